@@ -1,0 +1,349 @@
+//! The current value of every register, and the rules by which a host changes them.
+//!
+//! A write is checked completely, then applied completely (D15 to D17): [`RegisterFile::check`] hands out
+//! an [`Accepted`] write, which the arm may look into before it lets [`RegisterFile::apply`] carry it out.
+//! Knows nothing of frames or of what a value does.
+
+use super::map::{CHIP_ID, EEPROM_LOCK, MAP};
+use super::spec::{Access, Range, Region, Register};
+
+/// Address of the first EEPROM register.
+const EEPROM_START: usize = eeprom_bounds().0;
+/// Address behind the last EEPROM register.
+const EEPROM_END: usize = eeprom_bounds().1;
+/// Address behind the last register that a host can write.
+const WRITABLE_END: usize = writable_end();
+
+/// The rules of every address that can be written, unfolded from the table when it is compiled, so that
+/// the chip carries three bytes a register and none of the table's prose.
+static RULES: [Rule; WRITABLE_END] = rules();
+
+/// The EEPROM region, byte by byte: what has to survive a power cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Image(pub [u8; Image::LENGTH]);
+
+impl Image {
+    /// Bytes of the EEPROM region.
+    pub const LENGTH: usize = EEPROM_END - EEPROM_START;
+}
+
+/// Why a write frame has no effect: one of its bytes is not a value of its register (D16).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct OutOfRange {
+    /// The first such register.
+    pub address: u8,
+    /// The byte that was meant for it.
+    pub value: u8,
+}
+
+/// A write that was checked and may be applied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Accepted<'a> {
+    address: u8,
+    values: &'a [u8],
+    unlocked: bool,
+}
+
+impl Accepted<'_> {
+    /// The value this write gives to the register at `address`; `None` where it leaves it alone, because
+    /// it does not reach there or has no effect there (D15).
+    #[must_use]
+    pub fn value_at(&self, address: u8) -> Option<u8> {
+        let offset = address.checked_sub(self.address)?;
+        let value = self.values.get(usize::from(offset))?;
+        RULES.get(usize::from(address))?.takes_effect(self.unlocked).then_some(*value)
+    }
+}
+
+/// The values of all 256 registers.
+#[derive(Clone, Debug)]
+pub struct RegisterFile {
+    values: [u8; 256],
+}
+
+impl RegisterFile {
+    /// Registers as they stand after power-up: defaults, the chip's number (most significant byte first)
+    /// and the stored settings. A stored value that is out of range counts as its default (D19).
+    #[must_use]
+    pub fn new(chip_id: [u8; CHIP_ID.count as usize], stored: Option<&Image>) -> Self {
+        let mut file = Self { values: DEFAULTS };
+        for (address, byte) in (CHIP_ID.address..).zip(chip_id) {
+            file.set(address, byte);
+        }
+        let stored = stored.map_or([].as_slice(), |image| image.0.as_slice());
+        let slots = file.values.iter_mut().zip(&RULES).skip(EEPROM_START);
+        for ((value, rule), &byte) in slots.zip(stored) {
+            if rule.takes_effect(true) && rule.allows(byte) {
+                *value = byte;
+            }
+        }
+        file
+    }
+
+    /// The value of the register at `address`.
+    #[must_use]
+    pub fn get(&self, address: u8) -> u8 {
+        // A byte cannot index past 256 values: the compiler drops the other arm.
+        self.values.get(usize::from(address)).copied().unwrap_or(0)
+    }
+
+    /// Gives a register a value from the arm's own side, where no rule holds.
+    pub fn set(&mut self, address: u8, value: u8) {
+        if let Some(slot) = self.values.get_mut(usize::from(address)) {
+            *slot = value;
+        }
+    }
+
+    /// Adds one to a counter of two bytes, low byte first; it wraps.
+    pub fn increment(&mut self, counter: &Register) {
+        let low = self.get(counter.address).wrapping_add(1);
+        self.set(counter.address, low);
+        if low == 0 {
+            let high = counter.address.wrapping_add(1);
+            self.set(high, self.get(high).wrapping_add(1));
+        }
+    }
+
+    /// The values of `count` registers from `address` on; nothing where the range reaches past 255, which
+    /// no well-formed frame does (D2).
+    #[must_use]
+    pub fn read(&self, address: u8, count: u8) -> &[u8] {
+        let start = usize::from(address);
+        self.values.get(start..start + usize::from(count)).unwrap_or(&[])
+    }
+
+    /// Checks a write from the host without carrying it out.
+    ///
+    /// # Errors
+    /// The first byte that falls on a register which could be written now but does not take that value.
+    pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, OutOfRange> {
+        let unlocked = self.get(EEPROM_LOCK.address) == 0;
+        let rules = RULES.get(usize::from(address)..).unwrap_or(&[]);
+        for ((rule, &value), at) in rules.iter().zip(values).zip(address..) {
+            if rule.takes_effect(unlocked) && !rule.allows(value) {
+                return Err(OutOfRange { address: at, value });
+            }
+        }
+        Ok(Accepted { address, values, unlocked })
+    }
+
+    /// Carries out a write that was checked.
+    pub fn apply(&mut self, accepted: &Accepted<'_>) {
+        let start = usize::from(accepted.address);
+        let slots = self.values.iter_mut().zip(&RULES).skip(start);
+        for ((slot, rule), &value) in slots.zip(accepted.values) {
+            if rule.takes_effect(accepted.unlocked) {
+                *slot = value;
+            }
+        }
+    }
+
+    /// The EEPROM region as it is now: what has to be saved.
+    #[must_use]
+    pub fn image(&self) -> Image {
+        let mut image = Image([0; Image::LENGTH]);
+        for (byte, &value) in image.0.iter_mut().zip(self.values.iter().skip(EEPROM_START)) {
+            *byte = value;
+        }
+        image
+    }
+
+    /// Would this write change a register of the EEPROM region?
+    #[must_use]
+    pub fn changes_settings(&self, accepted: &Accepted<'_>) -> bool {
+        let start = usize::from(accepted.address);
+        let settings = self.values.iter().zip(&RULES).take(EEPROM_END).skip(start);
+        settings
+            .zip(accepted.values)
+            .any(|((now, rule), new)| accepted.unlocked && rule.gate == Gate::Unlocked && now != new)
+    }
+}
+
+/// When a host's write has an effect on a register.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Gate {
+    Never,
+    Unlocked,
+    Always,
+}
+
+/// What the chip has to know of a register to check a write.
+#[derive(Clone, Copy)]
+struct Rule {
+    gate: Gate,
+    /// The bits of a value that count towards its magnitude.
+    mask: u8,
+    max: u8,
+}
+
+impl Rule {
+    const CLOSED: Self = Self { gate: Gate::Never, mask: 0xFF, max: 0xFF };
+
+    const fn of(register: &Register) -> Self {
+        let gate = match (register.access, register.region) {
+            (Access::ReadWrite, Region::Eeprom) => Gate::Unlocked,
+            (Access::ReadWrite, Region::Ram) => Gate::Always,
+            _ => Gate::Never,
+        };
+        match register.range {
+            Range::UpTo(max) => Self { gate, mask: 0xFF, max },
+            Range::SignMagnitude(max) => Self { gate, mask: 0x7F, max },
+        }
+    }
+
+    const fn takes_effect(&self, unlocked: bool) -> bool {
+        match self.gate {
+            Gate::Never => false,
+            Gate::Unlocked => unlocked,
+            Gate::Always => true,
+        }
+    }
+
+    const fn allows(&self, value: u8) -> bool {
+        value & self.mask <= self.max
+    }
+}
+
+// What follows runs in the compiler only: an index out of bounds there is a build error, not a panic.
+
+const fn writable_end() -> usize {
+    let mut end = 0;
+    let mut rest = MAP;
+    while let [row, tail @ ..] = rest {
+        if matches!(row.access, Access::ReadWrite) {
+            end = row.address as usize + row.count as usize;
+        }
+        rest = tail;
+    }
+    end
+}
+
+const fn eeprom_bounds() -> (usize, usize) {
+    let (mut start, mut end) = (256, 0);
+    let mut rest = MAP;
+    while let [row, tail @ ..] = rest {
+        if matches!(row.region, Region::Eeprom) {
+            if end == 0 {
+                start = row.address as usize;
+            }
+            end = row.address as usize + row.count as usize;
+        }
+        rest = tail;
+    }
+    (start, end)
+}
+
+#[allow(clippy::indexing_slicing)]
+const fn rules() -> [Rule; WRITABLE_END] {
+    let mut rules = [Rule::CLOSED; WRITABLE_END];
+    let mut rest = MAP;
+    while let [row, tail @ ..] = rest {
+        let mut address = row.address as usize;
+        while address < row.address as usize + row.count as usize && address < WRITABLE_END {
+            rules[address] = Rule::of(row);
+            address += 1;
+        }
+        rest = tail;
+    }
+    rules
+}
+
+/// The values of a new arm after power-up.
+static DEFAULTS: [u8; 256] = defaults();
+
+#[allow(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+const fn defaults() -> [u8; 256] {
+    let mut values = [0; 256];
+    let mut rest = MAP;
+    while let [row, tail @ ..] = rest {
+        let mut offset = 0;
+        while offset < row.count as usize {
+            let address = row.address as usize + offset;
+            values[address] = row.default_at(address as u8);
+            offset += 1;
+        }
+        rest = tail;
+    }
+    values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::map::{BAUD_RATE, DEVICE_ID, FRAMES_ACCEPTED, OFFSET, SPEED, TARGET_POSITION};
+    use super::super::spec::Joint;
+    use super::*;
+
+    fn fresh() -> RegisterFile {
+        RegisterFile::new([1, 2, 3, 4, 5, 6], None)
+    }
+
+    fn write(file: &mut RegisterFile, address: u8, values: &[u8]) -> Result<(), OutOfRange> {
+        let accepted = file.check(address, values)?;
+        file.apply(&accepted);
+        Ok(())
+    }
+
+    #[test]
+    fn a_new_arm_has_the_defaults_of_the_table() {
+        let file = fresh();
+        assert_eq!(file.read(0, 8), [7, 30, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(file.read(28, 4), [1, 1, 0, 0]);
+        assert_eq!(file.read(TARGET_POSITION.address, 7), [90, 90, 65, 90, 90, 90, 80]);
+        assert_eq!(file.read(240, 1), [1]);
+        assert_eq!(file.read(61, 179), [0; 179]);
+    }
+
+    #[test]
+    fn stored_values_out_of_range_count_as_their_defaults() {
+        let mut stored = Image([0xFF; Image::LENGTH]);
+        stored.0[usize::from(DEVICE_ID.address) - EEPROM_START] = 42;
+        stored.0[usize::from(OFFSET.address) - EEPROM_START] = 0x90;
+        let file = RegisterFile::new([0; 6], Some(&stored));
+        assert_eq!(file.get(DEVICE_ID.address), 42);
+        assert_eq!(file.get(BAUD_RATE.address), 0);
+        assert_eq!(file.read(OFFSET.address, 7), [0x90, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(file.read(20, 8), [0; 8], "reserved registers read 0 whatever is stored");
+    }
+
+    #[test]
+    fn what_is_saved_is_what_is_loaded() {
+        let mut file = fresh();
+        write(&mut file, EEPROM_LOCK.address, &[0]).unwrap();
+        write(&mut file, DEVICE_ID.address, &[9, 3, 0x8A]).unwrap();
+        let again = RegisterFile::new([0; 6], Some(&file.image()));
+        assert_eq!(again.read(DEVICE_ID.address, 3), [9, 3, 0x8A]);
+    }
+
+    #[test]
+    fn an_accepted_write_says_what_it_will_do() {
+        let mut file = fresh();
+        let locked = file.check(DEVICE_ID.address, &[5, 99, 99]).unwrap();
+        assert_eq!(locked.value_at(DEVICE_ID.address), None, "EEPROM is locked (D15)");
+        assert!(!file.changes_settings(&locked));
+        write(&mut file, EEPROM_LOCK.address, &[0]).unwrap();
+        let open = file.check(DEVICE_ID.address, &[5]).unwrap();
+        assert_eq!(open.value_at(DEVICE_ID.address), Some(5));
+        assert_eq!(open.value_at(BAUD_RATE.address), None, "past its end");
+        assert_eq!(open.value_at(SPEED.of(Joint::ALL[0])), None, "before its start or past its end");
+        assert!(file.changes_settings(&open));
+        file.apply(&open);
+        assert!(!file.changes_settings(&open), "writing what is there costs no flash wear (D19)");
+    }
+
+    #[test]
+    fn counters_carry_into_their_high_byte_and_wrap() {
+        let mut file = fresh();
+        for _ in 0..0x1_0000 + 257 {
+            file.increment(&FRAMES_ACCEPTED);
+        }
+        assert_eq!(file.read(FRAMES_ACCEPTED.address, 2), [1, 1]);
+    }
+
+    #[test]
+    fn a_range_past_the_end_reads_nothing() {
+        assert_eq!(fresh().read(255, 1).len(), 1);
+        assert!(fresh().read(255, 2).is_empty());
+    }
+}

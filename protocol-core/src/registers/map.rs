@@ -1,0 +1,136 @@
+//! THE TABLE: every register of the 7Bot V2 (docs/protocol.md, sections 2 and 4).
+//!
+//! No other file holds a register address as a number.
+
+use super::spec::{Register, Unit, eeprom, ram, rom, well_formed};
+
+/// Turns rows into named constants with their doc comments, and into [`MAP`] in the same order.
+macro_rules! register_map {
+    ($($(#[doc = $doc:literal])+ $name:ident = $row:expr;)+) => {
+        $($(#[doc = $doc])+ pub const $name: Register = $row.described(stringify!($name), &[$($doc),+]);)+
+
+        /// The whole table, in ascending order of address.
+        pub const MAP: &[Register] = &[$($name),+];
+    };
+}
+
+register_map! {
+    /// Tells a 7Bot V2 from other devices on a serial port.
+    DEVICE_CODE = rom(0).default(7);
+    /// Version of the firmware. The maker's are 1.0, 2.1 and 2.2; this project begins at 3.0 (D7).
+    FIRMWARE_VERSION = rom(1).default(30).unit(Unit::VersionTenths);
+    /// The chip's own number, most significant byte first (D8).
+    CHIP_ID = rom(2).run(6);
+    /// Kept free by the maker.
+    RESERVED_8 = eeprom(8).run(3).reserved();
+    /// The user's number for this arm.
+    DEVICE_ID = eeprom(11);
+    /// Code of the host link's baud rate: 115200, 250000, 500000, 1000000, 57600, 38400, 19200, 9600.
+    /// In force after the next restart.
+    BAUD_RATE = eeprom(12).up_to(7);
+    /// Assembly error of the joint: angle seen = servo angle + offset (D9). -10 to 10 is a good assembly.
+    OFFSET = eeprom(13).each_joint().plus_minus(16).unit(Unit::Degree);
+    /// Kept free by the maker.
+    RESERVED_20 = eeprom(20).run(8).reserved();
+    /// 0: EEPROM registers can be written. 1: they are protected.
+    EEPROM_LOCK = ram(28).up_to(1).default(1);
+    /// 0: damping protection. 1: servo, the joints are driven. 2: forceless, the arm can be moved by hand (D13).
+    MOTOR_STATE = ram(29).up_to(2).default(1);
+    /// 0: suction cup. 1: gripper.
+    EFFECTOR_TYPE = ram(30).up_to(1);
+    /// 0: release. 1: suck (D20).
+    VACUUM_PUMP = ram(31).up_to(1);
+    /// Speed of the joint's moves; 0 is the motor's maximum, 372 °/s (D10, D11).
+    SPEED = ram(32).each_joint().up_to(100).default(60).unit(Unit::SpeedStep);
+    /// Duration of the joint's moves; counts only where the joint's speed is 0 (D11).
+    TIME = ram(39).each_joint().up_to(100).unit(Unit::Decisecond);
+    /// Where the joint should be. Writing it starts a move. Starts as the measured position (D12).
+    TARGET_POSITION =
+        ram(46).each_joint().up_to(180).default_each([90, 90, 65, 90, 90, 90, 80]).unit(Unit::Degree);
+    /// How often the arm sends its present positions unasked; 0: never. Bounded by the baud rate (D14).
+    FEEDBACK_FREQUENCY = ram(53).up_to(50).unit(Unit::Hertz);
+    /// Where the joint is, as measured.
+    PRESENT_POSITION = ram(54).each_joint().up_to(180).read_only().unit(Unit::Degree);
+    /// Layout version of the status block, this project's addition.
+    STATUS_VERSION = ram(240).read_only().default(1);
+    /// Bits: 0 settings storage, 1 servo bus, 2 watchdog restart, 3 brown-out restart, 4 crystal failed,
+    /// 5 over-run of the receive buffer.
+    FAULTS = ram(241).read_only();
+    /// Servos that do not answer: bit n-1 is joint n.
+    MISSING_SERVOS = ram(242).read_only();
+    /// Joints whose set-point has not reached the target yet: bit n-1 is joint n.
+    MOVING_JOINTS = ram(243).read_only();
+    /// Why the last refused frame was refused: 0 none yet, 1 malformed range, 2 value out of range,
+    /// 3 settings storage full.
+    LAST_REFUSAL = ram(244).read_only();
+    /// The register that made it so.
+    LAST_REFUSED_REGISTER = ram(245).read_only();
+    /// Frames accepted: low byte, high byte, wrapping.
+    FRAMES_ACCEPTED = ram(246).run(2).read_only();
+    /// Frames with a wrong CRC: low byte, high byte, wrapping.
+    FRAMES_CORRUPTED = ram(248).run(2).read_only();
+    /// Frames refused, for the reasons of LAST_REFUSAL: low byte, high byte, wrapping.
+    FRAMES_REFUSED = ram(250).run(2).read_only();
+    /// Time-outs and wrong checksums on the servo bus: low byte, high byte, wrapping.
+    SERVO_BUS_ERRORS = ram(252).run(2).read_only();
+    /// Supply voltage of the servos; 0: unknown.
+    SUPPLY_VOLTAGE = ram(254).read_only().unit(Unit::Decivolt);
+    /// Highest servo temperature; 0: unknown.
+    SERVO_TEMPERATURE = ram(255).read_only().unit(Unit::Celsius);
+}
+
+const _: () = assert!(well_formed(MAP), "the register table has an overlap, a wrong order or a bad default");
+
+/// The row that holds `address`; `None` where the table is silent.
+#[must_use]
+pub fn find(address: u8) -> Option<&'static Register> {
+    MAP.iter().find(|row| row.holds(address))
+}
+
+/// The bits of [`FAULTS`].
+pub mod fault {
+    /// Settings cannot be stored, or no more of them before the next restart (D19).
+    pub const SETTINGS_STORAGE: u8 = 1 << 0;
+    /// A servo is missing or reports a fault of its own.
+    pub const SERVO_BUS: u8 = 1 << 1;
+    /// The last restart was the watchdog's.
+    pub const WATCHDOG_RESTART: u8 = 1 << 2;
+    /// The last restart followed a drop of the supply.
+    pub const BROWN_OUT_RESTART: u8 = 1 << 3;
+    /// The crystal failed; the chip runs on its internal oscillator.
+    pub const CRYSTAL_FAILED: u8 = 1 << 4;
+    /// Bytes from the host were lost because nobody took them in time.
+    pub const RECEIVE_OVERRUN: u8 = 1 << 5;
+}
+
+/// The reasons of [`LAST_REFUSAL`].
+pub mod refusal {
+    /// Nothing was refused yet.
+    pub const NONE: u8 = 0;
+    /// The frame reached past address 255 (D2).
+    pub const MALFORMED_RANGE: u8 = 1;
+    /// A value was outside its register's range (D16).
+    pub const OUT_OF_RANGE: u8 = 2;
+    /// The settings storage takes no more before the next restart (D19).
+    pub const STORAGE_FULL: u8 = 3;
+}
+
+/// The states of [`MOTOR_STATE`].
+pub mod motor_state {
+    /// The joints are damped, not driven.
+    pub const DAMPING: u8 = 0;
+    /// The joints are driven to their targets.
+    pub const SERVO: u8 = 1;
+    /// The joints move freely.
+    pub const FORCELESS: u8 = 2;
+}
+
+/// The baud rates behind the codes of [`BAUD_RATE`], in baud.
+pub const BAUD_RATES: [u32; 8] = [115_200, 250_000, 500_000, 1_000_000, 57_600, 38_400, 19_200, 9_600];
+
+/// The baud rate behind a code; an unknown code counts as the default, so that no stored byte can lock
+/// a user out (D19).
+#[must_use]
+pub fn baud_rate(code: u8) -> u32 {
+    BAUD_RATES.get(usize::from(code)).copied().unwrap_or(115_200)
+}
