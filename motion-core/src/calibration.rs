@@ -1,1 +1,207 @@
-//! Being written.
+//! Degrees of a joint to counts of its servo, and back.
+//!
+//! ```text
+//!   counts = a × k + s - offset × k        a = angle, or 180° - angle where the servo is mounted reversed
+//! ```
+//!
+//! The numbers come from the maker's published firmware, and so does the way the offset (D9) counts:
+//! on the servo's side of the reversal. Integers only, in thousandths of a degree: 32 bits hold every
+//! product, and a count is 212 of them or more. Knows nothing of where a joint should be.
+
+use protocol_core::registers::Joint;
+
+/// An angle in millionths of a degree: what positions are kept in (D18).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MicroDegrees(pub i32);
+
+impl MicroDegrees {
+    const PER_DEGREE: i32 = 1_000_000;
+
+    /// This many whole degrees.
+    #[must_use]
+    pub const fn from_degrees(degrees: u8) -> Self {
+        // `as` widens here: `From` is not const.
+        Self(degrees as i32 * Self::PER_DEGREE)
+    }
+
+    /// The value a register shows: the nearest degree, 0 to 180 (D18).
+    #[must_use]
+    pub fn nearest_degree(self) -> u8 {
+        let degrees = rounded::<{ Self::PER_DEGREE }>(self.0.clamp(0, 180 * Self::PER_DEGREE));
+        u8::try_from(degrees).unwrap_or(180)
+    }
+}
+
+/// The highest position of a servo.
+const MAX_COUNTS: i32 = 1023;
+/// Thousandths of a degree in half a turn.
+const HALF_TURN: i32 = 180_000;
+
+/// How many counts a servo has in half a turn.
+#[derive(Clone, Copy)]
+enum Scale {
+    Counts850,
+    Counts625,
+}
+
+/// How one joint's servo is mounted.
+struct Mounting {
+    scale: Scale,
+    /// Counts at a = 0.
+    zero: i32,
+    reversed: bool,
+}
+
+impl Scale {
+    fn counts(self, millidegrees: i32) -> i32 {
+        match self {
+            Self::Counts850 => rounded::<HALF_TURN>(millidegrees * 850),
+            Self::Counts625 => rounded::<HALF_TURN>(millidegrees * 625),
+        }
+    }
+
+    fn millidegrees(self, counts: i32) -> i32 {
+        match self {
+            Self::Counts850 => rounded::<850>(counts * HALF_TURN),
+            Self::Counts625 => rounded::<625>(counts * HALF_TURN),
+        }
+    }
+}
+
+impl Mounting {
+    const fn of(joint: Joint) -> Self {
+        use Scale::{Counts625, Counts850};
+        let (scale, zero, reversed) = match joint.number() {
+            1 => (Counts850, 86, false),
+            2 => (Counts850, 20, true),
+            3 => (Counts850, 141, true),
+            4 => (Counts850, 86, true),
+            5 | 6 => (Counts625, 199, true),
+            _ => (Counts625, 730, false),
+        };
+        Self { scale, zero, reversed }
+    }
+
+    /// The angle on the other side of the reversal, if there is one: its own inverse.
+    const fn reverse(&self, millidegrees: i32) -> i32 {
+        if self.reversed { HALF_TURN - millidegrees } else { millidegrees }
+    }
+}
+
+/// The servo position for an angle of a joint, 0 to 1023 counts: an angle beyond them becomes the nearest
+/// they have. `offset_degrees` is the joint's offset register.
+#[must_use]
+pub fn counts_from_angle(joint: Joint, angle: MicroDegrees, offset_degrees: i8) -> u16 {
+    let mounting = Mounting::of(joint);
+    let on_servo_side = mounting.reverse(rounded::<1_000>(angle.0)) - i32::from(offset_degrees) * 1_000;
+    let counts = mounting.zero + mounting.scale.counts(on_servo_side);
+    u16::try_from(counts.clamp(0, MAX_COUNTS)).unwrap_or(0)
+}
+
+/// The angle of a joint whose servo is at `counts`, 0 to 1023; more counts as 1023. The angle may lie
+/// outside 0 to 180 degrees.
+#[must_use]
+pub fn angle_from_counts(joint: Joint, counts: u16, offset_degrees: i8) -> MicroDegrees {
+    let mounting = Mounting::of(joint);
+    let counts = i32::from(counts).min(MAX_COUNTS);
+    let seen = mounting.scale.millidegrees(counts - mounting.zero) + i32::from(offset_degrees) * 1_000;
+    MicroDegrees(mounting.reverse(seen) * 1_000)
+}
+
+/// The nearest whole number to `number` / `DIVISOR`. The divisor is known to the compiler, so nothing is
+/// left here that could divide by zero.
+fn rounded<const DIVISOR: i32>(number: i32) -> i32 {
+    number.saturating_add(DIVISOR / 2).div_euclid(DIVISOR)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn joint(number: u8) -> Joint {
+        Joint::new(number).unwrap()
+    }
+
+    fn counts(number: u8, degrees: u8, offset: i8) -> u16 {
+        counts_from_angle(joint(number), MicroDegrees::from_degrees(degrees), offset)
+    }
+
+    /// Worked out by hand: 850 / 180 = 4.7222, 625 / 180 = 3.4722 counts a degree.
+    #[test]
+    fn golden_counts_of_every_joint() {
+        assert_eq!([counts(1, 0, 0), counts(1, 90, 0), counts(1, 180, 0)], [86, 511, 936]);
+        assert_eq!([counts(2, 0, 0), counts(2, 90, 0), counts(2, 180, 0)], [870, 445, 20]);
+        assert_eq!([counts(3, 0, 0), counts(3, 65, 0), counts(3, 180, 0)], [991, 684, 141]);
+        assert_eq!([counts(4, 0, 0), counts(4, 90, 0), counts(4, 180, 0)], [936, 511, 86]);
+        for wrist in [5, 6] {
+            // Half a count at 90 degrees (511.5) goes up.
+            assert_eq!([counts(wrist, 0, 0), counts(wrist, 90, 0), counts(wrist, 180, 0)], [824, 512, 199]);
+        }
+        assert_eq!([counts(7, 0, 0), counts(7, 80, 0), counts(7, 180, 0)], [730, 1008, 1023]);
+    }
+
+    #[test]
+    fn golden_counts_with_offsets() {
+        // Ten degrees of offset are 47.2 or 34.7 counts less, on either side of a reversal (D9).
+        assert_eq!([counts(1, 90, 10), counts(1, 90, -10)], [464, 558]);
+        assert_eq!([counts(2, 90, 10), counts(2, 90, -10)], [398, 492]);
+        assert_eq!([counts(7, 40, 10), counts(7, 40, -10)], [834, 904]);
+    }
+
+    #[test]
+    fn golden_angles() {
+        let angle = |number, counts, offset| angle_from_counts(joint(number), counts, offset).0;
+        assert_eq!(angle(1, 511, 0), 90_000_000);
+        assert_eq!(angle(1, 512, 0), 90_212_000, "a count is 0.2118 degrees");
+        assert_eq!(angle(2, 446, 0), 89_788_000, "reversed: more counts, fewer degrees");
+        assert_eq!(angle(7, 731, 0), 288_000, "a count is 0.288 degrees");
+        assert_eq!(angle(1, 511, 5), 95_000_000, "angle seen = servo angle + offset (D9)");
+        assert_eq!(angle(2, 445, 5), 85_000_000, "but on the servo's side of the reversal");
+        assert_eq!(angle(1, 0, 0), -18_212_000, "not clamped");
+        assert_eq!(angle(1, u16::MAX, 0), angle(1, 1023, 0));
+    }
+
+    #[test]
+    fn every_degree_comes_back_unless_the_servo_ends_before_it() {
+        let mut clamped = 0;
+        for joint in Joint::ALL {
+            for (degrees, offset) in
+                (0..=180).flat_map(|degrees| (-16..=16).map(move |offset| (degrees, offset)))
+            {
+                let counts = counts_from_angle(joint, MicroDegrees::from_degrees(degrees), offset);
+                if counts == 0 || counts == 1023 {
+                    clamped += 1;
+                    continue;
+                }
+                let back = angle_from_counts(joint, counts, offset).nearest_degree();
+                assert_eq!(back, degrees, "{joint:?} at {degrees} degrees, offset {offset}: {counts} counts");
+            }
+        }
+        assert!(clamped < 4_000, "only joint 7, and joints 2 and 3 with large offsets: {clamped}");
+    }
+
+    #[test]
+    fn the_claw_reaches_its_last_count_at_about_84_degrees() {
+        assert_eq!([counts(7, 84, 0), counts(7, 85, 0)], [1022, 1023]);
+        assert_eq!(angle_from_counts(joint(7), 1023, 0), MicroDegrees(84_384_000));
+    }
+
+    #[test]
+    fn no_angle_and_no_offset_overflows() {
+        for joint in Joint::ALL {
+            for (angle, offset) in
+                [(i32::MIN, i8::MAX), (i32::MIN, i8::MIN), (i32::MAX, i8::MAX), (i32::MAX, i8::MIN)]
+            {
+                assert!([0, 1023].contains(&counts_from_angle(joint, MicroDegrees(angle), offset)));
+            }
+        }
+    }
+
+    #[test]
+    fn a_register_shows_the_nearest_degree_from_0_to_180() {
+        let shown = |micro| MicroDegrees(micro).nearest_degree();
+        assert_eq!([shown(89_499_999), shown(89_500_000), shown(90_499_999)], [89, 90, 90]);
+        assert_eq!([shown(-1), shown(i32::MIN), shown(180_600_000), shown(i32::MAX)], [0, 0, 180, 180]);
+    }
+}

@@ -11,8 +11,15 @@
 //!   }
 //! ```
 
+use protocol_core::registers::map::{FRAMES_ACCEPTED, FRAMES_CORRUPTED, PRESENT_POSITION, refusal};
 use protocol_core::registers::{Image, RegisterFile};
+use protocol_core::request::{Reply, Request};
 use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::{Defect, Deframer, FrameBuffer, MAX_LENGTH, ToArm, deframer};
+
+use crate::arm::Arm;
+use crate::servo_bus::TorqueCodes;
+use crate::vacuum::Vacuum;
 
 /// What the controller wants done. Each is asked for once.
 #[must_use]
@@ -20,25 +27,15 @@ use protocol_core::time::{Duration, Instant};
 pub enum Output<'a> {
     /// Send these bytes to the host. Never more than the room that `poll` was told of.
     ToHost(&'a [u8]),
-    /// Send these bytes on the servo bus. The bus is idle: one transaction is outstanding at most.
+    /// Send these bytes on the servo bus. It is idle: one transaction is outstanding at most.
     ToServos(&'a [u8]),
     /// Switch the pump and the valve (D20).
     Vacuum(Vacuum),
-    /// Store this image, then call [`Controller::storage`] with what became of it. Nothing the host asks
+    /// Store this image, then call [`Controller::set_storage`] with what became of it. Nothing the host asks
     /// afterwards is answered before.
     Save(Image),
     /// Nothing to do before this time, unless bytes come or the host link gets room.
     Wait(Instant),
-}
-
-/// The two outputs of the vacuum gripper.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Vacuum {
-    /// The pump runs.
-    pub pump: bool,
-    /// The valve is open: air comes in and the cup lets go.
-    pub valve: bool,
 }
 
 /// What the settings storage can still do.
@@ -66,70 +63,110 @@ pub struct Config {
     pub torque_codes: TorqueCodes,
 }
 
-/// The two published meanings of servo register 40.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum TorqueCodes {
-    /// 0 damping, 1 on, 2 free: the older table, and the same as register 29 of the arm.
-    #[default]
-    DampingOnFree,
-    /// 0 free, 1 on, 2 damping: Feetech's current table.
-    FreeOnDamping,
-}
-
-/// The arm.
+/// The controller of one arm.
 #[derive(Debug)]
 pub struct Controller {
-    registers: RegisterFile,
+    deframer: Deframer<ToArm>,
+    arm: Arm,
+    to_host: FrameBuffer,
 }
 
 impl Controller {
     /// An arm that was powered up at `now`, with the settings found in storage and the state of that storage.
     #[must_use]
     pub fn new(now: Instant, config: Config, stored: Option<&Image>, storage: Storage) -> Self {
-        let _ = (now, config.faults, storage);
-        Self { registers: RegisterFile::new(config.chip_id, stored) }
+        let arm = Arm::new(now, config, stored, storage);
+        Self { deframer: Deframer::new(deframer::gap(arm.baud())), arm, to_host: FrameBuffer::new() }
     }
 
     /// Takes bytes from the host, and says how many; offer the rest again after the next `poll`. An empty
     /// slice says that the host's line is silent as of `now` and that nothing waits anywhere.
     pub fn host_bytes(&mut self, now: Instant, bytes: &[u8]) -> usize {
-        let _ = now;
-        bytes.len()
+        self.deframer.push(now, bytes)
     }
 
     /// Takes bytes from the servo bus, all of them.
-    pub fn servo_bytes(&mut self, now: Instant, bytes: &[u8]) {
-        let _ = (now, bytes);
+    pub fn servo_bytes(&mut self, bytes: &[u8]) {
+        self.arm.bus.bytes(bytes);
     }
 
     /// What is to be done at `now`; call it again and again until it says [`Output::Wait`]. `host_room` is
     /// how many bytes the host link takes at once at this moment. With less than the longest frame (262
-    /// bytes) requests wait where they are: give the link at least that much.
+    /// bytes) requests wait where they are (D5): give the link at least that much.
     pub fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_> {
-        let _ = host_room;
-        Output::Wait(now + Duration::from_millis(10))
+        let has_room = host_room >= MAX_LENGTH;
+        self.arm.advance(now);
+        if self.arm.command_servos(now) {
+            return Output::ToServos(self.arm.bus.frame());
+        }
+        if has_room && self.answer(now) {
+            return Output::ToHost(&self.to_host);
+        }
+        if let Some(image) = self.arm.to_save.take() {
+            return Output::Save(image);
+        }
+        if let Some(vacuum) = self.arm.gripper.poll(now) {
+            return Output::Vacuum(vacuum);
+        }
+        // All requests are answered. A report that finds no room is skipped, not delayed (D14).
+        if self.arm.feedback.strike(now) && has_room {
+            self.reply_with(PRESENT_POSITION.address, PRESENT_POSITION.count);
+            return Output::ToHost(&self.to_host);
+        }
+        Output::Wait(self.deadline(now, has_room))
+    }
+
+    /// Carries out requests until one has an answer, or something has to be saved before the next. Says
+    /// whether there is an answer.
+    fn answer(&mut self, now: Instant) -> bool {
+        while self.arm.to_save.is_none()
+            && let Some(frame) = self.deframer.pull()
+        {
+            match frame.map(Request::from_frame) {
+                Ok(Request::Read { address, count }) => {
+                    self.arm.registers.increment(&FRAMES_ACCEPTED);
+                    self.reply_with(address, count);
+                    return true;
+                }
+                Ok(Request::Write { address, values }) => self.arm.write(now, address, values),
+                Err(Defect::MalformedRange { address }) => self.arm.refuse(refusal::MALFORMED_RANGE, address),
+                Err(Defect::WrongCrc | Defect::NoFrame) => self.arm.registers.increment(&FRAMES_CORRUPTED),
+            }
+        }
+        false
+    }
+
+    fn reply_with(&mut self, address: u8, count: u8) {
+        let values = self.arm.registers.read(address, count);
+        Reply { address, values }.encode(&mut self.to_host);
+    }
+
+    fn deadline(&self, now: Instant, has_room: bool) -> Instant {
+        // While requests wait for room, silence behind them says nothing.
+        let silence = self.deframer.deadline().filter(|_| has_room);
+        self.arm.deadline(now).min(silence.unwrap_or(Instant::FAR_FUTURE))
     }
 
     /// Tells what became of the storage: after every [`Output::Save`], and whenever it changes.
-    pub fn storage(&mut self, storage: Storage) {
-        let _ = storage;
+    pub fn set_storage(&mut self, storage: Storage) {
+        self.arm.set_storage(storage);
     }
 
-    /// Raises fault bits (`protocol_core::registers::map::fault`) that only the shell can see.
+    /// Raises fault bits (`protocol_core::registers::map::fault`) that only the shell can see. They stay
+    /// until the next restart.
     pub fn raise_faults(&mut self, bits: u8) {
-        let _ = bits;
+        self.arm.raise_faults(bits);
     }
 
     /// The baud rate of the host link in force since start, in bits per second: register 12 as it was stored.
     #[must_use]
-    pub fn baud(&self) -> u32 {
-        115_200
+    pub const fn baud(&self) -> u32 {
+        self.arm.baud()
     }
 
     /// The registers, to look at.
     #[must_use]
-    pub fn registers(&self) -> &RegisterFile {
-        &self.registers
+    pub const fn registers(&self) -> &RegisterFile {
+        &self.arm.registers
     }
 }

@@ -174,14 +174,12 @@ prop_compose! {
     /// A good frame, a damaged one, or noise rich in headers.
     fn stretch()(kind in 0..4, id in 0..=0xFE_u8, code: u8, params in prop::collection::vec(any::<u8>(), 0..=58),
                  noise in prop::collection::vec(prop_oneof![Just(0xFF), 0..8_u8, any::<u8>()], 0..12),
-                 at in 0..64_usize, flip in 1..=255_u8) -> Vec<u8> {
+                 at in 0..16_usize, flip in 1..=255_u8) -> Vec<u8> {
         let mut frame = encoded(|buffer| status(buffer, id, code, &params));
-        match kind {
-            0 => return noise,
-            1 => { let at = at % frame.len(); frame[at] ^= flip; }
-            _ => {}
+        if let (1, Some(byte)) = (kind, frame.get_mut(at)) {
+            *byte ^= flip;
         }
-        frame
+        if kind == 0 { noise } else { frame }
     }
 }
 

@@ -150,14 +150,15 @@ impl RegisterFile {
         image
     }
 
-    /// Would this write change a register of the EEPROM region?
+    /// The first register of the EEPROM region that this write would change, if any.
     #[must_use]
-    pub fn changes_settings(&self, accepted: &Accepted<'_>) -> bool {
+    pub fn first_changed_setting(&self, accepted: &Accepted<'_>) -> Option<u8> {
         let start = usize::from(accepted.address);
-        let settings = self.values.iter().zip(&RULES).take(EEPROM_END).skip(start);
-        settings
+        let settings = self.values.iter().zip(&RULES).zip(0_u8..).take(EEPROM_END).skip(start);
+        let changed = settings
             .zip(accepted.values)
-            .any(|((now, rule), new)| accepted.unlocked && rule.gate == Gate::Unlocked && now != new)
+            .find(|(((now, rule), _), new)| accepted.unlocked && rule.gate == Gate::Unlocked && now != new);
+        changed.map(|((_, address), _)| address)
     }
 }
 
@@ -321,15 +322,19 @@ mod tests {
         let mut file = fresh();
         let locked = file.check(DEVICE_ID.address, &[5, 99, 99]).unwrap();
         assert_eq!(locked.value_at(DEVICE_ID.address), None, "EEPROM is locked (D15)");
-        assert!(!file.changes_settings(&locked));
+        assert_eq!(file.first_changed_setting(&locked), None);
         write(&mut file, EEPROM_LOCK.address, &[0]).unwrap();
         let open = file.check(DEVICE_ID.address, &[5]).unwrap();
         assert_eq!(open.value_at(DEVICE_ID.address), Some(5));
         assert_eq!(open.value_at(BAUD_RATE.address), None, "past its end");
         assert_eq!(open.value_at(SPEED.of(Joint::ALL[0])), None, "before its start or past its end");
-        assert!(file.changes_settings(&open));
+        assert_eq!(file.first_changed_setting(&open), Some(DEVICE_ID.address));
         file.apply(&open);
-        assert!(!file.changes_settings(&open), "writing what is there costs no flash wear (D19)");
+        assert_eq!(
+            file.first_changed_setting(&open),
+            None,
+            "writing what is there costs no flash wear (D19)"
+        );
     }
 
     #[test]

@@ -1,0 +1,146 @@
+//! One joint, from here to there, on time (D10, D11, D18).
+//!
+//! A trajectory knows angles and control cycles. It does not know which joint it is, where the joint really
+//! is, or what a servo is. Each control cycle moves the set-point by one step; whoever calls late gets a
+//! later move, never a larger step.
+
+use crate::calibration::MicroDegrees;
+
+/// Control cycles in one unit of the time registers: 100 ms at 100 Hz.
+const CYCLES_PER_TIME_UNIT: u16 = 10;
+/// Step of one control cycle for each unit of the speed registers: 1.9 degrees/s at 100 Hz (D10).
+const STEP_PER_SPEED_UNIT: i32 = 19_000;
+/// Step of one control cycle at the motor's maximum: 62 rpm are 372 degrees/s (D10).
+const LARGEST_STEP: i32 = 3_720_000;
+
+/// The way of one joint's set-point to its target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Trajectory {
+    set_point: MicroDegrees,
+    target: MicroDegrees,
+    /// Cycles left of the time this move was given; 0 for as fast as the motor can.
+    cycles_left: u16,
+}
+
+impl Trajectory {
+    /// Standing still at `angle`.
+    #[must_use]
+    pub const fn holding(angle: MicroDegrees) -> Self {
+        Self { set_point: angle, target: angle, cycles_left: 0 }
+    }
+
+    /// Where the joint is to be now.
+    #[must_use]
+    pub const fn set_point(&self) -> MicroDegrees {
+        self.set_point
+    }
+
+    /// Has the set-point not reached the target yet?
+    #[must_use]
+    pub fn is_moving(&self) -> bool {
+        self.set_point != self.target
+    }
+
+    /// Starts a move from the present set-point to `target`. `time` is the joint's time register, 0 to 100
+    /// times 100 ms; it counts while the joint's speed register is 0.
+    pub fn move_to(&mut self, target: MicroDegrees, time: u8) {
+        self.target = target;
+        self.cycles_left = u16::from(time) * CYCLES_PER_TIME_UNIT;
+    }
+
+    /// One control cycle further. `speed` is the joint's speed register as it is now, 0 to 100 times 1.9
+    /// degrees/s.
+    pub fn advance(&mut self, speed: u8) {
+        let distance = self.target.0 - self.set_point.0;
+        let step = match (speed, self.cycles_left) {
+            (0, 0) => LARGEST_STEP,
+            // What is left of the way, evenly over what is left of the time: constant speed without drift.
+            (0, cycles) => (distance.abs() / i32::from(cycles)).min(LARGEST_STEP),
+            (speed, _) => i32::from(speed) * STEP_PER_SPEED_UNIT,
+        };
+        self.set_point.0 += distance.clamp(-step, step);
+        self.cycles_left = self.cycles_left.saturating_sub(1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn degrees(degrees: u8) -> MicroDegrees {
+        MicroDegrees::from_degrees(degrees)
+    }
+
+    /// Cycles until the move is over, and the largest step on the way.
+    fn run(from: u8, to: u8, speed: u8, time: u8) -> (u32, i32) {
+        let mut trajectory = Trajectory::holding(degrees(from));
+        trajectory.move_to(degrees(to), time);
+        let (mut cycles, mut largest) = (0, 0);
+        while trajectory.is_moving() {
+            let before = trajectory.set_point().0;
+            trajectory.advance(speed);
+            largest = largest.max((trajectory.set_point().0 - before).abs());
+            cycles += 1;
+            assert!(cycles < 20_000, "a move ends");
+        }
+        assert_eq!(trajectory.set_point(), degrees(to));
+        (cycles, largest)
+    }
+
+    #[test]
+    fn d10_speed_counts_in_steps_of_one_point_nine_degrees_a_second() {
+        // 95 degrees at 50 x 1.9 = 95 degrees/s: one second.
+        assert_eq!(run(0, 95, 50, 0), (100, 950_000));
+        assert_eq!(run(95, 0, 50, 0), (100, 950_000), "both ways");
+        assert_eq!(run(0, 19, 1, 0).0, 1_000);
+    }
+
+    #[test]
+    fn d10_speed_zero_is_62_rpm() {
+        let (cycles, step) = run(0, 180, 0, 0);
+        assert_eq!(step, 3_720_000);
+        assert_eq!(cycles, 49, "180 degrees at 372 degrees/s are 484 ms");
+    }
+
+    #[test]
+    fn d11_a_timed_move_lasts_its_time_at_constant_speed() {
+        for (from, to) in [(0, 180), (180, 0), (90, 91), (10, 77)] {
+            for time in 5..=100 {
+                let (cycles, step) = run(from, to, 0, time);
+                assert_eq!(cycles, u32::from(time) * 10, "{from} to {to} in {time}");
+                let even = i32::from(from.abs_diff(to)) * 1_000_000 / i32::from(time) / 10;
+                assert!((step - even).abs() <= 1, "{step} is not {even}");
+            }
+        }
+    }
+
+    #[test]
+    fn d11_a_time_too_short_is_stretched_to_the_motors_maximum() {
+        assert_eq!(run(0, 180, 0, 1), (49, 3_720_000));
+    }
+
+    #[test]
+    fn d11_speed_goes_before_time() {
+        assert_eq!(run(0, 95, 50, 100).0, 100);
+    }
+
+    #[test]
+    fn d11_a_change_of_speed_acts_at_once() {
+        let mut trajectory = Trajectory::holding(degrees(0));
+        trajectory.move_to(degrees(100), 0);
+        trajectory.advance(1);
+        assert_eq!(trajectory.set_point().0, 19_000);
+        trajectory.advance(100);
+        assert_eq!(trajectory.set_point().0, 1_919_000);
+    }
+
+    #[test]
+    fn a_new_target_on_the_way_turns_without_a_jump() {
+        let mut trajectory = Trajectory::holding(degrees(0));
+        trajectory.move_to(degrees(100), 0);
+        trajectory.advance(100);
+        trajectory.move_to(degrees(0), 0);
+        trajectory.advance(50);
+        assert_eq!(trajectory.set_point().0, 950_000);
+    }
+}
