@@ -164,21 +164,20 @@ mod tests {
 
     #[test]
     fn every_degree_comes_back_unless_the_servo_ends_before_it() {
-        let mut clamped = 0;
         for joint in Joint::ALL {
             for (degrees, offset) in
                 (0..=180).flat_map(|degrees| (-16..=16).map(move |offset| (degrees, offset)))
             {
                 let counts = counts_from_angle(joint, MicroDegrees::from_degrees(degrees), offset);
                 if counts == 0 || counts == 1023 {
-                    clamped += 1;
+                    let ends_early = joint.number() == 7 && degrees > 67;
+                    assert!(ends_early || [2, 3].contains(&joint.number()) && offset != 0, "{joint:?}");
                     continue;
                 }
                 let back = angle_from_counts(joint, counts, offset).nearest_degree();
                 assert_eq!(back, degrees, "{joint:?} at {degrees} degrees, offset {offset}: {counts} counts");
             }
         }
-        assert!(clamped < 4_000, "only joint 7, and joints 2 and 3 with large offsets: {clamped}");
     }
 
     #[test]
