@@ -161,18 +161,10 @@ impl<D: Direction> Deframer<D> {
                     self.wanted = at + length;
                     return None;
                 }
-                Verdict::Whole(length) => {
-                    let end = at + length;
-                    let known = self.is_known(at, end);
-                    self.head = end - self.lent_by(end);
-                    if !known {
-                        return Some(Found::Frame(at..end));
-                    }
-                }
-                Verdict::Defective(defect, length) => {
-                    self.head = self.next_header(at + 1);
-                    if defect != Defect::NoFrame && !self.is_known(at, at + length) {
-                        return Some(Found::Defect(defect));
+                verdict => {
+                    self.head = self.after(at, verdict);
+                    if let Some(found) = self.news(at, verdict) {
+                        return Some(found);
                     }
                 }
             }
@@ -183,27 +175,39 @@ impl<D: Direction> Deframer<D> {
 
     /// Looks for whole frames behind the unfinished head, among the bytes before the silence.
     fn search_behind(&mut self) -> Option<Found> {
-        while self.behind < self.quiet {
-            let at = self.behind;
+        loop {
+            let at = self.behind.max(self.head + 1);
+            if at >= self.quiet {
+                self.judged = self.quiet;
+                return None;
+            }
             let verdict = self.verdict(at, self.quiet);
-            self.behind = match verdict {
-                Verdict::Whole(length) => at + length,
-                _ => self.next_header(at + 1),
-            };
-            match verdict {
-                Verdict::Whole(length) if at + length > self.judged => {
-                    return Some(Found::Frame(at..at + length));
-                }
-                Verdict::Defective(defect, length)
-                    if defect != Defect::NoFrame && at + length > self.judged =>
-                {
-                    return Some(Found::Defect(defect));
-                }
-                _ => {}
+            let found = self.news(at, verdict);
+            self.behind = self.after(at, verdict);
+            if found.is_some() {
+                return found;
             }
         }
-        self.judged = self.quiet;
-        None
+    }
+
+    /// Where the search goes on after the verdict on what begins at `at`.
+    fn after(&self, at: usize, verdict: Verdict) -> usize {
+        match verdict {
+            Verdict::Whole(length) => at + length - self.lent_by(at + length),
+            _ => self.next_header(at + 1),
+        }
+    }
+
+    /// What a verdict has to say to the outside, unless it was said before, behind an unfinished head.
+    fn news(&self, at: usize, verdict: Verdict) -> Option<Found> {
+        match verdict {
+            Verdict::Whole(length) if !self.is_known(at, at + length) => Some(Found::Frame(at..at + length)),
+            Verdict::Defective(Defect::NoFrame, _) => None,
+            Verdict::Defective(defect, length) if !self.is_known(at, at + length) => {
+                Some(Found::Defect(defect))
+            }
+            _ => None,
+        }
     }
 
     /// Was the frame from `at` to `end` judged before, behind an unfinished head?

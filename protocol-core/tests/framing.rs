@@ -1,0 +1,156 @@
+//! Streams of bytes, damaged and cut at will: what the deframer makes of them (D1 to D4).
+
+#![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
+
+mod stream;
+
+use proptest::prelude::*;
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::{Deframer, MAX_LENGTH, ToArm, ToHost, deframer};
+use stream::{Event, GAP_US, Model, Received, frame, receive};
+
+const LONG_SILENCE_US: u64 = 100_000;
+
+/// A stretch of a stream that is likely to hold trouble: whole frames, pieces of frames, headers that
+/// promise too much, ranges past the end, noise rich in header bytes.
+fn stretch() -> impl Strategy<Value = Vec<u8>> {
+    let noise = prop_oneof![Just(0xAA_u8), Just(0x77), Just(0x06), Just(0x03), any::<u8>()];
+    let whole = (any::<bool>(), any::<u8>(), proptest::collection::vec(any::<u8>(), 0..12))
+        .prop_map(|(write, address, data)| frame(if write { 6 } else { 3 }, address, &data));
+    prop_oneof![
+        4 => whole.clone(),
+        2 => (whole.clone(), any::<proptest::sample::Index>()).prop_map(|(bytes, cut)| {
+            let length = cut.index(bytes.len());
+            bytes[..length].to_vec()
+        }),
+        1 => (whole, any::<proptest::sample::Index>(), any::<u8>()).prop_map(|(mut bytes, place, value)| {
+            let place = place.index(bytes.len());
+            bytes[place] = value;
+            bytes
+        }),
+        1 => (any::<u8>(), any::<u8>()).prop_map(|(address, count)| vec![0xAA, 0x77, 6, address, count]),
+        1 => proptest::collection::vec(noise, 1..20),
+        1 => Just(stream::raw_frame(6, 250, 7, &[1; 7])),
+        // A frame inside the data of another one.
+        1 => any::<u8>().prop_map(|address| frame(6, address, &frame(3, 54, &[]))),
+        // A frame whose checksum ends like a header begins.
+        1 => Just(stream::frame_ending_in_aa()),
+    ]
+}
+
+fn events() -> impl Strategy<Value = Vec<Event>> {
+    let silence = prop_oneof![Just(500), Just(GAP_US), Just(20_000), Just(LONG_SILENCE_US)];
+    let event = prop_oneof![3 => stretch().prop_map(Event::Bytes), 1 => silence.prop_map(Event::Silence)];
+    proptest::collection::vec(event, 1..24)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+    #[test]
+    fn d03_d04_the_deframer_agrees_with_a_slow_and_obvious_model(events in events()) {
+        let mut model = Model::default();
+        let expected: Vec<Received> = events.iter().flat_map(|event| model.take(event)).collect();
+        prop_assert_eq!(receive::<ToArm>(&events, MAX_LENGTH), expected);
+    }
+
+    #[test]
+    fn d03_any_cutting_of_a_stream_gives_the_same_frames(events in events(), piece in 1_usize..40) {
+        prop_assert_eq!(receive::<ToArm>(&events, piece), receive::<ToArm>(&events, MAX_LENGTH));
+        prop_assert_eq!(receive::<ToHost>(&events, piece), receive::<ToHost>(&events, MAX_LENGTH));
+    }
+
+    #[test]
+    fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 0..2_000), piece in 1_usize..300) {
+        let events = [Event::Bytes(bytes), Event::Silence(GAP_US), Event::Silence(LONG_SILENCE_US)];
+        receive::<ToArm>(&events, piece);
+        receive::<ToHost>(&events, piece);
+    }
+}
+
+#[test]
+fn d01_the_longest_frame_passes() {
+    let longest = frame(6, 1, &[0x55; 255]);
+    assert_eq!(longest.len(), 262);
+    let received = receive::<ToArm>(&[Event::Bytes(longest.clone())], 7);
+    assert_eq!(received, [Received::Frame(longest)]);
+}
+
+#[test]
+fn d02_a_range_may_end_at_255_and_not_behind() {
+    let last = stream::raw_frame(6, 255, 1, &[1]);
+    assert_eq!(receive::<ToArm>(&[Event::Bytes(last.clone())], 9), [Received::Frame(last)]);
+    let read = stream::raw_frame(3, 255, 2, &[]);
+    assert_eq!(receive::<ToArm>(&[Event::Bytes(read)], 9), [Received::MalformedRange(255)]);
+    let inner = frame(3, 54, &[]);
+    let outer = stream::raw_frame(6, 250, 7, &inner);
+    assert_eq!(
+        receive::<ToArm>(&[Event::Bytes(outer)], 99),
+        [Received::MalformedRange(250), Received::Frame(inner)],
+        "it is not well formed, so what it holds is not inside a well-formed frame"
+    );
+}
+
+#[test]
+fn d03_a_frame_inside_a_good_frame_is_data() {
+    let outer = frame(6, 46, &frame(3, 54, &[]));
+    assert_eq!(receive::<ToArm>(&[Event::Bytes(outer.clone())], 3), [Received::Frame(outer)]);
+}
+
+#[test]
+fn d04_a_false_header_holds_nothing_up_for_longer_than_the_gap() {
+    let good = frame(3, 54, &[]);
+    let mut bytes = vec![0xAA, 0x77, 6, 0x10, 0xFF];
+    bytes.extend(&good);
+    let mut events = vec![Event::Bytes(bytes)];
+    assert_eq!(receive::<ToArm>(&events, 99), []);
+    events.push(Event::Silence(GAP_US));
+    assert_eq!(receive::<ToArm>(&events, 99), [Received::Frame(good)]);
+}
+
+#[test]
+fn d04_a_pause_inside_a_frame_costs_nothing() {
+    let good = frame(6, 46, &[90; 7]);
+    for cut in 1..good.len() {
+        let (head, tail) = good.split_at(cut);
+        let paused = [Event::Bytes(head.to_vec()), Event::Silence(99_000), Event::Bytes(tail.to_vec())];
+        assert_eq!(receive::<ToArm>(&paused, 99), [Received::Frame(good.clone())]);
+        let too_long = [Event::Bytes(head.to_vec()), Event::Silence(100_000), Event::Bytes(tail.to_vec())];
+        assert_eq!(receive::<ToArm>(&too_long, 99), [], "cut at {cut}");
+    }
+}
+
+#[test]
+fn d04_the_gap_is_2_ms_or_three_and_a_half_characters() {
+    assert_eq!(deframer::gap(1_000_000), Duration::from_micros(2_000));
+    assert_eq!(deframer::gap(19_200), Duration::from_micros(2_000));
+    assert_eq!(deframer::gap(9_600), Duration::from_micros(3_645));
+    assert_eq!(deframer::gap(0), Duration::from_micros(u32::MAX.into()));
+}
+
+#[test]
+fn a_held_up_shell_does_not_mistake_its_own_pause_for_silence() {
+    let good = frame(6, 46, &[90; 7]);
+    let (head, tail) = good.split_at(8);
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    deframer.push(Instant::from_micros(0), head);
+    assert_eq!(deframer.pull(), None);
+    deframer.push(Instant::from_micros(5_000_000), tail);
+    assert!(matches!(deframer.pull(), Some(Ok(_))), "nobody saw the line silent");
+}
+
+#[test]
+fn the_deadline_says_when_silence_matters() {
+    let at = Instant::from_micros;
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    assert_eq!(deframer.deadline(), None);
+    deframer.push(at(1_000), &[0xAA, 0x77]);
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.deadline(), Some(at(3_000)));
+    deframer.push(at(3_000), &[]);
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.deadline(), Some(at(101_000)));
+    deframer.push(at(101_000), &[]);
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.deadline(), None);
+}

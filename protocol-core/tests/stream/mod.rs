@@ -1,0 +1,230 @@
+//! Streams for the framing tests: frames built with the `crc` crate, a driver for the deframer, and a
+//! model of what the deframer should do that starts from the whole history every time.
+
+#![allow(dead_code)] // Each test file uses its part.
+
+use std::collections::HashSet;
+
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::{Defect, Deframer, Direction, Function};
+
+pub const GAP_US: u64 = 2_000;
+const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
+
+/// What happens on the line.
+#[derive(Clone, Debug)]
+pub enum Event {
+    Bytes(Vec<u8>),
+    /// Nothing for so many microseconds, seen at its end.
+    Silence(u64),
+}
+
+/// What comes out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Received {
+    Frame(Vec<u8>),
+    WrongCrc,
+    MalformedRange(u8),
+}
+
+/// A frame with any content, right or wrong, and a right checksum.
+pub fn raw_frame(function: u8, address: u8, count: u8, data: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0xAA, 0x77, function, address, count];
+    bytes.extend(data);
+    bytes.extend(CRC.checksum(&bytes).to_le_bytes());
+    bytes
+}
+
+/// A well-formed frame, as near to `address` as the range allows: a write of `data`, or a read of seven.
+pub fn frame(function: u8, address: u8, data: &[u8]) -> Vec<u8> {
+    let (count, data) = if function == 3 { (7, &[][..]) } else { (u8::try_from(data.len()).unwrap(), data) };
+    raw_frame(function, address.min(255 - count), count, data)
+}
+
+pub fn frame_ending_in_aa() -> Vec<u8> {
+    (0..=255).map(|value| frame(6, 0, &[value])).find(|bytes| bytes.last() == Some(&0xAA)).unwrap()
+}
+
+/// Feeds a deframer in pieces and collects what it says, right after each piece and each silence.
+pub fn receive<D: Direction>(events: &[Event], piece: usize) -> Vec<Received> {
+    let mut deframer = Deframer::<D>::new(Duration::from_micros(GAP_US));
+    let mut now = 0;
+    let mut received = Vec::new();
+    for event in events {
+        match event {
+            Event::Silence(micros) => {
+                now += micros;
+                deframer.push(Instant::from_micros(now), &[]);
+                drain(&mut deframer, &mut received);
+            }
+            Event::Bytes(bytes) => {
+                for part in bytes.chunks(piece) {
+                    let mut rest = part;
+                    while !rest.is_empty() {
+                        let taken = deframer.push(Instant::from_micros(now), rest);
+                        drain(&mut deframer, &mut received);
+                        rest = &rest[taken..];
+                    }
+                }
+            }
+        }
+    }
+    received
+}
+
+pub fn drain<D: Direction>(deframer: &mut Deframer<D>, received: &mut Vec<Received>) {
+    while let Some(result) = deframer.pull() {
+        received.push(match result {
+            Ok(frame) => {
+                let function = if frame.function == Function::Read { 3 } else { 6 };
+                Received::Frame(raw_frame(function, frame.address, frame.count, frame.data))
+            }
+            Err(Defect::WrongCrc) => Received::WrongCrc,
+            Err(Defect::MalformedRange { address }) => Received::MalformedRange(address),
+            Err(Defect::NoFrame) => panic!("not worth mentioning"),
+        });
+    }
+}
+
+/// What the deframer should say, from the rules of D3 and D4 alone.
+#[derive(Default)]
+pub struct Model {
+    history: Vec<u8>,
+    /// Lengths of the history at which the line was silent for the gap.
+    short: Vec<usize>,
+    /// The same for the long silence.
+    long: Vec<usize>,
+    silence: u64,
+    told: HashSet<usize>,
+}
+
+enum Candidate {
+    Nothing,
+    Unfinished,
+    Judged(usize, Received),
+}
+
+impl Model {
+    /// What is new after one more event.
+    pub fn take(&mut self, event: &Event) -> Vec<Received> {
+        match event {
+            Event::Bytes(bytes) => {
+                // Byte by byte: what comes out must not depend on what comes later.
+                self.silence = 0;
+                bytes
+                    .iter()
+                    .flat_map(|&byte| {
+                        self.history.push(byte);
+                        self.news()
+                    })
+                    .collect()
+            }
+            Event::Silence(micros) => {
+                self.silence += micros;
+                if self.silence >= GAP_US {
+                    self.short.push(self.history.len());
+                }
+                if self.silence >= 100_000 {
+                    self.long.push(self.history.len());
+                }
+                self.news()
+            }
+        }
+    }
+
+    fn news(&mut self) -> Vec<Received> {
+        let mut news = Vec::new();
+        let mut at = 0;
+        while at < self.history.len() {
+            let cut = self.long.iter().copied().find(|&cut| cut > at);
+            match self.candidate(at, cut.unwrap_or(self.history.len())) {
+                Candidate::Unfinished if cut.is_none() => {
+                    let quiet = self.short.iter().copied().filter(|&quiet| quiet > at).max();
+                    self.look_behind(at + 1, quiet.unwrap_or(0), &mut news);
+                    break;
+                }
+                Candidate::Judged(length, said) => at = self.tell(at, length, said, &mut news),
+                _ => at += 1,
+            }
+        }
+        news
+    }
+
+    fn look_behind(&mut self, from: usize, quiet: usize, news: &mut Vec<Received>) {
+        let mut at = from;
+        while at < quiet {
+            match self.candidate(at, quiet) {
+                Candidate::Judged(length, said) => at = self.tell(at, length, said, news),
+                _ => at += 1,
+            }
+        }
+    }
+
+    /// Tells what was not told before, and where the search goes on.
+    fn tell(&mut self, at: usize, length: usize, said: Received, news: &mut Vec<Received>) -> usize {
+        let good = matches!(said, Received::Frame(_));
+        if self.told.insert(at) {
+            news.push(said);
+        }
+        match &self.history[at..at + length] {
+            _ if !good => at + 1,
+            [.., 0xAA] => at + length - 1,
+            [.., 0xAA, 0x77] => at + length - 2,
+            _ => at + length,
+        }
+    }
+
+    fn candidate(&self, at: usize, limit: usize) -> Candidate {
+        let bytes = &self.history[at..limit];
+        let header = [0xAA, 0x77];
+        if bytes.len() < 2 && header.starts_with(bytes) {
+            return Candidate::Unfinished;
+        }
+        if !bytes.starts_with(&header) {
+            return Candidate::Nothing;
+        }
+        let length = match bytes.get(2) {
+            None => return Candidate::Unfinished,
+            Some(3) => 7,
+            Some(6) => match bytes.get(4) {
+                None => return Candidate::Unfinished,
+                Some(&count) => 7 + usize::from(count),
+            },
+            Some(_) => return Candidate::Nothing,
+        };
+        let Some(bytes) = bytes.get(..length) else { return Candidate::Unfinished };
+        let said = if CRC.checksum(&bytes[..length - 2]).to_le_bytes() != bytes[length - 2..] {
+            Received::WrongCrc
+        } else if u16::from(bytes[3]) + u16::from(bytes[4]) > 256 {
+            Received::MalformedRange(bytes[3])
+        } else {
+            Received::Frame(bytes.to_vec())
+        };
+        Candidate::Judged(length, said)
+    }
+}
+
+/// A small generator of pseudo-random numbers (xorshift64*), so that a seed says everything.
+pub struct Random(u64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
+    }
+
+    pub fn next(&mut self) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        self.0.wrapping_mul(0x2545_F491_4F6C_DD1D)
+    }
+
+    pub fn byte(&mut self) -> u8 {
+        self.next().to_be_bytes()[0]
+    }
+
+    /// A number below `limit`.
+    pub fn below(&mut self, limit: usize) -> usize {
+        usize::try_from(self.next() >> 33).unwrap() % limit
+    }
+}
