@@ -1,0 +1,60 @@
+//! The project's chores: the only scripts there are. `cargo xtask help` lists them.
+//!
+//! Knows how the project is checked, measured and documented; knows nothing of how an arm works.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod elf;
+mod no_panic;
+mod registers_md;
+mod run;
+mod size;
+mod test;
+
+use run::Outcome;
+
+/// The project's chores.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    chore: Chore,
+}
+
+#[derive(Subcommand)]
+enum Chore {
+    /// Install what the tests need, then run every check and every test.
+    Test,
+    /// Write docs/registers.md anew from the register table.
+    Docs {
+        /// Change nothing; fail if the file is not what would be written.
+        #[arg(long)]
+        check: bool,
+    },
+    /// Link the cores for the chip and fail if a panic can be reached.
+    NoPanic,
+    /// Print what the cores cost on the chip, in bytes.
+    Size,
+}
+
+fn main() -> ExitCode {
+    match carry_out(&Arguments::parse().chore) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn carry_out(chore: &Chore) -> Outcome {
+    match chore {
+        Chore::Test => test::all(),
+        Chore::Docs { check: true } => registers_md::check(),
+        Chore::Docs { check: false } => registers_md::write(),
+        Chore::NoPanic => no_panic::check(),
+        Chore::Size => size::print(),
+    }
+}

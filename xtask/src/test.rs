@@ -1,0 +1,47 @@
+//! `cargo xtask test`: everything that has to hold, in one run. The steps are a table.
+
+use std::time::Instant;
+
+use crate::run::{CHIP, Outcome, cargo, run};
+use crate::{no_panic, registers_md};
+
+/// A heading, and what is done under it.
+type Step = (&'static str, fn() -> Outcome);
+
+/// What is done, in this order, until one fails. Tests come last: theirs is the last word.
+const STEPS: &[Step] = &[
+    ("tools that the tests need", install),
+    ("format", || cargo("fmt --all --check")),
+    ("lints, host", || cargo(&host("clippy", "--all-targets -- -D warnings"))),
+    ("lints, chip", || cargo(&format!("clippy -p footprint --target {CHIP} -- -D warnings"))),
+    ("documentation", documentation),
+    ("docs/registers.md is fresh", registers_md::check),
+    ("no panic can be reached", no_panic::check),
+    ("host programs", || cargo("build --release -p host-sim -p sevenbot")),
+    ("tests", || cargo(&host("test", ""))),
+];
+
+/// Carries out the steps.
+pub(crate) fn all() -> Outcome {
+    for (number, (heading, step)) in (1..).zip(STEPS) {
+        println!("\n=== {number}/{} {heading}", STEPS.len());
+        let start = Instant::now();
+        step().map_err(|why| format!("step {number}, {heading}: {why}"))?;
+        println!("=== {number}/{} done in {:.1} s", STEPS.len(), start.elapsed().as_secs_f32());
+    }
+    Ok(())
+}
+
+fn install() -> Outcome {
+    run("rustup", "component add clippy rustfmt", &[])?;
+    run("rustup", &format!("target add {CHIP}"), &[])
+}
+
+fn documentation() -> Outcome {
+    run("cargo", &host("doc", "--no-deps"), &[("RUSTDOCFLAGS", "-D warnings")])
+}
+
+/// A cargo command for every package that builds for the host.
+fn host(command: &str, words: &str) -> String {
+    format!("{command} --workspace --exclude footprint {words}")
+}
