@@ -1,0 +1,264 @@
+//! An open arm: registers read and written, typed values on top, and the reports it sends unasked.
+//!
+//! Knows the register table, not the port: that is the link's.
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{
+    CHIP_ID, DEVICE_CODE, FIRMWARE_VERSION, PRESENT_POSITION, SERVO_TEMPERATURE, SPEED, STATUS_VERSION,
+    TARGET_POSITION, TIME,
+};
+use protocol_core::request::Request;
+
+use crate::error::{Error, Heard, OpenError};
+use crate::link::Link;
+use crate::snapshot::{Snapshot, Span};
+use crate::units::{Angle, MoveTime, Speed};
+
+/// The status block, which is where the table ends.
+pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
+
+/// Reports kept for whoever asks later: 20 s of them at the highest rate (D14). The oldest go first.
+const REPORTS_KEPT: usize = 1_000;
+
+/// How to talk to an arm.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// In bits per second. The arm starts with the rate in its register 12.
+    pub baud: u32,
+    /// How long to wait for one answer.
+    pub reply_timeout: Duration,
+    /// How often to ask before giving up, at least once. Reads change nothing, so asking again is safe.
+    pub attempts: u32,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { baud: 115_200, reply_timeout: Duration::from_millis(500), attempts: 3 }
+    }
+}
+
+/// What an arm says it is (registers 0 to 7).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity(Snapshot);
+
+impl Identity {
+    /// The firmware's version, as `3.0`.
+    #[must_use]
+    pub fn version(&self) -> String {
+        let tenths = self.0.byte(&FIRMWARE_VERSION);
+        format!("{}.{}", tenths / 10, tenths % 10)
+    }
+
+    /// The chip's own number, most significant byte first (D8).
+    #[must_use]
+    pub fn chip_id(&self) -> [u8; 6] {
+        [0, 1, 2, 3, 4, 5].map(|offset| self.0.at(CHIP_ID.address + offset))
+    }
+}
+
+/// The present positions, as the arm sent them without being asked (D14).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Report {
+    /// When it was taken from the port.
+    pub received: Instant,
+    /// Joint 1 first.
+    pub positions: [Angle; 7],
+}
+
+/// A 7Bot V2 at the other end of a serial port.
+pub struct Arm {
+    link: Link,
+    options: Options,
+    identity: Identity,
+    reports: VecDeque<Report>,
+}
+
+impl fmt::Debug for Arm {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.debug_struct("Arm").field("identity", &self.identity).finish_non_exhaustive()
+    }
+}
+
+impl Arm {
+    /// Opens a port and makes sure that a 7Bot V2 answers there.
+    ///
+    /// # Errors
+    /// The port cannot be opened, nothing answers, or something else does.
+    pub fn open(path: &str, baud: u32) -> Result<Self, OpenError> {
+        Self::open_with(path, Options { baud, ..Options::default() })
+    }
+
+    /// As [`Arm::open`], with time-outs of one's own.
+    ///
+    /// # Errors
+    /// The port cannot be opened, nothing answers, or something else does.
+    pub fn open_with(path: &str, options: Options) -> Result<Self, OpenError> {
+        let open = |baud| serialport::new(path, baud).open();
+        let port = open(options.baud).or_else(|error| {
+            // A pseudo-terminal on macOS takes no baud rate; the serialport crate asks for 0 there.
+            if cfg!(target_os = "macos") && error.kind() == serialport::ErrorKind::Unknown {
+                open(0)
+            } else {
+                Err(error)
+            }
+        })?;
+        let link = Link::new(port, options.baud);
+        let nobody = Identity(Snapshot { address: 0, values: Vec::new() });
+        let mut arm = Self { link, options, identity: nobody, reports: VecDeque::new() };
+        arm.identity = Identity(arm.read_span(Span::between(&DEVICE_CODE, &CHIP_ID))?);
+        match arm.identity.0.byte(&DEVICE_CODE) {
+            code if code == DEVICE_CODE.default_at(DEVICE_CODE.address) => Ok(arm),
+            code => Err(OpenError::WrongDevice { code }),
+        }
+    }
+
+    /// What the arm said it is when it was opened.
+    #[must_use]
+    pub const fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// The values of `count` registers from `address` on, all of one instant.
+    ///
+    /// # Errors
+    /// No answer, however often asked; or the port is gone.
+    pub fn read(&mut self, address: u8, count: u8) -> Result<Vec<u8>, Error> {
+        self.read_span(Span { address, count }).map(|snapshot| snapshot.values)
+    }
+
+    /// As [`Arm::read`], for registers of the table.
+    ///
+    /// # Errors
+    /// No answer, however often asked; or the port is gone.
+    pub fn read_span(&mut self, span: Span) -> Result<Snapshot, Error> {
+        self.keep_waiting_reports()?;
+        self.link.take_heard();
+        for _ in 0..self.options.attempts.max(1) {
+            self.link.send(&Request::Read { address: span.address, count: span.count })?;
+            if let Some(answer) = self.answer(span)? {
+                return Ok(answer);
+            }
+        }
+        Err(self.no_answer(span))
+    }
+
+    /// Gives new values to the registers from `address` on, in one frame: all of them or none (D16, D17).
+    /// The arm does not answer a write; [`crate::change`] finds out what became of it.
+    ///
+    /// # Errors
+    /// The port is gone, or takes no more bytes.
+    pub fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Error> {
+        self.link.send(&Request::Write { address, values })
+    }
+
+    /// Where the joints are, joint 1 first.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn positions(&mut self) -> Result<[Angle; 7], Error> {
+        let snapshot = self.read_span(Span::of(&PRESENT_POSITION))?;
+        Ok(snapshot.joints(&PRESENT_POSITION).map(Angle::from_register))
+    }
+
+    /// Where the joints should be, joint 1 first.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn targets(&mut self) -> Result<[Angle; 7], Error> {
+        let snapshot = self.read_span(Span::of(&TARGET_POSITION))?;
+        Ok(snapshot.joints(&TARGET_POSITION).map(Angle::from_register))
+    }
+
+    /// Sends one joint to an angle.
+    ///
+    /// # Errors
+    /// As [`Arm::write`].
+    pub fn set_target(&mut self, joint: Joint, angle: Angle) -> Result<(), Error> {
+        self.write(TARGET_POSITION.of(joint), &[angle.degrees()])
+    }
+
+    /// Sends all joints to a pose, joint 1 first. They start together.
+    ///
+    /// # Errors
+    /// As [`Arm::write`].
+    pub fn set_targets(&mut self, pose: [Angle; 7]) -> Result<(), Error> {
+        self.write(TARGET_POSITION.address, &pose.map(Angle::degrees))
+    }
+
+    /// Sets the speed of all joints, at once and for moves to come.
+    ///
+    /// # Errors
+    /// As [`Arm::write`].
+    pub fn set_speeds(&mut self, speeds: [Speed; 7]) -> Result<(), Error> {
+        self.write(SPEED.address, &speeds.map(Speed::steps))
+    }
+
+    /// Sets the duration of all joints' moves to come; it counts where the speed is the maximum (D11).
+    ///
+    /// # Errors
+    /// As [`Arm::write`].
+    pub fn set_times(&mut self, times: [MoveTime; 7]) -> Result<(), Error> {
+        self.write(TIME.address, &times.map(MoveTime::steps))
+    }
+
+    /// The reports that came since this was last asked, oldest first.
+    pub fn reports(&mut self) -> impl Iterator<Item = Report> {
+        self.reports.drain(..)
+    }
+
+    /// The next report, kept or still to come; `None` when none came for `patience`.
+    ///
+    /// # Errors
+    /// The port is gone.
+    pub fn next_report(&mut self, patience: Duration) -> Result<Option<Report>, Error> {
+        let deadline = Instant::now() + patience;
+        while self.reports.is_empty() {
+            match self.link.receive(deadline)? {
+                Some(reply) => self.keep_report(&reply),
+                None => break,
+            }
+        }
+        Ok(self.reports.pop_front())
+    }
+
+    /// Waits for the answer to a read. Whatever else comes is no answer to it; reports among it are kept.
+    fn answer(&mut self, span: Span) -> Result<Option<Snapshot>, Error> {
+        let deadline = Instant::now() + self.options.reply_timeout;
+        while let Some(reply) = self.link.receive(deadline)? {
+            if reply.span() == span {
+                return Ok(Some(reply));
+            }
+            self.keep_report(&reply);
+        }
+        Ok(None)
+    }
+
+    fn no_answer(&mut self, span: Span) -> Error {
+        let Options { attempts, reply_timeout, .. } = self.options;
+        let heard: Heard = self.link.take_heard();
+        Error::NoAnswer { span, attempts: attempts.max(1), waited: reply_timeout, heard }
+    }
+
+    /// Takes what came unasked, so that an old frame cannot be mistaken for the answer to come.
+    fn keep_waiting_reports(&mut self) -> Result<(), Error> {
+        while let Some(reply) = self.link.receive_waiting()? {
+            self.keep_report(&reply);
+        }
+        Ok(())
+    }
+
+    fn keep_report(&mut self, reply: &Snapshot) {
+        if reply.span() != Span::of(&PRESENT_POSITION) {
+            return;
+        }
+        if self.reports.len() >= REPORTS_KEPT {
+            self.reports.pop_front();
+        }
+        let positions = reply.joints(&PRESENT_POSITION).map(Angle::from_register);
+        self.reports.push_back(Report { received: Instant::now(), positions });
+    }
+}

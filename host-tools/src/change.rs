@@ -1,0 +1,202 @@
+//! Writes that are checked: what took, what did not, and why.
+//!
+//! The arm does not answer a write (D6). What became of it shows in the registers, in the table that both
+//! ends share, and in the status block. Knows nothing of what a register is for.
+
+use std::fmt;
+
+use protocol_core::registers::map::{
+    EEPROM_LOCK, FRAMES_CORRUPTED, FRAMES_REFUSED, LAST_REFUSAL, LAST_REFUSED_REGISTER, STATUS_VERSION, find,
+    refusal,
+};
+use protocol_core::registers::{Access, Region, Register};
+
+use crate::arm::{Arm, STATUS};
+use crate::error::Error;
+use crate::names::name_of_register;
+use crate::snapshot::{Snapshot, Span};
+use crate::words;
+
+/// A register that does not hold what was written to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unchanged {
+    /// The register.
+    pub address: u8,
+    /// The byte that was written.
+    pub wanted: u8,
+    /// The byte that was read back.
+    pub found: u8,
+    /// Why.
+    pub cause: Cause,
+}
+
+/// Why a register does not hold what was written to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// The table has no register there.
+    NoRegister,
+    /// It can only be read.
+    ReadOnly,
+    /// The maker keeps it free.
+    Reserved,
+    /// It is a setting, and the EEPROM lock protects it (D15).
+    Locked,
+    /// A byte of the frame was out of its register's range, so none of it had an effect (D16).
+    OutOfRange {
+        /// The register it was meant for.
+        address: u8,
+    },
+    /// The settings storage takes no more before the next restart (D19).
+    StorageFull,
+    /// The frame reached the arm damaged.
+    Damaged,
+    /// The arm gives no reason: the frame was lost, or the register was changed again since.
+    Unknown,
+}
+
+impl Arm {
+    /// Writes, reads back, and says which registers do not hold what was written: none, if all went well.
+    ///
+    /// # Errors
+    /// As [`Arm::read`] and [`Arm::write`].
+    pub fn write_checked(&mut self, address: u8, values: &[u8]) -> Result<Vec<Unchanged>, Error> {
+        let locked = self.read_span(Span::of(&EEPROM_LOCK))?.byte(&EEPROM_LOCK) != 0;
+        let before = self.read_span(STATUS)?;
+        self.write(address, values)?;
+        let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
+        let found = self.read_span(Span { address, count })?;
+        let after = self.read_span(STATUS)?;
+        Ok(compare(&found, values, |address, wanted| {
+            rule(address, locked).unwrap_or_else(|| verdict(&before, &after, address, wanted))
+        }))
+    }
+}
+
+fn compare(found: &Snapshot, wanted: &[u8], cause: impl Fn(u8, u8) -> Cause) -> Vec<Unchanged> {
+    let pairs = found.span().addresses().zip(wanted).zip(&found.values);
+    pairs
+        .filter(|&((address, &wanted), &found)| number(address, wanted) != number(address, found))
+        .map(|((address, &wanted), &found)| {
+            let cause = cause(address, wanted);
+            Unchanged { address, wanted, found, cause }
+        })
+        .collect()
+}
+
+/// The number a byte stands for: minus zero is zero (D9).
+fn number(address: u8, byte: u8) -> i16 {
+    find(address).map_or(i16::from(byte), |row| row.range.decode(byte))
+}
+
+/// The rule of the table by which a register keeps its value; `None` where it could have taken another.
+fn rule(address: u8, locked: bool) -> Option<Cause> {
+    match find(address) {
+        None => Some(Cause::NoRegister),
+        Some(Register { access: Access::ReadOnly, .. }) => Some(Cause::ReadOnly),
+        Some(Register { access: Access::Reserved, .. }) => Some(Cause::Reserved),
+        Some(Register { region: Region::Eeprom, .. }) if locked => Some(Cause::Locked),
+        Some(_) => None,
+    }
+}
+
+/// What the arm's counters say of a frame that went out between the two looks at them.
+fn verdict(before: &Snapshot, after: &Snapshot, address: u8, wanted: u8) -> Cause {
+    let moved = |row: &Register| before.counter(row) != after.counter(row);
+    if after.byte(&STATUS_VERSION) != STATUS_VERSION.default_at(STATUS_VERSION.address) {
+        // The maker's firmware has no status block, so only the table is left to ask.
+        return match find(address) {
+            Some(row) if !row.range.contains(wanted) => Cause::OutOfRange { address },
+            _ => Cause::Unknown,
+        };
+    }
+    match after.byte(&LAST_REFUSAL) {
+        refusal::OUT_OF_RANGE if moved(&FRAMES_REFUSED) => {
+            Cause::OutOfRange { address: after.byte(&LAST_REFUSED_REGISTER) }
+        }
+        refusal::STORAGE_FULL if moved(&FRAMES_REFUSED) => Cause::StorageFull,
+        _ if moved(&FRAMES_CORRUPTED) => Cause::Damaged,
+        _ => Cause::Unknown,
+    }
+}
+
+impl fmt::Display for Unchanged {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (found, wanted) = (number(self.address, self.found), number(self.address, self.wanted));
+        write!(out, "{} is {found}, not {wanted}: {}", name_of_register(self.address), self.cause)
+    }
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NoRegister => out.write_str("the table has no register there"),
+            Self::ReadOnly => out.write_str("it is read only"),
+            Self::Reserved => out.write_str("it is reserved by the maker"),
+            Self::Locked => out.write_str("it is protected by the EEPROM lock"),
+            Self::OutOfRange { address } => {
+                let name = name_of_register(address);
+                write!(out, "the frame had no effect, {name} takes {}", words::range(address))
+            }
+            Self::StorageFull => {
+                out.write_str("the settings storage takes no more before a restart of the arm")
+            }
+            Self::Damaged => out.write_str("the request was damaged on its way to the arm; try again"),
+            Self::Unknown => out.write_str("the arm gives no reason; try again"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol_core::registers::map::{DEVICE_ID, OFFSET, PRESENT_POSITION, RESERVED_8, TARGET_POSITION};
+
+    fn status(version: u8, refused: u8, why: u8, register: u8) -> Snapshot {
+        let mut status = Snapshot { address: STATUS.address, values: vec![0; usize::from(STATUS.count)] };
+        for (row, value) in [
+            (STATUS_VERSION, version),
+            (LAST_REFUSAL, why),
+            (LAST_REFUSED_REGISTER, register),
+            (FRAMES_REFUSED, refused),
+        ] {
+            status.values[usize::from(row.address - STATUS.address)] = value;
+        }
+        status
+    }
+
+    #[test]
+    fn the_table_explains_what_no_write_can_change() {
+        assert_eq!(rule(61, false), Some(Cause::NoRegister));
+        assert_eq!(rule(PRESENT_POSITION.address, false), Some(Cause::ReadOnly));
+        assert_eq!(rule(RESERVED_8.address, false), Some(Cause::Reserved));
+        assert_eq!(rule(DEVICE_ID.address, true), Some(Cause::Locked));
+        assert_eq!(rule(DEVICE_ID.address, false), None);
+        assert_eq!(rule(TARGET_POSITION.address, true), None);
+    }
+
+    #[test]
+    fn the_status_block_explains_a_refusal_that_was_counted() {
+        let before = status(1, 4, refusal::OUT_OF_RANGE, 46);
+        let stale = status(1, 4, refusal::OUT_OF_RANGE, 46);
+        assert_eq!(verdict(&before, &stale, 46, 90), Cause::Unknown, "an older refusal explains nothing");
+        let after = status(1, 5, refusal::OUT_OF_RANGE, 47);
+        assert_eq!(verdict(&before, &after, 46, 90), Cause::OutOfRange { address: 47 });
+        let full = status(1, 5, refusal::STORAGE_FULL, 11);
+        assert_eq!(verdict(&before, &full, 11, 1), Cause::StorageFull);
+    }
+
+    #[test]
+    fn without_a_status_block_the_table_is_asked() {
+        let none = status(0, 0, 0, 0);
+        assert_eq!(verdict(&none, &none, 46, 200), Cause::OutOfRange { address: 46 });
+        assert_eq!(verdict(&none, &none, 46, 90), Cause::Unknown);
+    }
+
+    #[test]
+    fn minus_zero_took_where_zero_is_read_back() {
+        let found = Snapshot { address: OFFSET.address, values: vec![0, 0] };
+        let unchanged = compare(&found, &[0x80, 0x85], |_, _| Cause::Unknown);
+        let [only] = unchanged.as_slice() else { panic!("{unchanged:?}") };
+        assert_eq!(only.to_string(), "offset.2 is 0, not -5: the arm gives no reason; try again");
+    }
+}

@@ -1,0 +1,105 @@
+//! `set`: writes registers in one frame, reads them back, and says what did not take and why.
+
+use std::io::Write;
+
+use sevenbot::change::{Cause, Unchanged};
+use sevenbot::map::{BAUD_RATE, EEPROM_LOCK, find};
+use sevenbot::names::name_of_register;
+use sevenbot::words::{self, entries};
+use sevenbot::{Arm, Error, Span};
+
+use super::all_taken;
+use super::get::show;
+use crate::cli::SetArgs;
+use crate::failure::Failure;
+
+pub(crate) fn run(arm: &mut Arm, args: &SetArgs, out: &mut impl Write) -> Result<(), Failure> {
+    let span = args.register;
+    let bytes = bytes(span, &args.values, args.raw)?;
+    let unchanged = if args.unlock {
+        unlocked(arm, |arm| arm.write_checked(span.address, &bytes))?
+    } else {
+        arm.write_checked(span.address, &bytes)?
+    };
+    show(&entries(&arm.read_span(span)?), out)?;
+    note(span, args, &unchanged, out)?;
+    all_taken(&unchanged)
+}
+
+/// Does `work` with the EEPROM lock open, and closes it again whatever became of the work.
+fn unlocked<T>(arm: &mut Arm, work: impl FnOnce(&mut Arm) -> Result<T, Error>) -> Result<T, Failure> {
+    all_taken(&arm.write_checked(EEPROM_LOCK.address, &[0])?)?;
+    let done = work(arm);
+    let closed = arm.write_checked(EEPROM_LOCK.address, &[1]);
+    let done = done?;
+    all_taken(&closed?)?;
+    Ok(done)
+}
+
+fn note(span: Span, args: &SetArgs, unchanged: &[Unchanged], out: &mut impl Write) -> Result<(), Failure> {
+    if unchanged.iter().any(|register| register.cause == Cause::Locked) && !args.unlock {
+        writeln!(
+            out,
+            "Settings are protected by the EEPROM lock, register 28: --unlock opens it for this write."
+        )?;
+    } else if unchanged.is_empty() && span.addresses().any(|address| BAUD_RATE.holds(address)) {
+        writeln!(out, "The new baud rate is in force after the next restart of the arm.")?;
+    }
+    Ok(())
+}
+
+/// The bytes for a span: one value per register, or one for all.
+fn bytes(span: Span, values: &[i16], raw: bool) -> Result<Vec<u8>, Failure> {
+    let registers = usize::from(span.count);
+    let values = match values {
+        [only] => vec![*only; registers],
+        all if all.len() == registers => all.to_vec(),
+        all => {
+            let given = all.len();
+            return Err(Failure::Usage(format!(
+                "{given} values for {registers} registers: one each, or one for all"
+            )));
+        }
+    };
+    let pairs = span.addresses().zip(values);
+    pairs.map(|(address, value)| if raw { raw_byte(value) } else { byte(address, value) }).collect()
+}
+
+fn raw_byte(value: i16) -> Result<u8, Failure> {
+    u8::try_from(value).map_err(|_| Failure::Usage(format!("{value} is no byte: 0 to 255")))
+}
+
+/// The byte for a number in the table's units. One out of range is not even sent: the maker's firmware
+/// would take it.
+fn byte(address: u8, value: i16) -> Result<u8, Failure> {
+    let Some(row) = find(address) else { return raw_byte(value) };
+    row.range.encode(value).ok_or_else(|| {
+        let (name, range) = (name_of_register(address), words::range(address));
+        Failure::Arm(format!("{value} is out of range: {name} takes {range}; nothing was written"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sevenbot::map::{OFFSET, TARGET_POSITION};
+
+    #[test]
+    fn numbers_become_bytes_by_the_table() {
+        let joint_2 = Span { address: OFFSET.address + 1, count: 1 };
+        assert_eq!(bytes(joint_2, &[-5], false).ok(), Some(vec![0x85]));
+        assert_eq!(bytes(Span::of(&OFFSET), &[3], false).ok(), Some(vec![3; 7]));
+        let pose = [1, 2, 3, 4, 5, 6, 7];
+        assert_eq!(bytes(Span::of(&TARGET_POSITION), &pose, false).ok(), Some((1..=7).collect()));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_before_it_is_sent() {
+        let target = Span { address: TARGET_POSITION.address, count: 1 };
+        let Err(Failure::Arm(said)) = bytes(target, &[181], false) else { panic!("out of range") };
+        assert!(said.contains("target-position.1 takes 0 to 180"), "{said}");
+        assert_eq!(bytes(target, &[181], true).ok(), Some(vec![181]), "--raw sends it");
+        assert!(matches!(bytes(target, &[256], true), Err(Failure::Usage(_))));
+        assert!(matches!(bytes(target, &[1, 2], false), Err(Failure::Usage(_))));
+    }
+}

@@ -1,0 +1,189 @@
+//! What can go wrong between a host and its arm, said so that its reader knows what to check.
+//!
+//! Knows what happened on the wire, not what somebody wanted to do with it.
+
+use std::fmt;
+use std::io;
+use std::time::Duration;
+
+use crate::snapshot::Span;
+
+/// Why a port does not lead to an arm.
+#[derive(Clone, Debug)]
+pub enum OpenError {
+    /// There is no such port.
+    NotFound,
+    /// This user may not open the port.
+    PermissionDenied,
+    /// Another program has the port open.
+    Busy,
+    /// It cannot be used as a serial port; the system's own words say why.
+    Unusable(serialport::Error),
+    /// The port opened, but no arm answered.
+    Silent(Error),
+    /// Something answered, but it is not a 7Bot V2: its device code is not 7.
+    WrongDevice {
+        /// The device code it gave.
+        code: u8,
+    },
+}
+
+impl From<Error> for OpenError {
+    fn from(error: Error) -> Self {
+        Self::Silent(error)
+    }
+}
+
+impl From<serialport::Error> for OpenError {
+    fn from(error: serialport::Error) -> Self {
+        use io::ErrorKind;
+        match error.kind() {
+            serialport::ErrorKind::Io(ErrorKind::NotFound) => Self::NotFound,
+            serialport::ErrorKind::Io(ErrorKind::PermissionDenied) => Self::PermissionDenied,
+            // The serialport crate gives this kind to a port that is locked; on Windows to a missing one too.
+            serialport::ErrorKind::NoDevice if !cfg!(windows) => Self::Busy,
+            _ => Self::Unusable(error),
+        }
+    }
+}
+
+impl fmt::Display for OpenError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFound => out.write_str("there is no such port"),
+            Self::PermissionDenied => out.write_str("no permission to open this port"),
+            Self::Busy => out.write_str("another program has this port open"),
+            Self::Unusable(error) => write!(out, "this port cannot be used: {error}"),
+            Self::Silent(error) => error.fmt(out),
+            Self::WrongDevice { code } => {
+                write!(out, "the device on this port is not a 7Bot V2: its device code is {code}, not 7")
+            }
+        }
+    }
+}
+
+impl std::error::Error for OpenError {}
+
+/// Why an exchange with an open arm failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Error {
+    /// No answer to a read, though it was asked for several times.
+    NoAnswer {
+        /// The registers that were asked for.
+        span: Span,
+        /// How often they were.
+        attempts: u32,
+        /// How long each attempt waited.
+        waited: Duration,
+        /// What was heard instead.
+        heard: Heard,
+    },
+    /// The port takes no more bytes: its other side does not read.
+    Stalled,
+    /// The port is gone: a cable was pulled, or a simulator ended.
+    PortLost(io::ErrorKind),
+}
+
+/// What was heard on the line while an answer was missing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Heard {
+    /// Bytes of any kind.
+    pub bytes: usize,
+    /// Whole frames, but not the answer.
+    pub other_frames: usize,
+    /// Frames whose checksum was wrong.
+    pub damaged_frames: usize,
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoAnswer { span, attempts, waited, heard } => {
+                let millis = waited.as_millis();
+                write!(out, "no answer to a read of {span} ({attempts} tries of {millis} ms): {heard}")
+            }
+            Self::Stalled => out.write_str("the port takes no more bytes: nobody reads at its other end"),
+            Self::PortLost(kind) => write!(out, "the connection is gone: {kind}"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl fmt::Display for Heard {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self { bytes: 0, .. } => out.write_str("nothing was heard"),
+            Self { damaged_frames: 0, other_frames: 0, bytes } => {
+                write!(out, "{bytes} bytes were heard, none of them a frame")
+            }
+            Self { damaged_frames, other_frames, .. } => {
+                write!(out, "{damaged_frames} damaged and {other_frames} other frames were heard")
+            }
+        }
+    }
+}
+
+impl OpenError {
+    /// What a user should check, most likely first; empty where the message says it all.
+    #[must_use]
+    pub const fn advice(&self) -> &'static [&'static str] {
+        match self {
+            Self::NotFound => &[
+                "is the arm plugged in, or the simulator started?",
+                "the name may have changed: unplugging and plugging in again gives ports new numbers",
+            ],
+            Self::PermissionDenied => {
+                &["on Linux: `ls -l` of the port names the group that may open it (often dialout or uucp); \
+                 join it with `sudo usermod -aG GROUP $USER` and log in again"]
+            }
+            Self::Busy => &[
+                "close the other program: a terminal, a browser page, a second sevenbot",
+                "on Linux, `fuser -v PORT` names it",
+            ],
+            Self::Unusable(_) => {
+                &["does this name belong to a serial port, and does it take this baud rate?"]
+            }
+            Self::Silent(error) => error.advice(),
+            Self::WrongDevice { .. } => &["is this the right port?"],
+        }
+    }
+}
+
+impl Error {
+    /// What a user should check, most likely first; empty where the message says it all.
+    #[must_use]
+    pub const fn advice(&self) -> &'static [&'static str] {
+        match self {
+            Self::NoAnswer { heard: Heard { bytes: 0, .. }, .. } => &[
+                "has the arm power, and is its cable plugged in at both ends?",
+                "is this the right port?",
+                "is the baud rate right (--baud)? the arm starts with the one in its register 12",
+            ],
+            Self::NoAnswer { .. } => &[
+                "something sends, but it does not make sense: most often the baud rate is wrong (--baud)",
+                "is this the right port, and no other program reading from it?",
+            ],
+            Self::Stalled | Self::PortLost(_) => &["was the cable pulled, or the simulator ended?"],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_answer_says_what_was_heard_instead() {
+        let said = |heard| {
+            let span = Span { address: 54, count: 7 };
+            Error::NoAnswer { span, attempts: 3, waited: Duration::from_millis(500), heard }.to_string()
+        };
+        let nothing = said(Heard::default());
+        assert_eq!(nothing, "no answer to a read of 54..60 (3 tries of 500 ms): nothing was heard");
+        let garbage = said(Heard { bytes: 12, ..Heard::default() });
+        assert!(garbage.ends_with("12 bytes were heard, none of them a frame"), "{garbage}");
+        let frames = said(Heard { bytes: 50, other_frames: 2, damaged_frames: 1 });
+        assert!(frames.ends_with("1 damaged and 2 other frames were heard"), "{frames}");
+    }
+}

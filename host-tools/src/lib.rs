@@ -1,0 +1,43 @@
+//! Talks to a 7Bot V2 arm over its serial port: the other end of the wire.
+//!
+//! ```text
+//!   Arm ── read, write, typed values ──▶ Link ──▶ serial port ──▶ arm, simulator, or emulated firmware
+//!    ▲                                    │
+//!    ├── answers ◀── matched by range ────┤
+//!    └── reports ◀── sent unasked (D14) ──┘
+//! ```
+//!
+//! Everything blocks, with time-outs. Frames and the register table are those of `protocol-core`, which the
+//! arm itself runs, so the two ends cannot drift apart; `D1` to `D20` are decisions in `docs/protocol.md`.
+//! Knows nothing of motion: what a target does is the arm's business.
+//!
+//! ```no_run
+//! use sevenbot::{Angle, Arm, Joint};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut arm = Arm::open("/dev/ttyUSB0", 115_200)?;
+//! println!("firmware {}", arm.identity().version());
+//! if let (Some(base), Some(angle)) = (Joint::new(1), Angle::from_degrees(120)) {
+//!     arm.set_target(base, angle)?;
+//! }
+//! println!("{:?}", arm.positions()?);
+//! # Ok(())
+//! # }
+//! ```
+
+#![forbid(unsafe_code)]
+
+pub mod arm;
+pub mod change;
+pub mod error;
+mod link;
+pub mod names;
+pub mod snapshot;
+pub mod units;
+pub mod words;
+
+pub use arm::{Arm, Identity, Options};
+pub use error::{Error, Heard, OpenError};
+pub use protocol_core::registers::{Joint, Register, map};
+pub use snapshot::{Snapshot, Span};
+pub use units::{Angle, MoveTime, Speed};

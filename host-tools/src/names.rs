@@ -1,0 +1,161 @@
+//! Registers by the names people write: `target-position.3`, `SPEED`, `12`, `54..60`.
+//!
+//! The names are those of the table; none stands here.
+
+use std::fmt;
+
+use protocol_core::registers::map::find;
+use protocol_core::registers::{Joint, MAP, Register};
+
+use crate::snapshot::Span;
+
+/// Why a text names no registers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NameError {
+    /// No name of the table begins so, and it is no number either.
+    Unknown,
+    /// Several names of the table begin so: these rows.
+    Ambiguous(Vec<&'static Register>),
+    /// What stands behind the dot is no joint: 1 to 7.
+    NoJoint,
+    /// The register of this name is not one of seven.
+    NotPerJoint(&'static Register),
+    /// Addresses are 0 to 255.
+    NoAddress,
+    /// The range ends before it begins.
+    EmptyRange,
+}
+
+impl fmt::Display for NameError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown => out.write_str("there is no register of this name"),
+            Self::Ambiguous(rows) => {
+                let names: Vec<String> = rows.iter().map(|row| name_of(row)).collect();
+                write!(out, "this could be {}", names.join(" or "))
+            }
+            Self::NoJoint => out.write_str("a joint is a number from 1 to 7"),
+            Self::NotPerJoint(row) => write!(out, "{} has no joints", name_of(row)),
+            Self::NoAddress => out.write_str("a register's number is 0 to 255"),
+            Self::EmptyRange => out.write_str("the range ends before it begins"),
+        }
+    }
+}
+
+impl std::error::Error for NameError {}
+
+/// The name of a row as people write it: `target-position`.
+#[must_use]
+pub fn name_of(row: &Register) -> String {
+    row.name.to_ascii_lowercase().replace('_', "-")
+}
+
+/// The name of one register: `target-position.3`, `chip-id+2`, or its number where the table is silent.
+#[must_use]
+pub fn name_of_register(address: u8) -> String {
+    let Some(row) = find(address) else { return format!("register {address}") };
+    match (row.joint_at(address), address.saturating_sub(row.address)) {
+        (Some(joint), _) => format!("{}.{}", name_of(row), joint.number()),
+        (None, 0) => name_of(row),
+        (None, offset) => format!("{}+{offset}", name_of(row)),
+    }
+}
+
+/// The registers that a text names: a number (`12`), a range (`54..60`, the last one included), or a name
+/// of the table in any case, with `-` or `_`, as short as it is still the only one, with a joint (`.3`)
+/// where there is one register per joint.
+///
+/// # Errors
+/// The text names none.
+pub fn parse(text: &str) -> Result<Span, NameError> {
+    if let Some((first, last)) = text.split_once("..") {
+        let (first, last) = (address(first)?, address(last)?);
+        let distance = last.checked_sub(first).ok_or(NameError::EmptyRange)?;
+        // All 256 at once are more than one frame can ask for.
+        let count = distance.checked_add(1).ok_or(NameError::NoAddress)?;
+        return Ok(Span { address: first, count });
+    }
+    if text.starts_with(|first: char| first.is_ascii_digit()) {
+        return Ok(Span { address: address(text)?, count: 1 });
+    }
+    let (name, joint) = text.split_once('.').map_or((text, None), |(name, joint)| (name, Some(joint)));
+    let row = row(name)?;
+    joint.map_or(Ok(Span::of(row)), |joint| one_joint(row, joint))
+}
+
+fn address(text: &str) -> Result<u8, NameError> {
+    text.trim().parse().map_err(|_| NameError::NoAddress)
+}
+
+fn one_joint(row: &'static Register, joint: &str) -> Result<Span, NameError> {
+    let joint = joint.parse().ok().and_then(Joint::new).ok_or(NameError::NoJoint)?;
+    if row.per_joint {
+        Ok(Span { address: row.of(joint), count: 1 })
+    } else {
+        Err(NameError::NotPerJoint(row))
+    }
+}
+
+fn row(name: &str) -> Result<&'static Register, NameError> {
+    let wanted = name.to_ascii_uppercase().replace('-', "_");
+    if let Some(row) = MAP.iter().find(|row| row.name == wanted) {
+        return Ok(row);
+    }
+    let candidates: Vec<_> =
+        MAP.iter().filter(|row| !wanted.is_empty() && row.name.starts_with(&wanted)).collect();
+    match candidates.as_slice() {
+        [] => Err(NameError::Unknown),
+        [only] => Ok(only),
+        _ => Err(NameError::Ambiguous(candidates)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn span(address: u8, count: u8) -> Result<Span, NameError> {
+        Ok(Span { address, count })
+    }
+
+    #[test]
+    fn every_row_is_found_by_its_name_in_any_spelling() {
+        for row in MAP {
+            for name in [name_of(row), row.name.to_owned(), row.name.to_ascii_lowercase()] {
+                assert_eq!(parse(&name), Ok(Span::of(row)), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn joints_numbers_ranges_and_short_names() {
+        assert_eq!(parse("Target-Position.3"), span(48, 1));
+        assert_eq!(parse("target"), span(46, 7));
+        assert_eq!(parse("12"), span(12, 1));
+        assert_eq!(parse("54..60"), span(54, 7));
+        assert_eq!(parse("255..255"), span(255, 1));
+        assert_eq!(parse("1..255"), span(1, 255));
+    }
+
+    #[test]
+    fn what_names_nothing_says_why() {
+        assert_eq!(parse("nonsense"), Err(NameError::Unknown));
+        assert_eq!(parse(""), Err(NameError::Unknown));
+        assert_eq!(parse("speed.8"), Err(NameError::NoJoint));
+        assert_eq!(parse("speed.x"), Err(NameError::NoJoint));
+        assert!(matches!(parse("device-id.1"), Err(NameError::NotPerJoint(_))));
+        assert!(matches!(parse("device"), Err(NameError::Ambiguous(rows)) if rows.len() == 2));
+        for text in ["256", "0..256", "1..", "..", "0..255"] {
+            assert_eq!(parse(text), Err(NameError::NoAddress), "{text}");
+        }
+        assert_eq!(parse("60..54"), Err(NameError::EmptyRange));
+    }
+
+    #[test]
+    fn a_register_in_the_middle_of_a_row_has_a_name_too() {
+        assert_eq!(name_of_register(48), "target-position.3");
+        assert_eq!(name_of_register(2), "chip-id");
+        assert_eq!(name_of_register(4), "chip-id+2");
+        assert_eq!(name_of_register(61), "register 61");
+    }
+}

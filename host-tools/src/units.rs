@@ -1,0 +1,132 @@
+//! Quantities of the arm with their units in the type.
+//!
+//! Knows the registers' steps (docs/protocol.md, D10, D11, D18), not the registers.
+
+use std::fmt;
+use std::time::Duration;
+
+/// Angle of a joint, in whole degrees from 0 to 180, as the arm's registers hold it (D18).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Angle(u8);
+
+impl Angle {
+    /// The largest angle, in degrees.
+    pub const MAX_DEGREES: u8 = 180;
+
+    /// `None` where a joint cannot be asked for so many degrees.
+    #[must_use]
+    pub const fn from_degrees(degrees: u8) -> Option<Self> {
+        if degrees <= Self::MAX_DEGREES { Some(Self(degrees)) } else { None }
+    }
+
+    /// What a register holds. A byte past 180, which no arm should send, counts as 180.
+    #[must_use]
+    pub const fn from_register(byte: u8) -> Self {
+        if byte <= Self::MAX_DEGREES { Self(byte) } else { Self(Self::MAX_DEGREES) }
+    }
+
+    /// In degrees.
+    #[must_use]
+    pub const fn degrees(self) -> u8 {
+        self.0
+    }
+}
+
+impl fmt::Display for Angle {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{}°", self.0)
+    }
+}
+
+/// Speed of a joint's moves, in the register's steps of 1.9 degrees/s (D10).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Speed(u8);
+
+impl Speed {
+    /// The motor's maximum, 62 rpm; it leaves the choice to [`MoveTime`] where that is set (D11).
+    pub const MAXIMUM: Self = Self(0);
+    /// 62 rpm in degrees/s.
+    const MAXIMUM_DEGREES_PER_SECOND: f64 = 372.0;
+    /// Degrees/s of one step.
+    const STEP_DEGREES_PER_SECOND: f64 = 1.9;
+
+    /// `steps` of 1.9 degrees/s, 1 to 100; 0 is the maximum. `None` for more than 100.
+    #[must_use]
+    pub const fn from_steps(steps: u8) -> Option<Self> {
+        if steps <= 100 { Some(Self(steps)) } else { None }
+    }
+
+    /// What the register holds.
+    #[must_use]
+    pub const fn steps(self) -> u8 {
+        self.0
+    }
+
+    /// In degrees/s.
+    #[must_use]
+    pub fn degrees_per_second(self) -> f64 {
+        match self.0 {
+            0 => Self::MAXIMUM_DEGREES_PER_SECOND,
+            steps => f64::from(steps) * Self::STEP_DEGREES_PER_SECOND,
+        }
+    }
+}
+
+/// How long a joint's moves take, in the register's steps of 100 ms; counts where the speed is 0 (D11).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MoveTime(u8);
+
+impl MoveTime {
+    /// No duration is asked for.
+    pub const NONE: Self = Self(0);
+
+    /// `steps` of 100 ms, 0 to 100. `None` for more.
+    #[must_use]
+    pub const fn from_steps(steps: u8) -> Option<Self> {
+        if steps <= 100 { Some(Self(steps)) } else { None }
+    }
+
+    /// What the register holds.
+    #[must_use]
+    pub const fn steps(self) -> u8 {
+        self.0
+    }
+
+    /// As a length of time.
+    #[must_use]
+    pub const fn duration(self) -> Duration {
+        // `as` widens here: `From` is not const.
+        Duration::from_millis(self.0 as u64 * 100)
+    }
+}
+
+/// How long a joint takes over `degrees` with this speed and time (D11).
+#[must_use]
+pub fn move_duration(degrees: u8, speed: Speed, time: MoveTime) -> Duration {
+    let at_speed = Duration::from_secs_f64(f64::from(degrees) / speed.degrees_per_second());
+    if speed == Speed::MAXIMUM { at_speed.max(time.duration()) } else { at_speed }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speed_goes_before_time_and_zero_is_the_maximum() {
+        let (Some(slow), Some(long)) = (Speed::from_steps(10), MoveTime::from_steps(50)) else {
+            panic!("both are in range");
+        };
+        assert_eq!(move_duration(19, slow, long), Duration::from_secs(1));
+        assert_eq!(move_duration(19, Speed::MAXIMUM, long), Duration::from_secs(5));
+        assert_eq!(move_duration(186, Speed::MAXIMUM, MoveTime::NONE), Duration::from_millis(500));
+    }
+
+    #[test]
+    fn quantities_end_where_their_registers_do() {
+        assert_eq!(Angle::from_degrees(180).map(Angle::degrees), Some(180));
+        assert_eq!(Angle::from_degrees(181), None);
+        assert_eq!(Angle::from_register(200).degrees(), 180);
+        assert_eq!(Speed::from_steps(101), None);
+        assert_eq!(MoveTime::from_steps(101), None);
+    }
+}

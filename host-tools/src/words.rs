@@ -1,0 +1,209 @@
+//! Register values in words, by the table: `-5 °`, `servo`, `joints 2 and 3`.
+//!
+//! Knows how a value reads, not where it is shown.
+
+use protocol_core::registers::map::{
+    BAUD_RATE, CHIP_ID, EEPROM_LOCK, EFFECTOR_TYPE, FAULTS, LAST_REFUSAL, LAST_REFUSED_REGISTER,
+    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, VACUUM_PUMP, baud_rate, fault, find, motor_state, refusal,
+};
+use protocol_core::registers::{Joint, Register, Unit};
+
+use crate::names::{name_of, name_of_register};
+use crate::snapshot::Snapshot;
+use crate::units::Speed;
+
+/// One value of the table as it is shown.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Its first register.
+    pub address: u8,
+    /// Its name.
+    pub name: String,
+    /// The number, in the table's units: what a write takes.
+    pub value: String,
+    /// What the number means; empty where it says all itself.
+    pub meaning: String,
+}
+
+/// What a snapshot holds, value by value. A value of several registers is one entry where all of them are
+/// there, and bytes where they are not.
+#[must_use]
+pub fn entries(snapshot: &Snapshot) -> Vec<Entry> {
+    let mut entries = Vec::new();
+    let mut addresses = snapshot.span().addresses().peekable();
+    while let Some(address) = addresses.next() {
+        let whole = find(address).filter(|row| is_whole(row, address, snapshot));
+        match whole {
+            Some(row) => {
+                entries.push(long_entry(row, snapshot));
+                while addresses.next_if(|&next| row.holds(next)).is_some() {}
+            }
+            None => entries.push(entry(address, snapshot.at(address))),
+        }
+    }
+    entries
+}
+
+/// What a snapshot holds, byte by byte, without any interpretation.
+#[must_use]
+pub fn raw_entries(snapshot: &Snapshot) -> Vec<Entry> {
+    let pairs = snapshot.span().addresses().zip(&snapshot.values);
+    let raw = |(address, byte): (u8, &u8)| Entry { value: format!("0x{byte:02X}"), ..entry(address, *byte) };
+    pairs.map(raw).map(|entry| Entry { meaning: String::new(), ..entry }).collect()
+}
+
+/// Does a value of several registers begin here, all of them in the snapshot?
+fn is_whole(row: &Register, address: u8, snapshot: &Snapshot) -> bool {
+    let last = row.address.saturating_add(row.count.saturating_sub(1));
+    let runs = row.count > 1 && !row.per_joint && row.access != protocol_core::registers::Access::Reserved;
+    runs && address == row.address && snapshot.span().addresses().any(|held| held == last)
+}
+
+fn long_entry(row: &Register, snapshot: &Snapshot) -> Entry {
+    let value = if *row == CHIP_ID {
+        let bytes = snapshot.span().addresses().filter(|&address| row.holds(address));
+        bytes.map(|address| format!("{:02X}", snapshot.at(address))).collect()
+    } else {
+        snapshot.counter(row).to_string()
+    };
+    Entry { address: row.address, name: name_of(row), value, meaning: String::new() }
+}
+
+fn entry(address: u8, byte: u8) -> Entry {
+    let row = find(address);
+    let value = row.map_or(i16::from(byte), |row| row.range.decode(byte)).to_string();
+    let meaning = row.map(|row| meaning(row, byte)).unwrap_or_default();
+    Entry { address, name: name_of_register(address), value, meaning }
+}
+
+/// What a byte means in a row of the table; empty where the number says all.
+#[must_use]
+pub fn meaning(row: &Register, byte: u8) -> String {
+    match *row {
+        BAUD_RATE => format!("{} baud", baud_rate(byte)),
+        EEPROM_LOCK => (if byte == 0 { "open" } else { "locked" }).to_owned(),
+        MOTOR_STATE => motor_state_word(byte).to_owned(),
+        EFFECTOR_TYPE => (if byte == 0 { "suction cup" } else { "gripper" }).to_owned(),
+        VACUUM_PUMP => (if byte == 0 { "release" } else { "suck" }).to_owned(),
+        FAULTS => faults(byte),
+        MISSING_SERVOS | MOVING_JOINTS => joints(byte),
+        LAST_REFUSAL => refusal_word(byte).to_owned(),
+        LAST_REFUSED_REGISTER => name_of_register(byte),
+        _ => in_unit(row.unit, byte),
+    }
+}
+
+fn in_unit(unit: Unit, byte: u8) -> String {
+    let tenths = f64::from(byte) / 10.0;
+    match unit {
+        Unit::SpeedStep if byte == Speed::MAXIMUM.steps() => "maximum, 372 °/s".to_owned(),
+        Unit::SpeedStep => Speed::from_steps(byte)
+            .map_or_else(String::new, |speed| format!("{:.1} °/s", speed.degrees_per_second())),
+        Unit::Decisecond => format!("{tenths:.1} s"),
+        Unit::Decivolt if byte == 0 => "unknown".to_owned(),
+        Unit::Decivolt => format!("{tenths:.1} V"),
+        Unit::VersionTenths => format!("{tenths:.1}"),
+        _ => unit.symbol().to_owned(),
+    }
+}
+
+/// A state of the motors in a word.
+#[must_use]
+pub const fn motor_state_word(state: u8) -> &'static str {
+    match state {
+        motor_state::DAMPING => "damping protection",
+        motor_state::SERVO => "servo",
+        motor_state::FORCELESS => "forceless",
+        _ => "unknown",
+    }
+}
+
+/// Why the last refused frame was refused.
+#[must_use]
+pub const fn refusal_word(reason: u8) -> &'static str {
+    match reason {
+        refusal::NONE => "none",
+        refusal::MALFORMED_RANGE => "it reached past register 255",
+        refusal::OUT_OF_RANGE => "a value was out of range",
+        refusal::STORAGE_FULL => "the settings storage was full",
+        _ => "unknown",
+    }
+}
+
+/// The faults whose bits are set.
+#[must_use]
+pub fn faults(bits: u8) -> String {
+    const WORDS: [(u8, &str); 6] = [
+        (fault::SETTINGS_STORAGE, "settings storage"),
+        (fault::SERVO_BUS, "servo bus"),
+        (fault::WATCHDOG_RESTART, "restarted by the watchdog"),
+        (fault::BROWN_OUT_RESTART, "restarted after a drop of the supply"),
+        (fault::CRYSTAL_FAILED, "crystal failed"),
+        (fault::RECEIVE_OVERRUN, "over-run of the receive buffer"),
+    ];
+    let set = WORDS.iter().filter(|(bit, _)| bits & bit != 0).map(|&(_, word)| word.to_owned());
+    list(set.collect()).unwrap_or_else(|| "none".to_owned())
+}
+
+/// The joints whose bits are set.
+#[must_use]
+pub fn joints(bits: u8) -> String {
+    let set = Joint::ALL.iter().filter(|joint| bits & joint.bit() != 0);
+    let numbers: Vec<String> = set.map(|joint| joint.number().to_string()).collect();
+    let noun = if numbers.len() == 1 { "joint" } else { "joints" };
+    list(numbers).map_or_else(|| "none".to_owned(), |numbers| format!("{noun} {numbers}"))
+}
+
+fn list(mut words: Vec<String>) -> Option<String> {
+    let last = words.pop()?;
+    Some(if words.is_empty() { last } else { format!("{} and {last}", words.join(", ")) })
+}
+
+/// The values that the register at `address` takes.
+#[must_use]
+pub fn range(address: u8) -> String {
+    find(address).map_or_else(String::new, |row| {
+        let (low, high) = row.range.bounds();
+        format!("{low} to {high}")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol_core::registers::map::{FRAMES_ACCEPTED, OFFSET, SPEED};
+
+    #[test]
+    fn bits_become_lists() {
+        assert_eq!(joints(0), "none");
+        assert_eq!(joints(0b100), "joint 3");
+        assert_eq!(joints(0b110), "joints 2 and 3");
+        assert_eq!(faults(fault::SERVO_BUS | fault::CRYSTAL_FAILED), "servo bus and crystal failed");
+        assert_eq!(faults(0), "none");
+    }
+
+    #[test]
+    fn values_of_several_registers_are_one_entry_when_they_are_all_there() {
+        let whole = Snapshot { address: 0, values: vec![7, 30, 0xAB, 0x46, 0xDB, 0xA5, 0x94, 0x95] };
+        let shown = entries(&whole);
+        assert_eq!(shown.len(), 3);
+        assert_eq!((shown[2].name.as_str(), shown[2].value.as_str()), ("chip-id", "AB46DBA59495"));
+        assert_eq!(shown[1].meaning, "3.0");
+        let part = Snapshot { address: 3, values: vec![0x46, 0xDB] };
+        let names: Vec<String> = entries(&part).into_iter().map(|entry| entry.name).collect();
+        assert_eq!(names, ["chip-id+1", "chip-id+2"]);
+        let counter = Snapshot { address: FRAMES_ACCEPTED.address, values: vec![0x34, 0x12, 5] };
+        let values: Vec<String> = entries(&counter).into_iter().map(|entry| entry.value).collect();
+        assert_eq!(values, ["4660", "5"]);
+    }
+
+    #[test]
+    fn values_read_in_the_units_of_the_table() {
+        assert_eq!(entry(OFFSET.address, 0x85).value, "-5");
+        assert_eq!(entry(OFFSET.address, 0x85).meaning, "°");
+        assert_eq!(meaning(&SPEED, 60), "114.0 °/s");
+        assert_eq!(meaning(&SPEED, 0), "maximum, 372 °/s");
+        let raw = raw_entries(&Snapshot { address: OFFSET.address, values: vec![0x85] });
+        assert_eq!(raw[0].value, "0x85");
+    }
+}

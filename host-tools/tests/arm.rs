@@ -1,0 +1,153 @@
+//! The library against an arm that misbehaves on purpose, through a real pseudo-terminal: what a healthy
+//! arm, or a healthy simulator, never does.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
+
+use std::io::{ErrorKind, Read, Write};
+use std::thread;
+use std::time::Duration;
+
+use protocol_core::request::{Reply, Request};
+use protocol_core::time::{Duration as Micros, Instant};
+use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
+use serialport::{SerialPort, TTYPort};
+use sevenbot::{Arm, Error, Heard, OpenError, Options};
+
+const IDENTITY: [u8; 8] = [7, 30, 1, 2, 3, 4, 5, 6];
+
+/// The frame of a reply.
+fn reply(address: u8, values: &[u8]) -> Vec<u8> {
+    let mut frame = FrameBuffer::new();
+    Reply { address, values }.encode(&mut frame);
+    frame.to_vec()
+}
+
+/// An arm that answers the n-th read (the first is number 0) with whatever bytes the script says, on a port
+/// of this name. It ends when nobody has the port open any more.
+fn arm_of(mut script: impl FnMut(usize, u8, u8) -> Vec<u8> + Send + 'static) -> (String, TTYPort) {
+    let (mut master, slave) = TTYPort::pair().unwrap();
+    let name = slave.name().unwrap();
+    thread::spawn(move || {
+        let mut deframer = Deframer::<ToArm>::new(Micros::from_millis(2));
+        let mut reads = 0;
+        let mut chunk = [0; 256];
+        loop {
+            let length = match master.read(&mut chunk) {
+                Ok(length) => length,
+                Err(error) if error.kind() == ErrorKind::TimedOut => continue,
+                Err(_) => return,
+            };
+            // No test sends more than the deframer holds at once.
+            assert_eq!(deframer.push(Instant::ZERO, &chunk[..length]), length);
+            while let Some(found) = deframer.pull() {
+                if let Ok(Request::Read { address, count }) = found.map(Request::from_frame) {
+                    master.write_all(&script(reads, address, count)).unwrap();
+                    reads += 1;
+                }
+            }
+        }
+    });
+    // Whoever holds the other end keeps the port alive between two openings.
+    (name, slave)
+}
+
+fn options() -> Options {
+    Options { reply_timeout: Duration::from_millis(200), ..Options::default() }
+}
+
+#[test]
+fn a_read_that_got_lost_is_asked_again() {
+    let (name, _port) = arm_of(|read, _, _| if read < 2 { vec![] } else { reply(0, &IDENTITY) });
+    let arm = Arm::open_with(&name, options()).expect("the third try is answered");
+    assert_eq!(arm.identity().version(), "3.0");
+    assert_eq!(arm.identity().chip_id(), [1, 2, 3, 4, 5, 6]);
+}
+
+#[test]
+fn a_silent_port_is_told_from_garbage() {
+    let heard = |bytes: &'static [u8]| {
+        let (name, _port) = arm_of(move |_, _, _| bytes.to_vec());
+        match Arm::open_with(&name, options()) {
+            Err(OpenError::Silent(Error::NoAnswer { attempts: 3, heard, .. })) => heard,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(heard(b""), Heard::default());
+    assert_eq!(heard(b"garbage"), Heard { bytes: 21, ..Heard::default() });
+    let damaged = heard(&[0xAA, 0x77, 0x03, 0x00, 0x00, 0x11, 0x11]);
+    assert_eq!(damaged, Heard { bytes: 21, damaged_frames: 3, other_frames: 0 });
+}
+
+#[test]
+fn another_device_is_refused_by_its_code() {
+    let (name, _port) = arm_of(|_, _, _| reply(0, &[9, 30, 0, 0, 0, 0, 0, 0]));
+    assert!(matches!(Arm::open_with(&name, options()), Err(OpenError::WrongDevice { code: 9 })));
+}
+
+#[test]
+fn an_echo_of_the_request_is_no_answer() {
+    // A one-wire adapter sends back what it was told to send: seen from here, a reply cut short.
+    let echo = [0xAA, 0x77, 0x03, 0x00, 0x08, 0x50, 0x27];
+    let (name, _port) = arm_of(move |_, _, _| [echo.as_slice(), &reply(0, &IDENTITY)].concat());
+    assert!(Arm::open_with(&name, options()).is_ok());
+}
+
+#[test]
+fn reports_in_between_are_neither_answers_nor_lost() {
+    let positions = |first: u8| reply(54, &[first, 20, 30, 40, 50, 60, 70]);
+    let (name, _port) = arm_of(move |read, address, count| match read {
+        0 => reply(0, &IDENTITY),
+        // Two reports and an answer nobody asked for, then the one that was asked for.
+        1 => [positions(1), positions(2), reply(12, &[9]), reply(address, &vec![3; count.into()])].concat(),
+        _ => [reply(address, &vec![4; count.into()]), positions(5)].concat(),
+    });
+    let mut arm = Arm::open_with(&name, options()).unwrap();
+    assert_eq!(arm.read(12, 2).unwrap(), [3, 3]);
+    let first: Vec<u8> = arm.reports().map(|report| report.positions[0].degrees()).collect();
+    assert_eq!(first, [1, 2]);
+    assert_eq!(arm.read(12, 1).unwrap(), [4]);
+    let next = arm.next_report(Duration::from_secs(5)).unwrap().expect("a report came behind the answer");
+    assert_eq!(next.positions[0].degrees(), 5);
+    assert_eq!(arm.next_report(Duration::from_millis(20)).unwrap(), None);
+}
+
+#[test]
+fn a_late_answer_is_not_taken_for_the_next_one() {
+    let (name, _port) = arm_of(|read, address, _| match read {
+        0 => reply(0, &IDENTITY),
+        // The second answer is as good as the first, but comes too late to be wanted.
+        1 => [reply(address, &[1]), reply(address, &[99])].concat(),
+        _ => reply(address, &[2]),
+    });
+    let mut arm = Arm::open_with(&name, options()).unwrap();
+    assert_eq!(arm.read(53, 1).unwrap(), [1]);
+    thread::sleep(Duration::from_millis(50));
+    assert_eq!(arm.read(53, 1).unwrap(), [2]);
+}
+
+#[test]
+fn a_port_that_is_not_there_says_so() {
+    assert!(matches!(Arm::open("/dev/no-such-port", 115_200), Err(OpenError::NotFound)));
+    assert!(matches!(Arm::open("/dev/null", 115_200), Err(OpenError::Unusable(_))));
+    let (name, _port) = arm_of(|_, _, _| reply(0, &IDENTITY));
+    let _first = Arm::open_with(&name, options()).unwrap();
+    assert!(matches!(Arm::open_with(&name, options()), Err(OpenError::Busy)));
+}
+
+#[test]
+fn a_pulled_cable_is_an_error_not_a_time_out() {
+    let (mut master, slave) = TTYPort::pair().unwrap();
+    let name = slave.name().unwrap();
+    let answering = thread::spawn(move || {
+        let mut request = [0; 7];
+        master.set_timeout(Duration::from_secs(10)).unwrap();
+        master.read_exact(&mut request).unwrap();
+        master.write_all(&reply(0, &IDENTITY)).unwrap();
+        master.read_exact(&mut request).unwrap();
+    });
+    let mut arm = Arm::open_with(&name, options()).unwrap();
+    let lost = arm.read(0, 1).unwrap_err();
+    answering.join().unwrap();
+    assert!(matches!(lost, Error::PortLost(_)), "{lost:?}");
+}
