@@ -1,0 +1,76 @@
+//! The simulator's clock: the computer's, less the time the process was stopped.
+
+use std::time::Instant as SystemInstant;
+
+use protocol_core::time::{Duration, Instant};
+use rustix::event::Timespec;
+
+/// A process that was away for longer than this was stopped (Ctrl-Z, a debugger), and so was its arm.
+/// Shorter absences are a busy computer, and are made up for.
+const LONGEST_ABSENCE: Duration = Duration::from_millis(1_000);
+
+/// Microseconds since it was made.
+#[derive(Debug)]
+pub struct Clock {
+    start: SystemInstant,
+    last: Instant,
+    stopped: Duration,
+}
+
+impl Default for Clock {
+    fn default() -> Self {
+        Self { start: SystemInstant::now(), last: Instant::ZERO, stopped: Duration::ZERO }
+    }
+}
+
+impl Clock {
+    /// The time now. Has to be asked more often than once in [`LONGEST_ABSENCE`], or time stands still.
+    pub fn now(&mut self) -> Instant {
+        let micros = u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX);
+        self.at(Instant::from_micros(micros))
+    }
+
+    fn at(&mut self, elapsed: Instant) -> Instant {
+        let now = Instant::from_micros((elapsed - (Instant::ZERO + self.stopped)).as_micros());
+        let absence = now - self.last;
+        if absence > LONGEST_ABSENCE {
+            let excess = absence.as_micros() - LONGEST_ABSENCE.as_micros();
+            self.stopped = Duration::from_micros(self.stopped.as_micros() + excess);
+            self.last = self.last + LONGEST_ABSENCE;
+        } else {
+            self.last = now;
+        }
+        self.last
+    }
+}
+
+/// How long to sleep from `now` to `deadline`, in the operating system's words; at most half the absence
+/// the clock puts up with.
+#[must_use]
+pub fn sleep_until(now: Instant, deadline: Instant) -> Timespec {
+    let micros = (deadline - now).as_micros().min(LONGEST_ABSENCE.as_micros() / 2);
+    let nanos = i64::try_from(micros * 1_000).unwrap_or(0);
+    Timespec { tv_sec: 0, tv_nsec: nanos }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_busy_computer_is_made_up_for_and_a_stopped_process_is_not() {
+        let mut clock = Clock::default();
+        assert_eq!(clock.at(Instant::from_micros(900_000)).as_micros(), 900_000);
+        assert_eq!(clock.at(Instant::from_micros(60_000_000)).as_micros(), 1_900_000);
+        assert_eq!(clock.at(Instant::from_micros(60_000_010)).as_micros(), 1_900_010);
+        assert_eq!(clock.at(Instant::from_micros(60_500_000)).as_micros(), 2_400_000);
+    }
+
+    #[test]
+    fn sleep_is_short_enough_not_to_count_as_a_stop() {
+        let sleep = sleep_until(Instant::ZERO, Instant::FAR_FUTURE);
+        assert_eq!((sleep.tv_sec, sleep.tv_nsec), (0, 500_000_000));
+        assert_eq!(sleep_until(Instant::from_micros(5), Instant::from_micros(9)).tv_nsec, 4_000);
+        assert_eq!(sleep_until(Instant::from_micros(9), Instant::from_micros(5)).tv_nsec, 0);
+    }
+}

@@ -1,0 +1,226 @@
+//! The settings image on disk: where it is, that it is ours alone, and that it is one.
+//!
+//! Knows nothing of what an image holds; that is the journal's work.
+
+use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
+use std::io::{self, Write};
+use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{CWD, RenameFlags, renameat_with};
+use rustix::io::Errno;
+
+use crate::flash::{ERASED, Flash, SIZE};
+
+/// Where the settings live.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Eeprom {
+    /// In memory: forgotten at the end.
+    Memory,
+    /// In the user's state directory.
+    UsersOwn,
+    /// In this file.
+    File(PathBuf),
+}
+
+impl From<&str> for Eeprom {
+    fn from(argument: &str) -> Self {
+        if argument == "none" { Self::Memory } else { Self::File(argument.into()) }
+    }
+}
+
+/// Why there is no image to work with. Each message says what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// Neither `XDG_STATE_HOME` nor `HOME` is set.
+    #[error(
+        "no state directory, as neither XDG_STATE_HOME nor HOME is set: name a file with --eeprom FILE, or use --eeprom none"
+    )]
+    NoStateDirectory,
+    /// Another process holds the lock.
+    #[error("settings image {} is in use by another simulator: end that one, or use --eeprom FILE with a file of its own, or --eeprom none", .0.display())]
+    Locked(PathBuf),
+    /// It is not 32 KiB long, or no file at all.
+    #[error("{} is no settings image ({found}, not a file of {SIZE} bytes): delete it, or name another with --eeprom FILE", path.display())]
+    NotAnImage {
+        /// The path.
+        path: PathBuf,
+        /// What is there.
+        found: String,
+    },
+    /// It has the right size, but neither is it blank nor does it hold a single intact record.
+    #[error("settings image {} is damaged: delete it to start with default settings, or name another with --eeprom FILE", .0.display())]
+    Damaged(PathBuf),
+    /// The operating system refused.
+    #[error("cannot {verb} settings image {}: {cause}: choose another with --eeprom FILE, or use --eeprom none", path.display())]
+    Refused {
+        /// What was tried.
+        verb: &'static str,
+        /// On what.
+        path: PathBuf,
+        /// The system's reason.
+        cause: io::Error,
+    },
+}
+
+impl Eeprom {
+    /// The image's path; `None` in memory.
+    ///
+    /// # Errors
+    /// [`ImageError::NoStateDirectory`].
+    pub fn path(&self) -> Result<Option<PathBuf>, ImageError> {
+        match self {
+            Self::Memory => Ok(None),
+            Self::File(path) => Ok(Some(path.clone())),
+            Self::UsersOwn => users_own(|name| std::env::var_os(name).map(PathBuf::from)).map(Some),
+        }
+    }
+
+    /// The flash that stands for the image, made blank if there is none yet, and locked against other
+    /// simulators for as long as it is open.
+    ///
+    /// # Errors
+    /// See [`ImageError`].
+    pub fn open(&self) -> Result<Flash, ImageError> {
+        let Some(path) = self.path()? else { return Ok(Flash::in_memory()) };
+        let refused = |verb, cause| ImageError::Refused { verb, path: path.clone(), cause };
+        if *self == Self::UsersOwn
+            && let Some(directory) = path.parent()
+        {
+            let made = DirBuilder::new().recursive(true).mode(0o700).create(directory);
+            made.map_err(|cause| refused("make the directory of", cause))?;
+        }
+        let file = match open_existing(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                make_blank(&path).map_err(|cause| refused("make", cause))?;
+                open_existing(&path)
+            }
+            other => other,
+        };
+        let file = file.map_err(|cause| refused("open", cause))?;
+        file.try_lock().map_err(|reason| match reason {
+            TryLockError::WouldBlock => ImageError::Locked(path.clone()),
+            TryLockError::Error(cause) => refused("lock", cause),
+        })?;
+        check_size(&file, &path)?;
+        Ok(Flash::in_file(file))
+    }
+}
+
+fn open_existing(path: &Path) -> io::Result<File> {
+    OpenOptions::new().read(true).write(true).open(path)
+}
+
+/// The user's own image, by the XDG base directory specification: a relative path there counts as unset.
+fn users_own(variable: impl Fn(&str) -> Option<PathBuf>) -> Result<PathBuf, ImageError> {
+    let absolute = |name| variable(name).filter(|path| path.is_absolute());
+    let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")));
+    Ok(state.ok_or(ImageError::NoStateDirectory)?.join("7bot/eeprom.bin"))
+}
+
+/// Makes a blank image appear under its name whole or not at all. If another simulator made one in the
+/// meantime, that one stays.
+fn make_blank(path: &Path) -> io::Result<()> {
+    let mut draft = path.as_os_str().to_owned();
+    draft.push(format!(".{}.new", std::process::id()));
+    let made = write_blank(Path::new(&draft)).and_then(|()| publish(Path::new(&draft), path));
+    if made.is_err() {
+        let _ = fs::remove_file(&draft);
+    }
+    made
+}
+
+fn write_blank(path: &Path) -> io::Result<()> {
+    let mut file = OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(path)?;
+    file.write_all(&[ERASED; SIZE])?;
+    file.sync_all()
+}
+
+fn publish(draft: &Path, path: &Path) -> io::Result<()> {
+    match renameat_with(CWD, draft, CWD, path, RenameFlags::NOREPLACE) {
+        Err(Errno::EXIST) => fs::remove_file(draft),
+        // Some network file systems know no such flag.
+        Err(Errno::INVAL | Errno::NOSYS) => fs::rename(draft, path),
+        other => Ok(other?),
+    }
+}
+
+fn check_size(file: &File, path: &Path) -> Result<(), ImageError> {
+    let metadata = file.metadata().map_err(|cause| ImageError::Refused {
+        verb: "look at",
+        path: path.to_owned(),
+        cause,
+    })?;
+    let found = match (metadata.is_file(), metadata.len()) {
+        (true, length) if length == SIZE as u64 => return Ok(()),
+        (true, length) => format!("{length} bytes long"),
+        (false, _) => "no regular file".to_owned(),
+    };
+    Err(ImageError::NotAnImage { path: path.to_owned(), found })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
+    use super::*;
+
+    #[test]
+    fn the_users_own_image_is_where_the_xdg_specification_says() {
+        let none = |_: &str| None;
+        assert!(matches!(users_own(none), Err(ImageError::NoStateDirectory)));
+        let home = |name: &str| (name == "HOME").then(|| "/home/ada".into());
+        assert_eq!(users_own(home).unwrap(), Path::new("/home/ada/.local/state/7bot/eeprom.bin"));
+        let both = |name: &str| Some(if name == "HOME" { "/home/ada" } else { "/state" }.into());
+        assert_eq!(users_own(both).unwrap(), Path::new("/state/7bot/eeprom.bin"));
+        let relative = |name: &str| Some(if name == "HOME" { "/home/ada" } else { "state" }.into());
+        assert_eq!(users_own(relative).unwrap(), Path::new("/home/ada/.local/state/7bot/eeprom.bin"));
+    }
+
+    #[test]
+    fn a_new_image_is_blank_private_locked_and_leaves_no_draft() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("arm.bin");
+        let eeprom = Eeprom::File(path.clone());
+        let flash = eeprom.open().unwrap();
+        assert!(flash.is_blank().unwrap());
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+        assert!(matches!(eeprom.open(), Err(ImageError::Locked(_))));
+        drop(flash);
+        eeprom.open().unwrap();
+    }
+
+    #[test]
+    fn an_image_that_appears_meanwhile_is_not_replaced() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("arm.bin");
+        fs::write(&path, [7; SIZE]).unwrap();
+        make_blank(&path).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), [7; SIZE]);
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_is_no_image_is_refused_and_left_alone() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("notes.txt");
+        fs::write(&path, "shopping list").unwrap();
+        let error = Eeprom::File(path.clone()).open().unwrap_err();
+        assert!(error.to_string().contains("13 bytes long"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"shopping list");
+        let error = Eeprom::File("/dev/null".into()).open().unwrap_err();
+        assert!(error.to_string().contains("no regular file"), "{error}");
+        let error = Eeprom::File(directory.path().into()).open().unwrap_err();
+        assert!(matches!(error, ImageError::Refused { verb: "open", .. }), "{error}");
+        let error = Eeprom::File(directory.path().join("none/arm.bin")).open().unwrap_err();
+        assert!(matches!(error, ImageError::Refused { verb: "make", .. }), "{error}");
+    }
+
+    #[test]
+    fn none_means_memory() {
+        assert_eq!(Eeprom::from("none"), Eeprom::Memory);
+        assert_eq!(Eeprom::from("./none"), Eeprom::File("./none".into()));
+        assert_eq!(Eeprom::Memory.path().unwrap(), None);
+    }
+}

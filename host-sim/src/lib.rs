@@ -1,0 +1,33 @@
+//! A 7Bot V2 arm in a terminal: the firmware's own controller, with a pseudo-terminal for the host's end and
+//! seven simulated servos for the arm's.
+//!
+//! ```text
+//!              shell (clock, file descriptors, signals)
+//!   ┌──────────────────────────────────────────────────────────────────────┐
+//!   │        World (time is a number)                                      │
+//!   │  pty  ┌────────────────────────────────────────────────────────────┐ │
+//!  ═╪═════▶ │ pace ──▶ motion_core::Controller ──▶ bytes ──▶ Plant       │ │
+//!  ═╪═◀════ │ pace ◀──     │                   ◀── bytes ◀── 7 × Servo   │ │
+//!   │       └──────────────┼─────────────────────────────────────────────┘ │
+//!   │                      ▼ protocol_core::journal ──▶ flash ──▶ a file   │
+//!   └──────────────────────────────────────────────────────────────────────┘
+//! ```
+//!
+//! Everything but the chip is the real thing. [`world`] knows neither clocks nor file descriptors, so a
+//! test can run it through an hour in a second. Linux only: presence of a client is seen through inotify.
+
+#![deny(unsafe_code)]
+
+pub mod clients;
+pub mod clock;
+pub mod eeprom;
+pub mod faults;
+pub mod flash;
+pub mod link;
+pub mod pace;
+pub mod plant;
+pub mod pty;
+pub mod servo;
+pub mod servo_socket;
+pub mod signals;
+pub mod trace;

@@ -1,0 +1,263 @@
+//! The port: a pseudo-terminal whose far end any serial client can open.
+//!
+//! ```text
+//!   simulator ◀──▶ master ═══ kernel ═══ terminal (/dev/pts/N) ◀──▶ client, and the one after it
+//! ```
+//!
+//! The simulator keeps the terminal open as well. So the port stays, raw, while no client is there, and
+//! whatever a client left behind (an exclusive claim, another terminal mode, unread bytes) can be cleared
+//! away before the next one comes. Knows nothing of frames and of time.
+
+use std::ffi::OsStr;
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{Mode, OFlags, fchmod, fcntl_setfl, open};
+use rustix::io::Errno;
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{
+    InputModes, LocalModes, OptionalActions, OutputModes, QueueSelector, Termios, ioctl_tiocnxcl, tcflush,
+    tcgetattr, tcsetattr,
+};
+use tracing::{debug, info, warn};
+
+use crate::clients::Clients;
+
+/// A pseudo-terminal, both ends open.
+#[derive(Debug)]
+pub struct Pty {
+    master: OwnedFd,
+    terminal: OwnedFd,
+    path: PathBuf,
+    /// `None` where the system cannot tell: then somebody always counts as there.
+    clients: Option<Clients>,
+}
+
+impl Pty {
+    /// Opens a pseudo-terminal in raw mode that only this user can open.
+    ///
+    /// # Errors
+    /// The system has none left, or refuses.
+    pub fn open() -> io::Result<Self> {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+        grantpt(&master)?;
+        unlockpt(&master)?;
+        fcntl_setfl(&master, OFlags::RDWR | OFlags::NONBLOCK)?;
+        let name = ptsname(&master, Vec::new())?;
+        let terminal = open(&*name, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
+        fchmod(&terminal, Mode::RUSR | Mode::WUSR)?;
+        make_raw(&terminal, &mut tcgetattr(&terminal)?)?;
+        let path = PathBuf::from(OsStr::from_bytes(name.to_bytes()));
+        let clients = Clients::watch(&path)
+            .inspect_err(|error| warn!("cannot see clients come and go ({error}): output piles up unread"));
+        Ok(Self { master, terminal, path, clients: clients.ok() })
+    }
+
+    /// The name under which clients open it.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What is readable when a client wrote something.
+    #[must_use]
+    pub fn master(&self) -> BorrowedFd<'_> {
+        self.master.as_fd()
+    }
+
+    /// What is readable when a client came or went, if the system can tell.
+    #[must_use]
+    pub fn comings_and_goings(&self) -> Option<BorrowedFd<'_>> {
+        self.clients.as_ref().map(AsFd::as_fd)
+    }
+
+    /// Reads what clients have written; 0: nothing waits.
+    ///
+    /// # Errors
+    /// The pseudo-terminal failed.
+    pub fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
+        none_if_blocked(rustix::io::read(&self.master, bytes))
+    }
+
+    /// Writes to whoever reads; says how many bytes found room.
+    ///
+    /// # Errors
+    /// The pseudo-terminal failed.
+    pub fn write(&self, bytes: &[u8]) -> io::Result<usize> {
+        none_if_blocked(rustix::io::write(&self.master, bytes))
+    }
+
+    /// Has a client the port open?
+    #[must_use]
+    pub fn has_client(&self) -> bool {
+        self.clients.as_ref().is_none_or(|clients| clients.count() > 0)
+    }
+
+    /// Takes note of clients that came or went. When the last has gone, what it left is cleared away; says
+    /// whether that happened.
+    ///
+    /// # Errors
+    /// The pseudo-terminal or inotify failed.
+    pub fn look_for_clients(&mut self) -> io::Result<bool> {
+        let Some(clients) = &mut self.clients else { return Ok(false) };
+        let traffic = clients.look()?;
+        let count = clients.count();
+        if traffic.emptied {
+            self.clear_away(count == 0)?;
+        }
+        match (traffic.came, traffic.emptied, count) {
+            (true, _, 1..) => info!("port open ({count} client{})", if count == 1 { "" } else { "s" }),
+            (_, true, 0) => info!("port closed"),
+            _ => {}
+        }
+        Ok(traffic.emptied)
+    }
+
+    /// Unread answers go, and with them the last client's exclusive claim; its unread *requests* stay. The
+    /// terminal mode is only put right while nobody is there who may have chosen it.
+    fn clear_away(&self, deserted: bool) -> io::Result<()> {
+        // First what is on its way to the terminal, then what has got there.
+        tcflush(&self.master, QueueSelector::OFlush)?;
+        tcflush(&self.terminal, QueueSelector::IFlush)?;
+        ioctl_tiocnxcl(&self.terminal)?;
+        let mut mode = tcgetattr(&self.terminal)?;
+        if deserted && !is_raw(&mode) {
+            debug!("the last client left a terminal mode that alters bytes; raw again");
+            make_raw(&self.terminal, &mut mode)?;
+        }
+        Ok(())
+    }
+}
+
+fn make_raw(terminal: &OwnedFd, mode: &mut Termios) -> io::Result<()> {
+    mode.make_raw();
+    Ok(tcsetattr(terminal, OptionalActions::Now, mode)?)
+}
+
+/// Does every byte pass unaltered, both ways, and none come back as an echo?
+fn is_raw(mode: &Termios) -> bool {
+    let altering = InputModes::ISTRIP
+        | InputModes::INLCR
+        | InputModes::IGNCR
+        | InputModes::ICRNL
+        | InputModes::IXON
+        | InputModes::IXOFF;
+    let meddling = LocalModes::ECHO | LocalModes::ECHONL | LocalModes::ICANON | LocalModes::ISIG;
+    !mode.input_modes.intersects(altering)
+        && !mode.local_modes.intersects(meddling)
+        && !mode.output_modes.contains(OutputModes::OPOST)
+}
+
+fn none_if_blocked(outcome: rustix::io::Result<usize>) -> io::Result<usize> {
+    match outcome {
+        Err(Errno::AGAIN | Errno::INTR) => Ok(0),
+        other => Ok(other?),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::{File, OpenOptions};
+    use std::io::{Read, Write};
+    use std::os::unix::fs::PermissionsExt;
+
+    use rustix::io::ioctl_fionread;
+    use rustix::termios::ioctl_tiocexcl;
+
+    use super::*;
+
+    fn client(pty: &Pty) -> File {
+        OpenOptions::new().read(true).write(true).open(pty.path()).unwrap()
+    }
+
+    /// Bytes reach the master by way of a kernel thread, so they may take a moment.
+    fn read_exactly(pty: &Pty, length: usize) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        for _ in 0..10_000 {
+            let mut piece = [0; 256];
+            let count = pty.read(&mut piece).unwrap();
+            bytes.extend(&piece[..count]);
+            if bytes.len() >= length {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        bytes
+    }
+
+    #[test]
+    fn every_byte_passes_unaltered_both_ways() {
+        let pty = Pty::open().unwrap();
+        let mode = std::fs::metadata(pty.path()).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600);
+        let all: Vec<u8> = (0..=255).collect();
+        let mut client = client(&pty);
+        client.write_all(&all).unwrap();
+        assert_eq!(read_exactly(&pty, 256), all);
+        assert_eq!(pty.write(&all).unwrap(), 256);
+        let mut back = [0; 256];
+        client.read_exact(&mut back).unwrap();
+        assert_eq!(back.as_slice(), all);
+    }
+
+    #[test]
+    fn clients_are_counted_even_when_nobody_looks_for_a_while() {
+        let mut pty = Pty::open().unwrap();
+        assert!(!pty.has_client());
+        let (first, second) = (client(&pty), client(&pty));
+        assert!(!pty.look_for_clients().unwrap());
+        drop(first);
+        assert!(!pty.look_for_clients().unwrap());
+        assert!(pty.has_client(), "two came at once, one is left");
+        drop(second);
+        assert!(pty.look_for_clients().unwrap());
+        assert!(!pty.has_client());
+    }
+
+    #[test]
+    fn requests_of_a_client_that_left_are_kept_and_its_unread_answers_are_not() {
+        let mut pty = Pty::open().unwrap();
+        let mut visitor = client(&pty);
+        visitor.write_all(b"request").unwrap();
+        while pty.write(&[b'x'; 4_096]).unwrap() > 0 {}
+        drop(visitor);
+        assert!(pty.look_for_clients().unwrap());
+        assert_eq!(read_exactly(&pty, 7), b"request");
+        let next = client(&pty);
+        pty.write(b"!").unwrap();
+        for _ in 0..10_000 {
+            if ioctl_fionread(&next).unwrap() > 0 {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        assert_eq!(ioctl_fionread(&next).unwrap(), 1);
+    }
+
+    #[test]
+    fn the_next_client_finds_the_port_free_and_raw() {
+        let mut pty = Pty::open().unwrap();
+        let visitor = client(&pty);
+        ioctl_tiocexcl(&visitor).unwrap();
+        assert!(is_exclusive(&pty.terminal));
+        let mut mode = tcgetattr(&visitor).unwrap();
+        mode.local_modes |= LocalModes::ECHO | LocalModes::ICANON;
+        tcsetattr(&visitor, OptionalActions::Now, &mode).unwrap();
+        drop(visitor);
+        pty.look_for_clients().unwrap();
+        assert!(is_raw(&tcgetattr(&pty.terminal).unwrap()));
+        // Root may open a claimed terminal, so ask for the claim itself.
+        assert!(!is_exclusive(&pty.terminal));
+    }
+
+    /// TIOCGEXCL, which has no safe wrapper.
+    #[allow(unsafe_code)]
+    fn is_exclusive(terminal: &OwnedFd) -> bool {
+        use rustix::ioctl::{Getter, ioctl, opcode};
+        const TIOCGEXCL: rustix::ioctl::Opcode = opcode::read::<i32>(b'T', 0x40);
+        // SAFETY: the kernel writes one int (tty_ioctl(2)), and the getter makes room for one.
+        unsafe { ioctl(terminal, Getter::<TIOCGEXCL, i32>::new()) }.unwrap() != 0
+    }
+}
