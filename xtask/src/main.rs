@@ -37,6 +37,8 @@ enum Chore {
     NoPanic,
     /// Print what the cores cost on the chip, in bytes.
     Size,
+    /// Compare the parse-and-answer path with two Modbus RTU servers.
+    Bench,
 }
 
 fn main() -> ExitCode {
@@ -56,5 +58,6 @@ fn carry_out(chore: &Chore) -> Outcome {
         Chore::Docs { check: false } => registers_md::write(),
         Chore::NoPanic => no_panic::check(),
         Chore::Size => size::print(),
+        Chore::Bench => run::cargo("run --quiet --release --package bench"),
     }
 }

@@ -43,5 +43,5 @@ fn documentation() -> Outcome {
 
 /// A cargo command for every package that builds for the host.
 fn host(command: &str, words: &str) -> String {
-    format!("{command} --workspace --exclude footprint {words}")
+    format!("{command} --workspace --exclude footprint --exclude firmware-stm32 {words}")
 }

@@ -1,0 +1,134 @@
+//! modbus-core: it tells how long a frame is, checks it, decodes it and encodes the reply; stream and
+//! registers are the caller's.
+//!
+//! Its own stream decoder, `rtu::decode`, takes the high byte of the quantity for the byte count of a write
+//! of several registers (version 0.2.0, `request_pdu_len`) and finds no such frame. So the loop over the
+//! bytes is done here, with the same two calls in the same order, and the length of that one request worked
+//! out here.
+
+use modbus_core::rtu::server::encode_response;
+use modbus_core::rtu::{self, DecodedFrame, Header, ResponseAdu};
+use modbus_core::{Data, Error, Exception, ExceptionResponse, FunctionCode, Request, Response, ResponsePdu};
+
+use crate::inbox::Inbox;
+use crate::server::Server;
+use crate::traffic::{STATION, initial_words};
+
+pub(crate) struct ModbusCoreServer {
+    inbox: Inbox,
+    registers: Registers,
+    carried_out: usize,
+}
+
+/// The registers, and room for what is read from them and for the reply: made once, not for each request.
+struct Registers {
+    words: Vec<u16>,
+    data: [u8; 250],
+    frame: [u8; rtu::MAX_FRAME_LEN],
+}
+
+/// Bytes of a frame beside its PDU: station and CRC.
+const ENVELOPE: usize = 3;
+const WRITE_MULTIPLE_REGISTERS: u8 = 0x10;
+
+/// Why a request is refused.
+type Refusal = Exception;
+
+impl ModbusCoreServer {
+    pub(crate) fn new() -> Self {
+        let registers = Registers { words: initial_words(), data: [0; 250], frame: [0; rtu::MAX_FRAME_LEN] };
+        Self { inbox: Inbox::new(), registers, carried_out: 0 }
+    }
+
+    /// Looks for one request at the front. `false`: it takes more bytes to find one.
+    fn answer_one(&mut self, replies: &mut Vec<u8>) -> bool {
+        let bytes = self.inbox.bytes();
+        let frame = match pdu_length(bytes).and_then(|length| match length {
+            Some(length) => Ok(rtu::extract_frame(bytes, length)?.map(|frame| (frame, length))),
+            None => Ok(None),
+        }) {
+            Ok(Some(frame)) => frame,
+            Ok(None) => return false,
+            Err(_) => {
+                self.inbox.take(1);
+                return true;
+            }
+        };
+        let (DecodedFrame { slave, pdu }, length) = frame;
+        if slave == STATION
+            && let Ok(request) = Request::try_from(pdu)
+        {
+            self.carried_out += usize::from(self.registers.answer(request, replies));
+        }
+        self.inbox.take(length + ENVELOPE);
+        true
+    }
+}
+
+/// The length of a request's PDU, as soon as it can be known.
+fn pdu_length(bytes: &[u8]) -> Result<Option<usize>, Error> {
+    match bytes {
+        [_, WRITE_MULTIPLE_REGISTERS, rest @ ..] => Ok(rest.get(4).map(|&count| 6 + usize::from(count))),
+        _ => rtu::request_pdu_len(bytes),
+    }
+}
+
+impl Server for ModbusCoreServer {
+    fn feed(&mut self, piece: &[u8], replies: &mut Vec<u8>) {
+        self.inbox.push(piece);
+        while self.answer_one(replies) {}
+    }
+
+    fn end(&mut self, replies: &mut Vec<u8>) {
+        while !self.inbox.bytes().is_empty() {
+            if !self.answer_one(replies) {
+                self.inbox.take(1);
+            }
+        }
+    }
+
+    fn carried_out(&self) -> usize {
+        self.carried_out
+    }
+}
+
+impl Registers {
+    /// Appends the reply to a request; was it carried out?
+    fn answer(&mut self, request: Request<'_>, replies: &mut Vec<u8>) -> bool {
+        let result = carry_out(&mut self.words, request, &mut self.data);
+        let carried_out = result.is_ok();
+        let function = FunctionCode::from(request);
+        let pdu = ResponsePdu(result.map_err(|exception| ExceptionResponse { function, exception }));
+        let reply = ResponseAdu { hdr: Header { slave: STATION }, pdu };
+        if let Ok(length) = encode_response(reply, &mut self.frame) {
+            replies.extend_from_slice(self.frame.get(..length).unwrap_or(&[]));
+        }
+        carried_out
+    }
+}
+
+fn carry_out<'data>(
+    registers: &mut [u16],
+    request: Request<'_>,
+    data: &'data mut [u8],
+) -> Result<Response<'data>, Refusal> {
+    match request {
+        Request::ReadHoldingRegisters(first, count) => {
+            let first = usize::from(first);
+            let words =
+                registers.get(first..first + usize::from(count)).ok_or(Refusal::IllegalDataAddress)?;
+            let data = Data::from_words(words, data).map_err(|_| Refusal::IllegalDataValue)?;
+            Ok(Response::ReadHoldingRegisters(data))
+        }
+        Request::WriteMultipleRegisters(first, words) => {
+            let start = usize::from(first);
+            let places = registers.get_mut(start..start + words.len()).ok_or(Refusal::IllegalDataAddress)?;
+            for (place, word) in places.iter_mut().zip(words) {
+                *place = word;
+            }
+            let count = u16::try_from(words.len()).map_err(|_| Refusal::IllegalDataValue)?;
+            Ok(Response::WriteMultipleRegisters(first, count))
+        }
+        _ => Err(Refusal::IllegalFunction),
+    }
+}

@@ -1,0 +1,76 @@
+//! This project's path: deframer, request, register file, reply.
+
+use protocol_core::registers::RegisterFile;
+use protocol_core::request::{Reply, Request};
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::deframer::{ABANDON_AFTER, gap};
+use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
+
+use crate::server::Server;
+
+/// Time between two pieces.
+const STEP: Duration = Duration::from_micros(100);
+
+pub(crate) struct OurServer {
+    now: Instant,
+    deframer: Deframer<ToArm>,
+    registers: RegisterFile,
+    reply: FrameBuffer,
+    carried_out: usize,
+}
+
+impl OurServer {
+    pub(crate) fn new() -> Self {
+        Self {
+            now: Instant::ZERO,
+            deframer: Deframer::new(gap(115_200)),
+            registers: RegisterFile::new([1, 2, 3, 4, 5, 6], None),
+            reply: FrameBuffer::new(),
+            carried_out: 0,
+        }
+    }
+
+    fn answer(&mut self, replies: &mut Vec<u8>) {
+        while let Some(found) = self.deframer.pull() {
+            let Ok(frame) = found else { continue };
+            match Request::from_frame(frame) {
+                Request::Read { address, count } => {
+                    Reply { address, values: self.registers.read(address, count) }.encode(&mut self.reply);
+                    replies.extend_from_slice(&self.reply);
+                    self.carried_out += 1;
+                }
+                Request::Write { address, values } => {
+                    if let Ok(accepted) = self.registers.check(address, values) {
+                        self.registers.apply(&accepted);
+                        self.carried_out += 1;
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Server for OurServer {
+    fn feed(&mut self, piece: &[u8], replies: &mut Vec<u8>) {
+        self.now = self.now + STEP;
+        let mut rest = piece;
+        while !rest.is_empty() {
+            let taken = self.deframer.push(self.now, rest);
+            rest = rest.get(taken..).unwrap_or(&[]);
+            self.answer(replies);
+        }
+    }
+
+    fn end(&mut self, replies: &mut Vec<u8>) {
+        self.now = self.now + ABANDON_AFTER;
+        // Twice: a silence is noted again where a search was under way.
+        for _ in 0..2 {
+            self.deframer.push(self.now, &[]);
+            self.answer(replies);
+        }
+    }
+
+    fn carried_out(&self) -> usize {
+        self.carried_out
+    }
+}
