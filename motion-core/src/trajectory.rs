@@ -58,7 +58,8 @@ impl Trajectory {
             (0, cycles) => (distance.abs() / i32::from(cycles)).min(LARGEST_STEP),
             (speed, _) => i32::from(speed) * STEP_PER_SPEED_UNIT,
         };
-        self.set_point.0 += distance.clamp(-step, step);
+        // `clamp` would bring its own panic along.
+        self.set_point.0 += distance.min(step).max(-step);
         self.cycles_left = self.cycles_left.saturating_sub(1);
     }
 }

@@ -154,3 +154,39 @@ fn the_deadline_says_when_silence_matters() {
     assert_eq!(deframer.pull(), None);
     assert_eq!(deframer.deadline(), None);
 }
+
+#[test]
+fn d05_silence_counts_even_while_nobody_pulls() {
+    let at = Instant::from_micros;
+    let good = frame(6, 46, &[90; 7]);
+    let (head, tail) = good.split_at(8);
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    deframer.push(at(0), head);
+    deframer.push(at(LONG_SILENCE_US), &[]);
+    deframer.push(at(LONG_SILENCE_US), tail);
+    assert_eq!(deframer.pull(), None, "the two halves are not one frame");
+}
+
+#[test]
+fn d05_a_search_behind_a_head_goes_on_where_it_stopped() {
+    let at = Instant::from_micros;
+    let inner = [frame(3, 54, &[]), frame(6, 46, &[1]), frame(6, 46, &[2])];
+    let spoiled = |checksum: u8| {
+        let mut bytes = stream::raw_frame(6, 0, 23, &inner.concat());
+        bytes[28] ^= checksum;
+        bytes
+    };
+    // The head fails, or proves right, while one of three frames behind it is told.
+    for (checksum, expected) in [(1, 2), (0, 1)] {
+        let outer = spoiled(checksum);
+        let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+        deframer.push(at(0), &outer[..29]);
+        deframer.push(at(GAP_US), &[]);
+        assert!(matches!(deframer.pull(), Some(Ok(told)) if told.address == 54));
+        deframer.push(at(GAP_US), &outer[29..]);
+        let mut received = Vec::new();
+        stream::drain(&mut deframer, &mut received);
+        received.retain(|said| matches!(said, Received::Frame(_)));
+        assert_eq!(received.len(), expected, "{received:?}");
+    }
+}

@@ -137,7 +137,7 @@ impl<D: Direction> Deframer<D> {
         // An unfinished search keeps its mark: a later call will note the silence again.
         if silence >= self.gap && self.quiet < end && self.judged >= self.quiet {
             self.quiet = end;
-            self.behind = self.head + 1;
+            self.behind = self.head;
             self.wanted = 0;
         }
         if silence >= ABANDON_AFTER && self.cut < end {
