@@ -25,7 +25,7 @@
 use core::marker::PhantomData;
 use core::ops::Range;
 
-use super::frame::{Defect, Direction, Frame, HEADER, MAX_LENGTH, Verdict, judge, parse};
+use super::frame::{Defect, Direction, Frame, HEADER, MAX_LENGTH, Verdict, judge};
 use crate::time::{Duration, Instant};
 
 /// The shortest gap that lets whole frames pass an unfinished one (D4).
@@ -110,10 +110,7 @@ impl<D: Direction> Deframer<D> {
     pub fn pull(&mut self) -> Option<Result<Frame<'_>, Defect>> {
         match self.search()? {
             Found::Defect(defect) => Some(Err(defect)),
-            Found::Frame(place) => {
-                let bytes = self.buffer.get(place)?;
-                parse::<D>(bytes).ok().map(|(_, frame)| Ok(frame))
-            }
+            Found::Frame(place) => Frame::of_judged(self.buffer.get(place)?).map(Ok),
         }
     }
 

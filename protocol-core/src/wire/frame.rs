@@ -136,6 +136,17 @@ pub fn parse<D: Direction>(input: &[u8]) -> IResult<&[u8], Frame<'_>, Defect> {
     Ok((rest, Frame { function, address, count, data }))
 }
 
+impl<'a> Frame<'a> {
+    /// Takes apart bytes that were judged to be a whole frame, without checking them again.
+    pub(super) const fn of_judged(bytes: &'a [u8]) -> Option<Self> {
+        let [_, _, code, address, count, data @ .., _, _] = bytes else { return None };
+        match Function::from_code(*code) {
+            Some(function) => Some(Self { function, address: *address, count: *count, data }),
+            None => None,
+        }
+    }
+}
+
 /// What the beginning of a stretch of bytes is, and how long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
