@@ -118,11 +118,11 @@ impl Arm {
             return self.refuse(refusal::STORAGE_FULL, setting);
         }
         self.change_mode(&accepted);
-        let places = changed_setting.map(|_| self.set_points_in_counts());
+        let offsets = Joint::ALL.map(|joint| offset(&self.registers, joint));
         self.registers.apply(&accepted);
-        if let Some(places) = places {
+        if changed_setting.is_some() {
             self.to_save = Some(self.registers.image());
-            self.rename_places(&places);
+            self.rename_places(&offsets);
         }
         self.aim(&accepted);
         self.switch(now, &accepted);
@@ -178,22 +178,17 @@ impl Arm {
         }
     }
 
-    fn set_points_in_counts(&self) -> [u16; JOINTS] {
-        let mut counts = [0; JOINTS];
-        for ((joint, state), place) in Joint::ALL.into_iter().zip(&self.joints).zip(&mut counts) {
-            *place = counts_from_angle(joint, state.drive.set_point(), offset(&self.registers, joint));
-        }
-        counts
-    }
-
-    /// An offset changed, the joints did not move: their places have other names now (D9). Each then goes
-    /// to its target, by the new name, at its speed.
-    fn rename_places(&mut self, places: &[u16; JOINTS]) {
-        for ((joint, state), &counts) in Joint::ALL.into_iter().zip(&mut self.joints).zip(places) {
+    /// Where an offset changed, the joint did not move, but its place has another name now (D9). It goes to
+    /// its target, by the new name, at its speed.
+    fn rename_places(&mut self, offsets_before: &[i8; JOINTS]) {
+        for ((joint, state), &before) in Joint::ALL.into_iter().zip(&mut self.joints).zip(offsets_before) {
             let offset = offset(&self.registers, joint);
-            let place = angle_from_counts(joint, counts, offset);
-            let target = MicroDegrees::from_degrees(self.registers.get(TARGET_POSITION.of(joint)));
-            state.drive.rename_place(place, target, self.registers.get(TIME.of(joint)));
+            if offset != before {
+                let counts = counts_from_angle(joint, state.drive.set_point(), before);
+                let target = MicroDegrees::from_degrees(self.registers.get(TARGET_POSITION.of(joint)));
+                let place = angle_from_counts(joint, counts, offset);
+                state.drive.rename_place(place, target, self.registers.get(TIME.of(joint)));
+            }
         }
     }
 

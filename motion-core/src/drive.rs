@@ -72,10 +72,11 @@ impl Drive {
         Some(Engaged::Moving)
     }
 
-    /// What is called `from` now is called `to` from now on: the joint's offset changed, its place did not.
-    pub fn rename_place(&mut self, to: MicroDegrees, target: MicroDegrees, time: u8) {
+    /// The joint's offset changed: the place where it is has another name from now on, and the way to its
+    /// `target` begins there.
+    pub fn rename_place(&mut self, place: MicroDegrees, target: MicroDegrees, time: u8) {
         if self.is_engaged() {
-            self.trajectory = Trajectory::holding(to);
+            self.trajectory = Trajectory::holding(place);
             self.trajectory.move_to(target, time);
         }
     }

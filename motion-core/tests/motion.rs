@@ -206,6 +206,19 @@ fn d09_an_offset_changes_what_is_seen_and_where_the_servo_goes() {
 }
 
 #[test]
+fn d09_a_setting_written_during_a_timed_move_does_not_disturb_it() {
+    let mut rig = Rig::started();
+    rig.write(28, &[0]);
+    rig.write(32, &[0]);
+    rig.write(39, &[10]);
+    rig.write(46, &[130]);
+    rig.run_ms(500);
+    rig.write(11, &[77, 0, 0x80]);
+    let millis = rig.run_until_still();
+    assert!((490..=510).contains(&millis), "{millis} ms left of one second");
+}
+
+#[test]
 fn d18_present_positions_are_clamped_to_180() {
     let mut rig = Rig::started();
     rig.write(29, &[FORCELESS]);
