@@ -1,6 +1,6 @@
 //! The settings image on disk: where it is, that it is ours alone, and that it is one.
 //!
-//! Knows nothing of what an image holds; that is the journal's work.
+//! Knows nothing of what an image holds.
 
 use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
@@ -11,6 +11,7 @@ use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
 
 use crate::flash::{ERASED, Flash, SIZE};
+use crate::store::is_damaged;
 
 /// Where the settings live.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -103,7 +104,9 @@ impl Eeprom {
             TryLockError::Error(cause) => refused("lock", cause),
         })?;
         check_size(&file, &path)?;
-        Ok(Flash::in_file(file))
+        let flash = Flash::in_file(file);
+        let copy = flash.copy().map_err(|cause| refused("read", cause))?;
+        if is_damaged(copy) { Err(ImageError::Damaged(path)) } else { Ok(flash) }
     }
 }
 

@@ -12,6 +12,7 @@ use std::os::unix::fs::FileExt;
 use std::rc::Rc;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use tracing::warn;
 
 /// Bytes of one sector (STM32F405, sectors 0 to 3).
 pub const SECTOR_SIZE: usize = 16 * 1024;
@@ -107,7 +108,9 @@ impl Cells {
 
     fn write(&mut self, offset: usize, bytes: &[u8]) -> io::Result<()> {
         match self {
-            Self::File(file) => file.write_all_at(bytes, offset as u64),
+            Self::File(file) => file
+                .write_all_at(bytes, offset as u64)
+                .inspect_err(|error| warn!("cannot write to the settings image: {error}")),
             Self::Memory(cells) => {
                 let end = offset + bytes.len();
                 cells.get_mut(offset..end).ok_or(io::ErrorKind::UnexpectedEof)?.copy_from_slice(bytes);

@@ -18,6 +18,7 @@
 
 #![deny(unsafe_code)]
 
+pub mod cli;
 pub mod clients;
 pub mod clock;
 pub mod eeprom;
@@ -29,5 +30,8 @@ pub mod plant;
 pub mod pty;
 pub mod servo;
 pub mod servo_socket;
+pub mod shell;
 pub mod signals;
+pub mod store;
 pub mod trace;
+pub mod world;

@@ -118,8 +118,6 @@ impl Pty {
     /// Unread answers go, and with them the last client's exclusive claim; its unread *requests* stay. The
     /// terminal mode is only put right while nobody is there who may have chosen it.
     fn clear_away(&self, deserted: bool) -> io::Result<()> {
-        // First what is on its way to the terminal, then what has got there.
-        tcflush(&self.master, QueueSelector::OFlush)?;
         tcflush(&self.terminal, QueueSelector::IFlush)?;
         ioctl_tiocnxcl(&self.terminal)?;
         let mut mode = tcgetattr(&self.terminal)?;

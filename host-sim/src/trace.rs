@@ -34,13 +34,15 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Tells `sink` one line a frame. `gap` is the silence the arm itself goes by (D4).
+    /// Tells `sink` one line a frame.
     #[must_use]
-    pub fn new(gap: Duration, sink: Box<dyn FnMut(&str)>) -> Self {
+    pub fn new(sink: Box<dyn FnMut(&str)>) -> Self {
+        let gap = Duration::ZERO;
         Self { from_host: Listener::new("->", gap), to_host: Listener::new("<-", gap), sink }
     }
 
-    /// The link starts over, with another gap perhaps: unfinished frames are forgotten.
+    /// The link starts, or starts over: unfinished frames are forgotten. `gap` is the silence the arm itself
+    /// goes by (D4).
     pub fn restart(&mut self, gap: Duration) {
         self.from_host = Listener::new("->", gap);
         self.to_host = Listener::new("<-", gap);
@@ -236,7 +238,9 @@ mod tests {
         let lines = Rc::new(RefCell::new(Vec::new()));
         let heard = Rc::clone(&lines);
         let sink = Box::new(move |line: &str| heard.borrow_mut().push(line.to_owned()));
-        Session { trace: Trace::new(gap(115_200), sink), lines, now: Instant::ZERO }
+        let mut trace = Trace::new(sink);
+        trace.restart(gap(115_200));
+        Session { trace, lines, now: Instant::ZERO }
     }
 
     impl Session {

@@ -1,0 +1,248 @@
+//! The built simulator as a user meets it: its first line, its files, its signals, its exit statuses.
+
+#![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
+
+mod sim;
+
+use std::fs;
+use std::io::Read;
+use std::os::unix::fs::{FileTypeExt, PermissionsExt};
+use std::os::unix::net::UnixStream;
+use std::time::Duration;
+
+use protocol_core::registers::map::{DEVICE_ID, EEPROM_LOCK, MISSING_SERVOS, PRESENT_POSITION, SPEED};
+use rustix::process::Signal;
+use sim::{Client, Sim, complaint, refused};
+
+#[test]
+fn the_first_line_names_a_port_that_can_be_opened_and_is_the_only_one() {
+    let mut sim = Sim::start(&["--eeprom", "none"]);
+    let metadata = fs::metadata(sim.port()).unwrap();
+    assert!(metadata.file_type().is_char_device());
+    assert_eq!(metadata.permissions().mode() & 0o777, 0o600);
+    let mut client = Client::open(sim.port());
+    assert_eq!(client.read(DEVICE_ID.address, 1).len(), 1);
+    assert_eq!(sim.end_with(Signal::TERM), Some(0));
+    assert_eq!(sim.rest_of_stdout(), "");
+}
+
+#[test]
+fn the_link_stands_while_the_simulator_runs() {
+    let directory = tempfile::tempdir().unwrap();
+    let link = directory.path().join("7bot");
+    std::os::unix::fs::symlink("/dev/pts/stale", &link).unwrap();
+    let mut sim = Sim::start(&["--eeprom", "none", "--link", link.to_str().unwrap()]);
+    assert_eq!(fs::read_link(&link).unwrap(), sim.port());
+    Client::open(&link).read(PRESENT_POSITION.address, 7);
+    assert_eq!(sim.end_with(Signal::INT), Some(0));
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_file_in_the_place_of_the_link_is_left_alone() {
+    let directory = tempfile::tempdir().unwrap();
+    let link = directory.path().join("thesis.tex");
+    fs::write(&link, "years").unwrap();
+    let line = refused(&["--eeprom", "none", "--link", link.to_str().unwrap()]);
+    assert!(line.contains("thesis.tex") && line.contains("choose another path"), "{line}");
+    assert_eq!(fs::read(&link).unwrap(), b"years");
+}
+
+#[test]
+fn one_image_serves_one_simulator() {
+    let directory = tempfile::tempdir().unwrap();
+    let image = directory.path().join("arm.bin");
+    let image = image.to_str().unwrap();
+    let _first = Sim::start(&["--eeprom", image]);
+    let line = refused(&["--eeprom", image]);
+    assert!(line.contains("in use") && line.contains("--eeprom none"), "{line}");
+}
+
+#[test]
+fn without_an_option_the_image_is_in_the_state_directory() {
+    let state = tempfile::tempdir().unwrap();
+    let _first = Sim::start_in(state.path(), &[]);
+    let image = state.path().join("7bot/eeprom.bin");
+    assert_eq!(fs::metadata(&image).unwrap().len(), 32_768);
+    assert_eq!(fs::metadata(&image).unwrap().permissions().mode() & 0o777, 0o600);
+    let line = complaint(&mut sim::command(state.path(), &[]));
+    assert!(line.contains("--eeprom FILE") && line.contains("--eeprom none"), "{line}");
+}
+
+#[test]
+fn what_is_no_settings_image_is_refused_and_left_alone() {
+    let directory = tempfile::tempdir().unwrap();
+    let image = directory.path().join("arm.bin");
+    for (content, says) in [(vec![0xA5; 32_768], "damaged"), (vec![0xFF; 100], "100 bytes long")] {
+        fs::write(&image, &content).unwrap();
+        let line = refused(&["--eeprom", image.to_str().unwrap()]);
+        assert!(line.contains(says) && line.contains("delete it"), "{line}");
+        assert_eq!(fs::read(&image).unwrap(), content);
+    }
+}
+
+#[test]
+fn a_wrong_command_line_is_refused_in_one_line() {
+    for (arguments, says) in [
+        (vec!["--eprom", "x"], "--eeprom"),
+        (vec!["--chip-id", "xyz"], "12 hexadecimal digits"),
+        (vec!["--fault", "8=missing"], "1 to 7"),
+        (vec!["--eeprom", "none", "--link", "/nowhere/7bot"], "/nowhere/7bot"),
+        (vec!["--eeprom", "/nowhere/arm.bin"], "/nowhere/arm.bin"),
+        (vec!["--servo-socket", "/nowhere/servos"], "/nowhere/servos"),
+    ] {
+        let line = refused(&arguments);
+        assert!(line.contains(says), "{line}");
+    }
+}
+
+#[test]
+fn help_teaches() {
+    let state = tempfile::tempdir().unwrap();
+    let output = sim::command(state.path(), &["--help"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    let help = String::from_utf8(output.stdout).unwrap();
+    for word in ["host-sim --link ./7bot", "SIGHUP", "EXIT STATUS", "--servo-socket", "--unpaced"] {
+        assert!(help.contains(word), "{word}");
+    }
+}
+
+#[test]
+fn sighup_is_a_power_cycle_and_the_port_stays() {
+    let sim = Sim::start(&["--eeprom", "none"]);
+    let mut client = Client::open(sim.port());
+    client.write(EEPROM_LOCK.address, &[0]);
+    client.write(DEVICE_ID.address, &[42]);
+    client.write(SPEED.address, &[7]);
+    assert_eq!(client.read(SPEED.address, 1), [7]);
+    sim.signal(Signal::HUP);
+    client.read_until(SPEED.address, &[60]);
+    assert_eq!(client.read(DEVICE_ID.address, 1), [42], "settings are kept");
+    assert_eq!(client.read(EEPROM_LOCK.address, 1), [1], "and protected again");
+}
+
+#[test]
+fn settings_survive_a_kill() {
+    let directory = tempfile::tempdir().unwrap();
+    let image = directory.path().join("arm.bin");
+    let arguments = ["--eeprom", image.to_str().unwrap()];
+    for id in 1..=5 {
+        let mut sim = Sim::start(&arguments);
+        let mut client = Client::open(sim.port());
+        assert_eq!(client.read(DEVICE_ID.address, 1), [id - 1]);
+        client.write(EEPROM_LOCK.address, &[0]);
+        client.write(DEVICE_ID.address, &[id]);
+        assert_eq!(client.read(DEVICE_ID.address, 1), [id]);
+        assert_eq!(sim.end_with(Signal::KILL), None);
+    }
+}
+
+#[test]
+fn a_client_that_leaves_at_once_is_still_obeyed_and_the_next_starts_clean() {
+    let sim = Sim::start(&["--eeprom", "none"]);
+    let mut first = Client::open(sim.port());
+    for _ in 0..200 {
+        first.send_read(0, 61);
+    }
+    drop(first);
+    let mut second = Client::open(sim.port());
+    second.write(SPEED.address, &[7]);
+    drop(second);
+    let mut third = Client::open(sim.port());
+    third.read_until(SPEED.address, &[7]);
+}
+
+#[test]
+fn a_client_that_reads_late_gets_every_answer() {
+    let sim = Sim::start(&["--eeprom", "none", "--unpaced"]);
+    let mut client = Client::open(sim.port());
+    let mut reader = Client::open(sim.port());
+    // 34 KB of answers: far more than the kernel holds, so the simulator has to wait.
+    let writer = std::thread::spawn(move || (0..500).for_each(|_| client.send_read(0, 61)));
+    std::thread::sleep(Duration::from_millis(300));
+    for _ in 0..500 {
+        assert_eq!(reader.answer(0, 61).len(), 61);
+    }
+    writer.join().unwrap();
+}
+
+#[test]
+fn nobody_has_to_listen_to_what_it_says() {
+    let directory = tempfile::tempdir().unwrap();
+    let link = directory.path().join("7bot");
+    let arguments = ["--eeprom", "none", "--trace", "-vv", "--link", link.to_str().unwrap()];
+    let mut sim = Sim::start(&arguments);
+    sim.close_output();
+    let mut client = Client::open(&link);
+    client.read(PRESENT_POSITION.address, 7);
+    sim.signal(Signal::HUP);
+    client.read(PRESENT_POSITION.address, 7);
+    assert_eq!(sim.end_with(Signal::TERM), Some(0));
+}
+
+#[test]
+fn trace_tells_frames_in_words_on_standard_error() {
+    let mut sim = Sim::start(&["--eeprom", "none", "-q", "--trace"]);
+    Client::open(sim.port()).read(DEVICE_ID.address, 1);
+    sim.end_with(Signal::TERM);
+    let told = sim.rest_of_stderr();
+    assert!(told.contains("-> read device_id\n") && told.contains("<- device_id = 0\n"), "{told}");
+    assert!(!told.contains('\u{1b}'), "no colours in a pipe: {told}");
+}
+
+#[test]
+fn faults_from_the_command_line_befall_the_arm() {
+    let sim = Sim::start(&[
+        "--eeprom",
+        "none",
+        "--fault",
+        "3=missing",
+        "--fault",
+        "5=garbled",
+        "--fault",
+        "bus=echo",
+    ]);
+    Client::open(sim.port()).read_until(MISSING_SERVOS.address, &[0b001_0100]);
+}
+
+#[test]
+fn the_servos_alone_answer_on_a_socket() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("servos.sock");
+    let arguments = ["--servo-socket", path.to_str().unwrap()];
+    let mut sim = Sim::start(&arguments);
+    assert_eq!(sim.port(), path);
+    assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+    let line = refused(&arguments);
+    assert!(line.contains("another simulator"), "{line}");
+    for _ in 0..3 {
+        let mut bus = UnixStream::connect(&path).unwrap();
+        assert_eq!(ping(&mut bus), [0xFF, 0xFF, 0x00, 0x02, 0x00, 0xFD]);
+    }
+    assert_eq!(sim.end_with(Signal::TERM), Some(0));
+    assert!(!path.exists());
+}
+
+#[test]
+fn a_stale_servo_socket_is_replaced() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("servos.sock");
+    let arguments = ["--servo-socket", path.to_str().unwrap()];
+    Sim::start(&arguments).end_with(Signal::KILL);
+    assert!(path.exists());
+    let _sim = Sim::start(&arguments);
+    ping(&mut UnixStream::connect(&path).unwrap());
+}
+
+/// Pings servo 0 until it answers: it is deaf for a while after power-up.
+fn ping(bus: &mut UnixStream) -> [u8; 6] {
+    bus.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
+    for _ in 0..100 {
+        std::io::Write::write_all(bus, b"\xff\xff\x00\x02\x01\xfc").unwrap();
+        let mut answer = [0; 6];
+        if bus.read_exact(&mut answer).is_ok() {
+            return answer;
+        }
+    }
+    panic!("no servo answers");
+}

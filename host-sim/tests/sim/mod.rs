@@ -1,0 +1,201 @@
+//! Runs the built simulator, and talks to it as a serial client does.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use protocol_core::request::{Reply, Request};
+use protocol_core::time;
+use protocol_core::wire::{Deframer, FrameBuffer, ToHost, deframer};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::process::{Pid, Signal, kill_process};
+
+/// Nothing takes this long on the slowest machine.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// A running simulator; it is killed when this is dropped.
+pub(crate) struct Sim {
+    child: Child,
+    port: PathBuf,
+    stdout: Option<BufReader<ChildStdout>>,
+    stderr: Option<ChildStderr>,
+    _state: tempfile::TempDir,
+}
+
+/// The simulator with these arguments, and a state directory that is not the user's.
+pub(crate) fn command(state: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+    command.args(arguments).env("XDG_STATE_HOME", state).stdin(Stdio::null());
+    command
+}
+
+/// What a simulator that refuses its arguments says: one line, and exit status 2.
+pub(crate) fn refused(arguments: &[&str]) -> String {
+    complaint(&mut command(tempfile::tempdir().unwrap().path(), arguments))
+}
+
+/// Likewise, of a command.
+pub(crate) fn complaint(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(output.stdout, b"");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    said
+}
+
+impl Sim {
+    /// Starts a simulator and waits for its first line.
+    pub(crate) fn start(arguments: &[&str]) -> Self {
+        let state = tempfile::tempdir().unwrap();
+        let child = command(state.path(), arguments);
+        Self::spawn(child, state)
+    }
+
+    /// Likewise, with this state directory.
+    pub(crate) fn start_in(state: &Path, arguments: &[&str]) -> Self {
+        Self::spawn(command(state, arguments), tempfile::tempdir().unwrap())
+    }
+
+    fn spawn(mut command: Command, state: tempfile::TempDir) -> Self {
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut stdout = BufReader::new(child.stdout.take().unwrap());
+        let stderr = child.stderr.take();
+        let mut line = String::new();
+        stdout.read_line(&mut line).unwrap();
+        let port = line.strip_prefix("ready ").and_then(|rest| rest.strip_suffix('\n'));
+        let port = PathBuf::from(port.unwrap_or_else(|| panic!("first line: {line:?}")));
+        Self { child, port, stdout: Some(stdout), stderr, _state: state }
+    }
+
+    /// What the first line named.
+    pub(crate) fn port(&self) -> &Path {
+        &self.port
+    }
+
+    pub(crate) fn signal(&self, signal: Signal) {
+        kill_process(Pid::from_child(&self.child), signal).unwrap();
+    }
+
+    /// Sends a signal and waits for the exit status; `None` if it was killed.
+    pub(crate) fn end_with(&mut self, signal: Signal) -> Option<i32> {
+        self.signal(signal);
+        self.child.wait().unwrap().code()
+    }
+
+    /// Stops reading what it says, as a closed terminal does.
+    pub(crate) fn close_output(&mut self) {
+        self.stdout = None;
+        self.stderr = None;
+    }
+
+    /// What it said after the first line; it must have ended.
+    pub(crate) fn rest_of_stdout(&mut self) -> String {
+        read_to_end(self.stdout.as_mut().unwrap())
+    }
+
+    /// Everything it said on standard error; it must have ended.
+    pub(crate) fn rest_of_stderr(&mut self) -> String {
+        read_to_end(self.stderr.as_mut().unwrap())
+    }
+}
+
+fn read_to_end(stream: &mut impl Read) -> String {
+    let mut text = String::new();
+    stream.read_to_string(&mut text).unwrap();
+    text
+}
+
+impl Drop for Sim {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A serial client that asks and waits for answers.
+pub(crate) struct Client {
+    port: File,
+    deframer: Deframer<ToHost>,
+    /// Received, and not yet taken by the deframer.
+    received: Vec<u8>,
+    start: Instant,
+}
+
+impl Client {
+    pub(crate) fn open(port: &Path) -> Self {
+        let port = OpenOptions::new().read(true).write(true).open(port).unwrap();
+        let deframer = Deframer::new(deframer::gap(115_200));
+        Self { port, deframer, received: Vec::new(), start: Instant::now() }
+    }
+
+    fn send(&mut self, request: Request<'_>) {
+        let mut bytes = FrameBuffer::new();
+        request.encode(&mut bytes);
+        self.port.write_all(&bytes).unwrap();
+    }
+
+    pub(crate) fn write(&mut self, address: u8, values: &[u8]) {
+        self.send(Request::Write { address, values });
+    }
+
+    pub(crate) fn send_read(&mut self, address: u8, count: u8) {
+        self.send(Request::Read { address, count });
+    }
+
+    /// Reads registers.
+    pub(crate) fn read(&mut self, address: u8, count: u8) -> Vec<u8> {
+        self.send_read(address, count);
+        self.answer(address, count)
+    }
+
+    /// The next answer from these registers; others, and what is left of one, are skipped.
+    pub(crate) fn answer(&mut self, address: u8, count: u8) -> Vec<u8> {
+        let patience_ends = Instant::now() + PATIENCE;
+        loop {
+            while let Some(found) = self.deframer.pull() {
+                match found.ok().and_then(Reply::from_frame) {
+                    Some(reply) if (reply.address, reply.values.len()) == (address, count.into()) => {
+                        return reply.values.to_vec();
+                    }
+                    _ => {}
+                }
+            }
+            assert!(Instant::now() < patience_ends, "no answer");
+            self.receive();
+        }
+    }
+
+    /// Reads registers again and again until they hold these values.
+    pub(crate) fn read_until(&mut self, address: u8, values: &[u8]) {
+        let patience_ends = Instant::now() + PATIENCE;
+        let count = u8::try_from(values.len()).unwrap();
+        loop {
+            let found = self.read(address, count);
+            if found == values {
+                return;
+            }
+            assert!(Instant::now() < patience_ends, "still {found:?}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Gives the deframer what waits, or the next bytes from the port, or the news that there are none.
+    fn receive(&mut self) {
+        if self.received.is_empty() && self.waits_readable() {
+            let mut bytes = [0; 4_096];
+            let count = self.port.read(&mut bytes).unwrap();
+            self.received.extend(&bytes[..count]);
+        }
+        let micros = u64::try_from(self.start.elapsed().as_micros()).unwrap();
+        let taken = self.deframer.push(time::Instant::from_micros(micros), &self.received);
+        self.received.drain(..taken);
+    }
+
+    fn waits_readable(&self) -> bool {
+        let moment = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
+        poll(&mut [PollFd::new(&self.port, PollFlags::IN)], Some(&moment)).unwrap() > 0
+    }
+}
