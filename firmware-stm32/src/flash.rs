@@ -95,6 +95,9 @@ impl<'a> Flash<'a> {
         }
         let done = operation(self);
         self.registers.cr().write(|w| w.lock().locked());
+        if let Err(error) = done {
+            defmt::warn!("flash: {}", error);
+        }
         done
     }
 

@@ -241,6 +241,16 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Write for End<U, REC
         Ok(count)
     }
 
+    /// As the trait has it, less its panic at a `write` that takes nothing.
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), Infallible> {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let count = self.write(rest)?;
+            rest = rest.get(count..).unwrap_or(&[]);
+        }
+        Ok(())
+    }
+
     fn flush(&mut self) -> Result<(), Infallible> {
         while !self.line.with(|state| state.to_send.is_empty()) {
             self.wait();
