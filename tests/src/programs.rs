@@ -1,0 +1,40 @@
+//! The programs under test: where they are, and how they are built when they are not.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// The simulator.
+#[must_use]
+pub fn host_sim() -> &'static Path {
+    static PATH: OnceLock<PathBuf> = OnceLock::new();
+    PATH.get_or_init(|| program("host-sim"))
+}
+
+/// The command line tool.
+#[must_use]
+pub fn sevenbot() -> &'static Path {
+    static PATH: OnceLock<PathBuf> = OnceLock::new();
+    PATH.get_or_init(|| program("sevenbot"))
+}
+
+/// The program of this package. It stands two folders above the test: `target/debug/deps/test-0123`.
+fn program(package: &str) -> PathBuf {
+    let test = std::env::current_exe().expect("a test knows where it is");
+    let folder = test.ancestors().nth(2).expect("cargo's folders");
+    let path = folder.join(package).with_extension(std::env::consts::EXE_EXTENSION);
+    if !path.exists() {
+        build(package, folder);
+    }
+    path
+}
+
+fn build(package: &str, folder: &Path) {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.args(["build", "--quiet", "--package", package]);
+    if folder.ends_with("release") {
+        cargo.arg("--release");
+    }
+    let status = cargo.status().expect("cargo runs");
+    assert!(status.success(), "{package} does not build");
+}
