@@ -12,10 +12,10 @@
 #![no_std]
 #![no_main]
 
+mod bank;
 mod board;
 mod clock;
 mod fault;
-mod flash;
 mod gpio;
 mod host_link;
 mod servo_link;
@@ -28,15 +28,16 @@ use cortex_m_rt::{entry, exception};
 use defmt_rtt as _;
 use embedded_io::{BufRead, Write};
 use firmware_stm32::feeding::Feeding;
+use firmware_stm32::flash::Flash;
 use firmware_stm32::restart::{self, Ending};
 use motion_core::{Config, Controller, Output, Vacuum};
 use protocol_core::registers::map::{FAULTS, fault as fault_bit};
 use protocol_core::time::Instant;
 use stm32f4::stm32f405 as pac;
 
+use crate::bank::Bank;
 use crate::clock::Clock;
 use crate::fault::Watchdog;
-use crate::flash::Flash;
 use crate::gpio::{Output as Pin, Switch};
 use crate::host_link::HostLink;
 use crate::servo_link::ServoLink;
@@ -73,7 +74,7 @@ fn main() -> ! {
     let watchdog = Watchdog::start(chip.IWDG, &chip.DBGMCU);
     let faults = source.faults() | restart_faults(&chip.RCC);
 
-    let settings = Settings::open(Flash::new(chip.FLASH, chip.PWR, &watchdog));
+    let settings = Settings::open(Flash(Bank::new(chip.FLASH, chip.PWR, &watchdog)));
     let config = Config {
         chip_id: board::chip_id(source),
         faults,

@@ -1,21 +1,22 @@
 //! The settings between two starts: the journal on its two sectors, and what the controller has to know of
 //! it.
 
+use firmware_stm32::flash::Flash;
 use motion_core::Storage;
 use protocol_core::journal::{Journal, Opened, SaveError};
 use protocol_core::registers::Image;
 
-use crate::flash::Flash;
+use crate::bank::Bank;
 
 /// The journal and what the start found in it.
 pub(crate) struct Settings<'a> {
-    journal: Journal<Flash<'a>>,
+    journal: Journal<Flash<Bank<'a>>>,
     opened: Opened,
 }
 
 impl<'a> Settings<'a> {
     /// Opens the journal. This is where sectors are erased, and the only place.
-    pub(crate) fn open(flash: Flash<'a>) -> Self {
+    pub(crate) fn open(flash: Flash<Bank<'a>>) -> Self {
         let (journal, opened) = Journal::open(flash);
         defmt::info!("settings: {}, room for {=usize}", opened, journal.room());
         Self { journal, opened }
