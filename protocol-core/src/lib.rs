@@ -15,6 +15,7 @@
 #![forbid(unsafe_code)]
 
 pub mod chip_id;
+pub mod journal;
 pub mod registers;
 pub mod request;
 pub mod time;

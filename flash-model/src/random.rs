@@ -1,0 +1,72 @@
+//! Numbers that look random and are the same on every machine (SplitMix64, by Sebastiano Vigna, public
+//! domain: <https://prng.di.unimi.it/splitmix64.c>). Not for secrets.
+
+/// A sequence of numbers that its seed determines.
+#[derive(Clone, Debug)]
+pub struct Random(u64);
+
+impl Random {
+    /// The sequence of this seed.
+    #[must_use]
+    pub const fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// The next 64 bits.
+    pub const fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// The next 32 bits.
+    pub const fn word(&mut self) -> u32 {
+        let [a, b, c, d, ..] = self.next().to_le_bytes();
+        u32::from_le_bytes([a, b, c, d])
+    }
+
+    /// A number below `limit`; 0 where there is none. Good enough for limits that are small against 2^64.
+    pub const fn below(&mut self, limit: u64) -> u64 {
+        match self.next().checked_rem(limit) {
+            Some(number) => number,
+            None => 0,
+        }
+    }
+
+    /// One of the ones of `bits`, alone; 0 where there is none.
+    pub fn one_of(&mut self, bits: u32) -> u32 {
+        let mut rest = bits;
+        for _ in 0..self.below(u64::from(bits.count_ones())) {
+            rest &= rest.wrapping_sub(1);
+        }
+        rest & rest.wrapping_neg()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sequence_is_that_of_the_published_generator() {
+        // The first numbers of the reference implementation from seed 1234567.
+        let mut random = Random::new(1_234_567);
+        assert_eq!(random.next(), 6_457_827_717_110_365_317);
+        assert_eq!(random.next(), 3_203_168_211_198_807_973);
+    }
+
+    #[test]
+    fn one_of_takes_every_bit_in_turn_and_no_other() {
+        let mut random = Random::new(1);
+        let mut seen = 0;
+        for _ in 0..500 {
+            let bit = random.one_of(0x8001_0110);
+            assert_eq!(bit.count_ones(), 1);
+            seen |= bit;
+        }
+        assert_eq!(seen, 0x8001_0110);
+        assert_eq!(random.one_of(0), 0);
+    }
+}

@@ -1,0 +1,290 @@
+//! The settings on two sectors of NOR flash: after a power cut at any instant they are what they were before
+//! or after the save that was cut (D19), never anything else.
+//!
+//! ```text
+//!    one sector is home                    the other is spare
+//!   ┌───────────────────────────┐         ┌───────────────────────────┐
+//! 0 │ mark of generation 7      │       0 │ mark of generation 8      │
+//! 1 │ record                    │       1 │ (blank)                   │
+//! 2 │ record                    │         │                           │
+//!   │ remains of a cut record   │         │                           │
+//!   │ (blank: skipped at start) │         │                           │
+//!   │ record ◀── the settings   │         │                           │
+//!   │ (blank)                   │         │                           │
+//!   ├───────────────────────────┤         ├───────────────────────────┤
+//!   │ last four: starts only    │         │                           │
+//!   └───────────────────────────┘         └───────────────────────────┘
+//! ```
+//!
+//! A save appends the whole image as one record of eight words. When home is full the log goes on in
+//! the spare, one generation higher. The next start makes the old home blank, and it is the spare. Why so:
+//!
+//! - **Erased at start only.** An erase stops the chip for up to 0.8 s, and an arm with its servos on must not
+//!   wait that long. Hence a start that finds less than a quarter of home free moves to the spare at once:
+//!   a power cycle always has room for a quarter and a whole sector, over 600 saves with 16 KiB sectors.
+//! - **Half programmed cells.** What a cut leaves may read one way at this start and another way at the
+//!   next. The seal is programmed after the rest was read back, so that what is sealed was whole. A record that
+//!   is unsealed, that needed a correction, or that has remains of another behind it is the settings today,
+//!   and perhaps not tomorrow. So it is *appended again before anything is erased*, and before anybody is told.
+//! - **Order by generation and place, not by a running number.** The remains of a record and the one written
+//!   in its stead would share a number, and the older might win when it reads whole one day. A
+//!   place is taken once.
+//! - **A sector is blank because its mark says so**, not because it looks blank. After a cut erase a sector
+//!   can look blank, and not be. The mark is programmed after a whole erase and a check of every word. It
+//!   says for which generation, so that a mark that outlived a cut erase does not count. One word
+//!   will do: what it says is true before its first bit is programmed, and one that reads wrong costs an erase.
+//! - **One slot is skipped after a start**, since a word that was cut at its very beginning may not show. (A
+//!   power cycle whose first word is cut like that leaves the next one to begin in the same slot. A slot begins with
+//!   its sector's generation, so that it is the same word which is programmed again, and completed.)
+//! - **The last four slots are for starts**, so that the settings can be made firm in a sector that was full.
+//! - **A log is never without a record.** The first start writes one that says there are no settings
+//!   yet; else the first save of all, cut, could come and go.
+//! - **Not every flash forgets, or learns.** A sector that does not get blank, as in an emulator where an erase
+//!   changes nothing and all reads 0, is not used. No flash is taken to be blank where it does not change.
+//!
+//! No word is programmed twice with different values. A save programs eight words. A start erases two
+//! sectors and programs 18 words at most: a record made firm, a mark, a record moved, a mark. A cell that
+//! does not take its bit costs a second attempt, in the next slot. Knows no register: an image is 20 bytes.
+
+mod sectors;
+mod slot;
+
+use embedded_storage::nor_flash::NorFlash;
+
+use crate::registers::Image;
+use sectors::{Place, Refused, Sectors, Survey};
+use slot::Record;
+
+/// The slots at a sector's end that only a start may fill.
+const RESERVE: u32 = 4;
+/// How many slots are tried for one record.
+const ATTEMPTS: u32 = 2;
+/// What the record of an arm without settings holds. No arm's settings look like this: some of their bytes
+/// are reserved, and zero.
+const NO_SETTINGS: Image = Image([0xFF; Image::LENGTH]);
+
+/// What a start found.
+#[must_use]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Opened {
+    /// Nothing was ever saved: the flash was blank, or the first start was cut.
+    Fresh,
+    /// The settings.
+    Found(Image),
+    /// No record, but not blank either. It was erased, and is in use as if it had been
+    /// fresh; who would rather refuse it opens a copy first.
+    Damaged,
+    /// The flash does not keep what it is given: settings can be read at best, and nothing will be saved.
+    Broken(Option<Image>),
+}
+
+impl Opened {
+    /// The settings that were found.
+    #[must_use]
+    pub const fn image(&self) -> Option<&Image> {
+        match self {
+            Self::Found(image) | Self::Broken(Some(image)) => Some(image),
+            Self::Fresh | Self::Damaged | Self::Broken(None) => None,
+        }
+    }
+}
+
+/// Why an image was not saved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SaveError {
+    /// There is no slot left that can be had without an erase: not before the next start.
+    Full,
+    /// The flash does not keep what it is given.
+    Broken,
+}
+
+impl From<Refused> for SaveError {
+    fn from(_: Refused) -> Self {
+        Self::Broken
+    }
+}
+
+/// Where the log goes on.
+#[derive(Clone, Copy, Debug)]
+struct Tail {
+    next: Place,
+    generation: u32,
+    /// The first slot to use in the other sector, if that is blank from there on.
+    spare: Option<u32>,
+}
+
+impl Tail {
+    /// Goes on in the spare.
+    fn change_over(&mut self) -> Result<(), SaveError> {
+        let slot = self.spare.take().ok_or(SaveError::Full)?;
+        self.next = Place { sector: self.next.sector ^ 1, slot };
+        self.generation = self.generation.wrapping_add(1);
+        Ok(())
+    }
+
+    /// Takes the next slot below `limit`, or the spare's first.
+    fn take_place(&mut self, limit: u32) -> Result<Place, SaveError> {
+        if self.next.slot >= limit {
+            self.change_over()?;
+        }
+        let place = self.next;
+        self.next.slot += 1;
+        Ok(place)
+    }
+}
+
+/// The settings' log on a flash of two sectors.
+#[derive(Clone, Debug)]
+pub struct Journal<F> {
+    sectors: Sectors<F>,
+    tail: Tail,
+    /// What the next start will find, where that is known.
+    newest: Option<Image>,
+    broken: bool,
+}
+
+impl<F: NorFlash> Journal<F> {
+    const SLOTS: u32 = Sectors::<F>::SLOTS;
+    /// Saves fill the slots below this one.
+    const LIMIT: u32 = Self::SLOTS - RESERVE;
+
+    /// Finds the settings, and makes room for saves: the only place that erases.
+    ///
+    /// The flash has two sectors of `ERASE_SIZE` (512 bytes to 1 MiB) and words of at most four bytes.
+    pub fn open(flash: F) -> (Self, Opened) {
+        let tail = Tail { next: Place { sector: 0, slot: 1 }, generation: 1, spare: None };
+        let mut journal = Self { sectors: Sectors(flash), tail, newest: None, broken: false };
+        let opened = journal.start();
+        journal.broken = matches!(opened, Opened::Broken(_));
+        (journal, opened)
+    }
+
+    /// Saves the settings. What is already there is not saved again.
+    ///
+    /// # Errors
+    /// [`SaveError::Full`]: not before the next start. After [`SaveError::Broken`] the next start may find
+    /// the settings before or after this save.
+    pub fn save(&mut self, image: &Image) -> Result<(), SaveError> {
+        if self.newest.as_ref() == Some(image) {
+            return Ok(());
+        }
+        if self.broken {
+            return Err(SaveError::Broken);
+        }
+        self.append(Self::LIMIT, image)
+    }
+
+    /// How many different images can be saved before the next start.
+    #[must_use]
+    pub fn room(&self) -> usize {
+        let free = |slot| Self::LIMIT.saturating_sub(slot) as usize;
+        if self.broken { 0 } else { free(self.tail.next.slot) + self.tail.spare.map_or(0, free) }
+    }
+
+    /// The flash.
+    pub fn release(self) -> F {
+        self.sectors.0
+    }
+
+    fn start(&mut self) -> Opened {
+        let (Ok(first), Ok(second)) = (self.sectors.survey(0), self.sectors.survey(1)) else {
+            return Opened::Broken(None);
+        };
+        let later = first.generation() < second.generation();
+        let (home, other) = if later { (second, first) } else { (first, second) };
+        let (newest, done) = match home.newest {
+            Some(newest) => (newest.image, self.resume(&home, &other, newest)),
+            None => (NO_SETTINGS, self.begin(&home, &other)),
+        };
+        let fresh = home.newest.is_some() || home.was_never_used(&other);
+        let image = (newest != NO_SETTINGS).then_some(newest);
+        match (done, image) {
+            (Err(_), image) => Opened::Broken(image),
+            (Ok(()), Some(image)) => Opened::Found(image),
+            (Ok(()), None) if fresh => Opened::Fresh,
+            (Ok(()), None) => Opened::Damaged,
+        }
+    }
+
+    /// Starts a log in the first sector that is ready for one.
+    fn begin(&mut self, first: &Survey, second: &Survey) -> Result<(), SaveError> {
+        let generation = self.tail.generation;
+        let ready = [first, second].into_iter().find_map(|found| {
+            let waiting = Self::waiting(found, generation);
+            let slot = waiting.or_else(|| self.prepare(found.sector, generation))?;
+            Some(Place { sector: found.sector, slot })
+        });
+        self.tail.next = ready.ok_or(SaveError::Broken)?;
+        self.append(Self::SLOTS, &NO_SETTINGS)?;
+        self.prepare_spare();
+        Ok(())
+    }
+
+    /// Goes on with a log: its newest record made firm, its other sector blank, and room for saves.
+    fn resume(&mut self, home: &Survey, other: &Survey, newest: Record) -> Result<(), SaveError> {
+        let next = Place { sector: home.sector, slot: home.end + 1 };
+        let spare = Self::waiting(other, newest.generation.wrapping_add(1));
+        // Remains of a record in the spare are behind the newest one too. To append that behind them, which
+        // is a move, takes no erase before.
+        let begun = spare.is_some() && other.end > 1;
+        self.tail = Tail { next, generation: newest.generation, spare };
+        if !newest.firm && !begun {
+            self.firm_up(&newest.image)?;
+        }
+        self.prepare_spare();
+        if begun || Self::LIMIT.saturating_sub(self.tail.next.slot) < Self::SLOTS / 4 {
+            self.move_to_spare(&newest.image)?;
+        }
+        self.newest = Some(newest.image);
+        Ok(())
+    }
+
+    /// The first slot to use in a sector that waits for a generation. It may hold the remains of cut records,
+    /// and is worth keeping if they do not fill it.
+    fn waiting(found: &Survey, generation: u32) -> Option<u32> {
+        (found.waits_for(generation) && found.end <= Self::SLOTS / 2).then_some(found.end + 1)
+    }
+
+    /// Makes a sector blank; its first slot to use.
+    fn prepare(&mut self, sector: u32, generation: u32) -> Option<u32> {
+        self.sectors.prepare(sector, generation).ok()?;
+        Some(1)
+    }
+
+    fn firm_up(&mut self, image: &Image) -> Result<(), SaveError> {
+        match self.append(Self::SLOTS, image) {
+            // Start after start was cut at this, until home was full. Then the record before the newest is in
+            // home as well, and an erase of the other sector can do no harm.
+            Err(SaveError::Full) => Ok(()),
+            result => result,
+        }
+    }
+
+    fn prepare_spare(&mut self) {
+        let Tail { next, generation, spare } = self.tail;
+        let prepare = || self.prepare(next.sector ^ 1, generation.wrapping_add(1));
+        self.tail.spare = spare.or_else(prepare);
+    }
+
+    fn move_to_spare(&mut self, image: &Image) -> Result<(), SaveError> {
+        if self.tail.change_over().is_ok() {
+            self.append(Self::SLOTS, image)?;
+            self.prepare_spare();
+        }
+        Ok(())
+    }
+
+    fn append(&mut self, limit: u32, image: &Image) -> Result<(), SaveError> {
+        for _ in 0..ATTEMPTS {
+            let place = self.tail.take_place(limit)?;
+            self.newest = None;
+            if self.sectors.append(place, self.tail.generation, image).is_ok() {
+                self.newest = Some(*image);
+                return Ok(());
+            }
+        }
+        Err(SaveError::Broken)
+    }
+}

@@ -1,0 +1,155 @@
+//! One slot: 32 bytes that hold the settings once.
+//!
+//! ```text
+//!   word  0            1 .. 5          6                          7
+//!        ┌────────────┬───────────────┬──────────────────────────┬──────┐
+//!        │ generation │ 20 bytes data │ CRC-32 of words 0 to 5   │ seal │
+//!        └────────────┴───────────────┴──────────────────────────┴──────┘
+//!         numbers: low byte first                                  programmed last
+//! ```
+//!
+//! The CRC is CRC-32/ISO-HDLC. Over 192 bits any two records differ in at least six bits of data and CRC, so
+//! one wrong bit can be put right and up to four are never taken for another record. Knows nothing of where
+//! a slot is.
+
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+
+use crate::registers::Image;
+
+/// What is programmed at once, or not.
+pub(super) type Word = [u8; 4];
+/// Eight of them.
+pub(super) type Slot = [Word; 8];
+/// Bytes of a slot, as addresses are counted.
+pub(super) const LENGTH: u32 = 32;
+/// A slot that was erased, or whose very first word was cut so early that nothing shows.
+pub(super) const BLANK: Slot = [[0xFF; 4]; 8];
+
+/// Says that the other seven words were read back and are as they should be: they do not depend on cells
+/// that a power cut left half programmed. As many ones as zeros, so that no wear or cut makes one by chance.
+const SEAL: Word = [0x5E, 0xA1, 0xC3, 0x96];
+const CHECK: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+/// The settings as they stand in one slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Record {
+    /// How often the log has changed over to the other sector; the same for all records of a sector.
+    pub(super) generation: u32,
+    pub(super) image: Image,
+    /// Sealed, and read without correction: it will read the same after any number of starts.
+    pub(super) firm: bool,
+}
+
+/// The slot that holds `image`, sealed.
+pub(super) fn encode(generation: u32, image: &Image) -> Slot {
+    let mut covered = [[0; 4]; 6];
+    let bytes = generation.to_le_bytes().into_iter().chain(image.0);
+    for (to, from) in covered.as_flattened_mut().iter_mut().zip(bytes) {
+        *to = from;
+    }
+    let check = CHECK.checksum(covered.as_flattened()).to_le_bytes();
+    let [generation, a, b, c, d, e] = covered;
+    [generation, a, b, c, d, e, check, SEAL]
+}
+
+/// The record in a slot, if there is a whole one.
+pub(super) fn decode(slot: &Slot) -> Option<Record> {
+    let [mut covered @ .., check, seal] = *slot;
+    let difference = CHECK.checksum(covered.as_flattened()) ^ u32::from_le_bytes(check);
+    let sealed = seal == SEAL;
+    // Without a seal, a wrong bit is a sign of a cut: it may be one of many that read right by luck today.
+    if difference != 0 && !(sealed && correct(covered.as_flattened_mut(), difference)) {
+        return None;
+    }
+    let [generation, data @ ..] = covered;
+    let image = Image(*data.as_flattened().first_chunk()?);
+    Some(Record { generation: u32::from_le_bytes(generation), image, firm: sealed && difference == 0 })
+}
+
+/// Puts right the one bit whose change makes this `difference` to the CRC; false where there is no such bit.
+///
+/// The CRC is linear, so what a bit does to it depends on the bit's place only. The last bit does what the
+/// polynomial says, and each earlier one what the next one does, one step further.
+fn correct(covered: &mut [u8], difference: u32) -> bool {
+    const POLYNOMIAL: u32 = CRC_32_ISO_HDLC.poly.reverse_bits();
+    let mut effect = POLYNOMIAL;
+    for byte in covered.iter_mut().rev() {
+        for bit in (0..8).rev() {
+            if effect == difference {
+                *byte ^= 1 << bit;
+                return true;
+            }
+            effect = (effect >> 1) ^ if effect & 1 == 1 { POLYNOMIAL } else { 0 };
+        }
+    }
+    // Or the wrong bit is one of the CRC itself, and the data are right.
+    difference.is_power_of_two()
+}
+
+/// What stands in the first word of a sector that was erased, found blank and waits for `generation`.
+///
+/// Each generation has its own mark, and none comes twice. So the mark of a sector's earlier life, should it
+/// outlive an erase that was cut, is not taken for a promise about what that erase left. A CRC, because the
+/// marks of neighbouring generations must differ in many bits.
+pub(super) const fn mark(generation: u32) -> Word {
+    CHECK.checksum(&generation.to_le_bytes()).to_le_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const IMAGE: Image = Image([0, 0, 0, 7, 1, 0x85, 3, 0, 16, 0x90, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+
+    fn flipped(slot: &Slot, bits: &[usize]) -> Slot {
+        let mut slot = *slot;
+        for bit in bits {
+            slot.as_flattened_mut()[bit / 8] ^= 1 << (bit % 8);
+        }
+        slot
+    }
+
+    #[test]
+    fn any_single_wrong_bit_leaves_the_record_but_not_firm() {
+        let slot = encode(3, &IMAGE);
+        assert_eq!(decode(&slot), Some(Record { generation: 3, image: IMAGE, firm: true }));
+        for bit in 0..256 {
+            let record = decode(&flipped(&slot, &[bit]));
+            assert_eq!(record, Some(Record { generation: 3, image: IMAGE, firm: false }), "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn two_wrong_bits_never_make_another_record() {
+        let slot = encode(3, &IMAGE);
+        for (first, second) in (0..256).flat_map(|first| (0..first).map(move |second| (first, second))) {
+            let record = decode(&flipped(&slot, &[first, second]));
+            let same = |record: Record| record.image == IMAGE && record.generation == 3;
+            assert!(record.is_none_or(same), "bits {first}, {second}: {record:?}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_bit_is_not_put_right_without_a_seal() {
+        let mut slot = encode(3, &IMAGE);
+        slot[7] = [0xFF; 4];
+        assert!(decode(&slot).is_some_and(|record| !record.firm));
+        for bit in 0..224 {
+            assert_eq!(decode(&flipped(&slot, &[bit])), None, "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn blank_and_zeroed_slots_hold_nothing() {
+        assert_eq!(decode(&BLANK), None);
+        assert_eq!(decode(&[[0; 4]; 8]), None);
+    }
+
+    #[test]
+    fn marks_of_neighbouring_generations_differ_in_many_bits() {
+        for (a, b) in (0..2_000_u32).flat_map(|a| (a + 1..a + 4).map(move |b| (a, b))) {
+            let differing = u32::from_le_bytes(mark(a)) ^ u32::from_le_bytes(mark(b));
+            assert!(differing.count_ones() >= 6, "{a} and {b}");
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! An arm's settings over many power cycles, and what must hold in every one of them (D19):
+//!
+//! - a start finds what was last acknowledged, or something that was attempted since;
+//! - what a start has told stays so, until something else is acknowledged or attempted;
+//! - a save is refused only where no room was promised;
+//! - nothing is erased but by a start, which erases two sectors and programs 18 words at most; a save programs
+//!   eight.
+#![allow(dead_code)] // Each test program uses its part.
+
+use std::cell::RefCell;
+
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use flash_model::{Cut, EraseTear, Error, Flash, Operation, ProgramTear, Random};
+use protocol_core::journal::{Journal, Opened, SaveError};
+use protocol_core::registers::Image;
+
+/// The sectors of the reference board.
+pub const REAL: usize = 16_384;
+
+/// The journal's access to a flash that the test looks at, too.
+#[derive(Debug)]
+pub struct Access<'a, const SECTOR: usize>(pub &'a RefCell<Flash<SECTOR>>);
+
+impl<const SECTOR: usize> ErrorType for Access<'_, SECTOR> {
+    type Error = Error;
+}
+
+impl<const SECTOR: usize> ReadNorFlash for Access<'_, SECTOR> {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+        self.0.borrow_mut().read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.borrow().capacity()
+    }
+}
+
+impl<const SECTOR: usize> NorFlash for Access<'_, SECTOR> {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
+        self.0.borrow_mut().erase(from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        self.0.borrow_mut().write(offset, bytes)
+    }
+}
+
+/// The image with this number: all bytes differ from those of its neighbours.
+#[must_use]
+pub fn image(number: u64) -> Image {
+    let mut random = Random::new(number);
+    Image(std::array::from_fn(|_| random.next().to_le_bytes()[0]))
+}
+
+/// How a power cycle ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The power was switched off when all was done.
+    Quiet,
+    /// It was cut.
+    Cut,
+}
+
+/// A flash, and what may be found on it.
+#[derive(Clone, Debug)]
+pub struct World<const SECTOR: usize> {
+    pub flash: RefCell<Flash<SECTOR>>,
+    /// What the next start may find.
+    possible: Vec<Option<Image>>,
+    /// How many images there were.
+    pub images: u64,
+    /// Decides how marginal bits read.
+    pub seed: u64,
+    /// The most that a start here erased and programmed.
+    pub most: (usize, usize),
+    /// The power cycles that were, for the report of a failure.
+    past: Vec<(usize, Option<Cut>)>,
+}
+
+impl<const SECTOR: usize> Drop for World<SECTOR> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("saves and cuts of the power cycles that led here: {:?}", self.past);
+        }
+    }
+}
+
+impl<const SECTOR: usize> World<SECTOR> {
+    #[must_use]
+    pub fn new() -> Self {
+        let flash = RefCell::new(Flash::new(2));
+        Self { flash, possible: vec![None], images: 0, seed: 0, most: (0, 0), past: Vec::new() }
+    }
+
+    /// The settings, when there is no doubt.
+    #[must_use]
+    pub fn settings(&self) -> Option<Image> {
+        assert_eq!(self.possible.len(), 1);
+        self.possible[0]
+    }
+
+    /// One power cycle: a start and some saves.
+    pub fn cycle(&mut self, saves: usize, cut: Option<Cut>) -> End {
+        self.past.push((saves, cut));
+        self.seed = Random::new(self.seed).next();
+        self.flash.get_mut().power_up(self.seed);
+        if let Some(cut) = cut {
+            self.flash.get_mut().cut_power(cut);
+        }
+        let (mut journal, opened) = Journal::open(Access(&self.flash));
+        self.flash.borrow_mut().forbid_erase();
+        self.most = check_start(&self.flash.borrow(), self.most);
+        if !self.flash.borrow().is_powered() {
+            return End::Cut;
+        }
+        found(&mut self.possible, opened);
+        for _ in 0..saves {
+            self.images += 1;
+            if save(&self.flash, &mut self.possible, &mut journal, image(self.images)) == End::Cut {
+                return End::Cut;
+            }
+        }
+        End::Quiet
+    }
+
+    /// In a life of many power cycles, only those since the last quiet one tell why something failed.
+    pub fn forget_past(&mut self, end: End) {
+        if end == End::Quiet {
+            self.past.clear();
+        }
+    }
+
+    /// What a power cycle would do to the flash, operation by operation.
+    #[must_use]
+    pub fn operations(&self, saves: usize) -> Vec<Operation> {
+        let mut world = self.clone();
+        assert_eq!(world.cycle(saves, None), End::Quiet);
+        let flash = world.flash.borrow();
+        flash.history().to_vec()
+    }
+
+    /// Some quiet power cycles: the checks that they bring.
+    pub fn settle(&mut self) {
+        for saves in [0, 1, 0] {
+            assert_eq!(self.cycle(saves, None), End::Quiet);
+        }
+    }
+}
+
+fn check_start<const SECTOR: usize>(flash: &Flash<SECTOR>, most: (usize, usize)) -> (usize, usize) {
+    let (erases, programs) = (flash.count(Operation::Erase), flash.count(Operation::Program));
+    assert!(erases <= 2 && programs <= 18, "a start erased {erases} sectors and programmed {programs} words");
+    (most.0.max(erases), most.1.max(programs))
+}
+
+/// Checks what a start found, which is what all later ones have to find.
+fn found(possible: &mut Vec<Option<Image>>, opened: Opened) {
+    let settings = opened.image().copied();
+    match opened {
+        Opened::Found(_) | Opened::Fresh => {}
+        // A first start that was cut can leave anything.
+        Opened::Damaged if possible == &[None] => {}
+        _ => panic!("found {opened:?}, possible was {possible:?}"),
+    }
+    assert!(possible.contains(&settings), "found {settings:?}, possible was {possible:?}");
+    *possible = vec![settings];
+}
+
+fn save<const SECTOR: usize>(
+    flash: &RefCell<Flash<SECTOR>>,
+    possible: &mut Vec<Option<Image>>,
+    journal: &mut Journal<Access<'_, SECTOR>>,
+    image: Image,
+) -> End {
+    let (room, before) = (journal.room(), flash.borrow().history().len());
+    possible.push(Some(image));
+    let result = journal.save(&image);
+    let programs = flash.borrow().history().len() - before;
+    assert!(programs <= 8, "a save programmed {programs} words");
+    match result {
+        _ if !flash.borrow().is_powered() => return End::Cut,
+        Ok(()) => {
+            assert_eq!((journal.room() + 1, programs), (room, 8));
+            *possible = vec![Some(image)];
+        }
+        Err(SaveError::Full) => {
+            assert_eq!((room, programs), (0, 0));
+            possible.pop();
+        }
+        Err(SaveError::Broken) => panic!("a sound flash was called broken"),
+    }
+    End::Quiet
+}
+
+/// Every way to cut one operation.
+pub fn cuts(after: usize, operation: Operation, seed: u64) -> impl Iterator<Item = Cut> {
+    let base = Cut { after, program: ProgramTear::All, erase: EraseTear::All, seed };
+    let programs = ProgramTear::ALL.into_iter().filter(move |_| operation == Operation::Program);
+    let erases = EraseTear::ALL.into_iter().filter(move |_| operation == Operation::Erase);
+    let programs = programs.map(move |program| Cut { program, ..base });
+    programs.chain(erases.map(move |erase| Cut { erase, ..base }))
+}
+
+/// Every way to cut a power cycle after so many of its operations, and what is there afterwards.
+pub fn every_cut<const SECTOR: usize>(
+    world: &World<SECTOR>,
+    saves: usize,
+    from: usize,
+) -> impl Iterator<Item = World<SECTOR>> + '_ {
+    let operations = world.operations(saves).into_iter().enumerate().skip(from);
+    let cuts = operations.flat_map(|(after, operation)| cuts(after, operation, world.seed ^ after as u64));
+    cuts.enumerate().map(move |(number, cut)| {
+        let mut world = world.clone();
+        assert_eq!(world.cycle(saves, Some(cut)), End::Cut, "{cut:?}");
+        world.seed ^= number as u64;
+        world
+    })
+}

@@ -1,0 +1,172 @@
+//! D19: the power is cut at every program and every erase, in every way a cell can be left, once and then
+//! again before the first cut is mended. The settings are those before or after, never neither.
+//!
+//! `JOURNAL_LONG=1` tries much more, `JOURNAL_SEED=n` the random part from another seed. How much was tried is
+//! printed (`--nocapture`).
+
+#![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
+
+mod journal_world;
+
+use flash_model::{Cut, EraseTear, Operation, ProgramTear, Random};
+use journal_world::{End, REAL, World, every_cut};
+
+fn is_long() -> bool {
+    std::env::var_os("JOURNAL_LONG").is_some()
+}
+
+/// What was tried.
+#[derive(Debug, Default)]
+struct Tally {
+    updates: u64,
+    operations: usize,
+    cases: u64,
+    most_erases: usize,
+    most_programs: usize,
+}
+
+impl Tally {
+    /// Counts a case, after some quiet power cycles.
+    fn settle<const SECTOR: usize>(&mut self, mut world: World<SECTOR>) {
+        world.settle();
+        self.cases += 1;
+        self.most_erases = self.most_erases.max(world.most.0);
+        self.most_programs = self.most_programs.max(world.most.1);
+    }
+}
+
+/// Cuts every operation of power cycles with so many saves each, in every way, once.
+fn cut_everything_once<const SECTOR: usize>(cycles: impl IntoIterator<Item = usize>) -> Tally {
+    let (mut world, mut tally) = (World::<SECTOR>::new(), Tally::default());
+    for saves in cycles {
+        let operations = world.operations(saves).len();
+        // It takes long to get to the last operations of a cycle that fills the flash: only those.
+        let from = if saves > 100 { operations - 80 } else { 0 };
+        tally.operations += operations - from;
+        every_cut(&world, saves, from).for_each(|world| tally.settle(world));
+        assert_eq!(world.cycle(saves, None), End::Quiet);
+    }
+    tally.updates = world.images;
+    println!("{SECTOR} B sectors, one cut: {tally:?}");
+    tally
+}
+
+#[test]
+fn a_cut_at_every_step_of_a_thousand_updates_of_the_real_flash() {
+    let cycles = (0..6 * 44).map(|cycle| [3, 1, 11, 0, 6, 2][cycle % 6]);
+    // Then some that fill it: into the spare, and to its end.
+    cut_everything_once::<REAL>(cycles.chain([380, 2, 380, 640, 1, 900, 1200, 3]));
+}
+
+#[test]
+fn a_cut_at_every_step_of_a_thousand_updates_of_small_flashes() {
+    let cycles = || (0..).map(|cycle| [2, 5, 1, 13, 3, 0, 30, 7][cycle % 8]);
+    cut_everything_once::<512>(cycles().take(240));
+    cut_everything_once::<1_024>(cycles().take(240));
+    cut_everything_once::<2_048>(cycles().take(240));
+}
+
+/// Cuts power cycles, then the next start and some saves, and so on: each at every operation in every way.
+fn cut_everything_again<const SECTOR: usize>(
+    cycles: impl IntoIterator<Item = usize>,
+    saves_after: usize,
+    cuts: u32,
+) -> Tally {
+    let (mut world, mut tally) = (World::<SECTOR>::new(), Tally::default());
+    for saves in cycles {
+        every_cut(&world, saves, 0).for_each(|world| cut_again(world, saves_after, cuts - 1, &mut tally));
+        assert_eq!(world.cycle(saves, None), End::Quiet);
+    }
+    tally.updates = world.images;
+    println!("{SECTOR} B sectors, {cuts} cuts: {tally:?}");
+    tally
+}
+
+fn cut_again<const SECTOR: usize>(world: World<SECTOR>, saves: usize, cuts: u32, tally: &mut Tally) {
+    if cuts == 0 {
+        tally.settle(world);
+    } else {
+        every_cut(&world, saves, 0).for_each(|world| cut_again(world, saves, cuts - 1, tally));
+    }
+}
+
+#[test]
+fn a_second_cut_at_every_step_before_the_first_is_mended() {
+    let tally = cut_everything_again::<512>([0, 2, 14, 1, 23, 1], 2, 2);
+    assert!(tally.cases >= 1_000_000, "{tally:?}");
+    assert_eq!((tally.most_erases, tally.most_programs), (2, 18), "the bounds are not put to the test");
+    if is_long() {
+        cut_everything_again::<1_024>([1, 3, 30, 1, 55, 2, 0], 2, 2);
+    }
+}
+
+#[test]
+fn a_third_cut_at_every_step_before_the_others_are_mended() {
+    // All three in the very first start. The long run cuts starts after a change-over as well, and saves.
+    let starts: &[usize] = if is_long() { &[0, 1, 13] } else { &[0] };
+    cut_everything_again::<512>(starts.iter().copied(), 0, 3);
+    if is_long() {
+        cut_everything_again::<512>([1], 1, 3);
+    }
+}
+
+fn below(limit: usize, random: &mut Random) -> usize {
+    usize::try_from(random.below(limit as u64)).unwrap()
+}
+
+/// Power cycles of any length, most of them cut somewhere.
+fn cut_at_random<const SECTOR: usize>(cycles: u64, most_saves: usize) {
+    let seed = std::env::var("JOURNAL_SEED").map_or(2_026, |seed| seed.parse().unwrap());
+    println!("{SECTOR} B sectors, JOURNAL_SEED={seed}, {cycles} power cycles");
+    let mut random = Random::new(seed);
+    let mut world = World::<SECTOR>::new();
+    let mut cuts = 0;
+    for _ in 0..cycles {
+        let saves = below(most_saves, &mut random);
+        let after = below(10 + 8 * saves, &mut random);
+        let program = ProgramTear::ALL[below(ProgramTear::ALL.len(), &mut random)];
+        let erase = EraseTear::ALL[below(EraseTear::ALL.len(), &mut random)];
+        let cut = Cut { after, program, erase, seed: random.next() };
+        let end = world.cycle(saves, (random.below(8) > 0).then_some(cut));
+        cuts += u64::from(end == End::Cut);
+        world.forget_past(end);
+    }
+    println!("{cuts} cuts, {} updates; {:?}", world.images, world.most);
+}
+
+#[test]
+fn cuts_at_random_in_long_lives() {
+    let times = if is_long() { 50 } else { 1 };
+    cut_at_random::<512>(150_000 * times, 24);
+    cut_at_random::<1_024>(100_000 * times, 60);
+    cut_at_random::<REAL>(4_000 * times, 1_000);
+}
+
+/// What an erase leaves that was cut is chance: many chances for each kind.
+fn cut_erases<const SECTOR: usize>(chances: usize) -> u64 {
+    let mut world = World::<SECTOR>::new();
+    let mut cases = 0;
+    // Cycles that go on in the spare: the start after each has a sector to erase, or two.
+    for saves in [1, SECTOR / 32, SECTOR / 16, SECTOR / 20, 0] {
+        let operations = world.operations(saves).into_iter().enumerate();
+        for (after, _) in operations.filter(|(_, operation)| *operation == Operation::Erase) {
+            let tears = EraseTear::ALL.into_iter().cycle().take(EraseTear::ALL.len() * chances);
+            for (number, erase) in (0_u64..).zip(tears) {
+                let mut world = world.clone();
+                let cut = Cut { after, program: ProgramTear::All, erase, seed: world.seed ^ number };
+                assert_eq!(world.cycle(saves, Some(cut)), End::Cut);
+                world.settle();
+                cases += 1;
+            }
+        }
+        assert_eq!(world.cycle(saves, None), End::Quiet);
+    }
+    println!("{SECTOR} B sectors: {cases} erases cut");
+    cases
+}
+
+#[test]
+fn a_cut_erase_loses_nothing_whatever_it_leaves() {
+    assert!(cut_erases::<512>(200) >= 1_500);
+    assert!(cut_erases::<REAL>(if is_long() { 200 } else { 30 }) >= 1_500);
+}
