@@ -2,7 +2,7 @@
 //!
 //! Knows no arm.
 
-use clap::{Args, Parser, Subcommand, value_parser};
+use clap::{ArgAction, Args, Parser, Subcommand, value_parser};
 use sevenbot::Span;
 use sevenbot::names;
 
@@ -107,6 +107,7 @@ Exit status 1 when the arm did not take the pose, or with --wait did not reach i
 pub(crate) struct PoseArgs {
     /// Angles of joint 1 to 7 in degrees, 0 to 180.
     #[arg(value_names = ["A1", "A2", "A3", "A4", "A5", "A6", "A7"], num_args = 7, required = true,
+          action = ArgAction::Set,
           value_parser = value_parser!(u8).range(0..=180))]
     pub(crate) angles: Vec<u8>,
     /// Speed of all joints in steps of 1.9 degrees per second, 1 to 100; 0 is the motors' maximum.

@@ -88,6 +88,8 @@ pub fn meaning(row: &Register, byte: u8) -> String {
         FAULTS => faults(byte),
         MISSING_SERVOS | MOVING_JOINTS => joints(byte),
         LAST_REFUSAL => refusal_word(byte).to_owned(),
+        // No frame is ever refused because of the device code, which is at 0.
+        LAST_REFUSED_REGISTER if byte == 0 => "none".to_owned(),
         LAST_REFUSED_REGISTER => name_of_register(byte),
         _ => in_unit(row.unit, byte),
     }

@@ -113,6 +113,7 @@ fn set_says_what_is_out_of_range_before_and_after_sending() {
         let pose = ["set", "target", "--raw", "10", "20", "30", "40", "50", "60", "200"];
         let text = failed(&arm.sevenbot(&pose), 1);
         assert!(text.contains("target-position.7 takes 0 to 180"), "{text}");
+        assert_eq!(text.matches("error:").count(), 1, "one reason for all seven: {text}");
         assert_eq!(arm.read(TARGET_POSITION, 7), before);
     });
 }

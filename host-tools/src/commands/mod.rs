@@ -7,6 +7,7 @@ pub(crate) mod pose;
 pub(crate) mod set;
 
 use sevenbot::change::Unchanged;
+use sevenbot::names::name_of_register;
 
 use crate::failure::Failure;
 
@@ -15,6 +16,19 @@ fn all_taken(unchanged: &[Unchanged]) -> Result<(), Failure> {
     if unchanged.is_empty() {
         return Ok(());
     }
-    let reasons: Vec<String> = unchanged.iter().map(ToString::to_string).collect();
+    let groups = unchanged.chunk_by(|one, next| one.cause == next.cause);
+    let reasons: Vec<String> = groups.map(reason).collect();
     Err(Failure::Arm(reasons.join("\n       ")))
+}
+
+/// One reason for all registers that share it.
+fn reason(unchanged: &[Unchanged]) -> String {
+    match unchanged {
+        [only] => only.to_string(),
+        [first, .., last] => {
+            let (from, to) = (name_of_register(first.address), name_of_register(last.address));
+            format!("{from} to {to} did not change: {}", first.cause)
+        }
+        [] => String::new(),
+    }
 }
