@@ -34,7 +34,7 @@ pub(crate) fn write() -> Outcome {
     Ok(fs::write(path(), page())?)
 }
 
-/// Fails if the page is not what [`write`] would write.
+/// Fails if the page is not what [`write()`] would write.
 pub(crate) fn check() -> Outcome {
     let found = fs::read_to_string(path()).unwrap_or_default();
     if found == page() {

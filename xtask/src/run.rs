@@ -33,16 +33,38 @@ pub(crate) fn run(program: &str, words: &str, variables: &[(&str, &str)]) -> Out
     if status.success() { Ok(()) } else { Err(format!("`{program} {words}` failed").into()) }
 }
 
-/// Links the programs of `footprint` for the chip and reads one of them.
-pub(crate) fn linked(program: &str) -> Outcome<Vec<u8>> {
-    let path = target_directory().join(CHIP).join("chip").join(program);
-    fs::read(&path).map_err(|why| format!("cannot read {}: {why}", path.display()).into())
+/// A program that is linked for the chip.
+pub(crate) struct Linked {
+    /// Its name.
+    pub(crate) name: &'static str,
+    /// The profile it is built with.
+    profile: &'static str,
 }
 
-/// Links the programs of `footprint` for the chip.
-pub(crate) fn link_footprint() -> Outcome {
+impl Linked {
+    /// Reads the file.
+    pub(crate) fn read(&self) -> Outcome<Vec<u8>> {
+        let path = target_directory().join(CHIP).join(self.profile).join(self.name);
+        fs::read(&path).map_err(|why| format!("cannot read {}: {why}", path.display()).into())
+    }
+}
+
+/// The programs of `footprint`, each a part of the cores, and the image for the arm.
+const LINKED: &[Linked] = &[
+    Linked { name: "answer", profile: "chip" },
+    Linked { name: "arm", profile: "chip" },
+    Linked { name: "journal", profile: "chip" },
+    Linked { name: "rest_of_motion", profile: "chip" },
+    Linked { name: "rest_of_protocol", profile: "chip" },
+    Linked { name: "firmware-stm32", profile: "firmware" },
+];
+
+/// Links the programs for the chip.
+pub(crate) fn link() -> Outcome<&'static [Linked]> {
     run("rustup", &format!("--quiet target add {CHIP}"), &[])?;
-    cargo(&format!("build --quiet --package footprint --target {CHIP} --profile chip"))
+    cargo(&format!("build --quiet --package footprint --target {CHIP} --profile chip"))?;
+    cargo("fw --quiet")?;
+    Ok(LINKED)
 }
 
 fn target_directory() -> PathBuf {

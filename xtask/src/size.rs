@@ -4,19 +4,17 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use crate::elf::{Place, Program, Symbol};
-use crate::no_panic::PROGRAMS;
-use crate::run::{Outcome, link_footprint, linked};
+use crate::run::{Outcome, link};
 
 /// Functions the compiler calls to copy, fill and compare more than a few bytes.
 const COPIERS: &[&str] = &["memcpy", "memmove", "memset", "memclr", "memcmp"];
 
 /// Links the cores and prints their sizes.
 pub(crate) fn print() -> Outcome {
-    link_footprint()?;
-    for name in PROGRAMS {
-        let file = linked(name)?;
+    for linked in link()? {
+        let file = linked.read()?;
         let program = Program::read(&file)?;
-        println!("\n{name}, bytes");
+        println!("\n{}, bytes", linked.name);
         for section in &program.sections {
             println!("{:8}  {}", section.size, section.name);
         }
@@ -44,7 +42,7 @@ fn print_files(program: &Program<'_>) -> Outcome {
 /// outermost package.
 fn reason(places: &[Place]) -> String {
     let ours = places.iter().find(|place| place.is_ours);
-    let theirs = || places.last().map_or("?", |place| package(&place.file));
+    let theirs = || places.last().map_or("(no line of source)", |place| package(&place.file));
     ours.map_or_else(|| theirs().to_owned(), |place| place.file.clone())
 }
 

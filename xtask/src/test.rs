@@ -13,21 +13,25 @@ const STEPS: &[Step] = &[
     ("tools that the tests need", install),
     ("format", || cargo("fmt --all --check")),
     ("lints, host", || cargo(&host("clippy", "--all-targets -- -D warnings"))),
-    ("lints, chip", || cargo(&format!("clippy -p footprint --target {CHIP} -- -D warnings"))),
+    ("lints, what the firmware tests on the host", || {
+        cargo("clippy -p firmware-stm32 --lib --tests -- -D warnings")
+    }),
+    ("lints, chip", || {
+        cargo(&format!("clippy -p footprint -p firmware-stm32 --target {CHIP} -- -D warnings"))
+    }),
     ("documentation", documentation),
     ("docs/registers.md is fresh", registers_md::check),
     ("no panic can be reached", no_panic::check),
-    ("host programs", || cargo("build --release -p host-sim -p sevenbot")),
-    ("tests", || cargo(&host("test", ""))),
+    ("programs under test", || cargo("build -p host-sim -p sevenbot")),
+    ("tests", || cargo("test --workspace --exclude footprint")),
 ];
 
 /// Carries out the steps.
 pub(crate) fn all() -> Outcome {
+    let start = Instant::now();
     for (number, (heading, step)) in (1..).zip(STEPS) {
-        println!("\n=== {number}/{} {heading}", STEPS.len());
-        let start = Instant::now();
+        println!("\n=== {number}/{} {heading} (after {} s)", STEPS.len(), start.elapsed().as_secs());
         step().map_err(|why| format!("step {number}, {heading}: {why}"))?;
-        println!("=== {number}/{} done in {:.1} s", STEPS.len(), start.elapsed().as_secs_f32());
     }
     Ok(())
 }
@@ -41,7 +45,7 @@ fn documentation() -> Outcome {
     run("cargo", &host("doc", "--no-deps"), &[("RUSTDOCFLAGS", "-D warnings")])
 }
 
-/// A cargo command for every package that builds for the host.
+/// A cargo command for every package that builds for the host as a whole.
 fn host(command: &str, words: &str) -> String {
     format!("{command} --workspace --exclude footprint --exclude firmware-stm32 {words}")
 }

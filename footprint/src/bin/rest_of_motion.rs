@@ -14,6 +14,7 @@ use motion_core::sensor::Sensor;
 use motion_core::servo_bus::TorqueCodes;
 use motion_core::servo_bus::bus::{Bus, Torque};
 use motion_core::servo_bus::frame::{self, Decoder, FrameBuffer, Instruction, Reading};
+use motion_core::servo_bus::servo::Servo;
 use motion_core::trajectory::Trajectory;
 use motion_core::vacuum::Gripper;
 use protocol_core::registers::{JOINTS, Joint};
@@ -28,6 +29,7 @@ fn main() -> ! {
         servo_frames();
         decoder();
         bus();
+        servo();
     }
 }
 
@@ -101,4 +103,17 @@ fn bus() {
     bus.set_torque(any_time(), &opaque([Torque::Free; JOINTS]));
     bus.set_goals(any_time(), Joint::ALL.into_iter().zip(core::iter::repeat_with(|| opaque(0))));
     opaque(bus.frame());
+}
+
+fn servo() {
+    let mut servo = opaque(Servo::new(opaque(0)));
+    let heard = frame::Frame { id: opaque(0), code: opaque(0), params: any_bytes() };
+    opaque(servo.hear(&heard));
+    opaque((servo.torque_switch(), servo.goal(), servo.take_new_goal()));
+    servo.set_moving(opaque(true));
+    servo.set_errors(opaque(0));
+    opaque(servo.errors());
+    if let Some(reading) = Reading::parse(any_bytes()) {
+        servo.set_reading(&opaque(reading));
+    }
 }
