@@ -92,10 +92,14 @@ impl Drive {
         self.engagement == Engagement::Engaged
     }
 
-    /// Is the joint driven and on its way?
+    /// Is the joint on its way, or about to go?
     #[must_use]
     pub fn is_moving(&self) -> bool {
-        self.is_engaged() && self.trajectory.is_moving()
+        match self.engagement {
+            Engagement::Released => false,
+            Engagement::Waiting { target } => target.is_some(),
+            Engagement::Engaged => self.trajectory.is_moving(),
+        }
     }
 
     /// Where an engaged joint is to be now.
@@ -140,7 +144,9 @@ mod tests {
         let mut drive = Drive::RELEASED;
         drive.aim(degrees(10), 0);
         drive.wait();
+        assert!(!drive.is_moving());
         drive.aim(degrees(60), 0);
+        assert!(drive.is_moving(), "a host that waits must not be told that it is there");
         assert_eq!(drive.engage(degrees(40)), Some(Engaged::Moving));
         drive.advance(100);
         assert_eq!(drive.set_point(), MicroDegrees(41_900_000), "from where it is, not from anywhere else");
