@@ -24,8 +24,7 @@ impl Arm {
     pub(super) fn show_moving(&mut self) {
         // A joint whose servo does not answer is not on its way, whatever the host wants of it.
         let starting = self.starting_until.is_some();
-        let moving =
-            self.joint_set(|joint| joint.drive.is_moving() && (starting || joint.sensor.is_known()));
+        let moving = self.joint_set(|joint| joint.drive.is_moving() && (starting || joint.sensor.is_known()));
         self.registers.set(MOVING_JOINTS.address, moving);
     }
 
