@@ -13,7 +13,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
 
 /// Nothing takes this long on the slowest machine.
-const PATIENCE: Duration = Duration::from_secs(30);
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A running simulator; it is killed when this is dropped.
 pub(crate) struct Sim {
@@ -38,12 +38,26 @@ pub(crate) fn refused(arguments: &[&str]) -> String {
 
 /// Likewise, of a command.
 pub(crate) fn complaint(command: &mut Command) -> String {
-    let output = command.output().unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert_eq!(output.stdout, b"");
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let status = wait(&mut child);
+    let said = read_to_end(&mut child.stderr.take().unwrap());
+    assert_eq!(status, Some(2), "{said}");
+    assert_eq!(read_to_end(&mut child.stdout.take().unwrap()), "");
     assert_eq!(said.lines().count(), 1, "{said}");
     said
+}
+
+/// Waits for the exit status; `None` if it was killed, as it is once patience ends.
+fn wait(child: &mut Child) -> Option<i32> {
+    let patience_ends = Instant::now() + PATIENCE;
+    while Instant::now() < patience_ends {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap().code()
 }
 
 impl Sim {
@@ -82,7 +96,7 @@ impl Sim {
     /// Sends a signal and waits for the exit status; `None` if it was killed.
     pub(crate) fn end_with(&mut self, signal: Signal) -> Option<i32> {
         self.signal(signal);
-        self.child.wait().unwrap().code()
+        wait(&mut self.child)
     }
 
     /// Stops reading what it says, as a closed terminal does.
