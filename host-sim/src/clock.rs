@@ -24,7 +24,7 @@ impl Default for Clock {
 }
 
 impl Clock {
-    /// The time now. Has to be asked more often than once in [`LONGEST_ABSENCE`], or time stands still.
+    /// The time now. Has to be asked once a second at least: what is longer counts as stopped.
     pub fn now(&mut self) -> Instant {
         let micros = u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX);
         self.at(Instant::from_micros(micros))
