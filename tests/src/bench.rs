@@ -11,11 +11,11 @@ use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 
 use crate::line::{Line, PATIENCE};
+use crate::own::{OwnArm, World};
 use crate::programs::sevenbot;
 use crate::registers::{
     DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FEEDBACK_FREQUENCY, MOVING_JOINTS, PRESENT_POSITION, STANDARD_POSE,
 };
-use crate::simulator::Simulator;
 use crate::target::{Need, Port, Target};
 
 /// The baud rate of an arm that nobody has changed.
@@ -73,14 +73,20 @@ impl Setup {
 /// Runs a test against an arm that is up and at rest, or says why it cannot.
 pub fn with_arm<T: FnOnce(&mut Bench)>(setup: Setup, test: T) {
     let shared = env::var_os("ARM_PORT").map(|path| Port(PathBuf::from(path)));
-    if let Some(reason) = shared.as_ref().and_then(|port| lacking(port, &setup)) {
+    let world = if env::var_os("ARM").is_some_and(|arm| arm == "emulator") {
+        World::Emulator
+    } else {
+        World::Simulator
+    };
+    let lacks = |&need: &Need| shared.as_ref().map_or_else(|| world.lacks(need), |port| port.lacks(need));
+    if let Some(reason) = setup.needs.iter().find_map(lacks) {
         return skip(type_name::<T>(), reason);
     }
     // One arm for all tests, in all threads and processes: one after another.
     let _turn = shared.as_ref().map(|_| turn());
     let target: Box<dyn Target> = match shared {
         Some(port) => Box::new(port),
-        None => Box::new(Simulator::start(setup.options)),
+        None => Box::new(OwnArm::start(world, setup.options)),
     };
     let is_fresh = target.lacks(Need::FreshArm).is_none();
     let line = Line::open(target.port(), BAUD);
@@ -92,10 +98,6 @@ pub fn with_arm<T: FnOnce(&mut Bench)>(setup: Setup, test: T) {
         bench.wait_for_pose(&STANDARD_POSE);
     }
     test(&mut bench);
-}
-
-fn lacking(target: &impl Target, setup: &Setup) -> Option<&'static str> {
-    setup.needs.iter().find_map(|&need| target.lacks(need))
 }
 
 /// Past the capture of the test runner, which keeps quiet about tests that pass.
@@ -136,6 +138,12 @@ impl DerefMut for Bench {
 }
 
 impl Bench {
+    /// Can this arm meet a need?
+    #[must_use]
+    pub fn can(&self, need: Need) -> bool {
+        self.target.lacks(need).is_none()
+    }
+
     /// Switches the arm off and on, and waits until it answers again: at this baud rate, with a RAM that has
     /// forgotten everything.
     pub fn power_cycle(&mut self, baud: u32) {

@@ -1,8 +1,8 @@
-//! System tests know bytes only: frames through a serial port, against the simulator, or whatever answers on
-//! `ARM_PORT`.
+//! System tests know bytes only: frames through a serial port, against the simulator, the firmware in an
+//! emulator (`ARM=emulator`), or whatever answers on `ARM_PORT`.
 //!
 //! ```text
-//!   tests/*.rs ──▶ Bench ──▶ Line ──▶ serial port ──▶ host-sim, one a test: may be killed, faulty, ...
+//!   tests/*.rs ──▶ Bench ──▶ Line ──▶ serial port ──▶ OwnArm, one a test: may be killed, faulty, ...
 //!                    │                           └──▶ ARM_PORT: one arm for all tests, one after another
 //!                    └── Target: what can be done to the arm itself
 //! ```
@@ -15,9 +15,9 @@
 pub mod bench;
 pub mod frames;
 pub mod line;
+pub mod own;
 pub mod programs;
 pub mod registers;
-pub mod simulator;
 pub mod target;
 
 pub use bench::{Bench, Setup, near, with_arm};

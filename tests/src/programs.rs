@@ -18,6 +18,13 @@ pub fn sevenbot() -> &'static Path {
     PATH.get_or_init(|| program("sevenbot"))
 }
 
+/// The chores, one of which is the emulator.
+#[must_use]
+pub fn xtask() -> &'static Path {
+    static PATH: OnceLock<PathBuf> = OnceLock::new();
+    PATH.get_or_init(|| program("xtask"))
+}
+
 /// The program of this package. It stands two folders above the test: `target/debug/deps/test-0123`.
 fn program(package: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a test knows where it is");

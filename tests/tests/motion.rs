@@ -266,7 +266,7 @@ fn d14_answers_go_on_between_reports() {
 /// D14: reports take at most half the line: 34 Hz at 9600 baud.
 #[test]
 fn d14_reports_take_at_most_half_of_a_slow_line() {
-    with_arm(Setup::any().needs(Need::PowerCycle), |arm| {
+    with_arm(Setup::any().needs(Need::PowerCycle).needs(Need::Persistence), |arm| {
         arm.write_setting(BAUD_RATE, &[7]);
         arm.power_cycle(9_600);
         arm.write(FEEDBACK_FREQUENCY, &[50]);

@@ -41,7 +41,12 @@ fn a_new_arm_has_the_documented_defaults() {
         assert_eq!(arm.read(TIME, 7), [0; 7]);
         assert_eq!(arm.read(53, 1), [0]);
         assert_eq!(arm.read(61, 179), [0; 179], "no registers: they answer, and read 0");
-        assert_eq!(arm.read(STATUS, 3), [1, 0, 0], "layout 1, no faults, all servos there");
+        let faults = u8::from(!arm.can(Need::Persistence));
+        assert_eq!(
+            arm.read(STATUS, 3),
+            [1, faults, 0],
+            "layout 1, no fault but that of the storage, all servos there"
+        );
     });
 }
 

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod elf;
+mod emulate;
 mod no_panic;
 mod registers_md;
 mod run;
@@ -39,6 +40,11 @@ enum Chore {
     Size,
     /// Compare the parse-and-answer path with two Modbus RTU servers.
     Bench,
+    /// Run the image for the arm in an emulator, simulated servos on its bus, and print the port it is on.
+    ///
+    /// SIGHUP (`kill -HUP`) switches the arm off and on, Ctrl-C ends it. The emulator keeps no settings: its
+    /// flash ignores what it is told, and the status block says so (fault bit 0).
+    Emulate(emulate::Options),
 }
 
 fn main() -> ExitCode {
@@ -58,6 +64,7 @@ fn carry_out(chore: &Chore) -> Outcome {
         Chore::Docs { check: false } => registers_md::write(),
         Chore::NoPanic => no_panic::check(),
         Chore::Size => size::print(),
+        Chore::Emulate(options) => emulate::run(options),
         Chore::Bench => run::cargo("run --quiet --release --package bench"),
     }
 }

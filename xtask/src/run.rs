@@ -61,12 +61,18 @@ const LINKED: &[Linked] = &[
 
 /// Links the programs for the chip.
 pub(crate) fn link() -> Outcome<&'static [Linked]> {
-    run("rustup", &format!("--quiet target add {CHIP}"), &[])?;
+    build_image()?;
     cargo(&format!("build --quiet --package footprint --target {CHIP} --profile chip"))?;
-    cargo("fw --quiet")?;
     Ok(LINKED)
 }
 
-fn target_directory() -> PathBuf {
+/// Builds the image for the arm.
+pub(crate) fn build_image() -> Outcome {
+    run("rustup", &format!("--quiet target add {CHIP}"), &[])?;
+    cargo("fw --quiet")
+}
+
+/// Where cargo puts what it builds.
+pub(crate) fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |set| root().join(set))
 }

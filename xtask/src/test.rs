@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::run::{CHIP, Outcome, cargo, run};
-use crate::{no_panic, registers_md};
+use crate::{emulate, no_panic, registers_md};
 
 /// A heading, and what is done under it.
 type Step = (&'static str, fn() -> Outcome);
@@ -22,7 +22,10 @@ const STEPS: &[Step] = &[
     ("documentation", documentation),
     ("docs/registers.md is fresh", registers_md::check),
     ("no panic can be reached", no_panic::check),
-    ("programs under test", || cargo("build -p host-sim -p sevenbot")),
+    ("programs under test", || cargo("build -p host-sim -p sevenbot -p xtask")),
+    ("system tests, the image for the arm in an emulator", || {
+        run("cargo", "test -p system-tests", &[("ARM", "emulator")])
+    }),
     ("tests", || cargo("test --workspace --exclude footprint")),
 ];
 
@@ -38,7 +41,15 @@ pub(crate) fn all() -> Outcome {
 
 fn install() -> Outcome {
     run("rustup", "component add clippy rustfmt", &[])?;
-    run("rustup", &format!("target add {CHIP}"), &[])
+    run("rustup", &format!("target add {CHIP}"), &[])?;
+    if !emulate::has_qemu() {
+        println!("{} is missing: installing it", emulate::QEMU);
+        let installed = run("apt-get", "update", &[]).and_then(|()| {
+            run("apt-get", &format!("install -y --no-install-recommends {}", emulate::QEMU), &[])
+        });
+        installed.map_err(|why| format!("{why}; {}", emulate::HOW_TO_GET_QEMU))?;
+    }
+    Ok(())
 }
 
 fn documentation() -> Outcome {
