@@ -244,7 +244,8 @@ fn d20_the_pump_and_the_valve() {
 
 #[test]
 fn a_servo_that_falls_silent_is_flagged_and_the_others_go_on() {
-    for fault in [Fault::Missing, Fault::Late(Duration::from_millis(30)), Fault::Garbled(1)] {
+    let late = |millis| Fault::Late(Duration::from_millis(millis));
+    for fault in [Fault::Missing, late(9), late(10), late(12), late(30), late(100), Fault::Garbled(1)] {
         let mut rig = Rig::started();
         rig.plant.set_fault(joint(5), Some(fault));
         rig.run_ms(200);

@@ -12,6 +12,8 @@ use crate::CYCLE;
 
 /// Time on the wire of one byte at 1 Mbaud, ten bits.
 const BYTE_TIME_US: usize = 10;
+/// How many lengths of question there are.
+const LENGTHS: u8 = 4;
 
 /// What a motor does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,6 +78,9 @@ pub struct Bus {
     frame: FrameBuffer,
     /// Who was asked and has not answered yet.
     awaited: Option<Joint>,
+    /// By how much the next question to each servo is longer than it needs to be. It changes with every
+    /// question that got no answer: so a late answer to that one is told from the answer to the next.
+    surplus: [u8; JOINTS],
     /// When the time for the answer is over, or, where none is expected, when the wire is free again.
     busy_until: Instant,
 }
@@ -90,6 +95,7 @@ impl Bus {
             decoder: Decoder::new(),
             frame: FrameBuffer::new(),
             awaited: None,
+            surplus: [0; JOINTS],
             busy_until: Instant::ZERO,
         }
     }
@@ -108,10 +114,14 @@ impl Bus {
     }
 
     fn answer(&mut self) -> Option<Outcome> {
+        let joint = self.awaited?;
+        let surplus = self.surplus_of(joint);
         while let Some(result) = self.decoder.pull() {
-            if let (Ok(answer), Some(joint)) = (result, self.awaited)
+            if let Ok(answer) = result
                 && answer.id == joint.index()
-                && let Some(reading) = Reading::parse(answer.params)
+                && answer.params.len() == usize::from(Reading::REGISTERS + surplus)
+                && let Some(reading) =
+                    answer.params.get(..usize::from(Reading::REGISTERS)).and_then(Reading::parse)
             {
                 return Some(Outcome::Measured { joint, reading, alarms: answer.code });
             }
@@ -119,8 +129,16 @@ impl Bus {
         None
     }
 
-    fn expired(&self, now: Instant) -> Option<Outcome> {
-        self.awaited.filter(|_| now >= self.busy_until).map(|joint| Outcome::Failed { joint })
+    fn surplus_of(&self, joint: Joint) -> u8 {
+        self.surplus.get(usize::from(joint.index())).copied().unwrap_or(0)
+    }
+
+    fn expired(&mut self, now: Instant) -> Option<Outcome> {
+        let joint = self.awaited.filter(|_| now >= self.busy_until)?;
+        if let Some(surplus) = self.surplus.get_mut(usize::from(joint.index())) {
+            *surplus = (*surplus + 1) % LENGTHS;
+        }
+        Some(Outcome::Failed { joint })
     }
 
     /// May something be sent?
@@ -144,7 +162,8 @@ impl Bus {
     /// Asks a joint's servo where it is and how it is.
     pub fn ask(&mut self, now: Instant, joint: Joint) {
         self.decoder.clear();
-        frame::read(&mut self.frame, joint.index(), register::PRESENT_POSITION, Reading::REGISTERS);
+        let count = Reading::REGISTERS + self.surplus_of(joint);
+        frame::read(&mut self.frame, joint.index(), register::PRESENT_POSITION, count);
         self.awaited = Some(joint);
         self.busy_until = self.sent(now) + self.timeout;
     }
@@ -267,6 +286,21 @@ mod tests {
         assert_eq!(bus.poll(at(4_001)), None, "cleared before the question");
         bus.bytes(&answer_of(1, 0));
         assert_eq!(bus.poll(at(4_002)), None, "of another servo");
+    }
+
+    #[test]
+    fn a_late_answer_of_the_same_servo_is_told_by_its_length() {
+        let mut bus = bus();
+        bus.ask(at(0), J3);
+        assert_eq!(bus.poll(at(4_000)), Some(Outcome::Failed { joint: J3 }));
+        bus.ask(at(4_000), J3);
+        assert_eq!(bus.frame()[6], 9, "one register more");
+        bus.bytes(&answer_of(2, 0));
+        assert_eq!(bus.poll(at(4_300)), None, "that is the answer to the first question");
+        let mut longer = FrameBuffer::new();
+        status(&mut longer, 2, 0, &[reading().to_bytes().as_slice(), &[0]].concat());
+        bus.bytes(&longer);
+        assert_eq!(bus.poll(at(4_400)), measured(0));
     }
 
     #[test]

@@ -212,7 +212,7 @@ fn decode(bytes: &[u8]) -> ToServos {
     decoder.push(bytes);
     let frame = decoder.pull().expect("a whole frame").expect("a right checksum");
     match (Instruction::from_code(frame.code), frame.params) {
-        (Some(Instruction::Read), [register::PRESENT_POSITION, 8]) => ToServos::Ask(frame.id),
+        (Some(Instruction::Read), [register::PRESENT_POSITION, 8..=11]) => ToServos::Ask(frame.id),
         (Some(Instruction::SyncWrite), [register::TORQUE_SWITCH, 1, items @ ..]) => {
             ToServos::Torque(std::array::from_fn(|joint| items[joint * 2 + 1]))
         }
