@@ -45,12 +45,39 @@ impl Default for Options {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity(Snapshot);
 
+/// Whose firmware an arm runs: register 1 tells (D7).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Firmware {
+    /// This project's, 3.0 and later: everything here works with it.
+    Ours,
+    /// The maker's, 1.0 to 2.4: it has no status block, checks no ranges, and never says what it refused.
+    Makers,
+    /// A version nobody is known to have given out.
+    Unknown,
+}
+
 impl Identity {
     /// The firmware's version, as `3.0`.
     #[must_use]
     pub fn version(&self) -> String {
         let tenths = self.0.byte(&FIRMWARE_VERSION);
         format!("{}.{}", tenths / 10, tenths % 10)
+    }
+
+    /// Whose firmware it is.
+    #[must_use]
+    pub fn firmware(&self) -> Firmware {
+        match self.0.byte(&FIRMWARE_VERSION) {
+            version if version >= FIRMWARE_VERSION.default_at(FIRMWARE_VERSION.address) => Firmware::Ours,
+            10..=24 => Firmware::Makers,
+            _ => Firmware::Unknown,
+        }
+    }
+
+    /// Are registers 240 to 255 the status block of docs/protocol.md, section 6?
+    #[must_use]
+    pub fn has_status_block(&self) -> bool {
+        self.firmware() == Firmware::Ours
     }
 
     /// The chip's own number, most significant byte first (D8).
@@ -72,6 +99,7 @@ pub struct Report {
 /// A 7Bot V2 at the other end of a serial port.
 pub struct Arm {
     link: Link,
+    path: String,
     options: Options,
     identity: Identity,
     reports: VecDeque<Report>,
@@ -105,10 +133,12 @@ impl Arm {
             } else {
                 Err(error)
             }
-        })?;
+        });
+        let port = port.map_err(|error| OpenError::of(path, error))?;
         let link = Link::new(port, options.baud);
         let nobody = Identity(Snapshot { address: 0, values: Vec::new() });
-        let mut arm = Self { link, options, identity: nobody, reports: VecDeque::new() };
+        let path = path.to_owned();
+        let mut arm = Self { link, path, options, identity: nobody, reports: VecDeque::new() };
         arm.identity = Identity(arm.read_span(Span::between(&DEVICE_CODE, &CHIP_ID))?);
         match arm.identity.0.byte(&DEVICE_CODE) {
             code if code == DEVICE_CODE.default_at(DEVICE_CODE.address) => Ok(arm),
@@ -120,6 +150,18 @@ impl Arm {
     #[must_use]
     pub const fn identity(&self) -> &Identity {
         &self.identity
+    }
+
+    /// The name of its port.
+    #[must_use]
+    pub fn port(&self) -> &str {
+        &self.path
+    }
+
+    /// How it is talked to.
+    #[must_use]
+    pub const fn options(&self) -> Options {
+        self.options
     }
 
     /// The values of `count` registers from `address` on, all of one instant.

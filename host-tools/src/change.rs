@@ -5,16 +5,14 @@
 
 use std::fmt;
 
-use protocol_core::registers::map::{
-    EEPROM_LOCK, FRAMES_CORRUPTED, FRAMES_REFUSED, LAST_REFUSAL, LAST_REFUSED_REGISTER, STATUS_VERSION, find,
-    refusal,
-};
+use protocol_core::registers::map::{EEPROM_LOCK, find, refusal};
 use protocol_core::registers::{Access, Region, Register};
 
-use crate::arm::{Arm, STATUS};
+use crate::arm::Arm;
 use crate::error::Error;
 use crate::names::name_of_register;
 use crate::snapshot::{Snapshot, Span};
+use crate::status::Status;
 use crate::words;
 
 /// A register that does not hold what was written to it.
@@ -61,13 +59,16 @@ impl Arm {
     /// As [`Arm::read`] and [`Arm::write`].
     pub fn write_checked(&mut self, address: u8, values: &[u8]) -> Result<Vec<Unchanged>, Error> {
         let locked = self.read_span(Span::of(&EEPROM_LOCK))?.byte(&EEPROM_LOCK) != 0;
-        let before = self.read_span(STATUS)?;
+        let before = self.status()?;
         self.write(address, values)?;
         let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
         let found = self.read_span(Span { address, count })?;
-        let after = self.read_span(STATUS)?;
+        let after = self.status()?;
         Ok(compare(&found, values, |address, wanted| {
-            rule(address, locked).unwrap_or_else(|| verdict(&before, &after, address, wanted))
+            rule(address, locked).unwrap_or_else(|| match (&before, &after) {
+                (Some(before), Some(after)) => verdict(before, after),
+                _ => guess(address, wanted),
+            })
         }))
     }
 }
@@ -100,21 +101,20 @@ fn rule(address: u8, locked: bool) -> Option<Cause> {
 }
 
 /// What the arm's counters say of a frame that went out between the two looks at them.
-fn verdict(before: &Snapshot, after: &Snapshot, address: u8, wanted: u8) -> Cause {
-    let moved = |row: &Register| before.counter(row) != after.counter(row);
-    if after.byte(&STATUS_VERSION) != STATUS_VERSION.default_at(STATUS_VERSION.address) {
-        // The maker's firmware has no status block, so only the table is left to ask.
-        return match find(address) {
-            Some(row) if !row.range.contains(wanted) => Cause::OutOfRange { address },
-            _ => Cause::Unknown,
-        };
+fn verdict(before: &Status, after: &Status) -> Cause {
+    let refused = before.frames_refused() != after.frames_refused();
+    match after.last_refusal() {
+        Some((refusal::OUT_OF_RANGE, address)) if refused => Cause::OutOfRange { address },
+        Some((refusal::STORAGE_FULL, _)) if refused => Cause::StorageFull,
+        _ if before.frames_corrupted() != after.frames_corrupted() => Cause::Damaged,
+        _ => Cause::Unknown,
     }
-    match after.byte(&LAST_REFUSAL) {
-        refusal::OUT_OF_RANGE if moved(&FRAMES_REFUSED) => {
-            Cause::OutOfRange { address: after.byte(&LAST_REFUSED_REGISTER) }
-        }
-        refusal::STORAGE_FULL if moved(&FRAMES_REFUSED) => Cause::StorageFull,
-        _ if moved(&FRAMES_CORRUPTED) => Cause::Damaged,
+}
+
+/// Without a status block only the table is left to ask.
+fn guess(address: u8, wanted: u8) -> Cause {
+    match find(address) {
+        Some(row) if !row.range.contains(wanted) => Cause::OutOfRange { address },
         _ => Cause::Unknown,
     }
 }
@@ -149,19 +149,19 @@ impl fmt::Display for Cause {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol_core::registers::map::{DEVICE_ID, OFFSET, PRESENT_POSITION, RESERVED_8, TARGET_POSITION};
+    use protocol_core::registers::map::{
+        DEVICE_ID, FRAMES_REFUSED, LAST_REFUSAL, LAST_REFUSED_REGISTER, OFFSET, PRESENT_POSITION, RESERVED_8,
+        STATUS_VERSION, TARGET_POSITION,
+    };
 
-    fn status(version: u8, refused: u8, why: u8, register: u8) -> Snapshot {
-        let mut status = Snapshot { address: STATUS.address, values: vec![0; usize::from(STATUS.count)] };
-        for (row, value) in [
-            (STATUS_VERSION, version),
-            (LAST_REFUSAL, why),
-            (LAST_REFUSED_REGISTER, register),
-            (FRAMES_REFUSED, refused),
-        ] {
-            status.values[usize::from(row.address - STATUS.address)] = value;
+    fn status(refused: u8, why: u8, register: u8) -> Status {
+        let mut status = Snapshot { address: STATUS_VERSION.address, values: vec![0; 16] };
+        for (row, value) in
+            [(LAST_REFUSAL, why), (LAST_REFUSED_REGISTER, register), (FRAMES_REFUSED, refused)]
+        {
+            status.values[usize::from(row.address - STATUS_VERSION.address)] = value;
         }
-        status
+        Status::from(status)
     }
 
     #[test]
@@ -176,20 +176,19 @@ mod tests {
 
     #[test]
     fn the_status_block_explains_a_refusal_that_was_counted() {
-        let before = status(1, 4, refusal::OUT_OF_RANGE, 46);
-        let stale = status(1, 4, refusal::OUT_OF_RANGE, 46);
-        assert_eq!(verdict(&before, &stale, 46, 90), Cause::Unknown, "an older refusal explains nothing");
-        let after = status(1, 5, refusal::OUT_OF_RANGE, 47);
-        assert_eq!(verdict(&before, &after, 46, 90), Cause::OutOfRange { address: 47 });
-        let full = status(1, 5, refusal::STORAGE_FULL, 11);
-        assert_eq!(verdict(&before, &full, 11, 1), Cause::StorageFull);
+        let before = status(4, refusal::OUT_OF_RANGE, 46);
+        let stale = status(4, refusal::OUT_OF_RANGE, 46);
+        assert_eq!(verdict(&before, &stale), Cause::Unknown, "an older refusal explains nothing");
+        let after = status(5, refusal::OUT_OF_RANGE, 47);
+        assert_eq!(verdict(&before, &after), Cause::OutOfRange { address: 47 });
+        let full = status(5, refusal::STORAGE_FULL, 11);
+        assert_eq!(verdict(&before, &full), Cause::StorageFull);
     }
 
     #[test]
     fn without_a_status_block_the_table_is_asked() {
-        let none = status(0, 0, 0, 0);
-        assert_eq!(verdict(&none, &none, 46, 200), Cause::OutOfRange { address: 46 });
-        assert_eq!(verdict(&none, &none, 46, 90), Cause::Unknown);
+        assert_eq!(guess(46, 200), Cause::OutOfRange { address: 46 });
+        assert_eq!(guess(46, 90), Cause::Unknown);
     }
 
     #[test]

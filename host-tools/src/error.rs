@@ -6,6 +6,7 @@ use std::fmt;
 use std::io;
 use std::time::Duration;
 
+use crate::permission;
 use crate::snapshot::Span;
 
 /// Why a port does not lead to an arm.
@@ -14,7 +15,10 @@ pub enum OpenError {
     /// There is no such port.
     NotFound,
     /// This user may not open the port.
-    PermissionDenied,
+    PermissionDenied {
+        /// The group that may, where the system says so.
+        group: Option<String>,
+    },
     /// Another program has the port open.
     Busy,
     /// It cannot be used as a serial port; the system's own words say why.
@@ -34,12 +38,15 @@ impl From<Error> for OpenError {
     }
 }
 
-impl From<serialport::Error> for OpenError {
-    fn from(error: serialport::Error) -> Self {
+impl OpenError {
+    /// Why the port at `path` did not open.
+    pub(crate) fn of(path: &str, error: serialport::Error) -> Self {
         use io::ErrorKind;
         match error.kind() {
             serialport::ErrorKind::Io(ErrorKind::NotFound) => Self::NotFound,
-            serialport::ErrorKind::Io(ErrorKind::PermissionDenied) => Self::PermissionDenied,
+            serialport::ErrorKind::Io(ErrorKind::PermissionDenied) => {
+                Self::PermissionDenied { group: permission::group_of(path) }
+            }
             // The serialport crate gives this kind to a port that is locked; on Windows to a missing one too.
             serialport::ErrorKind::NoDevice if !cfg!(windows) => Self::Busy,
             _ => Self::Unusable(error),
@@ -51,7 +58,7 @@ impl fmt::Display for OpenError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotFound => out.write_str("there is no such port"),
-            Self::PermissionDenied => out.write_str("no permission to open this port"),
+            Self::PermissionDenied { .. } => out.write_str("no permission to open this port"),
             Self::Busy => out.write_str("another program has this port open"),
             Self::Unusable(error) => write!(out, "this port cannot be used: {error}"),
             Self::Silent(error) => error.fmt(out),
@@ -127,16 +134,15 @@ impl fmt::Display for Heard {
 impl OpenError {
     /// What a user should check, most likely first; empty where the message says it all.
     #[must_use]
-    pub const fn advice(&self) -> &'static [&'static str] {
-        match self {
+    pub fn advice(&self) -> Vec<String> {
+        let lines: &[&str] = match self {
+            Self::PermissionDenied { group } => return vec![join(group.as_deref())],
+            Self::Silent(error) => return error.advice(),
             Self::NotFound => &[
                 "is the arm plugged in, or the simulator started?",
                 "the name may have changed: unplugging and plugging in again gives ports new numbers",
+                "`sevenbot ports` lists what is there",
             ],
-            Self::PermissionDenied => {
-                &["on Linux: `ls -l` of the port names the group that may open it (often dialout or uucp); \
-                 join it with `sudo usermod -aG GROUP $USER` and log in again"]
-            }
             Self::Busy => &[
                 "close the other program: a terminal, a browser page, a second sevenbot",
                 "on Linux, `fuser -v PORT` names it",
@@ -144,29 +150,51 @@ impl OpenError {
             Self::Unusable(_) => {
                 &["does this name belong to a serial port, and does it take this baud rate?"]
             }
-            Self::Silent(error) => error.advice(),
-            Self::WrongDevice { .. } => &["is this the right port?"],
+            Self::WrongDevice { .. } => {
+                &["is this the right port? `sevenbot ports` says which ones lead to arms"]
+            }
+        };
+        owned(lines)
+    }
+}
+
+fn join(group: Option<&str>) -> String {
+    match group {
+        Some("root") => "only root may open it: a udev rule, or another kernel driver, made it so".to_owned(),
+        Some(group) => {
+            format!("join the group that may: `sudo usermod -aG {group} $USER`, then log out and in again")
         }
+        None if cfg!(unix) => {
+            "`ls -l` of the port names the group that may open it (often dialout or uucp); \
+                               join it and log in again"
+                .to_owned()
+        }
+        None => "is another program using it, or does it need an administrator?".to_owned(),
     }
 }
 
 impl Error {
     /// What a user should check, most likely first; empty where the message says it all.
     #[must_use]
-    pub const fn advice(&self) -> &'static [&'static str] {
-        match self {
+    pub fn advice(&self) -> Vec<String> {
+        owned(match self {
             Self::NoAnswer { heard: Heard { bytes: 0, .. }, .. } => &[
                 "has the arm power, and is its cable plugged in at both ends?",
-                "is this the right port?",
-                "is the baud rate right (--baud)? the arm starts with the one in its register 12",
+                "is this the right port? `sevenbot ports` says which ones lead to arms",
+                "is the baud rate right (--baud)? `sevenbot --port PORT baud --find` tries all of them",
             ],
             Self::NoAnswer { .. } => &[
-                "something sends, but it does not make sense: most often the baud rate is wrong (--baud)",
+                "something sends, but it does not make sense: most often the baud rate is wrong (--baud); \
+                 `sevenbot --port PORT baud --find` tries all of them",
                 "is this the right port, and no other program reading from it?",
             ],
             Self::Stalled | Self::PortLost(_) => &["was the cable pulled, or the simulator ended?"],
-        }
+        })
     }
+}
+
+fn owned(lines: &[&str]) -> Vec<String> {
+    lines.iter().map(|&line| line.to_owned()).collect()
 }
 
 #[cfg(test)]
@@ -185,5 +213,11 @@ mod tests {
         assert!(garbage.ends_with("12 bytes were heard, none of them a frame"), "{garbage}");
         let frames = said(Heard { bytes: 50, other_frames: 2, damaged_frames: 1 });
         assert!(frames.ends_with("1 damaged and 2 other frames were heard"), "{frames}");
+    }
+
+    #[test]
+    fn a_denied_permission_names_the_group_to_join() {
+        let denied = OpenError::PermissionDenied { group: Some("dialout".to_owned()) };
+        assert!(denied.advice().concat().contains("usermod -aG dialout $USER"));
     }
 }

@@ -1,26 +1,37 @@
 //! How a command can fail: what is said, and the exit status that scripts see.
 
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anstyle::{AnsiColor, Style};
 use sevenbot::{Error, OpenError};
+
+use crate::output::BAD;
+
+/// The exit status after Ctrl-C, as shells have it: 128 and the number of SIGINT.
+pub(crate) const INTERRUPTED: u8 = 130;
 
 /// Why the program does not end well.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// The arm did not do, or is not, what was asked for.
     Arm(String),
-    /// The command line makes no sense for this register.
+    /// The command line makes no sense for this register, or lacks an answer.
     Usage(String),
-    /// Nobody said which port.
-    NoPort,
+    /// Nobody said which port, and none leads to an arm: those that were tried, and what came of it.
+    NoArm { tried: Vec<(String, OpenError)> },
+    /// Nobody said which port, and several lead to an arm.
+    SeveralArms { ports: Vec<String> },
     /// The port does not lead to an arm.
     Open { port: String, error: OpenError },
     /// The arm went away.
     Wire(Error),
+    /// A file cannot be read or written, or does not hold what it should.
+    File { path: PathBuf, reason: String },
     /// What was found out cannot be shown.
     Output(io::Error),
+    /// The user wanted it to end.
+    Interrupted,
 }
 
 impl From<Error> for Failure {
@@ -36,22 +47,27 @@ impl From<io::Error> for Failure {
 }
 
 impl Failure {
-    /// 1: the arm said no. 2: wrong usage, as clap has it. 3: no connection. `sevenbot --help` says the same.
+    /// A failure with a file, for whatever reason.
+    pub(crate) fn file(path: &Path, reason: impl ToString) -> Self {
+        Self::File { path: path.to_owned(), reason: reason.to_string() }
+    }
+
+    /// The exit status; `sevenbot --help` lists them.
     pub(crate) fn exit_code(&self) -> ExitCode {
-        match self {
+        ExitCode::from(match self {
             // Somebody piped into `head`: it has all it wants.
-            Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
-            Self::Arm(_) | Self::Output(_) => ExitCode::from(1),
-            Self::Usage(_) | Self::NoPort => ExitCode::from(2),
-            Self::Open { .. } | Self::Wire(_) => ExitCode::from(3),
-        }
+            Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
+            Self::Arm(_) | Self::File { .. } | Self::Output(_) => 1,
+            Self::Usage(_) => 2,
+            Self::NoArm { .. } | Self::SeveralArms { .. } | Self::Open { .. } | Self::Wire(_) => 3,
+            Self::Interrupted => INTERRUPTED,
+        })
     }
 
     /// Tells the user. Where even that fails, the exit status is all that is left.
     pub(crate) fn report(&self, err: &mut impl Write) {
-        let red = Style::new().bold().fg_color(Some(AnsiColor::Red.into()));
         let Some(message) = self.message() else { return };
-        let _ = writeln!(err, "{red}error:{red:#} {message}");
+        let _ = writeln!(err, "{BAD}error:{BAD:#} {message}");
         for line in self.advice() {
             let _ = writeln!(err, "  - {line}");
         }
@@ -62,29 +78,34 @@ impl Failure {
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => None,
             Self::Output(error) => Some(format!("cannot write the output: {error}")),
             Self::Arm(message) | Self::Usage(message) => Some(message.clone()),
-            Self::NoPort => Some("no port given: use --port PORT or set SEVENBOT_PORT".to_owned()),
+            Self::NoArm { tried } if tried.is_empty() => {
+                Some("no port was given, and this machine has no serial port".to_owned())
+            }
+            Self::NoArm { .. } => {
+                Some("no port was given, and no serial port of this machine leads to an arm".to_owned())
+            }
+            Self::SeveralArms { ports } => {
+                Some(format!("no port was given, and several lead to an arm: {}", ports.join(", ")))
+            }
             Self::Open { port, error } => Some(format!("{port}: {error}")),
             Self::Wire(error) => Some(error.to_string()),
+            Self::File { path, reason } => Some(format!("{}: {reason}", path.display())),
+            Self::Interrupted => Some("interrupted".to_owned()),
         }
     }
 
     fn advice(&self) -> Vec<String> {
-        let lines = match self {
-            Self::NoPort => return vec![ports_here()],
+        let say_which = "use --port PORT or set SEVENBOT_PORT";
+        match self {
+            Self::NoArm { tried } => {
+                let tried = tried.iter().map(|(port, reason)| format!("{port}: {reason}"));
+                let simulator = "`cargo sim -- --link ./7bot` starts a simulated arm, for --port ./7bot";
+                tried.chain([say_which, simulator].map(str::to_owned)).collect()
+            }
+            Self::SeveralArms { .. } => vec![say_which.to_owned()],
             Self::Open { error, .. } => error.advice(),
             Self::Wire(error) => error.advice(),
-            _ => &[],
-        };
-        lines.iter().map(|&line| line.to_owned()).collect()
-    }
-}
-
-fn ports_here() -> String {
-    let ports = serialport::available_ports().unwrap_or_default();
-    let names: Vec<String> = ports.into_iter().map(|port| port.port_name).collect();
-    if names.is_empty() {
-        "this machine has no serial port; `cargo sim` starts a simulated arm and says its port".to_owned()
-    } else {
-        format!("serial ports on this machine: {}", names.join(", "))
+            _ => Vec::new(),
+        }
     }
 }

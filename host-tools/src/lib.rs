@@ -30,14 +30,19 @@
 pub mod arm;
 pub mod change;
 pub mod error;
+mod hold;
 mod link;
 pub mod names;
+mod permission;
+pub mod ports;
 pub mod snapshot;
+pub mod status;
 pub mod units;
 pub mod words;
 
-pub use arm::{Arm, Identity, Options};
+pub use arm::{Arm, Firmware, Identity, Options, Report};
 pub use error::{Error, Heard, OpenError};
 pub use protocol_core::registers::{Joint, Register, map};
 pub use snapshot::{Snapshot, Span};
+pub use status::Status;
 pub use units::{Angle, MoveTime, Speed};

@@ -19,6 +19,8 @@ pub struct Entry {
     pub address: u8,
     /// Its name.
     pub name: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
     /// The number, in the table's units: what a write takes.
     pub value: String,
     /// What the number means; empty where it says all itself.
@@ -60,20 +62,21 @@ fn is_whole(row: &Register, address: u8, snapshot: &Snapshot) -> bool {
 }
 
 fn long_entry(row: &Register, snapshot: &Snapshot) -> Entry {
+    let held = snapshot.span().addresses().filter(|&address| row.holds(address));
+    let bytes: Vec<u8> = held.map(|address| snapshot.at(address)).collect();
     let value = if *row == CHIP_ID {
-        let bytes = snapshot.span().addresses().filter(|&address| row.holds(address));
-        bytes.map(|address| format!("{:02X}", snapshot.at(address))).collect()
+        bytes.iter().map(|byte| format!("{byte:02X}")).collect()
     } else {
         snapshot.counter(row).to_string()
     };
-    Entry { address: row.address, name: name_of(row), value, meaning: String::new() }
+    Entry { address: row.address, name: name_of(row), bytes, value, meaning: String::new() }
 }
 
 fn entry(address: u8, byte: u8) -> Entry {
     let row = find(address);
     let value = row.map_or(i16::from(byte), |row| row.range.decode(byte)).to_string();
     let meaning = row.map(|row| meaning(row, byte)).unwrap_or_default();
-    Entry { address, name: name_of_register(address), value, meaning }
+    Entry { address, name: name_of_register(address), bytes: vec![byte], value, meaning }
 }
 
 /// What a byte means in a row of the table; empty where the number says all.

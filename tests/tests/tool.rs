@@ -219,7 +219,7 @@ fn without_a_connection_the_tool_says_what_to_check() {
         let mut tool = Command::new(sevenbot());
         tool.args(arguments).env_remove("SEVENBOT_PORT").output().expect("sevenbot runs")
     };
-    let text = failed(&run(&["info"]), 2);
+    let text = failed(&run(&["info"]), 3);
     assert!(text.contains("--port") && text.contains("SEVENBOT_PORT"), "{text}");
     let text = failed(&run(&["--port", "/dev/no-such-port", "info"]), 3);
     assert!(text.contains("/dev/no-such-port: there is no such port"), "{text}");

@@ -2,25 +2,93 @@
 
 use std::io::{self, Write};
 
-use sevenbot::Arm;
+use clap::Args;
+use serde::Serialize;
+use serde_json::Value;
+use sevenbot::Span;
+use sevenbot::names;
 use sevenbot::words::{Entry, entries, raw_entries};
 
-use crate::cli::GetArgs;
 use crate::failure::Failure;
+use crate::output::Facts;
+use crate::session::Session;
 
-pub(crate) fn run(arm: &mut Arm, args: &GetArgs, out: &mut impl Write) -> Result<(), Failure> {
+/// How registers are named, for the help of every command that takes such names.
+pub(crate) const NAMES: &str = "\
+Registers are named as in docs/registers.md, in any case, with - or _, as short as the name is still
+the only one; .3 is the third joint's. A number is an address, A..B all from A to B.";
+
+/// Show registers.
+#[derive(Debug, Args)]
+#[command(after_help = format!("{NAMES}
+
+Examples:
+  sevenbot get target-position          all seven
+  sevenbot get speed.3 motor-state 12
+  sevenbot get --raw 54..60
+  sevenbot get status-version..255 --json"))]
+pub(crate) struct GetArgs {
+    /// Names, numbers or ranges of registers.
+    #[arg(required = true, value_name = "REGISTER", value_parser = names::parse)]
+    registers: Vec<Span>,
+    /// Show the bytes as they are.
+    #[arg(long)]
+    raw: bool,
+}
+
+pub(crate) fn run(session: &mut Session, args: &GetArgs) -> Result<(), Failure> {
+    let mut arm = session.connect()?;
+    let mut shown = Vec::new();
     for &span in &args.registers {
         let snapshot = arm.read_span(span)?;
-        show(&if args.raw { raw_entries(&snapshot) } else { entries(&snapshot) }, out)?;
+        shown.extend(if args.raw { raw_entries(&snapshot) } else { entries(&snapshot) });
     }
-    Ok(())
+    session.output.show(&Registers::from(shown))
+}
+
+/// Registers as they are shown.
+#[derive(Debug, Serialize)]
+pub(crate) struct Registers {
+    registers: Vec<Line>,
+}
+
+#[derive(Debug, Serialize)]
+struct Line {
+    address: u8,
+    name: String,
+    bytes: Vec<u8>,
+    value: Value,
+    meaning: String,
+    #[serde(skip)]
+    text: String,
+}
+
+impl From<Vec<Entry>> for Registers {
+    fn from(entries: Vec<Entry>) -> Self {
+        Self { registers: entries.into_iter().map(Line::from).collect() }
+    }
+}
+
+impl From<Entry> for Line {
+    fn from(entry: Entry) -> Self {
+        let Entry { address, name, bytes, value: text, meaning } = entry;
+        // Not every value is a number: the chip id is a name, and raw bytes are shown with 0x.
+        let value = match (text.parse::<i32>(), bytes.as_slice()) {
+            (Ok(number), _) => Value::from(number),
+            (Err(_), [byte]) => Value::from(*byte),
+            (Err(_), _) => Value::from(text.as_str()),
+        };
+        Self { address, name, bytes, value, meaning, text }
+    }
 }
 
 /// One line an entry, in columns.
-pub(crate) fn show(entries: &[Entry], out: &mut impl Write) -> io::Result<()> {
-    for Entry { address, name, value, meaning } in entries {
-        let line = format!("{address:>3}  {name:<24} {value:>5}  {meaning}");
-        writeln!(out, "{}", line.trim_end())?;
+impl Facts for Registers {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        for Line { address, name, text, meaning, .. } in &self.registers {
+            let line = format!("{address:>3}  {name:<24} {text:>5}  {meaning}");
+            writeln!(out, "{}", line.trim_end())?;
+        }
+        Ok(())
     }
-    Ok(())
 }

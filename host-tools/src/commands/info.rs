@@ -2,101 +2,211 @@
 
 use std::io::{self, Write};
 
-use anstyle::{AnsiColor, Style};
-use sevenbot::arm::STATUS;
+use clap::Args;
+use serde::{Serialize, Serializer};
 use sevenbot::map::{
-    BAUD_RATE, DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FAULTS, FEEDBACK_FREQUENCY, FRAMES_ACCEPTED,
-    FRAMES_CORRUPTED, FRAMES_REFUSED, LAST_REFUSAL, LAST_REFUSED_REGISTER, MISSING_SERVOS, MOTOR_STATE,
-    MOVING_JOINTS, OFFSET, SERVO_BUS_ERRORS, SERVO_TEMPERATURE, STATUS_VERSION, SUPPLY_VOLTAGE, VACUUM_PUMP,
-    refusal,
+    BAUD_RATE, DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FEEDBACK_FREQUENCY, MOTOR_STATE, OFFSET, VACUUM_PUMP,
+    baud_rate,
 };
 use sevenbot::names::name_of_register;
 use sevenbot::words::{faults, joints, meaning, refusal_word};
-use sevenbot::{Arm, Register, Snapshot, Span};
+use sevenbot::{Arm, Firmware, Joint, Register, Snapshot, Span, Status};
 
 use crate::failure::Failure;
+use crate::output::{BAD, BOLD, Facts, GOOD};
+use crate::session::Session;
 
-const BOLD: Style = Style::new().bold();
-const GOOD: Style = AnsiColor::Green.on_default();
-const BAD: Style = AnsiColor::Red.on_default().bold();
+/// Show who the arm is, its settings, and how it is.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Exit status 1 when the arm reports a fault or a servo does not answer.")]
+pub(crate) struct InfoArgs {}
 
-pub(crate) fn run(arm: &mut Arm, port: &str, baud: u32, out: &mut impl Write) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session) -> Result<(), Failure> {
+    let mut arm = session.connect()?;
     let settings = arm.read_span(Span::between(&DEVICE_ID, &FEEDBACK_FREQUENCY))?;
-    let status = arm.read_span(STATUS)?;
-    writeln!(out, "{BOLD}7Bot V2{BOLD:#} on {port} at {baud} baud")?;
-    line(out, "firmware", &arm.identity().version())?;
-    line(out, "chip id", &arm.identity().chip_id().map(|byte| format!("{byte:02X}")).concat())?;
-    show_settings(&settings, out)?;
-    if status.byte(&STATUS_VERSION) == 0 {
-        writeln!(out, "This firmware has no status block: it is the maker's own.")?;
-        return Ok(());
-    }
-    show_health(&status, out)?;
-    show_link(&status, out)?;
-    healthy(&status)
+    let status = arm.status()?;
+    session.output.show(&Info {
+        identity: Identity::of(&arm),
+        settings: Settings::from(&settings),
+        health: status.as_ref().map(Health::from),
+    })?;
+    status.as_ref().map_or(Ok(()), healthy)
 }
 
-fn line(out: &mut impl Write, name: &str, value: &str) -> io::Result<()> {
-    writeln!(out, "  {name:<20}{value}")
+#[derive(Serialize)]
+struct Info {
+    #[serde(flatten)]
+    identity: Identity,
+    settings: Settings,
+    /// None from the maker's firmware.
+    health: Option<Health>,
 }
 
-fn show_settings(settings: &Snapshot, out: &mut impl Write) -> io::Result<()> {
-    let word = |row: &Register| meaning(row, settings.byte(row));
-    let offsets = settings.joints(&OFFSET).map(|byte| OFFSET.range.decode(byte).to_string());
-    let feedback = match settings.byte(&FEEDBACK_FREQUENCY) {
-        0 => "off".to_owned(),
-        hertz => format!("{hertz} Hz"),
-    };
-    writeln!(out, "{BOLD}Settings{BOLD:#}")?;
-    line(out, "device id", &settings.byte(&DEVICE_ID).to_string())?;
-    line(out, "baud rate at start", &word(&BAUD_RATE))?;
-    line(out, "offsets", &format!("{} °", offsets.join(" ")))?;
-    line(out, "EEPROM lock", &word(&EEPROM_LOCK))?;
-    line(out, "motor state", &word(&MOTOR_STATE))?;
-    line(out, "effector", &format!("{}, {}", word(&EFFECTOR_TYPE), word(&VACUUM_PUMP)))?;
-    line(out, "position feedback", &feedback)
+#[derive(Serialize)]
+struct Identity {
+    port: String,
+    baud: u32,
+    firmware: String,
+    makers_firmware: bool,
+    chip_id: String,
 }
 
-fn show_health(status: &Snapshot, out: &mut impl Write) -> io::Result<()> {
-    let judged = |row: &Register, words: String| {
-        let style = if status.byte(row) == 0 { GOOD } else { BAD };
-        format!("{style}{words}{style:#}")
-    };
-    let temperature = match status.byte(&SERVO_TEMPERATURE) {
-        0 => "unknown".to_owned(),
-        degrees => format!("{degrees} °C"),
-    };
-    writeln!(out, "{BOLD}Health{BOLD:#}")?;
-    line(out, "faults", &judged(&FAULTS, faults(status.byte(&FAULTS))))?;
-    line(out, "servos missing", &judged(&MISSING_SERVOS, joints(status.byte(&MISSING_SERVOS))))?;
-    line(out, "moving", &joints(status.byte(&MOVING_JOINTS)))?;
-    line(out, "supply", &meaning(&SUPPLY_VOLTAGE, status.byte(&SUPPLY_VOLTAGE)))?;
-    line(out, "hottest servo", &temperature)
+#[derive(Serialize)]
+struct Settings {
+    device_id: u8,
+    baud_rate: u32,
+    offsets_degrees: [i16; 7],
+    eeprom_lock: String,
+    motor_state: String,
+    effector: String,
+    vacuum: String,
+    feedback_hertz: u8,
 }
 
-fn show_link(status: &Snapshot, out: &mut impl Write) -> io::Result<()> {
-    let count = |row: &Register| status.counter(row).to_string();
-    writeln!(out, "{BOLD}Counters{BOLD:#}")?;
-    line(out, "frames accepted", &count(&FRAMES_ACCEPTED))?;
-    line(out, "frames damaged", &count(&FRAMES_CORRUPTED))?;
-    line(out, "frames refused", &count(&FRAMES_REFUSED))?;
-    line(out, "last refusal", &last_refusal(status))?;
-    line(out, "servo bus errors", &count(&SERVO_BUS_ERRORS))
+#[derive(Serialize)]
+struct Health {
+    healthy: bool,
+    faults: String,
+    fault_bits: u8,
+    #[serde(serialize_with = "joint_numbers")]
+    missing_joints: u8,
+    #[serde(serialize_with = "joint_numbers")]
+    moving_joints: u8,
+    supply_volts: Option<f64>,
+    hottest_servo_celsius: Option<u8>,
+    frames_accepted: u16,
+    frames_damaged: u16,
+    frames_refused: u16,
+    last_refusal: Option<String>,
+    servo_bus_errors: u16,
 }
 
-fn last_refusal(status: &Snapshot) -> String {
-    match status.byte(&LAST_REFUSAL) {
-        refusal::NONE => refusal_word(refusal::NONE).to_owned(),
-        reason => {
-            let register = name_of_register(status.byte(&LAST_REFUSED_REGISTER));
-            format!("{} ({register})", refusal_word(reason))
+impl Identity {
+    fn of(arm: &Arm) -> Self {
+        let identity = arm.identity();
+        Self {
+            port: arm.port().to_owned(),
+            baud: arm.options().baud,
+            firmware: identity.version(),
+            makers_firmware: identity.firmware() == Firmware::Makers,
+            chip_id: identity.chip_id().map(|byte| format!("{byte:02X}")).concat(),
         }
     }
 }
 
-fn healthy(status: &Snapshot) -> Result<(), Failure> {
-    let faulty = faults(status.byte(&FAULTS));
-    match (status.byte(&FAULTS), status.byte(&MISSING_SERVOS)) {
+impl From<&Snapshot> for Settings {
+    fn from(registers: &Snapshot) -> Self {
+        let word = |row: &Register| meaning(row, registers.byte(row));
+        Self {
+            device_id: registers.byte(&DEVICE_ID),
+            baud_rate: baud_rate(registers.byte(&BAUD_RATE)),
+            offsets_degrees: registers.joints(&OFFSET).map(|byte| OFFSET.range.decode(byte)),
+            eeprom_lock: word(&EEPROM_LOCK),
+            motor_state: word(&MOTOR_STATE),
+            effector: word(&EFFECTOR_TYPE),
+            vacuum: word(&VACUUM_PUMP),
+            feedback_hertz: registers.byte(&FEEDBACK_FREQUENCY),
+        }
+    }
+}
+
+impl From<&Status> for Health {
+    fn from(status: &Status) -> Self {
+        Self {
+            healthy: status.is_healthy(),
+            faults: faults(status.faults()),
+            fault_bits: status.faults(),
+            missing_joints: status.missing(),
+            moving_joints: status.moving(),
+            supply_volts: status.supply_volts(),
+            hottest_servo_celsius: status.hottest_celsius(),
+            frames_accepted: status.frames_accepted(),
+            frames_damaged: status.frames_corrupted(),
+            frames_refused: status.frames_refused(),
+            last_refusal: status.last_refusal().map(|(reason, register)| {
+                format!("{} ({})", refusal_word(reason), name_of_register(register))
+            }),
+            servo_bus_errors: status.servo_bus_errors(),
+        }
+    }
+}
+
+fn line(out: &mut dyn Write, name: &str, value: &str) -> io::Result<()> {
+    writeln!(out, "  {name:<20}{value}")
+}
+
+impl Facts for Info {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        let Identity { port, baud, firmware, chip_id, .. } = &self.identity;
+        writeln!(out, "{BOLD}7Bot V2{BOLD:#} on {port} at {baud} baud")?;
+        line(out, "firmware", firmware)?;
+        line(out, "chip id", chip_id)?;
+        self.settings.write_text(out)?;
+        match &self.health {
+            Some(health) => health.write_text(out),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Facts for Settings {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        let offsets = self.offsets_degrees.map(|degrees| degrees.to_string()).join(" ");
+        let feedback = match self.feedback_hertz {
+            0 => "off".to_owned(),
+            hertz => format!("{hertz} Hz"),
+        };
+        writeln!(out, "{BOLD}Settings{BOLD:#}")?;
+        line(out, "device id", &self.device_id.to_string())?;
+        line(out, "baud rate at start", &format!("{} baud", self.baud_rate))?;
+        line(out, "offsets", &format!("{offsets} °"))?;
+        line(out, "EEPROM lock", &self.eeprom_lock)?;
+        line(out, "motor state", &self.motor_state)?;
+        line(out, "effector", &format!("{}, {}", self.effector, self.vacuum))?;
+        line(out, "position feedback", &feedback)
+    }
+}
+
+/// The bits of a set of joints, as the joints' numbers.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's own way of calling")]
+fn joint_numbers<S: Serializer>(bits: &u8, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer
+        .collect_seq(Joint::ALL.iter().filter(|joint| bits & joint.bit() != 0).map(|joint| joint.number()))
+}
+
+impl Facts for Health {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        let judged = |is_good: bool, words: &str| {
+            let style = if is_good { GOOD } else { BAD };
+            format!("{style}{words}{style:#}")
+        };
+        let supply = self.supply_volts.map(|volts| format!("{volts:.1} V"));
+        let hottest = self.hottest_servo_celsius.map(|degrees| format!("{degrees} °C"));
+        writeln!(out, "{BOLD}Health{BOLD:#}")?;
+        line(out, "faults", &judged(self.fault_bits == 0, &self.faults))?;
+        line(out, "servos missing", &judged(self.missing_joints == 0, &joints(self.missing_joints)))?;
+        line(out, "moving", &joints(self.moving_joints))?;
+        line(out, "supply", supply.as_deref().unwrap_or("unknown"))?;
+        line(out, "hottest servo", hottest.as_deref().unwrap_or("unknown"))?;
+        self.write_counters(out)
+    }
+}
+
+impl Health {
+    fn write_counters(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{BOLD}Counters{BOLD:#}")?;
+        line(out, "frames accepted", &self.frames_accepted.to_string())?;
+        line(out, "frames damaged", &self.frames_damaged.to_string())?;
+        line(out, "frames refused", &self.frames_refused.to_string())?;
+        line(out, "last refusal", self.last_refusal.as_deref().unwrap_or("none"))?;
+        line(out, "servo bus errors", &self.servo_bus_errors.to_string())
+    }
+}
+
+fn healthy(status: &Status) -> Result<(), Failure> {
+    let faulty = faults(status.faults());
+    match (status.faults(), status.missing()) {
         (0, 0) => Ok(()),
         (0, missing) => Err(Failure::Arm(format!("no answer from the servos of {}", joints(missing)))),
         (_, 0) => Err(Failure::Arm(format!("the arm reports a fault: {faulty}"))),

@@ -1,4 +1,4 @@
-//! One file a command. Each takes an open arm, its arguments and where to write.
+//! One file a command: its arguments, and what it does in a session.
 
 pub(crate) mod get;
 pub(crate) mod info;
@@ -12,7 +12,7 @@ use sevenbot::names::name_of_register;
 use crate::failure::Failure;
 
 /// A command that wanted these registers changed fails with the reasons of those that are not.
-fn all_taken(unchanged: &[Unchanged]) -> Result<(), Failure> {
+pub(crate) fn all_taken(unchanged: &[Unchanged]) -> Result<(), Failure> {
     if unchanged.is_empty() {
         return Ok(());
     }

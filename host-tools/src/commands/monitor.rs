@@ -15,8 +15,10 @@ use sevenbot::map::{
 use sevenbot::words::{faults, meaning};
 use sevenbot::{Arm, Error, Joint, Snapshot, Span};
 
-use crate::cli::MonitorArgs;
+use clap::{Args, value_parser};
+
 use crate::failure::Failure;
+use crate::session::Session;
 
 const BOLD: Style = Style::new().bold();
 const MOVING: Style = AnsiColor::Cyan.on_default();
@@ -25,6 +27,23 @@ const BAD: Style = AnsiColor::Red.on_default().bold();
 const CLEAR: &str = "\x1b[K";
 /// Lines of the table: a head, seven joints, a foot.
 const LINES: usize = 9;
+
+/// Watch targets, positions and movement; Ctrl-C ends it.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+On a terminal the table is redrawn in place; into a pipe or a file goes one line a sample.
+
+Examples:
+  sevenbot monitor
+  sevenbot monitor --hz 20 --samples 100 > move.txt")]
+pub(crate) struct MonitorArgs {
+    /// Samples a second.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = value_parser!(u8).range(1..=50))]
+    pub(crate) hz: u8,
+    /// End after so many samples.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..))]
+    pub(crate) samples: Option<u64>,
+}
 
 /// The arm at one moment.
 struct Sample {
@@ -55,7 +74,11 @@ impl Sample {
     }
 }
 
-pub(crate) fn run(arm: &mut Arm, args: &MonitorArgs, out: &mut impl Write) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), Failure> {
+    watch(&mut session.connect()?, args, &mut anstream::stdout())
+}
+
+fn watch(arm: &mut Arm, args: &MonitorArgs, out: &mut impl Write) -> Result<(), Failure> {
     let period = Duration::from_secs(1) / u32::from(args.hz);
     let in_place = io::stdout().is_terminal();
     let start = Instant::now();

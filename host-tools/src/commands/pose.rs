@@ -13,8 +13,36 @@ use sevenbot::words::{joints, motor_state_word};
 use sevenbot::{Angle, Arm, Joint, MoveTime, Snapshot, Span, Speed};
 
 use super::all_taken;
-use crate::cli::PoseArgs;
+use clap::{ArgAction, Args, value_parser};
+
 use crate::failure::Failure;
+use crate::session::Session;
+
+/// Send all seven joints to a pose.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot pose 90 90 65 90 90 90 80               the standard pose
+  sevenbot pose 120 90 65 90 90 90 80 --speed 30   at 57 degrees per second
+  sevenbot pose 60 90 65 90 90 90 80 --time 20 --wait
+
+Exit status 1 when the arm did not take the pose, or with --wait did not reach it.")]
+pub(crate) struct PoseArgs {
+    /// Angles of joint 1 to 7 in degrees, 0 to 180.
+    #[arg(value_names = ["A1", "A2", "A3", "A4", "A5", "A6", "A7"], num_args = 7, required = true,
+          action = ArgAction::Set,
+          value_parser = value_parser!(u8).range(0..=180))]
+    pub(crate) angles: Vec<u8>,
+    /// Speed of all joints in steps of 1.9 degrees per second, 1 to 100; 0 is the motors' maximum.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=100))]
+    pub(crate) speed: Option<u8>,
+    /// Duration of the move in steps of 100 ms, 0 to 100; sets the speeds to 0, or it would not count.
+    #[arg(long, value_name = "N", conflicts_with = "speed", value_parser = value_parser!(u8).range(0..=100))]
+    pub(crate) time: Option<u8>,
+    /// Wait until the arm is there.
+    #[arg(long)]
+    pub(crate) wait: bool,
+}
 
 /// Time between two looks at a moving arm.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -25,7 +53,11 @@ const SETTLE: Duration = Duration::from_secs(2);
 /// A joint this near to its target is there: registers are whole degrees, servos have some play.
 const NEAR_DEGREES: u8 = 2;
 
-pub(crate) fn run(arm: &mut Arm, args: &PoseArgs, out: &mut impl Write) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &PoseArgs) -> Result<(), Failure> {
+    take(&mut session.connect()?, args, &mut anstream::stdout())
+}
+
+fn take(arm: &mut Arm, args: &PoseArgs, out: &mut impl Write) -> Result<(), Failure> {
     let state = arm.read_span(Span::of(&MOTOR_STATE))?.byte(&MOTOR_STATE);
     if state != motor_state::SERVO {
         let word = motor_state_word(state);

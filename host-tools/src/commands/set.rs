@@ -1,33 +1,73 @@
 //! `set`: writes registers in one frame, reads them back, and says what did not take and why.
 
-use std::io::Write;
-
+use clap::Args;
 use sevenbot::change::{Cause, Unchanged};
 use sevenbot::map::{BAUD_RATE, EEPROM_LOCK, find};
-use sevenbot::names::name_of_register;
+use sevenbot::names::{self, name_of_register};
 use sevenbot::words::{self, entries};
 use sevenbot::{Arm, Error, Span};
 
 use super::all_taken;
-use super::get::show;
-use crate::cli::SetArgs;
+use super::get::{NAMES, Registers};
 use crate::failure::Failure;
+use crate::output::note;
+use crate::session::Session;
 
-pub(crate) fn run(arm: &mut Arm, args: &SetArgs, out: &mut impl Write) -> Result<(), Failure> {
+/// Write registers, read them back, and say what did not take and why.
+#[derive(Debug, Args)]
+#[command(after_help = format!("{NAMES}
+
+Examples:
+  sevenbot set speed 30                 all seven joints
+  sevenbot set target-position.3 70
+  sevenbot set feedback-frequency 30
+  sevenbot set --unlock offset.2 -5     settings are kept over power cuts, and locked
+
+Exit status 1 when a register did not take its value."))]
+pub(crate) struct SetArgs {
+    /// Name, number or range of registers.
+    #[arg(value_name = "REGISTER", value_parser = names::parse)]
+    register: Span,
+    /// One value per register, or one for all of them, in the units of the table.
+    #[arg(required = true, value_name = "VALUE", allow_negative_numbers = true, value_parser = number)]
+    pub(crate) values: Vec<i16>,
+    /// The values are bytes as they go on the wire (0 to 255, or 0x00 to 0xFF), sent unchecked.
+    #[arg(long)]
+    raw: bool,
+    /// Open the EEPROM lock (register 28) before and close it after.
+    #[arg(long)]
+    unlock: bool,
+}
+
+/// A number in decimal or, after 0x, in hexadecimal digits.
+fn number(text: &str) -> Result<i16, String> {
+    let hexadecimal = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
+    let parsed = match hexadecimal {
+        Some(digits) => u8::from_str_radix(digits, 16).map(i16::from),
+        None => text.parse(),
+    };
+    parsed.map_err(|_| "not a number that a register could hold".to_owned())
+}
+
+pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), Failure> {
     let span = args.register;
     let bytes = bytes(span, &args.values, args.raw)?;
+    let mut arm = session.connect()?;
     let unchanged = if args.unlock {
-        unlocked(arm, |arm| arm.write_checked(span.address, &bytes))?
+        unlocked(&mut arm, |arm| arm.write_checked(span.address, &bytes))?
     } else {
         arm.write_checked(span.address, &bytes)?
     };
-    show(&entries(&arm.read_span(span)?), out)?;
-    note(span, args, &unchanged, out)?;
+    session.output.show(&Registers::from(entries(&arm.read_span(span)?)))?;
+    remark(span, args, &unchanged);
     all_taken(&unchanged)
 }
 
 /// Does `work` with the EEPROM lock open, and closes it again whatever became of the work.
-fn unlocked<T>(arm: &mut Arm, work: impl FnOnce(&mut Arm) -> Result<T, Error>) -> Result<T, Failure> {
+pub(crate) fn unlocked<T>(
+    arm: &mut Arm,
+    work: impl FnOnce(&mut Arm) -> Result<T, Error>,
+) -> Result<T, Failure> {
     all_taken(&arm.write_checked(EEPROM_LOCK.address, &[0])?)?;
     let done = work(arm);
     let closed = arm.write_checked(EEPROM_LOCK.address, &[1]);
@@ -36,16 +76,12 @@ fn unlocked<T>(arm: &mut Arm, work: impl FnOnce(&mut Arm) -> Result<T, Error>) -
     Ok(done)
 }
 
-fn note(span: Span, args: &SetArgs, unchanged: &[Unchanged], out: &mut impl Write) -> Result<(), Failure> {
+fn remark(span: Span, args: &SetArgs, unchanged: &[Unchanged]) {
     if unchanged.iter().any(|register| register.cause == Cause::Locked) && !args.unlock {
-        writeln!(
-            out,
-            "Settings are protected by the EEPROM lock, register 28: --unlock opens it for this write."
-        )?;
+        note("settings are protected by the EEPROM lock, register 28: --unlock opens it for this write");
     } else if unchanged.is_empty() && span.addresses().any(|address| BAUD_RATE.holds(address)) {
-        writeln!(out, "The new baud rate is in force after the next restart of the arm.")?;
+        note("the new baud rate is in force after the next restart of the arm");
     }
-    Ok(())
 }
 
 /// The bytes for a span: one value per register, or one for all.
@@ -83,6 +119,14 @@ fn byte(address: u8, value: i16) -> Result<u8, Failure> {
 mod tests {
     use super::*;
     use sevenbot::map::{OFFSET, TARGET_POSITION};
+
+    #[test]
+    fn numbers_are_decimal_or_hexadecimal() {
+        assert_eq!(number("-5"), Ok(-5));
+        assert_eq!(number("0x85"), Ok(0x85));
+        assert!(number("0x100").is_err());
+        assert!(number("five").is_err());
+    }
 
     #[test]
     fn numbers_become_bytes_by_the_table() {

@@ -1,0 +1,81 @@
+//! What commands show: facts as text or as JSON on standard output, everything else on standard error.
+//!
+//! ```text
+//!   sevenbot get speed.1           32  speed.1   60  114.0 °/s
+//!   sevenbot get speed.1 --json    {"registers":[{"address":32,"name":"speed.1",...}]}
+//! ```
+//!
+//! One JSON value a line. Colours go to terminals only: anstream takes them out of anything else, and where
+//! NO_COLOR is set.
+
+use std::fmt::Display;
+use std::io::{self, IsTerminal, Write};
+
+use anstyle::{AnsiColor, Style};
+use serde::Serialize;
+
+use crate::failure::Failure;
+
+/// For headings.
+pub(crate) const BOLD: Style = Style::new().bold();
+/// For what is well.
+pub(crate) const GOOD: Style = AnsiColor::Green.on_default();
+/// For what is not.
+pub(crate) const BAD: Style = AnsiColor::Red.on_default().bold();
+/// For what deserves a look.
+pub(crate) const DOUBTFUL: Style = AnsiColor::Yellow.on_default().bold();
+
+/// Something found out: its fields as serde names them, or lines for a reader.
+pub(crate) trait Facts: Serialize {
+    /// Writes the lines.
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()>;
+}
+
+/// Where facts are shown.
+pub(crate) struct Output {
+    json: bool,
+    stream: Box<dyn Write>,
+}
+
+impl Output {
+    pub(crate) fn stdout(json: bool) -> Self {
+        Self { json, stream: Box::new(anstream::stdout()) }
+    }
+
+    /// Is JSON wanted?
+    pub(crate) const fn is_json(&self) -> bool {
+        self.json
+    }
+
+    /// Will a person see it in a terminal?
+    pub(crate) fn is_for_the_screen(&self) -> bool {
+        !self.json && io::stdout().is_terminal()
+    }
+
+    /// Shows facts.
+    pub(crate) fn show(&mut self, facts: &impl Facts) -> Result<(), Failure> {
+        if self.json {
+            let line = serde_json::to_string(facts).map_err(io::Error::from)?;
+            writeln!(self.stream, "{line}")?;
+        } else {
+            facts.write_text(&mut self.stream)?;
+        }
+        Ok(self.stream.flush()?)
+    }
+
+    /// Shows text as it is, whether JSON is wanted or not: a generated file.
+    pub(crate) fn raw(&mut self, text: &[u8]) -> Result<(), Failure> {
+        self.stream.write_all(text)?;
+        Ok(self.stream.flush()?)
+    }
+}
+
+/// Something the user should know besides the facts. Where even standard error is closed, nobody reads it.
+pub(crate) fn note(message: impl Display) {
+    let _ = writeln!(anstream::stderr(), "{BOLD}note:{BOLD:#} {message}");
+}
+
+/// Something that may not be what the user expects.
+pub(crate) fn warn(message: impl Display) {
+    let _ = writeln!(anstream::stderr(), "{DOUBTFUL}warning:{DOUBTFUL:#} {message}");
+}

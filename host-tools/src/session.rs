@@ -1,0 +1,82 @@
+//! What every command is given: the way to the arm, and the place to show what it found.
+//!
+//! Knows how a port is chosen; what is said through it is the command's.
+
+use sevenbot::ports::{self, Probed};
+use sevenbot::{Arm, Firmware, OpenError};
+
+use crate::failure::Failure;
+use crate::output::{Output, note, warn};
+
+/// One run of the program.
+pub(crate) struct Session {
+    /// The port asked for; none: the only one that leads to an arm.
+    pub(crate) port: Option<String>,
+    /// In bits per second.
+    pub(crate) baud: u32,
+    /// Where facts are shown.
+    pub(crate) output: Output,
+}
+
+impl Session {
+    /// Opens the arm, and says what its firmware cannot do.
+    pub(crate) fn connect(&self) -> Result<Arm, Failure> {
+        let port = self.port_name()?;
+        let arm = Arm::open(&port, self.baud).map_err(|error| Failure::Open { port, error })?;
+        let version = arm.identity().version();
+        match arm.identity().firmware() {
+            Firmware::Ours => {}
+            Firmware::Makers => warn(format_args!(
+                "this arm runs the maker's firmware {version}: it has no status block, so faults, missing \
+                 servos and moving joints are not known; it takes values out of range, and never says what it \
+                 refused"
+            )),
+            Firmware::Unknown => warn(format_args!(
+                "this arm runs a firmware {version} that nobody is known to have given out; its status block, \
+                 if it has one, is not used"
+            )),
+        }
+        Ok(arm)
+    }
+
+    /// The port asked for, or else the only one that leads to an arm.
+    pub(crate) fn port_name(&self) -> Result<String, Failure> {
+        match &self.port {
+            Some(port) => Ok(port.clone()),
+            None => the_only(ports::probe(ports::available(), self.baud)),
+        }
+    }
+}
+
+fn the_only(probed: Vec<Probed>) -> Result<String, Failure> {
+    let (arms, others): (Vec<_>, Vec<_>) = probed.into_iter().partition(|found| found.answer.is_ok());
+    let names = |found: &[Probed]| found.iter().map(|found| found.port.name.clone()).collect::<Vec<_>>();
+    match arms.as_slice() {
+        [only] => {
+            note(format_args!("using {}, the only port that leads to an arm", only.port.name));
+            Ok(only.port.name.clone())
+        }
+        [] => Err(Failure::NoArm { tried: others.into_iter().filter_map(reason).collect() }),
+        several => Err(Failure::SeveralArms { ports: names(several) }),
+    }
+}
+
+/// A port that was tried, and why it is none of ours.
+fn reason(found: Probed) -> Option<(String, OpenError)> {
+    Some((found.port.name, found.answer.err()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sevenbot::ports::Port;
+
+    #[test]
+    fn ports_that_lead_nowhere_are_named_with_their_reasons() {
+        let port = Port { name: "COM1".to_owned(), description: String::new() };
+        let found = the_only(vec![Probed { port, answer: Err(OpenError::Busy) }]);
+        let Err(Failure::NoArm { tried }) = found else { panic!("no arm: {found:?}") };
+        assert!(matches!(tried.as_slice(), [(name, OpenError::Busy)] if name == "COM1"));
+        assert!(matches!(the_only(Vec::new()), Err(Failure::NoArm { tried }) if tried.is_empty()));
+    }
+}

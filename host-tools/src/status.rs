@@ -1,0 +1,141 @@
+//! The status block: how the arm says it is (docs/protocol.md, section 6).
+//!
+//! Knows which register says what, not how it is told to a user.
+
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{
+    FAULTS, FRAMES_ACCEPTED, FRAMES_CORRUPTED, FRAMES_REFUSED, LAST_REFUSAL, LAST_REFUSED_REGISTER,
+    MISSING_SERVOS, MOVING_JOINTS, SERVO_BUS_ERRORS, SERVO_TEMPERATURE, STATUS_VERSION, SUPPLY_VOLTAGE,
+    refusal,
+};
+
+use crate::arm::{Arm, STATUS};
+use crate::error::Error;
+use crate::snapshot::Snapshot;
+
+/// The status block, all of one instant.
+///
+/// ```no_run
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut arm = sevenbot::Arm::open("/dev/ttyUSB0", 115_200)?;
+/// match arm.status()? {
+///     Some(status) if status.is_healthy() => println!("all is well"),
+///     Some(status) => println!("faults: {}", sevenbot::words::faults(status.faults())),
+///     None => println!("the maker's firmware does not say"),
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Status(Snapshot);
+
+impl Arm {
+    /// How the arm says it is; `None` from firmware that has no status block, as the maker's.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn status(&mut self) -> Result<Option<Status>, Error> {
+        if !self.identity().has_status_block() {
+            return Ok(None);
+        }
+        let snapshot = self.read_span(STATUS)?;
+        let is_there = snapshot.byte(&STATUS_VERSION) != 0;
+        Ok(is_there.then(|| Status::from(snapshot)))
+    }
+}
+
+impl From<Snapshot> for Status {
+    /// What a read of [`STATUS`] brought.
+    fn from(registers: Snapshot) -> Self {
+        Self(registers)
+    }
+}
+
+impl Status {
+    /// The registers themselves.
+    #[must_use]
+    pub const fn registers(&self) -> &Snapshot {
+        &self.0
+    }
+
+    /// No fault, and every servo answers.
+    #[must_use]
+    pub fn is_healthy(&self) -> bool {
+        self.faults() == 0 && self.missing() == 0
+    }
+
+    /// The bits of [`crate::map::fault`].
+    #[must_use]
+    pub fn faults(&self) -> u8 {
+        self.0.byte(&FAULTS)
+    }
+
+    /// The joints whose servo does not answer, by their [`Joint::bit`]s.
+    #[must_use]
+    pub fn missing(&self) -> u8 {
+        self.0.byte(&MISSING_SERVOS)
+    }
+
+    /// Does this joint's servo not answer?
+    #[must_use]
+    pub fn is_missing(&self, joint: Joint) -> bool {
+        self.missing() & joint.bit() != 0
+    }
+
+    /// The joints whose set-point is on its way, by their [`Joint::bit`]s.
+    #[must_use]
+    pub fn moving(&self) -> u8 {
+        self.0.byte(&MOVING_JOINTS)
+    }
+
+    /// Is this joint's set-point on its way?
+    #[must_use]
+    pub fn is_moving(&self, joint: Joint) -> bool {
+        self.moving() & joint.bit() != 0
+    }
+
+    /// Why the last refused frame was refused (see [`crate::map::refusal`]), and the register that made it so.
+    #[must_use]
+    pub fn last_refusal(&self) -> Option<(u8, u8)> {
+        let reason = self.0.byte(&LAST_REFUSAL);
+        (reason != refusal::NONE).then(|| (reason, self.0.byte(&LAST_REFUSED_REGISTER)))
+    }
+
+    /// Frames the arm accepted; wraps.
+    #[must_use]
+    pub fn frames_accepted(&self) -> u16 {
+        self.0.counter(&FRAMES_ACCEPTED)
+    }
+
+    /// Frames that reached the arm with a wrong CRC; wraps.
+    #[must_use]
+    pub fn frames_corrupted(&self) -> u16 {
+        self.0.counter(&FRAMES_CORRUPTED)
+    }
+
+    /// Frames the arm refused; wraps.
+    #[must_use]
+    pub fn frames_refused(&self) -> u16 {
+        self.0.counter(&FRAMES_REFUSED)
+    }
+
+    /// Questions on the servo bus without an answer that could be trusted; wraps.
+    #[must_use]
+    pub fn servo_bus_errors(&self) -> u16 {
+        self.0.counter(&SERVO_BUS_ERRORS)
+    }
+
+    /// Supply of the servos in volts, where it is known.
+    #[must_use]
+    pub fn supply_volts(&self) -> Option<f64> {
+        let tenths = self.0.byte(&SUPPLY_VOLTAGE);
+        (tenths != 0).then(|| f64::from(tenths) / 10.0)
+    }
+
+    /// Temperature of the hottest servo in degrees Celsius, where it is known.
+    #[must_use]
+    pub fn hottest_celsius(&self) -> Option<u8> {
+        let degrees = self.0.byte(&SERVO_TEMPERATURE);
+        (degrees != 0).then_some(degrees)
+    }
+}
