@@ -133,7 +133,7 @@ fn d16_a_refused_frame_has_no_effect_and_says_why() {
 }
 
 #[test]
-fn d12_baud_is_in_force_after_the_next_restart() {
+fn d19_the_baud_rate_is_in_force_after_the_next_restart() {
     let mut rig = Rig::started();
     rig.write(28, &[0]);
     rig.write(12, &[3]);

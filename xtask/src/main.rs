@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod decisions;
 mod elf;
 mod emulate;
 mod no_panic;
@@ -28,9 +29,9 @@ struct Arguments {
 enum Chore {
     /// Install what the tests need, then run every check and every test.
     Test,
-    /// Write docs/registers.md anew from the register table.
+    /// Write docs/registers.md anew from the register table, and the table of tests in docs/protocol.md.
     Docs {
-        /// Change nothing; fail if the file is not what would be written.
+        /// Change nothing; fail if they are not what would be written.
         #[arg(long)]
         check: bool,
     },
@@ -60,8 +61,8 @@ fn main() -> ExitCode {
 fn carry_out(chore: &Chore) -> Outcome {
     match chore {
         Chore::Test => test::all(),
-        Chore::Docs { check: true } => registers_md::check(),
-        Chore::Docs { check: false } => registers_md::write(),
+        Chore::Docs { check: true } => registers_md::check().and_then(|()| decisions::check()),
+        Chore::Docs { check: false } => registers_md::write().and_then(|()| decisions::write()),
         Chore::NoPanic => no_panic::check(),
         Chore::Size => size::print(),
         Chore::Emulate(options) => emulate::run(options),

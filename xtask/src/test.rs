@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::run::{CHIP, Outcome, cargo, run};
-use crate::{emulate, no_panic, registers_md};
+use crate::{decisions, emulate, no_panic, registers_md};
 
 /// A heading, and what is done under it.
 type Step = (&'static str, fn() -> Outcome);
@@ -21,6 +21,7 @@ const STEPS: &[Step] = &[
     }),
     ("documentation", documentation),
     ("docs/registers.md is fresh", registers_md::check),
+    ("every decision of docs/protocol.md has its tests", decisions::check),
     ("no panic can be reached", no_panic::check),
     ("programs under test", || cargo("build -p host-sim -p sevenbot -p xtask")),
     ("system tests, the image for the arm in an emulator", || {
