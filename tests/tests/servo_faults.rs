@@ -5,7 +5,8 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use system_tests::registers::{
-    FAULTS, MISSING_SERVOS, MOVING_JOINTS, PRESENT_POSITION, SERVO_BUS_ERRORS, STANDARD_POSE, TARGET_POSITION,
+    FAULTS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, SERVO_BUS_ERRORS, STANDARD_POSE,
+    TARGET_POSITION,
 };
 use system_tests::{Bench, Setup, near, with_arm};
 
@@ -100,6 +101,24 @@ fn a_stuck_joint_shows_where_it_is_and_raises_the_fault() {
         arm.wait_until("set-points have arrived", |arm| arm.register(MOVING_JOINTS) == 0);
         assert!(near(arm.register(PRESENT_POSITION + 2), STANDARD_POSE[FAULTY]));
         assert_eq!(arm.register(MISSING_SERVOS), 0, "it answers");
+    });
+}
+
+/// A servo's overload lasts until its torque was off: so the status block shows whether letting go (D13) really
+/// reaches the servos.
+#[test]
+fn d13_an_overloaded_servo_is_well_again_after_its_torque_was_off() {
+    with_arm(Setup::any().fault("3=stuck"), |arm| {
+        arm.wait_for_pose(&STANDARD_POSE);
+        arm.write(TARGET_POSITION + 2, &[STANDARD_POSE[FAULTY] - 30]);
+        arm.wait_until("the overload shows", |arm| arm.register(FAULTS) & SERVO_BUS != 0);
+        for state in [0, 2] {
+            arm.write(MOTOR_STATE, &[state]);
+            arm.wait_until("the overload is gone", |arm| arm.register(FAULTS) & SERVO_BUS == 0);
+            arm.write(MOTOR_STATE, &[1]);
+            arm.write(TARGET_POSITION + 2, &[STANDARD_POSE[FAULTY] - 30]);
+            arm.wait_until("the overload is back", |arm| arm.register(FAULTS) & SERVO_BUS != 0);
+        }
     });
 }
 
