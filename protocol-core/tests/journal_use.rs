@@ -4,8 +4,8 @@
 
 mod journal_world;
 
-use flash_model::{Flash, Operation};
-use journal_world::{End, REAL, World, image};
+use flash_model::{Flash, Operation, ProgramTear};
+use journal_world::{End, REAL, World, cuts, image};
 use protocol_core::journal::{Journal, Opened, SaveError};
 use protocol_core::registers::Image;
 
@@ -93,6 +93,27 @@ fn a_full_flash_refuses_and_keeps_what_it_has() {
     let (journal, opened) = Journal::open(journal.release());
     assert_eq!(opened, Opened::Found(image(room)));
     assert!(journal.room() >= 600);
+}
+
+/// Home is as full as saves make it, and its spare is not blank: the slots kept for starts are for this.
+#[test]
+fn what_is_in_doubt_is_appended_again_before_anything_is_erased() {
+    use Operation::{Erase, Program};
+    let world = World::<512>::new();
+    let saves = Journal::open(Flash::<512>::new(2)).0.room();
+    let seal_of_the_last = world.operations(saves).len() - 1;
+    for cut in cuts(seal_of_the_last, Program, 1) {
+        let mut world = world.clone();
+        assert_eq!(world.cycle(saves, Some(cut)), End::Cut);
+        let in_doubt = cut.program != ProgramTear::All;
+        let expected: Vec<_> = [[Program; 8].as_slice(), &[Erase, Program], &[Program; 8], &[Erase, Program]]
+            .into_iter()
+            .skip(if in_doubt { 0 } else { 1 })
+            .flatten()
+            .copied()
+            .collect();
+        assert_eq!(world.operations(0), expected, "{cut:?}");
+    }
 }
 
 #[test]

@@ -16,35 +16,40 @@
 //!   └───────────────────────────┘         └───────────────────────────┘
 //! ```
 //!
-//! A save appends the whole image as one record of eight words. When home is full the log goes on in
-//! the spare, one generation higher. The next start makes the old home blank, and it is the spare. Why so:
+//! A save appends the whole image as one record of eight words. When home is full the log goes on in the
+//! spare, one generation higher; the next start makes the old home blank, and it is the spare. Why so:
 //!
-//! - **Erased at start only.** An erase stops the chip for up to 0.8 s, and an arm with its servos on must not
-//!   wait that long. Hence a start that finds less than a quarter of home free moves to the spare at once:
-//!   a power cycle always has room for a quarter and a whole sector, over 600 saves with 16 KiB sectors.
-//! - **Half programmed cells.** What a cut leaves may read one way at this start and another way at the
-//!   next. The seal is programmed after the rest was read back, so that what is sealed was whole. A record that
-//!   is unsealed, that needed a correction, or that has remains of another behind it is the settings today,
-//!   and perhaps not tomorrow. So it is *appended again before anything is erased*, and before anybody is told.
-//! - **Order by generation and place, not by a running number.** The remains of a record and the one written
-//!   in its stead would share a number, and the older might win when it reads whole one day. A
-//!   place is taken once.
-//! - **A sector is blank because its mark says so**, not because it looks blank. After a cut erase a sector
-//!   can look blank, and not be. The mark is programmed after a whole erase and a check of every word. It
-//!   says for which generation, so that a mark that outlived a cut erase does not count. One word
-//!   will do: what it says is true before its first bit is programmed, and one that reads wrong costs an erase.
-//! - **One slot is skipped after a start**, since a word that was cut at its very beginning may not show. (A
-//!   power cycle whose first word is cut like that leaves the next one to begin in the same slot. A slot begins with
-//!   its sector's generation, so that it is the same word which is programmed again, and completed.)
-//! - **The last four slots are for starts**, so that the settings can be made firm in a sector that was full.
-//! - **A log is never without a record.** The first start writes one that says there are no settings
-//!   yet; else the first save of all, cut, could come and go.
-//! - **Not every flash forgets, or learns.** A sector that does not get blank, as in an emulator where an erase
-//!   changes nothing and all reads 0, is not used. No flash is taken to be blank where it does not change.
+//! - **Erased at start only.** An erase stops the chip for up to 0.8 s: not while the servos are on. So a
+//!   start that finds less than a quarter of home free moves to the spare at once, and a power cycle has
+//!   room for a quarter and a whole sector at least: over 600 saves with 16 KiB sectors.
+//! - **Half programmed cells** are what a cut leaves: they may read one way at this start and another way
+//!   at the next. The seal is programmed after the rest was read back, so what is sealed was whole. A
+//!   record that is unsealed, or needed a correction, or has remains of another behind it, is the newest
+//!   today and perhaps not tomorrow. It is *appended again before anything is erased*, and before anybody
+//!   is told.
+//! - **Order is by generation and place**, not by a running number: the remains of a record and the one
+//!   written in its stead would share a number, and the wrong one might win when it reads whole one day.
+//! - **A sector is blank because its mark says so**, not because it looks blank: after a cut erase it may
+//!   look so. The mark is programmed after a whole erase and a check of every word. It names the generation
+//!   it waits for, so the mark of an earlier life that outlived a cut erase does not count. One word is
+//!   enough. What it says was true before its first bit was programmed; and a mark that was cut and reads
+//!   wrong lacks zeros, which no erase gives it: it costs an erase, and does not come to read right if that
+//!   is cut, too.
+//! - **One slot is skipped after a start**, since a word that was cut at its very beginning may not show.
+//!   (The first record of a power cycle, cut like that, is begun again in the same place by the next one. A
+//!   record begins with its sector's generation, so it is the same word that is programmed again, and made
+//!   whole.)
+//! - **The last four slots of a sector are for starts**: a record can be made firm where saves find no
+//!   room.
+//! - **A log always has a record.** The first start appends one that says there are no settings. Else the
+//!   first save of all, if it was cut, could come and go.
+//! - **Not every flash does as it is told.** A sector that is not blank after an erase is not used: in an
+//!   emulator nothing changes, and all of it reads 0.
 //!
-//! No word is programmed twice with different values. A save programs eight words. A start erases two
-//! sectors and programs 18 words at most: a record made firm, a mark, a record moved, a mark. A cell that
-//! does not take its bit costs a second attempt, in the next slot. Knows no register: an image is 20 bytes.
+//! No word is programmed with one value and then another. A save programs eight words. A start erases two
+//! sectors and programs 18 words at most: a record made firm, a mark, a record moved, a mark. Only a cell
+//! that does not take its bit costs more: a second attempt, in the next slot. Knows no register: an image
+//! is 20 bytes.
 
 mod sectors;
 mod slot;
@@ -196,7 +201,7 @@ impl<F: NorFlash> Journal<F> {
         let (home, other) = if later { (second, first) } else { (first, second) };
         let (newest, done) = match home.newest {
             Some(newest) => (newest.image, self.resume(&home, &other, newest)),
-            None => (NO_SETTINGS, self.begin(&home, &other)),
+            None => (NO_SETTINGS, self.begin()),
         };
         let fresh = home.newest.is_some() || home.was_never_used(&other);
         let image = (newest != NO_SETTINGS).then_some(newest);
@@ -208,13 +213,12 @@ impl<F: NorFlash> Journal<F> {
         }
     }
 
-    /// Starts a log in the first sector that is ready for one.
-    fn begin(&mut self, first: &Survey, second: &Survey) -> Result<(), SaveError> {
+    /// Starts a log in the first sector that gets blank.
+    fn begin(&mut self) -> Result<(), SaveError> {
         let generation = self.tail.generation;
-        let ready = [first, second].into_iter().find_map(|found| {
-            let waiting = Self::waiting(found, generation);
-            let slot = waiting.or_else(|| self.prepare(found.sector, generation))?;
-            Some(Place { sector: found.sector, slot })
+        let ready = [0, 1].into_iter().find_map(|sector| {
+            let slot = self.prepare(sector, generation)?;
+            Some(Place { sector, slot })
         });
         self.tail.next = ready.ok_or(SaveError::Broken)?;
         self.append(Self::SLOTS, &NO_SETTINGS)?;
@@ -225,26 +229,26 @@ impl<F: NorFlash> Journal<F> {
     /// Goes on with a log: its newest record made firm, its other sector blank, and room for saves.
     fn resume(&mut self, home: &Survey, other: &Survey, newest: Record) -> Result<(), SaveError> {
         let next = Place { sector: home.sector, slot: home.end + 1 };
-        let spare = Self::waiting(other, newest.generation.wrapping_add(1));
-        // Remains of a record in the spare are behind the newest one too. To append that behind them, which
-        // is a move, takes no erase before.
-        let begun = spare.is_some() && other.end > 1;
+        let spare = Self::first_free(other, newest.generation.wrapping_add(1));
         self.tail = Tail { next, generation: newest.generation, spare };
-        if !newest.firm && !begun {
+        if !newest.firm {
             self.firm_up(&newest.image)?;
         }
         self.prepare_spare();
-        if begun || Self::LIMIT.saturating_sub(self.tail.next.slot) < Self::SLOTS / 4 {
+        if Self::LIMIT.saturating_sub(self.tail.next.slot) < Self::SLOTS / 4 {
             self.move_to_spare(&newest.image)?;
         }
         self.newest = Some(newest.image);
         Ok(())
     }
 
-    /// The first slot to use in a sector that waits for a generation. It may hold the remains of cut records,
-    /// and is worth keeping if they do not fill it.
-    fn waiting(found: &Survey, generation: u32) -> Option<u32> {
-        (found.waits_for(generation) && found.end <= Self::SLOTS / 2).then_some(found.end + 1)
+    /// The first slot to use in a spare that waits for a generation.
+    ///
+    /// It may hold the remains of records that were cut. That happens when home is full, so what comes next
+    /// is a move, which appends the newest record behind them. An erase would be no better: if that is cut,
+    /// it may leave the right mark, and little else.
+    fn first_free(spare: &Survey, generation: u32) -> Option<u32> {
+        (spare.waits_for(generation) && spare.end <= Self::SLOTS / 2).then_some(spare.end)
     }
 
     /// Makes a sector blank; its first slot to use.

@@ -231,7 +231,7 @@ impl<D: Direction> Deframer<D> {
     fn lent_by(&self, end: usize) -> usize {
         match self.buffer.get(..end) {
             Some([.., last]) if *last == HEADER[0] => 1,
-            Some(frame) if frame.ends_with(&HEADER) => 2,
+            Some([.., first, second]) if [*first, *second] == HEADER => 2,
             _ => 0,
         }
     }

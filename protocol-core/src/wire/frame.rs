@@ -112,19 +112,21 @@ impl<I> ParseError<I> for Defect {
     }
 }
 
+/// What stands between the header and the data.
+type Prefix = (Function, u8, u8);
+
 /// Function, address and count of the frame at the beginning of `input`.
-fn prefix(input: &[u8]) -> IResult<&[u8], (Function, u8, u8), Defect> {
+fn prefix(input: &[u8]) -> IResult<&[u8], Prefix, Defect> {
     preceded(tag(HEADER.as_slice()), (map_opt(byte, Function::from_code), byte, byte)).parse(input)
 }
 
-/// The frame at the beginning of `input`, which goes in direction `D`.
-///
-/// # Errors
-/// `Incomplete` while bytes are missing; otherwise the [`Defect`].
-pub fn parse<D: Direction>(input: &[u8]) -> IResult<&[u8], Frame<'_>, Defect> {
-    let (rest, (function, address, count)) = prefix(input)?;
+/// The rest of a frame, of which `rest` is what stands behind the prefix in `input`.
+fn body<'a, D: Direction>(
+    input: &'a [u8],
+    rest: &'a [u8],
+    (function, address, count): Prefix,
+) -> IResult<&'a [u8], Frame<'a>, Defect> {
     let (rest, data) = take(D::data_length(function, count))(rest)?;
-    // `rest` is the tail of `input`: what stands before it is what the checksum covers.
     let covered = input.get(..PREFIX_LENGTH + data.len()).unwrap_or(input);
     let (rest, crc) = le_u16(rest)?;
     if crc != checksum(covered) {
@@ -134,6 +136,15 @@ pub fn parse<D: Direction>(input: &[u8]) -> IResult<&[u8], Frame<'_>, Defect> {
         return Err(nom::Err::Failure(Defect::MalformedRange { address }));
     }
     Ok((rest, Frame { function, address, count, data }))
+}
+
+/// The frame at the beginning of `input`, which goes in direction `D`.
+///
+/// # Errors
+/// `Incomplete` while bytes are missing; otherwise the [`Defect`].
+pub fn parse<D: Direction>(input: &[u8]) -> IResult<&[u8], Frame<'_>, Defect> {
+    let (rest, prefix) = prefix(input)?;
+    body::<D>(input, rest, prefix)
 }
 
 impl<'a> Frame<'a> {
@@ -160,17 +171,18 @@ pub(super) enum Verdict {
 
 /// Judges the beginning of `input`.
 pub(super) fn judge<D: Direction>(input: &[u8]) -> Verdict {
-    let claimed = |input| match prefix(input) {
-        Ok((_, (function, _, count))) => PREFIX_LENGTH + D::data_length(function, count) + CRC_LENGTH,
-        Err(_) => 1,
+    let (claimed, parsed) = match prefix(input) {
+        Err(error) => (1, Err(error)),
+        Ok((rest, prefix)) => {
+            let claimed = PREFIX_LENGTH + D::data_length(prefix.0, prefix.2) + CRC_LENGTH;
+            (claimed, body::<D>(input, rest, prefix))
+        }
     };
-    match parse::<D>(input) {
-        Ok((rest, _)) => Verdict::Whole(input.len() - rest.len()),
+    match parsed {
+        Ok(_) => Verdict::Whole(claimed),
         Err(nom::Err::Incomplete(Needed::Size(more))) => Verdict::Unfinished(input.len() + more.get()),
         Err(nom::Err::Incomplete(Needed::Unknown)) => Verdict::Unfinished(input.len() + 1),
-        Err(nom::Err::Error(defect) | nom::Err::Failure(defect)) => {
-            Verdict::Defective(defect, claimed(input))
-        }
+        Err(nom::Err::Error(defect) | nom::Err::Failure(defect)) => Verdict::Defective(defect, claimed),
     }
 }
 

@@ -73,17 +73,20 @@ pub fn receive<D: Direction>(events: &[Event], piece: usize) -> Vec<Received> {
 }
 
 pub fn drain<D: Direction>(deframer: &mut Deframer<D>, received: &mut Vec<Received>) {
-    while let Some(result) = deframer.pull() {
-        received.push(match result {
-            Ok(frame) => {
-                let function = if frame.function == Function::Read { 3 } else { 6 };
-                Received::Frame(raw_frame(function, frame.address, frame.count, frame.data))
-            }
-            Err(Defect::WrongCrc) => Received::WrongCrc,
-            Err(Defect::MalformedRange { address }) => Received::MalformedRange(address),
-            Err(Defect::NoFrame) => panic!("not worth mentioning"),
-        });
-    }
+    received.extend(std::iter::from_fn(|| pull(deframer)));
+}
+
+/// The next thing it says.
+pub fn pull<D: Direction>(deframer: &mut Deframer<D>) -> Option<Received> {
+    Some(match deframer.pull()? {
+        Ok(frame) => {
+            let function = if frame.function == Function::Read { 3 } else { 6 };
+            Received::Frame(raw_frame(function, frame.address, frame.count, frame.data))
+        }
+        Err(Defect::WrongCrc) => Received::WrongCrc,
+        Err(Defect::MalformedRange { address }) => Received::MalformedRange(address),
+        Err(Defect::NoFrame) => panic!("not worth mentioning"),
+    })
 }
 
 /// What the deframer should say, from the rules of D3 and D4 alone.
@@ -132,11 +135,24 @@ impl Model {
         }
     }
 
+    /// Everything in the history that has the length it claims, wherever it begins: nobody may say anything
+    /// else, or anything more often, however late he looks.
+    pub fn everything(&self) -> Vec<Received> {
+        let candidate = |at| self.candidate(at, self.cut_behind(at).unwrap_or(self.history.len()));
+        let judged = |at| if let Candidate::Judged(_, said) = candidate(at) { Some(said) } else { None };
+        (0..self.history.len()).filter_map(judged).collect()
+    }
+
+    /// Where the bytes end that came before the next long silence.
+    fn cut_behind(&self, at: usize) -> Option<usize> {
+        self.long.iter().copied().find(|&cut| cut > at)
+    }
+
     fn news(&mut self) -> Vec<Received> {
         let mut news = Vec::new();
         let mut at = 0;
         while at < self.history.len() {
-            let cut = self.long.iter().copied().find(|&cut| cut > at);
+            let cut = self.cut_behind(at);
             match self.candidate(at, cut.unwrap_or(self.history.len())) {
                 Candidate::Unfinished if cut.is_none() => {
                     let quiet = self.short.iter().copied().filter(|&quiet| quiet > at).max();
