@@ -25,17 +25,11 @@
 use std::error::Error;
 use std::time::{Duration, Instant};
 
-mod inbox;
-mod modbus_core_server;
-mod our_server;
-mod rmodbus_server;
 mod server;
 mod traffic;
 
-use modbus_core_server::ModbusCoreServer;
-use our_server::OurServer;
-use rmodbus_server::RmodbusServer;
-use server::Server;
+use bench_servers::{ModbusCoreServer, OurServer, RmodbusServer};
+use server::Serve;
 use traffic::{CASES, Case, Protocol, Traffic};
 
 /// Requests in one round.
@@ -47,18 +41,26 @@ const ROUNDS: usize = 301;
 struct Contestant {
     name: &'static str,
     protocol: Protocol,
-    start: fn() -> Box<dyn Server>,
+    start: fn() -> Box<dyn Serve>,
 }
 
 /// Ours, then the peers.
 static CONTESTANTS: [Contestant; 3] = [
-    Contestant { name: "protocol-core", protocol: Protocol::SevenBot, start: || Box::new(OurServer::new()) },
+    Contestant {
+        name: "protocol-core",
+        protocol: Protocol::SevenBot,
+        start: || Box::new(OurServer::default()),
+    },
     Contestant {
         name: "modbus-core",
         protocol: Protocol::ModbusRtu,
-        start: || Box::new(ModbusCoreServer::new()),
+        start: || Box::new(ModbusCoreServer::default()),
     },
-    Contestant { name: "rmodbus", protocol: Protocol::ModbusRtu, start: || Box::new(RmodbusServer::new()) },
+    Contestant {
+        name: "rmodbus",
+        protocol: Protocol::ModbusRtu,
+        start: || Box::new(RmodbusServer::default()),
+    },
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {

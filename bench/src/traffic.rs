@@ -2,14 +2,11 @@
 //! expects. Frames are built here from the protocols' descriptions, with the `crc` crate: nothing that is
 //! measured has a say in what is right.
 
+use bench_servers::work::{STATION, initial_values};
 use crc::{CRC_16_MODBUS, Crc};
-use protocol_core::registers::RegisterFile;
 use protocol_core::registers::map::TARGET_POSITION;
 
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
-
-/// The Modbus station that is asked.
-pub(crate) const STATION: u8 = 1;
 
 /// One row of the table.
 pub(crate) struct Case {
@@ -164,16 +161,6 @@ fn flip(frame: &mut [u8], damage: u64) {
     }
 }
 
-fn initial_values() -> Vec<u8> {
-    let file = RegisterFile::new([1, 2, 3, 4, 5, 6], None);
-    (0..=u8::MAX).map(|address| file.get(address)).collect()
-}
-
-/// The registers a Modbus server starts with: the same numbers.
-pub(crate) fn initial_words() -> Vec<u16> {
-    initial_values().into_iter().map(u16::from).collect()
-}
-
 /// Numbers without a pattern, the same in every run (splitmix64).
 struct Dice(u64);
 
@@ -194,6 +181,7 @@ impl Dice {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench_servers::work::{MODBUS_RTU, SEVEN_BOT};
 
     #[test]
     fn frames_are_those_of_the_protocols() {
@@ -208,5 +196,15 @@ mod tests {
         let ten = Operation { first: 0, count: 10, written: Vec::new() };
         assert_eq!(Protocol::ModbusRtu.request(&ten), [1, 3, 0, 0, 0, 10, 0xC5, 0xCD]);
         assert_eq!(Protocol::ModbusRtu.reply(&write, &values)[..6], [1, 16, 0, 46, 0, 7]);
+    }
+    #[test]
+    fn requests_counted_on_the_chip_are_those_timed_here() {
+        let operation = |first, count, written: &[u8]| Operation { first, count, written: written.to_vec() };
+        for (protocol, requests) in [(Protocol::SevenBot, SEVEN_BOT), (Protocol::ModbusRtu, MODBUS_RTU)] {
+            assert_eq!(protocol.request(&operation(46, 7, &[])), requests.read_of_7);
+            let pose = operation(46, 7, &[90, 90, 65, 90, 90, 90, 80]);
+            assert_eq!(protocol.request(&pose), requests.write_of_7);
+            assert_eq!(protocol.request(&operation(0, 61, &[])), requests.read_of_61);
+        }
     }
 }

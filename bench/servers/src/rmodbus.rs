@@ -6,27 +6,31 @@ use rmodbus::server::context::ModbusContext;
 use rmodbus::server::storage::ModbusStorage;
 use rmodbus::{ModbusProto, guess_request_frame_len};
 
+use crate::Server;
 use crate::inbox::Inbox;
-use crate::server::Server;
-use crate::traffic::{STATION, initial_words};
+use crate::work::{STATION, initial_words};
 
-pub(crate) struct RmodbusServer {
+/// The peer rmodbus.
+pub struct RmodbusServer {
     inbox: Inbox,
     registers: ModbusStorage<1, 1, 1, 256>,
-    reply: Vec<u8>,
+    reply: heapless::Vec<u8, 256>,
     carried_out: usize,
 }
 
-impl RmodbusServer {
-    pub(crate) fn new() -> Self {
+impl Default for RmodbusServer {
+    /// A server that was sent nothing yet.
+    fn default() -> Self {
         let mut registers = ModbusStorage::new();
         // Cannot fail: there are as many words as registers.
         let _ = registers.set_holdings_bulk(0, &initial_words());
-        Self { inbox: Inbox::new(), registers, reply: Vec::with_capacity(256), carried_out: 0 }
+        Self { inbox: Inbox::new(), registers, reply: heapless::Vec::new(), carried_out: 0 }
     }
+}
 
+impl RmodbusServer {
     /// Looks at the front for one request. `false`: it takes more bytes.
-    fn answer_one(&mut self, replies: &mut Vec<u8>) -> bool {
+    fn answer_one(&mut self, reply: &mut impl FnMut(&[u8])) -> bool {
         let Ok(length) = guess_request_frame_len(self.inbox.bytes(), ModbusProto::Rtu) else {
             return self.give_up_on_what_is_none();
         };
@@ -44,7 +48,7 @@ impl RmodbusServer {
         };
         let answered = processed.is_ok() && frame.error.is_none() && frame.finalize_response().is_ok();
         if answered {
-            replies.extend_from_slice(&self.reply);
+            reply(&self.reply);
             self.carried_out += 1;
         }
         self.inbox.take(usize::from(length));
@@ -64,14 +68,14 @@ impl RmodbusServer {
 }
 
 impl Server for RmodbusServer {
-    fn feed(&mut self, piece: &[u8], replies: &mut Vec<u8>) {
+    fn feed(&mut self, piece: &[u8], reply: &mut impl FnMut(&[u8])) {
         self.inbox.push(piece);
-        while self.answer_one(replies) {}
+        while self.answer_one(reply) {}
     }
 
-    fn end(&mut self, replies: &mut Vec<u8>) {
+    fn end(&mut self, reply: &mut impl FnMut(&[u8])) {
         while !self.inbox.bytes().is_empty() {
-            if !self.answer_one(replies) {
+            if !self.answer_one(reply) {
                 self.inbox.take(1);
             }
         }

@@ -6,12 +6,13 @@ use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer::{ABANDON_AFTER, gap};
 use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
 
-use crate::server::Server;
+use crate::Server;
 
 /// Time between two pieces.
 const STEP: Duration = Duration::from_micros(100);
 
-pub(crate) struct OurServer {
+/// Ours.
+pub struct OurServer {
     now: Instant,
     deframer: Deframer<ToArm>,
     registers: RegisterFile,
@@ -19,8 +20,9 @@ pub(crate) struct OurServer {
     carried_out: usize,
 }
 
-impl OurServer {
-    pub(crate) fn new() -> Self {
+impl Default for OurServer {
+    /// A server that was sent nothing yet.
+    fn default() -> Self {
         Self {
             now: Instant::ZERO,
             deframer: Deframer::new(gap(115_200)),
@@ -29,14 +31,16 @@ impl OurServer {
             carried_out: 0,
         }
     }
+}
 
-    fn answer(&mut self, replies: &mut Vec<u8>) {
+impl OurServer {
+    fn answer(&mut self, reply: &mut impl FnMut(&[u8])) {
         while let Some(found) = self.deframer.pull() {
             let Ok(frame) = found else { continue };
             match Request::from_frame(frame) {
                 Request::Read { address, count } => {
                     Reply { address, values: self.registers.read(address, count) }.encode(&mut self.reply);
-                    replies.extend_from_slice(&self.reply);
+                    reply(&self.reply);
                     self.carried_out += 1;
                 }
                 Request::Write { address, values } => {
@@ -51,22 +55,22 @@ impl OurServer {
 }
 
 impl Server for OurServer {
-    fn feed(&mut self, piece: &[u8], replies: &mut Vec<u8>) {
+    fn feed(&mut self, piece: &[u8], reply: &mut impl FnMut(&[u8])) {
         self.now = self.now + STEP;
         let mut rest = piece;
         while !rest.is_empty() {
             let taken = self.deframer.push(self.now, rest);
             rest = rest.get(taken..).unwrap_or(&[]);
-            self.answer(replies);
+            self.answer(reply);
         }
     }
 
-    fn end(&mut self, replies: &mut Vec<u8>) {
+    fn end(&mut self, reply: &mut impl FnMut(&[u8])) {
         self.now = self.now + ABANDON_AFTER;
         // Twice: a silence is noted again where a search was under way.
         for _ in 0..2 {
             self.deframer.push(self.now, &[]);
-            self.answer(replies);
+            self.answer(reply);
         }
     }
 

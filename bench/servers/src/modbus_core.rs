@@ -10,11 +10,12 @@ use modbus_core::rtu::server::encode_response;
 use modbus_core::rtu::{self, DecodedFrame, Header, ResponseAdu};
 use modbus_core::{Data, Error, Exception, ExceptionResponse, FunctionCode, Request, Response, ResponsePdu};
 
+use crate::Server;
 use crate::inbox::Inbox;
-use crate::server::Server;
-use crate::traffic::{STATION, initial_words};
+use crate::work::{STATION, initial_words};
 
-pub(crate) struct ModbusCoreServer {
+/// The peer modbus-core.
+pub struct ModbusCoreServer {
     inbox: Inbox,
     registers: Registers,
     carried_out: usize,
@@ -22,7 +23,7 @@ pub(crate) struct ModbusCoreServer {
 
 /// The registers, and room for what is read from them and for the reply: made once, not for each request.
 struct Registers {
-    words: Vec<u16>,
+    words: [u16; 256],
     data: [u8; 250],
     frame: [u8; rtu::MAX_FRAME_LEN],
 }
@@ -34,14 +35,17 @@ const WRITE_MULTIPLE_REGISTERS: u8 = 0x10;
 /// Why a request is refused.
 type Refusal = Exception;
 
-impl ModbusCoreServer {
-    pub(crate) fn new() -> Self {
+impl Default for ModbusCoreServer {
+    /// A server that was sent nothing yet.
+    fn default() -> Self {
         let registers = Registers { words: initial_words(), data: [0; 250], frame: [0; rtu::MAX_FRAME_LEN] };
         Self { inbox: Inbox::new(), registers, carried_out: 0 }
     }
+}
 
+impl ModbusCoreServer {
     /// Looks for one request at the front. `false`: it takes more bytes to find one.
-    fn answer_one(&mut self, replies: &mut Vec<u8>) -> bool {
+    fn answer_one(&mut self, reply: &mut impl FnMut(&[u8])) -> bool {
         let bytes = self.inbox.bytes();
         let frame = match pdu_length(bytes).and_then(|length| match length {
             Some(length) => Ok(rtu::extract_frame(bytes, length)?.map(|frame| (frame, length))),
@@ -58,7 +62,7 @@ impl ModbusCoreServer {
         if slave == STATION
             && let Ok(request) = Request::try_from(pdu)
         {
-            self.carried_out += usize::from(self.registers.answer(request, replies));
+            self.carried_out += usize::from(self.registers.answer(request, reply));
         }
         self.inbox.take(length + ENVELOPE);
         true
@@ -74,14 +78,14 @@ fn pdu_length(bytes: &[u8]) -> Result<Option<usize>, Error> {
 }
 
 impl Server for ModbusCoreServer {
-    fn feed(&mut self, piece: &[u8], replies: &mut Vec<u8>) {
+    fn feed(&mut self, piece: &[u8], reply: &mut impl FnMut(&[u8])) {
         self.inbox.push(piece);
-        while self.answer_one(replies) {}
+        while self.answer_one(reply) {}
     }
 
-    fn end(&mut self, replies: &mut Vec<u8>) {
+    fn end(&mut self, reply: &mut impl FnMut(&[u8])) {
         while !self.inbox.bytes().is_empty() {
-            if !self.answer_one(replies) {
+            if !self.answer_one(reply) {
                 self.inbox.take(1);
             }
         }
@@ -93,15 +97,15 @@ impl Server for ModbusCoreServer {
 }
 
 impl Registers {
-    /// Appends the reply to a request; was it carried out?
-    fn answer(&mut self, request: Request<'_>, replies: &mut Vec<u8>) -> bool {
+    /// Hands out the reply to a request; was it carried out?
+    fn answer(&mut self, request: Request<'_>, reply: &mut impl FnMut(&[u8])) -> bool {
         let result = carry_out(&mut self.words, request, &mut self.data);
         let carried_out = result.is_ok();
         let function = FunctionCode::from(request);
         let pdu = ResponsePdu(result.map_err(|exception| ExceptionResponse { function, exception }));
-        let reply = ResponseAdu { hdr: Header { slave: STATION }, pdu };
-        if let Ok(length) = encode_response(reply, &mut self.frame) {
-            replies.extend_from_slice(self.frame.get(..length).unwrap_or(&[]));
+        let response = ResponseAdu { hdr: Header { slave: STATION }, pdu };
+        if let Ok(length) = encode_response(response, &mut self.frame) {
+            reply(self.frame.get(..length).unwrap_or(&[]));
         }
         carried_out
     }

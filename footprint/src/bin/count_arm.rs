@@ -1,0 +1,115 @@
+//! The arm under the meter: its control cycles with seven servos that follow at once, and a checksum.
+
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use footprint::meter::Meter;
+use footprint::opaque;
+use motion_core::servo_bus::frame::{Decoder, FrameBuffer, Reading};
+use motion_core::servo_bus::servo::Servo;
+use motion_core::{Config, Controller, Output, Storage, TorqueCodes};
+use protocol_core::registers::map::{MISSING_SERVOS, MOVING_JOINTS};
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::crc::checksum;
+
+/// Every joint to 180 degrees, at 19 degrees a second: under way for as long as is counted.
+const FAR_AND_SLOW: [u8; 28] = *b"\xaa\x77\x06\x20\x15\x0a\x0a\x0a\x0a\x0a\x0a\x0a\x00\x00\
+    \x00\x00\x00\x00\x00\xb4\xb4\xb4\xb4\xb4\xb4\xb4\xe3\x31";
+/// How long the arm takes to start, and longer, in milliseconds.
+const START: u64 = 1_000;
+/// Control cycles that are counted.
+const CYCLES: u64 = 100;
+/// Milliseconds of a control cycle: the shell looks once in each.
+const CYCLE: u64 = 10;
+
+struct Rig {
+    meter: Meter,
+    controller: Controller,
+    servos: [Servo; 7],
+    /// What the servos have answered and nobody has heard yet.
+    answer: FrameBuffer,
+    /// The most that one call took.
+    longest_call: u32,
+}
+
+#[entry]
+fn main() -> ! {
+    let config = Config {
+        chip_id: opaque([0; 6]),
+        faults: 0,
+        servo_timeout: Duration::from_millis(3),
+        torque_codes: TorqueCodes::default(),
+    };
+    let mut rig = Rig {
+        meter: Meter::default(),
+        controller: opaque(Controller::new(Instant::ZERO, config, None, Storage::Ready)),
+        servos: [0, 1, 2, 3, 4, 5, 6].map(Servo::new),
+        answer: FrameBuffer::new(),
+        longest_call: 0,
+    };
+    (0..START).for_each(|millis| _ = rig.turn(millis));
+    rig.controller.host_bytes(now(START), opaque(&FAR_AND_SLOW));
+    let mut longest_cycle = 0;
+    for cycle in 0..CYCLES {
+        let start = START + cycle * CYCLE;
+        longest_cycle = longest_cycle.max((start..start + CYCLE).map(|millis| rig.turn(millis)).sum());
+    }
+    rig.meter.tell("joints moving", u32::from(rig.controller.registers().get(MOVING_JOINTS.address)));
+    rig.meter.tell("servos missing", u32::from(rig.controller.registers().get(MISSING_SERVOS.address)));
+    rig.meter.tell("longest control cycle", longest_cycle);
+    rig.meter.tell("longest poll", rig.longest_call);
+    let bytes = opaque([0x5A; 260]);
+    rig.meter.tell("CRC of 260 bytes", rig.meter.count(|| _ = opaque(checksum(&bytes))));
+    rig.meter.end()
+}
+
+fn now(millis: u64) -> Instant {
+    Instant::from_micros(millis * 1_000)
+}
+
+impl Rig {
+    /// One turn of the shell's loop: how many instructions the controller took for it.
+    fn turn(&mut self, millis: u64) -> u32 {
+        let Self { meter, controller, servos, answer, longest_call } = self;
+        let now = now(millis);
+        let mut sum = meter.count(|| {
+            controller.host_bytes(now, &[]);
+            controller.servo_bytes(answer);
+        });
+        answer.clear();
+        loop {
+            let mut output = Output::Wait(now);
+            let poll = meter.count(|| output = opaque(controller.poll(now, opaque(512))));
+            sum += poll;
+            *longest_call = poll.max(*longest_call);
+            match output {
+                Output::ToServos(bytes) => {
+                    servos
+                        .iter_mut()
+                        .filter_map(|servo| hear(servo, bytes))
+                        .for_each(|bytes| *answer = bytes);
+                }
+                Output::Wait(_) => return sum,
+                _ => {}
+            }
+        }
+    }
+}
+
+/// What a servo answers. It stands where it was told to.
+fn hear(servo: &mut Servo, bytes: &[u8]) -> Option<FrameBuffer> {
+    let mut decoder = Decoder::new();
+    decoder.push(bytes);
+    let frame = decoder.pull()?.ok()?;
+    // A servo that was told nothing yet stands in the middle.
+    let goal = servo.goal().position_counts;
+    servo.set_reading(&Reading {
+        position_counts: if goal == 0 { 511 } else { goal },
+        speed: 0,
+        load: 0,
+        voltage_decivolts: 74,
+        temperature_celsius: 30,
+    });
+    servo.hear(&frame)
+}
