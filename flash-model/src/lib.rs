@@ -2,26 +2,25 @@
 //!
 //! - Programming takes ones to zeros, word by word. A word that was programmed, or begun, is never programmed
 //!   with another value before its sector is erased: that is an error here.
-//! - The power can be cut at any operation, where an operation is one word programmed or one sector erased, and
-//!   what that leaves behind is one of the kinds of [`ProgramTear`] and [`EraseTear`]. From then on nothing answers until
-//!   [`Flash::power_up`].
+//! - The power can be cut at any operation, where an operation is one word programmed or one sector erased.
+//!   What that leaves behind is one of the kinds of [`ProgramTear`] and [`EraseTear`]. From then on nothing
+//!   answers until [`Flash::power_up`].
 //! - Half charged cells, *marginal* bits, read one way until the power goes, and perhaps another way after.
-//! - A sector whose erase was cut looks like anything, even blank. To program it before it is erased again is
-//!   an error.
-//! - Erases can be forbidden, sectors and cells wear out, bits rot. Or nothing ever changes, as in an emulator.
+//! - A sector whose erase was cut looks like anything, even blank. To program it before it was erased in full
+//!   is an error.
+//! - Erases can be forbidden, sectors and cells wear out, bits rot. Or nothing ever changes, as in an
+//!   emulator.
 //!
-//! It knows nothing of what is stored in it. Cheap to clone, so that a search can try everything from one
-//! state.
+//! It knows nothing of what is stored in it. Cheap to clone, so that a search can try everything that can
+//! happen from one state on.
 
+mod access;
 mod random;
 mod tear;
 
 use std::ops::Range;
 
-use embedded_storage::nor_flash::{
-    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
-};
-
+pub use access::Error;
 pub use random::Random;
 use tear::Torn;
 pub use tear::{EraseTear, ProgramTear};
@@ -33,30 +32,6 @@ pub enum Operation {
     Program,
     /// One sector.
     Erase,
-}
-
-/// Why the flash did not do as it was told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Error {
-    /// The power was cut, during this operation or before.
-    PowerLost,
-    /// The bounds or the alignment of `embedded-storage`'s contract.
-    Misused(NorFlashErrorKind),
-    /// An erase while [`Flash::forbid_erase`] was in force.
-    EraseForbidden,
-    /// This word was programmed or begun before, with another value.
-    ProgrammedTwice,
-    /// The last erase of this sector was cut.
-    HalfErased,
-}
-
-impl NorFlashError for Error {
-    fn kind(&self) -> NorFlashErrorKind {
-        match self {
-            Self::Misused(kind) => *kind,
-            _ => NorFlashErrorKind::Other,
-        }
-    }
 }
 
 /// A power cut to come.
@@ -319,48 +294,6 @@ impl<const SECTOR: usize, const WORD: usize> Flash<SECTOR, WORD> {
 /// A word's bytes as a number; bytes that it does not have are 0.
 fn word(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
-}
-
-impl<const SECTOR: usize, const WORD: usize> ErrorType for Flash<SECTOR, WORD> {
-    type Error = Error;
-}
-
-impl<const SECTOR: usize, const WORD: usize> ReadNorFlash for Flash<SECTOR, WORD> {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
-        self.check_power()?;
-        check_read(self, offset, bytes.len()).map_err(Error::Misused)?;
-        let cells = self.cells.get(offset as usize..).unwrap_or_default();
-        bytes.iter_mut().zip(cells).for_each(|(to, from)| *to = *from);
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        self.cells.len()
-    }
-}
-
-impl<const SECTOR: usize, const WORD: usize> NorFlash for Flash<SECTOR, WORD> {
-    const WRITE_SIZE: usize = WORD;
-    const ERASE_SIZE: usize = SECTOR;
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
-        check_erase(self, from, to).map_err(Error::Misused)?;
-        if self.inert {
-            return self.check_power();
-        }
-        (from as usize / SECTOR..to as usize / SECTOR).try_for_each(|sector| self.erase_sector(sector))
-    }
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
-        check_write(self, offset, bytes.len()).map_err(Error::Misused)?;
-        if self.inert {
-            return self.check_power();
-        }
-        let addresses = (offset as usize..).step_by(WORD);
-        addresses.zip(bytes.chunks(WORD)).try_for_each(|(address, new)| self.program(address, new))
-    }
 }
 
 #[cfg(test)]

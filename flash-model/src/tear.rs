@@ -89,8 +89,8 @@ impl ProgramTear {
     }
 }
 
-/// How the erase of a sector is cut. An erase takes zeros to ones, and marginal bits first: one that was begun
-/// leaves none of those that were there before.
+/// How the erase of a sector is cut. An erase takes zeros to ones, and marginal bits first: one that was
+/// begun leaves none of those that were there before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EraseTear {
     /// Before it began.
@@ -145,7 +145,8 @@ impl EraseTear {
         places.map(|(place, word)| self.tear_word(*word, place < first, place < blank_from, random)).collect()
     }
 
-    /// What becomes of a `word`, which is in the first part of the sector or not, and in the first two or not.
+    /// What becomes of a `word`, which is in the first part of the sector or not, and in the first two parts
+    /// or not.
     fn tear_word(self, word: u32, in_first: bool, in_first_two: bool, random: &mut Random) -> Torn {
         let set = |set| Torn { set, ..Torn::default() };
         let zero = Torn { cleared: u32::MAX, ..Torn::default() };

@@ -1,5 +1,7 @@
 //! The model does what flash does, and refuses what flash must not be asked.
 
+use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind, ReadNorFlash};
+
 use super::*;
 
 type Small = Flash<512>;

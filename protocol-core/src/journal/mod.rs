@@ -57,7 +57,7 @@ mod slot;
 use embedded_storage::nor_flash::NorFlash;
 
 use crate::registers::Image;
-use sectors::{Place, Refused, Sectors, Survey};
+use sectors::{Place, Sectors, Survey};
 use slot::Record;
 
 /// The slots at a sector's end that only a start may fill.
@@ -77,8 +77,8 @@ pub enum Opened {
     Fresh,
     /// The settings.
     Found(Image),
-    /// No record, but not blank either. It was erased, and is in use as if it had been
-    /// fresh; who would rather refuse it opens a copy first.
+    /// No record was left, though something was there. It was erased, and is in use as if it had been fresh:
+    /// who would rather refuse such a flash opens a copy of it first.
     Damaged,
     /// The flash does not keep what it is given: settings can be read at best, and nothing will be saved.
     Broken(Option<Image>),
@@ -103,12 +103,6 @@ pub enum SaveError {
     Full,
     /// The flash does not keep what it is given.
     Broken,
-}
-
-impl From<Refused> for SaveError {
-    fn from(_: Refused) -> Self {
-        Self::Broken
-    }
 }
 
 /// Where the log goes on.
@@ -166,7 +160,8 @@ impl<F: NorFlash> Journal<F> {
         (journal, opened)
     }
 
-    /// Saves the settings. What is already there is not saved again.
+    /// Saves the settings. What is already there is not saved again. (20 times 0xFF would be found as no
+    /// settings; no arm has such an image.)
     ///
     /// # Errors
     /// [`SaveError::Full`]: not before the next start. After [`SaveError::Broken`] the next start may find
@@ -216,11 +211,10 @@ impl<F: NorFlash> Journal<F> {
     /// Starts a log in the first sector that gets blank.
     fn begin(&mut self) -> Result<(), SaveError> {
         let generation = self.tail.generation;
-        let ready = [0, 1].into_iter().find_map(|sector| {
-            let slot = self.prepare(sector, generation)?;
-            Some(Place { sector, slot })
-        });
-        self.tail.next = ready.ok_or(SaveError::Broken)?;
+        if self.prepare(0, generation).is_none() {
+            self.tail.next.sector = 1;
+            self.prepare(1, generation).ok_or(SaveError::Broken)?;
+        }
         self.append(Self::SLOTS, &NO_SETTINGS)?;
         self.prepare_spare();
         Ok(())
@@ -259,8 +253,8 @@ impl<F: NorFlash> Journal<F> {
 
     fn firm_up(&mut self, image: &Image) -> Result<(), SaveError> {
         match self.append(Self::SLOTS, image) {
-            // Start after start was cut at this, until home was full. Then the record before the newest is in
-            // home as well, and an erase of the other sector can do no harm.
+            // Start after start was cut at this, until home was full. Then the record before the newest is
+            // in home as well, and an erase of the other sector can do no harm.
             Err(SaveError::Full) => Ok(()),
             result => result,
         }

@@ -3,8 +3,8 @@
 //! - a start finds what was last acknowledged, or something that was attempted since;
 //! - what a start has told stays so, until something else is acknowledged or attempted;
 //! - a save is refused only where no room was promised;
-//! - nothing is erased but by a start, which erases two sectors and programs 18 words at most; a save programs
-//!   eight.
+//! - nothing is erased but by a start, which erases two sectors and programs 18 words at most; a save
+//!   programs eight.
 #![allow(dead_code)] // Each test program uses its part.
 
 use std::cell::RefCell;
