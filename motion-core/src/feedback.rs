@@ -27,16 +27,13 @@ impl Feedback {
     pub const OFF: Self = Self { frequency: 0, due: Instant::FAR_FUTURE, remainder: 0 };
 
     /// Reports from `now` on, `frequency` (register 53, 0 to 50 Hz) times a second or as often as `baud`
-    /// allows; the first after one period.
-    #[must_use]
-    pub fn new(now: Instant, frequency: u8, baud: u32) -> Self {
+    /// allows; the first after one period. A host that repeats itself does not disturb the rhythm.
+    pub fn set(&mut self, now: Instant, frequency: u8, baud: u32) {
         let frequency = u32::from(frequency).min(highest_frequency(baud));
-        if frequency == 0 {
-            return Self::OFF;
+        if frequency != self.frequency {
+            *self = Self { frequency, due: now, remainder: 0 };
+            self.advance();
         }
-        let mut feedback = Self { frequency, due: now, remainder: 0 };
-        feedback.advance();
-        feedback
     }
 
     /// When the next report is due.
@@ -83,11 +80,17 @@ mod tests {
         Instant::from_micros(micros)
     }
 
+    fn feedback(now: Instant, frequency: u8, baud: u32) -> Feedback {
+        let mut feedback = Feedback::OFF;
+        feedback.set(now, frequency, baud);
+        feedback
+    }
+
     #[test]
     fn d14_reports_take_at_most_half_the_line() {
         assert_eq!(highest_frequency(9_600), 34);
         assert_eq!(highest_frequency(19_200), 68);
-        let mut feedback = Feedback::new(at(0), 50, 9_600);
+        let mut feedback = feedback(at(0), 50, 9_600);
         let strikes = (0..1_000_000).step_by(500).filter(|&now| feedback.strike(at(now))).count();
         assert_eq!(strikes, 33, "34 Hz, the last one at one second");
     }
@@ -95,7 +98,7 @@ mod tests {
     #[test]
     fn d14_an_hour_has_exactly_its_reports() {
         for frequency in 1..=50 {
-            let mut feedback = Feedback::new(at(7), frequency, 115_200);
+            let mut feedback = feedback(at(7), frequency, 115_200);
             for _ in 1..u32::from(frequency) * 3_600 {
                 let due = feedback.due();
                 assert!(feedback.strike(due));
@@ -106,7 +109,7 @@ mod tests {
 
     #[test]
     fn d14_a_late_report_does_not_delay_the_next_and_a_missed_one_is_skipped() {
-        let mut feedback = Feedback::new(at(0), 10, 115_200);
+        let mut feedback = feedback(at(0), 10, 115_200);
         assert!(!feedback.strike(at(99_999)));
         assert!(feedback.strike(at(150_000)));
         assert_eq!(feedback.due(), at(200_000));
@@ -116,8 +119,19 @@ mod tests {
     }
 
     #[test]
+    fn d14_repeating_the_frequency_does_not_disturb_the_rhythm() {
+        let mut feedback = feedback(at(0), 10, 115_200);
+        feedback.set(at(99_000), 10, 115_200);
+        assert_eq!(feedback.due(), at(100_000));
+        feedback.set(at(99_000), 20, 115_200);
+        assert_eq!(feedback.due(), at(149_000));
+        feedback.set(at(149_000), 0, 115_200);
+        assert_eq!(feedback.due(), Instant::FAR_FUTURE);
+    }
+
+    #[test]
     fn d14_frequency_zero_never_reports() {
-        let mut feedback = Feedback::new(at(5), 0, 115_200);
+        let mut feedback = feedback(at(5), 0, 115_200);
         assert!(!feedback.strike(at(u64::MAX / 2)));
         assert_eq!(feedback.due(), Instant::FAR_FUTURE);
     }

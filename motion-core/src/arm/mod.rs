@@ -178,7 +178,7 @@ impl Arm {
             self.gripper.set(now, pump != 0);
         }
         if let Some(frequency) = accepted.value_at(FEEDBACK_FREQUENCY.address) {
-            self.feedback = Feedback::new(now, frequency, self.baud);
+            self.feedback.set(now, frequency, self.baud);
         }
     }
 
