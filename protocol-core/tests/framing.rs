@@ -159,12 +159,16 @@ fn the_deadline_says_when_silence_matters() {
 fn d05_silence_counts_even_while_nobody_pulls() {
     let at = Instant::from_micros;
     let good = frame(6, 46, &[90; 7]);
-    let (head, tail) = good.split_at(8);
     let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
-    deframer.push(at(0), head);
-    deframer.push(at(LONG_SILENCE_US), &[]);
-    deframer.push(at(LONG_SILENCE_US), tail);
-    assert_eq!(deframer.pull(), None, "the two halves are not one frame");
+    // Two silences in a row, so that the second must not make the first forgotten.
+    for (number, part) in (0..).zip(good.chunks(6)) {
+        let now = at(number * LONG_SILENCE_US);
+        deframer.push(now, &[]);
+        assert_eq!(deframer.push(now, part), if number == 0 { part.len() } else { 0 });
+    }
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.push(at(LONG_SILENCE_US), &good), good.len(), "what came before is done with");
+    assert!(matches!(deframer.pull(), Some(Ok(_))));
 }
 
 #[test]

@@ -87,14 +87,18 @@ impl<D: Direction> Deframer<D> {
     }
 
     /// Takes bytes that came since the last call, and says how many; the rest has to be offered again
-    /// after [`Deframer::pull`] has made room. An empty slice says that the line is silent as of `now`:
-    /// nothing came and nothing waits anywhere.
+    /// after [`Deframer::pull`] has made room, or, behind a long silence, has looked at what came before it.
+    /// An empty slice says that the line is silent as of `now`: nothing came and nothing waits anywhere.
     pub fn push(&mut self, now: Instant, bytes: &[u8]) -> usize {
         if bytes.is_empty() {
             self.note_silence(now);
             return 0;
         }
         self.last_byte = now;
+        if self.head < self.cut {
+            // There is one mark for a long silence, and nobody has looked at what came before it yet.
+            return 0;
+        }
         if self.buffer.len() + bytes.len() > MAX_LENGTH {
             self.discard();
         }
