@@ -17,6 +17,7 @@ mod confirm;
 mod failure;
 mod interrupt;
 mod output;
+mod plot;
 mod progress;
 mod session;
 

@@ -1,0 +1,289 @@
+//! The view on a screen of any size: the table of joints, the plot of the last 20 s, health, link, keys.
+//!
+//! ```text
+//!   7Bot V2  /dev/ttyUSB0  firmware 3.0                       servo      title
+//!   joint   target  position     speed                                   table
+//!   ▸ 1       120°       97°   57.0 °/s   moving     ─────●──◇────
+//!   180°│        ...                                                     plot
+//!   faults none   supply 7.4 V   hottest servo 31 °C                     foot
+//! ```
+//!
+//! Knows nothing but the view.
+
+use std::time::Duration;
+
+use ratatui::Frame;
+use ratatui::layout::{Alignment, Constraint, Layout, Rect};
+use ratatui::style::{Color, Modifier, Style};
+use ratatui::symbols::Marker;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Axis, Block, Chart, Clear, Dataset, GraphType, Paragraph};
+use sevenbot::map::motor_state;
+use sevenbot::words::{faults, joints, motor_state_word};
+use sevenbot::{Angle, Joint};
+
+use super::keys::HELP;
+use super::sample::Sample;
+use super::view::{Connection, Dialog, PAST, Past, View};
+
+/// One colour a joint, in the table and in the plot: those that terminals can be told to change.
+const COLOURS: [Color; 7] =
+    [Color::Red, Color::Yellow, Color::Green, Color::Cyan, Color::Blue, Color::Magenta, Color::Gray];
+const FAINT: Style = Style::new().fg(Color::DarkGray);
+const BAD: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
+const GOOD: Style = Style::new().fg(Color::Green);
+const BOLD: Style = Style::new().add_modifier(Modifier::BOLD);
+/// Points further apart in time are not joined: nobody saw what was between them.
+const LONGEST_GAP: Duration = Duration::from_millis(1500);
+/// Columns of the table before its bars.
+const TABLE_WIDTH: usize = 49;
+
+/// Draws all of it.
+pub(crate) fn draw(frame: &mut Frame<'_>, view: &View) {
+    let heights = [1, 9, 0, 3, 1];
+    let [title, table, plot, foot, keys] = Layout::vertical(heights.map(|height| match height {
+        0 => Constraint::Min(4),
+        height => Constraint::Length(height),
+    }))
+    .areas(frame.area());
+    frame.render_widget(Paragraph::new(title_left(view)), title);
+    frame.render_widget(Paragraph::new(title_right(view)).alignment(Alignment::Right), title);
+    frame.render_widget(Paragraph::new(table_lines(view, table.width)), table);
+    draw_plot(frame, view, plot);
+    frame.render_widget(Paragraph::new(foot_lines(view)), foot);
+    frame.render_widget(Paragraph::new(last_line(view)), keys);
+    if let Some(dialog) = view.dialog {
+        draw_dialog(frame, dialog);
+    }
+}
+
+fn title_left(view: &View) -> Line<'_> {
+    let mut line = Line::from(vec![Span::styled(" 7Bot V2 ", BOLD), Span::raw(format!(" {}", view.port))]);
+    if let Connection::Open { firmware } = &view.connection {
+        line.push_span(Span::styled(format!("  firmware {firmware}"), FAINT));
+    }
+    line
+}
+
+fn title_right(view: &View) -> Line<'static> {
+    let state = match (&view.connection, view.arm()) {
+        (Connection::Looking(_), _) => Span::styled("no arm, looking again ", BAD),
+        (Connection::Open { .. }, None) => Span::styled("connected ", FAINT),
+        (Connection::Open { .. }, Some(sample)) => {
+            let state = sample.motor_state();
+            let style = if state == motor_state::SERVO { GOOD } else { BAD };
+            Span::styled(format!("{} ", motor_state_word(state)), style)
+        }
+    };
+    let frozen = view.is_frozen.then(|| Span::styled("frozen  ", BOLD));
+    Line::from_iter(frozen.into_iter().chain([state]))
+}
+
+fn table_lines(view: &View, width: u16) -> Vec<Line<'static>> {
+    let head = "   joint  target  position       speed";
+    let mut lines = vec![Line::from(Span::styled(head, BOLD))];
+    let bar = usize::from(width).saturating_sub(TABLE_WIDTH + 2);
+    lines.extend(Joint::ALL.map(|joint| match &view.sample {
+        Some(sample) => row(view, sample, joint, bar),
+        None => Line::from(vec![marker(view, joint), number(joint), Span::styled("       –", FAINT)]),
+    }));
+    lines
+}
+
+fn marker(view: &View, joint: Joint) -> Span<'static> {
+    Span::styled(if joint == view.selected { " ▸ " } else { "   " }, BOLD)
+}
+
+fn number(joint: Joint) -> Span<'static> {
+    Span::styled(format!("{:^5}", joint.number()), colour(joint))
+}
+
+fn colour(joint: Joint) -> Style {
+    let index = usize::from(joint.number()).wrapping_sub(1);
+    Style::new().fg(COLOURS.get(index).copied().unwrap_or(Color::Reset))
+}
+
+fn row(view: &View, sample: &Sample, joint: Joint, bar: usize) -> Line<'static> {
+    let (target, present) = (sample.target(joint), sample.present(joint));
+    let stale = if view.arm().is_some() { Style::new() } else { FAINT };
+    let (word, style) = match (sample.is_missing(joint), sample.is_moving(joint)) {
+        (true, _) => ("no answer", BAD),
+        (false, true) => ("moving", Style::new().fg(Color::Cyan)),
+        (false, false) => ("", Style::new()),
+    };
+    let speed = sample.speed(joint).degrees_per_second();
+    let numbers = format!("  {target:>5}°  {present:>7}°  {speed:>5.1} °/s  ");
+    let mut spans = vec![marker(view, joint), number(joint)];
+    spans.extend([Span::styled(numbers, stale), Span::styled(format!("{word:<10}"), style)]);
+    spans.extend(bar_spans(bar, target, present, colour(joint)));
+    Line::from(spans)
+}
+
+/// From 0 to 180 degrees: where the joint is, and where it should be.
+fn bar_spans(width: usize, target: u8, present: u8, colour: Style) -> Vec<Span<'static>> {
+    let last = width.saturating_sub(1);
+    let column = |degrees: u8| usize::from(degrees.min(Angle::MAX_DEGREES)) * last / 180;
+    let cells = (0..width).map(|cell| match cell {
+        cell if cell == column(present) => Span::styled("●", colour),
+        cell if cell == column(target) => Span::styled("◇", colour),
+        _ => Span::styled("─", FAINT),
+    });
+    cells.collect()
+}
+
+fn draw_plot(frame: &mut Frame<'_>, view: &View, area: Rect) {
+    // The selected joint last, so that it lies above the others.
+    let mut order = Joint::ALL.to_vec();
+    order.sort_by_key(|&joint| joint == view.selected);
+    let curves: Vec<(Joint, Vec<(f64, f64)>)> =
+        order.into_iter().flat_map(|joint| stretches(view, joint)).collect();
+    let datasets = curves.iter().map(|(joint, points)| {
+        let line = Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line);
+        line.style(colour(*joint)).data(points)
+    });
+    let degrees = Axis::default().bounds([0.0, 180.0]).labels(["0°", "90°", "180°"]).style(FAINT);
+    let past = PAST.as_secs_f64();
+    let seconds = Axis::default().bounds([-past, 0.0]).labels(["-20 s", "-10 s", "now"]).style(FAINT);
+    frame.render_widget(Chart::new(datasets.collect()).x_axis(seconds).y_axis(degrees), area);
+}
+
+/// A joint's past as lines: seconds before now, and degrees. A new line begins behind every gap.
+fn stretches(view: &View, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
+    let index = usize::from(joint.number()).wrapping_sub(1);
+    let point = |(time, pose): &Past| {
+        let before = view.now.saturating_sub(*time).as_secs_f64();
+        (-before, f64::from(pose.get(index).copied().unwrap_or(0)))
+    };
+    let past: Vec<Past> = view.past.iter().copied().collect();
+    let lines = past.chunk_by(|one, next| next.0.saturating_sub(one.0) <= LONGEST_GAP);
+    lines.map(|line| (joint, line.iter().map(point).collect())).collect()
+}
+
+fn foot_lines(view: &View) -> Vec<Line<'static>> {
+    vec![Line::default(), health(view), link(view)]
+}
+
+fn health(view: &View) -> Line<'static> {
+    let Some(sample) = &view.sample else { return Line::default() };
+    let Some(status) = &sample.status else {
+        return Line::styled(" the maker's firmware does not say how it is", FAINT);
+    };
+    let style = if status.is_healthy() { GOOD } else { BAD };
+    let mut spans = vec![Span::raw(" faults "), Span::styled(faults(status.faults()), style)];
+    if status.missing() != 0 {
+        spans.push(Span::styled(format!(", no answer from {}", joints(status.missing())), style));
+    }
+    let volts = status.supply_volts().map_or("unknown".to_owned(), |volts| format!("{volts:.1} V"));
+    let celsius = status.hottest_celsius().map_or("unknown".to_owned(), |degrees| format!("{degrees} °C"));
+    spans.push(Span::raw(format!("   supply {volts}   hottest servo {celsius}")));
+    Line::from(spans)
+}
+
+fn link(view: &View) -> Line<'static> {
+    let link = &view.link;
+    let losses = link.unanswered + u64::try_from(link.damaged).unwrap_or(u64::MAX);
+    let style = if losses + u64::from(link.damaged_at_arm()) == 0 { Style::new() } else { BAD };
+    Line::from(vec![
+        Span::raw(format!(" link   {} answers, ", link.answers)),
+        Span::styled(
+            format!(
+                "{} missing, {} damaged, {} at the arm",
+                link.unanswered,
+                link.damaged,
+                link.damaged_at_arm()
+            ),
+            style,
+        ),
+        Span::raw(format!("   round trip {:.1} ms", link.round_trip_ms)),
+    ])
+}
+
+/// What there is to say, or else the keys one needs most.
+fn last_line(view: &View) -> Line<'_> {
+    match (&view.connection, view.note()) {
+        (Connection::Looking(reason), _) => Line::styled(format!(" {reason}"), BAD),
+        (_, Some(note)) => Line::styled(format!(" {note}"), BOLD),
+        _ => Line::styled(
+            " ↑↓ joint  ←→ nudge  Shift 10°  +- speed  s state  space freeze  ? help  q quit",
+            FAINT,
+        ),
+    }
+}
+
+fn draw_dialog(frame: &mut Frame<'_>, dialog: Dialog) {
+    let (title, lines) = match dialog {
+        Dialog::Help => (" keys ", HELP.map(|(keys, what)| format!(" {keys:<16}{what}")).to_vec()),
+        Dialog::ChooseState => (" motor state ", CHOICES.map(str::to_owned).to_vec()),
+        Dialog::ConfirmState(state) => (" motor state ", question(state)),
+    };
+    let width = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0) + 3;
+    let area = centred(frame.area(), width, lines.len() + 2);
+    frame.render_widget(Clear, area);
+    let text: Vec<Line<'_>> = lines.into_iter().map(Line::from).collect();
+    frame.render_widget(Paragraph::new(text).block(Block::bordered().title(title)), area);
+}
+
+const CHOICES: [&str; 4] = [
+    " h  servo: hold where it is",
+    " d  damping: the arm sinks slowly",
+    " f  forceless: the arm falls",
+    " any other key changes nothing",
+];
+
+fn question(state: u8) -> Vec<String> {
+    let falls = if state == motor_state::FORCELESS { "fall" } else { "sink" };
+    vec![
+        format!(" The arm will {falls}. Hold it with your hand."),
+        " Let it go?  y: yes   any other key: no".to_owned(),
+    ]
+}
+
+fn centred(area: Rect, width: usize, height: usize) -> Rect {
+    let fit = |wanted: usize, there: u16| u16::try_from(wanted).unwrap_or(u16::MAX).min(there);
+    let (width, height) = (fit(width, area.width), fit(height, area.height));
+    let (x, y) = (area.x + (area.width - width) / 2, area.y + (area.height - height) / 2);
+    Rect { x, y, width, height }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::monitor::view::News;
+    use crate::commands::monitor::view::tests::watching;
+    use ratatui::Terminal;
+    use ratatui::backend::TestBackend;
+
+    fn screen(view: &View, width: u16, height: u16) -> TestBackend {
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("memory");
+        terminal.draw(|frame| draw(frame, view)).expect("memory takes all");
+        terminal.backend().clone()
+    }
+
+    #[test]
+    fn an_arm_that_moves() {
+        insta::assert_snapshot!(screen(&watching(), 80, 24));
+    }
+
+    #[test]
+    fn an_arm_that_went_away() {
+        let mut view = watching();
+        view.hear(News::Lost("the connection is gone: broken pipe".to_owned()));
+        insta::assert_snapshot!(screen(&view, 80, 24));
+    }
+
+    #[test]
+    fn the_help() {
+        let mut view = watching();
+        view.dialog = Some(Dialog::Help);
+        insta::assert_snapshot!(screen(&view, 80, 24));
+    }
+
+    #[test]
+    fn no_size_is_too_small() {
+        let mut view = watching();
+        view.dialog = Some(Dialog::ChooseState);
+        for (width, height) in [(1, 1), (10, 3), (49, 12), (300, 100)] {
+            screen(&view, width, height);
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! What the monitor's keys do. Knows the view and what can be asked of an arm, not the arm.
+
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use sevenbot::Joint;
+use sevenbot::map::motor_state;
+
+use super::view::{Dialog, View, Wish};
+
+/// Degrees of a nudge, and of one with Shift.
+const NUDGE: i16 = 1;
+const BIG_NUDGE: i16 = 10;
+/// A change of speed, in the register's steps.
+const SPEED_CHANGE: u8 = 5;
+/// The highest speed below the maximum, which is 0 (D10).
+const HIGHEST_SPEED: u8 = 100;
+
+/// What the help shows: keys, and what they do.
+pub(crate) const HELP: [(&str, &str); 8] = [
+    ("1..7, ↑ ↓", "select a joint"),
+    ("← →", "nudge it by 1°"),
+    ("Shift ← →, [ ]", "nudge it by 10°"),
+    ("+ -", "speed of all joints"),
+    ("s", "motor state: hold, damping, forceless"),
+    ("space", "freeze the picture; the arm goes on"),
+    ("?", "this help"),
+    ("q, Ctrl-C", "quit; the arm holds what it was told"),
+];
+
+/// What a key leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// The view has changed, or nothing has.
+    Shown,
+    /// The arm is to do this.
+    Ask(Wish),
+    /// The monitor ends.
+    Quit,
+}
+
+/// A key was pressed.
+pub(crate) fn press(view: &mut View, key: KeyEvent) -> Outcome {
+    let is_ctrl_c = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
+    if is_ctrl_c {
+        return Outcome::Quit;
+    }
+    match view.dialog {
+        None => press_in_view(view, key),
+        Some(dialog) => press_in_dialog(view, dialog, key.code),
+    }
+}
+
+fn press_in_view(view: &mut View, key: KeyEvent) -> Outcome {
+    let is_shifted = key.modifiers.contains(KeyModifiers::SHIFT);
+    let degrees = if is_shifted { BIG_NUDGE } else { NUDGE };
+    match key.code {
+        KeyCode::Char('q') | KeyCode::Esc => return Outcome::Quit,
+        KeyCode::Char('?' | 'h') | KeyCode::F(1) => view.dialog = Some(Dialog::Help),
+        KeyCode::Char(' ') => view.is_frozen = !view.is_frozen,
+        KeyCode::Char('s') => view.dialog = Some(Dialog::ChooseState),
+        KeyCode::Char(digit @ '1'..='7') => {
+            select(view, i16::from(u8::try_from(digit).unwrap_or(b'1') - b'0'))
+        }
+        KeyCode::Up => select(view, i16::from(view.selected.number()) - 1),
+        KeyCode::Down => select(view, i16::from(view.selected.number()) + 1),
+        KeyCode::Left => return nudge(view, -degrees),
+        KeyCode::Right => return nudge(view, degrees),
+        // Not every terminal tells Shift and an arrow from the arrow alone.
+        KeyCode::Char('[') => return nudge(view, -BIG_NUDGE),
+        KeyCode::Char(']') => return nudge(view, BIG_NUDGE),
+        KeyCode::Char('+' | '=') => return speed(view, faster),
+        KeyCode::Char('-' | '_') => return speed(view, slower),
+        _ => {}
+    }
+    Outcome::Shown
+}
+
+fn press_in_dialog(view: &mut View, dialog: Dialog, key: KeyCode) -> Outcome {
+    view.dialog = None;
+    match (dialog, key) {
+        (Dialog::ChooseState, KeyCode::Char('h' | '1')) => Outcome::Ask(Wish::State(motor_state::SERVO)),
+        (Dialog::ChooseState, KeyCode::Char('d' | '0')) => release(view, motor_state::DAMPING),
+        (Dialog::ChooseState, KeyCode::Char('f' | '2')) => release(view, motor_state::FORCELESS),
+        (Dialog::ConfirmState(state), KeyCode::Char('y' | 'Y')) => Outcome::Ask(Wish::State(state)),
+        _ => Outcome::Shown,
+    }
+}
+
+/// Asks first where the arm would fall.
+fn release(view: &mut View, state: u8) -> Outcome {
+    view.dialog = Some(Dialog::ConfirmState(state));
+    Outcome::Shown
+}
+
+fn select(view: &mut View, number: i16) {
+    if let Some(joint) = u8::try_from(number).ok().and_then(Joint::new) {
+        view.selected = joint;
+    }
+}
+
+fn nudge(view: &mut View, degrees: i16) -> Outcome {
+    match view.arm().map(|arm| arm.motor_state()) {
+        Some(motor_state::SERVO) => Outcome::Ask(Wish::Nudge { joint: view.selected, degrees }),
+        Some(_) => {
+            view.say("the motors are off: s, then h, makes the arm hold where it is");
+            Outcome::Shown
+        }
+        None => Outcome::Shown,
+    }
+}
+
+fn speed(view: &View, change: impl Fn(u8) -> u8) -> Outcome {
+    let present = view.arm().map(|arm| arm.speed(view.selected).steps());
+    present.map_or(Outcome::Shown, |present| Outcome::Ask(Wish::Speed(change(present))))
+}
+
+/// The next speed up; above the highest there is the maximum, which is 0.
+const fn faster(steps: u8) -> u8 {
+    match steps {
+        0 | HIGHEST_SPEED => 0,
+        steps if steps + SPEED_CHANGE > HIGHEST_SPEED => HIGHEST_SPEED,
+        steps => steps + SPEED_CHANGE,
+    }
+}
+
+const fn slower(steps: u8) -> u8 {
+    match steps {
+        0 => HIGHEST_SPEED,
+        steps if steps <= SPEED_CHANGE => 1,
+        steps => steps - SPEED_CHANGE,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::monitor::view::tests::watching;
+
+    fn pressed(view: &mut View, keys: &[KeyCode]) -> Vec<Outcome> {
+        keys.iter().map(|&key| press(view, KeyEvent::from(key))).collect()
+    }
+
+    #[test]
+    fn arrows_choose_a_joint_and_nudge_it() {
+        let mut view = watching();
+        let outcomes = pressed(&mut view, &[KeyCode::Up, KeyCode::Char('3'), KeyCode::Down, KeyCode::Left]);
+        let joint = Joint::ALL[3];
+        assert_eq!(outcomes[3], Outcome::Ask(Wish::Nudge { joint, degrees: -1 }));
+        let shifted = KeyEvent::new(KeyCode::Right, KeyModifiers::SHIFT);
+        assert_eq!(press(&mut view, shifted), Outcome::Ask(Wish::Nudge { joint, degrees: 10 }));
+    }
+
+    #[test]
+    fn letting_the_arm_fall_takes_two_keys_and_holding_it_one() {
+        let mut view = watching();
+        let let_go = [KeyCode::Char('s'), KeyCode::Char('f'), KeyCode::Char('y')];
+        let outcomes = pressed(&mut view, &let_go);
+        assert_eq!(outcomes, [Outcome::Shown, Outcome::Shown, Outcome::Ask(Wish::State(2))]);
+        let changed_my_mind = [KeyCode::Char('s'), KeyCode::Char('d'), KeyCode::Enter];
+        assert_eq!(pressed(&mut view, &changed_my_mind), [Outcome::Shown; 3]);
+        assert_eq!(view.dialog, None);
+        let hold = pressed(&mut view, &[KeyCode::Char('s'), KeyCode::Char('h')]);
+        assert_eq!(hold[1], Outcome::Ask(Wish::State(1)));
+    }
+
+    #[test]
+    fn ctrl_c_quits_even_from_a_dialog() {
+        let mut view = watching();
+        pressed(&mut view, &[KeyCode::Char('?')]);
+        assert_eq!(view.dialog, Some(Dialog::Help));
+        let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+        assert_eq!(press(&mut view, ctrl_c), Outcome::Quit);
+    }
+
+    #[test]
+    fn speeds_end_at_the_maximum_and_at_the_slowest() {
+        let up: Vec<u8> = std::iter::successors(Some(93), |&steps| Some(faster(steps))).take(5).collect();
+        assert_eq!(up, [93, 98, 100, 0, 0]);
+        let down: Vec<u8> = std::iter::successors(Some(8), |&steps| Some(slower(steps))).take(4).collect();
+        assert_eq!(down, [8, 3, 1, 1]);
+        assert_eq!(slower(0), 100);
+    }
+
+    #[test]
+    fn without_an_arm_keys_ask_for_nothing() {
+        let mut view = View::new("COM3");
+        let keys = [KeyCode::Left, KeyCode::Char('+'), KeyCode::Char(']')];
+        assert_eq!(pressed(&mut view, &keys), [Outcome::Shown; 3]);
+    }
+}

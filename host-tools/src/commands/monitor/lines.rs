@@ -1,0 +1,125 @@
+//! The monitor without a screen: one line a sample, as columns, CSV or JSON.
+//!
+//! Ends with the connection: whoever reads lines wants to be told, not to wait.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+
+use serde::Serialize;
+use sevenbot::Joint;
+
+use super::sample::Sample;
+use crate::output::Facts;
+
+/// How a sample becomes a line of text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Layout {
+    /// Seconds, seven targets, seven positions, and which joints move: for eyes, and for `cut`.
+    Columns,
+    /// All there is, for spreadsheets.
+    Csv,
+}
+
+impl Layout {
+    /// The names of the columns.
+    pub(crate) fn head(self) -> String {
+        let joints = |word: &str| Joint::ALL.map(|joint| format!("{word}.{}", joint.number()));
+        match self {
+            Self::Columns => {
+                format!("seconds {} {} moving", joints("target").join(" "), joints("present").join(" "))
+            }
+            Self::Csv => format!(
+                "seconds,{},{},{},{},motor_state,faults,missing,supply_volts,hottest_celsius,round_trip_ms",
+                joints("target").join(","),
+                joints("present").join(","),
+                joints("degrees_per_second").join(","),
+                joints("moving").join(",")
+            ),
+        }
+    }
+
+    /// One sample.
+    pub(crate) fn line(self, sample: &Sample) -> String {
+        match self {
+            Self::Columns => columns(sample),
+            Self::Csv => csv(sample),
+        }
+    }
+}
+
+fn columns(sample: &Sample) -> String {
+    let targets = Joint::ALL.map(|joint| sample.target(joint).to_string()).join(" ");
+    let present = Joint::ALL.map(|joint| sample.present(joint).to_string()).join(" ");
+    let moving: String = numbers(|joint| sample.is_moving(joint)).iter().map(u8::to_string).collect();
+    let moving = if moving.is_empty() { "-" } else { &moving };
+    format!("{:.3} {targets} {present} {moving}", sample.time.as_secs_f64())
+}
+
+fn csv(sample: &Sample) -> String {
+    let mut line = format!("{:.3}", sample.time.as_secs_f64());
+    let mut add = |field: String| drop(write!(line, ",{field}"));
+    Joint::ALL.iter().for_each(|&joint| add(sample.target(joint).to_string()));
+    Joint::ALL.iter().for_each(|&joint| add(sample.present(joint).to_string()));
+    Joint::ALL.iter().for_each(|&joint| add(format!("{:.1}", sample.speed(joint).degrees_per_second())));
+    Joint::ALL.iter().for_each(|&joint| add(u8::from(sample.is_moving(joint)).to_string()));
+    add(sample.motor_state().to_string());
+    let status = sample.status.as_ref();
+    let number = |value: Option<u8>| value.map_or_else(String::new, |value| value.to_string());
+    add(number(status.map(sevenbot::Status::faults)));
+    add(number(status.map(sevenbot::Status::missing)));
+    let volts = status.and_then(sevenbot::Status::supply_volts);
+    add(volts.map_or_else(String::new, |volts| format!("{volts:.1}")));
+    add(number(status.and_then(sevenbot::Status::hottest_celsius)));
+    add(format!("{:.1}", sample.round_trip.as_secs_f64() * 1e3));
+    line
+}
+
+fn numbers(is_so: impl Fn(Joint) -> bool) -> Vec<u8> {
+    Joint::ALL.into_iter().filter(|&joint| is_so(joint)).map(Joint::number).collect()
+}
+
+/// One sample as JSON.
+#[derive(Debug, Serialize)]
+pub(crate) struct Line {
+    seconds: f64,
+    targets: [u8; 7],
+    positions: [u8; 7],
+    degrees_per_second: [f64; 7],
+    moving: Vec<u8>,
+    missing: Vec<u8>,
+    motor_state: u8,
+    faults: Option<u8>,
+    supply_volts: Option<f64>,
+    hottest_celsius: Option<u8>,
+    round_trip_ms: f64,
+}
+
+impl From<&Sample> for Line {
+    fn from(sample: &Sample) -> Self {
+        let status = sample.status.as_ref();
+        Self {
+            seconds: thousandths(sample.time.as_secs_f64()),
+            targets: Joint::ALL.map(|joint| sample.target(joint)),
+            positions: Joint::ALL.map(|joint| sample.present(joint)),
+            degrees_per_second: Joint::ALL.map(|joint| thousandths(sample.speed(joint).degrees_per_second())),
+            moving: numbers(|joint| sample.is_moving(joint)),
+            missing: numbers(|joint| sample.is_missing(joint)),
+            motor_state: sample.motor_state(),
+            faults: status.map(sevenbot::Status::faults),
+            supply_volts: status.and_then(sevenbot::Status::supply_volts),
+            hottest_celsius: status.and_then(sevenbot::Status::hottest_celsius),
+            round_trip_ms: thousandths(sample.round_trip.as_secs_f64() * 1e3),
+        }
+    }
+}
+
+/// More digits say nothing, and make lines long.
+fn thousandths(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
+
+impl Facts for Line {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{:.3} {:?}", self.seconds, self.positions)
+    }
+}

@@ -1,0 +1,135 @@
+//! `monitor`: the arm as it moves, on the whole screen of a terminal; as lines into anything else.
+//!
+//! ```text
+//!              ┌─ screen: draws, takes keys ──┐
+//!   terminal ──┤     │ wishes      ▲ news     ├── View ── draw ── picture (SVG)
+//!              └─ watch: owns the arm, a ─────┘
+//!                 thread of its own
+//!   otherwise ── lines: columns, CSV, JSON
+//! ```
+
+mod draw;
+mod keys;
+mod lines;
+mod picture;
+mod sample;
+mod screen;
+mod view;
+mod watch;
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use clap::{Args, value_parser};
+use sevenbot::Arm;
+
+use self::lines::{Layout, Line};
+use self::sample::Sample;
+use self::view::{News, PAST, View};
+use crate::failure::Failure;
+use crate::session::Session;
+
+/// Watch the arm: targets, positions, movement, health, and how well it is understood.
+///
+/// On a terminal it fills the screen; ? explains its keys, which can move the arm too. When the arm goes away
+/// it waits until it is back. Into a pipe or a file goes one line a sample, and the arm going away is an error.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot monitor
+  sevenbot monitor --csv move.csv                  until Ctrl-C, or the arm goes away
+  sevenbot monitor --json --hz 2 | jq .positions
+  sevenbot monitor --hz 20 --samples 100 > move.txt")]
+pub(crate) struct MonitorArgs {
+    /// Samples a second.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = value_parser!(u8).range(1..=50))]
+    hz: u8,
+    /// End after so many samples; shows lines, even on a terminal.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..))]
+    samples: Option<u64>,
+    /// Write lines with commas to FILE, everything there is, instead of showing anything.
+    #[arg(long, value_name = "FILE", conflicts_with = "json")]
+    csv: Option<PathBuf>,
+    /// Write the last picture of the screen to FILE, as SVG.
+    #[arg(long, value_name = "FILE", hide = true, conflicts_with_all = ["csv", "json"])]
+    picture: Option<PathBuf>,
+}
+
+impl MonitorArgs {
+    fn period(&self) -> Duration {
+        Duration::from_secs(1) / u32::from(self.hz)
+    }
+}
+
+pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), Failure> {
+    let on_screen = session.output.is_for_the_screen() && args.csv.is_none() && args.samples.is_none();
+    match (&args.picture, &args.csv) {
+        (Some(path), _) => {
+            let view = if on_screen { screen::run(session, args.period())? } else { unseen(session, args)? };
+            fs::write(path, picture::picture(&view)).map_err(|error| Failure::file(path, error))
+        }
+        (None, Some(path)) => write_csv(session, args, path),
+        (None, None) if on_screen => screen::run(session, args.period()).map(drop),
+        (None, None) => show_lines(session, args),
+    }
+}
+
+/// Takes samples at their times, until there are enough.
+fn each_sample(
+    arm: &mut Arm,
+    args: &MonitorArgs,
+    enough: u64,
+    mut use_it: impl FnMut(Sample) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let start = Instant::now();
+    let mut due = start;
+    for _ in 0..enough {
+        sleep(due.saturating_duration_since(Instant::now()));
+        // A sample that could not be taken in time is left out, not made up for.
+        due = (due + args.period()).max(Instant::now());
+        use_it(Sample::take(arm, start)?)?;
+    }
+    Ok(())
+}
+
+fn show_lines(session: &mut Session, args: &MonitorArgs) -> Result<(), Failure> {
+    let mut arm = session.connect()?;
+    let output = &mut session.output;
+    if !output.is_json() {
+        output.raw(format!("{}\n", Layout::Columns.head()).as_bytes())?;
+    }
+    each_sample(&mut arm, args, args.samples.unwrap_or(u64::MAX), |sample| {
+        if output.is_json() {
+            output.show(&Line::from(&sample))
+        } else {
+            output.raw(format!("{}\n", Layout::Columns.line(&sample)).as_bytes())
+        }
+    })
+}
+
+fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), Failure> {
+    let mut arm = session.connect()?;
+    let failed = |error| Failure::file(path, error);
+    let mut file = File::create(path).map_err(failed)?;
+    // Each line in one piece, so that the file is whole whenever it ends.
+    let mut write = |line: String| file.write_all(format!("{line}\n").as_bytes()).map_err(failed);
+    write(Layout::Csv.head())?;
+    each_sample(&mut arm, args, args.samples.unwrap_or(u64::MAX), |sample| write(Layout::Csv.line(&sample)))
+}
+
+/// A view without a screen: of as many samples as asked for, or as a plot holds.
+fn unseen(session: &Session, args: &MonitorArgs) -> Result<View, Failure> {
+    let mut arm = session.connect()?;
+    let mut view = View::new(arm.port());
+    view.hear(News::Found { port: arm.port().to_owned(), firmware: arm.identity().version() });
+    let enough = args.samples.unwrap_or(PAST.as_secs() * u64::from(args.hz));
+    each_sample(&mut arm, args, enough, |sample| {
+        view.tick(sample.time);
+        view.hear(News::Sample(sample));
+        Ok(())
+    })?;
+    Ok(view)
+}

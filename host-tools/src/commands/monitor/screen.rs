@@ -1,0 +1,80 @@
+//! The monitor on a terminal: draws the view, listens to keys, and leaves the terminal as it was.
+
+use std::io;
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyEventKind};
+
+use super::draw::draw;
+use super::keys::{Outcome, press};
+use super::view::{News, View, Wish};
+use super::watch::Watcher;
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::session::Session;
+
+/// How long a key may wait for the picture, and the picture for news.
+const FRAME: Duration = Duration::from_millis(40);
+
+/// Shows the arm until the user has seen enough; gives the last view back.
+pub(crate) fn run(session: &Session, period: Duration) -> Result<View, Failure> {
+    // A port that cannot be chosen is a failure; one that does not answer yet is waited for.
+    let port = session.port_name()?;
+    let start = Instant::now();
+    let mut view = View::new(&port);
+    let (news, hear) = mpsc::channel();
+    let (wish, wishes) = mpsc::channel();
+    let asked = session.port.clone();
+    let watcher = Watcher { port: asked, last_port: port, baud: session.baud, period, start, news, wishes };
+    let watching = thread::spawn(|| watcher.run());
+    let shown = on_terminal(|terminal| show(terminal, &mut view, start, &hear, &wish));
+    // Without a wish to come the watcher ends, after those that it has already.
+    drop(wish);
+    let _ = watching.join();
+    shown.map(|()| view)
+}
+
+/// Does something on the whole screen, and gives it back as it was, even after a failure.
+fn on_terminal(work: impl FnOnce(&mut DefaultTerminal) -> io::Result<()>) -> Result<(), Failure> {
+    let mut terminal = ratatui::try_init()?;
+    let done = work(&mut terminal);
+    let restored = ratatui::try_restore();
+    done.and(restored).map_err(Failure::from)
+}
+
+fn show(
+    terminal: &mut DefaultTerminal,
+    view: &mut View,
+    start: Instant,
+    news: &Receiver<News>,
+    wishes: &Sender<Wish>,
+) -> io::Result<()> {
+    // In raw mode Ctrl-C is a key; other signals to end still come.
+    let interrupt = Interrupt::catch();
+    while !interrupt.has_come() {
+        view.tick(start.elapsed());
+        news.try_iter().for_each(|news| view.hear(news));
+        terminal.draw(|frame| draw(frame, view))?;
+        if event::poll(FRAME)? && !react(view, &event::read()?, wishes) {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Does what an event asks for; `false` when that is to end.
+fn react(view: &mut View, event: &Event, wishes: &Sender<Wish>) -> bool {
+    match event {
+        // Some terminals report releases too.
+        Event::Key(key) if key.kind != KeyEventKind::Release => match press(view, *key) {
+            Outcome::Shown => true,
+            // The watcher only ends after this end of the channel does.
+            Outcome::Ask(wish) => wishes.send(wish).is_ok(),
+            Outcome::Quit => false,
+        },
+        _ => true,
+    }
+}

@@ -1,0 +1,274 @@
+//! What the monitor shows, as data: no terminal, no arm, no clock.
+//!
+//! ```text
+//!   news from the arm ──▶ ┌──────┐
+//!                         │ View │ ──▶ draw: the same picture for a terminal, a test, an SVG
+//!   keys ─── keys.rs ───▶ └──────┘
+//!               └──▶ wishes to the arm
+//! ```
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use sevenbot::{Joint, Status};
+
+use super::sample::Sample;
+
+/// How much of the past is plotted.
+pub(crate) const PAST: Duration = Duration::from_secs(20);
+/// How long a note stays.
+const NOTE_STAYS: Duration = Duration::from_secs(6);
+/// The weight of a new round trip in the mean.
+const MEAN_WEIGHT: f64 = 0.1;
+
+/// What there is to tell about an arm.
+#[derive(Clone, Debug)]
+pub(crate) enum News {
+    /// It answers: this is its port, and its firmware's version.
+    Found { port: String, firmware: String },
+    /// It does not, for this reason.
+    Lost(String),
+    /// How it is.
+    Sample(Sample),
+    /// A question was not answered, but so many damaged frames were heard.
+    Unanswered { damaged: usize },
+    /// A wish was not fulfilled.
+    Refused(String),
+}
+
+/// What the arm is asked to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wish {
+    /// Move a joint's target by so many degrees.
+    Nudge { joint: Joint, degrees: i16 },
+    /// This speed for all joints, in the register's steps.
+    Speed(u8),
+    /// This motor state.
+    State(u8),
+}
+
+/// Is there an arm?
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Connection {
+    /// Not yet, or not any more, for this reason.
+    Looking(String),
+    /// One with firmware of this version.
+    Open { firmware: String },
+}
+
+/// What stands in front of all else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Dialog {
+    /// What the keys do.
+    Help,
+    /// Which motor state?
+    ChooseState,
+    /// This state lets the arm fall: really?
+    ConfirmState(u8),
+}
+
+/// How well host and arm understand each other.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct LinkQuality {
+    pub(crate) answers: u64,
+    pub(crate) unanswered: u64,
+    /// Frames that came damaged while an answer was missing.
+    pub(crate) damaged: usize,
+    /// The arm's counter of frames that reached it damaged: when it was first seen, and now.
+    corrupted: Option<(u16, u16)>,
+    /// In milliseconds, the mean of the last ten or so.
+    pub(crate) round_trip_ms: f64,
+}
+
+impl LinkQuality {
+    fn answer(&mut self, sample: &Sample) {
+        let last = sample.round_trip.as_secs_f64() * 1e3;
+        let mean = if self.answers == 0 { last } else { self.round_trip_ms };
+        self.round_trip_ms = mean + (last - mean) * MEAN_WEIGHT;
+        self.answers += 1;
+        if let Some(now) = sample.status.as_ref().map(Status::frames_corrupted) {
+            self.corrupted = Some((self.corrupted.map_or(now, |(first, _)| first), now));
+        }
+    }
+
+    /// Frames that reached the arm damaged since it was found.
+    pub(crate) fn damaged_at_arm(&self) -> u16 {
+        self.corrupted.map_or(0, |(first, now)| now.wrapping_sub(first))
+    }
+}
+
+/// The positions of all joints, joint 1 first, and when they were those.
+pub(crate) type Past = (Duration, [u8; 7]);
+
+/// All that is shown.
+#[derive(Clone, Debug)]
+pub(crate) struct View {
+    pub(crate) port: String,
+    pub(crate) connection: Connection,
+    /// The last sample, or the one that is frozen.
+    pub(crate) sample: Option<Sample>,
+    /// Of the last [`PAST`], oldest first.
+    pub(crate) past: VecDeque<Past>,
+    /// The right end of the plot.
+    pub(crate) now: Duration,
+    pub(crate) link: LinkQuality,
+    pub(crate) selected: Joint,
+    pub(crate) is_frozen: bool,
+    pub(crate) dialog: Option<Dialog>,
+    note: Option<(Duration, String)>,
+    clock: Duration,
+}
+
+impl View {
+    pub(crate) fn new(port: &str) -> Self {
+        Self {
+            port: port.to_owned(),
+            connection: Connection::Looking("opening the port".to_owned()),
+            sample: None,
+            past: VecDeque::new(),
+            now: Duration::ZERO,
+            link: LinkQuality::default(),
+            selected: Joint::ALL[0],
+            is_frozen: false,
+            dialog: None,
+            note: None,
+            clock: Duration::ZERO,
+        }
+    }
+
+    /// It is so late now, since the monitor began.
+    pub(crate) fn tick(&mut self, clock: Duration) {
+        self.clock = clock;
+        if !self.is_frozen {
+            self.now = clock;
+        }
+    }
+
+    /// Takes news in.
+    pub(crate) fn hear(&mut self, news: News) {
+        match news {
+            News::Found { port, firmware } => {
+                self.port = port;
+                self.connection = Connection::Open { firmware };
+                // Its counters may have begun anew.
+                self.link.corrupted = None;
+            }
+            News::Lost(reason) => self.connection = Connection::Looking(reason),
+            News::Sample(sample) => self.see(sample),
+            News::Unanswered { damaged } => {
+                self.link.unanswered += 1;
+                self.link.damaged += damaged;
+            }
+            News::Refused(reason) => self.say(reason),
+        }
+    }
+
+    fn see(&mut self, sample: Sample) {
+        self.link.answer(&sample);
+        if self.is_frozen {
+            return;
+        }
+        self.past.push_back((sample.time, Joint::ALL.map(|joint| sample.present(joint))));
+        while self.past.front().is_some_and(|(time, _)| *time + PAST < sample.time) {
+            self.past.pop_front();
+        }
+        self.sample = Some(sample);
+    }
+
+    /// Shows a note for a while.
+    pub(crate) fn say(&mut self, note: impl Into<String>) {
+        self.note = Some((self.clock, note.into()));
+    }
+
+    /// The note, while it is fresh.
+    pub(crate) fn note(&self) -> Option<&str> {
+        let (since, note) = self.note.as_ref()?;
+        (self.clock < *since + NOTE_STAYS).then_some(note)
+    }
+
+    /// Is there an arm, and is it known how it is?
+    pub(crate) fn arm(&self) -> Option<&Sample> {
+        self.sample.as_ref().filter(|_| matches!(self.connection, Connection::Open { .. }))
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use sevenbot::arm::STATUS;
+    use sevenbot::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION};
+    use sevenbot::{Snapshot, Span};
+
+    fn set(registers: &mut Snapshot, address: u8, values: &[u8]) {
+        let first = usize::from(address - registers.address);
+        registers.values[first..first + values.len()].copy_from_slice(values);
+    }
+
+    fn zeros(span: Span) -> Snapshot {
+        Snapshot { address: span.address, values: vec![0; span.count.into()] }
+    }
+
+    /// An arm whose joint 2 is on its way from 90 to 120 degrees.
+    pub(crate) fn sample(millis: u64, position: u8) -> Sample {
+        let mut registers = zeros(Span::between(&MOTOR_STATE, &PRESENT_POSITION));
+        set(&mut registers, MOTOR_STATE.address, &[1]);
+        set(&mut registers, SPEED.address, &[10; 7]);
+        set(&mut registers, TARGET_POSITION.address, &[90, 120, 65, 90, 90, 90, 80]);
+        set(&mut registers, PRESENT_POSITION.address, &[90, position, 65, 90, 90, 90, 80]);
+        let mut status = zeros(STATUS);
+        set(&mut status, STATUS.address, &[1, 0, 0, u8::from(position != 120) << 1]);
+        set(&mut status, 254, &[74, 31]);
+        Sample {
+            time: Duration::from_millis(millis),
+            registers,
+            status: Some(Status::from(status)),
+            round_trip: Duration::from_micros(4200),
+        }
+    }
+
+    /// A view of that arm, after 10 s.
+    pub(crate) fn watching() -> View {
+        let mut view = View::new("/dev/ttyUSB0");
+        view.hear(News::Found { port: "/dev/ttyUSB0".to_owned(), firmware: "3.0".to_owned() });
+        for tenth in 0..100_u8 {
+            view.tick(Duration::from_millis(u64::from(tenth) * 100));
+            view.hear(News::Sample(sample(u64::from(tenth) * 100, 90 + tenth / 5)));
+        }
+        view
+    }
+
+    #[test]
+    fn the_past_ends_after_twenty_seconds() {
+        let mut view = watching();
+        view.hear(News::Sample(sample(25_000, 120)));
+        assert_eq!(view.past.front().map(|past| past.0), Some(Duration::from_secs(5)));
+    }
+
+    #[test]
+    fn frozen_it_goes_on_counting_answers_but_shows_none() {
+        let mut view = watching();
+        view.is_frozen = true;
+        view.tick(Duration::from_secs(60));
+        view.hear(News::Sample(sample(60_000, 120)));
+        assert_eq!(view.link.answers, 101);
+        assert_eq!((view.now, view.past.len()), (Duration::from_millis(9900), 100));
+    }
+
+    #[test]
+    fn an_arm_that_is_away_cannot_be_asked_for_anything() {
+        let mut view = watching();
+        assert!(view.arm().is_some());
+        view.hear(News::Lost("gone".to_owned()));
+        assert!(view.arm().is_none());
+        assert!(view.sample.is_some(), "what was last known is still shown");
+    }
+
+    #[test]
+    fn a_note_goes_after_a_while() {
+        let mut view = watching();
+        view.say("no");
+        assert_eq!(view.note(), Some("no"));
+        view.tick(Duration::from_secs(30));
+        assert_eq!(view.note(), None);
+    }
+}

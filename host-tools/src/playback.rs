@@ -1,0 +1,243 @@
+//! Recordings turned into what is sent to an arm, and when: pure arithmetic, without an arm or a clock.
+//!
+//! ```text
+//!   recording ──▶ cut into pieces of 50 ms at most ──▶ a target for the end of each piece, and the speed
+//!                                                      that brings the joint there by then
+//! ```
+
+use std::time::Duration;
+
+use crate::recording::{Moment, Recording};
+use crate::units::{Angle, MoveTime, Speed};
+
+/// The longest piece of an even movement that is sent at once. Speeds have steps of 1.9 degrees/s, so a long
+/// piece would end early.
+const LONGEST_PIECE: Duration = Duration::from_millis(50);
+/// A single degree that is followed by rest is spread over no more than this.
+const LONGEST_DEGREE: Duration = Duration::from_millis(250);
+/// The fastest joint's speed on the way to where a recording begins, in degrees/s.
+const APPROACH_DEGREES_PER_SECOND: f64 = 30.0;
+/// What even the shortest way there takes.
+const SHORTEST_APPROACH: Duration = Duration::from_millis(500);
+
+/// What is sent to the arm at one time: one frame, carried out as one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// When, since the beginning.
+    pub time: Duration,
+    /// Does the pump suck?
+    pub vacuum: bool,
+    /// Speeds of the joints, joint 1 first.
+    pub speeds: [Speed; 7],
+    /// Where the joints go, joint 1 first.
+    pub targets: [Angle; 7],
+}
+
+impl Step {
+    /// The registers from the vacuum pump's to the last target's, all of them: one write frame.
+    #[must_use]
+    pub fn registers(&self) -> Vec<u8> {
+        let mut bytes = vec![u8::from(self.vacuum)];
+        bytes.extend(self.speeds.map(Speed::steps));
+        // A time would count where the speed is the maximum (D11).
+        bytes.extend([MoveTime::NONE.steps(); 7]);
+        bytes.extend(self.targets.map(Angle::degrees));
+        bytes
+    }
+}
+
+/// The steps that make an arm, which stands in the recording's first pose, follow the recording `factor`
+/// times as fast as it was made. The last step's time is that of its sending: the arm arrives a piece later.
+#[must_use]
+pub fn steps(recording: &Recording, factor: f64) -> Vec<Step> {
+    let points = pieces(recording, factor);
+    let ways = Ways { points: &points };
+    let mut speeds = [Speed::MAXIMUM; 7];
+    let pairs = points.iter().zip(points.iter().skip(1)).enumerate();
+    let mut steps: Vec<Step> = pairs
+        .map(|(index, (from, to))| {
+            for (joint, speed) in speeds.iter_mut().enumerate() {
+                *speed = ways.speed(index, joint).unwrap_or(*speed);
+            }
+            Step { time: from.time, vacuum: from.vacuum, speeds, targets: to.pose }
+        })
+        .collect();
+    // Nothing moves any more, but the pump may end otherwise than it was.
+    steps.extend(points.last().map(|end| Step {
+        time: end.time,
+        vacuum: end.vacuum,
+        speeds,
+        targets: end.pose,
+    }));
+    steps
+}
+
+/// One step that brings an arm slowly from where it is to a pose, all joints arriving together; and how long
+/// that takes.
+#[must_use]
+pub fn approach(from: [Angle; 7], to: Moment) -> (Step, Duration) {
+    let degrees = |joint| distance(&from, &to.pose, joint);
+    let longest = (0..7).map(degrees).fold(0.0, f64::max);
+    let seconds = Duration::from_secs_f64(longest / APPROACH_DEGREES_PER_SECOND);
+    let duration = seconds.max(SHORTEST_APPROACH);
+    let mut speeds = [Speed::MAXIMUM; 7];
+    for (joint, speed) in speeds.iter_mut().enumerate() {
+        *speed = covering(degrees(joint), duration);
+    }
+    (Step { time: Duration::ZERO, vacuum: to.vacuum, speeds, targets: to.pose }, duration)
+}
+
+/// The moments, with more of them between where they are far apart; times from 0, changed by the factor.
+fn pieces(recording: &Recording, factor: f64) -> Vec<Moment> {
+    let mut points: Vec<Moment> = Vec::new();
+    let mut start = None;
+    for moment in recording.moments() {
+        let time = (moment.time - *start.get_or_insert(moment.time)).div_f64(factor);
+        let to = Moment { time, ..moment };
+        if let Some(&from) = points.last() {
+            points.extend(between(from, to));
+        }
+        points.push(to);
+    }
+    points
+}
+
+/// What lies between two moments, evenly, no two further apart than a piece may be.
+fn between(from: Moment, to: Moment) -> impl Iterator<Item = Moment> {
+    let span = to.time - from.time;
+    let count = span.as_millis().div_ceil(LONGEST_PIECE.as_millis());
+    let count = if from.pose == to.pose { 1 } else { u32::try_from(count).unwrap_or(u32::MAX) };
+    (1..count).map(move |index| {
+        let share = f64::from(index) / f64::from(count);
+        let mut pose = from.pose;
+        for (angle, end) in pose.iter_mut().zip(to.pose) {
+            *angle = part_way(*angle, end, share);
+        }
+        Moment { time: from.time + span.mul_f64(share), pose, vacuum: from.vacuum }
+    })
+}
+
+/// The angle at a share, 0 to 1, of the way between two others.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two angles")]
+fn part_way(from: Angle, to: Angle, share: f64) -> Angle {
+    let (from, to) = (f64::from(from.degrees()), f64::from(to.degrees()));
+    Angle::from_register((from + (to - from) * share).round() as u8)
+}
+
+/// The slowest speed at which a joint covers so many degrees in this time; the maximum where none is enough.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the register's range"
+)]
+fn covering(degrees: f64, duration: Duration) -> Speed {
+    let step = Speed::from_steps(1).map_or(1.0, Speed::degrees_per_second);
+    let steps = (degrees / duration.as_secs_f64() / step).ceil().clamp(1.0, 255.0);
+    Speed::from_steps(steps as u8).unwrap_or(Speed::MAXIMUM)
+}
+
+fn distance(from: &[Angle; 7], to: &[Angle; 7], joint: usize) -> f64 {
+    let degrees = |pose: &[Angle; 7]| pose.get(joint).map_or(0, |angle| angle.degrees());
+    f64::from(degrees(from).abs_diff(degrees(to)))
+}
+
+/// The ways the joints go from point to point.
+struct Ways<'a> {
+    points: &'a [Moment],
+}
+
+impl Ways<'_> {
+    /// How far a joint goes from one point to the next.
+    fn degrees(&self, index: usize, joint: usize) -> f64 {
+        let pair = self.points.get(index).zip(self.points.get(index + 1));
+        pair.map_or(0.0, |(from, to)| distance(&from.pose, &to.pose, joint))
+    }
+
+    fn time(&self, index: usize) -> Duration {
+        self.points.get(index).or(self.points.last()).map_or(Duration::ZERO, |point| point.time)
+    }
+
+    /// The speed of a joint's way from one point to the next; `None` where it rests: it may still be on the
+    /// way to the last degree, at the speed that was chosen for it.
+    fn speed(&self, index: usize, joint: usize) -> Option<Speed> {
+        let degrees = self.degrees(index, joint);
+        let until = match degrees {
+            0.0 => return None,
+            // A slow movement is a degree now and then. Each is spread over the time to the next one.
+            1.0 => self.next_way(index, joint).min(self.time(index) + LONGEST_DEGREE),
+            _ => self.time(index + 1),
+        };
+        Some(covering(degrees, until.saturating_sub(self.time(index))))
+    }
+
+    /// When a joint that moves now moves again; the end, if it does not.
+    fn next_way(&self, index: usize, joint: usize) -> Duration {
+        let mut later = index + 1..self.points.len();
+        let next = later.find(|&later| self.degrees(later, joint) > 0.0);
+        self.time(next.unwrap_or(usize::MAX))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recording(moments: &[(&str, u8)]) -> Recording {
+        let line = |(time, base): &(&str, u8)| format!("{time} {base} 90 65 90 90 90 80 0\n");
+        let lines: String = moments.iter().map(line).collect();
+        Recording::parse(&format!("7bot-recording 1\n{lines}")).expect("a recording")
+    }
+
+    fn base_speeds(moments: &[(&str, u8)], factor: f64) -> Vec<f64> {
+        let steps = steps(&recording(moments), factor);
+        steps.iter().map(|step| step.speeds[0].degrees_per_second()).collect()
+    }
+
+    #[test]
+    fn a_long_way_is_cut_into_pieces_that_end_on_time() {
+        let steps = steps(&recording(&[("5", 90), ("6", 110)]), 1.0);
+        assert_eq!(steps.len(), 21, "20 pieces and the end");
+        assert_eq!(steps[0].time, Duration::ZERO, "however late the recording begins");
+        assert_eq!(steps[10].time, Duration::from_millis(500));
+        assert_eq!(steps[9].targets[0].degrees(), 100, "to be reached at 500 ms");
+        // 1 degree in 50 ms is 20 °/s, of which 20.9 is the next step up.
+        assert!((steps[0].speeds[0].degrees_per_second() - 20.9).abs() < 1e-9);
+        assert_eq!(steps[20].targets[0].degrees(), 110);
+    }
+
+    #[test]
+    fn the_factor_makes_it_faster_or_slower() {
+        let moments = [("0", 90), ("0.05", 95)];
+        assert!((base_speeds(&moments, 1.0)[0] - 1.9 * 53.0).abs() < 1e-9, "100 °/s");
+        let slow = steps(&recording(&moments), 0.5);
+        assert_eq!(slow.last().map(|step| step.time), Some(Duration::from_millis(100)));
+        assert!((base_speeds(&moments, 2.0)[0] - 372.0).abs() < 1e-9, "200 °/s is above 190: the maximum");
+    }
+
+    #[test]
+    fn a_slow_movement_is_even_and_not_a_jump_now_and_then() {
+        // A degree in 200 ms, recorded every 50 ms.
+        let moments = [("0", 90), ("0.05", 91), ("0.1", 91), ("0.15", 91), ("0.2", 91), ("0.25", 92)];
+        let speeds = base_speeds(&moments, 1.0);
+        assert!(speeds[..4].iter().all(|speed| (speed - 5.7).abs() < 1e-9), "5 °/s, rounded up: {speeds:?}");
+    }
+
+    #[test]
+    fn all_joints_approach_slowly_and_arrive_together() {
+        let from = [90, 90, 65, 90, 90, 90, 80].map(Angle::from_register);
+        let to = recording(&[("0", 150)]).moments().next().expect("one");
+        let (step, duration) = approach(from, to);
+        assert_eq!(duration, Duration::from_secs(2));
+        assert!((step.speeds[0].degrees_per_second() - 30.4).abs() < 1e-9);
+        let (_, short) = approach(to.pose, to);
+        assert_eq!(short, SHORTEST_APPROACH);
+    }
+
+    #[test]
+    fn one_frame_holds_pump_speeds_times_and_targets() {
+        let steps = steps(&recording(&[("0", 90), ("0.05", 95)]), 1.0);
+        let bytes = steps[0].registers();
+        assert_eq!(bytes.len(), 22);
+        assert_eq!((bytes[0], bytes[1], bytes[8], bytes[15]), (0, 53, 0, 95));
+    }
+}

@@ -1,0 +1,190 @@
+//! A drawing of a movement as SVG: for each joint where it should have been and where it was, over time.
+//!
+//! ```text
+//!   joint 1   120 ┤   ╭──╮          one panel a joint, all on the same axis of time
+//!              90 ┤───╯  ╰───       the target a broad pale line, the measurement a thin dark one on it
+//!                 └──┬──┬──┬─
+//! ```
+//!
+//! Knows neither arm nor recording: times, angles, and where ink goes.
+
+use std::fmt::Write;
+
+/// Seconds, and degrees.
+pub(crate) type Point = (f64, f64);
+
+/// What one joint did.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Track {
+    /// Where it should have been.
+    pub(crate) target: Vec<Point>,
+    /// Where it was.
+    pub(crate) measured: Vec<Point>,
+}
+
+// All lengths are in pixels.
+const WIDTH: f64 = 860.0;
+const LEFT: f64 = 96.0;
+const RIGHT: f64 = 16.0;
+const TOP: f64 = 56.0;
+const BOTTOM: f64 = 40.0;
+const PANEL: f64 = 78.0;
+/// Between two panels.
+const GAP: f64 = 14.0;
+
+/// No panel shows less than this, or a joint at rest would look restless, in degrees.
+const LEAST_SPAN: f64 = 20.0;
+
+const STYLE: &str = "\
+text { font: 12px sans-serif; fill: #444 } .title { font-size: 15px; fill: #111 } .joint { font-weight: bold }
+.panel { fill: #fafafa; stroke: #ddd } .grid { stroke: #e4e4e4 } .end { text-anchor: end }
+.middle { text-anchor: middle } polyline { fill: none; stroke-linejoin: round }
+.target { stroke: #f2b56b; stroke-width: 5 } .measured { stroke: #1b5e9e; stroke-width: 1.5 }";
+
+/// The drawing of seven joints' tracks.
+pub(crate) fn svg(title: &str, tracks: &[Track; 7]) -> String {
+    let seconds = Scale::of_time(tracks);
+    let height = TOP + 7.0 * (PANEL + GAP) - GAP + BOTTOM;
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" \
+         height=\"{height}\">\n<style>{STYLE}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n"
+    );
+    heading(&mut out, title);
+    for ((track, top), number) in tracks.iter().zip(tops()).zip(1..) {
+        panel(&mut out, number, track, top, &seconds);
+    }
+    axis_of_time(&mut out, &seconds, height - BOTTOM);
+    out.push_str("</svg>\n");
+    out
+}
+
+fn tops() -> impl Iterator<Item = f64> {
+    std::iter::successors(Some(TOP), |top| Some(top + PANEL + GAP))
+}
+
+fn heading(out: &mut String, title: &str) {
+    text(out, "title", LEFT, 24.0, &escaped(title));
+    let legend = [("target", "target", 0.0), ("measured", "measured position", 100.0)];
+    for (class, label, offset) in legend {
+        line(out, class, &[(LEFT + offset, 42.0), (LEFT + offset + 24.0, 42.0)]);
+        text(out, "", LEFT + offset + 30.0, 46.0, label);
+    }
+}
+
+fn panel(out: &mut String, number: u8, track: &Track, top: f64, seconds: &Scale) {
+    let degrees = Scale::of_degrees(track, top);
+    let width = WIDTH - LEFT - RIGHT;
+    let _ = writeln!(
+        out,
+        "<rect class=\"panel\" x=\"{LEFT}\" y=\"{top:.1}\" width=\"{width}\" height=\"{PANEL}\"/>"
+    );
+    text(out, "joint", 16.0, top + PANEL / 2.0 + 4.0, &format!("joint {number}"));
+    for tick in degrees.ticks(3.0) {
+        let y = degrees.at(tick);
+        let _ = writeln!(out, "<path class=\"grid\" d=\"M{LEFT} {y:.1}H{:.1}\"/>", WIDTH - RIGHT);
+        text(out, "end", LEFT - 6.0, y + 4.0, &format!("{tick}°"));
+    }
+    for (class, points) in [("target", &track.target), ("measured", &track.measured)] {
+        let points: Vec<Point> = points.iter().map(|&(x, y)| (seconds.at(x), degrees.at(y))).collect();
+        line(out, class, &points);
+    }
+}
+
+fn axis_of_time(out: &mut String, seconds: &Scale, bottom: f64) {
+    for tick in seconds.ticks(10.0) {
+        text(out, "middle", seconds.at(tick), bottom + 18.0, &format!("{tick}"));
+    }
+    text(out, "end", WIDTH - RIGHT, bottom + 34.0, "seconds");
+}
+
+fn text(out: &mut String, class: &str, x: f64, y: f64, text: &str) {
+    let _ = writeln!(out, "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\">{text}</text>");
+}
+
+fn line(out: &mut String, class: &str, points: &[Point]) {
+    let points: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+    let _ = writeln!(out, "<polyline class=\"{class}\" points=\"{}\"/>", points.join(" "));
+}
+
+/// A text as it may stand in SVG.
+pub(crate) fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// From a quantity to a place on the drawing.
+struct Scale {
+    low: f64,
+    high: f64,
+    /// Where `low` is drawn.
+    from: f64,
+    /// Where `high` is drawn.
+    to: f64,
+}
+
+impl Scale {
+    fn of_time(tracks: &[Track; 7]) -> Self {
+        let times = tracks.iter().flat_map(|track| track.target.iter().chain(&track.measured));
+        let high = times.map(|point| point.0).fold(0.1, f64::max);
+        Self { low: 0.0, high, from: LEFT, to: WIDTH - RIGHT }
+    }
+
+    /// Wide enough for the track, and some air.
+    fn of_degrees(track: &Track, top: f64) -> Self {
+        let all = || track.target.iter().chain(&track.measured).map(|point| point.1);
+        let (low, high) = (all().fold(180.0, f64::min), all().fold(0.0, f64::max));
+        let (low, high) = if low > high { (0.0, 180.0) } else { (low, high) };
+        let air = ((LEAST_SPAN - (high - low)) / 2.0).max(3.0);
+        Self { low: low - air, high: high + air, from: top + PANEL, to: top }
+    }
+
+    fn at(&self, value: f64) -> f64 {
+        self.from + (value - self.low) / (self.high - self.low) * (self.to - self.from)
+    }
+
+    /// Round values, about `count` of them.
+    fn ticks(&self, count: f64) -> impl Iterator<Item = f64> {
+        let rough = (self.high - self.low) / count;
+        let magnitude = 10_f64.powf(rough.log10().floor());
+        let round = [1.0, 2.0, 5.0].into_iter().map(|factor| factor * magnitude);
+        let step = round.into_iter().find(|step| *step >= rough).unwrap_or(10.0 * magnitude);
+        let first = (self.low / step).ceil();
+        let high = self.high;
+        // Rounded, or 0.1 would be drawn as 0.30000000000000004 now and then.
+        let value = move |index: u32| ((first + f64::from(index)) * step * 1e6).round() / 1e6;
+        (0..).map(value).take_while(move |tick| *tick <= high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scale(low: f64, high: f64) -> Scale {
+        Scale { low, high, from: 0.0, to: 100.0 }
+    }
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        let ticks = |low, high, count| scale(low, high).ticks(count).collect::<Vec<_>>();
+        assert_eq!(ticks(0.0, 1.0, 10.0), [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]);
+        assert_eq!(ticks(77.0, 123.0, 3.0), [80.0, 100.0, 120.0]);
+        assert_eq!(ticks(0.0, 7.3, 10.0), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    }
+
+    #[test]
+    fn every_joint_has_a_panel_with_both_lines() {
+        let track = Track { target: vec![(0.0, 90.0), (1.0, 120.0)], measured: vec![(0.0, 90.0)] };
+        let tracks = std::array::from_fn(|_| track.clone());
+        let drawing = svg("a < b & c", &tracks);
+        assert!(drawing.contains("a &lt; b &amp; c"));
+        assert_eq!(drawing.matches("class=\"panel\"").count(), 7);
+        assert_eq!(drawing.matches("<polyline").count(), 2 * 7 + 2, "and the legend's");
+        assert!(!drawing.contains("NaN") && !drawing.contains("inf"), "{drawing}");
+    }
+
+    #[test]
+    fn nothing_at_all_can_be_drawn() {
+        let drawing = svg("nothing", &Default::default());
+        assert!(!drawing.contains("NaN") && !drawing.contains("inf"), "{drawing}");
+    }
+}

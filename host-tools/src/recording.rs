@@ -1,0 +1,331 @@
+//! Recordings of a movement: text that people can read, write and change.
+//!
+//! ```text
+//!   7bot-recording 1                               what it is, and the version of the format
+//!   # seconds  joints 1 to 7 in degrees  vacuum    a comment, anywhere
+//!   0.000   90  90  65  90  90  90  80   0         one moment a line: vacuum is 1 to suck, 0 to release
+//!   0.033   91  90  65  90  90  90  80   0
+//! ```
+//!
+//! Between two moments the joints move evenly, so a movement written by hand needs a line only where its
+//! direction or speed changes. Knows no arm.
+
+use std::fmt;
+use std::io::{self, Write};
+use std::time::Duration;
+
+use protocol_core::registers::Joint;
+
+use crate::units::{Angle, Speed};
+
+/// The first word of every recording.
+const FORMAT: &str = "7bot-recording";
+/// The version of the format, the second word.
+const VERSION: &str = "1";
+/// Time, seven angles, vacuum.
+const FIELDS: usize = 9;
+/// A recording ends within a day, so that no arithmetic on its times can overflow.
+const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
+/// Angles are rounded to whole degrees, so two of them may seem one degree further apart than they were.
+const ROUNDING_DEGREES: f64 = 1.0;
+
+/// Where the arm was at one time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Moment {
+    /// Since the beginning of the recording.
+    pub time: Duration,
+    /// Joint 1 first.
+    pub pose: [Angle; 7],
+    /// Does the pump suck?
+    pub vacuum: bool,
+}
+
+/// A movement: moments in rising order of time, at least one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recording {
+    /// Each with the number of its line.
+    moments: Vec<(usize, Moment)>,
+}
+
+/// Why a text is no recording, or none that an arm could follow.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RecordingError {
+    /// It does not begin as recordings do.
+    NotARecording,
+    /// It is of another version of the format.
+    OtherVersion(String),
+    /// There is no moment in it.
+    Empty,
+    /// A line cannot be right.
+    Line {
+        /// Its number; the first is 1.
+        number: usize,
+        /// What is wrong.
+        cause: LineError,
+    },
+}
+
+/// What is wrong with a line of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LineError {
+    /// A moment has nine fields.
+    Fields(usize),
+    /// This is no time in seconds.
+    Time(String),
+    /// It is not later than the moment before it.
+    NotLater,
+    /// This is no angle in whole degrees from 0 to 180.
+    Angle {
+        /// The joint it was meant for.
+        joint: Joint,
+        /// What stands there.
+        text: String,
+    },
+    /// This is neither 0 nor 1.
+    Vacuum(String),
+    /// No joint can move so fast.
+    TooFast {
+        /// The joint that would have to.
+        joint: Joint,
+        /// How fast it would have to move, in degrees/s.
+        degrees_per_second: f64,
+    },
+}
+
+// Speeds come from finite numbers, never from NaN.
+impl Eq for LineError {}
+
+impl Recording {
+    /// The recording that a text holds.
+    ///
+    /// # Errors
+    /// The text is no recording; the first line that is wrong is named.
+    pub fn parse(text: &str) -> Result<Self, RecordingError> {
+        let mut lines = (1..).zip(text.lines()).filter(|(_, line)| says_something(line));
+        header(lines.next().map(|(_, line)| line))?;
+        let mut moments: Vec<(usize, Moment)> = Vec::new();
+        for (number, line) in lines {
+            let at_line = |cause| RecordingError::Line { number, cause };
+            let moment = moment(line).map_err(at_line)?;
+            if moments.last().is_some_and(|(_, before)| moment.time <= before.time) {
+                return Err(at_line(LineError::NotLater));
+            }
+            moments.push((number, moment));
+        }
+        if moments.is_empty() { Err(RecordingError::Empty) } else { Ok(Self { moments }) }
+    }
+
+    /// The moments, in rising order of time.
+    pub fn moments(&self) -> impl Iterator<Item = Moment> {
+        self.moments.iter().map(|&(_, moment)| moment)
+    }
+
+    /// From the first moment to the last.
+    #[must_use]
+    pub fn duration(&self) -> Duration {
+        match self.moments.as_slice() {
+            [(_, first), .., (_, last)] => last.time - first.time,
+            _ => Duration::ZERO,
+        }
+    }
+
+    /// Can every joint follow, when the recording is played `factor` times as fast?
+    ///
+    /// # Errors
+    /// The first moment that a joint cannot reach in time.
+    pub fn check_speeds(&self, factor: f64) -> Result<(), RecordingError> {
+        let pairs = self.moments.iter().zip(self.moments.iter().skip(1));
+        for ((_, from), (number, to)) in pairs {
+            if let Some(cause) = too_fast(from, to, factor) {
+                return Err(RecordingError::Line { number: *number, cause });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Is a line more than a comment?
+fn says_something(line: &str) -> bool {
+    let line = line.trim();
+    !line.is_empty() && !line.starts_with('#')
+}
+
+fn header(line: Option<&str>) -> Result<(), RecordingError> {
+    // Some editors begin a file with a byte order mark.
+    let mut words = line.unwrap_or_default().trim_start_matches('\u{feff}').split_whitespace();
+    match (words.next(), words.next(), words.next()) {
+        (Some(FORMAT), Some(VERSION), None) => Ok(()),
+        (Some(FORMAT), version, _) => {
+            Err(RecordingError::OtherVersion(version.unwrap_or_default().to_owned()))
+        }
+        _ => Err(RecordingError::NotARecording),
+    }
+}
+
+fn moment(line: &str) -> Result<Moment, LineError> {
+    let fields: Vec<&str> = line.split_whitespace().collect();
+    let [time, pose @ .., vacuum] = fields.as_slice() else { return Err(LineError::Fields(fields.len())) };
+    if fields.len() != FIELDS {
+        return Err(LineError::Fields(fields.len()));
+    }
+    let mut angles = [Angle::from_register(0); 7];
+    for ((angle, text), joint) in angles.iter_mut().zip(pose).zip(Joint::ALL) {
+        let parsed = text.parse().ok().and_then(Angle::from_degrees);
+        *angle = parsed.ok_or_else(|| LineError::Angle { joint, text: (*text).to_owned() })?;
+    }
+    Ok(Moment { time: seconds(time)?, pose: angles, vacuum: suck(vacuum)? })
+}
+
+fn seconds(text: &str) -> Result<Duration, LineError> {
+    let parsed = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    parsed.filter(|time| *time <= LONGEST).ok_or_else(|| LineError::Time(text.to_owned()))
+}
+
+fn suck(text: &str) -> Result<bool, LineError> {
+    match text {
+        "0" => Ok(false),
+        "1" => Ok(true),
+        _ => Err(LineError::Vacuum(text.to_owned())),
+    }
+}
+
+fn too_fast(from: &Moment, to: &Moment, factor: f64) -> Option<LineError> {
+    let seconds = (to.time - from.time).as_secs_f64() / factor;
+    let reach = Speed::MAXIMUM.degrees_per_second() * seconds + ROUNDING_DEGREES;
+    let pairs = from.pose.iter().zip(&to.pose).zip(Joint::ALL);
+    pairs
+        .map(|((from, to), joint)| (joint, f64::from(from.degrees().abs_diff(to.degrees()))))
+        .find(|&(_, degrees)| degrees > reach)
+        .map(|(joint, degrees)| LineError::TooFast { joint, degrees_per_second: degrees / seconds })
+}
+
+/// Writes what every recording begins with.
+///
+/// # Errors
+/// As of `out`.
+pub fn write_header(out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "{FORMAT} {VERSION}\n# seconds  joints 1 to 7 in degrees  vacuum (1: suck)")
+}
+
+/// Writes one moment, as one line and in one piece.
+///
+/// # Errors
+/// As of `out`.
+pub fn write_moment(out: &mut impl Write, moment: &Moment) -> io::Result<()> {
+    out.write_all(format!("{moment}\n").as_bytes())
+}
+
+impl fmt::Display for Moment {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{:.3}", self.time.as_secs_f64())?;
+        for angle in self.pose {
+            write!(out, " {:3}", angle.degrees())?;
+        }
+        write!(out, "   {}", u8::from(self.vacuum))
+    }
+}
+
+impl fmt::Display for RecordingError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotARecording => {
+                write!(out, "this is no recording of a movement: it does not begin with `{FORMAT} {VERSION}`")
+            }
+            Self::OtherVersion(version) => {
+                write!(out, "this recording is of version `{version}`, and only version {VERSION} is known")
+            }
+            Self::Empty => out.write_str("there is no movement in this recording"),
+            Self::Line { number, cause } => write!(out, "line {number}: {cause}"),
+        }
+    }
+}
+
+impl std::error::Error for RecordingError {}
+
+impl fmt::Display for LineError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fields(found) => {
+                write!(out, "{found} fields instead of {FIELDS}: seconds, seven angles, vacuum")
+            }
+            Self::Time(text) => write!(out, "`{text}` is no time in seconds, or more than a day"),
+            Self::NotLater => out.write_str("the time is not later than the one before"),
+            Self::Angle { joint, text } => {
+                let number = joint.number();
+                write!(out, "joint {number} cannot go to `{text}`: whole degrees from 0 to 180")
+            }
+            Self::Vacuum(text) => write!(out, "`{text}` is no vacuum: 1 to suck, 0 to release"),
+            Self::TooFast { joint, degrees_per_second } => {
+                let (number, limit) = (joint.number(), Speed::MAXIMUM.degrees_per_second());
+                write!(out, "joint {number} would have to turn at {degrees_per_second:.0} °/s; ")?;
+                write!(out, "the motors reach {limit:.0}")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WAVE: &str =
+        "7bot-recording 1\n\n# by hand\n0 90 90 65 90 90 90 80 0\n1.5 120 90 65 90 90 90 80 1\n";
+
+    fn refused(text: &str) -> String {
+        Recording::parse(text).expect_err("it is wrong").to_string()
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let recording = Recording::parse(WAVE).expect("a recording");
+        let mut text = Vec::new();
+        write_header(&mut text).expect("memory takes all");
+        for moment in recording.moments() {
+            write_moment(&mut text, &moment).expect("memory takes all");
+        }
+        let text = String::from_utf8(text).expect("text");
+        assert!(text.ends_with("1.500 120  90  65  90  90  90  80   1\n"), "{text}");
+        let again = Recording::parse(&text).expect("a recording");
+        assert!(again.moments().eq(recording.moments()));
+        assert_eq!(again.duration(), Duration::from_millis(1500));
+    }
+
+    #[test]
+    fn a_windows_editor_does_no_harm() {
+        let text = format!("\u{feff}{}", WAVE.replace('\n', "\r\n"));
+        assert_eq!(Recording::parse(&text), Recording::parse(WAVE));
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        assert!(refused("").contains("no recording"));
+        assert!(refused("seconds,joint\n").contains("no recording"));
+        assert!(refused("7bot-recording 2\n").contains("version `2`"));
+        assert!(refused("# no\n7bot-recording 1\n").contains("no movement"));
+        let line = |line: &str| refused(&format!("{WAVE}{line}\n"));
+        assert_eq!(line("2 90 90"), "line 6: 3 fields instead of 9: seconds, seven angles, vacuum");
+        assert_eq!(line("x 90 90 65 90 90 90 80 0"), "line 6: `x` is no time in seconds, or more than a day");
+        assert!(line("-1 90 90 65 90 90 90 80 0").contains("`-1` is no time"));
+        assert!(line("NaN 90 90 65 90 90 90 80 0").contains("`NaN` is no time"));
+        assert!(line("1.5 90 90 65 90 90 90 80 0").contains("not later"));
+        let angle = line("2 90 90 181 90 90 90 80 0");
+        assert_eq!(angle, "line 6: joint 3 cannot go to `181`: whole degrees from 0 to 180");
+        assert!(line("2 90 90 65.5 90 90 90 80 0").contains("whole degrees"));
+        assert!(line("2 90 90 65 90 90 90 80 on").contains("`on` is no vacuum"));
+    }
+
+    #[test]
+    fn a_movement_that_no_motor_can_follow_is_found() {
+        let recording = Recording::parse(WAVE).expect("a recording");
+        assert_eq!(recording.check_speeds(1.0), Ok(()));
+        let text = recording.check_speeds(20.0).expect_err("30 degrees in 75 ms").to_string();
+        assert_eq!(text, "line 5: joint 1 would have to turn at 400 °/s; the motors reach 372");
+    }
+
+    #[test]
+    fn full_speed_that_was_rounded_to_degrees_is_not_too_fast() {
+        // 372 °/s at 30 Hz is 12.4 degrees a line: 12 or 13 when rounded.
+        let text = "7bot-recording 1\n0 10 0 0 0 0 0 0 0\n0.033 23 0 0 0 0 0 0 0\n";
+        assert_eq!(Recording::parse(text).expect("a recording").check_speeds(1.0), Ok(()));
+    }
+}
