@@ -15,6 +15,7 @@ use protocol_core::request::Request;
 
 use crate::error::{Error, Heard, OpenError};
 use crate::link::Link;
+use crate::ports;
 use crate::snapshot::{Snapshot, Span};
 use crate::units::{Angle, MoveTime, Speed};
 
@@ -85,6 +86,12 @@ impl Identity {
     pub fn chip_id(&self) -> [u8; 6] {
         [0, 1, 2, 3, 4, 5].map(|offset| self.0.at(CHIP_ID.address + offset))
     }
+
+    /// The chip's number as twelve hexadecimal digits.
+    #[must_use]
+    pub fn chip_name(&self) -> String {
+        self.chip_id().map(|byte| format!("{byte:02X}")).concat()
+    }
 }
 
 /// The present positions, as the arm sent them without being asked (D14).
@@ -125,16 +132,7 @@ impl Arm {
     /// # Errors
     /// The port cannot be opened, nothing answers, or something else does.
     pub fn open_with(path: &str, options: Options) -> Result<Self, OpenError> {
-        let open = |baud| serialport::new(path, baud).open();
-        let port = open(options.baud).or_else(|error| {
-            // A pseudo-terminal on macOS takes no baud rate; the serialport crate asks for 0 there.
-            if cfg!(target_os = "macos") && error.kind() == serialport::ErrorKind::Unknown {
-                open(0)
-            } else {
-                Err(error)
-            }
-        });
-        let port = port.map_err(|error| OpenError::of(path, error))?;
+        let port = ports::open(path, options.baud)?;
         let link = Link::new(port, options.baud);
         let nobody = Identity(Snapshot { address: 0, values: Vec::new() });
         let path = path.to_owned();

@@ -55,21 +55,45 @@ pub enum Cause {
 impl Arm {
     /// Writes, reads back, and says which registers do not hold what was written: none, if all went well.
     ///
+    /// ```no_run
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let mut arm = sevenbot::Arm::open("/dev/ttyUSB0", 115_200)?;
+    /// for unchanged in arm.write_checked(sevenbot::map::DEVICE_ID.address, &[42])? {
+    ///     println!("{unchanged}"); // device-id is 0, not 42: it is protected by the EEPROM lock
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// As [`Arm::read`] and [`Arm::write`].
     pub fn write_checked(&mut self, address: u8, values: &[u8]) -> Result<Vec<Unchanged>, Error> {
+        self.write_all_checked(&[(address, values.to_vec())])
+    }
+
+    /// As [`Arm::write_checked`], for several frames, which go out together: first registers and values.
+    ///
+    /// # Errors
+    /// As [`Arm::read`] and [`Arm::write`].
+    pub fn write_all_checked(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<Unchanged>, Error> {
         let locked = self.read_span(Span::of(&EEPROM_LOCK))?.byte(&EEPROM_LOCK) != 0;
         let before = self.status()?;
-        self.write(address, values)?;
-        let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
-        let found = self.read_span(Span { address, count })?;
+        for (address, values) in writes {
+            self.write(*address, values)?;
+        }
+        let mut found = Vec::new();
+        for (address, values) in writes {
+            let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
+            found.push((self.read_span(Span { address: *address, count })?, values));
+        }
         let after = self.status()?;
-        Ok(compare(&found, values, |address, wanted| {
+        let cause = |address, wanted| {
             rule(address, locked).unwrap_or_else(|| match (&before, &after) {
                 (Some(before), Some(after)) => verdict(before, after),
                 _ => guess(address, wanted),
             })
-        }))
+        };
+        Ok(found.iter().flat_map(|(found, wanted)| compare(found, wanted, cause)).collect())
     }
 }
 

@@ -4,7 +4,9 @@
 
 use clap::{Args, Parser, Subcommand, value_parser};
 
-use crate::commands::{get, info, monitor, pose, set};
+use crate::commands::{
+    backup, baud, effector, get, info, monitor, ports, pose, registers, set, shell, sniff, state, stop,
+};
 use crate::failure::Failure;
 use crate::session::Session;
 
@@ -40,7 +42,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Args)]
 pub(crate) struct Global {
     /// The serial port the arm is on, such as /dev/ttyUSB0, COM3, or the link of the simulator.
-    #[arg(long, global = true, env = "SEVENBOT_PORT")]
+    #[arg(long, global = true, env = "SEVENBOT_PORT", hide_env_values = true)]
     pub(crate) port: Option<String>,
     /// Baud rate of the port. The arm starts with the one in its register 12.
     #[arg(long, global = true, default_value_t = 115_200, value_parser = value_parser!(u32).range(1..))]
@@ -52,21 +54,47 @@ pub(crate) struct Global {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    Ports(ports::PortsArgs),
     Info(info::InfoArgs),
     Get(get::GetArgs),
     Set(set::SetArgs),
     Pose(pose::PoseArgs),
+    Home(pose::HomeArgs),
+    Stop(stop::StopArgs),
+    State(state::StateArgs),
+    Vacuum(effector::VacuumArgs),
+    Effector(effector::EffectorArgs),
     Monitor(monitor::MonitorArgs),
+    Baud(baud::BaudArgs),
+    Backup(backup::BackupArgs),
+    Restore(backup::RestoreArgs),
+    Sniff(sniff::SniffArgs),
+    Registers(registers::RegistersArgs),
+    Completions(shell::CompletionsArgs),
+    Man(shell::ManArgs),
 }
 
 impl Command {
     pub(crate) fn run(self, session: &mut Session) -> Result<(), Failure> {
         match self {
+            Self::Ports(args) => ports::run(session, &args),
             Self::Info(_) => info::run(session),
             Self::Get(args) => get::run(session, &args),
             Self::Set(args) => set::run(session, &args),
             Self::Pose(args) => pose::run(session, &args),
+            Self::Home(args) => pose::home(session, &args),
+            Self::Stop(_) => stop::run(session),
+            Self::State(args) => state::run(session, &args),
+            Self::Vacuum(args) => effector::vacuum(session, &args),
+            Self::Effector(args) => effector::effector(session, &args),
             Self::Monitor(args) => monitor::run(session, &args),
+            Self::Baud(args) => baud::run(session, &args),
+            Self::Backup(args) => backup::backup(session, &args),
+            Self::Restore(args) => backup::restore(session, &args),
+            Self::Sniff(args) => sniff::run(session, &args),
+            Self::Registers(args) => registers::run(session, &args),
+            Self::Completions(args) => shell::completions(session, &args),
+            Self::Man(args) => shell::man(session, &args),
         }
     }
 }

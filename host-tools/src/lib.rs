@@ -30,7 +30,7 @@
 pub mod arm;
 pub mod change;
 pub mod error;
-mod hold;
+pub mod joints;
 mod link;
 pub mod names;
 mod permission;
@@ -39,6 +39,9 @@ pub mod ports;
 pub mod recording;
 pub mod snapshot;
 pub mod status;
+pub mod table;
+pub mod traffic;
+mod traffic_words;
 pub mod units;
 pub mod words;
 

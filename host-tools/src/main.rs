@@ -16,10 +16,12 @@ mod commands;
 mod confirm;
 mod failure;
 mod interrupt;
+mod moving;
 mod output;
 mod plot;
 mod progress;
 mod session;
+mod settings_file;
 
 use std::process::ExitCode;
 

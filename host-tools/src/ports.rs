@@ -5,11 +5,12 @@
 use std::thread;
 use std::time::Duration;
 
-use protocol_core::registers::map::BAUD_RATES;
-use serialport::SerialPortType;
+use protocol_core::registers::map::{BAUD_RATES, DEVICE_ID};
+use serialport::{SerialPort, SerialPortType};
 
 use crate::arm::{Arm, Identity, Options};
 use crate::error::OpenError;
+use crate::snapshot::Span;
 
 /// How long an arm may take to say who it is: eight registers take 2 ms at 115 200 baud and 25 ms at 9600,
 /// USB adapters add up to 16 ms each way, and an arm's own work little.
@@ -31,8 +32,8 @@ pub struct Port {
 pub struct Probed {
     /// The port.
     pub port: Port,
-    /// Who answered there, or why nobody did.
-    pub answer: Result<Identity, OpenError>,
+    /// Who answered there, with the number its user gave it; or why nobody did.
+    pub answer: Result<(Identity, u8), OpenError>,
 }
 
 /// The serial ports the system knows of. Pseudo-terminals, such as a simulator's, are not among them.
@@ -61,12 +62,29 @@ fn port(info: serialport::SerialPortInfo) -> Port {
     Port { name: info.port_name, description }
 }
 
+/// Opens a port, whoever is behind it. Nobody else can open it meanwhile.
+///
+/// # Errors
+/// It cannot be opened.
+pub fn open(name: &str, baud: u32) -> Result<Box<dyn SerialPort>, OpenError> {
+    let open = |baud| serialport::new(name, baud).open();
+    let port = open(baud).or_else(|error| {
+        // A pseudo-terminal on macOS takes no baud rate; the serialport crate asks for 0 there.
+        if cfg!(target_os = "macos") && error.kind() == serialport::ErrorKind::Unknown {
+            open(0)
+        } else {
+            Err(error)
+        }
+    });
+    port.map_err(|error| OpenError::of(name, error))
+}
+
 /// Asks all these ports at once who is there.
 ///
 /// ```no_run
 /// for found in sevenbot::ports::probe(sevenbot::ports::available(), 115_200) {
 ///     match found.answer {
-///         Ok(identity) => println!("{}: firmware {}", found.port.name, identity.version()),
+///         Ok((identity, id)) => println!("{}: arm {id}, {}", found.port.name, identity.version()),
 ///         Err(reason) => println!("{}: {reason}", found.port.name),
 ///     }
 /// }
@@ -78,8 +96,10 @@ pub fn probe(ports: Vec<Port>, baud: u32) -> Vec<Probed> {
     asked.into_iter().filter_map(|thread| thread.join().ok()).collect()
 }
 
-fn ask(name: &str, baud: u32) -> Result<Identity, OpenError> {
-    open_quickly(name, baud).map(|arm| arm.identity().clone())
+fn ask(name: &str, baud: u32) -> Result<(Identity, u8), OpenError> {
+    let mut arm = open_quickly(name, baud)?;
+    let device_id = arm.read_span(Span::of(&DEVICE_ID))?.byte(&DEVICE_ID);
+    Ok((arm.identity().clone(), device_id))
 }
 
 fn open_quickly(name: &str, baud: u32) -> Result<Arm, OpenError> {

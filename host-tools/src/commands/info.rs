@@ -90,7 +90,7 @@ impl Identity {
             baud: arm.options().baud,
             firmware: identity.version(),
             makers_firmware: identity.firmware() == Firmware::Makers,
-            chip_id: identity.chip_id().map(|byte| format!("{byte:02X}")).concat(),
+            chip_id: identity.chip_name(),
         }
     }
 }

@@ -1,10 +1,19 @@
 //! One file a command: its arguments, and what it does in a session.
 
+pub(crate) mod backup;
+pub(crate) mod baud;
+pub(crate) mod effector;
 pub(crate) mod get;
 pub(crate) mod info;
 pub(crate) mod monitor;
+pub(crate) mod ports;
 pub(crate) mod pose;
+pub(crate) mod registers;
 pub(crate) mod set;
+pub(crate) mod shell;
+pub(crate) mod sniff;
+pub(crate) mod state;
+pub(crate) mod stop;
 
 use sevenbot::change::Unchanged;
 use sevenbot::names::name_of_register;

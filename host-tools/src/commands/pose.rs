@@ -1,143 +1,180 @@
-//! `pose`: all seven joints to an angle each, and if asked until they are there.
+//! `pose`, `home`: joints to where they should be, at a pace, and waiting until they are there.
 
-use std::io::Write;
-use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::io::{self, Write};
+use std::str::FromStr;
 
-use sevenbot::arm::STATUS;
-use sevenbot::map::{
-    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, SPEED, TARGET_POSITION, TIME, motor_state,
-};
-use sevenbot::units::move_duration;
-use sevenbot::words::{joints, motor_state_word};
-use sevenbot::{Angle, Arm, Joint, MoveTime, Snapshot, Span, Speed};
+use clap::{ArgAction, Args, value_parser};
+use serde::Serialize;
+use sevenbot::joints::frames_for;
+use sevenbot::map::{SPEED, TARGET_POSITION, TIME};
+use sevenbot::{Angle, Arm, Joint, Span, Speed};
 
 use super::all_taken;
-use clap::{ArgAction, Args, value_parser};
-
 use crate::failure::Failure;
+use crate::interrupt::or_hold;
+use crate::moving::{Move, Targets, driven};
+use crate::output::Facts;
 use crate::session::Session;
 
-/// Send all seven joints to a pose.
+/// Send joints to a pose.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sevenbot pose 90 90 65 90 90 90 80               the standard pose
+  sevenbot pose 90 90 65 90 90 90 80               the standard pose, also `sevenbot home`
   sevenbot pose 120 90 65 90 90 90 80 --speed 30   at 57 degrees per second
+  sevenbot pose +10 _ -5 _ _ _ _ --wait            joint 1 up, joint 3 down, the others as they are
   sevenbot pose 60 90 65 90 90 90 80 --time 20 --wait
+
+Ctrl-C while it waits leaves the arm holding where it is.
 
 Exit status 1 when the arm did not take the pose, or with --wait did not reach it.")]
 pub(crate) struct PoseArgs {
-    /// Angles of joint 1 to 7 in degrees, 0 to 180.
+    /// Joint 1 to 7: degrees from 0 to 180; +N or -N from where the joint is sent already; _ or . leaves it
+    /// alone.
     #[arg(value_names = ["A1", "A2", "A3", "A4", "A5", "A6", "A7"], num_args = 7, required = true,
-          action = ArgAction::Set,
-          value_parser = value_parser!(u8).range(0..=180))]
-    pub(crate) angles: Vec<u8>,
-    /// Speed of all joints in steps of 1.9 degrees per second, 1 to 100; 0 is the motors' maximum.
+          action = ArgAction::Set, allow_negative_numbers = true)]
+    angles: Vec<Goal>,
+    #[command(flatten)]
+    how: HowArgs,
+}
+
+/// Send all joints to the standard pose.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot home --speed 20 --wait")]
+pub(crate) struct HomeArgs {
+    #[command(flatten)]
+    how: HowArgs,
+}
+
+#[derive(Debug, Args)]
+struct HowArgs {
+    /// Speed of these joints in steps of 1.9 degrees per second, 1 to 100; 0 is the motors' maximum.
     #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=100))]
-    pub(crate) speed: Option<u8>,
+    speed: Option<u8>,
     /// Duration of the move in steps of 100 ms, 0 to 100; sets the speeds to 0, or it would not count.
     #[arg(long, value_name = "N", conflicts_with = "speed", value_parser = value_parser!(u8).range(0..=100))]
-    pub(crate) time: Option<u8>,
-    /// Wait until the arm is there.
+    time: Option<u8>,
+    /// Wait until the joints are there.
     #[arg(long)]
-    pub(crate) wait: bool,
+    wait: bool,
 }
 
-/// Time between two looks at a moving arm.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// What a move may take beyond twice its duration.
-const MARGIN: Duration = Duration::from_secs(5);
-/// How long a joint may take to follow a set-point that has arrived.
-const SETTLE: Duration = Duration::from_secs(2);
-/// A joint this near to its target is there: registers are whole degrees, servos have some play.
-const NEAR_DEGREES: u8 = 2;
+/// Where one joint should go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Goal {
+    At(u8),
+    By(i16),
+    Leave,
+}
+
+impl FromStr for Goal {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || "use degrees from 0 to 180, +N or -N for a step, _ or . for a joint to leave".to_owned();
+        match text.as_bytes() {
+            [b'_' | b'.'] => Ok(Self::Leave),
+            [b'+' | b'-', ..] => text.parse().map(Self::By).map_err(|_| wrong()),
+            _ => text
+                .parse()
+                .ok()
+                .and_then(Angle::from_degrees)
+                .map_or_else(|| Err(wrong()), |angle| Ok(Self::At(angle.degrees()))),
+        }
+    }
+}
+
+impl Goal {
+    /// In degrees, for a joint that has this target already.
+    fn from_here(self, joint: Joint, target: u8) -> Result<Option<u8>, Failure> {
+        let Self::By(step) = self else {
+            return Ok(if let Self::At(degrees) = self { Some(degrees) } else { None });
+        };
+        let degrees = i16::from(target).saturating_add(step);
+        let angle = u8::try_from(degrees).ok().and_then(Angle::from_degrees);
+        angle.map(|angle| Some(angle.degrees())).ok_or_else(|| {
+            let number = joint.number();
+            Failure::Arm(format!(
+                "joint {number} would go to {degrees}°: it takes 0 to 180; nothing was moved"
+            ))
+        })
+    }
+}
 
 pub(crate) fn run(session: &mut Session, args: &PoseArgs) -> Result<(), Failure> {
-    take(&mut session.connect()?, args, &mut anstream::stdout())
+    let mut arm = session.connect()?;
+    let here = arm.read_span(Span::of(&TARGET_POSITION))?.joints(&TARGET_POSITION);
+    let mut targets = [None; 7];
+    for (((target, goal), joint), here) in targets.iter_mut().zip(&args.angles).zip(Joint::ALL).zip(here) {
+        *target = goal.from_here(joint, here)?;
+    }
+    take(session, &mut arm, targets, &args.how)
 }
 
-fn take(arm: &mut Arm, args: &PoseArgs, out: &mut impl Write) -> Result<(), Failure> {
-    let state = arm.read_span(Span::of(&MOTOR_STATE))?.byte(&MOTOR_STATE);
-    if state != motor_state::SERVO {
-        let word = motor_state_word(state);
-        let how = "`sevenbot set motor-state 1` makes it hold where it is";
-        return Err(Failure::Arm(format!(
-            "the arm's motors are in state {state}, {word}: {how}, and then move"
-        )));
-    }
-    set_pace(arm, args)?;
-    let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
-    all_taken(&arm.write_checked(TARGET_POSITION.address, &args.angles)?)?;
-    if !args.wait {
-        return Ok(());
-    }
-    wait_until_still(arm, time_out(&plan, &args.angles))?;
-    let there = settle(arm, &args.angles);
-    let [a, b, c, d, e, f, g] = arm.positions()?.map(Angle::degrees);
-    writeln!(out, "{a} {b} {c} {d} {e} {f} {g}")?;
-    there
+pub(crate) fn home(session: &mut Session, args: &HomeArgs) -> Result<(), Failure> {
+    let mut arm = session.connect()?;
+    take(session, &mut arm, TARGET_POSITION.defaults.map(Some), &args.how)
 }
 
-fn set_pace(arm: &mut Arm, args: &PoseArgs) -> Result<(), Failure> {
-    let speed = args.speed.or(args.time.map(|_| Speed::MAXIMUM.steps()));
-    if let Some(steps) = speed {
-        all_taken(&arm.write_checked(SPEED.address, &[steps; 7])?)?;
-    }
-    if let Some(steps) = args.time {
-        all_taken(&arm.write_checked(TIME.address, &[steps; 7])?)?;
+fn take(session: &mut Session, arm: &mut Arm, targets: Targets, how: &HowArgs) -> Result<(), Failure> {
+    driven(arm)?;
+    set_pace(arm, &targets, how)?;
+    let sent = Move::begin(arm, targets)?;
+    if how.wait {
+        let positions = or_hold(arm, |arm, interrupt| sent.finish(arm, interrupt))?;
+        session.output.show(&Stand { positions_degrees: positions })?;
     }
     Ok(())
 }
 
-/// Twice what the slowest joint needs from where it is, and a margin.
-fn time_out(plan: &Snapshot, angles: &[u8]) -> Duration {
-    let slowest = Joint::ALL.iter().zip(angles).map(|(&joint, &angle)| {
-        let speed = Speed::from_steps(plan.at(SPEED.of(joint))).unwrap_or(Speed::MAXIMUM);
-        let time = MoveTime::from_steps(plan.at(TIME.of(joint))).unwrap_or(MoveTime::NONE);
-        move_duration(plan.at(PRESENT_POSITION.of(joint)).abs_diff(angle), speed, time)
-    });
-    slowest.max().unwrap_or_default() * 2 + MARGIN
+/// Paces the joints that are to move, and only those.
+fn set_pace(arm: &mut Arm, targets: &Targets, how: &HowArgs) -> Result<(), Failure> {
+    let for_movers = |steps: u8| targets.map(|target| target.map(|_| steps));
+    let speed = how.speed.or(how.time.map(|_| Speed::MAXIMUM.steps()));
+    let speeds = speed.map(|steps| frames_for(&SPEED, &for_movers(steps)));
+    let times = how.time.map(|steps| frames_for(&TIME, &for_movers(steps)));
+    let frames: Vec<_> = speeds.into_iter().chain(times).flatten().collect();
+    if frames.is_empty() { Ok(()) } else { all_taken(&arm.write_all_checked(&frames)?) }
 }
 
-/// Waits until no set-point moves any more, but for joints whose servo does not answer.
-fn wait_until_still(arm: &mut Arm, patience: Duration) -> Result<(), Failure> {
-    let deadline = Instant::now() + patience;
-    loop {
-        let status = arm.read_span(STATUS)?;
-        let moving = status.byte(&MOVING_JOINTS) & !status.byte(&MISSING_SERVOS);
-        if moving == 0 {
-            return Ok(());
-        }
-        if Instant::now() >= deadline {
-            let seconds = patience.as_secs();
-            return Err(Failure::Arm(format!("still moving after {seconds} s: {}", joints(moving))));
-        }
-        sleep(LOOK_EVERY);
+/// Where the arm is.
+#[derive(Serialize)]
+pub(crate) struct Stand {
+    pub(crate) positions_degrees: [u8; 7],
+}
+
+impl Facts for Stand {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{}", self.positions_degrees.map(|degrees| degrees.to_string()).join(" "))
     }
 }
 
-/// Waits until the joints have followed their set-points; fails with those that have not.
-fn settle(arm: &mut Arm, angles: &[u8]) -> Result<(), Failure> {
-    let deadline = Instant::now() + SETTLE;
-    loop {
-        let positions = arm.positions()?.map(Angle::degrees);
-        let pairs = positions.into_iter().zip(angles).zip(Joint::ALL);
-        let far = pairs.filter(|((present, target), _)| present.abs_diff(**target) > NEAR_DEGREES);
-        let far: Vec<String> = far
-            .map(|((present, target), joint)| {
-                format!("joint {} is at {present}°, not {target}°", joint.number())
-            })
-            .collect();
-        if far.is_empty() {
-            return Ok(());
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn goals_are_absolute_relative_or_none() {
+        assert_eq!("120".parse(), Ok(Goal::At(120)));
+        assert_eq!("+10".parse(), Ok(Goal::By(10)));
+        assert_eq!("-10".parse(), Ok(Goal::By(-10)));
+        assert_eq!("_".parse(), Ok(Goal::Leave));
+        assert_eq!(".".parse(), Ok(Goal::Leave));
+        for text in ["181", "", "+", "_5", "9.5", "--5"] {
+            assert!(text.parse::<Goal>().is_err(), "{text}");
         }
-        if Instant::now() >= deadline {
-            let missing = arm.read_span(STATUS)?.byte(&MISSING_SERVOS);
-            let cause =
-                if missing == 0 { String::new() } else { format!("; {} not answering", joints(missing)) };
-            return Err(Failure::Arm(format!("the arm did not reach the pose: {}{cause}", far.join(", "))));
-        }
-        sleep(LOOK_EVERY);
+    }
+
+    #[test]
+    fn a_step_starts_from_the_target_and_stays_in_range() {
+        let [joint, ..] = Joint::ALL;
+        assert_eq!(Goal::By(-10).from_here(joint, 90).ok(), Some(Some(80)));
+        assert_eq!(Goal::At(5).from_here(joint, 90).ok(), Some(Some(5)));
+        assert_eq!(Goal::Leave.from_here(joint, 90).ok(), Some(None));
+        let Err(Failure::Arm(said)) = Goal::By(-91).from_here(joint, 90) else { panic!("below zero") };
+        assert!(said.contains("joint 1 would go to -1°"), "{said}");
     }
 }

@@ -1,0 +1,155 @@
+//! `backup`, `restore`: the settings of an arm, to a file and back.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+use sevenbot::map::{BAUD_RATE, find};
+use sevenbot::names::name_of_register;
+use sevenbot::words::meaning;
+use sevenbot::{Arm, Snapshot};
+
+use super::all_taken;
+use super::set::unlocked;
+use crate::confirm::confirm;
+use crate::failure::Failure;
+use crate::output::{Facts, note, warn};
+use crate::session::Session;
+use crate::settings_file::{SettingsFile, span};
+
+/// Write the settings of the arm to a file.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Settings are what the arm keeps over power cuts: device id, baud rate, offsets. The file is TOML.
+
+Examples:
+  sevenbot backup arm-42.toml
+  sevenbot backup -                      to standard output")]
+pub(crate) struct BackupArgs {
+    /// The file; - is standard output.
+    file: PathBuf,
+    /// Replace the file if it is there.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Write settings from a file to the arm, and verify them.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Shows what would change and asks first. What the file leaves out stays as it is.
+
+Examples:
+  sevenbot restore arm-42.toml
+  sevenbot restore --yes arm-42.toml     for scripts")]
+pub(crate) struct RestoreArgs {
+    /// The file.
+    file: PathBuf,
+    /// Do not ask.
+    #[arg(long)]
+    yes: bool,
+}
+
+pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), Failure> {
+    let mut arm = session.connect()?;
+    let registers = arm.read_span(span())?;
+    let text = SettingsFile::of(arm.identity(), &registers).text()?;
+    if args.file.as_os_str() == "-" {
+        return session.output.raw(text.as_bytes());
+    }
+    write_whole(&args.file, &text, args.force)?;
+    note(format_args!("settings are in {}", args.file.display()));
+    Ok(())
+}
+
+/// Writes a file that is there as a whole or not at all.
+fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), Failure> {
+    if may_replace {
+        let beside = path.with_extension("toml.new");
+        return fs::write(&beside, text)
+            .and_then(|()| fs::rename(&beside, path))
+            .map_err(|error| Failure::file(path, error));
+    }
+    let written = File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|error| match error.kind() {
+        io::ErrorKind::AlreadyExists => Failure::file(path, "it is there already; --force replaces it"),
+        _ => Failure::file(path, error),
+    })
+}
+
+pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), Failure> {
+    let file = SettingsFile::read(&args.file)?;
+    let mut arm = session.connect()?;
+    let now = arm.read_span(span())?;
+    let wanted = file.over(&args.file, &now)?;
+    let changes = changes(&now, &wanted);
+    session.output.show(&Changes { changes: &changes })?;
+    if changes.is_empty() {
+        return Ok(());
+    }
+    let chip = arm.identity().chip_name();
+    if file.chip_id != chip {
+        warn(format_args!(
+            "these are the settings of the arm with chip {}, this one has {chip}",
+            file.chip_id
+        ));
+    }
+    confirm("Write these settings?", args.yes)?;
+    write(&mut arm, &wanted)?;
+    note("written, read back, and right");
+    if changes.iter().any(|change| BAUD_RATE.holds(change.address)) {
+        note("the new baud rate is in force after the next restart of the arm");
+    }
+    Ok(())
+}
+
+/// All settings in one frame: a power cut leaves all the old ones or all the new ones (D19).
+fn write(arm: &mut Arm, wanted: &Snapshot) -> Result<(), Failure> {
+    all_taken(&unlocked(arm, |arm| arm.write_checked(wanted.address, &wanted.values))?)
+}
+
+#[derive(Debug, Serialize)]
+struct Change {
+    address: u8,
+    register: String,
+    from: String,
+    to: String,
+}
+
+#[derive(Serialize)]
+struct Changes<'a> {
+    changes: &'a [Change],
+}
+
+impl Facts for Changes<'_> {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        if self.changes.is_empty() {
+            return writeln!(out, "the arm has these settings already");
+        }
+        for Change { register, from, to, .. } in self.changes {
+            writeln!(out, "{register:<12}  {from:>12}  ->  {to}")?;
+        }
+        Ok(())
+    }
+}
+
+fn changes(now: &Snapshot, wanted: &Snapshot) -> Vec<Change> {
+    let pairs = now.span().addresses().zip(now.values.iter().zip(&wanted.values));
+    let changed = pairs.filter(|(_, (from, to))| from != to);
+    let change = |(address, (from, to)): (u8, (&u8, &u8))| Change {
+        address,
+        register: name_of_register(address),
+        from: in_words(address, *from),
+        to: in_words(address, *to),
+    };
+    changed.map(change).collect()
+}
+
+fn in_words(address: u8, byte: u8) -> String {
+    match find(address) {
+        Some(row) if *row == BAUD_RATE => meaning(row, byte),
+        Some(row) => format!("{} {}", row.range.decode(byte), row.unit.symbol()).trim_end().to_owned(),
+        None => byte.to_string(),
+    }
+}

@@ -1,0 +1,84 @@
+//! `baud`: the rate an arm starts with, and the way back to one whose rate nobody remembers.
+
+use std::io::{self, Write};
+
+use clap::Args;
+use serde::Serialize;
+use sevenbot::map::{BAUD_RATE, BAUD_RATES, baud_rate};
+use sevenbot::{Span, ports};
+
+use super::all_taken;
+use super::set::unlocked;
+use crate::failure::Failure;
+use crate::output::{Facts, note};
+use crate::session::Session;
+
+/// Show, change or find the baud rate of the arm.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The arm takes a new rate with its next restart; until then it listens at the old one.
+
+Examples:
+  sevenbot baud                                the rate in use, and the one after a restart
+  sevenbot baud 1000000
+  sevenbot --port /dev/ttyUSB0 baud --find     tries all eight rates")]
+pub(crate) struct BaudArgs {
+    /// The rate the arm shall start with.
+    #[arg(value_parser = rate)]
+    rate: Option<u32>,
+    /// Find the rate the arm listens at.
+    #[arg(long, conflicts_with = "rate")]
+    find: bool,
+}
+
+fn rate(text: &str) -> Result<u32, String> {
+    let known = text.parse().ok().filter(|rate| BAUD_RATES.contains(rate));
+    known.ok_or_else(|| {
+        let mut rates = BAUD_RATES;
+        rates.sort_unstable();
+        format!("the arm knows {}", rates.map(|rate| rate.to_string()).join(", "))
+    })
+}
+
+#[derive(Serialize)]
+struct Rates {
+    baud: u32,
+    baud_after_restart: u32,
+}
+
+impl Facts for Rates {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        let Self { baud, baud_after_restart } = self;
+        writeln!(out, "now            {baud} baud")?;
+        writeln!(out, "after restart  {baud_after_restart} baud")
+    }
+}
+
+pub(crate) fn run(session: &mut Session, args: &BaudArgs) -> Result<(), Failure> {
+    let mut arm = if args.find { find(session)? } else { session.connect()? };
+    let baud = arm.options().baud;
+    if let Some(rate) = args.rate {
+        let code = BAUD_RATES.iter().zip(0..).find_map(|(&known, code)| (known == rate).then_some(code));
+        let code = code.ok_or_else(|| Failure::Usage(format!("the arm does not know {rate} baud")))?;
+        all_taken(&unlocked(&mut arm, |arm| arm.write_checked(BAUD_RATE.address, &[code]))?)?;
+    }
+    let baud_after_restart = baud_rate(arm.read_span(Span::of(&BAUD_RATE))?.byte(&BAUD_RATE));
+    session.output.show(&Rates { baud, baud_after_restart })?;
+    if args.rate.is_some() && baud != baud_after_restart {
+        note(format_args!(
+            "switch the arm off and on, and then say --baud {baud_after_restart}; until then it listens at \
+             {baud} baud"
+        ));
+    } else if args.find {
+        note(format_args!("say --baud {baud} from now on"));
+    }
+    Ok(())
+}
+
+fn find(session: &Session) -> Result<sevenbot::Arm, Failure> {
+    let port = session.port.clone().ok_or_else(|| {
+        Failure::Usage("--find needs --port: it would send to every device of this machine".to_owned())
+    })?;
+    let tell = |baud| note(format_args!("trying {baud} baud"));
+    ports::find_baud(&port, tell).map_err(|error| Failure::Open { port, error })
+}

@@ -1,0 +1,61 @@
+//! `vacuum`, `effector`: what is at the end of the arm, and its pump.
+
+use clap::{Args, ValueEnum};
+use sevenbot::map::{EFFECTOR_TYPE, VACUUM_PUMP};
+use sevenbot::words::entries;
+use sevenbot::{Register, Span};
+
+use super::all_taken;
+use super::get::Registers;
+use crate::failure::Failure;
+use crate::session::Session;
+
+/// Show or switch the vacuum pump.
+#[derive(Debug, Args)]
+pub(crate) struct VacuumArgs {
+    /// What the pump should do.
+    vacuum: Option<Vacuum>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Vacuum {
+    /// The pump runs, the valve is closed.
+    #[value(alias = "suck")]
+    On,
+    /// The pump stops, and the valve opens for half a second.
+    #[value(alias = "release")]
+    Off,
+}
+
+/// Show or say what is at the end of the arm.
+#[derive(Debug, Args)]
+pub(crate) struct EffectorArgs {
+    /// What it is.
+    effector: Option<Effector>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Effector {
+    /// A suction cup.
+    SuctionCup,
+    /// A gripper, driven by joint 7.
+    Gripper,
+}
+
+pub(crate) fn vacuum(session: &mut Session, args: &VacuumArgs) -> Result<(), Failure> {
+    let value = args.vacuum.map(|wanted| matches!(wanted, Vacuum::On).into());
+    show_or_set(session, &VACUUM_PUMP, value)
+}
+
+pub(crate) fn effector(session: &mut Session, args: &EffectorArgs) -> Result<(), Failure> {
+    let value = args.effector.map(|wanted| matches!(wanted, Effector::Gripper).into());
+    show_or_set(session, &EFFECTOR_TYPE, value)
+}
+
+fn show_or_set(session: &mut Session, row: &Register, value: Option<u8>) -> Result<(), Failure> {
+    let mut arm = session.connect()?;
+    if let Some(value) = value {
+        all_taken(&arm.write_checked(row.address, &[value])?)?;
+    }
+    session.output.show(&Registers::from(entries(&arm.read_span(Span::of(row))?)))
+}

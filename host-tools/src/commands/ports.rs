@@ -1,0 +1,100 @@
+//! `ports`: the serial ports of this machine, and which of them lead to an arm.
+
+use std::io::{self, Write};
+
+use clap::Args;
+use serde::Serialize;
+use sevenbot::ports::{Port, Probed, available, probe};
+
+use crate::failure::Failure;
+use crate::output::{Facts, GOOD};
+use crate::session::Session;
+
+/// List serial ports, and which of them lead to an arm.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Each port is opened and asked for its device code, all at once; what is no arm is told 14 bytes.
+
+Examples:
+  sevenbot ports
+  sevenbot ports /dev/ttyUSB0 ./7bot     these, known to the system or not")]
+pub(crate) struct PortsArgs {
+    /// Ask these instead of all.
+    #[arg(value_name = "PORT")]
+    ports: Vec<String>,
+}
+
+pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), Failure> {
+    let named = args.ports.iter().chain(&session.port);
+    let named = named.map(|name| Port { name: name.clone(), description: String::new() });
+    let mut asked: Vec<Port> = if args.ports.is_empty() { available() } else { Vec::new() };
+    for port in named {
+        if asked.iter().all(|known| known.name != port.name) {
+            asked.push(port);
+        }
+    }
+    let ports = probe(asked, session.baud).into_iter().map(Line::from).collect();
+    session.output.show(&Ports { ports })
+}
+
+#[derive(Serialize)]
+struct Ports {
+    ports: Vec<Line>,
+}
+
+#[derive(Serialize)]
+struct Line {
+    port: String,
+    description: String,
+    arm: Option<Found>,
+    no_arm: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Found {
+    device_id: u8,
+    firmware: String,
+    chip_id: String,
+}
+
+impl From<Probed> for Line {
+    fn from(probed: Probed) -> Self {
+        let Probed { port: Port { name: port, description }, answer } = probed;
+        match answer {
+            Ok((identity, device_id)) => {
+                let chip_id = identity.chip_name();
+                let firmware = identity.version();
+                let arm = Some(Found { device_id, firmware, chip_id });
+                Self { port, description, arm, no_arm: None }
+            }
+            Err(reason) => Self { port, description, arm: None, no_arm: Some(reason.to_string()) },
+        }
+    }
+}
+
+impl Facts for Ports {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        if self.ports.is_empty() {
+            return writeln!(out, "this machine has no serial port");
+        }
+        let width = self.ports.iter().map(|line| line.port.chars().count()).max().unwrap_or_default();
+        for line in &self.ports {
+            line.write_text(width, out)?;
+        }
+        Ok(())
+    }
+}
+
+impl Line {
+    fn write_text(&self, width: usize, out: &mut dyn Write) -> io::Result<()> {
+        let Self { port, description, arm, no_arm } = self;
+        match arm {
+            Some(Found { device_id, firmware, chip_id }) => writeln!(
+                out,
+                "{port:<width$}  {GOOD}7Bot V2{GOOD:#}, id {device_id}, firmware {firmware}, chip {chip_id}"
+            )?,
+            None => writeln!(out, "{port:<width$}  {}", no_arm.as_deref().unwrap_or_default())?,
+        }
+        if description.is_empty() { Ok(()) } else { writeln!(out, "{:width$}  {description}", "") }
+    }
+}

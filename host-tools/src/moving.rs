@@ -1,0 +1,173 @@
+//! Sending joints somewhere, and waiting until they are there.
+//!
+//! The arm's moving bits speak of set-points; a servo arrives a little later, or never. So waiting has two
+//! parts: until no set-point is on its way, and until the measured positions have followed.
+
+use std::time::{Duration, Instant};
+
+use sevenbot::joints::frames_for;
+use sevenbot::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION, TIME, motor_state};
+use sevenbot::units::move_duration;
+use sevenbot::words::{joints, motor_state_word};
+use sevenbot::{Arm, Joint, MoveTime, Snapshot, Span, Speed};
+
+use crate::commands::all_taken;
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::progress::Progress;
+
+/// Time between two looks at a moving arm.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// What a move may take beyond twice its duration.
+const MARGIN: Duration = Duration::from_secs(5);
+/// A joint whose measured position has not changed for so long has settled.
+const AT_REST: Duration = Duration::from_millis(300);
+/// How long joints may take to settle: one that trembles never does.
+const SETTLE: Duration = Duration::from_secs(2);
+/// A joint this near to its target has arrived: registers are whole degrees.
+const ARRIVED_DEGREES: u8 = 1;
+/// A joint that came to rest this near to its target is where it was sent: servos have some play.
+const NEAR_DEGREES: u8 = 2;
+
+/// Where joints should go, in degrees, joint 1 first; `None` leaves one alone.
+pub(crate) type Targets = [Option<u8>; 7];
+
+/// Fails unless the motors drive the joints.
+pub(crate) fn driven(arm: &mut Arm) -> Result<(), Failure> {
+    let state = arm.read_span(Span::of(&MOTOR_STATE))?.byte(&MOTOR_STATE);
+    if state == motor_state::SERVO {
+        return Ok(());
+    }
+    let word = motor_state_word(state);
+    Err(Failure::Arm(format!(
+        "the arm's motors are in state {state}, {word}: `sevenbot state servo` makes it hold where it is, \
+         and then it can move"
+    )))
+}
+
+/// A move that was sent to the arm.
+pub(crate) struct Move {
+    targets: Targets,
+    /// Speeds, times and positions before it.
+    plan: Snapshot,
+    start: Instant,
+}
+
+impl Move {
+    /// Sends joints to their targets, all at once.
+    pub(crate) fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, Failure> {
+        let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
+        all_taken(&arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets))?)?;
+        Ok(Self { targets, plan, start: Instant::now() })
+    }
+
+    /// Waits until all joints are there; says where they are.
+    pub(crate) fn finish(&self, arm: &mut Arm, interrupt: Interrupt) -> Result<[u8; 7], Failure> {
+        let progress = Progress::new(self.way_to_go(&self.plan.joints(&PRESENT_POSITION)), "degrees");
+        self.wait_until_still(arm, interrupt, &progress)?;
+        progress.say("settling");
+        self.settle(arm, interrupt, &progress)
+    }
+
+    /// What the slowest joint takes.
+    fn duration(&self) -> Duration {
+        let durations = self.goals().map(|(joint, goal)| {
+            let speed = Speed::from_steps(self.plan.at(SPEED.of(joint))).unwrap_or(Speed::MAXIMUM);
+            let time = MoveTime::from_steps(self.plan.at(TIME.of(joint))).unwrap_or(MoveTime::NONE);
+            move_duration(self.plan.at(PRESENT_POSITION.of(joint)).abs_diff(goal), speed, time)
+        });
+        durations.max().unwrap_or_default()
+    }
+
+    fn wait_until_still(
+        &self,
+        arm: &mut Arm,
+        interrupt: Interrupt,
+        progress: &Progress,
+    ) -> Result<(), Failure> {
+        let patience = self.duration() * 2 + MARGIN;
+        loop {
+            let moving = self.moving(arm)?;
+            if moving == 0 {
+                return Ok(());
+            }
+            if self.start.elapsed() >= patience {
+                let seconds = patience.as_secs();
+                return Err(Failure::Arm(format!("still moving after {seconds} s: {}", joints(moving))));
+            }
+            progress.set(self.way_done(&positions(arm)?));
+            interrupt.sleep(LOOK_EVERY)?;
+        }
+    }
+
+    /// The joints of this move that are on their way, but for those whose servo does not answer.
+    fn moving(&self, arm: &mut Arm) -> Result<u8, Failure> {
+        let ours = self.goals().fold(0, |bits, (joint, _)| bits | joint.bit());
+        if let Some(status) = arm.status()? {
+            return Ok(status.moving() & !status.missing() & ours);
+        }
+        // The maker's firmware does not say: those that are not there yet, while they may be on their way.
+        let far = self.far(&positions(arm)?, ARRIVED_DEGREES);
+        let is_due = self.start.elapsed() >= self.duration();
+        Ok(if is_due { 0 } else { far.iter().fold(0, |bits, (joint, ..)| bits | joint.bit()) })
+    }
+
+    /// Waits until the joints have followed their set-points; fails with those that have not.
+    fn settle(&self, arm: &mut Arm, interrupt: Interrupt, progress: &Progress) -> Result<[u8; 7], Failure> {
+        let mut last = positions(arm)?;
+        let start = Instant::now();
+        let mut changed = start;
+        while !self.far(&last, ARRIVED_DEGREES).is_empty()
+            && changed.elapsed() < AT_REST
+            && start.elapsed() < SETTLE
+        {
+            interrupt.sleep(LOOK_EVERY)?;
+            let present = positions(arm)?;
+            if present != last {
+                changed = Instant::now();
+            }
+            last = present;
+            progress.set(self.way_done(&last));
+        }
+        match self.far(&last, NEAR_DEGREES).as_slice() {
+            [] => Ok(last),
+            far => Err(self.not_reached(arm, far)?),
+        }
+    }
+
+    fn not_reached(&self, arm: &mut Arm, far: &[(Joint, u8, u8)]) -> Result<Failure, Failure> {
+        driven(arm)?;
+        let words: Vec<String> = far
+            .iter()
+            .map(|(joint, is, goal)| format!("joint {} is at {is}°, not {goal}°", joint.number()))
+            .collect();
+        let missing = arm.status()?.map_or(0, |status| status.missing());
+        let cause = if missing == 0 { String::new() } else { format!("; {} not answering", joints(missing)) };
+        Ok(Failure::Arm(format!("the arm did not reach the pose: {}{cause}", words.join(", "))))
+    }
+
+    fn goals(&self) -> impl Iterator<Item = (Joint, u8)> {
+        Joint::ALL.into_iter().zip(self.targets).filter_map(|(joint, goal)| Some((joint, goal?)))
+    }
+
+    /// The joints further than `degrees` from where they should be: where they are, and should be.
+    fn far(&self, present: &[u8; 7], degrees: u8) -> Vec<(Joint, u8, u8)> {
+        let pairs = Joint::ALL.into_iter().zip(present).zip(self.targets);
+        let far = pairs.filter_map(|((joint, &is), goal)| Some((joint, is, goal?)));
+        far.filter(|(_, is, goal)| is.abs_diff(*goal) > degrees).collect()
+    }
+
+    /// Degrees left, of all joints together.
+    fn way_to_go(&self, present: &[u8; 7]) -> u64 {
+        self.far(present, 0).iter().map(|(_, is, goal)| u64::from(is.abs_diff(*goal))).sum()
+    }
+
+    fn way_done(&self, present: &[u8; 7]) -> u64 {
+        let total = self.way_to_go(&self.plan.joints(&PRESENT_POSITION));
+        total.saturating_sub(self.way_to_go(present))
+    }
+}
+
+fn positions(arm: &mut Arm) -> Result<[u8; 7], Failure> {
+    Ok(arm.read_span(Span::of(&PRESENT_POSITION))?.joints(&PRESENT_POSITION))
+}

@@ -1,0 +1,181 @@
+//! Settings in a file that people can read and change: TOML, the table's names, numbers in its units.
+//!
+//! ```toml
+//! format = 1
+//! chip-id = "53494D000001"
+//! firmware = "3.0"
+//!
+//! [settings]
+//! device-id = 42
+//! baud-rate = 115200
+//! offset = [0, -5, 0, 0, 0, 0, 0]
+//! ```
+//!
+//! Settings are what the arm keeps over power cuts and lets be written; the table says which these are.
+
+use std::fs;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sevenbot::map::{BAUD_RATE, BAUD_RATES, baud_rate};
+use sevenbot::names::{name_of, name_of_register};
+use sevenbot::table::settings;
+use sevenbot::{Register, Snapshot, Span, words};
+use toml::{Table, Value};
+
+use crate::failure::Failure;
+
+/// The format of the file. Another one is refused: it would be misunderstood.
+const FORMAT: u32 = 1;
+
+/// What such a file holds.
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(crate) struct SettingsFile {
+    format: u32,
+    /// Whose they were, as [`sevenbot::Identity::chip_name`] says it.
+    pub(crate) chip_id: String,
+    firmware: String,
+    settings: Table,
+}
+
+/// All registers from the first setting to the last.
+pub(crate) fn span() -> Span {
+    match (settings().next(), settings().last()) {
+        (Some(first), Some(last)) => Span::between(first, last),
+        _ => Span { address: 0, count: 0 },
+    }
+}
+
+impl SettingsFile {
+    /// The settings of an arm.
+    pub(crate) fn of(arm: &sevenbot::Identity, registers: &Snapshot) -> Self {
+        let settings = settings().map(|row| (name_of(row), value(row, registers))).collect();
+        Self { format: FORMAT, chip_id: arm.chip_name(), firmware: arm.version(), settings }
+    }
+
+    /// As it stands in the file.
+    pub(crate) fn text(&self) -> Result<String, Failure> {
+        let body = toml::to_string(self);
+        let body =
+            body.map_err(|error| Failure::Arm(format!("these settings cannot be written: {error}")))?;
+        Ok(format!(
+            "# Settings of a 7Bot V2. `sevenbot restore FILE` writes them back; what is left out stays as it \
+             is.\n{body}"
+        ))
+    }
+
+    /// Reads a file.
+    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+        let text = fs::read_to_string(path).map_err(|error| Failure::file(path, error))?;
+        let file: Self = toml::from_str(&text).map_err(|error| Failure::file(path, error))?;
+        if file.format == FORMAT {
+            Ok(file)
+        } else {
+            Err(Failure::file(path, format!("its format is {}; this program knows {FORMAT}", file.format)))
+        }
+    }
+
+    /// The registers with what stands in the file, over what they hold now.
+    pub(crate) fn over(&self, path: &Path, now: &Snapshot) -> Result<Snapshot, Failure> {
+        let mut wanted = now.clone();
+        for (name, value) in &self.settings {
+            let row = settings().find(|row| name_of(row) == *name);
+            let row = row.ok_or_else(|| Failure::file(path, format!("{name} is no setting")))?;
+            let bytes = bytes(row, value).map_err(|reason| Failure::file(path, reason))?;
+            let places = (row.address..).zip(bytes);
+            places.for_each(|(address, byte)| put(&mut wanted, address, byte));
+        }
+        Ok(wanted)
+    }
+}
+
+fn put(registers: &mut Snapshot, address: u8, byte: u8) {
+    let place = usize::from(address.wrapping_sub(registers.address));
+    if let Some(value) = registers.values.get_mut(place) {
+        *value = byte;
+    }
+}
+
+/// How a setting stands in the file.
+fn value(row: &Register, registers: &Snapshot) -> Value {
+    let number = |address| Value::from(i64::from(row.range.decode(registers.at(address))));
+    match *row {
+        BAUD_RATE => Value::from(i64::from(baud_rate(registers.byte(row)))),
+        _ if row.per_joint => Value::Array(Span::of(row).addresses().map(number).collect()),
+        _ => number(row.address),
+    }
+}
+
+/// The bytes for what stands in the file.
+fn bytes(row: &Register, value: &Value) -> Result<Vec<u8>, String> {
+    let values = value.as_array().map_or(std::slice::from_ref(value), Vec::as_slice);
+    if values.len() != usize::from(row.count) {
+        let (name, count, given) = (name_of(row), row.count, values.len());
+        return Err(format!("{name} has {given} values, not {count}"));
+    }
+    (row.address..).zip(values).map(|(address, value)| byte(row, address, value)).collect()
+}
+
+fn byte(row: &Register, address: u8, value: &Value) -> Result<u8, String> {
+    let number = value.as_integer();
+    if *row == BAUD_RATE {
+        let code = BAUD_RATES.iter().zip(0..).find(|&(&rate, _)| number == Some(i64::from(rate)));
+        return code.map(|(_, code)| code).ok_or_else(|| format!("the arm does not know {value} baud"));
+    }
+    let byte =
+        number.and_then(|number| i16::try_from(number).ok()).and_then(|number| row.range.encode(number));
+    byte.ok_or_else(|| {
+        format!("{value} is out of range: {} takes {}", name_of_register(address), words::range(address))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sevenbot::map::{DEVICE_ID, OFFSET};
+
+    fn registers() -> Snapshot {
+        Snapshot { address: DEVICE_ID.address, values: vec![42, 3, 0, 0x85, 0, 0, 0, 0, 16] }
+    }
+
+    fn file(settings: &str) -> SettingsFile {
+        toml::from_str(&format!("format=1\nchip-id=''\nfirmware=''\n[settings]\n{settings}")).expect("TOML")
+    }
+
+    fn refused(settings: &str) -> String {
+        match file(settings).over(Path::new("x"), &registers()) {
+            Err(Failure::File { reason, .. }) => reason,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn settings_stand_in_the_file_in_their_units() {
+        let settings = settings().map(|row| (name_of(row), value(row, &registers()))).collect::<Table>();
+        let text = toml::to_string(&settings).expect("TOML");
+        assert_eq!(text, "baud-rate = 1000000\ndevice-id = 42\noffset = [0, -5, 0, 0, 0, 0, 16]\n");
+        let back = file(&text).over(Path::new("x"), &Snapshot { values: vec![0; 9], ..registers() });
+        assert_eq!(back.expect("what was written is read"), registers());
+    }
+
+    #[test]
+    fn what_is_left_out_stays_as_it_is() {
+        let wanted = file("device-id = 7").over(Path::new("x"), &registers()).expect("a setting");
+        assert_eq!(wanted.values, [7, 3, 0, 0x85, 0, 0, 0, 0, 16]);
+    }
+
+    #[test]
+    fn what_is_no_setting_or_out_of_range_is_refused() {
+        assert_eq!(refused("speed = 5"), "speed is no setting");
+        assert_eq!(
+            refused("offset = [0, 17, 0, 0, 0, 0, 0]"),
+            "17 is out of range: offset.2 takes -16 to 16"
+        );
+        assert_eq!(refused("offset = [1]"), "offset has 1 values, not 7");
+        assert_eq!(refused("device-id = 300"), "300 is out of range: device-id takes 0 to 255");
+        assert_eq!(refused("device-id = 'x'").split(':').count(), 2);
+        assert_eq!(refused("baud-rate = 5"), "the arm does not know 5 baud");
+        assert_eq!(span(), Span::between(&DEVICE_ID, &OFFSET));
+    }
+}

@@ -1,0 +1,206 @@
+//! The register table for readers and for other languages, written from the table the arm is built from.
+
+use std::fmt::Write as _;
+
+use protocol_core::registers::map::BAUD_RATES;
+use protocol_core::registers::{Access, JOINTS, MAP, Range, Region, Register};
+use serde_json::{Value, json};
+
+use crate::snapshot::Span;
+
+/// The rows that are settings: kept over power cuts, and writable.
+pub fn settings() -> impl Iterator<Item = &'static Register> {
+    MAP.iter().filter(|row| row.region == Region::Eeprom && row.access == Access::ReadWrite)
+}
+
+/// Columns for a terminal.
+#[must_use]
+pub fn text() -> String {
+    let head = ["address", "name", "region", "access", "range", "default", "unit"].map(str::to_owned);
+    let rows: Vec<_> = std::iter::once(head).chain(MAP.iter().map(cells)).collect();
+    let width =
+        |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
+    let mut text = String::new();
+    for row in &rows {
+        let padded = row.iter().enumerate().map(|(column, cell)| {
+            let width = width(column).unwrap_or_default();
+            format!("{cell:<width$}")
+        });
+        push_line(&mut text, padded.collect::<Vec<_>>().join("  ").trim_end());
+    }
+    text
+}
+
+/// The table of `docs/registers.md`.
+#[must_use]
+pub fn markdown() -> String {
+    let mut page = "\
+| address | name | region | access | range | default | unit | meaning |
+| --- | --- | --- | --- | --- | --- | --- | --- |
+"
+    .to_owned();
+    for row in MAP {
+        let [address, name, rest @ ..] = cells(row);
+        let joints = if row.per_joint { format!("Joint 1..{JOINTS}. ") } else { String::new() };
+        let line = format!("| {address} | `{name}` | {} | {joints}{} |", rest.join(" | "), words(row));
+        push_line(&mut page, &line);
+    }
+    page
+}
+
+/// One array with an object for each row, in one line.
+#[must_use]
+pub fn json() -> String {
+    let rows: Vec<Value> = MAP.iter().map(object).collect();
+    let text = serde_json::to_string(&rows).unwrap_or_default();
+    format!("{text}\n")
+}
+
+/// Constants for C and C++.
+#[must_use]
+pub fn c_header() -> String {
+    let mut header = "\
+/* Registers of the 7Bot V2. Written by `sevenbot registers --format c`. */
+#ifndef SEVENBOT_REGISTERS_H
+#define SEVENBOT_REGISTERS_H
+"
+    .to_owned();
+    for row in MAP {
+        push_line(&mut header, &format!("\n/* {} */", words(row)));
+        for (suffix, number) in numbers(row) {
+            push_line(&mut header, &format!("#define SEVENBOT_{}{suffix} {number}", row.name));
+        }
+    }
+    let rates = BAUD_RATES.map(|rate| format!("{rate}L")).join(", ");
+    push_line(&mut header, "\n/* Baud rates by their codes. */");
+    push_line(&mut header, &format!("#define SEVENBOT_BAUD_RATES {{ {rates} }}"));
+    push_line(&mut header, "\n#endif");
+    header
+}
+
+/// Constants for Python.
+#[must_use]
+pub fn python() -> String {
+    let mut module =
+        "\"\"\"Registers of the 7Bot V2. Written by `sevenbot registers --format python`.\"\"\"\n".to_owned();
+    for row in MAP {
+        push_line(&mut module, &format!("\n# {}", words(row)));
+        for (suffix, number) in numbers(row) {
+            push_line(&mut module, &format!("{}{suffix} = {number}", row.name));
+        }
+    }
+    let rates = BAUD_RATES.map(|rate| rate.to_string()).join(", ");
+    push_line(&mut module, &format!("\n# Baud rates by their codes.\nBAUD_RATES = ({rates})"));
+    module
+}
+
+fn push_line(text: &mut String, line: &str) {
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "{line}");
+}
+
+/// Address, name, region, access, range, default, unit.
+fn cells(row: &Register) -> [String; 7] {
+    [
+        addresses(row),
+        row.name.to_owned(),
+        region(row.region).to_owned(),
+        access(row.access).to_owned(),
+        range(row).map_or_else(|| "-".to_owned(), |(low, high)| format!("{low}..{high}")),
+        default(row),
+        row.unit.symbol().to_owned(),
+    ]
+}
+
+/// What a program wants to know of a row: the end of the constant's name, and its value.
+fn numbers(row: &Register) -> Vec<(&'static str, i16)> {
+    let mut numbers = vec![("", i16::from(row.address))];
+    if row.count > 1 {
+        numbers.push(("_COUNT", i16::from(row.count)));
+    }
+    if let Some((low, high)) = range(row).filter(|_| row.access == Access::ReadWrite) {
+        numbers.extend([("_MIN", low), ("_MAX", high)]);
+    }
+    numbers
+}
+
+fn object(row: &Register) -> Value {
+    let (low, high) = range(row).unzip();
+    let defaults = row.defaults.map(|byte| row.range.decode(byte));
+    let [default, ..] = defaults;
+    json!({
+        "address": row.address,
+        "count": row.count,
+        "name": row.name,
+        "per_joint": row.per_joint,
+        "region": region(row.region),
+        "access": access(row.access),
+        "min": low,
+        "max": high,
+        "sign_magnitude": matches!(row.range, Range::SignMagnitude(_)),
+        "default": if row.per_joint { json!(defaults) } else { json!(default) },
+        "unit": row.unit.symbol(),
+        "meaning": words(row),
+    })
+}
+
+fn addresses(row: &Register) -> String {
+    if row.count == 1 { row.address.to_string() } else { Span::of(row).to_string() }
+}
+
+const fn region(region: Region) -> &'static str {
+    match region {
+        Region::Rom => "ROM",
+        Region::Eeprom => "EEPROM",
+        Region::Ram => "RAM",
+    }
+}
+
+const fn access(access: Access) -> &'static str {
+    match access {
+        Access::ReadOnly => "RO",
+        Access::ReadWrite => "RW",
+        Access::Reserved => "reserved",
+    }
+}
+
+/// The numbers of a row, where they are fewer than a byte has, or may be written.
+fn range(row: &Register) -> Option<(i16, i16)> {
+    let is_any_byte = row.range == Range::UpTo(u8::MAX) && row.access != Access::ReadWrite;
+    (!is_any_byte).then(|| row.range.bounds())
+}
+
+fn default(row: &Register) -> String {
+    let numbers = row.defaults.map(|byte| row.range.decode(byte).to_string());
+    match numbers.as_slice() {
+        [first, rest @ ..] if rest.iter().all(|number| number == first) => first.clone(),
+        _ => numbers.join(" "),
+    }
+}
+
+fn words(row: &Register) -> String {
+    row.doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_markdown_table_is_the_documented_one() {
+        assert!(include_str!("../../docs/registers.md").ends_with(&markdown()));
+    }
+
+    #[test]
+    fn each_form_has_every_row() {
+        let json: Vec<Value> = serde_json::from_str(&json()).expect("JSON");
+        assert_eq!(json.len(), MAP.len());
+        for row in MAP {
+            assert!(c_header().contains(&format!("#define SEVENBOT_{} {}\n", row.name, row.address)));
+            assert!(python().contains(&format!("\n{} = {}\n", row.name, row.address)));
+            assert!(text().lines().any(|line| line.split_whitespace().nth(1) == Some(row.name)));
+        }
+        assert_eq!(text().lines().count(), MAP.len() + 1);
+        assert!(c_header().contains("SEVENBOT_OFFSET_MIN -16"));
+    }
+}

@@ -1,0 +1,245 @@
+//! Traffic of both directions, as a listener on the line hears it: frames, and what is none.
+//!
+//! ```text
+//!   .. 01 02 AA 77 03 36 07 81 CE AA 77 03 36 07 5A 5A .. 43 81 ..
+//!      ╰ noise ╯╰ read 54..60  ─╯ ╰ answer ────────────────╯
+//! ```
+//!
+//! A read and its answer begin alike. The checksum tells them apart: only one of the two readings has a right
+//! one. Knows no register, and no clock: whoever hears silence says so.
+
+use protocol_core::wire::frame::{self, CRC_LENGTH, Defect, Direction, Frame, MAX_LENGTH, PREFIX_LENGTH};
+use protocol_core::wire::{Function, ToArm, ToHost};
+
+/// Something heard.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// A request for `count` registers from `address` on.
+    Read {
+        /// The first register.
+        address: u8,
+        /// How many.
+        count: u8,
+    },
+    /// The answer to a read, or a report.
+    Answer {
+        /// The first register.
+        address: u8,
+        /// One byte a register.
+        values: Vec<u8>,
+    },
+    /// A request to write.
+    Write {
+        /// The first register.
+        address: u8,
+        /// One byte a register.
+        values: Vec<u8>,
+    },
+    /// A frame with a right checksum that reaches past register 255 (D2).
+    TooFar {
+        /// The first register.
+        address: u8,
+        /// How many.
+        count: u8,
+    },
+    /// Bytes that are no frame.
+    Noise(Vec<u8>),
+}
+
+/// Hears bytes, and says what they are.
+///
+/// ```
+/// use sevenbot::traffic::{Heard, Listener};
+///
+/// let mut listener = Listener::default();
+/// listener.hear(b"\x01\xAA\x77\x03\x36\x07\x81\xCE");
+/// assert_eq!(listener.next(), Some(Heard::Noise(vec![1])));
+/// assert_eq!(listener.next(), Some(Heard::Read { address: 54, count: 7 }));
+/// assert_eq!(listener.next(), None);
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Listener {
+    waiting: Vec<u8>,
+    /// So many of the waiting bytes are no frame, or no beginning of one.
+    noise: usize,
+}
+
+/// What the beginning of some bytes is.
+enum Verdict {
+    Frame(Heard, usize),
+    Unfinished,
+    NoFrame,
+}
+
+impl Listener {
+    /// Bytes came.
+    pub fn hear(&mut self, bytes: &[u8]) {
+        self.waiting.extend(bytes);
+    }
+
+    /// What was heard next; `None` while that depends on bytes to come.
+    #[expect(clippy::should_implement_trait, reason = "none now does not mean none later")]
+    pub fn next(&mut self) -> Option<Heard> {
+        self.advance(false)
+    }
+
+    /// What was heard next, now that nothing more belongs to it: the line is silent, or at its end.
+    pub fn next_before_silence(&mut self) -> Option<Heard> {
+        self.advance(true)
+    }
+
+    fn advance(&mut self, is_over: bool) -> Option<Heard> {
+        while let Some(rest) = self.waiting.get(self.noise..).filter(|rest| !rest.is_empty()) {
+            match judge(rest) {
+                Verdict::Frame(..) if self.noise > 0 => return Some(self.take_noise()),
+                Verdict::Frame(heard, length) => {
+                    self.waiting.drain(..length);
+                    return Some(heard);
+                }
+                Verdict::Unfinished if !is_over => return None,
+                Verdict::Unfinished | Verdict::NoFrame => self.noise += 1,
+            }
+            // Noise without an end is told in pieces.
+            if self.noise >= MAX_LENGTH {
+                return Some(self.take_noise());
+            }
+        }
+        (is_over && self.noise > 0).then(|| self.take_noise())
+    }
+
+    fn take_noise(&mut self) -> Heard {
+        Heard::Noise(self.waiting.drain(..std::mem::take(&mut self.noise)).collect())
+    }
+}
+
+fn judge(bytes: &[u8]) -> Verdict {
+    match (reading::<ToArm>(bytes), reading::<ToHost>(bytes)) {
+        (found @ Verdict::Frame(..), _) | (_, found @ Verdict::Frame(..)) => found,
+        (Verdict::Unfinished, _) | (_, Verdict::Unfinished) => Verdict::Unfinished,
+        _ => Verdict::NoFrame,
+    }
+}
+
+/// What the bytes are if they go in direction `D`.
+fn reading<D: Direction>(bytes: &[u8]) -> Verdict {
+    match frame::parse::<D>(bytes) {
+        Ok((rest, found)) => Verdict::Frame(heard::<D>(&found), bytes.len() - rest.len()),
+        Err(error) if error.is_incomplete() => Verdict::Unfinished,
+        Err(error) => {
+            let mut verdict = Verdict::NoFrame;
+            // The parser's own error type stays in its crate; only the defect in it comes out.
+            let _ = error.map(|defect| verdict = too_far::<D>(defect, bytes));
+            verdict
+        }
+    }
+}
+
+/// A frame that is right but for its range has a length of its own; anything else wrong is no frame.
+fn too_far<D: Direction>(defect: Defect, bytes: &[u8]) -> Verdict {
+    let (Defect::MalformedRange { address }, [_, _, code, _, count, ..]) = (defect, bytes) else {
+        return Verdict::NoFrame;
+    };
+    let function = if *code == Function::Write as u8 { Function::Write } else { Function::Read };
+    let length = PREFIX_LENGTH + D::data_length(function, *count) + CRC_LENGTH;
+    Verdict::Frame(Heard::TooFar { address, count: *count }, length)
+}
+
+fn heard<D: Direction>(found: &Frame<'_>) -> Heard {
+    let (address, count, values) = (found.address, found.count, found.data.to_vec());
+    match found.function {
+        Function::Write => Heard::Write { address, values },
+        Function::Read if D::data_length(Function::Read, 1) == 0 => Heard::Read { address, count },
+        Function::Read => Heard::Answer { address, values },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol_core::request::{Reply, Request};
+    use protocol_core::wire::FrameBuffer;
+
+    const READ: &[u8] = b"\xaa\x77\x03\x36\x07\x81\xce";
+    const UNLOCK: &[u8] = b"\xaa\x77\x06\x1c\x01\x00\x2c\xc4";
+    const ANSWER: &[u8] = b"\xaa\x77\x03\x36\x07\x5a\x5a\x41\x5a\x5a\x5a\x50\x43\x81";
+
+    fn all(listener: &mut Listener) -> Vec<Heard> {
+        std::iter::from_fn(|| listener.next_before_silence()).collect()
+    }
+
+    fn heard_in(bytes: &[u8]) -> Vec<Heard> {
+        let mut listener = Listener::default();
+        listener.hear(bytes);
+        all(&mut listener)
+    }
+
+    fn conversation() -> (Vec<u8>, Vec<Heard>) {
+        let bytes = [READ, ANSWER, b"\x01\x02\xaa", UNLOCK].concat();
+        let heard = vec![
+            Heard::Read { address: 54, count: 7 },
+            Heard::Answer { address: 54, values: vec![90, 90, 65, 90, 90, 90, 80] },
+            Heard::Noise(vec![1, 2, 0xAA]),
+            Heard::Write { address: 28, values: vec![0] },
+        ];
+        (bytes, heard)
+    }
+
+    #[test]
+    fn both_directions_are_told_apart() {
+        let (bytes, heard) = conversation();
+        assert_eq!(heard_in(&bytes), heard);
+    }
+
+    #[test]
+    fn any_cutting_gives_the_same() {
+        let (bytes, heard) = conversation();
+        for size in 1..bytes.len() {
+            let mut listener = Listener::default();
+            let mut told = Vec::new();
+            for piece in bytes.chunks(size) {
+                listener.hear(piece);
+                told.extend(std::iter::from_fn(|| listener.next()));
+            }
+            told.extend(all(&mut listener));
+            assert_eq!(told, heard, "pieces of {size}");
+        }
+    }
+
+    #[test]
+    fn damage_is_noise_and_the_frame_behind_it_is_heard() {
+        let mut damaged = ANSWER.to_vec();
+        damaged[6] ^= 1;
+        let heard = heard_in(&[&damaged, READ].concat());
+        assert_eq!(heard, [Heard::Noise(damaged), Heard::Read { address: 54, count: 7 }]);
+        assert_eq!(heard_in(&READ[..4]), [Heard::Noise(READ[..4].to_vec())], "cut short");
+    }
+
+    #[test]
+    fn an_unfinished_frame_is_waited_for_until_silence() {
+        let mut listener = Listener::default();
+        let header = b"\xaa\x77\x06\x00\xff";
+        listener.hear(&[header, READ].concat());
+        assert_eq!(listener.next(), None, "a long write may go on like this");
+        assert_eq!(listener.next_before_silence(), Some(Heard::Noise(header.to_vec())));
+        assert_eq!(listener.next(), Some(Heard::Read { address: 54, count: 7 }));
+    }
+
+    #[test]
+    fn a_range_beyond_the_last_register_is_a_frame_that_reaches_too_far() {
+        let mut frame = FrameBuffer::new();
+        Request::Read { address: 250, count: 7 }.encode(&mut frame);
+        assert_eq!(heard_in(&frame), [Heard::TooFar { address: 250, count: 7 }]);
+        Reply { address: 250, values: &[0; 7] }.encode(&mut frame);
+        assert_eq!(heard_in(&frame), [Heard::TooFar { address: 250, count: 7 }]);
+    }
+
+    #[test]
+    fn noise_without_an_end_does_not_pile_up() {
+        let mut listener = Listener::default();
+        for _ in 0..100 {
+            listener.hear(&[0x55; 100]);
+            while listener.next().is_some() {}
+        }
+        assert!(listener.waiting.len() < MAX_LENGTH);
+    }
+}

@@ -1,0 +1,173 @@
+//! Traffic in words, by the names of the register table.
+//!
+//! ```text
+//!   read present-position 1..7
+//!   answer present-position 1..7 = 90 90 65 90 90 90 80 °
+//!   write eeprom-lock = 0 (open), motor-state = 1 (servo)
+//!   3 bytes that are no frame: 01 02 03
+//! ```
+
+use std::fmt;
+
+use protocol_core::registers::Register;
+use protocol_core::registers::map::find;
+
+use crate::names::name_of;
+use crate::snapshot::{Snapshot, Span};
+use crate::traffic::Heard;
+use crate::words::meaning;
+
+/// A read of more rows than this is named by its ends.
+const ROWS_NAMED: usize = 3;
+/// Of a long stretch of noise so many bytes are shown.
+const NOISE_SHOWN: usize = 32;
+
+impl fmt::Display for Heard {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Read { address, count } => {
+                write!(out, "read {}", names(Span { address: *address, count: *count }))
+            }
+            Self::Answer { address, values } => write!(out, "answer {}", assignments(*address, values)),
+            Self::Write { address, values } => write!(out, "write {}", assignments(*address, values)),
+            Self::TooFar { address, count } => {
+                write!(out, "{count} registers from {address} on, which is past the last one, 255")
+            }
+            Self::Noise(bytes) => noise(bytes, out),
+        }
+    }
+}
+
+fn noise(bytes: &[u8], out: &mut fmt::Formatter<'_>) -> fmt::Result {
+    match bytes {
+        [0xAA, 0x77, 3 | 6, ..] => write!(out, "a damaged frame or a part of one, {} bytes:", bytes.len())?,
+        [_] => write!(out, "1 byte that is no frame:")?,
+        _ => write!(out, "{} bytes that are no frame:", bytes.len())?,
+    }
+    for byte in bytes.iter().take(NOISE_SHOWN) {
+        write!(out, " {byte:02X}")?;
+    }
+    if bytes.len() > NOISE_SHOWN { out.write_str(" ..") } else { Ok(()) }
+}
+
+/// A stretch of registers inside one row of the table, or inside one of its holes.
+#[derive(Clone, Copy)]
+struct Stretch {
+    row: Option<&'static Register>,
+    first: u8,
+    last: u8,
+}
+
+fn stretches(span: Span) -> Vec<Stretch> {
+    let mut stretches: Vec<Stretch> = Vec::new();
+    for address in span.addresses() {
+        let row = find(address);
+        match stretches.last_mut() {
+            Some(stretch) if stretch.row == row => stretch.last = address,
+            _ => stretches.push(Stretch { row, first: address, last: address }),
+        }
+    }
+    stretches
+}
+
+impl Stretch {
+    /// `target-position 1..7`, `device-id`, `no register 61..63`: joints by their numbers, the rest by address.
+    fn name(self) -> String {
+        let Some(row) = self.row else { return format!("no register {}", range(self.first, self.last)) };
+        match (row.joint_at(self.first), row.joint_at(self.last)) {
+            (Some(first), Some(last)) => format!("{} {}", name_of(row), range(first.number(), last.number())),
+            _ if self.count() < usize::from(row.count) => {
+                format!("{} ({} of it)", name_of(row), range(self.first, self.last))
+            }
+            _ => name_of(row),
+        }
+    }
+
+    fn count(self) -> usize {
+        usize::from(self.last.saturating_sub(self.first)) + 1
+    }
+
+    fn assignment(self, values: &Snapshot) -> String {
+        let bytes: Vec<u8> = (self.first..=self.last).map(|address| values.at(address)).collect();
+        let number = |&byte: &u8| self.row.map_or(i16::from(byte), |row| row.range.decode(byte)).to_string();
+        let numbers = bytes.iter().map(number).collect::<Vec<_>>().join(" ");
+        let comment = match (self.row, bytes.as_slice()) {
+            (Some(row), [byte]) => comment(row, *byte),
+            (Some(row), _) => behind(row.unit.symbol()),
+            (None, _) => String::new(),
+        };
+        format!("{} = {numbers}{comment}", self.name())
+    }
+}
+
+/// What a single value means: a unit as it is, a word in brackets.
+fn comment(row: &Register, byte: u8) -> String {
+    let words = meaning(row, byte);
+    if words == row.unit.symbol() || words.is_empty() { behind(&words) } else { format!(" ({words})") }
+}
+
+fn behind(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
+fn range(first: u8, last: u8) -> String {
+    if first == last { first.to_string() } else { format!("{first}..{last}") }
+}
+
+fn names(span: Span) -> String {
+    let stretches = stretches(span);
+    match stretches.as_slice() {
+        [] => span.to_string(),
+        [first, .., last] if stretches.len() > ROWS_NAMED => {
+            format!("{} to {} ({span})", first.name(), last.name())
+        }
+        _ => stretches.iter().map(|stretch| stretch.name()).collect::<Vec<_>>().join(", "),
+    }
+}
+
+fn assignments(address: u8, values: &[u8]) -> String {
+    let values = Snapshot { address, values: values.to_vec() };
+    let stretches = stretches(values.span());
+    if stretches.is_empty() {
+        return values.span().to_string();
+    }
+    stretches.iter().map(|stretch| stretch.assignment(&values)).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_and_answers_read_by_the_table() {
+        let read = |address, count| Heard::Read { address, count }.to_string();
+        assert_eq!(read(54, 7), "read present-position 1..7");
+        assert_eq!(read(60, 3), "read present-position 7, no register 61..62");
+        assert_eq!(read(3, 2), "read chip-id (3..4 of it)");
+        assert_eq!(read(10, 0), "read no register at 10");
+        assert_eq!(read(0, 61), "read device-code to present-position 1..7 (0..60)");
+        let answer = Heard::Answer { address: 54, values: vec![90, 90, 65, 90, 90, 90, 80] };
+        assert_eq!(answer.to_string(), "answer present-position 1..7 = 90 90 65 90 90 90 80 °");
+    }
+
+    #[test]
+    fn values_have_their_meaning_behind_them() {
+        let write = |address, values: &[u8]| Heard::Write { address, values: values.to_vec() }.to_string();
+        assert_eq!(write(28, &[0, 1]), "write eeprom-lock = 0 (open), motor-state = 1 (servo)");
+        assert_eq!(write(13, &[0x85, 3]), "write offset 1..2 = -5 3 °");
+        assert_eq!(write(53, &[30]), "write feedback-frequency = 30 Hz");
+        assert_eq!(write(254, &[74]), "write supply-voltage = 74 (7.4 V)");
+        assert_eq!(write(46, &[]), "write no register at 46");
+    }
+
+    #[test]
+    fn noise_is_shown_as_such() {
+        assert_eq!(Heard::Noise(vec![1]).to_string(), "1 byte that is no frame: 01");
+        assert_eq!(Heard::Noise(vec![1, 0xAB]).to_string(), "2 bytes that are no frame: 01 AB");
+        let damaged = Heard::Noise(vec![0xAA, 0x77, 3, 1]).to_string();
+        assert_eq!(damaged, "a damaged frame or a part of one, 4 bytes: AA 77 03 01");
+        assert!(Heard::Noise(vec![0; 40]).to_string().ends_with("00 .."));
+        let far = Heard::TooFar { address: 250, count: 7 }.to_string();
+        assert_eq!(far, "7 registers from 250 on, which is past the last one, 255");
+    }
+}
