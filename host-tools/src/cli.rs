@@ -50,6 +50,9 @@ pub(crate) struct Global {
     /// Show facts as JSON, one value a line.
     #[arg(long, global = true)]
     pub(crate) json: bool,
+    /// Show every frame, in words, on standard error.
+    #[arg(short, long, global = true)]
+    pub(crate) verbose: bool,
 }
 
 #[derive(Debug, Subcommand)]

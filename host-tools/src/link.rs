@@ -10,9 +10,11 @@ use protocol_core::time;
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
 use serialport::SerialPort;
+use tracing::{debug, trace};
 
 use crate::error::{Error, Heard};
 use crate::snapshot::Snapshot;
+use crate::traffic::Traffic;
 
 /// The shortest time-out that every platform takes for what it is.
 const SHORTEST_WAIT: Duration = Duration::from_millis(1);
@@ -43,6 +45,7 @@ impl Link {
     pub(crate) fn send(&mut self, request: &Request<'_>) -> Result<(), Error> {
         let mut frame = FrameBuffer::new();
         request.encode(&mut frame);
+        trace!("-> {}", Traffic::from(request));
         self.port.set_timeout(WRITE_TIMEOUT).map_err(lost)?;
         self.port.write_all(&frame).map_err(|error| match error.kind() {
             ErrorKind::TimedOut => Error::Stalled,
@@ -93,10 +96,15 @@ impl Link {
             match found.map(Reply::from_frame) {
                 Ok(Some(reply)) => {
                     self.heard.other_frames += 1;
-                    return Some(Snapshot { address: reply.address, values: reply.values.to_vec() });
+                    let reply = Snapshot { address: reply.address, values: reply.values.to_vec() };
+                    trace!("<- {}", Traffic::from(&reply));
+                    return Some(reply);
                 }
                 Ok(None) => self.heard.other_frames += 1,
-                Err(_) => self.heard.damaged_frames += 1,
+                Err(defect) => {
+                    self.heard.damaged_frames += 1;
+                    debug!("<- a damaged frame: {defect:?}");
+                }
             }
         }
         None

@@ -23,9 +23,12 @@ mod progress;
 mod session;
 mod settings_file;
 
+use std::io;
 use std::process::ExitCode;
 
 use clap::Parser;
+use tracing::level_filters::LevelFilter;
+use tracing_subscriber::fmt::time::uptime;
 
 use crate::cli::Cli;
 use crate::output::Output;
@@ -33,6 +36,9 @@ use crate::session::Session;
 
 fn main() -> ExitCode {
     let Cli { global, command } = Cli::parse();
+    if global.verbose {
+        show_frames();
+    }
     let output = Output::stdout(global.json);
     let mut session = Session { port: global.port, baud: global.baud, output };
     match command.run(&mut session) {
@@ -42,4 +48,16 @@ fn main() -> ExitCode {
             failure.exit_code()
         }
     }
+}
+
+/// What the library has to say of every frame goes to standard error from now on.
+fn show_frames() {
+    tracing_subscriber::fmt()
+        .with_max_level(LevelFilter::TRACE)
+        .with_target(false)
+        .with_level(false)
+        .with_ansi(false)
+        .with_timer(uptime())
+        .with_writer(io::stderr)
+        .init();
 }

@@ -8,12 +8,15 @@
 //! A read and its answer begin alike. The checksum tells them apart: only one of the two readings has a right
 //! one. Knows no register, and no clock: whoever hears silence says so.
 
+use protocol_core::request::Request;
 use protocol_core::wire::frame::{self, CRC_LENGTH, Defect, Direction, Frame, MAX_LENGTH, PREFIX_LENGTH};
 use protocol_core::wire::{Function, ToArm, ToHost};
 
+use crate::snapshot::Snapshot;
+
 /// Something heard.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Heard {
+pub enum Traffic {
     /// A request for `count` registers from `address` on.
     Read {
         /// The first register.
@@ -46,15 +49,30 @@ pub enum Heard {
     Noise(Vec<u8>),
 }
 
+impl From<&Request<'_>> for Traffic {
+    fn from(request: &Request<'_>) -> Self {
+        match *request {
+            Request::Read { address, count } => Self::Read { address, count },
+            Request::Write { address, values } => Self::Write { address, values: values.to_vec() },
+        }
+    }
+}
+
+impl From<&Snapshot> for Traffic {
+    fn from(answer: &Snapshot) -> Self {
+        Self::Answer { address: answer.address, values: answer.values.clone() }
+    }
+}
+
 /// Hears bytes, and says what they are.
 ///
 /// ```
-/// use sevenbot::traffic::{Heard, Listener};
+/// use sevenbot::traffic::{Traffic, Listener};
 ///
 /// let mut listener = Listener::default();
 /// listener.hear(b"\x01\xAA\x77\x03\x36\x07\x81\xCE");
-/// assert_eq!(listener.next(), Some(Heard::Noise(vec![1])));
-/// assert_eq!(listener.next(), Some(Heard::Read { address: 54, count: 7 }));
+/// assert_eq!(listener.next(), Some(Traffic::Noise(vec![1])));
+/// assert_eq!(listener.next(), Some(Traffic::Read { address: 54, count: 7 }));
 /// assert_eq!(listener.next(), None);
 /// ```
 #[derive(Clone, Debug, Default)]
@@ -66,7 +84,7 @@ pub struct Listener {
 
 /// What the beginning of some bytes is.
 enum Verdict {
-    Frame(Heard, usize),
+    Frame(Traffic, usize),
     Unfinished,
     NoFrame,
 }
@@ -79,16 +97,16 @@ impl Listener {
 
     /// What was heard next; `None` while that depends on bytes to come.
     #[expect(clippy::should_implement_trait, reason = "none now does not mean none later")]
-    pub fn next(&mut self) -> Option<Heard> {
+    pub fn next(&mut self) -> Option<Traffic> {
         self.advance(false)
     }
 
     /// What was heard next, now that nothing more belongs to it: the line is silent, or at its end.
-    pub fn next_before_silence(&mut self) -> Option<Heard> {
+    pub fn next_before_silence(&mut self) -> Option<Traffic> {
         self.advance(true)
     }
 
-    fn advance(&mut self, is_over: bool) -> Option<Heard> {
+    fn advance(&mut self, is_over: bool) -> Option<Traffic> {
         while let Some(rest) = self.waiting.get(self.noise..).filter(|rest| !rest.is_empty()) {
             match judge(rest) {
                 Verdict::Frame(..) if self.noise > 0 => return Some(self.take_noise()),
@@ -107,8 +125,8 @@ impl Listener {
         (is_over && self.noise > 0).then(|| self.take_noise())
     }
 
-    fn take_noise(&mut self) -> Heard {
-        Heard::Noise(self.waiting.drain(..std::mem::take(&mut self.noise)).collect())
+    fn take_noise(&mut self) -> Traffic {
+        Traffic::Noise(self.waiting.drain(..std::mem::take(&mut self.noise)).collect())
     }
 }
 
@@ -141,45 +159,45 @@ fn too_far<D: Direction>(defect: Defect, bytes: &[u8]) -> Verdict {
     };
     let function = if *code == Function::Write as u8 { Function::Write } else { Function::Read };
     let length = PREFIX_LENGTH + D::data_length(function, *count) + CRC_LENGTH;
-    Verdict::Frame(Heard::TooFar { address, count: *count }, length)
+    Verdict::Frame(Traffic::TooFar { address, count: *count }, length)
 }
 
-fn heard<D: Direction>(found: &Frame<'_>) -> Heard {
+fn heard<D: Direction>(found: &Frame<'_>) -> Traffic {
     let (address, count, values) = (found.address, found.count, found.data.to_vec());
     match found.function {
-        Function::Write => Heard::Write { address, values },
-        Function::Read if D::data_length(Function::Read, 1) == 0 => Heard::Read { address, count },
-        Function::Read => Heard::Answer { address, values },
+        Function::Write => Traffic::Write { address, values },
+        Function::Read if D::data_length(Function::Read, 1) == 0 => Traffic::Read { address, count },
+        Function::Read => Traffic::Answer { address, values },
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol_core::request::{Reply, Request};
+    use protocol_core::request::Reply;
     use protocol_core::wire::FrameBuffer;
 
     const READ: &[u8] = b"\xaa\x77\x03\x36\x07\x81\xce";
     const UNLOCK: &[u8] = b"\xaa\x77\x06\x1c\x01\x00\x2c\xc4";
     const ANSWER: &[u8] = b"\xaa\x77\x03\x36\x07\x5a\x5a\x41\x5a\x5a\x5a\x50\x43\x81";
 
-    fn all(listener: &mut Listener) -> Vec<Heard> {
+    fn all(listener: &mut Listener) -> Vec<Traffic> {
         std::iter::from_fn(|| listener.next_before_silence()).collect()
     }
 
-    fn heard_in(bytes: &[u8]) -> Vec<Heard> {
+    fn heard_in(bytes: &[u8]) -> Vec<Traffic> {
         let mut listener = Listener::default();
         listener.hear(bytes);
         all(&mut listener)
     }
 
-    fn conversation() -> (Vec<u8>, Vec<Heard>) {
+    fn conversation() -> (Vec<u8>, Vec<Traffic>) {
         let bytes = [READ, ANSWER, b"\x01\x02\xaa", UNLOCK].concat();
         let heard = vec![
-            Heard::Read { address: 54, count: 7 },
-            Heard::Answer { address: 54, values: vec![90, 90, 65, 90, 90, 90, 80] },
-            Heard::Noise(vec![1, 2, 0xAA]),
-            Heard::Write { address: 28, values: vec![0] },
+            Traffic::Read { address: 54, count: 7 },
+            Traffic::Answer { address: 54, values: vec![90, 90, 65, 90, 90, 90, 80] },
+            Traffic::Noise(vec![1, 2, 0xAA]),
+            Traffic::Write { address: 28, values: vec![0] },
         ];
         (bytes, heard)
     }
@@ -210,8 +228,8 @@ mod tests {
         let mut damaged = ANSWER.to_vec();
         damaged[6] ^= 1;
         let heard = heard_in(&[&damaged, READ].concat());
-        assert_eq!(heard, [Heard::Noise(damaged), Heard::Read { address: 54, count: 7 }]);
-        assert_eq!(heard_in(&READ[..4]), [Heard::Noise(READ[..4].to_vec())], "cut short");
+        assert_eq!(heard, [Traffic::Noise(damaged), Traffic::Read { address: 54, count: 7 }]);
+        assert_eq!(heard_in(&READ[..4]), [Traffic::Noise(READ[..4].to_vec())], "cut short");
     }
 
     #[test]
@@ -220,17 +238,17 @@ mod tests {
         let header = b"\xaa\x77\x06\x00\xff";
         listener.hear(&[header, READ].concat());
         assert_eq!(listener.next(), None, "a long write may go on like this");
-        assert_eq!(listener.next_before_silence(), Some(Heard::Noise(header.to_vec())));
-        assert_eq!(listener.next(), Some(Heard::Read { address: 54, count: 7 }));
+        assert_eq!(listener.next_before_silence(), Some(Traffic::Noise(header.to_vec())));
+        assert_eq!(listener.next(), Some(Traffic::Read { address: 54, count: 7 }));
     }
 
     #[test]
     fn a_range_beyond_the_last_register_is_a_frame_that_reaches_too_far() {
         let mut frame = FrameBuffer::new();
         Request::Read { address: 250, count: 7 }.encode(&mut frame);
-        assert_eq!(heard_in(&frame), [Heard::TooFar { address: 250, count: 7 }]);
+        assert_eq!(heard_in(&frame), [Traffic::TooFar { address: 250, count: 7 }]);
         Reply { address: 250, values: &[0; 7] }.encode(&mut frame);
-        assert_eq!(heard_in(&frame), [Heard::TooFar { address: 250, count: 7 }]);
+        assert_eq!(heard_in(&frame), [Traffic::TooFar { address: 250, count: 7 }]);
     }
 
     #[test]

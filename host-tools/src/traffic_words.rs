@@ -14,15 +14,15 @@ use protocol_core::registers::map::find;
 
 use crate::names::name_of;
 use crate::snapshot::{Snapshot, Span};
-use crate::traffic::Heard;
-use crate::words::meaning;
+use crate::traffic::Traffic;
+use crate::words::entries;
 
 /// A read of more rows than this is named by its ends.
 const ROWS_NAMED: usize = 3;
 /// Of a long stretch of noise so many bytes are shown.
 const NOISE_SHOWN: usize = 32;
 
-impl fmt::Display for Heard {
+impl fmt::Display for Traffic {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Read { address, count } => {
@@ -89,21 +89,20 @@ impl Stretch {
 
     fn assignment(self, values: &Snapshot) -> String {
         let bytes: Vec<u8> = (self.first..=self.last).map(|address| values.at(address)).collect();
-        let number = |&byte: &u8| self.row.map_or(i16::from(byte), |row| row.range.decode(byte)).to_string();
-        let numbers = bytes.iter().map(number).collect::<Vec<_>>().join(" ");
-        let comment = match (self.row, bytes.as_slice()) {
-            (Some(row), [byte]) => comment(row, *byte),
+        let entries = entries(&Snapshot { address: self.first, values: bytes });
+        let numbers: Vec<&str> = entries.iter().map(|entry| entry.value.as_str()).collect();
+        let comment = match (self.row, entries.as_slice()) {
+            (Some(row), [only]) => comment(row, &only.meaning),
             (Some(row), _) => behind(row.unit.symbol()),
             (None, _) => String::new(),
         };
-        format!("{} = {numbers}{comment}", self.name())
+        format!("{} = {}{comment}", self.name(), numbers.join(" "))
     }
 }
 
 /// What a single value means: a unit as it is, a word in brackets.
-fn comment(row: &Register, byte: u8) -> String {
-    let words = meaning(row, byte);
-    if words == row.unit.symbol() || words.is_empty() { behind(&words) } else { format!(" ({words})") }
+fn comment(row: &Register, words: &str) -> String {
+    if words == row.unit.symbol() || words.is_empty() { behind(words) } else { format!(" ({words})") }
 }
 
 fn behind(unit: &str) -> String {
@@ -140,34 +139,36 @@ mod tests {
 
     #[test]
     fn requests_and_answers_read_by_the_table() {
-        let read = |address, count| Heard::Read { address, count }.to_string();
+        let read = |address, count| Traffic::Read { address, count }.to_string();
         assert_eq!(read(54, 7), "read present-position 1..7");
         assert_eq!(read(60, 3), "read present-position 7, no register 61..62");
         assert_eq!(read(3, 2), "read chip-id (3..4 of it)");
         assert_eq!(read(10, 0), "read no register at 10");
         assert_eq!(read(0, 61), "read device-code to present-position 1..7 (0..60)");
-        let answer = Heard::Answer { address: 54, values: vec![90, 90, 65, 90, 90, 90, 80] };
+        let answer = Traffic::Answer { address: 54, values: vec![90, 90, 65, 90, 90, 90, 80] };
         assert_eq!(answer.to_string(), "answer present-position 1..7 = 90 90 65 90 90 90 80 °");
     }
 
     #[test]
     fn values_have_their_meaning_behind_them() {
-        let write = |address, values: &[u8]| Heard::Write { address, values: values.to_vec() }.to_string();
+        let write = |address, values: &[u8]| Traffic::Write { address, values: values.to_vec() }.to_string();
         assert_eq!(write(28, &[0, 1]), "write eeprom-lock = 0 (open), motor-state = 1 (servo)");
         assert_eq!(write(13, &[0x85, 3]), "write offset 1..2 = -5 3 °");
         assert_eq!(write(53, &[30]), "write feedback-frequency = 30 Hz");
         assert_eq!(write(254, &[74]), "write supply-voltage = 74 (7.4 V)");
         assert_eq!(write(46, &[]), "write no register at 46");
+        assert_eq!(write(246, &[1, 1]), "write frames-accepted = 257");
+        assert_eq!(write(2, b"SIM\0\0\x01"), "write chip-id = 53494D000001");
     }
 
     #[test]
     fn noise_is_shown_as_such() {
-        assert_eq!(Heard::Noise(vec![1]).to_string(), "1 byte that is no frame: 01");
-        assert_eq!(Heard::Noise(vec![1, 0xAB]).to_string(), "2 bytes that are no frame: 01 AB");
-        let damaged = Heard::Noise(vec![0xAA, 0x77, 3, 1]).to_string();
+        assert_eq!(Traffic::Noise(vec![1]).to_string(), "1 byte that is no frame: 01");
+        assert_eq!(Traffic::Noise(vec![1, 0xAB]).to_string(), "2 bytes that are no frame: 01 AB");
+        let damaged = Traffic::Noise(vec![0xAA, 0x77, 3, 1]).to_string();
         assert_eq!(damaged, "a damaged frame or a part of one, 4 bytes: AA 77 03 01");
-        assert!(Heard::Noise(vec![0; 40]).to_string().ends_with("00 .."));
-        let far = Heard::TooFar { address: 250, count: 7 }.to_string();
+        assert!(Traffic::Noise(vec![0; 40]).to_string().ends_with("00 .."));
+        let far = Traffic::TooFar { address: 250, count: 7 }.to_string();
         assert_eq!(far, "7 registers from 250 on, which is past the last one, 255");
     }
 }

@@ -89,7 +89,7 @@ impl FromStr for Goal {
 
 impl Goal {
     /// In degrees, for a joint that has this target already.
-    fn from_here(self, joint: Joint, target: u8) -> Result<Option<u8>, Failure> {
+    fn degrees(self, joint: Joint, target: u8) -> Result<Option<u8>, Failure> {
         let Self::By(step) = self else {
             return Ok(if let Self::At(degrees) = self { Some(degrees) } else { None });
         };
@@ -109,7 +109,7 @@ pub(crate) fn run(session: &mut Session, args: &PoseArgs) -> Result<(), Failure>
     let here = arm.read_span(Span::of(&TARGET_POSITION))?.joints(&TARGET_POSITION);
     let mut targets = [None; 7];
     for (((target, goal), joint), here) in targets.iter_mut().zip(&args.angles).zip(Joint::ALL).zip(here) {
-        *target = goal.from_here(joint, here)?;
+        *target = goal.degrees(joint, here)?;
     }
     take(session, &mut arm, targets, &args.how)
 }
@@ -122,12 +122,12 @@ pub(crate) fn home(session: &mut Session, args: &HomeArgs) -> Result<(), Failure
 fn take(session: &mut Session, arm: &mut Arm, targets: Targets, how: &HowArgs) -> Result<(), Failure> {
     driven(arm)?;
     set_pace(arm, &targets, how)?;
-    let sent = Move::begin(arm, targets)?;
-    if how.wait {
-        let positions = or_hold(arm, |arm, interrupt| sent.finish(arm, interrupt))?;
-        session.output.show(&Stand { positions_degrees: positions })?;
+    if !how.wait {
+        return Move::begin(arm, targets).map(drop);
     }
-    Ok(())
+    let work = |arm: &mut Arm, interrupt| Move::begin(arm, targets)?.finish(arm, interrupt);
+    let positions_degrees = or_hold(arm, work)?;
+    session.output.show(&Stand { positions_degrees })
 }
 
 /// Paces the joints that are to move, and only those.
@@ -171,10 +171,10 @@ mod tests {
     #[test]
     fn a_step_starts_from_the_target_and_stays_in_range() {
         let [joint, ..] = Joint::ALL;
-        assert_eq!(Goal::By(-10).from_here(joint, 90).ok(), Some(Some(80)));
-        assert_eq!(Goal::At(5).from_here(joint, 90).ok(), Some(Some(5)));
-        assert_eq!(Goal::Leave.from_here(joint, 90).ok(), Some(None));
-        let Err(Failure::Arm(said)) = Goal::By(-91).from_here(joint, 90) else { panic!("below zero") };
+        assert_eq!(Goal::By(-10).degrees(joint, 90).ok(), Some(Some(80)));
+        assert_eq!(Goal::At(5).degrees(joint, 90).ok(), Some(Some(5)));
+        assert_eq!(Goal::Leave.degrees(joint, 90).ok(), Some(None));
+        let Err(Failure::Arm(said)) = Goal::By(-91).degrees(joint, 90) else { panic!("below zero") };
         assert!(said.contains("joint 1 would go to -1°"), "{said}");
     }
 }

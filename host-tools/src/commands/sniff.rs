@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot::traffic::{Heard, Listener};
+use sevenbot::traffic::{Listener, Traffic};
 use sevenbot::{Error, ports};
 
 use crate::failure::Failure;
@@ -105,19 +105,19 @@ struct Line {
 }
 
 impl Line {
-    fn new(seconds: Option<f64>, heard: &Heard) -> Self {
+    fn new(seconds: Option<f64>, heard: &Traffic) -> Self {
         let words = heard.to_string();
         let count_of = |values: &[u8]| u8::try_from(values.len()).ok();
         let (kind, address, count, bytes) = match heard {
-            Heard::Read { address, count } => ("read", Some(*address), Some(*count), &[][..]),
-            Heard::Answer { address, values } => {
+            Traffic::Read { address, count } => ("read", Some(*address), Some(*count), &[][..]),
+            Traffic::Answer { address, values } => {
                 ("answer", Some(*address), count_of(values), values.as_slice())
             }
-            Heard::Write { address, values } => {
+            Traffic::Write { address, values } => {
                 ("write", Some(*address), count_of(values), values.as_slice())
             }
-            Heard::TooFar { address, count } => ("too-far", Some(*address), Some(*count), &[][..]),
-            Heard::Noise(bytes) => ("noise", None, None, bytes.as_slice()),
+            Traffic::TooFar { address, count } => ("too-far", Some(*address), Some(*count), &[][..]),
+            Traffic::Noise(bytes) => ("noise", None, None, bytes.as_slice()),
         };
         Self { seconds, kind, address, count, bytes: bytes.to_vec(), words }
     }
