@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{
-    CHIP_ID, DEVICE_CODE, FIRMWARE_VERSION, PRESENT_POSITION, SERVO_TEMPERATURE, SPEED, STATUS_VERSION,
-    TARGET_POSITION, TIME,
+    CHIP_ID, DEVICE_CODE, PRESENT_POSITION, SERVO_TEMPERATURE, SPEED, STATUS_VERSION, TARGET_POSITION, TIME,
 };
 use protocol_core::request::Request;
 
 use crate::error::{Error, Heard, OpenError};
+use crate::identity::Identity;
 use crate::link::Link;
 use crate::ports;
 use crate::snapshot::{Snapshot, Span};
@@ -26,6 +26,14 @@ pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
 const REPORTS_KEPT: usize = 1_000;
 
 /// How to talk to an arm.
+///
+/// ```
+/// use sevenbot::Options;
+/// use std::time::Duration;
+///
+/// let patient = Options { reply_timeout: Duration::from_secs(2), ..Options::default() };
+/// assert_eq!(patient.baud, 115_200);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// In bits per second. The arm starts with the rate in its register 12.
@@ -42,59 +50,20 @@ impl Default for Options {
     }
 }
 
-/// What an arm says it is (registers 0 to 7).
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Identity(Snapshot);
-
-/// Whose firmware an arm runs: register 1 tells (D7).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Firmware {
-    /// This project's, 3.0 and later: everything here works with it.
-    Ours,
-    /// The maker's, 1.0 to 2.4: it has no status block, checks no ranges, and never says what it refused.
-    Makers,
-    /// A version nobody is known to have given out.
-    Unknown,
-}
-
-impl Identity {
-    /// The firmware's version, as `3.0`.
-    #[must_use]
-    pub fn version(&self) -> String {
-        let tenths = self.0.byte(&FIRMWARE_VERSION);
-        format!("{}.{}", tenths / 10, tenths % 10)
-    }
-
-    /// Whose firmware it is.
-    #[must_use]
-    pub fn firmware(&self) -> Firmware {
-        match self.0.byte(&FIRMWARE_VERSION) {
-            version if version >= FIRMWARE_VERSION.default_at(FIRMWARE_VERSION.address) => Firmware::Ours,
-            10..=24 => Firmware::Makers,
-            _ => Firmware::Unknown,
-        }
-    }
-
-    /// Are registers 240 to 255 the status block of docs/protocol.md, section 6?
-    #[must_use]
-    pub fn has_status_block(&self) -> bool {
-        self.firmware() == Firmware::Ours
-    }
-
-    /// The chip's own number, most significant byte first (D8).
-    #[must_use]
-    pub fn chip_id(&self) -> [u8; 6] {
-        [0, 1, 2, 3, 4, 5].map(|offset| self.0.at(CHIP_ID.address + offset))
-    }
-
-    /// The chip's number as twelve hexadecimal digits.
-    #[must_use]
-    pub fn chip_name(&self) -> String {
-        self.chip_id().map(|byte| format!("{byte:02X}")).concat()
-    }
-}
-
 /// The present positions, as the arm sent them without being asked (D14).
+///
+/// ```no_run
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use std::time::Duration;
+///
+/// let mut arm = sevenbot::Arm::open("/dev/ttyUSB0", 115_200)?;
+/// arm.write(sevenbot::map::FEEDBACK_FREQUENCY.address, &[30])?;
+/// while let Some(report) = arm.next_report(Duration::from_secs(1))? {
+///     println!("{:?}: {:?}", report.received, report.positions);
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Report {
     /// When it was taken from the port.
@@ -104,6 +73,20 @@ pub struct Report {
 }
 
 /// A 7Bot V2 at the other end of a serial port.
+///
+/// ```no_run
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sevenbot::{Angle, Arm, Joint};
+///
+/// let mut arm = Arm::open("/dev/ttyUSB0", 115_200)?;
+/// if let (Some(base), Some(angle)) = (Joint::new(1), Angle::from_degrees(120)) {
+///     arm.set_target(base, angle)?;
+/// }
+/// println!("{:?}", arm.positions()?);
+/// arm.hold()?;
+/// # Ok(())
+/// # }
+/// ```
 pub struct Arm {
     link: Link,
     path: String,
@@ -134,11 +117,11 @@ impl Arm {
     pub fn open_with(path: &str, options: Options) -> Result<Self, OpenError> {
         let port = ports::open(path, options.baud)?;
         let link = Link::new(port, options.baud);
-        let nobody = Identity(Snapshot { address: 0, values: Vec::new() });
+        let nobody = Identity::from(Snapshot { address: 0, values: Vec::new() });
         let path = path.to_owned();
         let mut arm = Self { link, path, options, identity: nobody, reports: VecDeque::new() };
-        arm.identity = Identity(arm.read_span(Span::between(&DEVICE_CODE, &CHIP_ID))?);
-        match arm.identity.0.byte(&DEVICE_CODE) {
+        arm.identity = Identity::from(arm.read_span(Span::between(&DEVICE_CODE, &CHIP_ID))?);
+        match arm.identity.device_code() {
             code if code == DEVICE_CODE.default_at(DEVICE_CODE.address) => Ok(arm),
             code => Err(OpenError::WrongDevice { code }),
         }

@@ -16,6 +16,8 @@ use crate::status::Status;
 use crate::words;
 
 /// A register that does not hold what was written to it.
+///
+/// See [`Arm::write_checked`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unchanged {
     /// The register.
@@ -29,6 +31,12 @@ pub struct Unchanged {
 }
 
 /// Why a register does not hold what was written to it.
+///
+/// ```
+/// use sevenbot::change::Cause;
+///
+/// assert_eq!(Cause::Locked.to_string(), "it is protected by the EEPROM lock");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// The table has no register there.

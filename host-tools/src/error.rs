@@ -10,6 +10,16 @@ use crate::permission;
 use crate::snapshot::Span;
 
 /// Why a port does not lead to an arm.
+///
+/// ```no_run
+/// use sevenbot::{Arm, OpenError};
+///
+/// match Arm::open("/dev/ttyUSB0", 115_200) {
+///     Ok(_) => println!("an arm"),
+///     Err(OpenError::WrongDevice { code }) => println!("something else, with device code {code}"),
+///     Err(error) => println!("{error}; {}", error.advice().join("; ")),
+/// }
+/// ```
 #[derive(Clone, Debug)]
 pub enum OpenError {
     /// There is no such port.
@@ -72,6 +82,20 @@ impl fmt::Display for OpenError {
 impl std::error::Error for OpenError {}
 
 /// Why an exchange with an open arm failed.
+///
+/// ```no_run
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sevenbot::{Arm, Error};
+///
+/// let mut arm = Arm::open("/dev/ttyUSB0", 115_200)?;
+/// match arm.positions() {
+///     Ok(positions) => println!("{positions:?}"),
+///     Err(Error::NoAnswer { heard, .. }) => println!("no answer: {heard}"),
+///     Err(error) => println!("{error}"),
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error {
     /// No answer to a read, though it was asked for several times.
@@ -92,6 +116,11 @@ pub enum Error {
 }
 
 /// What was heard on the line while an answer was missing.
+///
+/// ```
+/// let heard = sevenbot::Heard { bytes: 12, ..Default::default() };
+/// assert_eq!(heard.to_string(), "12 bytes were heard, none of them a frame");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Heard {
     /// Bytes of any kind.

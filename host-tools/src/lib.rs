@@ -30,6 +30,7 @@
 pub mod arm;
 pub mod change;
 pub mod error;
+pub mod identity;
 pub mod joints;
 mod link;
 pub mod names;
@@ -45,8 +46,9 @@ mod traffic_words;
 pub mod units;
 pub mod words;
 
-pub use arm::{Arm, Firmware, Identity, Options, Report};
+pub use arm::{Arm, Options, Report};
 pub use error::{Error, Heard, OpenError};
+pub use identity::{Firmware, Identity};
 pub use protocol_core::registers::{Joint, Register, map};
 pub use snapshot::{Snapshot, Span};
 pub use status::Status;

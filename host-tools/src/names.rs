@@ -10,6 +10,13 @@ use protocol_core::registers::{Joint, MAP, Register};
 use crate::snapshot::Span;
 
 /// Why a text names no registers.
+///
+/// ```
+/// use sevenbot::names::{NameError, parse};
+///
+/// assert_eq!(parse("nonsense"), Err(NameError::Unknown));
+/// assert_eq!(parse("target.3").map(|span| span.address), Ok(48));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NameError {
     /// No name of the table begins so, and it is no number either.

@@ -8,8 +8,9 @@ use std::time::Duration;
 use protocol_core::registers::map::{BAUD_RATES, DEVICE_ID};
 use serialport::{SerialPort, SerialPortType};
 
-use crate::arm::{Arm, Identity, Options};
+use crate::arm::{Arm, Options};
 use crate::error::OpenError;
+use crate::identity::Identity;
 use crate::snapshot::Span;
 
 /// How long an arm may take to say who it is: eight registers take 2 ms at 115 200 baud and 25 ms at 9600,
@@ -19,6 +20,12 @@ const PROBE_TIMEOUT: Duration = Duration::from_millis(200);
 const PROBE_ATTEMPTS: u32 = 2;
 
 /// A serial port of this machine.
+///
+/// ```no_run
+/// for port in sevenbot::ports::available() {
+///     println!("{} {}", port.name, port.description);
+/// }
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Port {
     /// What to open it by.
@@ -28,6 +35,8 @@ pub struct Port {
 }
 
 /// What was found behind a port.
+///
+/// See [`probe`].
 #[derive(Debug)]
 pub struct Probed {
     /// The port.

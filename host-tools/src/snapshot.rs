@@ -7,6 +7,12 @@ use std::fmt;
 use protocol_core::registers::{Joint, Register};
 
 /// A run of registers: `count` of them from `address` on.
+///
+/// ```
+/// use sevenbot::{Span, map};
+///
+/// assert_eq!(Span::of(&map::TARGET_POSITION).to_string(), "46..52");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
     /// The first register.
@@ -47,6 +53,17 @@ impl fmt::Display for Span {
 }
 
 /// The values one read brought, all of one instant.
+///
+/// ```no_run
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sevenbot::{Arm, Span, map};
+///
+/// let mut arm = Arm::open("/dev/ttyUSB0", 115_200)?;
+/// let snapshot = arm.read_span(Span::between(&map::SPEED, &map::TARGET_POSITION))?;
+/// println!("{:?} {:?}", snapshot.joints(&map::SPEED), snapshot.joints(&map::TARGET_POSITION));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Snapshot {
     /// The first register.

@@ -15,6 +15,13 @@ use protocol_core::wire::{Function, ToArm, ToHost};
 use crate::snapshot::Snapshot;
 
 /// Something heard.
+///
+/// ```
+/// use sevenbot::traffic::Traffic;
+///
+/// let read = Traffic::Read { address: 54, count: 7 };
+/// assert_eq!(read.to_string(), "read present-position 1..7");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Traffic {
     /// A request for `count` registers from `address` on.

@@ -6,6 +6,13 @@ use std::fmt;
 use std::time::Duration;
 
 /// Angle of a joint, in whole degrees from 0 to 180, as the arm's registers hold it (D18).
+///
+/// ```
+/// use sevenbot::Angle;
+///
+/// assert_eq!(Angle::from_degrees(90).map(|angle| angle.to_string()).as_deref(), Some("90°"));
+/// assert_eq!(Angle::from_degrees(181), None);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Angle(u8);
 
@@ -39,6 +46,13 @@ impl fmt::Display for Angle {
 }
 
 /// Speed of a joint's moves, in the register's steps of 1.9 degrees/s (D10).
+///
+/// ```
+/// use sevenbot::Speed;
+///
+/// assert_eq!(Speed::from_steps(10).map(Speed::degrees_per_second), Some(19.0));
+/// assert_eq!(Speed::MAXIMUM.degrees_per_second(), 372.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Speed(u8);
 
@@ -73,6 +87,13 @@ impl Speed {
 }
 
 /// How long a joint's moves take, in the register's steps of 100 ms; counts where the speed is 0 (D11).
+///
+/// ```
+/// use sevenbot::MoveTime;
+/// use std::time::Duration;
+///
+/// assert_eq!(MoveTime::from_steps(20).map(MoveTime::duration), Some(Duration::from_secs(2)));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MoveTime(u8);
 

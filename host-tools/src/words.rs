@@ -13,6 +13,14 @@ use crate::snapshot::Snapshot;
 use crate::units::Speed;
 
 /// One value of the table as it is shown.
+///
+/// ```
+/// use sevenbot::Snapshot;
+///
+/// let shown = sevenbot::words::entries(&Snapshot { address: 29, values: vec![1] });
+/// assert_eq!(shown[0].name, "motor-state");
+/// assert_eq!(shown[0].meaning, "servo");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Entry {
     /// Its first register.

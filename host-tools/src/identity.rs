@@ -1,0 +1,101 @@
+//! Who answered: what kind of device, which chip, whose firmware.
+
+use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, FIRMWARE_VERSION};
+
+use crate::snapshot::Snapshot;
+
+/// What an arm says it is (registers 0 to 7).
+///
+/// ```no_run
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let arm = sevenbot::Arm::open("/dev/ttyUSB0", 115_200)?;
+/// println!("firmware {}, chip {}", arm.identity().version(), arm.identity().chip_name());
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity(Snapshot);
+
+/// Whose firmware an arm runs: register 1 tells (D7).
+///
+/// ```no_run
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let arm = sevenbot::Arm::open("/dev/ttyUSB0", 115_200)?;
+/// if arm.identity().firmware() == sevenbot::Firmware::Makers {
+///     println!("this arm does not say what it refuses");
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Firmware {
+    /// This project's, 3.0 and later: everything here works with it.
+    Ours,
+    /// The maker's, 1.0 to 2.4: it has no status block, checks no ranges, and never says what it refused.
+    Makers,
+    /// A version nobody is known to have given out.
+    Unknown,
+}
+
+impl From<Snapshot> for Identity {
+    fn from(registers: Snapshot) -> Self {
+        Self(registers)
+    }
+}
+
+impl Identity {
+    /// What kind of device it is.
+    pub(crate) fn device_code(&self) -> u8 {
+        self.0.byte(&DEVICE_CODE)
+    }
+
+    /// The firmware's version, as `3.0`.
+    #[must_use]
+    pub fn version(&self) -> String {
+        let tenths = self.0.byte(&FIRMWARE_VERSION);
+        format!("{}.{}", tenths / 10, tenths % 10)
+    }
+
+    /// Whose firmware it is.
+    #[must_use]
+    pub fn firmware(&self) -> Firmware {
+        match self.0.byte(&FIRMWARE_VERSION) {
+            version if version >= FIRMWARE_VERSION.default_at(FIRMWARE_VERSION.address) => Firmware::Ours,
+            10..=24 => Firmware::Makers,
+            _ => Firmware::Unknown,
+        }
+    }
+
+    /// Are registers 240 to 255 the status block of docs/protocol.md, section 6?
+    #[must_use]
+    pub fn has_status_block(&self) -> bool {
+        self.firmware() == Firmware::Ours
+    }
+
+    /// The chip's own number, most significant byte first (D8).
+    #[must_use]
+    pub fn chip_id(&self) -> [u8; 6] {
+        [0, 1, 2, 3, 4, 5].map(|offset| self.0.at(CHIP_ID.address + offset))
+    }
+
+    /// The chip's number as twelve hexadecimal digits.
+    #[must_use]
+    pub fn chip_name(&self) -> String {
+        self.chip_id().map(|byte| format!("{byte:02X}")).concat()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_version_tells_whose_firmware_it_is() {
+        let firmware = |version| Identity(Snapshot { address: 0, values: vec![7, version] }).firmware();
+        for makers in [10, 21, 22, 24] {
+            assert_eq!(firmware(makers), Firmware::Makers, "{makers}");
+        }
+        assert_eq!((firmware(30), firmware(31)), (Firmware::Ours, Firmware::Ours));
+        assert_eq!((firmware(0), firmware(25)), (Firmware::Unknown, Firmware::Unknown));
+    }
+}
