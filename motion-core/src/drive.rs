@@ -1,14 +1,15 @@
 //! Whether one joint is driven, and where to: from released to engaged without a jump (D12, D13).
 //!
 //! ```text
-//!                engage when wanted                 the servo was measured
-//!   Released ───────────────────────▶ Waiting ─────────────────────────────▶ Engaged
-//!      ▲                                 ▲                                      │
-//!      └──── released ───────────────────┴──────────────── the servo was lost ──┘
+//!             engage when wanted             the servo was measured             it has torque
+//!   Released ────────────────────▶ Waiting ────────────────────────▶ Placed ───────────────────▶ Engaged
+//!      ▲                              ▲                                │                            │
+//!      └──── released ────────────────┴──────────── the servo was lost ┴────────────────────────────┘
 //! ```
 //!
-//! A joint engages where a fresh measurement says it is, never where somebody thinks it is. Knows nothing
-//! of the bus, nor of which joint it is.
+//! A joint engages where a fresh measurement says it is, never where somebody thinks it is, and its goal
+//! stays there until it has torque: a goal that went ahead would be a jump. Knows nothing of the bus, nor of
+//! which joint it is.
 
 use crate::calibration::MicroDegrees;
 use crate::trajectory::Trajectory;
@@ -20,6 +21,8 @@ enum Engagement {
     /// To be driven as soon as it is known where the joint is. If the host named a target in the meantime,
     /// with this value of the time register, the joint goes there once it is engaged.
     Waiting { target: Option<(MicroDegrees, u8)> },
+    /// To be given torque where it is.
+    Placed,
     /// Driven.
     Engaged,
 }
@@ -48,7 +51,7 @@ impl Drive {
 
     /// The servo was lost: the joint is driven again from the next measurement on.
     pub fn lose(&mut self) {
-        if self.engagement == Engagement::Engaged {
+        if self.is_engaged() {
             self.wait();
         }
     }
@@ -58,18 +61,25 @@ impl Drive {
         match &mut self.engagement {
             Engagement::Released => {}
             Engagement::Waiting { target } => *target = Some((angle, time)),
-            Engagement::Engaged => self.trajectory.move_to(angle, time),
+            Engagement::Placed | Engagement::Engaged => self.trajectory.move_to(angle, time),
         }
     }
 
     /// The joint was measured at `angle`: a waiting joint engages there. Says whether it did, and holds.
     pub fn engage(&mut self, angle: MicroDegrees) -> Option<Engaged> {
         let Engagement::Waiting { target } = self.engagement else { return None };
-        self.engagement = Engagement::Engaged;
+        self.engagement = Engagement::Placed;
         self.trajectory = Trajectory::holding(angle);
         let Some((target, time)) = target else { return Some(Engaged::Holding) };
         self.trajectory.move_to(target, time);
         Some(Engaged::Moving)
+    }
+
+    /// The joint was given torque: from now on it may move.
+    pub fn torque_is_on(&mut self) {
+        if self.engagement == Engagement::Placed {
+            self.engagement = Engagement::Engaged;
+        }
     }
 
     /// The joint's offset changed: the place where it is has another name from now on, and the way to its
@@ -83,13 +93,15 @@ impl Drive {
 
     /// One control cycle further at `speed` (the joint's speed register).
     pub fn advance(&mut self, speed: u8) {
-        self.trajectory.advance(speed);
+        if self.engagement == Engagement::Engaged {
+            self.trajectory.advance(speed);
+        }
     }
 
-    /// Is the joint driven?
+    /// Is the joint driven, or about to be given torque?
     #[must_use]
     pub fn is_engaged(&self) -> bool {
-        self.engagement == Engagement::Engaged
+        matches!(self.engagement, Engagement::Placed | Engagement::Engaged)
     }
 
     /// Is the joint on its way, or about to go?
@@ -98,7 +110,7 @@ impl Drive {
         match self.engagement {
             Engagement::Released => false,
             Engagement::Waiting { target } => target.is_some(),
-            Engagement::Engaged => self.trajectory.is_moving(),
+            Engagement::Placed | Engagement::Engaged => self.trajectory.is_moving(),
         }
     }
 
@@ -148,6 +160,9 @@ mod tests {
         drive.aim(degrees(60), 0);
         assert!(drive.is_moving(), "a host that waits must not be told that it is there");
         assert_eq!(drive.engage(degrees(40)), Some(Engaged::Moving));
+        drive.advance(100);
+        assert_eq!(drive.set_point(), degrees(40), "not before it has torque");
+        drive.torque_is_on();
         drive.advance(100);
         assert_eq!(drive.set_point(), MicroDegrees(41_900_000), "from where it is, not from anywhere else");
     }

@@ -115,6 +115,7 @@ impl Arm {
             return false;
         }
         self.bus.set_torque(now, &torque);
+        self.joints.iter_mut().for_each(|joint| joint.drive.torque_is_on());
         self.torque_set = Some(torque);
         self.torque_refresh_in = TORQUE_REFRESH_CYCLES;
         true

@@ -10,6 +10,8 @@ use protocol_core::time::{Duration, Instant};
 
 const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
 pub const STANDARD_POSE: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];
+/// The same in servo positions.
+pub const STANDARD_COUNTS: [u16; 7] = [511, 445, 684, 511, 512, 512, 1008];
 
 /// A frame for the servos, taken apart.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -84,7 +86,12 @@ impl Rig {
 
     /// Lets `millis` of virtual time pass.
     pub fn run_ms(&mut self, millis: u64) {
-        let end = self.now_us + millis * 1_000;
+        self.run_us(millis * 1_000);
+    }
+
+    /// Lets `micros` of virtual time pass.
+    pub fn run_us(&mut self, micros: u64) {
+        let end = self.now_us + micros;
         loop {
             let next = self.turn();
             if self.now_us >= end {
