@@ -1,40 +1,17 @@
 //! The command line tool, run as a user runs it: arguments in, text and exit status out.
 
-use std::io::Read;
-use std::process::{Command, Output, Stdio};
+mod said;
 
+use std::io::Read;
+use std::process::{Command, Stdio};
+
+use said::{done, failed, said, without_arm, words};
 use system_tests::programs::sevenbot;
 use system_tests::registers::{
     DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FEEDBACK_FREQUENCY, MOTOR_STATE, OFFSET, SPEED, STANDARD_POSE,
     TARGET_POSITION, TIME,
 };
 use system_tests::{Need, Setup, near, with_arm};
-
-/// Standard output of a command that ended well.
-#[track_caller]
-fn done(output: Output) -> String {
-    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
-    String::from_utf8(output.stdout).expect("text")
-}
-
-/// Everything a command said, for one that ended with this status.
-#[track_caller]
-fn failed(output: &Output, status: i32) -> String {
-    let said = said(output);
-    assert_eq!(output.status.code(), Some(status), "{said}");
-    assert!(!said.contains("panicked"), "{said}");
-    said
-}
-
-fn said(output: &Output) -> String {
-    [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes)).concat()
-}
-
-/// The words of a line that begins with `first`.
-fn words<'a>(text: &'a str, first: &str) -> Vec<&'a str> {
-    let line = text.lines().find(|line| line.trim_start().starts_with(first));
-    line.unwrap_or_else(|| panic!("no line with {first} in:\n{text}")).split_whitespace().collect()
-}
 
 #[test]
 fn info_says_who_the_arm_is_and_how_it_is() {
@@ -215,10 +192,7 @@ fn monitor_into_a_pipe_that_closes_ends_quietly() {
 
 #[test]
 fn without_a_connection_the_tool_says_what_to_check() {
-    let run = |arguments: &[&str]| {
-        let mut tool = Command::new(sevenbot());
-        tool.args(arguments).env_remove("SEVENBOT_PORT").output().expect("sevenbot runs")
-    };
+    let run = without_arm;
     let text = failed(&run(&["info"]), 3);
     assert!(text.contains("--port") && text.contains("SEVENBOT_PORT"), "{text}");
     let text = failed(&run(&["--port", "/dev/no-such-port", "info"]), 3);
@@ -237,7 +211,7 @@ fn without_a_connection_the_tool_says_what_to_check() {
 
 #[test]
 fn help_teaches_by_example_and_documents_exit_statuses() {
-    let help = |arguments: &[&str]| done(Command::new(sevenbot()).args(arguments).output().expect("it runs"));
+    let help = |arguments: &[&str]| done(without_arm(arguments));
     let text = help(&["--help"]);
     assert!(text.contains("Examples:") && text.contains("Exit status:"), "{text}");
     for command in ["get", "set", "pose", "monitor"] {
