@@ -24,6 +24,8 @@ pub(crate) enum Failure {
     SeveralArms { ports: Vec<String> },
     /// The port does not lead to an arm.
     Open { port: String, error: OpenError },
+    /// The port opens, but no arm answers there at any rate.
+    NoRate { port: String },
     /// The arm went away.
     Wire(Error),
     /// A file cannot be read or written, or does not hold what it should.
@@ -59,7 +61,8 @@ impl Failure {
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             Self::Arm(_) | Self::File { .. } | Self::Output(_) => 1,
             Self::Usage(_) => 2,
-            Self::NoArm { .. } | Self::SeveralArms { .. } | Self::Open { .. } | Self::Wire(_) => 3,
+            Self::NoArm { .. } | Self::SeveralArms { .. } => 3,
+            Self::Open { .. } | Self::NoRate { .. } | Self::Wire(_) => 3,
             Self::Interrupted => INTERRUPTED,
         })
     }
@@ -88,6 +91,9 @@ impl Failure {
                 Some(format!("no port was given, and several lead to an arm: {}", ports.join(", ")))
             }
             Self::Open { port, error } => Some(format!("{port}: {error}")),
+            Self::NoRate { port } => {
+                Some(format!("{port}: no arm answers, at any of the rates an arm knows"))
+            }
             Self::Wire(error) => Some(error.to_string()),
             Self::File { path, reason } => Some(format!("{}: {reason}", path.display())),
             Self::Interrupted => Some("interrupted".to_owned()),
@@ -103,6 +109,11 @@ impl Failure {
                 tried.chain([say_which, simulator].map(str::to_owned)).collect()
             }
             Self::SeveralArms { .. } => vec![say_which.to_owned()],
+            Self::NoRate { .. } => {
+                ["has the arm power, and is its cable plugged in at both ends?", "is this the right port?"]
+                    .map(str::to_owned)
+                    .to_vec()
+            }
             Self::Open { error, .. } => error.advice(),
             Self::Wire(error) => error.advice(),
             _ => Vec::new(),

@@ -4,53 +4,15 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
-use std::io::{ErrorKind, Read, Write};
+mod fake;
+
+use std::io::{Read, Write};
 use std::thread;
 use std::time::Duration;
 
-use protocol_core::request::{Reply, Request};
-use protocol_core::time::{Duration as Micros, Instant};
-use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
+use fake::{IDENTITY, arm_of, reply};
 use serialport::{SerialPort, TTYPort};
 use sevenbot::{Arm, Error, Heard, OpenError, Options};
-
-const IDENTITY: [u8; 8] = [7, 30, 1, 2, 3, 4, 5, 6];
-
-/// The frame of a reply.
-fn reply(address: u8, values: &[u8]) -> Vec<u8> {
-    let mut frame = FrameBuffer::new();
-    Reply { address, values }.encode(&mut frame);
-    frame.to_vec()
-}
-
-/// An arm that answers the n-th read (the first is number 0) with whatever bytes the script says, on a port
-/// of this name. It ends when nobody has the port open any more.
-fn arm_of(mut script: impl FnMut(usize, u8, u8) -> Vec<u8> + Send + 'static) -> (String, TTYPort) {
-    let (mut master, slave) = TTYPort::pair().unwrap();
-    let name = slave.name().unwrap();
-    thread::spawn(move || {
-        let mut deframer = Deframer::<ToArm>::new(Micros::from_millis(2));
-        let mut reads = 0;
-        let mut chunk = [0; 256];
-        loop {
-            let length = match master.read(&mut chunk) {
-                Ok(length) => length,
-                Err(error) if error.kind() == ErrorKind::TimedOut => continue,
-                Err(_) => return,
-            };
-            // No test sends more than the deframer holds at once.
-            assert_eq!(deframer.push(Instant::ZERO, &chunk[..length]), length);
-            while let Some(found) = deframer.pull() {
-                if let Ok(Request::Read { address, count }) = found.map(Request::from_frame) {
-                    master.write_all(&script(reads, address, count)).unwrap();
-                    reads += 1;
-                }
-            }
-        }
-    });
-    // Whoever holds the other end keeps the port alive between two openings.
-    (name, slave)
-}
 
 fn options() -> Options {
     Options { reply_timeout: Duration::from_millis(200), ..Options::default() }

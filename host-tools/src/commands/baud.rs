@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use clap::Args;
 use serde::Serialize;
 use sevenbot::map::{BAUD_RATE, BAUD_RATES, baud_rate};
-use sevenbot::{Span, ports};
+use sevenbot::{OpenError, Span, ports};
 
 use super::all_taken;
 use super::set::unlocked;
@@ -80,5 +80,8 @@ fn find(session: &Session) -> Result<sevenbot::Arm, Failure> {
         Failure::Usage("--find needs --port: it would send to every device of this machine".to_owned())
     })?;
     let tell = |baud| note(format_args!("trying {baud} baud"));
-    ports::find_baud(&port, tell).map_err(|error| Failure::Open { port, error })
+    ports::find_baud(&port, tell).map_err(|error| match error {
+        OpenError::Silent(_) => Failure::NoRate { port },
+        error => Failure::Open { port, error },
+    })
 }

@@ -1,0 +1,125 @@
+//! The command line against arms that are not ours: the maker's firmware, another device, a rate nobody
+//! remembers, an arm that stops answering.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
+
+mod fake;
+
+use std::process::{Command, Output, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+
+use fake::{IDENTITY, arm_of, arm_that, makers_arm, reply};
+use protocol_core::request::Request;
+use sevenbot::ports::find_baud;
+
+fn command(port: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sevenbot"));
+    command.args(["--port", port]).args(arguments).stdin(Stdio::null());
+    command
+}
+
+fn run(port: &str, arguments: &[&str], status: i32) -> String {
+    said(&command(port, arguments).output().unwrap(), status)
+}
+
+fn said(output: &Output, status: i32) -> String {
+    let said = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes)).concat();
+    assert_eq!(output.status.code(), Some(status), "{said}");
+    said
+}
+
+#[test]
+fn the_makers_firmware_works_as_far_as_it_goes() {
+    let (port, _held) = makers_arm();
+    let info = run(&port, &["info"], 0);
+    assert!(
+        info.contains("warning: this arm runs the maker's firmware 2.2: it has no status block"),
+        "{info}"
+    );
+    assert!(!info.contains("Health"), "nobody knows: {info}");
+    assert!(run(&port, &["info", "--json"], 0).contains("\"makers_firmware\":true"));
+    let pose = run(&port, &["pose", "100", "_", "_", "_", "_", "_", "90", "--wait"], 0);
+    assert!(pose.contains("100 0 0 0 0 0 90"), "only the two joints were sent anywhere: {pose}");
+    run(&port, &["stop"], 0);
+    let refused = run(&port, &["set", "speed.1", "101"], 1);
+    assert!(refused.contains("speed.1 takes 0 to 100; nothing was written"), "{refused}");
+}
+
+#[test]
+fn another_device_is_named_by_its_code() {
+    let (port, _held) = arm_of(|_, _, _| reply(0, &[9, 30, 0, 0, 0, 0, 0, 0]));
+    let text = run(&port, &["info"], 3);
+    assert!(text.contains("not a 7Bot V2: its device code is 9, not 7"), "{text}");
+    assert!(text.contains("sevenbot ports"), "{text}");
+}
+
+#[test]
+fn silence_and_nonsense_suggest_to_look_for_the_rate() {
+    for answer in [&b""[..], b"\x00\xF8\x80"] {
+        let (port, _held) = arm_of(|_, _, _| answer.to_vec());
+        let text = run(&port, &["info"], 3);
+        assert!(text.contains("no answer to a read of 0..7") && text.contains("baud --find"), "{text}");
+    }
+}
+
+/// Only where the master's end tells the rate that was chosen at the other one.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_forgotten_rate_is_found() {
+    use serialport::SerialPort;
+
+    let listens_at = |rate: u32| {
+        arm_that(move |line, request| match *request {
+            Request::Read { address, count } if line.baud_rate().unwrap() == rate => {
+                let registers = [IDENTITY.as_slice(), &[0; 248]].concat();
+                let first = usize::from(address);
+                reply(address, &registers[first..first + usize::from(count)])
+            }
+            _ => b"\x00\xF8".to_vec(),
+        })
+    };
+    let (port, _held) = listens_at(57_600);
+    let text = run(&port, &["baud", "--find"], 0);
+    assert!(text.contains("now            57600 baud") && text.contains("say --baud 57600"), "{text}");
+    let (port, _held) = listens_at(4_800);
+    let text = run(&port, &["baud", "--find"], 3);
+    assert!(text.contains("trying 9600 baud") && text.contains("no arm answers, at any"), "{text}");
+    let (port, _held) = listens_at(9_600);
+    let mut tried = Vec::new();
+    let arm = find_baud(&port, |baud| tried.push(baud)).unwrap();
+    assert_eq!((arm.options().baud, tried.len()), (9_600, 8));
+}
+
+#[test]
+fn a_second_ctrl_c_waits_for_nobody() {
+    let (moving, is_moving) = mpsc::channel();
+    let mut is_sent = false;
+    let (port, _held) = arm_that(move |_, request| match *request {
+        Request::Read { .. } if is_sent => {
+            let _ = moving.send(());
+            Vec::new()
+        }
+        Request::Read { address: 0, .. } => reply(0, &IDENTITY),
+        // In the servo state, and all is well.
+        Request::Read { address, count } => reply(address, &vec![1; count.into()]),
+        Request::Write { .. } => {
+            is_sent = true;
+            Vec::new()
+        }
+    });
+    let waiting = command(&port, &["pose", "100", "_", "_", "_", "_", "_", "_", "--wait"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    is_moving.recv_timeout(Duration::from_secs(20)).unwrap();
+    // Alone, the first one would end in three more reads without an answer, and status 3.
+    for _ in 0..2 {
+        let id = waiting.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    said(&waiting.wait_with_output().unwrap(), 130);
+}
