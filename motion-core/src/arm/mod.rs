@@ -25,7 +25,7 @@ use crate::drive::Drive;
 use crate::feedback::Feedback;
 use crate::mode::MotorState;
 use crate::sensor::Sensor;
-use crate::servo_bus::{Bus, Torque};
+use crate::servo_bus::Bus;
 use crate::vacuum::Gripper;
 
 /// How long the servos may take after power-up until those that have not answered are given up for now.
@@ -70,8 +70,8 @@ pub struct Arm {
     starting_until: Option<Instant>,
     next_cycle: Instant,
     goals_due: bool,
-    /// What the torque switches were last set to; `None` if they have to be set again.
-    torque_set: Option<[Torque; JOINTS]>,
+    /// The torque switches have to be set: a joint engaged or was lost, the mode changed, or it is time again.
+    torque_due: bool,
     torque_refresh_in: u8,
     next_to_ask: Joint,
     storage: Storage,
@@ -94,7 +94,7 @@ impl Arm {
             starting_until: Some(now + START_UP_TIME),
             next_cycle: now,
             goals_due: false,
-            torque_set: None,
+            torque_due: true,
             torque_refresh_in: TORQUE_REFRESH_CYCLES,
             next_to_ask: Joint::ALL[0],
             storage,
@@ -149,6 +149,7 @@ impl Arm {
             return;
         }
         self.mode = mode;
+        self.torque_due = true;
         for (joint, state) in Joint::ALL.into_iter().zip(&mut self.joints) {
             if mode != MotorState::Servo {
                 state.drive.release();

@@ -10,7 +10,7 @@ use super::{Arm, JointState, TORQUE_REFRESH_CYCLES, offset};
 use crate::CYCLE;
 use crate::calibration::{angle_from_counts, counts_from_angle};
 use crate::drive::Engaged;
-use crate::servo_bus::{Outcome, Reading};
+use crate::servo_bus::{Outcome, Reading, Torque};
 
 impl Arm {
     /// Takes in what the servos answered by `now`, and moves all set-points when a control cycle is due.
@@ -41,6 +41,7 @@ impl Arm {
             self.registers.set(TARGET_POSITION.of(joint), angle.nearest_degree());
         }
         self.goals_due |= engaged.is_some();
+        self.torque_due |= engaged.is_some();
         self.registers.set(SUPPLY_VOLTAGE.address, reading.voltage_decivolts);
         self.show_servos();
     }
@@ -54,6 +55,7 @@ impl Arm {
             state.drive.lose();
             state.temperature = 0;
             state.alarms = 0;
+            self.torque_due = true;
             self.show_servos();
         }
     }
@@ -79,9 +81,7 @@ impl Arm {
         }
         self.show_moving();
         self.torque_refresh_in = self.torque_refresh_in.saturating_sub(1);
-        if self.torque_refresh_in == 0 {
-            self.torque_set = None;
-        }
+        self.torque_due |= self.torque_refresh_in == 0;
     }
 
     /// Prepares the next frame for the servo bus, if there is one and the bus is idle. Goals go before
@@ -110,13 +110,15 @@ impl Arm {
     }
 
     fn send_torque(&mut self, now: Instant) -> bool {
-        let torque = self.joints.map(|joint| self.mode.torque(joint.drive.is_engaged()));
-        if self.torque_set == Some(torque) {
+        if !core::mem::take(&mut self.torque_due) {
             return false;
+        }
+        let mut torque = [Torque::Free; JOINTS];
+        for (torque, joint) in torque.iter_mut().zip(&self.joints) {
+            *torque = self.mode.torque(joint.drive.is_engaged());
         }
         self.bus.set_torque(now, &torque);
         self.joints.iter_mut().for_each(|joint| joint.drive.torque_is_on());
-        self.torque_set = Some(torque);
         self.torque_refresh_in = TORQUE_REFRESH_CYCLES;
         true
     }
