@@ -5,7 +5,8 @@
 use clap::{Args, Parser, Subcommand, value_parser};
 
 use crate::commands::{
-    backup, baud, effector, get, info, monitor, ports, pose, registers, set, shell, sniff, state, stop,
+    backup, baud, calibrate, effector, get, info, monitor, play, ports, pose, record, registers, set, shell,
+    sniff, state, stop,
 };
 use crate::failure::Failure;
 use crate::session::Session;
@@ -68,6 +69,9 @@ pub(crate) enum Command {
     Vacuum(effector::VacuumArgs),
     Effector(effector::EffectorArgs),
     Monitor(monitor::MonitorArgs),
+    Record(record::RecordArgs),
+    Play(play::PlayArgs),
+    Calibrate(calibrate::CalibrateArgs),
     Baud(baud::BaudArgs),
     Backup(backup::BackupArgs),
     Restore(backup::RestoreArgs),
@@ -91,6 +95,9 @@ impl Command {
             Self::Vacuum(args) => effector::vacuum(session, &args),
             Self::Effector(args) => effector::effector(session, &args),
             Self::Monitor(args) => monitor::run(session, &args),
+            Self::Record(args) => record::run(session, &args),
+            Self::Play(args) => play::run(session, &args),
+            Self::Calibrate(args) => calibrate::run(session, &args),
             Self::Baud(args) => baud::run(session, &args),
             Self::Backup(args) => backup::backup(session, &args),
             Self::Restore(args) => backup::restore(session, &args),

@@ -79,7 +79,7 @@ fn panel(out: &mut String, number: u8, track: &Track, top: f64, seconds: &Scale)
         "<rect class=\"panel\" x=\"{LEFT}\" y=\"{top:.1}\" width=\"{width}\" height=\"{PANEL}\"/>"
     );
     text(out, "joint", 16.0, top + PANEL / 2.0 + 4.0, &format!("joint {number}"));
-    for tick in degrees.ticks(3.0) {
+    for tick in degrees.ticks(4.0) {
         let y = degrees.at(tick);
         let _ = writeln!(out, "<path class=\"grid\" d=\"M{LEFT} {y:.1}H{:.1}\"/>", WIDTH - RIGHT);
         text(out, "end", LEFT - 6.0, y + 4.0, &format!("{tick}°"));

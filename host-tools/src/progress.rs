@@ -17,6 +17,16 @@ impl Progress {
         Self(bar)
     }
 
+    /// A count of `unit`, for what has no end of its own.
+    pub(crate) fn endless(unit: &str) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        let template = format!("{{spinner}} {{pos}} {unit}  {{msg}}");
+        bar.set_style(
+            ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_spinner()),
+        );
+        Self(bar)
+    }
+
     /// So much is done.
     pub(crate) fn set(&self, done: u64) {
         self.0.set_position(done);

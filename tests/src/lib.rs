@@ -19,6 +19,7 @@ pub mod own;
 pub mod programs;
 pub mod registers;
 pub mod target;
+pub mod terminal;
 
 pub use bench::{Bench, Setup, near, with_arm};
 pub use frames::{read_request, write_request};

@@ -2,12 +2,15 @@
 
 pub(crate) mod backup;
 pub(crate) mod baud;
+pub(crate) mod calibrate;
 pub(crate) mod effector;
 pub(crate) mod get;
 pub(crate) mod info;
 pub(crate) mod monitor;
+pub(crate) mod play;
 pub(crate) mod ports;
 pub(crate) mod pose;
+pub(crate) mod record;
 pub(crate) mod registers;
 pub(crate) mod set;
 pub(crate) mod shell;

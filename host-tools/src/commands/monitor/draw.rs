@@ -50,7 +50,9 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &View) {
     frame.render_widget(Paragraph::new(title_right(view)).alignment(Alignment::Right), title);
     frame.render_widget(Paragraph::new(table_lines(view, table.width)), table);
     draw_plot(frame, view, plot);
-    frame.render_widget(Paragraph::new(foot_lines(view)), foot);
+    // What was known of an arm that went away is old.
+    let age = if view.arm().is_some() { Style::new() } else { FAINT };
+    frame.render_widget(Paragraph::new(foot_lines(view)).style(age), foot);
     frame.render_widget(Paragraph::new(last_line(view)), keys);
     if let Some(dialog) = view.dialog {
         draw_dialog(frame, dialog);

@@ -4,16 +4,11 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use sevenbot::Joint;
 use sevenbot::map::motor_state;
 
-use super::view::{Dialog, View, Wish};
+use super::view::{Dialog, Pace, View, Wish};
 
 /// Degrees of a nudge, and of one with Shift.
 const NUDGE: i16 = 1;
 const BIG_NUDGE: i16 = 10;
-/// A change of speed, in the register's steps.
-const SPEED_CHANGE: u8 = 5;
-/// The highest speed below the maximum, which is 0 (D10).
-const HIGHEST_SPEED: u8 = 100;
-
 /// What the help shows: keys, and what they do.
 pub(crate) const HELP: [(&str, &str); 8] = [
     ("1..7, ↑ ↓", "select a joint"),
@@ -67,8 +62,8 @@ fn press_in_view(view: &mut View, key: KeyEvent) -> Outcome {
         // Not every terminal tells Shift and an arrow from the arrow alone.
         KeyCode::Char('[') => return nudge(view, -BIG_NUDGE),
         KeyCode::Char(']') => return nudge(view, BIG_NUDGE),
-        KeyCode::Char('+' | '=') => return speed(view, faster),
-        KeyCode::Char('-' | '_') => return speed(view, slower),
+        KeyCode::Char('+' | '=') => return change(view, Pace::Faster),
+        KeyCode::Char('-' | '_') => return change(view, Pace::Slower),
         _ => {}
     }
     Outcome::Shown
@@ -108,26 +103,8 @@ fn nudge(view: &mut View, degrees: i16) -> Outcome {
     }
 }
 
-fn speed(view: &View, change: impl Fn(u8) -> u8) -> Outcome {
-    let present = view.arm().map(|arm| arm.speed(view.selected).steps());
-    present.map_or(Outcome::Shown, |present| Outcome::Ask(Wish::Speed(change(present))))
-}
-
-/// The next speed up; above the highest there is the maximum, which is 0.
-const fn faster(steps: u8) -> u8 {
-    match steps {
-        0 | HIGHEST_SPEED => 0,
-        steps if steps + SPEED_CHANGE > HIGHEST_SPEED => HIGHEST_SPEED,
-        steps => steps + SPEED_CHANGE,
-    }
-}
-
-const fn slower(steps: u8) -> u8 {
-    match steps {
-        0 => HIGHEST_SPEED,
-        steps if steps <= SPEED_CHANGE => 1,
-        steps => steps - SPEED_CHANGE,
-    }
+fn change(view: &View, pace: Pace) -> Outcome {
+    view.arm().map_or(Outcome::Shown, |_| Outcome::Ask(Wish::Pace { joint: view.selected, pace }))
 }
 
 #[cfg(test)]
@@ -169,15 +146,6 @@ mod tests {
         assert_eq!(view.dialog, Some(Dialog::Help));
         let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
         assert_eq!(press(&mut view, ctrl_c), Outcome::Quit);
-    }
-
-    #[test]
-    fn speeds_end_at_the_maximum_and_at_the_slowest() {
-        let up: Vec<u8> = std::iter::successors(Some(93), |&steps| Some(faster(steps))).take(5).collect();
-        assert_eq!(up, [93, 98, 100, 0, 0]);
-        let down: Vec<u8> = std::iter::successors(Some(8), |&steps| Some(slower(steps))).take(4).collect();
-        assert_eq!(down, [8, 3, 1, 1]);
-        assert_eq!(slower(0), 100);
     }
 
     #[test]

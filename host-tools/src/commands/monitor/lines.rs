@@ -2,11 +2,10 @@
 //!
 //! Ends with the connection: whoever reads lines wants to be told, not to wait.
 
-use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use serde::Serialize;
-use sevenbot::Joint;
+use sevenbot::{Joint, Status};
 
 use super::sample::Sample;
 use crate::output::Facts;
@@ -56,22 +55,24 @@ fn columns(sample: &Sample) -> String {
 }
 
 fn csv(sample: &Sample) -> String {
-    let mut line = format!("{:.3}", sample.time.as_secs_f64());
-    let mut add = |field: String| drop(write!(line, ",{field}"));
-    Joint::ALL.iter().for_each(|&joint| add(sample.target(joint).to_string()));
-    Joint::ALL.iter().for_each(|&joint| add(sample.present(joint).to_string()));
-    Joint::ALL.iter().for_each(|&joint| add(format!("{:.1}", sample.speed(joint).degrees_per_second())));
-    Joint::ALL.iter().for_each(|&joint| add(u8::from(sample.is_moving(joint)).to_string()));
-    add(sample.motor_state().to_string());
+    let joints = |field: fn(&Sample, Joint) -> String| Joint::ALL.map(|joint| field(sample, joint)).join(",");
     let status = sample.status.as_ref();
     let number = |value: Option<u8>| value.map_or_else(String::new, |value| value.to_string());
-    add(number(status.map(sevenbot::Status::faults)));
-    add(number(status.map(sevenbot::Status::missing)));
-    let volts = status.and_then(sevenbot::Status::supply_volts);
-    add(volts.map_or_else(String::new, |volts| format!("{volts:.1}")));
-    add(number(status.and_then(sevenbot::Status::hottest_celsius)));
-    add(format!("{:.1}", sample.round_trip.as_secs_f64() * 1e3));
-    line
+    let volts = status.and_then(Status::supply_volts);
+    [
+        format!("{:.3}", sample.time.as_secs_f64()),
+        joints(|sample, joint| sample.target(joint).to_string()),
+        joints(|sample, joint| sample.present(joint).to_string()),
+        joints(|sample, joint| format!("{:.1}", sample.speed(joint).degrees_per_second())),
+        joints(|sample, joint| u8::from(sample.is_moving(joint)).to_string()),
+        sample.motor_state().to_string(),
+        number(status.map(Status::faults)),
+        number(status.map(Status::missing)),
+        volts.map_or_else(String::new, |volts| format!("{volts:.1}")),
+        number(status.and_then(Status::hottest_celsius)),
+        format!("{:.1}", sample.round_trip.as_secs_f64() * 1e3),
+    ]
+    .join(",")
 }
 
 fn numbers(is_so: impl Fn(Joint) -> bool) -> Vec<u8> {
@@ -105,9 +106,9 @@ impl From<&Sample> for Line {
             moving: numbers(|joint| sample.is_moving(joint)),
             missing: numbers(|joint| sample.is_missing(joint)),
             motor_state: sample.motor_state(),
-            faults: status.map(sevenbot::Status::faults),
-            supply_volts: status.and_then(sevenbot::Status::supply_volts),
-            hottest_celsius: status.and_then(sevenbot::Status::hottest_celsius),
+            faults: status.map(Status::faults),
+            supply_volts: status.and_then(Status::supply_volts),
+            hottest_celsius: status.and_then(Status::hottest_celsius),
             round_trip_ms: thousandths(sample.round_trip.as_secs_f64() * 1e3),
         }
     }

@@ -38,7 +38,7 @@ fn svg(screen: &Buffer) -> String {
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
          height=\"{height}\">\n<style>text {{ font: 15px ui-monospace, 'DejaVu Sans Mono', Menlo, Consolas, \
-         monospace; white-space: pre }}</style>\n\
+         monospace }}</style>\n\
          <rect width=\"100%\" height=\"100%\" rx=\"8\" fill=\"{BACKGROUND}\"/>\n"
     );
     for y in 0..screen.area.height {
@@ -56,7 +56,7 @@ fn row(out: &mut String, screen: &Buffer, y: u16) {
         let symbols: String = run.iter().map(|(_, cell)| cell.symbol()).collect();
         if is_drawn(first) {
             run.iter().for_each(|(x, cell)| shapes(out, *x, y, cell));
-        } else if !symbols.trim().is_empty() {
+        } else {
             text(out, *x, y, &symbols, first);
         }
     }
@@ -70,21 +70,23 @@ fn is_drawn(cell: &Cell) -> bool {
     cell.symbol().chars().next().is_some_and(|symbol| dots(symbol).is_some() || path(symbol).is_some())
 }
 
+/// Word by word: what becomes of spaces is up to the reader of an SVG.
 fn text(out: &mut String, x: u16, y: u16, symbols: &str, style: &Cell) {
-    let indent = symbols.chars().take_while(|symbol| *symbol == ' ').count();
-    let symbols = symbols.trim();
-    let left = x + u16::try_from(indent).unwrap_or(0);
-    let length = symbols.chars().count() * usize::from(CELL.0);
     let weight = if style.modifier.contains(Modifier::BOLD) { " font-weight=\"bold\"" } else { "" };
-    let _ = writeln!(
-        out,
-        "<text x=\"{}\" y=\"{}\" textLength=\"{length}\" lengthAdjust=\"spacingAndGlyphs\" fill=\"{}\"{weight}>{}\
-         </text>",
-        MARGIN + left * CELL.0,
-        MARGIN + y * CELL.1 + 14,
-        hexadecimal(style.fg),
-        escaped(symbols)
-    );
+    let colour = hexadecimal(style.fg);
+    let baseline = MARGIN + y * CELL.1 + 14;
+    let symbols: Vec<(u16, char)> = (x..).zip(symbols.chars()).collect();
+    for word in symbols.chunk_by(|one, next| (one.1 == ' ') == (next.1 == ' ')) {
+        let Some((column, _)) = word.first().filter(|(_, symbol)| *symbol != ' ') else { continue };
+        let left = MARGIN + column * CELL.0;
+        let length = word.len() * usize::from(CELL.0);
+        let word = escaped(&word.iter().map(|(_, symbol)| symbol).collect::<String>());
+        let _ = writeln!(
+            out,
+            "<text x=\"{left}\" y=\"{baseline}\" textLength=\"{length}\" \
+             lengthAdjust=\"spacingAndGlyphs\" fill=\"{colour}\"{weight}>{word}</text>"
+        );
+    }
 }
 
 fn shapes(out: &mut String, x: u16, y: u16, cell: &Cell) {
@@ -145,7 +147,7 @@ mod tests {
     #[test]
     fn what_the_screen_shows_is_in_the_picture() {
         let picture = picture(&watching());
-        assert!(picture.contains("firmware 3.0") && picture.contains(">moving<"), "{picture}");
+        assert!(picture.contains(">firmware<") && picture.contains(">moving<"), "{picture}");
         assert!(picture.matches("<circle").count() > 100, "the plot");
         assert!(picture.contains(&format!("fill=\"{}\"", hexadecimal(Color::Yellow))), "joint 2");
     }

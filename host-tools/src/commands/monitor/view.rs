@@ -41,10 +41,36 @@ pub(crate) enum News {
 pub(crate) enum Wish {
     /// Move a joint's target by so many degrees.
     Nudge { joint: Joint, degrees: i16 },
-    /// This speed for all joints, in the register's steps.
-    Speed(u8),
+    /// All joints faster or slower than this one is now.
+    Pace { joint: Joint, pace: Pace },
     /// This motor state.
     State(u8),
+}
+
+/// A change of speed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Pace {
+    Faster,
+    Slower,
+}
+
+impl Pace {
+    /// A change, in the register's steps.
+    const CHANGE: u8 = 5;
+    /// The highest speed below the maximum, which is 0 (D10).
+    const HIGHEST: u8 = 100;
+
+    /// The register's next speed after this one.
+    pub(crate) const fn after(self, steps: u8) -> u8 {
+        match (self, steps) {
+            (Self::Faster, 0 | Self::HIGHEST) => 0,
+            (Self::Faster, _) if steps > Self::HIGHEST - Self::CHANGE => Self::HIGHEST,
+            (Self::Faster, _) => steps + Self::CHANGE,
+            (Self::Slower, 0) => Self::HIGHEST,
+            (Self::Slower, _) if steps <= Self::CHANGE => 1,
+            (Self::Slower, _) => steps - Self::CHANGE,
+        }
+    }
 }
 
 /// Is there an arm?
@@ -261,6 +287,17 @@ pub(crate) mod tests {
         view.hear(News::Lost("gone".to_owned()));
         assert!(view.arm().is_none());
         assert!(view.sample.is_some(), "what was last known is still shown");
+    }
+
+    #[test]
+    fn speeds_end_at_the_maximum_and_at_the_slowest() {
+        let from = |pace: Pace, first| {
+            let speeds = std::iter::successors(Some(first), move |&steps| Some(pace.after(steps)));
+            speeds.take(5).collect::<Vec<u8>>()
+        };
+        assert_eq!(from(Pace::Faster, 93), [93, 98, 100, 0, 0]);
+        assert_eq!(from(Pace::Slower, 8), [8, 3, 1, 1, 1]);
+        assert_eq!(from(Pace::Slower, 0), [0, 100, 95, 90, 85]);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use sevenbot::change::Unchanged;
 use sevenbot::map::{MOTOR_STATE, SPEED, TARGET_POSITION};
-use sevenbot::{Angle, Arm, Error, Joint, Options, Register, ports};
+use sevenbot::{Angle, Arm, Error, Joint, Options, ports};
 
 use super::sample::Sample;
 use super::view::{News, Wish};
@@ -158,19 +158,23 @@ impl Watcher {
 fn grant(arm: &mut Arm, wish: Wish) -> Result<Vec<Unchanged>, Error> {
     match wish {
         Wish::Nudge { joint, degrees } => nudge(arm, joint, degrees),
-        Wish::Speed(steps) => arm.write_checked(SPEED.address, &[steps; 7]),
-        Wish::State(state) => one(arm, &MOTOR_STATE, state),
+        Wish::Pace { joint, pace } => {
+            let steps = register(arm, SPEED.of(joint))?;
+            arm.write_checked(SPEED.address, &[pace.after(steps); 7])
+        }
+        Wish::State(state) => arm.write_checked(MOTOR_STATE.address, &[state]),
     }
 }
 
-fn one(arm: &mut Arm, row: &Register, value: u8) -> Result<Vec<Unchanged>, Error> {
-    arm.write_checked(row.address, &[value])
+/// What a register holds now. What the screen shows of it may be older than the last wish.
+fn register(arm: &mut Arm, address: u8) -> Result<u8, Error> {
+    Ok(arm.read(address, 1)?.first().copied().unwrap_or(0))
 }
 
-/// Moves a joint's target from where it is now. Asked for it first, because other nudges may be just behind.
+/// Moves a joint's target from where it is now.
 fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<Vec<Unchanged>, Error> {
     let address = TARGET_POSITION.of(joint);
-    let target = arm.read(address, 1)?.first().copied().unwrap_or(0);
+    let target = register(arm, address)?;
     let wanted = (i16::from(target) + degrees).clamp(0, i16::from(Angle::MAX_DEGREES));
     let wanted = u8::try_from(wanted).unwrap_or(target);
     arm.write_checked(address, &[wanted])

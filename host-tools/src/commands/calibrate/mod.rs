@@ -1,0 +1,242 @@
+//! `calibrate`: finds the offsets of the joints together with the user, and stores them.
+//!
+//! ```text
+//!   joint by joint: nudge it onto a mark ──▶ what does the mark say? ──▶ offset, and how good it is
+//!   then: all seven ──▶ write them? ──▶ lock open, written, read back, lock closed ──▶ still there after a restart?
+//! ```
+//!
+//! Nothing is written before the last question.
+
+mod offsets;
+
+use std::io::{self, IsTerminal, Write};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use sevenbot::map::{OFFSET, PRESENT_POSITION, TARGET_POSITION};
+use sevenbot::{Angle, Arm, Joint, Span};
+
+use self::offsets::{Grade, Offsets, Table, corrected};
+use super::all_taken;
+use super::set::unlocked;
+use crate::confirm::confirm;
+use crate::failure::Failure;
+use crate::interrupt::or_hold;
+use crate::moving::{Move, driven};
+use crate::output::{Facts, note, warn};
+use crate::session::Session;
+
+/// Find the offsets of the joints, and store them.
+///
+/// Goes through the joints. At each one, bring the joint to a mark whose angle you know, by typing +N or -N
+/// degrees, or by hand after `sevenbot state forceless`; then type the mark's angle. The offsets are written
+/// at the end, after a question.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+At each joint:
+  +5, -2     move the joint by so many degrees
+  90         the joint really stands at 90 degrees: the offset follows
+  Enter      keep the offset, go on to the next joint
+  q          end, and write nothing
+
+Up to 10 degrees an offset is good, up to 16 acceptable. A larger one is bad and cannot be stored: take the
+joint apart and put it together a tooth further.
+
+Examples:
+  sevenbot calibrate
+  sevenbot calibrate --show
+  sevenbot calibrate --reset                   all offsets 0, as they left the factory")]
+pub(crate) struct CalibrateArgs {
+    /// Show the offsets and how good they are, and change nothing.
+    #[arg(long, conflicts_with = "reset")]
+    show: bool,
+    /// Make all offsets 0.
+    #[arg(long)]
+    reset: bool,
+    /// Write without a question.
+    #[arg(long)]
+    yes: bool,
+}
+
+/// How long an arm may take to come back from a restart.
+const RESTART: Duration = Duration::from_secs(20);
+const LOOK_EVERY: Duration = Duration::from_millis(500);
+
+pub(crate) fn run(session: &mut Session, args: &CalibrateArgs) -> Result<(), Failure> {
+    let mut arm = session.connect()?;
+    let before = read(&mut arm)?;
+    if args.show {
+        return session.output.show(&Table::new(before, before));
+    }
+    if !args.yes && !io::stdin().is_terminal() {
+        let how = "--yes says yes; --show only shows them";
+        return Err(Failure::Usage(format!("nobody is there to say whether offsets may be written: {how}")));
+    }
+    let wanted = if args.reset { Offsets([0; 7]) } else { walk(&mut arm, before)? };
+    store(session, arm, args, before, wanted)
+}
+
+fn read(arm: &mut Arm) -> Result<Offsets, Failure> {
+    Ok(arm.read_span(Span::of(&OFFSET))?.into())
+}
+
+/// Writes the offsets, if they are wanted, and shows them as the arm has them then.
+fn store(
+    session: &mut Session,
+    mut arm: Arm,
+    args: &CalibrateArgs,
+    before: Offsets,
+    wanted: Offsets,
+) -> Result<(), Failure> {
+    if wanted != before {
+        let mut err = anstream::stderr();
+        Table::new(before, wanted).write_text(&mut err)?;
+        confirm("Write these offsets? The arm moves a little by them.", args.yes)?;
+        all_taken(&unlocked(&mut arm, |arm| arm.write_checked(OFFSET.address, &wanted.bytes()))?)?;
+        if !args.yes {
+            restart(session, arm, wanted)?;
+        }
+    }
+    session.output.show(&Table::new(before, wanted))
+}
+
+/// Goes through the joints; gives the offsets that were found.
+fn walk(arm: &mut Arm, before: Offsets) -> Result<Offsets, Failure> {
+    let mut wanted = before;
+    say(
+        "Type +N or -N to move a joint, the angle it really stands at, or Enter to keep its offset; q ends.",
+    )?;
+    for joint in Joint::ALL {
+        wanted = wanted.with(joint, at_joint(arm, joint, before.of(joint))?);
+    }
+    Ok(wanted)
+}
+
+/// What may be typed at a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Answer {
+    Keep,
+    Quit,
+    /// Degrees.
+    Nudge(i16),
+    Truth(Angle),
+}
+
+impl Answer {
+    fn parse(line: &str) -> Option<Self> {
+        let line = line.trim();
+        match line {
+            "" => Some(Self::Keep),
+            "q" | "Q" => Some(Self::Quit),
+            _ if line.starts_with(['+', '-']) => line.parse().ok().map(Self::Nudge),
+            _ => line.parse().ok().and_then(Angle::from_degrees).map(Self::Truth),
+        }
+    }
+}
+
+/// The offset of one joint.
+fn at_joint(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, Failure> {
+    loop {
+        let seen = arm.read_span(Span::of(&PRESENT_POSITION))?.at(PRESENT_POSITION.of(joint));
+        let number = joint.number();
+        let grade = Grade::of(offset).word();
+        match Answer::parse(&ask(&format!("joint {number}: reads {seen}°, offset {offset}° ({grade}) > "))?)
+        {
+            Some(Answer::Keep) => return Ok(offset),
+            Some(Answer::Quit) => return Err(Failure::Arm("nothing was written".to_owned())),
+            Some(Answer::Nudge(degrees)) => nudge(arm, joint, degrees)?,
+            Some(Answer::Truth(truth)) => {
+                let found = corrected(joint, offset, seen, truth.degrees());
+                let grade = Grade::of(found);
+                let style = grade.style();
+                say(&format!("  offset {found}°: {style}{}{style:#}", grade.word()))?;
+                if grade != Grade::Bad {
+                    return Ok(found);
+                }
+                warn("the register holds 16° at most: put the joint together a tooth further, or keep it");
+            }
+            None => warn("+N or -N moves it, 0 to 180 is its true angle, Enter keeps the offset, q ends"),
+        }
+    }
+}
+
+/// Moves one joint. What keeps it from moving is told, and does not end the walk.
+fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), Failure> {
+    let target = arm.read_span(Span::of(&TARGET_POSITION))?.at(TARGET_POSITION.of(joint));
+    let wanted = i16::from(target).saturating_add(degrees).clamp(0, i16::from(Angle::MAX_DEGREES));
+    let wanted = u8::try_from(wanted).unwrap_or(target);
+    let targets = Joint::ALL.map(|other| (other == joint).then_some(wanted));
+    let moved = or_hold(arm, |arm, interrupt| {
+        driven(arm)?;
+        Move::begin(arm, targets)?.finish(arm, interrupt)
+    });
+    match moved {
+        Err(Failure::Arm(reason)) => warn(reason),
+        Err(failure) => return Err(failure),
+        Ok(_) => {}
+    }
+    Ok(())
+}
+
+/// Has the arm switched off and on, and looks whether it has forgotten anything.
+fn restart(session: &Session, mut arm: Arm, wanted: Offsets) -> Result<(), Failure> {
+    let accepted = |arm: &mut Arm| Ok::<_, Failure>(arm.status()?.map(|status| status.frames_accepted()));
+    let before = accepted(&mut arm)?;
+    // Without its supply the port may go, and come back as another one.
+    drop(arm);
+    ask("The offsets are written. To see that they stay, switch the arm off and on; then press Enter. > ")?;
+    let mut arm = reconnect(session)?;
+    if before.is_some() && accepted(&mut arm)? > before {
+        warn("the arm was not switched off: its counters go on");
+    }
+    if read(&mut arm)? != wanted {
+        return Err(Failure::Arm("the arm has forgotten its offsets over the restart".to_owned()));
+    }
+    note("the offsets are still there");
+    Ok(())
+}
+
+fn reconnect(session: &Session) -> Result<Arm, Failure> {
+    let deadline = Instant::now() + RESTART;
+    loop {
+        match session.connect() {
+            Err(_) if Instant::now() < deadline => sleep(LOOK_EVERY),
+            ended => return ended,
+        }
+    }
+}
+
+fn say(line: &str) -> Result<(), Failure> {
+    Ok(writeln!(anstream::stderr(), "{line}")?)
+}
+
+/// A line from the user.
+fn ask(question: &str) -> Result<String, Failure> {
+    let mut err = anstream::stderr();
+    write!(err, "{question}")?;
+    err.flush()?;
+    let mut line = String::new();
+    if io::stdin().read_line(&mut line)? == 0 {
+        writeln!(err)?;
+        return Err(Failure::Usage("the input has ended, and there were questions left".to_owned()));
+    }
+    Ok(line)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn answers_are_nudges_angles_or_words() {
+        assert_eq!(Answer::parse("\n"), Some(Answer::Keep));
+        assert_eq!(Answer::parse(" +5 \n"), Some(Answer::Nudge(5)));
+        assert_eq!(Answer::parse("-2\r\n"), Some(Answer::Nudge(-2)));
+        assert_eq!(Answer::parse("90"), Angle::from_degrees(90).map(Answer::Truth));
+        assert_eq!(Answer::parse("q"), Some(Answer::Quit));
+        for nonsense in ["181", "ninety", "+", "9 0"] {
+            assert_eq!(Answer::parse(nonsense), None, "{nonsense}");
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Offsets of the joints: how good they are, and which one makes a joint's angle right (docs/protocol.md, D9).
+//!
+//! Knows the arithmetic, neither arm nor user.
+
+use std::io::{self, Write};
+
+use anstyle::Style;
+use serde::Serialize;
+use sevenbot::map::OFFSET;
+use sevenbot::{Joint, Snapshot};
+
+use crate::output::{BAD, BOLD, DOUBTFUL, Facts, GOOD};
+
+/// Offsets up to this show a good assembly, says the maker's table.
+const GOOD_UP_TO: i16 = 10;
+
+/// How good an offset is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Grade {
+    /// The joint was put together well.
+    Good,
+    /// It will do.
+    Acceptable,
+    /// The register does not hold it: the joint has to be put together anew.
+    Bad,
+}
+
+impl Grade {
+    pub(super) fn of(offset: i16) -> Self {
+        match offset {
+            _ if OFFSET.range.encode(offset).is_none() => Self::Bad,
+            _ if offset.abs() <= GOOD_UP_TO => Self::Good,
+            _ => Self::Acceptable,
+        }
+    }
+
+    pub(super) const fn word(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Acceptable => "acceptable",
+            Self::Bad => "bad",
+        }
+    }
+
+    pub(super) const fn style(self) -> Style {
+        match self {
+            Self::Good => GOOD,
+            Self::Acceptable => DOUBTFUL,
+            Self::Bad => BAD,
+        }
+    }
+}
+
+/// The offset with which a joint that reads `seen` degrees would read `truth`.
+pub(super) fn corrected(joint: Joint, offset: i16, seen: u8, truth: u8) -> i16 {
+    let error = i16::from(truth) - i16::from(seen);
+    // Where the servo is mounted the other way round, the offset counts on the servo's side.
+    if is_reversed(joint) { offset - error } else { offset + error }
+}
+
+/// Is the joint's servo mounted the other way round (D9)?
+fn is_reversed(joint: Joint) -> bool {
+    (2..=6).contains(&joint.number())
+}
+
+/// The offsets of all joints, joint 1 first, in degrees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Offsets(pub(super) [i16; 7]);
+
+impl From<Snapshot> for Offsets {
+    fn from(registers: Snapshot) -> Self {
+        Self(registers.joints(&OFFSET).map(|byte| OFFSET.range.decode(byte)))
+    }
+}
+
+impl Offsets {
+    /// The registers' bytes. An offset that does not fit counts as none.
+    pub(super) fn bytes(self) -> [u8; 7] {
+        self.0.map(|offset| OFFSET.range.encode(offset).unwrap_or(0))
+    }
+
+    pub(super) fn of(self, joint: Joint) -> i16 {
+        let pairs = Joint::ALL.into_iter().zip(self.0);
+        pairs.filter(|(other, _)| *other == joint).map(|(_, offset)| offset).sum()
+    }
+
+    pub(super) fn with(mut self, joint: Joint, offset: i16) -> Self {
+        let pairs = Joint::ALL.into_iter().zip(&mut self.0);
+        pairs.filter(|(other, _)| *other == joint).for_each(|(_, held)| *held = offset);
+        self
+    }
+}
+
+/// The offsets, as they are told.
+#[derive(Debug, Serialize)]
+pub(super) struct Table {
+    joints: Vec<Row>,
+}
+
+#[derive(Debug, Serialize)]
+struct Row {
+    joint: u8,
+    offset_degrees: i16,
+    grade: Grade,
+    /// What it was, where it was another.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    before: Option<i16>,
+}
+
+impl Table {
+    /// What they are, and what they were.
+    pub(super) fn new(before: Offsets, now: Offsets) -> Self {
+        let row = |joint: Joint| {
+            let (was, is) = (before.of(joint), now.of(joint));
+            let before = (was != is).then_some(was);
+            Row { joint: joint.number(), offset_degrees: is, grade: Grade::of(is), before }
+        };
+        Self { joints: Joint::ALL.into_iter().map(row).collect() }
+    }
+}
+
+impl Facts for Table {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{BOLD}joint  offset{BOLD:#}")?;
+        for Row { joint, offset_degrees, grade, before } in &self.joints {
+            let (style, word) = (grade.style(), grade.word());
+            let was = before.map_or_else(String::new, |was| format!("  (was {was}°)"));
+            writeln!(out, "{joint:>5}  {offset_degrees:>5}°  {style}{word}{style:#}{was}")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grades_are_the_makers() {
+        let words: Vec<&str> = [0, 10, -10, 11, -16, 17, -300].map(|offset| Grade::of(offset).word()).into();
+        assert_eq!(words, ["good", "good", "good", "acceptable", "acceptable", "bad", "bad"]);
+    }
+
+    #[test]
+    fn an_offset_counts_on_the_servos_side() {
+        assert_eq!(corrected(Joint::ALL[0], 2, 90, 95), 7);
+        assert_eq!(corrected(Joint::ALL[1], 2, 90, 95), -3, "reversed");
+        assert_eq!(corrected(Joint::ALL[6], 0, 80, 79), -1);
+    }
+
+    #[test]
+    fn one_joint_is_changed_and_the_others_are_not() {
+        let offsets = Offsets([1, 2, 3, 4, 5, 6, 7]).with(Joint::ALL[2], -5);
+        assert_eq!(offsets.0, [1, 2, -5, 4, 5, 6, 7]);
+        assert_eq!(offsets.of(Joint::ALL[2]), -5);
+        assert_eq!(offsets.bytes(), [1, 2, 0x85, 4, 5, 6, 7]);
+    }
+}

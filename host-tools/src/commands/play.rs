@@ -1,0 +1,239 @@
+//! `play`: moves the arm as a recording says, and draws how well it followed.
+//!
+//! ```text
+//!   file ──▶ checked, before anything moves ──▶ approach, slowly ──▶ step by step ──▶ there
+//!                                                                      └── reports ──▶ drawing
+//! ```
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::{Args, value_parser};
+use serde::Serialize;
+use sevenbot::map::{FEEDBACK_FREQUENCY, SPEED, TIME, VACUUM_PUMP};
+use sevenbot::playback::{self, Step};
+use sevenbot::recording::{Moment, Recording};
+use sevenbot::{Angle, Arm, Snapshot, Span};
+
+use super::all_taken;
+use crate::failure::Failure;
+use crate::interrupt::{Interrupt, or_hold};
+use crate::moving::{Move, driven};
+use crate::output::Facts;
+use crate::plot::{self, Track};
+use crate::progress::Progress;
+use crate::session::Session;
+
+/// Play a recorded movement.
+///
+/// Nothing moves before the whole file was checked. The arm goes slowly from wherever it is to where the
+/// recording begins. Ctrl-C leaves it holding where it is.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot play wave.txt
+  sevenbot play wave.txt --speed 0.5 --loop=3
+  sevenbot play wave.txt --plot wave.svg       draws where each joint should have been, and where it was")]
+pub(crate) struct PlayArgs {
+    /// A recording of `sevenbot record`, or one written by hand.
+    file: PathBuf,
+    /// How many times as fast as it was recorded, 0.1 to 10.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
+    speed: f64,
+    /// Again and again; with a number, so many times in all.
+    #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0",
+          value_parser = value_parser!(u32))]
+    times: Option<u32>,
+    /// Draw the targets and the measured positions of the first time through, as SVG.
+    #[arg(long, value_name = "SVG")]
+    plot: Option<PathBuf>,
+}
+
+/// How often the arm reports while it plays, in Hz.
+const FEEDBACK_HZ: u8 = 30;
+/// No report for so long, and something is wrong.
+const SILENCE: Duration = Duration::from_secs(2);
+/// How long Ctrl-C may wait.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// How long the drawing goes on behind the end: servos lag.
+const AFTERMATH: Duration = Duration::from_millis(300);
+
+/// What was played.
+#[derive(Debug, Serialize)]
+struct Played {
+    times: u32,
+    seconds: f64,
+}
+
+impl Facts for Played {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        let Self { times, seconds, .. } = self;
+        let times = if *times == 1 { String::new() } else { format!(", {times} times") };
+        writeln!(out, "played {seconds:.1} s{times}")
+    }
+}
+
+pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), Failure> {
+    let recording = load(args)?;
+    let mut arm = session.connect()?;
+    driven(&mut arm)?;
+    let before = arm.read_span(Span::between(&SPEED, &TIME))?;
+    let mut player = Player::new(&recording, args.speed);
+    let done = or_hold(&mut arm, |arm, interrupt| player.play(arm, interrupt, args.times.unwrap_or(1)));
+    // An arm that went away cannot be told anything.
+    let tidied = if matches!(done, Err(Failure::Wire(_))) { Ok(()) } else { tidy(&mut arm, &before) };
+    if let Some(path) = &args.plot {
+        fs::write(path, player.drawing(args)).map_err(|error| Failure::file(path, error))?;
+    }
+    done.and(tidied)?;
+    let Player { played, seconds, .. } = player;
+    session.output.show(&Played { times: played, seconds })
+}
+
+/// The recording, if an arm can follow it.
+fn load(args: &PlayArgs) -> Result<Recording, Failure> {
+    let text = fs::read_to_string(&args.file).map_err(|error| Failure::file(&args.file, error))?;
+    let recording = Recording::parse(&text);
+    let checked = recording.and_then(|recording| recording.check_speeds(args.speed).map(|()| recording));
+    checked.map_err(|error| Failure::file(&args.file, error))
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    let factor = text.parse().ok().filter(|factor| (0.1..=10.0).contains(factor));
+    factor.ok_or_else(|| "a number from 0.1 to 10".to_owned())
+}
+
+/// The speeds, times and silence that the arm had before.
+fn tidy(arm: &mut Arm, before: &Snapshot) -> Result<(), Failure> {
+    all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[0])?)?;
+    all_taken(&arm.write_checked(before.address, &before.values)?)
+}
+
+/// A recording on its way through an arm.
+struct Player {
+    moments: Vec<Moment>,
+    steps: Vec<Step>,
+    /// Where the joints were the first time through, since its beginning.
+    measured: Vec<(Duration, [Angle; 7])>,
+    /// When a report last came.
+    heard: Instant,
+    played: u32,
+    seconds: f64,
+}
+
+impl Player {
+    fn new(recording: &Recording, factor: f64) -> Self {
+        let seconds = recording.duration().as_secs_f64() / factor;
+        let (moments, steps) = (recording.moments().collect(), playback::steps(recording, factor));
+        Self { moments, steps, measured: Vec::new(), heard: Instant::now(), played: 0, seconds }
+    }
+
+    /// Plays so many times; 0 is until somebody has seen enough.
+    fn play(&mut self, arm: &mut Arm, interrupt: Interrupt, times: u32) -> Result<(), Failure> {
+        all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[FEEDBACK_HZ])?)?;
+        while times == 0 || self.played < times {
+            self.approach(arm, interrupt)?;
+            self.run_through(arm, interrupt)?;
+            self.played = self.played.saturating_add(1);
+        }
+        Ok(())
+    }
+
+    /// Goes slowly to where it begins.
+    fn approach(&self, arm: &mut Arm, interrupt: Interrupt) -> Result<(), Failure> {
+        let Some(first) = self.moments.first() else { return Ok(()) };
+        let step = playback::approach(arm.positions()?, *first);
+        let pace = step.registers();
+        let pace = pace.get(..pace.len().saturating_sub(step.targets.len())).unwrap_or_default();
+        all_taken(&arm.write_checked(VACUUM_PUMP.address, pace)?)?;
+        to_pose(arm, interrupt, step.targets)
+    }
+
+    /// Goes from the first step to the last.
+    fn run_through(&mut self, arm: &mut Arm, interrupt: Interrupt) -> Result<(), Failure> {
+        let steps = std::mem::take(&mut self.steps);
+        let done = self.take(&steps, arm, interrupt);
+        self.steps = steps;
+        done?;
+        let end = self.steps.last().map(|step| step.targets);
+        end.map_or(Ok(()), |targets| to_pose(arm, interrupt, targets))
+    }
+
+    fn take(&mut self, steps: &[Step], arm: &mut Arm, interrupt: Interrupt) -> Result<(), Failure> {
+        let progress = Progress::new(u64::try_from(steps.len()).unwrap_or(u64::MAX), "steps");
+        arm.reports().for_each(drop);
+        let start = Instant::now();
+        self.heard = start;
+        for (number, step) in (1..).zip(steps) {
+            self.listen_until(start, step.time, arm, interrupt)?;
+            arm.write(VACUUM_PUMP.address, &step.registers())?;
+            progress.set(number);
+        }
+        let end = steps.last().map_or(Duration::ZERO, |step| step.time);
+        self.listen_until(start, end + AFTERMATH, arm, interrupt)
+    }
+
+    /// Waits, and takes reports meanwhile.
+    fn listen_until(
+        &mut self,
+        start: Instant,
+        time: Duration,
+        arm: &mut Arm,
+        interrupt: Interrupt,
+    ) -> Result<(), Failure> {
+        loop {
+            interrupt.check()?;
+            let left = time.saturating_sub(start.elapsed());
+            if left.is_zero() {
+                return Ok(());
+            }
+            match arm.next_report(left.min(LOOK_EVERY))? {
+                Some(report) => {
+                    self.heard = report.received;
+                    if self.played == 0 {
+                        self.measured
+                            .push((report.received.saturating_duration_since(start), report.positions));
+                    }
+                }
+                None if self.heard.elapsed() > SILENCE => return Err(silent(arm)),
+                None => {}
+            }
+        }
+    }
+
+    fn drawing(&self, args: &PlayArgs) -> String {
+        let mut tracks: [Track; 7] = Default::default();
+        let start = self.moments.first().map_or(Duration::ZERO, |moment| moment.time);
+        for moment in &self.moments {
+            let seconds = (moment.time.saturating_sub(start)).as_secs_f64() / args.speed;
+            for (track, angle) in tracks.iter_mut().zip(moment.pose) {
+                track.target.push((seconds, angle.degrees().into()));
+            }
+        }
+        for (time, pose) in &self.measured {
+            for (track, angle) in tracks.iter_mut().zip(pose) {
+                track.measured.push((time.as_secs_f64(), angle.degrees().into()));
+            }
+        }
+        let name = args.file.file_name().unwrap_or_default().to_string_lossy();
+        let speed = if args.speed == 1.0 { String::new() } else { format!(", speed {}", args.speed) };
+        plot::svg(&format!("{name}{speed}"), &tracks)
+    }
+}
+
+fn to_pose(arm: &mut Arm, interrupt: Interrupt, targets: [Angle; 7]) -> Result<(), Failure> {
+    let there = Move::begin(arm, targets.map(|angle| Some(angle.degrees())))?;
+    there.finish(arm, interrupt).map(drop)
+}
+
+/// Why no report comes any more.
+fn silent(arm: &mut Arm) -> Failure {
+    match driven(arm) {
+        Err(failure) => failure,
+        Ok(()) => Failure::Arm(
+            "the arm has stopped to report its positions: was it switched off and on again?".to_owned(),
+        ),
+    }
+}

@@ -1,0 +1,183 @@
+//! `record`: what a hand shows the arm, or what the arm does, to a file.
+//!
+//! ```text
+//!   arm ── reports, sent unasked ──▶ Stamps (when each was measured) ──▶ one line each ──▶ file
+//!                                     Pendant (keys: pump, nudges, end) ──┘
+//! ```
+//!
+//! However it ends, the file is whole up to there, and an arm that is still there holds where it is.
+
+mod pendant;
+mod stamps;
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use clap::{Args, value_parser};
+use serde::Serialize;
+use sevenbot::map::{FEEDBACK_FREQUENCY, MOTOR_STATE, VACUUM_PUMP, motor_state};
+use sevenbot::recording::{Moment, write_header, write_moment};
+use sevenbot::{Arm, Span};
+
+use self::pendant::Pendant;
+use self::stamps::Stamps;
+use super::all_taken;
+use crate::confirm::confirm;
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::moving::driven;
+use crate::output::{Facts, note};
+use crate::session::Session;
+
+/// Record a movement: guide the arm by hand, or watch it move.
+///
+/// The arm goes limp, so that a hand can lead it, and its positions go to a file as they come. Ctrl-C ends it:
+/// the arm then holds the pose that it was left in. On a terminal the space bar switches the vacuum pump.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot record wave.txt                     hold the arm, answer y, lead it; Ctrl-C ends
+  sevenbot record wave.txt --driven            the motors stay on, the arrow keys move the arm
+  sevenbot pose 150 60 90 90 90 90 80 --speed 10
+  sevenbot record move.txt --driven --seconds 5    a move that is under way
+
+The file is text, a line a moment: seconds, seven angles in degrees, vacuum. `sevenbot play` moves the arm
+by it, and so it does by a file that was written by hand.")]
+pub(crate) struct RecordArgs {
+    /// Where the recording goes.
+    file: PathBuf,
+    /// End after so many seconds.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=86_400))]
+    seconds: Option<u32>,
+    /// Moments a second.
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = value_parser!(u8).range(1..=50))]
+    hz: u8,
+    /// Leave the motors on: record a move that is under way, or one made by keys.
+    #[arg(long)]
+    driven: bool,
+    /// The arm is held, and FILE may be replaced: do not ask.
+    #[arg(long)]
+    yes: bool,
+}
+
+/// No report for so long, and something is wrong. The slowest rate is one a second.
+const SILENCE: Duration = Duration::from_secs(3);
+/// How long a key, or Ctrl-C, may wait.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// What was recorded.
+#[derive(Debug, Serialize)]
+struct Recorded {
+    file: String,
+    moments: u64,
+    seconds: f64,
+}
+
+impl Facts for Recorded {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{}: {} moments in {:.1} s", self.file, self.moments, self.seconds)
+    }
+}
+
+pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Failure> {
+    let mut arm = session.connect()?;
+    let replaced = args.file.exists();
+    if replaced {
+        confirm(&format!("{} is there already. Replace it?", args.file.display()), args.yes)?;
+    }
+    if args.driven {
+        driven(&mut arm)?;
+    } else {
+        confirm("The arm goes limp, and falls unless somebody holds it. Go on?", args.yes)?;
+    }
+    let mut tape = Tape::create(&args.file)?;
+    let done = limp(&mut arm, args).and_then(|()| roll(&mut arm, args, session.baud, &mut tape));
+    // An arm that went away cannot be told to hold; it was left as it is.
+    let held = if matches!(done, Err(Failure::Wire(_))) { Ok(()) } else { leave(&mut arm, args) };
+    let Tape { moments, seconds, .. } = tape;
+    let recorded = Recorded { file: args.file.display().to_string(), moments, seconds };
+    if done.is_err() {
+        note(format_args!("{} is complete up to {seconds:.1} s, {moments} moments", recorded.file));
+    }
+    done.and(held)?;
+    session.output.show(&recorded)
+}
+
+/// Lets the arm go, if a hand is to lead it.
+fn limp(arm: &mut Arm, args: &RecordArgs) -> Result<(), Failure> {
+    let state = if args.driven { motor_state::SERVO } else { motor_state::FORCELESS };
+    all_taken(&arm.write_checked(MOTOR_STATE.address, &[state])?)
+}
+
+/// Makes the arm hold the pose it was left in, and keeps it from reporting.
+fn leave(arm: &mut Arm, args: &RecordArgs) -> Result<(), Failure> {
+    all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[0])?)?;
+    if args.driven {
+        return Ok(());
+    }
+    // Coming from forceless, the targets become what was measured (D13).
+    all_taken(&arm.write_checked(MOTOR_STATE.address, &[motor_state::SERVO])?)?;
+    note("the arm holds where it is");
+    Ok(())
+}
+
+/// Takes reports until it is enough.
+fn roll(arm: &mut Arm, args: &RecordArgs, baud: u32, tape: &mut Tape) -> Result<(), Failure> {
+    let interrupt = Interrupt::catch();
+    let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
+    let mut pendant = Pendant::new(arm.targets()?, vacuum, args.driven);
+    all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[args.hz])?)?;
+    let mut stamps = Stamps::new(args.hz, baud);
+    let limit = args.seconds.map(|seconds| Duration::from_secs(seconds.into()));
+    let mut heard = Instant::now();
+    while !interrupt.has_come() && !pendant.attend(arm)? {
+        if let Some(report) = arm.next_report(LOOK_EVERY)? {
+            heard = report.received;
+            let time = stamps.stamp(report.received);
+            if limit.is_some_and(|limit| time > limit) {
+                break;
+            }
+            tape.add(&Moment { time, pose: report.positions, vacuum: pendant.vacuum() })?;
+            pendant.show(tape.moments, time);
+        } else if heard.elapsed() > SILENCE {
+            return Err(silent(arm));
+        }
+    }
+    Ok(())
+}
+
+/// Why no report comes any more.
+fn silent(arm: &mut Arm) -> Failure {
+    match arm.read_span(Span::of(&FEEDBACK_FREQUENCY)) {
+        Err(error) => error.into(),
+        Ok(_) => Failure::Arm(
+            "the arm has stopped to report its positions: was it switched off and on again?".to_owned(),
+        ),
+    }
+}
+
+/// The file, and how much is in it.
+struct Tape {
+    path: PathBuf,
+    file: File,
+    moments: u64,
+    seconds: f64,
+}
+
+impl Tape {
+    fn create(path: &Path) -> Result<Self, Failure> {
+        let failed = |error| Failure::file(path, error);
+        let mut file = File::create(path).map_err(failed)?;
+        write_header(&mut file).map_err(failed)?;
+        Ok(Self { path: path.to_owned(), file, moments: 0, seconds: 0.0 })
+    }
+
+    fn add(&mut self, moment: &Moment) -> Result<(), Failure> {
+        write_moment(&mut self.file, moment).map_err(|error| Failure::file(&self.path, error))?;
+        self.moments += 1;
+        self.seconds = moment.time.as_secs_f64();
+        Ok(())
+    }
+}

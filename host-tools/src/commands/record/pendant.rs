@@ -1,0 +1,141 @@
+//! The keys of whoever teaches the arm: the pump, the end, and while the motors are on, nudges. And the line
+//! that says how far it is. Both only on a terminal; elsewhere nothing is asked and nothing shown.
+
+use std::io::{self, IsTerminal};
+use std::time::Duration;
+
+use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use ratatui::crossterm::terminal::{disable_raw_mode, enable_raw_mode};
+use sevenbot::map::VACUUM_PUMP;
+use sevenbot::{Angle, Arm, Joint};
+
+use crate::failure::Failure;
+use crate::progress::Progress;
+
+/// What is in the teacher's hands.
+pub(crate) struct Pendant {
+    has_keys: bool,
+    targets: [Angle; 7],
+    vacuum: bool,
+    is_driven: bool,
+    selected: Joint,
+    progress: Progress,
+}
+
+/// What a key asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wish {
+    End,
+    SwitchPump,
+    Select(Joint),
+    /// Degrees.
+    Nudge(i16),
+}
+
+impl Pendant {
+    /// Takes the keys, where there are any.
+    pub(crate) fn new(targets: [Angle; 7], vacuum: bool, is_driven: bool) -> Self {
+        let has_keys = io::stdin().is_terminal() && io::stderr().is_terminal() && enable_raw_mode().is_ok();
+        let progress = Progress::endless("moments");
+        Self { has_keys, targets, vacuum, is_driven, selected: Joint::ALL[0], progress }
+    }
+
+    /// Does the pump suck?
+    pub(crate) const fn vacuum(&self) -> bool {
+        self.vacuum
+    }
+
+    /// Says how far it is.
+    pub(crate) fn show(&self, moments: u64, time: Duration) {
+        self.progress.set(moments);
+        let seconds = time.as_secs_f64();
+        let pump = if self.vacuum { "sucks" } else { "off" };
+        let nudge = match self.is_driven {
+            true => format!("  1-7 ← → Shift: nudge (joint {})", self.selected.number()),
+            false => String::new(),
+        };
+        let keys = if self.has_keys { format!("   space: pump{nudge}  q: end") } else { String::new() };
+        self.progress.say(&format!("{seconds:.1} s  pump {pump}{keys}"));
+    }
+
+    /// Does what the keys ask for; `true` when that is to end.
+    pub(crate) fn attend(&mut self, arm: &mut Arm) -> Result<bool, Failure> {
+        while self.has_keys && event::poll(Duration::ZERO)? {
+            let Event::Key(key) = event::read()? else { continue };
+            match wish(key, self.selected) {
+                Some(Wish::End) => return Ok(true),
+                Some(Wish::SwitchPump) => self.switch_pump(arm)?,
+                Some(Wish::Select(joint)) => self.selected = joint,
+                Some(Wish::Nudge(degrees)) if self.is_driven => self.nudge(arm, degrees)?,
+                _ => {}
+            }
+        }
+        Ok(false)
+    }
+
+    fn switch_pump(&mut self, arm: &mut Arm) -> Result<(), Failure> {
+        self.vacuum = !self.vacuum;
+        Ok(arm.write(VACUUM_PUMP.address, &[u8::from(self.vacuum)])?)
+    }
+
+    fn nudge(&mut self, arm: &mut Arm, degrees: i16) -> Result<(), Failure> {
+        let targets = self.targets.iter_mut().zip(Joint::ALL);
+        for (target, joint) in targets.filter(|(_, joint)| *joint == self.selected) {
+            let wanted = i16::from(target.degrees()) + degrees;
+            let wanted = u8::try_from(wanted.max(0)).unwrap_or(Angle::MAX_DEGREES);
+            *target = Angle::from_register(wanted);
+            arm.set_target(joint, *target)?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Pendant {
+    fn drop(&mut self) {
+        if self.has_keys {
+            let _ = disable_raw_mode();
+        }
+    }
+}
+
+fn wish(key: KeyEvent, selected: Joint) -> Option<Wish> {
+    // Some terminals report releases too.
+    if key.kind == KeyEventKind::Release {
+        return None;
+    }
+    let degrees = if key.modifiers.contains(KeyModifiers::SHIFT) { 10 } else { 1 };
+    let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
+    let select = |number: u8| Joint::new(number).map(Wish::Select);
+    match key.code {
+        KeyCode::Char('c') if is_control => Some(Wish::End),
+        KeyCode::Char('q') | KeyCode::Esc | KeyCode::Enter => Some(Wish::End),
+        KeyCode::Char(' ') => Some(Wish::SwitchPump),
+        KeyCode::Char(digit) => select(u8::try_from(digit.to_digit(10)?).ok()?),
+        KeyCode::Up => select(selected.number().saturating_sub(1)),
+        KeyCode::Down => select(selected.number().saturating_add(1)),
+        KeyCode::Left => Some(Wish::Nudge(-degrees)),
+        KeyCode::Right => Some(Wish::Nudge(degrees)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_ask_for_what_the_line_says() {
+        let first = Joint::ALL[0];
+        let plain = |code| wish(KeyEvent::from(code), first);
+        assert_eq!(plain(KeyCode::Char(' ')), Some(Wish::SwitchPump));
+        assert_eq!(plain(KeyCode::Char('q')), Some(Wish::End));
+        assert_eq!(plain(KeyCode::Char('7')), Some(Wish::Select(Joint::ALL[6])));
+        assert_eq!(plain(KeyCode::Char('8')), None);
+        assert_eq!(plain(KeyCode::Up), None, "there is nothing above the first");
+        assert_eq!(plain(KeyCode::Left), Some(Wish::Nudge(-1)));
+        let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+        assert_eq!(wish(ctrl_c, first), Some(Wish::End));
+        let shifted = KeyEvent::new(KeyCode::Right, KeyModifiers::SHIFT);
+        assert_eq!(wish(shifted, first), Some(Wish::Nudge(10)));
+    }
+}
