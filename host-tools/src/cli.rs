@@ -26,7 +26,7 @@ Exit status:
   1    the arm did not take or do what was asked, `info` found a fault, or a file cannot be used
   2    the command line makes no sense, or a question had nobody to answer it
   3    no connection: the port cannot be opened, nobody answers, no 7Bot V2 does, or it went away
-  130  ended by Ctrl-C; what moved the arm leaves it holding where it is. A second Ctrl-C ends at once";
+  130  ended by Ctrl-C; a moving arm is left holding where it is. A second Ctrl-C ends at once";
 
 /// Talks to a 7Bot V2 robot arm over its serial port: a real one, a simulated one, or the firmware in an
 /// emulator.
@@ -41,6 +41,7 @@ pub(crate) struct Cli {
 
 /// What every command understands.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Options of every command")]
 pub(crate) struct Global {
     /// The serial port the arm is on, such as /dev/ttyUSB0, COM3, or the link of the simulator.
     #[arg(long, global = true, env = "SEVENBOT_PORT", hide_env_values = true)]
