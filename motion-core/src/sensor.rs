@@ -2,8 +2,9 @@
 //!
 //! A checksum of eight bits lets one garbled answer in 256 through. So a position counts only when the
 //! answer before it agrees, as far as a motor can turn in between; a single wild value is never believed,
-//! and a joint that was moved while nobody looked is believed again at the second look. Knows nothing of
-//! angles or frames.
+//! and a joint that was moved while nobody looked is believed again at the second look. The longer ago the
+//! answer before, the less it speaks against a wild value; so a joint is given torque only at two answers that
+//! are alike. Knows nothing of angles or frames.
 
 use protocol_core::time::{Duration, Instant};
 
@@ -23,19 +24,25 @@ pub struct Sensor {
     last: Option<(u16, Instant)>,
     /// Where the joint is, in servo counts, if that is known.
     position: Option<u16>,
+    /// Were the last two answers alike?
+    is_steady: bool,
     failures: u8,
     ask_again_at: Instant,
 }
 
 impl Sensor {
     /// Nothing is known yet.
-    pub const UNKNOWN: Self = Self { last: None, position: None, failures: 0, ask_again_at: Instant::ZERO };
+    pub const UNKNOWN: Self =
+        Self { last: None, position: None, is_steady: false, failures: 0, ask_again_at: Instant::ZERO };
 
     /// Takes the position that the servo answered at `now`, and gives it back if it is to be believed.
     pub fn answered(&mut self, now: Instant, counts: u16) -> Option<u16> {
         self.failures = 0;
-        let agrees =
-            self.last.is_some_and(|(last, then)| u32::from(last.abs_diff(counts)) <= reach(now - then));
+        let (way, time) = self.last.map_or((u32::MAX, Duration::ZERO), |(last, then)| {
+            (u32::from(last.abs_diff(counts)), now - then)
+        });
+        let agrees = way <= reach(time);
+        self.is_steady = way <= JITTER_COUNTS;
         self.last = Some((counts, now));
         if agrees {
             self.position = Some(counts);
@@ -64,6 +71,13 @@ impl Sensor {
     #[must_use]
     pub const fn position(&self) -> Option<u16> {
         self.position
+    }
+
+    /// Is the joint at rest, as far as its last two answers can tell? Where one of them is damaged and passes
+    /// for right, they are hardly ever alike.
+    #[must_use]
+    pub const fn is_steady(&self) -> bool {
+        self.is_steady
     }
 
     /// Should the servo be asked at `now`?
@@ -117,6 +131,21 @@ mod tests {
         }
         assert_eq!(reach(Duration::from_millis(10)), 28);
         assert_eq!(reach(Duration::from_micros(u64::MAX)), 2_008);
+    }
+
+    #[test]
+    fn a_wild_value_after_a_long_time_is_within_reach_but_not_steady() {
+        let mut sensor = Sensor::UNKNOWN;
+        sensor.answered(at_ms(0), 404);
+        sensor.answered(at_ms(10), 404);
+        assert!(sensor.is_steady());
+        sensor.failed(at_ms(100));
+        assert_eq!(sensor.answered(at_ms(300), 1), Some(1), "a motor could have made that way");
+        assert!(!sensor.is_steady(), "but this is no place to give it torque");
+        sensor.answered(at_ms(310), 404);
+        assert!(!sensor.is_steady());
+        assert_eq!(sensor.answered(at_ms(320), 403), Some(403));
+        assert!(sensor.is_steady());
     }
 
     #[test]

@@ -35,7 +35,8 @@ impl Arm {
         let angle = angle_from_counts(joint, counts, offset);
         state.alarms = alarms;
         state.temperature = reading.temperature_celsius;
-        let engaged = if starting { None } else { state.drive.engage(angle) };
+        let may_engage = !starting && state.sensor.is_steady();
+        let engaged = if may_engage { state.drive.engage(angle) } else { None };
         self.registers.set(PRESENT_POSITION.of(joint), angle.nearest_degree());
         if engaged == Some(Engaged::Holding) {
             self.registers.set(TARGET_POSITION.of(joint), angle.nearest_degree());
