@@ -3,7 +3,7 @@
 //! Knows how to ask a stranger who it is, quickly; what to make of the answer is the caller's.
 
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use protocol_core::registers::map::{BAUD_RATES, DEVICE_ID};
 use serialport::{SerialPort, SerialPortType};
@@ -16,6 +16,9 @@ use crate::snapshot::Span;
 /// How long an arm may take to say who it is: eight registers take 2 ms at 115 200 baud and 25 ms at 9600,
 /// USB adapters add up to 16 ms each way, and an arm's own work little.
 const PROBE_TIMEOUT: Duration = Duration::from_millis(200);
+/// A lock may outlive its owner for so long: a process that was started meanwhile holds it too until it has
+/// become another program.
+const LET_GO: Duration = Duration::from_millis(100);
 /// A port that just opened may bring rubbish first.
 const PROBE_ATTEMPTS: u32 = 2;
 
@@ -76,16 +79,25 @@ fn port(info: serialport::SerialPortInfo) -> Port {
 /// # Errors
 /// It cannot be opened.
 pub fn open(name: &str, baud: u32) -> Result<Box<dyn SerialPort>, OpenError> {
+    let deadline = Instant::now() + LET_GO;
+    loop {
+        match open_once(name, baud).map_err(|error| OpenError::of(name, error)) {
+            Err(OpenError::Busy) if Instant::now() < deadline => thread::sleep(LET_GO / 10),
+            opened => return opened,
+        }
+    }
+}
+
+fn open_once(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     let open = |baud| serialport::new(name, baud).open();
-    let port = open(baud).or_else(|error| {
+    open(baud).or_else(|error| {
         // A pseudo-terminal on macOS takes no baud rate; the serialport crate asks for 0 there.
         if cfg!(target_os = "macos") && error.kind() == serialport::ErrorKind::Unknown {
             open(0)
         } else {
             Err(error)
         }
-    });
-    port.map_err(|error| OpenError::of(name, error))
+    })
 }
 
 /// Asks all these ports at once who is there.
