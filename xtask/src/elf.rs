@@ -1,7 +1,9 @@
 //! What the linker put into a program for the chip: sections, functions, who calls whom, and from which
 //! line of the source. Knows nothing of what is looked for.
 
+use std::collections::HashMap;
 use std::fmt;
+use std::ops::Range;
 use std::path::Path;
 
 use addr2line::gimli::{self, EndianSlice, LittleEndian};
@@ -10,6 +12,7 @@ use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use rustc_demangle::demangle;
 
 use crate::run::{Outcome, root};
+use crate::thumb::{self, Effect};
 
 type Lines<'data> = addr2line::Context<EndianSlice<'data, LittleEndian>>;
 
@@ -20,6 +23,8 @@ pub(crate) struct Program<'data> {
     /// The sections that take room on the chip.
     pub(crate) sections: Vec<Section>,
     code: Vec<Code<'data>>,
+    /// Where exceptions lead, reset first, each handler once.
+    handlers: Vec<u64>,
     lines: Lines<'data>,
 }
 
@@ -39,6 +44,8 @@ pub(crate) struct Symbol {
 pub(crate) struct Section {
     /// Its name: `.text`.
     pub(crate) name: String,
+    /// Where it begins.
+    pub(crate) address: u64,
     /// Its length in bytes.
     pub(crate) size: u64,
 }
@@ -56,6 +63,8 @@ pub(crate) struct Place {
 struct Code<'data> {
     start: u64,
     bytes: &'data [u8],
+    /// Constants and tables of jumps between the instructions.
+    data: Vec<Range<u64>>,
 }
 
 impl<'data> Program<'data> {
@@ -66,22 +75,54 @@ impl<'data> Program<'data> {
             symbols: elf.symbols().filter_map(|symbol| Symbol::of(&symbol)).collect(),
             sections: elf.sections().filter_map(|section| Section::of(&section)).collect(),
             code: code(&elf)?,
+            handlers: handlers(&elf)?,
             lines: lines(&elf)?,
         })
     }
 
     /// The addresses from which the code at `target` is called or jumped to.
     pub(crate) fn calls_to(&self, target: u64) -> Vec<u64> {
-        let calls = self.code.iter().flat_map(Code::branches);
-        calls.filter(|&(_, to)| to == target).map(|(from, _)| from).collect()
+        let instructions = self.code.iter().flat_map(Code::instructions);
+        let leads_there = |effect| matches!(effect, Effect::Call(to) | Effect::Jump(to) if to == target);
+        instructions.filter(|&(_, effect)| leads_there(effect)).map(|(at, _)| at).collect()
+    }
+
+    /// The functions, each once, whatever other names it has.
+    pub(crate) fn functions(&self) -> impl Iterator<Item = &Symbol> {
+        self.symbols.iter().filter(|symbol| symbol.is_function && symbol.size > 0)
+    }
+
+    /// The instructions of a function: where each is, and what it does.
+    pub(crate) fn instructions_of(&self, function: &Symbol) -> impl Iterator<Item = (u64, Effect)> {
+        let instructions = self.code.iter().flat_map(Code::instructions);
+        instructions.filter(|&(at, _)| function.holds(at))
+    }
+
+    /// Where the instructions are that do this.
+    pub(crate) fn places_of(&self, wanted: Effect) -> Vec<u64> {
+        let instructions = self.code.iter().flat_map(Code::instructions);
+        instructions.filter(|&(_, effect)| effect == wanted).map(|(at, _)| at).collect()
+    }
+
+    /// What the instruction at each address does.
+    pub(crate) fn effects(&self) -> HashMap<u64, Effect> {
+        self.code.iter().flat_map(Code::instructions).collect()
+    }
+
+    /// Where the function of this name begins.
+    pub(crate) fn address_of(&self, name: &str) -> Outcome<u64> {
+        let symbol = self.functions().find(|symbol| symbol.name == name);
+        Ok(symbol.ok_or_else(|| format!("no function is called {name}"))?.address)
+    }
+
+    /// Where exceptions lead, reset first, each handler once.
+    pub(crate) fn handlers(&self) -> &[u64] {
+        &self.handlers
     }
 
     /// The function that holds `address`.
     pub(crate) fn function_at(&self, address: u64) -> Option<&Symbol> {
-        let holds = |symbol: &&Symbol| {
-            symbol.is_function && (symbol.address..symbol.address + symbol.size).contains(&address)
-        };
-        self.symbols.iter().find(holds)
+        self.symbols.iter().find(|symbol| symbol.is_function && symbol.holds(address))
     }
 
     /// The places in the source behind `address`, innermost first: more than one where functions were
@@ -135,45 +176,89 @@ impl Symbol {
     }
 }
 
+impl Symbol {
+    /// Is `address` in it?
+    pub(crate) fn holds(&self, address: u64) -> bool {
+        (self.address..self.address + self.size).contains(&address)
+    }
+}
+
 impl Section {
     fn of<'data>(section: &impl ObjectSection<'data>) -> Option<Self> {
         let object::SectionFlags::Elf { sh_flags, .. } = section.flags() else { return None };
         let takes_room = sh_flags.contains(object::elf::SHF_ALLOC) && section.size() > 0;
         let name = section.name().ok()?.to_owned();
-        takes_room.then(|| Self { name, size: section.size() })
+        takes_room.then(|| Self { name, address: section.address(), size: section.size() })
     }
 }
 
 impl Code<'_> {
-    /// Where the long branches of Thumb code are and where they lead: BL (encoding T1) and B.W (T4), ARMv7-M
-    /// reference manual A7.7.12 and A7.7.18. Data between functions may look like one; no harm, since only
-    /// branches to a known function are asked for.
-    fn branches(&self) -> impl Iterator<Item = (u64, u64)> {
-        let words = self.bytes.windows(4).zip(self.start..).step_by(2);
-        words.filter_map(|(word, at)| {
-            let &[a, b, c, d] = word else { return None };
-            let offset = branch_offset(u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]))?;
-            Some((at, (at + 4).wrapping_add_signed(offset)))
+    /// The instructions, where each is and what it does, less the data between them.
+    fn instructions(&self) -> impl Iterator<Item = (u64, Effect)> {
+        let mut rest = self.bytes;
+        let mut at = self.start;
+        std::iter::from_fn(move || {
+            while let Some(data) = self.data.iter().find(|data| data.contains(&at)) {
+                rest = rest.get(usize::try_from(data.end - at).ok()?..)?;
+                at = data.end;
+            }
+            let here = at;
+            let first = half(rest, 0)?;
+            let length = if thumb::is_wide(first) { 4_u8 } else { 2 };
+            let effect = thumb::effect(here, first, half(rest, 2).unwrap_or(0));
+            rest = rest.get(usize::from(length)..)?;
+            at += u64::from(length);
+            Some((here, effect))
         })
     }
 }
 
-/// How far a long branch goes from the address four bytes behind it; `None` for any other instruction.
-fn branch_offset(first: u16, second: u16) -> Option<i64> {
-    if first & 0xF800 != 0xF000 || second & 0x9000 != 0x9000 {
-        return None;
-    }
-    let (first, second) = (i64::from(first), i64::from(second));
-    let sign = first >> 10 & 1;
-    let bit_23 = !(second >> 13 ^ sign) & 1;
-    let bit_22 = !(second >> 11 ^ sign) & 1;
-    let distance = bit_23 << 23 | bit_22 << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1;
-    Some(distance - (sign << 24))
+fn half(bytes: &[u8], at: usize) -> Option<u16> {
+    bytes.get(at..)?.first_chunk().copied().map(u16::from_le_bytes)
 }
 
 fn code<'data>(elf: &ElfFile32<'data>) -> Outcome<Vec<Code<'data>>> {
+    let marks = marks(elf);
     let sections = elf.sections().filter(|section| section.kind() == object::SectionKind::Text);
-    sections.map(|section| Ok(Code { start: section.address(), bytes: section.data()? })).collect()
+    sections
+        .map(|section| {
+            let (start, bytes) = (section.address(), section.data()?);
+            let end = start + bytes.len() as u64;
+            let stops = marks.iter().skip(1).map(|&(at, _)| at).chain([end]);
+            let stretches = marks.iter().zip(stops).filter(|((at, _), _)| (start..end).contains(at));
+            let data = stretches.filter(|((_, is_code), _)| !is_code).map(|(&(at, _), stop)| at..stop);
+            Ok(Code { start, bytes, data: data.collect() })
+        })
+        .collect()
+}
+
+/// Where instructions begin and where data, in order: the mapping symbols of the ELF for the ARM architecture.
+fn marks(elf: &ElfFile32<'_>) -> Vec<(u64, bool)> {
+    let mut marks: Vec<_> = elf
+        .symbols()
+        .filter_map(|symbol| match symbol.name().ok()? {
+            "$t" => Some((symbol.address(), true)),
+            "$d" => Some((symbol.address(), false)),
+            name if name.starts_with("$t.") => Some((symbol.address(), true)),
+            name if name.starts_with("$d.") => Some((symbol.address(), false)),
+            _ => None,
+        })
+        .collect();
+    marks.sort_unstable();
+    marks
+}
+
+/// The vector table, less its first word, the stack pointer, and its empty places.
+fn handlers(elf: &ElfFile32<'_>) -> Outcome<Vec<u64>> {
+    let table = elf.section_by_name(".vector_table").ok_or("no vector table")?.data()?;
+    let mut handlers = Vec::new();
+    for word in table.as_chunks().0.iter().skip(1) {
+        let handler = u64::from(u32::from_le_bytes(*word)) & !1;
+        if handler != 0 && !handlers.contains(&handler) {
+            handlers.push(handler);
+        }
+    }
+    Ok(handlers)
 }
 
 fn lines<'data>(elf: &ElfFile32<'data>) -> Outcome<Lines<'data>> {
@@ -183,21 +268,4 @@ fn lines<'data>(elf: &ElfFile32<'data>) -> Outcome<Lines<'data>> {
         Ok(EndianSlice::new(bytes, LittleEndian))
     };
     Ok(Lines::from_dwarf(gimli::Dwarf::load(section)?)?)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn branches_are_decoded_as_the_reference_manual_has_them() {
-        assert_eq!(branch_offset(0xF7FF, 0xFFFE), Some(-4), "BL to itself");
-        assert_eq!(branch_offset(0xF000, 0xF800), Some(0), "BL to the instruction behind the next");
-        assert_eq!(branch_offset(0xF000, 0xB800), Some(0), "B.W");
-        assert_eq!(branch_offset(0xF001, 0xF801), Some(0x1002));
-        assert_eq!(branch_offset(0xF3FF, 0xD7FF), Some(0x00FF_FFFE), "farthest forward");
-        assert_eq!(branch_offset(0xF400, 0xD000), Some(-0x0100_0000), "farthest back");
-        assert_eq!(branch_offset(0xF3EF, 0x8005), None, "MRS");
-        assert_eq!(branch_offset(0x4770, 0xF800), None, "BX LR");
-    }
 }

@@ -6,14 +6,19 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod budget;
+mod count;
 mod decisions;
 mod elf;
 mod emulate;
+mod footprint;
 mod no_panic;
 mod registers_md;
 mod run;
 mod size;
+mod stack;
 mod test;
+mod thumb;
 
 use run::Outcome;
 
@@ -37,8 +42,16 @@ enum Chore {
     },
     /// Link the cores for the chip and fail if a panic can be reached.
     NoPanic,
-    /// Print what the cores cost on the chip, in bytes.
-    Size,
+    /// Print what the cores and the image cost on the chip, in bytes, and hold it against the budgets.
+    Size {
+        /// Print where the bytes are, by section and by file of source, and no more
+        #[arg(long)]
+        by_file: bool,
+        #[command(flatten)]
+        accept: Accept,
+    },
+    /// Count instructions in the emulator, and hold them against the budgets.
+    Count(Accept),
     /// Compare the parse-and-answer path with two Modbus RTU servers.
     Bench,
     /// Run the image for the arm in an emulator, simulated servos on its bus, and print the port it is on.
@@ -46,6 +59,14 @@ enum Chore {
     /// SIGHUP (`kill -HUP`) switches the arm off and on, Ctrl-C ends it. The emulator keeps no settings: its
     /// flash ignores what it is told, and the status block says so (fault bit 0).
     Emulate(emulate::Options),
+}
+
+/// What becomes of the figures.
+#[derive(clap::Args)]
+struct Accept {
+    /// Commit the figures as they are instead of comparing them
+    #[arg(long)]
+    accept: bool,
 }
 
 fn main() -> ExitCode {
@@ -64,7 +85,9 @@ fn carry_out(chore: &Chore) -> Outcome {
         Chore::Docs { check: true } => registers_md::check().and_then(|()| decisions::check()),
         Chore::Docs { check: false } => registers_md::write().and_then(|()| decisions::write()),
         Chore::NoPanic => no_panic::check(),
-        Chore::Size => size::print(),
+        Chore::Size { by_file: true, .. } => size::print(),
+        Chore::Size { accept, .. } => footprint::check(accept.accept),
+        Chore::Count(Accept { accept }) => count::check(*accept),
         Chore::Emulate(options) => emulate::run(options),
         Chore::Bench => run::cargo("run --quiet --release --package bench"),
     }

@@ -38,31 +38,46 @@ pub(crate) struct Linked {
     /// Its name.
     pub(crate) name: &'static str,
     /// The profile it is built with.
-    profile: &'static str,
+    pub(crate) profile: &'static str,
 }
 
 impl Linked {
+    /// Where the file is.
+    pub(crate) fn path(&self) -> PathBuf {
+        target_directory().join(CHIP).join(self.profile).join(self.name)
+    }
+
     /// Reads the file.
     pub(crate) fn read(&self) -> Outcome<Vec<u8>> {
-        let path = target_directory().join(CHIP).join(self.profile).join(self.name);
+        let path = self.path();
         fs::read(&path).map_err(|why| format!("cannot read {}: {why}", path.display()).into())
     }
 }
 
-/// The programs of `footprint`, each a part of the cores, and the image for the arm.
+/// The profile of `footprint`, and the same for speed instead of size.
+pub(crate) const SMALL: &str = "chip";
+/// See above.
+pub(crate) const FAST: &str = "chip-fast";
+
+/// The image for the arm.
+pub(crate) const IMAGE: Linked = Linked { name: "firmware-stm32", profile: "firmware" };
+/// From bytes to reply, and nothing else.
+pub(crate) const ANSWER: Linked = Linked { name: "answer", profile: SMALL };
+
+/// The programs of `footprint` that are a part of the cores each, and the image.
 const LINKED: &[Linked] = &[
-    Linked { name: "answer", profile: "chip" },
-    Linked { name: "arm", profile: "chip" },
-    Linked { name: "journal", profile: "chip" },
-    Linked { name: "rest_of_motion", profile: "chip" },
-    Linked { name: "rest_of_protocol", profile: "chip" },
-    Linked { name: "firmware-stm32", profile: "firmware" },
+    ANSWER,
+    Linked { name: "arm", profile: SMALL },
+    Linked { name: "journal", profile: SMALL },
+    Linked { name: "rest_of_motion", profile: SMALL },
+    Linked { name: "rest_of_protocol", profile: SMALL },
+    IMAGE,
 ];
 
 /// Links the programs for the chip.
 pub(crate) fn link() -> Outcome<&'static [Linked]> {
     build_image()?;
-    cargo(&format!("build --quiet --package footprint --target {CHIP} --profile chip"))?;
+    build_footprint(SMALL)?;
     Ok(LINKED)
 }
 
@@ -70,6 +85,11 @@ pub(crate) fn link() -> Outcome<&'static [Linked]> {
 pub(crate) fn build_image() -> Outcome {
     run("rustup", &format!("--quiet target add {CHIP}"), &[])?;
     cargo("fw --quiet")
+}
+
+/// Builds the programs of `footprint` with a profile.
+pub(crate) fn build_footprint(profile: &str) -> Outcome {
+    cargo(&format!("build --quiet --package footprint --target {CHIP} --profile {profile}"))
 }
 
 /// Where cargo puts what it builds.

@@ -1,4 +1,4 @@
-//! `cargo xtask size`: what the cores cost on the chip, by section and by file of source.
+//! `cargo xtask size --by-file`: what the cores cost on the chip, by section and by file of source.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -9,7 +9,7 @@ use crate::run::{Outcome, link};
 /// Functions the compiler calls to copy, fill and compare more than a few bytes.
 const COPIERS: &[&str] = &["memcpy", "memmove", "memset", "memclr", "memcmp"];
 
-/// Links the cores and prints their sizes.
+/// Links the cores and the image and prints what they take, by section and by file of source.
 pub(crate) fn print() -> Outcome {
     for linked in link()? {
         let file = linked.read()?;

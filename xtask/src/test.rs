@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::run::{CHIP, Outcome, cargo, run};
-use crate::{decisions, emulate, no_panic, registers_md};
+use crate::{count, decisions, emulate, footprint, no_panic, registers_md};
 
 /// A heading, and what is done under it.
 type Step = (&'static str, fn() -> Outcome);
@@ -23,6 +23,8 @@ const STEPS: &[Step] = &[
     ("docs/registers.md is fresh", registers_md::check),
     ("every decision of docs/protocol.md has its tests", decisions::check),
     ("no panic can be reached", no_panic::check),
+    ("flash, RAM and stack are within their budgets", || footprint::check(false)),
+    ("instructions are within their budgets", || count::check(false)),
     ("programs under test", || cargo("build -p host-sim -p sevenbot -p xtask")),
     ("system tests, the image for the arm in an emulator", || {
         run("cargo", "test -p system-tests", &[("ARM", "emulator")])

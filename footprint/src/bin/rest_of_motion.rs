@@ -62,7 +62,8 @@ fn one_joint() {
 }
 
 fn timers() {
-    let mut feedback = opaque(Feedback::new(any_time(), opaque(0), opaque(0)));
+    let mut feedback = opaque(Feedback::OFF);
+    feedback.set(any_time(), opaque(0), opaque(0));
     opaque((feedback.strike(any_time()), feedback.due()));
     let mut gripper = opaque(Gripper::default());
     gripper.set(any_time(), opaque(true));

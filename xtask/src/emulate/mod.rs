@@ -24,7 +24,7 @@ use tempfile::TempDir;
 use crate::run::{self, Outcome, cargo, root};
 
 mod log;
-mod monitor;
+pub(crate) mod monitor;
 mod relay;
 
 use log::Log;
@@ -38,9 +38,9 @@ pub(crate) const QEMU: &str = "qemu-system-arm";
 pub(crate) const HOW_TO_GET_QEMU: &str =
     "`sudo apt-get install qemu-system-arm` brings it on Debian and Ubuntu, `brew install qemu` on a Mac";
 /// USART1's first control register (RM0090, section 30.6). What comes before it is set up is lost.
-const HOST_LINK_CONTROL: u32 = 0x4001_100C;
+pub(crate) const HOST_LINK_CONTROL: u32 = 0x4001_100C;
 /// Its bits UE and RE.
-const RECEIVER_ON: u32 = 1 << 13 | 1 << 2;
+pub(crate) const RECEIVER_ON: u32 = 1 << 13 | 1 << 2;
 
 /// How the emulated arm is set up.
 #[derive(Args)]
@@ -60,7 +60,7 @@ pub(crate) struct Options {
 }
 
 /// A program that ends when this is dropped.
-struct Running(Child);
+pub(crate) struct Running(pub(crate) Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
@@ -82,11 +82,11 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let servos = start_servos(&folder, &options.fault)?;
     let host = UnixListener::bind(folder.path().join("host"))?;
     let commands = UnixListener::bind(folder.path().join("monitor"))?;
-    let _machine = start_machine(&folder)?;
+    let _machine = start_machine(&folder, &servo_socket(&folder), &[])?;
     let mut relay = Relay::new(Pty::open()?, monitor::accept(&host)?)?;
     let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
     monitor.wait_for_bits(HOST_LINK_CONTROL, RECEIVER_ON)?;
-    let mut log = options.log.then(|| Log::open(&image())).transpose()?;
+    let mut log = options.log.then(|| Log::open(&run::IMAGE.path())).transpose()?;
     let port = relay.port().to_owned();
     let _link = options.link.as_deref().map(|path| Link::new(path, &port)).transpose()?;
     let mut out = io::stdout().lock();
@@ -112,19 +112,15 @@ pub(crate) fn has_qemu() -> bool {
     Command::new(QEMU).arg("--version").stdout(Stdio::null()).status().is_ok_and(|status| status.success())
 }
 
-fn need_qemu() -> Outcome {
+pub(crate) fn need_qemu() -> Outcome {
     if has_qemu() {
         return Ok(());
     }
     Err(format!("{QEMU} is missing: {HOW_TO_GET_QEMU}, or let `cargo xtask test` install it"))?
 }
 
-fn image() -> PathBuf {
-    run::target_directory().join(run::CHIP).join("firmware").join("firmware-stm32")
-}
-
 /// The seven servos, listening on a socket.
-fn start_servos(folder: &TempDir, faults: &[String]) -> Outcome<Running> {
+pub(crate) fn start_servos(folder: &TempDir, faults: &[String]) -> Outcome<Running> {
     let mut command = Command::new(run::target_directory().join("debug").join("host-sim"));
     command.arg("--quiet").arg("--servo-socket").arg(folder.path().join("servos"));
     faults.iter().for_each(|fault| {
@@ -138,19 +134,26 @@ fn start_servos(folder: &TempDir, faults: &[String]) -> Outcome<Running> {
     if line.starts_with("ready ") { Ok(child) } else { Err("host-sim did not start; see above why")? }
 }
 
-/// The emulated chip. It connects to the sockets in `folder` before it starts.
-fn start_machine(folder: &TempDir) -> Outcome<Running> {
+/// Where the servos listen, in the emulator's words.
+pub(crate) fn servo_socket(folder: &TempDir) -> String {
+    format!("socket,path={}", folder.path().join("servos").display())
+}
+
+/// The emulated chip. It connects to the sockets in `folder` before it starts. `servos` is what is on its servo bus,
+/// `options` are more words for the emulator.
+pub(crate) fn start_machine(folder: &TempDir, servos: &str, options: &[&str]) -> Outcome<Running> {
     let path = |name: &str| folder.path().join(name).display().to_string();
     let child = Command::new(QEMU)
         .current_dir(root())
         .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-nodefaults"])
         .args(["-chardev", &format!("socket,id=host,path={}", path("host"))])
         .args(["-serial", "chardev:host"])
-        .args(["-chardev", &format!("socket,id=servos,path={}", path("servos"))])
+        .args(["-chardev", &format!("{servos},id=servos")])
         .args(["-serial", "chardev:servos"])
         .args(["-qmp", &format!("unix:{}", path("monitor"))])
         .arg("-kernel")
-        .arg(image())
+        .arg(run::IMAGE.path())
+        .args(options)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .spawn()?;

@@ -12,7 +12,7 @@ use crate::run::Outcome;
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Waits until the emulator, which was told to, connects.
-pub(super) fn accept(listener: &UnixListener) -> Outcome<UnixStream> {
+pub(crate) fn accept(listener: &UnixListener) -> Outcome<UnixStream> {
     listener.set_nonblocking(true)?;
     let deadline = Instant::now() + PATIENCE;
     loop {
@@ -28,7 +28,7 @@ pub(super) fn accept(listener: &UnixListener) -> Outcome<UnixStream> {
 }
 
 /// A connection to the monitor.
-pub(super) struct Monitor {
+pub(crate) struct Monitor {
     stream: BufReader<UnixStream>,
     /// The file by which memory is handed over.
     scratch: PathBuf,
@@ -36,7 +36,7 @@ pub(super) struct Monitor {
 
 impl Monitor {
     /// Speaks over `stream`, and keeps a file in `folder`.
-    pub(super) fn new(stream: UnixStream, folder: &Path) -> Outcome<Self> {
+    pub(crate) fn new(stream: UnixStream, folder: &Path) -> Outcome<Self> {
         stream.set_read_timeout(Some(PATIENCE))?;
         let mut monitor = Self { stream: BufReader::new(stream), scratch: folder.join("memory") };
         monitor.execute("qmp_capabilities", "")?;
@@ -44,7 +44,7 @@ impl Monitor {
     }
 
     /// Executes a command; `arguments` are the members of a JSON object, without its braces.
-    pub(super) fn execute(&mut self, command: &str, arguments: &str) -> Outcome {
+    pub(crate) fn execute(&mut self, command: &str, arguments: &str) -> Outcome {
         writeln!(self.stream.get_mut(), r#"{{"execute":"{command}","arguments":{{{arguments}}}}}"#)?;
         loop {
             let mut line = String::new();
@@ -61,14 +61,14 @@ impl Monitor {
     }
 
     /// `length` bytes of the chip's memory from `address` on.
-    pub(super) fn memory(&mut self, address: u32, length: u32) -> Outcome<Vec<u8>> {
+    pub(crate) fn memory(&mut self, address: u32, length: u32) -> Outcome<Vec<u8>> {
         let file = self.scratch.display().to_string();
         self.execute("pmemsave", &format!(r#""val":{address},"size":{length},"filename":"{file}""#))?;
         Ok(fs::read(&self.scratch)?)
     }
 
     /// Waits until the bits of `mask` are set in the register at `address`.
-    pub(super) fn wait_for_bits(&mut self, address: u32, mask: u32) -> Outcome {
+    pub(crate) fn wait_for_bits(&mut self, address: u32, mask: u32) -> Outcome {
         let deadline = Instant::now() + PATIENCE;
         while Instant::now() < deadline {
             let bytes = self.memory(address, 4)?;

@@ -1,0 +1,225 @@
+//! The image for the arm, counted from the outside: what it executes between one event on its lines and another.
+
+use std::collections::HashMap;
+use std::thread::sleep;
+use std::time::Duration;
+
+use protocol_core::registers::JOINTS;
+use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION};
+use protocol_core::request::Request;
+
+use super::machine::{Machine, frame};
+use super::trace::{self, Event};
+use crate::budget::Figure;
+use crate::elf::Program;
+use crate::run::{IMAGE, Outcome};
+use crate::thumb::Effect;
+
+/// Data registers of the two lines (RM0090, section 30.6.2).
+const HOST_DATA: u64 = 0x4001_1004;
+/// See above.
+const SERVO_DATA: u64 = 0x4000_4404;
+/// How often a request is sent at most.
+const TRIES: usize = 400;
+/// How many requests that nothing disturbed are enough.
+const SAMPLES: usize = 48;
+/// A count that comes less often than once in so many times is a coincidence: a servo's answer that was complete in
+/// the same moment, a counter's carry, the LED's turn to blink.
+const SELDOM: usize = 8;
+/// How long the arm is watched while it moves: some forty control cycles.
+const WATCH: Duration = Duration::from_secs(4);
+/// How long the arm is left alone.
+const SILENCE: Duration = Duration::from_secs(2);
+/// Milliseconds after which an arm that is left alone does the same again: it asks missing servos ten times a second.
+const PATTERN: usize = 100;
+/// Bytes of the frame that gives seven joints their goals. Nothing else that goes to the servos is as long.
+const GOALS: usize = 57;
+/// Bytes that the transmitter of a USART takes at once at most: one to shift out, one to wait.
+const TRANSMITTER_HOLDS: u64 = 2;
+
+const READ: Request<'_> = Request::Read { address: PRESENT_POSITION.address, count: PRESENT_POSITION.count };
+const POSE: [u8; JOINTS] = [90, 90, 65, 90, 90, 90, 80];
+
+/// Where what matters stands in the image.
+struct Places {
+    sleeps: Vec<u64>,
+    host_interrupt: u64,
+    servo_interrupt: u64,
+    wake_up: u64,
+    handlers: Vec<u64>,
+    effects: HashMap<u64, Effect>,
+}
+
+/// Counts.
+pub(crate) fn figures() -> Outcome<Vec<Figure>> {
+    let file = IMAGE.read()?;
+    let places = Places::of(&Program::read(&file)?)?;
+    let silence = places.silence()?;
+    let mut machine = Machine::with_servos()?;
+    let write = Request::Write { address: TARGET_POSITION.address, values: &POSE };
+    let read = places.paths(&mut machine, READ, |event| *event == Event::Wrote(HOST_DATA))?;
+    let write = places.paths(&mut machine, write, |event| places.is_sleep(event))?;
+    let moving = while_moving(&mut machine)?;
+    let mut figures = vec![
+        Figure::new("image: 10 ms with nobody on its lines", silence),
+        Figure::new("image: read of 7, last byte in to first byte out", read),
+        Figure::new("image: write of 7, last byte in to asleep again", write),
+    ];
+    figures.extend(places.turns(&moving)?);
+    figures.extend(places.interrupts(&moving)?);
+    Ok(figures)
+}
+
+/// What the arm executes while all joints are on their way.
+fn while_moving(machine: &mut Machine) -> Outcome<Vec<Event>> {
+    machine.send(&frame(Request::Write { address: SPEED.address, values: &[5; JOINTS] }))?;
+    machine.send(&frame(Request::Write { address: TARGET_POSITION.address, values: &[0; JOINTS] }))?;
+    machine.watch(|_| {
+        sleep(WATCH);
+        Ok(())
+    })
+}
+
+impl Places {
+    fn of(program: &Program<'_>) -> Outcome<Self> {
+        Ok(Self {
+            sleeps: program.places_of(Effect::Wait),
+            host_interrupt: program.address_of("USART1")?,
+            servo_interrupt: program.address_of("USART2")?,
+            wake_up: program.address_of("SysTick")?,
+            handlers: program.handlers().to_vec(),
+            effects: program.effects(),
+        })
+    }
+
+    fn is_sleep(&self, event: &Event) -> bool {
+        self.sleeps.iter().any(|&at| trace::is_step_at(event, at))
+    }
+
+    /// Instructions in ten milliseconds, the most of many stretches of ten: all that the arm does by itself, which is
+    /// one control cycle, ten looks at its lines, and questions to servos that are not there.
+    fn silence(&self) -> Outcome<u64> {
+        let mut machine = Machine::alone()?;
+        // What is done repeats itself ten times a second, in the time of the emulator, which flies.
+        sleep(SILENCE);
+        let events = machine.watch(|_| {
+            sleep(SILENCE);
+            Ok(())
+        })?;
+        let ticks = trace::between(&events, |event| trace::is_step_at(event, self.wake_up));
+        let millis: Vec<_> =
+            ticks.into_iter().filter_map(|tick| Some(trace::steps(events.get(tick)?))).collect();
+        if millis.len() < PATTERN {
+            Err(format!("the log shows {} ms of silence only", millis.len()))?;
+        }
+        let most = millis.windows(10).map(|millis| millis.iter().sum()).max();
+        Ok(most.unwrap_or(0))
+    }
+
+    /// Instructions from the interrupt that brings the last byte of a request until `end`, the most of several
+    /// times. The arm sleeps when that byte comes, and nothing else comes in between.
+    fn paths(
+        &self,
+        machine: &mut Machine,
+        request: Request<'_>,
+        end: impl Fn(&Event) -> bool,
+    ) -> Outcome<u64> {
+        let mut paths = Vec::new();
+        for _ in 0..TRIES {
+            let events = last_byte(machine, request)?;
+            paths.extend(self.path(&events, &end));
+            if paths.len() >= SAMPLES {
+                break;
+            }
+        }
+        most(&paths, "a request that nothing disturbs")
+    }
+
+    /// `None` where the arm was awake, or anything else came in between.
+    fn path(&self, events: &[Event], end: impl Fn(&Event) -> bool) -> Option<u64> {
+        let byte = events.iter().position(|event| *event == Event::Read(HOST_DATA))?;
+        let is_entry = |event: &Event| trace::is_step_at(event, self.host_interrupt);
+        let start = events.get(..byte)?.iter().rposition(is_entry)?;
+        let (before, path) = events.split_at_checked(start)?;
+        let was_asleep = self.is_asleep_after(before);
+        let path = path.get(..=path.iter().position(end)?)?;
+        let others = self.handlers.iter().filter(|&&handler| handler != self.host_interrupt);
+        let is_disturbed =
+            others.into_iter().any(|&at| path.iter().any(|event| trace::is_step_at(event, at)));
+        (was_asleep && !is_disturbed).then(|| trace::steps(path))
+    }
+
+    /// Does the loop sleep after this? The look that comes before the sleep shuts interrupts out, so it may be some
+    /// instructions further, letting them in again. Where the log says nothing of the loop, it slept all along.
+    fn is_asleep_after(&self, events: &[Event]) -> bool {
+        let last = events.iter().rev().find_map(|event| match event {
+            Event::Step { at, in_handler: false } => Some(*at),
+            _ => None,
+        });
+        last.is_none_or(|at| self.sleeps.iter().any(|&sleep| (sleep..=sleep + 8).contains(&at)))
+    }
+
+    /// Turns of the loop from waking to sleeping, in which nothing was received.
+    fn turns(&self, events: &[Event]) -> Outcome<[Figure; 2]> {
+        let (mut cycles, mut others) = (Vec::new(), Vec::new());
+        for turn in trace::between(events, |event| self.is_sleep(event)) {
+            let turn = events.get(turn).unwrap_or_default();
+            if trace::times(turn, Event::Read(SERVO_DATA)) > 0 {
+                continue;
+            }
+            match trace::times(turn, Event::Wrote(SERVO_DATA)) {
+                GOALS.. => cycles.push(trace::steps(turn)),
+                0 => others.push(trace::steps(turn)),
+                _ => {}
+            }
+        }
+        Ok([
+            Figure::new("image: turn of the loop that moves seven joints", most(&cycles, "a control cycle")?),
+            Figure::new("image: turn of the loop with nothing to do", most(&others, "an idle turn")?),
+        ])
+    }
+
+    /// The interrupt of a line, which is the same code for both.
+    fn interrupts(&self, events: &[Event]) -> Outcome<[Figure; 3]> {
+        let calls = trace::handler_calls(events, self.servo_interrupt, &self.handlers, &self.effects);
+        let which = |received, sent| {
+            let matches = |call: &&&[Event]| {
+                trace::times(call, Event::Read(SERVO_DATA)) == received
+                    && trace::times(call, Event::Wrote(SERVO_DATA)) == sent
+            };
+            most(
+                &calls.iter().filter(matches).map(|call| trace::steps(call)).collect::<Vec<_>>(),
+                "an interrupt",
+            )
+        };
+        let (receives, sends_one, sends_eight) = (which(1, 0)?, which(0, 1)?, which(0, 8)?);
+        let per_byte_sent = (sends_eight - sends_one) / 7;
+        Ok([
+            Figure::new("image: interrupt that receives a byte", receives),
+            Figure::new("image: each byte that an interrupt sends", per_byte_sent),
+            Figure::new("image: worst interrupt", receives + TRANSMITTER_HOLDS * per_byte_sent),
+        ])
+    }
+}
+
+/// Sends a request so that the arm is asleep when its last byte comes, and gives what it executes from then on.
+fn last_byte(machine: &mut Machine, request: Request<'_>) -> Outcome<Vec<Event>> {
+    let bytes = frame(request);
+    let Some((last, first)) = bytes.split_last() else { return Ok(Vec::new()) };
+    machine.send(first)?;
+    machine.watch(|machine| {
+        machine.send(&[*last])?;
+        // On a machine so busy that the pause got too long (D4) there is no reply, and another try.
+        if let Request::Read { count, .. } = request {
+            let _ = machine.reply(count);
+        }
+        Ok(())
+    })
+}
+
+/// The largest count that is no coincidence.
+fn most(counts: &[u64], what: &str) -> Outcome<u64> {
+    let times = |count: &u64| counts.iter().filter(|other| *other == count).count();
+    let most = counts.iter().filter(|count| times(count) * SELDOM >= counts.len()).max();
+    Ok(*most.ok_or_else(|| format!("the log does not show {what} alike often enough: {counts:?}"))?)
+}

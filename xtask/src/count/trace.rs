@@ -1,0 +1,164 @@
+//! What the emulator did, instruction by instruction: its log of `-singlestep -d exec`, taken apart.
+//!
+//! ```text
+//!   Trace 0: 0x7f81a8 [00800409/0800c096/00000010/ff020201] USART1    about to execute; bit 0: in a handler
+//!   Stopped execution of TB chain before 0x7f81a8 [0800c096] USART1   it was not executed after all
+//!   cpu_io_recompile: rewound execution of TB to 0800c0c4             likewise
+//!   memory_region_ops_read cpu 0 mr 0x55 addr 0x40011000 value ...    it looked at a peripheral
+//! ```
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use crate::thumb::Effect;
+
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Event {
+    /// An instruction was executed.
+    Step {
+        /// Where it stands.
+        at: u64,
+        /// Was it part of an exception's handler?
+        in_handler: bool,
+    },
+    /// It read a register of a peripheral.
+    Read(u64),
+    /// It wrote to a register of a peripheral.
+    Wrote(u64),
+}
+
+/// Takes a log apart.
+pub(crate) fn parse(log: &str) -> Vec<Event> {
+    let mut events = Vec::new();
+    for line in log.lines() {
+        if line.starts_with("Stopped ") || line.starts_with("cpu_io_recompile") {
+            if let Some(Event::Step { .. }) = events.last() {
+                events.pop();
+            }
+        } else {
+            events.extend(event(line));
+        }
+    }
+    events
+}
+
+fn event(line: &str) -> Option<Event> {
+    if line.starts_with("Trace ") {
+        let mut fields = line.split_once('[')?.1.split('/');
+        let flags = hexadecimal(fields.next()?)?;
+        return Some(Event::Step { at: hexadecimal(fields.next()?)?, in_handler: flags & 1 == 1 });
+    }
+    let access = line.strip_prefix("memory_region_ops_")?;
+    let address = hexadecimal(access.split_once("addr 0x")?.1.split(' ').next()?)?;
+    Some(if access.starts_with("read") { Event::Read(address) } else { Event::Wrote(address) })
+}
+
+fn hexadecimal(digits: &str) -> Option<u64> {
+    u64::from_str_radix(digits, 16).ok()
+}
+
+/// How many instructions were executed.
+pub(crate) fn steps(events: &[Event]) -> u64 {
+    events.iter().filter(|event| matches!(event, Event::Step { .. })).count() as u64
+}
+
+/// Was this instruction executed?
+pub(crate) fn is_step_at(event: &Event, address: u64) -> bool {
+    matches!(event, Event::Step { at, .. } if *at == address)
+}
+
+/// How often a register was accessed in this way.
+pub(crate) fn times(events: &[Event], access: Event) -> usize {
+    events.iter().filter(|event| **event == access).count()
+}
+
+/// The stretches between one event and the next that are alike: what begins with such an event and ends before
+/// the next.
+pub(crate) fn between(events: &[Event], is_mark: impl Fn(&Event) -> bool) -> Vec<Range<usize>> {
+    let marks: Vec<_> =
+        events.iter().enumerate().filter(|(_, event)| is_mark(event)).map(|(at, _)| at).collect();
+    marks.iter().zip(marks.iter().skip(1)).map(|(&from, &to)| from..to).collect()
+}
+
+/// The calls of the handler at `entry`, from its first instruction to its return, less those that another of
+/// `entries` interrupts.
+pub(crate) fn handler_calls<'a>(
+    events: &'a [Event],
+    entry: u64,
+    entries: &[u64],
+    effects: &HashMap<u64, Effect>,
+) -> Vec<&'a [Event]> {
+    let starts = events.iter().enumerate().filter(|(_, event)| is_step_at(event, entry));
+    let calls = starts.filter_map(|(start, _)| call(events.get(start..)?, effects));
+    let is_entry = |event: &Event| entries.iter().any(|&entry| is_step_at(event, entry));
+    calls.filter(|call| !call.iter().skip(1).any(is_entry)).collect()
+}
+
+/// What was executed of the function that `events` begin with, and of those it called.
+fn call<'a>(events: &'a [Event], effects: &HashMap<u64, Effect>) -> Option<&'a [Event]> {
+    let mut depth = 0_u32;
+    let end = events.iter().position(|event| {
+        let Event::Step { at, .. } = event else { return false };
+        match effects.get(at) {
+            Some(Effect::Call(_)) => depth += 1,
+            Some(Effect::Return) if depth == 0 => return true,
+            Some(Effect::Return) => depth -= 1,
+            _ => {}
+        }
+        false
+    });
+    events.get(..=end?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LOG: &str = "\
+Trace 0: 0x7f81a810adc0 [00800408/0800e7a2/00000010/ff020201] _ZN14firmware_stm325Shell3run17he24a45144e4acff1E
+Trace 0: 0x7f81a811b100 [00800409/0800c096/00000010/ff020201] USART1
+Trace 0: 0x7f81a811c740 [00800409/0800c0c4/00000010/ff020201] USART1
+cpu_io_recompile: rewound execution of TB to 0800c0c4
+Trace 0: 0x7f81a811c8c0 [00800409/0800c0c4/00000010/ff038201] USART1
+memory_region_ops_read cpu 0 mr 0x55a02f5b2aa0 addr 0x40011000 value 0xe0 size 2 name 'stm32f2xx-usart'
+Trace 0: 0x7f81a811ca40 [00800409/0800c0c6/00000010/ff020201] USART1
+Stopped execution of TB chain before 0x7f81a811ca40 [0800c0c6] USART1
+Trace 0: 0x7f81a811ca40 [00800409/0800c0c6/00000010/ff020201] USART1
+Trace 0: 0x7f81a810adc0 [00800408/0800e7a4/00000010/ff020201] _ZN14firmware_stm325Shell3run17he24a45144e4acff1E
+";
+
+    #[test]
+    fn what_was_announced_and_not_executed_does_not_count() {
+        let events = parse(LOG);
+        assert_eq!(steps(&events), 5);
+        assert_eq!(times(&events, Event::Read(0x4001_1000)), 1);
+    }
+
+    const fn step(at: u64) -> Event {
+        Event::Step { at, in_handler: true }
+    }
+
+    #[test]
+    fn handlers_are_followed_to_their_return_through_what_they_call() {
+        let effects =
+            [(11, Effect::Call(50)), (50, Effect::Return), (12, Effect::Return), (20, Effect::Return)];
+        let effects = HashMap::from(effects);
+        let events = [10, 11, 50, 12, 20, 10].map(step);
+        assert_eq!(handler_calls(&events, 10, &[10, 20], &effects), [&events[..4]]);
+        assert_eq!(handler_calls(&events, 20, &[10, 20], &effects), [&events[4..5]]);
+    }
+
+    #[test]
+    fn interrupted_handlers_do_not_count() {
+        let effects = HashMap::from([(12, Effect::Return), (20, Effect::Return)]);
+        let events = [10, 11, 20, 12].map(step);
+        assert!(handler_calls(&events, 10, &[10, 20], &effects).is_empty());
+    }
+
+    #[test]
+    fn stretches_run_from_mark_to_mark() {
+        let events = [Event::Read(1), Event::Read(2), Event::Read(1), Event::Read(1), Event::Read(3)];
+        assert_eq!(between(&events, |event| *event == Event::Read(1)), [0..2, 2..3]);
+    }
+}
