@@ -16,9 +16,11 @@ use crate::snapshot::Span;
 /// How long an arm may take to say who it is: eight registers take 2 ms at 115 200 baud and 25 ms at 9600,
 /// USB adapters add up to 16 ms each way, and an arm's own work little.
 const PROBE_TIMEOUT: Duration = Duration::from_millis(200);
-/// A lock may outlive its owner for so long: a process that was started meanwhile holds it too until it has
-/// become another program.
-const LET_GO: Duration = Duration::from_millis(100);
+/// A lock may outlive its owner: a process that was started meanwhile holds it too until it has become another
+/// program, and on a busy machine that takes a while.
+const LET_GO: Duration = Duration::from_secs(1);
+/// How long to wait before a locked port is tried again.
+const TRY_AGAIN: Duration = Duration::from_millis(20);
 /// A port that just opened may bring rubbish first.
 const PROBE_ATTEMPTS: u32 = 2;
 
@@ -82,7 +84,7 @@ pub fn open(name: &str, baud: u32) -> Result<Box<dyn SerialPort>, OpenError> {
     let deadline = Instant::now() + LET_GO;
     loop {
         match open_once(name, baud).map_err(|error| OpenError::of(name, error)) {
-            Err(OpenError::Busy) if Instant::now() < deadline => thread::sleep(LET_GO / 10),
+            Err(OpenError::Busy) if Instant::now() < deadline => thread::sleep(TRY_AGAIN),
             opened => return opened,
         }
     }

@@ -28,10 +28,11 @@ fn under_way(arm: &mut Bench) -> (Child, BufReader<std::process::ChildStderr>) {
         .spawn()
         .expect("sevenbot runs");
     let mut frames = BufReader::new(tool.stderr.take().expect("a pipe"));
-    let mut line = String::new();
+    let (mut line, mut said) = (String::new(), String::new());
     while !line.contains("moving-joints = 1 ") {
+        said.push_str(&line);
         line.clear();
-        assert_ne!(frames.read_line(&mut line).expect("text"), 0, "it ended before the arm moved");
+        assert_ne!(frames.read_line(&mut line).expect("text"), 0, "ended before the arm moved:\n{said}");
     }
     (tool, frames)
 }
