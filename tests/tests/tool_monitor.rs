@@ -55,7 +55,8 @@ fn masked(screen: &str, port: &Path) -> String {
 
 #[test]
 fn the_screen_shows_the_arm() {
-    with_arm(Setup::any().needs(Need::FreshArm), |arm| {
+    // An arm that keeps no settings has a fault to show.
+    with_arm(Setup::any().needs(Need::FreshArm).needs(Need::Persistence), |arm| {
         let port = arm.lend_port();
         let mut terminal = monitor(&port, &[]);
         let screen = terminal.wait_until("a round trip", |screen| {
@@ -191,7 +192,7 @@ fn wait_for_lines(file: &Path, count: usize) {
 
 #[test]
 fn json_is_a_value_a_line() {
-    with_arm(Setup::any(), |arm| {
+    with_arm(Setup::any().needs(Need::Persistence), |arm| {
         let text = done(arm.sevenbot(&["monitor", "--json", "--samples", "3", "--hz", "50"]));
         assert_eq!(text.lines().count(), 3, "{text}");
         for line in text.lines() {
