@@ -93,7 +93,7 @@ fn wide(at: u64, first: u16, second: u16) -> Effect {
     }
 }
 
-/// BL, B.W, B<cond>.W, and what shares their space.
+/// `BL`, `B.W`, `B<cond>.W`, and what shares their space.
 fn branch(at: u64, first: u16, second: u16) -> Effect {
     let to = |distance: i64| (at + 4).wrapping_add_signed(distance);
     match second & 0xD000 {
