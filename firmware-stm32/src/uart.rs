@@ -89,12 +89,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Line<U, RECEIVE, TRA
 
     /// What the interrupt has to do.
     pub(crate) fn serve(&self) {
-        self.with(|state| {
-            if !state.receive() {
-                NVIC::mask(U::INTERRUPT);
-            }
-            state.send();
-        });
+        self.with(State::serve);
     }
 
     /// Lets the interrupt come, should it have been shut out for want of room.
@@ -112,36 +107,45 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Line<U, RECEIVE, TRA
 }
 
 impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> State<U, RECEIVE, TRANSMIT> {
-    /// Fetches a byte that has come; false if there is no room for it.
-    fn receive(&mut self) -> bool {
-        let Some(usart) = &self.usart else { return true };
-        let status = usart.sr().read();
-        let has_byte = status.rxne().bit_is_set();
-        let overrun = status.ore().bit_is_set();
-        self.overrun |= overrun;
-        if self.received.is_full() && has_byte {
-            return false;
+    fn serve(&mut self) {
+        let Self { usart: Some(usart), received, to_send, overrun } = self else { return };
+        if !receive(usart, received, overrun) {
+            NVIC::mask(U::INTERRUPT);
         }
-        if has_byte || overrun {
-            // Reading DR after SR also clears an over-run (RM0090, section 30.6.1).
-            let [byte, _] = usart.dr().read().dr().bits().to_le_bytes();
-            if has_byte {
-                // Cannot fail: there is room.
-                let _ = self.received.enqueue(byte);
-            }
-        }
-        true
+        send(usart, to_send);
     }
+}
 
-    fn send(&mut self) {
-        let Some(usart) = &self.usart else { return };
-        while usart.sr().read().txe().bit_is_set()
-            && let Some(byte) = self.to_send.dequeue()
-        {
-            usart.dr().write(|w| w.dr().set(u16::from(byte)));
-        }
-        usart.cr1().modify(|_, w| w.txeie().bit(!self.to_send.is_empty()));
+/// Fetches a byte that has come; false if there is no room for it.
+fn receive<const N: usize>(usart: &impl Usart, received: &mut Queue<u8, N>, overrun: &mut bool) -> bool {
+    let status = usart.sr().read();
+    let has_byte = status.rxne().bit_is_set();
+    if status.ore().bit_is_set() {
+        *overrun = true;
+    } else if !has_byte {
+        return true;
     }
+    if has_byte && received.is_full() {
+        return false;
+    }
+    // Reading DR after SR also clears an over-run (RM0090, section 30.6.1).
+    let [byte, _] = usart.dr().read().dr().bits().to_le_bytes();
+    if has_byte {
+        // Cannot fail: there is room.
+        let _ = received.enqueue(byte);
+    }
+    true
+}
+
+/// Sends what the transmitter takes, and asks to be called again if that is not all.
+fn send<const N: usize>(usart: &impl Usart, to_send: &mut Queue<u8, N>) {
+    while !to_send.is_empty()
+        && usart.sr().read().txe().bit_is_set()
+        && let Some(byte) = to_send.dequeue()
+    {
+        usart.dr().write(|w| w.dr().set(u16::from(byte)));
+    }
+    usart.cr1().modify(|_, w| w.txeie().bit(!to_send.is_empty()));
 }
 
 /// The loop's end of a line.
