@@ -136,7 +136,7 @@ fn cut_at_random<const SECTOR: usize>(cycles: u64, most_saves: usize) {
 
 #[test]
 fn cuts_at_random_in_long_lives() {
-    let times = if is_long() { 50 } else { 1 };
+    let times = if is_long() { 10 } else { 1 };
     cut_at_random::<512>(150_000 * times, 24);
     cut_at_random::<1_024>(100_000 * times, 60);
     cut_at_random::<REAL>(4_000 * times, 1_000);
