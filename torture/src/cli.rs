@@ -1,0 +1,115 @@
+//! The command line.
+
+use std::time::Duration as RealTime;
+
+use clap::{Parser, Subcommand};
+use protocol_core::time::Duration;
+
+use crate::campaign::{Budget, Plan};
+use crate::load;
+use crate::scenario::{self, SCENARIOS, Scenario};
+
+/// What is tried when nothing else is asked for.
+const DAYS: f64 = 30.0;
+
+/// The whole arm in worlds where everything goes wrong: the real controller, simulated servos, a flash that
+/// loses power, a host. Virtual time, one seed a world, the same every time.
+#[derive(Clone, Debug, Parser)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    after_help = "\
+EXIT STATUS
+  0   no rule was violated
+  1   one was: seed, virtual time and what led to it are printed
+  2   an option cannot be used"
+)]
+pub struct Options {
+    #[command(subcommand)]
+    /// Something else to do.
+    pub command: Option<Command>,
+
+    /// How many virtual days [default: 30]
+    #[arg(long, conflicts_with = "minutes", value_parser = positive)]
+    pub days: Option<f64>,
+
+    /// Go on for so many minutes of real time
+    #[arg(long, value_parser = positive)]
+    pub minutes: Option<f64>,
+
+    /// The seed of the first world; the others follow
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+
+    /// Only worlds of this kind
+    #[arg(long, value_name = "NAME", value_parser = scenario)]
+    pub scenario: Option<&'static Scenario>,
+
+    /// How many good frames for each kind of disturbance of the parser's line; 0: none
+    #[arg(long, default_value_t = 1_000_000)]
+    pub frames: usize,
+}
+
+/// Something else to do.
+#[derive(Clone, Debug, Subcommand)]
+pub enum Command {
+    /// Keep a port as busy as the line allows, and count what does not come back
+    Load(load::Options),
+}
+
+fn positive(text: &str) -> Result<f64, &'static str> {
+    let number: Option<f64> = text.parse().ok();
+    number.filter(|number| *number > 0.0 && *number < 1e6).ok_or("use a number above 0")
+}
+
+fn scenario(name: &str) -> Result<&'static Scenario, String> {
+    let names = || SCENARIOS.iter().map(|scenario| scenario.name).collect::<Vec<_>>().join(", ");
+    scenario::find(name).ok_or_else(|| format!("use one of {}", names()))
+}
+
+impl Options {
+    /// What is to be tried.
+    #[must_use]
+    pub fn plan(&self) -> Plan {
+        let budget = match self.minutes {
+            Some(minutes) => Budget::Real(RealTime::from_secs_f64(minutes * 60.0)),
+            None => Budget::Virtual(virtual_days(self.days.unwrap_or(DAYS))),
+        };
+        Plan { seed: self.seed, budget, scenario: self.scenario, frames: self.frames }
+    }
+}
+
+fn virtual_days(days: f64) -> Duration {
+    let time = RealTime::from_secs_f64(days * 86_400.0);
+    Duration::from_micros(u64::try_from(time.as_micros()).unwrap_or(u64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(arguments: &str) -> Result<Options, clap::Error> {
+        Options::try_parse_from(std::iter::once("torture").chain(arguments.split_whitespace()))
+    }
+
+    #[test]
+    fn the_command_line_is_sound() {
+        <Options as clap::CommandFactory>::command().debug_assert();
+    }
+
+    #[test]
+    fn a_plan_is_read_from_it() {
+        let plan = parse("--days 0.5 --seed 7 --scenario storm").unwrap().plan();
+        assert!(matches!(plan.budget, Budget::Virtual(time) if time == Duration::from_millis(43_200_000)));
+        assert_eq!((plan.seed, plan.scenario.map(|scenario| scenario.name)), (7, Some("storm")));
+        let plan = parse("--minutes 2").unwrap().plan();
+        assert!(matches!(plan.budget, Budget::Real(time) if time == RealTime::from_secs(120)));
+    }
+
+    #[test]
+    fn what_is_wrong_is_refused() {
+        for arguments in ["--days 0", "--days x", "--days 1 --minutes 1", "--scenario weather", "load"] {
+            assert!(parse(arguments).is_err(), "{arguments}");
+        }
+    }
+}

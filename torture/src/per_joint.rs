@@ -1,0 +1,32 @@
+//! One value a joint.
+
+use std::ops::{Index, IndexMut};
+
+use protocol_core::registers::{JOINTS, Joint};
+
+/// One value a joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PerJoint<T>(pub [T; JOINTS]);
+
+impl<T: Copy> PerJoint<T> {
+    /// The same for all.
+    pub const fn all(value: T) -> Self {
+        Self([value; JOINTS])
+    }
+}
+
+#[allow(clippy::indexing_slicing)] // A joint's index is below the number of joints.
+impl<T> Index<Joint> for PerJoint<T> {
+    type Output = T;
+
+    fn index(&self, joint: Joint) -> &T {
+        &self.0[usize::from(joint.index())]
+    }
+}
+
+#[allow(clippy::indexing_slicing)] // Likewise.
+impl<T> IndexMut<Joint> for PerJoint<T> {
+    fn index_mut(&mut self, joint: Joint) -> &mut T {
+        &mut self.0[usize::from(joint.index())]
+    }
+}

@@ -1,0 +1,127 @@
+//! The host link, both ways: when which byte is through, and how much room there is.
+//!
+//! Knows nothing of frames.
+
+use std::collections::VecDeque;
+
+use protocol_core::time::{Duration, Instant};
+
+/// Nanoseconds of ten bits at one baud.
+const TEN_BITS_NS: u64 = 10_000_000_000;
+
+fn time_of(bytes: usize, baud: u32) -> Duration {
+    let nanos = (bytes as u64).saturating_mul(TEN_BITS_NS).checked_div(u64::from(baud)).unwrap_or(0);
+    Duration::from_micros(nanos.div_ceil(1_000))
+}
+
+/// From the host to the arm. No byte is lost for want of room: it waits.
+#[derive(Debug)]
+pub(super) struct ToArm {
+    baud: u32,
+    free_at: Instant,
+    flying: VecDeque<(Instant, Vec<u8>)>,
+    waiting: VecDeque<u8>,
+    last_taken_at: Instant,
+}
+
+impl ToArm {
+    pub(super) const fn new(baud: u32) -> Self {
+        Self {
+            baud,
+            free_at: Instant::ZERO,
+            flying: VecDeque::new(),
+            waiting: VecDeque::new(),
+            last_taken_at: Instant::ZERO,
+        }
+    }
+
+    /// Sends bytes after a pause; says when they are through.
+    pub(super) fn send(&mut self, now: Instant, pause: Duration, bytes: &[u8]) -> Instant {
+        self.free_at = self.free_at.max(now) + pause;
+        // They are through one by one, and nobody looks more often than once in a millisecond.
+        let batch = usize::try_from(self.baud / 10_000).unwrap_or(1).max(1);
+        for part in bytes.chunks(batch) {
+            self.free_at = self.free_at + time_of(part.len(), self.baud);
+            self.flying.push_back((self.free_at, part.to_vec()));
+        }
+        self.free_at
+    }
+
+    /// When the line is free again.
+    pub(super) const fn free_at(&self) -> Instant {
+        self.free_at
+    }
+
+    pub(super) fn next_arrival(&self) -> Option<Instant> {
+        self.flying.front().map(|(at, _)| *at)
+    }
+
+    pub(super) fn arrive(&mut self, now: Instant) {
+        while self.flying.front().is_some_and(|(at, _)| *at <= now) {
+            self.flying.pop_front().into_iter().for_each(|(_, bytes)| self.waiting.extend(bytes));
+        }
+    }
+
+    /// What waits to be taken, or the first part of it.
+    pub(super) fn waiting(&self) -> &[u8] {
+        self.waiting.as_slices().0
+    }
+
+    pub(super) fn take(&mut self, now: Instant, count: usize) {
+        self.waiting.drain(..count);
+        self.last_taken_at = now;
+    }
+
+    /// When the arm last took bytes: before that, it knows of no silence.
+    pub(super) const fn last_taken_at(&self) -> Instant {
+        self.last_taken_at
+    }
+}
+
+/// From the arm to the host: a buffer that drains.
+#[derive(Debug)]
+pub(super) struct ToHost {
+    baud: u32,
+    level: usize,
+    /// As of when.
+    now: Instant,
+    /// The host does not read before this time.
+    blocked_until: Instant,
+}
+
+impl ToHost {
+    /// Two of the longest frames.
+    const CAPACITY: usize = 524;
+
+    pub(super) const fn new(baud: u32, now: Instant) -> Self {
+        Self { baud, level: 0, now, blocked_until: Instant::ZERO }
+    }
+
+    pub(super) fn block(&mut self, until: Instant) {
+        self.blocked_until = self.blocked_until.max(until);
+    }
+
+    pub(super) fn push(&mut self, count: usize) {
+        self.level += count;
+    }
+
+    pub(super) fn room(&mut self, now: Instant) -> usize {
+        let since = self.now.max(self.blocked_until.min(now));
+        let byte = time_of(1, self.baud).as_micros().max(1);
+        let sent = usize::try_from((now - since).as_micros() / byte).unwrap_or(usize::MAX);
+        if sent >= self.level {
+            (self.level, self.now) = (0, now);
+        } else {
+            self.level -= sent;
+            self.now = since + Duration::from_micros(sent as u64 * byte);
+        }
+        Self::CAPACITY.saturating_sub(self.level)
+    }
+
+    /// When there will be room for the longest frame.
+    pub(super) fn room_at(&self, now: Instant) -> Instant {
+        let excess = self.level.saturating_sub(Self::CAPACITY / 2);
+        let byte = time_of(1, self.baud).as_micros().max(1);
+        self.now.max(self.blocked_until).max(now) + Duration::from_micros(excess as u64 * byte)
+    }
+}
