@@ -1,36 +1,41 @@
-//! `cargo xtask bench`: how long the parse-and-answer path takes for a request, beside two Modbus RTU servers.
+//! `cargo xtask bench`: how long the parse-and-answer path takes for a request, beside its peers: two Modbus RTU
+//! servers, postcard with COBS, and MAVLink.
 //!
-//! All three get the same operations on the same register numbers with the same values, as one stream of
-//! bytes in pieces of 64 that pay no heed to where frames end, and append their replies to one vector. Every
-//! reply to undamaged traffic is held against what an independent model says, byte for byte; ours to damaged
-//! traffic too. The rounds of the three are interleaved, each begins with a fresh server, and the median of
-//! each is printed: so a busy machine disturbs all three alike.
+//! All get the same operations on the same register numbers with the same values, as one stream of bytes in
+//! pieces of 64 that pay no heed to where frames end, and append their replies to one vector. Every reply to
+//! undamaged traffic is held against what an independent model says, byte for byte; ours to damaged traffic
+//! too. The rounds are interleaved, each begins with a fresh server, and the median of each is printed: so a
+//! busy machine disturbs all alike.
 //!
 //! What is equal:
 //! * the number of requests, of registers in each, their order and their values;
-//! * finding frames in a stream, the check of CRC-16/MODBUS, registers looked up and bounds checked, the
+//! * finding frames in a stream, a CRC-16 over each of them, registers looked up and bounds checked, the
 //!   whole reply built with its CRC;
-//! * a damaged request has one byte changed, and they are the same requests in all three streams.
+//! * a damaged request has one byte changed, and they are the same requests in all streams.
 //!
 //! What is not, because the protocols differ:
-//! * a Modbus register has two bytes, one of ours has one: their frames are longer (the table says by how
-//!   much), and none of their values has to be checked against a range, as ours have;
-//! * Modbus answers a write, this protocol does not;
-//! * a Modbus frame has no header. On a line it is found by the silence round it; in a stream all a server
-//!   can do is to go on with the next byte whenever a frame is refused, as both peers do here. Ours looks for
-//!   its header, and keeps what it takes to tell what a silence would mean.
+//! * a Modbus register has two bytes and a MAVLink frame says who speaks to whom, so their frames are longer
+//!   (the table says by how much); postcard's requests are the shortest;
+//! * none of the peers checks a value against the range of its register, holds access rights, or keeps what it
+//!   takes to tell what a silence would mean (D4, D15, D16): ours does all of it;
+//! * Modbus answers a write; the others do not;
+//! * a frame ends where a zero comes (COBS), or is as long as its header says: there a wrong length can take
+//!   whole frames with it. Modbus has no header either: on a line its frames are found by the silence round
+//!   them; in a stream all a server can do is to go on with the next byte whenever a frame is refused.
 //!
-//! Both peers get a buffer that moves its bytes as rarely as ours does.
+//! The peers get a buffer that moves its bytes as rarely as ours does.
 
 use std::error::Error;
 use std::time::{Duration, Instant};
 
+mod protocol;
 mod server;
 mod traffic;
 
-use bench_servers::{ModbusCoreServer, OurServer, RmodbusServer};
+use bench_servers::{MavlinkServer, ModbusCoreServer, OurServer, PostcardServer, RmodbusServer};
+use protocol::Protocol;
 use server::Serve;
-use traffic::{CASES, Case, Protocol, Traffic};
+use traffic::{CASES, Case, Traffic};
 
 /// Requests in one round.
 const REQUESTS: usize = 2_000;
@@ -45,7 +50,7 @@ struct Contestant {
 }
 
 /// Ours, then the peers.
-static CONTESTANTS: [Contestant; 3] = [
+static CONTESTANTS: [Contestant; 5] = [
     Contestant {
         name: "protocol-core",
         protocol: Protocol::SevenBot,
@@ -61,16 +66,23 @@ static CONTESTANTS: [Contestant; 3] = [
         protocol: Protocol::ModbusRtu,
         start: || Box::new(RmodbusServer::default()),
     },
+    Contestant {
+        name: "postcard+cobs",
+        protocol: Protocol::Postcard,
+        start: || Box::new(PostcardServer::default()),
+    },
+    Contestant { name: "mavlink", protocol: Protocol::Mavlink, start: || Box::new(MavlinkServer::default()) },
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
     stay_on_one_core();
-    println!("ns a request: median of {ROUNDS} rounds of {REQUESTS} requests");
+    println!(
+        "Time of a request, median of {ROUNDS} interleaved rounds of {REQUESTS} requests; peers in multiples of ours"
+    );
     let names = CONTESTANTS.each_ref().map(|contestant| format!("{:>14}", contestant.name)).concat();
-    println!("{:18}{names}{:>16}   bytes a request in + out", "", "ours / best");
+    println!("{:20}{names}{:>13}", "", "ours / best");
     for case in CASES {
-        let [ours, peers @ ..] = contest(case)?;
-        print_row(case, &ours, &peers);
+        print_row(case, &contest(case)?);
     }
     Ok(())
 }
@@ -120,14 +132,14 @@ impl Race {
         format!("{:.0} + {:.0}", mean(&self.traffic.requests), mean(&self.traffic.replies))
     }
 
-    /// How many of the undamaged requests were carried out, in percent.
-    fn answered(&self) -> f64 {
-        100.0 * self.carried_out as f64 / self.traffic.undamaged as f64
+    /// How many of the undamaged requests were carried out.
+    fn answered(&self) -> String {
+        format!("{:.2} %", 100.0 * self.carried_out as f64 / self.traffic.undamaged as f64)
     }
 }
 
 /// Runs the rounds of one case.
-fn contest(case: &Case) -> Result<[Race; 3], String> {
+fn contest(case: &Case) -> Result<[Race; CONTESTANTS.len()], String> {
     let mut races = CONTESTANTS.each_ref().map(|contestant| Race::new(contestant, case));
     let mut replies = Vec::with_capacity(REQUESTS * 256);
     for _ in 0..ROUNDS {
@@ -138,17 +150,23 @@ fn contest(case: &Case) -> Result<[Race; 3], String> {
     Ok(races)
 }
 
-fn print_row(case: &Case, ours: &Race, peers: &[Race]) {
-    let races = || std::iter::once(ours).chain(peers);
-    let times: String = races().map(|race| format!("{:14.1}", race.nanoseconds())).collect();
+/// Ours in nanoseconds a request, the peers as multiples of that, and ours as a part of the best peer's.
+fn print_row(case: &Case, races: &[Race]) {
+    let Some((ours, peers)) = races.split_first() else { return };
+    let time = ours.nanoseconds();
+    let multiples: String =
+        peers.iter().map(|race| format!("{:12.2} x", race.nanoseconds() / time)).collect();
     let best = peers.iter().map(Race::nanoseconds).fold(f64::INFINITY, f64::min);
-    let bytes = peers.first().map_or_else(String::new, Race::bytes_a_request);
-    let ratio = ours.nanoseconds() / best;
-    println!("{:18}{times}{ratio:16.2}   ours {}, Modbus {bytes}", case.name, ours.bytes_a_request());
+    println!("{:20}{time:11.1} ns{multiples}{:13.2}", case.name, time / best);
+    print_cells("  bytes in + out", races, Race::bytes_a_request);
     if ours.traffic.undamaged < REQUESTS {
-        let answered: String = races().map(|race| format!("{:12.2} %", race.answered())).collect();
-        println!("{:18}{answered}   of the undamaged requests were carried out", "");
+        print_cells("  undamaged, done", races, Race::answered);
     }
+}
+
+fn print_cells(title: &str, races: &[Race], cell: impl Fn(&Race) -> String) {
+    let cells: String = races.iter().map(|race| format!("{:>14}", cell(race))).collect();
+    println!("{title:20}{cells}");
 }
 
 /// Keeps the scheduler from moving this program about, where that can be had.

@@ -1,12 +1,10 @@
-//! The operations of each case, as frames of either protocol, and the replies that a model of the registers
-//! expects. Frames are built here from the protocols' descriptions, with the `crc` crate: nothing that is
-//! measured has a say in what is right.
+//! The operations of each case, and the replies that a model of the registers expects: nothing that is measured
+//! has a say in what is right. Knows no frame.
 
-use bench_servers::work::{STATION, initial_values};
-use crc::{CRC_16_MODBUS, Crc};
+use bench_servers::work::initial_values;
 use protocol_core::registers::map::TARGET_POSITION;
 
-const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
+use crate::protocol::Protocol;
 
 /// One row of the table.
 pub(crate) struct Case {
@@ -42,13 +40,6 @@ enum Kind {
     ReadAll,
 }
 
-/// Which frames go over the line.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Protocol {
-    SevenBot,
-    ModbusRtu,
-}
-
 /// A stream of requests, and what becomes of it.
 pub(crate) struct Traffic {
     /// All requests, one behind the other.
@@ -60,7 +51,7 @@ pub(crate) struct Traffic {
 }
 
 impl Traffic {
-    /// `count` requests of a case. The same operations, and the same requests damaged, in either protocol.
+    /// `count` requests of a case. The same operations, and the same requests damaged, in every protocol.
     pub(crate) fn new(case: &Case, protocol: Protocol, count: usize) -> Self {
         let mut traffic = Self { requests: Vec::new(), replies: Vec::new(), undamaged: 0 };
         let mut values = initial_values();
@@ -73,7 +64,7 @@ impl Traffic {
                 flip(&mut request, damage);
             } else {
                 operation.carry_out(&mut values);
-                traffic.replies.extend(protocol.reply(&operation, &values));
+                traffic.replies.extend(protocol.reply(&operation, &operation.values_read(&values)));
                 traffic.undamaged += 1;
             }
             traffic.requests.extend(request);
@@ -83,11 +74,13 @@ impl Traffic {
 }
 
 /// What one request asks for.
-struct Operation {
-    first: u8,
-    count: u8,
+pub(crate) struct Operation {
+    /// The first register.
+    pub(crate) first: u8,
+    /// How many.
+    pub(crate) count: u8,
     /// Empty in a read.
-    written: Vec<u8>,
+    pub(crate) written: Vec<u8>,
 }
 
 impl Operation {
@@ -116,42 +109,6 @@ impl Operation {
     }
 }
 
-impl Protocol {
-    fn request(self, operation: &Operation) -> Vec<u8> {
-        let &Operation { first, count, .. } = operation;
-        let written = operation.written.as_slice();
-        let function = if written.is_empty() { 3 } else { 6 };
-        match self {
-            Self::SevenBot => framed([&[0xAA, 0x77, function, first, count], written].concat()),
-            Self::ModbusRtu if written.is_empty() => framed(vec![STATION, 3, 0, first, 0, count]),
-            Self::ModbusRtu => {
-                framed([&[STATION, 16, 0, first, 0, count, 2 * count], words(written).as_slice()].concat())
-            }
-        }
-    }
-
-    fn reply(self, operation: &Operation, values: &[u8]) -> Vec<u8> {
-        let &Operation { first, count, .. } = operation;
-        let read = operation.values_read(values);
-        match (self, operation.written.is_empty()) {
-            (Self::SevenBot, true) => framed([&[0xAA, 0x77, 3, first, count], read.as_slice()].concat()),
-            (Self::SevenBot, false) => Vec::new(),
-            (Self::ModbusRtu, true) => framed([&[STATION, 3, 2 * count], words(&read).as_slice()].concat()),
-            (Self::ModbusRtu, false) => framed(vec![STATION, 16, 0, first, 0, count]),
-        }
-    }
-}
-
-/// The bytes with their CRC behind them, low byte first: both protocols have the same.
-fn framed(mut bytes: Vec<u8>) -> Vec<u8> {
-    bytes.extend(CRC.checksum(&bytes).to_le_bytes());
-    bytes
-}
-
-fn words(bytes: &[u8]) -> Vec<u8> {
-    bytes.iter().flat_map(|&byte| [0, byte]).collect()
-}
-
 /// Changes one byte.
 fn flip(frame: &mut [u8], damage: u64) {
     let [place, bits, ..] = damage.to_le_bytes();
@@ -175,36 +132,5 @@ impl Dice {
     fn below(&mut self, limit: u8) -> u8 {
         let [byte, ..] = (self.next() % u64::from(limit.max(1))).to_le_bytes();
         byte
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use bench_servers::work::{MODBUS_RTU, SEVEN_BOT};
-
-    #[test]
-    fn frames_are_those_of_the_protocols() {
-        let read = Operation { first: 54, count: 7, written: Vec::new() };
-        let pose = [90, 90, 65, 90, 90, 90, 80];
-        let write = Operation { first: 46, count: 7, written: pose.to_vec() };
-        assert_eq!(Protocol::SevenBot.request(&read), *b"\xaa\x77\x03\x36\x07\x81\xce");
-        assert_eq!(Protocol::SevenBot.request(&write), *b"\xaa\x77\x06\x2e\x07ZZAZZZP\xf9\x91");
-        let mut values = initial_values();
-        values[54..61].copy_from_slice(&pose);
-        assert_eq!(Protocol::SevenBot.reply(&read, &values), *b"\xaa\x77\x03\x36\x07ZZAZZZP\x43\x81");
-        let ten = Operation { first: 0, count: 10, written: Vec::new() };
-        assert_eq!(Protocol::ModbusRtu.request(&ten), [1, 3, 0, 0, 0, 10, 0xC5, 0xCD]);
-        assert_eq!(Protocol::ModbusRtu.reply(&write, &values)[..6], [1, 16, 0, 46, 0, 7]);
-    }
-    #[test]
-    fn requests_counted_on_the_chip_are_those_timed_here() {
-        let operation = |first, count, written: &[u8]| Operation { first, count, written: written.to_vec() };
-        for (protocol, requests) in [(Protocol::SevenBot, SEVEN_BOT), (Protocol::ModbusRtu, MODBUS_RTU)] {
-            assert_eq!(protocol.request(&operation(46, 7, &[])), requests.read_of_7);
-            let pose = operation(46, 7, &[90, 90, 65, 90, 90, 90, 80]);
-            assert_eq!(protocol.request(&pose), requests.write_of_7);
-            assert_eq!(protocol.request(&operation(0, 61, &[])), requests.read_of_61);
-        }
     }
 }

@@ -1,5 +1,5 @@
-//! `cargo xtask size`: flash, RAM and stack of the image for the arm, and of the parse-and-answer path beside its
-//! peers', held against their budgets.
+//! `cargo xtask size`: flash, RAM and stack of the image for the arm, and of the parse-and-answer path, held against
+//! their budgets.
 
 use std::fs;
 
@@ -12,11 +12,9 @@ use crate::stack::{CallGraph, Depth};
 const RAM: u64 = 0x2000_0000;
 /// What the cores are called in the paths of source files, and in the names of data.
 const CORES: &[(&str, &str)] = &[("protocol-core/", "protocol_core::"), ("motion-core/", "motion_core::")];
-/// Programs in which a server is fed under a meter; the first has none.
-const NOTHING: Linked = Linked { name: "count_nothing", profile: SMALL };
+/// The program in which the path is fed under a meter, and the one whose server does nothing.
 const OURS: Linked = Linked { name: "count_ours", profile: SMALL };
-const PEERS: &[Linked] =
-    &[Linked { name: "count_modbus_core", profile: SMALL }, Linked { name: "count_rmodbus", profile: SMALL }];
+const NOTHING: &str = "count_nothing";
 /// The function in which a server does its work.
 const FEED: &str = "footprint::contest::feed";
 
@@ -27,10 +25,6 @@ pub(crate) fn check(accept: bool) -> Outcome {
     figures.push(with(&ANSWER, |program| Ok(Figure::new("answer: program, bytes", flash(program))))?);
     figures.push(Figure::new("path: stack, bytes", stack_of_path(&OURS)?));
     figures.push(Figure::new("path: flash, bytes", flash_of_path(&OURS)?));
-    println!("\npeers on the same work, stack and flash of the path, bytes:");
-    for peer in PEERS {
-        println!("{:10}{:8}  {}", stack_or_dash(peer), flash_of_path(peer)?, peer.name);
-    }
     println!();
     budget::hold("size", &figures, accept)?;
     print_hash()
@@ -79,19 +73,15 @@ fn cores_share(program: &Program<'_>) -> Outcome<u64> {
 }
 
 /// How deep the stack gets while a server is fed.
-fn stack_of_path(linked: &Linked) -> Outcome<u64> {
+pub(crate) fn stack_of_path(linked: &Linked) -> Outcome<u64> {
     with(linked, |program| Ok(CallGraph::of(program)?.depth(program.address_of(FEED)?)?.bytes))
 }
 
-/// Peers may call through pointers, and panic: their stack has no bound then that is known.
-fn stack_or_dash(linked: &Linked) -> String {
-    stack_of_path(linked).map_or_else(|_| "-".to_owned(), |bytes| bytes.to_string())
-}
-
 /// What a program is larger by than the one whose server does nothing.
-fn flash_of_path(linked: &Linked) -> Outcome<u64> {
+pub(crate) fn flash_of_path(linked: &Linked) -> Outcome<u64> {
     let all = with(linked, |program| Ok(flash(program)))?;
-    let nothing = with(&NOTHING, |program| Ok(flash(program)))?;
+    let nothing = Linked { name: NOTHING, profile: linked.profile };
+    let nothing = with(&nothing, |program| Ok(flash(program)))?;
     Ok(all.saturating_sub(nothing))
 }
 

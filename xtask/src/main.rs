@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod bench;
 mod budget;
 mod count;
 mod decisions;
@@ -52,7 +53,7 @@ enum Chore {
     },
     /// Count instructions in the emulator, and hold them against the budgets.
     Count(Accept),
-    /// Compare the parse-and-answer path with two Modbus RTU servers.
+    /// Compare the parse-and-answer path with its peers: Modbus, postcard with COBS, MAVLink.
     Bench,
     /// Run the image for the arm in an emulator, simulated servos on its bus, and print the port it is on.
     ///
@@ -89,6 +90,6 @@ fn carry_out(chore: &Chore) -> Outcome {
         Chore::Size { accept, .. } => footprint::check(accept.accept),
         Chore::Count(Accept { accept }) => count::check(*accept),
         Chore::Emulate(options) => emulate::run(options),
-        Chore::Bench => run::cargo("run --quiet --release --package bench"),
+        Chore::Bench => bench::compare(),
     }
 }

@@ -5,13 +5,17 @@
 #![no_std]
 
 mod inbox;
+mod mavlink;
 mod modbus_core;
 mod ours;
+mod postcard;
 mod rmodbus;
 pub mod work;
 
+pub use mavlink::MavlinkServer;
 pub use modbus_core::ModbusCoreServer;
 pub use ours::OurServer;
+pub use postcard::PostcardServer;
 pub use rmodbus::RmodbusServer;
 
 /// Takes a stream of requests and answers it.

@@ -1,0 +1,160 @@
+//! mavlink: its reader finds frames in a stream by itself; registers are the caller's. MAVLink has no message for
+//! bytes of a register map, so requests and replies travel in its message for bytes of any kind, TUNNEL: function,
+//! address, count, values.
+
+use core::convert::Infallible;
+
+use embedded_io::{ErrorType, Read};
+use mavlink::dialects::common::{MavTunnelPayloadType, TUNNEL_DATA};
+use mavlink::error::{MessageReadError, ParserError};
+use mavlink::{Dialect, MAVLinkV2MessageRaw, MavHeader, MavlinkReader, MavlinkVersion, MessageData};
+
+use crate::Server;
+use crate::inbox::Inbox;
+use crate::work::initial_values;
+
+/// Read, and write: as in this project's protocol.
+const READ: u8 = 3;
+/// See above.
+const WRITE: u8 = 6;
+/// Longer than any frame.
+const SILENCE: [u8; 64] = [0; 64];
+/// So many times, that is.
+const SILENCES: usize = 5;
+
+/// What came and was not read yet, as a source for the reader.
+struct Line(Inbox);
+
+impl ErrorType for Line {
+    type Error = Infallible;
+}
+
+impl Read for Line {
+    fn read(&mut self, room: &mut [u8]) -> Result<usize, Infallible> {
+        let bytes = self.0.bytes();
+        let count = bytes.len().min(room.len());
+        if let (Some(room), Some(bytes)) = (room.get_mut(..count), bytes.get(..count)) {
+            room.copy_from_slice(bytes);
+        }
+        self.0.take(count);
+        Ok(count)
+    }
+}
+
+/// The one message that is spoken here: a dialect of all of them would have to tell them apart first.
+struct Tunnel;
+
+impl Dialect for Tunnel {
+    type Message = TUNNEL_DATA;
+    type EncodeError = Infallible;
+
+    fn message_id(&self, _: &TUNNEL_DATA) -> u32 {
+        TUNNEL_DATA::ID
+    }
+
+    fn extra_crc(&self, message_id: u32) -> Option<u8> {
+        (message_id == TUNNEL_DATA::ID).then_some(TUNNEL_DATA::EXTRA_CRC)
+    }
+
+    fn decode(&self, version: MavlinkVersion, _: u32, payload: &[u8]) -> Result<TUNNEL_DATA, ParserError> {
+        TUNNEL_DATA::deser(version, payload)
+    }
+
+    fn encode(
+        &self,
+        version: MavlinkVersion,
+        message: &TUNNEL_DATA,
+        payload: &mut [u8],
+    ) -> Result<usize, Infallible> {
+        Ok(message.ser(version, payload))
+    }
+}
+
+/// The peer mavlink.
+pub struct MavlinkServer {
+    reader: MavlinkReader<Line>,
+    registers: [u8; 256],
+    /// Room for the reply, made once and not for each request.
+    data: TUNNEL_DATA,
+    frame: MAVLinkV2MessageRaw,
+    carried_out: usize,
+}
+
+impl Default for MavlinkServer {
+    /// A server that was sent nothing yet.
+    fn default() -> Self {
+        Self {
+            reader: MavlinkReader::new(Line(Inbox::new())),
+            registers: initial_values(),
+            data: empty(),
+            frame: MAVLinkV2MessageRaw::new(),
+            carried_out: 0,
+        }
+    }
+}
+
+/// A message to nobody with nothing in it.
+const fn empty() -> TUNNEL_DATA {
+    TUNNEL_DATA {
+        payload_type: MavTunnelPayloadType::MAV_TUNNEL_PAYLOAD_TYPE_UNKNOWN,
+        target_system: 0,
+        target_component: 0,
+        payload_length: 0,
+        payload: [0; 128],
+    }
+}
+
+impl MavlinkServer {
+    /// Carries a request out, and hands out the reply to a read. `None`: it is no request.
+    fn answer(&mut self, from: MavHeader, asked: &TUNNEL_DATA, reply: &mut impl FnMut(&[u8])) -> Option<()> {
+        let asked_bytes = asked.payload.get(..usize::from(asked.payload_length))?;
+        let (&[function, address, count], written) = asked_bytes.split_first_chunk()?;
+        let (first, length) = (usize::from(address), usize::from(count));
+        let registers = self.registers.get_mut(first..first + length)?;
+        match function {
+            READ => {
+                self.data.target_system = from.system_id.to_le_bytes()[0];
+                self.data.target_component = from.component_id;
+                let (head, rest) = self.data.payload.split_first_chunk_mut()?;
+                let (values, unused) = rest.split_at_mut_checked(length)?;
+                *head = [READ, address, count];
+                values.copy_from_slice(registers);
+                // Zeros at the end are not sent.
+                unused.fill(0);
+                self.data.payload_length = 3 + count;
+                let header = MavHeader { system_id: 1, component_id: 1, sequence: 0 };
+                self.frame.serialize_message_data(header, &self.data);
+                reply(self.frame.raw_bytes());
+            }
+            WRITE if written.len() == length => registers.copy_from_slice(written),
+            _ => return None,
+        }
+        self.carried_out += 1;
+        Some(())
+    }
+}
+
+impl Server for MavlinkServer {
+    fn feed(&mut self, piece: &[u8], reply: &mut impl FnMut(&[u8])) {
+        self.reader.get_mut().0.push(piece);
+        loop {
+            match self.reader.read_message_with_dialect(&Tunnel, MavlinkVersion::V2) {
+                Ok((from, asked)) => _ = self.answer(from, &asked, reply),
+                Err(MessageReadError::Parse { .. }) => {}
+                // There is nothing more to read.
+                Err(MessageReadError::Io) => return,
+            }
+        }
+    }
+
+    /// A reader has no sense of time: what is unfinished is filled up with zeros, and turns out to be no frame.
+    fn end(&mut self, reply: &mut impl FnMut(&[u8])) {
+        for _ in 0..SILENCES {
+            self.feed(&SILENCE, reply);
+        }
+    }
+
+    fn carried_out(&self) -> usize {
+        self.carried_out
+    }
+}
