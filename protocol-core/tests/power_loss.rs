@@ -170,3 +170,32 @@ fn a_cut_erase_loses_nothing_whatever_it_leaves() {
     assert!(cut_erases::<512>(200) >= 1_500);
     assert!(cut_erases::<REAL>(if is_long() { 200 } else { 30 }) >= 1_500);
 }
+
+/// A flash whose home is full, and whose spare is half full of what moves there left that were cut.
+fn spare_full_of_remains() -> World<512> {
+    let mut world = World::new();
+    assert_eq!(world.cycle(9, None), End::Quiet);
+    let moves =
+        |world: &World<512>| world.operations(0).iter().take_while(|op| **op == Operation::Program).count();
+    while moves(&world) >= 8 {
+        let cut = Cut { after: 4, program: ProgramTear::Bytes(2), erase: EraseTear::All, seed: 1 };
+        assert_eq!(world.cycle(0, Some(cut)), End::Cut);
+    }
+    world
+}
+
+#[test]
+fn a_spare_full_of_remains_is_not_trusted_after_an_erase_that_was_cut() {
+    let world = spare_full_of_remains();
+    let after = world.operations(0).iter().position(|op| *op == Operation::Erase).unwrap();
+    let tears = EraseTear::ALL.into_iter().cycle().take(EraseTear::ALL.len() * 200);
+    for (seed, erase) in (0..).zip(tears) {
+        let mut world = world.clone();
+        let cut = Cut { after, program: ProgramTear::All, erase, seed };
+        assert_eq!(world.cycle(0, Some(cut)), End::Cut);
+        world.settle();
+    }
+    let mut tally = Tally::default();
+    cut_again(world, 0, 2, &mut tally);
+    println!("a spare full of remains, two more cuts: {tally:?}");
+}

@@ -35,6 +35,10 @@
 //!   enough. What it says was true before its first bit was programmed; and a mark that was cut and reads
 //!   wrong lacks zeros, which no erase gives it: it costs an erase, and does not come to read right if that
 //!   is cut, too.
+//! - **A mark that is right is revoked before its sector is erased**, or it might outlive an erase that was
+//!   cut, and promise what is not so. It comes to this when start after start is cut while it moves to the
+//!   spare, until that is half full of remains. A word behind home's own mark then says that the spare waits
+//!   for one generation more.
 //! - **One slot is skipped after a start**, since a word that was cut at its very beginning may not show.
 //!   (The first record of a power cycle, cut like that, is begun again in the same place by the next one. A
 //!   record begins with its sector's generation, so it is the same word that is programmed again, and made
@@ -62,6 +66,8 @@ use slot::Record;
 
 /// The slots at a sector's end that only a start may fill.
 const RESERVE: u32 = 4;
+/// The words behind a sector's mark.
+const REVOCATIONS: u32 = 7;
 /// How many slots are tried for one record.
 const ATTEMPTS: u32 = 2;
 /// What the record of an arm without settings holds. No arm's settings look like this: some of their bytes
@@ -110,6 +116,8 @@ pub enum SaveError {
 struct Tail {
     next: Place,
     generation: u32,
+    /// The generation that the other sector waits for, or will.
+    following: u32,
     /// The first slot to use in the other sector, if that is blank from there on.
     spare: Option<u32>,
 }
@@ -119,7 +127,8 @@ impl Tail {
     fn change_over(&mut self) -> Result<(), SaveError> {
         let slot = self.spare.take().ok_or(SaveError::Full)?;
         self.next = Place { sector: self.next.sector ^ 1, slot };
-        self.generation = self.generation.wrapping_add(1);
+        self.generation = self.following;
+        self.following = self.following.wrapping_add(1);
         Ok(())
     }
 
@@ -153,7 +162,7 @@ impl<F: NorFlash> Journal<F> {
     ///
     /// The flash has two sectors of `ERASE_SIZE` (512 bytes to 1 MiB) and words of at most four bytes.
     pub fn open(flash: F) -> (Self, Opened) {
-        let tail = Tail { next: Place { sector: 0, slot: 1 }, generation: 1, spare: None };
+        let tail = Tail { next: Place { sector: 0, slot: 1 }, generation: 1, following: 2, spare: None };
         let mut journal = Self { sectors: Sectors(flash), tail, newest: None, broken: false };
         let opened = journal.start();
         journal.broken = matches!(opened, Opened::Broken(_));
@@ -223,10 +232,14 @@ impl<F: NorFlash> Journal<F> {
     /// Goes on with a log: its newest record made firm, its other sector blank, and room for saves.
     fn resume(&mut self, home: &Survey, other: &Survey, newest: Record) -> Result<(), SaveError> {
         let next = Place { sector: home.sector, slot: home.end + 1 };
-        let spare = Self::first_free(other, newest.generation.wrapping_add(1));
-        self.tail = Tail { next, generation: newest.generation, spare };
+        let following = newest.generation.wrapping_add(1).wrapping_add(home.revoked);
+        let spare = Self::first_free(other, following);
+        self.tail = Tail { next, generation: newest.generation, following, spare };
         if !newest.firm {
             self.firm_up(&newest.image)?;
+        }
+        if spare.is_none() {
+            self.revoke(home, other);
         }
         self.prepare_spare();
         if Self::LIMIT.saturating_sub(self.tail.next.slot) < Self::SLOTS / 4 {
@@ -260,9 +273,23 @@ impl<F: NorFlash> Journal<F> {
         }
     }
 
+    /// Before a sector with the right mark is erased, another is made the right one.
+    ///
+    /// A note that is there already is programmed again: the cut of an earlier start may have left it half
+    /// done. If there is no place for one more, or its cells are worn out, the erase has to do without.
+    fn revoke(&mut self, home: &Survey, other: &Survey) {
+        let Tail { following, .. } = &mut self.tail;
+        let is_right = other.mark == slot::mark(*following);
+        let count = home.revoked + u32::from(is_right);
+        if (1..=REVOCATIONS).contains(&count) {
+            *following = following.wrapping_add(u32::from(is_right));
+            let _ = self.sectors.revoke(home.sector, count, *following);
+        }
+    }
+
     fn prepare_spare(&mut self) {
-        let Tail { next, generation, spare } = self.tail;
-        let prepare = || self.prepare(next.sector ^ 1, generation.wrapping_add(1));
+        let Tail { next, following, spare, .. } = self.tail;
+        let prepare = || self.prepare(next.sector ^ 1, following);
         self.tail.spare = spare.or_else(prepare);
     }
 

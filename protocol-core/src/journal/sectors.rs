@@ -26,6 +26,8 @@ pub(super) struct Place {
 pub(super) struct Survey {
     pub(super) sector: u32,
     pub(super) mark: Word,
+    /// How many words stand behind the mark: as many marks of the other sector do not count any more.
+    pub(super) revoked: u32,
     /// The first slot with nothing but blank ones from there on.
     pub(super) end: u32,
     /// The last record; firm only if nothing was begun behind it.
@@ -76,8 +78,9 @@ impl<F: NorFlash> Sectors<F> {
 
     /// Reads a sector from its end, until it meets a record.
     pub(super) fn survey(&mut self, sector: u32) -> Result<Survey, Refused> {
-        let [mark, ..] = self.read(Place { sector, slot: 0 })?;
-        let mut survey = Survey { sector, mark, end: 1, newest: None };
+        let [mark, behind @ ..] = self.read(Place { sector, slot: 0 })?;
+        let revoked = behind.iter().fold(0, |count, word| count + u32::from(*word != BLANK[0]));
+        let mut survey = Survey { sector, mark, revoked, end: 1, newest: None };
         for slot in (1..Self::SLOTS).rev() {
             let content = self.read(Place { sector, slot })?;
             if content == BLANK {
@@ -131,5 +134,11 @@ impl<F: NorFlash> Sectors<F> {
             }
         }
         self.program(start, &[slot::mark(generation)])
+    }
+
+    /// Notes in `sector` that the other one waits for `generation` now: the `count`-th time that it has to.
+    pub(super) fn revoke(&mut self, sector: u32, count: u32, generation: u32) -> Result<(), Refused> {
+        let at = Self::address(Place { sector, slot: 0 }) + 4 * count;
+        self.program(at, &[slot::mark(generation)])
     }
 }
