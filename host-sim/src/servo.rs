@@ -53,6 +53,16 @@ pub(crate) struct Servo {
     /// How many answers it gave.
     answers: u32,
     warmth: Warmth,
+    /// What the registers were last told, less what the motor says.
+    shown: Option<Shown>,
+}
+
+/// What a servo says of itself, less what its motor does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Shown {
+    decivolts: u8,
+    celsius: u8,
+    is_overloaded: bool,
 }
 
 impl Servo {
@@ -70,6 +80,7 @@ impl Servo {
             strained_steps: 0,
             answers: 0,
             warmth: Warmth::default(),
+            shown: None,
         }
     }
 
@@ -129,6 +140,12 @@ impl Servo {
 
     /// Lets a step of the motor pass, at this supply.
     pub(crate) fn step(&mut self, supply_decivolts: u8) {
+        self.warmth.step(self.load());
+        if self.motor.is_at_rest() && self.shown == Some(self.to_be_shown(supply_decivolts)) {
+            // Nothing would change. Most steps of an arm are of this kind.
+            self.strained_steps = 0;
+            return;
+        }
         let hold = match (self.is_on && !self.is_overloaded, self.fault) {
             (false, _) => Hold::Released,
             (true, Some(Fault::Stuck)) => Hold::Blocked,
@@ -136,8 +153,11 @@ impl Servo {
         };
         self.motor.step(hold);
         self.strain();
-        self.warmth.step(self.load());
         self.show(supply_decivolts);
+    }
+
+    fn to_be_shown(&self, decivolts: u8) -> Shown {
+        Shown { decivolts, celsius: self.warmth.celsius(), is_overloaded: self.is_overloaded }
     }
 
     fn strain(&mut self) {
@@ -146,6 +166,7 @@ impl Servo {
     }
 
     fn show(&mut self, voltage_decivolts: u8) {
+        self.shown = Some(self.to_be_shown(voltage_decivolts));
         self.registers.set_reading(&Reading {
             position_counts: self.motor.position_counts(),
             speed: self.motor.speed(),

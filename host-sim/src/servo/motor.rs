@@ -118,6 +118,11 @@ impl Motor {
         i16::try_from(load.clamp(-1_000, 1_000)).unwrap_or(0)
     }
 
+    /// Would a step change nothing, however it is held?
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.moved == 0 && self.set_point == self.target && self.position == self.set_point
+    }
+
     /// Has it somewhere to go?
     pub(crate) fn is_moving(&self) -> bool {
         self.moved != 0 || self.set_point != self.target

@@ -60,6 +60,8 @@ struct Pending {
 #[derive(Debug)]
 struct Life {
     controller: Controller,
+    /// The bytes of its last output.
+    said: Vec<u8>,
     model: Model,
     commands: Commands,
     audit: Audit,

@@ -10,58 +10,65 @@ const KEPT: usize = 40;
 /// Bytes of a frame that are kept.
 const SHOWN: usize = 64;
 
-/// Something that happened.
-#[derive(Clone, Debug)]
-enum Note {
-    Words(String),
-    Bytes { what: &'static str, length: usize, bytes: [u8; SHOWN] },
+/// Three rings, so that many frames do not push out what is rare.
+#[derive(Debug, Default)]
+pub(super) struct Notes {
+    events: Ring,
+    host: Ring,
+    bus: Ring,
 }
 
-/// Three rings, so that many frames do not push out what is rare.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Notes {
-    events: VecDeque<(Instant, Note)>,
-    host: VecDeque<(Instant, Note)>,
-    bus: VecDeque<(Instant, Note)>,
+/// The last notes of a kind. Where a note was, the next is written: millions of frames are noted for each
+/// that is read.
+#[derive(Debug, Default)]
+struct Ring {
+    notes: VecDeque<Note>,
+}
+
+#[derive(Debug, Default)]
+struct Note {
+    at: Instant,
+    words: String,
+    /// What was on the line, or the first part of it.
+    bytes: Vec<u8>,
+    has_more: bool,
 }
 
 impl Notes {
     pub(super) fn event(&mut self, now: Instant, words: String) {
-        push(&mut self.events, now, Note::Words(words));
+        self.events.add(now, |note| note.words = words);
     }
 
-    pub(super) fn host(&mut self, now: Instant, what: &'static str, bytes: &[u8]) {
-        push(&mut self.host, now, shorten(what, bytes));
+    pub(super) fn host(&mut self, now: Instant, what: &str, bytes: &[u8]) {
+        self.host.add(now, |note| note.set(what, bytes));
     }
 
-    pub(super) fn bus(&mut self, now: Instant, what: &'static str, bytes: &[u8]) {
-        push(&mut self.bus, now, shorten(what, bytes));
+    pub(super) fn bus(&mut self, now: Instant, what: &str, bytes: &[u8]) {
+        self.bus.add(now, |note| note.set(what, bytes));
     }
 }
 
-fn shorten(what: &'static str, bytes: &[u8]) -> Note {
-    let mut kept = [0; SHOWN];
-    kept.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
-    Note::Bytes { what, length: bytes.len(), bytes: kept }
-}
-
-fn push(ring: &mut VecDeque<(Instant, Note)>, now: Instant, note: Note) {
-    if ring.len() == KEPT {
-        ring.pop_front();
-    }
-    ring.push_back((now, note));
-}
-
-impl Display for Note {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Words(words) => out.write_str(words),
-            Self::Bytes { what, length, bytes } => {
-                write!(out, "{what}")?;
-                bytes.iter().take(*length).try_for_each(|byte| write!(out, " {byte:02x}"))?;
-                out.write_str(if *length > SHOWN { " .." } else { "" })
-            }
+impl Ring {
+    fn add(&mut self, at: Instant, fill: impl FnOnce(&mut Note)) {
+        if self.notes.len() < KEPT {
+            self.notes.push_back(Note::default());
+        } else {
+            self.notes.rotate_left(1);
         }
+        if let Some(last) = self.notes.back_mut() {
+            last.at = at;
+            fill(last);
+        }
+    }
+}
+
+impl Note {
+    fn set(&mut self, what: &str, bytes: &[u8]) {
+        self.words.clear();
+        self.words.push_str(what);
+        self.bytes.clear();
+        self.bytes.extend(bytes.iter().take(SHOWN));
+        self.has_more = bytes.len() > SHOWN;
     }
 }
 
@@ -71,13 +78,20 @@ pub(super) fn clock(at: Instant) -> String {
     format!("{}.{:06} s", micros / 1_000_000, micros % 1_000_000)
 }
 
+impl Display for Note {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{:>20}  {}", clock(self.at), self.words)?;
+        self.bytes.iter().try_for_each(|byte| write!(out, " {byte:02x}"))?;
+        out.write_str(if self.has_more { " .." } else { "" })
+    }
+}
+
 impl Display for Notes {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut all: Vec<_> = self.events.iter().chain(&self.host).chain(&self.bus).collect();
-        all.sort_by_key(|(at, _)| *at);
-        for (at, note) in all {
-            writeln!(out, "{:>20}  {note}", clock(*at))?;
-        }
+        let Self { events, host, bus } = self;
+        let mut all: Vec<_> = [events, host, bus].into_iter().flat_map(|ring| &ring.notes).collect();
+        all.sort_by_key(|note| note.at);
+        all.into_iter().try_for_each(|note| writeln!(out, "{note}"))?;
         out.write_char('\n')
     }
 }

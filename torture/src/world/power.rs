@@ -126,6 +126,7 @@ impl World {
         self.stalled_until = now;
         self.power = Power::On(Box::new(Life {
             controller,
+            said: Vec::new(),
             model,
             commands: Commands::new(now, self.servos.torque_codes()),
             audit: Audit::new(now),

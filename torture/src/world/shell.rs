@@ -7,7 +7,6 @@ use protocol_core::registers::map::{
 };
 use protocol_core::registers::{Image, Joint, Register};
 use protocol_core::time::Instant;
-use protocol_core::wire::FrameBuffer;
 
 use super::asked::{Asked, answer};
 use super::audit::{Audit, Sight, concerns_motion};
@@ -19,10 +18,10 @@ use super::settings::End;
 use super::{Life, MOST_OUTPUTS, World};
 use crate::violation::{Check, Violation, ensure};
 
-/// An output, free of the controller that made it.
+/// An output, free of the controller that made it: the bytes are in [`Life::said`].
 enum Said {
-    ToHost(FrameBuffer),
-    ToServos(FrameBuffer),
+    ToHost,
+    ToServos,
     Vacuum(Vacuum),
     Save(Image),
     Wait(Instant),
@@ -30,10 +29,15 @@ enum Said {
 
 impl Life {
     fn poll(&mut self, now: Instant, room: usize) -> Said {
-        let owned = |bytes: &[u8]| FrameBuffer::from_slice(bytes).unwrap_or_default();
-        match self.controller.poll(now, room) {
-            Output::ToHost(bytes) => Said::ToHost(owned(bytes)),
-            Output::ToServos(bytes) => Said::ToServos(owned(bytes)),
+        let Self { controller, said, .. } = self;
+        let mut keep = |bytes: &[u8], what| {
+            said.clear();
+            said.extend_from_slice(bytes);
+            what
+        };
+        match controller.poll(now, room) {
+            Output::ToHost(bytes) => keep(bytes, Said::ToHost),
+            Output::ToServos(bytes) => keep(bytes, Said::ToServos),
             Output::Vacuum(vacuum) => Said::Vacuum(vacuum),
             Output::Save(image) => Said::Save(image),
             Output::Wait(until) => Said::Wait(until),
@@ -96,8 +100,8 @@ impl World {
             let count = life.counted().wrapping_sub(before);
             let effect = self.follow(life, count)?;
             match said {
-                Said::ToServos(bytes) => self.tell_servos(life, &bytes)?,
-                Said::ToHost(bytes) => self.tell_host(life, &bytes, effect, room)?,
+                Said::ToServos => self.tell_servos(life)?,
+                Said::ToHost => self.tell_host(life, effect, room)?,
                 Said::Vacuum(vacuum) => {
                     self.notes.event(self.now, format!("{vacuum:?}"));
                     life.audit.vacuum(self.now, vacuum)?;
@@ -184,16 +188,17 @@ impl World {
         }
     }
 
-    fn tell_servos(&mut self, life: &mut Life, bytes: &[u8]) -> Check {
+    fn tell_servos(&mut self, life: &mut Life) -> Check {
+        let Life { controller, model, commands, said: bytes, .. } = life;
         self.notes.bus(self.now, "to servos", bytes);
-        let Life { controller, model, commands, .. } = life;
         let arm = controller.registers();
         commands.judge(bytes, &Circumstances { now: self.now, arm, model, servos: &self.servos })?;
         self.servos.hear(self.now, bytes, &mut self.dice);
         Ok(())
     }
 
-    fn tell_host(&mut self, life: &mut Life, bytes: &[u8], effect: Option<Effect>, room: usize) -> Check {
+    fn tell_host(&mut self, life: &mut Life, effect: Option<Effect>, room: usize) -> Check {
+        let bytes = life.said.as_slice();
         self.notes.host(self.now, "arm", bytes);
         ensure(bytes.len() <= room, || format!("{} bytes for a room of {room}", bytes.len()))?;
         life.to_host.push(bytes.len());
@@ -210,7 +215,7 @@ impl World {
             }
         };
         let wanted = answer(address, life.controller.registers().read(address, count));
-        ensure(*bytes == wanted, || format!("{wanted:02x?} was to be said"))
+        ensure(life.said == wanted, || format!("{wanted:02x?} was to be said"))
     }
 
     /// Saves settings. Says whether the power is still on.
