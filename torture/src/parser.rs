@@ -1,14 +1,7 @@
 //! The parser on a disturbed line: the campaign of protocol-core's own tests, from any seed.
 
-// Written for tests, where a panic is how a failure is reported. It has none to report here.
-#[allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
-#[path = "../../protocol-core/tests/disturbed_line/mod.rs"]
-mod disturbed_line;
-#[allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
-#[path = "../../protocol-core/tests/stream/mod.rs"]
-mod stream;
-
-use disturbed_line::Disturbance;
+use crate::shared::disturbed_line::{self, Disturbance};
+use crate::shared::stream;
 
 /// Lost frames in a million that are noise which completes to a right checksum by chance.
 const MOST_LOST_IN_A_MILLION: usize = 5;

@@ -1,0 +1,114 @@
+//! What the host tools make of the bytes an arm may send: frames, snapshots, words. All of it but the port. And
+//! of what a user may type for a register.
+
+use arbitrary::Arbitrary;
+use protocol_core::request::Reply;
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
+use sevenbot::map::find;
+use sevenbot::{Snapshot, names, words};
+
+/// What came, cut into pieces of this size; and what was typed.
+#[derive(Arbitrary, Debug)]
+pub struct Input<'a> {
+    piece: u8,
+    sent: Vec<Sent<'a>>,
+    text: &'a str,
+}
+
+#[derive(Arbitrary, Debug)]
+enum Sent<'a> {
+    Bytes(&'a [u8]),
+    /// A reply, whole or short of some bytes, right or with a wrong byte.
+    Reply {
+        address: u8,
+        values: &'a [u8],
+        missing: u8,
+        damage: Option<(u8, u8)>,
+    },
+}
+
+impl Sent<'_> {
+    fn bytes(&self) -> Vec<u8> {
+        let (address, values, missing, damage) = match *self {
+            Self::Bytes(bytes) => return bytes.to_vec(),
+            Self::Reply { address, values, missing, damage } => (address, values, missing, damage),
+        };
+        let mut frame = FrameBuffer::new();
+        Reply { address, values }.encode(&mut frame);
+        frame.truncate(frame.len().saturating_sub(missing.into()));
+        if let Some((place, change)) = damage
+            && let Some(byte) = frame.get_mut(usize::from(place))
+        {
+            *byte ^= change;
+        }
+        frame.to_vec()
+    }
+}
+
+/// Tries it. Panics where something does not hold.
+pub fn run(input: &Input<'_>) {
+    let Input { piece, sent, text } = input;
+    let bytes: Vec<u8> = sent.iter().flat_map(Sent::bytes).collect();
+    let in_pieces = snapshots(&bytes, usize::from(*piece).max(1));
+    assert_eq!(in_pieces, snapshots(&bytes, bytes.len().max(1)), "any cutting gives the same");
+    in_pieces.iter().for_each(check);
+    if let Ok(span) = names::parse(text) {
+        assert!(usize::from(span.address) + usize::from(span.count) <= 256, "{text}: {span}");
+    }
+}
+
+fn snapshots(bytes: &[u8], piece: usize) -> Vec<Snapshot> {
+    let mut deframer = Deframer::<ToHost>::new(Duration::from_millis(2));
+    let mut snapshots = Vec::new();
+    for part in bytes.chunks(piece) {
+        let mut rest = part;
+        while !rest.is_empty() {
+            let taken = deframer.push(Instant::ZERO, rest);
+            rest = &rest[taken..];
+            pull(&mut deframer, &mut snapshots);
+        }
+    }
+    // The gap, then the silence after which a frame is given up.
+    for millis in [2, 100] {
+        deframer.push(Instant::ZERO + Duration::from_millis(millis), &[]);
+        pull(&mut deframer, &mut snapshots);
+    }
+    snapshots
+}
+
+fn pull(deframer: &mut Deframer<ToHost>, snapshots: &mut Vec<Snapshot>) {
+    while let Some(found) = deframer.pull() {
+        if let Some(Reply { address, values }) = found.ok().and_then(Reply::from_frame) {
+            snapshots.push(Snapshot { address, values: values.to_vec() });
+        }
+    }
+}
+
+fn check(snapshot: &Snapshot) {
+    let span = snapshot.span();
+    assert_eq!(usize::from(span.count), snapshot.values.len());
+    assert!(usize::from(span.address) + usize::from(span.count) <= 256, "{span}");
+    let mut again = FrameBuffer::new();
+    Reply { address: snapshot.address, values: &snapshot.values }.encode(&mut again);
+    assert_eq!(snapshots(&again, again.len()), std::slice::from_ref(snapshot), "what was heard can be said");
+    assert_eq!(words::raw_entries(snapshot).len(), snapshot.values.len());
+    check_names(snapshot);
+}
+
+/// Every register of the snapshot is shown, alone or with the others of its row, and by a name that the tools
+/// take for it.
+fn check_names(snapshot: &Snapshot) {
+    let mut entries = words::entries(snapshot).into_iter().peekable();
+    let mut row = None;
+    for address in snapshot.span().addresses() {
+        if let Some(entry) = entries.next_if(|entry| entry.address == address) {
+            row = find(address);
+            let named = names::parse(&entry.name).map_or(address, |span| span.address);
+            assert_eq!(named, address, "{}", entry.name);
+        } else {
+            assert!(row.is_some_and(|row| row.holds(address)), "{address} is not shown");
+        }
+    }
+    assert_eq!(entries.next(), None);
+}

@@ -1,0 +1,129 @@
+//! The simulator's settings image with any content: it is refused and left alone, or it serves settings that
+//! are in range (D19), the same after every start, and takes new ones.
+
+use std::fs;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use arbitrary::Arbitrary;
+use host_sim::eeprom::{Eeprom, ImageError};
+use host_sim::flash::{ERASED, SECTOR_SIZE, SIZE};
+use host_sim::store::Store;
+use motion_core::Storage;
+use protocol_core::registers::{Access, Image, MAP, Region, RegisterFile};
+use tempfile::NamedTempFile;
+
+static FILE: LazyLock<NamedTempFile> = LazyLock::new(|| NamedTempFile::new_in("/dev/shm").expect("a file"));
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// What is tried.
+#[derive(Arbitrary, Debug)]
+pub struct Input<'a> {
+    filled_with: u8,
+    patches: Vec<Patch<'a>>,
+    /// By how much it is too short.
+    missing: u8,
+    next: [u8; Image::LENGTH],
+}
+
+#[derive(Arbitrary, Debug)]
+enum Patch<'a> {
+    Bytes {
+        at: u16,
+        bytes: &'a [u8],
+    },
+    /// The mark of a sector that was blank.
+    Mark {
+        is_second: bool,
+        generation: u32,
+    },
+    /// A slot with a right checksum, sealed or not.
+    Record {
+        at: u16,
+        generation: u32,
+        settings: [u8; Image::LENGTH],
+        is_sealed: bool,
+    },
+    Flip {
+        bit: u32,
+    },
+}
+
+/// Tries it. Panics where something does not hold.
+pub fn run(input: &Input<'_>) {
+    let bytes = content(input);
+    fs::write(FILE.path(), &bytes).expect("a file can be written");
+    match start(FILE.path()) {
+        Err(ImageError::NotAnImage { .. }) => assert_ne!(bytes.len(), SIZE),
+        Err(ImageError::Damaged(_)) => assert!(fs::read(FILE.path()).is_ok_and(|now| now == bytes)),
+        Err(other) => panic!("{other}"),
+        Ok((store, settings)) => live(store, settings, input.next),
+    }
+}
+
+type FileStore = Store<host_sim::flash::Flash>;
+
+fn start(path: &Path) -> Result<(FileStore, Option<Image>), ImageError> {
+    Ok(Store::open(Eeprom::File(path.to_owned()).open()?))
+}
+
+fn live(mut store: FileStore, settings: Option<Image>, next: [u8; Image::LENGTH]) {
+    check_settings(settings.as_ref());
+    // Two blank sectors are where a first save goes; whatever else is there, a start makes room.
+    assert_eq!(store.state(), Storage::Ready);
+    store = restart(store, settings);
+    let next = RegisterFile::new([0; 6], Some(&Image(next))).image();
+    assert_eq!(store.save(&next), Storage::Ready);
+    restart(store, Some(next));
+}
+
+fn restart(store: FileStore, expected: Option<Image>) -> FileStore {
+    // The image is locked for as long as it is open.
+    drop(store);
+    match start(FILE.path()) {
+        Ok((store, settings)) => {
+            assert_eq!(settings, expected);
+            store
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// What the arm makes of what was stored.
+fn check_settings(stored: Option<&Image>) {
+    let file = RegisterFile::new([0; 6], stored);
+    for row in MAP.iter().filter(|row| row.region == Region::Eeprom) {
+        for address in (row.address..).take(row.count.into()) {
+            let value = file.get(address);
+            assert!(row.range.contains(value), "register {address} is {value}");
+            assert!(row.access == Access::ReadWrite || value == 0, "register {address} is {value}");
+        }
+    }
+}
+
+fn content(input: &Input<'_>) -> Vec<u8> {
+    let mut content =
+        vec![if input.filled_with.is_multiple_of(4) { ERASED } else { input.filled_with }; SIZE];
+    for patch in &input.patches {
+        match patch {
+            Patch::Bytes { at, bytes } => put(&mut content, usize::from(*at) % SIZE, bytes),
+            Patch::Mark { is_second, generation } => {
+                let mark = CRC.checksum(&generation.to_le_bytes()).to_le_bytes();
+                put(&mut content, usize::from(*is_second) * SECTOR_SIZE, &mark);
+            }
+            Patch::Record { at, generation, settings, is_sealed } => {
+                let mut slot = [generation.to_le_bytes().as_slice(), settings].concat();
+                slot.extend(CRC.checksum(&slot).to_le_bytes());
+                slot.extend(if *is_sealed { [0x5E, 0xA1, 0xC3, 0x96] } else { [ERASED; 4] });
+                put(&mut content, usize::from(*at) * 32 % SIZE, &slot);
+            }
+            Patch::Flip { bit } => content[*bit as usize / 8 % SIZE] ^= 1 << (bit % 8),
+        }
+    }
+    content.truncate(SIZE - usize::from(input.missing % 8 == 7));
+    content
+}
+
+fn put(content: &mut [u8], at: usize, bytes: &[u8]) {
+    content[at..].iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+}
