@@ -32,8 +32,9 @@ const NEAR_DEGREES: u8 = 2;
 /// Where joints should go, in degrees, joint 1 first; `None` leaves one alone.
 pub(crate) type Targets = [Option<u8>; 7];
 
-/// Fails unless the motors drive the joints.
+/// Fails unless the motors drive the joints, as soon as the arm has come up.
 pub(crate) fn driven(arm: &mut Arm) -> Result<(), Failure> {
+    arm.wait_until_measured()?;
     let state = arm.read_span(Span::of(&MOTOR_STATE))?.byte(&MOTOR_STATE);
     if state == motor_state::SERVO {
         return Ok(());

@@ -106,6 +106,7 @@ impl Goal {
 
 pub(crate) fn run(session: &mut Session, args: &PoseArgs) -> Result<(), Failure> {
     let mut arm = session.connect()?;
+    driven(&mut arm)?;
     let here = arm.read_span(Span::of(&TARGET_POSITION))?.joints(&TARGET_POSITION);
     let mut targets = [None; 7];
     for (((target, goal), joint), here) in targets.iter_mut().zip(&args.angles).zip(Joint::ALL).zip(here) {
@@ -116,11 +117,11 @@ pub(crate) fn run(session: &mut Session, args: &PoseArgs) -> Result<(), Failure>
 
 pub(crate) fn home(session: &mut Session, args: &HomeArgs) -> Result<(), Failure> {
     let mut arm = session.connect()?;
+    driven(&mut arm)?;
     take(session, &mut arm, TARGET_POSITION.defaults.map(Some), &args.how)
 }
 
 fn take(session: &mut Session, arm: &mut Arm, targets: Targets, how: &HowArgs) -> Result<(), Failure> {
-    driven(arm)?;
     set_pace(arm, &targets, how)?;
     if !how.wait {
         return Move::begin(arm, targets).map(drop);

@@ -104,6 +104,7 @@ fn store(
 /// Goes through the joints; gives the offsets that were found.
 fn walk(arm: &mut Arm, before: Offsets) -> Result<Offsets, Failure> {
     let mut wanted = before;
+    arm.wait_until_measured()?;
     say(
         "Type +N or -N to move a joint, the angle it really stands at, or Enter to keep its offset; q ends.",
     )?;
