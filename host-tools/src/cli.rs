@@ -49,6 +49,10 @@ pub(crate) struct Global {
     /// Baud rate of the port. The arm starts with the one in its register 12.
     #[arg(long, global = true, default_value_t = 115_200, value_parser = value_parser!(u32).range(1..))]
     pub(crate) baud: u32,
+    /// How long to wait for an answer before asking again, in milliseconds; each question is asked three times.
+    #[arg(long, global = true, value_name = "MS", env = "SEVENBOT_TIMEOUT", hide_env_values = true,
+          default_value_t = 500, value_parser = value_parser!(u16).range(1..))]
+    pub(crate) timeout: u16,
     /// Show facts as JSON, one value a line.
     #[arg(long, global = true)]
     pub(crate) json: bool,

@@ -1,9 +1,10 @@
 //! Ctrl-C while the arm moves: the first one leaves it holding where it is, the second one ends at once.
 //!
-//! A command that moves nothing does not catch it, and ends as any program does.
+//! A command that moves nothing does not catch it, and ends as any program does; so does a question between two
+//! moves.
 
 use std::sync::Once;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -14,6 +15,8 @@ use crate::output::note;
 
 /// How often Ctrl-C was pressed, or another wish to end came.
 static WISHES: AtomicU32 = AtomicU32::new(0);
+/// Does the arm move, so that it would have to be stopped?
+static MOVING: AtomicBool = AtomicBool::new(false);
 static CATCHING: Once = Once::new();
 /// A wait looks this often whether it should end.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
@@ -26,14 +29,20 @@ impl Interrupt {
     /// Catches Ctrl-C, and the signals that ask a program to end, from now on. Where that is not possible
     /// they end the program, as without.
     pub(crate) fn catch() -> Self {
+        MOVING.store(true, Ordering::SeqCst);
         CATCHING.call_once(|| {
             let _ = ctrlc::set_handler(|| {
-                if WISHES.fetch_add(1, Ordering::SeqCst) > 0 {
+                if !MOVING.load(Ordering::SeqCst) || WISHES.fetch_add(1, Ordering::SeqCst) > 0 {
                     std::process::exit(i32::from(INTERRUPTED));
                 }
             });
         });
         Self(())
+    }
+
+    /// The arm does not move any more: from now on the wish ends the program at once.
+    fn release() {
+        MOVING.store(false, Ordering::SeqCst);
     }
 
     /// Does the user want it to end?
@@ -71,5 +80,6 @@ pub(crate) fn or_hold<T>(
         arm.hold()?;
         note("the arm holds where it is");
     }
+    Interrupt::release();
     done
 }

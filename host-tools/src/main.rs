@@ -15,6 +15,7 @@ mod cli;
 mod commands;
 mod confirm;
 mod failure;
+mod growing;
 mod interrupt;
 mod moving;
 mod output;
@@ -25,8 +26,10 @@ mod settings_file;
 
 use std::io;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Parser;
+use sevenbot::Options;
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::fmt::time::uptime;
 
@@ -40,7 +43,11 @@ fn main() -> ExitCode {
         show_frames();
     }
     let output = Output::stdout(global.json);
-    let mut session = Session { port: global.port, baud: global.baud, output };
+    // A variable that was emptied is as good as one that was unset.
+    let port = global.port.filter(|port| !port.is_empty());
+    let reply_timeout = Duration::from_millis(global.timeout.into());
+    let options = Options { baud: global.baud, reply_timeout, ..Options::default() };
+    let mut session = Session { port, options, output };
     match command.run(&mut session) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -11,7 +11,6 @@
 //! direction or speed changes. Knows no arm.
 
 use std::fmt;
-use std::io::{self, Write};
 use std::time::Duration;
 
 use protocol_core::registers::Joint;
@@ -30,6 +29,16 @@ const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
 const ROUNDING_DEGREES: f64 = 1.0;
 
 /// Where the arm was at one time.
+///
+/// ```
+/// use sevenbot::Angle;
+/// use sevenbot::recording::Moment;
+/// use std::time::Duration;
+///
+/// let pose = [Angle::from_register(90); 7];
+/// let moment = Moment { time: Duration::from_millis(1500), pose, vacuum: true };
+/// assert_eq!(moment.to_string(), "1.500  90  90  90  90  90  90  90   1");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moment {
     /// Since the beginning of the recording.
@@ -41,6 +50,18 @@ pub struct Moment {
 }
 
 /// A movement: moments in rising order of time, at least one.
+///
+/// ```
+/// use sevenbot::recording::Recording;
+///
+/// # fn main() -> Result<(), sevenbot::recording::RecordingError> {
+/// let text = "7bot-recording 1\n0 90 90 65 90 90 90 80 0\n1.5 120 90 65 90 90 90 80 1\n";
+/// let recording = Recording::parse(text)?;
+/// assert_eq!(recording.duration().as_millis(), 1500);
+/// recording.check_speeds(2.0)?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recording {
     /// Each with the number of its line.
@@ -48,6 +69,13 @@ pub struct Recording {
 }
 
 /// Why a text is no recording, or none that an arm could follow.
+///
+/// ```
+/// use sevenbot::recording::{Recording, RecordingError};
+///
+/// assert_eq!(Recording::parse("a shopping list"), Err(RecordingError::NotARecording));
+/// assert_eq!(Recording::parse("7bot-recording 1\n"), Err(RecordingError::Empty));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RecordingError {
     /// It does not begin as recordings do.
@@ -66,6 +94,13 @@ pub enum RecordingError {
 }
 
 /// What is wrong with a line of a recording.
+///
+/// ```
+/// use sevenbot::recording::{LineError, Recording, RecordingError};
+///
+/// let refused = Recording::parse("7bot-recording 1\n0 90 90 65\n");
+/// assert_eq!(refused, Err(RecordingError::Line { number: 2, cause: LineError::Fields(4) }));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum LineError {
     /// A moment has nine fields.
@@ -199,20 +234,10 @@ fn too_fast(from: &Moment, to: &Moment, factor: f64) -> Option<LineError> {
         .map(|(joint, degrees)| LineError::TooFast { joint, degrees_per_second: degrees / seconds })
 }
 
-/// Writes what every recording begins with.
-///
-/// # Errors
-/// As of `out`.
-pub fn write_header(out: &mut impl Write) -> io::Result<()> {
-    writeln!(out, "{FORMAT} {VERSION}\n# seconds  joints 1 to 7 in degrees  vacuum (1: suck)")
-}
-
-/// Writes one moment, as one line and in one piece.
-///
-/// # Errors
-/// As of `out`.
-pub fn write_moment(out: &mut impl Write, moment: &Moment) -> io::Result<()> {
-    out.write_all(format!("{moment}\n").as_bytes())
+/// What every recording begins with, as whole lines. A line for each moment follows, as it displays itself.
+#[must_use]
+pub fn head() -> String {
+    format!("{FORMAT} {VERSION}\n# seconds  joints 1 to 7 in degrees  vacuum (1: suck)\n")
 }
 
 impl fmt::Display for Moment {
@@ -278,12 +303,8 @@ mod tests {
     #[test]
     fn what_is_written_is_read_again() {
         let recording = Recording::parse(WAVE).expect("a recording");
-        let mut text = Vec::new();
-        write_header(&mut text).expect("memory takes all");
-        for moment in recording.moments() {
-            write_moment(&mut text, &moment).expect("memory takes all");
-        }
-        let text = String::from_utf8(text).expect("text");
+        let lines = recording.moments().map(|moment| format!("{moment}\n"));
+        let text: String = std::iter::once(head()).chain(lines).collect();
         assert!(text.ends_with("1.500 120  90  65  90  90  90  80   1\n"), "{text}");
         let again = Recording::parse(&text).expect("a recording");
         assert!(again.moments().eq(recording.moments()));

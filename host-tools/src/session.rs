@@ -3,7 +3,7 @@
 //! Knows how a port is chosen; what is said through it is the command's.
 
 use sevenbot::ports::{self, Probed};
-use sevenbot::{Arm, Firmware, OpenError};
+use sevenbot::{Arm, Firmware, OpenError, Options};
 
 use crate::failure::Failure;
 use crate::output::{Output, note, warn};
@@ -12,8 +12,8 @@ use crate::output::{Output, note, warn};
 pub(crate) struct Session {
     /// The port asked for; none: the only one that leads to an arm.
     pub(crate) port: Option<String>,
-    /// In bits per second.
-    pub(crate) baud: u32,
+    /// How to talk to the arm.
+    pub(crate) options: Options,
     /// Where facts are shown.
     pub(crate) output: Output,
 }
@@ -22,7 +22,7 @@ impl Session {
     /// Opens the arm, and says what its firmware cannot do.
     pub(crate) fn connect(&self) -> Result<Arm, Failure> {
         let port = self.port_name()?;
-        let arm = Arm::open(&port, self.baud).map_err(|error| Failure::Open { port, error })?;
+        let arm = Arm::open_with(&port, self.options).map_err(|error| Failure::Open { port, error })?;
         let version = arm.identity().version();
         match arm.identity().firmware() {
             Firmware::Ours => {}
@@ -43,7 +43,7 @@ impl Session {
     pub(crate) fn port_name(&self) -> Result<String, Failure> {
         match &self.port {
             Some(port) => Ok(port.clone()),
-            None => the_only(ports::probe(ports::available(), self.baud)),
+            None => the_only(ports::probe(ports::available(), self.options.baud)),
         }
     }
 }

@@ -6,13 +6,13 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::ops::{Deref, DerefMut};
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::Output;
 use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 
 use crate::line::{Line, PATIENCE};
 use crate::own::{OwnArm, World};
-use crate::programs::sevenbot;
+use crate::programs::tool;
 use crate::registers::{
     DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FEEDBACK_FREQUENCY, MOVING_JOINTS, PRESENT_POSITION, STANDARD_POSE,
 };
@@ -220,7 +220,7 @@ impl Bench {
     /// Runs the command line tool on this arm's port, which nobody else may have open meanwhile.
     pub fn sevenbot(&mut self, arguments: &[&str]) -> Output {
         let port = self.lend_port();
-        let output = Command::new(sevenbot()).arg("--port").arg(port).args(arguments).output();
+        let output = tool().arg("--port").arg(port).args(arguments).output();
         self.reopen(BAUD);
         output.expect("sevenbot runs")
     }

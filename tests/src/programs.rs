@@ -18,6 +18,17 @@ pub fn sevenbot() -> &'static Path {
     PATH.get_or_init(|| program("sevenbot"))
 }
 
+/// How long the tool waits for an answer, in milliseconds: the machine may have much else to do.
+pub const TOOL_TIMEOUT: (&str, &str) = ("SEVENBOT_TIMEOUT", "10000");
+
+/// The command line tool, patient.
+#[must_use]
+pub fn tool() -> Command {
+    let mut tool = Command::new(sevenbot());
+    tool.env(TOOL_TIMEOUT.0, TOOL_TIMEOUT.1);
+    tool
+}
+
 /// The chores, one of which is the emulator.
 #[must_use]
 pub fn xtask() -> &'static Path {

@@ -13,6 +13,7 @@ use pty_process::blocking::{Command, Pty, open};
 use vt100::Parser;
 
 use crate::line::PATIENCE;
+use crate::programs::TOOL_TIMEOUT;
 
 /// The size of every terminal here: what everybody has at least.
 const ROWS: NonZeroU16 = NonZeroU16::new(24).unwrap();
@@ -34,6 +35,7 @@ impl Terminal {
         let (pty, terminal) = open().expect("a pseudo-terminal");
         pty.resize(Size::new(ROWS.get(), COLUMNS.get())).expect("a size");
         let command = Command::new(program).args(arguments).env("TERM", "xterm-256color");
+        let command = command.env(TOOL_TIMEOUT.0, TOOL_TIMEOUT.1);
         let program = command.spawn(terminal).expect("the program starts");
         let screen = Arc::new(Mutex::new(Parser::new(ROWS, COLUMNS, 0)));
         let (pty, painter) = (Arc::new(pty), Arc::clone(&screen));

@@ -3,10 +3,10 @@
 mod said;
 
 use std::io::Read;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use said::{done, failed, said, without_arm, words};
-use system_tests::programs::sevenbot;
+use system_tests::programs::tool;
 use system_tests::registers::{
     DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FEEDBACK_FREQUENCY, MOTOR_STATE, OFFSET, SPEED, STANDARD_POSE,
     TARGET_POSITION, TIME,
@@ -173,7 +173,7 @@ fn monitor_into_a_pipe_is_one_line_a_sample() {
 fn monitor_into_a_pipe_that_closes_ends_quietly() {
     with_arm(Setup::any(), |arm| {
         let port = arm.lend_port();
-        let mut monitor = Command::new(sevenbot())
+        let mut monitor = tool()
             .args(["monitor", "--hz", "50", "--port"])
             .arg(&port)
             .stdout(Stdio::piped())

@@ -4,7 +4,7 @@ mod said;
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ use said::{done, failed};
 
 use system_tests::line::PATIENCE;
 use system_tests::own::{OwnArm, World};
-use system_tests::programs::sevenbot;
+use system_tests::programs::{sevenbot, tool};
 use system_tests::registers::{MOTOR_STATE, TARGET_POSITION};
 use system_tests::terminal::Terminal;
 use system_tests::{Need, Setup, near, with_arm};
@@ -165,7 +165,7 @@ fn csv_goes_to_a_file_and_is_whole_when_the_cable_is_pulled() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let file = folder.path().join("move.csv");
         let port = arm.lend_port();
-        let mut command = Command::new(sevenbot());
+        let mut command = tool();
         command.args(["monitor", "--hz", "50", "--csv"]).arg(&file).arg("--port").arg(&port);
         let tool = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("sevenbot runs");
         wait_for_lines(&file, 10);

@@ -3,12 +3,14 @@
 mod said;
 
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 
 use rustix::process::{Pid, Signal, kill_process};
 use said::{done, failed, words};
-use system_tests::programs::sevenbot;
+use system_tests::own::{OwnArm, World};
+use system_tests::programs::tool;
 use system_tests::registers::{MOTOR_STATE, PRESENT_POSITION, SPEED, STANDARD_POSE, TARGET_POSITION, TIME};
+use system_tests::target::Target;
 use system_tests::{Bench, Need, Setup, near, with_arm};
 
 /// A pose far from the standard one.
@@ -17,7 +19,7 @@ const FAR: [&str; 7] = ["170", "90", "65", "90", "90", "90", "80"];
 /// The tool on its slow way to a far pose, the arm under way. Its port is the tool's.
 fn under_way(arm: &mut Bench) -> (Child, BufReader<std::process::ChildStderr>) {
     let port = arm.lend_port();
-    let mut tool = Command::new(sevenbot())
+    let mut tool = tool()
         .args(["--verbose", "pose", "--wait", "--speed", "5"])
         .args(FAR)
         .arg("--port")
@@ -90,6 +92,29 @@ fn stop_leaves_a_joint_alone_whose_servo_is_missing() {
         assert_eq!(arm.register(PRESENT_POSITION + 2), 0);
         assert_eq!(arm.register(TARGET_POSITION + 2), STANDARD_POSE[2]);
     });
+}
+
+/// What the tool says when it has done something with an arm, come up or not.
+#[track_caller]
+fn with(arm: &OwnArm, arguments: &[&str]) -> String {
+    let mut tool = tool();
+    done(tool.arg("--port").arg(arm.port()).args(arguments).output().expect("sevenbot runs"))
+}
+
+#[test]
+fn stop_waits_for_an_arm_that_was_just_switched_on() {
+    // One of its own: it is not waited for until it has come up.
+    let mut arm = OwnArm::start(World::Simulator, Vec::new());
+    assert_eq!(
+        with(&arm, &["stop"]),
+        "90 90 65 90 90 90 80\n",
+        "not 0, which is what nobody has measured yet"
+    );
+    with(&arm, &["pose", "120", "90", "65", "90", "90", "90", "80", "--wait"]);
+    arm.power_cycle();
+    let text = with(&arm, &["pose", "+10", "_", "_", "_", "_", "_", "_", "--wait"]);
+    let base: u8 = text.split_whitespace().next().expect("degrees").parse().expect("degrees");
+    assert!(near(base, 130), "from where it stands: {text}");
 }
 
 #[test]

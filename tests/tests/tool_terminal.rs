@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use said::{done, failed};
 use serialport::{SerialPort, TTYPort};
 use system_tests::line::PATIENCE;
-use system_tests::programs::sevenbot;
+use system_tests::programs;
 use system_tests::registers::MOTOR_STATE;
 use system_tests::{Bench, Setup, with_arm};
 
@@ -27,7 +27,7 @@ fn side_of(terminal: &TTYPort) -> Stdio {
 }
 
 fn tool(arm: &mut Bench, arguments: &[&str]) -> Command {
-    let mut tool = Command::new(sevenbot());
+    let mut tool = programs::tool();
     tool.arg("--port").arg(arm.lend_port()).args(arguments).env_remove("NO_COLOR").env("TERM", "xterm");
     tool
 }

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 
 use said::{done, failed, without_arm, words};
 use system_tests::frames::reply;
-use system_tests::programs::sevenbot;
+use system_tests::programs::tool;
 use system_tests::registers::{DEVICE_ID, FEEDBACK_FREQUENCY};
 use system_tests::{Setup, read_request, with_arm, write_request};
 
@@ -71,7 +71,7 @@ a damaged frame or a part of one, 4 bytes: AA 77 03 00
 }
 
 fn through_standard_input(bytes: &[u8]) -> String {
-    let mut tool = Command::new(sevenbot())
+    let mut tool = tool()
         .args(["sniff", "-"])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -86,7 +86,7 @@ fn sniff_listens_to_a_port() {
     with_arm(Setup::any(), |arm| {
         arm.write(FEEDBACK_FREQUENCY, &[20]);
         assert_eq!(arm.register(FEEDBACK_FREQUENCY), 20);
-        let mut tool = Command::new(sevenbot())
+        let mut tool = tool()
             .arg("--port")
             .arg(arm.lend_port())
             .arg("sniff")

@@ -63,8 +63,12 @@ pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), Fai
     Ok(())
 }
 
-/// Writes a file that is there as a whole or not at all.
+/// Writes a file that is there as a whole or not at all; into what is no plain file it just writes.
 fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), Failure> {
+    let is_special = fs::symlink_metadata(path).is_ok_and(|there| !there.is_file());
+    if may_replace && is_special {
+        return fs::write(path, text).map_err(|error| Failure::file(path, error));
+    }
     if may_replace {
         let beside = path.with_extension("toml.new");
         return fs::write(&beside, text)

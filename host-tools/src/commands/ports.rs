@@ -33,7 +33,7 @@ pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), Failure
             asked.push(port);
         }
     }
-    let ports = probe(asked, session.baud).into_iter().map(Line::from).collect();
+    let ports = probe(asked, session.options.baud).into_iter().map(Line::from).collect();
     session.output.show(&Ports { ports })
 }
 

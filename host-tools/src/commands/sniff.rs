@@ -68,7 +68,7 @@ fn port(session: &mut Session) -> Result<(), Failure> {
     let name = session.port.clone().ok_or_else(|| {
         Failure::Usage("what to listen to? use --port PORT, or name a file; - is standard input".to_owned())
     })?;
-    let opened = ports::open(&name, session.baud);
+    let opened = ports::open(&name, session.options.baud);
     let mut port = opened.map_err(|error| Failure::Open { port: name, error })?;
     let lost = |kind| Failure::Wire(Error::PortLost(kind));
     port.set_timeout(SILENCE).map_err(|error| lost(io::Error::from(error).kind()))?;

@@ -3,9 +3,9 @@
 // Not every test asks for everything.
 #![allow(dead_code)]
 
-use std::process::{Command, Output};
+use std::process::Output;
 
-use system_tests::programs::sevenbot;
+use system_tests::programs::tool;
 
 /// Standard output of a command that ended well.
 #[track_caller]
@@ -37,5 +37,5 @@ pub(crate) fn words<'a>(text: &'a str, first: &str) -> Vec<&'a str> {
 
 /// The tool without an arm: none is named, and none is looked for.
 pub(crate) fn without_arm(arguments: &[&str]) -> Output {
-    Command::new(sevenbot()).args(arguments).env_remove("SEVENBOT_PORT").output().expect("sevenbot runs")
+    tool().args(arguments).env_remove("SEVENBOT_PORT").output().expect("sevenbot runs")
 }

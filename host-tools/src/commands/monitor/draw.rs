@@ -38,25 +38,43 @@ const LONGEST_GAP: Duration = Duration::from_millis(1500);
 /// Columns of the table before its bars.
 const TABLE_WIDTH: usize = 49;
 
+/// Rows of the table of joints: its head, and seven.
+const JOINT_ROWS: u16 = 8;
+/// From so many rows on there is room for more than the joints.
+const ROOMY: u16 = 18;
+
 /// Draws all of it.
 pub(crate) fn draw(frame: &mut Frame<'_>, view: &View) {
-    let heights = [1, 9, 0, 3, 1];
-    let [title, table, plot, foot, keys] = Layout::vertical(heights.map(|height| match height {
-        0 => Constraint::Min(4),
-        height => Constraint::Length(height),
-    }))
-    .areas(frame.area());
+    let heights = heights(frame.area().height);
+    let [title, table, _, plot, _, foot, keys] = Layout::vertical(heights).areas(frame.area());
     frame.render_widget(Paragraph::new(title_left(view)), title);
     frame.render_widget(Paragraph::new(title_right(view)).alignment(Alignment::Right), title);
     frame.render_widget(Paragraph::new(table_lines(view, table.width)), table);
     draw_plot(frame, view, plot);
     // What was known of an arm that went away is old.
     let age = if view.arm().is_some() { Style::new() } else { FAINT };
-    frame.render_widget(Paragraph::new(foot_lines(view)).style(age), foot);
+    frame.render_widget(Paragraph::new(vec![health(view), link(view)]).style(age), foot);
     frame.render_widget(Paragraph::new(last_line(view)), keys);
     if let Some(dialog) = view.dialog {
         draw_dialog(frame, dialog);
     }
+}
+
+/// Of title, table, gap, plot, gap, foot and keys. On a low screen the plot goes first, and the joints last.
+fn heights(screen: u16) -> [Constraint; 7] {
+    let (gap, joints) = match screen {
+        ROOMY.. => (1, Constraint::Length(JOINT_ROWS)),
+        _ => (0, Constraint::Min(JOINT_ROWS)),
+    };
+    [
+        Constraint::Length(1),
+        joints,
+        Constraint::Length(gap),
+        Constraint::Fill(1),
+        Constraint::Length(gap),
+        Constraint::Length(2),
+        Constraint::Length(1),
+    ]
 }
 
 fn title_left(view: &View) -> Line<'_> {
@@ -159,10 +177,6 @@ fn stretches(view: &View, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
     let past: Vec<Past> = view.past.iter().copied().collect();
     let lines = past.chunk_by(|one, next| next.0.saturating_sub(one.0) <= LONGEST_GAP);
     lines.map(|line| (joint, line.iter().map(point).collect())).collect()
-}
-
-fn foot_lines(view: &View) -> Vec<Line<'static>> {
-    vec![Line::default(), health(view), link(view)]
 }
 
 fn health(view: &View) -> Line<'static> {
@@ -286,6 +300,14 @@ mod tests {
         view.dialog = Some(Dialog::ChooseState);
         for (width, height) in [(1, 1), (10, 3), (49, 12), (300, 100)] {
             screen(&view, width, height);
+        }
+    }
+
+    #[test]
+    fn on_a_low_screen_all_joints_are_seen() {
+        let low = screen(&watching(), 80, 12).to_string();
+        for seen in [" ▸   1", "     7", "faults none", "round trip", "q quit"] {
+            assert!(low.contains(seen), "{low}");
         }
     }
 }

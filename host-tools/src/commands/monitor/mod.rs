@@ -17,8 +17,7 @@ mod screen;
 mod view;
 mod watch;
 
-use std::fs::{self, File};
-use std::io::Write;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -30,6 +29,7 @@ use self::lines::{Layout, Line};
 use self::sample::Sample;
 use self::view::{News, PAST, View};
 use crate::failure::Failure;
+use crate::growing::Growing;
 use crate::session::Session;
 
 /// Watch the arm: targets, positions, movement, health, and how well it is understood.
@@ -112,10 +112,8 @@ fn show_lines(session: &mut Session, args: &MonitorArgs) -> Result<(), Failure> 
 
 fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), Failure> {
     let mut arm = session.connect()?;
-    let failed = |error| Failure::file(path, error);
-    let mut file = File::create(path).map_err(failed)?;
-    // Each line in one piece, so that the file is whole whenever it ends.
-    let mut write = |line: String| file.write_all(format!("{line}\n").as_bytes()).map_err(failed);
+    let mut file = Growing::create(path)?;
+    let mut write = |line: String| file.add(&format!("{line}\n"));
     write(Layout::Csv.head())?;
     each_sample(&mut arm, args, args.samples.unwrap_or(u64::MAX), |sample| write(Layout::Csv.line(&sample)))
 }

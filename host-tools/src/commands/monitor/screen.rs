@@ -28,7 +28,8 @@ pub(crate) fn run(session: &Session, period: Duration) -> Result<View, Failure> 
     let (news, hear) = mpsc::channel();
     let (wish, wishes) = mpsc::channel();
     let asked = session.port.clone();
-    let watcher = Watcher { port: asked, last_port: port, baud: session.baud, period, start, news, wishes };
+    let options = session.options;
+    let watcher = Watcher { port: asked, last_port: port, options, period, start, news, wishes };
     let watching = thread::spawn(|| watcher.run());
     let shown = on_terminal(|terminal| show(terminal, &mut view, start, &hear, &wish));
     // Without a wish to come the watcher ends, after those that it has already.

@@ -16,8 +16,6 @@ use super::view::{News, Wish};
 
 /// How long to wait before looking for an arm again.
 const LOOK_AGAIN: Duration = Duration::from_millis(500);
-/// No answer for so long is one lost. A read of 34 registers takes 50 ms at 9600 baud.
-const REPLY_TIMEOUT: Duration = Duration::from_millis(300);
 /// After so many lost answers in a row the arm counts as gone.
 const LOST_AFTER: u32 = 3;
 
@@ -27,7 +25,8 @@ pub(crate) struct Watcher {
     pub(crate) port: Option<String>,
     /// The port that was used last.
     pub(crate) last_port: String,
-    pub(crate) baud: u32,
+    /// How to talk to it.
+    pub(crate) options: Options,
     /// Between two samples.
     pub(crate) period: Duration,
     pub(crate) start: Instant,
@@ -74,14 +73,15 @@ impl Watcher {
 
     /// Opens the port that was asked for or used last, or else another one that leads to an arm.
     fn open(&mut self) -> Result<Arm, String> {
-        let options = Options { baud: self.baud, reply_timeout: REPLY_TIMEOUT, attempts: 1 };
+        // An answer that is missing is news, and the next sample asks again.
+        let options = Options { attempts: 1, ..self.options };
         let error = match Arm::open_with(&self.last_port, options) {
             Ok(arm) => return Ok(arm),
             Err(error) => error.to_string(),
         };
         if self.port.is_none() {
             // Unplugged and plugged in again, it may have another name.
-            let found = ports::probe(ports::available(), self.baud);
+            let found = ports::probe(ports::available(), options.baud);
             if let Some(found) = found.into_iter().find(|found| found.answer.is_ok()) {
                 self.last_port = found.port.name;
                 return Arm::open_with(&self.last_port, options).map_err(|error| error.to_string());

@@ -10,7 +10,6 @@
 mod pendant;
 mod stamps;
 
-use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -18,7 +17,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, value_parser};
 use serde::Serialize;
 use sevenbot::map::{FEEDBACK_FREQUENCY, MOTOR_STATE, VACUUM_PUMP, motor_state};
-use sevenbot::recording::{Moment, write_header, write_moment};
+use sevenbot::recording::{self, Moment};
 use sevenbot::{Arm, Span};
 
 use self::pendant::Pendant;
@@ -26,6 +25,7 @@ use self::stamps::Stamps;
 use super::all_taken;
 use crate::confirm::confirm;
 use crate::failure::Failure;
+use crate::growing::Growing;
 use crate::interrupt::Interrupt;
 use crate::moving::driven;
 use crate::output::{Facts, note};
@@ -93,7 +93,7 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Failur
         confirm("The arm goes limp, and falls unless somebody holds it. Go on?", args.yes)?;
     }
     let mut tape = Tape::create(&args.file)?;
-    let done = limp(&mut arm, args).and_then(|()| roll(&mut arm, args, session.baud, &mut tape));
+    let done = limp(&mut arm, args).and_then(|()| roll(&mut arm, args, session.options.baud, &mut tape));
     // An arm that went away cannot be told to hold; it was left as it is.
     let held = if matches!(done, Err(Failure::Wire(_))) { Ok(()) } else { leave(&mut arm, args) };
     let Tape { moments, seconds, .. } = tape;
@@ -160,22 +160,20 @@ fn silent(arm: &mut Arm) -> Failure {
 
 /// The file, and how much is in it.
 struct Tape {
-    path: PathBuf,
-    file: File,
+    file: Growing,
     moments: u64,
     seconds: f64,
 }
 
 impl Tape {
     fn create(path: &Path) -> Result<Self, Failure> {
-        let failed = |error| Failure::file(path, error);
-        let mut file = File::create(path).map_err(failed)?;
-        write_header(&mut file).map_err(failed)?;
-        Ok(Self { path: path.to_owned(), file, moments: 0, seconds: 0.0 })
+        let mut file = Growing::create(path)?;
+        file.add(&recording::head())?;
+        Ok(Self { file, moments: 0, seconds: 0.0 })
     }
 
     fn add(&mut self, moment: &Moment) -> Result<(), Failure> {
-        write_moment(&mut self.file, moment).map_err(|error| Failure::file(&self.path, error))?;
+        self.file.add(&format!("{moment}\n"))?;
         self.moments += 1;
         self.seconds = moment.time.as_secs_f64();
         Ok(())
