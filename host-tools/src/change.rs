@@ -17,7 +17,12 @@ use crate::words;
 
 /// A register that does not hold what was written to it.
 ///
-/// See [`Arm::write_checked`].
+/// ```
+/// use sevenbot::change::{Cause, Unchanged};
+///
+/// let refused = Unchanged { address: 11, wanted: 42, found: 0, cause: Cause::Locked };
+/// assert_eq!(refused.to_string(), "device-id is 0, not 42: it is protected by the EEPROM lock");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unchanged {
     /// The register.

@@ -194,8 +194,8 @@ fn join(group: Option<&str>) -> String {
             format!("join the group that may: `sudo usermod -aG {group} $USER`, then log out and in again")
         }
         None if cfg!(unix) => {
-            "`ls -l` of the port names the group that may open it (often dialout or uucp); \
-                               join it and log in again"
+            "`ls -lL` of the port shows who may open it: only its owner, or a group too (often dialout or uucp), \
+             which you can join; then log in again"
                 .to_owned()
         }
         None => "is another program using it, or does it need an administrator?".to_owned(),

@@ -1,16 +1,21 @@
-//! Who may open a port: the group its file belongs to, where ports are files and groups have names.
+//! Who may open a port: a group, where ports are files and groups have names.
 //!
 //! Only asked once opening has failed.
 
-/// The name of the group a port's file belongs to; `None` where the system does not say.
+/// A group's share of a file's mode: reading and writing.
+#[cfg(unix)]
+const GROUP_READS_AND_WRITES: u32 = 0o060;
+
+/// The name of the group that may open a port; `None` where there is none, or the system does not say.
 #[cfg(unix)]
 pub(crate) fn group_of(path: &str) -> Option<String> {
     use std::os::unix::fs::MetadataExt;
-    let number = std::fs::metadata(path).ok()?.gid();
-    name_in(&std::fs::read_to_string("/etc/group").ok()?, number)
+    let file = std::fs::metadata(path).ok()?;
+    let may_open = file.mode() & GROUP_READS_AND_WRITES == GROUP_READS_AND_WRITES;
+    may_open.then(|| name_in(&std::fs::read_to_string("/etc/group").ok()?, file.gid()))?
 }
 
-/// The name of the group a port's file belongs to; `None` where the system does not say.
+/// The name of the group that may open a port; `None` where the system does not say.
 #[cfg(not(unix))]
 pub(crate) fn group_of(_: &str) -> Option<String> {
     None

@@ -24,6 +24,18 @@ const APPROACH_DEGREES_PER_SECOND: f64 = 30.0;
 const SHORTEST_APPROACH: Duration = Duration::from_millis(500);
 
 /// What is sent to the arm at one time: one frame, carried out as one.
+///
+/// ```
+/// use sevenbot::{playback, recording::Recording};
+///
+/// # fn main() -> Result<(), sevenbot::recording::RecordingError> {
+/// let text = "7bot-recording 1\n0 90 90 65 90 90 90 80 0\n1 100 90 65 90 90 90 80 0\n";
+/// let steps = playback::steps(&Recording::parse(text)?, 1.0);
+/// assert_eq!(steps[0].registers().len(), 1 + 7 + 7 + 7);
+/// assert_eq!(steps.last().map(|step| step.targets[0].degrees()), Some(100));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
     /// When, since the beginning.

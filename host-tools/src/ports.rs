@@ -41,7 +41,11 @@ pub struct Port {
 
 /// What was found behind a port.
 ///
-/// See [`probe`].
+/// ```no_run
+/// let found = sevenbot::ports::probe(sevenbot::ports::available(), 115_200);
+/// let arms = found.iter().filter(|found| found.answer.is_ok());
+/// println!("{} arms", arms.count());
+/// ```
 #[derive(Debug)]
 pub struct Probed {
     /// The port.

@@ -10,7 +10,7 @@ impl Progress {
     pub(crate) fn new(total: u64, unit: &str) -> Self {
         // indicatif draws on terminals only.
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
-        let template = format!("{{bar:40}} {{pos}} of {{len}} {unit}  {{elapsed}}  {{msg}}");
+        let template = format!("{{wide_bar}} {{pos}} of {{len}} {unit}  {{elapsed}}  {{msg}}");
         bar.set_style(
             ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()),
         );
