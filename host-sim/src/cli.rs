@@ -16,6 +16,7 @@ THE FIRST MINUTE
   host-sim --link ./7bot                       an arm behind ./7bot, until Ctrl-C
   sevenbot --port ./7bot pose 120 90 65 90 90 90 80
   sevenbot --port ./7bot monitor               watch it move there
+  sevenbot --port ./7bot stop                  hold it where it is; `home` leads it back
   host-sim --link ./7bot --trace               the same, with every frame in words
   host-sim --eeprom none --fault 3=missing     no memory, and joint 3 does not answer
   In the source tree: cargo sim -- --link ./7bot, and cargo sevenbot --port ./7bot pose ...

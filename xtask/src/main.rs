@@ -9,6 +9,7 @@ use clap::{Parser, Subcommand};
 mod bench;
 mod budget;
 mod count;
+mod coverage;
 mod decisions;
 mod elf;
 mod emulate;
@@ -53,6 +54,8 @@ enum Chore {
     },
     /// Count instructions in the emulator, and hold them against the budgets.
     Count(Accept),
+    /// Fail if the tests of the cores leave a line or a function out.
+    Coverage,
     /// Compare the parse-and-answer path with its peers: Modbus, postcard with COBS, MAVLink.
     Bench,
     /// Run the image for the arm in an emulator, simulated servos on its bus, and print the port it is on.
@@ -89,6 +92,7 @@ fn carry_out(chore: &Chore) -> Outcome {
         Chore::Size { by_file: true, .. } => size::print(),
         Chore::Size { accept, .. } => footprint::check(accept.accept),
         Chore::Count(Accept { accept }) => count::check(*accept),
+        Chore::Coverage => coverage::check(),
         Chore::Emulate(options) => emulate::run(options),
         Chore::Bench => bench::compare(),
     }

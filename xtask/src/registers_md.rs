@@ -1,10 +1,9 @@
 //! `cargo xtask docs`: the register table as a page to read, written from the table the arm is built from.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
-use protocol_core::registers::{Access, JOINTS, MAP, Range, Region, Register};
+use sevenbot::table;
 
 use crate::run::{Outcome, root};
 
@@ -25,8 +24,6 @@ What a write does is in [protocol.md](protocol.md), as are the decisions that D-
   joint, 1 to 7, and lists them where they differ. What the arm itself knows, measures or counts replaces it
   as soon as it is there.
 
-| address | name | region | access | range | default | unit | meaning |
-| --- | --- | --- | --- | --- | --- | --- | --- |
 ";
 
 /// Writes the page.
@@ -49,64 +46,5 @@ fn path() -> PathBuf {
 }
 
 fn page() -> String {
-    let mut page = INTRODUCTION.to_owned();
-    for row in MAP {
-        // Writing to a string cannot fail.
-        let _ = writeln!(page, "{}", line(row));
-    }
-    page
-}
-
-fn line(row: &Register) -> String {
-    let cells = [
-        addresses(row),
-        format!("`{}`", row.name),
-        region(row.region).to_owned(),
-        access(row.access).to_owned(),
-        range(row),
-        default(row),
-        row.unit.symbol().to_owned(),
-        meaning(row),
-    ];
-    format!("| {} |", cells.join(" | "))
-}
-
-fn addresses(row: &Register) -> String {
-    let last = usize::from(row.address) + usize::from(row.count) - 1;
-    if row.count == 1 { row.address.to_string() } else { format!("{}..{last}", row.address) }
-}
-
-const fn region(region: Region) -> &'static str {
-    match region {
-        Region::Rom => "ROM",
-        Region::Eeprom => "EEPROM",
-        Region::Ram => "RAM",
-    }
-}
-
-const fn access(access: Access) -> &'static str {
-    match access {
-        Access::ReadOnly => "RO",
-        Access::ReadWrite => "RW",
-        Access::Reserved => "reserved",
-    }
-}
-
-fn range(row: &Register) -> String {
-    let (low, high) = row.range.bounds();
-    let whole_byte = row.range == Range::UpTo(u8::MAX) && row.access != Access::ReadWrite;
-    if whole_byte { "-".to_owned() } else { format!("{low}..{high}") }
-}
-
-fn default(row: &Register) -> String {
-    let numbers: Vec<_> = row.defaults.iter().map(|&byte| row.range.decode(byte).to_string()).collect();
-    match numbers.first() {
-        Some(first) if numbers.iter().all(|number| number == first) => first.clone(),
-        _ => numbers.join(" "),
-    }
-}
-
-fn meaning(row: &Register) -> String {
-    let words = row.doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ");
-    if row.per_joint { format!("Joint 1..{JOINTS}. {words}") } else { words }
+    INTRODUCTION.to_owned() + &table::markdown()
 }
