@@ -19,10 +19,17 @@ THE FIRST MINUTE
   sevenbot --port ./7bot stop                  hold it where it is; `home` leads it back
   host-sim --link ./7bot --trace               the same, with every frame in words
   host-sim --eeprom none --fault 3=missing     no memory, and joint 3 does not answer
+  host-sim --arms 3 --link ./7bot              three arms, behind ./7bot-1, ./7bot-2 and ./7bot-3
   In the source tree: cargo sim -- --link ./7bot, and cargo sevenbot --port ./7bot pose ...
 
   Any serial client can open the port; the baud rate it asks for does not matter. The first line on
-  standard output is 'ready <tty path>', as soon as it can be opened. All else is on standard error.
+  standard output is 'ready <tty path>', as soon as it can be opened; with --arms there is one such line for
+  each arm, in their order. All else is on standard error.
+
+MANY ARMS
+  --arms N runs arms 1 to N in one process. Where an option names a file, each arm has its own, with its number
+  before the extension: --eeprom arm.bin keeps the settings of arm 2 in arm-2.bin. Chip ids count on from
+  --chip-id, faults befall all arms, and so do signals.
 
 SIGNALS
   SIGHUP            a power cycle: RAM registers are lost, settings are kept, the port stays
@@ -46,6 +53,10 @@ pub struct Options {
     #[arg(long, value_name = "FILE", value_parser = |text: &str| Ok::<_, String>(Eeprom::from(text)))]
     pub eeprom: Option<Eeprom>,
 
+    /// Run N arms, each with its own port, settings and chip id: see MANY ARMS below
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub arms: Option<u16>,
+
     /// Let bytes pass at once instead of at the baud rate
     #[arg(long)]
     pub unpaced: bool,
@@ -67,7 +78,7 @@ pub struct Options {
     #[arg(
         long,
         value_name = "PATH",
-        conflicts_with_all = ["link", "eeprom", "unpaced", "chip_id", "trace"]
+        conflicts_with_all = ["arms", "link", "eeprom", "unpaced", "chip_id", "trace"]
     )]
     pub servo_socket: Option<PathBuf>,
 
@@ -137,6 +148,7 @@ mod tests {
         assert_eq!(options.faults.len(), 2);
         assert_eq!(options.level(), LevelFilter::WARN);
         assert_eq!(parse("").unwrap().chip_id, *b"SIM\0\0\x01");
+        assert_eq!(parse("--arms 1000").unwrap().arms, Some(1_000));
     }
 
     #[test]
@@ -148,6 +160,8 @@ mod tests {
             ("--fault 9=missing", "1 to 7"),
             ("--fault 3=broken", "missing"),
             ("--servo-socket a --link b", "--link"),
+            ("--servo-socket a --arms 2", "--arms"),
+            ("--arms 0", "--arms"),
             ("-q -v", "--verbose"),
             ("port", "port"),
         ] {

@@ -11,6 +11,7 @@ use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
 
 use crate::flash::{ERASED, Flash, SIZE};
+use crate::numbered;
 use crate::store::is_damaged;
 
 /// Where the settings live.
@@ -65,16 +66,17 @@ pub enum ImageError {
 }
 
 impl Eeprom {
-    /// The image's path; `None` in memory.
+    /// The image's path; `None` in memory. Each arm with a number has a file of its own.
     ///
     /// # Errors
     /// [`ImageError::NoStateDirectory`].
-    pub fn path(&self) -> Result<Option<PathBuf>, ImageError> {
-        match self {
-            Self::Memory => Ok(None),
-            Self::File(path) => Ok(Some(path.clone())),
-            Self::UsersOwn => users_own(|name| std::env::var_os(name).map(PathBuf::from)).map(Some),
-        }
+    pub fn path(&self, arm: Option<u16>) -> Result<Option<PathBuf>, ImageError> {
+        let path = match self {
+            Self::Memory => return Ok(None),
+            Self::File(path) => path.clone(),
+            Self::UsersOwn => users_own(|name| std::env::var_os(name).map(PathBuf::from))?,
+        };
+        Ok(Some(numbered::path(&path, arm)))
     }
 
     /// The flash that stands for the image, made blank if there is none yet, and locked against other
@@ -82,8 +84,8 @@ impl Eeprom {
     ///
     /// # Errors
     /// See [`ImageError`].
-    pub fn open(&self) -> Result<Flash, ImageError> {
-        let Some(path) = self.path()? else { return Ok(Flash::in_memory()) };
+    pub fn open(&self, arm: Option<u16>) -> Result<Flash, ImageError> {
+        let Some(path) = self.path(arm)? else { return Ok(Flash::in_memory()) };
         let refused = |verb, cause| ImageError::Refused { verb, path: path.clone(), cause };
         if *self == Self::UsersOwn
             && let Some(directory) = path.parent()
@@ -185,13 +187,13 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("arm.bin");
         let eeprom = Eeprom::File(path.clone());
-        let flash = eeprom.open().unwrap();
+        let flash = eeprom.open(None).unwrap();
         assert!(flash.is_blank().unwrap());
         assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
         assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
-        assert!(matches!(eeprom.open(), Err(ImageError::Locked(_))));
+        assert!(matches!(eeprom.open(None), Err(ImageError::Locked(_))));
         drop(flash);
-        eeprom.open().unwrap();
+        eeprom.open(None).unwrap();
     }
 
     #[test]
@@ -209,14 +211,14 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("notes.txt");
         fs::write(&path, "shopping list").unwrap();
-        let error = Eeprom::File(path.clone()).open().unwrap_err();
+        let error = Eeprom::File(path.clone()).open(None).unwrap_err();
         assert!(error.to_string().contains("13 bytes long"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"shopping list");
-        let error = Eeprom::File("/dev/null".into()).open().unwrap_err();
+        let error = Eeprom::File("/dev/null".into()).open(None).unwrap_err();
         assert!(error.to_string().contains("no regular file"), "{error}");
-        let error = Eeprom::File(directory.path().into()).open().unwrap_err();
+        let error = Eeprom::File(directory.path().into()).open(None).unwrap_err();
         assert!(matches!(error, ImageError::Refused { verb: "open", .. }), "{error}");
-        let error = Eeprom::File(directory.path().join("none/arm.bin")).open().unwrap_err();
+        let error = Eeprom::File(directory.path().join("none/arm.bin")).open(None).unwrap_err();
         assert!(matches!(error, ImageError::Refused { verb: "make", .. }), "{error}");
     }
 
@@ -224,6 +226,6 @@ mod tests {
     fn none_means_memory() {
         assert_eq!(Eeprom::from("none"), Eeprom::Memory);
         assert_eq!(Eeprom::from("./none"), Eeprom::File("./none".into()));
-        assert_eq!(Eeprom::Memory.path().unwrap(), None);
+        assert_eq!(Eeprom::Memory.path(None).unwrap(), None);
     }
 }

@@ -13,11 +13,14 @@
 //!   └──────────────────────────────────────────────────────────────────────┘
 //! ```
 //!
+//! One shell carries any number of worlds: see [`shell`] and [`arm`].
+//!
 //! Everything but the chip is the real thing. [`world`] knows neither clocks nor file descriptors, so a
 //! test can run it through an hour in a second. Linux only: presence of a client is seen through inotify.
 
 #![deny(unsafe_code)]
 
+pub mod arm;
 pub mod cli;
 pub mod clients;
 pub mod clock;
@@ -25,6 +28,7 @@ pub mod eeprom;
 pub mod faults;
 pub mod flash;
 pub mod link;
+pub mod numbered;
 pub mod pace;
 pub mod plant;
 pub mod pty;

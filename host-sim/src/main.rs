@@ -1,15 +1,19 @@
-//! The simulator's command line: a 7Bot V2 arm on a pseudo-terminal, until a signal ends it.
+//! The simulator's command line: 7Bot V2 arms on pseudo-terminals, until a signal ends them.
 
 use std::fmt::Display;
-use std::io::{self, IsTerminal, Write};
-use std::path::Path;
+use std::io::{self, BufWriter, IsTerminal, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
+use host_sim::arm::Arm;
 use host_sim::cli::{Options, in_one_line};
+use host_sim::clients::Clients;
 use host_sim::clock::Clock;
 use host_sim::eeprom::{Eeprom, ImageError};
+use host_sim::flash::Flash;
 use host_sim::link::{Link, LinkError};
+use host_sim::numbered;
 use host_sim::plant::Plant;
 use host_sim::pty::Pty;
 use host_sim::servo_socket::{ServoSocket, SocketError};
@@ -17,6 +21,8 @@ use host_sim::shell::Shell;
 use host_sim::signals::Signals;
 use host_sim::trace::Trace;
 use host_sim::world::{Setup, World};
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+use tracing::{Span, error_span};
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
 
@@ -32,7 +38,7 @@ enum Failure {
     Link(#[from] LinkError),
     #[error(transparent)]
     Socket(#[from] SocketError),
-    #[error("no pseudo-terminal: {0}: see that /dev/pts is mounted and has not run out")]
+    #[error("no pseudo-terminal: {0}: see that /dev/pts is mounted and has not run out, nor 'ulimit -n'")]
     Port(io::Error),
     #[error("cannot catch signals: {0}")]
     Signals(io::Error),
@@ -90,37 +96,82 @@ fn log_to_stderr(options: &Options) {
 fn run(options: &Options) -> Result<(), Failure> {
     let mut signals = Signals::catch().map_err(Failure::Signals)?;
     let mut clock = Clock::default();
-    let mut plant = Plant::new(clock.now());
-    options.faults.iter().for_each(|fault| fault.befall(&mut plant));
     match &options.servo_socket {
-        Some(path) => run_servos(path, plant, &mut clock, &mut signals),
-        None => run_arm(options, plant, &mut clock, &mut signals),
+        Some(path) => run_servos(options, path, &mut clock, &mut signals),
+        None => run_arms(options, &mut clock, &mut signals),
     }
 }
 
-fn run_servos(path: &Path, plant: Plant, clock: &mut Clock, signals: &mut Signals) -> Result<(), Failure> {
+/// The arm's other half, in the standard pose, with the faults that it was given.
+fn plant(options: &Options, clock: &mut Clock) -> Plant {
+    let mut plant = Plant::new(clock.now());
+    options.faults.iter().for_each(|fault| fault.befall(&mut plant));
+    plant
+}
+
+fn run_servos(
+    options: &Options,
+    path: &Path,
+    clock: &mut Clock,
+    signals: &mut Signals,
+) -> Result<(), Failure> {
+    let plant = plant(options, clock);
     let socket = ServoSocket::listen(path)?;
-    say_ready(path);
+    say_ready(&[path.to_owned()]);
     socket.serve(plant, clock, signals).map_err(Failure::Running)
 }
 
-fn run_arm(options: &Options, plant: Plant, clock: &mut Clock, signals: &mut Signals) -> Result<(), Failure> {
-    let flash = options.eeprom.as_ref().unwrap_or(&Eeprom::UsersOwn).open()?;
-    let pty = Pty::open().map_err(Failure::Port)?;
-    let port = pty.path().to_owned();
-    // Stands for as long as the shell runs.
-    let _link = options.link.as_deref().map(|path| Link::new(path, &port)).transpose()?;
-    let setup = Setup { chip_id: options.chip_id, is_paced: !options.unpaced };
+fn run_arms(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Result<(), Failure> {
+    let numbers = options.arms.map_or(vec![None], |count| (1..=count).map(Some).collect());
+    if numbers.len() > 1 {
+        allow_as_many_files_as_possible();
+    }
+    let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
+    let mut arms = Vec::with_capacity(numbers.len());
+    let mut ports = Vec::with_capacity(numbers.len());
+    // They stand for as long as the shell runs.
+    let mut links = Vec::new();
+    for number in numbers {
+        let pty = Pty::open(clients.as_mut()).map_err(Failure::Port)?;
+        let port = pty.path().to_owned();
+        if let Some(link) = &options.link {
+            links.push(Link::new(&numbered::path(link, number), &port)?);
+        }
+        ports.push(port);
+        arms.push(arm(options, number, pty, clock)?);
+    }
+    let shell = Shell::new(arms, clients).map_err(Failure::Running)?;
+    say_ready(&ports);
+    shell.run(clock, signals).map_err(Failure::Running)
+}
+
+/// Switches an arm on.
+fn arm(options: &Options, number: Option<u16>, pty: Pty, clock: &mut Clock) -> Result<Arm<Flash>, Failure> {
+    // An error, so that whatever is shown is shown with it.
+    let span = number.map_or_else(Span::none, |number| error_span!("arm", number));
+    let inside = span.enter();
+    let flash = options.eeprom.as_ref().unwrap_or(&Eeprom::UsersOwn).open(number)?;
+    let chip_id = numbered::chip_id(options.chip_id, number);
+    let setup = Setup { chip_id, is_paced: !options.unpaced };
+    let plant = plant(options, clock);
     let mut world = World::new(clock.now(), setup, flash, plant);
     if options.trace {
         world.watch(Trace::new(Box::new(|line| tracing::info!(target: FRAMES, "{line}"))));
     }
-    say_ready(&port);
-    Shell::new(world, pty).run(clock, signals).map_err(Failure::Running)
+    drop(inside);
+    Ok(Arm::new(world, pty, span))
 }
 
-/// The first and only line on standard output. Nobody has to read it.
-fn say_ready(path: &Path) {
-    let mut out = io::stdout().lock();
-    let _ = writeln!(out, "ready {}", path.display()).and_then(|()| out.flush());
+/// An arm takes three open files, and a process may have 1024 unless it asks for more. If that is not enough, the
+/// first arm that finds none says so.
+fn allow_as_many_files_as_possible() {
+    let limit = getrlimit(Resource::Nofile);
+    let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
+}
+
+/// The first and only lines on standard output, one a port. Nobody has to read them.
+fn say_ready(ports: &[PathBuf]) {
+    let mut out = BufWriter::new(io::stdout().lock());
+    let written = ports.iter().try_for_each(|port| writeln!(out, "ready {}", port.display()));
+    let _ = written.and_then(|()| out.flush());
 }

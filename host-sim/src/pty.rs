@@ -23,7 +23,7 @@ use rustix::termios::{
 };
 use tracing::{debug, info, warn};
 
-use crate::clients::Clients;
+use crate::clients::{Clients, Watch};
 
 /// A pseudo-terminal, both ends open.
 #[derive(Debug)]
@@ -31,16 +31,18 @@ pub struct Pty {
     master: OwnedFd,
     terminal: OwnedFd,
     path: PathBuf,
-    /// `None` where the system cannot tell: then somebody always counts as there.
-    clients: Option<Clients>,
+    /// `None` where the system cannot tell who is there: then somebody always counts as there.
+    watch: Option<Watch>,
+    client_count: usize,
 }
 
 impl Pty {
-    /// Opens a pseudo-terminal in raw mode that only this user can open.
+    /// Opens a pseudo-terminal in raw mode that only this user can open, and has its clients counted, if the
+    /// system lets them be.
     ///
     /// # Errors
     /// The system has none left, or refuses.
-    pub fn open() -> io::Result<Self> {
+    pub fn open(clients: Option<&mut Clients>) -> io::Result<Self> {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&master)?;
         unlockpt(&master)?;
@@ -50,9 +52,13 @@ impl Pty {
         fchmod(&terminal, Mode::RUSR | Mode::WUSR)?;
         make_raw(&terminal, &mut tcgetattr(&terminal)?)?;
         let path = PathBuf::from(OsStr::from_bytes(name.to_bytes()));
-        let clients = Clients::watch(&path)
-            .inspect_err(|error| warn!("cannot see clients come and go ({error}): output piles up unread"));
-        Ok(Self { master, terminal, path, clients: clients.ok() })
+        let watch = clients.and_then(|clients| clients.watch(&path).inspect_err(Self::warn_of).ok());
+        Ok(Self { master, terminal, path, watch, client_count: 0 })
+    }
+
+    /// Says what follows from not seeing clients.
+    pub fn warn_of(error: &io::Error) {
+        warn!("cannot see clients come and go ({error}): output piles up unread");
     }
 
     /// The name under which clients open it.
@@ -65,12 +71,6 @@ impl Pty {
     #[must_use]
     pub fn master(&self) -> BorrowedFd<'_> {
         self.master.as_fd()
-    }
-
-    /// What is readable when a client came or went, if the system can tell.
-    #[must_use]
-    pub fn comings_and_goings(&self) -> Option<BorrowedFd<'_>> {
-        self.clients.as_ref().map(AsFd::as_fd)
     }
 
     /// Reads what clients have written; 0: nothing waits.
@@ -91,19 +91,26 @@ impl Pty {
 
     /// Has a client the port open?
     #[must_use]
-    pub fn has_client(&self) -> bool {
-        self.clients.as_ref().is_none_or(|clients| clients.count() > 0)
+    pub const fn has_client(&self) -> bool {
+        self.watch.is_none() || self.client_count > 0
     }
 
-    /// Takes note of clients that came or went. When the last has gone, what it left is cleared away; says
-    /// whether that happened.
+    /// Were clients seen to come or go since the last call of [`Pty::take_note_of`]?
+    #[must_use]
+    pub fn has_news(&self, clients: &Clients) -> bool {
+        self.watch.is_some_and(|watch| clients.has_news(watch))
+    }
+
+    /// Takes note of clients that were seen to come or go. When the last has gone, what it left is cleared
+    /// away; says whether that happened.
     ///
     /// # Errors
-    /// The pseudo-terminal or inotify failed.
-    pub fn look_for_clients(&mut self) -> io::Result<bool> {
-        let Some(clients) = &mut self.clients else { return Ok(false) };
-        let traffic = clients.look()?;
-        let count = clients.count();
+    /// The pseudo-terminal failed.
+    pub fn take_note_of(&mut self, clients: &mut Clients) -> io::Result<bool> {
+        let Some(watch) = self.watch else { return Ok(false) };
+        let traffic = clients.news(watch);
+        let count = clients.count(watch);
+        self.client_count = count;
         if traffic.emptied {
             self.clear_away(count == 0)?;
         }
@@ -166,6 +173,16 @@ mod tests {
 
     use super::*;
 
+    fn open() -> (Pty, Clients) {
+        let mut clients = Clients::new().unwrap();
+        (Pty::open(Some(&mut clients)).unwrap(), clients)
+    }
+
+    fn look((pty, clients): &mut (Pty, Clients)) -> bool {
+        clients.look().unwrap();
+        pty.take_note_of(clients).unwrap()
+    }
+
     fn client(pty: &Pty) -> File {
         OpenOptions::new().read(true).write(true).open(pty.path()).unwrap()
     }
@@ -187,7 +204,7 @@ mod tests {
 
     #[test]
     fn every_byte_passes_unaltered_both_ways() {
-        let pty = Pty::open().unwrap();
+        let (pty, _) = open();
         let mode = std::fs::metadata(pty.path()).unwrap().permissions().mode();
         assert_eq!(mode & 0o777, 0o600);
         let all: Vec<u8> = (0..=255).collect();
@@ -202,26 +219,37 @@ mod tests {
 
     #[test]
     fn clients_are_counted_even_when_nobody_looks_for_a_while() {
-        let mut pty = Pty::open().unwrap();
-        assert!(!pty.has_client());
-        let (first, second) = (client(&pty), client(&pty));
-        assert!(!pty.look_for_clients().unwrap());
+        let mut port = open();
+        assert!(!port.0.has_client());
+        let (first, second) = (client(&port.0), client(&port.0));
+        assert!(!look(&mut port));
         drop(first);
-        assert!(!pty.look_for_clients().unwrap());
-        assert!(pty.has_client(), "two came at once, one is left");
+        assert!(!look(&mut port));
+        assert!(port.0.has_client(), "two came at once, one is left");
         drop(second);
-        assert!(pty.look_for_clients().unwrap());
-        assert!(!pty.has_client());
+        assert!(look(&mut port));
+        assert!(!port.0.has_client());
+    }
+
+    #[test]
+    fn each_port_has_its_own_clients() {
+        let mut clients = Clients::new().unwrap();
+        let mut ptys = [(); 3].map(|()| Pty::open(Some(&mut clients)).unwrap());
+        let _client = client(&ptys[1]);
+        clients.look().unwrap();
+        ptys.iter_mut().for_each(|pty| assert!(!pty.take_note_of(&mut clients).unwrap()));
+        assert_eq!(ptys.each_ref().map(Pty::has_client), [false, true, false]);
     }
 
     #[test]
     fn requests_of_a_client_that_left_are_kept_and_its_unread_answers_are_not() {
-        let mut pty = Pty::open().unwrap();
-        let mut visitor = client(&pty);
+        let mut port = open();
+        let mut visitor = client(&port.0);
         visitor.write_all(b"request").unwrap();
-        while pty.write(&[b'x'; 4_096]).unwrap() > 0 {}
+        while port.0.write(&[b'x'; 4_096]).unwrap() > 0 {}
         drop(visitor);
-        assert!(pty.look_for_clients().unwrap());
+        assert!(look(&mut port));
+        let (pty, _) = port;
         assert_eq!(read_exactly(&pty, 7), b"request");
         let next = client(&pty);
         pty.write(b"!").unwrap();
@@ -236,15 +264,16 @@ mod tests {
 
     #[test]
     fn the_next_client_finds_the_port_free_and_raw() {
-        let mut pty = Pty::open().unwrap();
-        let visitor = client(&pty);
+        let mut port = open();
+        let visitor = client(&port.0);
         ioctl_tiocexcl(&visitor).unwrap();
-        assert!(is_exclusive(&pty.terminal));
+        assert!(is_exclusive(&port.0.terminal));
         let mut mode = tcgetattr(&visitor).unwrap();
         mode.local_modes |= LocalModes::ECHO | LocalModes::ICANON;
         tcsetattr(&visitor, OptionalActions::Now, &mode).unwrap();
         drop(visitor);
-        pty.look_for_clients().unwrap();
+        look(&mut port);
+        let (pty, _) = port;
         assert!(is_raw(&tcgetattr(&pty.terminal).unwrap()));
         // Root may open a claimed terminal, so ask for the claim itself.
         assert!(!is_exclusive(&pty.terminal));

@@ -1,113 +1,146 @@
-//! The loop that puts a world behind a port: where clock, file descriptors and signals meet the arm.
+//! The loop that puts worlds behind ports: where clock, file descriptors and signals meet the arms.
 //!
-//! One thread that sleeps in poll(2) until somebody writes, comes, goes or signals, or until the world has
-//! something due.
+//! One thread that sleeps until somebody writes, comes, goes or signals, or until an arm has something due. An arm
+//! that has nothing to do costs nothing, however many there are.
 
 use std::io;
-use std::os::fd::AsFd;
+use std::mem::MaybeUninit;
+use std::os::fd::{AsFd, OwnedFd};
 
 use embedded_storage::nor_flash::NorFlash;
 use protocol_core::time::Instant;
+use rustix::event::epoll::{self, CreateFlags, Event, EventData, EventFlags};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
-use tracing::info;
 
+use crate::arm::Arm;
+use crate::clients::Clients;
 use crate::clock::{Clock, sleep_until};
-use crate::pace;
-use crate::pty::Pty;
 use crate::signals::{Signals, Wish};
-use crate::world::World;
 
-/// A world, a port, and whether the port is full.
+/// Events taken at a time; the rest come in the next turn.
+const EVENTS: usize = 64;
+/// No time: for calls that look and do not wait.
+const AT_ONCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 0 };
+/// What stands for the signals among the numbers of the arms.
+const SIGNALS: u64 = u64::MAX;
+/// Likewise, for the comings and goings of clients.
+const CLIENTS: u64 = u64::MAX - 1;
+
+/// Arms, and what they wait for.
 #[derive(Debug)]
 pub struct Shell<F> {
-    world: World<F>,
-    pty: Pty,
-    /// The client does not read, and its buffers in the kernel are full.
-    is_blocked: bool,
+    arms: Vec<Arm<F>>,
+    /// When each wants its next turn.
+    due: Vec<Instant>,
+    /// What each is waited for with.
+    interests: Vec<EventFlags>,
+    /// `None` where the system cannot tell who is there.
+    clients: Option<Clients>,
+    epoll: OwnedFd,
 }
 
 impl<F: NorFlash + Clone> Shell<F> {
-    /// Puts `world` behind `pty`.
-    #[must_use]
-    pub const fn new(world: World<F>, pty: Pty) -> Self {
-        Self { world, pty, is_blocked: false }
+    /// A shell round these arms, whose clients are counted in `clients`.
+    ///
+    /// # Errors
+    /// The operating system gives no epoll instance, or not enough room in it.
+    pub fn new(arms: Vec<Arm<F>>, clients: Option<Clients>) -> io::Result<Self> {
+        let epoll = epoll::create(CreateFlags::CLOEXEC)?;
+        for (number, arm) in (0..).zip(&arms) {
+            epoll::add(&epoll, arm, EventData::new_u64(number), arm.interest())?;
+        }
+        if let Some(clients) = &clients {
+            epoll::add(&epoll, clients, EventData::new_u64(CLIENTS), EventFlags::IN)?;
+        }
+        let due = vec![Instant::ZERO; arms.len()];
+        let interests = arms.iter().map(Arm::interest).collect();
+        Ok(Self { arms, due, interests, clients, epoll })
     }
 
     /// Runs until a signal says otherwise.
     ///
     /// # Errors
-    /// The operating system fails: the port or poll(2).
+    /// The operating system fails: a port, inotify or epoll.
     pub fn run(mut self, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
+        epoll::add(&self.epoll, signals.as_fd(), EventData::new_u64(SIGNALS), EventFlags::IN)?;
         loop {
-            for wish in signals.wishes() {
-                match wish {
-                    Wish::End => return Ok(()),
-                    Wish::PowerCycle => {
-                        info!("power cycle");
-                        self.world.power_cycle(clock.now());
-                    }
+            let mut space = [MaybeUninit::uninit(); EVENTS];
+            let events = self.wait(clock, &mut space)?;
+            let now = clock.now();
+            // Before anything is read: what was sent after a signal must not meet an arm that has not seen it.
+            if self.obey(signals, now) {
+                return Ok(());
+            }
+            for event in events {
+                match event.data.u64() {
+                    SIGNALS => {}
+                    CLIENTS => self.clients.as_mut().map_or(Ok(()), Clients::look)?,
+                    number => self.turn(usize::try_from(number).unwrap_or(usize::MAX), now)?,
                 }
             }
-            let now = clock.now();
-            self.turn(now)?;
-            let deadline = self.world.deadline(self.pty.has_client());
-            self.sleep(sleep_until(clock.now(), deadline), signals)?;
+            self.note_clients(now);
+            for number in 0..self.arms.len() {
+                if self.due.get(number).is_some_and(|&due| due <= now) {
+                    self.turn(number, now)?;
+                }
+            }
         }
     }
 
-    /// One turn: what came in, what is due, what goes out.
-    fn turn(&mut self, now: Instant) -> io::Result<()> {
-        let mut bytes = [0; pace::CAPACITY];
-        let room = bytes.get_mut(..self.world.host_room()).unwrap_or(&mut []);
-        let can_read = !room.is_empty();
-        let count = if can_read { self.pty.read(room)? } else { 0 };
-        // After the read, so that whoever sent these bytes is known by the time their answer goes out.
-        if self.pty.look_for_clients()? {
-            self.world.host_hangs_up();
-        }
-        if count > 0 {
-            self.world.host_sends(now, bytes.get(..count).unwrap_or(&[]));
-        }
-        // Nothing waited after `now`, so nothing did at any time before.
-        let is_silent = can_read && count == 0;
-        self.world.advance(now, is_silent);
-        while self.deliver()? {
-            self.world.advance(now, is_silent);
-        }
-        Ok(())
-    }
-
-    /// Hands what is through to the client, or to nobody. Says whether the link has more room now.
-    fn deliver(&mut self) -> io::Result<bool> {
-        let mut delivered = false;
-        self.is_blocked = false;
-        while !self.is_blocked && !self.world.host_hears().is_empty() {
-            let bytes = self.world.host_hears();
-            let offered = bytes.len();
-            let taken = if self.pty.has_client() { self.pty.write(bytes)? } else { offered };
-            self.world.host_heard(taken);
-            self.is_blocked = taken < offered;
-            delivered |= taken > 0;
-        }
-        Ok(delivered)
-    }
-
-    fn sleep(&self, time: Timespec, signals: &Signals) -> io::Result<()> {
-        let mut port = PollFlags::empty();
-        port.set(PollFlags::IN, self.world.host_room() > 0);
-        port.set(PollFlags::OUT, self.is_blocked);
-        let master = self.pty.master();
-        let signals = signals.as_fd();
-        let clients = self.pty.comings_and_goings().unwrap_or(signals);
-        let mut wanted = [
-            PollFd::from_borrowed_fd(master, port),
-            PollFd::from_borrowed_fd(signals, PollFlags::IN),
-            PollFd::from_borrowed_fd(clients, PollFlags::IN),
-        ];
-        match poll(&mut wanted, Some(&time)) {
-            Ok(_) | Err(Errno::INTR) => Ok(()),
+    /// Sleeps until something happens or is due. Of the two ways to wait for many ports, one is poor at many, and
+    /// the other, before Linux 5.11, at less than a millisecond: so the first waits for the second.
+    fn wait<'space>(
+        &self,
+        clock: &mut Clock,
+        space: &'space mut [MaybeUninit<Event>; EVENTS],
+    ) -> io::Result<&'space mut [Event]> {
+        let earliest = self.due.iter().min().copied().unwrap_or(Instant::FAR_FUTURE);
+        let time = sleep_until(clock.now(), earliest);
+        let waited = poll(&mut [PollFd::new(&self.epoll, PollFlags::IN)], Some(&time));
+        let looked = waited.and_then(|_| epoll::wait(&self.epoll, space, Some(&AT_ONCE)));
+        match looked {
+            Ok((events, _)) => Ok(events),
+            Err(Errno::INTR) => Ok(&mut []),
             Err(error) => Err(error.into()),
         }
+    }
+
+    /// Does what signals ask for. Says whether that is to end.
+    fn obey(&mut self, signals: &mut Signals, now: Instant) -> bool {
+        for wish in signals.wishes() {
+            match wish {
+                Wish::End => return true,
+                Wish::PowerCycle => {
+                    self.arms.iter_mut().for_each(|arm| arm.power_cycle(now));
+                    self.due.fill(now);
+                }
+            }
+        }
+        false
+    }
+
+    /// Arms that clients came to, or left, are due, whoever found it out.
+    fn note_clients(&mut self, now: Instant) {
+        let Some(clients) = &mut self.clients else { return };
+        if clients.take_fresh() {
+            let arms = self.due.iter_mut().zip(&self.arms);
+            arms.filter(|(_, arm)| arm.has_news(clients)).for_each(|(due, _)| *due = now);
+        }
+    }
+
+    fn turn(&mut self, number: usize, now: Instant) -> io::Result<()> {
+        let (Some(arm), Some(due), Some(interest)) =
+            (self.arms.get_mut(number), self.due.get_mut(number), self.interests.get_mut(number))
+        else {
+            return Ok(());
+        };
+        *due = arm.turn(now, self.clients.as_mut())?;
+        if *interest != arm.interest() {
+            *interest = arm.interest();
+            let number = u64::try_from(number).unwrap_or(u64::MAX);
+            epoll::modify(&self.epoll, &*arm, EventData::new_u64(number), *interest)?;
+        }
+        Ok(())
     }
 }

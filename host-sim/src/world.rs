@@ -15,9 +15,8 @@ use motion_core::controller::{Config, Controller, Output};
 use motion_core::servo_bus::TorqueCodes;
 use motion_core::vacuum::Vacuum;
 use protocol_core::registers::RegisterFile;
-use protocol_core::registers::map::FEEDBACK_FREQUENCY;
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::deframer::{ABANDON_AFTER, gap};
+use protocol_core::wire::deframer::gap;
 use tracing::info;
 
 use crate::pace::Pacer;
@@ -27,10 +26,10 @@ use crate::trace::Trace;
 
 /// How long the controller waits for a servo's answer.
 const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
-/// A deadline that stands though it has passed is looked at again after this long, and while the host link is
-/// in use, the shell need not wake up more often for what happens between controller and servos.
+/// A deadline that stands though it has passed is looked at again after this long, and the shell need not wake up
+/// more often than on the stroke of it but for bytes on the line: so many arms wake up together.
 const GRAIN: Duration = Duration::from_millis(1);
-/// While the host can hear nothing of it, all that happens inside can be made up for later.
+/// What the host cannot hear can be made up for later: this much later at most.
 const UNHEARD_GRAIN: Duration = Duration::from_millis(50);
 
 /// What differs from one simulated arm to another.
@@ -53,8 +52,6 @@ pub struct World<F> {
     to_host: Pacer,
     trace: Option<Trace>,
     now: Instant,
-    /// When the host's line was last seen to be anything but silent.
-    host_spoke_at: Instant,
     /// When the controller wants to be asked again.
     controller_due: Instant,
 }
@@ -65,18 +62,8 @@ impl<F: NorFlash + Clone> World<F> {
     pub fn new(now: Instant, setup: Setup, flash: F, plant: Plant) -> Self {
         let (store, controller) = power_up(now, setup, flash);
         let (to_arm, to_host) = (Pacer::new(None), Pacer::new(None));
-        let mut world = Self {
-            setup,
-            store,
-            controller,
-            plant,
-            to_arm,
-            to_host,
-            trace: None,
-            now,
-            host_spoke_at: now,
-            controller_due: now,
-        };
+        let mut world =
+            Self { setup, store, controller, plant, to_arm, to_host, trace: None, now, controller_due: now };
         world.start_link();
         world
     }
@@ -154,26 +141,19 @@ impl<F: NorFlash + Clone> World<F> {
         self.happen(now, host_is_silent);
     }
 
-    /// When to call [`World::advance`] next, if nothing comes from outside. With nobody listening that can
-    /// wait: all will have happened in its time nevertheless.
+    /// When to call [`World::advance`] next, if nothing comes from outside. What nobody can hear can wait: all
+    /// will have happened in its time nevertheless.
     #[must_use]
     pub fn deadline(&self, somebody_listens: bool) -> Instant {
         let link = self.link_deadline().unwrap_or(Instant::FAR_FUTURE).max(self.now);
         let inside = self.plant.deadline().unwrap_or(Instant::FAR_FUTURE).min(self.controller_due);
-        if !somebody_listens {
-            link.min(inside).max(self.now + UNHEARD_GRAIN)
-        } else if self.is_unheard() {
-            link.min(inside.max(self.now + UNHEARD_GRAIN))
+        let unheard = self.now + UNHEARD_GRAIN;
+        if somebody_listens {
+            let heard = self.controller.host_deadline().max(self.now + GRAIN);
+            link.min(stroke(heard.min(inside.max(unheard))))
         } else {
-            link.min(inside.max(self.now + GRAIN))
+            stroke(link.min(inside).max(unheard))
         }
-    }
-
-    /// Will the host hear nothing of the arm unless it says something? So it is without reports, and once
-    /// silence has decided about every request.
-    fn is_unheard(&self) -> bool {
-        let silence = self.now - self.host_spoke_at;
-        silence > ABANDON_AFTER && self.registers().get(FEEDBACK_FREQUENCY.address) == 0
     }
 
     fn link_deadline(&self) -> Option<Instant> {
@@ -196,8 +176,6 @@ impl<F: NorFlash + Clone> World<F> {
         self.controller.servo_bytes(&from_servos);
         if host_is_silent && self.to_arm.is_empty() {
             self.controller_hears(&[]);
-        } else {
-            self.host_spoke_at = now;
         }
         self.run_controller();
         while !self.to_arm.arrived().is_empty() && self.controller_takes_bytes() {
@@ -245,6 +223,12 @@ impl<F: NorFlash + Clone> World<F> {
             }
         }
     }
+}
+
+/// The first stroke of [`GRAIN`] at or after a time.
+fn stroke(at: Instant) -> Instant {
+    let micros = at.as_micros().checked_next_multiple_of(GRAIN.as_micros());
+    micros.map_or(Instant::FAR_FUTURE, Instant::from_micros)
 }
 
 fn power_up<F: NorFlash + Clone>(now: Instant, setup: Setup, flash: F) -> (Store<F>, Controller) {

@@ -147,6 +147,13 @@ impl Controller {
         self.arm.deadline(now).min(silence.unwrap_or(Instant::FAR_FUTURE))
     }
 
+    /// When the host may hear something, or silence on its line may matter, unless bytes come before: until then
+    /// nobody outside can tell whether `poll` was called, as long as it is called for each time in between.
+    #[must_use]
+    pub fn host_deadline(&self) -> Instant {
+        self.arm.feedback.due().min(self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE))
+    }
+
     /// Tells what became of the storage: after every [`Output::Save`], and whenever it changes.
     pub fn set_storage(&mut self, storage: Storage) {
         self.arm.set_storage(storage);

@@ -64,7 +64,7 @@ pub fn run(input: &Input<'_>) {
 type FileStore = Store<host_sim::flash::Flash>;
 
 fn start(path: &Path) -> Result<(FileStore, Option<Image>), ImageError> {
-    Ok(Store::open(Eeprom::File(path.to_owned()).open()?))
+    Ok(Store::open(Eeprom::File(path.to_owned()).open(None)?))
 }
 
 fn live(mut store: FileStore, settings: Option<Image>, next: [u8; Image::LENGTH]) {

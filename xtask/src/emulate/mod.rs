@@ -17,7 +17,6 @@ use std::process::{Child, Command, Stdio};
 
 use clap::Args;
 use host_sim::link::Link;
-use host_sim::pty::Pty;
 use host_sim::signals::{Signals, Wish};
 use tempfile::TempDir;
 
@@ -83,7 +82,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let host = UnixListener::bind(folder.path().join("host"))?;
     let commands = UnixListener::bind(folder.path().join("monitor"))?;
     let _machine = start_machine(&folder, &servo_socket(&folder), &[])?;
-    let mut relay = Relay::new(Pty::open()?, monitor::accept(&host)?)?;
+    let mut relay = Relay::new(monitor::accept(&host)?)?;
     let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
     monitor.wait_for_bits(HOST_LINK_CONTROL, RECEIVER_ON)?;
     let mut log = options.log.then(|| Log::open(&run::IMAGE.path())).transpose()?;

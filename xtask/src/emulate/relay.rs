@@ -5,6 +5,7 @@ use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 
+use host_sim::clients::Clients;
 use host_sim::pty::Pty;
 use host_sim::signals::Signals;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -19,6 +20,7 @@ const OFTEN: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
 /// A port and the socket behind it.
 pub(super) struct Relay {
+    clients: Option<Clients>,
     port: Pty,
     socket: UnixStream,
     to_arm: Vec<u8>,
@@ -26,9 +28,12 @@ pub(super) struct Relay {
 }
 
 impl Relay {
-    pub(super) fn new(port: Pty, socket: UnixStream) -> io::Result<Self> {
+    /// Opens a port for what is behind the socket.
+    pub(super) fn new(socket: UnixStream) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
-        Ok(Self { port, socket, to_arm: Vec::new(), to_host: Vec::new() })
+        let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
+        let port = Pty::open(clients.as_mut())?;
+        Ok(Self { clients, port, socket, to_arm: Vec::new(), to_host: Vec::new() })
     }
 
     /// The name under which clients open the port.
@@ -44,8 +49,11 @@ impl Relay {
             self.to_arm.extend(bytes.iter().take(count));
         }
         // After the read, so that whoever sent these bytes is known by the time their answer goes out.
-        if self.port.look_for_clients()? {
-            self.to_host.clear();
+        if let Some(clients) = &mut self.clients {
+            clients.look()?;
+            if self.port.take_note_of(clients)? {
+                self.to_host.clear();
+            }
         }
         let count = later(self.socket.write(&self.to_arm))?.unwrap_or(0);
         self.to_arm.drain(..count);
@@ -68,11 +76,12 @@ impl Relay {
         let port = if_empty(&self.to_arm, PollFlags::IN) | if_waiting(&self.to_host, PollFlags::OUT);
         let socket = if_empty(&self.to_host, PollFlags::IN) | if_waiting(&self.to_arm, PollFlags::OUT);
         let signals = signals.as_fd();
+        let clients = self.clients.as_ref().map_or(signals, AsFd::as_fd);
         let mut wanted = [
             PollFd::from_borrowed_fd(self.port.master(), port),
             PollFd::from_borrowed_fd(self.socket.as_fd(), socket),
             PollFd::from_borrowed_fd(signals, PollFlags::IN),
-            PollFd::from_borrowed_fd(self.port.comings_and_goings().unwrap_or(signals), PollFlags::IN),
+            PollFd::from_borrowed_fd(clients, PollFlags::IN),
         ];
         match poll(&mut wanted, often.then_some(&OFTEN)) {
             Ok(_) | Err(Errno::INTR) => Ok(()),
