@@ -62,6 +62,10 @@ pub(super) fn decode(slot: &Slot) -> Option<Record> {
         return None;
     }
     let [generation, data @ ..] = covered;
+    // The CRC of a blank word and five zeros is blank, too: an erase that was cut twice can leave that.
+    if generation == BLANK[0] {
+        return None;
+    }
     let image = Image(*data.as_flattened().first_chunk()?);
     Some(Record { generation: u32::from_le_bytes(generation), image, firm: sealed && difference == 0 })
 }
@@ -143,6 +147,18 @@ mod tests {
     fn blank_and_zeroed_slots_hold_nothing() {
         assert_eq!(decode(&BLANK), None);
         assert_eq!(decode(&[[0; 4]; 8]), None);
+    }
+
+    #[test]
+    fn runs_of_ones_and_zeros_as_erases_leave_them_hold_nothing() {
+        for (from, to) in (0..=256).flat_map(|from| (from..=256).map(move |to| (from, to))) {
+            let mut slot = [0; 32];
+            (from..to).for_each(|bit| slot[bit / 8] |= 1 << (bit % 8));
+            let words =
+                |slot: [u8; 32]| std::array::from_fn(|word| std::array::from_fn(|at| slot[4 * word + at]));
+            assert_eq!(decode(&words(slot)), None, "ones from bit {from} to {to}");
+            assert_eq!(decode(&words(slot.map(|byte| !byte))), None, "zeros from bit {from} to {to}");
+        }
     }
 
     #[test]
