@@ -6,7 +6,7 @@
 mod journal_world;
 
 use flash_model::{Cut, EraseTear, Flash, Operation, ProgramTear, Random};
-use journal_world::{End, REAL, World, image};
+use journal_world::{End, REAL, World, image, report};
 use protocol_core::journal::{Journal, Opened, SaveError};
 use protocol_core::registers::Image;
 
@@ -42,7 +42,7 @@ fn flip_every_bit<const SECTOR: usize>(saves: u64) -> usize {
 fn any_one_wrong_bit_of_a_full_flash_leaves_the_newest_image() {
     let small: usize = [1, 8, 10, 11, 22].map(flip_every_bit::<512>).iter().sum();
     let real: usize = [400, 1_013].map(flip_every_bit::<REAL>).iter().sum();
-    println!("{small} bits of 512 B sectors, {real} of 16 KiB sectors");
+    report("any one wrong bit of a full flash", &format!("{} bits", small + real));
 }
 
 #[test]
@@ -66,6 +66,7 @@ fn any_two_wrong_bits_of_the_newest_record_make_no_other_image() {
     }
     println!("two wrong bits: {kept} kept the newest image, {lost} went back to the one before");
     assert_eq!(kept + lost, 256 * 255 / 2);
+    report("any two wrong bits of the newest record", &format!("{} pairs", kept + lost));
 }
 
 #[test]
@@ -233,5 +234,5 @@ fn a_slot_that_was_begun_without_a_trace_is_skipped() {
             cases += 1;
         }
     }
-    println!("{cases} records cut at their very beginning");
+    report("records cut at their very beginning", &format!("{cases} records"));
 }

@@ -9,7 +9,7 @@
 mod journal_world;
 
 use flash_model::{Cut, EraseTear, Operation, ProgramTear, Random};
-use journal_world::{End, REAL, World, every_cut};
+use journal_world::{End, REAL, World, every_cut, report};
 
 fn is_long() -> bool {
     std::env::var_os("JOURNAL_LONG").is_some()
@@ -26,6 +26,15 @@ struct Tally {
 }
 
 impl Tally {
+    fn report(&self, tried: &str) {
+        let Self { updates, operations, cases, most_erases, most_programs } = self;
+        let steps = if *operations > 0 { format!("{operations} steps, ") } else { String::new() };
+        println!(
+            "{tried}: {updates} updates, {most_erases} erases and {most_programs} programs a start at most"
+        );
+        report(tried, &format!("{steps}{cases} cuts"));
+    }
+
     /// Counts a case, after some quiet power cycles.
     fn settle<const SECTOR: usize>(&mut self, mut world: World<SECTOR>) {
         world.settle();
@@ -47,7 +56,7 @@ fn cut_everything_once<const SECTOR: usize>(cycles: impl IntoIterator<Item = usi
         assert_eq!(world.cycle(saves, None), End::Quiet);
     }
     tally.updates = world.images;
-    println!("{SECTOR} B sectors, one cut: {tally:?}");
+    tally.report(&format!("{SECTOR} B sectors, power cut at every step in 25 ways"));
     tally
 }
 
@@ -78,7 +87,7 @@ fn cut_everything_again<const SECTOR: usize>(
         assert_eq!(world.cycle(saves, None), End::Quiet);
     }
     tally.updates = world.images;
-    println!("{SECTOR} B sectors, {cuts} cuts: {tally:?}");
+    tally.report(&format!("{SECTOR} B sectors, {cuts} cuts in a row, each at every step"));
     tally
 }
 
@@ -117,7 +126,7 @@ fn below(limit: usize, random: &mut Random) -> usize {
 /// Power cycles of any length, most of them cut somewhere.
 fn cut_at_random<const SECTOR: usize>(cycles: u64, most_saves: usize) {
     let seed = std::env::var("JOURNAL_SEED").map_or(2_026, |seed| seed.parse().unwrap());
-    println!("{SECTOR} B sectors, JOURNAL_SEED={seed}, {cycles} power cycles");
+    println!("{SECTOR} B sectors, JOURNAL_SEED={seed}");
     let mut random = Random::new(seed);
     let mut world = World::<SECTOR>::new();
     let mut cuts = 0;
@@ -131,7 +140,8 @@ fn cut_at_random<const SECTOR: usize>(cycles: u64, most_saves: usize) {
         cuts += u64::from(end == End::Cut);
         world.forget_past(end);
     }
-    println!("{cuts} cuts, {} updates; {:?}", world.images, world.most);
+    let tried = format!("{SECTOR} B sectors, cut at random, JOURNAL_SEED={seed}");
+    report(&tried, &format!("{cycles} power cycles, {cuts} cuts"));
 }
 
 #[test]
@@ -161,7 +171,7 @@ fn cut_erases<const SECTOR: usize>(chances: usize) -> u64 {
         }
         assert_eq!(world.cycle(saves, None), End::Quiet);
     }
-    println!("{SECTOR} B sectors: {cases} erases cut");
+    report(&format!("{SECTOR} B sectors, erases cut in 12 ways"), &format!("{cases} erases"));
     cases
 }
 
@@ -197,5 +207,5 @@ fn a_spare_full_of_remains_is_not_trusted_after_an_erase_that_was_cut() {
     }
     let mut tally = Tally::default();
     cut_again(world, 0, 2, &mut tally);
-    println!("a spare full of remains, two more cuts: {tally:?}");
+    tally.report("a spare full of remains, then 2 cuts in a row");
 }

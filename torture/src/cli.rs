@@ -48,6 +48,10 @@ pub struct Options {
     /// How many good frames for each kind of disturbance of the parser's line; 0: none
     #[arg(long, default_value_t = 1_000_000)]
     pub frames: usize,
+
+    /// Print the rows of the table with tabs in them, for other programs
+    #[arg(long)]
+    pub rows: bool,
 }
 
 /// Something else to do.

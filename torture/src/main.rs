@@ -14,11 +14,11 @@ fn main() -> ExitCode {
     let options = Options::parse();
     match &options.command {
         Some(Command::Load(options)) => load_port(options),
-        None => try_worlds(&options.plan()),
+        None => try_worlds(&options.plan(), options.rows),
     }
 }
 
-fn try_worlds(plan: &Plan) -> ExitCode {
+fn try_worlds(plan: &Plan, as_rows: bool) -> ExitCode {
     let is_seen = io::stderr().is_terminal();
     let outcome = campaign::run(plan, |outcome, elapsed| {
         if is_seen {
@@ -33,7 +33,13 @@ fn try_worlds(plan: &Plan) -> ExitCode {
             plan.scenario.map_or_else(String::new, |scenario| format!(" --scenario {}", scenario.name));
         say(&format!("{}\nThe same again: torture --seed {}{scenario}\n", failure.story, failure.seed));
     }
-    say(&Table(plan, &outcome).to_string());
+    let table = Table(plan, &outcome);
+    if as_rows {
+        table.rows().iter().for_each(|row| say(&row.join("\t")));
+        say(&table.pace());
+    } else {
+        say(&table.to_string());
+    }
     if outcome.is_good() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 

@@ -7,6 +7,9 @@ use crate::parser::Line;
 use crate::scenario::SCENARIOS;
 use crate::tally::Tally;
 
+/// A row: what was tried, how many, what went wrong.
+pub type Row = [String; 3];
+
 /// A plan and what came of it, as a table.
 #[derive(Debug)]
 pub struct Table<'a>(pub &'a Plan, pub &'a Outcome);
@@ -18,42 +21,48 @@ pub fn days(micros: u64) -> f64 {
     micros as f64 / 86_400e6
 }
 
-impl Display for Table<'_> {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(plan, outcome) = self;
-        row(out, "what was tried", "how many", "went wrong")?;
-        writeln!(out, "{}", "-".repeat(112))?;
-        for scenario in &SCENARIOS {
-            let Some((worlds, tally)) = outcome.worlds.get(scenario.name) else { continue };
-            let tried = format!("{}: {}", scenario.name, scenario.about);
-            let many = format!("{worlds} worlds, {:.2} days", days(tally.micros));
-            row(out, &tried, &many, "nothing")?;
-        }
-        self.total(out)?;
-        for line in &outcome.lines {
-            parser_row(out, line)?;
-        }
+impl Table<'_> {
+    /// The rows, less the heading.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Row> {
+        let Self(_, outcome) = self;
+        let mut rows = self.worlds();
+        rows.extend(self.total());
+        rows.extend(outcome.lines.iter().map(parser_row));
         if let Some(failure) = &outcome.failure {
             let tried = format!("{}: seed {}", failure.scenario.name, failure.seed);
-            row(out, &tried, "1 world", &failure.violation.to_string())?;
+            rows.push([tried, "1 world".to_owned(), failure.violation.to_string()]);
         }
-        write!(out, "seed {}", plan.seed)?;
-        let minutes = outcome.worlds_took.as_secs_f64() / 60.0;
-        let (_, tally) = outcome.total();
-        let a_minute = days(tally.micros) / minutes.max(1e-9);
-        write!(out, ", {minutes:.1} minutes for the worlds: {a_minute:.1} virtual days a minute")
+        rows
     }
-}
 
-impl Table<'_> {
-    fn total(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+    /// The seed, and how fast it went.
+    #[must_use]
+    pub fn pace(&self) -> String {
+        let Self(plan, outcome) = self;
+        let minutes = outcome.worlds_took.as_secs_f64() / 60.0;
+        let a_minute = days(outcome.total().1.micros) / minutes.max(1e-9);
+        format!(
+            "seed {}, {minutes:.1} minutes for the worlds: {a_minute:.1} virtual days a minute",
+            plan.seed
+        )
+    }
+
+    fn worlds(&self) -> Vec<Row> {
+        let row = |scenario: &crate::scenario::Scenario| {
+            let (worlds, tally) = self.1.worlds.get(scenario.name)?;
+            Some(row(&format!("{}: {}", scenario.name, scenario.about), &amount(*worlds, tally)))
+        };
+        SCENARIOS.iter().filter_map(row).collect()
+    }
+
+    fn total(&self) -> Vec<Row> {
         let (worlds, tally) = self.1.total();
-        let many = format!("{worlds} worlds, {:.2} days", days(tally.micros));
-        row(out, "all worlds", &many, "")?;
         let Tally { requests, answers, reports, damaged_bursts, commands, engagements, .. } = tally;
         let Tally { damaged_servo_frames, deceptions, servo_faults, stalls, .. } = tally;
         let Tally { cuts, cut_starts, cut_saves, saves, .. } = tally;
-        for (what, many) in [
+        let counts = [
+            ("all worlds", amount(worlds, &tally)),
             ("  whole requests from the host", requests.to_string()),
             ("  answers and reports to the host, each as it has to be", format!("{answers}, {reports}")),
             ("  bursts of requests with damage in or between them", damaged_bursts.to_string()),
@@ -68,22 +77,31 @@ impl Table<'_> {
                 format!("{cuts}; {cut_starts}, {cut_saves}"),
             ),
             ("  settings saved", saves.to_string()),
-        ] {
-            row(out, what, &many, "")?;
-        }
-        Ok(())
+        ];
+        counts.iter().map(|(what, many)| row(what, many)).collect()
     }
 }
 
-fn parser_row(out: &mut fmt::Formatter<'_>, line: &Line) -> fmt::Result {
-    let tried = format!("parser, {}", line.name);
-    let delay = line.worst_delay_us;
-    let verdict = if line.is_good() { "" } else { ": TOO MUCH" };
-    let wrong = format!("{} lost, {delay} us late at worst{verdict}", line.lost);
-    row(out, &tried, &format!("{} frames", line.frames), &wrong)
+fn amount(worlds: u64, tally: &Tally) -> String {
+    format!("{worlds} worlds, {:.2} days", days(tally.micros))
 }
 
-fn row(out: &mut fmt::Formatter<'_>, tried: &str, many: &str, wrong: &str) -> fmt::Result {
-    let line = format!("{tried:<72} {many:<26} {wrong}");
-    writeln!(out, "{}", line.trim_end())
+fn row(tried: &str, many: &str) -> Row {
+    [tried.to_owned(), many.to_owned(), "nothing".to_owned()]
+}
+
+fn parser_row(line: &Line) -> Row {
+    let verdict = if line.is_good() { "" } else { ": TOO MUCH" };
+    let wrong = format!("{} lost, {} us late at worst{verdict}", line.lost, line.worst_delay_us);
+    [format!("parser, {}", line.name), format!("{} frames", line.frames), wrong]
+}
+
+impl Display for Table<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let heading = ["what was tried", "how many", "what went wrong"].map(str::to_owned);
+        for [tried, many, wrong] in std::iter::once(heading).chain(self.rows()) {
+            writeln!(out, "{tried:<86} {many:>26}  {wrong}")?;
+        }
+        write!(out, "{}", self.pace())
+    }
 }

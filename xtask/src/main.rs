@@ -14,13 +14,16 @@ mod decisions;
 mod elf;
 mod emulate;
 mod footprint;
+mod fuzz;
 mod no_panic;
 mod registers_md;
 mod run;
 mod size;
 mod stack;
+mod table;
 mod test;
 mod thumb;
+mod torture;
 
 use run::Outcome;
 
@@ -42,6 +45,13 @@ enum Chore {
         #[arg(long)]
         check: bool,
     },
+    /// Try to break the arm: worlds in which everything goes wrong, a disturbed line, power cuts, a fuzzer.
+    ///
+    /// Prints one table: what was tried, how many, what went wrong, from which seed. The same seed tries the
+    /// same worlds; how many, the time decides.
+    Torture(torture::Options),
+    /// Feed six parts of it with inputs that a fuzzer makes up (needs the nightly compiler and cargo-fuzz).
+    Fuzz(fuzz::Options),
     /// Link the cores for the chip and fail if a panic can be reached.
     NoPanic,
     /// Print what the cores and the image cost on the chip, in bytes, and hold it against the budgets.
@@ -88,6 +98,8 @@ fn carry_out(chore: &Chore) -> Outcome {
         Chore::Test => test::all(),
         Chore::Docs { check: true } => registers_md::check().and_then(|()| decisions::check()),
         Chore::Docs { check: false } => registers_md::write().and_then(|()| decisions::write()),
+        Chore::Torture(options) => torture::run(options),
+        Chore::Fuzz(options) => fuzz::check(options),
         Chore::NoPanic => no_panic::check(),
         Chore::Size { by_file: true, .. } => size::print(),
         Chore::Size { accept, .. } => footprint::check(accept.accept),

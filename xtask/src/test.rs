@@ -3,10 +3,13 @@
 use std::time::Instant;
 
 use crate::run::{CHIP, Outcome, cargo, run};
-use crate::{count, decisions, emulate, footprint, no_panic, registers_md};
+use crate::{count, decisions, emulate, footprint, fuzz, no_panic, registers_md, torture};
 
 /// A heading, and what is done under it.
 type Step = (&'static str, fn() -> Outcome);
+
+/// For each target: enough to see that it runs. The corpora are tried whole, with the tests.
+const FUZZ_SECONDS: u64 = 5;
 
 /// What is done, in this order, until one fails. Tests come last: theirs is the last word.
 const STEPS: &[Step] = &[
@@ -32,6 +35,8 @@ const STEPS: &[Step] = &[
         let words: String = tests.iter().map(|test| format!(" --test {test}")).collect();
         run("cargo", &format!("test -p system-tests{words}"), &[("ARM", "emulator")])
     }),
+    ("30 virtual days in which everything goes wrong", torture::short),
+    ("inputs that a fuzzer makes up", || fuzz::check(&fuzz::Options { seconds: FUZZ_SECONDS, seed: 1 })),
     ("tests", || cargo("test --workspace --exclude footprint")),
 ];
 

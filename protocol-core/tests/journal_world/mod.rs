@@ -221,3 +221,8 @@ pub fn every_cut<const SECTOR: usize>(
         world
     })
 }
+
+/// Says what was tried, as a row of the table that `cargo xtask torture` prints. What failed has panicked.
+pub fn report(tried: &str, many: &str) {
+    println!("\njournal, {tried}\t{many}\tnothing");
+}
