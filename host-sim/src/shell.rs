@@ -97,8 +97,11 @@ impl<F: NorFlash + Clone> Shell<F> {
     ) -> io::Result<&'space mut [Event]> {
         let earliest = self.due.iter().min().copied().unwrap_or(Instant::FAR_FUTURE);
         let time = sleep_until(clock.now(), earliest);
-        let waited = poll(&mut [PollFd::new(&self.epoll, PollFlags::IN)], Some(&time));
-        let looked = waited.and_then(|_| epoll::wait(&self.epoll, space, Some(&AT_ONCE)));
+        let looked = match poll(&mut [PollFd::new(&self.epoll, PollFlags::IN)], Some(&time)) {
+            Ok(0) => return Ok(&mut []),
+            Ok(_) => epoll::wait(&self.epoll, space, Some(&AT_ONCE)),
+            Err(error) => Err(error),
+        };
         match looked {
             Ok((events, _)) => Ok(events),
             Err(Errno::INTR) => Ok(&mut []),

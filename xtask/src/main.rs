@@ -67,7 +67,7 @@ enum Chore {
     /// Fail if the tests of the cores leave a line or a function out.
     Coverage,
     /// Compare the parse-and-answer path with its peers: Modbus, postcard with COBS, MAVLink.
-    Bench,
+    Bench(bench::Options),
     /// Run the image for the arm in an emulator, simulated servos on its bus, and print the port it is on.
     ///
     /// SIGHUP (`kill -HUP`) switches the arm off and on, Ctrl-C ends it. The emulator keeps no settings: its
@@ -106,6 +106,6 @@ fn carry_out(chore: &Chore) -> Outcome {
         Chore::Count(Accept { accept }) => count::check(*accept),
         Chore::Coverage => coverage::check(),
         Chore::Emulate(options) => emulate::run(options),
-        Chore::Bench => bench::compare(),
+        Chore::Bench(options) => bench::run(options),
     }
 }

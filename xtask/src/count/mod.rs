@@ -9,6 +9,7 @@ mod machine;
 mod trace;
 
 pub(crate) use cores::Told;
+pub(crate) use machine::frame;
 
 use crate::budget::{self, Figure};
 use crate::emulate;

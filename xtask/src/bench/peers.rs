@@ -1,5 +1,5 @@
-//! `cargo xtask bench`: the parse-and-answer path beside its peers, on this machine by the clock and on the chip by
-//! instructions and bytes. Prints; the budgets are held by `count` and `size`.
+//! The parse-and-answer path beside its peers, on this machine by the clock and on the chip by
+//! instructions and bytes.
 
 use crate::count::{self, Told};
 use crate::run::{Linked, Outcome, build_footprint, cargo};
