@@ -21,6 +21,8 @@ use crate::per_joint::PerJoint;
 const BOOT_TIME: Duration = Duration::from_millis(200);
 /// Answers are held up on the wire for up to this long.
 const LONGEST_DELAY: Duration = Duration::from_millis(40);
+/// Bytes of the longest answer to what the arm asks, and some more.
+const LONGEST_ANSWER: usize = 32;
 /// A torque frame that was lost has been repeated after this.
 const REFRESHED: Duration = Duration::from_millis(600);
 /// Two deceptions within this time may be believed: nobody can tell.
@@ -65,6 +67,8 @@ pub(super) struct Servos {
     since: PerJoint<Instant>,
     disturbed_at: Instant,
     said: PerJoint<Said>,
+    /// What was heard of the answer that is on its way.
+    piece: Vec<u8>,
     /// An answer that is no later than this is one, and an answer that is later than that is none.
     in_time: Duration,
     too_late: Duration,
@@ -86,6 +90,7 @@ impl Servos {
             since: PerJoint::all(now + BOOT_TIME),
             disturbed_at: now,
             said: PerJoint::default(),
+            piece: Vec::new(),
             in_time,
             too_late,
             deceived_at: PerJoint::all(Instant::ZERO),
@@ -138,9 +143,14 @@ impl Servos {
         bytes
     }
 
-    /// Takes down what a servo said, where nothing else was on the wire.
+    /// Takes down what a servo said, where nothing else was on the wire. It may come in pieces.
     fn note(&mut self, bytes: &[u8]) {
-        if let &[0xFF, 0xFF, id, length, alarms, _, _, _, _, _, _, decivolts, celsius, ref rest @ ..] = bytes
+        if bytes.starts_with(&[0xFF, 0xFF]) || self.piece.len() > LONGEST_ANSWER {
+            self.piece.clear();
+        }
+        self.piece.extend_from_slice(bytes);
+        if let &[0xFF, 0xFF, id, length, alarms, _, _, _, _, _, _, decivolts, celsius, ref rest @ ..] =
+            self.piece.as_slice()
             && usize::from(length) == rest.len() + 9
             && let Some(joint) = Joint::from_index(id)
         {
