@@ -26,8 +26,8 @@ use serialport::SerialPort;
 use memory::Memory;
 use round_trips::RoundTrips;
 
-/// An answer that has not come after this long counts as lost.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// An answer that has not come after this long counts as lost: a busy machine may be late by seconds.
+const PATIENCE: Duration = Duration::from_secs(60);
 /// How long one look at the port waits for bytes.
 const LOOK: Duration = Duration::from_millis(1);
 /// Between two progress lines.
@@ -88,7 +88,7 @@ pub struct Tally {
     answers: u64,
     reports: u64,
     lost: u64,
-    /// Frames that answer nothing that was asked, or not in its turn.
+    /// Frames that answer nothing that was asked.
     strange: u64,
     damaged: u64,
     bytes: u64,
@@ -116,7 +116,7 @@ impl Display for Tally {
         writeln!(out, "reports                     {} ({:.2}/s)", self.reports, rate(self.reports))?;
         writeln!(out, "bytes from the arm          {} ({:.0}/s)", self.bytes, rate(self.bytes))?;
         writeln!(out, "answers lost                {}", self.lost)?;
-        writeln!(out, "frames out of turn          {}", self.strange)?;
+        writeln!(out, "frames nobody asked for     {}", self.strange)?;
         writeln!(out, "frames damaged              {}", self.damaged)?;
         writeln!(out, "round trip                  {}", self.round_trips)?;
         write!(out, "memory of the other end     {}", self.memory)
@@ -267,18 +267,23 @@ impl Client {
             let (address, count) = (reply.address, u8::try_from(reply.values.len()).unwrap_or(0));
             if (address, count) == (PRESENT_POSITION.address, PRESENT_POSITION.count) {
                 self.tally.reports += 1;
-            } else if self
-                .under_way
-                .front()
-                .is_some_and(|first| (first.address, first.count) == (address, count))
-            {
-                self.tally.answers += 1;
-                let first = self.under_way.pop_front();
-                first.into_iter().for_each(|first| self.tally.round_trips.add(first.since.elapsed()));
             } else {
-                self.tally.strange += 1;
+                self.take_answer(address, count);
             }
         }
+    }
+
+    /// Answers come in the order of the reads: one that is for a later read says that those before are lost.
+    fn take_answer(&mut self, address: u8, count: u8) {
+        let is_for = |awaited: &Awaited| (awaited.address, awaited.count) == (address, count);
+        let Some(place) = self.under_way.iter().position(is_for) else {
+            self.tally.strange += 1;
+            return;
+        };
+        self.tally.lost += place as u64;
+        self.tally.answers += 1;
+        let answered = self.under_way.drain(..=place).next_back();
+        answered.into_iter().for_each(|read| self.tally.round_trips.add(read.since.elapsed()));
     }
 
     fn give_up_on_lost(&mut self) {
