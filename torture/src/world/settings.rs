@@ -159,7 +159,11 @@ impl<const SECTOR: usize> Settings for Flashed<SECTOR> {
         self.check_storage(storage)?;
         let possible = self.possible.contains(&image);
         ensure(possible, || format!("settings {image:?} found, and only {:?} may be", self.possible))?;
-        self.possible = vec![image];
+        // What could not be made firm, on a worn flash, may read otherwise at the next start: the arm says that
+        // its storage is broken.
+        if storage == Storage::Ready || !self.is_worn {
+            self.possible = vec![image];
+        }
         Ok(End::Done(Found { image, storage }))
     }
 
