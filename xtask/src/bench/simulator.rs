@@ -20,10 +20,12 @@ use crate::run::Outcome;
 
 /// How long a share of a core is watched.
 const WATCH: Duration = Duration::from_secs(5);
-/// How long servos and settings need at start, and longer.
+/// How long servos need at start, and hosts until all goes evenly, and longer.
 const START: Duration = Duration::from_secs(2);
-/// The period of a host that steers at 100 Hz.
+/// The period of a host that steers at 100 Hz..
 const PERIOD: Duration = Duration::from_millis(10);
+/// .. and what it takes at least for each arm, or this program would be what is measured.
+const PERIOD_PER_ARM: Duration = Duration::from_micros(100);
 /// How long an answer may take on a busy machine.
 const PATIENCE: Timespec = Timespec { tv_sec: 20, tv_nsec: 0 };
 /// Bytes of an answer to a read of seven registers.
@@ -74,10 +76,10 @@ impl Simulator {
         Ok(Duration::from_nanos(nanos.parse()?))
     }
 
-    /// Memory that is its own, in KiB.
+    /// Memory that is its own and stands for no file, in KiB.
     pub(crate) fn memory(&self) -> Outcome<u64> {
         let text = fs::read_to_string(format!("/proc/{}/smaps_rollup", self.process.0.id()))?;
-        let line = text.lines().find_map(|line| line.strip_prefix("Private_Dirty:")).ok_or("no memory")?;
+        let line = text.lines().find_map(|line| line.strip_prefix("Anonymous:")).ok_or("no memory")?;
         Ok(line.trim().trim_end_matches(" kB").parse()?)
     }
 
@@ -90,7 +92,7 @@ impl Simulator {
     }
 
     /// The share of a core that it takes while all joints of all arms move, and every arm is asked for its positions
-    /// a hundred times a second; and how often each was asked in truth, in Hz.
+    /// a hundred times a second, or as often as this program can; and how often that was, in Hz.
     pub(crate) fn share_polled(&self) -> Outcome<(f64, f64)> {
         let mut ports = self.open()?;
         for port in &mut ports {
@@ -100,10 +102,11 @@ impl Simulator {
                 values: &[0; JOINTS],
             }))?;
         }
+        ask(&mut ports, START)?;
         let mut rounds = 0;
         let start = Instant::now();
         let share = self.share_during(|| {
-            rounds = ask(&mut ports)?;
+            rounds = ask(&mut ports, WATCH)?;
             Ok(())
         })?;
         Ok((share, f64::from(rounds) / start.elapsed().as_secs_f64()))
@@ -117,20 +120,17 @@ impl Simulator {
     }
 }
 
-/// Asks every arm, and takes the answers to the questions of the round before; round after round. Says how many.
-fn ask(ports: &mut [File]) -> Outcome<u32> {
+/// Asks every arm, and takes the answers a period later; round after round. Says how many.
+fn ask(ports: &mut [File], time: Duration) -> Outcome<u32> {
     let question = frame(Request::Read { address: PRESENT_POSITION.address, count: PRESENT_POSITION.count });
+    let period = PERIOD.max(PERIOD_PER_ARM * u32::try_from(ports.len())?);
     let start = Instant::now();
     let mut rounds = 0;
-    while start.elapsed() < WATCH {
-        for port in &mut *ports {
-            if rounds > 0 {
-                take_answer(port)?;
-            }
-            port.write_all(&question)?;
-        }
+    while start.elapsed() < time {
+        ports.iter_mut().try_for_each(|port| port.write_all(&question))?;
         rounds += 1;
-        sleep((PERIOD * rounds).saturating_sub(start.elapsed()));
+        sleep((period * rounds).saturating_sub(start.elapsed()));
+        ports.iter_mut().try_for_each(take_answer)?;
     }
     Ok(rounds)
 }
