@@ -11,6 +11,7 @@ mod budget;
 mod count;
 mod coverage;
 mod decisions;
+mod deny;
 mod elf;
 mod emulate;
 mod footprint;
@@ -52,6 +53,8 @@ enum Chore {
     Torture(torture::Options),
     /// Feed six parts of it with inputs that a fuzzer makes up (needs the nightly compiler and cargo-fuzz).
     Fuzz(fuzz::Options),
+    /// Check licences, versions and sources of all dependencies, and the advisories where they can be had.
+    Deny,
     /// Link the cores for the chip and fail if a panic can be reached.
     NoPanic,
     /// Print what the cores and the image cost on the chip, in bytes, and hold it against the budgets.
@@ -100,6 +103,7 @@ fn carry_out(chore: &Chore) -> Outcome {
         Chore::Docs { check: false } => registers_md::write().and_then(|()| decisions::write()),
         Chore::Torture(options) => torture::run(options),
         Chore::Fuzz(options) => fuzz::check(options),
+        Chore::Deny => deny::check(),
         Chore::NoPanic => no_panic::check(),
         Chore::Size { by_file: true, .. } => size::print(),
         Chore::Size { accept, .. } => footprint::check(accept.accept),

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::run::{CHIP, Outcome, cargo, run};
-use crate::{count, decisions, emulate, footprint, fuzz, no_panic, registers_md, torture};
+use crate::{count, decisions, deny, emulate, footprint, fuzz, no_panic, registers_md, torture};
 
 /// A heading, and what is done under it.
 type Step = (&'static str, fn() -> Outcome);
@@ -25,6 +25,7 @@ const STEPS: &[Step] = &[
     ("documentation", documentation),
     ("docs/registers.md is fresh", registers_md::check),
     ("every decision of docs/protocol.md has its tests", decisions::check),
+    ("what comes in with dependencies", deny::rules),
     ("no panic can be reached", no_panic::check),
     ("flash, RAM and stack are within their budgets", || footprint::check(false)),
     ("instructions are within their budgets", || count::check(false)),
