@@ -151,7 +151,9 @@ mod tests {
 
     #[test]
     fn runs_of_ones_and_zeros_as_erases_leave_them_hold_nothing() {
-        for (from, to) in (0..=256).flat_map(|from| (from..=256).map(move |to| (from, to))) {
+        let step = if cfg!(miri) { 32 } else { 1 };
+        let ends = (0..=256).step_by(step);
+        for (from, to) in ends.clone().flat_map(|from| ends.clone().map(move |to| (from, to))) {
             let mut slot = [0; 32];
             (from..to).for_each(|bit| slot[bit / 8] |= 1 << (bit % 8));
             let words =
