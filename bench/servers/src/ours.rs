@@ -2,14 +2,11 @@
 
 use protocol_core::registers::RegisterFile;
 use protocol_core::request::{Reply, Request};
-use protocol_core::time::{Duration, Instant};
+use protocol_core::time::Instant;
 use protocol_core::wire::deframer::{ABANDON_AFTER, gap};
 use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
 
 use crate::Server;
-
-/// Time between two pieces.
-const STEP: Duration = Duration::from_micros(100);
 
 /// Ours.
 pub struct OurServer {
@@ -56,12 +53,11 @@ impl OurServer {
 
 impl Server for OurServer {
     fn feed(&mut self, piece: &[u8], reply: &mut impl FnMut(&[u8])) {
-        self.now = self.now + STEP;
         let mut rest = piece;
         while !rest.is_empty() {
             let taken = self.deframer.push(self.now, rest);
-            rest = rest.get(taken..).unwrap_or(&[]);
             self.answer(reply);
+            rest = rest.get(taken..).unwrap_or(&[]);
         }
     }
 

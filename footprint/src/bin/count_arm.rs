@@ -1,17 +1,23 @@
-//! The arm under the meter: its control cycles with seven servos that follow at once, and a checksum.
+//! The arm under the meter: its control cycles with seven servos that follow at once, what it does between the bytes
+//! of a request and those of the reply, and a checksum.
 
 #![no_std]
 #![no_main]
 
+use bench_servers::work::SEVEN_BOT;
 use cortex_m_rt::entry;
 use footprint::meter::Meter;
 use footprint::opaque;
-use motion_core::servo_bus::frame::{Decoder, FrameBuffer, Reading};
+use motion_core::servo_bus::frame::{self, Decoder, Reading};
 use motion_core::servo_bus::servo::Servo;
 use motion_core::{Config, Controller, Output, Storage, TorqueCodes};
+use protocol_core::registers::RegisterFile;
 use protocol_core::registers::map::{MISSING_SERVOS, MOVING_JOINTS};
+use protocol_core::request::{Reply, Request};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::crc::checksum;
+use protocol_core::wire::deframer::gap;
+use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
 
 /// Every joint to 180 degrees, at 19 degrees a second: under way for as long as is counted.
 const FAR_AND_SLOW: [u8; 28] = *b"\xaa\x77\x06\x20\x15\x0a\x0a\x0a\x0a\x0a\x0a\x0a\x00\x00\
@@ -28,7 +34,7 @@ struct Rig {
     controller: Controller,
     servos: [Servo; 7],
     /// What the servos have answered and nobody has heard yet.
-    answer: FrameBuffer,
+    answer: frame::FrameBuffer,
     /// The most that one call took.
     longest_call: u32,
 }
@@ -45,7 +51,7 @@ fn main() -> ! {
         meter: Meter::default(),
         controller: opaque(Controller::new(Instant::ZERO, config, None, Storage::Ready)),
         servos: [0, 1, 2, 3, 4, 5, 6].map(Servo::new),
-        answer: FrameBuffer::new(),
+        answer: frame::FrameBuffer::new(),
         longest_call: 0,
     };
     (0..START).for_each(|millis| _ = rig.turn(millis));
@@ -59,9 +65,25 @@ fn main() -> ! {
     rig.meter.tell("servos missing", u32::from(rig.controller.registers().get(MISSING_SERVOS.address)));
     rig.meter.tell("longest control cycle", longest_cycle);
     rig.meter.tell("longest poll", rig.longest_call);
+    rig.meter.tell("read of 7, parse and answer alone", parse_and_answer(&rig.meter));
     let bytes = opaque([0x5A; 260]);
     rig.meter.tell("CRC of 260 bytes", rig.meter.count(|| _ = opaque(checksum(&bytes))));
     rig.meter.end()
+}
+
+/// A request that is there as a whole, until its reply is: without the way in and out.
+fn parse_and_answer(meter: &Meter) -> u32 {
+    let mut deframer = opaque(Deframer::<ToArm>::new(gap(115_200)));
+    let registers = opaque(RegisterFile::new([0; 6], None));
+    let mut reply = opaque(FrameBuffer::new());
+    deframer.push(Instant::ZERO, opaque(SEVEN_BOT.read_of_7));
+    let count = meter.count(|| {
+        let Some(Ok(frame)) = deframer.pull() else { return };
+        let Request::Read { address, count } = Request::from_frame(frame) else { return };
+        Reply { address, values: registers.read(address, count) }.encode(&mut reply);
+    });
+    meter.tell("bytes of the reply", u32::try_from(reply.len()).unwrap_or(0));
+    count
 }
 
 fn now(millis: u64) -> Instant {
@@ -98,7 +120,7 @@ impl Rig {
 }
 
 /// What a servo answers. It stands where it was told to.
-fn hear(servo: &mut Servo, bytes: &[u8]) -> Option<FrameBuffer> {
+fn hear(servo: &mut Servo, bytes: &[u8]) -> Option<frame::FrameBuffer> {
     let mut decoder = Decoder::new();
     decoder.push(bytes);
     let frame = decoder.pull()?.ok()?;

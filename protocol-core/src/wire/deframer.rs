@@ -23,9 +23,9 @@
 //! shell that was held up for a second therefore never mistakes its own pause for the sender's.
 
 use core::marker::PhantomData;
-use core::ops::Range;
 
-use super::frame::{Defect, Direction, Frame, HEADER, MAX_LENGTH, Verdict, judge};
+use super::frame::{Defect, Direction, Frame, MAX_LENGTH};
+use super::search::Search;
 use crate::time::{Duration, Instant};
 
 /// The shortest gap that lets whole frames pass an unfinished one (D4).
@@ -45,27 +45,10 @@ pub fn gap(baud: u32) -> Duration {
 #[derive(Clone, Debug)]
 pub struct Deframer<D> {
     buffer: heapless::Vec<u8, MAX_LENGTH>,
-    /// The head: everything before it is done with.
-    head: usize,
-    /// Nothing new can be said before the buffer is this long.
-    wanted: usize,
-    /// The line was silent for the gap when the buffer was this long.
-    quiet: usize,
-    /// The line was silent for [`ABANDON_AFTER`] when the buffer was this long.
-    cut: usize,
-    /// The search behind an unfinished head goes on here.
-    behind: usize,
-    /// Whatever ends up to here was judged behind an unfinished head.
-    judged: usize,
+    search: Search,
     gap: Duration,
     last_byte: Instant,
     direction: PhantomData<D>,
-}
-
-/// What the search came upon.
-enum Found {
-    Frame(Range<usize>),
-    Defect(Defect),
 }
 
 impl<D: Direction> Deframer<D> {
@@ -74,12 +57,7 @@ impl<D: Direction> Deframer<D> {
     pub const fn new(gap: Duration) -> Self {
         Self {
             buffer: heapless::Vec::new(),
-            head: 0,
-            wanted: 0,
-            quiet: 0,
-            cut: 0,
-            behind: 0,
-            judged: 0,
+            search: Search::START,
             gap,
             last_byte: Instant::ZERO,
             direction: PhantomData,
@@ -95,27 +73,33 @@ impl<D: Direction> Deframer<D> {
             return 0;
         }
         self.last_byte = now;
-        if self.head < self.cut {
+        if self.search.is_cut() {
             // There is one mark for a long silence, and nobody has looked at what came before it yet.
             return 0;
         }
-        if self.buffer.len() + bytes.len() > MAX_LENGTH {
+        if self.search.done() == self.buffer.len() {
+            self.buffer.clear();
+            self.search = Search::START;
+        } else if self.buffer.len() + bytes.len() > MAX_LENGTH {
             self.discard();
         }
         let room = MAX_LENGTH - self.buffer.len();
         let taken = bytes.get(..room).unwrap_or(bytes);
-        // Cannot fail: it was cut to fit.
-        let _ = self.buffer.extend_from_slice(taken);
+        // Pieces are short: words in line cost less than a call to copy them. None can fail: they were cut to fit.
+        let (words, rest) = taken.as_chunks::<4>();
+        for word in words {
+            let _ = self.buffer.extend_from_slice(word);
+        }
+        for &byte in rest {
+            let _ = self.buffer.push(byte);
+        }
         taken.len()
     }
 
     /// The next frame, or the next thing that looked like one and was not; `None` once there is nothing
     /// more to say about the bytes so far. Call it until then.
     pub fn pull(&mut self) -> Option<Result<Frame<'_>, Defect>> {
-        match self.search()? {
-            Found::Defect(defect) => Some(Err(defect)),
-            Found::Frame(place) => Frame::of_judged(self.buffer.get(place)?).map(Ok),
-        }
+        self.search.next::<D>(&self.buffer)
     }
 
     /// When silence on the line would change something: the shell should look at the line by then.
@@ -123,132 +107,28 @@ impl<D: Direction> Deframer<D> {
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
         let end = self.buffer.len();
-        if self.head >= end {
+        if self.search.done() >= end {
             None
-        } else if self.quiet < end {
-            Some(self.last_byte + self.gap)
-        } else {
+        } else if self.search.is_quiet(end) {
             Some(self.last_byte + ABANDON_AFTER)
+        } else {
+            Some(self.last_byte + self.gap)
         }
     }
 
     fn note_silence(&mut self, now: Instant) {
         let silence = now - self.last_byte;
-        let end = self.buffer.len();
-        // An unfinished search keeps its mark: a later call will note the silence again.
-        if silence >= self.gap && self.quiet < end && self.judged >= self.quiet {
-            self.quiet = end;
-            self.behind = self.head;
-            self.wanted = 0;
+        if silence >= self.gap {
+            self.search.note_gap(self.buffer.len());
         }
-        if silence >= ABANDON_AFTER && self.cut < end {
-            self.cut = end;
-            self.wanted = 0;
-        }
-    }
-
-    /// Looks at the head until there is something to say.
-    fn search(&mut self) -> Option<Found> {
-        while self.buffer.len() >= self.wanted.max(self.head + 1) {
-            let at = self.head;
-            match self.verdict(at, self.limit(at)) {
-                Verdict::Unfinished(_) if at < self.cut => self.head = self.next_header(at + 1),
-                Verdict::Unfinished(_) if self.judged < self.quiet => {
-                    if let Some(found) = self.search_behind() {
-                        return Some(found);
-                    }
-                }
-                Verdict::Unfinished(length) => {
-                    self.wanted = at + length;
-                    return None;
-                }
-                verdict => {
-                    self.head = self.after(at, verdict);
-                    if let Some(found) = self.news(at, verdict) {
-                        return Some(found);
-                    }
-                }
-            }
-        }
-        self.start_over_if_empty();
-        None
-    }
-
-    /// Looks for whole frames behind the unfinished head, among the bytes before the silence.
-    fn search_behind(&mut self) -> Option<Found> {
-        loop {
-            let at = self.behind.max(self.head + 1);
-            if at >= self.quiet {
-                self.judged = self.quiet;
-                return None;
-            }
-            let verdict = self.verdict(at, self.quiet);
-            let found = self.news(at, verdict);
-            self.behind = self.after(at, verdict);
-            if found.is_some() {
-                return found;
-            }
-        }
-    }
-
-    /// Where the search goes on after the verdict on what begins at `at`.
-    fn after(&self, at: usize, verdict: Verdict) -> usize {
-        match verdict {
-            Verdict::Whole(length) => at + length - self.lent_by(at + length),
-            _ => self.next_header(at + 1),
-        }
-    }
-
-    /// What a verdict has to say to the outside, unless it was said before, behind an unfinished head.
-    fn news(&self, at: usize, verdict: Verdict) -> Option<Found> {
-        match verdict {
-            Verdict::Whole(length) if !self.is_known(at, at + length) => Some(Found::Frame(at..at + length)),
-            Verdict::Defective(Defect::NoFrame, _) => None,
-            Verdict::Defective(defect, length) if !self.is_known(at, at + length) => {
-                Some(Found::Defect(defect))
-            }
-            _ => None,
-        }
-    }
-
-    /// Was the frame from `at` to `end` judged before, behind an unfinished head?
-    fn is_known(&self, at: usize, end: usize) -> bool {
-        end <= self.judged || (at < self.behind && end <= self.quiet)
-    }
-
-    /// Where the bytes end that may belong to a frame beginning at `at`: none goes on after a long silence.
-    fn limit(&self, at: usize) -> usize {
-        if at < self.cut { self.cut } else { self.buffer.len() }
-    }
-
-    fn verdict(&self, at: usize, limit: usize) -> Verdict {
-        judge::<D>(self.buffer.get(at..limit).unwrap_or(&[]))
-    }
-
-    /// The first place from `at` on where a header may begin, or the end.
-    fn next_header(&self, at: usize) -> usize {
-        let rest = self.buffer.get(at..).unwrap_or(&[]);
-        at + rest.iter().position(|&byte| byte == HEADER[0]).unwrap_or(rest.len())
-    }
-
-    /// How many bytes at the end of a frame may begin the next one.
-    fn lent_by(&self, end: usize) -> usize {
-        match self.buffer.get(..end) {
-            Some([.., last]) if *last == HEADER[0] => 1,
-            Some([.., first, second]) if [*first, *second] == HEADER => 2,
-            _ => 0,
-        }
-    }
-
-    fn start_over_if_empty(&mut self) {
-        if self.head >= self.buffer.len() {
-            self.discard();
+        if silence >= ABANDON_AFTER {
+            self.search.note_cut(self.buffer.len());
         }
     }
 
     /// Moves the bytes that still count to the front of the buffer.
     fn discard(&mut self) {
-        let done = self.head;
+        let done = self.search.done();
         let left = self.buffer.len().saturating_sub(done);
         for to in 0..left {
             if let Some(&byte) = self.buffer.get(done + to)
@@ -258,15 +138,6 @@ impl<D: Direction> Deframer<D> {
             }
         }
         self.buffer.truncate(left);
-        for mark in [
-            &mut self.head,
-            &mut self.wanted,
-            &mut self.quiet,
-            &mut self.cut,
-            &mut self.behind,
-            &mut self.judged,
-        ] {
-            *mark = mark.saturating_sub(done);
-        }
+        self.search.forget(done);
     }
 }

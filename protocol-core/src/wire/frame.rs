@@ -2,14 +2,11 @@
 //!
 //! Knows nothing of streams (the deframer's work) or of what a frame asks for.
 
-use nom::bytes::streaming::{tag, take};
-use nom::combinator::map_opt;
+use nom::bytes::streaming::take;
 use nom::error::{ErrorKind, ParseError};
-use nom::number::streaming::{le_u16, u8 as byte};
-use nom::sequence::preceded;
-use nom::{IResult, Needed, Parser};
+use nom::{IResult, Needed};
 
-use super::crc::checksum;
+use super::crc::Crc;
 
 /// The two bytes every frame begins with.
 pub const HEADER: [u8; 2] = [0xAA, 0x77];
@@ -17,6 +14,8 @@ pub const HEADER: [u8; 2] = [0xAA, 0x77];
 pub const PREFIX_LENGTH: usize = 5;
 /// Bytes of the checksum.
 pub const CRC_LENGTH: usize = 2;
+/// The shortest frame: one without data.
+pub(super) const MIN_LENGTH: usize = PREFIX_LENGTH + CRC_LENGTH;
 /// The longest frame: 255 bytes of data in their envelope (D1).
 pub const MAX_LENGTH: usize = PREFIX_LENGTH + 255 + CRC_LENGTH;
 
@@ -116,20 +115,42 @@ impl<I> ParseError<I> for Defect {
 type Prefix = (Function, u8, u8);
 
 /// Function, address and count of the frame at the beginning of `input`.
+#[inline(always)]
 fn prefix(input: &[u8]) -> IResult<&[u8], Prefix, Defect> {
-    preceded(tag(HEADER.as_slice()), (map_opt(byte, Function::from_code), byte, byte)).parse(input)
+    match input {
+        [first, second, code, address, count, rest @ ..] if [*first, *second] == HEADER => {
+            let function = Function::from_code(*code).ok_or(nom::Err::Error(Defect::NoFrame))?;
+            Ok((rest, (function, *address, *count)))
+        }
+        [_, _, _, _, _, ..] => Err(nom::Err::Error(Defect::NoFrame)),
+        short if may_begin(short) => Err(nom::Err::Incomplete(Needed::new(PREFIX_LENGTH - short.len()))),
+        _ => Err(nom::Err::Error(Defect::NoFrame)),
+    }
 }
 
-/// The rest of a frame, of which `rest` is what stands behind the prefix in `input`.
+/// The checksum of a frame's first bytes.
+#[inline(always)]
+fn crc_of_prefix((function, address, count): Prefix) -> Crc {
+    Crc::START.word([HEADER[0], HEADER[1], function as u8, address]).byte(count)
+}
+
+/// Could these bytes, too few for a prefix, be the first of one?
+fn may_begin(bytes: &[u8]) -> bool {
+    let is_header = bytes.iter().zip(&HEADER).all(|(found, expected)| found == expected);
+    is_header && bytes.get(2).is_none_or(|&code| Function::from_code(code).is_some())
+}
+
+/// The frame with this prefix, of which `rest` is what stands behind it.
+#[inline(always)]
 fn body<'a, D: Direction>(
-    input: &'a [u8],
     rest: &'a [u8],
     (function, address, count): Prefix,
 ) -> IResult<&'a [u8], Frame<'a>, Defect> {
     let (rest, data) = take(D::data_length(function, count))(rest)?;
-    let covered = input.get(..PREFIX_LENGTH + data.len()).unwrap_or(input);
-    let (rest, crc) = le_u16(rest)?;
-    if crc != checksum(covered) {
+    let (rest, crc) = take(CRC_LENGTH)(rest)?;
+    let sum = crc_of_prefix((function, address, count));
+    let sum = if data.is_empty() { sum } else { sum.bytes(data) };
+    if crc != sum.finish().to_le_bytes() {
         return Err(nom::Err::Failure(Defect::WrongCrc));
     }
     if usize::from(address) + usize::from(count) > 256 {
@@ -144,44 +165,33 @@ fn body<'a, D: Direction>(
 /// `Incomplete` while bytes are missing; otherwise the [`Defect`].
 pub fn parse<D: Direction>(input: &[u8]) -> IResult<&[u8], Frame<'_>, Defect> {
     let (rest, prefix) = prefix(input)?;
-    body::<D>(input, rest, prefix)
-}
-
-impl<'a> Frame<'a> {
-    /// Takes apart bytes that were judged to be a whole frame, without checking them again.
-    pub(super) const fn of_judged(bytes: &'a [u8]) -> Option<Self> {
-        let [_, _, code, address, count, data @ .., _, _] = bytes else { return None };
-        match Function::from_code(*code) {
-            Some(function) => Some(Self { function, address: *address, count: *count, data }),
-            None => None,
-        }
-    }
+    body::<D>(rest, prefix)
 }
 
 /// What the beginning of a stretch of bytes is, and how long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Verdict {
+pub(super) enum Verdict<'a> {
     /// A frame of this many bytes.
-    Whole(usize),
+    Whole(Frame<'a>, usize),
     /// Not a frame, though as long as this many bytes; 1 where not even the header is right.
     Defective(Defect, usize),
-    /// The beginning of a frame; it takes at least this many bytes to say more.
+    /// The beginning of a frame, which takes at least this many bytes.
     Unfinished(usize),
 }
 
 /// Judges the beginning of `input`.
-pub(super) fn judge<D: Direction>(input: &[u8]) -> Verdict {
+#[inline(never)]
+pub(super) fn judge<D: Direction>(input: &[u8]) -> Verdict<'_> {
     let (claimed, parsed) = match prefix(input) {
         Err(error) => (1, Err(error)),
         Ok((rest, prefix)) => {
             let claimed = PREFIX_LENGTH + D::data_length(prefix.0, prefix.2) + CRC_LENGTH;
-            (claimed, body::<D>(input, rest, prefix))
+            (claimed, body::<D>(rest, prefix))
         }
     };
     match parsed {
-        Ok(_) => Verdict::Whole(claimed),
-        Err(nom::Err::Incomplete(Needed::Size(more))) => Verdict::Unfinished(input.len() + more.get()),
-        Err(nom::Err::Incomplete(Needed::Unknown)) => Verdict::Unfinished(input.len() + 1),
+        Ok((_, frame)) => Verdict::Whole(frame, claimed),
+        Err(nom::Err::Incomplete(_)) => Verdict::Unfinished(claimed.max(MIN_LENGTH)),
         Err(nom::Err::Error(defect) | nom::Err::Failure(defect)) => Verdict::Defective(defect, claimed),
     }
 }
@@ -191,10 +201,23 @@ pub(super) fn judge<D: Direction>(input: &[u8]) -> Verdict {
 /// `data` is at most 255 bytes long; what is beyond that is cut off, and no caller in this project has it.
 pub fn encode(buffer: &mut FrameBuffer, function: Function, address: u8, count: u8, data: &[u8]) {
     buffer.clear();
-    let prefix = [HEADER[0], HEADER[1], function as u8, address, count];
     // The buffer holds the longest frame, so nothing here can fail.
-    let _ = buffer.extend_from_slice(&prefix);
-    let _ = buffer.extend_from_slice(data.get(..255).unwrap_or(data));
-    let crc = checksum(buffer).to_le_bytes();
-    let _ = buffer.extend_from_slice(&crc);
+    let _ = buffer.extend_from_slice(&[HEADER[0], HEADER[1], function as u8, address]);
+    let _ = buffer.push(count);
+    // Copied and summed up at once: a call that copies costs more than that.
+    let (words, rest) = data.get(..255).unwrap_or(data).as_chunks();
+    let crc = words.iter().fold(crc_of_prefix((function, address, count)), |crc, word| {
+        let _ = buffer.extend_from_slice(word);
+        crc.word(*word)
+    });
+    let (halves, rest) = rest.as_chunks();
+    let crc = halves.iter().fold(crc, |crc, half| {
+        let _ = buffer.extend_from_slice(half);
+        crc.half(*half)
+    });
+    let crc = rest.iter().fold(crc, |crc, &byte| {
+        let _ = buffer.push(byte);
+        crc.byte(byte)
+    });
+    let _ = buffer.extend_from_slice(&crc.finish().to_le_bytes());
 }

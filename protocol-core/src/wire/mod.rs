@@ -16,6 +16,7 @@
 pub mod crc;
 pub mod deframer;
 pub mod frame;
+mod search;
 
 pub use deframer::Deframer;
 pub use frame::{Defect, Direction, Frame, FrameBuffer, Function, MAX_LENGTH, ToArm, ToHost};
