@@ -199,3 +199,23 @@ fn faults_that_the_shell_sees_are_shown_until_restart() {
     rig.run_ms(2_000);
     assert_eq!(rig.get(241), 1 << 5);
 }
+
+#[test]
+fn nothing_reaches_the_host_before_its_deadline() {
+    let mut rig = Rig::started();
+    let deadline = |rig: &Rig| rig.controller.host_deadline();
+    assert_eq!(deadline(&rig), Instant::FAR_FUTURE, "it only answers");
+    rig.send(&[0xAA, 0x77, 3]);
+    let silence = deadline(&rig).as_micros() - rig.now_us;
+    assert!((1..=2_000).contains(&silence), "half a frame is judged again after {silence} us");
+    rig.run_ms(200);
+    rig.write(53, &[10]);
+    for _ in 0..3 {
+        rig.forget();
+        let due = deadline(&rig).as_micros();
+        rig.run_us(due - rig.now_us - 1);
+        assert!(rig.to_host.is_empty(), "not before {due}");
+        rig.run_us(1);
+        assert_eq!(rig.to_host.len(), 1, "a report at {due}");
+    }
+}

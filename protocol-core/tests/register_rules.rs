@@ -3,6 +3,7 @@
 
 #![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
 
+use protocol_core::registers::map::find;
 use protocol_core::registers::{Access, MAP, Region, Register, RegisterFile};
 
 const LOCK: u8 = 28;
@@ -140,4 +141,15 @@ fn addresses_outside_the_table_read_zero_and_cannot_be_written() {
         write(&mut file, address, &[0xFF]).unwrap();
         assert_eq!(file.get(address), 0, "{address}");
     }
+}
+
+#[test]
+fn a_row_is_found_by_each_of_its_addresses() {
+    for address in 0..=255 {
+        let holding: Vec<_> = MAP.iter().filter(|row| row.holds(address)).collect();
+        assert_eq!(find(address), holding.first().copied(), "{address}");
+        assert!(holding.len() <= 1, "{address}");
+    }
+    assert_eq!(find(49).map(|row| row.name), Some("TARGET_POSITION"));
+    assert_eq!(find(100), None);
 }

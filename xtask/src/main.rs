@@ -67,7 +67,7 @@ enum Chore {
     },
     /// Count instructions in the emulator, and hold them against the budgets.
     Count(Accept),
-    /// Fail if the tests of the cores leave a line or a function out.
+    /// Show what the tests of the cores run through, and fail if it is less than it was.
     Coverage,
     /// Compare the parse-and-answer path with its peers: Modbus, postcard with COBS, MAVLink.
     Bench(bench::Options),

@@ -333,4 +333,9 @@ mod tests {
         bus.set_torque(at(0), &[Torque::Free; JOINTS]);
         assert_eq!(bus.frame()[5..9], [40, 1, 0, 0]);
     }
+
+    #[test]
+    fn a_cycle_in_milliseconds_is_a_cycle() {
+        assert_eq!(u64::from(cycle_in_millis()) * 1_000, CYCLE.as_micros());
+    }
 }

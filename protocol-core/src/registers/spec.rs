@@ -396,4 +396,28 @@ mod tests {
         assert_eq!(row.default_at(48), 3);
         assert_eq!(ram(46).of(Joint::ALL[6]), 46, "a row without joints has one address");
     }
+
+    #[test]
+    fn a_row_is_what_it_was_said_to_be() {
+        let row = rom(2).run(6).described("CHIP_ID", &["Which chip."]);
+        assert_eq!(
+            (row.region, row.access, row.count, row.name),
+            (Region::Rom, Access::ReadOnly, 6, "CHIP_ID")
+        );
+        let row = eeprom(13).each_joint().plus_minus(16).unit(Unit::Degree);
+        assert_eq!((row.region, row.access, row.count), (Region::Eeprom, Access::ReadWrite, 7));
+        assert_eq!((row.range, row.unit.symbol()), (Range::SignMagnitude(16), "°"));
+        assert_eq!(eeprom(8).reserved().access, Access::Reserved);
+        let row = ram(254).read_only().default(3);
+        assert_eq!((row.region, row.access, row.default_at(254)), (Region::Ram, Access::ReadOnly, 3));
+        assert_eq!(ram(46).each_joint().default(90).default_at(53), 0, "it does not hold this one");
+    }
+
+    #[test]
+    fn units_are_written_as_people_write_them() {
+        let symbols = [Unit::None, Unit::SpeedStep, Unit::Decisecond, Unit::Hertz].map(Unit::symbol);
+        assert_eq!(symbols, ["", "× 1.9 °/s", "× 100 ms", "Hz"]);
+        let symbols = [Unit::Decivolt, Unit::Celsius, Unit::VersionTenths].map(Unit::symbol);
+        assert_eq!(symbols, ["× 0.1 V", "°C", "× 0.1"]);
+    }
 }
