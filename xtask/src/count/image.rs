@@ -29,9 +29,10 @@ const SELDOM: usize = 8;
 /// How long the arm is watched while it moves: some forty control cycles.
 const WATCH: Duration = Duration::from_secs(4);
 /// How long the arm is left alone.
-const SILENCE: Duration = Duration::from_secs(2);
-/// Milliseconds after which an arm that is left alone does the same again: it asks missing servos ten times a second.
-const PATTERN: usize = 100;
+const SILENCE: Duration = Duration::from_secs(4);
+/// Milliseconds after which an arm that is left alone does the same again: it asks missing servos ten times a second,
+/// and its LED blinks twice.
+const PATTERN: usize = 500;
 /// Bytes of the frame that gives seven joints their goals. Nothing else that goes to the servos is as long.
 const GOALS: usize = 57;
 /// Bytes that the transmitter of a USART takes at once at most: one to shift out, one to wait.
@@ -196,7 +197,7 @@ impl Places {
         let per_byte_sent = (sends_eight - sends_one) / 7;
         Ok([
             Figure::new("image: interrupt that receives a byte", receives),
-            Figure::new("image: each byte that an interrupt sends", per_byte_sent),
+            Figure::new("image: interrupt that sends a byte", sends_one),
             Figure::new("image: worst interrupt", receives + TRANSMITTER_HOLDS * per_byte_sent),
         ])
     }
