@@ -258,9 +258,11 @@ impl Servos {
 
     pub(super) fn health(&self, joint: Joint) -> Health {
         let since = self.since[joint];
+        // Where damage passed for its answers, it did not look silent.
+        let silent = Health::Silent(since.max(self.deceived_until[joint]));
         match self.faults[joint] {
-            Some(Fault::Missing | Fault::Garbled(1)) => Health::Silent(since),
-            Some(Fault::Late(by)) if by >= self.too_late => Health::Silent(since),
+            Some(Fault::Missing | Fault::Garbled(1)) => silent,
+            Some(Fault::Late(by)) if by >= self.too_late => silent,
             Some(Fault::Late(by)) if by > self.in_time => Health::Unclear,
             Some(Fault::Garbled(_)) => Health::Unclear,
             _ => Health::Well(since.max(self.disturbed_at)),
