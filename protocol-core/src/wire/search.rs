@@ -127,8 +127,8 @@ impl Search {
         None
     }
 
-    #[inline(never)]
     /// Looks for whole frames behind the unfinished head, among the bytes before the silence.
+    #[inline(never)]
     fn next_behind<'a, D: Direction>(&mut self, bytes: &'a [u8]) -> Option<Found<'a>> {
         loop {
             let at = self.behind.max(self.head + 1);
