@@ -112,6 +112,9 @@ impl Shell<'_> {
                 Output::Vacuum(vacuum) => self.switch(vacuum),
                 Output::Save(image) => arm.set_storage(self.settings.save(image)),
                 Output::Wait(until) => {
+                    if self.host.take_overrun() {
+                        arm.raise_faults(fault_bit::RECEIVE_OVERRUN);
+                    }
                     self.watchdog.feed_if_due(&mut self.feeding);
                     self.show(now, &arm);
                     self.sleep(until);
@@ -122,25 +125,20 @@ impl Shell<'_> {
 
     fn receive(&mut self, now: Instant, arm: &mut Controller) {
         self.host.attend();
-        if self.host.has_received() {
-            let Ok(bytes) = self.host.fill_buf();
-            let taken = arm.host_bytes(now, bytes);
-            self.host.consume(taken);
-            if taken > 0 {
-                self.feeding.host_link_ran();
-            }
-        } else {
-            arm.host_bytes(now, &[]);
+        let bytes = self.host.received();
+        let taken = arm.host_bytes(now, bytes);
+        if taken > 0 || bytes.is_empty() {
             self.feeding.host_link_ran();
         }
-        while self.servos.has_received() {
-            let Ok(bytes) = self.servos.fill_buf();
+        self.host.consume(taken);
+        loop {
+            let bytes = self.servos.received();
             let count = bytes.len();
+            if count == 0 {
+                break;
+            }
             arm.servo_bytes(bytes);
             self.servos.consume(count);
-        }
-        if self.host.take_overrun() {
-            arm.raise_faults(fault_bit::RECEIVE_OVERRUN);
         }
     }
 
@@ -153,8 +151,7 @@ impl Shell<'_> {
     /// Steady light: all is well. Blinking: the status block has a fault to tell.
     fn show(&mut self, now: Instant, arm: &Controller) {
         let well = arm.registers().get(FAULTS.address) == 0;
-        let light = (now.as_micros() / BLINK_MICROS).is_multiple_of(2);
-        self.led.set(well || light);
+        self.led.set(well || (now.as_micros() / BLINK_MICROS).is_multiple_of(2));
     }
 
     /// Sleeps until an interrupt comes, the system timer's at the latest. With interrupts shut out, one that

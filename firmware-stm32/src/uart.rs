@@ -177,18 +177,22 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> End<U, RECEIVE, TRAN
         self.line.admit();
     }
 
-    fn refill(&mut self) {
+    /// The first of the bytes that wait to be read; none where none waits.
+    pub(crate) fn received(&mut self) -> &[u8] {
         let Self { line, chunk, taken } = self;
-        chunk.clear();
-        *taken = 0;
-        line.with(|state| {
-            while !chunk.is_full()
-                && let Some(byte) = state.received.dequeue()
-            {
-                // Cannot fail: there is room.
-                let _ = chunk.push(byte);
-            }
-        });
+        if *taken >= chunk.len() {
+            chunk.clear();
+            *taken = 0;
+            line.with(|state| {
+                while !chunk.is_full()
+                    && let Some(byte) = state.received.dequeue()
+                {
+                    // Cannot fail: there is room.
+                    let _ = chunk.push(byte);
+                }
+            });
+        }
+        chunk.get(*taken..).unwrap_or(&[])
     }
 
     fn wait(&self) {
@@ -212,10 +216,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> BufRead for End<U, R
         while !self.has_received() {
             self.wait();
         }
-        if self.taken >= self.chunk.len() {
-            self.refill();
-        }
-        Ok(self.chunk.get(self.taken..).unwrap_or(&[]))
+        Ok(self.received())
     }
 
     fn consume(&mut self, count: usize) {
@@ -240,14 +241,16 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> WriteReady for End<U
 
 impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Write for End<U, RECEIVE, TRANSMIT> {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
-        while !bytes.is_empty() && self.room() == 0 {
+        loop {
+            let count = self.line.with(|state| {
+                bytes.iter().take(CHUNK).take_while(|&&byte| state.to_send.enqueue(byte).is_ok()).count()
+            });
+            if count > 0 || bytes.is_empty() {
+                NVIC::pend(U::INTERRUPT);
+                return Ok(count);
+            }
             self.wait();
         }
-        let count = self.line.with(|state| {
-            bytes.iter().take(CHUNK).take_while(|&&byte| state.to_send.enqueue(byte).is_ok()).count()
-        });
-        NVIC::pend(U::INTERRUPT);
-        Ok(count)
     }
 
     /// As the trait has it, less its panic at a `write` that takes nothing.
