@@ -20,6 +20,7 @@ use protocol_core::registers::map::{
     FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED, STATUS_VERSION, TARGET_POSITION,
 };
 use protocol_core::request::{Reply, Request};
+use protocol_core::wire::frame::{CRC_LENGTH, PREFIX_LENGTH};
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost, deframer};
 use serialport::SerialPort;
 
@@ -92,6 +93,8 @@ pub struct Tally {
     strange: u64,
     damaged: u64,
     bytes: u64,
+    /// Bytes that waited anywhere at once, at most: of requests that were not answered yet, and of their answers.
+    most_waiting: (u64, u64),
     round_trips: RoundTrips,
     memory: Memory,
     elapsed: Duration,
@@ -118,6 +121,8 @@ impl Display for Tally {
         writeln!(out, "answers lost                {}", self.lost)?;
         writeln!(out, "frames nobody asked for     {}", self.strange)?;
         writeln!(out, "frames damaged              {}", self.damaged)?;
+        let (requests, answers) = self.most_waiting;
+        writeln!(out, "waiting at once, at most    {requests} bytes of requests, {answers} of answers")?;
         writeln!(out, "round trip                  {}", self.round_trips)?;
         write!(out, "memory of the other end     {}", self.memory)
     }
@@ -129,6 +134,8 @@ struct Awaited {
     address: u8,
     count: u8,
     since: Instant,
+    /// Bytes sent until then.
+    sent: u64,
 }
 
 struct Client {
@@ -138,6 +145,9 @@ struct Client {
     window: usize,
     under_way: VecDeque<Awaited>,
     requests: u64,
+    /// Bytes sent, and how many of them were answered.
+    sent: u64,
+    answered: u64,
     tally: Tally,
 }
 
@@ -176,6 +186,8 @@ impl Client {
             window: usize::try_from(options.window).unwrap_or(1),
             under_way: VecDeque::new(),
             requests: 0,
+            sent: 0,
+            answered: 0,
             tally: Tally::default(),
         })
     }
@@ -202,8 +214,10 @@ impl Client {
             _ => (TARGET_POSITION.address, 7),
         };
         self.send(&Request::Read { address, count })?;
-        self.under_way.push_back(Awaited { address, count, since: Instant::now() });
+        let (since, sent) = (Instant::now(), self.sent);
+        self.under_way.push_back(Awaited { address, count, since, sent });
         self.tally.reads += 1;
+        self.look_at_waiting();
         Ok(())
     }
 
@@ -225,6 +239,7 @@ impl Client {
     fn send(&mut self, request: &Request<'_>) -> Result<(), Failure> {
         let mut frame = FrameBuffer::new();
         request.encode(&mut frame);
+        self.sent += frame.len() as u64;
         let mut rest = frame.as_slice();
         while !rest.is_empty() {
             match self.port.write(rest) {
@@ -283,7 +298,17 @@ impl Client {
         self.tally.lost += place as u64;
         self.tally.answers += 1;
         let answered = self.under_way.drain(..=place).next_back();
-        answered.into_iter().for_each(|read| self.tally.round_trips.add(read.since.elapsed()));
+        let Some(read) = answered else { return };
+        self.answered = read.sent;
+        self.tally.round_trips.add(read.since.elapsed());
+    }
+
+    /// More than this cannot be in any queue between here and the arm's registers.
+    fn look_at_waiting(&mut self) {
+        let answer = |read: &Awaited| (PREFIX_LENGTH + usize::from(read.count) + CRC_LENGTH) as u64;
+        let waiting = (self.sent - self.answered, self.under_way.iter().map(answer).sum());
+        let most = &mut self.tally.most_waiting;
+        *most = (most.0.max(waiting.0), most.1.max(waiting.1));
     }
 
     fn give_up_on_lost(&mut self) {
