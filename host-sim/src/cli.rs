@@ -23,13 +23,13 @@ THE FIRST MINUTE
   In the source tree: cargo sim -- --link ./7bot, and cargo sevenbot --port ./7bot pose ...
 
   Any serial client can open the port; the baud rate it asks for does not matter. The first line on
-  standard output is 'ready <tty path>', as soon as it can be opened; with --arms there is one such line for
-  each arm, in their order. All else is on standard error.
+  standard output is 'ready <tty path>', as soon as it can be opened; with --arms there is one such
+  line for each arm, in their order. All else is on standard error.
 
 MANY ARMS
-  --arms N runs arms 1 to N in one process. Where an option names a file, each arm has its own, with its number
-  before the extension: --eeprom arm.bin keeps the settings of arm 2 in arm-2.bin. Chip ids count on from
-  --chip-id, faults befall all arms, and so do signals.
+  --arms N runs arms 1 to N in one process. Where an option names a file, each arm has its own, with
+  its number before the extension: --eeprom arm.bin keeps the settings of arm 2 in arm-2.bin. Chip
+  ids count on from --chip-id, faults befall all arms, and so do signals.
 
 SIGNALS
   SIGHUP            a power cycle: RAM registers are lost, settings are kept, the port stays

@@ -30,7 +30,7 @@ pub(crate) struct SetArgs {
     register: Span,
     /// One value per register, or one for all of them, in the units of the table.
     #[arg(required = true, value_name = "VALUE", allow_negative_numbers = true, value_parser = number)]
-    pub(crate) values: Vec<i16>,
+    pub(crate) values: Vec<i32>,
     /// The values are bytes as they go on the wire (0 to 255, or 0x00 to 0xFF), sent unchecked.
     #[arg(long)]
     raw: bool,
@@ -40,13 +40,13 @@ pub(crate) struct SetArgs {
 }
 
 /// A number in decimal or, after 0x, in hexadecimal digits.
-fn number(text: &str) -> Result<i16, String> {
+fn number(text: &str) -> Result<i32, String> {
     let hexadecimal = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
     let parsed = match hexadecimal {
-        Some(digits) => u8::from_str_radix(digits, 16).map(i16::from),
+        Some(digits) => u8::from_str_radix(digits, 16).map(i32::from),
         None => text.parse(),
     };
-    parsed.map_err(|_| "not a number that a register could hold".to_owned())
+    parsed.map_err(|_| "not a number".to_owned())
 }
 
 pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), Failure> {
@@ -85,7 +85,7 @@ fn remark(span: Span, args: &SetArgs, unchanged: &[Unchanged]) {
 }
 
 /// The bytes for a span: one value per register, or one for all.
-fn bytes(span: Span, values: &[i16], raw: bool) -> Result<Vec<u8>, Failure> {
+fn bytes(span: Span, values: &[i32], raw: bool) -> Result<Vec<u8>, Failure> {
     let registers = usize::from(span.count);
     let values = match values {
         [only] => vec![*only; registers],
@@ -101,17 +101,18 @@ fn bytes(span: Span, values: &[i16], raw: bool) -> Result<Vec<u8>, Failure> {
     pairs.map(|(address, value)| if raw { raw_byte(value) } else { byte(address, value) }).collect()
 }
 
-fn raw_byte(value: i16) -> Result<u8, Failure> {
+fn raw_byte(value: i32) -> Result<u8, Failure> {
     u8::try_from(value).map_err(|_| Failure::Usage(format!("{value} is no byte: 0 to 255")))
 }
 
 /// The byte for a number in the table's units. One out of range is not even sent: the maker's firmware
 /// would take it.
-fn byte(address: u8, value: i16) -> Result<u8, Failure> {
+fn byte(address: u8, value: i32) -> Result<u8, Failure> {
     let Some(row) = find(address) else { return raw_byte(value) };
-    row.range.encode(value).ok_or_else(|| {
+    i16::try_from(value).ok().and_then(|value| row.range.encode(value)).ok_or_else(|| {
         let (name, range) = (name_of_register(address), words::range(address));
-        Failure::Arm(format!("{value} is out of range: {name} takes {range}; nothing was written"))
+        let hint = if *row == BAUD_RATE { "; `sevenbot baud` takes bits per second" } else { "" };
+        Failure::Arm(format!("{value} is out of range: {name} takes {range}; nothing was written{hint}"))
     })
 }
 
