@@ -262,12 +262,11 @@ impl Client {
         };
         self.tally.bytes += count as u64;
         let mut rest = bytes.get(..count).unwrap_or(&[]);
-        let mut is_first = true;
-        // An empty push says that the line is silent.
-        while is_first || !rest.is_empty() {
+        // Silence is never told to the deframer: a busy machine may hold up the rest of an answer for longer than a
+        // sender may pause (D4), and that answer is not lost.
+        while !rest.is_empty() {
             let taken = self.deframer.push(self.now(), rest);
             rest = rest.get(taken..).unwrap_or(&[]);
-            is_first = false;
             self.take_frames();
         }
         Ok(())
