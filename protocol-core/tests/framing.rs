@@ -4,8 +4,13 @@
 
 mod stream;
 
+use nom::Parser;
+use nom::branch::alt;
+use nom::bytes::streaming::tag;
+use nom::sequence::preceded;
 use proptest::prelude::*;
 use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::frame::{Defect, parse};
 use protocol_core::wire::{Deframer, MAX_LENGTH, ToArm, ToHost, deframer};
 use stream::{Event, GAP_US, Model, Received, frame, receive};
 
@@ -74,6 +79,28 @@ fn d01_the_longest_frame_passes() {
     assert_eq!(longest.len(), 262);
     let received = receive::<ToArm>(&[Event::Bytes(longest.clone())], 7);
     assert_eq!(received, [Received::Frame(longest)]);
+}
+
+#[test]
+fn a_frame_is_parsed_without_a_stream_too() {
+    let bytes = [frame(6, 46, &[1, 2]), vec![9]].concat();
+    let (rest, parsed) = parse::<ToArm>(&bytes).unwrap();
+    assert_eq!((rest, parsed.address, parsed.data), ([9].as_slice(), 46, [1, 2].as_slice()));
+    assert!(matches!(parse::<ToArm>(&bytes[..8]), Err(nom::Err::Incomplete(_))));
+    assert_eq!(parse::<ToArm>(&bytes[1..]), Err(nom::Err::Error(Defect::NoFrame)));
+    let mut wrong = bytes.clone();
+    wrong[6] ^= 1;
+    assert_eq!(parse::<ToArm>(&wrong), Err(nom::Err::Failure(Defect::WrongCrc)));
+}
+
+#[test]
+fn what_a_parser_of_nom_does_not_find_is_no_frame() {
+    let bytes = frame(6, 46, &[1, 2]);
+    let mut behind_a_byte = preceded(tag([7].as_slice()), parse::<ToArm>);
+    assert_eq!(behind_a_byte.parse(&bytes), Err(nom::Err::Error(Defect::NoFrame)));
+    let mut either = alt((behind_a_byte, parse::<ToArm>));
+    assert!(either.parse(&bytes).is_ok());
+    assert_eq!(either.parse(&bytes[1..]), Err(nom::Err::Error(Defect::NoFrame)));
 }
 
 #[test]

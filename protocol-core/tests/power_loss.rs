@@ -194,6 +194,28 @@ fn spare_full_of_remains() -> World<512> {
     world
 }
 
+/// Home full to its last slot, its newest record in doubt, and the other sector not blank: there is no slot to make
+/// it firm in, so the other sector is erased first, and what is in doubt is moved there.
+#[test]
+fn what_is_in_doubt_and_finds_no_slot_is_moved() {
+    use Operation::{Erase, Program};
+    let mut world = World::<512>::new();
+    // As many as find room; the seal of the last one is cut.
+    let saves = 21;
+    let cut = |after| Cut { after, program: ProgramTear::Bytes(2), erase: EraseTear::All, seed: 1 };
+    let seal = world.operations(saves).len() - 1;
+    assert_eq!(world.cycle(saves, Some(cut(seal))), End::Cut);
+    let mut starts = 0;
+    while world.operations(0).starts_with(&[Program; 8]) {
+        assert_eq!(world.cycle(0, Some(cut(4))), End::Cut);
+        starts += 1;
+    }
+    assert_eq!(starts, 2, "each skips one of the four slots that are kept for starts, and fills one");
+    let moved = [[Erase, Program].as_slice(), &[Program; 8], &[Erase, Program]].concat();
+    assert_eq!(world.operations(0), moved);
+    world.settle();
+}
+
 #[test]
 fn a_spare_full_of_remains_is_not_trusted_after_an_erase_that_was_cut() {
     let world = spare_full_of_remains();
