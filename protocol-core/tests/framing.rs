@@ -76,7 +76,7 @@ proptest! {
 #[test]
 fn d01_the_longest_frame_passes() {
     let longest = frame(6, 1, &[0x55; 255]);
-    assert_eq!(longest.len(), 262);
+    assert_eq!((longest.len(), MAX_LENGTH), (262, 262));
     let received = receive::<ToArm>(&[Event::Bytes(longest.clone())], 7);
     assert_eq!(received, [Received::Frame(longest)]);
 }
@@ -91,6 +91,23 @@ fn a_frame_is_parsed_without_a_stream_too() {
     let mut wrong = bytes.clone();
     wrong[6] ^= 1;
     assert_eq!(parse::<ToArm>(&wrong), Err(nom::Err::Failure(Defect::WrongCrc)));
+}
+
+#[test]
+fn the_beginning_of_a_frame_is_told_from_what_is_none() {
+    let beginning = [0xAA, 0x77, 6, 46];
+    for length in 0..=beginning.len() {
+        let missing = nom::Needed::new(5 - length);
+        assert_eq!(
+            parse::<ToArm>(&beginning[..length]),
+            Err(nom::Err::Incomplete(missing)),
+            "{length} bytes"
+        );
+    }
+    for wrong in [[0xAB].as_slice(), &[0xAA, 0x78], &[0xAA, 0x77, 4], &[0xAA, 0x78, 6], &[0xAB, 0x77, 6, 46]]
+    {
+        assert_eq!(parse::<ToArm>(wrong), Err(nom::Err::Error(Defect::NoFrame)), "{wrong:?}");
+    }
 }
 
 #[test]
@@ -122,6 +139,34 @@ fn d02_a_range_may_end_at_255_and_not_behind() {
 fn d03_a_frame_inside_a_good_frame_is_data() {
     let outer = frame(6, 46, &frame(3, 54, &[]));
     assert_eq!(receive::<ToArm>(&[Event::Bytes(outer.clone())], 3), [Received::Frame(outer)]);
+}
+
+#[test]
+fn d03_a_frame_lends_its_end_to_the_next_one() {
+    let next = frame(3, 54, &[]);
+    // Checksums are unlike for unlike pairs of bytes: one of them makes it a header.
+    let pairs = (0..=u16::MAX).map(|pair| frame(6, 0, &pair.to_le_bytes()));
+    let ending_in_header = pairs.into_iter().find(|bytes| bytes.ends_with(&[0xAA, 0x77])).unwrap();
+    for (whole, lent) in [(ending_in_header, 2), (stream::frame_ending_in_aa(), 1)] {
+        let bytes = [&whole[..whole.len() - lent], &next].concat();
+        let expected = [Received::Frame(whole), Received::Frame(next.clone())];
+        assert_eq!(receive::<ToArm>(&[Event::Bytes(bytes.clone())], 1), expected, "{lent} lent");
+        let behind_a_head = [&[0xAA, 0x77, 6, 0x10, 0xFF], bytes.as_slice()].concat();
+        let events = [Event::Bytes(behind_a_head), Event::Silence(GAP_US)];
+        assert_eq!(receive::<ToArm>(&events, 99), expected, "{lent} lent, behind a head");
+    }
+}
+
+#[test]
+fn d05_a_stream_longer_than_the_buffer_loses_nothing_however_it_is_cut() {
+    let good = frame(3, 54, &[]);
+    let false_header = [0xAA, 0x77, 6, 0x10, 0xFF].to_vec();
+    let bytes = [false_header, good.repeat(100)].concat();
+    let frames = std::iter::repeat_n(Received::Frame(good), 100);
+    let expected: Vec<_> = std::iter::once(Received::WrongCrc).chain(frames).collect();
+    for piece in [1, 2, 7, 40, 262, 300] {
+        assert_eq!(receive::<ToArm>(&[Event::Bytes(bytes.clone())], piece), expected, "pieces of {piece}");
+    }
 }
 
 #[test]
