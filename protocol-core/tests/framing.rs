@@ -244,6 +244,22 @@ fn d05_silence_counts_even_while_nobody_pulls() {
 }
 
 #[test]
+fn d05_a_silence_during_a_search_behind_a_head_tells_nothing_twice() {
+    let at = |gaps| Instant::from_micros(gaps * GAP_US);
+    let frames = [frame(3, 54, &[]), frame(6, 46, &[1]), frame(6, 46, &[2])];
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    deframer.push(at(0), &[&[0xAA, 0x77, 6, 0x10, 0xFF], frames[0].as_slice(), &frames[1]].concat());
+    deframer.push(at(1), &[]);
+    let mut received: Vec<_> = stream::pull(&mut deframer).into_iter().collect();
+    deframer.push(at(1), &frames[2]);
+    for gaps in 2..4 {
+        deframer.push(at(gaps), &[]);
+        stream::drain(&mut deframer, &mut received);
+    }
+    assert_eq!(received, frames.map(Received::Frame));
+}
+
+#[test]
 fn d05_a_search_behind_a_head_goes_on_where_it_stopped() {
     let at = Instant::from_micros;
     let inner = [frame(3, 54, &[]), frame(6, 46, &[1]), frame(6, 46, &[2])];
