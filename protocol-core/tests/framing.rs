@@ -147,7 +147,9 @@ fn d03_a_frame_lends_its_end_to_the_next_one() {
     // Checksums are unlike for unlike pairs of bytes: one of them makes it a header.
     let pairs = (0..=u16::MAX).map(|pair| frame(6, 0, &pair.to_le_bytes()));
     let ending_in_header = pairs.into_iter().find(|bytes| bytes.ends_with(&[0xAA, 0x77])).unwrap();
-    for (whole, lent) in [(ending_in_header, 2), (stream::frame_ending_in_aa(), 1)] {
+    let mut shortest = (0..=255).map(|count| stream::raw_frame(3, 0, count, &[]));
+    let shortest = shortest.find(|bytes| bytes.ends_with(&[0xAA])).unwrap();
+    for (whole, lent) in [(ending_in_header, 2), (stream::frame_ending_in_aa(), 1), (shortest, 1)] {
         let bytes = [&whole[..whole.len() - lent], &next].concat();
         let expected = [Received::Frame(whole), Received::Frame(next.clone())];
         assert_eq!(receive::<ToArm>(&[Event::Bytes(bytes.clone())], 1), expected, "{lent} lent");
