@@ -227,6 +227,10 @@ fn the_deadline_says_when_silence_matters() {
     deframer.push(at(101_000), &[]);
     assert_eq!(deframer.pull(), None);
     assert_eq!(deframer.deadline(), None);
+    deframer.push(at(102_000), &frame(3, 54, &[]));
+    assert!(deframer.pull().is_some());
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.deadline(), None, "nothing of it is left");
 }
 
 #[test]
