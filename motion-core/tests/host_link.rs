@@ -4,8 +4,10 @@
 
 mod rig;
 
+use host_sim::servo::Fault;
 use motion_core::{Controller, Storage};
-use protocol_core::registers::Image;
+use protocol_core::registers::map::fault;
+use protocol_core::registers::{Image, Joint};
 use protocol_core::time::Instant;
 use rig::{Rig, STANDARD_POSE, config, frame, reply, write};
 
@@ -198,6 +200,17 @@ fn faults_that_the_shell_sees_are_shown_until_restart() {
     rig.controller.raise_faults(1 << 5);
     rig.run_ms(2_000);
     assert_eq!(rig.get(241), 1 << 5);
+}
+
+#[test]
+fn a_fault_that_two_can_see_is_shown_when_both_do() {
+    let mut rig = Rig::started();
+    rig.plant.set_fault(Joint::ALL[2], Some(Fault::Missing));
+    rig.run_ms(200);
+    rig.controller.set_storage(Storage::Broken);
+    assert_eq!(rig.get(241), fault::SERVO_BUS | fault::SETTINGS_STORAGE);
+    rig.controller.raise_faults(fault::SERVO_BUS | fault::SETTINGS_STORAGE);
+    assert_eq!(rig.get(241), fault::SERVO_BUS | fault::SETTINGS_STORAGE);
 }
 
 #[test]

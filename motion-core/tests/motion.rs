@@ -261,6 +261,25 @@ fn a_servo_that_falls_silent_is_flagged_and_the_others_go_on() {
 }
 
 #[test]
+fn a_joint_that_comes_back_while_a_hand_turns_it_gets_torque_only_at_rest() {
+    let mut rig = Rig::started();
+    rig.plant.set_fault(joint(3), Some(Fault::Missing));
+    rig.run_ms(200);
+    rig.plant.set_fault(joint(3), None);
+    rig.forget();
+    for step in 0..30 {
+        rig.hand(3, 400 + 10 * step);
+        rig.run_ms(10);
+    }
+    assert_eq!(rig.get(242), 0, "it is measured");
+    assert_eq!(rig.get(56), 64, "(690 - 141) * 180 / 850 = 116.3, reversed: 63.7");
+    assert!(rig.goals().all(|(_, goals)| goals.iter().all(|&(id, _)| id != 2)), "and not driven");
+    rig.run_ms(100);
+    assert!(rig.goals().flat_map(|(_, goals)| goals).all(|&(id, counts)| id != 2 || counts == 690));
+    assert_eq!(rig.torques().last(), Some([1; 7]));
+}
+
+#[test]
 fn an_answer_garbled_now_and_then_costs_an_error_and_not_the_joint() {
     let mut rig = Rig::started();
     rig.plant.set_fault(joint(5), Some(Fault::Garbled(4)));

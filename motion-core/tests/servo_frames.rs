@@ -105,6 +105,19 @@ fn golden_status() {
 }
 
 #[test]
+fn a_magnitude_past_its_field_is_cut_and_zero_has_no_sign() {
+    let bytes = |speed, load| {
+        let reading =
+            Reading { position_counts: 0, speed, load, voltage_decivolts: 0, temperature_celsius: 0 };
+        reading.to_bytes()[2..6].to_vec()
+    };
+    assert_eq!(bytes(0, 0), [0, 0, 0, 0]);
+    assert_eq!(bytes(i16::MIN, -1_024), [0xFF, 0xFF, 0x07, 0xFF]);
+    assert_eq!(bytes(i16::MAX, 1_024), [0x7F, 0xFF, 0x03, 0xFF]);
+    assert_eq!(bytes(-0x7FFF, i16::MIN), [0xFF, 0xFF, 0x07, 0xFF]);
+}
+
+#[test]
 fn a_failed_read_never_becomes_a_position() {
     assert_eq!(Reading::parse(&[]), None);
     assert_eq!(Reading::parse(&[1, 255, 0, 0, 0, 0, 74]), None, "too short");
@@ -145,6 +158,7 @@ fn what_does_not_fit_a_frame_is_left_out_whole() {
     assert_eq!(encoded(|buffer| write(buffer, 0, 0, &[7; 58])).len(), 7, "register only");
     assert_eq!(encoded(|buffer| status(buffer, 0, 0, &[7; 58])).len(), MAX_FRAME);
     assert_eq!(encoded(|buffer| sync_write(buffer, 0, (0..40).map(|id| (id, [7; 6])))).len(), 64);
+    assert_eq!(encoded(|buffer| sync_write(buffer, 0, (0..40).map(|id| (id, [7; 2])))).len(), 62, "18 items");
 }
 
 #[test]

@@ -86,6 +86,7 @@ mod tests {
         let late = Instant::from_micros(5) + Duration::from_millis(1);
         assert_eq!(late.as_micros(), 1_005);
         assert_eq!(Instant::ZERO - late, Duration::ZERO);
+        assert_eq!((late - Instant::ZERO).as_micros(), 1_005);
         assert_eq!(late - Instant::ZERO, Duration::from_micros(1_005));
         assert_eq!(Instant::FAR_FUTURE + Duration::from_millis(1), Instant::FAR_FUTURE);
     }

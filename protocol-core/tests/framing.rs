@@ -4,8 +4,13 @@
 
 mod stream;
 
+use nom::Parser;
+use nom::branch::alt;
+use nom::bytes::streaming::tag;
+use nom::sequence::preceded;
 use proptest::prelude::*;
 use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::frame::{Defect, parse};
 use protocol_core::wire::{Deframer, MAX_LENGTH, ToArm, ToHost, deframer};
 use stream::{Event, GAP_US, Model, Received, frame, receive};
 
@@ -71,9 +76,48 @@ proptest! {
 #[test]
 fn d01_the_longest_frame_passes() {
     let longest = frame(6, 1, &[0x55; 255]);
-    assert_eq!(longest.len(), 262);
+    assert_eq!((longest.len(), MAX_LENGTH), (262, 262));
     let received = receive::<ToArm>(&[Event::Bytes(longest.clone())], 7);
     assert_eq!(received, [Received::Frame(longest)]);
+}
+
+#[test]
+fn a_frame_is_parsed_without_a_stream_too() {
+    let bytes = [frame(6, 46, &[1, 2]), vec![9]].concat();
+    let (rest, parsed) = parse::<ToArm>(&bytes).unwrap();
+    assert_eq!((rest, parsed.address, parsed.data), ([9].as_slice(), 46, [1, 2].as_slice()));
+    assert!(matches!(parse::<ToArm>(&bytes[..8]), Err(nom::Err::Incomplete(_))));
+    assert_eq!(parse::<ToArm>(&bytes[1..]), Err(nom::Err::Error(Defect::NoFrame)));
+    let mut wrong = bytes.clone();
+    wrong[6] ^= 1;
+    assert_eq!(parse::<ToArm>(&wrong), Err(nom::Err::Failure(Defect::WrongCrc)));
+}
+
+#[test]
+fn the_beginning_of_a_frame_is_told_from_what_is_none() {
+    let beginning = [0xAA, 0x77, 6, 46];
+    for length in 0..=beginning.len() {
+        let missing = nom::Needed::new(5 - length);
+        assert_eq!(
+            parse::<ToArm>(&beginning[..length]),
+            Err(nom::Err::Incomplete(missing)),
+            "{length} bytes"
+        );
+    }
+    for wrong in [[0xAB].as_slice(), &[0xAA, 0x78], &[0xAA, 0x77, 4], &[0xAA, 0x78, 6], &[0xAB, 0x77, 6, 46]]
+    {
+        assert_eq!(parse::<ToArm>(wrong), Err(nom::Err::Error(Defect::NoFrame)), "{wrong:?}");
+    }
+}
+
+#[test]
+fn what_a_parser_of_nom_does_not_find_is_no_frame() {
+    let bytes = frame(6, 46, &[1, 2]);
+    let mut behind_a_byte = preceded(tag([7].as_slice()), parse::<ToArm>);
+    assert_eq!(behind_a_byte.parse(&bytes), Err(nom::Err::Error(Defect::NoFrame)));
+    let mut either = alt((behind_a_byte, parse::<ToArm>));
+    assert!(either.parse(&bytes).is_ok());
+    assert_eq!(either.parse(&bytes[1..]), Err(nom::Err::Error(Defect::NoFrame)));
 }
 
 #[test]
@@ -95,6 +139,36 @@ fn d02_a_range_may_end_at_255_and_not_behind() {
 fn d03_a_frame_inside_a_good_frame_is_data() {
     let outer = frame(6, 46, &frame(3, 54, &[]));
     assert_eq!(receive::<ToArm>(&[Event::Bytes(outer.clone())], 3), [Received::Frame(outer)]);
+}
+
+#[test]
+fn d03_a_frame_lends_its_end_to_the_next_one() {
+    let next = frame(3, 54, &[]);
+    // Checksums are unlike for unlike pairs of bytes: one of them makes it a header.
+    let pairs = (0..=u16::MAX).map(|pair| frame(6, 0, &pair.to_le_bytes()));
+    let ending_in_header = pairs.into_iter().find(|bytes| bytes.ends_with(&[0xAA, 0x77])).unwrap();
+    let mut shortest = (0..=255).map(|count| stream::raw_frame(3, 0, count, &[]));
+    let shortest = shortest.find(|bytes| bytes.ends_with(&[0xAA])).unwrap();
+    for (whole, lent) in [(ending_in_header, 2), (stream::frame_ending_in_aa(), 1), (shortest, 1)] {
+        let bytes = [&whole[..whole.len() - lent], &next].concat();
+        let expected = [Received::Frame(whole), Received::Frame(next.clone())];
+        assert_eq!(receive::<ToArm>(&[Event::Bytes(bytes.clone())], 1), expected, "{lent} lent");
+        let behind_a_head = [&[0xAA, 0x77, 6, 0x10, 0xFF], bytes.as_slice()].concat();
+        let events = [Event::Bytes(behind_a_head), Event::Silence(GAP_US)];
+        assert_eq!(receive::<ToArm>(&events, 99), expected, "{lent} lent, behind a head");
+    }
+}
+
+#[test]
+fn d05_a_stream_longer_than_the_buffer_loses_nothing_however_it_is_cut() {
+    let good = frame(3, 54, &[]);
+    let false_header = [0xAA, 0x77, 6, 0x10, 0xFF].to_vec();
+    let bytes = [false_header, good.repeat(100)].concat();
+    let frames = std::iter::repeat_n(Received::Frame(good), 100);
+    let expected: Vec<_> = std::iter::once(Received::WrongCrc).chain(frames).collect();
+    for piece in [1, 2, 7, 40, 262, 300] {
+        assert_eq!(receive::<ToArm>(&[Event::Bytes(bytes.clone())], piece), expected, "pieces of {piece}");
+    }
 }
 
 #[test]
@@ -153,6 +227,10 @@ fn the_deadline_says_when_silence_matters() {
     deframer.push(at(101_000), &[]);
     assert_eq!(deframer.pull(), None);
     assert_eq!(deframer.deadline(), None);
+    deframer.push(at(102_000), &frame(3, 54, &[]));
+    assert!(deframer.pull().is_some());
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.deadline(), None, "nothing of it is left");
 }
 
 #[test]
@@ -169,6 +247,22 @@ fn d05_silence_counts_even_while_nobody_pulls() {
     assert_eq!(deframer.pull(), None);
     assert_eq!(deframer.push(at(LONG_SILENCE_US), &good), good.len(), "what came before is done with");
     assert!(matches!(deframer.pull(), Some(Ok(_))));
+}
+
+#[test]
+fn d05_a_silence_during_a_search_behind_a_head_tells_nothing_twice() {
+    let at = |gaps| Instant::from_micros(gaps * GAP_US);
+    let frames = [frame(3, 54, &[]), frame(6, 46, &[1]), frame(6, 46, &[2])];
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    deframer.push(at(0), &[&[0xAA, 0x77, 6, 0x10, 0xFF], frames[0].as_slice(), &frames[1]].concat());
+    deframer.push(at(1), &[]);
+    let mut received: Vec<_> = stream::pull(&mut deframer).into_iter().collect();
+    deframer.push(at(1), &frames[2]);
+    for gaps in 2..4 {
+        deframer.push(at(gaps), &[]);
+        stream::drain(&mut deframer, &mut received);
+    }
+    assert_eq!(received, frames.map(Received::Frame));
 }
 
 #[test]

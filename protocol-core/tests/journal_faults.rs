@@ -74,7 +74,7 @@ fn a_flash_that_takes_nothing_is_broken_and_the_arm_goes_on() {
     // The emulator's reads 0 everywhere; one that is write protected may be blank.
     for bytes in [vec![0; 2 * REAL], vec![0xFF; 2 * REAL]] {
         let (mut journal, opened) = Journal::open(Flash::<REAL>::inert(&bytes));
-        assert_eq!((opened, journal.room()), (Opened::Broken(None), 0));
+        assert_eq!((opened, opened.image(), journal.room()), (Opened::Broken(None), None, 0));
         assert_eq!(journal.save(&image(1)), Err(SaveError::Broken));
         assert_eq!(journal.save(&image(2)), Err(SaveError::Broken));
         assert_eq!(Journal::open(journal.release()).1, opened);
@@ -96,6 +96,7 @@ fn a_write_protected_flash_gives_its_settings_and_takes_no_others() {
     flash.flip(101 * 256 + 70);
     let (journal, opened) = Journal::open(Flash::<REAL>::inert(flash.bytes()));
     assert_eq!((opened, journal.room()), (Opened::Broken(Some(newest)), 0));
+    assert_eq!(opened.image(), Some(&newest));
 }
 
 #[test]

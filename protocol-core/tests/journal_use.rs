@@ -117,6 +117,18 @@ fn what_is_in_doubt_is_appended_again_before_anything_is_erased() {
 }
 
 #[test]
+fn a_start_moves_to_the_spare_when_less_than_a_quarter_of_home_is_free() {
+    use Operation::{Erase, Program};
+    // 16 slots. The first says that there are no settings, one is skipped after a start, four are for starts.
+    for (saves, moves) in [(5, false), (6, true)] {
+        let mut world = World::<512>::new();
+        assert_eq!(world.cycle(saves, None), End::Quiet);
+        let moved = [[Program; 8].as_slice(), &[Erase, Program]].concat();
+        assert_eq!(world.operations(0), if moves { moved } else { vec![] }, "{saves} saves");
+    }
+}
+
+#[test]
 fn what_is_already_there_is_not_written_again() {
     let (mut journal, _) = Journal::open(Flash::<REAL>::new(2));
     journal.save(&image(1)).unwrap();

@@ -8,8 +8,9 @@
 
 mod journal_world;
 
-use flash_model::{Cut, EraseTear, Operation, ProgramTear, Random};
-use journal_world::{End, REAL, World, every_cut, report};
+use flash_model::{Cut, EraseTear, Flash, Operation, ProgramTear, Random};
+use journal_world::{End, REAL, World, cuts, every_cut, report};
+use protocol_core::journal::{Journal, Opened};
 
 fn is_long() -> bool {
     std::env::var_os("JOURNAL_LONG").is_some()
@@ -185,13 +186,80 @@ fn a_cut_erase_loses_nothing_whatever_it_leaves() {
 fn spare_full_of_remains() -> World<512> {
     let mut world = World::new();
     assert_eq!(world.cycle(9, None), End::Quiet);
-    let moves =
-        |world: &World<512>| world.operations(0).iter().take_while(|op| **op == Operation::Program).count();
-    while moves(&world) >= 8 {
-        let cut = Cut { after: 4, program: ProgramTear::Bytes(2), erase: EraseTear::All, seed: 1 };
-        assert_eq!(world.cycle(0, Some(cut)), End::Cut);
-    }
+    fill_spare_with_remains(&mut world);
     world
+}
+
+/// Cuts start after start while it moves to the spare, until it does not try any more.
+fn fill_spare_with_remains(world: &mut World<512>) {
+    while world.operations(0).starts_with(&[Operation::Program; 8]) {
+        assert_eq!(world.cycle(0, Some(torn_after(4))), End::Cut);
+    }
+}
+
+/// A cut that leaves half a word.
+fn torn_after(after: usize) -> Cut {
+    Cut { after, program: ProgramTear::Bytes(2), erase: EraseTear::All, seed: 1 }
+}
+
+#[test]
+fn a_mark_is_revoked_seven_times_each_with_a_word_of_its_own() {
+    use Operation::{Erase, Program};
+    let mut world = spare_full_of_remains();
+    for times in 1..=7 {
+        assert_eq!(world.operations(0)[..3], [Program, Erase, Program], "note, erase, mark");
+        assert_eq!(world.cycle(0, Some(torn_after(3 + 4))), End::Cut);
+        fill_spare_with_remains(&mut world);
+        let flash = world.flash.borrow();
+        let words = flash.bytes()[4..32].chunks(4).map(|word| word != [0xFF; 4]);
+        assert!(words.eq((1..=7).map(|word| word <= times)), "behind home's mark, {times} times");
+    }
+    assert_eq!(world.operations(0)[..2], [Erase, Program], "no place for one more");
+    world.settle();
+}
+
+#[test]
+fn a_first_start_that_was_cut_in_its_record_left_nothing_that_is_damaged() {
+    for (after, cut) in
+        (2..10).flat_map(|after| cuts(after, Operation::Program, 1).map(move |cut| (after, cut)))
+    {
+        let mut flash = Flash::<512>::new(2);
+        flash.cut_power(cut);
+        let mut flash = Journal::open(flash).0.release();
+        flash.power_up(1);
+        assert_eq!(Journal::open(flash).1, Opened::Fresh, "after {after}, {cut:?}");
+    }
+}
+
+#[test]
+fn a_record_with_remains_behind_it_is_appended_again() {
+    let mut world = World::<512>::new();
+    assert_eq!(world.cycle(1, None), End::Quiet);
+    assert_eq!(world.operations(0), []);
+    assert_eq!(world.cycle(1, Some(torn_after(4))), End::Cut);
+    assert_eq!(world.operations(0), [Operation::Program; 8]);
+    world.settle();
+}
+
+/// Home full to its last slot, its newest record in doubt, and the other sector not blank: there is no slot to make
+/// it firm in, so the other sector is erased first, and what is in doubt is moved there.
+#[test]
+fn what_is_in_doubt_and_finds_no_slot_is_moved() {
+    use Operation::{Erase, Program};
+    let mut world = World::<512>::new();
+    // As many as find room; the seal of the last one is cut.
+    let saves = 21;
+    let seal = world.operations(saves).len() - 1;
+    assert_eq!(world.cycle(saves, Some(torn_after(seal))), End::Cut);
+    let mut starts = 0;
+    while world.operations(0).starts_with(&[Program; 8]) {
+        assert_eq!(world.cycle(0, Some(torn_after(4))), End::Cut);
+        starts += 1;
+    }
+    assert_eq!(starts, 2, "each skips one of the four slots that are kept for starts, and fills one");
+    let moved = [[Erase, Program].as_slice(), &[Program; 8], &[Erase, Program]].concat();
+    assert_eq!(world.operations(0), moved);
+    world.settle();
 }
 
 #[test]

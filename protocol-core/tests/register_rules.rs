@@ -3,7 +3,7 @@
 
 #![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
 
-use protocol_core::registers::map::find;
+use protocol_core::registers::map::{baud_rate, fault, find};
 use protocol_core::registers::{Access, MAP, Region, Register, RegisterFile};
 
 const LOCK: u8 = 28;
@@ -152,4 +152,20 @@ fn a_row_is_found_by_each_of_its_addresses() {
     }
     assert_eq!(find(49).map(|row| row.name), Some("TARGET_POSITION"));
     assert_eq!(find(100), None);
+}
+
+#[test]
+fn codes_are_as_released() {
+    let faults = [
+        fault::SETTINGS_STORAGE,
+        fault::SERVO_BUS,
+        fault::WATCHDOG_RESTART,
+        fault::BROWN_OUT_RESTART,
+        fault::CRYSTAL_FAILED,
+        fault::RECEIVE_OVERRUN,
+    ];
+    assert_eq!(faults, [1, 2, 4, 8, 16, 32]);
+    let rates = [115_200, 250_000, 500_000, 1_000_000, 57_600, 38_400, 19_200, 9_600];
+    assert_eq!([0, 1, 2, 3, 4, 5, 6, 7].map(baud_rate), rates);
+    assert_eq!(baud_rate(8), 115_200, "no stored byte locks a user out (D19)");
 }

@@ -217,7 +217,7 @@ impl Decoder {
     pub fn push(&mut self, bytes: &[u8]) {
         let newest = bytes.get(bytes.len().saturating_sub(Self::CAPACITY)..).unwrap_or(bytes);
         let excess = (self.buffer.len() + newest.len()).saturating_sub(Self::CAPACITY);
-        if excess > 0 {
+        if excess != 0 {
             self.forget(excess.max(self.head));
         }
         // Cannot fail: there is room now.
@@ -263,7 +263,6 @@ fn judge(bytes: &[u8]) -> Verdict<'_> {
     match bytes {
         [] | [0xFF] | [0xFF, 0xFF] => Verdict::Unfinished,
         [0xFF, 0xFF, 0xFF, ..] => Verdict::NoFrame,
-        [0xFF, 0xFF, _] => Verdict::Unfinished,
         [0xFF, 0xFF, rest @ ..] => judge_body(rest),
         _ => Verdict::NoFrame,
     }
@@ -277,10 +276,9 @@ fn judge_body(body: &[u8]) -> Verdict<'_> {
         return Verdict::NoFrame;
     }
     match body.get(..2 + length) {
-        None => Verdict::Unfinished,
         Some([covered @ .., sum]) if checksum(covered) != *sum => Verdict::WrongChecksum,
         Some([id, _, code, params @ .., _]) => Verdict::Whole(Frame { id: *id, code: *code, params }),
-        Some(_) => Verdict::NoFrame,
+        _ => Verdict::Unfinished,
     }
 }
 

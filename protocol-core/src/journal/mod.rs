@@ -95,8 +95,9 @@ impl Opened {
     #[must_use]
     pub const fn image(&self) -> Option<&Image> {
         match self {
-            Self::Found(image) | Self::Broken(Some(image)) => Some(image),
-            Self::Fresh | Self::Damaged | Self::Broken(None) => None,
+            Self::Found(image) => Some(image),
+            Self::Broken(image) => image.as_ref(),
+            Self::Fresh | Self::Damaged => None,
         }
     }
 }

@@ -163,7 +163,7 @@ impl RegisterFile {
 }
 
 /// When a host's write has an effect on a register.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Gate {
     Never,
     Unlocked,
@@ -171,7 +171,7 @@ enum Gate {
 }
 
 /// What the chip has to know of a register to check a write.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Rule {
     gate: Gate,
     /// The bits of a value that count towards its magnitude.
@@ -294,6 +294,19 @@ mod tests {
         assert_eq!(file.read(TARGET_POSITION.address, 7), [90, 90, 65, 90, 90, 90, 80]);
         assert_eq!(file.read(240, 1), [1]);
         assert_eq!(file.read(61, 179), [0; 179]);
+    }
+
+    /// What the compiler unfolded is what comes out here and now, where it can be counted and broken.
+    #[test]
+    fn the_table_unfolds_to_rules_and_defaults() {
+        assert_eq!((writable_end(), eeprom_bounds()), (54, (8, 28)));
+        let rules = rules();
+        assert_eq!(rules.as_slice(), RULES.as_slice());
+        assert_eq!(defaults(), DEFAULTS);
+        let rule = |gate, mask, max| Rule { gate, mask, max };
+        assert_eq!(rules[..9], [Rule::CLOSED; 9], "ROM, and what the maker keeps free");
+        assert_eq!(rules[12..14], [rule(Gate::Unlocked, 0xFF, 7), rule(Gate::Unlocked, 0x7F, 16)]);
+        assert_eq!(rules[28..30], [rule(Gate::Always, 0xFF, 1), rule(Gate::Always, 0xFF, 2)]);
     }
 
     #[test]

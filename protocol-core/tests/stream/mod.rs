@@ -6,7 +6,7 @@
 use std::collections::HashSet;
 
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::{Defect, Deframer, Direction, Function};
+use protocol_core::wire::{Defect, Deframer, Direction, Function, MAX_LENGTH};
 
 pub const GAP_US: u64 = 2_000;
 const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
@@ -59,11 +59,13 @@ pub fn receive<D: Direction>(events: &[Event], piece: usize) -> Vec<Received> {
             }
             Event::Bytes(bytes) => {
                 for part in bytes.chunks(piece) {
-                    let mut rest = part;
+                    let (mut rest, mut refusals) = (part, 0);
                     while !rest.is_empty() {
                         let taken = deframer.push(Instant::from_micros(now), rest);
                         drain(&mut deframer, &mut received);
                         rest = &rest[taken..];
+                        refusals = if taken == 0 { refusals + 1 } else { 0 };
+                        assert!(refusals < 3, "nothing makes room any more");
                     }
                 }
             }
@@ -73,7 +75,9 @@ pub fn receive<D: Direction>(events: &[Event], piece: usize) -> Vec<Received> {
 }
 
 pub fn drain<D: Direction>(deframer: &mut Deframer<D>, received: &mut Vec<Received>) {
-    received.extend(std::iter::from_fn(|| pull(deframer)));
+    let before = received.len();
+    received.extend(std::iter::from_fn(|| pull(deframer)).take(MAX_LENGTH + 1));
+    assert!(received.len() - before <= MAX_LENGTH, "of what it holds, each byte begins one thing at most");
 }
 
 /// The next thing it says.
