@@ -124,7 +124,6 @@ impl Shell<'_> {
     }
 
     fn receive(&mut self, now: Instant, arm: &mut Controller) {
-        self.host.attend();
         let bytes = self.host.received();
         let taken = arm.host_bytes(now, bytes);
         if taken > 0 || bytes.is_empty() {

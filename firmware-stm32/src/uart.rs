@@ -172,11 +172,6 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> End<U, RECEIVE, TRAN
         self.line.with(|state| core::mem::take(&mut state.overrun))
     }
 
-    /// Gives the interrupt a turn, should it have been shut out for want of room.
-    pub(crate) fn attend(&self) {
-        self.line.admit();
-    }
-
     /// The first of the bytes that wait to be read; none where none waits.
     pub(crate) fn received(&mut self) -> &[u8] {
         let Self { line, chunk, taken } = self;
@@ -191,12 +186,14 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> End<U, RECEIVE, TRAN
                     let _ = chunk.push(byte);
                 }
             });
+            // There is room now, whatever there was before.
+            line.admit();
         }
         chunk.get(*taken..).unwrap_or(&[])
     }
 
     fn wait(&self) {
-        self.attend();
+        self.line.admit();
         cortex_m::asm::wfi();
     }
 }

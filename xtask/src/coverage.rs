@@ -6,8 +6,8 @@
 use crate::run::{Outcome, run};
 
 /// The tests of both cores, and the least they may cover, in percent. Left out are those that go the same ways
-/// millions of times, which takes minutes where each step is counted. The regions that are missing are arms that
-/// nothing leads to: without them the compiler would put a panic there.
+/// millions of times, which takes minutes where each step is counted. The regions that are missing are
+/// for the most part arms that nothing leads to: docs/reliability.md lists them.
 const RUN: &str = "llvm-cov --package protocol-core --package motion-core --summary-only \
                    --fail-under-lines 100 --fail-under-functions 100 --fail-under-regions 99 \
                    --ignore-filename-regex (host-sim|flash-model|tests)/ \

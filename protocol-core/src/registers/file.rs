@@ -207,7 +207,7 @@ impl Rule {
     }
 }
 
-// What follows runs in the compiler only: an index out of bounds there is a build error, not a panic.
+// What follows runs in the compiler, and in a test: an index out of bounds there is a build error, not a panic.
 
 const fn writable_end() -> usize {
     let mut end = 0;

@@ -302,7 +302,7 @@ impl Client {
         self.tally.round_trips.add(read.since.elapsed());
     }
 
-    /// More than this cannot be in any queue between here and the arm's registers.
+    /// But for reports, more than this cannot be in any queue between here and the arm's registers.
     fn look_at_waiting(&mut self) {
         let answer = |read: &Awaited| (PREFIX_LENGTH + usize::from(read.count) + CRC_LENGTH) as u64;
         let waiting = (self.sent - self.answered, self.under_way.iter().map(answer).sum());
