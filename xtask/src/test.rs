@@ -8,8 +8,8 @@ use crate::{count, decisions, deny, emulate, footprint, fuzz, no_panic, register
 /// A heading, and what is done under it.
 type Step = (&'static str, fn() -> Outcome);
 
-/// For each target: enough to see that it runs. The corpora are tried whole, with the tests.
-const FUZZ_SECONDS: u64 = 5;
+/// For each target. The corpora are tried whole, with the tests, where there is no fuzzer.
+const FUZZ_SECONDS: u64 = 60;
 
 /// What is done, in this order, until one fails. Tests come last: theirs is the last word.
 const STEPS: &[Step] = &[
