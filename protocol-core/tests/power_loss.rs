@@ -9,7 +9,7 @@
 mod journal_world;
 
 use flash_model::{Cut, EraseTear, Flash, Operation, ProgramTear, Random};
-use journal_world::{End, REAL, World, cuts, every_cut, report};
+use journal_world::{End, REAL, World, cuts, every_cut, image, report};
 use protocol_core::journal::{Journal, Opened};
 
 fn is_long() -> bool {
@@ -46,8 +46,16 @@ impl Tally {
 }
 
 /// Cuts every operation of power cycles with so many saves each, in every way, once.
-fn cut_everything_once<const SECTOR: usize>(cycles: impl IntoIterator<Item = usize>) -> Tally {
-    let (mut world, mut tally) = (World::<SECTOR>::new(), Tally::default());
+fn cut_everything_once<const SECTOR: usize>(cycles: impl IntoIterator<Item = usize>) {
+    let tally = cut_everything_once_in(World::<SECTOR>::new(), cycles);
+    tally.report(&format!("{SECTOR} B sectors, power cut at every step in 25 ways"));
+}
+
+fn cut_everything_once_in<const SECTOR: usize>(
+    mut world: World<SECTOR>,
+    cycles: impl IntoIterator<Item = usize>,
+) -> Tally {
+    let mut tally = Tally::default();
     for saves in cycles {
         let operations = world.operations(saves).len();
         // It takes long to get to the last operations of a cycle that fills the flash: only those.
@@ -57,7 +65,6 @@ fn cut_everything_once<const SECTOR: usize>(cycles: impl IntoIterator<Item = usi
         assert_eq!(world.cycle(saves, None), End::Quiet);
     }
     tally.updates = world.images;
-    tally.report(&format!("{SECTOR} B sectors, power cut at every step in 25 ways"));
     tally
 }
 
@@ -74,6 +81,21 @@ fn a_cut_at_every_step_of_a_thousand_updates_of_small_flashes() {
     cut_everything_once::<512>(cycles().take(240));
     cut_everything_once::<1_024>(cycles().take(240));
     cut_everything_once::<2_048>(cycles().take(240));
+}
+
+/// No flash lives long enough, but one that is damaged, or an image file with any content, may say so.
+#[test]
+fn the_first_generation_follows_the_last() {
+    const LAST: u32 = u32::MAX / 2;
+    for generation in LAST - 9..=LAST {
+        let world = World::<512>::holding(generation, image(9_999));
+        let tally = cut_everything_once_in(world, [0, 5, 12, 3, 0, 12, 12, 1]);
+        assert_eq!(tally.most_erases, 2);
+    }
+    for no_generation in [LAST + 1, u32::MAX] {
+        let world = World::<512>::holding(no_generation, image(9_999));
+        assert_eq!(Journal::open(world.flash.borrow().clone()).1, Opened::Damaged);
+    }
 }
 
 /// Cuts power cycles, then the next start and some saves, and so on: each at every operation in every way.

@@ -129,7 +129,7 @@ impl Tail {
         let slot = self.spare.take().ok_or(SaveError::Full)?;
         self.next = Place { sector: self.next.sector ^ 1, slot };
         self.generation = self.following;
-        self.following = self.following.wrapping_add(1);
+        self.following = slot::generation_after(self.following, 1);
         Ok(())
     }
 
@@ -202,8 +202,7 @@ impl<F: NorFlash> Journal<F> {
         let (Ok(first), Ok(second)) = (self.sectors.survey(0), self.sectors.survey(1)) else {
             return Opened::Broken(None);
         };
-        let later = first.generation() < second.generation();
-        let (home, other) = if later { (second, first) } else { (first, second) };
+        let (home, other) = if second.is_later_than(&first) { (second, first) } else { (first, second) };
         let (newest, done) = match home.newest {
             Some(newest) => (newest.image, self.resume(&home, &other, newest)),
             None => (NO_SETTINGS, self.begin()),
@@ -233,7 +232,7 @@ impl<F: NorFlash> Journal<F> {
     /// Goes on with a log: its newest record made firm, its other sector blank, and room for saves.
     fn resume(&mut self, home: &Survey, other: &Survey, newest: Record) -> Result<(), SaveError> {
         let next = Place { sector: home.sector, slot: home.end + 1 };
-        let following = newest.generation.wrapping_add(1).wrapping_add(home.revoked);
+        let following = slot::generation_after(newest.generation, 1 + home.revoked);
         let spare = Self::first_free(other, following);
         self.tail = Tail { next, generation: newest.generation, following, spare };
         if !newest.firm {
@@ -283,7 +282,7 @@ impl<F: NorFlash> Journal<F> {
         let is_right = other.mark == slot::mark(*following);
         let count = home.revoked + u32::from(is_right);
         if (1..=REVOCATIONS).contains(&count) {
-            *following = following.wrapping_add(u32::from(is_right));
+            *following = slot::generation_after(*following, is_right.into());
             let _ = self.sectors.revoke(home.sector, count, *following);
         }
     }

@@ -35,8 +35,10 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    pub(super) fn generation(&self) -> Option<u32> {
-        self.newest.map(|record| record.generation)
+    /// Does this sector hold the newer record?
+    pub(super) fn is_later_than(&self, other: &Self) -> bool {
+        let is_later = |mine: Record| other.newest.is_none_or(|theirs| mine.is_later_than(&theirs));
+        self.newest.is_some_and(is_later)
     }
 
     /// Was this sector found blank when it was marked for `generation`, and holds no record yet? It may hold

@@ -30,6 +30,15 @@ pub(super) const BLANK: Slot = [[0xFF; 4]; 8];
 const SEAL: Word = [0x5E, 0xA1, 0xC3, 0x96];
 const CHECK: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
+/// Generations follow each other in a circle: this one, then 0. A blank word is none of them. No flash lives
+/// to see it closed, but a flash that is damaged may say that it did.
+const LAST_GENERATION: u32 = u32::MAX / 2;
+
+/// The generation that is `steps` after another.
+pub(super) const fn generation_after(generation: u32, steps: u32) -> u32 {
+    generation.wrapping_add(steps) & LAST_GENERATION
+}
+
 /// The settings as they stand in one slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Record {
@@ -38,6 +47,14 @@ pub(super) struct Record {
     pub(super) image: Image,
     /// Sealed, and read without correction: it will read the same after any number of starts.
     pub(super) firm: bool,
+}
+
+impl Record {
+    /// Was this one written after the `other`, in another sector?
+    pub(super) fn is_later_than(&self, other: &Self) -> bool {
+        let steps = self.generation.wrapping_sub(other.generation) & LAST_GENERATION;
+        (1..=LAST_GENERATION / 2).contains(&steps)
+    }
 }
 
 /// The slot that holds `image`, sealed.
@@ -62,12 +79,13 @@ pub(super) fn decode(slot: &Slot) -> Option<Record> {
         return None;
     }
     let [generation, data @ ..] = covered;
+    let generation = u32::from_le_bytes(generation);
     // The CRC of a blank word and five zeros is blank, too: an erase that was cut twice can leave that.
-    if generation == BLANK[0] {
+    if generation > LAST_GENERATION {
         return None;
     }
     let image = Image(*data.as_flattened().first_chunk()?);
-    Some(Record { generation: u32::from_le_bytes(generation), image, firm: sealed && difference == 0 })
+    Some(Record { generation, image, firm: sealed && difference == 0 })
 }
 
 /// Puts right the one bit whose change makes this `difference` to the CRC; false where there is no such bit.

@@ -14,6 +14,8 @@ use flash_model::{Cut, EraseTear, Error, Flash, Operation, ProgramTear, Random};
 use protocol_core::journal::{Journal, Opened, SaveError};
 use protocol_core::registers::Image;
 
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
 /// The sectors of the reference board.
 pub const REAL: usize = 16_384;
 
@@ -93,8 +95,23 @@ impl<const SECTOR: usize> Drop for World<SECTOR> {
 impl<const SECTOR: usize> World<SECTOR> {
     #[must_use]
     pub fn new() -> Self {
-        let flash = RefCell::new(Flash::new(2));
-        Self { flash, possible: vec![None], images: 0, seed: 0, most: (0, 0), past: Vec::new() }
+        Self::of(Flash::new(2), None)
+    }
+
+    /// A flash that holds nothing but one record.
+    #[must_use]
+    pub fn holding(generation: u32, image: Image) -> Self {
+        let mut record = [generation.to_le_bytes().as_slice(), &image.0].concat();
+        record.extend(CRC.checksum(&record).to_le_bytes());
+        record.extend([0x5E, 0xA1, 0xC3, 0x96]);
+        let mut bytes = vec![0xFF; 2 * SECTOR];
+        bytes[32..64].copy_from_slice(&record);
+        Self::of(Flash::holding(&bytes), Some(image))
+    }
+
+    fn of(flash: Flash<SECTOR>, settings: Option<Image>) -> Self {
+        let (flash, possible) = (RefCell::new(flash), vec![settings]);
+        Self { flash, possible, images: 0, seed: 0, most: (0, 0), past: Vec::new() }
     }
 
     /// The settings, when there is no doubt.
