@@ -8,14 +8,14 @@ use super::map::{CHIP_ID, EEPROM_LOCK, MAP};
 use super::spec::{Access, Range, Region, Register};
 
 /// Address of the first EEPROM register.
-const EEPROM_START: usize = eeprom_bounds().0;
+const EEPROM_START: u8 = eeprom_bounds().0;
 /// Address behind the last EEPROM register.
-const EEPROM_END: usize = eeprom_bounds().1;
+const EEPROM_END: u8 = eeprom_bounds().1;
 /// Address behind the last register that a host can write.
 const WRITABLE_END: usize = writable_end();
 
 /// The rules of every address that can be written, unfolded from the table when it is compiled, so that
-/// the chip carries three bytes a register and none of the table's prose.
+/// the chip carries two bytes a register and none of the table's prose.
 static RULES: [Rule; WRITABLE_END] = rules();
 
 /// The EEPROM region, byte by byte: what has to survive a power cut.
@@ -25,7 +25,7 @@ pub struct Image(pub [u8; Image::LENGTH]);
 
 impl Image {
     /// Bytes of the EEPROM region.
-    pub const LENGTH: usize = EEPROM_END - EEPROM_START;
+    pub const LENGTH: usize = (EEPROM_END - EEPROM_START) as usize;
 }
 
 /// Why a write frame has no effect: one of its bytes is not a value of its register (D16).
@@ -41,9 +41,9 @@ pub struct OutOfRange {
 /// A write that was checked and may be applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Accepted<'a> {
-    address: u8,
+    /// The first register that is not closed to writes, if the write reaches one.
+    start: u8,
     values: &'a [u8],
-    unlocked: bool,
 }
 
 impl Accepted<'_> {
@@ -51,9 +51,8 @@ impl Accepted<'_> {
     /// it does not reach there or has no effect there (D15).
     #[must_use]
     pub fn value_at(&self, address: u8) -> Option<u8> {
-        let offset = address.checked_sub(self.address)?;
-        let value = self.values.get(usize::from(offset))?;
-        RULES.get(usize::from(address))?.takes_effect(self.unlocked).then_some(*value)
+        let value = self.values.get(usize::from(address.checked_sub(self.start)?))?;
+        RULES.get(usize::from(address))?.is_open().then_some(*value)
     }
 }
 
@@ -73,9 +72,9 @@ impl RegisterFile {
             file.set(address, byte);
         }
         let stored = stored.map_or([].as_slice(), |image| image.0.as_slice());
-        let slots = file.values.iter_mut().zip(&RULES).skip(EEPROM_START);
+        let slots = file.values.iter_mut().zip(&RULES).skip(EEPROM_START.into());
         for ((value, rule), &byte) in slots.zip(stored) {
-            if rule.takes_effect(true) && rule.allows(byte) {
+            if rule.is_open() && rule.allows(byte) {
                 *value = byte;
             }
         }
@@ -119,22 +118,22 @@ impl RegisterFile {
     /// # Errors
     /// The first byte that falls on a register which could be written now but does not take that value.
     pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, OutOfRange> {
-        let unlocked = self.get(EEPROM_LOCK.address) == 0;
-        let rules = RULES.get(usize::from(address)..).unwrap_or(&[]);
-        for ((rule, &value), at) in rules.iter().zip(values).zip(address..) {
-            if rule.takes_effect(unlocked) && !rule.allows(value) {
-                return Err(OutOfRange { address: at, value });
+        let is_locked = self.get(EEPROM_LOCK.address) != 0;
+        let start = address.max(if is_locked { EEPROM_END } else { EEPROM_START });
+        let values = values.get(usize::from(start - address)..).unwrap_or(&[]);
+        for ((rule, &value), address) in rules_from(start).iter().zip(values).zip(start..) {
+            if !rule.allows(value) {
+                return Err(OutOfRange { address, value });
             }
         }
-        Ok(Accepted { address, values, unlocked })
+        Ok(Accepted { start, values })
     }
 
     /// Carries out a write that was checked.
     pub fn apply(&mut self, accepted: &Accepted<'_>) {
-        let start = usize::from(accepted.address);
-        let slots = self.values.iter_mut().zip(&RULES).skip(start);
-        for ((slot, rule), &value) in slots.zip(accepted.values) {
-            if rule.takes_effect(accepted.unlocked) {
+        let slots = self.values.get_mut(usize::from(accepted.start)..).unwrap_or(&mut []);
+        for ((rule, slot), &value) in rules_from(accepted.start).iter().zip(slots).zip(accepted.values) {
+            if rule.is_open() {
                 *slot = value;
             }
         }
@@ -144,7 +143,7 @@ impl RegisterFile {
     #[must_use]
     pub fn image(&self) -> Image {
         let mut image = Image([0; Image::LENGTH]);
-        for (byte, &value) in image.0.iter_mut().zip(self.values.iter().skip(EEPROM_START)) {
+        for (byte, &value) in image.0.iter_mut().zip(self.values.iter().skip(EEPROM_START.into())) {
             *byte = value;
         }
         image
@@ -153,55 +152,40 @@ impl RegisterFile {
     /// The first register of the EEPROM region that this write would change, if any.
     #[must_use]
     pub fn first_changed_setting(&self, accepted: &Accepted<'_>) -> Option<u8> {
-        let start = usize::from(accepted.address);
-        let settings = self.values.iter().zip(&RULES).zip(0_u8..).take(EEPROM_END).skip(start);
-        let changed = settings
-            .zip(accepted.values)
-            .find(|(((now, rule), _), new)| accepted.unlocked && rule.gate == Gate::Unlocked && now != new);
-        changed.map(|((_, address), _)| address)
+        let is_change =
+            |address: &u8| accepted.value_at(*address).is_some_and(|new| new != self.get(*address));
+        (accepted.start..EEPROM_END).find(is_change)
     }
 }
 
-/// When a host's write has an effect on a register.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Gate {
-    Never,
-    Unlocked,
-    Always,
+fn rules_from(start: u8) -> &'static [Rule] {
+    RULES.get(usize::from(start)..).unwrap_or(&[])
 }
 
 /// What the chip has to know of a register to check a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Rule {
-    gate: Gate,
-    /// The bits of a value that count towards its magnitude.
+    /// The bits of a value that count towards its magnitude. Without any, a write has no effect.
     mask: u8,
     max: u8,
 }
 
 impl Rule {
-    const CLOSED: Self = Self { gate: Gate::Never, mask: 0xFF, max: 0xFF };
+    const CLOSED: Self = Self { mask: 0, max: 0 };
 
     const fn of(register: &Register) -> Self {
-        let gate = match (register.access, register.region) {
-            (Access::ReadWrite, Region::Eeprom) => Gate::Unlocked,
-            (Access::ReadWrite, Region::Ram) => Gate::Always,
-            _ => Gate::Never,
-        };
-        match register.range {
-            Range::UpTo(max) => Self { gate, mask: 0xFF, max },
-            Range::SignMagnitude(max) => Self { gate, mask: 0x7F, max },
+        match (register.access, register.range) {
+            (Access::ReadWrite, Range::UpTo(max)) => Self { mask: 0xFF, max },
+            (Access::ReadWrite, Range::SignMagnitude(max)) => Self { mask: 0x7F, max },
+            _ => Self::CLOSED,
         }
     }
 
-    const fn takes_effect(&self, unlocked: bool) -> bool {
-        match self.gate {
-            Gate::Never => false,
-            Gate::Unlocked => unlocked,
-            Gate::Always => true,
-        }
+    const fn is_open(&self) -> bool {
+        self.mask != 0
     }
 
+    /// Any value is allowed where it has no effect.
     const fn allows(&self, value: u8) -> bool {
         value & self.mask <= self.max
     }
@@ -221,15 +205,15 @@ const fn writable_end() -> usize {
     end
 }
 
-const fn eeprom_bounds() -> (usize, usize) {
-    let (mut start, mut end) = (256, 0);
+const fn eeprom_bounds() -> (u8, u8) {
+    let (mut start, mut end) = (0, 0);
     let mut rest = MAP;
     while let [row, tail @ ..] = rest {
         if matches!(row.region, Region::Eeprom) {
             if end == 0 {
-                start = row.address as usize;
+                start = row.address;
             }
-            end = row.address as usize + row.count as usize;
+            end = row.address + row.count;
         }
         rest = tail;
     }
@@ -303,17 +287,17 @@ mod tests {
         let rules = rules();
         assert_eq!(rules.as_slice(), RULES.as_slice());
         assert_eq!(defaults(), DEFAULTS);
-        let rule = |gate, mask, max| Rule { gate, mask, max };
+        let rule = |mask, max| Rule { mask, max };
         assert_eq!(rules[..9], [Rule::CLOSED; 9], "ROM, and what the maker keeps free");
-        assert_eq!(rules[12..14], [rule(Gate::Unlocked, 0xFF, 7), rule(Gate::Unlocked, 0x7F, 16)]);
-        assert_eq!(rules[28..30], [rule(Gate::Always, 0xFF, 1), rule(Gate::Always, 0xFF, 2)]);
+        assert_eq!(rules[12..14], [rule(0xFF, 7), rule(0x7F, 16)]);
+        assert_eq!(rules[28..30], [rule(0xFF, 1), rule(0xFF, 2)]);
     }
 
     #[test]
     fn stored_values_out_of_range_count_as_their_defaults() {
         let mut stored = Image([0xFF; Image::LENGTH]);
-        stored.0[usize::from(DEVICE_ID.address) - EEPROM_START] = 42;
-        stored.0[usize::from(OFFSET.address) - EEPROM_START] = 0x90;
+        stored.0[usize::from(DEVICE_ID.address) - usize::from(EEPROM_START)] = 42;
+        stored.0[usize::from(OFFSET.address) - usize::from(EEPROM_START)] = 0x90;
         let file = RegisterFile::new([0; 6], Some(&stored));
         assert_eq!(file.get(DEVICE_ID.address), 42);
         assert_eq!(file.get(BAUD_RATE.address), 0);
