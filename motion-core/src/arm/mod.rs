@@ -43,17 +43,10 @@ struct JointState {
     alarms: u8,
     /// In degrees Celsius; 0 while unknown.
     temperature: u8,
-    asked_this_cycle: bool,
 }
 
 impl JointState {
-    const NEW: Self = Self {
-        drive: Drive::RELEASED,
-        sensor: Sensor::UNKNOWN,
-        alarms: 0,
-        temperature: 0,
-        asked_this_cycle: false,
-    };
+    const NEW: Self = Self { drive: Drive::RELEASED, sensor: Sensor::UNKNOWN, alarms: 0, temperature: 0 };
 }
 
 /// The arm.
@@ -74,6 +67,8 @@ pub struct Arm {
     torque_due: bool,
     torque_refresh_in: u8,
     next_to_ask: Joint,
+    /// How many servos' turns to be asked have not come in this cycle.
+    left_to_ask: usize,
     storage: Storage,
     /// Fault bits that stay until the next restart.
     lasting_faults: u8,
@@ -97,6 +92,7 @@ impl Arm {
             torque_due: true,
             torque_refresh_in: TORQUE_REFRESH_CYCLES,
             next_to_ask: Joint::ALL[0],
+            left_to_ask: 0,
             storage,
             lasting_faults: config.faults,
             to_save: None,

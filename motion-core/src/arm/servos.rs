@@ -73,8 +73,8 @@ impl Arm {
     fn cycle(&mut self, now: Instant) {
         // One cycle may be made up for; more than that, and motion is late rather than fast.
         self.next_cycle = self.next_cycle.max(earlier(now, CYCLE)) + CYCLE;
+        self.left_to_ask = JOINTS;
         for (joint, state) in Joint::ALL.into_iter().zip(&mut self.joints) {
-            state.asked_this_cycle = false;
             if state.drive.is_engaged() {
                 state.drive.advance(self.registers.get(SPEED.of(joint)));
                 self.goals_due = true;
@@ -124,14 +124,14 @@ impl Arm {
         true
     }
 
-    /// Asks the next servo that was not asked in this cycle.
+    /// Asks the next servo whose turn has not come in this cycle.
     fn ask(&mut self, now: Instant) -> bool {
-        for _ in 0..JOINTS {
+        while self.left_to_ask > 0 {
+            self.left_to_ask -= 1;
             let joint = self.next_to_ask;
             self.next_to_ask = Joint::from_index(joint.index() + 1).unwrap_or(Joint::ALL[0]);
-            let Some(state) = self.joints.get_mut(usize::from(joint.index())) else { continue };
-            if !state.asked_this_cycle && state.sensor.wants_asking(now) {
-                state.asked_this_cycle = true;
+            let state = self.joints.get(usize::from(joint.index()));
+            if state.is_some_and(|state| state.sensor.wants_asking(now)) {
                 self.bus.ask(now, joint);
                 return true;
             }
