@@ -97,16 +97,27 @@ fn comes_true(flag: impl Fn() -> bool) -> bool {
 /// The time since start.
 pub(crate) struct Clock {
     timeline: Timeline,
+    ticker: SYST,
 }
 
 impl Clock {
-    /// Starts the count.
-    pub(crate) fn start(timer: &pac::TIM2, rates: Rates) -> Self {
+    /// Starts the count, and lets the system timer wake the core.
+    pub(crate) fn start(timer: &pac::TIM2, mut ticker: SYST, rates: Rates) -> Self {
         timer.psc().write(|w| w.psc().set(rates::microsecond_prescaler(rates.timer)));
         // The prescaler takes effect with an update, which also sets the count to 0.
         timer.egr().write(|w| w.ug().update());
         timer.cr1().write(|w| w.cen().enabled());
-        Self { timeline: Timeline::new() }
+        ticker.set_clock_source(SystClkSource::Core);
+        ticker.set_reload(rates.core / board::WAKE_HZ - 1);
+        ticker.clear_current();
+        ticker.enable_counter();
+        ticker.enable_interrupt();
+        Self { timeline: Timeline::new(), ticker }
+    }
+
+    /// Has the system timer ticked since the last look?
+    pub(crate) fn has_ticked(&mut self) -> bool {
+        self.ticker.has_wrapped()
     }
 
     /// What time it is.
@@ -119,15 +130,6 @@ impl Clock {
 pub(crate) fn micros() -> u32 {
     // SAFETY: reading the count of a timer changes nothing, whoever owns the timer.
     unsafe { pac::TIM2::steal() }.cnt().read().bits()
-}
-
-/// Lets the system timer wake the core.
-pub(crate) fn start_waking(timer: &mut SYST, rates: Rates) {
-    timer.set_clock_source(SystClkSource::Core);
-    timer.set_reload(rates.core / board::WAKE_HZ - 1);
-    timer.clear_current();
-    timer.enable_counter();
-    timer.enable_interrupt();
 }
 
 defmt::timestamp!("{=u32:us}", micros());

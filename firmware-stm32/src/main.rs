@@ -67,8 +67,7 @@ fn main() -> ! {
     let source = clock::start(&chip.RCC, &chip.FLASH, &chip.DBGMCU);
     let rates = source.rates();
     enable_peripherals(&chip.RCC);
-    let mut clock = Clock::start(&chip.TIM2, rates);
-    clock::start_waking(&mut core.SYST, rates);
+    let mut clock = Clock::start(&chip.TIM2, core.SYST, rates);
     // First of all the line on which the servos can be told to let go.
     let servos = servo_link::open(chip.USART2, rates, &mut core.NVIC);
     let watchdog = Watchdog::start(chip.IWDG, &chip.DBGMCU);
@@ -103,6 +102,19 @@ impl Shell<'_> {
         loop {
             let now = self.clock.now();
             self.receive(now, &mut arm);
+            let until = self.act(now, &mut arm);
+            if self.host.take_overrun() {
+                arm.raise_faults(fault_bit::RECEIVE_OVERRUN);
+            }
+            self.watchdog.feed_if_due(&mut self.feeding);
+            self.show(now, &arm);
+            self.sleep(until, arm.host_bytes_wanted());
+        }
+    }
+
+    /// Does all that is to be done at `now`, and says until when there is nothing more.
+    fn act(&mut self, now: Instant, arm: &mut Controller) -> Instant {
+        loop {
             match arm.poll(now, self.host.room()) {
                 Output::ToHost(bytes) => send(&mut self.host, bytes),
                 Output::ToServos(bytes) => {
@@ -111,14 +123,7 @@ impl Shell<'_> {
                 }
                 Output::Vacuum(vacuum) => self.switch(vacuum),
                 Output::Save(image) => arm.set_storage(self.settings.save(image)),
-                Output::Wait(until) => {
-                    if self.host.take_overrun() {
-                        arm.raise_faults(fault_bit::RECEIVE_OVERRUN);
-                    }
-                    self.watchdog.feed_if_due(&mut self.feeding);
-                    self.show(now, &arm);
-                    self.sleep(until);
-                }
+                Output::Wait(until) => return until,
             }
         }
     }
@@ -153,17 +158,28 @@ impl Shell<'_> {
         self.led.set(well || (now.as_micros() / BLINK_MICROS).is_multiple_of(2));
     }
 
-    /// Sleeps until an interrupt comes, the system timer's at the latest. With interrupts shut out, one that
-    /// comes between the look and the sleep ends the sleep.
-    fn sleep(&mut self, until: Instant) {
+    /// Sleeps until bytes come that make a difference, or the system timer ticks: an interrupt that brings less, or
+    /// sends, is not worth a turn of the loop. Of the bytes that are wanted, the last one finds the others taken in.
+    fn sleep(&mut self, until: Instant, wanted: usize) {
+        let enough = wanted.saturating_sub(1).max(1);
+        let _ = self.clock.has_ticked();
         if self.clock.now() >= until {
             return;
         }
-        critical_section::with(|_| {
-            if !(self.host.has_received() || self.servos.has_received()) {
-                cortex_m::asm::wfi();
+        loop {
+            // With interrupts shut out, one that comes between the look and the sleep ends the sleep.
+            let is_over = critical_section::with(|_| {
+                let is_over =
+                    self.clock.has_ticked() || self.servos.has_received() || self.host.waiting() >= enough;
+                if !is_over {
+                    cortex_m::asm::wfi();
+                }
+                is_over
+            });
+            if is_over {
+                return;
             }
-        });
+        }
     }
 }
 

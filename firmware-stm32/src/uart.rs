@@ -162,6 +162,11 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> End<U, RECEIVE, TRAN
         self.taken < self.chunk.len() || self.line.with(|state| !state.received.is_empty())
     }
 
+    /// How many bytes wait to be read.
+    pub(crate) fn waiting(&self) -> usize {
+        self.chunk.len() - self.taken + self.line.with(|state| state.received.len())
+    }
+
     /// How many bytes can be written at once.
     pub(crate) fn room(&self) -> usize {
         self.line.with(|state| state.to_send.capacity() - state.to_send.len())

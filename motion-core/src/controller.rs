@@ -85,6 +85,13 @@ impl Controller {
         self.deframer.push(now, bytes)
     }
 
+    /// How many bytes from the host may make a difference. With fewer, and nothing else to do, a shell may go on
+    /// sleeping for a while: silence on the line begins to count when the bytes are handed over.
+    #[must_use]
+    pub fn host_bytes_wanted(&self) -> usize {
+        self.deframer.wanted()
+    }
+
     /// Takes bytes from the servo bus, all of them.
     pub fn servo_bytes(&mut self, bytes: &[u8]) {
         self.arm.bus.bytes(bytes);

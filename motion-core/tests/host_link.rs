@@ -218,7 +218,9 @@ fn nothing_reaches_the_host_before_its_deadline() {
     let mut rig = Rig::started();
     let deadline = |rig: &Rig| rig.controller.host_deadline();
     assert_eq!(deadline(&rig), Instant::FAR_FUTURE, "it only answers");
+    assert_eq!(rig.controller.host_bytes_wanted(), 7, "the shortest request");
     rig.send(&[0xAA, 0x77, 3]);
+    assert_eq!(rig.controller.host_bytes_wanted(), 4);
     let silence = deadline(&rig).as_micros() - rig.now_us;
     assert!((1..=2_000).contains(&silence), "half a frame is judged again after {silence} us");
     rig.run_ms(200);

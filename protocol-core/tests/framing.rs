@@ -43,6 +43,10 @@ fn stretch() -> impl Strategy<Value = Vec<u8>> {
     ]
 }
 
+fn stretches() -> impl Strategy<Value = Vec<u8>> {
+    proptest::collection::vec(stretch(), 1..24).prop_map(|stretches| stretches.concat())
+}
+
 fn events() -> impl Strategy<Value = Vec<Event>> {
     let silence = prop_oneof![Just(500), Just(GAP_US), Just(20_000), Just(LONG_SILENCE_US)];
     let event = prop_oneof![3 => stretch().prop_map(Event::Bytes), 1 => silence.prop_map(Event::Silence)];
@@ -63,6 +67,18 @@ proptest! {
     fn d03_any_cutting_of_a_stream_gives_the_same_frames(events in events(), piece in 1_usize..40) {
         prop_assert_eq!(receive::<ToArm>(&events, piece), receive::<ToArm>(&events, MAX_LENGTH));
         prop_assert_eq!(receive::<ToHost>(&events, piece), receive::<ToHost>(&events, MAX_LENGTH));
+    }
+
+    #[test]
+    fn nothing_comes_out_before_as_many_bytes_came_as_were_wanted(bytes in stretches()) {
+        let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+        for byte in bytes {
+            let wanted = deframer.wanted();
+            prop_assert!((1..=MAX_LENGTH).contains(&wanted));
+            deframer.push(Instant::ZERO, &[byte]);
+            prop_assert!(deframer.pull().is_none() || wanted == 1);
+            while deframer.pull().is_some() {}
+        }
     }
 
     #[test]
@@ -231,6 +247,22 @@ fn the_deadline_says_when_silence_matters() {
     assert!(deframer.pull().is_some());
     assert_eq!(deframer.pull(), None);
     assert_eq!(deframer.deadline(), None, "nothing of it is left");
+}
+
+#[test]
+fn what_is_wanted_is_the_rest_of_the_frame() {
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    let bytes = [frame(3, 54, &[]), frame(6, 46, &[90; 7])].concat();
+    let mut wanted = Vec::new();
+    for byte in bytes {
+        wanted.push(deframer.wanted());
+        deframer.push(Instant::ZERO, &[byte]);
+        let _ = deframer.pull();
+    }
+    assert_eq!(wanted, [7, 6, 5, 4, 3, 2, 1, 7, 6, 5, 4, 3, 2, 1, 7, 6, 5, 4, 3, 2, 1]);
+    deframer.push(Instant::from_micros(0), &[0xAA]);
+    deframer.push(Instant::from_micros(LONG_SILENCE_US), &[]);
+    assert_eq!(deframer.wanted(), 0, "silence is news by itself");
 }
 
 #[test]

@@ -116,6 +116,12 @@ impl<D: Direction> Deframer<D> {
         }
     }
 
+    /// How many more bytes have to come before there is anything new to pull, unless the line falls silent.
+    #[must_use]
+    pub fn wanted(&self) -> usize {
+        self.search.wanted().saturating_sub(self.buffer.len())
+    }
+
     fn note_silence(&mut self, now: Instant) {
         let silence = now - self.last_byte;
         if silence >= self.gap {

@@ -34,6 +34,11 @@ impl Search {
         self.head
     }
 
+    /// How many bytes there have to be before anything new can be said.
+    pub(super) const fn wanted(&self) -> usize {
+        self.wanted
+    }
+
     /// Is there a long silence that nobody has looked behind yet?
     pub(super) const fn is_cut(&self) -> bool {
         self.head < self.cut

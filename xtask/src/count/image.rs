@@ -55,13 +55,17 @@ pub(crate) fn figures() -> Outcome<Vec<Figure>> {
     let silence = places.silence()?;
     let mut machine = Machine::with_servos()?;
     let write = Request::Write { address: TARGET_POSITION.address, values: &POSE };
-    let read = places.paths(&mut machine, READ, |event| *event == Event::Wrote(HOST_DATA))?;
-    let write = places.paths(&mut machine, write, |event| places.is_sleep(event))?;
+    let bytes = |request, watched| move |machine: &mut _| feed(machine, request, watched);
+    let read =
+        places.paths(&mut machine, bytes(READ, Byte::Last), |event| *event == Event::Wrote(HOST_DATA))?;
+    let write = places.paths(&mut machine, bytes(write, Byte::Last), |event| places.is_sleep(event))?;
+    let first = places.paths(&mut machine, bytes(READ, Byte::First), |event| places.is_sleep(event))?;
     let moving = while_moving(&mut machine)?;
     let mut figures = vec![
         Figure::new("image: 10 ms with nobody on its lines", silence),
         Figure::new("image: read of 7, last byte in to first byte out", read),
         Figure::new("image: write of 7, last byte in to asleep again", write),
+        Figure::new("image: byte that is not worth a turn of the loop, in to asleep again", first),
     ];
     figures.extend(places.turns(&moving)?);
     figures.extend(places.interrupts(&moving)?);
@@ -114,17 +118,17 @@ impl Places {
         Ok(most.unwrap_or(0))
     }
 
-    /// Instructions from the interrupt that brings the last byte of a request until `end`. The arm sleeps when that
+    /// Instructions from the interrupt that brings the byte which is watched until `end`. The arm sleeps when that
     /// byte comes, and nothing else comes in between.
     fn paths(
         &self,
         machine: &mut Machine,
-        request: Request<'_>,
+        bring: impl Fn(&mut Machine) -> Outcome<Vec<Event>>,
         end: impl Fn(&Event) -> bool,
     ) -> Outcome<u64> {
         let mut paths = Vec::new();
         for _ in 0..TRIES {
-            let events = last_byte(machine, request)?;
+            let events = bring(machine)?;
             paths.extend(self.path(&events, &end));
             if paths.len() >= SAMPLES {
                 break;
@@ -147,14 +151,16 @@ impl Places {
         (was_asleep && !is_disturbed).then(|| trace::steps(path))
     }
 
-    /// Does the loop sleep after this? The look that comes before the sleep shuts interrupts out, so it may be some
-    /// instructions further, letting them in again. Where the log says nothing of the loop, it slept all along.
+    /// Does the loop sleep after this, and has nothing come yet that would wake it? The look that comes before the
+    /// sleep shuts interrupts out, so it may be some instructions further, letting them in again. Where the log says
+    /// nothing, it slept all along.
     fn is_asleep_after(&self, events: &[Event]) -> bool {
         let last = events.iter().rev().find_map(|event| match event {
-            Event::Step { at, in_handler: false } => Some(*at),
+            Event::Step { at, in_handler } => Some((*at, *in_handler)),
             _ => None,
         });
-        last.is_none_or(|at| self.sleeps.iter().any(|&sleep| (sleep..=sleep + 8).contains(&at)))
+        let is_sleep = |at| self.sleeps.iter().any(|&sleep| (sleep..=sleep + 8).contains(&at));
+        last.is_none_or(|(at, in_handler)| !in_handler && is_sleep(at))
     }
 
     /// Turns of the loop from waking to sleeping, in which nothing was received.
@@ -201,19 +207,29 @@ impl Places {
     }
 }
 
-/// Sends a request so that the arm is asleep when its last byte comes, and gives what it executes from then on.
-fn last_byte(machine: &mut Machine, request: Request<'_>) -> Outcome<Vec<Event>> {
+/// Which byte of a request is watched.
+#[derive(Clone, Copy)]
+enum Byte {
+    First,
+    Last,
+}
+
+/// Sends a request so that the arm is asleep when one of its bytes comes, and gives what it executes from then on.
+fn feed(machine: &mut Machine, request: Request<'_>, watched: Byte) -> Outcome<Vec<Event>> {
     let bytes = frame(request);
-    let Some((last, first)) = bytes.split_last() else { return Ok(Vec::new()) };
-    machine.send(first)?;
-    machine.watch(|machine| {
-        machine.send(&[*last])?;
-        // On a machine so busy that the pause got too long (D4) there is no reply, and another try.
-        if let Request::Read { count, .. } = request {
-            let _ = machine.reply(count);
-        }
-        Ok(())
-    })
+    let (before, rest) = bytes.split_at(match watched {
+        Byte::First => 0,
+        Byte::Last => bytes.len() - 1,
+    });
+    let (byte, after) = rest.split_at(1);
+    machine.send(before)?;
+    let events = machine.watch(|machine| machine.send(byte))?;
+    machine.send(after)?;
+    // On a machine so busy that the pause got too long (D4) there is no reply, and another try.
+    if let Request::Read { count, .. } = request {
+        let _ = machine.reply(count);
+    }
+    Ok(events)
 }
 
 /// The median: one in several times something else is due in the same moment, such as a question to a servo, and how
