@@ -42,6 +42,7 @@ use crate::gpio::{Output as Pin, Switch};
 use crate::host_link::HostLink;
 use crate::servo_link::ServoLink;
 use crate::settings::Settings;
+use crate::uart::CHUNK;
 
 /// Half a period of the LED where there is a fault to tell, in microseconds.
 const BLINK_MICROS: u64 = 250_000;
@@ -112,7 +113,7 @@ impl Shell<'_> {
         }
     }
 
-    /// Does all that is to be done at `now`, and says until when there is nothing more.
+    /// Does what is to be done at `now`, and says when there will be more.
     fn act(&mut self, now: Instant, arm: &mut Controller) -> Instant {
         loop {
             match arm.poll(now, self.host.room()) {
@@ -122,19 +123,29 @@ impl Shell<'_> {
                     self.feeding.control_cycle_ran();
                 }
                 Output::Vacuum(vacuum) => self.switch(vacuum),
-                Output::Save(image) => arm.set_storage(self.settings.save(image)),
+                Output::Save(image) => {
+                    arm.set_storage(self.settings.save(image));
+                    // That took its time.
+                    return now;
+                }
                 Output::Wait(until) => return until,
             }
         }
     }
 
     fn receive(&mut self, now: Instant, arm: &mut Controller) {
-        let bytes = self.host.received();
-        let taken = arm.host_bytes(now, bytes);
-        if taken > 0 || bytes.is_empty() {
-            self.feeding.host_link_ran();
+        loop {
+            let bytes = self.host.received();
+            let taken = arm.host_bytes(now, bytes);
+            if taken > 0 || bytes.is_empty() {
+                self.feeding.host_link_ran();
+            }
+            self.host.consume(taken);
+            // Less than a whole chunk: nothing more waits, or the controller takes no more.
+            if taken < CHUNK {
+                break;
+            }
         }
-        self.host.consume(taken);
         loop {
             let bytes = self.servos.received();
             let count = bytes.len();

@@ -28,7 +28,7 @@ use heapless::spsc::Queue;
 use stm32f4::stm32f405 as pac;
 
 /// Bytes that the loop moves at once.
-const CHUNK: usize = 8;
+pub(crate) const CHUNK: usize = 8;
 
 /// One of the chip's USARTs.
 pub(crate) trait Usart: Deref<Target = pac::usart1::RegisterBlock> {
@@ -180,6 +180,9 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> End<U, RECEIVE, TRAN
     /// The first of the bytes that wait to be read; none where none waits.
     pub(crate) fn received(&mut self) -> &[u8] {
         let Self { line, chunk, taken } = self;
+        // Even where nothing is taken out: the interrupt that is shut out sends, too, and room to send may be what
+        // the bytes that wait here are waiting for.
+        line.admit();
         if *taken >= chunk.len() {
             chunk.clear();
             *taken = 0;
@@ -191,8 +194,6 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> End<U, RECEIVE, TRAN
                     let _ = chunk.push(byte);
                 }
             });
-            // There is room now, whatever there was before.
-            line.admit();
         }
         chunk.get(*taken..).unwrap_or(&[])
     }

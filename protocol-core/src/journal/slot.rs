@@ -110,7 +110,7 @@ fn correct(covered: &mut [u8], difference: u32) -> bool {
 
 /// What stands in the first word of a sector that was erased, found blank and waits for `generation`.
 ///
-/// Each generation has its own mark, and none comes twice. So the mark of a sector's earlier life, should it
+/// Each generation has its own mark. So the mark of a sector's earlier life, should it
 /// outlive an erase that was cut, is not taken for a promise about what that erase left. A CRC, because the
 /// marks of neighbouring generations must differ in many bits.
 pub(super) const fn mark(generation: u32) -> Word {

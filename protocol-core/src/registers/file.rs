@@ -41,7 +41,7 @@ pub struct OutOfRange {
 /// A write that was checked and may be applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Accepted<'a> {
-    /// The first register that is not closed to writes, if the write reaches one.
+    /// Where the write begins, less what comes before the EEPROM region, or before its end while that is locked.
     start: u8,
     values: &'a [u8],
 }

@@ -310,16 +310,18 @@ impl Register {
     }
 }
 
-/// Is the table in ascending order, without overlap, inside the address space, per-joint rows seven
-/// long, and every default a value of its row's range? Checked when the table is compiled.
+/// Is the table in ascending order, ROM before EEPROM before RAM, without overlap, inside the address space,
+/// per-joint rows seven long, and every default a value of its row's range? Checked when the table is compiled.
 #[must_use]
 pub const fn well_formed(map: &[Register]) -> bool {
     let mut rest = map;
     let mut next = 0;
+    let mut region = Region::Rom;
     while let [row, tail @ ..] = rest {
         let end = row.address as usize + row.count as usize;
         let shape_is_right = row.count > 0 && (!row.per_joint || row.count as usize == JOINTS);
-        if (row.address as usize) < next || end > 256 || !shape_is_right {
+        let is_in_order = row.address as usize >= next && row.region as u8 >= region as u8;
+        if !is_in_order || end > 256 || !shape_is_right {
             return false;
         }
         let mut defaults = row.defaults.as_slice();
@@ -330,6 +332,7 @@ pub const fn well_formed(map: &[Register]) -> bool {
             defaults = others;
         }
         next = end;
+        region = row.region;
         rest = tail;
     }
     true
@@ -368,6 +371,8 @@ mod tests {
     fn a_bad_table_is_refused() {
         assert!(well_formed(&[ram(1), ram(2).run(3), ram(5)]));
         assert!(!well_formed(&[ram(2), ram(1)]), "order");
+        assert!(well_formed(&[rom(1), eeprom(2), ram(3)]));
+        assert!(!well_formed(&[ram(1), eeprom(2)]) && !well_formed(&[eeprom(1), rom(2)]), "regions");
         assert!(!well_formed(&[ram(1).run(2), ram(2)]), "overlap");
         assert!(!well_formed(&[ram(255).run(2)]), "past the end");
         assert!(!well_formed(&[ram(1).run(0)]), "empty");

@@ -30,6 +30,12 @@ const SILENCE: Duration = Duration::from_secs(4);
 /// Milliseconds after which an arm that is left alone does the same again: it asks missing servos ten times a second,
 /// and its LED blinks twice.
 const PATTERN: usize = 500;
+/// How many requests stand behind a false header: a header claims 262 bytes at most.
+const HELD_UP: usize = 34;
+/// How often that is tried.
+const HELD_UP_TRIES: usize = 9;
+/// Time enough for the arm to give the false header up (D4).
+const FORGOTTEN: Duration = Duration::from_millis(300);
 /// Bytes of the frame that gives seven joints their goals. Nothing else that goes to the servos is as long.
 const GOALS: usize = 57;
 /// Bytes that the transmitter of a USART takes at once at most: one to shift out, one to wait.
@@ -60,12 +66,14 @@ pub(crate) fn figures() -> Outcome<Vec<Figure>> {
         places.paths(&mut machine, bytes(READ, Byte::Last), |event| *event == Event::Wrote(HOST_DATA))?;
     let write = places.paths(&mut machine, bytes(write, Byte::Last), |event| places.is_sleep(event))?;
     let first = places.paths(&mut machine, bytes(READ, Byte::First), |event| places.is_sleep(event))?;
+    let held_up = places.behind_a_false_header(&mut machine)?;
     let moving = while_moving(&mut machine)?;
     let mut figures = vec![
         Figure::new("image: 10 ms with nobody on its lines", silence),
         Figure::new("image: read of 7, last byte in to first byte out", read),
         Figure::new("image: write of 7, last byte in to asleep again", write),
         Figure::new("image: byte that is not worth a turn of the loop, in to asleep again", first),
+        Figure::new("image: milliseconds that 34 reads are held up by a false header", held_up),
     ];
     figures.extend(places.turns(&moving)?);
     figures.extend(places.interrupts(&moving)?);
@@ -135,6 +143,27 @@ impl Places {
             }
         }
         typical(paths, "a request that nothing disturbs")
+    }
+
+    /// Milliseconds from the last of many requests that a header in noise could claim to the first answer: the gap of
+    /// 2 ms (D4), and what the firmware adds to it.
+    fn behind_a_false_header(&self, machine: &mut Machine) -> Outcome<u64> {
+        let mut requests = vec![0xAA, 0x77, 6, 0, 0xFF];
+        requests.extend(frame(READ).repeat(HELD_UP));
+        let mut delays = Vec::new();
+        for _ in 0..HELD_UP_TRIES {
+            let events = machine.watch(|machine| {
+                machine.send(&requests)?;
+                (0..HELD_UP).try_for_each(|_| machine.reply(PRESENT_POSITION.count).map(|_| ()))
+            })?;
+            sleep(FORGOTTEN);
+            let answer = events.iter().position(|event| *event == Event::Wrote(HOST_DATA));
+            let events = events.get(..answer.unwrap_or(0)).unwrap_or_default();
+            let last = events.iter().rposition(|event| *event == Event::Read(HOST_DATA));
+            let silence = events.get(last.unwrap_or(0)..).unwrap_or_default();
+            delays.push(silence.iter().filter(|event| trace::is_step_at(event, self.wake_up)).count() as u64);
+        }
+        typical(delays, "an answer to a request behind a false header")
     }
 
     /// `None` where the arm was awake, or anything else came in between.
