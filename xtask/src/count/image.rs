@@ -61,17 +61,21 @@ pub(crate) fn figures() -> Outcome<Vec<Figure>> {
     let silence = places.silence()?;
     let mut machine = Machine::with_servos()?;
     let write = Request::Write { address: TARGET_POSITION.address, values: &POSE };
-    let bytes = |request, watched| move |machine: &mut _| feed(machine, request, watched);
-    let read =
-        places.paths(&mut machine, bytes(READ, Byte::Last), |event| *event == Event::Wrote(HOST_DATA))?;
-    let write = places.paths(&mut machine, bytes(write, Byte::Last), |event| places.is_sleep(event))?;
-    let first = places.paths(&mut machine, bytes(READ, Byte::First), |event| places.is_sleep(event))?;
+    let answered = |event: &Event| *event == Event::Wrote(HOST_DATA);
+    let asleep = |event: &Event| places.is_sleep(event);
+    let read = places.paths(&mut machine, READ, Byte::FromEnd(1), answered)?;
+    let read_whole = places.paths(&mut machine, READ, Byte::FromEnd(1), asleep)?;
+    let write = places.paths(&mut machine, write, Byte::FromEnd(1), asleep)?;
+    let last_but_one = places.paths(&mut machine, READ, Byte::FromEnd(2), asleep)?;
+    let first = places.paths(&mut machine, READ, Byte::First, asleep)?;
     let held_up = places.behind_a_false_header(&mut machine)?;
     let moving = while_moving(&mut machine)?;
     let mut figures = vec![
         Figure::new("image: 10 ms with nobody on its lines", silence),
         Figure::new("image: read of 7, last byte in to first byte out", read),
+        Figure::new("image: read of 7, last byte in to asleep again", read_whole),
         Figure::new("image: write of 7, last byte in to asleep again", write),
+        Figure::new("image: last byte but one of a request, in to asleep again", last_but_one),
         Figure::new("image: byte that is not worth a turn of the loop, in to asleep again", first),
         Figure::new("image: milliseconds that 34 reads are held up by a false header", held_up),
     ];
@@ -127,16 +131,18 @@ impl Places {
     }
 
     /// Instructions from the interrupt that brings the byte which is watched until `end`. The arm sleeps when that
-    /// byte comes, and nothing else comes in between.
+    /// byte comes, and nothing else comes in between. There is a pause before it, which makes the search behind an
+    /// unfinished frame look, too.
     fn paths(
         &self,
         machine: &mut Machine,
-        bring: impl Fn(&mut Machine) -> Outcome<Vec<Event>>,
+        request: Request<'_>,
+        watched: Byte,
         end: impl Fn(&Event) -> bool,
     ) -> Outcome<u64> {
         let mut paths = Vec::new();
         for _ in 0..TRIES {
-            let events = bring(machine)?;
+            let events = feed(machine, request, watched)?;
             paths.extend(self.path(&events, &end));
             if paths.len() >= SAMPLES {
                 break;
@@ -240,7 +246,8 @@ impl Places {
 #[derive(Clone, Copy)]
 enum Byte {
     First,
-    Last,
+    /// The last is 1.
+    FromEnd(usize),
 }
 
 /// Sends a request so that the arm is asleep when one of its bytes comes, and gives what it executes from then on.
@@ -248,7 +255,7 @@ fn feed(machine: &mut Machine, request: Request<'_>, watched: Byte) -> Outcome<V
     let bytes = frame(request);
     let (before, rest) = bytes.split_at(match watched {
         Byte::First => 0,
-        Byte::Last => bytes.len() - 1,
+        Byte::FromEnd(number) => bytes.len() - number,
     });
     let (byte, after) = rest.split_at(1);
     machine.send(before)?;
