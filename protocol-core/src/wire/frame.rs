@@ -180,7 +180,10 @@ pub(super) enum Verdict<'a> {
 }
 
 /// Judges the beginning of `input`.
-#[inline(never)]
+///
+/// In line it takes a third less, but not on the chip, where registers run out and flash is dear.
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
 pub(super) fn judge<D: Direction>(input: &[u8]) -> Verdict<'_> {
     let (claimed, parsed) = match prefix(input) {
         Err(error) => (1, Err(error)),
