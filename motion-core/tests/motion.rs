@@ -261,6 +261,22 @@ fn a_servo_that_falls_silent_is_flagged_and_the_others_go_on() {
 }
 
 #[test]
+fn each_servo_is_asked_once_in_a_cycle_and_a_missing_one_ten_times_a_second() {
+    let mut rig = Rig::started();
+    rig.plant.set_fault(joint(4), Some(Fault::Missing));
+    rig.run_ms(200);
+    rig.forget();
+    rig.run_ms(1_000);
+    for id in 0..7 {
+        let asked = rig.to_servos.iter().filter(|(_, told)| *told == ToServos::Ask(id));
+        let mut cycles: Vec<_> = asked.map(|(at_us, _)| at_us / 10_000).collect();
+        assert_eq!(cycles.len(), if id == 3 { 10 } else { 100 }, "servo {id}");
+        cycles.dedup();
+        assert_eq!(cycles.len(), if id == 3 { 10 } else { 100 }, "servo {id}, not twice in a cycle");
+    }
+}
+
+#[test]
 fn a_joint_that_comes_back_while_a_hand_turns_it_gets_torque_only_at_rest() {
     let mut rig = Rig::started();
     rig.plant.set_fault(joint(3), Some(Fault::Missing));

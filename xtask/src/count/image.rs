@@ -63,11 +63,11 @@ pub(crate) fn figures() -> Outcome<Vec<Figure>> {
     let write = Request::Write { address: TARGET_POSITION.address, values: &POSE };
     let answered = |event: &Event| *event == Event::Wrote(HOST_DATA);
     let asleep = |event: &Event| places.is_sleep(event);
-    let read = places.paths(&mut machine, READ, Byte::FromEnd(1), answered)?;
-    let read_whole = places.paths(&mut machine, READ, Byte::FromEnd(1), asleep)?;
-    let write = places.paths(&mut machine, write, Byte::FromEnd(1), asleep)?;
-    let last_but_one = places.paths(&mut machine, READ, Byte::FromEnd(2), asleep)?;
-    let first = places.paths(&mut machine, READ, Byte::First, asleep)?;
+    let read = places.paths(&mut machine, READ, 1, answered)?;
+    let read_whole = places.paths(&mut machine, READ, 1, asleep)?;
+    let write = places.paths(&mut machine, write, 1, asleep)?;
+    let last_but_one = places.paths(&mut machine, READ, 2, asleep)?;
+    let first = places.paths(&mut machine, READ, 7, asleep)?;
     let held_up = places.behind_a_false_header(&mut machine)?;
     let moving = while_moving(&mut machine)?;
     let mut figures = vec![
@@ -130,19 +130,19 @@ impl Places {
         Ok(most.unwrap_or(0))
     }
 
-    /// Instructions from the interrupt that brings the byte which is watched until `end`. The arm sleeps when that
-    /// byte comes, and nothing else comes in between. There is a pause before it, which makes the search behind an
-    /// unfinished frame look, too.
+    /// Instructions from the interrupt that brings a byte of a request, counted from its last one, until `end`. The
+    /// arm sleeps when that byte comes, and nothing else comes in between. There is a pause before it, which makes the
+    /// search behind an unfinished frame look, too.
     fn paths(
         &self,
         machine: &mut Machine,
         request: Request<'_>,
-        watched: Byte,
+        from_last: usize,
         end: impl Fn(&Event) -> bool,
     ) -> Outcome<u64> {
         let mut paths = Vec::new();
         for _ in 0..TRIES {
-            let events = feed(machine, request, watched)?;
+            let events = feed(machine, request, from_last)?;
             paths.extend(self.path(&events, &end));
             if paths.len() >= SAMPLES {
                 break;
@@ -245,21 +245,11 @@ impl Places {
     }
 }
 
-/// Which byte of a request is watched.
-#[derive(Clone, Copy)]
-enum Byte {
-    First,
-    /// The last is 1.
-    FromEnd(usize),
-}
-
 /// Sends a request so that the arm is asleep when one of its bytes comes, and gives what it executes from then on.
-fn feed(machine: &mut Machine, request: Request<'_>, watched: Byte) -> Outcome<Vec<Event>> {
+/// The last byte is 1.
+fn feed(machine: &mut Machine, request: Request<'_>, from_last: usize) -> Outcome<Vec<Event>> {
     let bytes = frame(request);
-    let (before, rest) = bytes.split_at(match watched {
-        Byte::First => 0,
-        Byte::FromEnd(number) => bytes.len() - number,
-    });
+    let (before, rest) = bytes.split_at(bytes.len() - from_last);
     let (byte, after) = rest.split_at(1);
     machine.send(before)?;
     let events = machine.watch(|machine| machine.send(byte))?;
