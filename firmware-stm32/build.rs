@@ -1,5 +1,5 @@
-//! Tells the linker where things go: `memory.x` at the root of the workspace, and the scripts of cortex-m-rt
-//! and defmt. Only the image is linked that way, so the flags stand here and not in `.cargo/config.toml`.
+//! Passes the linker scripts to the linker: `memory.x` from the root of the workspace, and those of cortex-m-rt and defmt.
+//! The flags apply only to this package, so they are here and not in `.cargo/config.toml`.
 
 use std::path::PathBuf;
 use std::{env, fs, io};

@@ -1,4 +1,4 @@
-//! Puts this package's memory layout where cortex-m-rt's linker script finds it.
+//! Copies this package's `memory.x` to a folder in which the linker script of cortex-m-rt finds it.
 
 use std::error::Error;
 use std::path::PathBuf;

@@ -1,16 +1,16 @@
-//! A server of any kind, fed a whole stream.
+//! Feeds a whole stream to a server.
 
 use bench_servers::Server;
 
-/// Bytes taken from the line at once: a driver's queue, not a frame.
+/// Bytes taken from the line at once: the size of a driver's queue, independent of frames.
 const PIECE: usize = 64;
 
-/// A server, whichever. One call through the trait object a stream, so that none is counted.
+/// Any server as a trait object. The one dynamic call for each stream does not count in the time of a request.
 pub(crate) trait Serve {
     /// Takes a whole stream and appends the replies.
     fn serve(&mut self, stream: &[u8], replies: &mut Vec<u8>);
 
-    /// How many requests were carried out so far.
+    /// The number of requests carried out so far.
     fn carried_out(&self) -> usize;
 }
 

@@ -1,52 +1,60 @@
-//! What time it is, and how fast the chip runs.
+//! The clock tree and the time.
 //!
 //! ```text
-//!   crystal ──▶ PLL ──▶ 168 MHz        dead crystal: PLL from the internal oscillator
-//!                                      dead PLL: the internal oscillator, 16 MHz
-//!                                      none of the three: the emulator, which has no clock tree
+//!   crystal ──▶ PLL ──▶ 168 MHz        the crystal fails: PLL from the internal oscillator
+//!                                      the PLL fails: the internal oscillator, 16 MHz
+//!                                      none of the three is ready: the emulator, which has no clock tree
 //! ```
 //!
-//! Time is the count of TIM2, 1 MHz, free running. The system timer only wakes the core: in the emulator it
-//! loses ticks, and nothing counts them.
+//! Time is the count of TIM2, free running at 1 MHz. The system timer only wakes the core, each millisecond or sooner. It
+//! does not measure time, because the emulator loses some of its ticks.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
-use firmware_stm32::rates::{self, Rates, Source};
+use cortex_m_rt::exception;
+use firmware_stm32::clock_rates::{self, ClockRates, ClockSource};
+use firmware_stm32::tick;
 use firmware_stm32::timeline::Timeline;
-use protocol_core::time::Instant;
+use firmware_stm32::wait::wait_for;
+use protocol_core::time::{Duration, Instant};
 use stm32f4::stm32f405 as pac;
 
 use crate::board;
 
-/// Looks at a flag before it counts as never coming: some 0.1 s on the internal oscillator, which the core
-/// runs on then. A crystal takes a few milliseconds (datasheet DS8626, table 33).
-const PATIENCE: u32 = 200_000;
-/// The input of the PLL, in Hz (RM0090, section 7.3.2 recommends 2 MHz).
+/// Polls until a clock is ready: some 0.1 s, as the core runs on the internal oscillator meanwhile. A crystal takes a few
+/// milliseconds (DS8626, table 33).
+const READY_POLLS: u32 = 200_000;
+/// The input of the PLL, in Hz. RM0090, section 7.3.2 recommends 2 MHz.
 const PLL_INPUT_HZ: u32 = 2_000_000;
 
 const _: () = assert!(board::CRYSTAL_HZ.is_multiple_of(PLL_INPUT_HZ) && board::CRYSTAL_HZ <= 26_000_000);
 
-/// Starts the best clock there is. The chip has just been reset: it runs on its internal oscillator.
-pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH, dbgmcu: &pac::DBGMCU) -> Source {
+/// Starts the best clock that works and returns it. After a reset the chip runs on its internal oscillator.
+pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH, dbgmcu: &pac::DBGMCU) -> ClockSource {
+    // Without DBG_SLEEP, WFI also stops the clock of the debug port, and no probe can attach to a sleeping chip
+    // (RM0090, DBGMCU_CR). A probe clears the bit when it detaches; a reset does not.
+    dbgmcu.cr().modify(|_, w| w.dbg_sleep().set_bit());
     if is_emulated(rcc, dbgmcu) {
-        return Source::Emulated;
+        return ClockSource::Emulated;
     }
     rcc.cr().modify(|_, w| w.hseon().on());
-    let crystal = comes_true(|| rcc.cr().read().hserdy().is_ready());
+    let crystal = wait_for(READY_POLLS, || rcc.cr().read().hserdy().is_ready());
     if crystal && lock_pll(rcc, board::CRYSTAL_HZ, true) && switch_to_pll(rcc, flash) {
-        // From now on a crystal that stops is an NMI (RM0090, section 7.2.7), which ends in a restart.
+        // From now on a crystal that stops raises an NMI (RM0090, section 7.2.7), which restarts the chip.
         rcc.cr().modify(|_, w| w.csson().on());
-        return Source::Crystal;
+        return ClockSource::Crystal;
     }
     rcc.cr().modify(|_, w| w.hseon().off());
-    if lock_pll(rcc, rates::INTERNAL_HZ, false) && switch_to_pll(rcc, flash) {
-        return Source::InternalPll;
+    if lock_pll(rcc, clock_rates::INTERNAL_HZ, false) && switch_to_pll(rcc, flash) {
+        return ClockSource::InternalPll;
     }
     rcc.cr().modify(|_, w| w.pllon().off());
-    Source::Internal
+    ClockSource::Internal
 }
 
-/// On the chip the internal oscillator is ready when the first instruction runs, and the id is never 0.
+/// True in the emulator. On the chip the internal oscillator is ready at the first instruction, and the id is never 0.
 fn is_emulated(rcc: &pac::RCC, dbgmcu: &pac::DBGMCU) -> bool {
     let cr = rcc.cr().read();
     cr.hsirdy().is_not_ready()
@@ -55,80 +63,128 @@ fn is_emulated(rcc: &pac::RCC, dbgmcu: &pac::DBGMCU) -> bool {
         && dbgmcu.idcode().read().bits() == 0
 }
 
-/// 2 MHz x 168 / 2 = 168 MHz.
+/// Locks the PLL at 2 MHz x 168 / 2 = 168 MHz. Returns false if it does not lock.
 fn lock_pll(rcc: &pac::RCC, input_hz: u32, from_crystal: bool) -> bool {
     let [divisor, ..] = (input_hz / PLL_INPUT_HZ).to_le_bytes();
     rcc.cr().modify(|_, w| w.pllon().off());
-    if !comes_true(|| rcc.cr().read().pllrdy().is_not_ready()) {
+    if !wait_for(READY_POLLS, || rcc.cr().read().pllrdy().is_not_ready()) {
         return false;
     }
     rcc.pllcfgr().write(|w| {
-        // SAFETY: 8 / 2 to 26 / 2 and 168 are within what the PLL takes (RM0090, section 7.3.2): 2..63 and
-        // 50..432; 7 is the reset value of an output that nobody uses here, which may be 2..15.
+        // SAFETY: all values are in range (RM0090, section 7.3.2). M is 8 / 2 to 26 / 2 in 2..63, N is 168 in 50..432.
+        // Q is 7 in 2..15; its output is not used.
         unsafe { w.pllm().bits(divisor).plln().bits(168).pllq().bits(7) };
         w.pllp().div2().pllsrc().bit(from_crystal)
     });
     rcc.cr().modify(|_, w| w.pllon().on());
-    comes_true(|| rcc.cr().read().pllrdy().is_ready())
+    wait_for(READY_POLLS, || rcc.cr().read().pllrdy().is_ready())
 }
 
-/// Slows the flash and the peripheral buses down for 168 MHz, then switches over.
+/// Sets wait states and bus dividers for 168 MHz, then switches to the PLL. Returns false if the switch fails.
 fn switch_to_pll(rcc: &pac::RCC, flash: &pac::FLASH) -> bool {
-    // Five wait states from 2.7 V on (RM0090, table 10). No prefetch: the first revision of the chip
-    // cannot (errata ES0182, section 2.1.12), and the caches make up for most of it.
+    // Five wait states are enough above 2.7 V (RM0090, table 10). Prefetch stays off: it fails in the first revision of
+    // the chip (errata ES0182, section 2.1.12), and the caches replace most of it.
     flash.acr().write(|w| w.latency().ws5().icen().enabled().dcen().enabled());
-    if !comes_true(|| flash.acr().read().latency().is_ws5()) {
+    if !wait_for(READY_POLLS, || flash.acr().read().latency().is_ws5()) {
         return false;
     }
     rcc.cfgr().modify(|_, w| w.hpre().div1().ppre1().div4().ppre2().div2());
     rcc.cfgr().modify(|_, w| w.sw().pll());
-    let switched = comes_true(|| rcc.cfgr().read().sws().is_pll());
+    let switched = wait_for(READY_POLLS, || rcc.cfgr().read().sws().is_pll());
     if !switched {
         rcc.cfgr().modify(|_, w| w.sw().hsi().ppre1().div1().ppre2().div1());
     }
     switched
 }
 
-/// Looks at a flag until it is as wanted, but not for ever.
-fn comes_true(flag: impl Fn() -> bool) -> bool {
-    (0..PATIENCE).any(|_| flag())
+/// Enables the clocks of the peripherals. The reads give them the delay that they need before the first access (errata
+/// ES0182, delay after an RCC peripheral clock enabling).
+pub(crate) fn enable_peripherals(rcc: &pac::RCC) {
+    rcc.apb1enr().modify(|_, w| w.tim2en().enabled().usart2en().enabled().pwren().enabled());
+    let _ = rcc.apb1enr().read();
+    rcc.apb2enr().modify(|_, w| w.usart1en().enabled());
+    let _ = rcc.apb2enr().read();
 }
 
-/// The time since start.
+/// Set by each tick of the system timer.
+static TICKED: AtomicBool = AtomicBool::new(false);
+/// Reload value to restore after a short tick; 0 if no short tick is running.
+static FULL_TICK: AtomicU32 = AtomicU32::new(0);
+
+/// The time since start, and the system timer that wakes the core.
 pub(crate) struct Clock {
     timeline: Timeline,
     ticker: SYST,
+    cycles_per_micro: u32,
 }
 
 impl Clock {
-    /// Starts the count, and lets the system timer wake the core.
-    pub(crate) fn start(timer: &pac::TIM2, mut ticker: SYST, rates: Rates) -> Self {
-        timer.psc().write(|w| w.psc().set(rates::microsecond_prescaler(rates.timer)));
-        // The prescaler takes effect with an update, which also sets the count to 0.
+    /// Starts TIM2 and the system timer.
+    pub(crate) fn start(timer: &pac::TIM2, mut ticker: SYST, rates: ClockRates) -> Self {
+        timer.psc().write(|w| w.psc().set(clock_rates::microsecond_prescaler(rates.timer)));
+        // An update event loads the prescaler and clears the count.
         timer.egr().write(|w| w.ug().update());
         timer.cr1().write(|w| w.cen().enabled());
         ticker.set_clock_source(SystClkSource::Core);
-        ticker.set_reload(rates.core / board::WAKE_HZ - 1);
+        ticker.set_reload(reload(rates.core / 1_000_000));
         ticker.clear_current();
         ticker.enable_counter();
         ticker.enable_interrupt();
-        Self { timeline: Timeline::new(), ticker }
+        Self { timeline: Timeline::new(), ticker, cycles_per_micro: rates.core / 1_000_000 }
     }
 
-    /// Has the system timer ticked since the last look?
+    /// Makes the next tick come within `wait`. The ticks after it have the usual period.
+    pub(crate) fn tick_within(&mut self, wait: Duration) {
+        if let Some(cycles) = tick::cycles(wait, self.cycles_per_micro)
+            && cycles < SYST::get_current()
+        {
+            FULL_TICK.store(reload(self.cycles_per_micro), Ordering::Relaxed);
+            self.ticker.set_reload(cycles.max(1));
+            self.ticker.clear_current();
+        }
+    }
+
+    /// True if the system timer has ticked since the last call.
     pub(crate) fn has_ticked(&mut self) -> bool {
-        self.ticker.has_wrapped()
+        // Load and store cost less than a swap. A tick between them is not lost: the call returns true anyway.
+        let ticked = TICKED.load(Ordering::Relaxed);
+        if ticked {
+            TICKED.store(false, Ordering::Relaxed);
+        }
+        ticked
     }
 
-    /// What time it is.
+    /// The time since start.
     pub(crate) fn now(&mut self) -> Instant {
         self.timeline.extend(micros())
     }
 }
 
-/// The count of microseconds as it is; it wraps every 71 minutes.
+/// Reload value of the system timer: the cycles of a tick less one.
+const fn reload(cycles_per_micro: u32) -> u32 {
+    cycles_per_micro * tick::TICK_MICROS - 1
+}
+
+/// Wakes the core. After a short tick it restores the usual period.
+#[exception]
+fn SysTick() {
+    TICKED.store(true, Ordering::Relaxed);
+    let full = FULL_TICK.load(Ordering::Relaxed);
+    if full != 0 {
+        FULL_TICK.store(0, Ordering::Relaxed);
+        // SAFETY: `tick_within` writes the same registers. If this handler interrupts it, the next tick is short or
+        // full. That only changes when the loop wakes.
+        unsafe {
+            let timer = &*SYST::PTR;
+            timer.rvr.write(full);
+            timer.cvr.write(0);
+        }
+    }
+}
+
+/// The count of TIM2 in microseconds. It wraps every 71 minutes.
 pub(crate) fn micros() -> u32 {
-    // SAFETY: reading the count of a timer changes nothing, whoever owns the timer.
+    // SAFETY: reading the count of a timer has no side effect.
     unsafe { pac::TIM2::steal() }.cnt().read().bits()
 }
 

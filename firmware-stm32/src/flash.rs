@@ -1,10 +1,12 @@
-//! The two journal sectors as a NOR flash (RM0090, sections 3.6 and 3.9). Knows nothing of what is stored
-//! there, and sees the chip through its registers only.
+//! The two journal sectors as a NOR flash (RM0090, sections 3.6 and 3.9). It does not know what is stored there, and
+//! accesses the chip only through [`FlashRegisters`].
 //!
-//! The core stands still while a word is programmed (16 microseconds) or a sector erased (up to 0.8 s),
-//! because it fetches its instructions from the same bank. Words are programmed one by one, with interrupts
-//! open, so these get their turn in between; erasing is for start only, before the servos are looked after.
-//! Where the cells do not take what they are given (the emulator has none that do), that is an error.
+//! The core stalls while a word is programmed (16 microseconds) or a sector is erased (up to 0.8 s), because it fetches
+//! its instructions from the same bank. Interrupts run between two words. Sectors are erased only at start, before the
+//! servos are controlled.
+//!
+//! Each word is read back. A word that differs is an error: in the emulator no cell changes. A write also updates the
+//! data cache, so the cache is flushed before the read.
 //! Tests: `flash/tests.rs`.
 
 use embedded_storage::nor_flash::{
@@ -18,47 +20,53 @@ mod tests;
 pub const SECTOR: usize = 16 * 1024;
 /// Bytes of the journal: two sectors.
 pub const JOURNAL: usize = 2 * SECTOR;
-/// Bytes programmed at once: at 2.7 V and more a word (RM0090, table 13), and below 2.9 V nothing is.
+/// Bytes programmed at once. 32 bits need 2.7 V (RM0090, table 13); [`SUPPLY_LEVEL`] is above that.
 pub const WORD: usize = 4;
-/// Ten times what a word may take, in microseconds.
+/// Timeout for programming a word, in microseconds: ten times the maximum of the datasheet.
 const WORD_LIMIT_MICROS: u32 = 1_000;
-/// Half as much again as a sector may take.
+/// Timeout for erasing a sector, in microseconds: 1.5 times the maximum of the datasheet.
 const SECTOR_LIMIT_MICROS: u32 = 1_200_000;
+/// The level of the supply monitor (PLS of PWR_CR). At level 6 the supply counts as low below 2.85 to 2.99 V and as good
+/// again above 2.96 to 3.10 V (DS8626, table of the embedded reset and power control block). The upper threshold of
+/// level 7 is 3.07 to 3.21 V: a rail of 3.3 V - 5 % might never reach it.
+pub const SUPPLY_LEVEL: u8 = 6;
+/// Start-up time of the supply monitor, in microseconds. The datasheet gives no figure, so this is an assumption.
+pub const SUPPLY_SETTLING_MICROS: u32 = 100;
 
 /// Bits of FLASH_CR (RM0090, section 3.9.5).
 pub mod control {
-    /// A write to a cell programs it.
+    /// PG: a write to a cell programs it.
     pub const PROGRAM: u32 = 1 << 0;
-    /// `START` erases a sector.
+    /// SER: `START` erases a sector.
     pub const SECTOR_ERASE: u32 = 1 << 1;
-    /// Where the number of that sector stands, four bits.
+    /// SNB: position of the sector number, four bits.
     pub const SECTOR_NUMBER: u32 = 3;
-    /// Cells are programmed by words of 32 bits.
+    /// PSIZE: 32 bits are programmed at once.
     pub const BY_WORDS: u32 = 0b10 << 8;
-    /// Starts an erase.
+    /// STRT: starts an erase.
     pub const START: u32 = 1 << 16;
-    /// No bit can be changed before both keys have come. Reads 1 after a reset.
+    /// LOCK: no bit of the register can change until both keys are written. Set after a reset.
     pub const LOCK: u32 = 1 << 31;
 }
 
 /// Bits of FLASH_SR (RM0090, section 3.9.4).
 pub mod status {
-    /// An operation is running.
+    /// BSY: an operation is running.
     pub const BUSY: u32 = 1 << 16;
-    /// An operation has ended; a one clears it.
+    /// EOP: an operation has ended. Writing a one clears it.
     pub const END_OF_OPERATION: u32 = 1 << 0;
-    /// Why one was refused: OPERR, WRPERR, PGAERR, PGPERR, PGSERR; ones clear them.
+    /// Why an operation was refused: OPERR, WRPERR, PGAERR, PGPERR, PGSERR. Writing ones clears them.
     pub const ERRORS: u32 = 0b1111_0010;
 }
 
-/// What unlocks FLASH_CR, in this order.
+/// The keys that unlock FLASH_CR, in this order.
 pub const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-/// The chip, as far as its flash is concerned.
-pub trait Chip {
+/// The registers and cells of the flash, and what its driver needs of the chip.
+pub trait FlashRegisters {
     /// Reads FLASH_SR.
     fn status(&self) -> u32;
-    /// Writes FLASH_SR, where ones clear.
+    /// Writes FLASH_SR. Ones clear bits.
     fn clear_status(&mut self, bits: u32);
     /// Reads FLASH_CR.
     fn control(&self) -> u32;
@@ -72,33 +80,36 @@ pub trait Chip {
     fn store(&mut self, offset: usize, word: u32);
     /// The number of the sector at `offset` of the journal.
     fn sector_number(&self, offset: usize) -> u8;
-    /// Empties the caches, which still hold what an erased sector held before.
-    fn flush_caches(&mut self);
-    /// Is the chip set to reset itself below 2.7 V (brown-out level 3)?
+    /// Empties the data cache. It may hold the old contents of an erased sector, or a written value that the cell did
+    /// not take. The instruction cache needs no flush: no code lies in the journal.
+    fn flush_data_cache(&mut self);
+    /// True if the chip resets below 2.7 V (brown-out level 3).
     fn resets_when_supply_sags(&self) -> bool;
-    /// Is the supply below 2.9 V now?
+    /// Switches the supply monitor on at `level`, 0 to 7.
+    fn watch_supply(&mut self, level: u8);
+    /// True if the supply is below that level now.
     fn supply_is_low(&self) -> bool;
     /// Feeds the watchdog.
     fn feed_watchdog(&mut self);
-    /// A count of microseconds that wraps.
+    /// A microsecond counter that wraps.
     fn micros(&self) -> u32;
 }
 
-/// Why the flash did not do what it was told.
+/// Why a flash operation failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Error {
-    /// The range is not in the journal, or not on its grid.
+    /// The range is outside the journal or not aligned.
     Range(NorFlashErrorKind),
-    /// The chip is not set to reset itself below 2.7 V: `docs/bring-up.md` has the option byte.
+    /// The chip does not reset below 2.7 V. `docs/bring-up.md` names the option byte to set.
     BrownOutLevel,
-    /// The supply is below 2.9 V.
+    /// The supply monitor reports a low supply: see [`SUPPLY_LEVEL`].
     Supply,
-    /// The chip refused: the error bits of FLASH_SR.
+    /// The chip refused the operation. Holds the error bits of FLASH_SR.
     Refused(u32),
-    /// The chip did not come back in time.
+    /// The operation did not end in time.
     Timeout,
-    /// Nothing was refused, and yet the cells do not hold what was programmed.
+    /// The chip reported no error, but the cells do not hold the programmed word.
     Unchanged,
 }
 
@@ -119,16 +130,24 @@ impl From<NorFlashErrorKind> for Error {
 
 /// The journal sectors.
 #[derive(Debug)]
-pub struct Flash<C>(pub C);
+pub struct Flash<C>(C);
 
-impl<C: Chip> Flash<C> {
-    /// Runs an operation between unlocking and locking.
+impl<C: FlashRegisters> Flash<C> {
+    /// Takes ownership of the flash, and starts the supply monitor.
+    pub fn new(mut chip: C) -> Self {
+        chip.watch_supply(SUPPLY_LEVEL);
+        let start = chip.micros();
+        while chip.micros().wrapping_sub(start) < SUPPLY_SETTLING_MICROS {}
+        Self(chip)
+    }
+
+    /// Unlocks the flash, runs `operation`, and locks it again.
     fn unlocked(&mut self, operation: impl FnOnce(&mut Self) -> Result<(), Error>) -> Result<(), Error> {
         if self.0.control() & control::LOCK != 0 {
             KEYS.into_iter().for_each(|key| self.0.enter_key(key));
         }
         let done = operation(self);
-        // A write to the register of a chip that is still busy would stop the core until it is not.
+        // A write to FLASH_CR during an operation would stall the core until the operation ends.
         if !self.is_busy() {
             self.0.set_control(control::LOCK);
         }
@@ -147,7 +166,7 @@ impl<C: Chip> Flash<C> {
         self.0.set_control(erase);
         self.0.set_control(erase | control::START);
         let done = self.wait(SECTOR_LIMIT_MICROS);
-        self.0.flush_caches();
+        self.0.flush_data_cache();
         self.0.feed_watchdog();
         done
     }
@@ -157,10 +176,11 @@ impl<C: Chip> Flash<C> {
         self.0.set_control(control::PROGRAM | control::BY_WORDS);
         self.0.store(offset, word);
         self.wait(WORD_LIMIT_MICROS)?;
+        self.0.flush_data_cache();
         if self.0.load(offset) == word { Ok(()) } else { Err(Error::Unchanged) }
     }
 
-    /// Checks chip and supply, and clears what an earlier operation left.
+    /// Checks the brown-out level and the supply, and clears old status bits.
     fn make_ready(&mut self) -> Result<(), Error> {
         if self.is_busy() {
             return Err(Error::Timeout);
@@ -179,7 +199,7 @@ impl<C: Chip> Flash<C> {
         self.0.status() & status::BUSY != 0
     }
 
-    /// Waits for the end of an operation, and says whether it was refused.
+    /// Waits for the end of an operation and returns its error, if any.
     fn wait(&self, limit_micros: u32) -> Result<(), Error> {
         let start = self.0.micros();
         while self.is_busy() {
@@ -194,7 +214,7 @@ impl<C: Chip> Flash<C> {
     }
 }
 
-/// Offsets from `from` up to `to`, `step` by `step`.
+/// The offsets from `from` up to but not including `to`, in steps of `step`.
 fn offsets(from: u32, to: usize, step: usize) -> impl Iterator<Item = usize> {
     (from as usize..to).step_by(step)
 }
@@ -203,7 +223,7 @@ impl<C> ErrorType for Flash<C> {
     type Error = Error;
 }
 
-impl<C: Chip> ReadNorFlash for Flash<C> {
+impl<C: FlashRegisters> ReadNorFlash for Flash<C> {
     const READ_SIZE: usize = WORD;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
@@ -220,7 +240,7 @@ impl<C: Chip> ReadNorFlash for Flash<C> {
     }
 }
 
-impl<C: Chip> NorFlash for Flash<C> {
+impl<C: FlashRegisters> NorFlash for Flash<C> {
     const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = SECTOR;
 

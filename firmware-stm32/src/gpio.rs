@@ -1,9 +1,16 @@
-//! Pins by name. Knows nothing of what hangs on them.
+//! The pins of the chip. `board.rs` says what is connected to them.
 
 use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType, OutputPin, PinState};
 use stm32f4::stm32f405 as pac;
+
+/// Enables the clocks of the ports. The read gives them the delay that they need before the first access (errata ES0182,
+/// delay after an RCC peripheral clock enabling).
+pub(crate) fn enable(rcc: &pac::RCC) {
+    rcc.ahb1enr().modify(|_, w| w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled());
+    let _ = rcc.ahb1enr().read();
+}
 
 /// The registers of a port.
 type Registers = pac::gpioi::RegisterBlock;
@@ -24,7 +31,7 @@ pub(crate) struct Pin {
     number: u8,
 }
 
-/// The level at which what hangs on an output is on.
+/// The level that switches the connected device on.
 #[derive(Clone, Copy)]
 pub(crate) enum Active {
     High,
@@ -34,8 +41,10 @@ pub(crate) enum Active {
 /// How a peripheral drives its pin.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Drive {
+    /// Drives high and low. The chip's weak pull-up is on: it keeps an unconnected input high.
     PushPull,
-    /// Low or nothing, with the weak pull-up of the chip.
+    /// Drives low only; the pull-up is outside the chip. With its internal pull-up on, a pin would not be 5 V tolerant: at
+    /// most VDD + 0.3 V (DS8626, table of the operating conditions).
     OpenDrain,
 }
 
@@ -46,9 +55,8 @@ impl Port {
             Self::B => pac::GPIOB::ptr().cast(),
             Self::C => pac::GPIOC::ptr().cast(),
         };
-        // SAFETY: the address of a port of this chip; all ports have the same registers (RM0090, section
-        // 8.4), the crate has several types for them because their reset values differ. They live as
-        // long as the program, and every access is volatile.
+        // SAFETY: `base` is the address of a port of this chip. All ports have the same registers (RM0090, section 8.4);
+        // the crate has several types because the reset values differ. Every access is volatile.
         unsafe { &*base }
     }
 }
@@ -60,7 +68,7 @@ impl Pin {
         Self { port, number }
     }
 
-    /// Gives the pin to a peripheral.
+    /// Connects the pin to a peripheral.
     pub(crate) fn give_to(self, function: u8, drive: Drive) {
         let port = self.port.registers();
         let n = self.n();
@@ -70,31 +78,36 @@ impl Pin {
             port.afrh().modify(|_, w| w.afr(n & 7).set(function & 0xF));
         }
         match drive {
-            Drive::PushPull => port.otyper().modify(|_, w| w.ot(n).push_pull()),
-            Drive::OpenDrain => port.otyper().modify(|_, w| w.ot(n).open_drain()),
-        };
-        port.pupdr().modify(|_, w| w.pupdr(n).pull_up());
+            Drive::PushPull => {
+                port.otyper().modify(|_, w| w.ot(n).push_pull());
+                port.pupdr().modify(|_, w| w.pupdr(n).pull_up());
+            }
+            Drive::OpenDrain => {
+                port.otyper().modify(|_, w| w.ot(n).open_drain());
+                port.pupdr().modify(|_, w| w.pupdr(n).floating());
+            }
+        }
         port.ospeedr().modify(|_, w| w.ospeedr(n).medium_speed());
         port.moder().modify(|_, w| w.moder(n).alternate());
     }
 
-    /// Makes the pin an output, at the level for off.
-    pub(crate) fn into_switch(self, active: Active) -> Switch<Output> {
-        let switch = Switch::new(Output(self), active);
+    /// Makes the pin an output that is off.
+    pub(crate) fn into_switch(self, active: Active) -> Switch<DigitalOutput> {
+        let switch = Switch::new(DigitalOutput(self), active);
         self.port.registers().moder().modify(|_, w| w.moder(self.n()).output());
         switch
     }
 
-    /// Drives the pin, whoever has it.
+    /// Sets the level of the pin. The crash handler uses it without owning the pin.
     pub(crate) fn drive(self, state: PinState) {
-        // A write sets or clears single pins and leaves the others alone (RM0090, section 8.4.7).
+        // BSRR sets or clears one pin and leaves the others unchanged (RM0090, section 8.4.7).
         self.port.registers().bsrr().write(|w| match state {
             PinState::High => w.bs(self.n()).set_bit(),
             PinState::Low => w.br(self.n()).set_bit(),
         });
     }
 
-    /// The number, as the compiler knows it is one.
+    /// The pin number. The mask lets the compiler drop range checks.
     const fn n(self) -> u8 {
         self.number & 0xF
     }
@@ -107,14 +120,14 @@ impl Active {
     }
 }
 
-/// A pin that drives a level.
-pub(crate) struct Output(Pin);
+/// A pin that is an output.
+pub(crate) struct DigitalOutput(Pin);
 
-impl ErrorType for Output {
+impl ErrorType for DigitalOutput {
     type Error = Infallible;
 }
 
-impl OutputPin for Output {
+impl OutputPin for DigitalOutput {
     fn set_low(&mut self) -> Result<(), Infallible> {
         self.set_state(PinState::Low)
     }
@@ -129,7 +142,7 @@ impl OutputPin for Output {
     }
 }
 
-/// Something that is on or off, on any pin.
+/// A device that is switched on and off by a pin.
 pub(crate) struct Switch<P> {
     pin: P,
     active: Active,
@@ -143,7 +156,7 @@ impl<P: OutputPin<Error = Infallible>> Switch<P> {
         switch
     }
 
-    /// Switches it, unless it is that way already.
+    /// Switches the device. Writes to the pin only on a change.
     pub(crate) fn set(&mut self, on: bool) {
         if self.on != on {
             let Ok(()) = self.pin.set_state(self.active.level(on));

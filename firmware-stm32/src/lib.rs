@@ -1,11 +1,20 @@
-//! What of the firmware is arithmetic and not hardware: tested on the machine that builds it, because the
-//! emulator has no watchdog, no reset causes, no clock tree and no flash to try it on.
+//! The part of the firmware that needs no hardware. Its tests run on the host, because the emulator has no watchdog, no
+//! reset causes, no clock tree and no working flash.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
-pub mod feeding;
+pub mod bus_pause;
+pub mod clock_rates;
 pub mod flash;
-pub mod rates;
-pub mod restart;
+pub mod led_pattern;
+pub mod line_errors;
+pub mod question;
+pub mod reset_cause;
+pub mod settings;
+pub mod stack_guard;
+pub mod tick;
 pub mod timeline;
+pub mod vdd;
+pub mod wait;
+pub mod watchdog_gate;

@@ -1,43 +1,43 @@
-//! The settings between two starts: the journal on its two sectors, and what the controller has to know of
-//! it.
+//! The stored settings: the journal on a flash, and the state of the storage as the controller needs it.
 
-use firmware_stm32::flash::Flash;
+use embedded_storage::nor_flash::NorFlash;
 use motion_core::Storage;
 use protocol_core::journal::{Journal, Opened, SaveError};
 use protocol_core::registers::Image;
 
-use crate::bank::Bank;
-
-/// The journal and what the start found in it.
-pub(crate) struct Settings<'a> {
-    journal: Journal<Flash<Bank<'a>>>,
+/// The journal, and the settings that it held at start.
+#[derive(Debug)]
+pub struct Settings<F> {
+    journal: Journal<F>,
     opened: Opened,
 }
 
-impl<'a> Settings<'a> {
-    /// Opens the journal. This is where sectors are erased, and the only place.
-    pub(crate) fn open(flash: Flash<Bank<'a>>) -> Self {
+impl<F: NorFlash> Settings<F> {
+    /// Opens the journal. Only this function erases sectors.
+    pub fn open(flash: F) -> Self {
         let (journal, opened) = Journal::open(flash);
+        #[cfg(target_os = "none")]
         defmt::info!("settings: {}, room for {=usize}", opened, journal.room());
         Self { journal, opened }
     }
 
-    /// The settings that were found.
-    pub(crate) fn found(&self) -> Option<&Image> {
+    /// The settings that the journal held at start, if any.
+    pub const fn found(&self) -> Option<&Image> {
         self.opened.image()
     }
 
-    /// What the storage can do from start.
-    pub(crate) fn storage(&self) -> Storage {
+    /// The state of the storage after start.
+    pub fn storage(&self) -> Storage {
         match self.opened {
             Opened::Broken(_) => Storage::Broken,
             _ => self.ready_or_full(),
         }
     }
 
-    /// Saves settings, and says what the storage can still do.
-    pub(crate) fn save(&mut self, image: Image) -> Storage {
+    /// Saves `image` and returns the state of the storage after that.
+    pub fn save(&mut self, image: Image) -> Storage {
         let saved = self.journal.save(&image);
+        #[cfg(target_os = "none")]
         defmt::info!("save: {}, room for {=usize}", saved, self.journal.room());
         match saved {
             Ok(()) => self.ready_or_full(),
@@ -48,5 +48,50 @@ impl<'a> Settings<'a> {
 
     fn ready_or_full(&self) -> Storage {
         if self.journal.room() > 0 { Storage::Ready } else { Storage::Full }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use flash_model::Flash;
+
+    use super::*;
+
+    const IMAGE: Image = Image([7; Image::LENGTH]);
+    const SECTOR: usize = 1024;
+
+    /// The journal does not save an image that it already holds, so each save needs another one.
+    fn image(number: usize) -> Image {
+        let [low, ..] = number.to_le_bytes();
+        Image([low; Image::LENGTH])
+    }
+
+    #[test]
+    fn saved_settings_are_found_at_the_next_start() {
+        let mut settings = Settings::open(Flash::<SECTOR>::new(2));
+        assert_eq!((settings.found(), settings.storage()), (None, Storage::Ready));
+        assert_eq!(settings.save(IMAGE), Storage::Ready);
+        let settings = Settings::open(settings.journal.release());
+        assert_eq!((settings.found(), settings.storage()), (Some(&IMAGE), Storage::Ready));
+    }
+
+    #[test]
+    fn the_save_that_uses_the_last_slot_reports_a_full_storage() {
+        let mut settings = Settings::open(Flash::<SECTOR>::new(2));
+        let room = settings.journal.room();
+        for save in 1..room {
+            assert_eq!(settings.save(image(save)), Storage::Ready, "save {save} of {room}");
+        }
+        assert_eq!(settings.save(image(room)), Storage::Full);
+        assert_eq!(settings.save(image(0)), Storage::Full, "a save without room");
+        let settings = Settings::open(settings.journal.release());
+        assert_eq!((settings.found(), settings.storage()), (Some(&image(room)), Storage::Ready));
+    }
+
+    #[test]
+    fn a_flash_that_changes_nothing_is_a_broken_storage() {
+        let mut settings = Settings::open(Flash::<SECTOR>::inert(&[0; 2 * SECTOR]));
+        assert_eq!((settings.found(), settings.storage()), (None, Storage::Broken));
+        assert_eq!(settings.save(IMAGE), Storage::Broken);
     }
 }

@@ -1,9 +1,8 @@
-//! A 32-bit counter of microseconds wraps every 71 minutes; time does not.
+//! 64-bit time from a 32-bit microsecond counter that wraps every 71 minutes.
 
 use protocol_core::time::Instant;
 
-/// Extends a counter of microseconds that wraps to one that never does, provided that somebody looks at
-/// least once per turn of the counter.
+/// Extends the counter to 64 bits. [`Timeline::extend`] has to be called at least once between two wraps.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Timeline {
     turns: u32,
@@ -11,7 +10,7 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// A time line that starts where the counter is 0.
+    /// A time line that starts at a count of 0.
     #[must_use]
     pub const fn new() -> Self {
         Self { turns: 0, last: 0 }
@@ -42,7 +41,7 @@ mod tests {
     }
 
     #[test]
-    fn a_day_looked_at_once_an_hour_is_a_day() {
+    fn one_call_per_hour_is_enough() {
         let hour = 3_600_000_000u64;
         let mut timeline = Timeline::new();
         for hours in 0..=24 {

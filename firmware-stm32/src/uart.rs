@@ -1,4 +1,4 @@
-//! A serial line: a queue each way, with the interrupt at one end and the loop at the other.
+//! A serial line with a queue in each direction, between the USART interrupt and the main loop.
 //!
 //! ```text
 //!             interrupt                     loop
@@ -6,16 +6,17 @@
 //!   TX ◀── DR ◀── to_send ◀─── queue ◀───────────── Write
 //! ```
 //!
-//! The interrupt alone touches the registers. The loop sends by pending it: in QEMU 7.2 a transmitter that
-//! falls empty does not interrupt by itself.
+//! Only the interrupt accesses the registers. The loop starts a transmission by pending the interrupt, because in QEMU 7.2
+//! an empty transmitter does not raise it.
 //!
-//! Where the queue is full a byte stays in the USART, and the interrupt stays off until the loop's next turn.
-//! In the emulator the sender waits then; on a wire the next byte but one is an over-run, which is told.
+//! If the receive queue is full, the byte stays in the USART and the interrupt stays masked until the loop reads the
+//! queue. In the emulator the sender then waits. On a wire the byte after the next one is an overrun. Overruns and all
+//! other receive errors are counted.
 //!
-//! Both ends reach the queues through a critical section, the loop for eight bytes at a time: even on the
-//! internal oscillator that is less than the 10 microseconds which a byte on the servo bus may wait. heapless
-//! can do without, but the halves it splits a queue into divide by a length that only the running program
-//! knows: a division per byte, and a path to a panic in every interrupt.
+//! Both sides access the queues in a critical section. The loop moves eight bytes at a time: even on the internal
+//! oscillator that takes less than the 10 microseconds within which a byte of the servo bus has to be read. The split
+//! halves of a heapless queue need no critical section. But they divide by a length known only at run time: that costs a
+//! division per byte and adds a path to a panic in every interrupt.
 
 use core::cell::RefCell;
 use core::convert::Infallible;
@@ -24,10 +25,11 @@ use core::ops::Deref;
 use cortex_m::peripheral::NVIC;
 use critical_section::Mutex;
 use embedded_io::{BufRead, ErrorType, Read, ReadReady, Write, WriteReady};
+use firmware_stm32::line_errors::{self, LineErrors};
 use heapless::spsc::Queue;
 use stm32f4::stm32f405 as pac;
 
-/// Bytes that the loop moves at once.
+/// Bytes that the loop moves in one critical section.
 pub(crate) const CHUNK: usize = 8;
 
 /// One of the chip's USARTs.
@@ -44,8 +46,8 @@ impl Usart for pac::USART2 {
     const INTERRUPT: pac::Interrupt = pac::Interrupt::USART2;
 }
 
-/// What both ends of a line share. Each queue holds one byte less than its size.
-pub(crate) struct Line<U, const RECEIVE: usize, const TRANSMIT: usize>(
+/// The state that interrupt and loop share. Each queue holds one byte less than its size.
+pub(crate) struct SharedUart<U, const RECEIVE: usize, const TRANSMIT: usize>(
     Mutex<RefCell<State<U, RECEIVE, TRANSMIT>>>,
 );
 
@@ -53,54 +55,60 @@ struct State<U, const RECEIVE: usize, const TRANSMIT: usize> {
     usart: Option<U>,
     received: Queue<u8, RECEIVE>,
     to_send: Queue<u8, TRANSMIT>,
-    overrun: bool,
+    errors: LineErrors,
 }
 
-/// How a line is set up; always 8N1.
+/// Configuration of a line. The format is always 8N1.
 pub(crate) struct Setup {
-    /// What the bus clock is divided by.
+    /// Divisor of the bus clock, in sixteenths.
     pub(crate) divisor: u16,
-    /// It transmits and receives on its TX pin.
+    /// Half duplex: transmit and receive on the TX pin.
     pub(crate) one_wire: bool,
     /// Interrupt priority.
     pub(crate) priority: u8,
 }
 
-impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Line<U, RECEIVE, TRANSMIT> {
-    /// A line that is still closed.
+impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> SharedUart<U, RECEIVE, TRANSMIT> {
+    /// A closed line.
     pub(crate) const fn new() -> Self {
-        let state = State { usart: None, received: Queue::new(), to_send: Queue::new(), overrun: false };
+        let state =
+            State { usart: None, received: Queue::new(), to_send: Queue::new(), errors: LineErrors::new() };
         Self(Mutex::new(RefCell::new(state)))
     }
 
-    /// Opens the line. But for the setup, a USART comes out of reset as it is wanted.
-    pub(crate) fn open(&'static self, usart: U, setup: &Setup, nvic: &mut NVIC) -> End<U, RECEIVE, TRANSMIT> {
+    /// Opens the line. All other USART settings keep their reset values.
+    pub(crate) fn open(
+        &'static self,
+        usart: U,
+        setup: &Setup,
+        nvic: &mut NVIC,
+    ) -> UartPort<U, RECEIVE, TRANSMIT> {
         let [low, high] = setup.divisor.to_le_bytes();
         let mantissa = u16::from(high) << 4 | u16::from(low >> 4);
         usart.brr().write(|w| w.div_mantissa().set(mantissa).div_fraction().set(low & 0xF));
         usart.cr3().write(|w| w.hdsel().bit(setup.one_wire));
         usart.cr1().write(|w| w.ue().enabled().te().enabled().re().enabled().rxneie().enabled());
         self.with(|state| state.usart = Some(usart));
-        // SAFETY: nothing in this program counts on a priority to keep an interrupt out.
+        // SAFETY: no code relies on a priority to exclude an interrupt.
         unsafe { nvic.set_priority(U::INTERRUPT, setup.priority) };
-        self.admit();
-        End { line: self, chunk: heapless::Vec::new(), taken: 0 }
+        self.unmask();
+        UartPort { line: self, chunk: heapless::Vec::new(), taken: 0 }
     }
 
-    /// What the interrupt has to do.
+    /// The interrupt handler.
     pub(crate) fn serve(&self) {
         self.with(State::serve);
     }
 
-    /// Lets the interrupt come, should it have been shut out for want of room.
-    fn admit(&self) {
-        // SAFETY: nothing in this program counts on an interrupt being masked to keep it out.
+    /// Unmasks the interrupt, which is masked while the receive queue is full.
+    fn unmask(&self) {
+        // SAFETY: no code relies on this interrupt being masked.
         unsafe { NVIC::unmask(U::INTERRUPT) };
     }
 
     fn with<T: Default>(&self, act: impl FnOnce(&mut State<U, RECEIVE, TRANSMIT>) -> T) -> T {
         critical_section::with(|cs| {
-            // Nobody else has it: nothing that `act` does comes back here.
+            // The borrow cannot fail: `act` never calls this function.
             self.0.borrow(cs).try_borrow_mut().map_or_else(|_| T::default(), |mut state| act(&mut state))
         })
     }
@@ -108,36 +116,38 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Line<U, RECEIVE, TRA
 
 impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> State<U, RECEIVE, TRANSMIT> {
     fn serve(&mut self) {
-        let Self { usart: Some(usart), received, to_send, overrun } = self else { return };
-        if !receive(usart, received, overrun) {
+        let Self { usart: Some(usart), received, to_send, errors } = self else { return };
+        if !receive(usart, received, errors) {
             NVIC::mask(U::INTERRUPT);
         }
         send(usart, to_send);
     }
 }
 
-/// Fetches a byte that has come; false if there is no room for it.
-fn receive<const N: usize>(usart: &impl Usart, received: &mut Queue<u8, N>, overrun: &mut bool) -> bool {
-    let status = usart.sr().read();
-    let has_byte = status.rxne().bit_is_set();
-    if status.ore().bit_is_set() {
-        *overrun = true;
-    } else if !has_byte {
+/// Moves a received byte to the queue. Returns false if the queue is full.
+fn receive<const N: usize>(usart: &impl Usart, received: &mut Queue<u8, N>, errors: &mut LineErrors) -> bool {
+    let status = usart.sr().read().bits();
+    let seen = status & (line_errors::RECEIVED | line_errors::ERRORS);
+    if seen == 0 {
         return true;
     }
-    if has_byte && received.is_full() {
+    if received.is_full() && status & line_errors::RECEIVED != 0 {
         return false;
     }
-    // Reading DR after SR also clears an over-run (RM0090, section 30.6.1).
+    // Reading DR after SR also clears the errors (RM0090, section 30.6.1).
     let [byte, _] = usart.dr().read().dr().bits().to_le_bytes();
-    if has_byte {
-        // Cannot fail: there is room.
-        let _ = received.enqueue(byte);
+    if seen != line_errors::RECEIVED {
+        errors.count(status);
+        if status & line_errors::RECEIVED == 0 {
+            return true;
+        }
     }
+    // Cannot fail: the queue is not full.
+    let _ = received.enqueue(byte);
     true
 }
 
-/// Sends what the transmitter takes, and asks to be called again if that is not all.
+/// Passes queued bytes to the transmitter, and enables its interrupt if more bytes are queued.
 fn send<const N: usize>(usart: &impl Usart, to_send: &mut Queue<u8, N>) {
     while !to_send.is_empty()
         && usart.sr().read().txe().bit_is_set()
@@ -148,41 +158,51 @@ fn send<const N: usize>(usart: &impl Usart, to_send: &mut Queue<u8, N>) {
     usart.cr1().modify(|_, w| w.txeie().bit(!to_send.is_empty()));
 }
 
-/// The loop's end of a line.
-pub(crate) struct End<U: 'static, const RECEIVE: usize, const TRANSMIT: usize> {
-    line: &'static Line<U, RECEIVE, TRANSMIT>,
+/// A line as the main loop uses it.
+pub(crate) struct UartPort<U: 'static, const RECEIVE: usize, const TRANSMIT: usize> {
+    line: &'static SharedUart<U, RECEIVE, TRANSMIT>,
     chunk: heapless::Vec<u8, CHUNK>,
-    /// Bytes of the chunk that were consumed.
+    /// Consumed bytes of the chunk.
     taken: usize,
 }
 
-impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> End<U, RECEIVE, TRANSMIT> {
-    /// Does any byte wait to be read?
+impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> UartPort<U, RECEIVE, TRANSMIT> {
+    /// True if a byte is ready to be read.
     pub(crate) fn has_received(&self) -> bool {
         self.taken < self.chunk.len() || self.line.with(|state| !state.received.is_empty())
     }
 
-    /// How many bytes wait to be read.
+    /// Number of bytes that are ready to be read.
     pub(crate) fn waiting(&self) -> usize {
         self.chunk.len() - self.taken + self.line.with(|state| state.received.len())
     }
 
-    /// How many bytes can be written at once.
+    /// Number of bytes that can be written without waiting.
     pub(crate) fn room(&self) -> usize {
         self.line.with(|state| state.to_send.capacity() - state.to_send.len())
     }
 
-    /// Were bytes lost since the last call because nobody fetched them in time?
-    pub(crate) fn take_overrun(&self) -> bool {
-        self.line.with(|state| core::mem::take(&mut state.overrun))
+    /// Receive errors since start.
+    pub(crate) fn errors(&self) -> LineErrors {
+        self.line.with(|state| state.errors)
     }
 
-    /// The first of the bytes that wait to be read; none where none waits.
+    /// True if bytes were lost since start because they were not read in time.
+    pub(crate) fn has_overrun(&self) -> bool {
+        self.line.with(|state| state.errors.overruns > 0)
+    }
+
+    /// True if bytes are queued for sending.
+    pub(crate) fn is_sending(&self) -> bool {
+        self.line.with(|state| !state.to_send.is_empty())
+    }
+
+    /// The first bytes that are ready to be read; empty if there are none.
     pub(crate) fn received(&mut self) -> &[u8] {
         let Self { line, chunk, taken } = self;
-        // Even where nothing is taken out: the interrupt that is shut out sends, too, and room to send may be what
-        // the bytes that wait here are waiting for.
-        line.admit();
+        // Unmask even if the loop takes no byte. The masked interrupt also sends, and the controller may wait for room to
+        // send before it takes more bytes.
+        line.unmask();
         if *taken >= chunk.len() {
             chunk.clear();
             *taken = 0;
@@ -190,7 +210,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> End<U, RECEIVE, TRAN
                 while !chunk.is_full()
                     && let Some(byte) = state.received.dequeue()
                 {
-                    // Cannot fail: there is room.
+                    // Cannot fail: the chunk is not full.
                     let _ = chunk.push(byte);
                 }
             });
@@ -199,22 +219,22 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> End<U, RECEIVE, TRAN
     }
 
     fn wait(&self) {
-        self.line.admit();
+        self.line.unmask();
         cortex_m::asm::wfi();
     }
 }
 
-impl<U, const RECEIVE: usize, const TRANSMIT: usize> ErrorType for End<U, RECEIVE, TRANSMIT> {
+impl<U, const RECEIVE: usize, const TRANSMIT: usize> ErrorType for UartPort<U, RECEIVE, TRANSMIT> {
     type Error = Infallible;
 }
 
-impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> ReadReady for End<U, RECEIVE, TRANSMIT> {
+impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> ReadReady for UartPort<U, RECEIVE, TRANSMIT> {
     fn read_ready(&mut self) -> Result<bool, Infallible> {
         Ok(self.has_received())
     }
 }
 
-impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> BufRead for End<U, RECEIVE, TRANSMIT> {
+impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> BufRead for UartPort<U, RECEIVE, TRANSMIT> {
     fn fill_buf(&mut self) -> Result<&[u8], Infallible> {
         while !self.has_received() {
             self.wait();
@@ -227,7 +247,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> BufRead for End<U, R
     }
 }
 
-impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Read for End<U, RECEIVE, TRANSMIT> {
+impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Read for UartPort<U, RECEIVE, TRANSMIT> {
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
         let bytes = self.fill_buf()?;
         let count = bytes.iter().zip(buffer).map(|(from, to)| *to = *from).count();
@@ -236,13 +256,13 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Read for End<U, RECE
     }
 }
 
-impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> WriteReady for End<U, RECEIVE, TRANSMIT> {
+impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> WriteReady for UartPort<U, RECEIVE, TRANSMIT> {
     fn write_ready(&mut self) -> Result<bool, Infallible> {
         Ok(self.room() > 0)
     }
 }
 
-impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Write for End<U, RECEIVE, TRANSMIT> {
+impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Write for UartPort<U, RECEIVE, TRANSMIT> {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         loop {
             let count = self.line.with(|state| {
@@ -256,7 +276,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Write for End<U, REC
         }
     }
 
-    /// As the trait has it, less its panic at a `write` that takes nothing.
+    /// The default of the trait panics if `write` returns 0. This one has no path to a panic.
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), Infallible> {
         let mut rest = bytes;
         while !rest.is_empty() {

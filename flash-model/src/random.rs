@@ -1,12 +1,12 @@
-//! Numbers that look random and are the same on every machine (SplitMix64, by Sebastiano Vigna, public
-//! domain: <https://prng.di.unimi.it/splitmix64.c>). Not for secrets.
+//! Pseudo-random numbers, the same on every machine (SplitMix64, by Sebastiano Vigna, public domain:
+//! <https://prng.di.unimi.it/splitmix64.c>). Not for cryptography.
 
-/// A sequence of numbers that its seed determines.
+/// A sequence of numbers that depends only on its seed.
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 
 impl Random {
-    /// The sequence of this seed.
+    /// The sequence of `seed`.
     #[must_use]
     pub const fn new(seed: u64) -> Self {
         Self(seed)
@@ -27,7 +27,7 @@ impl Random {
         u32::from_le_bytes([a, b, c, d])
     }
 
-    /// A number below `limit`; 0 where there is none. Good enough for limits that are small against 2^64.
+    /// A number below `limit`; 0 if `limit` is 0. Nearly uniform for limits far below 2^64.
     pub const fn below(&mut self, limit: u64) -> u64 {
         match self.next().checked_rem(limit) {
             Some(number) => number,
@@ -35,7 +35,7 @@ impl Random {
         }
     }
 
-    /// One of the ones of `bits`, alone; 0 where there is none.
+    /// One of the set bits of `bits`; 0 if no bit is set.
     pub fn one_of(&mut self, bits: u32) -> u32 {
         let mut rest = bits;
         for _ in 0..self.below(u64::from(bits.count_ones())) {
@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_sequence_is_that_of_the_published_generator() {
+    fn the_sequence_equals_the_reference_implementation() {
         // The first numbers of the reference implementation from seed 1234567.
         let mut random = Random::new(1_234_567);
         assert_eq!(random.next(), 6_457_827_717_110_365_317);
@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn one_of_takes_every_bit_in_turn_and_no_other() {
+    fn one_of_returns_each_set_bit_and_no_other() {
         let mut random = Random::new(1);
         let mut seen = 0;
         for _ in 0..500 {

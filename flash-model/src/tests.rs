@@ -1,8 +1,8 @@
-//! The model does what flash does, and refuses what flash must not be asked.
+//! Tests of the model: effects of operations and power cuts, and refusals.
 
 use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind, ReadNorFlash};
 
-use super::*;
+use crate::*;
 
 type Small = Flash<512>;
 
@@ -14,7 +14,7 @@ fn read(flash: &mut Small, address: u32) -> Result<u32, Error> {
     Ok(u32::from_le_bytes(bytes))
 }
 
-/// What a word reads at each of many starts.
+/// The value of a word after each of 64 power-ups.
 fn readings(flash: &mut Small, address: u32) -> Vec<u32> {
     let reading = |start| {
         flash.power_up(start);
@@ -39,7 +39,7 @@ fn a_word_takes_another_value_only_after_an_erase() {
     let mut flash = Small::new(2);
     assert_eq!(flash.write(0, &[0xF0; 4]), Ok(()));
     assert_eq!(flash.write(0, &[0xF0; 4]), Ok(()));
-    assert_eq!(flash.told_again(), 1);
+    assert_eq!(flash.reprogrammed(), 1);
     assert_eq!(flash.write(0, &[0x70; 4]), Err(Error::ProgrammedTwice));
     assert_eq!(flash.erase(0, 512), Ok(()));
     assert_eq!(flash.write(0, &[0x70; 4]), Ok(()));
@@ -55,7 +55,7 @@ fn bounds_and_alignment_are_those_of_the_contract() {
 }
 
 #[test]
-fn nothing_answers_from_a_cut_to_the_next_start() {
+fn every_access_fails_between_a_cut_and_the_next_power_up() {
     let mut flash = Small::new(2);
     flash.cut_power(Cut { after: 1, program: ProgramTear::Bytes(2), ..CUT });
     assert_eq!(flash.write(0, &[0; 8]), Err(Error::PowerLost));
@@ -67,7 +67,7 @@ fn nothing_answers_from_a_cut_to_the_next_start() {
 }
 
 #[test]
-fn every_tear_of_a_program_leaves_what_it_says() {
+fn every_program_tear_changes_the_documented_bits() {
     let expected = |tear, reading: u32| match tear {
         ProgramTear::Nothing => reading == u32::MAX,
         ProgramTear::All => reading == 0xFF00_FF00,
@@ -89,14 +89,14 @@ fn every_tear_of_a_program_leaves_what_it_says() {
         for reading in readings(&mut flash, 4) {
             assert!(expected(tear, reading), "{tear:?} reads {reading:08x}");
             let stays = tear == ProgramTear::Disturbed || reading & 0xFF00_FF00 == 0xFF00_FF00;
-            assert!(stays, "{tear:?} cleared a bit that was to stay");
+            assert!(stays, "{tear:?} cleared a bit that should stay set");
         }
         assert_eq!(readings(&mut flash, 0), [u32::MAX; 64]);
     }
 }
 
 #[test]
-fn marginal_bits_are_stable_while_the_power_is_on_and_firm_once_programmed() {
+fn marginal_bits_are_stable_while_the_power_is_on_and_firm_after_a_program() {
     let mut flash = Small::new(2);
     flash.cut_power(Cut { program: ProgramTear::MarginalWord, ..CUT });
     assert_eq!(flash.write(0, &[0; 4]), Err(Error::PowerLost));
@@ -108,7 +108,7 @@ fn marginal_bits_are_stable_while_the_power_is_on_and_firm_once_programmed() {
 }
 
 #[test]
-fn a_sector_whose_erase_was_cut_takes_nothing_until_it_is_erased() {
+fn a_sector_whose_erase_was_cut_refuses_programs_until_it_is_erased() {
     for tear in EraseTear::ALL {
         let mut flash = Small::new(2);
         flash.write(256, &[0; 256]).unwrap();
@@ -127,7 +127,7 @@ fn a_sector_whose_erase_was_cut_takes_nothing_until_it_is_erased() {
 }
 
 #[test]
-fn erases_can_be_forbidden_until_the_next_start() {
+fn erases_can_be_forbidden_until_the_next_power_up() {
     let mut flash = Small::new(2);
     flash.forbid_erase();
     assert_eq!(flash.erase(0, 512), Err(Error::EraseForbidden));
@@ -136,7 +136,7 @@ fn erases_can_be_forbidden_until_the_next_start() {
 }
 
 #[test]
-fn worn_cells_and_sectors_stay_as_they_are() {
+fn worn_cells_and_sectors_do_not_change() {
     let mut flash = Small::new(2);
     flash.wear_out_bit(32 + 5);
     assert_eq!(flash.write(4, &[0; 4]), Ok(()));
@@ -149,7 +149,7 @@ fn worn_cells_and_sectors_stay_as_they_are() {
 }
 
 #[test]
-fn an_inert_flash_takes_everything_and_changes_nothing() {
+fn an_inert_flash_accepts_every_operation_and_changes_nothing() {
     let mut flash = Small::inert(&[0; 1_024]);
     assert_eq!(flash.erase(0, 1_024), Ok(()));
     assert_eq!(flash.write(0, &[0x55; 8]), Ok(()));

@@ -1,14 +1,13 @@
-//! What the measuring programs share: inputs that the compiler knows nothing about, and the panic handler
-//! that must not be linked.
+//! Shared parts of the measuring programs: inputs that the compiler cannot evaluate, and a panic handler that must not be
+//! linked.
 //!
-//! Each program calls one part of the cores the way a shell does. Whatever goes in and comes out passes
-//! through [`opaque`], so that nothing can be worked out in advance, left out, or proved away on account of
-//! what this package happens to call. None of them does anything useful: they are linked, and looked at;
-//! those that [count](meter) are run in an emulator.
+//! Each program calls one part of the cores as the firmware does. All inputs and outputs pass through [`opaque`], so the
+//! compiler can neither evaluate nor remove the calls. The programs have no other use: `xtask` inspects the linked images,
+//! and runs those that [count](meter) in the emulator.
 
 #![no_std]
 
-pub mod contest;
+pub mod count_server;
 pub mod meter;
 
 use core::hint::black_box;
@@ -16,24 +15,24 @@ use core::panic::PanicInfo;
 
 use protocol_core::time::Instant;
 
-/// The value, as something that could be anything from now on.
+/// Returns `value`. The compiler cannot know it any more.
 pub fn opaque<T>(value: T) -> T {
     black_box(value)
 }
 
-/// Any bytes, any number of them.
+/// Bytes of unknown number and value, for the compiler.
 #[must_use]
 pub fn any_bytes() -> &'static [u8] {
     opaque(&[])
 }
 
-/// Any time.
+/// A time that the compiler does not know.
 #[must_use]
 pub fn any_time() -> Instant {
     Instant::from_micros(opaque(0))
 }
 
-/// Linked only if a panic can be reached: `cargo xtask no-panic` looks for it.
+/// Linked only if a panic is reachable: `cargo xtask no-panic` searches for it.
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     loop {

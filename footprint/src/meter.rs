@@ -1,29 +1,32 @@
-//! Counts instructions, in the emulator only: under `-icount shift=0` TIM2, without a prescaler, gains one tick with
-//! each instruction. Figures leave by USART1, a line each: name, tab, number.
+//! Counts instructions in the emulator: with `-icount shift=0` and without a prescaler, TIM2 counts one per instruction.
+//! Each figure is a line on USART1: name, tab, number.
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use crate::opaque;
 
-/// Bytes as they are written to a register of a peripheral.
+/// The address of a peripheral's register.
 type Register = *mut u32;
 
-/// TIM2 (RM0090, section 18.4): enable, count.
+/// TIM2 (RM0090, section 18.4): control register.
 const TIM2_CR1: Register = 0x4000_0000 as Register;
+/// TIM2: count.
 const TIM2_CNT: Register = 0x4000_0024 as Register;
-/// USART1 (RM0090, section 30.6): data, enable of the whole and of the transmitter.
+/// USART1 (RM0090, section 30.6): data register.
 const USART1_DR: Register = 0x4001_1004 as Register;
+/// USART1: control register.
 const USART1_CR1: Register = 0x4001_100C as Register;
+/// Bits UE and TE.
 const ENABLE_TRANSMITTER: u32 = 1 << 13 | 1 << 3;
 
-/// A running count.
+/// A running instruction counter.
 pub struct Meter {
-    /// What counting nothing costs.
+    /// Instructions counted for an empty function.
     overhead: u32,
 }
 
 impl Default for Meter {
-    /// Starts it.
+    /// Starts the counter.
     fn default() -> Self {
         write(TIM2_CR1, 1);
         write(USART1_CR1, ENABLE_TRANSMITTER);
@@ -34,7 +37,7 @@ impl Default for Meter {
 }
 
 impl Meter {
-    /// How many instructions `act` takes. What it does must not depend on what the compiler knows: see [`opaque`].
+    /// Counts the instructions of `act`. Pass its inputs and outputs through [`opaque`].
     #[inline(always)]
     pub fn count(&self, act: impl FnOnce()) -> u32 {
         let start = count_so_far();
@@ -44,7 +47,7 @@ impl Meter {
         count_so_far().wrapping_sub(start).wrapping_sub(self.overhead)
     }
 
-    /// Tells a figure.
+    /// Sends a figure.
     #[inline(never)]
     pub fn tell(&self, name: &str, figure: u32) {
         name.bytes().for_each(send);
@@ -60,7 +63,7 @@ impl Meter {
         send(b'\n');
     }
 
-    /// Says that there are no more figures.
+    /// Sends the end mark. Never returns.
     pub fn end(&self) -> ! {
         "end\n".bytes().for_each(send);
         loop {
@@ -74,11 +77,11 @@ fn send(byte: u8) {
 }
 
 fn count_so_far() -> u32 {
-    // SAFETY: a register of every STM32F405; reading it changes nothing.
+    // SAFETY: every STM32F405 has this register, and reading it has no side effect.
     unsafe { TIM2_CNT.read_volatile() }
 }
 
 fn write(register: Register, value: u32) {
-    // SAFETY: one of the registers above, of peripherals that nobody else here uses.
+    // SAFETY: `register` is one of the constants above, and no other code here uses these peripherals.
     unsafe { register.write_volatile(value) }
 }

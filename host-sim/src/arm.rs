@@ -5,18 +5,21 @@ use std::os::fd::{AsFd, BorrowedFd};
 
 use embedded_storage::nor_flash::NorFlash;
 use protocol_core::time::Instant;
+use rustix::event::PollFlags;
 use rustix::event::epoll::EventFlags;
-use tracing::{Span, info};
+use tracing::{Span, error, info};
 
 use crate::clients::Clients;
 use crate::pace;
+use crate::plant::Plant;
 use crate::pty::Pty;
+use crate::servo_bus::ServoBus;
 use crate::world::World;
 
 /// A world, a port, and whether the port is full.
 #[derive(Debug)]
-pub struct Arm<F> {
-    world: World<F>,
+pub struct Arm<F, B = Plant> {
+    world: World<F, B>,
     pty: Pty,
     /// The client does not read, and its buffers in the kernel are full.
     is_blocked: bool,
@@ -24,10 +27,10 @@ pub struct Arm<F> {
     span: Span,
 }
 
-impl<F: NorFlash + Clone> Arm<F> {
+impl<F: NorFlash + Clone, B: ServoBus> Arm<F, B> {
     /// Puts `world` behind `pty`; what is logged about it is logged inside of `span`.
     #[must_use]
-    pub const fn new(world: World<F>, pty: Pty, span: Span) -> Self {
+    pub const fn new(world: World<F, B>, pty: Pty, span: Span) -> Self {
         Self { world, pty, is_blocked: false, span }
     }
 
@@ -36,6 +39,25 @@ impl<F: NorFlash + Clone> Arm<F> {
         let _inside = self.span.enter();
         info!("power cycle");
         self.world.power_cycle(now);
+    }
+
+    /// Says that its port failed.
+    pub(crate) fn report_failure(&self, failure: &io::Error) {
+        let _inside = self.span.enter();
+        error!("the port failed ({failure}): this arm ends");
+    }
+
+    /// The registers, to look at.
+    #[cfg(test)]
+    pub(crate) fn registers(&self) -> &protocol_core::registers::RegisterFile {
+        self.world.registers()
+    }
+
+    /// Restarts its controller, and leaves its servos alone.
+    pub fn restart_controller(&mut self, now: Instant) {
+        let _inside = self.span.enter();
+        info!("restart of the controller");
+        self.world.restart_controller(now);
     }
 
     /// One turn at `now`. Says when it wants the next.
@@ -90,6 +112,26 @@ impl<F: NorFlash + Clone> Arm<F> {
         self.pty.has_news(clients)
     }
 
+    /// The servo bus, for whoever moves its bytes.
+    pub const fn bus(&mut self) -> &mut B {
+        self.world.bus()
+    }
+
+    /// A register, to look at.
+    #[must_use]
+    pub fn register(&self, address: u8) -> u8 {
+        self.world.registers().get(address)
+    }
+
+    /// Likewise [`Arm::interest`], for poll(2).
+    #[must_use]
+    pub fn poll_interest(&self) -> PollFlags {
+        let mut interest = PollFlags::empty();
+        interest.set(PollFlags::IN, self.interest().contains(EventFlags::IN));
+        interest.set(PollFlags::OUT, self.interest().contains(EventFlags::OUT));
+        interest
+    }
+
     /// What has to happen at the port for it to want a turn before that.
     #[must_use]
     pub fn interest(&self) -> EventFlags {
@@ -100,7 +142,7 @@ impl<F: NorFlash + Clone> Arm<F> {
     }
 }
 
-impl<F> AsFd for Arm<F> {
+impl<F, B> AsFd for Arm<F, B> {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.pty.master()
     }

@@ -2,9 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::{ArgAction, Parser};
+use clap::{ArgAction, ArgGroup, Parser};
+use motion_core::servo_bus::TorqueCodes;
+use protocol_core::registers::JOINTS;
 use tracing::level_filters::LevelFilter;
 
+use crate::adapter::Latency;
 use crate::eeprom::Eeprom;
 use crate::faults::FaultAt;
 
@@ -26,13 +29,40 @@ THE FIRST MINUTE
   standard output is 'ready <tty path>', as soon as it can be opened; with --arms there is one such
   line for each arm, in their order. All else is on standard error.
 
+THE ARM HAS WEIGHT
+  Without torque, a loaded joint falls, and in state damping it sinks. After power-up a hand holds
+  each joint until it has torque. --fault arm=supported keeps it up at all times.
+
 MANY ARMS
   --arms N runs arms 1 to N in one process. Where an option names a file, each arm has its own, with
   its number before the extension: --eeprom arm.bin keeps the settings of arm 2 in arm-2.bin. Chip
   ids count on from --chip-id, faults befall all arms, and so do signals.
 
+REAL SERVOS
+  host-sim --servos /dev/ttyUSB0 --link ./7bot the controller on this computer, real servos behind an
+                                               adapter for bus servos; clients use ./7bot as ever
+  'ready' comes when the adapter's port is open. Standard error tells which servos were found and how
+  the bus does. An adapter that is pulled out is waited for, and the arm holds meanwhile. At the end
+  the servos are damped, so that the arm sinks slowly; --hold-on-exit leaves them holding. Never
+  connect a second controller to the same servos.
+  An answer may come --usb-timeout later than on the wire. The default suits an adapter that gathers
+  bytes for 16 ms; goals do not wait for answers. A shorter time asks more often where a servo is
+  missing; one that is too short for the adapter loses answers.
+  An FTDI adapter has a latency timer, 16 ms by default. It is set to 1 ms through its file in sysfs,
+  which most systems let only root write. ASYNC_LOW_LATENCY (setserial low_latency) is not set.
+
+SERVOS ONLY
+  host-sim --servos-only --link ./bus          seven servos, as a computer sees them behind a USB adapter
+  host-sim --servos-only --link ./bus --usb-latency 1-20 --fault bus=echo --trace
+  The port carries raw frames of the servo bus. The servos hear a client only at their own baud rate,
+  --servo-baud, so set the port to it. --trace prints the bytes on the wire. A fault is named by its
+  joint, from 1 to 7, also where --ids gives the joint's servo another id.
+
 SIGNALS
   SIGHUP            a power cycle: RAM registers are lost, settings are kept, the port stays
+  SIGUSR1           with --servos-only: unplugs the adapter, and plugs it in again; the servos keep
+                    their power. The port and its link are gone meanwhile
+  SIGUSR2           a restart of the controller alone: the servos keep their power, torque and goals
   SIGINT, SIGTERM   a clean end
 
 EXIT STATUS
@@ -40,9 +70,13 @@ EXIT STATUS
   1   the operating system failed while the simulator ran
   2   an option or a file cannot be used; standard error says why, in one line";
 
+/// Ids of servos: one value of one option.
+pub type Ids = Vec<u8>;
+
 /// A 7Bot V2 arm without the arm: any serial client can open the port it makes.
 #[derive(Clone, Debug, Parser)]
 #[command(version, about, after_help = LESSON)]
+#[command(group = ArgGroup::new("adapter").args(["servos", "servos_only"]))]
 pub struct Options {
     /// Keep a symbolic link to the port at PATH while running
     #[arg(long, value_name = "PATH")]
@@ -70,7 +104,8 @@ pub struct Options {
     pub trace: bool,
 
     /// Give the arm a fault (repeatable): JOINT from 1 to 7 and missing, stuck, late, late=MILLISECONDS,
-    /// garbled or garbled=EVERY_NTH; or bus=echo
+    /// garbled, garbled=EVERY_NTH or restarting=MILLISECONDS (the servo restarts that often); or bus=echo; or
+    /// arm=supported (it does not fall without torque); or arm=goal-starts-torque (in a servo that restarted)
     #[arg(long = "fault", value_name = "JOINT=KIND")]
     pub faults: Vec<FaultAt>,
 
@@ -81,6 +116,42 @@ pub struct Options {
         conflicts_with_all = ["arms", "link", "eeprom", "unpaced", "chip_id", "trace"]
     )]
     pub servo_socket: Option<PathBuf>,
+
+    /// Drive real servos behind the USB adapter at PORT, /dev/ttyUSB0 for example: see REAL SERVOS below
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["arms", "faults", "servo_socket"])]
+    pub servos: Option<PathBuf>,
+
+    /// With --servos: how many milliseconds later than on the wire an answer may arrive
+    #[arg(long, value_name = "MS", default_value_t = 40, requires = "servos", value_parser = clap::value_parser!(u16).range(0..=1_000))]
+    pub usb_timeout: u16,
+
+    /// With --servos: at the end leave the servos holding instead of damping them
+    #[arg(long, requires = "servos")]
+    pub hold_on_exit: bool,
+
+    /// Run only the servos, on a port that carries the servo bus as a USB adapter does: see SERVOS ONLY below
+    #[arg(long, conflicts_with_all = ["arms", "eeprom", "unpaced", "chip_id", "servo_socket"])]
+    pub servos_only: bool,
+
+    /// With --servos-only: the servos' ids, seven at most; joint n has id n-1 [default: 0,1,2,3,4,5,6]
+    #[arg(long, value_name = "ID,..", value_parser = ids, requires = "servos_only")]
+    pub ids: Option<Ids>,
+
+    /// With --servos-only: how many milliseconds the adapter gathers bytes, as 16 or 1-20
+    #[arg(long, value_name = "MS", default_value = "0", requires = "servos_only")]
+    pub usb_latency: Latency,
+
+    /// With --servos-only: what the adapter's delays are drawn from
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "servos_only")]
+    pub seed: u64,
+
+    /// The baud rate of the servo bus
+    #[arg(long, value_name = "BAUD", default_value_t = 1_000_000, requires = "adapter")]
+    pub servo_baud: u32,
+
+    /// What a servo's register 40 means: 'older' is 0 damping, 1 on, 2 free; 'current' is 0 free, 1 on, 2 damping
+    #[arg(long, value_name = "TABLE", default_value = "older", value_parser = torque_codes)]
+    pub torque_codes: TorqueCodes,
 
     /// Say more on standard error; twice: everything
     #[arg(short, long, action = ArgAction::Count, conflicts_with = "quiet")]
@@ -104,6 +175,21 @@ impl Options {
     }
 }
 
+/// Up to seven ids of servos, with commas in between. Several servos may have the same.
+fn ids(text: &str) -> Result<Ids, &'static str> {
+    let ids: Option<Ids> = text.split(',').map(|id| id.parse().ok().filter(|&id| id <= 253)).collect();
+    ids.filter(|ids| ids.len() <= JOINTS).ok_or("use up to seven ids from 0 to 253, as 0,1,2")
+}
+
+/// Which of the two published tables of register 40.
+fn torque_codes(word: &str) -> Result<TorqueCodes, &'static str> {
+    match word {
+        "older" => Ok(TorqueCodes::DampingOnFree),
+        "current" => Ok(TorqueCodes::FreeOnDamping),
+        _ => Err("use older (0 damping, 1 on, 2 free) or current (0 free, 1 on, 2 damping)"),
+    }
+}
+
 /// Twelve hexadecimal digits, most significant first.
 fn chip_id(text: &str) -> Result<[u8; 6], &'static str> {
     const WANTED: &str = "use exactly 12 hexadecimal digits, for example 53494d000001";
@@ -121,8 +207,11 @@ pub fn in_one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let mut words = text.lines().map(str::trim);
     let first = words.next().unwrap_or_default().trim_start_matches("error: ");
+    // A list stands on lines of its own.
+    let listed = if first.ends_with(':') { words.next().unwrap_or_default() } else { "" };
+    let space = if listed.is_empty() { "" } else { " " };
     let tip = words.find(|line| line.starts_with("tip: ")).map(|tip| format!(" ({tip})")).unwrap_or_default();
-    format!("{first}{tip}; see host-sim --help")
+    format!("{first}{space}{listed}{tip}; see host-sim --help")
 }
 
 #[cfg(test)]
@@ -161,6 +250,18 @@ mod tests {
             ("--fault 3=broken", "missing"),
             ("--servo-socket a --link b", "--link"),
             ("--servo-socket a --arms 2", "--arms"),
+            ("--servos-only --arms 2", "--arms"),
+            ("--servos-only --eeprom none", "--eeprom"),
+            ("--servos-only --usb-latency 20-1", "1-20"),
+            ("--servos-only --ids 0,254", "0 to 253"),
+            ("--servos-only --ids 0,1,2,3,4,5,6,7", "seven"),
+            ("--usb-latency 1", "--servos-only"),
+            ("--servos a --arms 2", "--arms"),
+            ("--servos a --fault 3=missing", "--fault"),
+            ("--servos a --servos-only", "--servos-only"),
+            ("--hold-on-exit", "--servos"),
+            ("--servo-baud 1000", "--servos"),
+            ("--torque-codes new", "older"),
             ("--arms 0", "--arms"),
             ("-q -v", "--verbose"),
             ("port", "port"),

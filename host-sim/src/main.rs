@@ -14,13 +14,18 @@ use host_sim::eeprom::{Eeprom, ImageError};
 use host_sim::flash::Flash;
 use host_sim::link::{Link, LinkError};
 use host_sim::numbered;
-use host_sim::plant::Plant;
+use host_sim::plant::{self, Plant};
 use host_sim::pty::Pty;
+use host_sim::real_servos::{self, RealServos};
+use host_sim::serial::{Serial, SerialError};
+use host_sim::servo_bus::{BusLine, ServoBus};
 use host_sim::servo_socket::{ServoSocket, SocketError};
+use host_sim::servos_only::{self, ServosOnly, ServosOnlyError};
 use host_sim::shell::Shell;
 use host_sim::signals::Signals;
 use host_sim::trace::Trace;
 use host_sim::world::{Setup, World};
+use protocol_core::time::Duration;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tracing::{Span, error_span};
 use tracing_subscriber::filter::Targets;
@@ -37,6 +42,8 @@ enum Failure {
     #[error(transparent)]
     Link(#[from] LinkError),
     #[error(transparent)]
+    Serial(#[from] SerialError),
+    #[error(transparent)]
     Socket(#[from] SocketError),
     #[error("no pseudo-terminal: {0}: see that /dev/pts is mounted and has not run out, nor 'ulimit -n'")]
     Port(io::Error),
@@ -44,6 +51,15 @@ enum Failure {
     Signals(io::Error),
     #[error("the operating system failed: {0}")]
     Running(io::Error),
+}
+
+impl From<ServosOnlyError> for Failure {
+    fn from(error: ServosOnlyError) -> Self {
+        match error {
+            ServosOnlyError::Link(link) => Self::Link(link),
+            ServosOnlyError::System(cause) => Self::Running(cause),
+        }
+    }
 }
 
 impl Failure {
@@ -94,22 +110,26 @@ fn log_to_stderr(options: &Options) {
 }
 
 fn run(options: &Options) -> Result<(), Failure> {
-    let mut signals = Signals::catch().map_err(Failure::Signals)?;
+    let catch = if options.servos_only { Signals::catch_with_unplug } else { Signals::catch };
+    let mut signals = catch().map_err(Failure::Signals)?;
     let mut clock = Clock::default();
-    match &options.servo_socket {
-        Some(path) => run_servos(options, path, &mut clock, &mut signals),
-        None => run_arms(options, &mut clock, &mut signals),
+    match (&options.servo_socket, &options.servos) {
+        (Some(path), _) => run_servo_socket(options, path, &mut clock, &mut signals),
+        (None, Some(port)) => run_real_servos(options, port, &mut clock, &mut signals),
+        (None, None) if options.servos_only => run_servos_only(options, &mut clock, &mut signals),
+        (None, None) => run_arms(options, &mut clock, &mut signals),
     }
 }
 
 /// The arm's other half, in the standard pose, with the faults that it was given.
 fn plant(options: &Options, clock: &mut Clock) -> Plant {
-    let mut plant = Plant::new(clock.now());
+    let settings = plant::Settings { torque_codes: options.torque_codes, ..plant::Settings::default() };
+    let mut plant = Plant::with_settings(clock.now(), settings);
     options.faults.iter().for_each(|fault| fault.befall(&mut plant));
     plant
 }
 
-fn run_servos(
+fn run_servo_socket(
     options: &Options,
     path: &Path,
     clock: &mut Clock,
@@ -119,6 +139,49 @@ fn run_servos(
     let socket = ServoSocket::listen(path)?;
     say_ready(&[path.to_owned()]);
     socket.serve(plant, clock, signals).map_err(Failure::Running)
+}
+
+fn run_servos_only(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Result<(), Failure> {
+    let mut plant = plant(options, clock);
+    if let Some(ids) = &options.ids {
+        plant.set_ids(ids);
+    }
+    let setup = servos_only::Setup {
+        link: options.link.clone(),
+        baud: options.servo_baud,
+        latency: options.usb_latency,
+        seed: options.seed,
+    };
+    let mut servos = ServosOnly::new(setup, plant)?;
+    if options.trace {
+        servos.watch(|direction, bytes| tracing::info!(target: FRAMES, "{direction} {bytes:02x?}"));
+    }
+    say_ready(servos.path().as_slice());
+    Ok(servos.serve(clock, signals)?)
+}
+
+fn run_real_servos(
+    options: &Options,
+    port: &Path,
+    clock: &mut Clock,
+    signals: &mut Signals,
+) -> Result<(), Failure> {
+    let serial = Serial::open(port, options.servo_baud)?;
+    let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
+    let pty = Pty::open(clients.as_mut()).map_err(Failure::Port)?;
+    let path = pty.path().to_owned();
+    let _link = options.link.as_ref().map(|link| Link::new(link, &path)).transpose()?;
+    let line = BusLine::new(Duration::from_millis(options.usb_timeout.into()));
+    let arm = arm(options, None, pty, clock, line)?;
+    let setup = real_servos::Setup {
+        port: port.to_owned(),
+        baud: options.servo_baud,
+        torque_codes: options.torque_codes,
+        holds_on_exit: options.hold_on_exit,
+    };
+    let servos = RealServos::new(clock.now(), setup, arm, clients, serial);
+    say_ready(&[path]);
+    servos.run(clock, signals).map_err(Failure::Running)
 }
 
 fn run_arms(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Result<(), Failure> {
@@ -138,7 +201,8 @@ fn run_arms(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Resu
             links.push(Link::new(&numbered::path(link, number), &port)?);
         }
         ports.push(port);
-        arms.push(arm(options, number, pty, clock)?);
+        let plant = plant(options, clock);
+        arms.push(arm(options, number, pty, clock, plant)?);
     }
     let shell = Shell::new(arms, clients).map_err(Failure::Running)?;
     say_ready(&ports);
@@ -146,15 +210,20 @@ fn run_arms(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Resu
 }
 
 /// Switches an arm on.
-fn arm(options: &Options, number: Option<u16>, pty: Pty, clock: &mut Clock) -> Result<Arm<Flash>, Failure> {
+fn arm<B: ServoBus>(
+    options: &Options,
+    number: Option<u16>,
+    pty: Pty,
+    clock: &mut Clock,
+    bus: B,
+) -> Result<Arm<Flash, B>, Failure> {
     // An error, so that whatever is shown is shown with it.
     let span = number.map_or_else(Span::none, |number| error_span!("arm", number));
     let inside = span.enter();
     let flash = options.eeprom.as_ref().unwrap_or(&Eeprom::UsersOwn).open(number)?;
     let chip_id = numbered::chip_id(options.chip_id, number);
-    let setup = Setup { chip_id, is_paced: !options.unpaced };
-    let plant = plant(options, clock);
-    let mut world = World::new(clock.now(), setup, flash, plant);
+    let setup = Setup { chip_id, is_paced: !options.unpaced, torque_codes: options.torque_codes };
+    let mut world = World::new(clock.now(), setup, flash, bus);
     if options.trace {
         world.watch(Trace::new(Box::new(|line| tracing::info!(target: FRAMES, "{line}"))));
     }

@@ -7,19 +7,25 @@
 //!   plant.poll(now)  ◀── Wire: 1 Mbaud ◀──────┘
 //! ```
 //!
+//! The arm has weight: a loaded joint without torque falls, and one with torque droops a little. After power-up
+//! a hand holds each joint until it has torque.
+//!
 //! The same calls at the same times give the same bytes, on every machine. Knows nothing of the controller.
 
+mod pose;
+mod sine;
+mod weight;
 mod wire;
 
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
-use motion_core::servo_bus::TorqueCodes;
 use motion_core::servo_bus::frame::Decoder;
+use motion_core::servo_bus::{Torque, TorqueCodes};
 use protocol_core::registers::map::TARGET_POSITION;
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::{Duration, Instant};
 
 use crate::servo::motor::STEP;
-use crate::servo::{Fault, Servo};
+use crate::servo::{Fault, Make, Servo};
 use wire::Wire;
 
 /// The supply of an idle arm, in 0.1 V.
@@ -38,6 +44,8 @@ pub struct Settings {
     pub return_delay: Duration,
     /// What the codes of the torque switch mean.
     pub torque_codes: TorqueCodes,
+    /// After a servo's own start, does the first goal switch its torque on? Some servos do so.
+    pub goal_starts_torque: bool,
 }
 
 impl Default for Settings {
@@ -46,6 +54,17 @@ impl Default for Settings {
             boot_time: Duration::from_millis(200),
             return_delay: Duration::from_micros(250),
             torque_codes: TorqueCodes::default(),
+            goal_starts_torque: false,
+        }
+    }
+}
+
+impl Settings {
+    const fn make(&self) -> Make {
+        Make {
+            boot_time: self.boot_time,
+            codes: self.torque_codes,
+            goal_starts_torque: self.goal_starts_torque,
         }
     }
 }
@@ -58,6 +77,10 @@ pub struct Plant {
     decoder: Decoder,
     wire: Wire,
     has_echo: bool,
+    /// Is it known to the microsecond when the controller's bytes are on the wire?
+    has_exact_times: bool,
+    /// How many frames of the controller were lost because a servo drove the line.
+    collisions: u64,
     /// The motors have gone as far as this.
     now: Instant,
 }
@@ -73,24 +96,36 @@ impl Plant {
     #[must_use]
     pub fn with_settings(now: Instant, settings: Settings) -> Self {
         let ready_at = now + settings.boot_time;
-        let servo =
-            |joint| Servo::new(joint, settings.torque_codes, standard_position_counts(joint), ready_at);
-        Self {
+        let servo = |joint| Servo::new(joint, settings.make(), standard_position_counts(joint), ready_at);
+        let mut plant = Self {
             settings,
             servos: Joint::ALL.map(servo),
             decoder: Decoder::new(),
             wire: Wire::new(),
             has_echo: false,
+            has_exact_times: true,
+            collisions: 0,
             now,
-        }
+        };
+        plant.weigh();
+        plant
     }
 
-    /// Takes bytes that the controller began to send at `now`.
+    /// Takes bytes that the controller began to send at `now`: a whole frame, or a piece of one. They are lost for
+    /// the servos if a servo still drives the line.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.advance(now);
+        if bytes.is_empty() {
+            return;
+        }
         let (begin, end) = self.wire.master_sends(now, bytes.len());
-        if self.has_echo && !bytes.is_empty() {
-            self.wire.send(begin, bytes);
+        let has_collided = self.has_exact_times && self.wire.collides(begin, end);
+        if self.has_echo {
+            self.wire.echo(begin, bytes, has_collided);
+        }
+        if has_collided {
+            self.collisions += 1;
+            return;
         }
         for piece in bytes.chunks(Decoder::CAPACITY / 2) {
             self.decoder.push(piece);
@@ -107,6 +142,18 @@ impl Plant {
                 wire.send(answer_at + answer.delay, &answer.bytes);
             }
         }
+    }
+
+    /// How many frames of the controller were lost since the start because a servo drove the line.
+    #[must_use]
+    pub const fn collisions(&self) -> u64 {
+        self.collisions
+    }
+
+    /// Simulates no collisions: for a controller behind a file descriptor, whose bytes come when the operating system
+    /// hands them over, several frames at once perhaps.
+    pub const fn ignore_collisions(&mut self) {
+        self.has_exact_times = false;
     }
 
     /// Lets the arm move on to `now` and gives the bytes that are through to the controller by then.
@@ -129,8 +176,27 @@ impl Plant {
         while self.now + STEP <= now {
             self.now = self.now + STEP;
             let supply = self.supply_decivolts();
-            self.servos.iter_mut().for_each(|servo| servo.step(supply));
+            let mut has_turned = false;
+            for servo in &mut self.servos {
+                has_turned |= servo.step(self.now, supply);
+            }
+            if has_turned {
+                self.weigh();
+            }
         }
+    }
+
+    /// Loads every servo with its share of the arm's weight in this pose.
+    fn weigh(&mut self) {
+        let torques = weight::torques(self.pose());
+        for ((servo, joint), torque) in self.servos.iter_mut().zip(Joint::ALL).zip(torques) {
+            servo.load_with(if pose::is_reversed(joint) { -torque } else { torque });
+        }
+    }
+
+    /// Each joint's angle in thousandths of a degree.
+    fn pose(&self) -> [i64; JOINTS] {
+        Joint::ALL.map(|joint| self.at(joint).map_or(0, |servo| pose::angle(joint, servo.position())))
     }
 
     fn supply_decivolts(&self) -> u8 {
@@ -141,10 +207,42 @@ impl Plant {
 
     /// Makes a joint's servo defective, or well again.
     pub fn set_fault(&mut self, joint: Joint, fault: Option<Fault>) {
-        let ready_at = self.now + self.settings.boot_time;
+        let (now, ready_at) = (self.now, self.now + self.settings.boot_time);
         if let Some(servo) = self.servo(joint) {
-            servo.set_fault(fault, ready_at);
+            servo.set_fault(now, fault, ready_at);
         }
+    }
+
+    /// Leaves only servos with these ids on the bus. An id from 0 to 6 belongs to its joint's servo, where that one
+    /// is not taken yet; any other id goes to the first servo that has none.
+    pub fn set_ids(&mut self, ids: &[u8]) {
+        let mut free: Vec<Joint> = Joint::ALL.to_vec();
+        for &id in ids {
+            let own = free.iter().position(|joint| joint.index() == id);
+            let other = || free.iter().position(|joint| !ids.contains(&joint.index()));
+            let Some(place) = own.or_else(other) else { continue };
+            let joint = free.remove(place);
+            if let Some(servo) = self.servo(joint) {
+                servo.set_id(id);
+            }
+        }
+        free.into_iter().for_each(|joint| self.set_fault(joint, Some(Fault::Missing)));
+    }
+
+    /// Lets one servo lose its power for a moment at `now`: torque and goal are forgotten, and no hand holds it.
+    pub fn restart_servo(&mut self, now: Instant, joint: Joint) {
+        self.advance(now);
+        let ready_at = now + self.settings.boot_time;
+        if let Some(servo) = self.servo(joint) {
+            servo.power_cycle(ready_at);
+        }
+    }
+
+    /// Sets whether a goal switches torque on after a servo's own start.
+    pub fn set_goal_starts_torque(&mut self, starts_torque: bool) {
+        self.settings.goal_starts_torque = starts_torque;
+        let make = self.settings.make();
+        self.servos.iter_mut().for_each(|servo| servo.set_make(make));
     }
 
     /// Lets the controller hear its own bytes, as on a bus whose one wire is both sent and listened on.
@@ -152,27 +250,71 @@ impl Plant {
         self.has_echo = has_echo;
     }
 
-    /// Turns a joint from outside, to a position in counts. With torque on, it goes back by itself.
+    /// Turns a joint from outside, to a position in counts, and holds it there. With torque on, it goes back by
+    /// itself.
     pub fn move_by_hand(&mut self, joint: Joint, counts: u16) {
         if let Some(servo) = self.servo(joint) {
             servo.move_by_hand(counts);
         }
+        self.weigh();
     }
 
-    /// Power off and on: torque is off, goals and answers are forgotten; the joints stay where they are and
-    /// the faults as they are.
+    /// A hand holds a joint where it is until the joint has torque. Does nothing where it has.
+    pub fn hold(&mut self, joint: Joint) {
+        self.servo(joint).into_iter().for_each(|servo| servo.hold_by_hand(true));
+    }
+
+    /// The hand lets go: without torque, a loaded joint falls.
+    pub fn let_go(&mut self, joint: Joint) {
+        self.servo(joint).into_iter().for_each(|servo| servo.hold_by_hand(false));
+    }
+
+    /// Supports the whole arm whenever it has no torque, as a stand does, or no longer.
+    pub fn support(&mut self, is_supported: bool) {
+        self.servos.iter_mut().for_each(|servo| servo.support(is_supported));
+    }
+
+    /// Power off and on: torque is off, goals and answers are forgotten, the faults stay. A hand holds the joints
+    /// where they are until they have torque.
     pub fn power_cycle(&mut self, now: Instant) {
         self.advance(now);
         let ready_at = now + self.settings.boot_time;
-        self.servos.iter_mut().for_each(|servo| servo.power_cycle(ready_at));
+        for servo in &mut self.servos {
+            servo.power_cycle(ready_at);
+            servo.hold_by_hand(true);
+        }
         self.decoder.clear();
         self.wire.clear();
+    }
+
+    /// The true angle of a joint in thousandths of a degree, as of the last call with a time. No offset counts.
+    #[must_use]
+    pub fn angle(&self, joint: Joint) -> i32 {
+        let angle = self.at(joint).map_or(0, |servo| pose::angle(joint, servo.position()));
+        i32::try_from(angle).unwrap_or(0)
+    }
+
+    /// What a joint's servo does with its motor, as of the last call with a time; `None` where it does nothing: it has
+    /// no power, or gave up after an overload.
+    #[must_use]
+    pub fn torque(&self, joint: Joint) -> Option<Torque> {
+        self.at(joint).and_then(|servo| servo.torque_at(self.now))
     }
 
     /// Where a joint's servo is, in counts, as of the last call with a time.
     #[must_use]
     pub fn position_counts(&self, joint: Joint) -> u16 {
-        self.servos.get(usize::from(joint.index())).map_or(0, Servo::position_counts)
+        self.at(joint).map_or(0, Servo::position_counts)
+    }
+
+    /// Does a joint's servo drive it? Not where it has no torque, gave up, or has no power.
+    #[must_use]
+    pub fn has_torque(&self, joint: Joint) -> bool {
+        self.at(joint).is_some_and(Servo::has_torque)
+    }
+
+    fn at(&self, joint: Joint) -> Option<&Servo> {
+        self.servos.get(usize::from(joint.index()))
     }
 
     fn servo(&mut self, joint: Joint) -> Option<&mut Servo> {

@@ -56,6 +56,15 @@ impl Pty {
         Ok(Self { master, terminal, path, watch, client_count: 0 })
     }
 
+    /// A port whose every read and write fails.
+    #[cfg(test)]
+    pub(crate) fn broken() -> Self {
+        let mut port = Self::open(None).unwrap();
+        // The end of a pipe that cannot be read.
+        port.master = io::pipe().unwrap().1.into();
+        port
+    }
+
     /// Says what follows from not seeing clients.
     pub fn warn_of(error: &io::Error) {
         warn!("cannot see clients come and go ({error}): output piles up unread");
@@ -87,6 +96,14 @@ impl Pty {
     /// The pseudo-terminal failed.
     pub fn write(&self, bytes: &[u8]) -> io::Result<usize> {
         none_if_blocked(rustix::io::write(&self.master, bytes))
+    }
+
+    /// The baud rate that the client chose, in bits per second.
+    ///
+    /// # Errors
+    /// The pseudo-terminal failed.
+    pub fn baud(&self) -> io::Result<u32> {
+        Ok(tcgetattr(&self.terminal)?.output_speed())
     }
 
     /// Has a client the port open?

@@ -4,29 +4,25 @@
 //! temperature and load behave plausibly and prove nothing: no arm was measured.
 
 mod fault;
+mod gear;
 pub(crate) mod motor;
+mod warmth;
 
-use motion_core::servo_bus::frame::{Frame, FrameBuffer, error};
+use motion_core::servo_bus::frame::{BROADCAST, Frame, FrameBuffer, Instruction, error, register};
 use motion_core::servo_bus::servo as protocol;
 use motion_core::servo_bus::{Reading, Torque, TorqueCodes};
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
 pub use fault::{Fault, UnknownFault};
+use gear::Drag;
 use motor::{Hold, Motor};
+use warmth::Warmth;
 
 /// Pushing harder than this, in 0.1 %, ..
 const OVERLOAD: u16 = 800;
 /// .. for so many steps makes a servo give up until its torque is switched off and on.
 const OVERLOAD_STEPS: u32 = 1_000;
-/// The temperature around the arm, in thousandths of a degree Celsius.
-const AMBIENT: u32 = 25_000;
-/// How much warmer a servo gets in the long run for each 0.1 % it pushes, in thousandths of a degree.
-const WARMTH_PER_LOAD: u32 = 40;
-/// The steps between two looks at the temperature: a second.
-const WARMING_STEPS: u32 = 1_000;
-/// The time constant of the temperature, in such looks.
-const WARMING_LAG: u32 = 300;
 
 /// An answer on its way.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,17 +32,35 @@ pub(crate) struct Answer {
     pub(crate) bytes: FrameBuffer,
 }
 
+/// What a servo does by its make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Make {
+    /// How long it hears nothing after a start.
+    pub(crate) boot_time: Duration,
+    /// What the codes of the torque switch mean.
+    pub(crate) codes: TorqueCodes,
+    /// After a start of its own, does a goal switch torque on?
+    pub(crate) goal_starts_torque: bool,
+}
+
 /// A servo.
 #[derive(Clone, Debug)]
 pub(crate) struct Servo {
-    joint: Joint,
-    codes: TorqueCodes,
+    make: Make,
     registers: protocol::Servo,
     motor: Motor,
     fault: Option<Fault>,
     /// It hears nothing before this time.
     ready_at: Instant,
+    /// When it starts again by itself.
+    restarts_at: Instant,
+    /// Its torque switch was not written since it started.
+    is_fresh: bool,
     is_on: bool,
+    /// A hand keeps it from turning until it has torque.
+    is_held: bool,
+    /// A hand keeps it from turning whenever it has no torque.
+    is_supported: bool,
     is_overloaded: bool,
     /// For how many steps it has been pushing too hard.
     strained_steps: u32,
@@ -66,16 +80,19 @@ struct Shown {
 }
 
 impl Servo {
-    /// The servo of a joint, switched off until `ready_at`, then free of torque.
-    pub(crate) fn new(joint: Joint, codes: TorqueCodes, position_counts: u16, ready_at: Instant) -> Self {
+    /// The servo of a joint, switched off until `ready_at`, in somebody's hand.
+    pub(crate) fn new(joint: Joint, make: Make, position_counts: u16, ready_at: Instant) -> Self {
         Self {
-            joint,
-            codes,
+            make,
             registers: protocol::Servo::new(joint.index()),
             motor: Motor::new(joint, position_counts),
             fault: None,
             ready_at,
+            restarts_at: Instant::FAR_FUTURE,
+            is_fresh: true,
             is_on: false,
+            is_held: true,
+            is_supported: false,
             is_overloaded: false,
             strained_steps: 0,
             answers: 0,
@@ -84,19 +101,37 @@ impl Servo {
         }
     }
 
-    /// Power off and on: everything is forgotten but the place, the temperature and the defect.
+    /// Power off and on: everything is forgotten but the place, the temperature, the defect, the servo's EEPROM
+    /// and the hand.
     pub(crate) fn power_cycle(&mut self, ready_at: Instant) {
-        let fresh = Self::new(self.joint, self.codes, self.motor.position_counts(), ready_at);
-        *self = Self { fault: self.fault, warmth: self.warmth, ..fresh };
+        self.registers.power_cycle();
+        self.ready_at = ready_at;
+        self.is_fresh = true;
+        self.is_on = false;
+        self.is_overloaded = false;
+        self.strained_steps = 0;
+        self.answers = 0;
+        self.shown = None;
+    }
+
+    /// Makes it the servo with another id; all its registers are as they leave the factory.
+    pub(crate) fn set_id(&mut self, id: u8) {
+        self.registers = protocol::Servo::new(id);
     }
 
     /// Makes it defective, or well again. `ready_at` counts where that plugs the servo out or in.
-    pub(crate) fn set_fault(&mut self, fault: Option<Fault>, ready_at: Instant) {
+    pub(crate) fn set_fault(&mut self, now: Instant, fault: Option<Fault>, ready_at: Instant) {
         let was_missing = self.fault == Some(Fault::Missing);
         self.fault = fault;
+        self.restarts_at = next_restart(now, fault);
         if was_missing != (fault == Some(Fault::Missing)) {
             self.power_cycle(ready_at);
         }
+    }
+
+    /// Makes it one of another make.
+    pub(crate) const fn set_make(&mut self, make: Make) {
+        self.make = make;
     }
 
     /// Hears a frame at `now`.
@@ -104,14 +139,33 @@ impl Servo {
         if now < self.ready_at || self.fault == Some(Fault::Missing) {
             return None;
         }
-        let answer = self.registers.hear(frame);
-        self.follow_switch();
+        self.is_fresh &= !writes_torque_switch(frame, self.registers.id());
+        let answer = self.registers.handle_frame(frame);
+        self.follow_registers();
         answer.map(|bytes| self.spoil(bytes))
     }
 
+    fn follow_registers(&mut self) {
+        let goal = self.registers.take_new_goal();
+        if goal.is_some() && self.is_fresh && self.make.goal_starts_torque {
+            let code = self.make.codes.code(Torque::On);
+            let switch_on = [register::TORQUE_SWITCH, code];
+            self.registers.handle_frame(&Frame {
+                id: self.registers.id(),
+                code: Instruction::Write as u8,
+                params: &switch_on,
+            });
+        }
+        self.follow_switch();
+        if let Some(goal) = goal {
+            self.motor.start(goal);
+        }
+    }
+
     fn follow_switch(&mut self) {
-        let is_on = self.registers.torque_switch() == self.codes.code(Torque::On);
+        let is_on = self.torque() == Torque::On;
         if is_on && !self.is_on {
+            self.is_held = false;
             self.motor.rest();
             self.motor.start(self.registers.goal());
         }
@@ -120,9 +174,20 @@ impl Servo {
             self.strained_steps = 0;
         }
         self.is_on = is_on;
-        if let Some(goal) = self.registers.take_new_goal() {
-            self.motor.start(goal);
-        }
+    }
+
+    /// What its torque switch says.
+    fn torque(&self) -> Torque {
+        let code = self.registers.torque_switch();
+        let says = |torque: &Torque| self.make.codes.code(*torque) == code;
+        [Torque::On, Torque::Damping].into_iter().find(says).unwrap_or(Torque::Free)
+    }
+
+    /// What it does with its motor as of `now`; `None` where it does nothing: it has no power, or gave up after an
+    /// overload.
+    pub(crate) fn torque_at(&self, now: Instant) -> Option<Torque> {
+        let has_power = now >= self.ready_at && self.fault != Some(Fault::Missing);
+        (has_power && !self.is_overloaded).then(|| self.torque())
     }
 
     fn spoil(&mut self, mut bytes: FrameBuffer) -> Answer {
@@ -138,22 +203,39 @@ impl Servo {
         Answer { delay, bytes }
     }
 
-    /// Lets a step of the motor pass, at this supply.
-    pub(crate) fn step(&mut self, supply_decivolts: u8) {
+    /// Lets a step of the motor pass that ends at `now`, at this supply. Says whether it turned.
+    pub(crate) fn step(&mut self, now: Instant, supply_decivolts: u8) -> bool {
+        if now >= self.restarts_at {
+            self.power_cycle(now + self.make.boot_time);
+            self.restarts_at = next_restart(now, self.fault);
+        }
         self.warmth.step(self.load());
-        if self.motor.is_at_rest() && self.shown == Some(self.to_be_shown(supply_decivolts)) {
+        let hold = self.hold(now);
+        if self.motor.is_at_rest(hold) && self.shown == Some(self.to_be_shown(supply_decivolts)) {
             // Nothing would change. Most steps of an arm are of this kind.
             self.strained_steps = 0;
-            return;
+            return false;
         }
-        let hold = match (self.is_on && !self.is_overloaded, self.fault) {
-            (false, _) => Hold::Released,
-            (true, Some(Fault::Stuck)) => Hold::Blocked,
-            (true, _) => Hold::Driven,
-        };
+        let before = self.motor.position();
         self.motor.step(hold);
         self.strain();
         self.show(supply_decivolts);
+        before != self.motor.position()
+    }
+
+    /// What holds the motor in the step that ends at `now`.
+    fn hold(&self, now: Instant) -> Hold {
+        let is_stuck = self.fault == Some(Fault::Stuck);
+        if self.has_torque() {
+            return if is_stuck { Hold::Blocked } else { Hold::Driven };
+        }
+        if is_stuck || self.is_held || self.is_supported {
+            Hold::Outside
+        } else if self.torque_at(now) == Some(Torque::Damping) {
+            Hold::Released(Drag::Damped)
+        } else {
+            Hold::Released(Drag::Free)
+        }
     }
 
     fn to_be_shown(&self, decivolts: u8) -> Shown {
@@ -188,41 +270,56 @@ impl Servo {
         self.motor.position_counts()
     }
 
-    /// Turns it from outside. A servo with torque goes back.
+    /// Does it drive its joint?
+    pub(crate) const fn has_torque(&self) -> bool {
+        self.is_on && !self.is_overloaded
+    }
+
+    /// Where it is, in millionths of a count.
+    pub(crate) const fn position(&self) -> i64 {
+        self.motor.position()
+    }
+
+    /// Loads it with a torque in micronewton metres, towards more counts.
+    pub(crate) const fn load_with(&mut self, weight: i64) {
+        self.motor.load_with(weight);
+    }
+
+    /// Turns it from outside, and holds it there. A servo with torque goes back.
     pub(crate) fn move_by_hand(&mut self, counts: u16) {
         self.motor.turn_to(counts);
+        self.hold_by_hand(true);
+    }
+
+    /// Keeps it from turning until it has torque, or no longer.
+    pub(crate) const fn hold_by_hand(&mut self, is_held: bool) {
+        self.is_held = is_held && !self.is_on;
+    }
+
+    /// Keeps it from turning whenever it has no torque, or no longer.
+    pub(crate) const fn support(&mut self, is_supported: bool) {
+        self.is_supported = is_supported;
     }
 }
 
-/// How warm a servo is.
-#[derive(Clone, Copy, Debug)]
-struct Warmth {
-    /// In thousandths of a degree Celsius.
-    millidegrees: u32,
-    /// The loads of the steps since the last look.
-    loads: u32,
-    steps: u32,
-}
-
-impl Default for Warmth {
-    fn default() -> Self {
-        Self { millidegrees: AMBIENT, loads: 0, steps: 0 }
+/// When a servo with this fault starts again by itself.
+fn next_restart(now: Instant, fault: Option<Fault>) -> Instant {
+    match fault {
+        Some(Fault::Restarting(every)) => now + every,
+        _ => Instant::FAR_FUTURE,
     }
 }
 
-impl Warmth {
-    fn step(&mut self, load: u16) {
-        self.loads += u32::from(load);
-        self.steps += 1;
-        if self.steps < WARMING_STEPS {
-            return;
+/// Is this a frame that writes the torque switch of the servo with this id?
+fn writes_torque_switch(frame: &Frame<'_>, id: u8) -> bool {
+    match (Instruction::from_code(frame.code), frame.params) {
+        (Some(Instruction::Write), [register::TORQUE_SWITCH, _, ..]) => {
+            frame.id == id || frame.id == BROADCAST
         }
-        let aim = AMBIENT + WARMTH_PER_LOAD * self.loads / WARMING_STEPS;
-        let millidegrees = (self.millidegrees * (WARMING_LAG - 1) + aim) / WARMING_LAG;
-        *self = Self { millidegrees, loads: 0, steps: 0 };
-    }
-
-    fn celsius(self) -> u8 {
-        u8::try_from(self.millidegrees / 1_000).unwrap_or(u8::MAX)
+        (Some(Instruction::SyncWrite), [register::TORQUE_SWITCH, width, items @ ..]) => {
+            let mut items = items.chunks_exact(usize::from(*width) + 1);
+            items.any(|item| item.first() == Some(&id))
+        }
+        _ => false,
     }
 }

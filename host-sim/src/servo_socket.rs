@@ -80,15 +80,18 @@ impl ServoSocket {
     /// The operating system fails: poll(2), or accepting a connection.
     pub fn serve(self, mut plant: Plant, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
         let mut controller: Option<UnixStream> = None;
+        plant.ignore_collisions();
         loop {
             let now = clock.now();
             for wish in signals.wishes() {
                 match wish {
                     Wish::End => return Ok(()),
+                    Wish::Unplug => {}
                     Wish::PowerCycle => {
                         info!("power cycle");
                         plant.power_cycle(now);
                     }
+                    Wish::RestartController => info!("no controller here to restart"),
                 }
             }
             if controller.is_none() {
@@ -128,9 +131,11 @@ impl Drop for ServoSocket {
     }
 }
 
-/// Everything the controller has sent goes to the servos, and what they have to say back. An error means
-/// that the controller has gone.
-fn exchange(stream: &mut UnixStream, plant: &mut Plant, now: Instant) -> io::Result<()> {
+/// Everything the controller has sent goes to the servos, and what they have to say back.
+///
+/// # Errors
+/// The controller has gone.
+pub fn exchange(stream: &mut UnixStream, plant: &mut Plant, now: Instant) -> io::Result<()> {
     let mut bytes = [0; 4_096];
     match stream.read(&mut bytes) {
         Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),

@@ -1,7 +1,7 @@
 //! The loop that puts worlds behind ports: where clock, file descriptors and signals meet the arms.
 //!
 //! One thread that sleeps until somebody writes, comes, goes or signals, or until an arm has something due. An arm
-//! that has nothing to do costs nothing, however many there are.
+//! that has nothing to do costs nothing, however many there are. An arm whose port fails ends, and the others go on.
 
 use std::io;
 use std::mem::MaybeUninit;
@@ -35,6 +35,8 @@ pub struct Shell<F> {
     due: Vec<Instant>,
     /// What each is waited for with.
     interests: Vec<EventFlags>,
+    /// Which have failed.
+    has_ended: Vec<bool>,
     /// `None` where the system cannot tell who is there.
     clients: Option<Clients>,
     epoll: OwnedFd,
@@ -55,13 +57,14 @@ impl<F: NorFlash + Clone> Shell<F> {
         }
         let due = vec![Instant::ZERO; arms.len()];
         let interests = arms.iter().map(Arm::interest).collect();
-        Ok(Self { arms, due, interests, clients, epoll })
+        let has_ended = vec![false; arms.len()];
+        Ok(Self { arms, due, interests, has_ended, clients, epoll })
     }
 
     /// Runs until a signal says otherwise.
     ///
     /// # Errors
-    /// The operating system fails: a port, inotify or epoll.
+    /// The operating system fails: inotify, epoll, or the port of the last arm that was left.
     pub fn run(mut self, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
         epoll::add(&self.epoll, signals.as_fd(), EventData::new_u64(SIGNALS), EventFlags::IN)?;
         loop {
@@ -114,8 +117,13 @@ impl<F: NorFlash + Clone> Shell<F> {
         for wish in signals.wishes() {
             match wish {
                 Wish::End => return true,
+                Wish::Unplug => {}
                 Wish::PowerCycle => {
                     self.arms.iter_mut().for_each(|arm| arm.power_cycle(now));
+                    self.due.fill(now);
+                }
+                Wish::RestartController => {
+                    self.arms.iter_mut().for_each(|arm| arm.restart_controller(now));
                     self.due.fill(now);
                 }
             }
@@ -132,7 +140,30 @@ impl<F: NorFlash + Clone> Shell<F> {
         }
     }
 
+    /// One turn of an arm. If it fails, it is the arm's last; an error means that no arm is left.
     fn turn(&mut self, number: usize, now: Instant) -> io::Result<()> {
+        if self.has_ended.get(number).is_some_and(|&has_ended| has_ended) {
+            self.due.get_mut(number).into_iter().for_each(|due| *due = Instant::FAR_FUTURE);
+            return Ok(());
+        }
+        let Err(failure) = self.try_turn(number, now) else { return Ok(()) };
+        self.end(number, &failure);
+        if self.has_ended.iter().all(|&has_ended| has_ended) { Err(failure) } else { Ok(()) }
+    }
+
+    fn end(&mut self, number: usize, failure: &io::Error) {
+        if let (Some(arm), Some(due), Some(has_ended)) =
+            (self.arms.get(number), self.due.get_mut(number), self.has_ended.get_mut(number))
+        {
+            arm.report_failure(failure);
+            // It may be the very thing that failed.
+            let _ = epoll::delete(&self.epoll, arm);
+            *due = Instant::FAR_FUTURE;
+            *has_ended = true;
+        }
+    }
+
+    fn try_turn(&mut self, number: usize, now: Instant) -> io::Result<()> {
         let (Some(arm), Some(due), Some(interest)) =
             (self.arms.get_mut(number), self.due.get_mut(number), self.interests.get_mut(number))
         else {
@@ -145,5 +176,56 @@ impl<F: NorFlash + Clone> Shell<F> {
             epoll::modify(&self.epoll, &*arm, EventData::new_u64(number), *interest)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+    use std::io::Write;
+
+    use motion_core::TorqueCodes;
+    use protocol_core::registers::map::SPEED;
+    use protocol_core::request::Request;
+    use protocol_core::time::Duration;
+    use protocol_core::wire::FrameBuffer;
+    use tracing::Span;
+
+    use super::*;
+    use crate::flash::Flash;
+    use crate::plant::Plant;
+    use crate::pty::Pty;
+    use crate::world::{Setup, World};
+
+    fn arm(pty: Pty) -> Arm<Flash> {
+        let setup = Setup { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };
+        let world = World::new(Instant::ZERO, setup, Flash::in_memory(), Plant::new(Instant::ZERO));
+        Arm::new(world, pty, Span::none())
+    }
+
+    #[test]
+    fn an_arm_whose_port_fails_ends_and_the_others_go_on() {
+        let good = Pty::open(None).unwrap();
+        let mut client = File::options().write(true).open(good.path()).unwrap();
+        let mut shell = Shell::new(vec![arm(Pty::broken()), arm(good)], None).unwrap();
+        let now = Instant::ZERO + Duration::from_millis(1_000);
+        shell.turn(0, now).unwrap();
+        assert_eq!((shell.has_ended[0], shell.due[0]), (true, Instant::FAR_FUTURE));
+        let mut frame = FrameBuffer::new();
+        Request::Write { address: SPEED.address, values: &[7] }.encode(&mut frame);
+        client.write_all(&frame).unwrap();
+        for number in [1, 0] {
+            shell.due[number] = now;
+            shell.turn(number, now).unwrap();
+        }
+        assert_eq!(shell.arms[1].registers().get(SPEED.address), 7);
+        assert_eq!(shell.due[0], Instant::FAR_FUTURE, "it is not asked for again");
+    }
+
+    #[test]
+    fn when_the_last_arm_has_failed_so_has_the_shell() {
+        let mut shell = Shell::new(vec![arm(Pty::broken()), arm(Pty::broken())], None).unwrap();
+        shell.turn(1, Instant::ZERO).unwrap();
+        assert!(shell.turn(0, Instant::ZERO).is_err());
     }
 }

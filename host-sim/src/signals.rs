@@ -4,7 +4,7 @@ use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 use signal_hook::iterator::backend::SignalDelivery;
 use signal_hook::iterator::exfiltrator::SignalOnly;
 
@@ -13,6 +13,10 @@ use signal_hook::iterator::exfiltrator::SignalOnly;
 pub enum Wish {
     /// SIGHUP: switch the arm off and on.
     PowerCycle,
+    /// SIGUSR1, where it is caught: pull the adapter out, or plug it in again.
+    Unplug,
+    /// SIGUSR2: restart the controller, with the servos under power.
+    RestartController,
     /// SIGINT, SIGTERM: end.
     End,
 }
@@ -22,19 +26,35 @@ pub enum Wish {
 pub struct Signals(SignalDelivery<UnixStream, SignalOnly>);
 
 impl Signals {
-    /// Catches SIGHUP, SIGINT and SIGTERM from now on.
+    /// Catches SIGHUP, SIGINT, SIGTERM and SIGUSR2 from now on.
     ///
     /// # Errors
     /// The system refuses.
     pub fn catch() -> io::Result<Self> {
+        Self::catch_these(&[SIGHUP, SIGUSR2, SIGINT, SIGTERM])
+    }
+
+    /// Likewise, and SIGUSR1 as well.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub fn catch_with_unplug() -> io::Result<Self> {
+        Self::catch_these(&[SIGHUP, SIGUSR1, SIGUSR2, SIGINT, SIGTERM])
+    }
+
+    fn catch_these(signals: &[i32]) -> io::Result<Self> {
         let (read, write) = UnixStream::pair()?;
-        let delivery = SignalDelivery::with_pipe(read, write, SignalOnly, [SIGHUP, SIGINT, SIGTERM])?;
-        Ok(Self(delivery))
+        Ok(Self(SignalDelivery::with_pipe(read, write, SignalOnly, signals)?))
     }
 
     /// What was asked for since the last call, each at most once. A wish to end comes last.
     pub fn wishes(&mut self) -> Vec<Wish> {
-        let wish = |signal| if signal == SIGHUP { Wish::PowerCycle } else { Wish::End };
+        let wish = |signal| match signal {
+            SIGHUP => Wish::PowerCycle,
+            SIGUSR1 => Wish::Unplug,
+            SIGUSR2 => Wish::RestartController,
+            _ => Wish::End,
+        };
         let mut wishes: Vec<Wish> = self.0.pending().map(wish).collect();
         wishes.sort_by_key(|&wish| wish == Wish::End);
         wishes

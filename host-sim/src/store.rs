@@ -1,7 +1,7 @@
 //! The settings between two power-ups: the journal on a flash, and what the controller has to know of it.
 
 use embedded_storage::nor_flash::NorFlash;
-use motion_core::controller::Storage;
+use motion_core::Storage;
 use protocol_core::journal::{Journal, Opened, SaveError};
 use protocol_core::registers::Image;
 use tracing::{debug, info, warn};

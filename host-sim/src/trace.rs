@@ -133,7 +133,6 @@ fn tell_noise(bytes: &[u8], arrow: &str, sink: &mut dyn FnMut(&str)) {
 
 const fn defect_in_words(defect: Defect) -> &'static str {
     match defect {
-        Defect::NoFrame => "no frame",
         Defect::WrongCrc => "a frame with a wrong CRC",
         Defect::MalformedRange { .. } => "a frame that reaches past register 255: refused",
     }

@@ -6,26 +6,32 @@
 //!   host_hears ◀── Pacer ◀── └────────────┘ ──▶ Store
 //! ```
 //!
+//! In the place of the plant there may be a line to real servos: see [`crate::servo_bus`].
+//!
 //! Events happen in the order and at the time of their deadlines, however seldom [`World::advance`] is
 //! called: a shell that oversleeps makes the arm neither slower nor its servos late. Knows no clock and no
 //! file descriptor.
 
 use embedded_storage::nor_flash::NorFlash;
-use motion_core::controller::{Config, Controller, Output};
 use motion_core::servo_bus::TorqueCodes;
 use motion_core::vacuum::Vacuum;
+use motion_core::{Config, Controller, Output};
 use protocol_core::registers::RegisterFile;
+use protocol_core::registers::map::fault;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer::gap;
 use tracing::info;
 
 use crate::pace::Pacer;
 use crate::plant::Plant;
+use crate::servo_bus::ServoBus;
 use crate::store::Store;
 use crate::trace::Trace;
 
 /// How long the controller waits for a servo's answer.
 const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
+/// How long the controller lets the servo bus rest before each frame: what the reference board does.
+const GUARD_TIME: Duration = Duration::from_micros(100);
 /// A deadline that stands though it has passed is looked at again after this long, and the shell need not wake up
 /// more often than on the stroke of it but for bytes on the line: so many arms wake up together.
 const GRAIN: Duration = Duration::from_millis(1);
@@ -39,31 +45,59 @@ pub struct Setup {
     pub chip_id: [u8; 6],
     /// Do bytes take their time on the host link?
     pub is_paced: bool,
+    /// What the codes of the servos' torque switch mean.
+    pub torque_codes: TorqueCodes,
 }
 
 /// An arm with a host link.
 #[derive(Debug)]
-pub struct World<F> {
+pub struct World<F, B = Plant> {
     setup: Setup,
     store: Store<F>,
     controller: Controller,
-    plant: Plant,
+    /// What is behind the controller.
+    bus: B,
     to_arm: Pacer,
     to_host: Pacer,
     trace: Option<Trace>,
     now: Instant,
     /// When the controller wants to be asked again.
     controller_due: Instant,
+    /// The controller does nothing until it is started again.
+    is_halted: bool,
 }
 
 impl<F: NorFlash + Clone> World<F> {
+    /// The arm itself, to look at.
+    #[must_use]
+    pub const fn plant(&self) -> &Plant {
+        &self.bus
+    }
+
+    /// The arm itself, to do something to it.
+    pub const fn plant_mut(&mut self) -> &mut Plant {
+        &mut self.bus
+    }
+}
+
+impl<F: NorFlash + Clone, B: ServoBus> World<F, B> {
     /// Switches an arm on at `now`, with the settings that `flash` holds.
     #[must_use]
-    pub fn new(now: Instant, setup: Setup, flash: F, plant: Plant) -> Self {
-        let (store, controller) = power_up(now, setup, flash);
+    pub fn new(now: Instant, setup: Setup, flash: F, bus: B) -> Self {
+        let (store, controller) = power_up(now, setup, flash, 0, bus.answer_delay());
         let (to_arm, to_host) = (Pacer::new(None), Pacer::new(None));
-        let mut world =
-            Self { setup, store, controller, plant, to_arm, to_host, trace: None, now, controller_due: now };
+        let mut world = Self {
+            setup,
+            store,
+            controller,
+            bus,
+            to_arm,
+            to_host,
+            trace: None,
+            now,
+            controller_due: now,
+            is_halted: false,
+        };
         world.start_link();
         world
     }
@@ -71,10 +105,36 @@ impl<F: NorFlash + Clone> World<F> {
     /// Switches the arm off and on at `now`: RAM is lost, and what is on the host link; the flash is kept.
     pub fn power_cycle(&mut self, now: Instant) {
         self.advance(now, false);
-        self.plant.power_cycle(now);
-        (self.store, self.controller) = power_up(now, self.setup, self.store.flash().clone());
+        self.bus.power_cycle(now);
+        self.start_controller(now, 0);
+    }
+
+    /// Restarts only the controller at `now`, as its watchdog does: RAM is lost, and what is on the host link. The
+    /// servos keep their power, and with it their torque and their goals.
+    pub fn restart_controller(&mut self, now: Instant) {
+        self.advance(now, false);
+        self.start_controller(now, fault::WATCHDOG_RESTART);
+    }
+
+    /// Stops the controller at `now`, as a program that hangs: it sends nothing and hears nothing until
+    /// [`World::restart_controller`] or [`World::power_cycle`]. The servos go on with what they were told.
+    pub fn halt_controller(&mut self, now: Instant) {
+        self.advance(now, false);
+        self.is_halted = true;
+        self.controller_due = Instant::FAR_FUTURE;
+    }
+
+    fn start_controller(&mut self, now: Instant, faults: u8) {
+        (self.store, self.controller) =
+            power_up(now, self.setup, self.store.flash().clone(), faults, self.bus.answer_delay());
         self.controller_due = now;
+        self.is_halted = false;
         self.start_link();
+    }
+
+    /// The servo bus, for whoever moves its bytes.
+    pub const fn bus(&mut self) -> &mut B {
+        &mut self.bus
     }
 
     fn start_link(&mut self) {
@@ -135,7 +195,10 @@ impl<F: NorFlash + Clone> World<F> {
     /// Lets everything happen that is due by `now`. `host_is_silent` says that the host has sent nothing
     /// since the last call that was not handed over.
     pub fn advance(&mut self, now: Instant, host_is_silent: bool) {
-        while let Some(event) = self.next_event().filter(|&event| event < now) {
+        // Real servos were not there in the past: an answer that waits to be read has not timed out.
+        while !B::IS_REAL
+            && let Some(event) = self.next_event().filter(|&event| event < now)
+        {
             self.happen(event, host_is_silent);
         }
         self.happen(now, host_is_silent);
@@ -146,7 +209,11 @@ impl<F: NorFlash + Clone> World<F> {
     #[must_use]
     pub fn deadline(&self, somebody_listens: bool) -> Instant {
         let link = self.link_deadline().unwrap_or(Instant::FAR_FUTURE).max(self.now);
-        let inside = self.plant.deadline().unwrap_or(Instant::FAR_FUTURE).min(self.controller_due);
+        if B::IS_REAL {
+            let later = self.now + GRAIN;
+            return link.min(if self.controller_due > self.now { self.controller_due } else { later });
+        }
+        let inside = self.bus.deadline().unwrap_or(Instant::FAR_FUTURE).min(self.controller_due);
         let unheard = self.now + UNHEARD_GRAIN;
         if somebody_listens {
             let heard = self.controller.host_deadline().max(self.now + GRAIN);
@@ -163,7 +230,7 @@ impl<F: NorFlash + Clone> World<F> {
     /// The next thing to happen after `self.now`. A deadline that has passed and still stands waits for
     /// something else (for silence while bytes are on the line, say) and is looked at again after a while.
     fn next_event(&self) -> Option<Instant> {
-        let candidates = [self.link_deadline(), self.plant.deadline(), Some(self.controller_due)];
+        let candidates = [self.link_deadline(), self.bus.deadline(), Some(self.controller_due)];
         let later = |deadline| if deadline > self.now { deadline } else { self.now + GRAIN };
         candidates.into_iter().flatten().map(later).min()
     }
@@ -172,8 +239,11 @@ impl<F: NorFlash + Clone> World<F> {
         self.now = now;
         self.to_arm.advance(now);
         self.to_host.advance(now);
-        let from_servos = self.plant.poll(now);
-        self.controller.servo_bytes(&from_servos);
+        let from_servos = self.bus.poll(now);
+        if self.is_halted {
+            return;
+        }
+        self.controller.servo_bytes(now, &from_servos);
         if host_is_silent && self.to_arm.is_empty() {
             self.controller_hears(&[]);
         }
@@ -210,7 +280,7 @@ impl<F: NorFlash + Clone> World<F> {
                     }
                     self.to_host.push(self.now, bytes);
                 }
-                Output::ToServos(bytes) => self.plant.bytes(self.now, bytes),
+                Output::ToServos(bytes) => self.bus.bytes(self.now, bytes),
                 Output::Vacuum(vacuum) => tell(vacuum),
                 Output::Save(image) => {
                     let storage = self.store.save(&image);
@@ -231,15 +301,23 @@ fn stroke(at: Instant) -> Instant {
     micros.map_or(Instant::FAR_FUTURE, Instant::from_micros)
 }
 
-fn power_up<F: NorFlash + Clone>(now: Instant, setup: Setup, flash: F) -> (Store<F>, Controller) {
+fn power_up<F: NorFlash + Clone>(
+    now: Instant,
+    setup: Setup,
+    flash: F,
+    faults: u8,
+    answer_delay: Duration,
+) -> (Store<F>, Controller) {
     let (store, stored) = Store::open(flash);
     let config = Config {
         chip_id: setup.chip_id,
-        faults: 0,
+        faults,
         servo_timeout: SERVO_TIMEOUT,
-        torque_codes: TorqueCodes::default(),
+        guard_time: GUARD_TIME,
+        torque_codes: setup.torque_codes,
     };
-    let controller = Controller::new(now, config, stored.as_ref(), store.state());
+    let mut controller = Controller::new(now, config, stored.as_ref(), store.state());
+    controller.set_answer_delay(answer_delay);
     (store, controller)
 }
 

@@ -2,6 +2,7 @@
 
 #![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
 
+#[allow(dead_code)] // Each test file uses a part of it.
 mod sim;
 
 use std::fs;
@@ -10,7 +11,9 @@ use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
-use protocol_core::registers::map::{DEVICE_ID, EEPROM_LOCK, MISSING_SERVOS, PRESENT_POSITION, SPEED};
+use protocol_core::registers::map::{
+    DEVICE_ID, EEPROM_LOCK, FAULTS, MISSING_SERVOS, PRESENT_POSITION, SPEED, TARGET_POSITION, fault,
+};
 use rustix::process::Signal;
 use sim::{Client, Sim, complaint, refused};
 
@@ -102,7 +105,15 @@ fn help_teaches() {
     let output = sim::command(state.path(), &["--help"]).output().unwrap();
     assert_eq!(output.status.code(), Some(0));
     let help = String::from_utf8(output.stdout).unwrap();
-    for word in ["host-sim --link ./7bot", "SIGHUP", "EXIT STATUS", "--servo-socket", "--unpaced"] {
+    for word in [
+        "host-sim --link ./7bot",
+        "SIGHUP",
+        "SIGUSR2",
+        "arm=supported",
+        "EXIT STATUS",
+        "--servo-socket",
+        "--unpaced",
+    ] {
         assert!(help.contains(word), "{word}");
     }
 }
@@ -119,6 +130,21 @@ fn sighup_is_a_power_cycle_and_the_port_stays() {
     client.read_until(SPEED.address, &[60]);
     assert_eq!(client.read(DEVICE_ID.address, 1), [42], "settings are kept");
     assert_eq!(client.read(EEPROM_LOCK.address, 1), [1], "and protected again");
+}
+
+#[test]
+fn sigusr2_restarts_the_controller_and_the_servos_go_on_holding() {
+    let sim = Sim::start(&["--eeprom", "none"]);
+    let mut client = Client::open(sim.port());
+    client.write(TARGET_POSITION.address, &[100]);
+    client.read_until(PRESENT_POSITION.address, &[100]);
+    client.write(SPEED.address, &[7]);
+    assert_eq!(client.read(SPEED.address, 1), [7]);
+    sim.signal(Signal::USR2);
+    client.read_until(FAULTS.address, &[fault::WATCHDOG_RESTART]);
+    assert_eq!(client.read(SPEED.address, 1), [60], "registers in RAM are lost");
+    client.read_until(TARGET_POSITION.address, &[100]);
+    client.read_until(PRESENT_POSITION.address, &[100, 90, 65, 90, 90, 90, 80]);
 }
 
 #[test]
@@ -237,7 +263,7 @@ fn a_stale_servo_socket_is_replaced() {
 /// Pings servo 0 until it answers: it is deaf for a while after power-up.
 fn ping(bus: &mut UnixStream) -> [u8; 6] {
     bus.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
-    for _ in 0..100 {
+    for _ in 0..300 {
         std::io::Write::write_all(bus, b"\xff\xff\x00\x02\x01\xfc").unwrap();
         let mut answer = [0; 6];
         if bus.read_exact(&mut answer).is_ok() {

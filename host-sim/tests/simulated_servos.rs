@@ -9,6 +9,9 @@ use motion_core::servo_bus::{Torque, TorqueCodes};
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
+/// What a master waits between the last byte it heard and its next frame.
+const GUARD_TIME: Duration = Duration::from_micros(100);
+
 /// A master with a plant and a time of its own.
 struct Bench {
     plant: Plant,
@@ -38,7 +41,8 @@ impl Bench {
         self.plant.bytes(self.now, &buffer);
     }
 
-    /// What comes back on the wire, and how many microseconds after the question began.
+    /// What comes back on the wire, and how many microseconds after the question began. The next frame keeps the
+    /// guard time.
     fn ask(&mut self, encode: impl FnOnce(&mut FrameBuffer)) -> (Vec<u8>, u64) {
         let asked_at = self.now;
         self.send(encode);
@@ -47,7 +51,9 @@ impl Bench {
             self.now = due;
             bytes.extend(self.plant.poll(due));
         }
-        (bytes, (self.now - asked_at).as_micros())
+        let took = (self.now - asked_at).as_micros();
+        self.now = self.now + GUARD_TIME;
+        (bytes, took)
     }
 
     /// A joint's answer to a read of eight bytes, with its error bits.
@@ -168,7 +174,7 @@ fn a_sync_write_starts_all_joints_at_the_same_instant() {
     for _ in 0..9 {
         bench.pass(100);
         let gone = [0, 1, 2, 3, 4, 5, 6].map(|i| start[i] - bench.counts(Joint::ALL[i]));
-        assert!(gone.iter().all(|&counts| counts == gone[0]), "{gone:?}");
+        assert!(gone.iter().all(|counts| counts.abs_diff(gone[0]) <= 1), "but for their droop: {gone:?}");
     }
     assert_eq!(start[0] - bench.counts(BASE), 200, "300 counts/s");
 }
@@ -225,7 +231,11 @@ fn a_moving_arm_warms_up_and_takes_its_toll_of_the_supply() {
     assert!((26..40).contains(&warm.temperature_celsius), "{} degrees", warm.temperature_celsius);
     (0..10).for_each(|_| bench.pass(100_000));
     let (rested, _) = bench.reading(BASE).unwrap();
-    assert_eq!((rested.voltage_decivolts, rested.load, rested.speed), (74, 0, 0));
+    assert_eq!(
+        (rested.voltage_decivolts, rested.load, rested.speed),
+        (73, 0, 0),
+        "other joints carry weight"
+    );
     assert!(rested.temperature_celsius < warm.temperature_celsius);
 }
 
@@ -333,4 +343,37 @@ fn it_does_not_matter_how_often_anybody_looks() {
     };
     assert_eq!(run(1), run(600));
     assert_eq!(run(7), run(595), "595 is a multiple of 7");
+}
+
+#[test]
+fn a_frame_that_begins_while_a_servo_drives_the_line_is_lost() {
+    for (pause_us, is_lost) in [(0, true), (19, true), (20, false)] {
+        let mut bench = Bench::ready();
+        bench.plant.set_echo(true);
+        bench.send(|b| ping(b, 0));
+        let answered_at = bench.plant.deadline().unwrap() + Duration::from_micros(250 + 60);
+        assert_eq!(bench.plant.poll(answered_at).len(), 12, "echo and answer");
+        bench.now = answered_at + Duration::from_micros(pause_us);
+        let (bytes, _) = bench.ask(|b| ping(b, 6));
+        assert_eq!(bench.plant.collisions(), u64::from(is_lost), "{pause_us} us");
+        if is_lost {
+            assert_eq!(bytes, [0xFF, 0xFF, 6, 2, 1, 0xF6].map(|byte| byte ^ 0x55), "the echo is damaged");
+        } else {
+            assert_eq!(bytes.len(), 12);
+        }
+        assert_eq!(bench.ask(|b| ping(b, 6)).0.len(), 12, "the next is heard");
+    }
+}
+
+#[test]
+fn frames_without_a_pause_are_heard_unless_an_answer_comes_between_them() {
+    let mut bench = Bench::ready();
+    bench.send(|b| sync_write(b, register::TORQUE_SWITCH, (0..7).map(|id| (id, [1]))));
+    assert_eq!(bench.ask(|b| ping(b, 0)).0.len(), 6, "no servo answers a sync write");
+    bench.send(|b| ping(b, 0));
+    // 480 us on the wire: the answer to the ping begins in the middle of it.
+    let goal = |id: u8| (id, [2, 0, 0, 0, 1, 44]);
+    let (bytes, _) = bench.ask(|b| sync_write(b, register::GOAL_POSITION, (0..7).map(goal)));
+    assert_eq!((bench.plant.collisions(), bytes.len()), (1, 6));
+    assert_ne!(bytes, [0xFF, 0xFF, 0, 2, 0, 0xFD], "and the answer is damaged");
 }

@@ -8,6 +8,7 @@ use host_sim::flash::{Flash, SIZE};
 use host_sim::pace;
 use host_sim::plant::Plant;
 use host_sim::world::{Setup, World};
+use motion_core::servo_bus::TorqueCodes;
 use protocol_core::registers::map::{
     BAUD_RATE, DEVICE_ID, EEPROM_LOCK, FAULTS, FEEDBACK_FREQUENCY, MOVING_JOINTS, PRESENT_POSITION, SPEED,
     TARGET_POSITION, fault,
@@ -22,7 +23,7 @@ const READ_POSITIONS: Request<'_> =
 const ANSWER_LENGTH: usize = 14;
 
 fn world(is_paced: bool, flash: Flash) -> World<Flash> {
-    let setup = Setup { chip_id: *b"SIM\0\0\x01", is_paced };
+    let setup = Setup { chip_id: *b"SIM\0\0\x01", is_paced, torque_codes: TorqueCodes::default() };
     World::new(Instant::ZERO, setup, flash, Plant::new(Instant::ZERO))
 }
 
@@ -195,6 +196,20 @@ fn a_power_cycle_keeps_settings_and_forgets_the_rest() {
     assert_eq!(world.registers().get(EEPROM_LOCK.address), 1);
     assert_eq!(world.registers().get(SPEED.address), 60);
     assert_eq!(world.host_room(), pace::CAPACITY);
+}
+
+#[test]
+fn a_halted_controller_is_silent_until_it_is_restarted() {
+    let mut world = world(false, Flash::in_memory());
+    world.advance(at_millis(1_000), true);
+    world.halt_controller(at_millis(1_000));
+    world.host_sends(at_millis(1_001), &frame(READ_POSITIONS));
+    world.advance(at_millis(2_000), true);
+    assert_eq!(hear(&mut world), b"");
+    world.restart_controller(at_millis(2_000));
+    world.host_sends(at_millis(3_000), &frame(READ_POSITIONS));
+    world.advance(at_millis(3_001), true);
+    assert_eq!(hear(&mut world).len(), ANSWER_LENGTH);
 }
 
 #[test]

@@ -15,8 +15,10 @@ use protocol_core::request::Request;
 use crate::error::{Error, Heard, OpenError};
 use crate::identity::Identity;
 use crate::link::Link;
+use crate::pending::{Pending, REPORT};
 use crate::ports;
-use crate::snapshot::{Snapshot, Span};
+use crate::snapshot::Snapshot;
+use crate::span::Span;
 use crate::units::{Angle, MoveTime, Speed};
 
 /// The status block, which is where the table ends.
@@ -24,6 +26,9 @@ pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
 
 /// Reports kept for whoever asks later: 20 s of them at the highest rate (D14). The oldest go first.
 const REPORTS_KEPT: usize = 1_000;
+
+/// How often to ask, at least, after something was written.
+const PATIENT_ATTEMPTS: u32 = 3;
 
 /// How to talk to an arm.
 ///
@@ -92,6 +97,7 @@ pub struct Arm {
     path: String,
     options: Options,
     identity: Identity,
+    pending: Pending,
     reports: VecDeque<Report>,
 }
 
@@ -119,7 +125,8 @@ impl Arm {
         let link = Link::new(port, options.baud);
         let nobody = Identity::from(Snapshot { address: 0, values: Vec::new() });
         let path = path.to_owned();
-        let mut arm = Self { link, path, options, identity: nobody, reports: VecDeque::new() };
+        let (pending, reports) = (Pending::default(), VecDeque::new());
+        let mut arm = Self { link, path, options, identity: nobody, pending, reports };
         arm.identity = Identity::from(arm.read_span(Span::between(&DEVICE_CODE, &CHIP_ID))?);
         match arm.identity.device_code() {
             code if code == DEVICE_CODE.default_at(DEVICE_CODE.address) => Ok(arm),
@@ -148,9 +155,11 @@ impl Arm {
     /// The values of `count` registers from `address` on, all of one instant.
     ///
     /// # Errors
-    /// No answer, however often asked; or the port is gone.
+    /// The registers reach past 255; no answer, however often asked; or the port is gone.
     pub fn read(&mut self, address: u8, count: u8) -> Result<Vec<u8>, Error> {
-        self.read_span(Span { address, count }).map(|snapshot| snapshot.values)
+        let outside = Error::OutsideMap { address, count: count.into() };
+        let span = Span::new(address, count).ok_or(outside)?;
+        self.read_span(span).map(|snapshot| snapshot.values)
     }
 
     /// As [`Arm::read`], for registers of the table.
@@ -158,23 +167,36 @@ impl Arm {
     /// # Errors
     /// No answer, however often asked; or the port is gone.
     pub fn read_span(&mut self, span: Span) -> Result<Snapshot, Error> {
-        self.keep_waiting_reports()?;
+        self.take_waiting_replies()?;
         self.link.take_heard();
+        let mut asked = Vec::new();
         for _ in 0..self.options.attempts.max(1) {
-            self.link.send(&Request::Read { address: span.address, count: span.count })?;
-            if let Some(answer) = self.answer(span)? {
-                return Ok(answer);
+            let range = self.pending.add(span);
+            asked.push(range);
+            self.link.send(&Request::Read { address: range.address(), count: range.count() })?;
+            if let Some(answer) = self.answer(&asked)? {
+                return Ok(answer.part(span));
             }
         }
         Err(self.no_answer(span))
+    }
+
+    /// Does work that asks at least three times for each answer, however the arm was opened.
+    pub(crate) fn patiently<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> T {
+        let attempts = self.options.attempts;
+        self.options.attempts = attempts.max(PATIENT_ATTEMPTS);
+        let done = work(self);
+        self.options.attempts = attempts;
+        done
     }
 
     /// Gives new values to the registers from `address` on, in one frame: all of them or none (D16, D17).
     /// The arm does not answer a write; [`crate::change`] finds out what became of it.
     ///
     /// # Errors
-    /// The port is gone, or takes no more bytes.
+    /// The registers reach past 255, and nothing was sent; or the port is gone, or takes no more bytes.
     pub fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Error> {
+        Span::of_values(address, values).ok_or(Error::OutsideMap { address, count: values.len() })?;
         self.link.send(&Request::Write { address, values })
     }
 
@@ -248,11 +270,12 @@ impl Arm {
         Ok(self.reports.pop_front())
     }
 
-    /// Waits for the answer to a read. Whatever else comes is no answer to it; reports among it are kept.
-    fn answer(&mut self, span: Span) -> Result<Option<Snapshot>, Error> {
+    /// Waits for a reply to one of these reads. Other replies are late ones or reports.
+    fn answer(&mut self, asked: &[Span]) -> Result<Option<Snapshot>, Error> {
         let deadline = Instant::now() + self.options.reply_timeout;
         while let Some(reply) = self.link.receive(deadline)? {
-            if reply.span() == span {
+            self.pending.replied(reply.span());
+            if asked.contains(&reply.span()) {
                 return Ok(Some(reply));
             }
             self.keep_report(&reply);
@@ -266,16 +289,17 @@ impl Arm {
         Error::NoAnswer { span, attempts: attempts.max(1), waited: reply_timeout, heard }
     }
 
-    /// Takes what came unasked, so that an old frame cannot be mistaken for the answer to come.
-    fn keep_waiting_reports(&mut self) -> Result<(), Error> {
+    /// Takes what has come since the last read: reports, and late replies.
+    fn take_waiting_replies(&mut self) -> Result<(), Error> {
         while let Some(reply) = self.link.receive_waiting()? {
+            self.pending.replied(reply.span());
             self.keep_report(&reply);
         }
         Ok(())
     }
 
     fn keep_report(&mut self, reply: &Snapshot) {
-        if reply.span() != Span::of(&PRESENT_POSITION) {
+        if reply.span() != REPORT {
             return;
         }
         if self.reports.len() >= REPORTS_KEPT {

@@ -11,7 +11,8 @@ use protocol_core::registers::{Access, Region, Register};
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::names::name_of_register;
-use crate::snapshot::{Snapshot, Span};
+use crate::snapshot::Snapshot;
+use crate::span::Span;
 use crate::status::Status;
 use crate::words;
 
@@ -65,8 +66,20 @@ pub enum Cause {
     Unknown,
 }
 
+impl Cause {
+    /// Could the same frame have an effect when it is sent again?
+    #[must_use]
+    pub const fn may_pass(self) -> bool {
+        matches!(self, Self::Damaged | Self::Unknown)
+    }
+}
+
+/// How often a frame is sent before its loss counts as a failure.
+const WRITE_ATTEMPTS: u32 = 5;
+
 impl Arm {
-    /// Writes, reads back, and says which registers do not hold what was written: none, if all went well.
+    /// Writes, reads back, and says which registers do not hold what was written: none, if all went well. A frame
+    /// that seems to be lost is sent again, a few times.
     ///
     /// ```no_run
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -79,7 +92,7 @@ impl Arm {
     /// ```
     ///
     /// # Errors
-    /// As [`Arm::read`] and [`Arm::write`].
+    /// As [`Arm::read`] and [`Arm::write`]. The arm may have taken the values nevertheless.
     pub fn write_checked(&mut self, address: u8, values: &[u8]) -> Result<Vec<Unchanged>, Error> {
         self.write_all_checked(&[(address, values.to_vec())])
     }
@@ -87,26 +100,50 @@ impl Arm {
     /// As [`Arm::write_checked`], for several frames, which go out together: first registers and values.
     ///
     /// # Errors
-    /// As [`Arm::read`] and [`Arm::write`].
+    /// As [`Arm::read`] and [`Arm::write`]. The arm may have taken some of the values nevertheless.
     pub fn write_all_checked(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<Unchanged>, Error> {
+        self.patiently(|arm| arm.write_until_taken(writes))
+    }
+
+    fn write_until_taken(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<Unchanged>, Error> {
         let locked = self.read_span(Span::of(&EEPROM_LOCK))?.byte(&EEPROM_LOCK) != 0;
-        let before = self.status()?;
+        let mut before = self.status()?;
+        let (mut unchanged, mut sending) = (Vec::new(), writes.iter().collect::<Vec<_>>());
+        for attempt in 1..=WRITE_ATTEMPTS {
+            let found = self.write_and_read_back(&sending)?;
+            let after = self.status()?;
+            let cause = |address, wanted| {
+                rule(address, locked).unwrap_or_else(|| match (&before, &after) {
+                    (Some(before), Some(after)) => verdict(before, after),
+                    _ => guess(address, wanted),
+                })
+            };
+            let mut lost = Vec::new();
+            for (found, write) in found.iter().zip(sending) {
+                let differing = compare(found, &write.1, cause);
+                if attempt < WRITE_ATTEMPTS && differing.iter().any(|register| register.cause.may_pass()) {
+                    lost.push(write);
+                } else {
+                    unchanged.extend(differing);
+                }
+            }
+            if lost.is_empty() {
+                break;
+            }
+            (before, sending) = (after, lost);
+        }
+        Ok(unchanged)
+    }
+
+    fn write_and_read_back(&mut self, writes: &[&(u8, Vec<u8>)]) -> Result<Vec<Snapshot>, Error> {
         for (address, values) in writes {
             self.write(*address, values)?;
         }
-        let mut found = Vec::new();
-        for (address, values) in writes {
+        let read_back = |(address, values): &&(u8, Vec<u8>)| {
             let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
-            found.push((self.read_span(Span { address: *address, count })?, values));
-        }
-        let after = self.status()?;
-        let cause = |address, wanted| {
-            rule(address, locked).unwrap_or_else(|| match (&before, &after) {
-                (Some(before), Some(after)) => verdict(before, after),
-                _ => guess(address, wanted),
-            })
+            self.read(*address, count).map(|values| Snapshot { address: *address, values })
         };
-        Ok(found.iter().flat_map(|(found, wanted)| compare(found, wanted, cause)).collect())
+        writes.iter().map(read_back).collect()
     }
 }
 
@@ -138,7 +175,7 @@ fn rule(address: u8, locked: bool) -> Option<Cause> {
 }
 
 /// What the arm's counters say of a frame that went out between the two looks at them.
-fn verdict(before: &Status, after: &Status) -> Cause {
+pub(crate) fn verdict(before: &Status, after: &Status) -> Cause {
     let refused = before.frames_refused() != after.frames_refused();
     match after.last_refusal() {
         Some((refusal::OUT_OF_RANGE, address)) if refused => Cause::OutOfRange { address },

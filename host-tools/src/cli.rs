@@ -5,8 +5,8 @@
 use clap::{Args, Parser, Subcommand, value_parser};
 
 use crate::commands::{
-    backup, baud, calibrate, effector, get, info, monitor, play, ports, pose, record, registers, set, shell,
-    sniff, state, stop,
+    backup, baud, calibrate, effector, get, info, monitor, play, ports, pose, record, registers, servo, set,
+    shell, sniff, state, stop,
 };
 use crate::failure::Failure;
 use crate::session::Session;
@@ -81,6 +81,7 @@ pub(crate) enum Command {
     Backup(backup::BackupArgs),
     Restore(backup::RestoreArgs),
     Sniff(sniff::SniffArgs),
+    Servo(servo::ServoArgs),
     Registers(registers::RegistersArgs),
     Completions(shell::CompletionsArgs),
     Man(shell::ManArgs),
@@ -107,6 +108,7 @@ impl Command {
             Self::Backup(args) => backup::backup(session, &args),
             Self::Restore(args) => backup::restore(session, &args),
             Self::Sniff(args) => sniff::run(session, &args),
+            Self::Servo(args) => servo::run(session, &args),
             Self::Registers(args) => registers::run(session, &args),
             Self::Completions(args) => shell::completions(session, &args),
             Self::Man(args) => shell::man(session, &args),

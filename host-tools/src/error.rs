@@ -7,7 +7,7 @@ use std::io;
 use std::time::Duration;
 
 use crate::permission;
-use crate::snapshot::Span;
+use crate::span::Span;
 
 /// Why a port does not lead to an arm.
 ///
@@ -98,6 +98,13 @@ impl std::error::Error for OpenError {}
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error {
+    /// The frame would reach past register 255, or be longer than a frame can be. Nothing was sent.
+    OutsideMap {
+        /// The first register.
+        address: u8,
+        /// How many registers from there on.
+        count: usize,
+    },
     /// No answer to a read, though it was asked for several times.
     NoAnswer {
         /// The registers that were asked for.
@@ -134,6 +141,12 @@ pub struct Heard {
 impl fmt::Display for Error {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::OutsideMap { address, count } => {
+                write!(
+                    out,
+                    "{count} registers from {address} on: the last register is 255, and one frame takes 255 values"
+                )
+            }
             Self::NoAnswer { span, attempts, waited, heard } => {
                 let millis = waited.as_millis();
                 write!(out, "no answer to a read of {span} ({attempts} tries of {millis} ms): {heard}")
@@ -207,6 +220,7 @@ impl Error {
     #[must_use]
     pub fn advice(&self) -> Vec<String> {
         owned(match self {
+            Self::OutsideMap { .. } => &[],
             Self::NoAnswer { heard: Heard { bytes: 0, .. }, .. } => &[
                 "has the arm power, and is its cable plugged in at both ends?",
                 "is this the right port? `sevenbot ports` says which ones lead to arms",
@@ -233,7 +247,7 @@ mod tests {
     #[test]
     fn a_missing_answer_says_what_was_heard_instead() {
         let said = |heard| {
-            let span = Span { address: 54, count: 7 };
+            let span = Span::new(54, 7).expect("a span");
             Error::NoAnswer { span, attempts: 3, waited: Duration::from_millis(500), heard }.to_string()
         };
         let nothing = said(Heard::default());

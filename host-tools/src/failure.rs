@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use sevenbot::servo_bench;
 use sevenbot::{Error, OpenError};
 
 use crate::output::BAD;
@@ -11,11 +12,20 @@ use crate::output::BAD;
 /// The exit status after Ctrl-C, as shells have it: 128 and the number of SIGINT.
 pub(crate) const INTERRUPTED: u8 = 130;
 
+/// What to do about an arm that may be moving.
+const SAFETY: [&str; 3] = [
+    "if anybody or anything is in its way, switch the supply of the servos off; the arm then falls",
+    "is the cable plugged in at both ends, and the baud rate right (--baud)?",
+    "then `sevenbot stop` again",
+];
+
 /// Why the program does not end well.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// The arm did not do, or is not, what was asked for.
     Arm(String),
+    /// It is not known that the arm did what it was told to do with its motors, for this reason.
+    MayMove(String),
     /// The command line makes no sense for this register, or lacks an answer.
     Usage(String),
     /// Nobody said which port, and none leads to an arm: those that were tried, and what came of it.
@@ -28,6 +38,14 @@ pub(crate) enum Failure {
     NoRate { port: String },
     /// The arm went away.
     Wire(Error),
+    /// An exchange with a servo failed.
+    Servo { port: String, error: servo_bench::Error },
+    /// No servo answers at any of the rates and ids that were tried.
+    NoServo { port: String, has_echo: bool },
+    /// The port of a servo adapter was wanted, but this one leads to an arm's controller.
+    HostLink { port: String },
+    /// Something did not do what was asked for, and there is advice about it.
+    Advised { message: String, advice: &'static [&'static str] },
     /// A file cannot be read or written, or does not hold what it should.
     File { path: PathBuf, reason: String },
     /// What was found out cannot be shown.
@@ -54,15 +72,22 @@ impl Failure {
         Self::File { path: path.to_owned(), reason: reason.to_string() }
     }
 
+    /// Did the connection fail, so that the arm cannot be told anything more?
+    pub(crate) const fn is_of_the_wire(&self) -> bool {
+        matches!(self, Self::Wire(_) | Self::MayMove(_))
+    }
+
     /// The exit status; `sevenbot --help` lists them.
     pub(crate) fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
             // Somebody piped into `head`: it has all it wants.
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
-            Self::Arm(_) | Self::File { .. } | Self::Output(_) => 1,
+            Self::Arm(_) | Self::MayMove(_) | Self::File { .. } | Self::Output(_) => 1,
             Self::Usage(_) => 2,
             Self::NoArm { .. } | Self::SeveralArms { .. } => 3,
             Self::Open { .. } | Self::NoRate { .. } | Self::Wire(_) => 3,
+            Self::Servo { error: servo_bench::Error::NotTaken { .. }, .. } | Self::Advised { .. } => 1,
+            Self::Servo { .. } | Self::NoServo { .. } | Self::HostLink { .. } => 3,
             Self::Interrupted => INTERRUPTED,
         })
     }
@@ -76,11 +101,13 @@ impl Failure {
         }
     }
 
-    fn message(&self) -> Option<String> {
+    /// What is wrong; `None` where nobody needs to know.
+    pub(crate) fn message(&self) -> Option<String> {
         match self {
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => None,
             Self::Output(error) => Some(format!("cannot write the output: {error}")),
             Self::Arm(message) | Self::Usage(message) => Some(message.clone()),
+            Self::MayMove(reason) => Some(format!("the arm may still be moving: {reason}")),
             Self::NoArm { tried } if tried.is_empty() => {
                 Some("no port was given, and this machine has no serial port".to_owned())
             }
@@ -95,6 +122,12 @@ impl Failure {
                 Some(format!("{port}: no arm answers, at any of the rates an arm knows"))
             }
             Self::Wire(error) => Some(error.to_string()),
+            Self::Servo { port, error } => Some(format!("{port}: {error}")),
+            Self::NoServo { port, .. } => Some(format!("{port}: no servo answers")),
+            Self::HostLink { port } => Some(format!(
+                "{port}: this is the arm's host link: its controller answers here, not its servos"
+            )),
+            Self::Advised { message, .. } => Some(message.clone()),
             Self::File { path, reason } => Some(format!("{}: {reason}", path.display())),
             Self::Interrupted => Some("interrupted".to_owned()),
         }
@@ -114,9 +147,32 @@ impl Failure {
                     .map(str::to_owned)
                     .to_vec()
             }
+            Self::MayMove(_) => SAFETY.map(str::to_owned).to_vec(),
             Self::Open { error, .. } => error.advice(),
             Self::Wire(error) => error.advice(),
+            Self::Servo { error, .. } => owned(error.advice()),
+            Self::Advised { advice, .. } => owned(advice),
+            Self::HostLink { .. } => {
+                owned(&["use an adapter on the servo bus, and take the arm's controller off that bus"])
+            }
+            Self::NoServo { has_echo, .. } => no_servo(*has_echo),
             _ => Vec::new(),
         }
     }
+}
+
+/// What to check when no servo answers.
+fn no_servo(has_echo: bool) -> Vec<String> {
+    let echo: &[&str] = if has_echo { &["the adapter works: it echoes what is sent"] } else { &[] };
+    let checks = [
+        "do the servos have their own power? The adapter does not supply them",
+        "is the signal wire on the adapter's servo side, and the ground common to both?",
+        "without --rates and --ids all eight rates and all ids are tried",
+        "is the arm's controller off the bus? Two masters disturb each other",
+    ];
+    owned(&[echo, &checks].concat())
+}
+
+fn owned(lines: &[&str]) -> Vec<String> {
+    lines.iter().map(|&line| line.to_owned()).collect()
 }

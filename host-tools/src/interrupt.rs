@@ -9,9 +9,11 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use sevenbot::Arm;
+use sevenbot::joints::JointSnapshot;
+use sevenbot::words::{self, motor_state_word};
 
 use crate::failure::{Failure, INTERRUPTED};
-use crate::output::note;
+use crate::output::{note, warn};
 
 /// How often Ctrl-C was pressed, or another wish to end came.
 static WISHES: AtomicU32 = AtomicU32::new(0);
@@ -45,9 +47,19 @@ impl Interrupt {
         MOVING.store(false, Ordering::SeqCst);
     }
 
+    /// The user pressed Ctrl-C where that is a key and no signal. The signal ends the program from now on.
+    pub(crate) fn wish() {
+        WISHES.fetch_add(1, Ordering::SeqCst);
+    }
+
+    /// Did the user want a command to end, in whatever thread it runs?
+    pub(crate) fn is_wished() -> bool {
+        WISHES.load(Ordering::SeqCst) > 0
+    }
+
     /// Does the user want it to end?
     pub(crate) fn has_come(self) -> bool {
-        WISHES.load(Ordering::SeqCst) > 0
+        Self::is_wished()
     }
 
     /// Fails if the user wants it to end.
@@ -69,17 +81,48 @@ impl Interrupt {
     }
 }
 
-/// Does work that moves the arm. Interrupted, it leaves the arm holding where it is.
+/// Does work that may move the arm. Interrupted at any time, it leaves the arm holding where it is.
 pub(crate) fn or_hold<T>(
     arm: &mut Arm,
     work: impl FnOnce(&mut Arm, Interrupt) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
     let interrupt = Interrupt::catch();
     let done = work(arm, interrupt);
-    if matches!(done, Err(Failure::Interrupted)) {
-        arm.hold()?;
+    Interrupt::release();
+    if !interrupt.has_come() {
+        return done;
+    }
+    let interrupt = Interrupt::catch();
+    let held = hold(arm);
+    Interrupt::release();
+    say_how_it_stands(&held?);
+    interrupt.check()?;
+    done
+}
+
+/// Makes the arm hold where it is, and makes sure of it.
+pub(crate) fn hold(arm: &mut Arm) -> Result<JointSnapshot, Failure> {
+    arm.hold().map_err(|reason| Failure::MayMove(reason.to_string()))
+}
+
+/// Says what an arm does that was made to hold.
+pub(crate) fn say_how_it_stands(joints: &JointSnapshot) {
+    if joints.is_driven() {
         note("the arm holds where it is");
     }
-    Interrupt::release();
-    done
+    warn_of_exceptions(joints);
+}
+
+/// Warns of joints that a stop does not reach.
+pub(crate) fn warn_of_exceptions(joints: &JointSnapshot) {
+    if !joints.is_driven() {
+        let (state, word) = (joints.motor_state(), motor_state_word(joints.motor_state()));
+        warn(format_args!("the motors are in state {state}, {word}: they do not drive the joints"));
+    } else if joints.missing() != 0 {
+        let silent = words::joints(joints.missing());
+        warn(format_args!(
+            "no answer from the servos of {silent}: where they are is not known. Switch the supply of the servos \
+             off before you reach into the arm"
+        ));
+    }
 }

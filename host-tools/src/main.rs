@@ -21,6 +21,7 @@ mod moving;
 mod output;
 mod plot;
 mod progress;
+mod reports;
 mod session;
 mod settings_file;
 

@@ -5,13 +5,13 @@
 
 use std::time::{Duration, Instant};
 
-use sevenbot::joints::frames_for;
-use sevenbot::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION, TIME, motor_state};
+use sevenbot::joints::{JointSnapshot, frames_for};
+use sevenbot::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
 use sevenbot::units::move_duration;
 use sevenbot::words::{joints, motor_state_word};
 use sevenbot::{Arm, Joint, MoveTime, Snapshot, Span, Speed};
 
-use crate::commands::all_taken;
+use crate::commands::motors_obey;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
@@ -32,13 +32,21 @@ const NEAR_DEGREES: u8 = 2;
 /// Where joints should go, in degrees, joint 1 first; `None` leaves one alone.
 pub(crate) type Targets = [Option<u8>; 7];
 
-/// Fails unless the motors drive the joints, as soon as the arm has come up.
-pub(crate) fn driven(arm: &mut Arm) -> Result<(), Failure> {
-    arm.wait_until_measured()?;
-    let state = arm.read_span(Span::of(&MOTOR_STATE))?.byte(&MOTOR_STATE);
-    if state == motor_state::SERVO {
-        return Ok(());
+/// Where a joint goes by a step from where it is sent already, in degrees. It may be out of range.
+pub(crate) fn stepped(joints: &JointSnapshot, joint: Joint, degrees: i16) -> Result<i16, Failure> {
+    let base = joints.step_base(joint).map_err(|reason| {
+        Failure::Arm(format!("joint {} takes no step: {reason}; nothing was moved", joint.number()))
+    })?;
+    Ok(i16::from(base).saturating_add(degrees))
+}
+
+/// The joints, as soon as the arm has come up. Fails unless the motors drive them.
+pub(crate) fn driven(arm: &mut Arm) -> Result<JointSnapshot, Failure> {
+    let joints = arm.wait_until_settled()?;
+    if joints.is_driven() {
+        return Ok(joints);
     }
+    let state = joints.motor_state();
     let word = motor_state_word(state);
     Err(Failure::Arm(format!(
         "the arm's motors are in state {state}, {word}: `sevenbot state servo` makes it hold where it is, \
@@ -58,7 +66,7 @@ impl Move {
     /// Sends joints to their targets, all at once.
     pub(crate) fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, Failure> {
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
-        all_taken(&arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets))?)?;
+        motors_obey(arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets)))?;
         Ok(Self { targets, plan, start: Instant::now() })
     }
 

@@ -7,7 +7,7 @@ use std::fmt;
 use protocol_core::registers::map::find;
 use protocol_core::registers::{Joint, MAP, Register};
 
-use crate::snapshot::Span;
+use crate::span::Span;
 
 /// Why a text names no registers.
 ///
@@ -15,7 +15,7 @@ use crate::snapshot::Span;
 /// use sevenbot::names::{NameError, parse};
 ///
 /// assert_eq!(parse("nonsense"), Err(NameError::Unknown));
-/// assert_eq!(parse("target.3").map(|span| span.address), Ok(48));
+/// assert_eq!(parse("target.3").map(sevenbot::Span::address), Ok(48));
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NameError {
@@ -79,11 +79,11 @@ pub fn parse(text: &str) -> Result<Span, NameError> {
         let (first, last) = (address(first)?, address(last)?);
         let distance = last.checked_sub(first).ok_or(NameError::EmptyRange)?;
         // All 256 at once are more than one frame can ask for.
-        let count = distance.checked_add(1).ok_or(NameError::NoAddress)?;
-        return Ok(Span { address: first, count });
+        let span = distance.checked_add(1).and_then(|count| Span::new(first, count));
+        return span.ok_or(NameError::NoAddress);
     }
     if text.starts_with(|first: char| first.is_ascii_digit()) {
-        return Ok(Span { address: address(text)?, count: 1 });
+        return Ok(Span::one(address(text)?));
     }
     let (name, joint) = text.split_once('.').map_or((text, None), |(name, joint)| (name, Some(joint)));
     let row = row(name)?;
@@ -96,11 +96,7 @@ fn address(text: &str) -> Result<u8, NameError> {
 
 fn one_joint(row: &'static Register, joint: &str) -> Result<Span, NameError> {
     let joint = joint.parse().ok().and_then(Joint::new).ok_or(NameError::NoJoint)?;
-    if row.per_joint {
-        Ok(Span { address: row.of(joint), count: 1 })
-    } else {
-        Err(NameError::NotPerJoint(row))
-    }
+    if row.per_joint { Ok(Span::one(row.of(joint))) } else { Err(NameError::NotPerJoint(row)) }
 }
 
 fn row(name: &str) -> Result<&'static Register, NameError> {
@@ -122,7 +118,7 @@ mod tests {
     use super::*;
 
     fn span(address: u8, count: u8) -> Result<Span, NameError> {
-        Ok(Span { address, count })
+        Ok(Span::new(address, count).expect("a span"))
     }
 
     #[test]

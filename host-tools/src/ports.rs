@@ -11,7 +11,7 @@ use serialport::{SerialPort, SerialPortType};
 use crate::arm::{Arm, Options};
 use crate::error::OpenError;
 use crate::identity::Identity;
-use crate::snapshot::Span;
+use crate::span::Span;
 
 /// How long an arm may take to say who it is: eight registers take 2 ms at 115 200 baud and 25 ms at 9600,
 /// USB adapters add up to 16 ms each way, and an arm's own work little.

@@ -43,7 +43,7 @@ pub(crate) struct SettingsFile {
 pub(crate) fn span() -> Span {
     match (settings().next(), settings().last()) {
         (Some(first), Some(last)) => Span::between(first, last),
-        _ => Span { address: 0, count: 0 },
+        _ => Span::NONE,
     }
 }
 

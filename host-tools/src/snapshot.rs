@@ -2,55 +2,9 @@
 //!
 //! Knows which registers it holds, not what they mean.
 
-use std::fmt;
-
 use protocol_core::registers::{Joint, Register};
 
-/// A run of registers: `count` of them from `address` on.
-///
-/// ```
-/// use sevenbot::{Span, map};
-///
-/// assert_eq!(Span::of(&map::TARGET_POSITION).to_string(), "46..52");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Span {
-    /// The first register.
-    pub address: u8,
-    /// How many.
-    pub count: u8,
-}
-
-impl Span {
-    /// All registers of one row of the table.
-    #[must_use]
-    pub const fn of(row: &Register) -> Self {
-        Self { address: row.address, count: row.count }
-    }
-
-    /// Everything from one row of the table to another one behind it.
-    #[must_use]
-    pub const fn between(first: &Register, last: &Register) -> Self {
-        let distance = last.address.saturating_sub(first.address);
-        Self { address: first.address, count: distance.saturating_add(last.count) }
-    }
-
-    /// The addresses, in ascending order.
-    pub fn addresses(self) -> impl Iterator<Item = u8> {
-        (self.address..=u8::MAX).take(usize::from(self.count))
-    }
-}
-
-/// As the documentation writes it: `54..60`, the last one included.
-impl fmt::Display for Span {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.addresses().last() {
-            Some(last) if last > self.address => write!(out, "{}..{last}", self.address),
-            Some(only) => write!(out, "register {only}"),
-            None => write!(out, "no register at {}", self.address),
-        }
-    }
-}
+use crate::span::Span;
 
 /// The values one read brought, all of one instant.
 ///
@@ -99,25 +53,22 @@ impl Snapshot {
         Joint::ALL.map(|joint| self.at(row.of(joint)))
     }
 
-    /// The registers it holds.
+    /// The registers it holds; none of them where it claims to hold some past register 255.
     #[must_use]
     pub fn span(&self) -> Span {
-        Span { address: self.address, count: u8::try_from(self.values.len()).unwrap_or(u8::MAX) }
+        Span::of_values(self.address, &self.values).unwrap_or(Span::NONE)
+    }
+
+    /// These registers of it alone.
+    pub(crate) fn part(&self, span: Span) -> Self {
+        Self { address: span.address(), values: span.addresses().map(|address| self.at(address)).collect() }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol_core::registers::map::{FRAMES_ACCEPTED, OFFSET, STATUS_VERSION};
-
-    #[test]
-    fn a_span_reads_as_the_documentation_writes_it() {
-        assert_eq!(Span::of(&OFFSET).to_string(), "13..19");
-        assert_eq!(Span { address: 12, count: 1 }.to_string(), "register 12");
-        assert_eq!(Span { address: 255, count: 1 }.to_string(), "register 255");
-        assert_eq!(Span::between(&STATUS_VERSION, &FRAMES_ACCEPTED), Span { address: 240, count: 8 });
-    }
+    use protocol_core::registers::map::FRAMES_ACCEPTED;
 
     #[test]
     fn values_are_found_by_their_rows() {

@@ -6,7 +6,7 @@ use protocol_core::registers::map::BAUD_RATES;
 use protocol_core::registers::{Access, JOINTS, MAP, Range, Region, Register};
 use serde_json::{Value, json};
 
-use crate::snapshot::Span;
+use crate::span::Span;
 
 /// The rows that are settings: kept over power cuts, and writable.
 pub fn settings() -> impl Iterator<Item = &'static Register> {

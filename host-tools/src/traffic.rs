@@ -9,7 +9,7 @@
 //! one. Knows no register, and no clock: whoever hears silence says so.
 
 use protocol_core::request::Request;
-use protocol_core::wire::frame::{self, CRC_LENGTH, Defect, Direction, Frame, MAX_LENGTH, PREFIX_LENGTH};
+use protocol_core::wire::frame::{self, Defect, Direction, Frame, MAX_LENGTH, ParseOutcome};
 use protocol_core::wire::{Function, ToArm, ToHost};
 
 use crate::snapshot::Snapshot;
@@ -145,28 +145,16 @@ fn judge(bytes: &[u8]) -> Verdict {
     }
 }
 
-/// What the bytes are if they go in direction `D`.
+/// What the bytes are if they go in direction `D`. A malformed range still has a length; other damage is no frame.
 fn reading<D: Direction>(bytes: &[u8]) -> Verdict {
-    match frame::parse::<D>(bytes) {
-        Ok((rest, found)) => Verdict::Frame(heard::<D>(&found), bytes.len() - rest.len()),
-        Err(error) if error.is_incomplete() => Verdict::Unfinished,
-        Err(error) => {
-            let mut verdict = Verdict::NoFrame;
-            // The parser's own error type stays in its crate; only the defect in it comes out.
-            let _ = error.map(|defect| verdict = too_far::<D>(defect, bytes));
-            verdict
+    match (frame::parse::<D>(bytes), bytes) {
+        (ParseOutcome::Complete(found, length), _) => Verdict::Frame(heard::<D>(&found), length),
+        (ParseOutcome::Defective(Defect::MalformedRange { address }, length), [_, _, _, _, count, ..]) => {
+            Verdict::Frame(Traffic::TooFar { address, count: *count }, length)
         }
+        (ParseOutcome::Incomplete(_), _) => Verdict::Unfinished,
+        _ => Verdict::NoFrame,
     }
-}
-
-/// A frame that is right but for its range has a length of its own; anything else wrong is no frame.
-fn too_far<D: Direction>(defect: Defect, bytes: &[u8]) -> Verdict {
-    let (Defect::MalformedRange { address }, [_, _, code, _, count, ..]) = (defect, bytes) else {
-        return Verdict::NoFrame;
-    };
-    let function = if *code == Function::Write as u8 { Function::Write } else { Function::Read };
-    let length = PREFIX_LENGTH + D::data_length(function, *count) + CRC_LENGTH;
-    Verdict::Frame(Traffic::TooFar { address, count: *count }, length)
 }
 
 fn heard<D: Direction>(found: &Frame<'_>) -> Traffic {

@@ -13,7 +13,8 @@ use protocol_core::registers::Register;
 use protocol_core::registers::map::find;
 
 use crate::names::name_of;
-use crate::snapshot::{Snapshot, Span};
+use crate::snapshot::Snapshot;
+use crate::span::Span;
 use crate::traffic::Traffic;
 use crate::words::entries;
 
@@ -26,7 +27,7 @@ impl fmt::Display for Traffic {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Read { address, count } => {
-                write!(out, "read {}", names(Span { address: *address, count: *count }))
+                write!(out, "read {}", names(Span::new(*address, *count).unwrap_or(Span::NONE)))
             }
             Self::Answer { address, values } => write!(out, "answer {}", assignments(*address, values)),
             Self::Write { address, values } => write!(out, "write {}", assignments(*address, values)),

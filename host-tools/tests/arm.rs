@@ -14,8 +14,9 @@ use fake::{IDENTITY, arm_of, reply};
 use serialport::{SerialPort, TTYPort};
 use sevenbot::{Arm, Error, Heard, OpenError, Options};
 
+/// Patient: a busy machine may take long to answer, and only tests of silence wait to the end.
 fn options() -> Options {
-    Options { reply_timeout: Duration::from_millis(200), ..Options::default() }
+    Options { reply_timeout: Duration::from_secs(2), ..Options::default() }
 }
 
 #[test]

@@ -1,16 +1,16 @@
-//! Degrees of a joint to counts of its servo, and back.
+//! Converts degrees of a joint to counts of its servo, and back.
 //!
 //! ```text
 //!   counts = a × k + s - offset × k        a = angle, or 180° - angle where the servo is mounted reversed
 //! ```
 //!
-//! The numbers come from the maker's published firmware, and so does the way the offset (D9) counts:
-//! on the servo's side of the reversal. Integers only, in thousandths of a degree: 32 bits hold every
-//! product, and a count is 212 of them or more. Knows nothing of where a joint should be.
+//! The constants come from the maker's published firmware. As in that firmware, the offset (D9) applies on the servo's
+//! side of the reversal. The arithmetic uses thousandths of a degree in 32-bit integers; one count is at least 212 of
+//! them. This file does not know targets.
 
 use protocol_core::registers::Joint;
 
-/// An angle in millionths of a degree: what positions are kept in (D18).
+/// An angle in millionths of a degree, the unit of all positions in this crate (D18).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MicroDegrees(pub i32);
@@ -25,7 +25,7 @@ impl MicroDegrees {
         Self(degrees as i32 * Self::PER_DEGREE)
     }
 
-    /// The value a register shows: the nearest degree, 0 to 180 (D18).
+    /// The value of a position register: the nearest degree, 0 to 180 (D18).
     #[must_use]
     pub fn nearest_degree(self) -> u8 {
         let degrees = rounded::<{ Self::PER_DEGREE }>(self.0.clamp(0, 180 * Self::PER_DEGREE));
@@ -83,14 +83,14 @@ impl Mounting {
         Self { scale, zero, reversed }
     }
 
-    /// The angle on the other side of the reversal, if there is one: its own inverse.
+    /// Converts an angle across the reversal, in either direction.
     const fn reverse(&self, millidegrees: i32) -> i32 {
         if self.reversed { HALF_TURN - millidegrees } else { millidegrees }
     }
 }
 
-/// The servo position for an angle of a joint, 0 to 1023 counts: an angle beyond them becomes the nearest
-/// they have. `offset_degrees` is the joint's offset register.
+/// The servo position for an angle of a joint, limited to 0 to 1023 counts. `offset_degrees` is the joint's offset
+/// register.
 #[must_use]
 pub fn counts_from_angle(joint: Joint, angle: MicroDegrees, offset_degrees: i8) -> u16 {
     let mounting = Mounting::of(joint);
@@ -109,8 +109,7 @@ pub fn angle_from_counts(joint: Joint, counts: u16, offset_degrees: i8) -> Micro
     MicroDegrees(mounting.reverse(seen) * 1_000)
 }
 
-/// The nearest whole number to `number` / `DIVISOR`. The divisor is known to the compiler, so nothing is
-/// left here that could divide by zero.
+/// `number` / `DIVISOR`, rounded to the nearest integer. The divisor is a constant, so the division cannot panic.
 fn rounded<const DIVISOR: i32>(number: i32) -> i32 {
     number.saturating_add(DIVISOR / 2).div_euclid(DIVISOR)
 }
@@ -127,7 +126,7 @@ mod tests {
         counts_from_angle(joint(number), MicroDegrees::from_degrees(degrees), offset)
     }
 
-    /// Worked out by hand: 850 / 180 = 4.7222, 625 / 180 = 3.4722 counts a degree.
+    /// Calculated by hand: 850 / 180 = 4.7222, 625 / 180 = 3.4722 counts a degree.
     #[test]
     fn golden_counts_of_every_joint() {
         assert_eq!([counts(1, 0, 0), counts(1, 90, 0), counts(1, 180, 0)], [86, 511, 936]);
@@ -163,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn every_degree_comes_back_unless_the_servo_ends_before_it() {
+    fn every_degree_survives_conversion_within_the_range_of_the_servo() {
         for joint in Joint::ALL {
             for (degrees, offset) in
                 (0..=180).flat_map(|degrees| (-16..=16).map(move |offset| (degrees, offset)))

@@ -1,184 +1,154 @@
-//! Everything the arm is, less its hardware: bytes in, bytes out, time as an argument.
+//! The controller of one arm, without hardware: bytes in, bytes out, time as an argument.
 //!
 //! ```text
 //!   loop {
-//!       controller.host_bytes(now, ...);       what came from the host; empty: its line is silent
-//!       controller.servo_bytes(now, ...);      what came from the servo bus
-//!       match controller.poll(now, room) {     until Wait: then sleep until then, or until bytes come
+//!       controller.host_bytes(now, ...);       bytes from the host; empty: the line is silent
+//!       controller.servo_bytes(now, ...);      bytes from the servo bus
+//!       match controller.poll(now, room) {     repeat until Wait, then sleep until then or until bytes come
 //!           Output::ToHost(bytes) => ...
 //!           ...
 //!       }
 //!   }
 //! ```
 
-use protocol_core::registers::map::{FRAMES_ACCEPTED, FRAMES_CORRUPTED, PRESENT_POSITION, refusal};
-use protocol_core::registers::{Image, RegisterFile};
-use protocol_core::request::{Reply, Request};
+use protocol_core::registers::map::{BAUD_RATE, FEEDBACK_FREQUENCY, baud_rate};
+use protocol_core::registers::{Image, JOINTS, RegisterFile};
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::{Defect, Deframer, FrameBuffer, MAX_LENGTH, ToArm, deframer};
 
-use crate::arm::Arm;
-use crate::servo_bus::TorqueCodes;
+use crate::arm_control::ArmControl;
+use crate::config::{Config, Storage};
+use crate::host_port::{HostEvent, HostPort};
 use crate::vacuum::Vacuum;
 
-/// What the controller wants done. Each is asked for once.
+/// An action for the shell. `poll` returns each action once.
 #[must_use]
 #[derive(Debug, PartialEq, Eq)]
 pub enum Output<'a> {
-    /// Send these bytes to the host. Never more than the room that `poll` was told of.
+    /// Send these bytes to the host. They fit the room that was passed to `poll`.
     ToHost(&'a [u8]),
-    /// Send these bytes on the servo bus. It is idle: one transaction is outstanding at most.
+    /// Send these bytes on the servo bus. The bus is free: at most one read is outstanding.
     ToServos(&'a [u8]),
     /// Switch the pump and the valve (D20).
     Vacuum(Vacuum),
-    /// Store this image, then call [`Controller::set_storage`] with what became of it. Nothing the host asks
-    /// afterwards is answered before.
+    /// Store this image, then call [`Controller::set_storage`] with the result, before the next `poll`. So no later
+    /// request is answered before the image is stored.
     Save(Image),
-    /// Nothing to do before this time, unless bytes come or the host link gets room.
+    /// There is nothing to do before this time, unless bytes come or the host link gets room.
     Wait(Instant),
-}
-
-/// What the settings storage can still do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Storage {
-    /// It takes another image.
-    Ready,
-    /// It is full until the next restart: writes that would change a setting are refused (D19).
-    Full,
-    /// It does not keep what it is given: settings live in RAM only.
-    Broken,
-}
-
-/// What differs from board to board and from arm to arm, and what is known at start.
-#[derive(Clone, Copy, Debug)]
-pub struct Config {
-    /// The chip id, most significant byte first (D8).
-    pub chip_id: [u8; 6],
-    /// Fault bits known at start: reset cause, clock (`protocol_core::registers::map::fault`).
-    pub faults: u8,
-    /// How long a servo may take to answer, from the last byte sent to the last byte received.
-    pub servo_timeout: Duration,
-    /// What the servos' torque switch (their register 40) means on this arm.
-    pub torque_codes: TorqueCodes,
 }
 
 /// The controller of one arm.
 #[derive(Debug)]
 pub struct Controller {
-    deframer: Deframer<ToArm>,
-    arm: Arm,
-    to_host: FrameBuffer,
+    host: HostPort,
+    arm: ArmControl,
 }
 
 impl Controller {
-    /// An arm that was powered up at `now`, with the settings found in storage and the state of that storage.
+    /// An arm that was powered up at `now`. `stored` holds the settings found in the storage.
     #[must_use]
     pub fn new(now: Instant, config: Config, stored: Option<&Image>, storage: Storage) -> Self {
-        let arm = Arm::new(now, config, stored, storage);
-        Self { deframer: Deframer::new(deframer::gap(arm.baud())), arm, to_host: FrameBuffer::new() }
+        let arm = ArmControl::new(now, config, stored, storage);
+        Self { host: HostPort::new(baud_rate(arm.registers.get(BAUD_RATE.address))), arm }
     }
 
-    /// Takes bytes from the host, and says how many; offer the rest again after the next `poll`. An empty
-    /// slice says that the host's line is silent as of `now` and that nothing waits anywhere.
+    /// Takes bytes from the host, and returns how many. Offer the rest again after the next `poll`. An empty slice
+    /// states that the host's line is silent at `now` and that no byte waits anywhere.
     pub fn host_bytes(&mut self, now: Instant, bytes: &[u8]) -> usize {
-        self.deframer.push(now, bytes)
+        self.host.bytes(now, bytes)
     }
 
-    /// How many bytes from the host may make a difference. With fewer, and nothing else to do, a shell may go on
-    /// sleeping for a while: silence on the line begins to count when the bytes are handed over.
+    /// How many bytes from the host are needed for a new event. With fewer and no deadline, a shell may keep sleeping.
+    /// Silence on the line counts from the call that takes the bytes.
     #[must_use]
     pub fn host_bytes_wanted(&self) -> usize {
-        self.deframer.wanted()
+        self.host.bytes_wanted()
     }
 
-    /// Takes bytes from the servo bus, all of them.
-    pub fn servo_bytes(&mut self, bytes: &[u8]) {
-        self.arm.bus.bytes(bytes);
+    /// Takes all bytes that were received from the servo bus by `now`.
+    pub fn servo_bytes(&mut self, now: Instant, bytes: &[u8]) {
+        self.arm.bus.servo_bytes(now, bytes);
     }
 
-    /// What is to be done at `now`; call it again and again until it says [`Output::Wait`]. `host_room` is
-    /// how many bytes the host link takes at once at this moment. With less than the longest frame (262
-    /// bytes) requests wait where they are (D5): give the link at least that much.
+    /// The next action at `now`. Call it until it returns [`Output::Wait`]. `host_room` is how many bytes the host link
+    /// can take at once now. A read whose reply does not fit waits, and every request behind it waits, too (D5). An
+    /// idle link must take the longest frame, 262 bytes.
     pub fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_> {
-        let has_room = host_room >= MAX_LENGTH;
         self.arm.advance(now);
-        if self.arm.command_servos(now) {
+        if self.arm.prepare_servo_frame(now) {
             return Output::ToServos(self.arm.bus.frame());
         }
-        if has_room && self.answer(now) {
-            return Output::ToHost(&self.to_host);
+        self.execute_requests(now);
+        if let Some(read) = self.host.take_read(host_room) {
+            self.arm.count_accepted();
+            return Output::ToHost(self.host.reply(read, &self.arm.registers));
         }
         if let Some(image) = self.arm.to_save.take() {
             return Output::Save(image);
         }
-        if let Some(vacuum) = self.arm.gripper.poll(now) {
+        if let Some(vacuum) = self.arm.vacuum.poll(now) {
             return Output::Vacuum(vacuum);
         }
-        // All requests are answered. A report that finds no room is skipped, not delayed (D14).
-        if self.arm.feedback.strike(now) && has_room {
-            self.reply_with(PRESENT_POSITION.address, PRESENT_POSITION.count);
-            return Output::ToHost(&self.to_host);
+        if let Some(report) = self.host.take_report(now, host_room) {
+            return Output::ToHost(self.host.reply(report, &self.arm.registers));
         }
-        Output::Wait(self.deadline(now, has_room))
+        Output::Wait(self.arm.deadline(now).min(self.host.deadline()))
     }
 
-    /// Carries out requests until one has an answer, or something has to be saved before the next. Says
-    /// whether there is an answer.
-    fn answer(&mut self, now: Instant) -> bool {
+    /// Executes requests up to the next read, or until settings have to be saved.
+    fn execute_requests(&mut self, now: Instant) {
         while self.arm.to_save.is_none()
-            && let Some(frame) = self.deframer.pull()
+            && let Some(event) = self.host.next_event()
         {
-            match frame.map(Request::from_frame) {
-                Ok(Request::Read { address, count }) => {
-                    self.arm.registers.increment(&FRAMES_ACCEPTED);
-                    self.reply_with(address, count);
-                    return true;
+            match event {
+                HostEvent::Write { address, values } => {
+                    self.arm.write(now, address, values);
+                    let frequency = self.arm.registers.get(FEEDBACK_FREQUENCY.address);
+                    self.host.set_report_frequency(now, frequency);
                 }
-                Ok(Request::Write { address, values }) => self.arm.write(now, address, values),
-                Err(Defect::MalformedRange { address }) => self.arm.refuse(refusal::MALFORMED_RANGE, address),
-                Err(Defect::WrongCrc | Defect::NoFrame) => self.arm.registers.increment(&FRAMES_CORRUPTED),
+                HostEvent::MalformedRange { address } => self.arm.refuse_range(address),
+                HostEvent::Corrupted => self.arm.count_corrupted(),
             }
         }
-        false
     }
 
-    fn reply_with(&mut self, address: u8, count: u8) {
-        let values = self.arm.registers.read(address, count);
-        Reply { address, values }.encode(&mut self.to_host);
-    }
-
-    fn deadline(&self, now: Instant, has_room: bool) -> Instant {
-        // While requests wait for room, silence behind them says nothing.
-        let silence = self.deframer.deadline().filter(|_| has_room);
-        self.arm.deadline(now).min(silence.unwrap_or(Instant::FAR_FUTURE))
-    }
-
-    /// When the host may hear something, or silence on its line may matter, unless bytes come before: until then
-    /// nobody outside can tell whether `poll` was called, as long as it is called for each time in between.
+    /// The latest time at which a delayed poll is unobservable to the host, unless bytes come before: the next report, or
+    /// silence that has an effect. Each deadline until then still needs its own call.
     #[must_use]
     pub fn host_deadline(&self) -> Instant {
-        self.arm.feedback.due().min(self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE))
+        self.host.deadline()
     }
 
-    /// Tells what became of the storage: after every [`Output::Save`], and whenever it changes.
+    /// Sets the state of the storage. Call it after every [`Output::Save`] and after every change.
     pub fn set_storage(&mut self, storage: Storage) {
         self.arm.set_storage(storage);
     }
 
-    /// Raises fault bits (`protocol_core::registers::map::fault`) that only the shell can see. They stay
-    /// until the next restart.
+    /// Raises fault bits (`protocol_core::registers::map::fault`) that only the shell can detect. They stay until the next
+    /// restart.
     pub fn raise_faults(&mut self, bits: u8) {
         self.arm.raise_faults(bits);
     }
 
-    /// The baud rate of the host link in force since start, in bits per second: register 12 as it was stored.
-    #[must_use]
-    pub const fn baud(&self) -> u32 {
-        self.arm.baud()
+    /// Sets how long a USB adapter may buffer the answers of the servos; 0 at start. The delay is added to
+    /// `Config::servo_timeout` and does not delay goals.
+    pub fn set_answer_delay(&mut self, delay: Duration) {
+        self.arm.bus.set_answer_delay(delay);
     }
 
-    /// The registers, to look at.
+    /// The longest answer time of each servo since the last call, in microseconds from the last byte of the read; 0 if the
+    /// servo did not answer.
+    pub const fn take_longest_answers(&mut self) -> [u16; JOINTS] {
+        self.arm.bus.take_longest_answers()
+    }
+
+    /// The baud rate of the host link since start, in bits per second: register 12 as it was stored.
+    #[must_use]
+    pub const fn baud(&self) -> u32 {
+        self.host.baud()
+    }
+
+    /// The registers.
     #[must_use]
     pub const fn registers(&self) -> &RegisterFile {
         &self.arm.registers

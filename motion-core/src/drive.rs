@@ -1,33 +1,48 @@
-//! Whether one joint is driven, and where to: from released to engaged without a jump (D12, D13).
+//! The drive of one joint: from released to engaged without a jump (D12, D13).
 //!
 //! ```text
-//!             engage when wanted             the servo was measured             it has torque
-//!   Released ────────────────────▶ Waiting ────────────────────────▶ Placed ───────────────────▶ Engaged
-//!      ▲                              ▲                                │                            │
-//!      └──── released ────────────────┴──────────── the servo was lost ┴────────────────────────────┘
+//!                 wait                       measured, steady            torque is on
+//!   Released ───────────────────────▶ Waiting ───────────────▶ TorquePending ─────────▶ Engaged
+//!      ▲                                                          ▲     │                  │
+//!      │                                          measured, steady│     │ no answers       │
+//!      │                                                          │     ▼                  │
+//!      └── released, from every state ──                        Silent ◀─────────────────┘
 //! ```
 //!
-//! A joint engages where a fresh measurement says it is, never where somebody thinks it is, and its goal
-//! stays there until it has torque: a goal that went ahead would be a jump. Knows nothing of the bus, nor of
-//! which joint it is.
+//! A waiting joint engages at its measured position. Its goal stays there until it has torque, so that the servo does
+//! not jump. A silent joint keeps its set-point, because the servo may still execute what it receives. This file does
+//! not know the bus or which joint it drives.
 
 use crate::calibration::MicroDegrees;
 use crate::trajectory::Trajectory;
 
+/// A silent joint that is measured within this distance of its set-point continues its move (D12).
+const REJOIN_WITHIN: MicroDegrees = MicroDegrees::from_degrees(3);
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Engagement {
-    /// Not to be driven.
+    /// The joint is not driven.
     Released,
-    /// To be driven as soon as it is known where the joint is. If the host named a target in the meantime,
-    /// with this value of the time register, the joint goes there once it is engaged.
-    Waiting { target: Option<(MicroDegrees, u8)> },
-    /// To be given torque where it is.
-    Placed,
-    /// Driven.
+    /// The joint will engage at the next measurement. The trajectory keeps a target that the host writes meanwhile.
+    Waiting { has_target: bool },
+    /// The joint has its measured position as its goal. Its torque is not on yet.
+    TorquePending,
+    /// The joint has torque and follows its set-point.
     Engaged,
+    /// The servo of a driven joint does not answer. The set-point does not move.
+    Silent { has_new_target: bool },
 }
 
-/// One joint's drive.
+/// The target of a joint that engaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// The measured position: the joint holds there.
+    Measured,
+    /// The target that the host wrote.
+    FromHost,
+}
+
+/// The drive of one joint.
 #[derive(Clone, Copy, Debug)]
 pub struct Drive {
     engagement: Engagement,
@@ -35,13 +50,13 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// A joint that is not to be driven.
+    /// A joint that is not driven.
     pub const RELEASED: Self =
         Self { engagement: Engagement::Released, trajectory: Trajectory::holding(MicroDegrees(0)) };
 
-    /// Drives the joint from the next measurement on.
+    /// Lets the joint engage at the next measurement.
     pub fn wait(&mut self) {
-        self.engagement = Engagement::Waiting { target: None };
+        self.engagement = Engagement::Waiting { has_target: false };
     }
 
     /// Stops driving the joint.
@@ -49,85 +64,107 @@ impl Drive {
         *self = Self::RELEASED;
     }
 
-    /// The servo was lost: the joint is driven again from the next measurement on.
-    pub fn lose(&mut self) {
-        if self.is_engaged() {
-            self.wait();
+    /// Marks the servo as silent. An engaged joint keeps its set-point until the servo answers again. A joint whose
+    /// torque is pending waits again.
+    pub fn mark_silent(&mut self) {
+        self.engagement = match self.engagement {
+            Engagement::Engaged => Engagement::Silent { has_new_target: false },
+            Engagement::TorquePending => Engagement::Waiting { has_target: self.trajectory.is_moving() },
+            other => other,
+        };
+    }
+
+    /// Sets the target that the host wrote. A released joint ignores it.
+    pub fn set_target(&mut self, angle: MicroDegrees, time: u8) {
+        if self.engagement == Engagement::Released {
+            return;
         }
-    }
-
-    /// The host wrote a target. A released joint does not care.
-    pub fn aim(&mut self, angle: MicroDegrees, time: u8) {
-        match &mut self.engagement {
-            Engagement::Released => {}
-            Engagement::Waiting { target } => *target = Some((angle, time)),
-            Engagement::Placed | Engagement::Engaged => self.trajectory.move_to(angle, time),
+        if let Engagement::Waiting { has_target: is_new } | Engagement::Silent { has_new_target: is_new } =
+            &mut self.engagement
+        {
+            *is_new = true;
         }
+        self.trajectory.move_to(angle, time);
     }
 
-    /// The joint was measured at `angle`: a waiting joint engages there. Says whether it did, and holds.
-    pub fn engage(&mut self, angle: MicroDegrees) -> Option<Engaged> {
-        let Engagement::Waiting { target } = self.engagement else { return None };
-        self.engagement = Engagement::Placed;
-        self.trajectory = Trajectory::holding(angle);
-        let Some((target, time)) = target else { return Some(Engaged::Holding) };
-        self.trajectory.move_to(target, time);
-        Some(Engaged::Moving)
+    /// Engages a joint that is at rest at `angle`. A waiting joint engages there. A silent joint continues from its
+    /// set-point if that is near, and engages at `angle` otherwise. Returns the target if the joint engaged.
+    pub fn engage(&mut self, angle: MicroDegrees) -> Option<Target> {
+        let (Engagement::Waiting { has_target } | Engagement::Silent { has_new_target: has_target }) =
+            self.engagement
+        else {
+            return None;
+        };
+        let continues = self.is_silent() && self.is_near(angle);
+        let target = if continues || has_target { Target::FromHost } else { Target::Measured };
+        if target == Target::Measured {
+            self.trajectory = Trajectory::holding(angle);
+        } else if !continues {
+            self.trajectory.rebase(angle);
+        }
+        self.engagement = Engagement::TorquePending;
+        Some(target)
     }
 
-    /// The joint was given torque: from now on it may move.
+    fn is_silent(&self) -> bool {
+        matches!(self.engagement, Engagement::Silent { .. })
+    }
+
+    fn is_near(&self, angle: MicroDegrees) -> bool {
+        angle.0.abs_diff(self.set_point().0) <= REJOIN_WITHIN.0.unsigned_abs()
+    }
+
+    /// Records that the joint has torque. From now on its set-point may move.
     pub fn torque_is_on(&mut self) {
-        if self.engagement == Engagement::Placed {
+        if self.engagement == Engagement::TorquePending {
             self.engagement = Engagement::Engaged;
         }
     }
 
-    /// The joint's offset changed: the place where it is has another name from now on, and the way to its
-    /// `target` begins there.
-    pub fn rename_place(&mut self, place: MicroDegrees, target: MicroDegrees, time: u8) {
-        if self.is_engaged() {
-            self.trajectory = Trajectory::holding(place);
+    /// Replaces the set-point after a change of the joint's offset. `set_point` and `target` use the new offset.
+    pub fn rebase_offset(&mut self, set_point: MicroDegrees, target: MicroDegrees, time: u8) {
+        if self.is_driven() || self.is_silent() {
+            self.trajectory = Trajectory::holding(set_point);
             self.trajectory.move_to(target, time);
         }
     }
 
-    /// One control cycle further at `speed` (the joint's speed register).
+    /// Advances the set-point by one control cycle at `speed` (the joint's speed register).
     pub fn advance(&mut self, speed: u8) {
         if self.engagement == Engagement::Engaged {
             self.trajectory.advance(speed);
         }
     }
 
-    /// Is the joint driven, or about to be given torque?
+    /// Is the joint engaged, or is its torque pending? Only such a joint is sent goals.
     #[must_use]
-    pub fn is_engaged(&self) -> bool {
-        matches!(self.engagement, Engagement::Placed | Engagement::Engaged)
+    pub fn is_driven(&self) -> bool {
+        matches!(self.engagement, Engagement::TorquePending | Engagement::Engaged)
     }
 
-    /// Is the joint on its way, or about to go?
+    /// Is the joint waiting for its torque?
+    #[must_use]
+    pub fn is_torque_pending(&self) -> bool {
+        self.engagement == Engagement::TorquePending
+    }
+
+    /// Has the set-point not reached the target, or is a target waiting?
     #[must_use]
     pub fn is_moving(&self) -> bool {
         match self.engagement {
             Engagement::Released => false,
-            Engagement::Waiting { target } => target.is_some(),
-            Engagement::Placed | Engagement::Engaged => self.trajectory.is_moving(),
+            Engagement::Waiting { has_target } => has_target,
+            Engagement::TorquePending | Engagement::Engaged | Engagement::Silent { .. } => {
+                self.trajectory.is_moving()
+            }
         }
     }
 
-    /// Where an engaged joint is to be now.
+    /// The present set-point of a driven joint.
     #[must_use]
     pub const fn set_point(&self) -> MicroDegrees {
         self.trajectory.set_point()
     }
-}
-
-/// What a joint does after it engaged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Engaged {
-    /// It holds where it was measured.
-    Holding,
-    /// It moves to the target the host wrote while it was waiting.
-    Moving,
 }
 
 #[cfg(test)]
@@ -138,66 +175,127 @@ mod tests {
         MicroDegrees::from_degrees(degrees)
     }
 
+    /// A joint that has torque and holds at 40 degrees.
+    fn engaged() -> Drive {
+        let mut drive = Drive::RELEASED;
+        drive.wait();
+        drive.engage(degrees(40));
+        drive.torque_is_on();
+        drive
+    }
+
+    /// A joint that fell silent at 41.9 degrees during a move to 80 degrees.
+    fn silent() -> Drive {
+        let mut drive = engaged();
+        drive.set_target(degrees(80), 0);
+        drive.advance(100);
+        drive.mark_silent();
+        drive
+    }
+
     #[test]
     fn d12_a_joint_engages_where_it_is_and_holds() {
         let mut drive = Drive::RELEASED;
-        assert_eq!(drive.engage(degrees(40)), None, "it was not asked to");
+        assert_eq!(drive.engage(degrees(40)), None, "the joint is released");
         drive.wait();
-        assert!(!drive.is_engaged());
-        assert_eq!(drive.engage(degrees(40)), Some(Engaged::Holding));
+        assert!(!drive.is_driven());
+        assert_eq!(drive.engage(degrees(40)), Some(Target::Measured));
         drive.advance(100);
-        assert!(drive.is_engaged() && !drive.is_moving());
+        assert!(drive.is_driven() && !drive.is_moving());
         assert_eq!(drive.set_point(), degrees(40));
         assert_eq!(drive.engage(degrees(50)), None, "only once");
     }
 
     #[test]
-    fn a_target_written_while_waiting_is_approached_at_speed() {
+    fn a_target_written_while_waiting_is_approached_at_the_set_speed() {
         let mut drive = Drive::RELEASED;
-        drive.aim(degrees(10), 0);
+        drive.set_target(degrees(10), 0);
         drive.wait();
         assert!(!drive.is_moving());
-        drive.aim(degrees(60), 0);
-        assert!(drive.is_moving(), "a host that waits must not be told that it is there");
-        assert_eq!(drive.engage(degrees(40)), Some(Engaged::Moving));
+        drive.set_target(degrees(60), 0);
+        assert!(drive.is_moving(), "the move is not over");
+        assert_eq!(drive.engage(degrees(40)), Some(Target::FromHost));
         drive.advance(100);
-        assert_eq!(drive.set_point(), degrees(40), "not before it has torque");
+        assert_eq!(drive.set_point(), degrees(40), "the set-point waits for torque");
         drive.torque_is_on();
         drive.advance(100);
-        assert_eq!(drive.set_point(), MicroDegrees(41_900_000), "from where it is, not from anywhere else");
+        assert_eq!(drive.set_point(), MicroDegrees(41_900_000), "from the measured position");
     }
 
     #[test]
-    fn a_lost_joint_waits_and_then_holds_where_it_is_found() {
+    fn d12_a_silent_joint_stops_its_set_point_and_is_driven_on_from_there() {
+        for found in [38_900_000, 41_900_000, 44_900_000].map(MicroDegrees) {
+            let mut drive = silent();
+            drive.advance(100);
+            assert!(!drive.is_driven(), "no goal is sent to it");
+            assert_eq!(drive.set_point(), MicroDegrees(41_900_000));
+            assert_eq!(drive.engage(found), Some(Target::FromHost));
+            drive.torque_is_on();
+            drive.advance(100);
+            assert_eq!(drive.set_point(), MicroDegrees(43_800_000), "found at {found:?}");
+        }
+    }
+
+    #[test]
+    fn d12_a_silent_joint_that_is_found_elsewhere_holds_there() {
+        for found in [38_899_999, 44_900_001, 170_000_000].map(MicroDegrees) {
+            let mut drive = silent();
+            assert_eq!(drive.engage(found), Some(Target::Measured));
+            assert!(drive.is_driven() && !drive.is_moving(), "the old move is forgotten");
+            assert_eq!(drive.set_point(), found);
+        }
+    }
+
+    #[test]
+    fn d12_a_silent_joint_keeps_a_target_that_the_host_writes() {
+        let mut elsewhere = silent();
+        elsewhere.set_target(degrees(30), 0);
+        assert_eq!(elsewhere.engage(degrees(60)), Some(Target::FromHost));
+        elsewhere.torque_is_on();
+        elsewhere.advance(100);
+        assert_eq!(elsewhere.set_point(), MicroDegrees(58_100_000), "from the measured position");
+        let mut near = silent();
+        near.set_target(degrees(30), 0);
+        near.engage(degrees(42));
+        near.torque_is_on();
+        near.advance(100);
+        assert_eq!(near.set_point(), degrees(40), "from its set-point");
+    }
+
+    #[test]
+    fn d12_a_joint_that_falls_silent_before_it_has_torque_engages_where_it_is_found() {
         let mut drive = Drive::RELEASED;
-        drive.lose();
+        drive.wait();
+        drive.engage(degrees(40));
+        drive.mark_silent();
+        assert_eq!(drive.engage(degrees(41)), Some(Target::Measured));
+        assert_eq!(drive.set_point(), degrees(41));
+        drive.set_target(degrees(60), 0);
+        drive.mark_silent();
+        assert_eq!(drive.engage(degrees(42)), Some(Target::FromHost), "the target is kept");
+        assert_eq!(drive.set_point(), degrees(42));
+    }
+
+    #[test]
+    fn silence_changes_nothing_for_a_joint_that_is_not_driven() {
+        let mut drive = Drive::RELEASED;
+        drive.mark_silent();
         assert_eq!(drive.engage(degrees(1)), None, "a released joint stays released");
         drive.wait();
-        drive.engage(degrees(40));
-        drive.aim(degrees(80), 0);
-        drive.lose();
-        assert!(!drive.is_engaged() && !drive.is_moving());
-        assert_eq!(drive.engage(degrees(45)), Some(Engaged::Holding), "the old move is forgotten");
+        drive.set_target(degrees(60), 0);
+        drive.mark_silent();
+        assert_eq!(drive.engage(degrees(40)), Some(Target::FromHost), "the target is kept");
     }
 
     #[test]
-    fn a_lost_joint_keeps_a_target_written_while_it_waits() {
-        let mut drive = Drive::RELEASED;
-        drive.wait();
-        drive.aim(degrees(60), 0);
-        drive.lose();
-        assert_eq!(drive.engage(degrees(40)), Some(Engaged::Moving));
-    }
-
-    #[test]
-    fn a_new_offset_moves_the_name_and_not_the_joint() {
-        let mut drive = Drive::RELEASED;
-        drive.rename_place(degrees(1), degrees(1), 0);
-        assert_eq!(drive.set_point(), MicroDegrees(0), "a released joint has no place");
-        drive.wait();
-        drive.engage(degrees(40));
-        drive.rename_place(degrees(43), degrees(40), 0);
-        assert_eq!(drive.set_point(), degrees(43));
-        assert!(drive.is_moving());
+    fn a_new_offset_rebases_the_set_point_of_a_driven_and_of_a_silent_joint() {
+        let mut released = Drive::RELEASED;
+        released.rebase_offset(degrees(1), degrees(1), 0);
+        assert_eq!(released.set_point(), MicroDegrees(0));
+        for mut drive in [engaged(), silent()] {
+            drive.rebase_offset(degrees(43), degrees(40), 0);
+            assert_eq!(drive.set_point(), degrees(43));
+            assert!(drive.is_moving());
+        }
     }
 }

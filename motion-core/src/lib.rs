@@ -1,34 +1,42 @@
-//! What a 7Bot V2 arm does about what its host says.
+//! Motion control of a 7Bot V2 arm: executes the requests of a host with seven servos.
 //!
 //! ```text
-//!   host bytes ──▶ Controller ──▶ Arm ──▶ Drive, Trajectory ──▶ calibration ──▶ Bus ──▶ servo bytes
-//!   host bytes ◀──     │      ◀── Arm ◀── Sensor          ◀── calibration ◀── Bus ◀── servo bytes
-//!                      ▼
-//!            vacuum, settings to save
+//!   host bytes ──▶ HostPort ──▶ ArmControl ──▶ Joints: Drive, Trajectory ──▶ calibration ──▶ Bus ──▶ servo bytes
+//!                                  │  ▲         Joints: PositionFilter   ◀── calibration ◀── Bus ◀── servo bytes
+//!                                  │  └── BusScheduler selects the next frame of the Bus
+//!   host bytes ◀── HostPort ◀── registers ◀── Joints, Status
+//!                                  │
+//!                                  ▼ VacuumControl, settings to save
 //! ```
 //!
-//! Firmware and simulator run the same [`Controller`]; only what stands round it differs. It refuses to
-//! know clocks, hardware, heaps and logs, has no unsafe code and no path to a panic.
+//! [`Controller`] combines all parts: bytes in, `poll`, outputs out. Firmware and simulator run the same controller in
+//! different shells. The crate uses no clock, hardware, heap or log. It has no unsafe code and no path to a panic.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
-pub mod arm;
+mod arm_control;
+mod bus_scheduler;
 pub mod calibration;
+mod config;
 pub mod controller;
 pub mod drive;
-pub mod feedback;
-pub mod mode;
-pub mod sensor;
+mod host_port;
+mod joints;
+pub mod motor_state;
+pub mod position_filter;
+pub mod report_timer;
 pub mod servo_bus;
+mod status;
 pub mod trajectory;
 pub mod vacuum;
 
 use protocol_core::time::Duration;
 
-pub use controller::{Config, Controller, Output, Storage};
+pub use config::{Config, Storage};
+pub use controller::{Controller, Output};
 pub use servo_bus::TorqueCodes;
 pub use vacuum::Vacuum;
 
-/// The control cycle: every 10 ms each driven joint gets a new goal and each servo is asked once.
+/// The control cycle: every 10 ms each driven joint gets a new goal and each servo is read once.
 pub const CYCLE: Duration = Duration::from_millis(10);

@@ -1,8 +1,7 @@
-//! One joint, from here to there, on time (D10, D11, D18).
+//! The set-point of one joint during a move (D10, D11, D18).
 //!
-//! A trajectory knows angles and control cycles. It does not know which joint it is, where the joint really
-//! is, or what a servo is. Each control cycle moves the set-point by one step; whoever calls late gets a
-//! later move, never a larger step.
+//! Each control cycle advances the set-point by one step. A late call delays the move; it never makes a step larger.
+//! This file does not know the joint, its measured position or its servo.
 
 use crate::calibration::MicroDegrees;
 
@@ -13,23 +12,23 @@ const STEP_PER_SPEED_UNIT: i32 = 19_000;
 /// Step of one control cycle at the motor's maximum: 62 rpm are 372 degrees/s (D10).
 const LARGEST_STEP: i32 = 3_720_000;
 
-/// The way of one joint's set-point to its target.
+/// The set-point of one joint and its target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Trajectory {
     set_point: MicroDegrees,
     target: MicroDegrees,
-    /// Cycles left of the time this move was given; 0 for as fast as the motor can.
+    /// Remaining cycles of a timed move; 0 is the motor's maximum speed.
     cycles_left: u16,
 }
 
 impl Trajectory {
-    /// Standing still at `angle`.
+    /// A trajectory at rest at `angle`.
     #[must_use]
     pub const fn holding(angle: MicroDegrees) -> Self {
         Self { set_point: angle, target: angle, cycles_left: 0 }
     }
 
-    /// Where the joint is to be now.
+    /// The present set-point.
     #[must_use]
     pub const fn set_point(&self) -> MicroDegrees {
         self.set_point
@@ -48,17 +47,22 @@ impl Trajectory {
         self.cycles_left = u16::from(time) * CYCLES_PER_TIME_UNIT;
     }
 
-    /// One control cycle further. `speed` is the joint's speed register as it is now, 0 to 100 times 1.9
+    /// Continues from `angle` to the same target.
+    pub fn rebase(&mut self, angle: MicroDegrees) {
+        self.set_point = angle;
+    }
+
+    /// Advances the set-point by one control cycle. `speed` is the joint's present speed register, 0 to 100 times 1.9
     /// degrees/s.
     pub fn advance(&mut self, speed: u8) {
         let distance = self.target.0 - self.set_point.0;
         let step = match (speed, self.cycles_left) {
             (0, 0) => LARGEST_STEP,
-            // What is left of the way, evenly over what is left of the time: constant speed without drift.
+            // The remaining distance divided by the remaining cycles gives a constant speed without drift.
             (0, cycles) => (distance.abs() / i32::from(cycles)).min(LARGEST_STEP),
             (speed, _) => i32::from(speed) * STEP_PER_SPEED_UNIT,
         };
-        // `clamp` would bring its own panic along.
+        // `clamp` contains a panic path.
         self.set_point.0 += distance.min(step).max(-step);
         self.cycles_left = self.cycles_left.saturating_sub(1);
     }
@@ -82,7 +86,7 @@ mod tests {
             trajectory.advance(speed);
             largest = largest.max((trajectory.set_point().0 - before).abs());
             cycles += 1;
-            assert!(cycles < 20_000, "a move ends");
+            assert!(cycles < 20_000, "the move does not end");
         }
         assert_eq!(trajectory.set_point(), degrees(to));
         (cycles, largest)
@@ -116,17 +120,17 @@ mod tests {
     }
 
     #[test]
-    fn d11_a_time_too_short_is_stretched_to_the_motors_maximum() {
+    fn d11_too_short_a_time_is_extended_to_the_motors_maximum_speed() {
         assert_eq!(run(0, 180, 0, 1), (49, 3_720_000));
     }
 
     #[test]
-    fn d11_speed_goes_before_time() {
+    fn d11_speed_has_priority_over_time() {
         assert_eq!(run(0, 95, 50, 100).0, 100);
     }
 
     #[test]
-    fn d11_a_change_of_speed_acts_at_once() {
+    fn d11_a_change_of_speed_is_effective_immediately() {
         let mut trajectory = Trajectory::holding(degrees(0));
         trajectory.move_to(degrees(100), 0);
         trajectory.advance(1);
@@ -136,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_target_on_the_way_turns_without_a_jump() {
+    fn a_new_target_during_a_move_causes_no_jump() {
         let mut trajectory = Trajectory::holding(degrees(0));
         trajectory.move_to(degrees(100), 0);
         trajectory.advance(100);

@@ -1,38 +1,38 @@
-//! The vacuum gripper: when the pump runs and when the valve is open (D20).
+//! The control of the vacuum pump and its valve (D20).
 
 use protocol_core::time::{Duration, Instant};
 
-/// How long the valve is held open to let go. The maker's valve overheats when it is held longer.
+/// How long the valve stays open to release. The maker's valve overheats if it stays open longer.
 const RELEASE_TIME: Duration = Duration::from_millis(500);
 
-/// The two outputs of the vacuum gripper.
+/// The two outputs of the vacuum control.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Vacuum {
     /// The pump runs.
     pub pump: bool,
-    /// The valve is open: air comes in and the cup lets go.
+    /// The valve is open: air enters and the cup releases.
     pub valve: bool,
 }
 
-/// Decides over the outputs as time goes by.
+/// The state of the vacuum control.
 #[derive(Clone, Copy, Debug)]
-pub struct Gripper {
+pub struct VacuumControl {
     wanted: Vacuum,
-    /// What the outputs were last told to be.
+    /// The outputs that `poll` returned last.
     shown: Vacuum,
     close_valve_at: Instant,
 }
 
-impl Default for Gripper {
+impl Default for VacuumControl {
     fn default() -> Self {
         Self { wanted: Vacuum::default(), shown: Vacuum::default(), close_valve_at: Instant::FAR_FUTURE }
     }
 }
 
-impl Gripper {
-    /// Register 31 was written: suck or release. Releasing what is released already does nothing, so that
-    /// a host which repeats itself cannot hold the valve open.
+impl VacuumControl {
+    /// Sets register 31: suck or release. A repeated release has no effect, so that a host cannot keep the valve open by
+    /// repeating it.
     pub fn set(&mut self, now: Instant, suck: bool) {
         if suck {
             self.wanted = Vacuum { pump: true, valve: false };
@@ -43,7 +43,7 @@ impl Gripper {
         }
     }
 
-    /// What the outputs have to be switched to at `now`, if that is news.
+    /// The new state of the outputs at `now`, if it has changed.
     pub fn poll(&mut self, now: Instant) -> Option<Vacuum> {
         if self.close_valve_at <= now {
             self.wanted.valve = false;
@@ -55,7 +55,7 @@ impl Gripper {
         })
     }
 
-    /// When the outputs change next by themselves.
+    /// When the valve closes.
     #[must_use]
     pub const fn deadline(&self) -> Instant {
         self.close_valve_at
@@ -71,44 +71,44 @@ mod tests {
     }
 
     const SUCK: Option<Vacuum> = Some(Vacuum { pump: true, valve: false });
-    const LET_GO: Option<Vacuum> = Some(Vacuum { pump: false, valve: true });
+    const RELEASE: Option<Vacuum> = Some(Vacuum { pump: false, valve: true });
     const OFF: Option<Vacuum> = Some(Vacuum { pump: false, valve: false });
 
     #[test]
     fn d20_release_opens_the_valve_for_half_a_second() {
-        let mut gripper = Gripper::default();
-        assert_eq!(gripper.poll(at_ms(0)), None);
-        gripper.set(at_ms(10), true);
-        assert_eq!(gripper.poll(at_ms(10)), SUCK);
-        assert_eq!(gripper.poll(at_ms(11)), None, "said once");
-        gripper.set(at_ms(100), false);
-        assert_eq!(gripper.poll(at_ms(100)), LET_GO);
-        assert_eq!(gripper.deadline(), at_ms(600));
-        assert_eq!(gripper.poll(at_ms(599)), None);
-        assert_eq!(gripper.poll(at_ms(600)), OFF);
-        assert_eq!(gripper.deadline(), Instant::FAR_FUTURE);
+        let mut control = VacuumControl::default();
+        assert_eq!(control.poll(at_ms(0)), None);
+        control.set(at_ms(10), true);
+        assert_eq!(control.poll(at_ms(10)), SUCK);
+        assert_eq!(control.poll(at_ms(11)), None, "returned once");
+        control.set(at_ms(100), false);
+        assert_eq!(control.poll(at_ms(100)), RELEASE);
+        assert_eq!(control.deadline(), at_ms(600));
+        assert_eq!(control.poll(at_ms(599)), None);
+        assert_eq!(control.poll(at_ms(600)), OFF);
+        assert_eq!(control.deadline(), Instant::FAR_FUTURE);
     }
 
     #[test]
     fn d20_repeated_release_does_not_hold_the_valve() {
-        let mut gripper = Gripper::default();
-        gripper.set(at_ms(0), false);
-        assert_eq!(gripper.poll(at_ms(0)), None, "nothing was held");
-        gripper.set(at_ms(0), true);
-        gripper.set(at_ms(100), false);
-        gripper.set(at_ms(400), false);
-        assert_eq!(gripper.poll(at_ms(400)), LET_GO);
-        assert_eq!(gripper.poll(at_ms(600)), OFF);
+        let mut control = VacuumControl::default();
+        control.set(at_ms(0), false);
+        assert_eq!(control.poll(at_ms(0)), None, "the pump was off");
+        control.set(at_ms(0), true);
+        control.set(at_ms(100), false);
+        control.set(at_ms(400), false);
+        assert_eq!(control.poll(at_ms(400)), RELEASE);
+        assert_eq!(control.poll(at_ms(600)), OFF);
     }
 
     #[test]
     fn d20_sucking_again_closes_the_valve_at_once() {
-        let mut gripper = Gripper::default();
-        gripper.set(at_ms(0), true);
-        gripper.set(at_ms(10), false);
-        assert_eq!(gripper.poll(at_ms(10)), LET_GO);
-        gripper.set(at_ms(20), true);
-        assert_eq!(gripper.poll(at_ms(20)), SUCK);
-        assert_eq!(gripper.poll(at_ms(600)), None, "the old release is forgotten");
+        let mut control = VacuumControl::default();
+        control.set(at_ms(0), true);
+        control.set(at_ms(10), false);
+        assert_eq!(control.poll(at_ms(10)), RELEASE);
+        control.set(at_ms(20), true);
+        assert_eq!(control.poll(at_ms(20)), SUCK);
+        assert_eq!(control.poll(at_ms(600)), None, "the release is cancelled");
     }
 }

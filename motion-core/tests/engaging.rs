@@ -17,6 +17,11 @@ fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
         let mut rig = Rig::started();
         rig.write(32, &[0; 7]);
         rig.write(29, &[2]);
+        rig.run_ms(20);
+        // Without torque a loaded joint falls: hands put each where it was, and hold it there.
+        for (joint, counts) in (1..).zip(STANDARD_COUNTS) {
+            rig.hand(joint, counts);
+        }
         let late = Fault::Late(Duration::from_micros(phase * 25));
         for (fault, joint) in [late, Fault::Garbled(2), Fault::Garbled(2)].into_iter().zip(Joint::ALL) {
             rig.plant.set_fault(joint, Some(fault));
@@ -36,7 +41,7 @@ fn goals_at_torque(rig: &Rig) -> [Option<u16>; 7] {
         match told {
             ToServos::Goals(items) => items.iter().for_each(|&(id, to)| goals[usize::from(id)] = to),
             ToServos::Torque(codes) => {
-                for id in (0..7).filter(|&id| codes[id] == 1) {
+                for id in (0..7).filter(|&id| codes[id] == Some(1)) {
                     at_torque[id].get_or_insert(goals[id]);
                 }
             }

@@ -35,16 +35,66 @@ fn d02_a_malformed_range_is_counted_and_shown() {
 #[test]
 fn d05_requests_wait_for_room_and_are_answered_in_order() {
     let mut rig = Rig::started();
-    rig.room = 261;
+    rig.room = 9;
     let requests: Vec<u8> = (0..30).flat_map(|address| frame(3, address, 3, &[])).collect();
     let taken = rig.controller.host_bytes(Instant::from_micros(rig.now_us), &requests);
     assert_eq!(taken, 210, "all of them fit the buffer");
     rig.run_ms(500);
     assert!(rig.to_host.is_empty());
-    rig.room = 262;
+    rig.room = 10;
     rig.run_ms(1);
     let order: Vec<u8> = rig.to_host.iter().map(|(_, bytes)| bytes[3]).collect();
     assert_eq!(order, (0..30).collect::<Vec<u8>>());
+}
+
+#[test]
+fn d05_a_write_needs_no_room() {
+    let mut rig = Rig::started();
+    rig.room = 0;
+    rig.write(46, &[120]);
+    assert_eq!(rig.controller.registers().get(46), 120);
+    rig.send(&frame(3, 54, 7, &[]));
+    rig.write(46, &[130]);
+    rig.run_ms(500);
+    assert_eq!(
+        rig.controller.registers().get(46),
+        120,
+        "a write behind a read that waits is carried out after it"
+    );
+    assert!(rig.to_host.is_empty());
+    rig.room = 14;
+    rig.run_ms(1);
+    assert_eq!(rig.to_host.len(), 1);
+    assert_eq!(rig.controller.registers().get(46), 130);
+}
+
+#[test]
+fn d05_a_stop_gets_through_to_an_arm_whose_reports_are_not_read() {
+    let mut rig = Rig::started();
+    rig.write(53, &[50]);
+    rig.room = 0;
+    rig.write(46, &[180]);
+    rig.run_ms(100);
+    rig.write(46, &[100]);
+    rig.run_ms(2_000);
+    rig.room = 4_096;
+    assert_eq!(rig.present()[0], 100);
+}
+
+#[test]
+fn d05_a_read_that_waits_for_room_wakes_nobody_up() {
+    let mut rig = Rig::started();
+    rig.room = 7;
+    rig.send(&[frame(3, 0, 1, &[]), vec![0xAA, 0x77, 3]].concat());
+    assert_eq!(
+        rig.controller.host_deadline(),
+        Instant::FAR_FUTURE,
+        "half a frame stands behind a read that waits"
+    );
+    rig.room = 8;
+    rig.send(&[0, 1]);
+    assert_eq!(rig.to_host.len(), 1);
+    assert_ne!(rig.controller.host_deadline(), Instant::FAR_FUTURE);
 }
 
 #[test]
@@ -102,12 +152,15 @@ fn d14_feedback_comes_at_its_rate_until_it_is_stopped() {
 fn d14_a_report_without_room_is_skipped_and_answers_go_first() {
     let mut rig = Rig::started();
     rig.write(53, &[10]);
-    rig.room = 261;
+    rig.room = 13;
     rig.run_ms(250);
-    let request = frame(3, 0, 1, &[]);
+    let request = frame(3, 0, 8, &[]);
     rig.controller.host_bytes(Instant::from_micros(rig.now_us), &request);
     rig.run_ms(70);
     assert!(rig.to_host.is_empty());
+    rig.room = 14;
+    rig.run_ms(100);
+    assert!(rig.to_host.is_empty(), "a report that would fit waits for the reply before it");
     rig.room = 4_096;
     rig.run_ms(100);
     let order: Vec<u8> = rig.to_host.iter().map(|(_, bytes)| bytes[3]).collect();

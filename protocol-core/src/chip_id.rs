@@ -1,4 +1,4 @@
-//! One number per chip: the 96-bit unique id of an STM32 in the six bytes the register map has for it (D8).
+//! The chip id: reduces the 96-bit unique id of an STM32 to the six bytes of the register map (D8).
 
 /// Low bits of x^48 + x^47 + x^21 + x^20 + 1, a primitive polynomial.
 const POLYNOMIAL: u64 = (1 << 47) | (1 << 21) | (1 << 20) | 1;
@@ -7,9 +7,9 @@ const MASK: u64 = (1 << 48) - 1;
 /// Reduces a unique id (12 bytes in the order of their addresses, reference manual RM0090 section 39.1)
 /// to the chip id, most significant byte first.
 ///
-/// It is the remainder by a polynomial of degree 48. Two ids that differ only inside some run of 48 bits
-/// never meet: so no two chips of one lot do, as place on the wafer and wafer number are the first 40
-/// bits. Any other two meet with a chance of 2^-48.
+/// The chip id is the remainder modulo a polynomial of degree 48. Two unique ids that differ only within 48 consecutive
+/// bits have different chip ids. Chips of one lot differ in the first 40 bits: position on the wafer and wafer number. Any
+/// two other chips collide with a probability of 2^-48.
 #[must_use]
 pub fn reduce(unique_id: [u8; 12]) -> [u8; 6] {
     let mut remainder: u64 = 0;
@@ -29,16 +29,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_number_of_a_chip_never_changes() {
+    fn a_chip_id_never_changes() {
         assert_eq!(reduce([0; 12]), [0; 6]);
         assert_eq!(reduce(*b"\x33\x00\x25\x00\x0c\x51\x34\x36\x33\x32\x36\x36"), GOLDEN);
     }
 
-    /// Computed once with a separate program (long division over GF(2)); released, so never edited.
+    /// Calculated with a separate program (long division over GF(2)). Released arms use it, so it must not change.
     const GOLDEN: [u8; 6] = [0xAB, 0x46, 0xDB, 0xA5, 0x94, 0x95];
 
     #[test]
-    fn chips_of_one_lot_never_share_a_number() {
+    fn chips_of_one_lot_never_share_a_chip_id() {
         // The remainder is linear, so ids that differ in the first 40 bits collide only if a difference
         // has remainder zero: 40 independent remainders rule that out.
         let mut basis: Vec<u64> = Vec::new();

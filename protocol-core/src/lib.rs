@@ -1,4 +1,4 @@
-//! What a 7Bot V2 arm and its host say to each other, and what the arm remembers.
+//! The protocol between a 7Bot V2 arm and its host, and the settings that the arm stores.
 //!
 //! ```text
 //!   bytes ──▶ wire::Deframer ──▶ wire::Frame ──▶ request::Request ──▶ registers::RegisterFile
@@ -7,9 +7,9 @@
 //!                                                                         Image ──▶ journal::Journal
 //! ```
 //!
-//! Firmware, simulator and host tools share this crate, so the two ends of the wire cannot drift apart.
-//! It refuses to know clocks, hardware, heaps and logs: time is handed in ([`time`]), bytes are handed in
-//! and out, and every operation returns what happened. It has no unsafe code and no path to a panic.
+//! Firmware, simulator and host tools share this crate, so both ends of the wire use the same definitions. The crate uses
+//! no clock, hardware, heap or log: time ([`time`]) and bytes are arguments, and every operation returns its result. It
+//! has no unsafe code and no path to a panic.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

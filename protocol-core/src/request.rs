@@ -1,5 +1,4 @@
-//! What a frame asks for and what is answered: both ends of the wire in one place, so that the arm and its
-//! host tools cannot drift apart.
+//! Requests and replies, for both ends of the wire, so that the arm and the host tools use the same definitions.
 //!
 //! ```text
 //!   host                                   arm
@@ -7,32 +6,32 @@
 //!   Reply::from_frame ◀── Frame ◀── Reply::encode
 //! ```
 //!
-//! Knows nothing of what a register means, nor of streams.
+//! This file does not know the meaning of registers, or streams.
 
 use crate::wire::frame::{self, Frame, FrameBuffer, Function};
 
-/// What the host asks for.
+/// A request of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Request<'a> {
-    /// The values of `count` registers from `address` on.
+    /// Reads `count` registers from `address` on.
     Read {
         /// The first register.
         address: u8,
-        /// How many; 0 is answered with no values.
+        /// How many registers; 0 gives a reply without values.
         count: u8,
     },
-    /// New values for the registers from `address` on.
+    /// Writes the registers from `address` on.
     Write {
         /// The first register.
         address: u8,
-        /// One byte a register, at most 255 of them.
+        /// One byte per register, at most 255.
         values: &'a [u8],
     },
 }
 
 impl<'a> Request<'a> {
-    /// What a frame that came to the arm asks for.
+    /// The request in a frame that the arm received.
     #[must_use]
     pub const fn from_frame(frame: Frame<'a>) -> Self {
         match frame.function {
@@ -41,7 +40,7 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Writes the request's frame into `buffer`, over whatever was there. Values past the 255th are cut off.
+    /// Encodes the request into `buffer`, replacing its content. Values are cut to 255.
     pub fn encode(&self, buffer: &mut FrameBuffer) {
         match *self {
             Self::Read { address, count } => frame::encode(buffer, Function::Read, address, count, &[]),
@@ -50,18 +49,18 @@ impl<'a> Request<'a> {
     }
 }
 
-/// What the arm answers to a read. The same frame, unasked, reports the present positions (D14).
+/// The reply of the arm to a read. A report of the present positions has the same form (D14).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reply<'a> {
     /// The first register.
     pub address: u8,
-    /// Their values, one byte a register, at most 255 of them.
+    /// The values, one byte per register, at most 255.
     pub values: &'a [u8],
 }
 
 impl<'a> Reply<'a> {
-    /// The reply in a frame that came to the host; `None` for a write, which no arm sends.
+    /// The reply in a frame that the host received; `None` for a write, which an arm never sends.
     #[must_use]
     pub const fn from_frame(frame: Frame<'a>) -> Option<Self> {
         match frame.function {
@@ -70,14 +69,14 @@ impl<'a> Reply<'a> {
         }
     }
 
-    /// Writes the reply's frame into `buffer`, over whatever was there. Values past the 255th are cut off.
+    /// Encodes the reply into `buffer`, replacing its content. Values are cut to 255.
     pub fn encode(&self, buffer: &mut FrameBuffer) {
         encode_values(buffer, Function::Read, self.address, self.values);
     }
 }
 
 fn encode_values(buffer: &mut FrameBuffer, function: Function, address: u8, values: &[u8]) {
-    let values = values.get(..255).unwrap_or(values);
+    // `frame::encode` cuts the data to 255 bytes, too.
     let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
     frame::encode(buffer, function, address, count, values);
 }

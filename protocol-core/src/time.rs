@@ -1,14 +1,13 @@
-//! Time as a number somebody hands in.
+//! Time as an argument.
 //!
-//! Nothing in the cores reads a clock. A shell says what time it is with every call, so a test can
-//! live through a year in a second and a run can be repeated exactly. What the zero of time is, only
-//! the shell knows.
+//! The cores read no clock. The shell passes the time with every call, so a test can simulate a year in a second and
+//! repeat a run exactly. The shell defines the zero of time.
 
 use core::ops::{Add, Sub};
 
-/// A point in time, in microseconds since a start that only the shell knows.
+/// A point in time, in microseconds since a start that the shell defines.
 ///
-/// 64 bits last for 584 000 years, so arithmetic saturates and nobody has to think about a wrap.
+/// 64 bits last for 584 000 years. Arithmetic saturates and does not wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Instant(u64);
@@ -19,9 +18,9 @@ pub struct Instant(u64);
 pub struct Duration(u64);
 
 impl Instant {
-    /// The shell's start of time.
+    /// The zero of time.
     pub const ZERO: Self = Self(0);
-    /// Later than anything that happens: "nothing is planned".
+    /// Later than every event: a deadline that never comes.
     pub const FAR_FUTURE: Self = Self(u64::MAX);
 
     /// The point `micros` microseconds after the start.
@@ -38,7 +37,7 @@ impl Instant {
 }
 
 impl Duration {
-    /// No time at all.
+    /// Zero duration.
     pub const ZERO: Self = Self(0);
 
     /// A duration of `micros` microseconds.

@@ -4,13 +4,9 @@
 
 mod stream;
 
-use nom::Parser;
-use nom::branch::alt;
-use nom::bytes::streaming::tag;
-use nom::sequence::preceded;
 use proptest::prelude::*;
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::frame::{Defect, parse};
+use protocol_core::wire::frame::{Defect, ParseOutcome, parse};
 use protocol_core::wire::{Deframer, MAX_LENGTH, ToArm, ToHost, deframer};
 use stream::{Event, GAP_US, Model, Received, frame, receive};
 
@@ -98,42 +94,31 @@ fn d01_the_longest_frame_passes() {
 }
 
 #[test]
-fn a_frame_is_parsed_without_a_stream_too() {
+fn a_frame_is_parsed_without_a_stream() {
     let bytes = [frame(6, 46, &[1, 2]), vec![9]].concat();
-    let (rest, parsed) = parse::<ToArm>(&bytes).unwrap();
-    assert_eq!((rest, parsed.address, parsed.data), ([9].as_slice(), 46, [1, 2].as_slice()));
-    assert!(matches!(parse::<ToArm>(&bytes[..8]), Err(nom::Err::Incomplete(_))));
-    assert_eq!(parse::<ToArm>(&bytes[1..]), Err(nom::Err::Error(Defect::NoFrame)));
-    let mut wrong = bytes.clone();
-    wrong[6] ^= 1;
-    assert_eq!(parse::<ToArm>(&wrong), Err(nom::Err::Failure(Defect::WrongCrc)));
+    let ParseOutcome::Complete(parsed, length) = parse::<ToArm>(&bytes) else { panic!("{bytes:?}") };
+    assert_eq!((length, parsed.address, parsed.data), (9, 46, [1, 2].as_slice()));
+    assert_eq!(parse::<ToArm>(&bytes[..8]), ParseOutcome::Incomplete(9));
+    assert_eq!(parse::<ToArm>(&bytes[1..]), ParseOutcome::NotAFrame);
+    let mut damaged = bytes.clone();
+    damaged[6] ^= 1;
+    assert_eq!(parse::<ToArm>(&damaged), ParseOutcome::Defective(Defect::WrongCrc, 9));
+    let malformed = stream::raw_frame(6, 255, 2, &[1, 2]);
+    let defect = Defect::MalformedRange { address: 255 };
+    assert_eq!(parse::<ToArm>(&malformed), ParseOutcome::Defective(defect, 9));
 }
 
 #[test]
-fn the_beginning_of_a_frame_is_told_from_what_is_none() {
+fn the_beginning_of_a_frame_is_distinguished_from_other_bytes() {
     let beginning = [0xAA, 0x77, 6, 46];
     for length in 0..=beginning.len() {
-        let missing = nom::Needed::new(5 - length);
-        assert_eq!(
-            parse::<ToArm>(&beginning[..length]),
-            Err(nom::Err::Incomplete(missing)),
-            "{length} bytes"
-        );
+        let outcome = parse::<ToArm>(&beginning[..length]);
+        assert_eq!(outcome, ParseOutcome::Incomplete(7), "{length} bytes");
     }
     for wrong in [[0xAB].as_slice(), &[0xAA, 0x78], &[0xAA, 0x77, 4], &[0xAA, 0x78, 6], &[0xAB, 0x77, 6, 46]]
     {
-        assert_eq!(parse::<ToArm>(wrong), Err(nom::Err::Error(Defect::NoFrame)), "{wrong:?}");
+        assert_eq!(parse::<ToArm>(wrong), ParseOutcome::NotAFrame, "{wrong:?}");
     }
-}
-
-#[test]
-fn what_a_parser_of_nom_does_not_find_is_no_frame() {
-    let bytes = frame(6, 46, &[1, 2]);
-    let mut behind_a_byte = preceded(tag([7].as_slice()), parse::<ToArm>);
-    assert_eq!(behind_a_byte.parse(&bytes), Err(nom::Err::Error(Defect::NoFrame)));
-    let mut either = alt((behind_a_byte, parse::<ToArm>));
-    assert!(either.parse(&bytes).is_ok());
-    assert_eq!(either.parse(&bytes[1..]), Err(nom::Err::Error(Defect::NoFrame)));
 }
 
 #[test]
@@ -149,6 +134,15 @@ fn d02_a_range_may_end_at_255_and_not_behind() {
         [Received::MalformedRange(250), Received::Frame(inner)],
         "it is not well formed, so what it holds is not inside a well-formed frame"
     );
+}
+
+#[test]
+fn d02_what_a_malformed_frame_holds_is_searched_like_any_bytes() {
+    // Registers 170 to 288. The address and the count read as a header, too, of a frame with a wrong CRC.
+    let malformed = stream::raw_frame(6, 0xAA, 0x77, &[3; 0x77]);
+    assert!(malformed[3..].starts_with(&[0xAA, 0x77, 3, 3, 3]));
+    let expected = [Received::MalformedRange(0xAA), Received::WrongCrc];
+    assert_eq!(receive::<ToArm>(&[Event::Bytes(malformed)], 99), expected);
 }
 
 #[test]
@@ -207,6 +201,26 @@ fn d04_a_pause_inside_a_frame_costs_nothing() {
         assert_eq!(receive::<ToArm>(&paused, 99), [Received::Frame(good.clone())]);
         let too_long = [Event::Bytes(head.to_vec()), Event::Silence(100_000), Event::Bytes(tail.to_vec())];
         assert_eq!(receive::<ToArm>(&too_long, 99), [], "cut at {cut}");
+    }
+}
+
+#[test]
+fn d04_a_pause_inside_a_frame_makes_no_damage_of_its_data() {
+    let data = [0xAA, 0x77, 3, 3, 3, 3, 3, 3];
+    let good = frame(6, 46, &data);
+    for cut in 12..good.len() {
+        let (head, tail) = good.split_at(cut);
+        let silence = [Event::Bytes(head.to_vec()), Event::Silence(GAP_US)];
+        assert_eq!(receive::<ToArm>(&silence, 99), [], "cut at {cut}");
+        let [head, silence] = silence;
+        let whole = [head.clone(), silence.clone(), Event::Bytes(tail.to_vec())];
+        assert_eq!(receive::<ToArm>(&whole, 99), [Received::Frame(good.clone())], "cut at {cut}");
+        let abandoned = [head, silence, Event::Silence(LONG_SILENCE_US)];
+        assert_eq!(
+            receive::<ToArm>(&abandoned, 99),
+            [Received::WrongCrc],
+            "counted once, when it is no data"
+        );
     }
 }
 

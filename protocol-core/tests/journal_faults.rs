@@ -231,7 +231,7 @@ fn a_slot_that_was_begun_without_a_trace_is_skipped() {
             assert_eq!(world.cycle(9, Some(cut)), End::Cut);
             world.settle();
             world.settle();
-            assert_eq!(world.flash.borrow().told_again(), 0, "seed {seed}");
+            assert_eq!(world.flash.borrow().reprogrammed(), 0, "seed {seed}");
             cases += 1;
         }
     }

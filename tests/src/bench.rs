@@ -14,7 +14,8 @@ use crate::line::{Line, PATIENCE};
 use crate::own::{OwnArm, World};
 use crate::programs::tool;
 use crate::registers::{
-    DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FEEDBACK_FREQUENCY, MOVING_JOINTS, PRESENT_POSITION, STANDARD_POSE,
+    DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FEEDBACK_FREQUENCY, MOVING_JOINTS, PRESENT_POSITION,
+    STANDARD_POSE, TARGET_POSITION,
 };
 use crate::target::{Need, Port, Target};
 
@@ -33,7 +34,8 @@ pub const fn near(is: u8, wanted: u8) -> bool {
 #[derive(Clone, Debug, Default)]
 pub struct Setup {
     needs: Vec<Need>,
-    options: Vec<String>,
+    /// Names and values.
+    options: Vec<(String, String)>,
     is_faulty: bool,
 }
 
@@ -64,23 +66,28 @@ impl Setup {
         self.needs(Need::ServoFaults).option("--fault", fault)
     }
 
+    /// An arm that stays where it is without torque: a stand or a hand supports it.
+    #[must_use]
+    pub fn supported(self) -> Self {
+        self.needs(Need::Support).option("--fault", "arm=supported")
+    }
+
     fn option(mut self, name: &str, value: &str) -> Self {
-        self.options.extend([name.to_owned(), value.to_owned()]);
+        self.options.push((name.to_owned(), value.to_owned()));
         self
     }
 }
 
-/// Runs a test against an arm that is up and at rest, or says why it cannot.
+/// Runs a test against an arm that is up and at rest, or says why it cannot. With `ARM_MEETS_ALL_NEEDS` set that is a
+/// failure: whoever chooses the tests has to leave this one out.
 pub fn with_arm<T: FnOnce(&mut Bench)>(setup: Setup, test: T) {
     let shared = env::var_os("ARM_PORT").map(|path| Port(PathBuf::from(path)));
-    let world = if env::var_os("ARM").is_some_and(|arm| arm == "emulator") {
-        World::Emulator
-    } else {
-        World::Simulator
-    };
+    let world = World::chosen();
     let lacks = |&need: &Need| shared.as_ref().map_or_else(|| world.lacks(need), |port| port.lacks(need));
     if let Some(reason) = setup.needs.iter().find_map(lacks) {
-        return skip(type_name::<T>(), reason);
+        let name = type_name::<T>().trim_end_matches("::{{closure}}");
+        assert!(env::var_os("ARM_MEETS_ALL_NEEDS").is_none(), "`--skip {name}` is missing: {reason}");
+        return skip(name, reason);
     }
     // One arm for all tests, in all threads and processes: one after another.
     let _turn = shared.as_ref().map(|_| turn());
@@ -102,9 +109,8 @@ pub fn with_arm<T: FnOnce(&mut Bench)>(setup: Setup, test: T) {
 
 /// Past the capture of the test runner, which keeps quiet about tests that pass.
 fn skip(test: &str, reason: &str) {
-    let name = test.trim_end_matches("::{{closure}}");
     // In one piece: other tests write there too.
-    let line = format!("skipped {name}: {reason}\n");
+    let line = format!("skipped {test}: {reason}\n");
     let _ = io::stderr().write_all(line.as_bytes());
 }
 
@@ -159,6 +165,18 @@ impl Bench {
         self.quieten();
     }
 
+    /// Restarts the controller alone, and waits until it answers again with a RAM that has forgotten everything.
+    pub fn restart_controller(&mut self) {
+        self.write(EFFECTOR_TYPE, &[1]);
+        assert_eq!(self.register(EFFECTOR_TYPE), 1, "set before the restart");
+        self.target.restart_controller();
+        let patience = Duration::from_millis(500);
+        self.wait_until("the controller is back with an empty RAM", |arm| {
+            arm.try_read(EFFECTOR_TYPE, 1, patience) == Some(vec![0])
+        });
+        self.quieten();
+    }
+
     /// Kills the arm with no chance to tidy up, starts it again, and opens its port anew.
     pub fn kill_and_restart(&mut self) {
         self.line = None;
@@ -195,12 +213,24 @@ impl Bench {
         }
     }
 
-    /// Waits until no set-point is on its way, and says how long that took.
+    /// Waits until no set-point is on its way.
     #[track_caller]
-    pub fn wait_until_still(&mut self) -> Duration {
-        let start = Instant::now();
+    pub fn wait_until_still(&mut self) {
         self.wait_until("all joints have arrived", |arm| arm.register(MOVING_JOINTS) == 0);
-        start.elapsed()
+    }
+
+    /// Sends the arm to a pose and waits until it is there. On a machine so busy that a servo misses its turns the arm
+    /// takes the joint up again where it stands (D12): then it is told once more.
+    #[track_caller]
+    pub fn drive_to(&mut self, pose: &[u8; 7]) {
+        self.write(TARGET_POSITION, pose);
+        self.wait_until("the arm has gone to the pose", |arm| {
+            if arm.read(TARGET_POSITION, 7) != pose {
+                arm.write(TARGET_POSITION, pose);
+            }
+            arm.positions().iter().zip(pose).all(|(is, wanted)| near(*is, *wanted))
+        });
+        self.wait_until_still();
     }
 
     /// The measured positions.

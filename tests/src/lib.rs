@@ -1,5 +1,6 @@
 //! System tests know bytes only: frames through a serial port, against the simulator, the firmware in an
-//! emulator (`ARM=emulator`), or whatever answers on `ARM_PORT`.
+//! emulator (`ARM=emulator`), the controller on this computer with servos behind a simulated USB adapter
+//! (`ARM=adapter`), or whatever answers on `ARM_PORT`.
 //!
 //! ```text
 //!   tests/*.rs ──▶ Bench ──▶ Line ──▶ serial port ──▶ OwnArm, one a test: may be killed, faulty, ...
@@ -10,7 +11,8 @@
 //! Nothing here is shared with the product: frames, checksum and register numbers are written down a second
 //! time, from `docs/protocol.md`, so that a mistake on one side shows on the other.
 //!
-//! A test that needs what its arm cannot do is skipped, by name and with the reason, on standard error.
+//! A test that needs what its arm cannot do is skipped, by name and with the reason, on standard error. `cargo xtask
+//! test` names the tests for each kind of arm instead, and sets `ARM_MEETS_ALL_NEEDS`: then it is a failure.
 
 pub mod bench;
 pub mod frames;

@@ -13,7 +13,7 @@ use serialport::{ClearBuffer, SerialPort};
 use crate::frames::{read_request, sealed, write_request};
 
 /// Patience with an arm on a busy machine. It costs nothing while all is well.
-pub const PATIENCE: Duration = Duration::from_secs(20);
+pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// An answer, or a report sent unasked: the frames look the same.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,6 +64,19 @@ impl Line {
     #[track_caller]
     pub fn read(&mut self, address: u8, count: u8) -> Vec<u8> {
         self.send(&read_request(address, count));
+        self.answer(address, count)
+    }
+
+    /// Sends a write and a read in one piece, and takes the answer: the arm's state directly after the write, however
+    /// late this machine takes the answer.
+    #[track_caller]
+    pub fn write_and_read(&mut self, (address, values): (u8, &[u8]), (asked, count): (u8, u8)) -> Vec<u8> {
+        self.send(&[write_request(address, values), read_request(asked, count)].concat());
+        self.answer(asked, count)
+    }
+
+    #[track_caller]
+    fn answer(&mut self, address: u8, count: u8) -> Vec<u8> {
         let deadline = Instant::now() + PATIENCE;
         while Instant::now() < deadline {
             match self.reply_within(PATIENCE) {

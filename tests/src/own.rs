@@ -1,5 +1,11 @@
 //! An arm of a test's own: started, switched off and on, killed, and gone with the test.
+//!
+//! ```text
+//!   Simulator, Emulator:  port ──▶ one process
+//!   Adapter:              port ──▶ host-sim --servos ──▶ link ──▶ host-sim --servos-only
+//! ```
 
+use std::env;
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -21,22 +27,58 @@ pub enum World {
     Simulator,
     /// In the image for the real arm, in an emulator, with the simulator's servos.
     Emulator,
+    /// In a simulator that drives servos behind a USB adapter; adapter and servos are simulated by a second process.
+    Adapter,
 }
 
+/// How long the simulated adapter gathers bytes, in milliseconds: from a short latency timer to a busy host.
+const USB_LATENCY: &str = "1-4";
+/// How long the controller behind the adapter waits for an answer, in milliseconds: longer than a busy machine delays
+/// it, and less than the delay of a servo that a test makes late.
+const USB_TIMEOUT: &str = "300";
+
 impl World {
-    fn command(self, folder: &Path) -> Command {
-        match self {
-            Self::Simulator => {
-                let mut command = Command::new(host_sim());
-                command.arg("--eeprom").arg(folder.join("eeprom"));
-                command
-            }
-            Self::Emulator => {
-                let mut command = Command::new(xtask());
-                command.args(["emulate", "--no-build"]);
-                command
-            }
+    /// The kind that the variable `ARM` names; the simulator where it names none.
+    ///
+    /// # Panics
+    /// With a name that is none: the tests would run against another arm than was asked for.
+    #[must_use]
+    pub fn chosen() -> Self {
+        match env::var("ARM").as_deref() {
+            Err(_) | Ok("simulator") => Self::Simulator,
+            Ok("emulator") => Self::Emulator,
+            Ok("adapter") => Self::Adapter,
+            Ok(other) => panic!("ARM={other}: use simulator, emulator or adapter"),
         }
+    }
+
+    /// The controller, with the servos where they are its own.
+    fn controller(self, folder: &Path) -> Command {
+        if self == Self::Emulator {
+            let mut command = Command::new(xtask());
+            command.args(["emulate", "--no-build"]);
+            return command;
+        }
+        let mut command = Command::new(host_sim());
+        command.arg("--eeprom").arg(folder.join("eeprom"));
+        if self == Self::Adapter {
+            command.arg("--servos").arg(folder.join("bus")).args(["--usb-timeout", USB_TIMEOUT]);
+        }
+        command
+    }
+
+    /// The servos, where they are a process of their own.
+    fn servos(self, folder: &Path) -> Option<Command> {
+        (self == Self::Adapter).then(|| {
+            let mut command = Command::new(host_sim());
+            command.args(["--servos-only", "--usb-latency", USB_LATENCY, "--link"]).arg(folder.join("bus"));
+            command
+        })
+    }
+
+    /// Is this option for the process of the servos?
+    fn gives_servos(self, option: &str) -> bool {
+        self == Self::Adapter && option == "--fault"
     }
 
     /// Why an arm there cannot meet a need; `None` if it can.
@@ -56,48 +98,69 @@ impl World {
 /// A running arm that nobody else uses.
 pub struct OwnArm {
     world: World,
-    process: Child,
-    port: PathBuf,
-    options: Vec<String>,
+    processes: Processes,
+    options: Vec<(String, String)>,
     /// Holds the settings and the log; both go with it.
     folder: TempDir,
 }
 
-impl OwnArm {
-    /// Starts one with these options.
-    #[must_use]
-    pub fn start(world: World, options: Vec<String>) -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let (process, port) = launch(world, folder.path(), &options);
-        Self { world, process, port, options, folder }
-    }
+/// What an arm consists of. The servos are first in every order.
+struct Processes {
+    servos: Option<Child>,
+    controller: Child,
+    port: PathBuf,
+}
 
-    fn signal(&self, signal: Signal) {
-        let id = i32::try_from(self.process.id()).ok().and_then(Pid::from_raw).expect("a process id");
-        kill_process(id, signal).expect("the arm is running");
+impl OwnArm {
+    /// Starts one with these options and their values.
+    #[must_use]
+    pub fn start(world: World, options: Vec<(String, String)>) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let processes = Processes::launch(world, folder.path(), &options);
+        Self { world, processes, options, folder }
     }
 
     /// The simulator has nothing to tidy up; the emulator has processes of its own.
     fn end(&mut self) {
+        let Processes { servos, controller, .. } = &mut self.processes;
         match self.world {
             // Errors mean that it is gone already, which is what is wanted.
-            World::Simulator => drop(self.process.kill()),
-            World::Emulator => self.signal(Signal::TERM),
+            World::Simulator | World::Adapter => drop(controller.kill()),
+            World::Emulator => signal(controller, Signal::TERM),
         }
-        let _ = self.process.wait();
+        let _ = controller.wait();
+        if let Some(servos) = servos {
+            let _ = servos.kill();
+            let _ = servos.wait();
+        }
     }
 }
 
-fn launch(world: World, folder: &Path, options: &[String]) -> (Child, PathBuf) {
+impl Processes {
+    fn launch(world: World, folder: &Path, options: &[(String, String)]) -> Self {
+        let options_of = |are_servos: bool| {
+            let wanted = options.iter().filter(move |(name, _)| world.gives_servos(name) == are_servos);
+            wanted.flat_map(|(name, value)| [name, value])
+        };
+        let servos = world.servos(folder).map(|mut command| {
+            let (process, _) = launch(command.args(options_of(true)), folder);
+            process
+        });
+        let (controller, port) = launch(world.controller(folder).args(options_of(false)), folder);
+        Self { servos, controller, port }
+    }
+}
+
+fn signal(process: &Child, signal: Signal) {
+    let id = i32::try_from(process.id()).ok().and_then(Pid::from_raw).expect("a process id");
+    kill_process(id, signal).expect("the arm is running");
+}
+
+/// Starts a process, and waits for the port that it names.
+fn launch(command: &mut Command, folder: &Path) -> (Child, PathBuf) {
     let log = File::options().create(true).append(true).open(folder.join("log")).expect("a log file");
-    let mut process = world
-        .command(folder)
-        .args(options)
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(log)
-        .spawn()
-        .expect("the arm starts");
+    let mut process =
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(log).spawn().expect("the arm starts");
     let output = process.stdout.take().expect("a pipe");
     let (sender, first_line) = mpsc::channel();
     // Reads to the end, so that the program never writes into a closed pipe.
@@ -115,7 +178,7 @@ fn launch(world: World, folder: &Path, options: &[String]) -> (Child, PathBuf) {
 
 impl Target for OwnArm {
     fn port(&self) -> &Path {
-        &self.port
+        &self.processes.port
     }
 
     fn lacks(&self, need: Need) -> Option<&'static str> {
@@ -123,12 +186,19 @@ impl Target for OwnArm {
     }
 
     fn power_cycle(&mut self) {
-        self.signal(Signal::HUP);
+        if let Some(servos) = &self.processes.servos {
+            signal(servos, Signal::HUP);
+        }
+        signal(&self.processes.controller, Signal::HUP);
+    }
+
+    fn restart_controller(&mut self) {
+        signal(&self.processes.controller, Signal::USR2);
     }
 
     fn restart_after_kill(&mut self) {
         self.end();
-        (self.process, self.port) = launch(self.world, self.folder.path(), &self.options);
+        self.processes = Processes::launch(self.world, self.folder.path(), &self.options);
     }
 }
 

@@ -17,6 +17,8 @@ pub enum Need {
     Persistence,
     /// Its servos can be made to fail.
     ServoFaults,
+    /// It does not fall where it has no torque.
+    Support,
     /// Its settings storage may be filled to the brim.
     ExpendableStorage,
 }
@@ -31,6 +33,9 @@ pub trait Target {
 
     /// Takes its power and gives it back, without waiting for it to come up.
     fn power_cycle(&mut self);
+
+    /// Restarts its controller, and leaves its servos under power.
+    fn restart_controller(&mut self);
 
     /// Kills it, with no chance to tidy up, and starts it again.
     fn restart_after_kill(&mut self);
@@ -52,11 +57,16 @@ impl Target for Port {
             Need::Kill => "the arm on ARM_PORT cannot be killed from here",
             Need::Persistence => "the arm on ARM_PORT may keep no settings, as in an emulator",
             Need::ServoFaults => "the servos of the arm on ARM_PORT cannot be made to fail",
+            Need::Support => "the arm on ARM_PORT falls where it has no torque",
             Need::ExpendableStorage => "the flash of the arm on ARM_PORT is not to be worn out",
         })
     }
 
     fn power_cycle(&mut self) {
+        unreachable!("no test gets here: the need is not met");
+    }
+
+    fn restart_controller(&mut self) {
         unreachable!("no test gets here: the need is not met");
     }
 

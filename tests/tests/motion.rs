@@ -1,6 +1,7 @@
 //! How the arm moves: `docs/protocol.md`, D9 to D14 and D18.
 //!
-//! Time is taken generously: a busy machine makes moves look longer, never shorter.
+//! A busy machine makes moves and reports look slower, never faster: so only the least time that they may take is
+//! checked. Where it has to be shown that something is fast, one fast try proves it, however many it takes.
 
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -11,37 +12,37 @@ use system_tests::registers::{
 };
 use system_tests::{Bench, Need, Setup, near, with_arm};
 
-/// How much longer than planned a move may look, on a machine that has other things to do.
-const SLACK: Duration = Duration::from_secs(10);
-
 /// Puts joint 1 at an angle and lets it come to rest there. The others stay, after they have moved a little:
 /// so all of them are known to be driven, which takes a moment after power-up.
 fn start_at(arm: &mut Bench, degrees: u8) {
     arm.write(SPEED, &[100; 7]);
     let mut pose = arm.positions();
     pose[0] = degrees;
-    let nearby: Vec<u8> = pose.iter().map(|&at| if at > 40 { at - 4 } else { at + 4 }).collect();
-    for pose in [nearby, pose] {
-        arm.write(TARGET_POSITION, &pose);
-        arm.wait_for_pose(&pose);
-        arm.wait_until_still();
-    }
+    let pose: [u8; 7] = pose.try_into().expect("seven joints");
+    arm.drive_to(&pose.map(|at| if at > 40 { at - 4 } else { at + 4 }));
+    arm.drive_to(&pose);
 }
 
-/// Sends joint 1 to an angle and says how long its set-point was on its way.
+/// Writes, and says which joints are on their way directly after it.
+fn set_off(arm: &mut Bench, address: u8, values: &[u8]) -> u8 {
+    arm.write_and_read((address, values), (MOVING_JOINTS, 1))[0]
+}
+
+/// Sends joint 1 to an angle and says how long its set-point was on its way, at most.
 fn time_move(arm: &mut Bench, degrees: u8) -> Duration {
-    arm.write(TARGET_POSITION, &[degrees]);
-    assert_eq!(arm.register(MOVING_JOINTS) & 1, 1, "joint 1 is on its way as soon as it was told to");
-    let duration = arm.wait_until_still();
+    let start = Instant::now();
+    let moving = set_off(arm, TARGET_POSITION, &[degrees]);
+    assert_eq!(moving & 1, 1, "joint 1 is on its way as soon as it was told to");
+    arm.wait_until_still();
+    let duration = start.elapsed();
     assert_eq!(arm.register(TARGET_POSITION), degrees);
     arm.wait_until("joint 1 has followed", |arm| near(arm.register(PRESENT_POSITION), degrees));
     duration
 }
 
 fn assert_took(duration: Duration, planned: Duration) {
-    // What passed between the write and the first look does not count, so a tenth less is possible.
+    // The clocks of the arm and of this machine need not agree to the last percent.
     assert!(duration >= planned.mul_f64(0.9), "{duration:?} instead of {planned:?}: too fast");
-    assert!(duration <= planned + SLACK, "{duration:?} instead of {planned:?}: too slow");
 }
 
 /// D9: the angle seen is the servo's plus the offset; the angle commanded is the one wanted less the offset.
@@ -85,14 +86,18 @@ fn d10_a_move_takes_as_long_as_its_speed_says() {
 #[test]
 fn d11_a_change_of_speed_acts_on_the_running_move() {
     with_arm(Setup::any(), |arm| {
-        start_at(arm, 90);
-        arm.write(SPEED, &[1]);
-        arm.write(TARGET_POSITION, &[128]);
-        sleep(Duration::from_millis(300));
-        assert_eq!(arm.register(MOVING_JOINTS), 1, "20 s to go");
-        arm.write(SPEED, &[100]);
-        assert!(arm.wait_until_still() < SLACK);
-        arm.wait_until("joint 1 is there", |arm| near(arm.register(PRESENT_POSITION), 128));
+        arm.wait_until("a slow move ends soon once it is fast", |arm| {
+            start_at(arm, 90);
+            arm.write(SPEED, &[1]);
+            assert_eq!(set_off(arm, TARGET_POSITION, &[128]), 1);
+            sleep(Duration::from_millis(300));
+            let start = Instant::now();
+            arm.write(SPEED, &[100]);
+            arm.wait_until_still();
+            arm.wait_until("joint 1 is there", |arm| near(arm.register(PRESENT_POSITION), 128));
+            // 20 s were to go.
+            start.elapsed() < Duration::from_secs(15)
+        });
     });
 }
 
@@ -115,9 +120,13 @@ fn d11_speed_goes_before_time_and_nothing_is_faster_than_the_motor() {
         start_at(arm, 90);
         arm.write(SPEED, &[100]);
         arm.write(TIME, &[100]);
-        // 38 degrees at 190 degrees/s, and not 10 s.
-        let duration = time_move(arm, 128);
-        assert!(duration < Duration::from_secs(9), "{duration:?}");
+        let mut target = 90;
+        arm.wait_until("38 degrees at 190 degrees/s do not take 10 s", |arm| {
+            target = if target == 90 { 128 } else { 90 };
+            time_move(arm, target) < Duration::from_secs(9)
+        });
+        arm.write(TARGET_POSITION, &[128]);
+        arm.wait_until_still();
         arm.write(SPEED, &[0]);
         for time in [0, 1] {
             arm.write(TIME, &[time]);
@@ -136,10 +145,11 @@ fn d17_all_joints_of_a_pose_start_together() {
         let pose: Vec<u8> =
             arm.positions().iter().map(|&at| if at > 60 { at - 20 } else { at + 20 }).collect();
         arm.write(SPEED, &[10, 20, 30, 40, 50, 60, 70]);
-        arm.write(TARGET_POSITION, &pose);
-        assert_eq!(arm.register(MOVING_JOINTS), 0x7F);
+        let start = Instant::now();
+        assert_eq!(set_off(arm, TARGET_POSITION, &pose), 0x7F);
+        arm.wait_until_still();
         // The slowest needs 1.05 s.
-        assert_took(arm.wait_until_still(), Duration::from_millis(1_000));
+        assert_took(start.elapsed(), Duration::from_millis(1_050));
         arm.wait_for_pose(&pose);
     });
 }
@@ -175,10 +185,36 @@ fn d12_after_a_power_cycle_the_arm_stays_where_it_was() {
     });
 }
 
+/// D12: the controller alone restarts, and no joint falls: each holds where it was. A servo that never answers makes
+/// start-up last half a second, time enough to fall by 30 degrees.
+#[test]
+fn d12_after_a_restart_of_the_controller_the_arm_stays_where_it_was() {
+    with_arm(Setup::any().needs(Need::PowerCycle).fault("7=missing"), |arm| {
+        let mut pose = STANDARD_POSE;
+        // Rear arm and forearm stretched out to the front: without torque, both fall.
+        (pose[0], pose[1], pose[2]) = (130, 45, 80);
+        let pose = &pose[..6];
+        arm.wait_for_pose(&STANDARD_POSE[..6]);
+        arm.write(TARGET_POSITION, pose);
+        arm.wait_for_pose(pose);
+        for _ in 0..3 {
+            arm.restart_controller();
+            arm.wait_for_pose(pose);
+            sleep(Duration::from_millis(500));
+            let (targets, positions) = (arm.read(TARGET_POSITION, 7), arm.positions());
+            for (joint, &wanted) in pose.iter().enumerate() {
+                let (target, is) = (targets[joint], positions[joint]);
+                assert!(near(target, wanted) && near(is, wanted), "joint {}: {target}, {is}", joint + 1);
+            }
+            assert_eq!(arm.register(MOVING_JOINTS), 0);
+        }
+    });
+}
+
 /// D13: in damping and forceless nothing is driven; entering servo, the arm holds where it is.
 #[test]
 fn d13_without_servo_state_nothing_is_driven_and_positions_go_on_being_measured() {
-    with_arm(Setup::any(), |arm| {
+    with_arm(Setup::any().supported(), |arm| {
         for state in [0, 2] {
             start_at(arm, 90);
             let here = arm.positions();
@@ -206,28 +242,20 @@ fn d13_a_frame_that_enters_servo_state_may_bring_targets() {
         let mut frame = arm.read(MOTOR_STATE, 24);
         frame[0] = 1;
         frame[usize::from(TARGET_POSITION - MOTOR_STATE)] = 120;
-        arm.write(MOTOR_STATE, &frame);
+        let moving = set_off(arm, MOTOR_STATE, &frame);
+        assert_eq!(moving & 1, 1, "joint 1 is on its way, though it has to be measured first");
         assert_eq!(arm.register(TARGET_POSITION), 120);
-        assert_eq!(
-            arm.register(MOVING_JOINTS) & 1,
-            1,
-            "joint 1 is on its way, though it has to be measured first"
-        );
         arm.wait_until("joint 1 went there", |arm| near(arm.register(PRESENT_POSITION), 120));
     });
 }
 
-/// Counts what comes unasked for a while, and checks what it is.
-fn count_reports(arm: &mut Bench, time: Duration) -> u32 {
-    let start = Instant::now();
-    let mut count = 0;
-    while let Some(left) = time.checked_sub(start.elapsed()) {
-        if let Some(report) = arm.reply_within(left) {
-            assert_eq!((report.address, report.values.len()), (PRESENT_POSITION, 7));
-            count += 1;
-        }
+/// Takes so many reports, checks what they are, and that they did not come more often than `hertz`.
+fn take_reports(arm: &mut Bench, start: Instant, count: u32, hertz: u32) {
+    for _ in 0..count {
+        let report = arm.reply();
+        assert_eq!((report.address, report.values.len()), (PRESENT_POSITION, 7));
     }
-    count
+    assert_took(start.elapsed(), Duration::from_secs(1) * (count - 1) / hertz);
 }
 
 /// D14: positions come unasked, as often as was asked for.
@@ -235,11 +263,11 @@ fn count_reports(arm: &mut Bench, time: Duration) -> u32 {
 fn d14_reports_come_at_their_rate_and_not_at_all_at_zero() {
     with_arm(Setup::any(), |arm| {
         let here = arm.positions();
+        let start = Instant::now();
         arm.write(FEEDBACK_FREQUENCY, &[20]);
         let report = arm.reply();
         assert_eq!((report.address, report.values), (PRESENT_POSITION, here));
-        let count = count_reports(arm, Duration::from_secs(2));
-        assert!((20..=44).contains(&count), "{count} reports in 2 s at 20 Hz");
+        take_reports(arm, start, 40, 20);
         arm.write(FEEDBACK_FREQUENCY, &[0]);
         arm.read(FEEDBACK_FREQUENCY, 1);
         assert_eq!(arm.reply_within(Duration::from_millis(500)), None);
@@ -257,8 +285,7 @@ fn d14_answers_go_on_between_reports() {
             assert_eq!(arm.register(EFFECTOR_TYPE), round & 1);
             sleep(Duration::from_millis(5));
         }
-        let count = count_reports(arm, Duration::from_secs(1));
-        assert!(count >= 10, "{count} reports in 1 s at 50 Hz");
+        take_reports(arm, Instant::now(), 1, 50);
         arm.write(FEEDBACK_FREQUENCY, &[0]);
     });
 }
@@ -269,10 +296,10 @@ fn d14_reports_take_at_most_half_of_a_slow_line() {
     with_arm(Setup::any().needs(Need::PowerCycle).needs(Need::Persistence), |arm| {
         arm.write_setting(BAUD_RATE, &[7]);
         arm.power_cycle(9_600);
+        let start = Instant::now();
         arm.write(FEEDBACK_FREQUENCY, &[50]);
-        arm.reply();
-        let count = count_reports(arm, Duration::from_secs(3));
-        assert!((50..=106).contains(&count), "{count} reports in 3 s, 102 are due");
+        // At 50 Hz they would take 2 s.
+        take_reports(arm, start, 103, 34);
         // Half the line is free, so answers come.
         assert_eq!(arm.register(FEEDBACK_FREQUENCY), 50, "the register keeps what was written");
     });
@@ -286,8 +313,7 @@ fn d18_positions_end_at_0_and_180() {
             start_at(arm, end);
             arm.write(MOTOR_STATE, &[2]);
             arm.write_setting(OFFSET, &[offset]);
-            sleep(Duration::from_millis(500));
-            assert_eq!(arm.register(PRESENT_POSITION), beyond);
+            arm.wait_until("the end shows", |arm| arm.register(PRESENT_POSITION) == beyond);
             arm.write_setting(OFFSET, &[0]);
             arm.write(MOTOR_STATE, &[1]);
         }

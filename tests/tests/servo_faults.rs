@@ -73,11 +73,11 @@ fn a_servo_that_is_garbled_now_and_then_goes_on() {
     });
 }
 
-/// Answers that come far too late are dropped, not taken for those of the servo asked next. (The emulated arm is
-/// patient: 50 ms.)
+/// Answers that come far too late are dropped, not taken for those of the servo asked next. (The emulated arm waits
+/// for 50 ms, the one behind a USB adapter for 300 ms.)
 #[test]
 fn a_late_servo_is_named_and_confuses_no_other() {
-    with_arm(Setup::any().fault("3=late=120"), |arm| {
+    with_arm(Setup::any().fault("3=late=600"), |arm| {
         wait_for_missing(arm, FAULTY_BIT);
         others_go_on(arm);
         for _ in 0..50 {

@@ -59,6 +59,8 @@ pub struct Options {
 pub enum Command {
     /// Keep a port as busy as the line allows, and count what does not come back
     Load(load::Options),
+    /// Measure how far the arm sags over restarts of the controller, noise, and a silent servo
+    Sag,
 }
 
 fn positive(text: &str) -> Result<f64, &'static str> {
@@ -106,6 +108,7 @@ mod tests {
         let plan = parse("--days 0.5 --seed 7 --scenario storm").unwrap().plan();
         assert!(matches!(plan.budget, Budget::Virtual(time) if time == Duration::from_millis(43_200_000)));
         assert_eq!((plan.seed, plan.scenario.map(|scenario| scenario.name)), (7, Some("storm")));
+        assert!(matches!(parse("sag").unwrap().command, Some(Command::Sag)));
         let plan = parse("--minutes 2").unwrap().plan();
         assert!(matches!(plan.budget, Budget::Real(time) if time == RealTime::from_secs(120)));
     }

@@ -4,6 +4,7 @@
 //!   cli ──▶ Plan ──▶ campaign ──▶ World (one seed, one scenario, an hour) ──▶ Tally or Failure ──▶ table
 //!                            └──▶ parser: good frames on a disturbed line ──▶ Line ───────────────▶
 //!   cli ──▶ load: a client that saturates a port
+//!   cli ──▶ sag: how far the arm sags when something fails
 //!   fuzz: what the fuzzer tries, for `fuzz/` and for the test of its corpora
 //! ```
 //!
@@ -19,6 +20,7 @@ pub mod fuzz;
 pub mod load;
 pub mod parser;
 pub mod per_joint;
+pub mod sag;
 pub mod scenario;
 // Written for tests, where a panic is how a failure is told. What of it runs in a campaign has none to tell.
 #[allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]

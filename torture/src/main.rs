@@ -8,12 +8,14 @@ use clap::Parser;
 use torture::campaign::{self, Outcome, Plan};
 use torture::cli::{Command, Options};
 use torture::load;
+use torture::sag;
 use torture::table::{Table, days};
 
 fn main() -> ExitCode {
     let options = Options::parse();
     match &options.command {
         Some(Command::Load(options)) => load_port(options),
+        Some(Command::Sag) => measure_sag(),
         None => try_worlds(&options.plan(), options.rows),
     }
 }
@@ -47,6 +49,11 @@ fn show_progress(outcome: &Outcome, elapsed: Duration) {
     let (worlds, tally) = outcome.total();
     let line = format!("{worlds} worlds, {:.2} virtual days in {} s", days(tally.micros), elapsed.as_secs());
     let _ = write!(io::stderr(), "\r{line:60}");
+}
+
+fn measure_sag() -> ExitCode {
+    say(&sag::Table::measure().to_string());
+    ExitCode::SUCCESS
 }
 
 fn load_port(options: &load::Options) -> ExitCode {

@@ -25,6 +25,10 @@ pub enum Trouble {
     SaveCut,
     /// The controller starts again; the servos keep their power.
     Restart,
+    /// The controller hangs until its watchdog restarts it; likewise.
+    Watchdog,
+    /// The controller panics, damps the servos and starts again; likewise.
+    Fault,
     /// A sector does not erase, or a cell does not program, from now on.
     Wear,
     /// Somebody turns a joint by hand.
@@ -53,7 +57,7 @@ const fn seconds(seconds: u64) -> Duration {
 }
 
 /// All of them. Worlds take turns.
-pub static SCENARIOS: [Scenario; 7] = [
+pub static SCENARIOS: [Scenario; 8] = [
     Scenario {
         name: "calm",
         about: "nothing goes wrong, and nothing may look as if it did",
@@ -83,6 +87,24 @@ pub static SCENARIOS: [Scenario; 7] = [
         about: "the shell is late, by up to seconds",
         every: seconds(2),
         troubles: &[Trouble::Stall, Trouble::Stall, Trouble::Hand, Trouble::Servo],
+        settings_per_mille: 20,
+        cut_starts_percent: 0,
+    },
+    Scenario {
+        name: "holds",
+        about: "restarts, hangs and panics of the controller alone, a disturbed servo bus, silent servos",
+        every: seconds(3),
+        troubles: &[
+            Trouble::Restart,
+            Trouble::Restart,
+            Trouble::Watchdog,
+            Trouble::Fault,
+            Trouble::Bus,
+            Trouble::Servo,
+            Trouble::Servo,
+            Trouble::Reset,
+            Trouble::Hand,
+        ],
         settings_per_mille: 20,
         cut_starts_percent: 0,
     },
@@ -119,6 +141,8 @@ pub static SCENARIOS: [Scenario; 7] = [
             Trouble::Cut,
             Trouble::SaveCut,
             Trouble::Restart,
+            Trouble::Watchdog,
+            Trouble::Fault,
             Trouble::Hand,
         ],
         settings_per_mille: 100,

@@ -11,6 +11,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use crate::run::{Outcome, root};
+use crate::table::Column::{Left, Right};
+use crate::table::Table;
 
 /// How much worse than committed a figure may get, in percent.
 const TOLERANCE: u64 = 5;
@@ -75,7 +77,7 @@ pub(crate) fn hold(file: &str, figures: &[Figure], accept: bool) -> Outcome {
 }
 
 fn compare(budgets: &[Budget], figures: &[Figure]) -> Vec<String> {
-    println!("{:>10}{:>11}{:>9}", "", "committed", "at most");
+    let mut table = Table::new([Right("measured"), Right("committed"), Right("at most"), Left("figure")]);
     let mut faults = Vec::new();
     for figure in figures {
         let budget = budgets.iter().find(|budget| budget.name == figure.name);
@@ -86,9 +88,10 @@ fn compare(budgets: &[Budget], figures: &[Figure]) -> Vec<String> {
         let committed = budget.map_or_else(String::new, |budget| budget.committed.to_string());
         let most = budget.and_then(|budget| budget.most).map_or_else(String::new, |most| most.to_string());
         let mark = fault.as_ref().map_or_else(String::new, |fault| format!("   <-- {fault}"));
-        println!("{:10}{committed:>11}{most:>9}  {}{mark}", figure.value, figure.name);
+        table.add([figure.value.to_string(), committed, most, format!("{}{mark}", figure.name)]);
         faults.extend(fault.map(|fault| format!("{}: {}, {fault}", figure.name, figure.value)));
     }
+    print!("{table}");
     let is_measured = |budget: &&Budget| figures.iter().any(|figure| figure.name == budget.name);
     let lost = budgets.iter().filter(|budget| !is_measured(budget));
     faults.extend(lost.map(|budget| format!("{}: has a budget and was not measured", budget.name)));

@@ -7,37 +7,24 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::generated::Section;
 use crate::run::{Outcome, root};
 
 /// The decisions there are.
 const DECISIONS: std::ops::RangeInclusive<u8> = 1..=20;
-const BEGIN: &str = "<!-- begin: made by `cargo xtask docs` from the names of the tests -->\n";
-const END: &str = "<!-- end -->\n";
+const SECTION: Section = Section {
+    document: "docs/protocol.md",
+    begin: "<!-- begin: made by `cargo xtask docs` from the names of the tests -->\n",
+};
 
-/// Writes the table anew.
+/// Writes the table.
 pub(crate) fn write() -> Outcome {
-    Ok(fs::write(page(), with_table(&fs::read_to_string(page())?)?)?)
+    SECTION.write(&table()?)
 }
 
-/// Fails if the table is not what would be written, or a decision has no test.
+/// Fails if the table is stale, or if a decision has no test.
 pub(crate) fn check() -> Outcome {
-    let text = fs::read_to_string(page())?;
-    if with_table(&text)? == text {
-        Ok(())
-    } else {
-        Err("docs/protocol.md is stale: run `cargo xtask docs`")?
-    }
-}
-
-fn page() -> PathBuf {
-    root().join("docs").join("protocol.md")
-}
-
-fn with_table(text: &str) -> Outcome<String> {
-    let (before, rest) =
-        text.split_once(BEGIN).ok_or("docs/protocol.md has no place for the table of tests")?;
-    let (_, after) = rest.split_once(END).ok_or("the table of tests in docs/protocol.md has no end")?;
-    Ok(format!("{before}{BEGIN}{}{END}{after}", table()?))
+    SECTION.check(&table()?)
 }
 
 fn table() -> Outcome<String> {

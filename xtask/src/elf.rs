@@ -1,7 +1,7 @@
 //! What the linker put into a program for the chip: sections, functions, who calls whom, and from which
 //! line of the source. Knows nothing of what is looked for.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
@@ -11,8 +11,9 @@ use object::read::elf::ElfFile32;
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use rustc_demangle::demangle;
 
+use crate::jump_table::Body;
 use crate::run::{Outcome, root};
-use crate::thumb::{self, Effect};
+use crate::thumb_decode::{self, Effect, halfword};
 
 type Lines<'data> = addr2line::Context<EndianSlice<'data, LittleEndian>>;
 
@@ -23,6 +24,8 @@ pub(crate) struct Program<'data> {
     /// The sections that take room on the chip.
     pub(crate) sections: Vec<Section>,
     code: Vec<Code<'data>>,
+    /// The effect of the instruction at each address.
+    instructions: BTreeMap<u64, Effect>,
     /// Where exceptions lead, reset first, each handler once.
     handlers: Vec<u64>,
     lines: Lines<'data>,
@@ -71,10 +74,12 @@ impl<'data> Program<'data> {
     /// Reads a linked ELF file.
     pub(crate) fn read(file: &'data [u8]) -> Outcome<Self> {
         let elf: ElfFile32<'_> = ElfFile32::parse(file)?;
+        let code = code(&elf)?;
         Ok(Self {
             symbols: elf.symbols().filter_map(|symbol| Symbol::of(&symbol)).collect(),
             sections: elf.sections().filter_map(|section| Section::of(&section)).collect(),
-            code: code(&elf)?,
+            instructions: code.iter().flat_map(Code::instructions).collect(),
+            code,
             handlers: handlers(&elf)?,
             lines: lines(&elf)?,
         })
@@ -82,9 +87,9 @@ impl<'data> Program<'data> {
 
     /// The addresses from which the code at `target` is called or jumped to.
     pub(crate) fn calls_to(&self, target: u64) -> Vec<u64> {
-        let instructions = self.code.iter().flat_map(Code::instructions);
         let leads_there = |effect| matches!(effect, Effect::Call(to) | Effect::Jump(to) if to == target);
-        instructions.filter(|&(_, effect)| leads_there(effect)).map(|(at, _)| at).collect()
+        let calls = self.instructions.iter().filter(|&(_, &effect)| leads_there(effect));
+        calls.map(|(&at, _)| at).collect()
     }
 
     /// The functions, each once, whatever other names it has.
@@ -92,21 +97,28 @@ impl<'data> Program<'data> {
         self.symbols.iter().filter(|symbol| symbol.is_function && symbol.size > 0)
     }
 
-    /// The instructions of a function: where each is, and what it does.
+    /// The instructions of a function: address and effect.
     pub(crate) fn instructions_of(&self, function: &Symbol) -> impl Iterator<Item = (u64, Effect)> {
-        let instructions = self.code.iter().flat_map(Code::instructions);
-        instructions.filter(|&(at, _)| function.holds(at))
+        self.instructions.range(function.range()).map(|(&at, &effect)| (at, effect))
     }
 
-    /// Where the instructions are that do this.
+    /// The targets of the indirect jump at `at` in a function; `None` if they cannot be read from the image.
+    pub(crate) fn jump_targets(&self, function: &Symbol, at: u64) -> Option<Vec<u64>> {
+        let code = self.code.iter().find(|code| function.address >= code.start)?;
+        let first = usize::try_from(function.address - code.start).ok()?;
+        let bytes = code.bytes.get(first..)?.get(..usize::try_from(function.size).ok()?)?;
+        let instructions: Vec<_> = self.instructions_of(function).map(|(at, _)| at).collect();
+        Body { start: function.address, bytes, instructions: &instructions }.targets(at)
+    }
+
+    /// The addresses of the instructions with this effect.
     pub(crate) fn places_of(&self, wanted: Effect) -> Vec<u64> {
-        let instructions = self.code.iter().flat_map(Code::instructions);
-        instructions.filter(|&(_, effect)| effect == wanted).map(|(at, _)| at).collect()
+        self.instructions.iter().filter(|&(_, &effect)| effect == wanted).map(|(&at, _)| at).collect()
     }
 
-    /// What the instruction at each address does.
+    /// The effect of the instruction at each address.
     pub(crate) fn effects(&self) -> HashMap<u64, Effect> {
-        self.code.iter().flat_map(Code::instructions).collect()
+        self.instructions.iter().map(|(&at, &effect)| (at, effect)).collect()
     }
 
     /// Where the function of this name begins.
@@ -179,7 +191,11 @@ impl Symbol {
 impl Symbol {
     /// Is `address` in it?
     pub(crate) fn holds(&self, address: u64) -> bool {
-        (self.address..self.address + self.size).contains(&address)
+        self.range().contains(&address)
+    }
+
+    const fn range(&self) -> Range<u64> {
+        self.address..self.address + self.size
     }
 }
 
@@ -203,18 +219,13 @@ impl Code<'_> {
                 at = data.end;
             }
             let here = at;
-            let first = half(rest, 0)?;
-            let length = if thumb::is_wide(first) { 4_u8 } else { 2 };
-            let effect = thumb::effect(here, first, half(rest, 2).unwrap_or(0));
-            rest = rest.get(usize::from(length)..)?;
-            at += u64::from(length);
+            let length = thumb_decode::length(halfword(rest, 0)?);
+            let effect = thumb_decode::effect(here, rest);
+            rest = rest.get(usize::try_from(length).ok()?..)?;
+            at += length;
             Some((here, effect))
         })
     }
-}
-
-fn half(bytes: &[u8], at: usize) -> Option<u16> {
-    bytes.get(at..)?.first_chunk().copied().map(u16::from_le_bytes)
 }
 
 fn code<'data>(elf: &ElfFile32<'data>) -> Outcome<Vec<Code<'data>>> {

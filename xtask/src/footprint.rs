@@ -16,7 +16,7 @@ const CORES: &[(&str, &str)] = &[("protocol-core/", "protocol_core::"), ("motion
 const OURS: Linked = Linked { name: "count_ours", profile: SMALL };
 const NOTHING: &str = "count_nothing";
 /// The function in which a server does its work.
-const FEED: &str = "footprint::contest::feed";
+const FEED: &str = "footprint::count_server::feed";
 
 /// Measures, prints, and holds the sizes against their budgets.
 pub(crate) fn check(accept: bool) -> Outcome {

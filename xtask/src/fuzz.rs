@@ -1,23 +1,34 @@
-//! `cargo xtask fuzz`: inputs that a fuzzer makes up, for so long each target.
+//! `cargo xtask fuzz`: inputs that a fuzzer makes up, for so long each target, with the stable compiler.
 //!
-//! Begins with the corpora of the repository. What it finds beyond them stays under `target/fuzz`, where the
-//! next run goes on from. Knows nothing of what the targets try: `fuzz/README.md` does.
+//! ```text
+//!   fuzz/fuzz_targets ── cargo build, with the compiler's coverage counters ──> target/fuzz/build
+//!   fuzz/corpus ───────> one program for each target ──> target/fuzz/TARGET   new inputs that reach more
+//!                                                    └─> target/fuzz/failures inputs that break a rule
+//! ```
+//!
+//! The next run goes on from the inputs of the last. Knows nothing of what the targets try: `fuzz/README.md` does.
 
 use std::fs;
-use std::process::{Command, Stdio};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::thread::{self, ScopedJoinHandle, available_parallelism};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 
-use crate::run::{Outcome, root, run};
-use crate::table::Table;
+use crate::run::{Outcome, root, run, target_directory};
+use crate::trials::Trials;
 
 /// The programs of `fuzz/`.
 const TARGETS: [&str; 6] = ["controller", "deframer", "host_reply", "image_file", "journal", "register_ops"];
 /// Bytes of an input, at most.
 const LONGEST: usize = 512;
-/// What a run needs.
-const HOW_TO_GET_IT: &str =
-    "`rustup toolchain install nightly --profile minimal` and `cargo install cargo-fuzz --locked` bring it";
+/// What makes the compiler count the edges of the control flow and report comparisons, as libFuzzer needs it.
+/// cargo-fuzz passes the same flags. None of them needs a nightly compiler: the address sanitizer would.
+const COVERAGE: &str = "--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
+    -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
+    -Cllvm-args=-sanitizer-coverage-trace-compares";
 
 /// For how long, and from where.
 #[derive(Args)]
@@ -25,67 +36,98 @@ pub(crate) struct Options {
     /// Seconds for each of the six targets
     #[arg(long, default_value_t = 60)]
     pub(crate) seconds: u64,
-    /// Where the fuzzer's chance begins
-    #[arg(long, default_value_t = 1)]
-    pub(crate) seed: u64,
-}
-
-/// Are the nightly compiler and cargo-fuzz here?
-pub(crate) fn is_installed() -> bool {
-    let works = |words: &str| {
-        let program =
-            Command::new("cargo").args(words.split(' ')).stdout(Stdio::null()).stderr(Stdio::null()).status();
-        program.is_ok_and(|status| status.success())
-    };
-    works("+nightly --version") && works("+nightly fuzz --version")
+    /// Where the fuzzer's chance begins; another one in each run if this is left out
+    #[arg(long)]
+    pub(crate) seed: Option<u32>,
 }
 
 /// Fuzzes every target, and prints the table.
 pub(crate) fn check(options: &Options) -> Outcome {
-    let mut table = Table::default();
-    all(options, &mut table)?;
-    table.finish(options.seed)
+    let seed = options.seed.unwrap_or_else(another_seed);
+    let mut trials = Trials::default();
+    all(options.seconds, seed, &mut trials)?;
+    trials.finish(u64::from(seed))
 }
 
-/// Likewise, into a table. Without its tools that is a row, and no failure.
-pub(crate) fn all(options: &Options, table: &mut Table) -> Outcome {
-    if !is_installed() {
-        table.add(
-            "fuzz",
-            "0 executions",
-            &format!("skipped, nightly or cargo-fuzz is missing: {HOW_TO_GET_IT}"),
-        );
-        return Ok(());
-    }
-    run("cargo", "+nightly fuzz build -s none", &[])?;
-    TARGETS.into_iter().try_for_each(|target| one(target, options, table))
-}
-
-fn one(target: &str, options: &Options, table: &mut Table) -> Outcome {
-    let Options { seconds, seed } = options;
-    let found = format!("target/fuzz/{target}");
-    fs::create_dir_all(root().join(&found))?;
-    let words = format!(
-        "+nightly fuzz run -s none {target} {found} fuzz/corpus/{target} -- -seed={seed} -max_len={LONGEST} \
-         -max_total_time={seconds} -print_final_stats=1"
-    );
-    println!("{target}, {seconds} s");
-    let output = Command::new("cargo").args(words.split_whitespace()).current_dir(root()).output()?;
-    let said = String::from_utf8_lossy(&output.stderr);
-    let many = format!("{} executions", executions(&said).unwrap_or(0));
-    if output.status.success() {
-        table.add(&format!("fuzz, {target}"), &many, "nothing");
-    } else {
-        println!("{said}");
-        table.fail(&format!("fuzz, {target}"), &many, "FAILED: see above");
+/// Likewise, and adds the results to `trials`. As many targets at once as there are processors.
+pub(crate) fn all(seconds: u64, seed: u32, trials: &mut Trials) -> Outcome {
+    let programs = build()?;
+    println!("fuzzing: {seconds} s for each target, seed {seed}");
+    let at_once = available_parallelism().map_or(1, usize::from);
+    for targets in TARGETS.chunks(at_once) {
+        let outputs: Vec<_> = thread::scope(|scope| {
+            let programs = &programs;
+            let start = |&target| scope.spawn(move || one(programs, target, seconds, seed));
+            let running: Vec<_> = targets.iter().map(start).collect();
+            running.into_iter().map(ScopedJoinHandle::join).collect()
+        });
+        for (target, output) in targets.iter().zip(outputs) {
+            report(target, &output.map_err(|_| "a thread panicked")??, trials);
+        }
     }
     Ok(())
+}
+
+/// Builds the programs and says where they are.
+fn build() -> Outcome<PathBuf> {
+    let folder = target_directory().join("fuzz/build");
+    let host = host()?;
+    let words = format!(
+        "build --quiet --release --manifest-path fuzz/Cargo.toml --target {host} --target-dir {}",
+        folder.display()
+    );
+    run("cargo", &words, &[("RUSTFLAGS", COVERAGE)])?;
+    Ok(folder.join(host).join("release"))
+}
+
+/// The triple of this machine. Named as the target, it keeps the flags from build scripts and macros.
+fn host() -> Outcome<String> {
+    let output = Command::new("rustc").arg("-vV").current_dir(root()).output()?;
+    let said = String::from_utf8(output.stdout)?;
+    let host = said.lines().find_map(|line| line.strip_prefix("host: "));
+    Ok(host.ok_or("`rustc -vV` names no host")?.to_owned())
+}
+
+fn one(programs: &Path, target: &str, seconds: u64, seed: u32) -> io::Result<Output> {
+    let found = target_directory().join("fuzz").join(target);
+    let failures = failures();
+    for folder in [&found, &failures] {
+        fs::create_dir_all(folder)?;
+    }
+    let mut command = Command::new(programs.join(target));
+    command.current_dir(root()).arg(found).arg(format!("fuzz/corpus/{target}"));
+    command.arg(format!("-artifact_prefix={}/{target}-", failures.display()));
+    command.args([format!("-seed={seed}"), format!("-max_len={LONGEST}")]);
+    command.args([format!("-max_total_time={seconds}"), "-print_final_stats=1".to_owned()]);
+    command.output()
+}
+
+/// Where inputs that break a rule are kept.
+fn failures() -> PathBuf {
+    target_directory().join("fuzz/failures")
+}
+
+fn report(target: &str, output: &Output, trials: &mut Trials) {
+    let said = String::from_utf8_lossy(&output.stderr);
+    let (name, many) = (format!("fuzz, {target}"), format!("{} executions", executions(&said).unwrap_or(0)));
+    if output.status.success() {
+        trials.add(&name, &many, "nothing");
+    } else {
+        println!("{said}");
+        trials.fail(&name, &many, &format!("FAILED: see above, and {}", failures().display()));
+    }
 }
 
 /// What libFuzzer counted.
 fn executions(said: &str) -> Option<u64> {
     let count = said.lines().find_map(|line| line.strip_prefix("stat::number_of_executed_units:"))?;
     count.trim().parse().ok()
+}
+
+/// A seed from the clock. libFuzzer takes 0 for "choose one", so it is never 0.
+fn another_seed() -> u32 {
+    let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    time.subsec_nanos() | 1
 }
 
 #[cfg(test)]

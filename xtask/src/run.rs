@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command};
 use std::{env, fs};
 
 /// What a chore comes to: a failure says what to do about it.
@@ -10,6 +10,10 @@ pub(crate) type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
 /// The target of the chip.
 pub(crate) const CHIP: &str = "thumbv7em-none-eabihf";
+
+/// Every package that builds for the host as a whole. All commands that build for the host choose the same packages: another
+/// choice may mean other features, and then a second build of much of it.
+pub(crate) const HOST: &str = "--workspace --exclude footprint --exclude firmware-stm32";
 
 /// The root of the workspace, wherever the chore was started from.
 pub(crate) fn root() -> &'static Path {
@@ -31,6 +35,17 @@ pub(crate) fn run(program: &str, words: &str, variables: &[(&str, &str)]) -> Out
         .status()
         .map_err(|why| format!("cannot start `{program}`: {why}"))?;
     if status.success() { Ok(()) } else { Err(format!("`{program} {words}` failed").into()) }
+}
+
+/// A program that ends when this is dropped.
+pub(crate) struct Running(pub(crate) Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // Errors mean that it has ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }
 
 /// A program that is linked for the chip.
@@ -61,6 +76,8 @@ pub(crate) const FAST: &str = "chip-fast";
 
 /// The image for the arm.
 pub(crate) const IMAGE: Linked = Linked { name: "firmware-stm32", profile: "firmware" };
+/// The image for the first power-up of a board.
+pub(crate) const SELF_TEST: Linked = Linked { name: "self-test", profile: "firmware" };
 /// From bytes to reply, and nothing else.
 pub(crate) const ANSWER: Linked = Linked { name: "answer", profile: SMALL };
 
@@ -69,8 +86,8 @@ const LINKED: &[Linked] = &[
     ANSWER,
     Linked { name: "arm", profile: SMALL },
     Linked { name: "journal", profile: SMALL },
-    Linked { name: "rest_of_motion", profile: SMALL },
-    Linked { name: "rest_of_protocol", profile: SMALL },
+    Linked { name: "unused_by_arm_motion", profile: SMALL },
+    Linked { name: "unused_by_arm_protocol", profile: SMALL },
     IMAGE,
 ];
 

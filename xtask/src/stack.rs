@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use crate::elf::{Program, Symbol};
 use crate::run::Outcome;
-use crate::thumb::Effect;
+use crate::thumb_decode::Effect;
 
 /// What the core pushes when an interrupt comes: 26 words where the program uses floating point, and one that
 /// aligns (ARMv7-M reference manual, B1.5.7).
@@ -17,7 +17,7 @@ const EXCEPTION_FRAME: u64 = 27 * 4;
 const BEGIN_A_STACK: &[&str] = &["Reset", "HardFault"];
 
 /// Where the logger panics if a log frame begins inside another: a call that closes a circle, since a panic is logged.
-/// The panic handler logs only when it is entered for the first time (`fault.rs`, `ENTERED`), so a circle is run
+/// The panic handler logs only when it is entered for the first time (`crash.rs`, `ENTERED`), so a circle is run
 /// through once, and its beginning once more.
 const GUARDS: (&[&str], &str) = (&["_defmt_acquire", "_defmt_release"], "core::panicking::panic_fmt");
 
@@ -133,8 +133,14 @@ impl<'a> Function<'a> {
                     function.pushed += bytes;
                     pushes.push(at);
                 }
-                Effect::Indirect => function.refuse(at, "calls through a pointer")?,
-                Effect::StackSet if !begins_a_stack(&symbol.name) => {
+                Effect::Indirect => match program.jump_targets(symbol, at) {
+                    Some(targets) => {
+                        loops.extend(targets.into_iter().filter(|&to| to <= at).map(|to| to..=at))
+                    }
+                    None => function.refuse(at, "calls through a pointer")?,
+                },
+                Effect::Unknown => function.refuse(at, "holds an unknown instruction")?,
+                Effect::SetStackPointer if !begins_a_stack(&symbol.name) => {
                     function.refuse(at, "sets the stack pointer")?;
                 }
                 _ => {}

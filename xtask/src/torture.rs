@@ -13,7 +13,7 @@ use clap::Args;
 
 use crate::fuzz;
 use crate::run::{Outcome, cargo};
-use crate::table::Table;
+use crate::trials::Trials;
 
 /// How much is tried, and from where.
 #[derive(Args)]
@@ -23,7 +23,7 @@ pub(crate) struct Options {
     minutes: f64,
     /// The seed of the first world, and of all other chance
     #[arg(long, default_value_t = 1)]
-    seed: u64,
+    seed: u32,
 }
 
 fn minutes(text: &str) -> Result<f64, &'static str> {
@@ -31,32 +31,39 @@ fn minutes(text: &str) -> Result<f64, &'static str> {
     number.filter(|number| *number > 0.0 && *number < 1e6).ok_or("use a number above 0")
 }
 
-/// What the short form tries: virtual days, from a seed that never changes.
-const SHORT: &str = "--days 30 --seed 1 --frames 0";
-
-/// The short form: the same worlds every time.
+/// The short form, 10 virtual days: the same worlds every time.
 pub(crate) fn short() -> Outcome {
-    cargo(&format!("run --quiet --release --package torture -- {SHORT}"))
+    days(10)
+}
+
+/// The long form, 30 virtual days: likewise, and begins with the worlds of the short one.
+pub(crate) fn long() -> Outcome {
+    days(30)
+}
+
+fn days(days: u32) -> Outcome {
+    cargo(&format!("run --quiet --release --package torture -- --days {days} --seed 1 --frames 0"))
 }
 
 /// Tries everything.
 pub(crate) fn run(options: &Options) -> Outcome {
     let Options { minutes, seed } = options;
-    let mut table = Table::default();
+    let mut trials = Trials::default();
     let half = minutes / 2.0;
-    table.take(
+    trials.take(
         &format!("cargo run --release --package torture -- --minutes {half} --seed {seed} --rows"),
         &[],
     )?;
-    journal(*seed, &mut table)?;
+    journal(*seed, &mut trials)?;
     let seconds = std::time::Duration::try_from_secs_f64(half * 10.0)?.as_secs().max(1);
-    fuzz::all(&fuzz::Options { seconds, seed: *seed }, &mut table)?;
-    table.finish(*seed)
+    fuzz::all(seconds, *seed, &mut trials)?;
+    trials.finish(u64::from(*seed))
 }
 
-fn journal(seed: u64, table: &mut Table) -> Outcome {
+/// The long forms of the tests of the settings.
+pub(crate) fn journal(seed: u32, trials: &mut Trials) -> Outcome {
     let tests = "--test power_loss --test journal_faults";
-    table.take(
+    trials.take(
         &format!("cargo test --package protocol-core {tests} -- --include-ignored --nocapture --quiet"),
         &[("JOURNAL_LONG", "1"), ("JOURNAL_SEED", &seed.to_string())],
     )

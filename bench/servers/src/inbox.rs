@@ -1,10 +1,10 @@
-//! A buffer for the peers' streams: bytes go in at the end, frames go out at the front, and what is left is
-//! moved only when room is needed.
+//! Receive buffer of the peers: bytes go in at the end and frames are taken from the front. The remaining bytes
+//! are moved only when room is needed.
 
-/// Twice the longest Modbus frame and a piece.
+/// Room for two of the longest Modbus frames (256 bytes each) and more than one piece of the stream.
 const CAPACITY: usize = 1024;
 
-/// Bytes that came and were not used yet.
+/// Bytes that were received and not yet consumed.
 pub(crate) struct Inbox {
     bytes: [u8; CAPACITY],
     start: usize,
@@ -16,7 +16,8 @@ impl Inbox {
         Self { bytes: [0; CAPACITY], start: 0, end: 0 }
     }
 
-    /// Adds bytes at the end. Without room for them the oldest are lost; no server here lets it come to that.
+    /// Adds bytes at the end. If there is no room, the piece is dropped. The servers here consume frames early
+    /// enough that this does not happen.
     pub(crate) fn push(&mut self, piece: &[u8]) {
         if self.end + piece.len() > CAPACITY {
             self.bytes.copy_within(self.start..self.end, 0);
@@ -28,12 +29,12 @@ impl Inbox {
         }
     }
 
-    /// The bytes not used yet.
+    /// The bytes not yet consumed.
     pub(crate) fn bytes(&self) -> &[u8] {
         self.bytes.get(self.start..self.end).unwrap_or(&[])
     }
 
-    /// Takes bytes off the front.
+    /// Removes bytes from the front.
     pub(crate) fn take(&mut self, count: usize) {
         self.start = (self.start + count).min(self.end);
         if self.start == self.end {

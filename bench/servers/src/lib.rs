@@ -1,6 +1,6 @@
-//! Those compared by `cargo xtask bench` and `cargo xtask count`: servers that take a stream of requests in pieces
-//! and hand out replies. The same code runs on the host, against the clock, and on the chip, where instructions are
-//! counted. It knows nothing of how it is measured.
+//! The servers that `cargo xtask bench` and `cargo xtask count` compare. Each takes a stream of requests in pieces
+//! and returns replies. The same code is timed on the host, and its instructions are counted on the chip. It does not
+//! know how it is measured.
 
 #![no_std]
 
@@ -18,14 +18,14 @@ pub use ours::OurServer;
 pub use postcard::PostcardServer;
 pub use rmodbus::RmodbusServer;
 
-/// Takes a stream of requests and answers it.
+/// Parses a stream of requests and answers them.
 pub trait Server {
-    /// Takes the next piece of the stream and hands out the replies that follow from it.
+    /// Takes the next piece of the stream and passes each reply to `reply`.
     fn feed(&mut self, piece: &[u8], reply: &mut impl FnMut(&[u8]));
 
-    /// The line has been silent for long: whatever is still unfinished stays so.
+    /// The line has been silent longer than any timeout: no unfinished frame will be completed.
     fn end(&mut self, reply: &mut impl FnMut(&[u8]));
 
-    /// How many requests were carried out so far.
+    /// The number of requests carried out so far.
     fn carried_out(&self) -> usize;
 }

@@ -1,5 +1,5 @@
-//! mavlink: its reader finds frames in a stream by itself; registers are the caller's. MAVLink has no message for
-//! bytes of a register map, so requests and replies travel in its message for bytes of any kind, TUNNEL: function,
+//! The peer `mavlink`. Its reader finds frames in a stream; the registers are implemented here. MAVLink has no
+//! message for a register map, so requests and replies travel in TUNNEL, its message for arbitrary bytes: function,
 //! address, count, values.
 
 use core::convert::Infallible;
@@ -13,16 +13,16 @@ use crate::Server;
 use crate::inbox::Inbox;
 use crate::work::initial_values;
 
-/// Read, and write: as in this project's protocol.
+/// Function code of a read, as in this project's protocol.
 const READ: u8 = 3;
-/// See above.
+/// Function code of a write, as in this project's protocol.
 const WRITE: u8 = 6;
-/// Longer than any frame.
-const SILENCE: [u8; 64] = [0; 64];
-/// So many times, that is.
-const SILENCES: usize = 5;
+/// Zeros that complete an unfinished frame at the end of the stream.
+const FILLER: [u8; 64] = [0; 64];
+/// Repetitions of [`FILLER`] that exceed the longest frame (280 bytes).
+const FILLERS: usize = 5;
 
-/// What came and was not read yet, as a source for the reader.
+/// The received bytes, as the source that the reader reads from.
 struct Line(Inbox);
 
 impl ErrorType for Line {
@@ -41,7 +41,7 @@ impl Read for Line {
     }
 }
 
-/// The one message that is spoken here: a dialect of all of them would have to tell them apart first.
+/// A dialect with the one message in use: a full dialect would first have to look the message up.
 struct Tunnel;
 
 impl Dialect for Tunnel {
@@ -74,14 +74,14 @@ impl Dialect for Tunnel {
 pub struct MavlinkServer {
     reader: MavlinkReader<Line>,
     registers: [u8; 256],
-    /// Room for the reply, made once and not for each request.
+    /// Buffer for the reply, created once instead of once a request.
     data: TUNNEL_DATA,
     frame: MAVLinkV2MessageRaw,
     carried_out: usize,
 }
 
 impl Default for MavlinkServer {
-    /// A server that was sent nothing yet.
+    /// A server that has received nothing.
     fn default() -> Self {
         Self {
             reader: MavlinkReader::new(Line(Inbox::new())),
@@ -93,7 +93,7 @@ impl Default for MavlinkServer {
     }
 }
 
-/// A message to nobody with nothing in it.
+/// A message without destination and payload.
 const fn empty() -> TUNNEL_DATA {
     TUNNEL_DATA {
         payload_type: MavTunnelPayloadType::MAV_TUNNEL_PAYLOAD_TYPE_UNKNOWN,
@@ -105,7 +105,7 @@ const fn empty() -> TUNNEL_DATA {
 }
 
 impl MavlinkServer {
-    /// Carries a request out, and hands out the reply to a read. `None`: it is no request.
+    /// Carries a request out and returns the reply to a read. `None` if the message is not a valid request.
     fn answer(&mut self, from: MavHeader, asked: &TUNNEL_DATA, reply: &mut impl FnMut(&[u8])) -> Option<()> {
         let asked_bytes = asked.payload.get(..usize::from(asked.payload_length))?;
         let (&[function, address, count], written) = asked_bytes.split_first_chunk()?;
@@ -119,7 +119,7 @@ impl MavlinkServer {
                 let (values, unused) = rest.split_at_mut_checked(length)?;
                 *head = [READ, address, count];
                 values.copy_from_slice(registers);
-                // Zeros at the end are not sent.
+                // MAVLink 2 does not send the zeros at the end of a payload.
                 unused.fill(0);
                 self.data.payload_length = 3 + count;
                 let header = MavHeader { system_id: 1, component_id: 1, sequence: 0 };
@@ -141,16 +141,16 @@ impl Server for MavlinkServer {
             match self.reader.read_message_with_dialect(&Tunnel, MavlinkVersion::V2) {
                 Ok((from, asked)) => _ = self.answer(from, &asked, reply),
                 Err(MessageReadError::Parse { .. }) => {}
-                // There is nothing more to read.
+                // The received bytes are used up.
                 Err(MessageReadError::Io) => return,
             }
         }
     }
 
-    /// A reader has no sense of time: what is unfinished is filled up with zeros, and turns out to be no frame.
+    /// The reader has no timeout. Zeros complete an unfinished frame, and its checksum then fails.
     fn end(&mut self, reply: &mut impl FnMut(&[u8])) {
-        for _ in 0..SILENCES {
-            self.feed(&SILENCE, reply);
+        for _ in 0..FILLERS {
+            self.feed(&FILLER, reply);
         }
     }
 

@@ -1,10 +1,9 @@
-//! modbus-core: it tells how long a frame is, checks it, decodes it and encodes the reply; stream and
-//! registers are the caller's.
+//! The peer `modbus-core`. It determines the length of a frame, checks and decodes it, and encodes the reply. The
+//! stream and the registers are implemented here.
 //!
-//! Its own stream decoder, `rtu::decode`, takes the high byte of the quantity for the byte count of a write
-//! of several registers (version 0.2.0, `request_pdu_len`) and finds no such frame. So the loop over the
-//! bytes is done here, with the same two calls in the same order, and the length of that one request worked
-//! out here.
+//! Its own stream decoder, `rtu::decode`, finds no write of several registers: it takes the high byte of the
+//! quantity for the byte count (version 0.2.0, `request_pdu_len`). So the loop over the bytes is here, with the same
+//! two calls in the same order, and the length of that one request is determined here.
 
 use modbus_core::rtu::server::encode_response;
 use modbus_core::rtu::{self, DecodedFrame, Header, ResponseAdu};
@@ -12,7 +11,7 @@ use modbus_core::{Data, Error, Exception, ExceptionResponse, FunctionCode, Reque
 
 use crate::Server;
 use crate::inbox::Inbox;
-use crate::work::{STATION, initial_words};
+use crate::work::{REGISTERS, STATION, initial_words};
 
 /// The peer modbus-core.
 pub struct ModbusCoreServer {
@@ -21,22 +20,22 @@ pub struct ModbusCoreServer {
     carried_out: usize,
 }
 
-/// The registers, and room for what is read from them and for the reply: made once, not for each request.
+/// The registers, and buffers for the values read and for the reply: created once instead of once a request.
 struct Registers {
-    words: [u16; 256],
+    words: [u16; REGISTERS],
     data: [u8; 250],
     frame: [u8; rtu::MAX_FRAME_LEN],
 }
 
-/// Bytes of a frame beside its PDU: station and CRC.
+/// Bytes of a frame outside its PDU: station and CRC.
 const ENVELOPE: usize = 3;
 const WRITE_MULTIPLE_REGISTERS: u8 = 0x10;
 
-/// Why a request is refused.
+/// The reason why a request is refused.
 type Refusal = Exception;
 
 impl Default for ModbusCoreServer {
-    /// A server that was sent nothing yet.
+    /// A server that has received nothing.
     fn default() -> Self {
         let registers = Registers { words: initial_words(), data: [0; 250], frame: [0; rtu::MAX_FRAME_LEN] };
         Self { inbox: Inbox::new(), registers, carried_out: 0 }
@@ -44,7 +43,7 @@ impl Default for ModbusCoreServer {
 }
 
 impl ModbusCoreServer {
-    /// Looks for one request at the front. `false`: it takes more bytes to find one.
+    /// Parses one request at the front. Returns `false` if it needs more bytes.
     fn answer_one(&mut self, reply: &mut impl FnMut(&[u8])) -> bool {
         let bytes = self.inbox.bytes();
         let frame = match pdu_length(bytes).and_then(|length| match length {
@@ -69,7 +68,7 @@ impl ModbusCoreServer {
     }
 }
 
-/// The length of a request's PDU, as soon as it can be known.
+/// The length of a request's PDU, or `None` if too few bytes have arrived.
 fn pdu_length(bytes: &[u8]) -> Result<Option<usize>, Error> {
     match bytes {
         [_, WRITE_MULTIPLE_REGISTERS, rest @ ..] => Ok(rest.get(4).map(|&count| 6 + usize::from(count))),
@@ -97,7 +96,7 @@ impl Server for ModbusCoreServer {
 }
 
 impl Registers {
-    /// Hands out the reply to a request; was it carried out?
+    /// Carries a request out and returns the reply. Returns `true` if the request was carried out.
     fn answer(&mut self, request: Request<'_>, reply: &mut impl FnMut(&[u8])) -> bool {
         let result = carry_out(&mut self.words, request, &mut self.data);
         let carried_out = result.is_ok();

@@ -1,4 +1,4 @@
-//! This project's path: deframer, request, register file, reply.
+//! This project's parse-and-answer path: deframer, request, register file, reply.
 
 use protocol_core::registers::RegisterFile;
 use protocol_core::request::{Reply, Request};
@@ -8,7 +8,7 @@ use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
 
 use crate::Server;
 
-/// Ours.
+/// This project's server.
 pub struct OurServer {
     now: Instant,
     deframer: Deframer<ToArm>,
@@ -18,7 +18,7 @@ pub struct OurServer {
 }
 
 impl Default for OurServer {
-    /// A server that was sent nothing yet.
+    /// A server that has received nothing.
     fn default() -> Self {
         Self {
             now: Instant::ZERO,
@@ -63,7 +63,7 @@ impl Server for OurServer {
 
     fn end(&mut self, reply: &mut impl FnMut(&[u8])) {
         self.now = self.now + ABANDON_AFTER;
-        // Twice: a silence is noted again where a search was under way.
+        // Twice: a timeout during a search is recorded only after that search.
         for _ in 0..2 {
             self.deframer.push(self.now, &[]);
             self.answer(reply);

@@ -1,5 +1,6 @@
-//! postcard and cobs: requests and replies are Rust types, serialised by postcard with a CRC-16 behind them and
-//! stuffed by cobs, so that a zero ends a frame and stands nowhere else; stream and registers are the caller's.
+//! The peer `postcard` with `cobs`. Requests and replies are Rust types, serialised by postcard with a CRC-16 and
+//! encoded by COBS, so that a zero marks the end of a frame and occurs nowhere else. The stream and the registers are
+//! implemented here.
 
 use crc::{CRC_16_MODBUS, Crc};
 use postcard::de_flavors::crc::from_bytes_u16;
@@ -12,17 +13,17 @@ use crate::work::initial_values;
 
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 
-/// Longer than any frame: 255 values, what is said about them, CRC, and what stuffing adds.
+/// Longer than any frame: 255 values, header, CRC and the bytes that COBS adds.
 const ROOM: usize = 272;
 
-/// What can be asked.
+/// A request.
 #[derive(Deserialize)]
 enum Request<'a> {
     Read { address: u8, count: u8 },
     Write { address: u8, values: &'a [u8] },
 }
 
-/// What is answered.
+/// The reply to a read.
 #[derive(Serialize)]
 struct Reply<'a> {
     address: u8,
@@ -30,20 +31,20 @@ struct Reply<'a> {
     values: &'a [u8],
 }
 
-/// Bytes as bytes: a slice goes value by value otherwise.
+/// Serialises the values as one byte string: serde serialises a slice element by element.
 fn at_once<S: Serializer>(values: &&[u8], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_bytes(values)
 }
 
-/// The peers postcard and cobs.
+/// The peer postcard with cobs.
 pub struct PostcardServer {
     inbox: Inbox,
-    /// So many bytes in the inbox are not the end of a frame.
+    /// The number of bytes at the front of the inbox that are known to hold no zero.
     searched: usize,
     work: Work,
 }
 
-/// The registers, and room for a frame without and with its stuffing.
+/// The registers, and buffers for a frame before and after COBS encoding.
 struct Work {
     registers: [u8; 256],
     plain: [u8; ROOM],
@@ -52,7 +53,7 @@ struct Work {
 }
 
 impl Default for PostcardServer {
-    /// A server that was sent nothing yet.
+    /// A server that has received nothing.
     fn default() -> Self {
         let (plain, stuffed) = ([0; ROOM], [0; ROOM]);
         let work = Work { registers: initial_values(), plain, stuffed, carried_out: 0 };
@@ -65,13 +66,13 @@ impl Server for PostcardServer {
         self.inbox.push(piece);
         while let Some(length) = self.frame_length() {
             let frame = self.inbox.bytes().get(..length).unwrap_or(&[]);
-            // A frame that is none is skipped, up to the zero behind it.
+            // An invalid frame is skipped, up to the zero that ends it.
             let _ = self.work.answer(frame, reply);
             self.inbox.take(length + 1);
         }
     }
 
-    /// Nothing waits for a silence: a zero is the only end of a frame.
+    /// Does nothing: a frame ends with a zero, never with a timeout.
     fn end(&mut self, _: &mut impl FnMut(&[u8])) {}
 
     fn carried_out(&self) -> usize {
@@ -80,18 +81,18 @@ impl Server for PostcardServer {
 }
 
 impl PostcardServer {
-    /// How long the first frame is without its zero, once that has come.
+    /// The length of the first frame without its zero, once the zero has arrived.
     fn frame_length(&mut self) -> Option<usize> {
         let bytes = self.inbox.bytes();
         let found = bytes.iter().skip(self.searched).position(|&byte| byte == 0);
-        let length = found.map(|place| self.searched + place);
+        let length = found.map(|offset| self.searched + offset);
         self.searched = if length.is_some() { 0 } else { bytes.len() };
         length
     }
 }
 
 impl Work {
-    /// Carries a request out, and hands out the reply to a read. `None`: it is no request.
+    /// Carries a request out and returns the reply to a read. `None` if the frame is not a valid request.
     fn answer(&mut self, frame: &[u8], reply: &mut impl FnMut(&[u8])) -> Option<()> {
         let report = cobs::decode(frame, &mut self.plain).ok()?;
         let plain = self.plain.get(..report.frame_size())?;

@@ -1,5 +1,5 @@
-//! rmodbus: it guesses a frame's length and processes a frame whole, registers included; the stream is the
-//! caller's.
+//! The peer `rmodbus`. It guesses the length of a frame and processes it, registers included. The stream is
+//! implemented here.
 
 use rmodbus::server::ModbusFrame;
 use rmodbus::server::context::ModbusContext;
@@ -8,31 +8,31 @@ use rmodbus::{ModbusProto, guess_request_frame_len};
 
 use crate::Server;
 use crate::inbox::Inbox;
-use crate::work::{STATION, initial_words};
+use crate::work::{REGISTERS, STATION, initial_words};
 
 /// The peer rmodbus.
 pub struct RmodbusServer {
     inbox: Inbox,
-    registers: ModbusStorage<1, 1, 1, 256>,
+    registers: ModbusStorage<1, 1, 1, REGISTERS>,
     reply: heapless::Vec<u8, 256>,
     carried_out: usize,
 }
 
 impl Default for RmodbusServer {
-    /// A server that was sent nothing yet.
+    /// A server that has received nothing.
     fn default() -> Self {
         let mut registers = ModbusStorage::new();
-        // Cannot fail: there are as many words as registers.
+        // Cannot fail: both hold the same number of registers.
         let _ = registers.set_holdings_bulk(0, &initial_words());
         Self { inbox: Inbox::new(), registers, reply: heapless::Vec::new(), carried_out: 0 }
     }
 }
 
 impl RmodbusServer {
-    /// Looks at the front for one request. `false`: it takes more bytes.
+    /// Parses one request at the front. Returns `false` if it needs more bytes.
     fn answer_one(&mut self, reply: &mut impl FnMut(&[u8])) -> bool {
         let Ok(length) = guess_request_frame_len(self.inbox.bytes(), ModbusProto::Rtu) else {
-            return self.give_up_on_what_is_none();
+            return self.skip_byte_of_no_frame();
         };
         let Some(bytes) = self.inbox.bytes().get(..usize::from(length)) else { return false };
         let mut frame = ModbusFrame::new(STATION, bytes, ModbusProto::Rtu, &mut self.reply);
@@ -55,15 +55,15 @@ impl RmodbusServer {
         true
     }
 
-    /// No length can be guessed: for want of bytes, or because no frame is that long.
-    fn give_up_on_what_is_none(&mut self) -> bool {
-        /// With so many bytes there is a length, if there is a frame.
+    /// Drops one byte if the length cannot be guessed although enough bytes have arrived.
+    fn skip_byte_of_no_frame(&mut self) -> bool {
+        /// The length of every valid frame can be guessed from this many bytes.
         const ENOUGH: usize = 7;
-        let is_none = self.inbox.bytes().len() >= ENOUGH;
-        if is_none {
+        let is_no_frame = self.inbox.bytes().len() >= ENOUGH;
+        if is_no_frame {
             self.inbox.take(1);
         }
-        is_none
+        is_no_frame
     }
 }
 

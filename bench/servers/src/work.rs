@@ -1,11 +1,15 @@
-//! The registers that all servers start with, and the requests that are counted on the chip, as literal bytes.
+//! The register values that all servers start with, and the requests that are counted on the chip, as literal
+//! bytes.
+//!
+//! A Modbus register holds two bytes. Modbus register `n` holds bytes `2n` (high) and `2n + 1` (low) of the register
+//! map, so all servers hold the same 256 bytes.
 
 use protocol_core::registers::RegisterFile;
 
-/// The Modbus station that is asked.
+/// The address of the Modbus station.
 pub const STATION: u8 = 1;
 
-/// Values of the registers at the start, the same for all.
+/// The register values that every server starts with.
 #[must_use]
 pub fn initial_values() -> [u8; 256] {
     let file = RegisterFile::new([1, 2, 3, 4, 5, 6], None);
@@ -16,20 +20,28 @@ pub fn initial_values() -> [u8; 256] {
     values
 }
 
-/// The registers a Modbus server starts with: the same numbers.
+/// The number of registers of a Modbus server.
+pub const REGISTERS: usize = 128;
+
+/// The same values as the registers of a Modbus server, two bytes in each.
 #[must_use]
-pub fn initial_words() -> [u16; 256] {
-    initial_values().map(u16::from)
+pub fn initial_words() -> [u16; REGISTERS] {
+    let values = initial_values();
+    let mut words = [0; REGISTERS];
+    for (word, &bytes) in words.iter_mut().zip(values.as_chunks().0) {
+        *word = u16::from_be_bytes(bytes);
+    }
+    words
 }
 
-/// The same three requests, as one protocol has them.
+/// The three requests that are counted, in one protocol.
 #[derive(Clone, Copy)]
 pub struct Requests {
-    /// A read of registers 46 to 52.
+    /// A read of bytes 46 to 52 of the register map; 46 to 53 in Modbus.
     pub read_of_7: &'static [u8],
-    /// A write of 90 90 65 90 90 90 80 to them.
+    /// A write of 90 90 65 90 90 90 80 to bytes 46 to 52; in Modbus also 0 to byte 53.
     pub write_of_7: &'static [u8],
-    /// A read of registers 0 to 60.
+    /// A read of bytes 0 to 60; 0 to 61 in Modbus.
     pub read_of_61: &'static [u8],
 }
 
@@ -40,12 +52,11 @@ pub const SEVEN_BOT: Requests = Requests {
     read_of_61: b"\xaa\x77\x03\x00\x3d\x16\x7d",
 };
 
-/// Modbus RTU, functions 3 and 16.
+/// Modbus RTU, functions 3 and 16, on 4 and 31 registers.
 pub const MODBUS_RTU: Requests = Requests {
-    read_of_7: b"\x01\x03\x00\x2e\x00\x07\x64\x01",
-    write_of_7:
-        b"\x01\x10\x00\x2e\x00\x07\x0e\x00\x5a\x00\x5a\x00\x41\x00\x5a\x00\x5a\x00\x5a\x00\x50\x2a\xb9",
-    read_of_61: b"\x01\x03\x00\x00\x00\x3d\x84\x1b",
+    read_of_7: b"\x01\x03\x00\x17\x00\x04\xf4\x0d",
+    write_of_7: b"\x01\x10\x00\x17\x00\x04\x08\x5a\x5a\x41\x5a\x5a\x5a\x50\x00\xa4\xdf",
+    read_of_61: b"\x01\x03\x00\x00\x00\x1f\x04\x02",
 };
 
 /// postcard, CRC-16 and COBS.

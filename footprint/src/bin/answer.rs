@@ -1,4 +1,4 @@
-//! From bytes to reply: deframer, request, register file, reply. No motion.
+//! The path from bytes to reply: deframer, request, register file, reply. No motion.
 
 #![no_std]
 #![no_main]

@@ -1,4 +1,4 @@
-//! The whole arm, as the firmware has it: the controller between its two lines.
+//! The whole controller, called as the firmware calls it.
 
 #![no_std]
 #![no_main]
@@ -15,13 +15,14 @@ fn main() -> ! {
         chip_id: opaque([0; 6]),
         faults: opaque(0),
         servo_timeout: opaque(Duration::from_millis(5)),
+        guard_time: opaque(Duration::from_micros(100)),
         torque_codes: opaque(TorqueCodes::DampingOnFree),
     };
     let stored = opaque(Some(Image([0; Image::LENGTH])));
     let mut arm = Controller::new(any_time(), config, stored.as_ref(), opaque(Storage::Ready));
     loop {
         opaque(arm.host_bytes(any_time(), any_bytes()));
-        arm.servo_bytes(any_bytes());
+        arm.servo_bytes(any_time(), any_bytes());
         if let Output::Save(image) = opaque(arm.poll(any_time(), opaque(512))) {
             opaque(image);
             arm.set_storage(opaque(Storage::Full));

@@ -1,5 +1,5 @@
-//! The arm under the meter: its control cycles with seven servos that follow at once, what it does between the bytes
-//! of a request and those of the reply, and a checksum.
+//! Counts the instructions of the controller: control cycles with seven servos that follow at once, the answer to a
+//! request, and a checksum.
 
 #![no_std]
 #![no_main]
@@ -19,23 +19,23 @@ use protocol_core::wire::crc::checksum;
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
 
-/// Every joint to 180 degrees, at 19 degrees a second: under way for as long as is counted.
+/// Every joint to 180 degrees at 19 degrees per second: all joints move during the whole count.
 const FAR_AND_SLOW: [u8; 28] = *b"\xaa\x77\x06\x20\x15\x0a\x0a\x0a\x0a\x0a\x0a\x0a\x00\x00\
     \x00\x00\x00\x00\x00\xb4\xb4\xb4\xb4\xb4\xb4\xb4\xe3\x31";
-/// How long the arm takes to start, and longer, in milliseconds.
+/// Time for the start-up of the controller, in milliseconds.
 const START: u64 = 1_000;
-/// Control cycles that are counted.
+/// Number of control cycles that are counted.
 const CYCLES: u64 = 100;
-/// Milliseconds of a control cycle: the shell looks once in each.
+/// Milliseconds of a control cycle. The controller is polled once per millisecond.
 const CYCLE: u64 = 10;
 
 struct Rig {
     meter: Meter,
     controller: Controller,
     servos: [Servo; 7],
-    /// What the servos have answered and nobody has heard yet.
+    /// Answer of a servo that the controller has not received yet.
     answer: frame::FrameBuffer,
-    /// The most that one call took.
+    /// Most instructions of a single call of `poll`.
     longest_call: u32,
 }
 
@@ -45,6 +45,7 @@ fn main() -> ! {
         chip_id: opaque([0; 6]),
         faults: 0,
         servo_timeout: Duration::from_millis(3),
+        guard_time: Duration::from_micros(100),
         torque_codes: TorqueCodes::default(),
     };
     let mut rig = Rig {
@@ -71,7 +72,7 @@ fn main() -> ! {
     rig.meter.end()
 }
 
-/// A request that is there as a whole, until its reply is: without the way in and out.
+/// Counts the instructions from a complete request in the deframer to its encoded reply.
 fn parse_and_answer(meter: &Meter) -> u32 {
     let mut deframer = opaque(Deframer::<ToArm>::new(gap(115_200)));
     let registers = opaque(RegisterFile::new([0; 6], None));
@@ -91,13 +92,13 @@ fn now(millis: u64) -> Instant {
 }
 
 impl Rig {
-    /// One turn of the shell's loop: how many instructions the controller took for it.
+    /// Runs one turn of the main loop. Returns the instructions of the controller.
     fn turn(&mut self, millis: u64) -> u32 {
         let Self { meter, controller, servos, answer, longest_call } = self;
         let now = now(millis);
         let mut sum = meter.count(|| {
             controller.host_bytes(now, &[]);
-            controller.servo_bytes(answer);
+            controller.servo_bytes(now, answer);
         });
         answer.clear();
         loop {
@@ -119,12 +120,12 @@ impl Rig {
     }
 }
 
-/// What a servo answers. It stands where it was told to.
+/// The answer of a servo, which stands at its goal.
 fn hear(servo: &mut Servo, bytes: &[u8]) -> Option<frame::FrameBuffer> {
     let mut decoder = Decoder::new();
     decoder.push(bytes);
     let frame = decoder.pull()?.ok()?;
-    // A servo that was told nothing yet stands in the middle.
+    // A servo without a goal stands in the middle.
     let goal = servo.goal().position_counts;
     servo.set_reading(&Reading {
         position_counts: if goal == 0 { 511 } else { goal },
@@ -133,5 +134,5 @@ fn hear(servo: &mut Servo, bytes: &[u8]) -> Option<frame::FrameBuffer> {
         voltage_decivolts: 74,
         temperature_celsius: 30,
     });
-    servo.hear(&frame)
+    servo.handle_frame(&frame)
 }

@@ -1,4 +1,4 @@
-//! The peer mavlink under the meter.
+//! Counts the instructions of the peer `mavlink`.
 
 #![no_std]
 #![no_main]
@@ -6,9 +6,9 @@
 use bench_servers::MavlinkServer;
 use bench_servers::work::MAVLINK;
 use cortex_m_rt::entry;
-use footprint::contest;
+use footprint::count_server;
 
 #[entry]
 fn main() -> ! {
-    contest::run::<MavlinkServer>(MAVLINK)
+    count_server::run::<MavlinkServer>(MAVLINK)
 }

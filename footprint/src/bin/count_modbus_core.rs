@@ -1,4 +1,4 @@
-//! The peer modbus-core under the meter.
+//! Counts the instructions of the peer `modbus-core`.
 
 #![no_std]
 #![no_main]
@@ -6,9 +6,9 @@
 use bench_servers::ModbusCoreServer;
 use bench_servers::work::MODBUS_RTU;
 use cortex_m_rt::entry;
-use footprint::contest;
+use footprint::count_server;
 
 #[entry]
 fn main() -> ! {
-    contest::run::<ModbusCoreServer>(MODBUS_RTU)
+    count_server::run::<ModbusCoreServer>(MODBUS_RTU)
 }

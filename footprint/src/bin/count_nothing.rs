@@ -1,4 +1,5 @@
-//! A server that does nothing, under the meter: what the others are larger by is theirs.
+//! Counts the instructions of a server that does nothing. The size of this program is subtracted from that of the
+//! others.
 
 #![no_std]
 #![no_main]
@@ -6,8 +7,9 @@
 use bench_servers::Server;
 use bench_servers::work::SEVEN_BOT;
 use cortex_m_rt::entry;
-use footprint::{contest, opaque};
+use footprint::{count_server, opaque};
 
+/// A server that returns each piece as the reply.
 #[derive(Default)]
 struct Nothing;
 
@@ -25,5 +27,5 @@ impl Server for Nothing {
 
 #[entry]
 fn main() -> ! {
-    contest::run::<Nothing>(SEVEN_BOT)
+    count_server::run::<Nothing>(SEVEN_BOT)
 }

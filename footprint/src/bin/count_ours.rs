@@ -1,4 +1,4 @@
-//! This project's path under the meter.
+//! Counts the instructions of this project's parse-and-answer path.
 
 #![no_std]
 #![no_main]
@@ -6,9 +6,9 @@
 use bench_servers::OurServer;
 use bench_servers::work::SEVEN_BOT;
 use cortex_m_rt::entry;
-use footprint::contest;
+use footprint::count_server;
 
 #[entry]
 fn main() -> ! {
-    contest::run::<OurServer>(SEVEN_BOT)
+    count_server::run::<OurServer>(SEVEN_BOT)
 }

@@ -1,4 +1,4 @@
-//! The peers postcard and cobs under the meter.
+//! Counts the instructions of the peer `postcard` with `cobs`.
 
 #![no_std]
 #![no_main]
@@ -6,9 +6,9 @@
 use bench_servers::PostcardServer;
 use bench_servers::work::POSTCARD;
 use cortex_m_rt::entry;
-use footprint::contest;
+use footprint::count_server;
 
 #[entry]
 fn main() -> ! {
-    contest::run::<PostcardServer>(POSTCARD)
+    count_server::run::<PostcardServer>(POSTCARD)
 }

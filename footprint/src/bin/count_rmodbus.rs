@@ -1,4 +1,4 @@
-//! The peer rmodbus under the meter.
+//! Counts the instructions of the peer `rmodbus`.
 
 #![no_std]
 #![no_main]
@@ -6,9 +6,9 @@
 use bench_servers::RmodbusServer;
 use bench_servers::work::MODBUS_RTU;
 use cortex_m_rt::entry;
-use footprint::contest;
+use footprint::count_server;
 
 #[entry]
 fn main() -> ! {
-    contest::run::<RmodbusServer>(MODBUS_RTU)
+    count_server::run::<RmodbusServer>(MODBUS_RTU)
 }

@@ -1,4 +1,4 @@
-//! The settings on a flash that says and does anything: opened, saved to, given back.
+//! The settings journal on a flash with unknown contents and results: open, save, release.
 
 #![no_std]
 #![no_main]
@@ -9,10 +9,10 @@ use footprint::opaque;
 use protocol_core::journal::Journal;
 use protocol_core::registers::Image;
 
-/// A flash of which nothing is known but its geometry, the reference chip's.
+/// A flash with the geometry of the reference chip and unknown contents.
 struct AnyFlash;
 
-/// Whatever the flash has to complain about.
+/// An unknown error of the flash.
 #[derive(Debug)]
 struct AnyError;
 

@@ -16,11 +16,17 @@ pub enum Fault {
     Garbled(u32),
     /// Something keeps it from turning.
     Stuck,
+    /// It starts again by itself each time this has passed: its torque and its goal are forgotten, and it hears
+    /// nothing for 200 ms.
+    Restarting(Duration),
 }
 
 /// A word that is no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown fault '{0}': use missing, late, late=MILLISECONDS, garbled, garbled=EVERY_NTH or stuck")]
+#[error(
+    "unknown fault '{0}': use missing, late, late=MILLISECONDS, garbled, garbled=EVERY_NTH, \
+         restarting=MILLISECONDS or stuck"
+)]
 pub struct UnknownFault(String);
 
 /// `late` is 30 ms late; `garbled` is always.
@@ -34,6 +40,10 @@ impl FromStr for Fault {
                 millis.parse().ok().map(|millis| Self::Late(Duration::from_millis(millis)))
             }
             Some(("garbled", every)) => every.parse().ok().filter(|&every| every > 0).map(Self::Garbled),
+            Some(("restarting", millis)) => {
+                let millis = millis.parse().ok().filter(|&millis| millis > 0);
+                millis.map(|millis| Self::Restarting(Duration::from_millis(millis)))
+            }
             Some(_) => None,
         };
         fault.ok_or_else(|| UnknownFault(word.to_owned()))
@@ -62,11 +72,14 @@ mod tests {
         assert_eq!("garbled".parse(), Ok(Fault::Garbled(1)));
         assert_eq!("garbled=10".parse(), Ok(Fault::Garbled(10)));
         assert_eq!("stuck".parse(), Ok(Fault::Stuck));
+        assert_eq!("restarting=2000".parse(), Ok(Fault::Restarting(Duration::from_millis(2_000))));
     }
 
     #[test]
     fn other_words_are_refused_with_a_hint() {
-        for word in ["", "Missing", "late=", "late=-1", "garbled=0", "garbled=x", "stuck=1", "lost"] {
+        for word in
+            ["", "Missing", "late=", "late=-1", "garbled=0", "garbled=x", "stuck=1", "restarting=0", "lost"]
+        {
             let error = word.parse::<Fault>().unwrap_err().to_string();
             assert!(error.contains(word) && error.contains("use missing"), "{error}");
         }

@@ -1,11 +1,16 @@
-//! The motor, gear and position control of one simulated servo, a millisecond at a time.
+//! The motor and position control of one simulated servo, a millisecond at a time.
 //!
 //! ```text
 //!   goal ──▶ set-point, at the speed or in the time asked for ──▶ position, lagging behind
+//!                                              weight of the arm ──▶ and drooping
 //! ```
 //!
+//! With torque, control is proportional: a load turns the joint away from its set-point, by a count at the
+//! stall torque. Without torque, the weight turns it as [`gear`](super::gear) says, to the servo's mechanical
+//! ends at 0 and 1023 counts.
+//!
 //! Integers in fixed steps: a run comes out the same however often anybody looks. The speed limit is the
-//! motor's (62 rpm); the lag is an assumption, as no arm was measured. Knows nothing of frames.
+//! motor's (62 rpm); lag and droop are assumed, as no arm was measured. Knows nothing of frames.
 
 use motion_core::calibration::angle_from_counts;
 use motion_core::servo_bus::Reading;
@@ -13,28 +18,40 @@ use motion_core::servo_bus::servo::Goal;
 use protocol_core::registers::Joint;
 use protocol_core::time::Duration;
 
+use super::gear::{Drag, Gear};
+
 /// How far a call of [`Motor::step`] goes.
 pub(crate) const STEP: Duration = Duration::from_millis(1);
 
 /// Positions are kept in millionths of a count, so that a count per second is whole in every step.
-const COUNT: i64 = 1_000_000;
+pub(crate) const COUNT: i64 = 1_000_000;
+/// The other mechanical end of the servo; the first is 0.
+const END: i64 = Reading::MAX_POSITION as i64 * COUNT;
 /// One count per second, per step.
-const COUNT_PER_SECOND: i64 = COUNT / 1_000;
+pub(crate) const COUNT_PER_SECOND: i64 = COUNT / 1_000;
 /// 62 revolutions a minute, in micro-degrees per second.
 const MAX_SPEED: i64 = 372_000_000;
 /// The position makes up for a part of what it lags behind in each step: a time constant of 20 ms.
 const LAG_STEPS: i64 = 20;
 /// Closer than this (1/16 count), and the position is the set-point.
 const SNAP: i64 = COUNT / 16;
-/// How hard the motor pushes for each count it is off, in 0.1 %.
+/// How hard the motor pushes for each count it lags behind, in 0.1 %.
 const LOAD_PER_COUNT: i64 = 10;
+/// How far a load turns the joint away from its set-point, in millionths of a count for each millionth of the
+/// stall torque: a count (0.21 degrees of joints 1 to 4) at that torque.
+const DROOP: i64 = 1;
 
 /// One motor with its gear and its position sensor.
 #[derive(Clone, Debug)]
 pub(crate) struct Motor {
+    gear: Gear,
     /// The most it turns in a step.
     fastest: i64,
     position: i64,
+    /// The torque of the arm's weight, in micronewton metres, towards more counts.
+    weight: i64,
+    /// What held it in the last step.
+    hold: Hold,
     /// Where its control wants it to be now.
     set_point: i64,
     target: i64,
@@ -47,8 +64,10 @@ pub(crate) struct Motor {
 /// What holds a motor in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Hold {
-    /// Nothing, or a brake: it stays where it is.
-    Released,
+    /// Something from outside: it stays where it is.
+    Outside,
+    /// Its friction, and what resists besides.
+    Released(Drag),
     /// It is driven and turns.
     Driven,
     /// It is driven, but something keeps it from turning.
@@ -59,7 +78,17 @@ impl Motor {
     /// The motor of a joint's servo, at rest.
     pub(crate) fn new(joint: Joint, position_counts: u16) -> Self {
         let position = i64::from(position_counts) * COUNT;
-        Self { fastest: fastest(joint), position, set_point: position, target: position, rate: 0, moved: 0 }
+        Self {
+            gear: Gear::of(joint),
+            fastest: fastest(joint),
+            position,
+            weight: 0,
+            hold: Hold::Outside,
+            set_point: position,
+            target: position,
+            rate: 0,
+            moved: 0,
+        }
     }
 
     /// Begins a move from where the set-point is.
@@ -83,22 +112,48 @@ impl Motor {
 
     /// Lets [`STEP`] pass.
     pub(crate) fn step(&mut self, hold: Hold) {
-        if hold == Hold::Released {
+        self.hold = hold;
+        if let Hold::Outside | Hold::Released(_) = hold {
             self.rest();
         }
         self.set_point += (self.target - self.set_point).clamp(-self.rate, self.rate);
-        self.moved = if hold == Hold::Driven { self.pull() } else { 0 };
-        self.position += self.moved;
+        let way = match hold {
+            Hold::Outside | Hold::Blocked => 0,
+            Hold::Driven => self.pull(),
+            Hold::Released(drag) => self.gear.speed_after(self.moved, self.weight, drag),
+        };
+        let before = self.position;
+        self.position = (before + way).clamp(0, END);
+        self.moved = self.position - before;
+        if let Hold::Released(_) = hold {
+            self.rest();
+        }
     }
 
     fn pull(&self) -> i64 {
-        let behind = self.set_point - self.position;
+        let behind = self.balance() - self.position;
         if behind.abs() <= SNAP { behind } else { (behind / LAG_STEPS).clamp(-self.fastest, self.fastest) }
+    }
+
+    /// Where control and weight are in balance.
+    fn balance(&self) -> i64 {
+        (self.set_point + DROOP * self.gear.share_of_stall(self.weight)).clamp(0, END)
+    }
+
+    /// Loads it with a torque in micronewton metres, towards more counts.
+    pub(crate) const fn load_with(&mut self, weight: i64) {
+        self.weight = weight;
     }
 
     /// Turns it from outside.
     pub(crate) fn turn_to(&mut self, position_counts: u16) {
         self.position = i64::from(position_counts.min(Reading::MAX_POSITION)) * COUNT;
+        self.moved = 0;
+    }
+
+    /// Where it is, in millionths of a count.
+    pub(crate) const fn position(&self) -> i64 {
+        self.position
     }
 
     /// Where it is, 0 to 1023.
@@ -112,15 +167,35 @@ impl Motor {
         i16::try_from(self.moved / COUNT_PER_SECOND).unwrap_or(0)
     }
 
-    /// How hard it pushes, in 0.1 %.
+    /// How hard it pushes, in 0.1 %: plus is towards more counts.
     pub(crate) fn load(&self) -> i16 {
-        let load = (self.set_point - self.position) * LOAD_PER_COUNT / COUNT;
+        let load = match self.hold {
+            Hold::Outside | Hold::Released(_) => 0,
+            Hold::Blocked => self.push(self.set_point),
+            Hold::Driven => self.push(self.balance()) - self.gear.share_of_stall(self.weight) / 1_000,
+        };
         i16::try_from(load.clamp(-1_000, 1_000)).unwrap_or(0)
     }
 
-    /// Would a step change nothing, however it is held?
-    pub(crate) fn is_at_rest(&self) -> bool {
-        self.moved == 0 && self.set_point == self.target && self.position == self.set_point
+    const fn push(&self, aim: i64) -> i64 {
+        (aim - self.position) * LOAD_PER_COUNT / COUNT
+    }
+
+    /// Would a step change nothing, if it is held like this?
+    pub(crate) fn is_at_rest(&self, hold: Hold) -> bool {
+        let is_still = match hold {
+            Hold::Outside | Hold::Blocked => self.position == self.set_point,
+            Hold::Released(_) => {
+                self.position == self.set_point && (self.gear.holds(self.weight) || self.is_at_end())
+            }
+            Hold::Driven => self.position == self.balance(),
+        };
+        is_still && hold == self.hold && self.moved == 0 && self.set_point == self.target
+    }
+
+    /// Does an end keep its weight from turning it further?
+    const fn is_at_end(&self) -> bool {
+        (self.position <= 0 && self.weight < 0) || (self.position >= END && self.weight > 0)
     }
 
     /// Has it somewhere to go?
@@ -237,10 +312,49 @@ mod tests {
         motor.start(goal(700, 0, 0));
         (0..500).for_each(|_| motor.step(Hold::Blocked));
         assert_eq!((motor.position_counts(), motor.speed(), motor.load()), (100, 0, 1_000));
-        (0..500).for_each(|_| motor.step(Hold::Released));
+        let released = Hold::Released(Drag::Free);
+        (0..500).for_each(|_| motor.step(released));
         assert_eq!((motor.position_counts(), motor.load(), motor.is_moving()), (100, 0, false));
         motor.turn_to(u16::MAX);
-        motor.step(Hold::Released);
+        motor.step(released);
         assert_eq!((motor.position_counts(), motor.speed()), (1_023, 0));
+    }
+
+    #[test]
+    fn a_driven_motor_droops_by_half_a_count_for_half_its_stall_torque_and_shows_the_load() {
+        for (weight, load) in [(809_000, -500), (-809_000, 500)] {
+            let mut motor = motor(3);
+            motor.start(goal(500, 0, 0));
+            motor.load_with(weight);
+            (0..1_000).for_each(|_| motor.step(Hold::Driven));
+            assert_eq!(motor.position(), 500 * COUNT + weight.signum() * COUNT / 2);
+            assert_eq!((motor.load(), motor.speed()), (load, 0));
+            assert!(motor.is_at_rest(Hold::Driven) && !motor.is_at_rest(Hold::Released(Drag::Free)));
+        }
+    }
+
+    #[test]
+    fn a_released_motor_turns_under_its_weight_to_its_end() {
+        for (weight, end) in [(400_000, 1_023), (-400_000, 0)] {
+            let mut motor = motor(3);
+            motor.load_with(weight);
+            motor.step(Hold::Released(Drag::Free));
+            assert!(!motor.is_at_rest(Hold::Released(Drag::Free)));
+            (0..10_000).for_each(|_| motor.step(Hold::Released(Drag::Free)));
+            assert_eq!((motor.position_counts(), motor.speed(), motor.load()), (end, 0, 0));
+            assert!(motor.is_at_rest(Hold::Released(Drag::Free)));
+        }
+    }
+
+    #[test]
+    fn torque_stops_a_fall() {
+        let mut motor = motor(3);
+        motor.turn_to(500);
+        motor.load_with(-400_000);
+        (0..200).for_each(|_| motor.step(Hold::Released(Drag::Free)));
+        let caught_at = motor.position_counts();
+        assert!((400..480).contains(&caught_at), "{caught_at}");
+        (0..500).for_each(|_| motor.step(Hold::Driven));
+        assert!(motor.position_counts().abs_diff(caught_at) <= 1, "{}", motor.position_counts());
     }
 }

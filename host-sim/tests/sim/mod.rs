@@ -11,9 +11,10 @@ use protocol_core::time;
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost, deframer};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 /// Nothing takes this long on the slowest machine.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A running simulator; it is killed when this is dropped.
 pub(crate) struct Sim {
@@ -73,8 +74,19 @@ impl Sim {
         Self::spawn(command(state, arguments), tempfile::tempdir().unwrap())
     }
 
-    fn spawn(mut command: Command, state: tempfile::TempDir) -> Self {
-        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    /// Likewise, with its standard error in a file: whoever says much must not wait for a reader.
+    pub(crate) fn start_with_log(arguments: &[&str], log: &Path) -> Self {
+        let state = tempfile::tempdir().unwrap();
+        let command = command(state.path(), arguments);
+        Self::spawn_with_stderr(command, File::create(log).unwrap().into(), state)
+    }
+
+    fn spawn(command: Command, state: tempfile::TempDir) -> Self {
+        Self::spawn_with_stderr(command, Stdio::piped(), state)
+    }
+
+    fn spawn_with_stderr(mut command: Command, stderr: Stdio, state: tempfile::TempDir) -> Self {
+        let mut child = command.stdout(Stdio::piped()).stderr(stderr).spawn().unwrap();
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
         let stderr = child.stderr.take();
         let mut line = String::new();
@@ -113,6 +125,16 @@ impl Sim {
     /// Everything it said on standard error; it must have ended.
     pub(crate) fn rest_of_stderr(&mut self) -> String {
         read_to_end(self.stderr.as_mut().unwrap())
+    }
+}
+
+/// Waits for something to become true.
+#[track_caller]
+pub(crate) fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let patience_ends = Instant::now() + PATIENCE;
+    while !is_so() {
+        assert!(Instant::now() < patience_ends, "waited in vain until {what}");
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 
@@ -211,5 +233,59 @@ impl Client {
     fn waits_readable(&self) -> bool {
         let moment = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
         poll(&mut [PollFd::new(&self.port, PollFlags::IN)], Some(&moment)).unwrap() > 0
+    }
+}
+
+/// A master on a servo bus that sends raw bytes.
+pub(crate) struct Bus(File);
+
+impl Bus {
+    pub(crate) fn open(port: &Path, baud: u32) -> Self {
+        let bus = Self(OpenOptions::new().read(true).write(true).open(port).unwrap());
+        bus.set_baud(baud);
+        bus
+    }
+
+    pub(crate) fn set_baud(&self, baud: u32) {
+        let mut mode = tcgetattr(&self.0).unwrap();
+        mode.make_raw();
+        mode.set_speed(baud).unwrap();
+        tcsetattr(&self.0, OptionalActions::Now, &mode).unwrap();
+    }
+
+    /// Everything that comes until it has been quiet for so long.
+    fn receive(&mut self, quiet: Duration) -> Vec<u8> {
+        let mut received = Vec::new();
+        let quiet = Timespec { tv_sec: 0, tv_nsec: quiet.as_nanos().try_into().unwrap() };
+        while poll(&mut [PollFd::new(&self.0, PollFlags::IN)], Some(&quiet)).unwrap() > 0 {
+            let mut bytes = [0; 256];
+            let count = self.0.read(&mut bytes).unwrap();
+            received.extend(&bytes[..count]);
+        }
+        received
+    }
+
+    /// Sends a frame, again and again until an answer of this length comes.
+    pub(crate) fn ask(&mut self, frame: &[u8], length: usize) -> Vec<u8> {
+        let patience_ends = Instant::now() + PATIENCE;
+        loop {
+            self.0.write_all(frame).unwrap();
+            let answer = self.receive(Duration::from_millis(200));
+            if answer.len() == length {
+                return answer;
+            }
+            assert!(Instant::now() < patience_ends, "no answer to {frame:02x?} but {answer:02x?}");
+        }
+    }
+
+    /// Pings a servo once, and takes everything that comes until it has been quiet for so long.
+    pub(crate) fn ping(&mut self, id: u8, quiet: Duration) -> Vec<u8> {
+        self.0.write_all(&[0xFF, 0xFF, id, 2, 1, !(id + 3)]).unwrap();
+        self.receive(quiet)
+    }
+
+    /// Pings a servo until it answers: servos are deaf for a while after power-up.
+    pub(crate) fn ping_until_answered(&mut self, id: u8) -> Vec<u8> {
+        self.ask(&[0xFF, 0xFF, id, 2, 1, !(id + 3)], 6)
     }
 }

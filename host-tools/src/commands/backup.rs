@@ -15,6 +15,7 @@ use super::all_taken;
 use super::set::unlocked;
 use crate::confirm::confirm;
 use crate::failure::Failure;
+use crate::interrupt::or_hold;
 use crate::output::{Facts, note, warn};
 use crate::session::Session;
 use crate::settings_file::{SettingsFile, span};
@@ -110,7 +111,9 @@ pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), F
 
 /// All settings in one frame: a power cut leaves all the old ones or all the new ones (D19).
 fn write(arm: &mut Arm, wanted: &Snapshot) -> Result<(), Failure> {
-    all_taken(&unlocked(arm, |arm| arm.write_checked(wanted.address, &wanted.values))?)
+    // New offsets move the arm a little.
+    let write = |arm: &mut Arm| arm.write_checked(wanted.address, &wanted.values);
+    all_taken(&or_hold(arm, |arm, _| unlocked(arm, write))?)
 }
 
 #[derive(Debug, Serialize)]

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, value_parser};
 use serde::Serialize;
-use sevenbot::map::{FEEDBACK_FREQUENCY, SPEED, TIME, VACUUM_PUMP};
+use sevenbot::map::{SPEED, TIME, VACUUM_PUMP};
 use sevenbot::playback::{self, Step};
 use sevenbot::recording::{Moment, Recording};
 use sevenbot::{Angle, Arm, Snapshot, Span};
@@ -24,6 +24,7 @@ use crate::moving::{Move, driven};
 use crate::output::Facts;
 use crate::plot::{self, Track};
 use crate::progress::Progress;
+use crate::reports::reporting;
 use crate::session::Session;
 
 /// Play a recorded movement.
@@ -81,9 +82,13 @@ pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), Failure>
     driven(&mut arm)?;
     let before = arm.read_span(Span::between(&SPEED, &TIME))?;
     let mut player = Player::new(&recording, args.speed);
-    let done = or_hold(&mut arm, |arm, interrupt| player.play(arm, interrupt, args.times.unwrap_or(1)));
+    let times = args.times.unwrap_or(1);
+    let done = reporting(&mut arm, FEEDBACK_HZ, |arm| {
+        or_hold(arm, |arm, interrupt| player.play(arm, interrupt, times))
+    });
     // An arm that went away cannot be told anything.
-    let tidied = if matches!(done, Err(Failure::Wire(_))) { Ok(()) } else { tidy(&mut arm, &before) };
+    let is_gone = done.as_ref().is_err_and(Failure::is_of_the_wire);
+    let tidied = if is_gone { Ok(()) } else { restore_pace(&mut arm, &before) };
     if let Some(path) = &args.plot {
         fs::write(path, player.drawing(args)).map_err(|error| Failure::file(path, error))?;
     }
@@ -105,9 +110,8 @@ fn factor(text: &str) -> Result<f64, String> {
     factor.ok_or_else(|| "a number from 0.1 to 10".to_owned())
 }
 
-/// The speeds, times and silence that the arm had before.
-fn tidy(arm: &mut Arm, before: &Snapshot) -> Result<(), Failure> {
-    all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[0])?)?;
+/// Restores the speeds and times that the arm had before.
+fn restore_pace(arm: &mut Arm, before: &Snapshot) -> Result<(), Failure> {
     all_taken(&arm.write_checked(before.address, &before.values)?)
 }
 
@@ -132,7 +136,6 @@ impl Player {
 
     /// Plays so many times; 0 is until somebody has seen enough.
     fn play(&mut self, arm: &mut Arm, interrupt: Interrupt, times: u32) -> Result<(), Failure> {
-        all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[FEEDBACK_HZ])?)?;
         while times == 0 || self.played < times {
             self.approach(arm, interrupt)?;
             self.run_through(arm, interrupt)?;
@@ -232,7 +235,7 @@ fn to_pose(arm: &mut Arm, interrupt: Interrupt, targets: [Angle; 7]) -> Result<(
 fn silent(arm: &mut Arm) -> Failure {
     match driven(arm) {
         Err(failure) => failure,
-        Ok(()) => Failure::Arm(
+        Ok(_) => Failure::Arm(
             "the arm has stopped to report its positions: was it switched off and on again?".to_owned(),
         ),
     }

@@ -5,14 +5,14 @@ use std::str::FromStr;
 
 use clap::{ArgAction, Args, value_parser};
 use serde::Serialize;
-use sevenbot::joints::frames_for;
+use sevenbot::joints::{JointSnapshot, frames_for};
 use sevenbot::map::{SPEED, TARGET_POSITION, TIME};
-use sevenbot::{Angle, Arm, Joint, Span, Speed};
+use sevenbot::{Angle, Arm, Joint, Speed};
 
 use super::all_taken;
 use crate::failure::Failure;
 use crate::interrupt::or_hold;
-use crate::moving::{Move, Targets, driven};
+use crate::moving::{Move, Targets, driven, stepped};
 use crate::output::Facts;
 use crate::session::Session;
 
@@ -25,9 +25,10 @@ Examples:
   sevenbot pose +10 _ -5 _ _ _ _ --wait            joint 1 up, joint 3 down, the others as they are
   sevenbot pose 60 90 65 90 90 90 80 --time 20 --wait
 
-Ctrl-C while it waits leaves the arm holding where it is.
+Ctrl-C leaves the arm holding where it is.
 
-Exit status 1 when the arm did not take the pose, or with --wait did not reach it.")]
+Exit status 1 when the arm did not take the pose, or with --wait did not reach it. Where it is not known
+whether it took the pose, the message says that the arm may be moving.")]
 pub(crate) struct PoseArgs {
     /// Joint 1 to 7: degrees from 0 to 180; +N or -N from where the joint is sent already; _ or . leaves it
     /// alone.
@@ -88,12 +89,12 @@ impl FromStr for Goal {
 }
 
 impl Goal {
-    /// In degrees, for a joint that has this target already.
-    fn degrees(self, joint: Joint, target: u8) -> Result<Option<u8>, Failure> {
+    /// In degrees, for a joint that stands and is sent where these joints are.
+    fn degrees(self, joint: Joint, joints: &JointSnapshot) -> Result<Option<u8>, Failure> {
         let Self::By(step) = self else {
             return Ok(if let Self::At(degrees) = self { Some(degrees) } else { None });
         };
-        let degrees = i16::from(target).saturating_add(step);
+        let degrees = stepped(joints, joint, step)?;
         let angle = u8::try_from(degrees).ok().and_then(Angle::from_degrees);
         angle.map(|angle| Some(angle.degrees())).ok_or_else(|| {
             let number = joint.number();
@@ -105,30 +106,31 @@ impl Goal {
 }
 
 pub(crate) fn run(session: &mut Session, args: &PoseArgs) -> Result<(), Failure> {
-    let mut arm = session.connect()?;
-    driven(&mut arm)?;
-    let here = arm.read_span(Span::of(&TARGET_POSITION))?.joints(&TARGET_POSITION);
-    let mut targets = [None; 7];
-    for (((target, goal), joint), here) in targets.iter_mut().zip(&args.angles).zip(Joint::ALL).zip(here) {
-        *target = goal.degrees(joint, here)?;
-    }
-    take(session, &mut arm, targets, &args.how)
+    take(session, &args.angles, &args.how)
 }
 
 pub(crate) fn home(session: &mut Session, args: &HomeArgs) -> Result<(), Failure> {
-    let mut arm = session.connect()?;
-    driven(&mut arm)?;
-    take(session, &mut arm, TARGET_POSITION.defaults.map(Some), &args.how)
+    take(session, &TARGET_POSITION.defaults.map(Goal::At), &args.how)
 }
 
-fn take(session: &mut Session, arm: &mut Arm, targets: Targets, how: &HowArgs) -> Result<(), Failure> {
-    set_pace(arm, &targets, how)?;
-    if !how.wait {
-        return Move::begin(arm, targets).map(drop);
+fn take(session: &mut Session, goals: &[Goal], how: &HowArgs) -> Result<(), Failure> {
+    let mut arm = session.connect()?;
+    let reached = or_hold(&mut arm, |arm, interrupt| {
+        let targets = targets(goals, &driven(arm)?)?;
+        set_pace(arm, &targets, how)?;
+        interrupt.check()?;
+        let begun = Move::begin(arm, targets)?;
+        how.wait.then(|| begun.finish(arm, interrupt)).transpose()
+    })?;
+    reached.map_or(Ok(()), |positions_degrees| session.output.show(&Stand { positions_degrees }))
+}
+
+fn targets(goals: &[Goal], joints: &JointSnapshot) -> Result<Targets, Failure> {
+    let mut targets = [None; 7];
+    for ((target, goal), joint) in targets.iter_mut().zip(goals).zip(Joint::ALL) {
+        *target = goal.degrees(joint, joints)?;
     }
-    let work = |arm: &mut Arm, interrupt| Move::begin(arm, targets)?.finish(arm, interrupt);
-    let positions_degrees = or_hold(arm, work)?;
-    session.output.show(&Stand { positions_degrees })
+    Ok(targets)
 }
 
 /// Paces the joints that are to move, and only those.
@@ -167,15 +169,5 @@ mod tests {
         for text in ["181", "", "+", "_5", "9.5", "--5"] {
             assert!(text.parse::<Goal>().is_err(), "{text}");
         }
-    }
-
-    #[test]
-    fn a_step_starts_from_the_target_and_stays_in_range() {
-        let [joint, ..] = Joint::ALL;
-        assert_eq!(Goal::By(-10).degrees(joint, 90).ok(), Some(Some(80)));
-        assert_eq!(Goal::At(5).degrees(joint, 90).ok(), Some(Some(5)));
-        assert_eq!(Goal::Leave.degrees(joint, 90).ok(), Some(None));
-        let Err(Failure::Arm(said)) = Goal::By(-91).degrees(joint, 90) else { panic!("below zero") };
-        assert!(said.contains("joint 1 would go to -1°"), "{said}");
     }
 }

@@ -10,6 +10,7 @@ use sevenbot::{Arm, Error, Span};
 use super::all_taken;
 use super::get::{NAMES, Registers};
 use crate::failure::Failure;
+use crate::interrupt::or_hold;
 use crate::output::note;
 use crate::session::Session;
 
@@ -53,11 +54,11 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), Failure> 
     let span = args.register;
     let bytes = bytes(span, &args.values, args.raw)?;
     let mut arm = session.connect()?;
-    let unchanged = if args.unlock {
-        unlocked(&mut arm, |arm| arm.write_checked(span.address, &bytes))?
-    } else {
-        arm.write_checked(span.address, &bytes)?
-    };
+    // Targets, offsets and the motor state move the arm.
+    let unchanged = or_hold(&mut arm, |arm, _| {
+        let write = |arm: &mut Arm| arm.write_checked(span.address(), &bytes);
+        if args.unlock { unlocked(arm, write) } else { Ok(write(arm)?) }
+    })?;
     session.output.show(&Registers::from(entries(&arm.read_span(span)?)))?;
     remark(span, args, &unchanged);
     all_taken(&unchanged)
@@ -86,7 +87,7 @@ fn remark(span: Span, args: &SetArgs, unchanged: &[Unchanged]) {
 
 /// The bytes for a span: one value per register, or one for all.
 fn bytes(span: Span, values: &[i32], raw: bool) -> Result<Vec<u8>, Failure> {
-    let registers = usize::from(span.count);
+    let registers = usize::from(span.count());
     let values = match values {
         [only] => vec![*only; registers],
         all if all.len() == registers => all.to_vec(),
@@ -131,7 +132,7 @@ mod tests {
 
     #[test]
     fn numbers_become_bytes_by_the_table() {
-        let joint_2 = Span { address: OFFSET.address + 1, count: 1 };
+        let joint_2 = Span::one(OFFSET.address + 1);
         assert_eq!(bytes(joint_2, &[-5], false).ok(), Some(vec![0x85]));
         assert_eq!(bytes(Span::of(&OFFSET), &[3], false).ok(), Some(vec![3; 7]));
         let pose = [1, 2, 3, 4, 5, 6, 7];
@@ -140,7 +141,7 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused_before_it_is_sent() {
-        let target = Span { address: TARGET_POSITION.address, count: 1 };
+        let target = Span::one(TARGET_POSITION.address);
         let Err(Failure::Arm(said)) = bytes(target, &[181], false) else { panic!("out of range") };
         assert!(said.contains("target-position.1 takes 0 to 180"), "{said}");
         assert_eq!(bytes(target, &[181], true).ok(), Some(vec![181]), "--raw sends it");

@@ -5,10 +5,11 @@ use sevenbot::map::{MOTOR_STATE, motor_state};
 use sevenbot::words::entries;
 use sevenbot::{Arm, Span};
 
-use super::all_taken;
 use super::get::Registers;
+use super::motors_obey;
 use crate::confirm::confirm;
 use crate::failure::Failure;
+use crate::interrupt::or_hold;
 use crate::session::Session;
 
 /// Show or change the state of the motors.
@@ -17,7 +18,9 @@ use crate::session::Session;
 Examples:
   sevenbot state                     what it is
   sevenbot state servo               the arm holds where it is found, and can be moved
-  sevenbot state forceless --yes     the arm can be moved by hand; without a hand it falls")]
+  sevenbot state forceless --yes     the arm can be moved by hand; without a hand it falls
+
+Exit status 1 when it is not known that the arm took the state: it may be moving then.")]
 pub(crate) struct StateArgs {
     /// The state wanted.
     state: Option<Wanted>,
@@ -60,5 +63,5 @@ fn change(arm: &mut Arm, wanted: Wanted, yes: bool) -> Result<(), Failure> {
         let how = if matches!(wanted, Wanted::Damping) { "sink" } else { "fall" };
         confirm(&format!("The arm will {how} unless somebody holds it. Go on?"), yes)?;
     }
-    all_taken(&arm.write_checked(MOTOR_STATE.address, &[wanted.code()])?)
+    or_hold(arm, |arm, _| motors_obey(arm.write_checked(MOTOR_STATE.address, &[wanted.code()])))
 }

@@ -1,20 +1,27 @@
 //! `stop`: every joint holds where it is.
 
-use sevenbot::Angle;
-
 use super::pose::Stand;
 use crate::failure::Failure;
+use crate::interrupt::{hold, warn_of_exceptions};
+use crate::output::warn;
 use crate::session::Session;
 
 /// Stop: every joint holds where it is.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Targets become the measured positions. A joint whose servo does not answer is left alone.")]
+Targets become the measured positions; they are read back, and written again where they did not take.
+Where the motors are off (state 0 or 2) nothing is written.
+
+Exit status 1 when it is not known that the arm holds: it may still be moving then.")]
 pub(crate) struct StopArgs {}
 
 pub(crate) fn run(session: &mut Session) -> Result<(), Failure> {
-    let mut arm = session.connect()?;
-    arm.hold()?;
-    let positions_degrees = arm.targets()?.map(Angle::degrees);
+    let connected = session.connect();
+    let mut arm = connected.inspect_err(|_| {
+        warn("the arm was not told to stop and may be moving; the switch of the servos' supply stops it");
+    })?;
+    let joints = hold(&mut arm)?;
+    warn_of_exceptions(&joints);
+    let positions_degrees = if joints.is_driven() { joints.targets() } else { joints.positions() };
     session.output.show(&Stand { positions_degrees })
 }

@@ -1,156 +1,191 @@
-//! The master's end of the servo bus: one transaction at a time, and what came of it.
+//! The master's end of the servo bus: one transaction at a time.
 //!
-//! Whatever does not answer the question that was asked is dropped here: the echo of our own bytes on the
-//! one wire, the late answer to an earlier question, another servo's answer, garbage. A question has one
-//! outcome, a reading or a failure, so a failed read never becomes data.
+//! A read has one outcome, a reading or a failure, so a failed read never becomes data. Bytes that do not answer the
+//! outstanding read are dropped: the echo of our own bytes, a late answer, another servo's answer, noise.
 
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::{Duration, Instant};
 
 use super::frame::{self, Decoder, FrameBuffer, Reading, register};
+use super::torque::{Torque, TorqueCodes};
 use crate::CYCLE;
 
 /// Time on the wire of one byte at 1 Mbaud, ten bits.
 const BYTE_TIME_US: usize = 10;
-/// How many lengths of question there are.
-const LENGTHS: u8 = 4;
+/// The longest time that noise may delay a frame. A frame that damps the servos must not wait for noise to end.
+const MAX_NOISE_DELAY: Duration = Duration::from_millis(1);
+/// How many different read lengths there are.
+const READ_LENGTHS: u8 = 4;
 
-/// What a motor does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Torque {
-    /// It brakes.
-    Damping,
-    /// It goes to its goal and holds it.
-    On,
-    /// It turns freely.
-    Free,
-}
-
-/// The two published meanings of servo register 40, the torque switch.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum TorqueCodes {
-    /// 0 damping, 1 on, 2 free: the older table, and the same as register 29 of the arm.
-    #[default]
-    DampingOnFree,
-    /// 0 free, 1 on, 2 damping: Feetech's current table.
-    FreeOnDamping,
-}
-
-impl TorqueCodes {
-    /// The value of the torque switch for `torque`.
-    #[must_use]
-    pub const fn code(self, torque: Torque) -> u8 {
-        match (self, torque) {
-            (_, Torque::On) => 1,
-            (Self::DampingOnFree, Torque::Damping) | (Self::FreeOnDamping, Torque::Free) => 0,
-            (Self::DampingOnFree, Torque::Free) | (Self::FreeOnDamping, Torque::Damping) => 2,
-        }
-    }
-}
-
-/// What came of a question to a servo.
+/// The outcome of a read from a servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// It answered.
+    /// The servo answered.
     Measured {
-        /// Which servo.
+        /// The joint of the servo.
         joint: Joint,
-        /// What it measured.
+        /// The measured values.
         reading: Reading,
-        /// What it complains about: bits of [`frame::error`].
+        /// The error bits of the answer, see [`frame::error`].
         alarms: u8,
+        /// Was the answer processed within a control cycle after the timeout? After that the joint may have moved.
+        is_timely: bool,
     },
-    /// It did not answer in time, or not in a form that can be trusted.
+    /// The servo did not send a valid answer in time.
     Failed {
-        /// Which servo.
+        /// The joint of the servo.
         joint: Joint,
     },
 }
 
-/// The master's end of the wire.
+/// The master's end of the servo bus.
 #[derive(Clone, Debug)]
 pub struct Bus {
     timeout: Duration,
+    guard_time: Duration,
+    /// How much later than on the wire an answer may arrive here, because a USB adapter buffers it.
+    answer_delay: Duration,
     codes: TorqueCodes,
     decoder: Decoder,
     frame: FrameBuffer,
-    /// Who was asked and has not answered yet.
+    /// The joint of the outstanding read.
     awaited: Option<Joint>,
-    /// By how much the next question to each servo is longer than it needs to be. It changes with every
-    /// question that got no answer: so a late answer to that one is told from the answer to the next.
-    surplus: [u8; JOINTS],
-    /// When the time for the answer is over, or, where none is expected, when the wire is free again.
+    /// How many additional registers the next read of each servo asks for. The number changes with each read that
+    /// failed, so a late answer to that read differs in length from the answer to the next.
+    read_length_tags: [u8; JOINTS],
+    /// The longest answer time of each servo since the last call that took it, in microseconds.
+    longest_answers: [u16; JOINTS],
+    /// Until when the wire is busy: with an answer on the wire, or with a frame that has no answer.
     busy_until: Instant,
+    /// When the bytes began that have come without a pause of the guard time.
+    heard_since: Instant,
+    /// When the guard time after the last byte received ends.
+    quiet_at: Instant,
+    /// When the outstanding read fails. Later than `busy_until` by the answer delay.
+    answer_until: Instant,
+    /// When the guard time after the last frame without an answer ends.
+    sent_until: Instant,
 }
 
 impl Bus {
-    /// A silent bus on which a servo answers within `timeout` of the last byte sent.
+    /// An idle bus. A servo has to answer within `timeout` of the last byte sent. A frame follows the byte before it
+    /// after `guard_time` at the earliest.
     #[must_use]
-    pub const fn new(timeout: Duration, codes: TorqueCodes) -> Self {
+    pub const fn new(timeout: Duration, guard_time: Duration, codes: TorqueCodes) -> Self {
         Self {
             timeout,
+            guard_time,
+            answer_delay: Duration::ZERO,
             codes,
             decoder: Decoder::new(),
             frame: FrameBuffer::new(),
             awaited: None,
-            surplus: [0; JOINTS],
+            read_length_tags: [0; JOINTS],
+            longest_answers: [0; JOINTS],
             busy_until: Instant::ZERO,
+            heard_since: Instant::ZERO,
+            quiet_at: Instant::ZERO,
+            answer_until: Instant::ZERO,
+            sent_until: Instant::ZERO,
         }
     }
 
-    /// Takes bytes from the wire.
-    pub fn bytes(&mut self, bytes: &[u8]) {
-        self.decoder.push(bytes);
+    /// Sets how much later than on the wire answers may arrive here. Meanwhile the wire is free for frames without an
+    /// answer.
+    pub const fn set_answer_delay(&mut self, delay: Duration) {
+        self.answer_delay = delay;
     }
 
-    /// What came of the outstanding question, once that is known.
+    /// Takes bytes that were received by `now`. The guard time begins after them, whoever sent them.
+    pub fn bytes(&mut self, now: Instant, bytes: &[u8]) {
+        self.decoder.push(bytes);
+        if bytes.is_empty() {
+            return;
+        }
+        if now >= self.quiet_at {
+            self.heard_since = now;
+        }
+        self.quiet_at = now + self.guard_time;
+    }
+
+    /// The outcome of the outstanding read, once it is known.
     pub fn poll(&mut self, now: Instant) -> Option<Outcome> {
-        let outcome = self.answer().or_else(|| self.expired(now))?;
+        let outcome = self.answer(now).or_else(|| self.expired(now))?;
+        if let Outcome::Measured { joint, .. } = outcome {
+            self.note_answer(now, joint);
+            self.busy_until = self.sent_until.max(now + self.guard_time);
+        }
         self.awaited = None;
-        self.busy_until = now;
         Some(outcome)
     }
 
-    fn answer(&mut self) -> Option<Outcome> {
+    fn answer(&mut self, now: Instant) -> Option<Outcome> {
         let joint = self.awaited?;
-        let surplus = self.surplus_of(joint);
+        let tag = self.read_length_tag(joint);
         while let Some(result) = self.decoder.pull() {
             if let Ok(answer) = result
                 && answer.id == joint.index()
-                && answer.params.len() == usize::from(Reading::REGISTERS + surplus)
+                && answer.params.len() == usize::from(Reading::REGISTERS + tag)
                 && let Some(reading) =
                     answer.params.get(..usize::from(Reading::REGISTERS)).and_then(Reading::parse)
             {
-                return Some(Outcome::Measured { joint, reading, alarms: answer.code });
+                let is_timely = now <= self.answer_until + CYCLE;
+                return Some(Outcome::Measured { joint, reading, alarms: answer.code, is_timely });
             }
         }
         None
     }
 
-    fn surplus_of(&self, joint: Joint) -> u8 {
-        self.surplus.get(usize::from(joint.index())).copied().unwrap_or(0)
+    /// Records the answer time, from the last byte of the read to the last byte of the answer.
+    fn note_answer(&mut self, now: Instant, joint: Joint) {
+        let whole = self.timeout.as_micros().saturating_add(self.answer_delay.as_micros());
+        let taken = whole.saturating_sub((self.answer_until - now).as_micros());
+        if let Some(longest) = self.longest_answers.get_mut(usize::from(joint.index())) {
+            *longest = (*longest).max(u16::try_from(taken).unwrap_or(u16::MAX));
+        }
+    }
+
+    /// The longest answer time of each servo since the last call, in microseconds; 0 if it did not answer.
+    pub const fn take_longest_answers(&mut self) -> [u16; JOINTS] {
+        core::mem::replace(&mut self.longest_answers, [0; JOINTS])
+    }
+
+    fn read_length_tag(&self, joint: Joint) -> u8 {
+        self.read_length_tags.get(usize::from(joint.index())).copied().unwrap_or(0)
     }
 
     fn expired(&mut self, now: Instant) -> Option<Outcome> {
-        let joint = self.awaited.filter(|_| now >= self.busy_until)?;
-        if let Some(surplus) = self.surplus.get_mut(usize::from(joint.index())) {
-            *surplus = (*surplus + 1) % LENGTHS;
+        let joint = self.awaited.filter(|_| now >= self.answer_until)?;
+        if let Some(tag) = self.read_length_tags.get_mut(usize::from(joint.index())) {
+            *tag = (*tag + 1) % READ_LENGTHS;
         }
         Some(Outcome::Failed { joint })
     }
 
-    /// May something be sent?
+    /// May a read be sent?
     #[must_use]
     pub fn is_idle(&self, now: Instant) -> bool {
-        self.awaited.is_none() && now >= self.busy_until
+        self.awaited.is_none() && self.is_free(now)
     }
 
-    /// When the bus is idle again, at the latest; meaningless while it is idle.
+    /// May a frame without an answer be sent?
     #[must_use]
-    pub const fn busy_until(&self) -> Instant {
-        self.busy_until
+    pub fn is_free(&self, now: Instant) -> bool {
+        now >= self.free_at()
+    }
+
+    fn free_at(&self) -> Instant {
+        self.busy_until.max(self.quiet_at.min(self.heard_since + MAX_NOISE_DELAY))
+    }
+
+    /// When the bus becomes free or the outstanding read fails; `None` while the bus is idle.
+    #[must_use]
+    pub fn deadline(&self, now: Instant) -> Option<Instant> {
+        match (self.is_free(now), self.awaited) {
+            (false, _) => Some(self.free_at()),
+            (true, Some(_)) => Some(self.answer_until),
+            (true, None) => None,
+        }
     }
 
     /// The frame to send, after one of the calls below.
@@ -159,29 +194,29 @@ impl Bus {
         &self.frame
     }
 
-    /// Asks a joint's servo where it is and how it is.
+    /// Reads the measurements of a joint's servo.
     pub fn ask(&mut self, now: Instant, joint: Joint) {
         self.decoder.clear();
-        let count = Reading::REGISTERS + self.surplus_of(joint);
+        let count = Reading::REGISTERS + self.read_length_tag(joint);
         frame::read(&mut self.frame, joint.index(), register::PRESENT_POSITION, count);
         self.awaited = Some(joint);
         self.busy_until = self.sent(now) + self.timeout;
+        self.answer_until = self.busy_until + self.answer_delay;
     }
 
-    /// Sets all torque switches at one instant. No servo answers.
-    pub fn set_torque(&mut self, now: Instant, torque: &[Torque; JOINTS]) {
-        let items = Joint::ALL.iter().zip(torque);
+    /// Sets the torque switches of some joints simultaneously. No servo answers.
+    pub fn set_torque(&mut self, now: Instant, switches: impl Iterator<Item = (Joint, Torque)>) {
         let codes = self.codes;
         frame::sync_write(
             &mut self.frame,
             register::TORQUE_SWITCH,
-            items.map(|(joint, &torque)| (joint.index(), [codes.code(torque)])),
+            switches.map(|(joint, torque)| (joint.index(), [codes.code(torque)])),
         );
-        self.busy_until = self.sent(now);
+        self.rest_after_frame(now);
     }
 
-    /// Gives joints their goals in servo counts, all at one instant. Each is to be reached within a control
-    /// cycle, so that a row of goals makes an even movement. No servo answers.
+    /// Sets the goals of some joints in servo counts, simultaneously. Each goal time is one control cycle, so that
+    /// consecutive goals give an even movement. No servo answers.
     pub fn set_goals(&mut self, now: Instant, goals: impl Iterator<Item = (Joint, u16)>) {
         let [time_high, time_low] = const { cycle_in_millis().to_be_bytes() };
         frame::sync_write(
@@ -192,150 +227,26 @@ impl Bus {
                 (joint.index(), [high, low, time_high, time_low, 0, 0])
             }),
         );
-        self.busy_until = self.sent(now);
+        self.rest_after_frame(now);
     }
 
-    /// When the last byte of the frame is on the wire.
+    /// Keeps the wire busy for a frame without an answer and the guard time after it.
+    fn rest_after_frame(&mut self, now: Instant) {
+        self.sent_until = self.sent(now) + self.guard_time;
+        self.busy_until = self.sent_until;
+    }
+
+    /// When the last byte of the frame has left.
     fn sent(&self, now: Instant) -> Instant {
         let micros = u64::try_from(self.frame.len() * BYTE_TIME_US).unwrap_or(0);
         now + Duration::from_micros(micros)
     }
 }
 
-#[allow(clippy::cast_possible_truncation)] // Evaluated when compiled: 10.
+#[allow(clippy::cast_possible_truncation)] // 10, evaluated at compile time.
 const fn cycle_in_millis() -> u16 {
     (CYCLE.as_micros() / 1_000) as u16
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::frame::{error, status};
-    use super::*;
-
-    const J3: Joint = Joint::ALL[2];
-
-    fn at(micros: u64) -> Instant {
-        Instant::from_micros(micros)
-    }
-
-    fn bus() -> Bus {
-        Bus::new(Duration::from_millis(3), TorqueCodes::default())
-    }
-
-    fn reading() -> Reading {
-        Reading { position_counts: 500, speed: 0, load: 0, voltage_decivolts: 74, temperature_celsius: 30 }
-    }
-
-    fn answer_of(id: u8, error: u8) -> Vec<u8> {
-        let mut buffer = FrameBuffer::new();
-        status(&mut buffer, id, error, &reading().to_bytes());
-        buffer.to_vec()
-    }
-
-    fn measured(alarms: u8) -> Option<Outcome> {
-        Some(Outcome::Measured { joint: J3, reading: reading(), alarms })
-    }
-
-    #[test]
-    fn a_question_is_answered() {
-        let mut bus = bus();
-        bus.ask(at(0), J3);
-        assert_eq!(bus.frame(), [0xFF, 0xFF, 2, 4, 2, 56, 8, 0xB7]);
-        assert!(!bus.is_idle(at(1)));
-        let answer = answer_of(2, error::OVERLOAD);
-        bus.bytes(&answer[..5]);
-        assert_eq!(bus.poll(at(200)), None);
-        bus.bytes(&answer[5..]);
-        assert_eq!(bus.poll(at(300)), measured(error::OVERLOAD));
-        assert!(bus.is_idle(at(300)));
-    }
-
-    #[test]
-    fn silence_is_a_failure_once_its_time_is_over() {
-        let mut bus = bus();
-        bus.ask(at(0), J3);
-        assert_eq!(bus.busy_until(), at(3_080), "eight bytes and the time-out");
-        assert_eq!(bus.poll(at(3_079)), None);
-        assert_eq!(bus.poll(at(3_080)), Some(Outcome::Failed { joint: J3 }));
-        assert_eq!(bus.poll(at(3_081)), None, "said once");
-    }
-
-    #[test]
-    fn echo_garbage_and_others_answers_are_dropped() {
-        let mut bus = bus();
-        bus.ask(at(0), J3);
-        let echo = bus.frame().to_vec();
-        bus.bytes(&echo);
-        bus.bytes(&[0xFF, 0x00, 0xFF, 0xFF]);
-        bus.bytes(&answer_of(1, 0));
-        let mut garbled = answer_of(2, 0);
-        garbled[6] ^= 1;
-        bus.bytes(&garbled);
-        assert_eq!(bus.poll(at(500)), None);
-        bus.bytes(&answer_of(2, 0));
-        assert_eq!(bus.poll(at(600)), measured(0));
-    }
-
-    #[test]
-    fn a_late_answer_is_not_taken_for_the_next_one() {
-        let mut bus = bus();
-        bus.ask(at(0), Joint::ALL[1]);
-        assert!(bus.poll(at(4_000)).is_some());
-        bus.bytes(&answer_of(1, 0));
-        bus.ask(at(4_000), J3);
-        assert_eq!(bus.poll(at(4_001)), None, "cleared before the question");
-        bus.bytes(&answer_of(1, 0));
-        assert_eq!(bus.poll(at(4_002)), None, "of another servo");
-    }
-
-    #[test]
-    fn a_late_answer_of_the_same_servo_is_told_by_its_length() {
-        let mut bus = bus();
-        bus.ask(at(0), J3);
-        assert_eq!(bus.poll(at(4_000)), Some(Outcome::Failed { joint: J3 }));
-        bus.ask(at(4_000), J3);
-        assert_eq!(bus.frame()[6], 9, "one register more");
-        bus.bytes(&answer_of(2, 0));
-        assert_eq!(bus.poll(at(4_300)), None, "that is the answer to the first question");
-        let mut longer = FrameBuffer::new();
-        status(&mut longer, 2, 0, &[reading().to_bytes().as_slice(), &[0]].concat());
-        bus.bytes(&longer);
-        assert_eq!(bus.poll(at(4_400)), measured(0));
-    }
-
-    #[test]
-    fn an_answer_that_is_no_measurement_is_a_failure() {
-        let mut bus = bus();
-        bus.ask(at(0), J3);
-        let mut buffer = FrameBuffer::new();
-        status(&mut buffer, 2, 0, &[0xFF; 8]);
-        bus.bytes(&buffer);
-        assert_eq!(bus.poll(at(100)), None);
-        assert_eq!(bus.poll(at(9_000)), Some(Outcome::Failed { joint: J3 }));
-    }
-
-    #[test]
-    fn all_goals_leave_in_one_frame() {
-        let mut bus = bus();
-        bus.set_goals(at(0), Joint::ALL.into_iter().map(|joint| (joint, 511 + u16::from(joint.index()))));
-        assert_eq!(bus.frame().len(), 57);
-        assert_eq!(bus.frame()[..14], [0xFF, 0xFF, 0xFE, 53, 0x83, 42, 6, 0, 1, 0xFF, 0, 10, 0, 0]);
-        assert_eq!(bus.busy_until(), at(570));
-        assert!(!bus.is_idle(at(569)) && bus.is_idle(at(570)));
-    }
-
-    #[test]
-    fn torque_codes_follow_the_arm_s_table() {
-        let all = [Torque::Damping, Torque::On, Torque::Free];
-        assert_eq!(all.map(|torque| TorqueCodes::DampingOnFree.code(torque)), [0, 1, 2]);
-        assert_eq!(all.map(|torque| TorqueCodes::FreeOnDamping.code(torque)), [2, 1, 0]);
-        let mut bus = Bus::new(Duration::ZERO, TorqueCodes::FreeOnDamping);
-        bus.set_torque(at(0), &[Torque::Free; JOINTS]);
-        assert_eq!(bus.frame()[5..9], [40, 1, 0, 0]);
-    }
-
-    #[test]
-    fn a_cycle_in_milliseconds_is_a_cycle() {
-        assert_eq!(u64::from(cycle_in_millis()) * 1_000, CYCLE.as_micros());
-    }
-}
+mod tests;

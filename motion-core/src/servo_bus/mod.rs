@@ -1,15 +1,17 @@
-//! The servo bus: seven SCS servos on one wire, both ends of it.
+//! The servo bus: both ends of the wire that connects seven SCS servos.
 //!
 //! ```text
-//!   frame    what goes over the wire, either way      (no time, no turns)
+//!   frame    frames of both directions                (no time, no turns)
 //!     ▼
-//!   bus      whose turn it is: the master's end       (no angles, no registers of the arm)
+//!   bus      the master's end: transactions, timeouts (no angles, no registers of the arm)
 //!   servo    the servo's end, for simulators          (no motor)
 //! ```
 
 pub mod bus;
 pub mod frame;
 pub mod servo;
+mod torque;
 
-pub use bus::{Bus, Outcome, Torque, TorqueCodes};
+pub use bus::{Bus, Outcome};
 pub use frame::Reading;
+pub use torque::{Torque, TorqueCodes};

@@ -17,7 +17,8 @@ pub const STANDARD_COUNTS: [u16; 7] = [511, 445, 684, 511, 512, 512, 1008];
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ToServos {
     Ask(u8),
-    Torque([u8; 7]),
+    /// The code for each joint that is named.
+    Torque([Option<u8>; 7]),
     /// Id and counts.
     Goals(Vec<(u8, u16)>),
 }
@@ -41,6 +42,7 @@ pub fn config() -> Config {
         chip_id: [1, 2, 3, 4, 5, 6],
         faults: 0,
         servo_timeout: Duration::from_millis(3),
+        guard_time: Duration::from_micros(100),
         torque_codes: TorqueCodes::default(),
     }
 }
@@ -71,6 +73,11 @@ impl Rig {
         rig.run_ms(1_000);
         rig.forget();
         rig
+    }
+
+    /// Restarts the controller and nothing else: the servos keep their power, their torque and their goals.
+    pub fn restart_controller(&mut self) {
+        self.controller = Controller::new(self.now(), config(), None, Storage::Ready);
     }
 
     /// Forgets what came out so far.
@@ -106,7 +113,7 @@ impl Rig {
         let now = self.now();
         self.controller.host_bytes(now, &[]);
         let answer = self.plant.poll(now);
-        self.controller.servo_bytes(&answer);
+        self.controller.servo_bytes(now, &answer);
         loop {
             match self.controller.poll(now, self.room) {
                 Output::ToHost(bytes) => self.to_host.push((self.now_us, bytes.to_vec())),
@@ -186,7 +193,7 @@ impl Rig {
         })
     }
 
-    pub fn torques(&self) -> impl Iterator<Item = [u8; 7]> {
+    pub fn torques(&self) -> impl Iterator<Item = [Option<u8>; 7]> {
         self.to_servos.iter().filter_map(|(_, told)| match told {
             ToServos::Torque(torque) => Some(*torque),
             _ => None,
@@ -221,7 +228,9 @@ fn decode(bytes: &[u8]) -> ToServos {
     match (Instruction::from_code(frame.code), frame.params) {
         (Some(Instruction::Read), [register::PRESENT_POSITION, 8..=11]) => ToServos::Ask(frame.id),
         (Some(Instruction::SyncWrite), [register::TORQUE_SWITCH, 1, items @ ..]) => {
-            ToServos::Torque(std::array::from_fn(|joint| items[joint * 2 + 1]))
+            let mut codes = [None; 7];
+            items.chunks_exact(2).for_each(|item| codes[usize::from(item[0])] = Some(item[1]));
+            ToServos::Torque(codes)
         }
         (Some(Instruction::SyncWrite), [register::GOAL_POSITION, 6, items @ ..]) => {
             let item = |item: &[u8]| (item[0], u16::from_be_bytes([item[1], item[2]]));

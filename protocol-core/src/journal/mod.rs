@@ -1,8 +1,8 @@
-//! The settings on two sectors of NOR flash: after a power cut at any instant they are what they were before
-//! or after the save that was cut (D19), never anything else.
+//! The settings on two sectors of NOR flash. After a power cut at any instant the settings are those before or after the
+//! interrupted save (D19).
 //!
 //! ```text
-//!    one sector is home                    the other is spare
+//!    home: the sector in use               spare: the other sector
 //!   ┌───────────────────────────┐         ┌───────────────────────────┐
 //! 0 │ mark of generation 7      │       0 │ mark of generation 8      │
 //! 1 │ record                    │       1 │ (blank)                   │
@@ -16,44 +16,39 @@
 //!   └───────────────────────────┘         └───────────────────────────┘
 //! ```
 //!
-//! A save appends the whole image as one record of eight words. When home is full the log goes on in the
-//! spare, one generation higher; the next start makes the old home blank, and it is the spare. Why so:
+//! A save appends the whole image as one record of eight words. When home is full, the log continues in the spare with
+//! the next generation. The next start erases the old home, which becomes the spare. The rules:
 //!
-//! - **Erased at start only.** An erase stops the chip for up to 0.8 s: not while the servos are on. So a
-//!   start that finds less than a quarter of home free moves to the spare at once, and a power cycle has
-//!   room for a quarter and a whole sector at least: over 600 saves with 16 KiB sectors.
-//! - **Half programmed cells** are what a cut leaves: they may read one way at this start and another way
-//!   at the next. The seal is programmed after the rest was read back, so what is sealed was whole. A
-//!   record that is unsealed, or needed a correction, or has remains of another behind it, is the newest
-//!   today and perhaps not tomorrow. It is *appended again before anything is erased*, and before anybody
-//!   is told.
-//! - **Order is by generation and place**, not by a running number: the remains of a record and the one
-//!   written in its stead would share a number, and the wrong one might win when it reads whole one day.
-//! - **A sector is blank because its mark says so**, not because it looks blank: after a cut erase it may
-//!   look so. The mark is programmed after a whole erase and a check of every word. It names the generation
-//!   it waits for, so the mark of an earlier life that outlived a cut erase does not count. One word is
-//!   enough. What it says was true before its first bit was programmed; and a mark that was cut and reads
-//!   wrong lacks zeros, which no erase gives it: it costs an erase, and does not come to read right if that
-//!   is cut, too.
-//! - **A mark that is right is revoked before its sector is erased**, or it might outlive an erase that was
-//!   cut, and promise what is not so. It comes to this when start after start is cut while it moves to the
-//!   spare, until that is half full of remains. A word behind home's own mark then says that the spare waits
-//!   for one generation more.
-//! - **One slot is skipped after a start**, since a word that was cut at its very beginning may not show.
-//!   (The first record of a power cycle, cut like that, is begun again in the same place by the next one. A
-//!   record begins with its sector's generation, so it is the same word that is programmed again, and made
-//!   whole.)
-//! - **The last four slots of a sector are for starts**: a record can be made firm where saves find no
+//! - **Only a start erases.** An erase stops the chip for up to 0.8 s, which is not allowed while the servos are on. A
+//!   start that finds less than a quarter of home free moves to the spare at once. So each power cycle has room for a
+//!   quarter and a whole sector at least: over 600 saves with 16 KiB sectors.
+//! - **A power cut leaves half-programmed cells.** They may read differently at each start. The seal is programmed after
+//!   the other words were verified, so a sealed record was complete. A record is in doubt if it is unsealed, needed a
+//!   correction, or has remains of another record behind it. A start appends such a record again before it erases
+//!   anything and before it returns the settings.
+//! - **Generation and slot give the order**, not a running number. An interrupted record and its replacement would have
+//!   the same number, and the wrong one might become readable later.
+//! - **Only its mark states that a sector is blank.** After an interrupted erase a sector may read as blank. The mark is
+//!   programmed after a complete erase and a check of every word. It contains the generation that the sector is prepared
+//!   for, so an older mark that survives an interrupted erase is not valid. One word is enough: its statement is true
+//!   before its first bit is programmed. An interrupted mark lacks zeros, and an erase adds none. It costs one more
+//!   erase, and it cannot become valid if that erase is interrupted, too.
+//! - **A valid mark is revoked before its sector is erased.** Otherwise it might survive an interrupted erase. This
+//!   happens if many starts in a row are interrupted during the move to the spare, until the spare is half full of
+//!   remains. A word behind home's own mark then moves the spare to the next generation.
+//! - **A start skips one slot**, because a word that was cut at its very beginning may read as blank. If the first record
+//!   of a power cycle is cut like that, the next power cycle uses the same slot. It programs the same first word again,
+//!   because a record begins with the generation of its sector.
+//! - **The last four slots of a sector are reserved for starts**, so that a start can append a record when saves find no
 //!   room.
-//! - **A log always has a record.** The first start appends one that says there are no settings. Else the
-//!   first save of all, if it was cut, could come and go.
-//! - **Not every flash does as it is told.** A sector that is not blank after an erase is not used: in an
-//!   emulator nothing changes, and all of it reads 0.
+//! - **A log always has a record.** The first start appends a record without settings. Otherwise an interrupted first
+//!   save could appear and disappear.
+//! - **A sector that is not blank after an erase is not used.** In an emulator, for example, flash does not change and
+//!   reads 0.
 //!
-//! No word is programmed with one value and then another. A save programs eight words. A start erases two
-//! sectors and programs 18 words at most: a record made firm, a mark, a record moved, a mark. Only a cell
-//! that does not take its bit costs more: a second attempt, in the next slot. Knows no register: an image
-//! is 20 bytes.
+//! No word is programmed with two different values. A save programs eight words. A start erases two sectors and programs
+//! 18 words at most: a record appended again, a mark, a record moved, a mark. A cell that does not take its bit costs a
+//! second attempt in the next slot. This module does not know registers: an image is 20 bytes.
 
 mod sectors;
 mod slot;
@@ -61,37 +56,36 @@ mod slot;
 use embedded_storage::nor_flash::NorFlash;
 
 use crate::registers::Image;
-use sectors::{Place, Sectors, Survey};
+use sectors::{Sectors, SlotAddress, Survey};
 use slot::Record;
 
-/// The slots at a sector's end that only a start may fill.
+/// The slots at the end of a sector that only a start may use.
 const RESERVE: u32 = 4;
-/// The words behind a sector's mark.
+/// The words behind the mark of a sector, one for each revocation.
 const REVOCATIONS: u32 = 7;
-/// How many slots are tried for one record.
+/// The number of slots tried for one record.
 const ATTEMPTS: u32 = 2;
-/// What the record of an arm without settings holds. No arm's settings look like this: some of their bytes
-/// are reserved, and zero.
+/// The image in a record without settings. It differs from all settings, because their reserved bytes are zero.
 const NO_SETTINGS: Image = Image([0xFF; Image::LENGTH]);
 
-/// What a start found.
+/// The result of opening a journal.
 #[must_use]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Opened {
-    /// Nothing was ever saved: the flash was blank, or the first start was cut.
+    /// Nothing was ever saved: the flash was blank, or the first start was interrupted.
     Fresh,
-    /// The settings.
+    /// The saved settings.
     Found(Image),
-    /// No record was left, though something was there. It was erased, and is in use as if it had been fresh:
-    /// who would rather refuse such a flash opens a copy of it first.
+    /// The flash was not blank, but held no valid record. It was erased and is in use as a fresh flash. A caller that wants
+    /// to refuse such a flash opens a copy of it first.
     Damaged,
-    /// The flash does not keep what it is given: settings can be read at best, and nothing will be saved.
+    /// The flash does not keep data. Settings may be readable, but nothing will be saved.
     Broken(Option<Image>),
 }
 
 impl Opened {
-    /// The settings that were found.
+    /// The saved settings, if there are any.
     #[must_use]
     pub const fn image(&self) -> Option<&Image> {
         match self {
@@ -106,76 +100,77 @@ impl Opened {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SaveError {
-    /// There is no slot left that can be had without an erase: not before the next start.
+    /// No slot is left before the next start, which erases.
     Full,
-    /// The flash does not keep what it is given.
+    /// The flash does not keep data.
     Broken,
 }
 
-/// Where the log goes on.
+/// The end of the log.
 #[derive(Clone, Copy, Debug)]
 struct Tail {
-    next: Place,
+    next: SlotAddress,
     generation: u32,
-    /// The generation that the other sector waits for, or will.
+    /// The generation that the other sector is or will be prepared for.
     following: u32,
-    /// The first slot to use in the other sector, if that is blank from there on.
+    /// The first slot to use in the spare, if the spare is prepared.
     spare: Option<u32>,
 }
 
 impl Tail {
-    /// Goes on in the spare.
+    /// Continues in the spare.
     fn change_over(&mut self) -> Result<(), SaveError> {
         let slot = self.spare.take().ok_or(SaveError::Full)?;
-        self.next = Place { sector: self.next.sector ^ 1, slot };
+        self.next = SlotAddress { sector: self.next.sector ^ 1, slot };
         self.generation = self.following;
         self.following = slot::generation_after(self.following, 1);
         Ok(())
     }
 
-    /// Takes the next slot below `limit`, or the spare's first.
-    fn take_place(&mut self, limit: u32) -> Result<Place, SaveError> {
+    /// Takes the next slot below `limit`, or the first slot of the spare.
+    fn take_slot(&mut self, limit: u32) -> Result<SlotAddress, SaveError> {
         if self.next.slot >= limit {
             self.change_over()?;
         }
-        let place = self.next;
+        let address = self.next;
         self.next.slot += 1;
-        Ok(place)
+        Ok(address)
     }
 }
 
-/// The settings' log on a flash of two sectors.
+/// The log of settings on a flash of two sectors.
 #[derive(Clone, Debug)]
 pub struct Journal<F> {
     sectors: Sectors<F>,
     tail: Tail,
-    /// What the next start will find, where that is known.
+    /// The image that the next start will find, if it is known.
     newest: Option<Image>,
     broken: bool,
 }
 
 impl<F: NorFlash> Journal<F> {
     const SLOTS: u32 = Sectors::<F>::SLOTS;
-    /// Saves fill the slots below this one.
+    /// Saves use the slots below this one.
     const LIMIT: u32 = Self::SLOTS - RESERVE;
 
-    /// Finds the settings, and makes room for saves: the only place that erases.
+    /// Finds the settings and makes room for saves. Only this function erases.
     ///
     /// The flash has two sectors of `ERASE_SIZE` (512 bytes to 1 MiB) and words of at most four bytes.
     pub fn open(flash: F) -> (Self, Opened) {
-        let tail = Tail { next: Place { sector: 0, slot: 1 }, generation: 1, following: 2, spare: None };
+        let tail =
+            Tail { next: SlotAddress { sector: 0, slot: 1 }, generation: 1, following: 2, spare: None };
         let mut journal = Self { sectors: Sectors(flash), tail, newest: None, broken: false };
         let opened = journal.start();
         journal.broken = matches!(opened, Opened::Broken(_));
         (journal, opened)
     }
 
-    /// Saves the settings. What is already there is not saved again. (20 times 0xFF would be found as no
-    /// settings; no arm has such an image.)
+    /// Saves the settings. An unchanged image is not saved again. (An image of 20 times 0xFF would read as no settings;
+    /// no arm has such an image.)
     ///
     /// # Errors
-    /// [`SaveError::Full`]: not before the next start. After [`SaveError::Broken`] the next start may find
-    /// the settings before or after this save.
+    /// [`SaveError::Full`] until the next start. After [`SaveError::Broken`] the next start may find the settings before or
+    /// after this save.
     pub fn save(&mut self, image: &Image) -> Result<(), SaveError> {
         if self.newest.as_ref() == Some(image) {
             return Ok(());
@@ -186,14 +181,14 @@ impl<F: NorFlash> Journal<F> {
         self.append(Self::LIMIT, image)
     }
 
-    /// How many different images can be saved before the next start.
+    /// How many images can be saved before the next start.
     #[must_use]
     pub fn room(&self) -> usize {
         let free = |slot| Self::LIMIT.saturating_sub(slot) as usize;
         if self.broken { 0 } else { free(self.tail.next.slot) + self.tail.spare.map_or(0, free) }
     }
 
-    /// The flash.
+    /// Returns the flash.
     pub fn release(self) -> F {
         self.sectors.0
     }
@@ -217,7 +212,7 @@ impl<F: NorFlash> Journal<F> {
         }
     }
 
-    /// Starts a log in the first sector that gets blank.
+    /// Starts a log in the first sector that can be erased.
     fn begin(&mut self) -> Result<(), SaveError> {
         let generation = self.tail.generation;
         if self.prepare(0, generation).is_none() {
@@ -229,9 +224,9 @@ impl<F: NorFlash> Journal<F> {
         Ok(())
     }
 
-    /// Goes on with a log: its newest record made firm, its other sector blank, and room for saves.
+    /// Continues a log: makes the newest record firm, prepares the spare, and makes room for saves.
     fn resume(&mut self, home: &Survey, other: &Survey, newest: Record) -> Result<(), SaveError> {
-        let next = Place { sector: home.sector, slot: home.end + 1 };
+        let next = SlotAddress { sector: home.sector, slot: home.end + 1 };
         let following = slot::generation_after(newest.generation, 1 + home.revoked);
         let spare = Self::first_free(other, following);
         self.tail = Tail { next, generation: newest.generation, following, spare };
@@ -249,16 +244,16 @@ impl<F: NorFlash> Journal<F> {
         Ok(())
     }
 
-    /// The first slot to use in a spare that waits for a generation.
+    /// The first slot to use in a spare that is prepared for a generation.
     ///
-    /// It may hold the remains of records that were cut. That happens when home is full, so what comes next
-    /// is a move, which appends the newest record behind them. An erase would be no better: if that is cut,
-    /// it may leave the right mark, and little else.
+    /// The spare may hold the remains of interrupted records. This happens when home is full, so the next step is a move,
+    /// which appends the newest record behind the remains. An erase would not be safer: an interrupted erase may leave the
+    /// valid mark and damage the rest.
     fn first_free(spare: &Survey, generation: u32) -> Option<u32> {
         (spare.waits_for(generation) && spare.end <= Self::SLOTS / 2).then_some(spare.end)
     }
 
-    /// Makes a sector blank; its first slot to use.
+    /// Prepares a sector. Returns its first slot to use.
     fn prepare(&mut self, sector: u32, generation: u32) -> Option<u32> {
         self.sectors.prepare(sector, generation).ok()?;
         Some(1)
@@ -266,23 +261,23 @@ impl<F: NorFlash> Journal<F> {
 
     fn firm_up(&mut self, image: &Image) -> Result<(), SaveError> {
         match self.append(Self::SLOTS, image) {
-            // Start after start was cut at this, until home was full. Then the record before the newest is
-            // in home as well, and an erase of the other sector can do no harm.
+            // Many starts in a row were interrupted here, until home was full. Then home holds the previous record,
+            // too, and an erase of the other sector loses nothing.
             Err(SaveError::Full) => Ok(()),
             result => result,
         }
     }
 
-    /// Before a sector with the right mark is erased, another is made the right one.
+    /// Revokes the valid mark of a sector before the sector is erased.
     ///
-    /// A note that is there already is programmed again: the cut of an earlier start may have left it half
-    /// done. If there is no place for one more, or its cells are worn out, the erase has to do without.
+    /// An existing revocation is programmed again, because an earlier start may have been interrupted in it. If there is no
+    /// word left, or its cells are worn out, the sector is erased without a revocation.
     fn revoke(&mut self, home: &Survey, other: &Survey) {
         let Tail { following, .. } = &mut self.tail;
-        let is_right = other.mark == slot::mark(*following);
-        let count = home.revoked + u32::from(is_right);
+        let is_valid = other.mark == slot::mark(*following);
+        let count = home.revoked + u32::from(is_valid);
         if (1..=REVOCATIONS).contains(&count) {
-            *following = slot::generation_after(*following, is_right.into());
+            *following = slot::generation_after(*following, is_valid.into());
             let _ = self.sectors.revoke(home.sector, count, *following);
         }
     }
@@ -303,9 +298,9 @@ impl<F: NorFlash> Journal<F> {
 
     fn append(&mut self, limit: u32, image: &Image) -> Result<(), SaveError> {
         for _ in 0..ATTEMPTS {
-            let place = self.tail.take_place(limit)?;
+            let address = self.tail.take_slot(limit)?;
             self.newest = None;
-            if self.sectors.append(place, self.tail.generation, image).is_ok() {
+            if self.sectors.append(address, self.tail.generation, image).is_ok() {
                 self.newest = Some(*image);
                 return Ok(());
             }

@@ -1,53 +1,52 @@
-//! Two sectors of slots: reading them over, filling a slot, making a sector blank.
+//! Two sectors of slots: survey a sector, append a record, prepare a blank sector.
 //!
-//! Checks everything it does by reading it back, and never erases or programs on its own account. Knows
-//! nothing of which record counts.
+//! Every operation is verified by reading back. The journal decides when to erase and program, and which record counts.
 
 use embedded_storage::nor_flash::NorFlash;
 
 use super::slot::{self, BLANK, Record, Slot, Word};
 use crate::registers::Image;
 
-/// The flash did not do, or did not keep, what it was told.
+/// The flash refused an operation, or the verification failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Refused;
 
-/// Where a slot is.
+/// The address of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct SlotAddress {
     /// 0 or 1.
     pub(super) sector: u32,
-    /// From 1 on; 0 is the sector's mark.
+    /// Records begin at slot 1; slot 0 holds the mark of the sector.
     pub(super) slot: u32,
 }
 
-/// What a sector holds.
+/// The content of a sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Survey {
     pub(super) sector: u32,
     pub(super) mark: Word,
-    /// How many words stand behind the mark: as many marks of the other sector do not count any more.
+    /// Number of revocations behind the mark: so many marks of the other sector are no longer valid.
     pub(super) revoked: u32,
-    /// The first slot with nothing but blank ones from there on.
+    /// The first slot of the blank rest of the sector.
     pub(super) end: u32,
-    /// The last record; firm only if nothing was begun behind it.
+    /// The last valid record. It is firm only if no slot behind it was begun.
     pub(super) newest: Option<Record>,
 }
 
 impl Survey {
-    /// Does this sector hold the newer record?
+    /// Does this sector hold the newer record of the two?
     pub(super) fn is_later_than(&self, other: &Self) -> bool {
         let is_later = |mine: Record| other.newest.is_none_or(|theirs| mine.is_later_than(&theirs));
         self.newest.is_some_and(is_later)
     }
 
-    /// Was this sector found blank when it was marked for `generation`, and holds no record yet? It may hold
-    /// the remains of one that was cut.
+    /// Is this sector prepared for `generation` and still without a valid record? It may hold the remains of an interrupted
+    /// record.
     pub(super) fn waits_for(&self, generation: u32) -> bool {
         self.mark == slot::mark(generation) && self.newest.is_none()
     }
 
-    /// Was nothing ever saved here, or was the very first start cut?
+    /// Was nothing ever saved, or was the very first start interrupted?
     pub(super) fn was_never_used(&self, other: &Self) -> bool {
         let is_blank = |sector: &Self| sector.end == 1 && sector.mark == BLANK[0];
         let is_first = |sector: &Self| sector.waits_for(1);
@@ -59,7 +58,7 @@ impl Survey {
 pub(super) struct Sectors<F>(pub(super) F);
 
 impl<F: NorFlash> Sectors<F> {
-    /// Slots of a sector, with slot 0.
+    /// Number of slots in a sector, including slot 0.
     pub(super) const SLOTS: u32 = {
         assert!(F::ERASE_SIZE.is_multiple_of(32) && F::ERASE_SIZE >= 512 && F::ERASE_SIZE <= 1 << 20);
         assert!(4_usize.is_multiple_of(F::WRITE_SIZE) && 4_usize.is_multiple_of(F::READ_SIZE));
@@ -68,23 +67,23 @@ impl<F: NorFlash> Sectors<F> {
         bytes / slot::LENGTH
     };
 
-    fn address(place: Place) -> u32 {
-        (place.sector * Self::SLOTS + place.slot) * slot::LENGTH
+    fn offset(address: SlotAddress) -> u32 {
+        (address.sector * Self::SLOTS + address.slot) * slot::LENGTH
     }
 
-    fn read(&mut self, place: Place) -> Result<Slot, Refused> {
+    fn read(&mut self, address: SlotAddress) -> Result<Slot, Refused> {
         let mut slot = BLANK;
-        self.0.read(Self::address(place), slot.as_flattened_mut()).map_err(|_| Refused)?;
+        self.0.read(Self::offset(address), slot.as_flattened_mut()).map_err(|_| Refused)?;
         Ok(slot)
     }
 
-    /// Reads a sector from its end, until it meets a record.
+    /// Reads a sector backwards from its end to the last valid record.
     pub(super) fn survey(&mut self, sector: u32) -> Result<Survey, Refused> {
-        let [mark, behind @ ..] = self.read(Place { sector, slot: 0 })?;
+        let [mark, behind @ ..] = self.read(SlotAddress { sector, slot: 0 })?;
         let revoked = behind.iter().fold(0, |count, word| count + u32::from(*word != BLANK[0]));
         let mut survey = Survey { sector, mark, revoked, end: 1, newest: None };
         for slot in (1..Self::SLOTS).rev() {
-            let content = self.read(Place { sector, slot })?;
+            let content = self.read(SlotAddress { sector, slot })?;
             if content == BLANK {
                 continue;
             }
@@ -98,14 +97,14 @@ impl<F: NorFlash> Sectors<F> {
         Ok(survey)
     }
 
-    /// Programs words one by one in ascending order, then reads all of them back.
-    fn program(&mut self, address: u32, words: &[Word]) -> Result<(), Refused> {
-        let mut to = address;
+    /// Programs words in ascending order, then verifies all of them.
+    fn program(&mut self, offset: u32, words: &[Word]) -> Result<(), Refused> {
+        let mut to = offset;
         for word in words {
             self.0.write(to, word).map_err(|_| Refused)?;
             to += 4;
         }
-        let mut from = address;
+        let mut from = offset;
         for word in words {
             let mut kept = [0; 4];
             self.0.read(from, &mut kept).map_err(|_| Refused)?;
@@ -117,30 +116,35 @@ impl<F: NorFlash> Sectors<F> {
         Ok(())
     }
 
-    /// Fills a blank slot with a record: eight words, the seal only when the others are as they should be.
-    pub(super) fn append(&mut self, place: Place, generation: u32, image: &Image) -> Result<(), Refused> {
+    /// Programs a record into a blank slot: eight words. The seal follows after the other seven were verified.
+    pub(super) fn append(
+        &mut self,
+        address: SlotAddress,
+        generation: u32,
+        image: &Image,
+    ) -> Result<(), Refused> {
         let [body @ .., seal] = slot::encode(generation, image);
-        let address = Self::address(place);
-        self.program(address, &body)?;
-        self.program(address + slot::LENGTH - 4, &[seal])
+        let offset = Self::offset(address);
+        self.program(offset, &body)?;
+        self.program(offset + slot::LENGTH - 4, &[seal])
     }
 
-    /// Erases a sector, makes sure that it is blank, and marks it for `generation`: one word.
+    /// Erases a sector, verifies that it is blank, and programs the mark of `generation`.
     pub(super) fn prepare(&mut self, sector: u32, generation: u32) -> Result<(), Refused> {
-        let start = Self::address(Place { sector, slot: 0 });
+        let start = Self::offset(SlotAddress { sector, slot: 0 });
         let end = start + Self::SLOTS * slot::LENGTH;
         self.0.erase(start, end).map_err(|_| Refused)?;
         for slot in 0..Self::SLOTS {
-            if self.read(Place { sector, slot })? != BLANK {
+            if self.read(SlotAddress { sector, slot })? != BLANK {
                 return Err(Refused);
             }
         }
         self.program(start, &[slot::mark(generation)])
     }
 
-    /// Notes in `sector` that the other one waits for `generation` now: the `count`-th time that it has to.
+    /// Programs the `count`-th revocation in `sector`: the other sector is to be prepared for `generation` now.
     pub(super) fn revoke(&mut self, sector: u32, count: u32, generation: u32) -> Result<(), Refused> {
-        let at = Self::address(Place { sector, slot: 0 }) + 4 * count;
+        let at = Self::offset(SlotAddress { sector, slot: 0 }) + 4 * count;
         self.program(at, &[slot::mark(generation)])
     }
 }

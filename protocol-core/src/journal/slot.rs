@@ -1,4 +1,4 @@
-//! One slot: 32 bytes that hold the settings once.
+//! One slot: 32 bytes that hold one record of the settings.
 //!
 //! ```text
 //!   word  0            1 .. 5          6                          7
@@ -8,56 +8,55 @@
 //!         numbers: low byte first                                  programmed last
 //! ```
 //!
-//! The CRC is CRC-32/ISO-HDLC. Over 192 bits any two records differ in at least six bits of data and CRC, so
-//! one wrong bit can be put right and up to four are never taken for another record. Knows nothing of where
-//! a slot is.
+//! The CRC is CRC-32/ISO-HDLC. Over 192 bits its Hamming distance is six: one wrong bit is corrected, and up to four
+//! wrong bits never decode as another record. This file does not know the address of a slot.
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 use crate::registers::Image;
 
-/// What is programmed at once, or not.
+/// The unit of programming.
 pub(super) type Word = [u8; 4];
-/// Eight of them.
+/// Eight words.
 pub(super) type Slot = [Word; 8];
-/// Bytes of a slot, as addresses are counted.
+/// Bytes of a slot.
 pub(super) const LENGTH: u32 = 32;
-/// A slot that was erased, or whose very first word was cut so early that nothing shows.
+/// An erased slot. A slot also reads like this after a power cut at the very beginning of its first word.
 pub(super) const BLANK: Slot = [[0xFF; 4]; 8];
 
-/// Says that the other seven words were read back and are as they should be: they do not depend on cells
-/// that a power cut left half programmed. As many ones as zeros, so that no wear or cut makes one by chance.
+/// The seal is programmed after the other seven words were verified, so a sealed slot has no half-programmed cells. It
+/// has as many ones as zeros, so wear or a power cut does not produce it by chance.
 const SEAL: Word = [0x5E, 0xA1, 0xC3, 0x96];
 const CHECK: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// Generations follow each other in a circle: this one, then 0. A blank word is none of them. No flash lives
-/// to see it closed, but a flash that is damaged may say that it did.
+/// The last generation; the next one is 0. A blank word is not a generation. Wrap-around is unreachable in practice, but
+/// damaged flash may hold any generation.
 const LAST_GENERATION: u32 = u32::MAX / 2;
 
-/// The generation that is `steps` after another.
+/// The generation `steps` after `generation`.
 pub(super) const fn generation_after(generation: u32, steps: u32) -> u32 {
     generation.wrapping_add(steps) & LAST_GENERATION
 }
 
-/// The settings as they stand in one slot.
+/// The content of a valid slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Record {
-    /// How often the log has changed over to the other sector; the same for all records of a sector.
+    /// How often the log has moved to the other sector; equal for all records of a sector.
     pub(super) generation: u32,
     pub(super) image: Image,
-    /// Sealed, and read without correction: it will read the same after any number of starts.
+    /// The slot is sealed and needed no correction, so later starts will read the same.
     pub(super) firm: bool,
 }
 
 impl Record {
-    /// Was this one written after the `other`, in another sector?
+    /// Was this record written after `other`, in the other sector?
     pub(super) fn is_later_than(&self, other: &Self) -> bool {
         let steps = self.generation.wrapping_sub(other.generation) & LAST_GENERATION;
         (1..=LAST_GENERATION / 2).contains(&steps)
     }
 }
 
-/// The slot that holds `image`, sealed.
+/// Encodes a sealed slot.
 pub(super) fn encode(generation: u32, image: &Image) -> Slot {
     let mut covered = [[0; 4]; 6];
     let bytes = generation.to_le_bytes().into_iter().chain(image.0);
@@ -69,18 +68,18 @@ pub(super) fn encode(generation: u32, image: &Image) -> Slot {
     [generation, a, b, c, d, e, check, SEAL]
 }
 
-/// The record in a slot, if there is a whole one.
+/// Decodes a slot; `None` if it holds no valid record.
 pub(super) fn decode(slot: &Slot) -> Option<Record> {
     let [mut covered @ .., check, seal] = *slot;
     let difference = CHECK.checksum(covered.as_flattened()) ^ u32::from_le_bytes(check);
     let sealed = seal == SEAL;
-    // Without a seal, a wrong bit is a sign of a cut: it may be one of many that read right by luck today.
+    // Without a seal, a wrong bit is a sign of a power cut: more bits may read wrong at the next start.
     if difference != 0 && !(sealed && correct(covered.as_flattened_mut(), difference)) {
         return None;
     }
     let [generation, data @ ..] = covered;
     let generation = u32::from_le_bytes(generation);
-    // The CRC of a blank word and five zeros is blank, too: an erase that was cut twice can leave that.
+    // The CRC of a blank word and five zero words is blank, too. An erase that was cut twice can leave that.
     if generation > LAST_GENERATION {
         return None;
     }
@@ -88,10 +87,10 @@ pub(super) fn decode(slot: &Slot) -> Option<Record> {
     Some(Record { generation, image, firm: sealed && difference == 0 })
 }
 
-/// Puts right the one bit whose change makes this `difference` to the CRC; false where there is no such bit.
+/// Corrects the one bit that explains this `difference` of the CRC; returns false if there is no such bit.
 ///
-/// The CRC is linear, so what a bit does to it depends on the bit's place only. The last bit does what the
-/// polynomial says, and each earlier one what the next one does, one step further.
+/// The CRC is linear, so the effect of a bit depends only on its position. The effect of the last bit is the polynomial.
+/// The effect of each earlier bit is the effect of the next bit, shifted by one step.
 fn correct(covered: &mut [u8], difference: u32) -> bool {
     const POLYNOMIAL: u32 = CRC_32_ISO_HDLC.poly.reverse_bits();
     let mut effect = POLYNOMIAL;
@@ -104,15 +103,14 @@ fn correct(covered: &mut [u8], difference: u32) -> bool {
             effect = (effect >> 1) ^ if effect & 1 == 1 { POLYNOMIAL } else { 0 };
         }
     }
-    // Or the wrong bit is one of the CRC itself, and the data are right.
+    // A single bit of difference means that the CRC itself has the wrong bit and the data are correct.
     difference.is_power_of_two()
 }
 
-/// What stands in the first word of a sector that was erased, found blank and waits for `generation`.
+/// The first word of a sector that was erased, verified as blank and prepared for `generation`.
 ///
-/// Each generation has its own mark. So the mark of a sector's earlier life, should it
-/// outlive an erase that was cut, is not taken for a promise about what that erase left. A CRC, because the
-/// marks of neighbouring generations must differ in many bits.
+/// Each generation has its own mark, so an older mark that survives an interrupted erase is not valid. The mark is a CRC,
+/// because the marks of neighbouring generations must differ in many bits.
 pub(super) const fn mark(generation: u32) -> Word {
     CHECK.checksum(&generation.to_le_bytes()).to_le_bytes()
 }
@@ -152,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_bit_is_not_put_right_without_a_seal() {
+    fn a_wrong_bit_is_not_corrected_without_a_seal() {
         let mut slot = encode(3, &IMAGE);
         slot[7] = [0xFF; 4];
         assert!(decode(&slot).is_some_and(|record| !record.firm));
@@ -162,13 +160,13 @@ mod tests {
     }
 
     #[test]
-    fn blank_and_zeroed_slots_hold_nothing() {
+    fn blank_and_zeroed_slots_hold_no_record() {
         assert_eq!(decode(&BLANK), None);
         assert_eq!(decode(&[[0; 4]; 8]), None);
     }
 
     #[test]
-    fn runs_of_ones_and_zeros_as_erases_leave_them_hold_nothing() {
+    fn runs_of_ones_and_zeros_left_by_an_erase_hold_no_record() {
         let step = if cfg!(miri) { 32 } else { 1 };
         let ends = (0..=256).step_by(step);
         for (from, to) in ends.clone().flat_map(|from| ends.clone().map(move |to| (from, to))) {

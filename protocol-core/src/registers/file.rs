@@ -1,8 +1,8 @@
-//! The current value of every register, and the rules by which a host changes them.
+//! The current value of every register, and the rules for writes of a host.
 //!
-//! A write is checked completely, then applied completely (D15 to D17): [`RegisterFile::check`] hands out
-//! an [`Accepted`] write, which the arm may look into before it lets [`RegisterFile::apply`] carry it out.
-//! Knows nothing of frames or of what a value does.
+//! A write is checked completely, then applied completely (D15 to D17). [`RegisterFile::check`] returns an [`Accepted`]
+//! write, which the arm can inspect before [`RegisterFile::apply`]. This file does not know frames or the effect of a
+//! value.
 
 use super::map::{CHIP_ID, EEPROM_LOCK, MAP};
 use super::spec::{Access, Range, Region, Register};
@@ -14,11 +14,11 @@ const EEPROM_END: u8 = eeprom_bounds().1;
 /// Address behind the last register that a host can write.
 const WRITABLE_END: usize = writable_end();
 
-/// The rules of every address that can be written, unfolded from the table when it is compiled, so that
-/// the chip carries two bytes a register and none of the table's prose.
+/// The rules of all addresses that can be written, generated from the table at compile time. The image holds two bytes
+/// per register and none of the table's text.
 static RULES: [Rule; WRITABLE_END] = rules();
 
-/// The EEPROM region, byte by byte: what has to survive a power cut.
+/// The bytes of the EEPROM region, which survive a power cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Image(pub [u8; Image::LENGTH]);
@@ -28,27 +28,26 @@ impl Image {
     pub const LENGTH: usize = (EEPROM_END - EEPROM_START) as usize;
 }
 
-/// Why a write frame has no effect: one of its bytes is not a value of its register (D16).
+/// The reason why a write has no effect: a byte is outside the range of its register (D16).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OutOfRange {
     /// The first such register.
     pub address: u8,
-    /// The byte that was meant for it.
+    /// The byte for that register.
     pub value: u8,
 }
 
 /// A write that was checked and may be applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Accepted<'a> {
-    /// Where the write begins, less what comes before the EEPROM region, or before its end while that is locked.
+    /// The first address of the write that can have an effect: from the EEPROM region on, or from its end while locked.
     start: u8,
     values: &'a [u8],
 }
 
 impl Accepted<'_> {
-    /// The value this write gives to the register at `address`; `None` where it leaves it alone, because
-    /// it does not reach there or has no effect there (D15).
+    /// The new value of the register at `address`; `None` if the write does not include it or has no effect on it (D15).
     #[must_use]
     pub fn value_at(&self, address: u8) -> Option<u8> {
         let value = self.values.get(usize::from(address.checked_sub(self.start)?))?;
@@ -63,8 +62,8 @@ pub struct RegisterFile {
 }
 
 impl RegisterFile {
-    /// Registers as they stand after power-up: defaults, the chip's number (most significant byte first)
-    /// and the stored settings. A stored value that is out of range counts as its default (D19).
+    /// The registers after power-up: defaults, the chip id (most significant byte first) and the stored settings. A
+    /// stored value that is out of range is replaced by the default (D19).
     #[must_use]
     pub fn new(chip_id: [u8; CHIP_ID.count as usize], stored: Option<&Image>) -> Self {
         let mut file = Self { values: DEFAULTS };
@@ -84,18 +83,18 @@ impl RegisterFile {
     /// The value of the register at `address`.
     #[must_use]
     pub fn get(&self, address: u8) -> u8 {
-        // A byte cannot index past 256 values: the compiler drops the other arm.
+        // A byte always indexes one of 256 values, so the compiler removes the default.
         self.values.get(usize::from(address)).copied().unwrap_or(0)
     }
 
-    /// Gives a register a value from the arm's own side, where no rule holds.
+    /// Sets a register from the arm's side, without any rule.
     pub fn set(&mut self, address: u8, value: u8) {
         if let Some(slot) = self.values.get_mut(usize::from(address)) {
             *slot = value;
         }
     }
 
-    /// Adds one to a counter of two bytes, low byte first; it wraps.
+    /// Increments a counter of two bytes, low byte first. The counter wraps.
     pub fn increment(&mut self, counter: &Register) {
         let low = self.get(counter.address).wrapping_add(1);
         self.set(counter.address, low);
@@ -105,18 +104,18 @@ impl RegisterFile {
         }
     }
 
-    /// The values of `count` registers from `address` on; nothing where the range reaches past 255, which
-    /// no well-formed frame does (D2).
+    /// The values of `count` registers from `address` on; empty if the range ends beyond address 255, which the frame parser
+    /// rejects (D2).
     #[must_use]
     pub fn read(&self, address: u8, count: u8) -> &[u8] {
         let start = usize::from(address);
         self.values.get(start..start + usize::from(count)).unwrap_or(&[])
     }
 
-    /// Checks a write from the host without carrying it out.
+    /// Checks a write from the host without applying it.
     ///
     /// # Errors
-    /// The first byte that falls on a register which could be written now but does not take that value.
+    /// The first byte that is outside the range of a register that can be written now.
     pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, OutOfRange> {
         let is_locked = self.get(EEPROM_LOCK.address) != 0;
         let start = address.max(if is_locked { EEPROM_END } else { EEPROM_START });
@@ -129,7 +128,7 @@ impl RegisterFile {
         Ok(Accepted { start, values })
     }
 
-    /// Carries out a write that was checked.
+    /// Applies a checked write.
     pub fn apply(&mut self, accepted: &Accepted<'_>) {
         let slots = self.values.get_mut(usize::from(accepted.start)..).unwrap_or(&mut []);
         for ((rule, slot), &value) in rules_from(accepted.start).iter().zip(slots).zip(accepted.values) {
@@ -139,7 +138,7 @@ impl RegisterFile {
         }
     }
 
-    /// The EEPROM region as it is now: what has to be saved.
+    /// The present values of the EEPROM region.
     #[must_use]
     pub fn image(&self) -> Image {
         let mut image = Image([0; Image::LENGTH]);
@@ -162,10 +161,10 @@ fn rules_from(start: u8) -> &'static [Rule] {
     RULES.get(usize::from(start)..).unwrap_or(&[])
 }
 
-/// What the chip has to know of a register to check a write.
+/// The rule for a write to one register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Rule {
-    /// The bits of a value that count towards its magnitude. Without any, a write has no effect.
+    /// The bits of the magnitude. If the mask is 0, a write has no effect.
     mask: u8,
     max: u8,
 }
@@ -185,13 +184,13 @@ impl Rule {
         self.mask != 0
     }
 
-    /// Any value is allowed where it has no effect.
+    /// Returns whether the value is in range. A register without effect allows any value.
     const fn allows(&self, value: u8) -> bool {
         value & self.mask <= self.max
     }
 }
 
-// What follows runs in the compiler, and in a test: an index out of bounds there is a build error, not a panic.
+// The functions below run at compile time and in a test. An index out of bounds is a build error, not a panic.
 
 const fn writable_end() -> usize {
     let mut end = 0;
@@ -280,21 +279,21 @@ mod tests {
         assert_eq!(file.read(61, 179), [0; 179]);
     }
 
-    /// What the compiler unfolded is what comes out here and now, where it can be counted and broken.
+    /// Runs the compile-time functions at run time, so that coverage and mutation tests see them.
     #[test]
-    fn the_table_unfolds_to_rules_and_defaults() {
+    fn the_rules_and_defaults_follow_from_the_table() {
         assert_eq!((writable_end(), eeprom_bounds()), (54, (8, 28)));
         let rules = rules();
         assert_eq!(rules.as_slice(), RULES.as_slice());
         assert_eq!(defaults(), DEFAULTS);
         let rule = |mask, max| Rule { mask, max };
-        assert_eq!(rules[..9], [Rule::CLOSED; 9], "ROM, and what the maker keeps free");
+        assert_eq!(rules[..9], [Rule::CLOSED; 9], "ROM and reserved registers");
         assert_eq!(rules[12..14], [rule(0xFF, 7), rule(0x7F, 16)]);
         assert_eq!(rules[28..30], [rule(0xFF, 1), rule(0xFF, 2)]);
     }
 
     #[test]
-    fn stored_values_out_of_range_count_as_their_defaults() {
+    fn stored_values_out_of_range_are_replaced_by_their_defaults() {
         let mut stored = Image([0xFF; Image::LENGTH]);
         stored.0[usize::from(DEVICE_ID.address) - usize::from(EEPROM_START)] = 42;
         stored.0[usize::from(OFFSET.address) - usize::from(EEPROM_START)] = 0x90;
@@ -306,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_saved_is_what_is_loaded() {
+    fn a_saved_image_is_loaded_unchanged() {
         let mut file = fresh();
         write(&mut file, EEPROM_LOCK.address, &[0]).unwrap();
         write(&mut file, DEVICE_ID.address, &[9, 3, 0x8A]).unwrap();
@@ -315,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn an_accepted_write_says_what_it_will_do() {
+    fn an_accepted_write_reports_its_effect() {
         let mut file = fresh();
         let locked = file.check(DEVICE_ID.address, &[5, 99, 99]).unwrap();
         assert_eq!(locked.value_at(DEVICE_ID.address), None, "EEPROM is locked (D15)");
@@ -330,7 +329,7 @@ mod tests {
         assert_eq!(
             file.first_changed_setting(&open),
             None,
-            "writing what is there costs no flash wear (D19)"
+            "writing unchanged settings causes no flash wear (D19)"
         );
     }
 

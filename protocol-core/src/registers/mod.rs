@@ -1,16 +1,16 @@
-//! What the arm can be asked and told: 256 registers of one byte (docs/protocol.md, section 2).
+//! The registers of the arm: 256 registers of one byte (docs/protocol.md, section 2).
 //!
 //! ```text
-//!  spec   the words a row is written in            (no addresses)
+//!  spec   the types of a row                       (no addresses)
 //!    ▼
-//!  map    THE TABLE: one row a register            (no values)
+//!  map    THE TABLE: one row per register          (no values)
 //!    ▼
-//!  file   the current values, and who may change   (no wire, no motion)
-//!         which of them when
+//!  file   the current values, and the rules of     (no wire, no motion)
+//!         a write
 //! ```
 //!
 //! The register file, the journal's contents, the simulator's trace, the host tools and
-//! `docs/registers.md` all read the one table.
+//! `docs/registers.md` all use this one table.
 
 pub mod file;
 pub mod map;

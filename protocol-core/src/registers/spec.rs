@@ -1,6 +1,6 @@
-//! The words the register table is written in, and the checks it has to pass before it compiles.
+//! The types of the register table, and its checks at compile time.
 //!
-//! Knows no address. A later revision of the arm is a second table in the same words.
+//! This file does not know any address. A later revision of the arm is a second table of the same types.
 
 /// Number of joints, and of servos on the bus.
 pub const JOINTS: usize = 7;
@@ -45,25 +45,25 @@ impl Joint {
     }
 }
 
-/// Where a register's value lives, and so what it survives.
+/// The memory region of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Region {
-    /// Fixed for this chip and firmware.
+    /// Constant for this chip and firmware.
     Rom,
-    /// Kept over power cuts; written only while the EEPROM lock is open.
+    /// Survives power cuts; can be written only while the EEPROM lock is open.
     Eeprom,
-    /// Starts from its default at every power-up.
+    /// Has its default after every power-up.
     Ram,
 }
 
-/// What a host may do with a register.
+/// The access of a host to a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Answers reads; a write has no effect.
+    /// Can be read; a write has no effect.
     ReadOnly,
-    /// Answers reads and takes writes.
+    /// Can be read and written.
     ReadWrite,
-    /// Kept free by the maker: reads 0; a write has no effect.
+    /// Reserved by the maker: reads 0; a write has no effect.
     Reserved,
 }
 
@@ -78,7 +78,7 @@ pub enum Unit {
     SpeedStep,
     /// Tenths of a second.
     Decisecond,
-    /// Times a second.
+    /// Hertz.
     Hertz,
     /// Tenths of a volt.
     Decivolt,
@@ -89,7 +89,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// How the unit is written behind a number; empty for [`Unit::None`].
+    /// The symbol of the unit; empty for [`Unit::None`].
     #[must_use]
     pub const fn symbol(self) -> &'static str {
         match self {
@@ -105,7 +105,7 @@ impl Unit {
     }
 }
 
-/// The values a register takes.
+/// The valid values of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Range {
     /// Every byte up to and including this one.
@@ -118,7 +118,7 @@ pub enum Range {
 const SIGN: u8 = 0x80;
 
 impl Range {
-    /// Is `byte` a value of this range?
+    /// Is `byte` in this range?
     #[must_use]
     pub const fn contains(self, byte: u8) -> bool {
         match self {
@@ -127,7 +127,7 @@ impl Range {
         }
     }
 
-    /// The number a byte stands for: 0x85 of a signed range is -5.
+    /// Decodes a byte: 0x85 of a signed range is -5.
     #[must_use]
     pub const fn decode(self, byte: u8) -> i16 {
         // `as` widens here: `From` is not const.
@@ -137,7 +137,7 @@ impl Range {
         }
     }
 
-    /// The byte that stands for a number; `None` where the range does not hold it.
+    /// Encodes a number; `None` if it is outside the range.
     #[must_use]
     pub const fn encode(self, number: i16) -> Option<u8> {
         let magnitude = number.unsigned_abs();
@@ -166,9 +166,9 @@ impl Range {
 /// bytes of one longer value).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
-    /// The row's name, in the spelling of the code: `TARGET_POSITION`.
+    /// The name of the constant: `TARGET_POSITION`.
     pub name: &'static str,
-    /// What it is for: the row's doc comment, one line a string.
+    /// The doc comment of the row, one string per line.
     pub doc: &'static [&'static str],
     /// Address of the first register of the run.
     pub address: u8,
@@ -176,15 +176,15 @@ pub struct Register {
     pub count: u8,
     /// Is the run one register per joint?
     pub per_joint: bool,
-    /// Where the value lives.
+    /// The memory region.
     pub region: Region,
-    /// What a host may do with it.
+    /// The access of a host.
     pub access: Access,
-    /// What it takes.
+    /// The valid values.
     pub range: Range,
-    /// The value at power-up, or, in EEPROM, of a new arm; one a joint in a per-joint row.
+    /// The values after power-up or, in EEPROM, of a new arm. A per-joint row has one for each joint.
     pub defaults: [u8; JOINTS],
-    /// The unit of its value.
+    /// The unit of the value.
     pub unit: Unit,
 }
 
@@ -219,62 +219,62 @@ pub(crate) const fn ram(address: u8) -> Register {
 }
 
 impl Register {
-    /// One register per joint.
+    /// Makes the row a run of one register per joint.
     pub(crate) const fn each_joint(mut self) -> Self {
         self.count = 7;
         self.per_joint = true;
         self
     }
 
-    /// A run of `count` registers.
+    /// Makes the row a run of `count` registers.
     pub(crate) const fn run(mut self, count: u8) -> Self {
         self.count = count;
         self
     }
 
-    /// A host can read it only.
+    /// Makes the row read only.
     pub(crate) const fn read_only(mut self) -> Self {
         self.access = Access::ReadOnly;
         self
     }
 
-    /// Kept free by the maker.
+    /// Marks the row as reserved.
     pub(crate) const fn reserved(mut self) -> Self {
         self.access = Access::Reserved;
         self
     }
 
-    /// Takes 0 to `max`.
+    /// Sets the range 0 to `max`.
     pub(crate) const fn up_to(mut self, max: u8) -> Self {
         self.range = Range::UpTo(max);
         self
     }
 
-    /// Takes -`max` to `max`, as sign and magnitude.
+    /// Sets the range -`max` to `max`, as sign and magnitude.
     pub(crate) const fn plus_minus(mut self, max: u8) -> Self {
         self.range = Range::SignMagnitude(max);
         self
     }
 
-    /// Starts as `value`.
+    /// Sets the default.
     pub(crate) const fn default(mut self, value: u8) -> Self {
         self.defaults = [value; JOINTS];
         self
     }
 
-    /// Starts as these values, joint 1 first.
+    /// Sets the default of each joint, joint 1 first.
     pub(crate) const fn default_each(mut self, values: [u8; JOINTS]) -> Self {
         self.defaults = values;
         self
     }
 
-    /// Counts in `unit`.
+    /// Sets the unit.
     pub(crate) const fn unit(mut self, unit: Unit) -> Self {
         self.unit = unit;
         self
     }
 
-    /// The row's own name and doc comment; the table's macro fills them in.
+    /// Sets the name and the doc comment. The macro of the table calls it.
     pub(crate) const fn described(mut self, name: &'static str, doc: &'static [&'static str]) -> Self {
         self.name = name;
         self.doc = doc;
@@ -310,8 +310,8 @@ impl Register {
     }
 }
 
-/// Is the table in ascending order, ROM before EEPROM before RAM, without overlap, inside the address space,
-/// per-joint rows seven long, and every default a value of its row's range? Checked when the table is compiled.
+/// Checks a table at compile time: ascending addresses, ROM before EEPROM before RAM, no overlap, all addresses below
+/// 256, seven registers in each per-joint row, and every default within its range.
 #[must_use]
 pub const fn well_formed(map: &[Register]) -> bool {
     let mut rest = map;
@@ -392,7 +392,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_knows_its_addresses() {
+    fn a_row_holds_its_addresses() {
         let row = ram(46).each_joint().default_each([1, 2, 3, 4, 5, 6, 7]);
         assert!(row.holds(46) && row.holds(52) && !row.holds(45) && !row.holds(53));
         assert_eq!(row.joint_at(48), Joint::new(3));
@@ -403,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_is_what_it_was_said_to_be() {
+    fn a_row_has_the_properties_that_were_set() {
         let row = rom(2).run(6).described("CHIP_ID", &["Which chip."]);
         assert_eq!(
             (row.region, row.access, row.count, row.name),
@@ -419,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn units_are_written_as_people_write_them() {
+    fn units_have_their_usual_symbols() {
         let symbols = [Unit::None, Unit::SpeedStep, Unit::Decisecond, Unit::Hertz].map(Unit::symbol);
         assert_eq!(symbols, ["", "× 1.9 °/s", "× 100 ms", "Hz"]);
         let symbols = [Unit::Decivolt, Unit::Celsius, Unit::VersionTenths].map(Unit::symbol);

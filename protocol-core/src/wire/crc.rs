@@ -1,40 +1,39 @@
-//! CRC-16/MODBUS (reflected polynomial 0x8005, start 0xFFFF, no final xor), four bytes at a step, no table.
+//! CRC-16/MODBUS (reflected polynomial 0x8005, start 0xFFFF, no final xor), four bytes per step, without a table.
 //!
-//! The polynomial is (x + 1)(x^15 + x + 1), and each factor is easy on its own:
+//! The polynomial is (x + 1)(x^15 + x + 1). Each factor is cheap to reduce by:
 //!
-//! * modulo `x + 1` the remainder is the parity of all message bits: one exclusive-or a word;
-//! * modulo `x^15 + x + 1`, x^32 is `x^4 + x^2`: a word that leaves comes back by two shifts, and nobody looks at a
-//!   single bit.
+//! * Modulo `x + 1` the remainder is the parity of all message bits: one exclusive-or per word.
+//! * Modulo `x^15 + x + 1`, x^32 is `x^4 + x^2`: reducing a word takes two shifts and no loop over bits.
 //!
-//! In the end the remainder shrinks to 16 bits where 15 would do, and the parity says which of the two numbers that
-//! they stand for is the CRC. The unit test holds this against the `crc` crate.
+//! The remainder modulo `x^15 + x + 1` leaves two candidates for the CRC. Parity selects the CRC from the two.
+//! The unit tests compare the result with the `crc` crate.
 
 /// `x^15 + x + 1` in reflected notation of 16 bits: the lowest is x^15.
 const FACTOR: u32 = 0xC001;
 
-/// The checksum of `bytes`, as it goes on the wire: low byte first.
+/// The CRC of `bytes`. On the wire its low byte comes first.
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> u16 {
     Crc::START.bytes(bytes).finish()
 }
 
-/// A running checksum.
+/// A CRC in progress.
 #[derive(Clone, Copy)]
 pub(super) struct Crc {
     /// The message so far modulo `x^15 + x + 1`, in reflected notation: bit 0 is x^31.
     sum: u32,
-    /// Has the parity of all message bits so far.
+    /// A word with the parity of all message bits so far.
     parity: u32,
 }
 
 impl Crc {
-    /// Of no bytes: times x^16 this is the start value, 0xFFFF, which is of even parity.
+    /// The state before the first byte: times x^16 it is the start value 0xFFFF, which has even parity.
     pub(super) const START: Self = Self { sum: 0xD556_0000, parity: 0 };
 
-    /// With these bytes behind those before.
+    /// Appends bytes.
     #[inline(never)]
     pub(super) fn bytes(self, bytes: &[u8]) -> Self {
-        // By two words, which halves what the loop itself costs.
+        // Two words per iteration halve the cost of the loop itself.
         let (pairs, rest) = bytes.as_chunks();
         let crc = pairs
             .iter()
@@ -46,34 +45,34 @@ impl Crc {
         rest.iter().fold(crc, |crc, &byte| crc.byte(byte))
     }
 
-    /// With four more bytes.
+    /// Appends four bytes.
     pub(super) const fn word(self, bytes: [u8; 4]) -> Self {
         self.step(u32::from_le_bytes(bytes), 32)
     }
 
-    /// With two more bytes.
+    /// Appends two bytes.
     pub(super) const fn half(self, bytes: [u8; 2]) -> Self {
         self.step(u16::from_le_bytes(bytes) as u32, 16)
     }
 
-    /// With one more byte.
+    /// Appends one byte.
     pub(super) const fn byte(self, byte: u8) -> Self {
         self.step(byte as u32, 8)
     }
 
-    /// With so many more bits, which stand at the lower end of `data`.
+    /// Appends the lowest `bits` bits of `data`.
     #[inline(always)]
     const fn step(self, data: u32, bits: u32) -> Self {
-        // What goes above x^31 comes back by two shifts, and the few bits that they lift above it once more.
+        // Two shifts reduce the bits above x^31. The few bits that overflow by these shifts are reduced once more.
         let leaving = self.sum << (32 - bits);
         let leaving = leaving ^ leaving << 30 ^ leaving << 28;
         let staying = if bits < 32 { self.sum >> bits } else { 0 };
         Self { sum: staying ^ data << (32 - bits) ^ leaving >> 2 ^ leaving >> 4, parity: self.parity ^ data }
     }
 
-    /// The checksum of what it was given.
+    /// The CRC of all bytes appended.
     pub(super) const fn finish(self) -> u16 {
-        // Times x^16, which is x^2 + x, `high * x^16 + low` reaches x^19, here in bit 0.
+        // Multiplied by x^16 = x^2 + x, `high * x^16 + low` reaches x^19, which is bit 0 here.
         let high = self.sum & 0xFFFF;
         let low = self.sum >> 16;
         let sum = high ^ high << 2 ^ low << 2 ^ low << 3;
@@ -93,7 +92,7 @@ mod tests {
     const REFERENCE: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
 
     #[test]
-    fn the_check_value_is_right() {
+    fn the_check_value_is_correct() {
         assert_eq!(checksum(b"123456789"), 0x4B37);
         assert_eq!(checksum(b""), 0xFFFF);
     }
@@ -110,7 +109,7 @@ mod tests {
 
     #[test]
     fn every_single_bit_of_a_longest_frame_agrees_with_the_crc_crate() {
-        // The CRC is affine: together with the zero message this fixes it for every message of the length.
+        // The CRC is affine, so these messages and the zero message prove it for every message of the length.
         for length in [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 260] {
             let mut message = vec![0; length];
             assert_eq!(checksum(&message), REFERENCE.checksum(&message));

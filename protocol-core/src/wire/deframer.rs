@@ -1,26 +1,26 @@
-//! Pieces of a stream in, whole frames out: loses its place in the stream and finds it again (D3, D4).
+//! Splits a stream of bytes into frames, and re-synchronises after damage (D3, D4).
 //!
 //! ```text
-//!      done with      the head: first byte that
+//!      finished       the head: first byte that
 //!                     may begin a frame
 //!   ┌───────────────┬──────────────────────────────────────────────┐
 //!   │ . . . . . . . │ AA 77 06 10 FF  ..  AA 77 03 36 07 81 CE  .. │ ◀── push
 //!   └───────────────┴──────────────────────────────────────────────┘
-//!                     ╰─ unfinished: claims   ╰─ whole: comes out once the line
-//!                        262 bytes               has been silent for the gap
+//!                     ╰─ incomplete: claims   ╰─ complete: comes out once the
+//!                        262 bytes               line was silent for the gap
 //! ```
 //!
-//! * A frame at the head comes out as soon as its last byte is there.
-//! * Behind a head that turns out not to be a frame, the search goes on with the very next byte.
-//! * Behind an unfinished head, whole frames come out after a short silence (the gap), and the head goes
-//!   on waiting; after a long one ([`ABANDON_AFTER`]) it is given up. So a false header in noise holds up
-//!   nothing for longer than the gap, and a sender that pauses inside a frame loses nothing.
-//! * A frame whose last byte could be the first of a header lends it to the next one: a frame that lost
-//!   its own last byte and was completed by the next frame's first does not take that frame with it.
+//! * A frame at the head comes out as soon as its last byte is in the buffer.
+//! * If the head is not a frame, the search continues with the next byte.
+//! * Behind an incomplete head, complete frames come out after a short silence (the gap), while the head keeps
+//!   waiting. After the timeout ([`ABANDON_AFTER`]) the head is abandoned. So a false header in noise delays
+//!   frames by the gap at most, and a sender that pauses inside a frame loses nothing.
+//! * If the last bytes of a frame could begin a header, the next frame may begin with them. A frame may have lost its
+//!   own last byte and be completed by the first byte of the next frame; this rule keeps that next frame.
 //!
-//! Silence has to be seen. Bytes that wait outside (in a driver's queue, in the kernel) came at a time
-//! nobody knows, so only an empty [`Deframer::push`], which says that nothing waits, lets time pass here. A
-//! shell that was held up for a second therefore never mistakes its own pause for the sender's.
+//! Only an empty [`Deframer::push`] counts as silence: it states that no byte waits in a driver or in the kernel. The
+//! arrival time of bytes that waited is unknown. So a shell that was delayed for a second does not mistake its own
+//! delay for a pause of the sender.
 
 use core::marker::PhantomData;
 
@@ -28,20 +28,20 @@ use super::frame::{Defect, Direction, Frame, MAX_LENGTH};
 use super::search::Search;
 use crate::time::{Duration, Instant};
 
-/// The shortest gap that lets whole frames pass an unfinished one (D4).
+/// The shortest gap (D4).
 const SHORTEST_GAP: Duration = Duration::from_millis(2);
-/// Silence after which an unfinished frame is given up (D4).
+/// Timeout after which an incomplete frame is abandoned (D4).
 pub const ABANDON_AFTER: Duration = Duration::from_millis(100);
 
-/// The silence after which whole frames may pass an unfinished one: 2 ms, or three and a half characters
-/// of ten bits where those take longer (D4). `baud` is in bits per second.
+/// The silence after which complete frames may pass an incomplete one (D4). It is 2 ms, or three and a half
+/// characters of ten bits where those take longer. `baud` is in bits per second.
 #[must_use]
 pub fn gap(baud: u32) -> Duration {
     let characters = 35_000_000_u32.checked_div(baud).unwrap_or(u32::MAX);
     SHORTEST_GAP.max(Duration::from_micros(u64::from(characters)))
 }
 
-/// Finds the frames that go in direction `D` in a stream of bytes.
+/// Finds the frames of direction `D` in a stream of bytes.
 #[derive(Clone, Debug)]
 pub struct Deframer<D> {
     buffer: heapless::Vec<u8, MAX_LENGTH>,
@@ -52,7 +52,7 @@ pub struct Deframer<D> {
 }
 
 impl<D: Direction> Deframer<D> {
-    /// A deframer that has seen nothing yet. `gap` is the silence of [`gap()`].
+    /// A deframer with an empty buffer. `gap` comes from [`gap()`].
     #[must_use]
     pub const fn new(gap: Duration) -> Self {
         Self {
@@ -64,20 +64,20 @@ impl<D: Direction> Deframer<D> {
         }
     }
 
-    /// Takes bytes that came since the last call, and says how many; the rest has to be offered again
-    /// after [`Deframer::pull`] has made room, or, behind a long silence, has looked at what came before it.
-    /// An empty slice says that the line is silent as of `now`: nothing came and nothing waits anywhere.
+    /// Takes bytes that came since the last call, and returns how many. Offer the rest again after
+    /// [`Deframer::pull`] has made room. After a timeout it takes nothing until `pull` has passed the bytes before it.
+    /// An empty slice states that the line is silent at `now` and that no byte waits anywhere.
     pub fn push(&mut self, now: Instant, bytes: &[u8]) -> usize {
         if bytes.is_empty() {
             self.note_silence(now);
             return 0;
         }
         self.last_byte = now;
-        if self.search.is_cut() {
-            // There is one mark for a long silence, and nobody has looked at what came before it yet.
+        if self.search.has_pending_timeout() {
+            // Only one timeout can be recorded; pull first.
             return 0;
         }
-        if self.search.done() == self.buffer.len() {
+        if self.search.finished() == self.buffer.len() {
             self.buffer.clear();
             self.search = Search::START;
         } else if self.buffer.len() + bytes.len() > MAX_LENGTH {
@@ -85,7 +85,7 @@ impl<D: Direction> Deframer<D> {
         }
         let room = MAX_LENGTH - self.buffer.len();
         let taken = bytes.get(..room).unwrap_or(bytes);
-        // Pieces are short: words in line cost less than a call to copy them. None can fail: they were cut to fit.
+        // Pieces are short, so copying words inline is cheaper than a call. No copy can fail: `taken` fits the room.
         let (words, rest) = taken.as_chunks::<4>();
         for word in words {
             let _ = self.buffer.extend_from_slice(word);
@@ -96,27 +96,26 @@ impl<D: Direction> Deframer<D> {
         taken.len()
     }
 
-    /// The next frame, or the next thing that looked like one and was not; `None` once there is nothing
-    /// more to say about the bytes so far. Call it until then.
+    /// The next frame or defect; `None` once the bytes so far hold no more. Call it until then.
     pub fn pull(&mut self) -> Option<Result<Frame<'_>, Defect>> {
         self.search.next::<D>(&self.buffer)
     }
 
-    /// When silence on the line would change something: the shell should look at the line by then.
-    /// `None` if no silence, however long, would.
+    /// When continued silence would have an effect. The shell has to check the line by then. `None` if silence has no
+    /// effect.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
         let end = self.buffer.len();
-        if self.search.done() >= end {
+        if self.search.finished() >= end {
             None
-        } else if self.search.is_quiet(end) {
+        } else if self.search.has_gap_at(end) {
             Some(self.last_byte + ABANDON_AFTER)
         } else {
             Some(self.last_byte + self.gap)
         }
     }
 
-    /// How many more bytes have to come before there is anything new to pull, unless the line falls silent.
+    /// How many more bytes are needed before there is something to pull, unless the line becomes silent.
     #[must_use]
     pub fn wanted(&self) -> usize {
         self.search.wanted().saturating_sub(self.buffer.len())
@@ -128,22 +127,22 @@ impl<D: Direction> Deframer<D> {
             self.search.note_gap(self.buffer.len());
         }
         if silence >= ABANDON_AFTER {
-            self.search.note_cut(self.buffer.len());
+            self.search.note_timeout(self.buffer.len());
         }
     }
 
-    /// Moves the bytes that still count to the front of the buffer.
+    /// Moves the unfinished bytes to the front of the buffer.
     fn discard(&mut self) {
-        let done = self.search.done();
-        let left = self.buffer.len().saturating_sub(done);
+        let finished = self.search.finished();
+        let left = self.buffer.len().saturating_sub(finished);
         for to in 0..left {
-            if let Some(&byte) = self.buffer.get(done + to)
+            if let Some(&byte) = self.buffer.get(finished + to)
                 && let Some(slot) = self.buffer.get_mut(to)
             {
                 *slot = byte;
             }
         }
         self.buffer.truncate(left);
-        self.search.forget(done);
+        self.search.forget(finished);
     }
 }

@@ -1,9 +1,8 @@
 //! One frame: its layout, its parser, its encoder.
 //!
-//! Knows nothing of streams (the deframer's work) or of what a frame asks for.
+//! This file does not know streams, which are the deframer's work, or the meaning of a request.
 
 use nom::bytes::streaming::take;
-use nom::error::{ErrorKind, ParseError};
 use nom::{IResult, Needed};
 
 use super::crc::Crc;
@@ -15,21 +14,21 @@ pub const PREFIX_LENGTH: usize = 5;
 /// Bytes of the checksum.
 pub const CRC_LENGTH: usize = 2;
 /// The shortest frame: one without data.
-pub(super) const MIN_LENGTH: usize = PREFIX_LENGTH + CRC_LENGTH;
+pub const MIN_LENGTH: usize = PREFIX_LENGTH + CRC_LENGTH;
 /// The longest frame: 255 bytes of data in their envelope (D1).
 pub const MAX_LENGTH: usize = PREFIX_LENGTH + 255 + CRC_LENGTH;
 
-/// A frame as it goes on the line.
+/// An encoded frame.
 pub type FrameBuffer = heapless::Vec<u8, MAX_LENGTH>;
 
-/// What a frame is about.
+/// The function code of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Function {
-    /// 03: read registers, and the answer to it.
+    /// 03: a read request, or the reply to one.
     Read = 0x03,
-    /// 06: write registers; there is no answer (D6).
+    /// 06: a write request; it has no reply (D6).
     Write = 0x06,
 }
 
@@ -43,17 +42,17 @@ impl Function {
     }
 }
 
-/// Which way frames travel: it decides whether a read carries data.
+/// The direction of a frame. It decides whether a read carries data.
 pub trait Direction {
     /// Number of data bytes in a frame of this function and count.
     fn data_length(function: Function, count: u8) -> usize;
 }
 
-/// From the host to the arm: a read only asks.
+/// From the host to the arm: a read is a request without data.
 #[derive(Clone, Copy, Debug)]
 pub enum ToArm {}
 
-/// From the arm to the host: a read brings the values.
+/// From the arm to the host: a read is a reply that carries the values.
 #[derive(Clone, Copy, Debug)]
 pub enum ToHost {}
 
@@ -72,142 +71,124 @@ impl Direction for ToHost {
     }
 }
 
-/// A whole frame with a right checksum and a range inside the address space.
+/// A complete frame with a correct CRC and a range inside the address space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Frame<'a> {
-    /// What it is about.
+    /// Read or write.
     pub function: Function,
     /// The first register.
     pub address: u8,
     /// How many registers.
     pub count: u8,
-    /// Their values; empty in a read request.
+    /// Values of the registers; empty in a read request.
     pub data: &'a [u8],
 }
 
-/// What is wrong with a stretch of bytes that begins like a frame.
+/// Why a frame of full length is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Defect {
-    /// No header here, or a function this protocol does not know: not the beginning of a frame.
-    NoFrame,
-    /// The checksum is not that of the bytes before it.
+    /// The CRC does not match the bytes before it.
     WrongCrc,
-    /// The checksum is right, but the registers reach past address 255 (D2).
+    /// The CRC is correct, but the range ends beyond address 255 (D2).
     MalformedRange {
-        /// The first register asked for.
+        /// The first register of the range.
         address: u8,
     },
 }
 
-impl<I> ParseError<I> for Defect {
-    fn from_error_kind(_: I, _: ErrorKind) -> Self {
-        Self::NoFrame
-    }
-
-    fn append(_: I, _: ErrorKind, other: Self) -> Self {
-        other
-    }
+/// What [`parse`] finds at the beginning of its input. Lengths count bytes from there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParseOutcome<'a> {
+    /// A frame and its length.
+    Complete(Frame<'a>, usize),
+    /// A rejected frame and its length.
+    Defective(Defect, usize),
+    /// The beginning of a frame, and the least length that the frame can have.
+    Incomplete(usize),
+    /// No header, or an unknown function code.
+    NotAFrame,
 }
 
-/// What stands between the header and the data.
+/// Function, address and count.
 type Prefix = (Function, u8, u8);
 
-/// Function, address and count of the frame at the beginning of `input`.
+/// Parses the prefix of a frame.
 #[inline(always)]
-fn prefix(input: &[u8]) -> IResult<&[u8], Prefix, Defect> {
+fn prefix(input: &[u8]) -> IResult<&[u8], Prefix, ()> {
     match input {
         [first, second, code, address, count, rest @ ..] if [*first, *second] == HEADER => {
-            let function = Function::from_code(*code).ok_or(nom::Err::Error(Defect::NoFrame))?;
+            let function = Function::from_code(*code).ok_or(nom::Err::Error(()))?;
             Ok((rest, (function, *address, *count)))
         }
-        [_, _, _, _, _, ..] => Err(nom::Err::Error(Defect::NoFrame)),
+        [_, _, _, _, _, ..] => Err(nom::Err::Error(())),
         short if may_begin(short) => Err(nom::Err::Incomplete(Needed::new(PREFIX_LENGTH - short.len()))),
-        _ => Err(nom::Err::Error(Defect::NoFrame)),
+        _ => Err(nom::Err::Error(())),
     }
 }
 
-/// The checksum of a frame's first bytes.
+/// The CRC over header and prefix.
 #[inline(always)]
 fn crc_of_prefix((function, address, count): Prefix) -> Crc {
     Crc::START.word([HEADER[0], HEADER[1], function as u8, address]).byte(count)
 }
 
-/// Could these bytes, too few for a prefix, be the first of one?
+/// Returns whether these bytes, too few for a prefix, can begin a frame.
 fn may_begin(bytes: &[u8]) -> bool {
     let is_header = bytes.iter().zip(&HEADER).all(|(found, expected)| found == expected);
     is_header && bytes.get(2).is_none_or(|&code| Function::from_code(code).is_some())
 }
 
-/// The frame with this prefix, of which `rest` is what stands behind it.
+/// Parses data and CRC, and checks the frame.
 #[inline(always)]
 fn body<'a, D: Direction>(
-    rest: &'a [u8],
+    input: &'a [u8],
     (function, address, count): Prefix,
-) -> IResult<&'a [u8], Frame<'a>, Defect> {
-    let (rest, data) = take(D::data_length(function, count))(rest)?;
+) -> IResult<&'a [u8], Result<Frame<'a>, Defect>, ()> {
+    let (rest, data) = take(D::data_length(function, count))(input)?;
     let (rest, crc) = take(CRC_LENGTH)(rest)?;
     let sum = crc_of_prefix((function, address, count));
     let sum = if data.is_empty() { sum } else { sum.bytes(data) };
-    if crc != sum.finish().to_le_bytes() {
-        return Err(nom::Err::Failure(Defect::WrongCrc));
-    }
-    if usize::from(address) + usize::from(count) > 256 {
-        return Err(nom::Err::Failure(Defect::MalformedRange { address }));
-    }
-    Ok((rest, Frame { function, address, count, data }))
+    let checked = if crc != sum.finish().to_le_bytes() {
+        Err(Defect::WrongCrc)
+    } else if usize::from(address) + usize::from(count) > 256 {
+        Err(Defect::MalformedRange { address })
+    } else {
+        Ok(Frame { function, address, count, data })
+    };
+    Ok((rest, checked))
 }
 
-/// The frame at the beginning of `input`, which goes in direction `D`.
+/// Parses the frame at the beginning of `input`, which goes in direction `D`.
 ///
-/// # Errors
-/// `Incomplete` while bytes are missing; otherwise the [`Defect`].
-pub fn parse<D: Direction>(input: &[u8]) -> IResult<&[u8], Frame<'_>, Defect> {
-    let (rest, prefix) = prefix(input)?;
-    body::<D>(rest, prefix)
-}
-
-/// What the beginning of a stretch of bytes is, and how long.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Verdict<'a> {
-    /// A frame of this many bytes.
-    Whole(Frame<'a>, usize),
-    /// Not a frame, though as long as this many bytes; 1 where not even the header is right.
-    Defective(Defect, usize),
-    /// The beginning of a frame, which takes at least this many bytes.
-    Unfinished(usize),
-}
-
-/// Judges the beginning of `input`.
-///
-/// In line it takes a third less, but not on the chip, where registers run out and flash is dear.
+/// On the host, inlining saves a third of the time. On the chip it spills registers and costs flash.
 #[cfg_attr(target_os = "none", inline(never))]
 #[cfg_attr(not(target_os = "none"), inline(always))]
-pub(super) fn judge<D: Direction>(input: &[u8]) -> Verdict<'_> {
-    let (claimed, parsed) = match prefix(input) {
-        Err(error) => (1, Err(error)),
+#[must_use]
+pub fn parse<D: Direction>(input: &[u8]) -> ParseOutcome<'_> {
+    let (length, parsed) = match prefix(input) {
+        Err(error) => (MIN_LENGTH, Err(error)),
         Ok((rest, prefix)) => {
-            let claimed = PREFIX_LENGTH + D::data_length(prefix.0, prefix.2) + CRC_LENGTH;
-            (claimed, body::<D>(rest, prefix))
+            let length = PREFIX_LENGTH + D::data_length(prefix.0, prefix.2) + CRC_LENGTH;
+            (length, body::<D>(rest, prefix))
         }
     };
     match parsed {
-        Ok((_, frame)) => Verdict::Whole(frame, claimed),
-        Err(nom::Err::Incomplete(_)) => Verdict::Unfinished(claimed.max(MIN_LENGTH)),
-        Err(nom::Err::Error(defect) | nom::Err::Failure(defect)) => Verdict::Defective(defect, claimed),
+        Ok((_, Ok(frame))) => ParseOutcome::Complete(frame, length),
+        Ok((_, Err(defect))) => ParseOutcome::Defective(defect, length),
+        Err(nom::Err::Incomplete(_)) => ParseOutcome::Incomplete(length),
+        Err(nom::Err::Error(()) | nom::Err::Failure(())) => ParseOutcome::NotAFrame,
     }
 }
 
-/// Writes a frame into `buffer`, over whatever was there.
-///
-/// `data` is at most 255 bytes long; what is beyond that is cut off, and no caller in this project has it.
+/// Encodes a frame into `buffer`, replacing its content. `data` is cut to 255 bytes.
 pub fn encode(buffer: &mut FrameBuffer, function: Function, address: u8, count: u8, data: &[u8]) {
     buffer.clear();
     // The buffer holds the longest frame, so nothing here can fail.
     let _ = buffer.extend_from_slice(&[HEADER[0], HEADER[1], function as u8, address]);
     let _ = buffer.push(count);
-    // Copied and summed up at once: a call that copies costs more than that.
+    // Copy and compute the CRC in one pass: a separate call to copy takes longer.
     let (words, rest) = data.get(..255).unwrap_or(data).as_chunks();
     let crc = words.iter().fold(crc_of_prefix((function, address, count)), |crc, word| {
         let _ = buffer.extend_from_slice(word);

@@ -1,17 +1,17 @@
-//! The envelope: what a frame looks like on the line, and how frames are found in a stream of bytes.
+//! The layout of a frame on the line, and the search for frames in a stream of bytes.
 //!
 //! ```text
 //!     0    1    2      3     4      5 ..            5+n   6+n
 //!   ┌────┬────┬────┬──────┬───────┬───────────────┬─────┬─────┐
 //!   │ AA │ 77 │ fn │ addr │ count │ n data bytes  │ CRC │ CRC │
 //!   └────┴────┴────┴──────┴───────┴───────────────┴─────┴─────┘
-//!    header         first   how     n = 0 in a      low   high
-//!                  register many    read request,   over every byte before
-//!                                   else count
+//!    header         first   number  n = 0 in a      low   high
+//!                  register  of     read request,   over all bytes before it
+//!                         registers else count
 //! ```
 //!
-//! Function 03 is a read, 06 a write. A reply has the function, address and count of its request. Knows
-//! nothing of registers: an address here is a number.
+//! Function 03 is a read, 06 a write. A reply has the function, address and count of its request. This module does not
+//! know the registers: an address is a number here.
 
 pub mod crc;
 pub mod deframer;
@@ -19,4 +19,6 @@ pub mod frame;
 mod search;
 
 pub use deframer::Deframer;
-pub use frame::{Defect, Direction, Frame, FrameBuffer, Function, MAX_LENGTH, ToArm, ToHost};
+pub use frame::{
+    Defect, Direction, Frame, FrameBuffer, Function, MAX_LENGTH, MIN_LENGTH, ParseOutcome, ToArm, ToHost,
+};

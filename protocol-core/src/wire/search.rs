@@ -1,91 +1,96 @@
-//! Where the frames are in the bytes of a stream so far, and how far the search for them has come (D3, D4).
+//! The search for frames in the bytes of a stream, and how far it has come (D3, D4).
 //!
-//! Knows positions only: the bytes stand in the deframer's buffer, which grows at its end while the search goes on.
+//! ```text
+//!    0        head      scan_pos             gap_end          timeout_end      bytes.len()
+//!    ├──────────┼──────────┼───────────────────┼──────────────────┼────────────────┤
+//!      finished   the frame   searched once the
+//!                 at the head  line was silent
+//!                 is incomplete  up to gap_end
+//! ```
+//!
+//! This file handles positions only. The deframer owns the bytes and appends to them while the search goes on.
 
-use super::frame::{Defect, Direction, Frame, HEADER, MIN_LENGTH, Verdict, judge};
+use super::frame::{Defect, Direction, Frame, HEADER, MIN_LENGTH, ParseOutcome, parse};
 
-/// How far the search has come.
+/// The state of the search. All fields are positions in the buffer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Search {
-    /// The head: everything before it is done with.
+    /// Everything before the head is finished.
     head: usize,
-    /// Nothing new can be said before there are this many bytes.
+    /// The search has no new result before the buffer has this length.
     wanted: usize,
-    /// The line was silent for the gap when there were this many bytes.
-    quiet: usize,
-    /// The line was silent for so long that nothing goes on behind it, when there were this many bytes.
-    cut: usize,
-    /// The search behind an unfinished head goes on here.
-    behind: usize,
-    /// Whatever ends up to here was judged behind an unfinished head.
-    judged: usize,
+    /// Length of the buffer when the line was last silent for the gap.
+    gap_end: usize,
+    /// Length of the buffer at the last timeout. No frame continues across it.
+    timeout_end: usize,
+    /// Where the search behind an incomplete head continues.
+    scan_pos: usize,
+    /// The search behind an incomplete head has evaluated every frame that ends up to here.
+    evaluated_end: usize,
 }
 
-/// A frame, or something that looked like one and was not.
-pub(super) type Found<'a> = Result<Frame<'a>, Defect>;
-
 impl Search {
-    /// Nothing was seen yet.
+    /// The search in an empty buffer.
     pub(super) const START: Self =
-        Self { head: 0, wanted: MIN_LENGTH, quiet: 0, cut: 0, behind: 0, judged: 0 };
+        Self { head: 0, wanted: MIN_LENGTH, gap_end: 0, timeout_end: 0, scan_pos: 0, evaluated_end: 0 };
 
-    /// How many bytes are done with.
-    pub(super) const fn done(&self) -> usize {
+    /// How many bytes are finished.
+    pub(super) const fn finished(&self) -> usize {
         self.head
     }
 
-    /// How many bytes there have to be before anything new can be said.
+    /// How many bytes the buffer needs before there is a new result.
     pub(super) const fn wanted(&self) -> usize {
         self.wanted
     }
 
-    /// Is there a long silence that nobody has looked behind yet?
-    pub(super) const fn is_cut(&self) -> bool {
-        self.head < self.cut
+    /// Is there a timeout that the search has not passed yet?
+    pub(super) const fn has_pending_timeout(&self) -> bool {
+        self.head < self.timeout_end
     }
 
-    /// Was the line silent for the gap when there were `end` bytes?
-    pub(super) const fn is_quiet(&self, end: usize) -> bool {
-        self.quiet >= end
+    /// Was the line silent for the gap after `end` bytes?
+    pub(super) const fn has_gap_at(&self, end: usize) -> bool {
+        self.gap_end >= end
     }
 
-    /// Takes note that the line was silent for the gap when there were `end` bytes.
+    /// Records that the line was silent for the gap after `end` bytes.
     pub(super) const fn note_gap(&mut self, end: usize) {
-        // An unfinished search keeps its mark: a later call will note the silence again.
-        if self.quiet < end && self.judged >= self.quiet {
-            self.quiet = end;
-            self.behind = self.head;
+        // An unfinished scan keeps its end. The next call records this gap again.
+        if self.gap_end < end && self.evaluated_end >= self.gap_end {
+            self.gap_end = end;
+            self.scan_pos = self.head;
             self.wanted = 0;
         }
     }
 
-    /// Takes note that nothing goes on behind the first `end` bytes.
-    pub(super) const fn note_cut(&mut self, end: usize) {
-        if self.cut < end {
-            self.cut = end;
+    /// Records a timeout after `end` bytes.
+    pub(super) const fn note_timeout(&mut self, end: usize) {
+        if self.timeout_end < end {
+            self.timeout_end = end;
             self.wanted = 0;
         }
     }
 
-    /// The search after the first `count` bytes were taken away.
+    /// Adjusts all positions after the first `count` bytes were removed.
     pub(super) fn forget(&mut self, count: usize) {
-        for mark in [
+        for position in [
             &mut self.head,
             &mut self.wanted,
-            &mut self.quiet,
-            &mut self.cut,
-            &mut self.behind,
-            &mut self.judged,
+            &mut self.gap_end,
+            &mut self.timeout_end,
+            &mut self.scan_pos,
+            &mut self.evaluated_end,
         ] {
-            *mark = mark.saturating_sub(count);
+            *position = position.saturating_sub(count);
         }
     }
 
-    /// Goes on until there is something to say.
-    pub(super) fn next<'a, D: Direction>(&mut self, bytes: &'a [u8]) -> Option<Found<'a>> {
+    /// Searches until there is a frame or a defect to report.
+    pub(super) fn next<'a, D: Direction>(&mut self, bytes: &'a [u8]) -> Option<Result<Frame<'a>, Defect>> {
         while bytes.len() >= self.wanted {
             let found =
-                if self.quiet == 0 { self.step::<D>(bytes) } else { self.step_in_silence::<D>(bytes) };
+                if self.gap_end == 0 { self.step::<D>(bytes) } else { self.step_after_gap::<D>(bytes) };
             if found.is_some() {
                 return found;
             }
@@ -93,95 +98,108 @@ impl Search {
         None
     }
 
-    /// Looks at the head, on a line that was not silent since.
+    /// Parses at the head while no gap is recorded.
     #[inline(never)]
-    fn step<'a, D: Direction>(&mut self, bytes: &'a [u8]) -> Option<Found<'a>> {
+    fn step<'a, D: Direction>(&mut self, bytes: &'a [u8]) -> Option<Result<Frame<'a>, Defect>> {
         let at = self.head;
-        match judge::<D>(bytes.get(at..).unwrap_or_default()) {
-            Verdict::Unfinished(length) => {
+        match parse::<D>(bytes.get(at..).unwrap_or_default()) {
+            ParseOutcome::Incomplete(length) => {
                 self.wanted = at + length;
                 None
             }
-            Verdict::Whole(frame, length) => {
+            ParseOutcome::Complete(frame, length) => {
                 let end = at + length;
-                self.head = end - lent_by(bytes, end);
+                self.head = end - header_bytes_before(bytes, end);
                 self.wanted = self.head + MIN_LENGTH;
                 Some(Ok(frame))
             }
-            Verdict::Defective(defect, _) => {
+            ParseOutcome::Defective(defect, _) => {
                 self.head = next_header(bytes, at + 1);
-                (defect != Defect::NoFrame).then_some(Err(defect))
+                Some(Err(defect))
+            }
+            ParseOutcome::NotAFrame => {
+                self.head = next_header(bytes, at + 1);
+                None
             }
         }
     }
 
-    /// Looks at the head, or behind it, among bytes that came before a silence.
+    /// Parses at the head, or behind it, once a gap is recorded.
     #[inline(never)]
-    fn step_in_silence<'a, D: Direction>(&mut self, bytes: &'a [u8]) -> Option<Found<'a>> {
+    fn step_after_gap<'a, D: Direction>(&mut self, bytes: &'a [u8]) -> Option<Result<Frame<'a>, Defect>> {
         let at = self.head;
-        let limit = if at < self.cut { self.cut } else { bytes.len() };
-        match judge::<D>(bytes.get(at..limit).unwrap_or_default()) {
-            Verdict::Unfinished(_) if at < self.cut => self.head = next_header(bytes, at + 1),
-            Verdict::Unfinished(_) if self.judged < self.quiet => return self.next_behind::<D>(bytes),
-            Verdict::Unfinished(length) => self.wanted = at + length,
-            verdict => {
-                self.head = after(bytes, at, verdict);
-                return self.news(at, verdict);
+        let limit = if at < self.timeout_end { self.timeout_end } else { bytes.len() };
+        match parse::<D>(bytes.get(at..limit).unwrap_or_default()) {
+            ParseOutcome::Incomplete(_) if at < self.timeout_end => self.head = next_header(bytes, at + 1),
+            ParseOutcome::Incomplete(_) if self.evaluated_end < self.gap_end => {
+                return self.scan_behind_head::<D>(bytes);
+            }
+            ParseOutcome::Incomplete(length) => self.wanted = at + length,
+            outcome => {
+                self.head = position_after(bytes, at, outcome);
+                return self.report(at, outcome);
             }
         }
         None
     }
 
-    /// Looks for whole frames behind the unfinished head, among the bytes before the silence.
+    /// Searches for complete frames between the incomplete head and the gap.
+    ///
+    /// The bytes may be data of the head's frame, so a wrong CRC among them is not reported here. It is reported once
+    /// the head has failed and the search passes the bytes again.
     #[inline(never)]
-    fn next_behind<'a, D: Direction>(&mut self, bytes: &'a [u8]) -> Option<Found<'a>> {
+    fn scan_behind_head<'a, D: Direction>(&mut self, bytes: &'a [u8]) -> Option<Result<Frame<'a>, Defect>> {
         loop {
-            let at = self.behind.max(self.head + 1);
-            if at >= self.quiet {
-                self.judged = self.quiet;
+            let at = self.scan_pos.max(self.head + 1);
+            if at >= self.gap_end {
+                self.evaluated_end = self.gap_end;
                 return None;
             }
-            let verdict = judge::<D>(bytes.get(at..self.quiet).unwrap_or_default());
-            let found = self.news(at, verdict);
-            self.behind = after(bytes, at, verdict);
+            let outcome = parse::<D>(bytes.get(at..self.gap_end).unwrap_or_default());
+            let is_damage = matches!(outcome, ParseOutcome::Defective(Defect::WrongCrc, _));
+            let found = if is_damage { None } else { self.report(at, outcome) };
+            self.scan_pos = position_after(bytes, at, outcome);
             if found.is_some() {
                 return found;
             }
         }
     }
 
-    /// What a verdict has to say to the outside, unless it was said before, behind an unfinished head.
-    fn news<'a>(&self, at: usize, verdict: Verdict<'a>) -> Option<Found<'a>> {
-        match verdict {
-            Verdict::Whole(frame, length) if !self.is_known(at, at + length) => Some(Ok(frame)),
-            Verdict::Defective(Defect::NoFrame, _) => None,
-            Verdict::Defective(defect, length) if !self.is_known(at, at + length) => Some(Err(defect)),
-            _ => None,
-        }
+    /// The frame or defect to report, unless the scan behind an incomplete head has reported it.
+    fn report<'a>(&self, at: usize, outcome: ParseOutcome<'a>) -> Option<Result<Frame<'a>, Defect>> {
+        let (found, length) = match outcome {
+            ParseOutcome::Complete(frame, length) => (Ok(frame), length),
+            ParseOutcome::Defective(Defect::MalformedRange { address }, length) => {
+                (Err(Defect::MalformedRange { address }), length)
+            }
+            ParseOutcome::Defective(Defect::WrongCrc, _) => return Some(Err(Defect::WrongCrc)),
+            ParseOutcome::Incomplete(_) | ParseOutcome::NotAFrame => return None,
+        };
+        if self.is_reported(at, at + length) { None } else { Some(found) }
     }
 
-    /// Was the frame from `at` to `end` judged before, behind an unfinished head?
-    const fn is_known(&self, at: usize, end: usize) -> bool {
-        end <= self.judged || (at < self.behind && end <= self.quiet)
+    /// Has the scan behind an incomplete head evaluated the frame from `at` to `end`?
+    const fn is_reported(&self, at: usize, end: usize) -> bool {
+        end <= self.evaluated_end || (at < self.scan_pos && end <= self.gap_end)
     }
 }
 
-/// Where the search goes on after the verdict on what begins at `at`.
-fn after(bytes: &[u8], at: usize, verdict: Verdict<'_>) -> usize {
-    match verdict {
-        Verdict::Whole(_, length) => at + length - lent_by(bytes, at + length),
+/// Where the search continues after the `outcome` of parsing at `at`.
+fn position_after(bytes: &[u8], at: usize, outcome: ParseOutcome<'_>) -> usize {
+    match outcome {
+        ParseOutcome::Complete(_, length) => at + length - header_bytes_before(bytes, at + length),
         _ => next_header(bytes, at + 1),
     }
 }
 
-/// The first place from `at` on where a header may begin, or the end.
+/// The first position from `at` on where a header may begin, or the end of `bytes`.
 fn next_header(bytes: &[u8], at: usize) -> usize {
     let rest = bytes.get(at..).unwrap_or(&[]);
     at + rest.iter().position(|&byte| byte == HEADER[0]).unwrap_or(rest.len())
 }
 
-/// How many bytes at the end of a frame may begin the next one.
-fn lent_by(bytes: &[u8], end: usize) -> usize {
+/// How many bytes before `end` may belong to the header of the next frame.
+fn header_bytes_before(bytes: &[u8], end: usize) -> usize {
     let Some([.., before, last]) = bytes.get(..end) else { return 0 };
     match [*before, *last] {
         HEADER => 2,

@@ -89,7 +89,6 @@ pub fn pull<D: Direction>(deframer: &mut Deframer<D>) -> Option<Received> {
         }
         Err(Defect::WrongCrc) => Received::WrongCrc,
         Err(Defect::MalformedRange { address }) => Received::MalformedRange(address),
-        Err(Defect::NoFrame) => panic!("not worth mentioning"),
     })
 }
 
@@ -116,11 +115,11 @@ impl Model {
     pub fn take(&mut self, event: &Event) -> Vec<Received> {
         match event {
             Event::Bytes(bytes) => {
-                // Byte by byte: what comes out must not depend on what comes later.
-                self.silence = 0;
+                // Byte by byte: what comes out must not depend on what comes later. No bytes end no silence.
                 bytes
                     .iter()
                     .flat_map(|&byte| {
+                        self.silence = 0;
                         self.history.push(byte);
                         self.news()
                     })
@@ -174,6 +173,8 @@ impl Model {
         let mut at = from;
         while at < quiet {
             match self.candidate(at, quiet) {
+                // It may be data of the unfinished frame before it.
+                Candidate::Judged(_, Received::WrongCrc) => at += 1,
                 Candidate::Judged(length, said) => at = self.tell(at, length, said, news),
                 _ => at += 1,
             }

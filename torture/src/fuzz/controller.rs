@@ -90,7 +90,13 @@ pub fn run(input: &Input<'_>) {
     let timeout = Duration::from_millis(input.servo_timeout_ms.into());
     let torque_codes =
         if input.free_on_damping { TorqueCodes::FreeOnDamping } else { TorqueCodes::default() };
-    let config = Config { chip_id: [1, 2, 3, 4, 5, 6], faults: 0, servo_timeout: timeout, torque_codes };
+    let config = Config {
+        chip_id: [1, 2, 3, 4, 5, 6],
+        faults: 0,
+        servo_timeout: timeout,
+        guard_time: Duration::from_micros(100),
+        torque_codes,
+    };
     let mut shell = Shell::new(config, input.stored.map(Image).as_ref(), input.storage.into());
     for step in &input.steps {
         shell.step(step);
@@ -119,7 +125,7 @@ impl Shell {
                 self.request(&Request::Write { address: 13, values: &offsets.map(|offset| offset & 0x8F) });
             }
             Step::Pump(sucks) => self.request(&Request::Write { address: 31, values: &[sucks.into()] }),
-            Step::ServoBytes(bytes) => self.controller.servo_bytes(bytes),
+            Step::ServoBytes(bytes) => self.servo_bytes(bytes),
             Step::Answering { joints } => self.servos.answering = joints,
             Step::Hand { joint, counts } => {
                 self.servos.counts[usize::from(joint) % Joint::ALL.len()] = counts % 1_024;

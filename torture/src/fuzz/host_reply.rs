@@ -54,7 +54,7 @@ pub fn run(input: &Input<'_>) {
     assert_eq!(in_pieces, snapshots(&bytes, bytes.len().max(1)), "any cutting gives the same");
     in_pieces.iter().for_each(check);
     if let Ok(span) = names::parse(text) {
-        assert!(usize::from(span.address) + usize::from(span.count) <= 256, "{text}: {span}");
+        assert!(usize::from(span.address()) + usize::from(span.count()) <= 256, "{text}: {span}");
     }
 }
 
@@ -87,8 +87,8 @@ fn pull(deframer: &mut Deframer<ToHost>, snapshots: &mut Vec<Snapshot>) {
 
 fn check(snapshot: &Snapshot) {
     let span = snapshot.span();
-    assert_eq!(usize::from(span.count), snapshot.values.len());
-    assert!(usize::from(span.address) + usize::from(span.count) <= 256, "{span}");
+    assert_eq!(usize::from(span.count()), snapshot.values.len());
+    assert!(usize::from(span.address()) + usize::from(span.count()) <= 256, "{span}");
     let mut again = FrameBuffer::new();
     Reply { address: snapshot.address, values: &snapshot.values }.encode(&mut again);
     assert_eq!(snapshots(&again, again.len()), std::slice::from_ref(snapshot), "what was heard can be said");
@@ -104,7 +104,7 @@ fn check_names(snapshot: &Snapshot) {
     for address in snapshot.span().addresses() {
         if let Some(entry) = entries.next_if(|entry| entry.address == address) {
             row = find(address);
-            let named = names::parse(&entry.name).map_or(address, |span| span.address);
+            let named = names::parse(&entry.name).map_or(address, |span| span.address());
             assert_eq!(named, address, "{}", entry.name);
         } else {
             assert!(row.is_some_and(|row| row.holds(address)), "{address} is not shown");

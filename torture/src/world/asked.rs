@@ -24,6 +24,32 @@ impl Asked {
     }
 }
 
+impl Asked {
+    /// How many bytes its answer has; 0: there is none.
+    pub(super) fn answer_length(&self) -> usize {
+        match self {
+            Self::Read { address, count } if usize::from(*address) + usize::from(*count) <= 256 => {
+                7 + usize::from(*count)
+            }
+            _ => 0,
+        }
+    }
+
+    /// How many times a frame with a wrong checksum seems to begin inside this request, where that counts: a
+    /// request that reaches past address 255 is not well formed, so the bytes behind its header are searched
+    /// (D2, D3). Whole frames are not among them: see [`Stream::has_phantom`].
+    pub(super) fn false_headers(&self) -> u16 {
+        let bytes = self.bytes();
+        let Some([address, count]) = bytes.get(3..5) else { return 0 };
+        if u16::from(*address) + u16::from(*count) <= 256 {
+            return 0;
+        }
+        let inside = bytes.windows(3).skip(1);
+        let headers = inside.filter(|bytes| matches!(bytes, [0xAA, 0x77, 3 | 6]));
+        u16::try_from(headers.count()).unwrap_or(u16::MAX)
+    }
+}
+
 fn count(values: &[u8]) -> u8 {
     u8::try_from(values.len()).unwrap_or(u8::MAX)
 }
@@ -107,6 +133,15 @@ mod tests {
         assert!(!stream.has_phantom());
         stream.add(&Asked::Write { address: 0, values: inner }.bytes(), true);
         assert!(stream.has_phantom());
+    }
+
+    #[test]
+    fn false_headers_count_in_malformed_requests_only() {
+        let holding = |address| Asked::Write { address, values: vec![0xAA, 0x77, 3, 9, 0xAA, 0x77, 6] };
+        assert_eq!(holding(46).false_headers(), 0);
+        assert_eq!(holding(250).false_headers(), 2);
+        assert_eq!(Asked::Write { address: 0xAA, values: vec![3; 0x77] }.false_headers(), 1);
+        assert_eq!(Asked::Read { address: 250, count: 7 }.false_headers(), 0);
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod audit;
 mod client;
 mod commands;
 mod damage;
+mod hold;
 mod line;
 mod model;
 mod notes;
@@ -87,6 +88,8 @@ pub struct World {
     settings: Box<dyn Settings>,
     client: Client,
     power: Power,
+    /// Are joints to be driven, or were they when the controller stopped?
+    is_servo: bool,
     /// The shell does not get to run before.
     stalled_until: Instant,
     trouble_at: Instant,
@@ -124,6 +127,7 @@ impl World {
             traits,
             client: Client::new(now, scenario.settings_per_mille),
             power: Power::Off { until: now, servos_too: false },
+            is_servo: true,
             stalled_until: now,
             trouble_at: now + dice.wait(scenario.every),
             hand: None,
@@ -155,6 +159,14 @@ impl World {
 
     fn step(&mut self) -> Check {
         self.now = self.next_event().max(self.now + Duration::from_micros(1));
+        self.go_on()?;
+        if let Power::On(life) = &self.power {
+            self.is_servo = life.model.is_servo();
+        }
+        self.servos.look(self.now, self.is_servo)
+    }
+
+    fn go_on(&mut self) -> Check {
         if self.now >= self.trouble_at {
             self.trouble();
         }
@@ -221,6 +233,7 @@ impl World {
             }
             if let Some(asked) = piece.asked {
                 self.tally.requests += 1;
+                life.audit.false_headers += asked.false_headers();
                 life.pending.push_back(Pending { asked, arrived });
             }
         }
@@ -230,7 +243,9 @@ impl World {
     fn check_pending(&self, life: &Life, room: usize) -> Check {
         let gap = protocol_core::wire::deframer::gap(life.controller.baud());
         let first = life.pending.front().map(|first| first.arrived + gap);
-        let is_due = first.is_some_and(|due| due <= self.now) && room >= asked::LONGEST;
+        // A write needs no room, and a read that of its answer (D5).
+        let needs = life.pending.front().map_or(0, |first| first.asked.answer_length());
+        let is_due = first.is_some_and(|due| due <= self.now) && room >= needs;
         let is_silent = life.to_arm.next_arrival().is_none_or(|at| at > self.now);
         let last = life.to_arm.last_taken_at();
         ensure(!(is_due && is_silent && self.now >= last + gap), || {

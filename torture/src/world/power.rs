@@ -31,12 +31,17 @@ pub(super) enum Power {
     None,
 }
 
+/// What the reference board keeps between two frames of the servo bus.
+const GUARD_TIME: Duration = Duration::from_micros(100);
+
 /// What differs from world to world.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Traits {
     sector: usize,
     servo_timeout: Duration,
     torque_codes: TorqueCodes,
+    /// After a servo's own start, a goal switches its torque on.
+    goal_starts_torque: bool,
     /// The shell wakes up so much too late, at most.
     pub(super) jitter: Duration,
     /// Does the shell hand over bytes before every poll, or once before all?
@@ -56,11 +61,16 @@ impl Traits {
             ),
             jitter: Duration::from_micros(dice.one_of(&jitters, 0)),
             receives_before_every_poll: dice.one_in(2),
+            goal_starts_torque: dice.one_in(2),
         }
     }
 
     pub(super) fn plant(&self) -> plant::Settings {
-        plant::Settings { torque_codes: self.torque_codes, ..plant::Settings::default() }
+        plant::Settings {
+            torque_codes: self.torque_codes,
+            goal_starts_torque: self.goal_starts_torque,
+            ..plant::Settings::default()
+        }
     }
 
     /// A servo that is no later than the first answers in time, one that is later than the second never does.
@@ -114,6 +124,7 @@ impl World {
             chip_id: CHIP_ID,
             faults: 0,
             servo_timeout: self.traits.servo_timeout,
+            guard_time: GUARD_TIME,
             torque_codes: self.traits.torque_codes,
         };
         self.notes.event(now, format!("power on, {found:?}"));
@@ -128,7 +139,7 @@ impl World {
             controller,
             said: Vec::new(),
             model,
-            commands: Commands::new(now, self.servos.torque_codes()),
+            commands: Commands::new(now, self.servos.torque_codes(), self.traits.servo_timeout),
             audit: Audit::new(now),
             to_arm: ToArm::new(baud),
             to_host: ToHost::new(baud, now),
@@ -145,6 +156,9 @@ impl World {
         self.tally.cuts += 1;
         self.tally.commands += life.commands.count;
         self.tally.engagements += life.commands.engagements;
+        if !servos_too {
+            self.servos.restarted_at = self.now;
+        }
         let what = if servos_too { "power cut" } else { "restart" };
         self.notes.event(self.now, format!("{what}, {} requests under way", life.pending.len()));
         self.power = self.off(servos_too);

@@ -9,13 +9,16 @@ use std::collections::VecDeque;
 
 use host_sim::plant::{self, Plant};
 use host_sim::servo::Fault;
+use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{Decoder, Reading};
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
 use super::damage::damage;
+use super::hold::{Excuse, Hold};
 use crate::dice::Dice;
 use crate::per_joint::PerJoint;
+use crate::violation::Check;
 
 /// A servo that was switched on hears nothing for so long.
 const BOOT_TIME: Duration = Duration::from_millis(200);
@@ -58,6 +61,7 @@ pub(super) struct Disturbance {
 #[derive(Debug)]
 pub(super) struct Servos {
     plant: Plant,
+    hold: Hold,
     settings: plant::Settings,
     disturbance: Disturbance,
     /// What is held up on the wire.
@@ -66,6 +70,8 @@ pub(super) struct Servos {
     /// Since when the servo is as it is.
     since: PerJoint<Instant>,
     disturbed_at: Instant,
+    /// When the controller last started again alone.
+    pub(super) restarted_at: Instant,
     said: PerJoint<Said>,
     /// What was heard of the answer that is on its way.
     piece: Vec<u8>,
@@ -83,12 +89,14 @@ impl Servos {
     pub(super) fn new(now: Instant, settings: plant::Settings, [in_time, too_late]: [Duration; 2]) -> Self {
         Self {
             plant: Plant::with_settings(now, settings),
+            hold: Hold::new(now),
             settings,
             disturbance: Disturbance::default(),
             held_up: VecDeque::new(),
             faults: PerJoint::all(None),
             since: PerJoint::all(now + BOOT_TIME),
             disturbed_at: now,
+            restarted_at: Instant::ZERO,
             said: PerJoint::default(),
             piece: Vec::new(),
             in_time,
@@ -117,10 +125,43 @@ impl Servos {
     pub(super) fn hear(&mut self, now: Instant, bytes: &[u8], dice: &mut Dice) {
         if self.disturbance.damaged > 0 && dice.in_a_million(self.disturbance.damaged) {
             self.disturb(now);
-            self.plant.bytes(now, &damage(bytes, dice));
+            self.pass_on(now, bytes, &damage(bytes, dice));
         } else {
-            self.plant.bytes(now, bytes);
+            self.pass_on(now, bytes, bytes);
         }
+    }
+
+    fn pass_on(&mut self, now: Instant, sent: &[u8], heard: &[u8]) {
+        let before = self.plant.collisions();
+        self.plant.bytes(now, heard);
+        if self.plant.collisions() == before {
+            self.hold.heard(now, sent, heard);
+        } else {
+            // A late servo still spoke: nobody heard the frame, and the answer is damaged.
+            self.hold.heard(now, sent, &[]);
+            self.disturbed_at = now;
+        }
+    }
+
+    /// The controller fails, and sends this frame by its fault path.
+    pub(super) fn controller_fails(&mut self, now: Instant, frame: &[u8]) {
+        self.hold.excuse_all(now, Excuse::Fault);
+        self.pass_on(now, frame, frame);
+    }
+
+    /// The joints are not to be driven.
+    pub(super) fn state_is_off(&mut self, now: Instant) {
+        self.hold.excuse_all(now, Excuse::State);
+    }
+
+    /// Has any joint moved by itself?
+    pub(super) fn look(&mut self, now: Instant, is_servo: bool) -> Check {
+        self.hold.look(now, is_servo, &self.plant)
+    }
+
+    /// Does the servo turn its motor?
+    pub(super) fn has_torque(&self, joint: Joint) -> bool {
+        self.plant.torque(joint) == Some(Torque::On)
     }
 
     fn disturb(&mut self, now: Instant) {
@@ -143,19 +184,16 @@ impl Servos {
         bytes
     }
 
-    /// Takes down what a servo said, where nothing else was on the wire. It may come in pieces.
+    /// Notes what a servo said, where nothing else was on the wire. Its answer may come in pieces of any length.
     fn note(&mut self, bytes: &[u8]) {
-        if bytes.starts_with(&[0xFF, 0xFF]) || self.piece.len() > LONGEST_ANSWER {
+        self.piece.extend_from_slice(bytes);
+        let answer = (0..self.piece.len()).find_map(|start| answer(self.piece.get(start..)?));
+        if let Some((joint, said)) = answer {
+            self.said[joint] = said;
             self.piece.clear();
         }
-        self.piece.extend_from_slice(bytes);
-        if let &[0xFF, 0xFF, id, length, alarms, _, _, _, _, _, _, decivolts, celsius, ref rest @ ..] =
-            self.piece.as_slice()
-            && usize::from(length) == rest.len() + 9
-            && let Some(joint) = Joint::from_index(id)
-        {
-            self.said[joint] = Said { alarms, decivolts, celsius };
-        }
+        let surplus = self.piece.len().saturating_sub(LONGEST_ANSWER);
+        self.piece.drain(..surplus);
     }
 
     /// Bytes through a wire that is not quiet.
@@ -214,6 +252,9 @@ impl Servos {
         let _ = self.plant.poll(now);
         self.plant.set_fault(joint, fault);
         self.faults[joint] = fault;
+        if was_missing || fault == Some(Fault::Missing) {
+            self.hold.excuse(now, joint, Excuse::Power);
+        }
         self.since[joint] = if was_missing { now + BOOT_TIME } else { now };
     }
 
@@ -226,13 +267,20 @@ impl Servos {
 
     pub(super) fn power_cycle(&mut self, now: Instant) {
         self.plant.power_cycle(now);
+        self.hold.power_cycle(now);
         self.held_up.clear();
         self.since = PerJoint::all(now + BOOT_TIME);
     }
 
     /// Turns a joint from outside.
-    pub(super) fn turn(&mut self, joint: Joint, counts: u16) {
+    pub(super) fn turn(&mut self, now: Instant, joint: Joint, counts: u16) {
+        self.hold.excuse(now, joint, Excuse::Hand);
         self.plant.move_by_hand(joint, counts);
+    }
+
+    /// The hand lets go of a joint.
+    pub(super) fn let_go(&mut self, joint: Joint) {
+        self.plant.let_go(joint);
     }
 
     /// Does the controller hear every word of the servos, and they of it, for long enough that they are as it
@@ -262,12 +310,19 @@ impl Servos {
         let silent = Health::Silent(since.max(self.deceived_until[joint]));
         match self.faults[joint] {
             Some(Fault::Missing | Fault::Garbled(1)) => silent,
+            // An answer under way in a restart may pass for that to the next question, and so on from there.
+            Some(Fault::Late(_)) if self.restarted_at > since => Health::Unclear,
             Some(Fault::Late(by)) if by >= self.too_late => silent,
             Some(Fault::Late(by)) if by > self.in_time => Health::Unclear,
             Some(Fault::Garbled(_)) => Health::Unclear,
             _ => Health::Well(since.max(self.disturbed_at)),
         }
     }
+}
+
+fn has_right_checksum(frame: &[u8]) -> bool {
+    let [_, _, covered @ .., checksum] = frame else { return false };
+    covered.iter().fold(0, |sum: u8, byte| sum.wrapping_add(*byte)) == !checksum
 }
 
 /// The answers in these bytes that no checksum speaks against.
@@ -284,4 +339,12 @@ fn answers(bytes: &[u8]) -> Vec<(Joint, u8, Vec<u8>)> {
         }
     }
     found
+}
+/// A whole answer with a right checksum, and nothing behind it.
+fn answer(bytes: &[u8]) -> Option<(Joint, Said)> {
+    let &[0xFF, 0xFF, id, length, alarms, _, _, _, _, _, _, decivolts, celsius, ref rest @ ..] = bytes else {
+        return None;
+    };
+    let is_whole = usize::from(length) == rest.len() + 9 && has_right_checksum(bytes);
+    Joint::from_index(id).filter(|_| is_whole).map(|joint| (joint, Said { alarms, decivolts, celsius }))
 }

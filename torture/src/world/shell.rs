@@ -78,7 +78,8 @@ impl World {
         let said = self.servos.say(self.now, &mut self.dice);
         if !said.is_empty() {
             self.notes.bus(self.now, "from servos", &said);
-            life.controller.servo_bytes(&said);
+            life.commands.answered(&said);
+            life.controller.servo_bytes(self.now, &said);
         }
         while life.hand_over(self.now) {
             if !self.poll(life)? {
@@ -133,6 +134,9 @@ impl World {
             if life.model.is_servo() != was_servo {
                 Joint::ALL.into_iter().for_each(|joint| life.commands.forget(joint));
             }
+            if !life.model.is_servo() {
+                self.servos.state_is_off(self.now);
+            }
             self.written(life, &next.asked, effect);
             last = Some(effect);
         }
@@ -149,7 +153,7 @@ impl World {
         for joint in Joint::ALL {
             if gone & joint.bit() != 0 {
                 life.model.aimed[joint] = false;
-                life.commands.forget(joint);
+                life.commands.falls_silent(joint);
             }
         }
         if back != 0 {

@@ -1,18 +1,25 @@
 //! What goes wrong next.
 
 use host_sim::servo::Fault;
+use motion_core::servo_bus::Torque;
+use motion_core::servo_bus::frame::{FrameBuffer, register, sync_write};
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
-use super::World;
 use super::power::Power;
 use super::servos::Disturbance;
+use super::{Life, World};
 use crate::scenario::Trouble;
 
 /// Between two small turns of a hand.
 const HAND_EVERY: Duration = Duration::from_millis(10);
 /// The fastest that a hand turns a joint, in thousandths of a count in that time: about 25 degrees/s.
 const FASTEST_HAND: usize = 1_000;
+
+/// How long the controller hangs until its watchdog acts, at least and at most.
+const WATCHDOG: [Duration; 2] = [Duration::from_millis(1_000), Duration::from_millis(2_000)];
+/// Between two frames of the fault path, so that the bus is silent before each.
+const FAULT_PAUSE: Duration = Duration::from_millis(3);
 
 /// A hand that turns a joint.
 #[derive(Debug)]
@@ -59,7 +66,12 @@ impl World {
             Trouble::Stall => self.stall(),
             Trouble::Hand => self.lend_hand(),
             Trouble::Wear => self.wear(),
-            Trouble::Deaf | Trouble::Cut | Trouble::Restart | Trouble::SaveCut => self.life_trouble(trouble),
+            Trouble::Deaf
+            | Trouble::Cut
+            | Trouble::Restart
+            | Trouble::Watchdog
+            | Trouble::Fault
+            | Trouble::SaveCut => self.life_trouble(trouble),
         }
     }
 
@@ -114,9 +126,32 @@ impl World {
         match trouble {
             Trouble::Deaf => life.to_host.block(deaf_until),
             Trouble::SaveCut => life.save_is_cut = true,
+            Trouble::Watchdog => return self.hang(&life),
+            Trouble::Fault => return self.fault(&life),
             _ => return self.power_down(&life, trouble == Trouble::Cut),
         }
         self.power = Power::On(life);
+    }
+
+    /// The controller hangs until its watchdog restarts it. From outside, that is a long restart.
+    fn hang(&mut self, life: &Life) {
+        self.power_down(life, false);
+        let time = self.dice.between(WATCHDOG[0], WATCHDOG[1]);
+        self.power = Power::Off { until: self.now + time, servos_too: false };
+    }
+
+    /// The controller panics: it damps all servos three times and starts again.
+    fn fault(&mut self, life: &Life) {
+        self.power_down(life, false);
+        let mut frame = FrameBuffer::new();
+        let code = self.servos.torque_codes().code(Torque::Damping);
+        let items = Joint::ALL.into_iter().map(|joint| (joint.index(), [code]));
+        sync_write(&mut frame, register::TORQUE_SWITCH, items);
+        for _ in 0..3 {
+            self.now = self.now + FAULT_PAUSE;
+            self.notes.bus(self.now, "to servos, by the fault path", &frame);
+            self.servos.controller_fails(self.now, &frame);
+        }
     }
 
     /// The power is off already, which is trouble enough.
@@ -126,6 +161,7 @@ impl World {
 
     fn lend_hand(&mut self) {
         let joint = self.dice.joint();
+        self.hand.take().into_iter().for_each(|hand| self.servos.let_go(hand.joint));
         let speed = i64::try_from(self.dice.below(2 * FASTEST_HAND + 1)).unwrap_or(0);
         self.hand = Some(Hand {
             joint,
@@ -136,20 +172,22 @@ impl World {
         });
     }
 
-    /// A hand is no match for a motor: it lets go of a joint that is driven, or may be.
+    /// A hand is no match for a motor: it lets go of a joint that is driven, or may be. A silent joint may be.
     pub(super) fn move_hand(&mut self) {
         let Some(hand) = self.hand.as_mut().filter(|hand| hand.next_at <= self.now) else { return };
         let is_driven = match &self.power {
             Power::On(life) => life.model.is_servo() && !Self::is_missing(life, hand.joint),
             _ => true,
         };
+        let is_driven = is_driven || self.servos.has_torque(hand.joint);
         if is_driven || self.now > hand.until || !self.servos.wire_is_quiet(self.now) {
+            self.servos.let_go(hand.joint);
             self.hand = None;
             return;
         }
         hand.place = (hand.place + hand.step).clamp(0, 1_023_000);
         hand.next_at = self.now + HAND_EVERY;
         let (joint, counts) = (hand.joint, u16::try_from(hand.place / 1_000).unwrap_or(0));
-        self.servos.turn(joint, counts);
+        self.servos.turn(self.now, joint, counts);
     }
 }

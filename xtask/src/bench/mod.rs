@@ -1,4 +1,5 @@
-//! `cargo xtask bench`: how fast, how small, how many. Prints; the budgets are held by `count` and `size`.
+//! `cargo xtask bench`: speed beside peers, and figures of the host programs. It only prints; `count` and `size` check
+//! budgets.
 
 mod peers;
 mod programs;
@@ -6,7 +7,7 @@ mod simulator;
 
 use crate::run::Outcome;
 
-/// What is measured.
+/// Options of `cargo xtask bench`.
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// Instead, measure the programs: their size and start, a round trip, and what 1, 10, 100 and 1000 simulated

@@ -1,12 +1,13 @@
-//! The parse-and-answer path beside its peers, on this machine by the clock and on the chip by
-//! instructions and bytes.
+//! Compares the parse-and-answer path with its peers: time on this machine; instructions and bytes on the chip.
 
 use crate::count::{self, Told};
 use crate::run::{Linked, Outcome, build_footprint, cargo};
+use crate::table::Column::{Left, Right};
+use crate::table::Table;
 use crate::{emulate, footprint};
 
-/// Those compared, and the program in which each of them counts itself. Ours comes first.
-const CONTESTANTS: &[(&str, &str)] = &[
+/// The servers compared, each with the program that counts its instructions. Ours comes first.
+const CANDIDATES: &[(&str, &str)] = &[
     ("protocol-core", "count_ours"),
     ("modbus-core", "count_modbus_core"),
     ("rmodbus", "count_rmodbus"),
@@ -27,27 +28,28 @@ pub(crate) fn compare() -> Outcome {
 }
 
 fn print_chip(profile: &'static str) -> Outcome {
-    let all = CONTESTANTS.iter().map(|&(_, name)| costs(&Linked { name, profile }));
+    let all = CANDIDATES.iter().map(|&(_, name)| costs(&Linked { name, profile }));
     let all: Vec<Costs> = all.collect::<Outcome<_>>()?;
-    let names: String = CONTESTANTS.iter().map(|(name, _)| format!("{name:>14}")).collect();
-    println!("{:32}{names}{:>13}", "", "ours / best");
+    let names = CANDIDATES.iter().map(|&(name, _)| Right(name));
+    let mut table = Table::new([Left("")].into_iter().chain(names).chain([Right("ours / best")]));
     for (what, ours) in all.first().into_iter().flatten() {
         let cost = |costs: &Costs| costs.iter().find(|(name, _)| name == what).and_then(|&(_, cost)| cost);
-        let cells: String = all.iter().map(|costs| format!("{:>14}", or_dash(cost(costs)))).collect();
         let best = all.iter().skip(1).filter_map(cost).min();
         let ratio = ours.zip(best).map(|(ours, best)| format!("{:.2}", ours as f64 / best as f64));
-        println!("{what:32}{cells}{:>13}", or_dash(ratio));
+        let cells = all.iter().map(|costs| or_dash(cost(costs)));
+        table.add([what.clone()].into_iter().chain(cells).chain([or_dash(ratio)]));
     }
+    print!("{table}");
     Ok(())
 }
 
-/// What each thing costs, by its name; `None` where it has no bound that is known.
+/// Each cost by its name; `None` if it has no known bound.
 type Costs = Vec<(String, Option<u64>)>;
 
 fn costs(program: &Linked) -> Outcome<Costs> {
     let counted = count::of(program)?;
     let mut costs: Costs = counted.into_iter().map(|(name, count): Told| (name, Some(count))).collect();
-    // Peers may call through pointers, and panic: how deep their stack gets cannot be told then.
+    // Calls through pointers and panics leave a peer's stack without a known bound.
     costs.push(("stack, bytes".to_owned(), footprint::stack_of_path(program).ok()));
     costs.push(("flash, bytes".to_owned(), Some(footprint::flash_of_path(program)?)));
     Ok(costs)

@@ -14,6 +14,8 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use super::simulator::{Simulator, take_answer};
 use crate::count::frame;
 use crate::run::{Outcome, cargo, target_directory};
+use crate::table::Column::Right;
+use crate::table::Table;
 
 /// How often a program is started.
 const STARTS: usize = 51;
@@ -87,9 +89,18 @@ fn print_arms(program: &Path) -> Outcome {
         "\nArms in one process, each with its settings in a file and its bytes paced at 115200 baud. Shares of a core;"
     );
     println!("busy: all joints move, and a host asks for the positions. Memory: anonymous, KiB");
-    println!(
-        "  arms     idle  an arm   asked at     busy   an answer   an arm at 100 Hz   arms a core   memory"
-    );
+    let columns = [
+        "arms",
+        "idle",
+        "an arm",
+        "asked at",
+        "busy",
+        "an answer",
+        "an arm at 100 Hz",
+        "arms a core",
+        "memory",
+    ];
+    let mut table = Table::new(columns.map(Right));
     let mut memory = Vec::new();
     for size in SIZES {
         let folder = tempfile::tempdir()?;
@@ -101,17 +112,20 @@ fn print_arms(program: &Path) -> Outcome {
         let answer = (busy - idle).max(0.0) / (rate * size as f64);
         let each = idle / size as f64;
         let at_100_hz = each + 100.0 * answer;
-        println!(
-            "{size:6}{:7.2} %{:6.3} %{rate:8.1} Hz{:7.2} %{:9.1} us{:17.3} %{:14.0}{kibibytes:9}",
-            100.0 * idle,
-            100.0 * each,
-            100.0 * busy,
-            1e6 * answer,
-            100.0 * at_100_hz,
-            at_100_hz.recip()
-        );
+        table.add([
+            size.to_string(),
+            format!("{:.2} %", 100.0 * idle),
+            format!("{:.3} %", 100.0 * each),
+            format!("{rate:.1} Hz"),
+            format!("{:.2} %", 100.0 * busy),
+            format!("{:.1} us", 1e6 * answer),
+            format!("{:.3} %", 100.0 * at_100_hz),
+            format!("{:.0}", at_100_hz.recip()),
+            kibibytes.to_string(),
+        ]);
         memory.push((size, kibibytes));
     }
+    print!("{table}");
     if let ([(1, one), ..], [.., (most, all)]) = (memory.as_slice(), memory.as_slice()) {
         let more = all.saturating_sub(*one) as f64 / (most - 1) as f64;
         println!("each arm more takes {more:.1} KiB");

@@ -15,8 +15,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::OFlags;
 
 use crate::count::frame;
-use crate::emulate::Running;
-use crate::run::Outcome;
+use crate::run::{Outcome, Running};
 
 /// How long a share of a core is watched.
 const WATCH: Duration = Duration::from_secs(5);

@@ -3,8 +3,8 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
-use crate::emulate::{self, Running};
-use crate::run::{Linked, Outcome};
+use crate::emulate;
+use crate::run::{Linked, Outcome, Running};
 
 /// A name and a number, as a program told them.
 pub(crate) type Told = (String, u64);

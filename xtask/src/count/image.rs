@@ -13,7 +13,7 @@ use super::trace::{self, Event};
 use crate::budget::Figure;
 use crate::elf::Program;
 use crate::run::{IMAGE, Outcome};
-use crate::thumb::Effect;
+use crate::thumb_decode::Effect;
 
 /// Data registers of the two lines (RM0090, section 30.6.2).
 const HOST_DATA: u64 = 0x4001_1004;
@@ -25,6 +25,10 @@ const TRIES: usize = 400;
 const SAMPLES: usize = 48;
 /// How long the arm is watched while it moves: some forty control cycles.
 const WATCH: Duration = Duration::from_secs(4);
+/// How often it is watched at most, until the machine has had time for enough of it.
+const WATCHES: usize = 20;
+/// Control cycles that are enough.
+const CYCLES: usize = 20;
 /// How long the arm is left alone.
 const SILENCE: Duration = Duration::from_secs(4);
 /// Milliseconds after which an arm that is left alone does the same again: it asks missing servos ten times a second,
@@ -84,12 +88,25 @@ pub(crate) fn figures() -> Outcome<Vec<Figure>> {
     Ok(figures)
 }
 
-/// What the arm executes while all joints are on their way.
+/// What the arm executes while all joints are on their way. A busy machine may show too little of it: then it is
+/// watched on the way back.
 fn while_moving(machine: &mut Machine) -> Outcome<Vec<Event>> {
     machine.send(&frame(Request::Write { address: SPEED.address, values: &[5; JOINTS] }))?;
-    machine.send(&frame(Request::Write { address: TARGET_POSITION.address, values: &[0; JOINTS] }))?;
+    for target in [0, 90].into_iter().cycle().take(WATCHES) {
+        let values = &[target; JOINTS];
+        machine.send(&frame(Request::Write { address: TARGET_POSITION.address, values }))?;
+        let events = watch_for(machine, WATCH)?;
+        if trace::times(&events, Event::Wrote(SERVO_DATA)) >= CYCLES * GOALS {
+            return Ok(events);
+        }
+    }
+    Err("the log shows too few control cycles".into())
+}
+
+/// What the arm executes by itself for a while.
+fn watch_for(machine: &mut Machine, time: Duration) -> Outcome<Vec<Event>> {
     machine.watch(|_| {
-        sleep(WATCH);
+        sleep(time);
         Ok(())
     })
 }
@@ -97,7 +114,7 @@ fn while_moving(machine: &mut Machine) -> Outcome<Vec<Event>> {
 impl Places {
     fn of(program: &Program<'_>) -> Outcome<Self> {
         Ok(Self {
-            sleeps: program.places_of(Effect::Wait),
+            sleeps: program.places_of(Effect::WaitForInterrupt),
             host_interrupt: program.address_of("USART1")?,
             servo_interrupt: program.address_of("USART2")?,
             wake_up: program.address_of("SysTick")?,
@@ -116,18 +133,18 @@ impl Places {
         let mut machine = Machine::alone()?;
         // What is done repeats itself ten times a second, in the time of the emulator, which flies.
         sleep(SILENCE);
-        let events = machine.watch(|_| {
-            sleep(SILENCE);
-            Ok(())
-        })?;
-        let ticks = trace::between(&events, |event| trace::is_step_at(event, self.wake_up));
-        let millis: Vec<_> =
-            ticks.into_iter().filter_map(|tick| Some(trace::steps(events.get(tick)?))).collect();
-        if millis.len() < PATTERN {
-            Err(format!("the log shows {} ms of silence only", millis.len()))?;
+        for _ in 0..WATCHES {
+            let events = watch_for(&mut machine, SILENCE)?;
+            let ticks = trace::between(&events, |event| trace::is_step_at(event, self.wake_up));
+            let millis: Vec<_> =
+                ticks.into_iter().filter_map(|tick| Some(trace::steps(events.get(tick)?))).collect();
+            if millis.len() >= PATTERN {
+                // Ten ticks are less than 10 ms: the one that begins a control cycle comes sooner than its turn.
+                let most = millis.windows(11).map(|millis| millis.iter().sum()).max();
+                return Ok(most.unwrap_or(0));
+            }
         }
-        let most = millis.windows(10).map(|millis| millis.iter().sum()).max();
-        Ok(most.unwrap_or(0))
+        Err("the log shows too few milliseconds of silence".into())
     }
 
     /// Instructions from the interrupt that brings a byte of a request, counted from its last one, until `end`. The
@@ -255,9 +272,7 @@ fn feed(machine: &mut Machine, request: Request<'_>, from_last: usize) -> Outcom
     let events = machine.watch(|machine| machine.send(byte))?;
     machine.send(after)?;
     // On a machine so busy that the pause got too long (D4) there is no reply, and another try.
-    if let Request::Read { count, .. } = request {
-        let _ = machine.reply(count);
-    }
+    machine.settle()?;
     Ok(events)
 }
 

@@ -14,12 +14,12 @@ use protocol_core::wire::FrameBuffer;
 use tempfile::TempDir;
 
 use super::trace::{self, Event};
+use crate::emulate;
 use crate::emulate::monitor::{self, Monitor};
-use crate::emulate::{self, Running};
-use crate::run::Outcome;
+use crate::run::{IMAGE, Outcome, Running};
 
-/// How long a reply may take.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// How long a reply may take, on a machine that does other things too.
+const PATIENCE: Duration = Duration::from_secs(60);
 /// Time enough for the arm to have done what it was told and to sleep again.
 const CALM: Duration = Duration::from_millis(20);
 
@@ -63,7 +63,7 @@ impl Machine {
         let log = folder.path().join("log");
         let log_option = log.display().to_string();
         let options = ["-icount", icount, "-singlestep", "-D", &log_option];
-        let machine = emulate::start_machine(&folder, bus, &options)?;
+        let machine = emulate::start_machine(&IMAGE, &folder, bus, &options)?;
         let host = monitor::accept(&host)?;
         host.set_read_timeout(Some(PATIENCE))?;
         let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
@@ -89,6 +89,21 @@ impl Machine {
     pub(crate) fn read(&mut self, address: u8, count: u8) -> Outcome<Vec<u8>> {
         self.host.write_all(&frame(Request::Read { address, count }))?;
         self.reply(count)
+    }
+
+    /// Waits until the arm has answered all that it was asked, and forgets the answers.
+    pub(crate) fn settle(&mut self) -> Outcome {
+        self.host.write_all(&frame(Request::Read { address: 0, count: 0 }))?;
+        loop {
+            let mut head = [0; 5];
+            self.host.read_exact(&mut head).map_err(|why| format!("the arm does not answer: {why}"))?;
+            let [.., count] = head;
+            self.host.read_exact(&mut vec![0; usize::from(count) + 2])?;
+            // Answers keep the order of their requests (D5), and only this one is empty.
+            if count == 0 {
+                return Ok(());
+            }
+        }
     }
 
     /// Logs what the arm executes meanwhile.

@@ -10,7 +10,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use crate::thumb::Effect;
+use crate::thumb_decode::Effect;
 
 /// What happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,9 +14,8 @@ use std::process::{ChildStdin, Command, Stdio};
 use object::read::elf::ElfFile32;
 use object::{Object, ObjectSymbol};
 
-use super::Running;
 use super::monitor::Monitor;
-use crate::run::Outcome;
+use crate::run::{Outcome, Running};
 
 /// Bytes of the control block with its first channel.
 const CONTROL_BLOCK: u32 = 48;

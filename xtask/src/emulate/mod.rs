@@ -13,14 +13,14 @@
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use clap::Args;
 use host_sim::link::Link;
 use host_sim::signals::{Signals, Wish};
 use tempfile::TempDir;
 
-use crate::run::{self, Outcome, cargo, root};
+use crate::run::{self, Linked, Outcome, Running, cargo, root};
 
 mod log;
 pub(crate) mod monitor;
@@ -34,7 +34,7 @@ use relay::Relay;
 pub(crate) const QEMU: &str = "qemu-system-arm";
 
 /// For those who do not have it.
-pub(crate) const HOW_TO_GET_QEMU: &str =
+const HOW_TO_GET_QEMU: &str =
     "`sudo apt-get install qemu-system-arm` brings it on Debian and Ubuntu, `brew install qemu` on a Mac";
 /// USART1's first control register (RM0090, section 30.6). What comes before it is set up is lost.
 pub(crate) const HOST_LINK_CONTROL: u32 = 0x4001_100C;
@@ -53,23 +53,18 @@ pub(crate) struct Options {
     /// Print the firmware's log on standard error (needs defmt-print: `cargo install defmt-print`)
     #[arg(long)]
     log: bool,
+    /// Run the image for the first power-up of a board instead of the one for the arm
+    #[arg(long)]
+    self_test: bool,
+    /// Write what the image sends to the servos into this file
+    #[arg(long, value_name = "PATH")]
+    servo_line: Option<PathBuf>,
     /// Take the image and the simulator as they were built last
     #[arg(long)]
     no_build: bool,
 }
 
-/// A program that ends when this is dropped.
-pub(crate) struct Running(pub(crate) Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // Errors mean that it has ended already.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// Runs the image until a signal ends it. SIGHUP switches the arm off and on.
+/// Runs the image until a signal ends it. SIGHUP switches the arm off and on, SIGUSR2 resets the chip alone.
 pub(crate) fn run(options: &Options) -> Outcome {
     need_qemu()?;
     if !options.no_build {
@@ -81,11 +76,16 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let servos = start_servos(&folder, &options.fault)?;
     let host = UnixListener::bind(folder.path().join("host"))?;
     let commands = UnixListener::bind(folder.path().join("monitor"))?;
-    let _machine = start_machine(&folder, &servo_socket(&folder), &[])?;
+    let image = if options.self_test { &run::SELF_TEST } else { &run::IMAGE };
+    let mut servo_line = servo_socket(&folder);
+    if let Some(path) = &options.servo_line {
+        servo_line = format!("{servo_line},logfile={}", std::path::absolute(path)?.display());
+    }
+    let _machine = start_machine(image, &folder, &servo_line, &[])?;
     let mut relay = Relay::new(monitor::accept(&host)?)?;
     let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
     monitor.wait_for_bits(HOST_LINK_CONTROL, RECEIVER_ON)?;
-    let mut log = options.log.then(|| Log::open(&run::IMAGE.path())).transpose()?;
+    let mut log = options.log.then(|| Log::open(&image.path())).transpose()?;
     let port = relay.port().to_owned();
     let _link = options.link.as_deref().map(|path| Link::new(path, &port)).transpose()?;
     let mut out = io::stdout().lock();
@@ -95,7 +95,9 @@ pub(crate) fn run(options: &Options) -> Outcome {
         for wish in signals.wishes() {
             match wish {
                 Wish::End => return Ok(()),
+                Wish::Unplug => {}
                 Wish::PowerCycle => power_cycle(&servos, &mut monitor)?,
+                Wish::RestartController => monitor.execute("system_reset", "")?,
             }
         }
         if let Some(log) = &mut log {
@@ -107,7 +109,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
 }
 
 /// Is the emulator there?
-pub(crate) fn has_qemu() -> bool {
+fn has_qemu() -> bool {
     Command::new(QEMU).arg("--version").stdout(Stdio::null()).status().is_ok_and(|status| status.success())
 }
 
@@ -138,9 +140,14 @@ pub(crate) fn servo_socket(folder: &TempDir) -> String {
     format!("socket,path={}", folder.path().join("servos").display())
 }
 
-/// The emulated chip. It connects to the sockets in `folder` before it starts. `servos` is what is on its servo bus,
+/// The emulated chip, with an image in it. It connects to the sockets in `folder` before it starts. `servos` is what is on its servo bus,
 /// `options` are more words for the emulator.
-pub(crate) fn start_machine(folder: &TempDir, servos: &str, options: &[&str]) -> Outcome<Running> {
+pub(crate) fn start_machine(
+    image: &Linked,
+    folder: &TempDir,
+    servos: &str,
+    options: &[&str],
+) -> Outcome<Running> {
     let path = |name: &str| folder.path().join(name).display().to_string();
     let child = Command::new(QEMU)
         .current_dir(root())
@@ -151,7 +158,7 @@ pub(crate) fn start_machine(folder: &TempDir, servos: &str, options: &[&str]) ->
         .args(["-serial", "chardev:servos"])
         .args(["-qmp", &format!("unix:{}", path("monitor"))])
         .arg("-kernel")
-        .arg(run::IMAGE.path())
+        .arg(image.path())
         .args(options)
         .stdin(Stdio::null())
         .stdout(Stdio::null())

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use crate::run::Outcome;
 
 /// How long the emulator may take to start, or to answer.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Waits until the emulator, which was told to, connects.
 pub(crate) fn accept(listener: &UnixListener) -> Outcome<UnixStream> {

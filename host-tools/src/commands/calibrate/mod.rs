@@ -14,7 +14,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use sevenbot::map::{OFFSET, PRESENT_POSITION, TARGET_POSITION};
+use sevenbot::map::{OFFSET, PRESENT_POSITION};
 use sevenbot::{Angle, Arm, Joint, Span};
 
 use self::offsets::{Grade, Offsets, Table, corrected};
@@ -23,7 +23,7 @@ use super::set::unlocked;
 use crate::confirm::confirm;
 use crate::failure::Failure;
 use crate::interrupt::or_hold;
-use crate::moving::{Move, driven};
+use crate::moving::{Move, driven, stepped};
 use crate::output::{Facts, note, warn};
 use crate::session::Session;
 
@@ -93,7 +93,8 @@ fn store(
         let mut err = anstream::stderr();
         Table::new(before, wanted).write_text(&mut err)?;
         confirm("Write these offsets? The arm moves a little by them.", args.yes)?;
-        all_taken(&unlocked(&mut arm, |arm| arm.write_checked(OFFSET.address, &wanted.bytes()))?)?;
+        let write = |arm: &mut Arm| arm.write_checked(OFFSET.address, &wanted.bytes());
+        all_taken(&or_hold(&mut arm, |arm, _| unlocked(arm, write))?)?;
         if !args.yes {
             restart(session, arm, wanted)?;
         }
@@ -104,7 +105,7 @@ fn store(
 /// Goes through the joints; gives the offsets that were found.
 fn walk(arm: &mut Arm, before: Offsets) -> Result<Offsets, Failure> {
     let mut wanted = before;
-    arm.wait_until_measured()?;
+    arm.wait_until_settled()?;
     say(
         "Type +N or -N to move a joint, the angle it really stands at, or Enter to keep its offset; q ends.",
     )?;
@@ -164,12 +165,10 @@ fn at_joint(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, Failure> {
 
 /// Moves one joint. What keeps it from moving is told, and does not end the walk.
 fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), Failure> {
-    let target = arm.read_span(Span::of(&TARGET_POSITION))?.at(TARGET_POSITION.of(joint));
-    let wanted = i16::from(target).saturating_add(degrees).clamp(0, i16::from(Angle::MAX_DEGREES));
-    let wanted = u8::try_from(wanted).unwrap_or(target);
-    let targets = Joint::ALL.map(|other| (other == joint).then_some(wanted));
     let moved = or_hold(arm, |arm, interrupt| {
-        driven(arm)?;
+        let wanted = stepped(&driven(arm)?, joint, degrees)?.max(0);
+        let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
+        let targets = Joint::ALL.map(|other| (other == joint).then_some(wanted));
         Move::begin(arm, targets)?.finish(arm, interrupt)
     });
     match moved {

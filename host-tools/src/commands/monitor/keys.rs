@@ -10,7 +10,7 @@ use super::view::{Dialog, Pace, View, Wish};
 const NUDGE: i16 = 1;
 const BIG_NUDGE: i16 = 10;
 /// What the help shows: keys, and what they do.
-pub(crate) const HELP: [(&str, &str); 8] = [
+pub(crate) const HELP: [(&str, &str); 9] = [
     ("1..7, ↑ ↓", "select a joint"),
     ("← →", "nudge it by 1°"),
     ("Shift ← →, [ ]", "nudge it by 10°"),
@@ -18,7 +18,8 @@ pub(crate) const HELP: [(&str, &str); 8] = [
     ("s", "motor state: hold, damping, forceless"),
     ("space", "freeze the picture; the arm goes on"),
     ("?", "this help"),
-    ("q, Ctrl-C", "quit; the arm holds what it was told"),
+    ("q", "quit; the arm goes where it was sent"),
+    ("Ctrl-C", "stop the arm where it is, and quit"),
 ];
 
 /// What a key leads to.
@@ -30,13 +31,15 @@ pub(crate) enum Outcome {
     Ask(Wish),
     /// The monitor ends.
     Quit,
+    /// The arm is to hold where it is, and the monitor ends.
+    Stop,
 }
 
 /// A key was pressed.
 pub(crate) fn press(view: &mut View, key: KeyEvent) -> Outcome {
     let is_ctrl_c = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
     if is_ctrl_c {
-        return Outcome::Quit;
+        return Outcome::Stop;
     }
     match view.dialog {
         None => press_in_view(view, key),
@@ -145,7 +148,7 @@ mod tests {
         pressed(&mut view, &[KeyCode::Char('?')]);
         assert_eq!(view.dialog, Some(Dialog::Help));
         let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
-        assert_eq!(press(&mut view, ctrl_c), Outcome::Quit);
+        assert_eq!(press(&mut view, ctrl_c), Outcome::Stop);
     }
 
     #[test]

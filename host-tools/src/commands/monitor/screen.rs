@@ -13,7 +13,8 @@ use super::keys::{Outcome, press};
 use super::view::{News, View, Wish};
 use super::watch::Watcher;
 use crate::failure::Failure;
-use crate::interrupt::Interrupt;
+use crate::interrupt::{Interrupt, say_how_it_stands};
+use crate::output::warn;
 use crate::session::Session;
 
 /// How long a key may wait for the picture, and the picture for news.
@@ -29,13 +30,19 @@ pub(crate) fn run(session: &Session, period: Duration) -> Result<View, Failure> 
     let (wish, wishes) = mpsc::channel();
     let asked = session.port.clone();
     let options = session.options;
-    let watcher = Watcher { port: asked, last_port: port, options, period, start, news, wishes };
+    let watcher = Watcher { port: asked, last_port: port, options, period, start, news, wishes, arm: None };
     let watching = thread::spawn(|| watcher.run());
     let shown = on_terminal(|terminal| show(terminal, &mut view, start, &hear, &wish));
     // Without a wish to come the watcher ends, after those that it has already.
     drop(wish);
-    let _ = watching.join();
-    shown.map(|()| view)
+    let held = watching.join().ok().flatten();
+    shown?;
+    match held {
+        Some(held) => say_how_it_stands(&held?),
+        None if Interrupt::is_wished() => warn("there is no arm that could be made to hold"),
+        None => {}
+    }
+    Ok(view)
 }
 
 /// Does something on the whole screen, and gives it back as it was, even after a failure.
@@ -75,6 +82,10 @@ fn react(view: &mut View, event: &Event, wishes: &Sender<Wish>) -> bool {
             // The watcher only ends after this end of the channel does.
             Outcome::Ask(wish) => wishes.send(wish).is_ok(),
             Outcome::Quit => false,
+            Outcome::Stop => {
+                Interrupt::wish();
+                false
+            }
         },
         _ => true,
     }

@@ -231,7 +231,7 @@ pub(crate) mod tests {
     }
 
     fn zeros(span: Span) -> Snapshot {
-        Snapshot { address: span.address, values: vec![0; span.count.into()] }
+        Snapshot { address: span.address(), values: vec![0; span.count().into()] }
     }
 
     /// An arm whose joint 2 is on its way from 90 to 120 degrees.
@@ -242,7 +242,7 @@ pub(crate) mod tests {
         set(&mut registers, TARGET_POSITION.address, &[90, 120, 65, 90, 90, 90, 80]);
         set(&mut registers, PRESENT_POSITION.address, &[90, position, 65, 90, 90, 90, 80]);
         let mut status = zeros(STATUS);
-        set(&mut status, STATUS.address, &[1, 0, 0, u8::from(position != 120) << 1]);
+        set(&mut status, STATUS.address(), &[1, 0, 0, u8::from(position != 120) << 1]);
         set(&mut status, 254, &[74, 31]);
         Sample {
             time: Duration::from_millis(millis),

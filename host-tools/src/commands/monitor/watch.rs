@@ -7,12 +7,16 @@
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
-use sevenbot::change::Unchanged;
-use sevenbot::map::{MOTOR_STATE, SPEED, TARGET_POSITION};
+use sevenbot::joints::JointSnapshot;
+use sevenbot::map::{MOTOR_STATE, SPEED, TARGET_POSITION, motor_state};
 use sevenbot::{Angle, Arm, Error, Joint, Options, ports};
 
 use super::sample::Sample;
 use super::view::{News, Wish};
+use crate::commands::{all_taken, motors_obey};
+use crate::failure::Failure;
+use crate::interrupt::{Interrupt, hold};
+use crate::moving::stepped;
 
 /// How long to wait before looking for an arm again.
 const LOOK_AGAIN: Duration = Duration::from_millis(500);
@@ -32,6 +36,8 @@ pub(crate) struct Watcher {
     pub(crate) start: Instant,
     pub(crate) news: Sender<News>,
     pub(crate) wishes: Receiver<Wish>,
+    /// The arm that was watched at the end.
+    pub(crate) arm: Option<Arm>,
 }
 
 /// Nobody listens any more.
@@ -51,8 +57,11 @@ impl From<Error> for Break {
 
 impl Watcher {
     /// Watches, until nobody wishes any more.
-    pub(crate) fn run(mut self) {
+    /// After Ctrl-C the arm is made to hold: returns what became of that, or `None` if there was no arm.
+    pub(crate) fn run(mut self) -> Option<Result<JointSnapshot, Failure>> {
         while self.look().is_ok() {}
+        let arm = self.arm.take();
+        if Interrupt::is_wished() { arm.map(|mut arm| hold(&mut arm)) } else { None }
     }
 
     /// Finds the arm and watches it for as long as it is there; then waits a little.
@@ -62,7 +71,10 @@ impl Watcher {
                 let firmware = arm.identity().version();
                 self.tell(News::Found { port: arm.port().to_owned(), firmware })?;
                 match self.watch(&mut arm) {
-                    Break::Ended => return Err(Ended),
+                    Break::Ended => {
+                        self.arm = Some(arm);
+                        return Err(Ended);
+                    }
                     Break::Lost(error) => self.tell(News::Lost(error.to_string()))?,
                 }
             }
@@ -117,24 +129,28 @@ impl Watcher {
     fn fulfil(&self, arm: &mut Arm, due: Instant) -> Result<(), Break> {
         loop {
             match self.wishes.recv_timeout(due.saturating_duration_since(Instant::now())) {
-                Ok(wish) => match grant(arm, wish) {
-                    Ok(unchanged) => self.tell_refused(&unchanged)?,
-                    Err(Error::NoAnswer { heard, .. }) => {
-                        let news = News::Unanswered { damaged: heard.damaged_frames };
-                        self.tell(news).map_err(|Ended| Break::Ended)?;
-                    }
-                    Err(error) => return Err(error.into()),
-                },
+                // A stop does not wait for the wishes before it.
+                Ok(_) if Interrupt::is_wished() => return Err(Break::Ended),
+                Ok(wish) => self.grant(arm, wish)?,
                 Err(RecvTimeoutError::Timeout) => return Ok(()),
                 Err(RecvTimeoutError::Disconnected) => return Err(Break::Ended),
             }
         }
     }
 
-    fn tell_refused(&self, unchanged: &[Unchanged]) -> Result<(), Break> {
-        unchanged
-            .first()
-            .map_or(Ok(()), |first| self.tell(News::Refused(first.to_string())).map_err(|Ended| Break::Ended))
+    /// Does what is wished, and tells what did not take.
+    fn grant(&self, arm: &mut Arm, wish: Wish) -> Result<(), Break> {
+        let (refusal, lost) = match fulfilled(arm, wish) {
+            Ok(()) => return Ok(()),
+            Err(Failure::Wire(error)) => (Failure::MayMove(error.to_string()), Some(error)),
+            Err(failure) => (failure, None),
+        };
+        let refusal = refusal.message().unwrap_or_default();
+        self.tell(News::Refused(refusal)).map_err(|Ended| Break::Ended)?;
+        match lost {
+            Some(error @ (Error::PortLost(_) | Error::Stalled)) => Err(error.into()),
+            _ => Ok(()),
+        }
     }
 
     fn tell(&self, news: News) -> Result<(), Ended> {
@@ -146,7 +162,7 @@ impl Watcher {
         let end = Instant::now() + duration;
         loop {
             match self.wishes.recv_timeout(end.saturating_duration_since(Instant::now())) {
-                Ok(_) => {}
+                Ok(_) => self.tell(News::Refused("there is no arm: nothing was written".to_owned()))?,
                 Err(RecvTimeoutError::Timeout) => return Ok(()),
                 Err(RecvTimeoutError::Disconnected) => return Err(Ended),
             }
@@ -154,28 +170,24 @@ impl Watcher {
     }
 }
 
-/// Does what is wished, and says what did not take.
-fn grant(arm: &mut Arm, wish: Wish) -> Result<Vec<Unchanged>, Error> {
+/// Does what is wished, and makes sure of it.
+fn fulfilled(arm: &mut Arm, wish: Wish) -> Result<(), Failure> {
     match wish {
         Wish::Nudge { joint, degrees } => nudge(arm, joint, degrees),
         Wish::Pace { joint, pace } => {
-            let steps = register(arm, SPEED.of(joint))?;
-            arm.write_checked(SPEED.address, &[pace.after(steps); 7])
+            let joints = arm.read(SPEED.of(joint), 1)?;
+            let steps = joints.first().copied().unwrap_or(0);
+            all_taken(&arm.write_checked(SPEED.address, &[pace.after(steps); 7])?)
         }
-        Wish::State(state) => arm.write_checked(MOTOR_STATE.address, &[state]),
+        // In the servo state already, the same state again would stop nothing.
+        Wish::State(motor_state::SERVO) if arm.joints()?.is_driven() => hold(arm).map(drop),
+        Wish::State(state) => motors_obey(arm.write_checked(MOTOR_STATE.address, &[state])),
     }
 }
 
-/// What a register holds now. What the screen shows of it may be older than the last wish.
-fn register(arm: &mut Arm, address: u8) -> Result<u8, Error> {
-    Ok(arm.read(address, 1)?.first().copied().unwrap_or(0))
-}
-
-/// Moves a joint's target from where it is now.
-fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<Vec<Unchanged>, Error> {
-    let address = TARGET_POSITION.of(joint);
-    let target = register(arm, address)?;
-    let wanted = (i16::from(target) + degrees).clamp(0, i16::from(Angle::MAX_DEGREES));
-    let wanted = u8::try_from(wanted).unwrap_or(target);
-    arm.write_checked(address, &[wanted])
+/// Moves a joint's target from where it is now. What the screen shows of it may be older than the last wish.
+fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), Failure> {
+    let wanted = stepped(&arm.wait_until_settled()?, joint, degrees)?.max(0);
+    let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
+    motors_obey(arm.write_checked(TARGET_POSITION.of(joint), &[wanted]))
 }

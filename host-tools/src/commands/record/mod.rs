@@ -22,19 +22,21 @@ use sevenbot::{Arm, Span};
 
 use self::pendant::Pendant;
 use self::stamps::Stamps;
-use super::all_taken;
+use super::motors_obey;
 use crate::confirm::confirm;
 use crate::failure::Failure;
 use crate::growing::Growing;
-use crate::interrupt::Interrupt;
+use crate::interrupt::{Interrupt, hold, say_how_it_stands};
 use crate::moving::driven;
 use crate::output::{Facts, note};
+use crate::reports::reporting;
 use crate::session::Session;
 
 /// Record a movement: guide the arm by hand, or watch it move.
 ///
 /// The arm goes limp, so that a hand can lead it, and its positions go to a file as they come. Ctrl-C ends it:
-/// the arm then holds the pose that it was left in. On a terminal the space bar switches the vacuum pump.
+/// the arm then holds the pose that it was left in,
+/// with --driven too. On a terminal the space bar switches the vacuum pump.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -93,9 +95,13 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Failur
         confirm("The arm goes limp, and falls unless somebody holds it. Go on?", args.yes)?;
     }
     let mut tape = Tape::create(&args.file)?;
-    let done = limp(&mut arm, args).and_then(|()| roll(&mut arm, args, session.options.baud, &mut tape));
+    let interrupt = Interrupt::catch();
+    let baud = session.options.baud;
+    let done = limp(&mut arm, args)
+        .and_then(|()| reporting(&mut arm, args.hz, |arm| roll(arm, args, baud, &mut tape, interrupt)));
     // An arm that went away cannot be told to hold; it was left as it is.
-    let held = if matches!(done, Err(Failure::Wire(_))) { Ok(()) } else { leave(&mut arm, args) };
+    let is_gone = done.as_ref().is_err_and(Failure::is_of_the_wire);
+    let held = if is_gone && !interrupt.has_come() { Ok(()) } else { leave(&mut arm, args, interrupt) };
     let Tape { moments, seconds, .. } = tape;
     let recorded = Recorded { file: args.file.display().to_string(), moments, seconds };
     if done.is_err() {
@@ -108,27 +114,33 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Failur
 /// Lets the arm go, if a hand is to lead it.
 fn limp(arm: &mut Arm, args: &RecordArgs) -> Result<(), Failure> {
     let state = if args.driven { motor_state::SERVO } else { motor_state::FORCELESS };
-    all_taken(&arm.write_checked(MOTOR_STATE.address, &[state])?)
+    motors_obey(arm.write_checked(MOTOR_STATE.address, &[state]))
 }
 
-/// Makes the arm hold the pose it was left in, and keeps it from reporting.
-fn leave(arm: &mut Arm, args: &RecordArgs) -> Result<(), Failure> {
-    all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[0])?)?;
+/// Makes the arm hold the pose it was left in. A driven arm goes on with its move, but not after Ctrl-C.
+fn leave(arm: &mut Arm, args: &RecordArgs, interrupt: Interrupt) -> Result<(), Failure> {
     if args.driven {
+        if interrupt.has_come() {
+            say_how_it_stands(&hold(arm)?);
+        }
         return Ok(());
     }
     // Coming from forceless, the targets become what was measured (D13).
-    all_taken(&arm.write_checked(MOTOR_STATE.address, &[motor_state::SERVO])?)?;
+    motors_obey(arm.write_checked(MOTOR_STATE.address, &[motor_state::SERVO]))?;
     note("the arm holds where it is");
     Ok(())
 }
 
 /// Takes reports until it is enough.
-fn roll(arm: &mut Arm, args: &RecordArgs, baud: u32, tape: &mut Tape) -> Result<(), Failure> {
-    let interrupt = Interrupt::catch();
+fn roll(
+    arm: &mut Arm,
+    args: &RecordArgs,
+    baud: u32,
+    tape: &mut Tape,
+    interrupt: Interrupt,
+) -> Result<(), Failure> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut pendant = Pendant::new(arm.targets()?, vacuum, args.driven);
-    all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[args.hz])?)?;
     let mut stamps = Stamps::new(args.hz, baud);
     let limit = args.seconds.map(|seconds| Duration::from_secs(seconds.into()));
     let mut heard = Instant::now();

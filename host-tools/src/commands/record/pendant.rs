@@ -6,10 +6,12 @@ use std::time::Duration;
 
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::crossterm::terminal::{disable_raw_mode, enable_raw_mode};
-use sevenbot::map::VACUUM_PUMP;
+use sevenbot::map::{TARGET_POSITION, VACUUM_PUMP};
 use sevenbot::{Angle, Arm, Joint};
 
+use crate::commands::{all_taken, motors_obey};
 use crate::failure::Failure;
+use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 
 /// What is in the teacher's hands.
@@ -26,6 +28,8 @@ pub(crate) struct Pendant {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Wish {
     End,
+    /// And hold the arm.
+    Stop,
     SwitchPump,
     Select(Joint),
     /// Degrees.
@@ -64,6 +68,10 @@ impl Pendant {
             let Event::Key(key) = event::read()? else { continue };
             match wish(key, self.selected) {
                 Some(Wish::End) => return Ok(true),
+                Some(Wish::Stop) => {
+                    Interrupt::wish();
+                    return Ok(true);
+                }
                 Some(Wish::SwitchPump) => self.switch_pump(arm)?,
                 Some(Wish::Select(joint)) => self.selected = joint,
                 Some(Wish::Nudge(degrees)) if self.is_driven => self.nudge(arm, degrees)?,
@@ -75,7 +83,7 @@ impl Pendant {
 
     fn switch_pump(&mut self, arm: &mut Arm) -> Result<(), Failure> {
         self.vacuum = !self.vacuum;
-        Ok(arm.write(VACUUM_PUMP.address, &[u8::from(self.vacuum)])?)
+        all_taken(&arm.write_checked(VACUUM_PUMP.address, &[u8::from(self.vacuum)])?)
     }
 
     fn nudge(&mut self, arm: &mut Arm, degrees: i16) -> Result<(), Failure> {
@@ -84,7 +92,7 @@ impl Pendant {
             let wanted = i16::from(target.degrees()) + degrees;
             let wanted = u8::try_from(wanted.max(0)).unwrap_or(Angle::MAX_DEGREES);
             *target = Angle::from_register(wanted);
-            arm.set_target(joint, *target)?;
+            motors_obey(arm.write_checked(TARGET_POSITION.of(joint), &[target.degrees()]))?;
         }
         Ok(())
     }
@@ -107,7 +115,7 @@ fn wish(key: KeyEvent, selected: Joint) -> Option<Wish> {
     let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
     let select = |number: u8| Joint::new(number).map(Wish::Select);
     match key.code {
-        KeyCode::Char('c') if is_control => Some(Wish::End),
+        KeyCode::Char('c') if is_control => Some(Wish::Stop),
         KeyCode::Char('q') | KeyCode::Esc | KeyCode::Enter => Some(Wish::End),
         KeyCode::Char(' ') => Some(Wish::SwitchPump),
         KeyCode::Char(digit) => select(u8::try_from(digit.to_digit(10)?).ok()?),
@@ -134,7 +142,7 @@ mod tests {
         assert_eq!(plain(KeyCode::Up), None, "there is nothing above the first");
         assert_eq!(plain(KeyCode::Left), Some(Wish::Nudge(-1)));
         let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
-        assert_eq!(wish(ctrl_c, first), Some(Wish::End));
+        assert_eq!(wish(ctrl_c, first), Some(Wish::Stop));
         let shifted = KeyEvent::new(KeyCode::Right, KeyModifiers::SHIFT);
         assert_eq!(wish(shifted, first), Some(Wish::Nudge(10)));
     }

@@ -9,7 +9,8 @@ use motion_core::servo_bus::frame::{Decoder, FrameBuffer, Instruction, Reading, 
 pub enum Command {
     /// Which servo, and how many registers from its position on.
     Ask(u8, u8),
-    Torque([u8; 7]),
+    /// The code for each servo that is named.
+    Torque([Option<u8>; 7]),
     Goals(Vec<(u8, u16)>),
 }
 
@@ -63,8 +64,10 @@ pub fn decode(bytes: &[u8]) -> Command {
             Command::Ask(frame.id, *count)
         }
         (Some(Instruction::SyncWrite), [register::TORQUE_SWITCH, 1, items @ ..]) => {
-            assert_eq!(items.len(), 14);
-            Command::Torque(std::array::from_fn(|joint| items[joint * 2 + 1]))
+            assert!(!items.is_empty() && items.len().is_multiple_of(2));
+            let mut codes = [None; 7];
+            items.chunks_exact(2).for_each(|item| codes[usize::from(item[0])] = Some(item[1]));
+            Command::Torque(codes)
         }
         (Some(Instruction::SyncWrite), [register::GOAL_POSITION, 6, items @ ..]) => {
             assert!(!items.is_empty() && items.len() % 7 == 0);

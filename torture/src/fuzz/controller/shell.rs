@@ -58,6 +58,11 @@ impl Shell {
         }
     }
 
+    /// Bytes come over the servo bus, whoever sent them.
+    pub fn servo_bytes(&mut self, bytes: &[u8]) {
+        self.controller.servo_bytes(Instant::from_micros(self.now_us), bytes);
+    }
+
     /// All that can be done now is done in a bounded number of calls.
     pub fn turn(&mut self) {
         // Every frame may take a call, and every byte of a header that proves wrong be looked at again.
@@ -88,9 +93,14 @@ impl Shell {
             }
             Output::ToServos(bytes) => {
                 let command = decode(bytes);
-                self.watch.told_servos(self.now_us, &command, self.controller.registers());
+                self.watch.told_servos(
+                    self.now_us,
+                    &command,
+                    self.controller.registers(),
+                    &self.servos.counts,
+                );
                 if let Some(answer) = self.servos.take(&command) {
-                    self.controller.servo_bytes(&answer);
+                    self.controller.servo_bytes(now, &answer);
                 }
             }
             Output::Vacuum(vacuum) => self.watch.switched(self.now_us, vacuum),

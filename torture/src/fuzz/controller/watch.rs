@@ -8,7 +8,7 @@ use protocol_core::registers::map::{
     EEPROM_LOCK, FAULTS, MISSING_SERVOS, MOTOR_STATE, OFFSET, PRESENT_POSITION, SPEED, fault, motor_state,
 };
 use protocol_core::registers::{Access, Image, Joint, MAP, RegisterFile};
-use protocol_core::wire::frame::{Function, ToHost, parse};
+use protocol_core::wire::frame::{Function, ParseOutcome, ToHost, parse};
 
 use super::servos::Command;
 
@@ -58,27 +58,41 @@ impl Watch {
 
     /// Replies are whole frames, and tell the registers as they are.
     pub fn told_host(&self, bytes: &[u8], registers: &RegisterFile) {
-        let Ok((rest, reply)) = parse::<ToHost>(bytes) else { panic!("{bytes:?} is no frame") };
-        assert!(rest.is_empty() && reply.function == Function::Read);
+        let ParseOutcome::Complete(reply, length) = parse::<ToHost>(bytes) else {
+            panic!("{bytes:?} is not a frame")
+        };
+        assert!(length == bytes.len() && reply.function == Function::Read);
         assert_eq!(reply.data, registers.read(reply.address, reply.count));
         assert!(registers.image() == self.settings, "answered before the settings were saved");
     }
 
-    pub fn told_servos(&mut self, now_us: u64, command: &Command, registers: &RegisterFile) {
+    /// `positions` are where the servos really are, in counts.
+    pub fn told_servos(
+        &mut self,
+        now_us: u64,
+        command: &Command,
+        registers: &RegisterFile,
+        positions: &[u16; 7],
+    ) {
         match command {
             Command::Ask(id, _) => assert!(*id < 7),
             Command::Torque(codes) => self.told_torque(codes, registers),
             Command::Goals(goals) => {
                 assert_eq!(registers.get(MOTOR_STATE.address), motor_state::SERVO, "driven in state 0 or 2");
-                goals.iter().for_each(|&(id, counts)| self.told_goal(now_us, id, counts, registers));
+                for &(id, counts) in goals {
+                    let position = positions.get(usize::from(id)).copied().unwrap_or(u16::MAX);
+                    self.told_goal(now_us, id, counts, position, registers);
+                }
             }
         }
     }
 
-    fn told_torque(&mut self, codes: &[u8; 7], registers: &RegisterFile) {
-        for ((joint, state), &code) in Joint::ALL.iter().zip(&mut self.joints).zip(codes) {
+    fn told_torque(&mut self, codes: &[Option<u8>; 7], registers: &RegisterFile) {
+        let is_servo = registers.get(MOTOR_STATE.address) == motor_state::SERVO;
+        for ((joint, state), code) in Joint::ALL.iter().zip(&mut self.joints).zip(codes) {
+            let Some(code) = *code else { continue };
             let on = code == self.config.torque_codes.code(Torque::On);
-            assert!(!on || registers.get(MOTOR_STATE.address) == motor_state::SERVO, "on in state 0 or 2");
+            assert_eq!(on, is_servo, "on in state 0 or 2, or freed in state 1");
             assert!(!on || state.goal.is_some(), "{joint:?} wakes up with an old goal");
             state.goal = state.goal.filter(|_| on);
             self.is_driven[usize::from(joint.index())] = on;
@@ -89,7 +103,7 @@ impl Watch {
     }
 
     /// A goal is within reach of the one before, or of where the joint is.
-    fn told_goal(&mut self, now_us: u64, id: u8, counts: u16, registers: &RegisterFile) {
+    fn told_goal(&mut self, now_us: u64, id: u8, counts: u16, position: u16, registers: &RegisterFile) {
         let Some(joint) = Joint::from_index(id) else { panic!("there is no servo {id}") };
         assert_eq!(registers.get(MISSING_SERVOS.address) & joint.bit(), 0, "{joint:?} is missing");
         let state = &mut self.joints[usize::from(id)];
@@ -103,8 +117,9 @@ impl Watch {
         let offset = OFFSET.range.decode(registers.get(OFFSET.of(joint)));
         let goal = degrees(angle_from_counts(joint, counts, i8::try_from(offset).unwrap()));
         let place = f64::from(registers.get(PRESENT_POSITION.of(joint)));
-        // Half a degree is what the register rounds off, and a third of one is a count.
-        let is_here = (goal.clamp(0.0, 180.0) - place).abs() < 1.0;
+        // Half a degree is what the register rounds off, and a third of one is a count. The register keeps the old
+        // angle until the next measurement where an offset has just changed.
+        let is_here = (goal.clamp(0.0, 180.0) - place).abs() < 1.0 || counts == position;
         assert!(
             state.goal.is_some_and(is_near) || is_here,
             "{joint:?} jumps to {counts} from {:?}",

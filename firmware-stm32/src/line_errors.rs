@@ -1,0 +1,72 @@
+//! Counts of the receive errors of a USART. An overrun is a byte that was not read in time. Framing errors and noise come
+//! from bad edges or from a wrong baud rate.
+
+/// Number of errors of each kind since start. The counts saturate.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct LineErrors {
+    /// At least one byte was lost, because it was not read before the next one was complete.
+    pub overruns: u16,
+    /// The stop bit was missing.
+    pub framing: u16,
+    /// The samples of a bit differed.
+    pub noise: u16,
+}
+
+/// Bits of USART_SR (RM0090, section 30.6.1).
+const FRAMING: u16 = 1 << 1;
+const NOISE: u16 = 1 << 2;
+const OVERRUN: u16 = 1 << 3;
+
+/// RXNE: a byte is ready to be read.
+pub const RECEIVED: u16 = 1 << 5;
+/// The bits that [`LineErrors::count`] counts.
+pub const ERRORS: u16 = FRAMING | NOISE | OVERRUN;
+
+impl LineErrors {
+    /// Counts of zero.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { overruns: 0, framing: 0, noise: 0 }
+    }
+
+    /// Counts the errors in a value of USART_SR. Call it once for each read of USART_DR, which clears the bits.
+    #[cold]
+    pub const fn count(&mut self, status: u16) {
+        self.overruns = self.overruns.saturating_add((status & OVERRUN != 0) as u16);
+        self.framing = self.framing.saturating_add((status & FRAMING != 0) as u16);
+        self.noise = self.noise.saturating_add((status & NOISE != 0) as u16);
+    }
+
+    /// True if there was no error.
+    #[must_use]
+    pub const fn is_clean(self) -> bool {
+        self.overruns == 0 && self.framing == 0 && self.noise == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PARITY: u16 = 1 << 0;
+
+    #[test]
+    fn each_error_has_its_own_count() {
+        let mut errors = LineErrors::new();
+        errors.count(RECEIVED | PARITY);
+        assert!(errors.is_clean());
+        errors.count(RECEIVED | OVERRUN);
+        errors.count(RECEIVED | FRAMING | NOISE);
+        errors.count(FRAMING);
+        assert_eq!(errors, LineErrors { overruns: 1, framing: 2, noise: 1 });
+        assert!(!errors.is_clean());
+    }
+
+    #[test]
+    fn a_count_saturates() {
+        let mut errors = LineErrors { overruns: u16::MAX, ..LineErrors::new() };
+        errors.count(OVERRUN);
+        assert_eq!(errors.overruns, u16::MAX);
+    }
+}

@@ -1,0 +1,90 @@
+//! The self-test image, for the first power-up of a board. It has five steps and never drives a servo.
+//!
+//! ```text
+//!   a  the board alone: LED, clock, supply, brown-out level, unique id
+//!   b  the servo bus with its pull-up and without servos: 1,000 echoes
+//!   c  one servo: 100 questions
+//!   d  seven servos: their positions, repeated until the next command
+//!   e  ways to crash: p panic, h hard fault, o stack overflow, w hang
+//! ```
+//!
+//! Each step runs when its letter arrives on the host link, at 115,200 baud; step a also runs at start. Results go to the
+//! host link as text, to the log, and to the LED (`led_pattern.rs`).
+//!
+//! The motor state is always 2. The image has no controller, the servo bus sends only questions (`question.rs`), and a
+//! crash damps the servos. So no servo gets torque, even if their inrush current resets the board.
+
+#![no_std]
+#![no_main]
+
+mod adc;
+#[allow(dead_code, reason = "the firmware uses the rest")]
+mod board;
+#[allow(dead_code, reason = "the firmware uses the rest")]
+mod clock;
+#[allow(dead_code, reason = "the firmware uses the rest")]
+mod crash;
+mod delay;
+mod gpio;
+mod host_link;
+mod mpu;
+#[allow(dead_code, reason = "the firmware uses the rest")]
+mod outputs;
+mod read_only_bus;
+mod servo_link;
+mod steps;
+#[allow(dead_code, reason = "the firmware uses the rest")]
+mod uart;
+#[allow(dead_code, reason = "the firmware uses the rest")]
+mod watchdog;
+
+use cortex_m_rt::entry;
+use defmt_rtt as _;
+use firmware_stm32::reset_cause::ResetCause;
+use stm32f4::stm32f405 as pac;
+
+use crate::clock::Clock;
+use crate::outputs::Outputs;
+use crate::read_only_bus::ReadOnlyBus;
+use crate::steps::{Board, SelfTest};
+use crate::watchdog::Watchdog;
+
+/// Baud rate of the host link: the default of register 12.
+const BAUD: u32 = 115_200;
+
+#[entry]
+fn main() -> ! {
+    let (Some(chip), Some(mut core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
+        crash::restart(ResetCause::Unexpected);
+    };
+    gpio::enable(&chip.RCC);
+    let outputs = Outputs::open();
+    mpu::protect_stack(&core.MPU);
+    let source = clock::start(&chip.RCC, &chip.FLASH, &chip.DBGMCU);
+    let rates = source.rates();
+    clock::enable_peripherals(&chip.RCC);
+    let clock = Clock::start(&chip.TIM2, core.SYST, rates);
+    let servos = servo_link::open(chip.USART2, rates, &mut core.NVIC);
+    let watchdog = Watchdog::start(chip.IWDG, &chip.DBGMCU);
+    let (flags, cause) = crash::take_cause(&chip.RCC);
+    let board = Board {
+        source,
+        flags,
+        cause,
+        // BOR_LEV 0 is level 3, 3 is off (RM0090, FLASH_OPTCR).
+        brown_out_level: 3 - (chip.FLASH.optcr().read().bor_lev().bits() & 3),
+        calibration: adc::calibration(source),
+        reference: adc::read_reference(&chip.RCC, &chip.ADC1, &chip.ADC_COMMON),
+    };
+    let timeout = u32::try_from(board::servo_timeout(source).as_micros()).unwrap_or(u32::MAX);
+    SelfTest {
+        board,
+        clock,
+        host: host_link::open(chip.USART1, rates, BAUD, &mut core.NVIC),
+        servos: ReadOnlyBus::new(servos, timeout),
+        led: outputs.led,
+        watchdog,
+        shown: (0, true),
+    }
+    .run()
+}

@@ -1,0 +1,118 @@
+//! The parts of motion-core, called directly and with inputs that the controller never passes to them.
+
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use footprint::{any_bytes, any_time, opaque};
+use motion_core::calibration::{MicroDegrees, angle_from_counts, counts_from_angle};
+use motion_core::drive::Drive;
+use motion_core::motor_state::MotorState;
+use motion_core::position_filter::PositionFilter;
+use motion_core::report_timer::ReportTimer;
+use motion_core::servo_bus::frame::{self, Decoder, FrameBuffer, Instruction, Reading};
+use motion_core::servo_bus::servo::Servo;
+use motion_core::servo_bus::{Bus, Torque, TorqueCodes};
+use motion_core::trajectory::Trajectory;
+use motion_core::vacuum::VacuumControl;
+use protocol_core::registers::{JOINTS, Joint};
+use protocol_core::time::Duration;
+
+#[entry]
+fn main() -> ! {
+    loop {
+        calibration();
+        one_joint();
+        timers();
+        servo_frames();
+        decoder();
+        bus();
+        servo();
+    }
+}
+
+fn calibration() {
+    for joint in Joint::ALL {
+        opaque(counts_from_angle(joint, MicroDegrees(opaque(0)), opaque(0)));
+        opaque(angle_from_counts(joint, opaque(0), opaque(0)).nearest_degree());
+    }
+    opaque(MicroDegrees::from_degrees(opaque(0)));
+}
+
+fn one_joint() {
+    let mut trajectory = opaque(Trajectory::holding(MicroDegrees(opaque(0))));
+    trajectory.move_to(MicroDegrees(opaque(0)), opaque(0));
+    trajectory.advance(opaque(0));
+    opaque((trajectory.set_point(), trajectory.is_moving()));
+    let mut drive = opaque(Drive::RELEASED);
+    drive.wait();
+    drive.set_target(MicroDegrees(opaque(0)), opaque(0));
+    opaque(drive.engage(MicroDegrees(opaque(0))));
+    drive.rebase_offset(MicroDegrees(opaque(0)), MicroDegrees(opaque(0)), opaque(0));
+    drive.advance(opaque(0));
+    opaque((drive.is_driven(), drive.is_moving(), drive.set_point()));
+    drive.mark_silent();
+    drive.release();
+    let mut sensor = opaque(PositionFilter::UNKNOWN);
+    opaque(sensor.answered(any_time(), opaque(0)));
+    opaque(sensor.failed(any_time()));
+    opaque((sensor.is_known(), sensor.position(), sensor.wants_asking(any_time())));
+}
+
+fn timers() {
+    let mut feedback = opaque(ReportTimer::OFF);
+    feedback.set(any_time(), opaque(0), opaque(0));
+    opaque((feedback.poll_due(any_time()), feedback.due()));
+    let mut gripper = opaque(VacuumControl::default());
+    gripper.set(any_time(), opaque(true));
+    opaque((gripper.poll(any_time()), gripper.deadline()));
+    opaque(MotorState::from_register(opaque(0)).torque(opaque(true)));
+}
+
+fn servo_frames() {
+    let mut buffer = FrameBuffer::new();
+    frame::ping(&mut buffer, opaque(0));
+    frame::read(&mut buffer, opaque(0), opaque(0), opaque(0));
+    frame::write(&mut buffer, opaque(0), opaque(0), any_bytes());
+    frame::status(&mut buffer, opaque(0), opaque(0), any_bytes());
+    let items = any_bytes().iter().map(|&id| (id, opaque([0; 6])));
+    frame::sync_write(&mut buffer, opaque(0), items);
+    opaque(buffer.as_slice());
+    opaque(Instruction::from_code(opaque(0)));
+}
+
+fn decoder() {
+    let mut decoder = opaque(Decoder::new());
+    decoder.push(any_bytes());
+    while let Some(found) = decoder.pull() {
+        if let Ok(frame) = opaque(found) {
+            opaque(Reading::parse(frame.params).map(|reading| opaque(reading).to_bytes()));
+        }
+    }
+    decoder.clear();
+}
+
+fn bus() {
+    let codes = opaque(TorqueCodes::DampingOnFree);
+    let mut bus = opaque(Bus::new(Duration::from_millis(opaque(0)), Duration::from_micros(opaque(0)), codes));
+    bus.bytes(any_time(), any_bytes());
+    opaque(bus.poll(any_time()));
+    opaque((bus.is_idle(any_time()), bus.is_free(any_time()), bus.deadline(any_time())));
+    bus.ask(any_time(), Joint::from_index(opaque(0)).unwrap_or(Joint::ALL[0]));
+    bus.set_torque(any_time(), Joint::ALL.into_iter().zip(opaque([Torque::Free; JOINTS])));
+    bus.set_goals(any_time(), Joint::ALL.into_iter().zip(core::iter::repeat_with(|| opaque(0))));
+    opaque(bus.frame());
+}
+
+fn servo() {
+    let mut servo = opaque(Servo::new(opaque(0)));
+    let heard = frame::Frame { id: opaque(0), code: opaque(0), params: any_bytes() };
+    opaque(servo.handle_frame(&heard));
+    opaque((servo.torque_switch(), servo.goal(), servo.take_new_goal()));
+    servo.set_moving(opaque(true));
+    servo.set_errors(opaque(0));
+    opaque(servo.errors());
+    if let Some(reading) = Reading::parse(any_bytes()) {
+        servo.set_reading(&opaque(reading));
+    }
+}

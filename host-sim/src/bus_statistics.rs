@@ -1,0 +1,189 @@
+//! What goes over a servo bus, counted: questions, answers, goals, and how long answers take.
+//!
+//! Listens to the bytes of both directions and changes nothing. Time is an argument.
+
+use std::fmt;
+
+use motion_core::CYCLE;
+use motion_core::servo_bus::frame::{BROADCAST, Decoder, Instruction, register};
+use protocol_core::time::{Duration, Instant};
+
+/// The resolution of round trips.
+const GRAIN_US: u64 = 100;
+/// Round trips that take longer than this count as this long: 100 ms.
+const GRAINS: usize = 1_000;
+
+/// Counts since a moment.
+#[derive(Debug)]
+pub struct BusStatistics {
+    since: Instant,
+    decoder: Decoder,
+    /// Who was asked last, and when, unless the answer has come.
+    asked: Option<(u8, Instant)>,
+    questions: u64,
+    goals: u64,
+    /// Bytes that arrived, whatever they are.
+    bytes: u64,
+    answers: u64,
+    round_trips: Vec<u32>,
+}
+
+/// Figures of a stretch of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figures {
+    /// Questions in a control cycle of 10 ms.
+    pub questions_per_cycle: f64,
+    /// Frames with goals in a second.
+    pub goals_per_second: f64,
+    /// Half of the answers took no longer than this, from the question handed to the port to the answer read from it.
+    pub median: Duration,
+    /// 99 of 100 took no longer than this.
+    pub p99: Duration,
+    /// Questions that were answered.
+    pub answers: u64,
+    /// Bytes that came, answers or not.
+    pub bytes: u64,
+}
+
+impl BusStatistics {
+    /// Nothing counted yet.
+    #[must_use]
+    pub fn new(now: Instant) -> Self {
+        Self {
+            since: now,
+            decoder: Decoder::new(),
+            asked: None,
+            questions: 0,
+            goals: 0,
+            bytes: 0,
+            answers: 0,
+            round_trips: vec![0; GRAINS],
+        }
+    }
+
+    /// These bytes are handed to the port: whole frames.
+    pub fn sent(&mut self, now: Instant, bytes: &[u8]) {
+        let mut decoder = Decoder::new();
+        for piece in bytes.chunks(Decoder::CAPACITY / 2) {
+            decoder.push(piece);
+            while let Some(found) = decoder.pull() {
+                let Ok(frame) = found else { continue };
+                if frame.code == Instruction::Read as u8 {
+                    self.questions += 1;
+                    self.asked = Some((frame.id, now));
+                } else if frame.id == BROADCAST && frame.params.first() == Some(&register::GOAL_POSITION) {
+                    self.goals += 1;
+                }
+            }
+        }
+    }
+
+    /// These bytes were read from the port.
+    pub fn heard(&mut self, now: Instant, bytes: &[u8]) {
+        self.bytes += bytes.len() as u64;
+        for piece in bytes.chunks(Decoder::CAPACITY / 2) {
+            self.decoder.push(piece);
+            while let Some(found) = self.decoder.pull() {
+                let Ok(frame) = found else { continue };
+                // An echo of the question has two parameters, an answer has eight or more.
+                if let Some((_, at)) = self.asked.filter(|&(id, _)| id == frame.id && frame.params.len() > 2)
+                {
+                    self.asked = None;
+                    self.answers += 1;
+                    let grains = usize::try_from((now - at).as_micros() / GRAIN_US).unwrap_or(GRAINS);
+                    if let Some(count) = self.round_trips.get_mut(grains.min(GRAINS - 1)) {
+                        *count += 1;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The figures since the last call, or since the beginning.
+    pub fn take(&mut self, now: Instant) -> Figures {
+        let figures = self.figures(now);
+        let asked = self.asked;
+        *self = Self { asked, ..Self::new(now) };
+        figures
+    }
+
+    #[allow(clippy::cast_precision_loss)] // Counts are far below 2^52.
+    fn figures(&self, now: Instant) -> Figures {
+        let micros = (now - self.since).as_micros().max(1) as f64;
+        Figures {
+            questions_per_cycle: self.questions as f64 * CYCLE.as_micros() as f64 / micros,
+            goals_per_second: self.goals as f64 * 1e6 / micros,
+            median: self.quantile(50),
+            p99: self.quantile(99),
+            answers: self.answers,
+            bytes: self.bytes,
+        }
+    }
+
+    fn quantile(&self, percent: u64) -> Duration {
+        let wanted = (self.answers * percent).div_ceil(100);
+        let mut seen = 0;
+        let grains = self.round_trips.iter().take_while(|&&count| {
+            seen += u64::from(count);
+            seen < wanted
+        });
+        // The end of the grain.
+        Duration::from_micros((grains.count() as u64 + 1) * GRAIN_US)
+    }
+}
+
+impl fmt::Display for Figures {
+    #[allow(clippy::cast_precision_loss)] // Round trips are milliseconds.
+    fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let millis = |time: Duration| time.as_micros() as f64 / 1e3;
+        write!(
+            text,
+            "{:.1} questions per cycle of 10 ms, {:.0} goals/s",
+            self.questions_per_cycle, self.goals_per_second
+        )?;
+        if self.answers == 0 {
+            return write!(text, ", no answer");
+        }
+        write!(text, ", round trip p50 {:.1} ms, p99 {:.1} ms", millis(self.median), millis(self.p99))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motion_core::servo_bus::frame::{FrameBuffer, read, status, sync_write};
+
+    use super::*;
+
+    fn at(millis: u64) -> Instant {
+        Instant::ZERO + Duration::from_millis(millis)
+    }
+
+    #[test]
+    fn questions_goals_and_round_trips_are_counted() {
+        let mut statistics = BusStatistics::new(at(0));
+        let (mut question, mut answer, mut goals) =
+            (FrameBuffer::new(), FrameBuffer::new(), FrameBuffer::new());
+        read(&mut question, 2, register::PRESENT_POSITION, 8);
+        status(&mut answer, 2, 0, &[0; 8]);
+        sync_write(&mut goals, register::GOAL_POSITION, [(2, [0; 6])].into_iter());
+        for round in 0..100 {
+            let start = at(round * 10);
+            statistics.sent(start, &[goals.as_slice(), question.as_slice()].concat());
+            let takes = if round < 98 { 2 } else { 9 };
+            // An echo, and the answer in two pieces.
+            statistics.heard(start, &question);
+            statistics.heard(start, &answer[..5]);
+            statistics.heard(start + Duration::from_millis(takes), &answer[5..]);
+        }
+        let figures = statistics.take(at(1_000));
+        assert!(
+            (figures.questions_per_cycle - 1.0).abs() < 1e-9
+                && (figures.goals_per_second - 100.0).abs() < 1e-9
+        );
+        assert_eq!(
+            (figures.answers, figures.median, figures.p99),
+            (100, Duration::from_micros(2_100), Duration::from_micros(9_100))
+        );
+        assert_eq!(statistics.take(at(2_000)).answers, 0);
+    }
+}

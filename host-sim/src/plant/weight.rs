@@ -1,0 +1,136 @@
+//! The weight of the arm: which torque gravity puts on each joint in a pose.
+//!
+//! ```text
+//!          elbow ───────────── joint 5 ── tool        T2: rear arm above the horizontal
+//!         ╱        forearm                            T3 - 65: forearm below the horizontal,
+//!   rear ╱                                                     whatever T2 is (parallelogram)
+//!       ╱                                             T4, T5: roll and pitch of the tool
+//!   shoulder
+//! ```
+//!
+//! Three point masses. Lengths are the maker's; masses and their places are assumed, as no arm was weighed.
+//! Joints 1 (vertical axis), 6 (the tool's own axis) and 7 (the claw) carry no weight. Integers only.
+//! Knows nothing of servos or friction.
+
+use protocol_core::registers::JOINTS;
+
+use super::sine::{ONE, cosine, sine};
+
+/// Shoulder to elbow, in millimetres (the maker's length a).
+const REAR_ARM_MM: i64 = 120;
+/// From the elbow pin square to the axis of the forearm, in millimetres (the maker's length h).
+const ELBOW_OFFSET_MM: i64 = 25;
+/// Elbow to joint 5, in hundredths of a millimetre (the maker's length c).
+const FOREARM_CENTI_MM: i64 = 19_850;
+
+/// The rear arm, in grams: assumed.
+const REAR_ARM_G: i64 = 120;
+/// Its centre of mass, from the shoulder, in millimetres: assumed to be in the middle.
+const REAR_ARM_CENTRE_MM: i64 = 60;
+/// The forearm with the servos of joints 4 and 5, in grams: assumed.
+const FOREARM_G: i64 = 200;
+/// Its centre of mass, from the elbow, in millimetres: assumed.
+const FOREARM_CENTRE_MM: i64 = 110;
+/// What joint 5 carries (the servos of joints 6 and 7, the claw or the cup), in grams: assumed.
+const TOOL_G: i64 = 100;
+/// Its centre of mass, from the axis of joint 5, in millimetres: assumed.
+const TOOL_CENTRE_MM: i64 = 50;
+
+/// The weight of a gram, in thousandths of a millinewton: so grams times millimetres times this are nanonewton
+/// metres.
+const GRAVITY: i64 = 9_807;
+
+/// What joint 2 lifts: a moment in gram millimetres.
+const SHOULDER: i64 = REAR_ARM_G * REAR_ARM_CENTRE_MM + (FOREARM_G + TOOL_G) * REAR_ARM_MM;
+/// What joint 3 lifts along the forearm.
+const FOREARM: i64 = FOREARM_G * FOREARM_CENTRE_MM + TOOL_G * FOREARM_CENTI_MM / 100;
+/// What joint 3 lifts square to the forearm.
+const ELBOW: i64 = (FOREARM_G + TOOL_G) * ELBOW_OFFSET_MM;
+/// What joints 3, 4 and 5 lift along the tool.
+const TOOL: i64 = TOOL_G * TOOL_CENTRE_MM;
+/// The angle of joint 3 at which the forearm is level, in thousandths of a degree.
+const LEVEL: i64 = 65_000;
+
+/// The torque of gravity on each joint, in micronewton metres, towards greater angles, in a pose given in
+/// thousandths of a degree.
+pub(crate) fn torques(pose: [i64; JOINTS]) -> [i64; JOINTS] {
+    let [_, rear, forearm, roll, pitch, _, _] = pose;
+    let drop = forearm - LEVEL;
+    let (sin_drop, cos_drop) = (sine(drop), cosine(drop));
+    let (sin_roll, cos_roll) = (sine(roll), cosine(roll));
+    let (sin_pitch, cos_pitch) = (sine(pitch), cosine(pitch));
+    // Each is a derivative of the height of the masses.
+    let along = FOREARM * cos_drop + ELBOW * sin_drop;
+    let tool_at_elbow = sin_pitch * cos_drop + cos_pitch * sin_roll / ONE * sin_drop;
+    let tool_at_pitch = cos_pitch * sin_drop + sin_pitch * sin_roll / ONE * cos_drop;
+    let tool_at_roll = cos_pitch * cos_roll / ONE * cos_drop;
+    [
+        0,
+        torque(-SHOULDER * cosine(rear)),
+        torque(along + TOOL * (tool_at_elbow / ONE)),
+        torque(-TOOL * (tool_at_roll / ONE)),
+        torque(TOOL * (tool_at_pitch / ONE)),
+        0,
+        0,
+    ]
+}
+
+/// Micronewton metres, of gram millimetres in millionths.
+const fn torque(moment: i64) -> i64 {
+    moment / 1_000 * GRAVITY / ONE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn pose(rear: i64, forearm: i64, roll: i64, pitch: i64) -> [i64; JOINTS] {
+        [90_000, rear * 1_000, forearm * 1_000, roll * 1_000, pitch * 1_000, 90_000, 80_000]
+    }
+
+    /// The height of the centre of mass times the mass, by floating point: what the torques derive from.
+    fn energy(pose: [i64; JOINTS]) -> f64 {
+        let radians = |millidegrees: i64| (millidegrees as f64 / 1_000.0).to_radians();
+        let [_, rear, forearm, roll, pitch, _, _] = pose.map(radians);
+        let drop = forearm - 65_f64.to_radians();
+        let elbow = 0.120 * rear.sin();
+        let offset = 0.025 * drop.cos();
+        let direction = -pitch.sin() * drop.sin() + pitch.cos() * roll.sin() * drop.cos();
+        let mass_height = 0.120 * 0.060 * rear.sin()
+            + 0.200 * (elbow + offset - 0.110 * drop.sin())
+            + 0.100 * (elbow + offset - 0.1985 * drop.sin() + 0.050 * direction);
+        mass_height * 9.807
+    }
+
+    #[test]
+    fn torques_are_the_slope_of_the_energy() {
+        for (rear, forearm, roll, pitch) in
+            [(90, 65, 90, 90), (30, 90, 90, 90), (120, 40, 60, 20), (60, 120, 150, 130), (0, 0, 0, 0)]
+        {
+            let at = pose(rear, forearm, roll, pitch);
+            for joint in 0..JOINTS {
+                let shifted = |by: i64| {
+                    let mut shifted = at;
+                    shifted[joint] += by;
+                    energy(shifted)
+                };
+                let slope = (shifted(-500) - shifted(500)) / 1_f64.to_radians();
+                let torque = torques(at)[joint] as f64 / 1e6;
+                assert!((torque - slope).abs() < 0.001, "joint {}: {torque} N m, not {slope}", joint + 1);
+            }
+        }
+    }
+
+    #[test]
+    fn the_level_forearm_is_heavy_and_the_upright_rear_arm_is_not() {
+        let [base, rear, forearm, roll, pitch, wrist, claw] = torques(pose(90, 65, 90, 90));
+        assert_eq!([base, rear, roll, wrist, claw], [0; 5]);
+        assert_eq!([forearm, pitch], [459_457, 49_035], "towards greater angles: down");
+        assert_eq!(
+            torques(pose(0, 65, 90, 90))[1],
+            -423_662,
+            "a rear arm that leans to the front falls there"
+        );
+        assert!(torques(pose(120, 65, 90, 90))[1] > 0, "and one that leans back falls back");
+    }
+}

@@ -1,0 +1,189 @@
+//! The serial port of a USB adapter with real servos behind it.
+//!
+//! Opens it for this process alone, raw, at any baud rate, and sets the latency timer of the adapter where it has one.
+//! Knows nothing of frames.
+
+use std::fs;
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{FlockOperation, Mode, OFlags, flock, open};
+use rustix::io::Errno;
+use rustix::termios::{
+    ControlModes, OptionalActions, QueueSelector, Termios, ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr,
+};
+
+/// The latency timer that is asked for, in milliseconds: the shortest there is.
+const SHORTEST_LATENCY_MS: u32 = 1;
+
+/// Why there is no port. Each message says what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum SerialError {
+    /// Nothing has that name.
+    #[error("--servos {}: there is no such port: plug the adapter in; ports that are there: {}", path.display(), ports())]
+    Absent {
+        /// The port.
+        path: PathBuf,
+    },
+    /// This user may not open it.
+    #[error("--servos {}: you may not open it: join the group that owns it (number {group}, most often dialout: sudo usermod -aG dialout $USER) and log in again", path.display())]
+    Forbidden {
+        /// The port.
+        path: PathBuf,
+        /// The group that may.
+        group: u32,
+    },
+    /// Another program has it.
+    #[error("--servos {}: another program uses the port: end that one; 'fuser {}' tells its number", .0.display(), .0.display())]
+    InUse(PathBuf),
+    /// It is something else.
+    #[error("--servos {}: that is no serial port: ports that are there: {}", .0.display(), ports())]
+    NoPort(PathBuf),
+    /// The adapter cannot do that baud rate.
+    #[error("--servos {}: the adapter refuses {baud} baud ({cause}): choose another --servo-baud, or an adapter that can", path.display())]
+    Baud {
+        /// The port.
+        path: PathBuf,
+        /// The baud rate.
+        baud: u32,
+        /// The system's reason.
+        cause: io::Error,
+    },
+    /// The operating system refused.
+    #[error("--servos {}: {cause}: unplug the adapter, plug it in again, and look what 'dmesg' says of it", path.display())]
+    Refused {
+        /// The port.
+        path: PathBuf,
+        /// The system's reason.
+        cause: io::Error,
+    },
+}
+
+/// An open port.
+#[derive(Debug)]
+pub struct Serial {
+    port: OwnedFd,
+    latency: Option<Latency>,
+}
+
+/// The latency timer of the adapter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Latency {
+    /// In milliseconds, as it was found.
+    pub found: u32,
+    /// In milliseconds, as it is now.
+    pub now: u32,
+}
+
+impl Serial {
+    /// Opens a port for this process alone.
+    ///
+    /// # Errors
+    /// See [`SerialError`].
+    pub fn open(path: &Path, baud: u32) -> Result<Self, SerialError> {
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+        let port = open(path, flags, Mode::empty()).map_err(|cause| refused(path, cause))?;
+        let mut mode = tcgetattr(&port).map_err(|_| SerialError::NoPort(path.to_owned()))?;
+        flock(&port, FlockOperation::NonBlockingLockExclusive).map_err(|cause| refused(path, cause))?;
+        ioctl_tiocexcl(&port).map_err(|cause| refused(path, cause))?;
+        set_mode(&port, &mut mode, baud).map_err(|cause| {
+            let cause = cause.into();
+            SerialError::Baud { path: path.to_owned(), baud, cause }
+        })?;
+        tcflush(&port, QueueSelector::IOFlush).map_err(|cause| refused(path, cause))?;
+        Ok(Self { port, latency: shorten_latency(path) })
+    }
+
+    /// The latency timer, where the adapter has one that can be seen.
+    #[must_use]
+    pub const fn latency(&self) -> Option<Latency> {
+        self.latency
+    }
+
+    /// Reads what has arrived; 0: nothing.
+    ///
+    /// # Errors
+    /// The adapter was unplugged, or the operating system failed.
+    pub fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
+        match rustix::io::read(&self.port, bytes) {
+            // In raw mode a read waits for a byte, or says that it would have to.
+            Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
+            Err(Errno::AGAIN | Errno::INTR) => Ok(0),
+            other => Ok(other?),
+        }
+    }
+
+    /// Sends bytes; says how many found room.
+    ///
+    /// # Errors
+    /// The adapter was unplugged, or the operating system failed.
+    pub fn write(&self, bytes: &[u8]) -> io::Result<usize> {
+        match rustix::io::write(&self.port, bytes) {
+            Err(Errno::AGAIN | Errno::INTR) => Ok(0),
+            other => Ok(other?),
+        }
+    }
+
+    /// Waits until everything is sent.
+    ///
+    /// # Errors
+    /// The adapter was unplugged, or the operating system failed.
+    pub fn drain(&self) -> io::Result<()> {
+        Ok(rustix::termios::tcdrain(&self.port)?)
+    }
+}
+
+impl AsFd for Serial {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.port.as_fd()
+    }
+}
+
+fn set_mode(port: &OwnedFd, mode: &mut Termios, baud: u32) -> rustix::io::Result<()> {
+    mode.make_raw();
+    mode.control_modes |= ControlModes::CREAD | ControlModes::CLOCAL;
+    mode.control_modes -= ControlModes::CSTOPB | ControlModes::CRTSCTS;
+    mode.set_speed(baud)?;
+    tcsetattr(port, OptionalActions::Now, mode)
+}
+
+fn refused(path: &Path, cause: Errno) -> SerialError {
+    let path = path.to_owned();
+    match cause {
+        Errno::NOENT | Errno::NODEV | Errno::NXIO => SerialError::Absent { path },
+        Errno::ACCESS | Errno::PERM => {
+            let group = fs::metadata(&path).map_or(0, |metadata| metadata.gid());
+            SerialError::Forbidden { path, group }
+        }
+        Errno::BUSY | Errno::WOULDBLOCK => SerialError::InUse(path),
+        Errno::NOTTY | Errno::ISDIR | Errno::INVAL => SerialError::NoPort(path),
+        cause => SerialError::Refused { path, cause: cause.into() },
+    }
+}
+
+/// The serial ports of USB adapters there are, in words.
+fn ports() -> String {
+    let devices = fs::read_dir("/dev").into_iter().flatten().flatten();
+    let mut ports: Vec<String> = devices
+        .filter_map(|device| device.file_name().into_string().ok())
+        .filter(|name| name.starts_with("ttyUSB") || name.starts_with("ttyACM"))
+        .map(|name| format!("/dev/{name}"))
+        .collect();
+    ports.sort();
+    if ports.is_empty() { "none".to_owned() } else { ports.join(" ") }
+}
+
+/// An FTDI chip has a latency timer, 16 ms by default. The kernel shows it in a file, which only root may write in
+/// most systems.
+fn shorten_latency(path: &Path) -> Option<Latency> {
+    let device = fs::canonicalize(path).ok()?;
+    let file = Path::new("/sys/bus/usb-serial/devices").join(device.file_name()?).join("latency_timer");
+    let read = || fs::read_to_string(&file).ok()?.trim().parse().ok();
+    let found = read()?;
+    if found > SHORTEST_LATENCY_MS {
+        let _ = fs::write(&file, SHORTEST_LATENCY_MS.to_string());
+    }
+    Some(Latency { found, now: read().unwrap_or(found) })
+}

@@ -1,0 +1,110 @@
+//! `servo center`: turns a servo to the middle of its range.
+
+use std::io::{self, Write};
+
+use clap::{Args, value_parser};
+use serde::Serialize;
+use sevenbot::servo_bench::center::{CenterError, Limits, MIDDLE, center};
+use sevenbot::servo_bench::{Reading, ServoBus};
+
+use super::{Rate, failure, id, open};
+use crate::confirm::confirm;
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::output::{Facts, note};
+use crate::progress::Progress;
+use crate::session::Session;
+
+/// Turn a servo to the middle of its range, 511 counts, slowly.
+///
+/// The servo gets its present position as its goal, then torque, then the middle as its goal. It stops and loses its
+/// torque when it pushes harder than --load, when it comes no closer for 3 s, and at Ctrl-C. At the end it holds the
+/// middle with torque on, so that a horn or a gear can be fitted.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Best done with the servo alone on the bench. In an arm, support the arm: at a stop the servo lets go.
+
+Examples:
+  sevenbot servo center 3
+  sevenbot servo center 3 --speed 50 --load 30 --yes")]
+pub(super) struct CenterArgs {
+    /// The servo's id.
+    #[arg(value_parser = id())]
+    id: u8,
+    #[command(flatten)]
+    rate: Rate,
+    /// Speed in counts per second; 100 are about 21 degrees/s in joints 1 to 4, 29 in 5 to 7.
+    #[arg(long, value_name = "COUNTS", default_value_t = 100, value_parser = value_parser!(u16).range(1..=1000))]
+    speed: u16,
+    /// The load that ends the move, in percent of the stall torque.
+    #[arg(long, value_name = "PERCENT", default_value_t = 60, value_parser = value_parser!(u16).range(1..=100))]
+    load: u16,
+    /// Move without a question.
+    #[arg(long)]
+    yes: bool,
+}
+
+#[derive(Serialize)]
+struct Centered {
+    id: u8,
+    position_counts: u16,
+}
+
+impl Facts for Centered {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "servo {} holds at {} counts", self.id, self.position_counts)
+    }
+}
+
+pub(super) fn run(session: &mut Session, args: &CenterArgs) -> Result<(), Failure> {
+    let id = args.id;
+    let mut bus = open(session, args.rate.rate)?;
+    // Before the question, so that it is asked about a servo that is there.
+    if let Err(error) = bus.read(id, 0, 1) {
+        return Err(failure(session, bus, error));
+    }
+    confirm(
+        &format!("Servo {id} turns to {MIDDLE} counts. Is nothing in its way, and the arm supported?"),
+        args.yes,
+    )?;
+    match drive(&mut bus, args) {
+        Ok(position_counts) => session.output.show(&Centered { id, position_counts }),
+        Err(CenterError::Interrupted) => {
+            note("the servo stopped, and its torque is off");
+            Err(Failure::Interrupted)
+        }
+        Err(CenterError::Bus(error)) => Err(failure(session, bus, error)),
+        Err(error) => Err(Failure::Advised { message: error.to_string(), advice: advice(&error) }),
+    }
+}
+
+fn drive(bus: &mut ServoBus, args: &CenterArgs) -> Result<u16, CenterError> {
+    let limits = Limits { speed: args.speed, load: args.load * 10, ..Limits::default() };
+    let interrupt = Interrupt::catch();
+    let mut progress: Option<(Progress, u16)> = None;
+    center(bus, args.id, &limits, |reading| {
+        let distance = |reading: &Reading| reading.position_counts.abs_diff(MIDDLE);
+        let (bar, total) = progress
+            .get_or_insert_with(|| (Progress::new(distance(reading).into(), "counts"), distance(reading)));
+        bar.set(total.saturating_sub(distance(reading)).into());
+        bar.say(&format!("load {:.1} %", f64::from(reading.load) / 10.0));
+        !interrupt.has_come()
+    })
+}
+
+const fn advice(error: &CenterError) -> &'static [&'static str] {
+    match error {
+        CenterError::OutOfReach { .. } | CenterError::Unmeasured => {
+            &["nothing was moved; see `sevenbot servo info`"]
+        }
+        CenterError::Unfit { .. } => {
+            &["nothing was moved; an overload ends when the servo's power goes off and on"]
+        }
+        CenterError::Overload { .. } | CenterError::Stalled { .. } => &[
+            "the servo's torque is off",
+            "is something in its way, or its horn at a stop? Is its supply strong enough?",
+        ],
+        CenterError::StillOn(_) => &["switch the servos' supply off"],
+        CenterError::Bus(_) | CenterError::Interrupted => &[],
+    }
+}

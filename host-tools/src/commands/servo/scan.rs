@@ -1,0 +1,151 @@
+//! `servo scan`: which servos are on the bus, at which baud rates.
+
+use std::io::{self, Write};
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+use clap::{Args, value_parser};
+use serde::Serialize;
+use sevenbot::Joint;
+use sevenbot::servo_bench::scan::{Answers, Found, Plan, Scan, scan};
+use sevenbot::servo_bench::{BAUD_RATES, MAX_ID};
+
+use super::{leads_to_arm, open, port, rate};
+use crate::failure::Failure;
+use crate::output::{DOUBTFUL, Facts, warn};
+use crate::progress::Progress;
+use crate::session::Session;
+
+/// Find the servos on the bus, at all eight baud rates.
+///
+/// Only asks: no servo moves, and nothing is written.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Each id gets a short question; what answered is then asked patiently. All 254 ids take about 1.4 s at 1000000 baud
+and 17 s at all eight rates. \"several servos\" or \"damaged answers\" at one id mostly means that two servos have it.
+
+Exit status 1 when an id does not answer as one servo does, 3 when no servo answers.
+
+Examples:
+  sevenbot servo scan
+  sevenbot servo scan --rates 1000000 --ids 0-6     the servos of an arm, as its controller asks them
+  sevenbot servo scan --json")]
+pub(super) struct ScanArgs {
+    /// Try only these baud rates.
+    #[arg(long, value_name = "RATE,..", value_delimiter = ',', value_parser = rate)]
+    rates: Vec<u32>,
+    /// Ask only these ids, as 5 or 0-6.
+    #[arg(long, value_name = "ID-ID", default_value = "0-253", value_parser = ids)]
+    ids: RangeInclusive<u8>,
+    /// Wait so long for each id, in milliseconds, instead of as long as a servo needs.
+    #[arg(long, value_name = "MS", value_parser = value_parser!(u16).range(1..))]
+    wait: Option<u16>,
+}
+
+fn ids(text: &str) -> Result<RangeInclusive<u8>, String> {
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let id = |text: &str| text.trim().parse().ok().filter(|&id: &u8| id <= MAX_ID);
+    match (id(first), id(last)) {
+        (Some(first), Some(last)) if first <= last => Ok(first..=last),
+        _ => Err(format!("use one id or two with a hyphen, from 0 to {MAX_ID}")),
+    }
+}
+
+#[derive(Serialize)]
+struct Servos {
+    port: String,
+    /// Does the adapter echo what is sent?
+    echo: bool,
+    servos: Vec<Servo>,
+    rates_not_tried: Vec<u32>,
+}
+
+#[derive(Serialize)]
+struct Servo {
+    id: u8,
+    baud: u32,
+    /// None for an id that no joint of the arm has.
+    joint: Option<u8>,
+    answers: &'static str,
+}
+
+impl From<&Found> for Servo {
+    fn from(found: &Found) -> Self {
+        let joint = Joint::from_index(found.id).map(Joint::number);
+        Self { id: found.id, baud: found.baud, joint, answers: word(found.answers) }
+    }
+}
+
+const fn word(answers: Answers) -> &'static str {
+    match answers {
+        Answers::Good => "good",
+        Answers::Several => "several servos",
+        Answers::Damaged => "damaged answers",
+    }
+}
+
+impl Facts for Servos {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        for Servo { id, baud, joint, answers } in &self.servos {
+            let joint = joint.map_or_else(|| "no joint's id".to_owned(), |joint| format!("joint {joint}"));
+            write!(out, "id {id:<3}  {baud:>7} baud  ")?;
+            if *answers == word(Answers::Good) {
+                writeln!(out, "{joint}")?;
+            } else {
+                writeln!(out, "{joint:<13}  {DOUBTFUL}{answers}{DOUBTFUL:#}")?;
+            }
+        }
+        writeln!(
+            out,
+            "{}",
+            if self.echo { "the adapter echoes what is sent" } else { "the adapter gives no echo" }
+        )
+    }
+}
+
+pub(super) fn run(session: &mut Session, args: &ScanArgs) -> Result<(), Failure> {
+    let port = port(session)?;
+    let rates = if args.rates.is_empty() { BAUD_RATES.to_vec() } else { args.rates.clone() };
+    let wait = args.wait.map(|millis| Duration::from_millis(millis.into()));
+    let plan = Plan { ids: args.ids.clone(), wait, rates };
+    let mut bus = open(session, plan.rates.first().copied().unwrap_or(1_000_000))?;
+    let scan = with_progress(&plan, |tell| scan(&mut bus, &plan, tell));
+    let Scan { found, unknown_rates, has_echo } =
+        scan.map_err(|error| Failure::Servo { port: port.clone(), error })?;
+    for rate in &unknown_rates {
+        warn(format_args!("this adapter does not know {rate} baud: servos at that rate were not looked for"));
+    }
+    if found.is_empty() {
+        let is_host_link = leads_to_arm(session, bus, &port);
+        return Err(if is_host_link {
+            Failure::HostLink { port }
+        } else {
+            Failure::NoServo { port, has_echo }
+        });
+    }
+    let servos = found.iter().map(Servo::from).collect();
+    session.output.show(&Servos { port, echo: has_echo, servos, rates_not_tried: unknown_rates })?;
+    all_good(&found)
+}
+
+/// Runs a scan with a bar for its questions.
+pub(super) fn with_progress<T>(
+    plan: &Plan,
+    scan: impl FnOnce(&mut dyn FnMut(sevenbot::servo_bench::scan::Step)) -> T,
+) -> T {
+    let total = u64::try_from(plan.questions()).unwrap_or(u64::MAX);
+    let progress = Progress::new(total, "questions");
+    scan(&mut |step| {
+        progress.set(u64::try_from(step.asked).unwrap_or(total));
+        progress.say(&format!("{} baud, {} found", step.baud, step.found));
+    })
+}
+
+fn all_good(found: &[Found]) -> Result<(), Failure> {
+    let bad: Vec<String> = found
+        .iter()
+        .filter(|found| found.answers != Answers::Good)
+        .map(|found| format!("id {} at {} baud: {}", found.id, found.baud, word(found.answers)))
+        .collect();
+    if bad.is_empty() { Ok(()) } else { Err(Failure::Arm(bad.join("\n       "))) }
+}

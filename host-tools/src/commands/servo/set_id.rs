@@ -1,0 +1,65 @@
+//! `servo set-id`: gives the only servo on the bus another id.
+
+use std::io::{self, Write};
+use std::time::Duration;
+
+use clap::{Args, value_parser};
+use serde::Serialize;
+use sevenbot::servo_bench::id::{IdError, everything_at, set_id};
+
+use super::scan::with_progress;
+use super::{Rate, failure, id, open};
+use crate::failure::Failure;
+use crate::output::Facts;
+use crate::session::Session;
+
+/// Give the only servo on the bus another id.
+///
+/// All ids are asked first. Unless exactly one servo answers, and to OLD, nothing is written. Then the servo's EEPROM is
+/// unlocked, the id written, the EEPROM locked again, and made sure that the servo answers to NEW and no more to OLD.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Joint 1 has id 0, joint 7 has id 6.
+
+Examples:
+  sevenbot servo set-id 1 3                    a new servo with id 1 becomes that of joint 4
+  sevenbot servo set-id 1 3 --rate 500000")]
+pub(super) struct SetIdArgs {
+    /// The id it has.
+    #[arg(value_parser = id())]
+    old: u8,
+    /// The id it shall have.
+    #[arg(value_parser = id())]
+    new: u8,
+    #[command(flatten)]
+    rate: Rate,
+    /// Wait so long for each id while looking for other servos, in milliseconds.
+    #[arg(long, value_name = "MS", value_parser = value_parser!(u16).range(1..))]
+    wait: Option<u16>,
+}
+
+#[derive(Serialize)]
+struct Changed {
+    old_id: u8,
+    id: u8,
+}
+
+impl Facts for Changed {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "the servo has id {} now; nothing answers to {} any more", self.id, self.old_id)
+    }
+}
+
+pub(super) fn run(session: &mut Session, args: &SetIdArgs) -> Result<(), Failure> {
+    let &SetIdArgs { old, new, rate: Rate { rate }, wait } = args;
+    if old == new {
+        return Err(Failure::Usage(format!("the old id and the new one are both {old}")));
+    }
+    let mut bus = open(session, rate)?;
+    let plan = everything_at(rate, wait.map(|millis| Duration::from_millis(millis.into())));
+    match with_progress(&plan, |tell| set_id(&mut bus, &plan, old, new, tell)) {
+        Ok(()) => session.output.show(&Changed { old_id: old, id: new }),
+        Err(IdError::Bus(error)) => Err(failure(session, bus, error)),
+        Err(error) => Err(Failure::Advised { message: error.to_string(), advice: error.advice() }),
+    }
+}

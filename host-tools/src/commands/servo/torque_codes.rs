@@ -1,0 +1,244 @@
+//! `servo torque-codes`: which of the two published meanings of register 40 a servo has.
+//!
+//! A person turns the joint by hand with code 0 and with code 2. Code 1, torque on, is the same in both tables and is
+//! never written: the servo is never driven.
+
+use std::io::{self, IsTerminal, Write};
+
+use clap::Args;
+use motion_core::servo_bus::frame::register::TORQUE_SWITCH;
+use serde::Serialize;
+use sevenbot::servo_bench::{ServoBus, TorqueCodes};
+
+use super::{Rate, failure, id, open};
+use crate::confirm::confirm;
+use crate::failure::Failure;
+use crate::output::Facts;
+use crate::session::Session;
+
+/// Find out with your hand what codes 0 and 2 of the torque switch (register 40) mean.
+///
+/// There are two tables: in the older one 0 is damping and 2 is free, in Feetech's current one it is the other way
+/// round. Code 1 is torque on in both; it is not tried, so the servo is never driven. You turn joint 1, which carries no
+/// weight, and say with which code it turns lighter.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+With a hand on the joint:
+  Enter      switch to the other code
+  0, 2       it turns lighter with this code: that ends the test
+  s          both feel the same
+  q          end, without a result
+
+Afterwards the servo has no torque, with code 0.
+
+Examples:
+  sevenbot servo torque-codes
+  sevenbot servo torque-codes --id 4 --json    another servo, alone on the bench")]
+pub(super) struct TorqueCodesArgs {
+    /// The servo's id; 0 is joint 1.
+    #[arg(long, default_value_t = 0, value_parser = id())]
+    id: u8,
+    #[command(flatten)]
+    rate: Rate,
+}
+
+#[derive(Serialize)]
+struct Verdict {
+    id: u8,
+    lighter_code: u8,
+    /// As `host-sim --torque-codes` calls it.
+    table: &'static str,
+    /// The constant of the firmware.
+    torque_codes: &'static str,
+}
+
+impl Verdict {
+    const fn new(id: u8, lighter: Code) -> Self {
+        let (table, torque_codes) = match lighter.table() {
+            TorqueCodes::DampingOnFree => ("older", "DampingOnFree"),
+            TorqueCodes::FreeOnDamping => ("current", "FreeOnDamping"),
+        };
+        Self { id, lighter_code: lighter.number(), table, torque_codes }
+    }
+}
+
+impl Facts for Verdict {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        let &Self { lighter_code, table, torque_codes, .. } = self;
+        writeln!(out, "{table} table: code {lighter_code} is free, code {} is damping", 2 - lighter_code)?;
+        let default = if table == "older" { ", which is its default" } else { "" };
+        writeln!(out, "board:    TORQUE_CODES in board.rs is TorqueCodes::{torque_codes}{default}")?;
+        writeln!(out, "computer: host-sim --torque-codes {table}{default}")
+    }
+}
+
+/// The two codes that give no torque.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Code {
+    Zero,
+    Two,
+}
+
+impl Code {
+    const fn number(self) -> u8 {
+        match self {
+            Self::Zero => 0,
+            Self::Two => 2,
+        }
+    }
+
+    const fn other(self) -> Self {
+        match self {
+            Self::Zero => Self::Two,
+            Self::Two => Self::Zero,
+        }
+    }
+
+    /// The table in which this code is free.
+    const fn table(self) -> TorqueCodes {
+        match self {
+            Self::Zero => TorqueCodes::FreeOnDamping,
+            Self::Two => TorqueCodes::DampingOnFree,
+        }
+    }
+}
+
+/// What may be typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Answer {
+    Switch,
+    Lighter(Code),
+    Same,
+    Quit,
+}
+
+impl Answer {
+    fn parse(line: &str) -> Option<Self> {
+        Some(match line.trim() {
+            "" => Self::Switch,
+            "0" => Self::Lighter(Code::Zero),
+            "2" => Self::Lighter(Code::Two),
+            "s" | "S" => Self::Same,
+            "q" | "Q" => Self::Quit,
+            _ => return None,
+        })
+    }
+}
+
+pub(super) fn run(session: &mut Session, args: &TorqueCodesArgs) -> Result<(), Failure> {
+    if !io::stdin().is_terminal() {
+        let why = "torque-codes asks what a person feels: run it in a terminal";
+        return Err(Failure::Usage(why.to_owned()));
+    }
+    let id = args.id;
+    let mut bus = open(session, args.rate.rate)?;
+    if let Err(error) = bus.read(id, TORQUE_SWITCH, 1) {
+        return Err(failure(session, bus, error));
+    }
+    confirm(
+        &format!("The torque of servo {id} goes off. Is the arm supported, and your hand on the joint?"),
+        false,
+    )?;
+    let felt = ask_which_is_lighter(&mut bus, id);
+    // Also after a failure, which is then the one to tell.
+    let ended = switch(&mut bus, id, Code::Zero);
+    match felt? {
+        Err(error) => Err(failure(session, bus, error)),
+        Ok(lighter) => match ended {
+            Err(error) => Err(failure(session, bus, error)),
+            Ok(()) => session.output.show(&Verdict::new(id, lighter)),
+        },
+    }
+}
+
+/// The code with which the joint turns lighter. The outer failure is the person's, the inner one the bus's.
+fn ask_which_is_lighter(
+    bus: &mut ServoBus,
+    id: u8,
+) -> Result<Result<Code, sevenbot::servo_bench::Error>, Failure> {
+    let (mut code, mut has_felt_both) = (Code::Zero, false);
+    if let Err(error) = switch(bus, id, code) {
+        return Ok(Err(error));
+    }
+    loop {
+        match ask(code)? {
+            Some(Answer::Switch) => {
+                code = code.other();
+                has_felt_both = true;
+                if let Err(error) = switch(bus, id, code) {
+                    return Ok(Err(error));
+                }
+            }
+            Some(Answer::Quit) => return Err(Failure::Arm("ended without a result".to_owned())),
+            Some(_) if !has_felt_both => say("feel the other code too first: press Enter")?,
+            Some(Answer::Lighter(code)) => return Ok(Ok(code)),
+            Some(Answer::Same) => return Err(same()),
+            None => say("type Enter, 0, 2, s or q")?,
+        }
+    }
+}
+
+fn same() -> Failure {
+    Failure::Advised {
+        message: "both codes feel the same, so this joint does not tell which table it is".to_owned(),
+        advice: &[
+            "turn the joint faster: damping grows with speed",
+            "compare with the servos' power off, which feels as free does",
+            "keep the default, the older table: with the wrong one an arm drops where it should sink",
+        ],
+    }
+}
+
+fn switch(bus: &mut ServoBus, id: u8, code: Code) -> Result<(), sevenbot::servo_bench::Error> {
+    bus.write(id, TORQUE_SWITCH, &[code.number()])
+}
+
+fn say(message: &str) -> io::Result<()> {
+    writeln!(anstream::stderr(), "{message}")
+}
+
+fn ask(code: Code) -> Result<Option<Answer>, Failure> {
+    let mut err = anstream::stderr();
+    write!(
+        err,
+        "code {} is on: turn the joint. Enter for the other, 0 or 2 for the lighter, s, q > ",
+        code.number()
+    )?;
+    err.flush()?;
+    let mut line = String::new();
+    if io::stdin().read_line(&mut line)? == 0 {
+        return Ok(Some(Answer::Quit));
+    }
+    Ok(Answer::parse(&line))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lighter_code_names_the_table() {
+        let verdict = |code| {
+            let verdict = Verdict::new(0, code);
+            (verdict.lighter_code, verdict.table, verdict.torque_codes)
+        };
+        assert_eq!(verdict(Code::Two), (2, "older", "DampingOnFree"));
+        assert_eq!(verdict(Code::Zero), (0, "current", "FreeOnDamping"));
+    }
+
+    #[test]
+    fn the_table_agrees_with_the_controller() {
+        use motion_core::servo_bus::Torque;
+        for code in [Code::Zero, Code::Two] {
+            assert_eq!(code.table().code(Torque::Free), code.number());
+            assert_eq!(code.table().code(Torque::Damping), code.other().number());
+        }
+    }
+
+    #[test]
+    fn answers_are_short() {
+        assert_eq!(Answer::parse("\n"), Some(Answer::Switch));
+        assert_eq!(Answer::parse("2\n"), Some(Answer::Lighter(Code::Two)));
+        assert_eq!(Answer::parse("1\n"), None);
+    }
+}

@@ -1,0 +1,78 @@
+//! Which reads still wait for their replies, so that a late reply is not taken for another read's.
+//!
+//! A reply carries nothing but its range, and the arm replies in the order of the requests (D5). So no two reads wait
+//! for the same range: a read whose range is waited for already asks for a few registers more. The same keeps a read
+//! of the present positions apart from the reports (D14). This file knows no bytes and no time.
+
+use std::collections::VecDeque;
+
+use protocol_core::registers::map::PRESENT_POSITION;
+
+use crate::span::Span;
+
+/// So many unanswered reads are remembered. A reply that is later than this many reads is not expected.
+const REMEMBERED: usize = 16;
+
+/// The registers of a report (D14).
+pub(crate) const REPORT: Span = Span::of(&PRESENT_POSITION);
+
+/// The reads without a reply, oldest first.
+#[derive(Debug, Default)]
+pub(crate) struct Pending(VecDeque<Span>);
+
+impl Pending {
+    /// Adds a read of these registers. Returns the registers to ask for: these, and a few more where the reply could
+    /// be taken for another one. A span of more than 239 registers may have no room for that.
+    pub(crate) fn add(&mut self, wanted: Span) -> Span {
+        let is_free = |span: &Span| *span != REPORT && !self.0.contains(span);
+        let asked = (0..=u8::MAX).map_while(|by| wanted.widened(by)).find(is_free).unwrap_or(wanted);
+        if self.0.len() >= REMEMBERED {
+            self.0.pop_front();
+        }
+        self.0.push_back(asked);
+        asked
+    }
+
+    /// A reply came: the read it belongs to waits no more, nor do those before it, whose replies are lost.
+    pub(crate) fn replied(&mut self, span: Span) {
+        if let Some(index) = self.0.iter().position(|&pending| pending == span) {
+            self.0.drain(..=index);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn span(address: u8, count: u8) -> Span {
+        Span::new(address, count).expect("a span")
+    }
+
+    #[test]
+    fn a_read_that_is_asked_again_asks_for_another_range() {
+        let mut pending = Pending::default();
+        assert_eq!(pending.add(span(29, 3)), span(29, 3));
+        assert_eq!(pending.add(span(29, 3)), span(29, 4));
+        assert_eq!(pending.add(span(29, 4)), span(29, 5), "taken by the second");
+        pending.replied(span(29, 4));
+        assert_eq!(pending.add(span(29, 3)), span(29, 3), "the first is lost");
+        assert_eq!(pending.add(span(29, 5)), span(29, 6), "the third still waits");
+    }
+
+    #[test]
+    fn a_read_of_the_positions_is_no_report() {
+        assert_eq!(Pending::default().add(REPORT), span(54, 8));
+    }
+
+    #[test]
+    fn what_never_comes_is_forgotten() {
+        let mut pending = Pending::default();
+        for _ in 0..1_000 {
+            let asked = pending.add(span(240, 16));
+            assert!(usize::from(asked.count()) <= 16 + REMEMBERED);
+        }
+        assert_eq!(pending.add(span(0, 255)), span(0, 255));
+        assert_eq!(pending.add(span(0, 255)), span(0, 255), "there is no room for another range");
+    }
+}

@@ -1,0 +1,26 @@
+//! Reports for the time of some work; the frequency is afterwards what it was before (register 53).
+
+use sevenbot::map::FEEDBACK_FREQUENCY;
+use sevenbot::{Arm, Span};
+
+use crate::commands::all_taken;
+use crate::failure::Failure;
+
+/// Does work while the arm reports its positions so many times a second.
+pub(crate) fn reporting<T>(
+    arm: &mut Arm,
+    hz: u8,
+    work: impl FnOnce(&mut Arm) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    let before = arm.read_span(Span::of(&FEEDBACK_FREQUENCY))?.byte(&FEEDBACK_FREQUENCY);
+    all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[hz])?)?;
+    let done = work(arm);
+    // An arm that went away cannot be told anything.
+    if done.as_ref().is_err_and(Failure::is_of_the_wire) {
+        return done;
+    }
+    let restored = arm.write_checked(FEEDBACK_FREQUENCY.address, &[before]);
+    let done = done?;
+    all_taken(&restored?)?;
+    Ok(done)
+}

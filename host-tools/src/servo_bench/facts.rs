@@ -1,0 +1,146 @@
+//! What a servo says of itself: its settings, what it was told, and what it measures.
+
+use motion_core::calibration::angle_from_counts;
+use motion_core::servo_bus::Reading;
+use motion_core::servo_bus::frame::{BAUD_RATES, error, register};
+use protocol_core::registers::Joint;
+
+use super::bus::ServoBus;
+use super::error::Error;
+
+/// Registers of the EEPROM that are read: up to the conditions that make the LED blink.
+const SETTINGS: u8 = register::LED_CONDITIONS + 1;
+/// Registers from the torque switch to the lock.
+const ORDERS: u8 = register::LOCK - register::TORQUE_SWITCH + 1;
+/// Registers from the present position to the moving flag.
+const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;
+
+/// What a servo's registers say. Fields that stand for one register bear its name in Feetech's memory table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Facts {
+    /// The servo.
+    pub id: u8,
+    /// Major and minor version of its firmware: 0.0 where the servo's table does not define it.
+    pub firmware_version: (u8, u8),
+    /// Major and minor version of the servo itself.
+    pub servo_version: (u8, u8),
+    /// Register 2: 1 is high byte first, as SCS servos have it.
+    pub byte_order: u8,
+    /// Its baud rate; `None` for a code that no table has.
+    pub baud: Option<u32>,
+    /// Does it acknowledge writes?
+    pub acknowledges_writes: bool,
+    /// Lowest and highest goal position, in counts. Both 0: the motor turns on and on.
+    pub position_limits: (u16, u16),
+    /// In degrees Celsius.
+    pub max_temperature: u8,
+    /// Lowest and highest supply, in 0.1 V.
+    pub voltage_limits: (u8, u8),
+    /// In 0.1 % of the stall torque.
+    pub max_torque: u16,
+    /// Error bits that switch the torque off.
+    pub unload_conditions: u8,
+    /// The code in the torque switch.
+    pub torque_switch: u8,
+    /// Where it was told to go, in counts.
+    pub goal_position: u16,
+    /// Can its EEPROM be written?
+    pub is_unlocked: bool,
+    /// What it measures; `None` where the position is none.
+    pub reading: Option<Reading>,
+    /// Its error bits.
+    pub errors: u8,
+    /// Does it move?
+    pub is_moving: bool,
+}
+
+impl Facts {
+    /// Reads them, in three questions.
+    ///
+    /// # Errors
+    /// The servo does not answer, or the port is gone.
+    pub fn read(bus: &mut ServoBus, id: u8) -> Result<Self, Error> {
+        let settings = Block::read(bus, id, 0, SETTINGS)?;
+        let orders = Block::read(bus, id, register::TORQUE_SWITCH, ORDERS)?;
+        let measured = Block::read(bus, id, register::PRESENT_POSITION, MEASURED)?;
+        let reading = measured.values.get(..usize::from(Reading::REGISTERS));
+        Ok(Self {
+            id,
+            firmware_version: settings.pair(register::FIRMWARE_VERSION),
+            servo_version: settings.pair(register::SERVO_VERSION),
+            byte_order: settings.byte(register::BYTE_ORDER),
+            baud: BAUD_RATES.get(usize::from(settings.byte(register::BAUD_RATE))).copied(),
+            acknowledges_writes: settings.byte(register::RESPONSE_LEVEL) != 0,
+            position_limits: (settings.word(register::MIN_POSITION), settings.word(register::MAX_POSITION)),
+            max_temperature: settings.byte(register::MAX_TEMPERATURE),
+            voltage_limits: (settings.byte(register::MIN_VOLTAGE), settings.byte(register::MAX_VOLTAGE)),
+            max_torque: settings.word(register::MAX_TORQUE),
+            unload_conditions: settings.byte(register::UNLOAD_CONDITIONS),
+            torque_switch: orders.byte(register::TORQUE_SWITCH),
+            goal_position: orders.word(register::GOAL_POSITION),
+            is_unlocked: orders.byte(register::LOCK) == 0,
+            reading: reading.and_then(Reading::parse),
+            errors: measured.byte(register::STATUS) | measured.errors,
+            is_moving: measured.byte(register::MOVING) != 0,
+        })
+    }
+
+    /// The joint that a servo with this id belongs to; `None` for ids that no joint of the arm has.
+    #[must_use]
+    pub const fn joint(&self) -> Option<Joint> {
+        Joint::from_index(self.id)
+    }
+
+    /// The angle of its joint in degrees, without the joint's offset: that is stored in the arm's controller.
+    #[must_use]
+    pub fn degrees(&self) -> Option<f64> {
+        let counts = self.reading?.position_counts;
+        Some(f64::from(angle_from_counts(self.joint()?, counts, 0).0) / 1e6)
+    }
+
+    /// Does the motor turn on and on, without a position?
+    #[must_use]
+    pub const fn turns_endlessly(&self) -> bool {
+        matches!(self.position_limits, (0, 0))
+    }
+}
+
+/// Error bits in words: `voltage, overload`; `none` where no bit is set.
+#[must_use]
+pub fn error_words(errors: u8) -> String {
+    const NAMES: [(u8, &str); 3] =
+        [(error::VOLTAGE, "voltage"), (error::OVERHEAT, "overheated"), (error::OVERLOAD, "overload")];
+    let known = NAMES.iter().filter(|(bit, _)| errors & bit != 0).map(|(_, name)| (*name).to_owned());
+    let named = NAMES.iter().fold(0, |bits, (bit, _)| bits | bit);
+    let unknown = (errors & !named != 0).then(|| format!("unknown bits {:#04x}", errors & !named));
+    let words: Vec<String> = known.chain(unknown).collect();
+    if words.is_empty() { "none".to_owned() } else { words.join(", ") }
+}
+
+/// Registers that were read together.
+struct Block {
+    first: u8,
+    errors: u8,
+    values: Vec<u8>,
+}
+
+impl Block {
+    fn read(bus: &mut ServoBus, id: u8, first: u8, count: u8) -> Result<Self, Error> {
+        let answer = bus.read(id, first, count)?;
+        Ok(Self { first, errors: answer.errors, values: answer.values })
+    }
+
+    /// 0 for a register that is not among them.
+    fn byte(&self, register: u8) -> u8 {
+        let place = usize::from(register.saturating_sub(self.first));
+        self.values.get(place).copied().unwrap_or(0)
+    }
+
+    fn pair(&self, register: u8) -> (u8, u8) {
+        (self.byte(register), self.byte(register + 1))
+    }
+
+    fn word(&self, register: u8) -> u16 {
+        u16::from_be_bytes([self.byte(register), self.byte(register + 1)])
+    }
+}

@@ -1,0 +1,41 @@
+//! The servo bus without an arm's controller: for who builds or repairs an arm.
+//!
+//! ```text
+//!   scan, facts, id, center ──▶ ServoBus ──▶ Line ──▶ half-duplex adapter ──▶ servos
+//!                                  │
+//!                                  └── frames of motion-core, which the arm's controller uses too
+//! ```
+//!
+//! Talks to SCS servos directly, through a half-duplex TTL adapter. Two masters must never share one bus: the arm's
+//! controller has to be off the bus, or off. Everything blocks, with timeouts.
+//!
+//! ```no_run
+//! use sevenbot::servo_bench::{Options, ServoBus, facts::Facts};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut bus = ServoBus::open("/dev/ttyUSB0", 1_000_000, Options::default())?;
+//! println!("{:?}", Facts::read(&mut bus, 0)?);
+//! # Ok(())
+//! # }
+//! ```
+
+pub mod bus;
+pub mod center;
+pub mod error;
+pub mod facts;
+pub mod id;
+pub mod line;
+pub mod scan;
+#[cfg(test)]
+mod simulated;
+#[cfg(test)]
+mod tests;
+
+pub use bus::{Answer, Options, ServoBus};
+pub use error::{Error, Heard};
+pub use line::Line;
+pub use motion_core::servo_bus::frame::BAUD_RATES;
+pub use motion_core::servo_bus::{Reading, TorqueCodes};
+
+/// The highest id that a servo can have.
+pub const MAX_ID: u8 = 253;

@@ -1,0 +1,281 @@
+//! The bench against servos without a wire, in virtual time.
+
+use std::time::Duration;
+
+use motion_core::servo_bus::frame::{FrameBuffer, error, register, write};
+
+use super::bus::ServoBus;
+use super::center::{CenterError, Limits, center};
+use super::error::Error;
+use super::facts::{Facts, error_words};
+use super::id::{IdError, everything_at, set_id};
+use super::scan::{Answers, Found, Plan, Scan, scan};
+use super::simulated::{Simulated, bus};
+use super::{BAUD_RATES, MAX_ID};
+
+const FAST: u32 = 1_000_000;
+
+fn plan(rates: &[u32]) -> Plan {
+    Plan { rates: rates.to_vec(), ids: 0..=MAX_ID, wait: None }
+}
+
+fn found(bus: &mut ServoBus, plan: &Plan) -> Vec<(u32, u8, Answers)> {
+    let Scan { found, .. } = scan(bus, plan, |_| ()).unwrap();
+    found.into_iter().map(|Found { baud, id, answers }| (baud, id, answers)).collect()
+}
+
+/// Writes a register of the EEPROM.
+fn set(simulated: &mut Simulated, register: u8, values: &[u8]) {
+    for (register, values) in [(register::LOCK, [0].as_slice()), (register, values), (register::LOCK, &[1])] {
+        let mut request = FrameBuffer::new();
+        write(&mut request, simulated.servo.id(), register, values);
+        let mut decoder = motion_core::servo_bus::frame::Decoder::new();
+        decoder.push(&request);
+        simulated.servo.handle_frame(&decoder.pull().unwrap().unwrap());
+    }
+}
+
+#[test]
+fn a_scan_finds_every_servo_at_every_rate() {
+    let mut servos: Vec<_> = [7, 0, 253].map(Simulated::new).into();
+    for (code, id) in (0..8).zip(100..) {
+        let mut servo = Simulated::new(id);
+        set(&mut servo, register::BAUD_RATE, &[code]);
+        servos.push(servo);
+    }
+    let (mut bus, _) = bus(servos);
+    let mut wanted: Vec<_> = [0, 7].map(|id| (FAST, id, Answers::Good)).into();
+    wanted.extend(BAUD_RATES.into_iter().zip(100..).map(|(baud, id)| (baud, id, Answers::Good)));
+    wanted.insert(3, (FAST, 253, Answers::Good));
+    assert_eq!(found(&mut bus, &plan(&BAUD_RATES)), wanted);
+    assert!(!bus.has_echo());
+}
+
+#[test]
+fn a_scan_of_one_rate_takes_two_seconds_at_most_and_tells_how_far_it_is() {
+    let (mut bus, _) = bus(vec![Simulated::new(3)]);
+    let start = bus.now();
+    let mut last = None;
+    scan(&mut bus, &plan(&[FAST]), |step| last = Some(step)).unwrap();
+    let step = last.unwrap();
+    assert_eq!((step.baud, step.asked, step.found), (FAST, 254, 1));
+    // Virtual time: the sum of the waits.
+    assert!(bus.now() - start < Duration::from_secs(2), "{:?}", bus.now() - start);
+}
+
+#[test]
+fn an_echo_is_no_answer_and_does_not_hide_one() {
+    let (mut bus, world) = bus([1, 5].map(Simulated::new).into());
+    world.borrow_mut().has_echo = true;
+    assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 1, Answers::Good), (FAST, 5, Answers::Good)]);
+    assert!(bus.has_echo());
+    let Err(Error::NoAnswer { heard, .. }) = bus.read(2, register::ID, 1) else { panic!("nobody is there") };
+    assert_eq!(heard.to_string(), "only the echo of the question was heard");
+}
+
+#[test]
+fn an_echo_does_not_hide_a_servo_that_reports_a_wrong_voltage() {
+    let mut servo = Simulated::new(4);
+    servo.servo.set_errors(error::VOLTAGE);
+    let (mut bus, world) = bus(vec![servo]);
+    for has_echo in [false, true] {
+        world.borrow_mut().has_echo = has_echo;
+        assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 4, Answers::Good)]);
+    }
+    // Two values have the length of a question, and 2 is the code of a question.
+    world.borrow_mut().servos[0].servo.set_errors(2);
+    let answer = bus.read(4, register::ID, 2).unwrap();
+    assert_eq!((answer.errors, answer.values), (2, vec![4, 0]));
+}
+
+#[test]
+fn a_slow_adapter_hides_no_servo() {
+    let slow = |id| Simulated { delay: Duration::from_millis(60), ..Simulated::new(id) };
+    let (mut bus, _) = bus([0, 3, 253].map(slow).into());
+    assert_eq!(found(&mut bus, &plan(&[FAST])), [0, 3, 253].map(|id| (FAST, id, Answers::Good)));
+}
+
+#[test]
+fn late_echoes_are_no_late_answers() {
+    let (mut bus, world) = bus(vec![Simulated::new(3)]);
+    (world.borrow_mut().has_echo, world.borrow_mut().echo_delay) = (true, Duration::from_millis(60));
+    assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 3, Answers::Good)]);
+    assert!(bus.has_echo());
+    // Virtual time: 254 short waits, and patient questions to one id only.
+    assert!(bus.now() < Duration::from_secs(3), "{:?}", bus.now());
+}
+
+#[test]
+fn damaged_answers_and_servos_with_one_id_are_told() {
+    let garbled = |id| Simulated { is_garbled: true, ..Simulated::new(id) };
+    let late = Simulated { delay: Duration::from_micros(600), ..Simulated::new(9) };
+    let (mut bus, _) = bus(vec![garbled(2), Simulated::new(9), late]);
+    assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 2, Answers::Damaged), (FAST, 9, Answers::Several)]);
+}
+
+#[test]
+fn rates_that_the_adapter_does_not_know_are_told() {
+    let (mut bus, world) = bus(vec![Simulated::new(0)]);
+    world.borrow_mut().rates = vec![500_000, FAST];
+    let scan = scan(&mut bus, &plan(&BAUD_RATES), |_| ()).unwrap();
+    assert_eq!(scan.found.len(), 1);
+    assert_eq!(scan.unknown_rates, BAUD_RATES[2..]);
+}
+
+#[test]
+fn a_late_answer_is_not_taken_for_the_next_one() {
+    let late = Simulated { delay: Duration::from_millis(610), ..Simulated::new(0) };
+    let (mut bus, world) = bus(vec![late]);
+    assert!(matches!(bus.read(0, register::ID, 1), Err(Error::NoAnswer { attempts: 3, .. })));
+    world.borrow_mut().servos[0].delay = Duration::from_millis(1);
+    assert_eq!(bus.read(0, register::RESPONSE_LEVEL, 1).unwrap().values, [1]);
+}
+
+#[test]
+fn facts_are_read_high_byte_first() {
+    let mut servo = Simulated::new(1);
+    set(&mut servo, register::MIN_POSITION, &[0, 20, 3, 0xEB]);
+    let (mut bus, _) = bus(vec![servo]);
+    let facts = Facts::read(&mut bus, 1).unwrap();
+    assert_eq!(facts.position_limits, (20, 1003));
+    assert_eq!((facts.max_torque, facts.max_temperature, facts.voltage_limits), (1_000, 80, (50, 250)));
+    assert_eq!((facts.baud, facts.is_unlocked, facts.acknowledges_writes), (Some(FAST), false, true));
+    assert_eq!(facts.reading.unwrap().position_counts, 300);
+    // Joint 2: reversed, 20 counts at 180 degrees, 850/180 counts a degree.
+    assert!((facts.degrees().unwrap() - (180.0 - 280.0 * 180.0 / 850.0)).abs() < 0.001);
+    assert_eq!(error_words(facts.unload_conditions), "voltage, overheated, overload");
+    assert_eq!(error_words(0x42), "unknown bits 0x42");
+}
+
+#[test]
+fn an_id_is_changed_and_locked_again() {
+    for has_echo in [false, true] {
+        let (mut bus, world) = bus(vec![Simulated::new(1)]);
+        world.borrow_mut().has_echo = has_echo;
+        set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap();
+        let servo = &mut world.borrow_mut().servos[0].servo;
+        servo.power_cycle();
+        assert_eq!(servo.id(), 6);
+    }
+    let (mut bus, _) = bus(vec![Simulated::new(1)]);
+    set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap();
+    assert_eq!(bus.read(6, register::LOCK, 1).unwrap().values, [1]);
+}
+
+#[test]
+fn an_id_is_changed_on_a_servo_that_acknowledges_nothing() {
+    let mut servo = Simulated::new(1);
+    set(&mut servo, register::RESPONSE_LEVEL, &[0]);
+    let (mut bus, world) = bus(vec![servo]);
+    set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap();
+    assert_eq!(world.borrow().servos[0].servo.id(), 6);
+}
+
+#[test]
+fn nothing_is_written_unless_the_servo_is_alone() {
+    let garbled = Simulated { is_garbled: true, ..Simulated::new(4) };
+    for (servos, says) in [
+        (vec![Simulated::new(1), Simulated::new(200)], "these ids answer: 1, 200"),
+        (vec![Simulated::new(2)], "these ids answer: 2"),
+        (vec![Simulated::new(1), garbled], "1, 4 (damaged answers)"),
+        (vec![Simulated::new(1), Simulated::new(1)], "1 (several servos)"),
+        (vec![], "no servo answers"),
+    ] {
+        let (mut bus, world) = bus(servos);
+        let error = set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap_err();
+        assert!(matches!(error, IdError::NotAlone { .. }));
+        assert!(error.to_string().contains(says), "{error}");
+        assert!(world.borrow().sent.iter().all(|frame| frame[4] == 2), "only reads");
+    }
+}
+
+#[test]
+fn a_servo_that_falls_silent_half_way_is_told() {
+    let plan = everything_at(FAST, None);
+    let (mut first, _) = bus(vec![Simulated::new(1)]);
+    scan(&mut first, &plan, |_| ()).unwrap();
+    let (mut bus, world) = bus(vec![Simulated::new(1)]);
+    // Just after the scan, while the EEPROM is being opened.
+    world.borrow_mut().servos[0].dies_at = first.now() + Duration::from_micros(100);
+    let error = set_id(&mut bus, &plan, 1, 6, |_| ()).unwrap_err();
+    assert!(matches!(error, IdError::StaysLocked(_)), "{error:?}");
+}
+
+#[test]
+fn wherever_the_port_is_lost_the_user_learns_what_state_the_servo_may_be_in() {
+    let plan = everything_at(FAST, None);
+    let (mut bus_to_count, counted) = bus(vec![Simulated::new(1)]);
+    set_id(&mut bus_to_count, &plan, 1, 6, |_| ()).unwrap();
+    let frames = counted.borrow().sent.clone();
+    let first_write = frames.iter().position(|frame| frame[4] == 3).unwrap();
+    for frames_until_lost in first_write..frames.len() {
+        let (mut bus, world) = bus(vec![Simulated::new(1)]);
+        world.borrow_mut().frames_until_lost = Some(frames_until_lost);
+        let error = set_id(&mut bus, &plan, 1, 6, |_| ()).unwrap_err();
+        let id = world.borrow().servos[0].servo.id();
+        match error {
+            IdError::StaysLocked(_) => assert_eq!(id, 1),
+            IdError::StaysOpen(_) => assert_eq!(id, 6),
+            IdError::HalfWay(_) => assert!(!error.advice().is_empty()),
+            error => panic!("frame {frames_until_lost}: {error:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_servo_goes_to_its_middle_and_starts_where_it_stands() {
+    let (mut bus, world) = bus(vec![Simulated::new(1)]);
+    assert_eq!(center(&mut bus, 1, &Limits::default(), |_| true), Ok(511));
+    let goals: Vec<Vec<u8>> = world
+        .borrow()
+        .sent
+        .iter()
+        .filter(|frame| frame[4] == 3)
+        .map(|frame| frame[5..frame.len() - 1].to_vec())
+        .collect();
+    let (start, middle) = ([42, 1, 44, 0, 0, 0, 100].to_vec(), [42, 1, 255, 0, 0, 0, 100].to_vec());
+    assert_eq!(goals, [start, [40, 1].to_vec(), middle]);
+}
+
+#[test]
+fn a_blocked_servo_loses_its_torque() {
+    let stuck = Simulated { is_stuck: true, ..Simulated::new(1) };
+    let (mut bus, world) = bus(vec![stuck]);
+    let error = center(&mut bus, 1, &Limits::default(), |_| true).unwrap_err();
+    assert_eq!(error, CenterError::Overload { position: 300, load: 900, errors: 0 });
+    assert_eq!(world.borrow().servos[0].servo.torque_switch(), 0);
+    let weak = Limits { load: 1_000, ..Limits::default() };
+    let error = center(&mut bus, 1, &weak, |_| true).unwrap_err();
+    assert_eq!(error, CenterError::Stalled { position: 300 });
+    assert_eq!(world.borrow().servos[0].servo.torque_switch(), 0);
+}
+
+#[test]
+fn an_interrupted_servo_loses_its_torque() {
+    let (mut bus, world) = bus(vec![Simulated::new(1)]);
+    let error = center(&mut bus, 1, &Limits::default(), |reading| reading.position_counts < 320).unwrap_err();
+    assert_eq!(error, CenterError::Interrupted);
+    assert_eq!(world.borrow().servos[0].servo.torque_switch(), 0);
+}
+
+#[test]
+fn a_servo_that_cannot_reach_its_middle_is_left_alone() {
+    for (limits, says) in [([0, 0, 0, 0], "turn on and on"), ([2, 88, 3, 255], "600 to 1023")] {
+        let mut servo = Simulated::new(1);
+        set(&mut servo, register::MIN_POSITION, &limits);
+        let (mut bus, world) = bus(vec![servo]);
+        let error = center(&mut bus, 1, &Limits::default(), |_| true).unwrap_err();
+        assert!(error.to_string().contains(says), "{error}");
+        assert_eq!(world.borrow().servos[0].servo.torque_switch(), 0);
+    }
+}
+
+#[test]
+fn a_servo_that_falls_silent_may_still_be_moving() {
+    let (mut bus, world) = bus(vec![Simulated::new(1)]);
+    let silence = Duration::from_millis(500);
+    world.borrow_mut().servos[0].dies_at = silence;
+    let error = center(&mut bus, 1, &Limits::default(), |_| true).unwrap_err();
+    assert!(matches!(error, CenterError::StillOn(_)), "{error:?}");
+    assert!(error.to_string().contains("may still be moving"), "{error}");
+}

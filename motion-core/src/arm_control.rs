@@ -1,0 +1,168 @@
+//! The arm behind its host port: the effects of writes and of the servos' answers.
+//!
+//! ```text
+//!   write ──▶ registers ──▶ Joints ──▶ BusScheduler ──▶ frame for the servos
+//!                  ▲          ▲             │
+//!                Status ◀─────┴── outcome ◀─┘
+//! ```
+//!
+//! A write is checked completely, then executed completely (D15 to D17). This file does not know the host's stream.
+
+use protocol_core::registers::map::{
+    FRAMES_ACCEPTED, FRAMES_CORRUPTED, MOTOR_STATE, SERVO_BUS_ERRORS, SUPPLY_VOLTAGE, VACUUM_PUMP, refusal,
+};
+use protocol_core::registers::{Accepted, Image, Joint, RegisterFile};
+use protocol_core::time::Instant;
+
+use crate::bus_scheduler::BusScheduler;
+use crate::config::{Config, Storage};
+use crate::joints::{Joints, Measured, offset};
+use crate::motor_state::MotorState;
+use crate::servo_bus::{Outcome, Reading};
+use crate::status::Status;
+use crate::vacuum::VacuumControl;
+
+/// Registers, joints, servo bus, status and vacuum of one arm.
+#[derive(Debug)]
+pub(crate) struct ArmControl {
+    pub(crate) registers: RegisterFile,
+    pub(crate) bus: BusScheduler,
+    pub(crate) vacuum: VacuumControl,
+    joints: Joints,
+    status: Status,
+    /// Changed settings that are not saved yet.
+    pub(crate) to_save: Option<Image>,
+}
+
+impl ArmControl {
+    /// An arm that was powered up at `now`.
+    pub(crate) fn new(now: Instant, config: Config, stored: Option<&Image>, storage: Storage) -> Self {
+        let mut registers = RegisterFile::new(config.chip_id, stored);
+        let joints = Joints::new(MotorState::from_register(registers.get(MOTOR_STATE.address)));
+        let status = Status::new(storage, config.faults);
+        status.show_faults(&mut registers, &joints);
+        let (bus, vacuum) = (BusScheduler::new(now, &config), VacuumControl::default());
+        Self { registers, bus, vacuum, joints, status, to_save: None }
+    }
+
+    /// Processes the answers of the servos, and advances all set-points if a control cycle is due.
+    pub(crate) fn advance(&mut self, now: Instant) {
+        while let Some(outcome) = self.bus.outcome(now) {
+            match outcome {
+                Outcome::Measured { joint, reading, alarms, is_timely } => {
+                    self.measured(now, joint, (reading, alarms), is_timely);
+                }
+                Outcome::Failed { joint } => self.failed(now, joint),
+            }
+        }
+        if self.bus.end_start_up(now, &self.joints) {
+            self.show_servos();
+        }
+        if self.bus.begin_cycle(now) {
+            if self.joints.advance(&self.registers) {
+                self.bus.goals_changed();
+            }
+            Status::show_moving(&mut self.registers, &self.joints);
+        }
+    }
+
+    fn measured(&mut self, now: Instant, joint: Joint, reading: (Reading, u8), is_timely: bool) {
+        let may_engage = is_timely && !self.bus.is_starting();
+        match self.joints.measured(now, joint, reading, may_engage, &mut self.registers) {
+            Measured::Rejected => return,
+            Measured::FellSilent => return self.show_servos(),
+            Measured::Accepted => {}
+            Measured::Engaged => self.bus.joint_engaged(),
+        }
+        self.registers.set(SUPPLY_VOLTAGE.address, reading.0.voltage_decivolts);
+        self.show_servos();
+    }
+
+    fn failed(&mut self, now: Instant, joint: Joint) {
+        if !self.bus.is_starting() {
+            self.registers.increment(&SERVO_BUS_ERRORS);
+        }
+        if self.joints.failed(now, joint) {
+            self.show_servos();
+        }
+    }
+
+    /// Prepares the next frame for the servo bus. Returns whether there is one.
+    pub(crate) fn prepare_servo_frame(&mut self, now: Instant) -> bool {
+        self.bus.prepare_frame(now, &mut self.joints, &self.registers)
+    }
+
+    /// Executes a write of the host, or refuses it completely.
+    pub(crate) fn write(&mut self, now: Instant, address: u8, values: &[u8]) {
+        let accepted = match self.registers.check(address, values) {
+            Ok(accepted) => accepted,
+            Err(wrong) => return Status::refuse(&mut self.registers, refusal::OUT_OF_RANGE, wrong.address),
+        };
+        let changed_setting = self.registers.first_changed_setting(&accepted);
+        if let (Some(setting), Storage::Full) = (changed_setting, self.status.storage()) {
+            return Status::refuse(&mut self.registers, refusal::STORAGE_FULL, setting);
+        }
+        // Before the rest of the frame, so that a target in it replaces the measured position (D13).
+        self.set_motor_state(&accepted);
+        self.apply(&accepted, changed_setting.is_some());
+        self.joints.set_targets(&accepted, &self.registers);
+        if let Some(pump) = accepted.value_at(VACUUM_PUMP.address) {
+            self.vacuum.set(now, pump != 0);
+        }
+        self.count_accepted();
+        Status::show_moving(&mut self.registers, &self.joints);
+    }
+
+    fn set_motor_state(&mut self, accepted: &Accepted<'_>) {
+        if let Some(value) = accepted.value_at(MOTOR_STATE.address)
+            && self.joints.set_state(MotorState::from_register(value), &mut self.registers)
+        {
+            self.bus.state_changed();
+        }
+    }
+
+    fn apply(&mut self, accepted: &Accepted<'_>, changes_settings: bool) {
+        let offsets = Joint::ALL.map(|joint| offset(&self.registers, joint));
+        self.registers.apply(accepted);
+        if changes_settings {
+            self.to_save = Some(self.registers.image());
+            self.joints.rebase_offsets(&offsets, &self.registers);
+        }
+    }
+
+    /// Counts an accepted request.
+    pub(crate) fn count_accepted(&mut self) {
+        self.registers.increment(&FRAMES_ACCEPTED);
+    }
+
+    /// Counts a frame with a wrong CRC.
+    pub(crate) fn count_corrupted(&mut self) {
+        self.registers.increment(&FRAMES_CORRUPTED);
+    }
+
+    /// Refuses a frame whose range ends beyond address 255 (D2).
+    pub(crate) fn refuse_range(&mut self, address: u8) {
+        Status::refuse(&mut self.registers, refusal::MALFORMED_RANGE, address);
+    }
+
+    /// Sets the state of the settings storage.
+    pub(crate) fn set_storage(&mut self, storage: Storage) {
+        self.status.set_storage(storage);
+        self.status.show_faults(&mut self.registers, &self.joints);
+    }
+
+    /// Raises fault bits until the next restart.
+    pub(crate) fn raise_faults(&mut self, bits: u8) {
+        self.status.raise_faults(bits);
+        self.status.show_faults(&mut self.registers, &self.joints);
+    }
+
+    fn show_servos(&mut self) {
+        self.status.show_servos(&mut self.registers, &self.joints, self.bus.is_starting());
+    }
+
+    /// When the next action of the arm is due.
+    pub(crate) fn deadline(&self, now: Instant) -> Instant {
+        self.bus.deadline(now).min(self.vacuum.deadline())
+    }
+}

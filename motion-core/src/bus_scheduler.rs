@@ -1,0 +1,250 @@
+//! The schedule of the servo bus: control cycles, goals, torque, reads (D12).
+//!
+//! ```text
+//!   one cycle of 10 ms:   goals of all driven joints │ torque, if it is due │ one read of each servo
+//! ```
+//!
+//! Goals are sent before torque, so that no servo gets torque with an old goal. During start-up only reads are sent.
+//! This file does not know angles.
+
+use protocol_core::registers::{JOINTS, Joint, RegisterFile};
+use protocol_core::time::{Duration, Instant};
+
+use crate::CYCLE;
+use crate::config::Config;
+use crate::joints::Joints;
+use crate::servo_bus::{Bus, Outcome};
+
+/// How long start-up lasts at most. A servo that has not answered by then counts as silent. Real servos need about
+/// 200 ms after power-up.
+const START_UP_TIME: Duration = Duration::from_millis(500);
+/// The torque switches are set again after this many control cycles, in case a frame was lost.
+const TORQUE_REFRESH_CYCLES: u8 = 25;
+
+/// The servo bus and its schedule.
+#[derive(Debug)]
+pub(crate) struct BusScheduler {
+    bus: Bus,
+    /// When start-up ends at the latest; `None` once it is over.
+    starting_until: Option<Instant>,
+    next_cycle: Instant,
+    goals_due: bool,
+    torque_due: bool,
+    torque_refresh_in: u8,
+    next_to_read: Joint,
+    /// How many servos are still to be read in this cycle.
+    left_to_read: usize,
+}
+
+impl BusScheduler {
+    /// A bus at the start of the controller. The servos may have power already.
+    pub(crate) fn new(now: Instant, config: &Config) -> Self {
+        Self {
+            bus: Bus::new(config.servo_timeout, config.guard_time, config.torque_codes),
+            starting_until: Some(now + START_UP_TIME),
+            next_cycle: now,
+            goals_due: false,
+            torque_due: false,
+            torque_refresh_in: TORQUE_REFRESH_CYCLES,
+            next_to_read: Joint::ALL[0],
+            left_to_read: 0,
+        }
+    }
+
+    /// Takes bytes that were received by `now`.
+    pub(crate) fn servo_bytes(&mut self, now: Instant, bytes: &[u8]) {
+        self.bus.bytes(now, bytes);
+    }
+
+    /// See [`Bus::set_answer_delay`].
+    pub(crate) const fn set_answer_delay(&mut self, delay: Duration) {
+        self.bus.set_answer_delay(delay);
+    }
+
+    /// See [`Bus::take_longest_answers`].
+    pub(crate) const fn take_longest_answers(&mut self) -> [u16; JOINTS] {
+        self.bus.take_longest_answers()
+    }
+
+    /// The frame to send, after [`BusScheduler::prepare_frame`] returned true.
+    pub(crate) fn frame(&self) -> &[u8] {
+        self.bus.frame()
+    }
+
+    /// The outcome of the outstanding read, once it is known.
+    pub(crate) fn outcome(&mut self, now: Instant) -> Option<Outcome> {
+        self.bus.poll(now)
+    }
+
+    /// Is this start-up?
+    pub(crate) const fn is_starting(&self) -> bool {
+        self.starting_until.is_some()
+    }
+
+    /// Ends start-up once every joint is measured or its time is over. Returns whether this call ended it.
+    pub(crate) fn end_start_up(&mut self, now: Instant, joints: &Joints) -> bool {
+        let is_over = self.starting_until.is_some_and(|until| now >= until || joints.silent() == 0);
+        if is_over {
+            self.starting_until = None;
+        }
+        is_over
+    }
+
+    /// Schedules goals, then torque, because a joint engaged.
+    pub(crate) const fn joint_engaged(&mut self) {
+        self.goals_due = true;
+        self.torque_due = true;
+    }
+
+    /// Schedules torque, because the motor state changed.
+    pub(crate) const fn state_changed(&mut self) {
+        self.torque_due = true;
+    }
+
+    /// Begins a control cycle if one is due at `now`, and returns whether it did. At most one missed cycle is repeated:
+    /// a late call makes motion late, not fast.
+    pub(crate) fn begin_cycle(&mut self, now: Instant) -> bool {
+        if now < self.next_cycle {
+            return false;
+        }
+        self.next_cycle = self.next_cycle.max(earlier(now, CYCLE)) + CYCLE;
+        self.left_to_read = JOINTS;
+        self.torque_refresh_in = self.torque_refresh_in.saturating_sub(1);
+        self.torque_due |= self.torque_refresh_in == 0;
+        true
+    }
+
+    /// Schedules goals, because the set-points have advanced.
+    pub(crate) const fn goals_changed(&mut self) {
+        self.goals_due = true;
+    }
+
+    /// Prepares the next frame if one is due and the bus is free. Returns whether there is a frame to send.
+    pub(crate) fn prepare_frame(
+        &mut self,
+        now: Instant,
+        joints: &mut Joints,
+        registers: &RegisterFile,
+    ) -> bool {
+        if self.torque_due {
+            joints.expire_pending(now);
+        }
+        self.bus.is_free(now)
+            && (self.prepare_goals(now, joints, registers)
+                || self.prepare_torque(now, joints)
+                || (self.bus.is_idle(now) && self.prepare_read(now, joints)))
+    }
+
+    fn prepare_goals(&mut self, now: Instant, joints: &Joints, registers: &RegisterFile) -> bool {
+        let any = core::mem::take(&mut self.goals_due) && joints.goals(registers).next().is_some();
+        if any {
+            self.bus.set_goals(now, joints.goals(registers));
+        }
+        any
+    }
+
+    fn prepare_torque(&mut self, now: Instant, joints: &mut Joints) -> bool {
+        if self.is_starting() || !core::mem::take(&mut self.torque_due) {
+            return false;
+        }
+        self.torque_refresh_in = TORQUE_REFRESH_CYCLES;
+        let switches = joints.take_torque();
+        let any = switches.iter().any(Option::is_some);
+        if any {
+            let named = Joint::ALL.into_iter().zip(switches);
+            self.bus.set_torque(now, named.filter_map(|(joint, torque)| Some((joint, torque?))));
+        }
+        any
+    }
+
+    /// Reads the next servo of this cycle.
+    fn prepare_read(&mut self, now: Instant, joints: &Joints) -> bool {
+        while self.left_to_read > 0 {
+            self.left_to_read -= 1;
+            let joint = self.next_to_read;
+            self.next_to_read = Joint::from_index(joint.index() + 1).unwrap_or(Joint::ALL[0]);
+            if joints.wants_asking(joint, now) {
+                self.bus.ask(now, joint);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// When the next action of the bus is due.
+    pub(crate) fn deadline(&self, now: Instant) -> Instant {
+        self.next_cycle.min(self.bus.deadline(now).unwrap_or(Instant::FAR_FUTURE))
+    }
+}
+
+fn earlier(now: Instant, by: Duration) -> Instant {
+    Instant::from_micros(now.as_micros().saturating_sub(by.as_micros()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motor_state::MotorState;
+    use crate::servo_bus::TorqueCodes;
+    use crate::servo_bus::frame::Instruction;
+
+    fn at(micros: u64) -> Instant {
+        Instant::from_micros(micros)
+    }
+
+    fn scheduler() -> BusScheduler {
+        let config = Config {
+            chip_id: [0; 6],
+            faults: 0,
+            servo_timeout: Duration::from_millis(1),
+            guard_time: Duration::from_micros(100),
+            torque_codes: TorqueCodes::default(),
+        };
+        BusScheduler::new(at(0), &config)
+    }
+
+    /// The instructions and ids of the frames in one cycle without answers.
+    fn cycle(scheduler: &mut BusScheduler, joints: &mut Joints, start: u64) -> Vec<(u8, u8)> {
+        let registers = RegisterFile::new([0; 6], None);
+        assert!(scheduler.begin_cycle(at(start)));
+        let mut frames = Vec::new();
+        for now in (start..start + 10_000).step_by(100).map(at) {
+            let _ = scheduler.outcome(now);
+            if scheduler.prepare_frame(now, joints, &registers) {
+                frames.push((scheduler.frame()[4], scheduler.frame()[2]));
+            }
+        }
+        frames
+    }
+
+    const READ: u8 = Instruction::Read as u8;
+
+    #[test]
+    fn each_servo_is_read_once_per_cycle() {
+        let (mut scheduler, mut joints) = (scheduler(), Joints::new(MotorState::Servo));
+        let reads: Vec<_> = (0..7).map(|id| (READ, id)).collect();
+        assert_eq!(cycle(&mut scheduler, &mut joints, 0), reads);
+        assert_eq!(cycle(&mut scheduler, &mut joints, 10_000), reads);
+    }
+
+    #[test]
+    fn d12_a_change_of_state_waits_for_the_end_of_start_up() {
+        let (mut scheduler, mut joints) = (scheduler(), Joints::new(MotorState::Damping));
+        scheduler.state_changed();
+        assert!(cycle(&mut scheduler, &mut joints, 0).iter().all(|&(code, _)| code == READ));
+        assert!(
+            !scheduler.end_start_up(at(499_999), &joints) && scheduler.end_start_up(at(500_000), &joints)
+        );
+        let first = cycle(&mut scheduler, &mut joints, 500_000).first().copied();
+        assert_eq!(first, Some((Instruction::SyncWrite as u8, 0xFE)));
+    }
+
+    #[test]
+    fn at_most_one_missed_cycle_is_repeated() {
+        let mut scheduler = scheduler();
+        assert!(scheduler.begin_cycle(at(0)));
+        assert!(!scheduler.begin_cycle(at(9_999)));
+        assert!(scheduler.begin_cycle(at(3_000_000)) && scheduler.begin_cycle(at(3_000_000)));
+        assert!(!scheduler.begin_cycle(at(3_009_999)) && scheduler.begin_cycle(at(3_010_000)));
+    }
+}

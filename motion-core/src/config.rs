@@ -1,0 +1,33 @@
+//! The configuration of a controller: the board, the arm, and the state of the settings storage.
+
+use protocol_core::time::Duration;
+
+use crate::servo_bus::TorqueCodes;
+
+/// The properties of the board and of the arm.
+#[derive(Clone, Copy, Debug)]
+pub struct Config {
+    /// The chip id, most significant byte first (D8).
+    pub chip_id: [u8; 6],
+    /// Fault bits known at start: reset cause, clock (`protocol_core::registers::map::fault`).
+    pub faults: u8,
+    /// How long a servo may take to answer, from the last byte sent to the last byte received.
+    pub servo_timeout: Duration,
+    /// The pause on the servo bus between the last byte, received or sent, and the next frame. A servo needs some
+    /// microseconds after its last stop bit to release the line.
+    pub guard_time: Duration,
+    /// The code table of the servos' torque switch (their register 40).
+    pub torque_codes: TorqueCodes,
+}
+
+/// The state of the settings storage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Storage {
+    /// The storage takes another image.
+    Ready,
+    /// The storage is full until the next restart. Writes that change a setting are refused (D19).
+    Full,
+    /// The storage does not keep data. Settings live in RAM only.
+    Broken,
+}

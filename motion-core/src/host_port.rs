@@ -1,0 +1,193 @@
+//! The arm's end of the host link: decodes requests, encodes replies and reports (D3 to D5, D14).
+//!
+//! ```text
+//!   bytes ──▶ Deframer ──▶ next_event ──▶ writes, damage
+//!                              │
+//!                              ▼
+//!                        waiting read ──▶ take_read, once its reply has room ──▶ reply ──▶ frame
+//!                                             ReportTimer ──▶ take_report ──┘
+//! ```
+//!
+//! A read waits until its reply fits the room of the link. All requests behind it wait, too. This file only reads
+//! registers.
+
+use protocol_core::registers::RegisterFile;
+use protocol_core::registers::map::PRESENT_POSITION;
+use protocol_core::request::{Reply, Request};
+use protocol_core::time::Instant;
+use protocol_core::wire::{Defect, Deframer, FrameBuffer, MIN_LENGTH, ToArm, deframer};
+
+use crate::report_timer::ReportTimer;
+
+/// A read of `count` registers from `address` on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Read {
+    pub(crate) address: u8,
+    pub(crate) count: u8,
+}
+
+impl Read {
+    /// The registers in a report.
+    const REPORT: Self = Self { address: PRESENT_POSITION.address, count: PRESENT_POSITION.count };
+
+    const fn fits(self, room: usize) -> bool {
+        MIN_LENGTH + self.count as usize <= room
+    }
+}
+
+/// A write or a defect in the bytes from the host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum HostEvent<'a> {
+    /// New values for the registers from `address` on.
+    Write { address: u8, values: &'a [u8] },
+    /// A frame whose range ends beyond address 255.
+    MalformedRange { address: u8 },
+    /// A frame with a wrong CRC.
+    Corrupted,
+}
+
+/// The arm's end of the host link.
+#[derive(Debug)]
+pub(crate) struct HostPort {
+    deframer: Deframer<ToArm>,
+    /// The oldest pending request, if it is a read. The requests behind it wait in the deframer.
+    waiting_read: Option<Read>,
+    reports: ReportTimer,
+    /// In bits per second.
+    baud: u32,
+    frame: FrameBuffer,
+}
+
+impl HostPort {
+    /// A port at `baud` bits per second, without reports.
+    pub(crate) fn new(baud: u32) -> Self {
+        Self {
+            deframer: Deframer::new(deframer::gap(baud)),
+            waiting_read: None,
+            reports: ReportTimer::OFF,
+            baud,
+            frame: FrameBuffer::new(),
+        }
+    }
+
+    /// The baud rate since start, in bits per second.
+    pub(crate) const fn baud(&self) -> u32 {
+        self.baud
+    }
+
+    /// Takes bytes and returns how many. An empty slice states that the line is silent at `now`.
+    pub(crate) fn bytes(&mut self, now: Instant, bytes: &[u8]) -> usize {
+        self.deframer.push(now, bytes)
+    }
+
+    /// How many more bytes are needed before there is a new event, unless the line becomes silent.
+    pub(crate) fn bytes_wanted(&self) -> usize {
+        self.deframer.wanted()
+    }
+
+    /// The next event; `None` if there is none, or while a read waits for room.
+    pub(crate) fn next_event(&mut self) -> Option<HostEvent<'_>> {
+        if self.waiting_read.is_some() {
+            return None;
+        }
+        let event = match self.deframer.pull()?.map(Request::from_frame) {
+            Ok(Request::Read { address, count }) => {
+                self.waiting_read = Some(Read { address, count });
+                return None;
+            }
+            Ok(Request::Write { address, values }) => HostEvent::Write { address, values },
+            Err(Defect::MalformedRange { address }) => HostEvent::MalformedRange { address },
+            Err(Defect::WrongCrc) => HostEvent::Corrupted,
+        };
+        Some(event)
+    }
+
+    /// The waiting read, if its reply fits `room` bytes.
+    pub(crate) fn take_read(&mut self, room: usize) -> Option<Read> {
+        self.waiting_read.take_if(|read| read.fits(room))
+    }
+
+    /// Sets the report frequency in Hz (register 53) from `now` on.
+    pub(crate) fn set_report_frequency(&mut self, now: Instant, frequency: u8) {
+        self.reports.set(now, frequency, self.baud);
+    }
+
+    /// The report that is due. Replies go first, and a report that does not fit `room` is skipped (D14).
+    pub(crate) fn take_report(&mut self, now: Instant, room: usize) -> Option<Read> {
+        let has_room = self.waiting_read.is_none() && Read::REPORT.fits(room);
+        (self.reports.poll_due(now) && has_room).then_some(Read::REPORT)
+    }
+
+    /// Encodes the reply to `read`.
+    pub(crate) fn reply(&mut self, read: Read, registers: &RegisterFile) -> &[u8] {
+        let values = registers.read(read.address, read.count);
+        Reply { address: read.address, values }.encode(&mut self.frame);
+        &self.frame
+    }
+
+    /// When the next report is due, or silence on the line has an effect. While a read waits for room, silence has no
+    /// effect.
+    pub(crate) fn deadline(&self) -> Instant {
+        let silence = self.deframer.deadline().filter(|_| self.waiting_read.is_none());
+        self.reports.due().min(silence.unwrap_or(Instant::FAR_FUTURE))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol_core::time::Duration;
+
+    const NOW: Instant = Instant::ZERO;
+
+    fn port_with(requests: &[Request<'_>]) -> HostPort {
+        let mut port = HostPort::new(115_200);
+        for request in requests {
+            let mut frame = FrameBuffer::new();
+            request.encode(&mut frame);
+            assert_eq!(port.bytes(NOW, &frame), frame.len());
+        }
+        port
+    }
+
+    #[test]
+    fn d05_a_read_waits_for_the_room_of_its_own_reply() {
+        let mut port = port_with(&[Request::Read { address: 54, count: 7 }]);
+        assert_eq!(port.next_event(), None);
+        assert_eq!(port.take_read(13), None);
+        assert_eq!(port.take_read(14), Some(Read { address: 54, count: 7 }));
+        assert_eq!(port.take_read(262), None, "only once");
+    }
+
+    #[test]
+    fn d05_a_write_waits_only_behind_a_read() {
+        let write = Request::Write { address: 46, values: &[90] };
+        let event = Some(HostEvent::Write { address: 46, values: &[90] });
+        assert_eq!(port_with(&[write]).next_event(), event);
+        let mut port = port_with(&[Request::Read { address: 0, count: 1 }, write]);
+        assert_eq!(port.next_event(), None);
+        assert_eq!(port.take_read(7), None);
+        assert_eq!(port.deadline(), Instant::FAR_FUTURE, "only more room has an effect");
+        assert!(port.take_read(8).is_some());
+        assert_eq!(port.next_event(), event);
+    }
+
+    #[test]
+    fn d14_a_report_without_room_is_skipped() {
+        let mut port = HostPort::new(115_200);
+        port.set_report_frequency(NOW, 10);
+        let at = |number: u64| NOW + Duration::from_millis(100 * number);
+        assert_eq!(port.deadline(), at(1));
+        assert_eq!(port.take_report(at(1), 13), None);
+        assert_eq!(port.take_report(at(1), 14), None, "it was skipped, not delayed");
+        assert_eq!(port.take_report(at(2), 14), Some(Read::REPORT));
+    }
+
+    #[test]
+    fn a_malformed_range_and_a_wrong_crc_are_distinguished() {
+        let mut port = port_with(&[Request::Read { address: 250, count: 7 }]);
+        assert_eq!(port.next_event(), Some(HostEvent::MalformedRange { address: 250 }));
+        port.bytes(NOW, &[0xAA, 0x77, 3, 0, 0, 1, 2]);
+        assert_eq!(port.next_event(), Some(HostEvent::Corrupted));
+    }
+}

@@ -1,0 +1,102 @@
+//! Splits the bytes of the servo bus into frames, and re-synchronises after damage.
+
+use super::{ENVELOPE, Frame, MAX_FRAME, UNCOUNTED, checksum};
+
+/// A frame of full length has a wrong checksum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct WrongChecksum;
+
+/// Finds the frames of either direction in a stream of bytes.
+#[derive(Clone, Debug, Default)]
+pub struct Decoder {
+    buffer: heapless::Vec<u8, { Decoder::CAPACITY }>,
+    /// Everything before the head is finished.
+    head: usize,
+}
+
+/// What [`parse`] finds at the beginning of its input.
+enum ParseOutcome<'a> {
+    Complete(Frame<'a>),
+    WrongChecksum,
+    Incomplete,
+    NotAFrame,
+}
+
+impl Decoder {
+    /// Size of the buffer: the echo of the longest frame and an answer behind it.
+    pub const CAPACITY: usize = 2 * MAX_FRAME;
+
+    /// A decoder with an empty buffer.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { buffer: heapless::Vec::new(), head: 0 }
+    }
+
+    /// Takes received bytes. Beyond [`Decoder::CAPACITY`] the oldest bytes are lost, so pull in between.
+    pub fn push(&mut self, bytes: &[u8]) {
+        let newest = bytes.get(bytes.len().saturating_sub(Self::CAPACITY)..).unwrap_or(bytes);
+        let excess = (self.buffer.len() + newest.len()).saturating_sub(Self::CAPACITY);
+        if excess != 0 {
+            self.forget(excess.max(self.head));
+        }
+        // Cannot fail: `forget` made room.
+        let _ = self.buffer.extend_from_slice(newest);
+    }
+
+    /// The next frame or wrong checksum; `None` once more bytes are needed. Call it until then. After a wrong checksum
+    /// the search continues with the next byte, so a damaged frame does not cost the next one.
+    pub fn pull(&mut self) -> Option<Result<Frame<'_>, WrongChecksum>> {
+        loop {
+            match parse(self.buffer.get(self.head..)?) {
+                ParseOutcome::Incomplete => return None,
+                ParseOutcome::NotAFrame => self.head += 1,
+                ParseOutcome::WrongChecksum => {
+                    self.head += 1;
+                    return Some(Err(WrongChecksum));
+                }
+                ParseOutcome::Complete(frame) => {
+                    self.head += ENVELOPE + frame.params.len();
+                    return Some(Ok(frame));
+                }
+            }
+        }
+    }
+
+    /// Empties the buffer.
+    pub fn clear(&mut self) {
+        *self = Self::new();
+    }
+
+    fn forget(&mut self, count: usize) {
+        let mut kept = heapless::Vec::new();
+        // Cannot fail: both buffers have the same size.
+        let _ = kept.extend_from_slice(self.buffer.get(count..).unwrap_or(&[]));
+        self.buffer = kept;
+        self.head = self.head.saturating_sub(count);
+    }
+}
+
+/// Parses the frame at the beginning of `bytes`. No servo has the id FF, so after FF FF FF the header is one byte on.
+fn parse(bytes: &[u8]) -> ParseOutcome<'_> {
+    match bytes {
+        [] | [0xFF] | [0xFF, 0xFF] => ParseOutcome::Incomplete,
+        [0xFF, 0xFF, 0xFF, ..] => ParseOutcome::NotAFrame,
+        [0xFF, 0xFF, rest @ ..] => parse_body(rest),
+        _ => ParseOutcome::NotAFrame,
+    }
+}
+
+/// Parses the bytes behind the header.
+fn parse_body(body: &[u8]) -> ParseOutcome<'_> {
+    let Some(&length) = body.get(1) else { return ParseOutcome::Incomplete };
+    let length = usize::from(length);
+    if !(2..=MAX_FRAME - UNCOUNTED).contains(&length) {
+        return ParseOutcome::NotAFrame;
+    }
+    match body.get(..2 + length) {
+        Some([covered @ .., sum]) if checksum(covered) != *sum => ParseOutcome::WrongChecksum,
+        Some([id, _, code, params @ .., _]) => ParseOutcome::Complete(Frame { id: *id, code: *code, params }),
+        _ => ParseOutcome::Incomplete,
+    }
+}

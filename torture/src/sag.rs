@@ -1,0 +1,272 @@
+//! How far the arm sags while the controller, the servo bus or a servo fails (`torture sag`).
+//!
+//! The arm holds a pose that loads joints 2 and 3. Then one thing fails, and the largest distance of each joint from
+//! where it stood is the sag: true angles of the simulator's plant with gravity, sampled each millisecond of virtual
+//! time. This file knows neither registers of servos nor rules about frames.
+
+use std::fmt::{self, Display};
+
+use host_sim::flash::Flash;
+use host_sim::plant::Plant;
+use host_sim::servo::Fault;
+use host_sim::world::{Setup, World};
+use motion_core::TorqueCodes;
+use motion_core::servo_bus::Torque;
+use motion_core::servo_bus::frame::{FrameBuffer as ServoFrame, register, sync_write};
+use protocol_core::registers::map::TARGET_POSITION;
+use protocol_core::registers::{JOINTS, Joint};
+use protocol_core::request::Request;
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::FrameBuffer;
+
+use crate::dice::Dice;
+
+/// Targets in degrees: the rear arm leans to the front, the forearm points down by 35 degrees.
+pub const POSE: [u8; JOINTS] = [90, 60, 100, 90, 90, 90, 80];
+/// How long the arm has for the way to [`POSE`], and how long it is watched after each failure.
+pub const SETTLE_TIME: Duration = Duration::from_millis(5_000);
+/// The joint angles are sampled this often.
+const SAMPLE_TIME: Duration = Duration::from_millis(1);
+/// From the moment the program hangs until the watchdog has restarted it.
+pub const WATCHDOG_TIME: Duration = Duration::from_millis(2_000);
+/// How long noise lasts, and how long the answers of a silent servo are lost.
+pub const DISTURBANCE_TIME: Duration = Duration::from_millis(3_000);
+/// Noise puts this many random bytes on the line in each millisecond.
+pub const NOISE_BYTES: usize = 4;
+/// What the firmware does after a panic: the same frame three times, each after a pause.
+const PANIC_FRAMES: usize = 3;
+const PANIC_PAUSE: Duration = Duration::from_millis(2);
+
+/// Joint 3, which lifts the forearm.
+pub const FOREARM: Joint = Joint::ALL[2];
+
+/// What fails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// The controller alone restarts at once.
+    WarmRestart,
+    /// The program hangs for two seconds, then the watchdog restarts the controller.
+    Watchdog,
+    /// The program panics: it puts every servo into state 0 three times, then restarts.
+    Panic,
+    /// Three seconds of random bytes on the line to the servos, while each answer comes with a wrong checksum.
+    Noise,
+    /// The answers of joint 3 are lost for three seconds.
+    SilentServo,
+}
+
+impl Failure {
+    /// Each of them, in the order of the table.
+    pub const ALL: [Self; 5] =
+        [Self::WarmRestart, Self::Watchdog, Self::Panic, Self::Noise, Self::SilentServo];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::WarmRestart => "warm restart (the controller alone)",
+            Self::Watchdog => "watchdog restart (the controller hangs for 2 s)",
+            Self::Panic => "panic (state 0 to all servos three times, then a restart)",
+            Self::Noise => "noise on the servo bus for 3 s",
+            Self::SilentServo => "answers of joint 3 lost for 3 s",
+        }
+    }
+}
+
+/// The largest distance of each joint from where it stood, in thousandths of a degree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sag([u32; JOINTS]);
+
+impl Sag {
+    /// Measures the sag while this fails and for five seconds afterwards.
+    #[must_use]
+    pub fn over(failure: Failure) -> Self {
+        let mut bench = Bench::new();
+        bench.bring_about(failure);
+        bench.run(SETTLE_TIME);
+        bench.sag
+    }
+
+    /// Takes a sample of the joint angles, which stood at `rest`.
+    pub fn sample(&mut self, rest: &[i32; JOINTS], angles: [i32; JOINTS]) {
+        for ((largest, rest), angle) in self.0.iter_mut().zip(rest).zip(angles) {
+            *largest = (*largest).max(angle.abs_diff(*rest));
+        }
+    }
+
+    /// The sag of a joint, in thousandths of a degree.
+    #[must_use]
+    pub fn of(&self, joint: Joint) -> u32 {
+        self.0.get(usize::from(joint.index())).copied().unwrap_or(0)
+    }
+
+    /// The joint that sagged most.
+    #[must_use]
+    pub fn worst(&self) -> Joint {
+        Joint::ALL.into_iter().rev().max_by_key(|&joint| self.of(joint)).unwrap_or(FOREARM)
+    }
+}
+
+/// An arm that holds [`POSE`].
+struct Bench {
+    world: World<Flash>,
+    now: Instant,
+    rest: [i32; JOINTS],
+    sag: Sag,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let now = Instant::ZERO;
+        let setup = Setup { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };
+        let world = World::new(now, setup, Flash::in_memory(), Plant::new(now));
+        let mut bench = Self { world, now, rest: [0; JOINTS], sag: Sag::default() };
+        bench.run(SETTLE_TIME);
+        let mut frame = FrameBuffer::new();
+        Request::Write { address: TARGET_POSITION.address, values: &POSE }.encode(&mut frame);
+        bench.world.host_sends(bench.now, &frame);
+        bench.run(SETTLE_TIME);
+        bench.rest = bench.angles();
+        bench.sag = Sag::default();
+        bench
+    }
+
+    fn angles(&self) -> [i32; JOINTS] {
+        Joint::ALL.map(|joint| self.world.plant().angle(joint))
+    }
+
+    /// Lets time pass and samples the angles.
+    fn run(&mut self, time: Duration) {
+        let until = self.now + time;
+        while self.now < until {
+            self.now = self.now + SAMPLE_TIME;
+            self.world.advance(self.now, true);
+            let angles = self.angles();
+            self.sag.sample(&self.rest, angles);
+        }
+    }
+
+    fn bring_about(&mut self, failure: Failure) {
+        match failure {
+            Failure::WarmRestart => self.world.restart_controller(self.now),
+            Failure::Watchdog => {
+                self.world.halt_controller(self.now);
+                self.run(WATCHDOG_TIME);
+                self.world.restart_controller(self.now);
+            }
+            Failure::Panic => self.panic(),
+            Failure::Noise => self.noise(),
+            Failure::SilentServo => {
+                // Not one of its answers comes within the measurement.
+                self.world
+                    .plant_mut()
+                    .set_fault(FOREARM, Some(Fault::Late(Duration::from_millis(3_600_000))));
+                self.run(DISTURBANCE_TIME);
+                self.world.plant_mut().set_fault(FOREARM, None);
+            }
+        }
+    }
+
+    fn panic(&mut self) {
+        let mut frame = ServoFrame::new();
+        let damping = [TorqueCodes::default().code(Torque::Damping)];
+        sync_write(
+            &mut frame,
+            register::TORQUE_SWITCH,
+            Joint::ALL.map(|joint| (joint.index(), damping)).into_iter(),
+        );
+        self.world.halt_controller(self.now);
+        for _ in 0..PANIC_FRAMES {
+            self.run(PANIC_PAUSE);
+            self.world.plant_mut().bytes(self.now, &frame);
+        }
+        self.run(SAMPLE_TIME);
+        self.world.restart_controller(self.now);
+    }
+
+    fn noise(&mut self) {
+        let mut dice = Dice::new(1);
+        self.set_all_faults(Some(Fault::Garbled(1)));
+        let until = self.now + DISTURBANCE_TIME;
+        while self.now < until {
+            let noise = [(); NOISE_BYTES].map(|()| dice.byte());
+            self.world.plant_mut().bytes(self.now, &noise);
+            self.run(SAMPLE_TIME);
+        }
+        self.set_all_faults(None);
+    }
+
+    fn set_all_faults(&mut self, fault: Option<Fault>) {
+        Joint::ALL.into_iter().for_each(|joint| self.world.plant_mut().set_fault(joint, fault));
+    }
+}
+
+/// The sag over each failure.
+#[derive(Clone, Debug)]
+pub struct Table(pub Vec<(Failure, Sag)>);
+
+impl Table {
+    /// Measures them all.
+    #[must_use]
+    pub fn measure() -> Self {
+        Self(Failure::ALL.into_iter().map(|failure| (failure, Sag::over(failure))).collect())
+    }
+}
+
+impl Display for Table {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "| failure | worst joint | joint 3 |\n| --- | --- | --- |")?;
+        for (failure, sag) in &self.0 {
+            let forearm = degrees(sag.of(FOREARM));
+            write!(out, "\n| {} | {} | {forearm}° |", failure.name(), in_words(sag))?;
+        }
+        Ok(())
+    }
+}
+
+fn in_words(sag: &Sag) -> String {
+    let worst = sag.worst();
+    match sag.of(worst) {
+        0 => "0.00°".to_owned(),
+        millidegrees => format!("{}° (joint {})", degrees(millidegrees), worst.number()),
+    }
+}
+
+/// Degrees with two decimals, rounded up: a joint that moved at all shows it.
+fn degrees(millidegrees: u32) -> String {
+    let hundredths = millidegrees.div_ceil(10);
+    format!("{}.{:02}", hundredths / 100, hundredths % 100)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In thousandths of a degree: a servo of the plant droops by less than this under the arm's weight.
+    const HOLDS_WITHIN: u32 = 100;
+
+    #[test]
+    fn an_arm_that_fails_holds_its_pose() {
+        for failure in [Failure::WarmRestart, Failure::Watchdog, Failure::Noise, Failure::SilentServo] {
+            let sag = Sag::over(failure);
+            assert!(sag.of(sag.worst()) <= HOLDS_WITHIN, "{failure:?}: {sag:?}");
+        }
+    }
+
+    #[test]
+    fn an_arm_that_panics_sinks_and_is_caught() {
+        let sag = Sag::over(Failure::Panic);
+        assert!((1..=350).contains(&sag.of(sag.worst())), "{sag:?}");
+    }
+
+    #[test]
+    fn the_plant_shows_a_fall() {
+        let mut bench = Bench::new();
+        bench.world.plant_mut().restart_servo(bench.now, FOREARM);
+        bench.run(Duration::from_millis(500));
+        assert!(bench.sag.of(FOREARM) > 5_000, "{:?}", bench.sag);
+    }
+
+    #[test]
+    fn degrees_are_rounded_up() {
+        assert_eq!([0, 1, 10, 1_991, 12_340].map(degrees), ["0.00", "0.01", "0.01", "2.00", "12.34"]);
+    }
+}

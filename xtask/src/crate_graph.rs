@@ -1,0 +1,79 @@
+//! The picture of the crates and their dependencies in docs/design.md, drawn from `cargo metadata`.
+
+use std::fmt::Write;
+
+use crate::generated::Section;
+use crate::run::Outcome;
+use crate::workspace::{self, Package};
+
+const SECTION: Section = Section {
+    document: "docs/design.md",
+    begin: "<!-- begin: made by `cargo xtask docs` from `cargo metadata` -->\n",
+};
+
+/// A kind of crate and its crates.
+type Group = (&'static str, &'static [&'static str]);
+
+/// Every crate belongs to one group.
+const GROUPS: [Group; 3] = [
+    ("product", &["protocol-core", "motion-core", "firmware-stm32", "host-sim", "sevenbot"]),
+    ("proof", &["flash-model", "system-tests", "torture", "xtask"]),
+    ("measurement", &["bench", "bench-servers", "footprint"]),
+];
+
+/// Draws the picture.
+pub(crate) fn write() -> Outcome {
+    SECTION.write(&picture(&workspace::packages()?)?)
+}
+
+/// Fails if the picture is not the one that [`write()`] draws.
+pub(crate) fn check() -> Outcome {
+    SECTION.check(&picture(&workspace::packages()?)?)?;
+    println!("docs/design.md shows the crates and their dependencies");
+    Ok(())
+}
+
+/// A flowchart in the language of Mermaid.
+fn picture(packages: &[Package]) -> Outcome<String> {
+    let mut text = "```mermaid\nflowchart TD\n".to_owned();
+    for (group, crates) in GROUPS {
+        writeln!(text, "    subgraph {group}")?;
+        for name in crates {
+            let package = packages.iter().find(|package| package.name == *name);
+            let folder = package.ok_or_else(|| format!("the workspace has no crate {name}"))?.folder()?;
+            writeln!(text, "        {name}[\"{}\"]", folder.display())?;
+        }
+        writeln!(text, "    end")?;
+    }
+    for package in packages {
+        if !GROUPS.iter().any(|(_, crates)| crates.contains(&package.name.as_str())) {
+            Err(format!("{} belongs to no group of xtask/src/crate_graph.rs", package.name))?;
+        }
+        for used in package.uses() {
+            writeln!(text, "    {} --> {used}", package.name)?;
+        }
+    }
+    Ok(text + "```\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_crate_and_every_dependency_is_drawn() {
+        let packages = workspace::packages().unwrap();
+        let picture = picture(&packages).unwrap();
+        for package in &packages {
+            assert!(picture.contains(&format!("        {}[", package.name)), "{}", package.name);
+        }
+        assert!(picture.contains("    motion-core --> protocol-core\n"));
+        assert!(!picture.contains("motion-core --> host-sim"), "only its tests use it");
+    }
+
+    #[test]
+    fn a_missing_crate_is_refused() {
+        let packages = workspace::packages().unwrap();
+        assert!(picture(packages.get(1..).unwrap()).is_err());
+    }
+}

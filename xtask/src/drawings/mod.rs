@@ -1,0 +1,50 @@
+//! `cargo xtask docs`: the circuit drawings in docs/circuits, one SVG for each table of parts in [`circuits`].
+//!
+//! ```text
+//!   circuits.rs ──▶ drawing.rs ──▶ part.rs ──▶ sheet.rs ──▶ docs/circuits/*.svg
+//!   (which parts,   (name, size)   (terminals,  (lines and
+//!    and where)                     shape)       text as SVG)
+//! ```
+
+use std::fs;
+use std::path::PathBuf;
+
+use crate::run::{Outcome, root};
+
+mod circuits;
+mod drawing;
+mod part;
+mod sheet;
+#[cfg(test)]
+mod tests;
+
+use drawing::Drawing;
+
+fn path(drawing: &Drawing) -> PathBuf {
+    folder().join(drawing.name).with_extension("svg")
+}
+
+/// Writes every drawing.
+pub(crate) fn write() -> Outcome {
+    fs::create_dir_all(folder())?;
+    for drawing in circuits::all() {
+        fs::write(path(&drawing), drawing.svg())?;
+    }
+    Ok(())
+}
+
+/// Fails if a drawing is not what [`write()`] would write.
+pub(crate) fn check() -> Outcome {
+    for drawing in circuits::all() {
+        let path = path(&drawing);
+        if fs::read_to_string(&path).unwrap_or_default() != drawing.svg() {
+            return Err(format!("{} is stale: run `cargo xtask docs`", path.display()).into());
+        }
+    }
+    println!("docs/circuits shows what the tables of parts say");
+    Ok(())
+}
+
+fn folder() -> PathBuf {
+    root().join("docs/circuits")
+}

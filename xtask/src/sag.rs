@@ -1,0 +1,226 @@
+//! `cargo xtask sag`: how far the arm sags when something fails, with the image in the emulator as the controller.
+//!
+//! ```text
+//!   Bench ── host link ── USART1 ┌──────────┐ USART2 ── servo bus ── Plant (true angles)
+//!         ── monitor ─────────── │   qemu   │
+//!         ── debugger ────────── │ the image│
+//!                                └──────────┘
+//! ```
+//!
+//! The failures and the table are those of `torture sag`. Time is the clock's, so a busy machine raises the figures.
+
+use std::io::{BufReader, Read, Write};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::thread::sleep;
+use std::time::Duration as RealTime;
+
+use host_sim::clock::Clock;
+use host_sim::plant::Plant;
+use host_sim::servo::Fault;
+use host_sim::servo_socket::exchange;
+use object::read::elf::ElfFile32;
+use object::{Object, ObjectSymbol};
+use protocol_core::registers::map::TARGET_POSITION;
+use protocol_core::registers::{JOINTS, Joint};
+use protocol_core::request::Request;
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::FrameBuffer;
+use tempfile::TempDir;
+use torture::dice::Dice;
+use torture::sag::{
+    DISTURBANCE_TIME, FOREARM, Failure, NOISE_BYTES, POSE, SETTLE_TIME, Sag, Table, WATCHDOG_TIME,
+};
+
+use crate::emulate::monitor::{self, Monitor};
+use crate::emulate::{HOST_LINK_CONTROL, RECEIVER_ON, need_qemu, servo_socket, start_machine};
+use crate::run::{self, Outcome, Running};
+
+/// Between two looks at the servo bus and two samples of the angles.
+const TURN: RealTime = RealTime::from_micros(200);
+/// Noise comes this often.
+const NOISE_PERIOD: Duration = Duration::from_millis(1);
+/// The function that a panic ends in.
+const PANIC_HANDLER: &str = "rust_begin_unwind";
+
+/// Builds the image, measures the sag over each failure and prints the table.
+pub(crate) fn measure() -> Outcome {
+    need_qemu()?;
+    run::build_image()?;
+    let sags: Outcome<Vec<_>> =
+        Failure::ALL.into_iter().map(|failure| Ok((failure, sag_over(failure)?))).collect();
+    println!("{}", Table(sags?));
+    Ok(())
+}
+
+fn sag_over(failure: Failure) -> Outcome<Sag> {
+    let mut bench = Bench::new()?;
+    bench.bring_about(failure)?;
+    bench.run(SETTLE_TIME)?;
+    Ok(bench.sag)
+}
+
+/// An emulated arm that holds [`POSE`].
+struct Bench {
+    _machine: Running,
+    folder: TempDir,
+    monitor: Monitor,
+    servos: UnixStream,
+    plant: Plant,
+    clock: Clock,
+    rest: [i32; JOINTS],
+    sag: Sag,
+}
+
+impl Bench {
+    fn new() -> Outcome<Self> {
+        let folder = tempfile::tempdir()?;
+        let listen = |name| UnixListener::bind(folder.path().join(name));
+        let (host, commands, servos) = (listen("host")?, listen("monitor")?, listen("servos")?);
+        let debugger = format!("unix:{},server=on,wait=off", folder.path().join("debugger").display());
+        let machine = start_machine(&run::IMAGE, &folder, &servo_socket(&folder), &["-gdb", &debugger])?;
+        let (mut host, servos) = (monitor::accept(&host)?, monitor::accept(&servos)?);
+        servos.set_nonblocking(true)?;
+        let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
+        monitor.wait_for_bits(HOST_LINK_CONTROL, RECEIVER_ON)?;
+        let mut clock = Clock::default();
+        let mut plant = Plant::new(clock.now());
+        plant.ignore_collisions();
+        let (rest, sag) = ([0; JOINTS], Sag::default());
+        let mut bench = Self { _machine: machine, folder, monitor, servos, plant, clock, rest, sag };
+        bench.run(SETTLE_TIME)?;
+        let mut frame = FrameBuffer::new();
+        Request::Write { address: TARGET_POSITION.address, values: &POSE }.encode(&mut frame);
+        host.write_all(&frame)?;
+        bench.run(SETTLE_TIME)?;
+        bench.rest = bench.angles();
+        bench.sag = Sag::default();
+        bench.is_in_pose()?;
+        Ok(bench)
+    }
+
+    /// An arm that does not stand in its pose would measure nothing.
+    fn is_in_pose(&self) -> Outcome {
+        let is_off = |(angle, degrees): (&i32, u8)| angle.abs_diff(i32::from(degrees) * 1_000) > 1_000;
+        if self.rest.iter().zip(POSE).any(is_off) {
+            Err(format!("the arm did not reach its pose: {:?} thousandths of a degree", self.rest))?;
+        }
+        Ok(())
+    }
+
+    fn angles(&self) -> [i32; JOINTS] {
+        Joint::ALL.map(|joint| self.plant.angle(joint))
+    }
+
+    /// Lets time pass and samples the angles. Returns the time.
+    fn run(&mut self, time: Duration) -> Outcome<Instant> {
+        let until = self.clock.now() + time;
+        loop {
+            let now = self.clock.now();
+            exchange(&mut self.servos, &mut self.plant, now)?;
+            let angles = self.angles();
+            self.sag.sample(&self.rest, angles);
+            if now >= until {
+                return Ok(now);
+            }
+            sleep(TURN);
+        }
+    }
+
+    fn bring_about(&mut self, failure: Failure) -> Outcome {
+        match failure {
+            Failure::WarmRestart => self.monitor.execute("system_reset", ""),
+            Failure::Watchdog => {
+                self.monitor.execute("stop", "")?;
+                self.run(WATCHDOG_TIME)?;
+                self.monitor.execute("system_reset", "")?;
+                self.monitor.execute("cont", "")
+            }
+            Failure::Panic => Debugger::attach(&self.folder)?.continue_at(panic_handler()?),
+            Failure::Noise => self.noise(),
+            Failure::SilentServo => {
+                // Not one of its answers comes within the measurement.
+                self.plant.set_fault(FOREARM, Some(Fault::Late(Duration::from_millis(3_600_000))));
+                self.run(DISTURBANCE_TIME)?;
+                self.plant.set_fault(FOREARM, None);
+                Ok(())
+            }
+        }
+    }
+
+    fn noise(&mut self) -> Outcome {
+        let mut dice = Dice::new(1);
+        self.set_all_faults(Some(Fault::Garbled(1)));
+        let mut now = self.clock.now();
+        let until = now + DISTURBANCE_TIME;
+        while now < until {
+            self.plant.bytes(now, &[(); NOISE_BYTES].map(|()| dice.byte()));
+            now = self.run(NOISE_PERIOD)?;
+        }
+        self.set_all_faults(None);
+        Ok(())
+    }
+
+    fn set_all_faults(&mut self, fault: Option<Fault>) {
+        Joint::ALL.into_iter().for_each(|joint| self.plant.set_fault(joint, fault));
+    }
+}
+
+/// The emulator's debugger port (GDB remote serial protocol). The chip stands still while it is attached.
+struct Debugger(BufReader<UnixStream>);
+
+impl Debugger {
+    fn attach(folder: &TempDir) -> Outcome<Self> {
+        let stream = UnixStream::connect(folder.path().join("debugger"))?;
+        stream.set_read_timeout(Some(RealTime::from_secs(60)))?;
+        Ok(Self(BufReader::new(stream)))
+    }
+
+    /// Lets the chip go on at `address`, and leaves.
+    fn continue_at(mut self, address: u32) -> Outcome {
+        // The emulator sets single registers only for who knows its description of them.
+        self.command("qSupported")?;
+        self.command("qXfer:features:read:target.xml:0,40")?;
+        // Register 15 is the program counter; its bytes go in the order of the chip's memory.
+        let reply = self.command(&format!("Pf={:08x}", address.swap_bytes()))?;
+        if reply != "OK" {
+            Err(format!("the emulator does not set the program counter: {reply}"))?;
+        }
+        self.command("D").map(drop)
+    }
+
+    fn command(&mut self, words: &str) -> Outcome<String> {
+        let sum = words.bytes().fold(0, u8::wrapping_add);
+        write!(self.0.get_mut(), "${words}#{sum:02x}")?;
+        loop {
+            let reply = self.reply()?;
+            // The emulator may first tell that the chip stands still.
+            if !reply.starts_with('T') {
+                return Ok(reply);
+            }
+        }
+    }
+
+    fn reply(&mut self) -> Outcome<String> {
+        let mut reply = Vec::new();
+        // Acknowledgement, `$`, reply, `#`, two digits.
+        while !reply.ends_with(b"#") {
+            let mut byte = [0];
+            self.0.read_exact(&mut byte)?;
+            reply.extend(byte);
+        }
+        self.0.read_exact(&mut [0; 2])?;
+        self.0.get_mut().write_all(b"+")?;
+        let reply = String::from_utf8_lossy(&reply).into_owned();
+        Ok(reply.trim_start_matches(['+', '$']).trim_end_matches('#').to_owned())
+    }
+}
+
+/// Where the panic handler begins.
+fn panic_handler() -> Outcome<u32> {
+    let file = run::IMAGE.read()?;
+    let elf: ElfFile32<'_> = ElfFile32::parse(file.as_slice())?;
+    let symbol = elf.symbols().find(|symbol| symbol.name().is_ok_and(|name| name.contains(PANIC_HANDLER)));
+    let address = symbol.ok_or("the image has no panic handler")?.address();
+    // The lowest bit says that the code is Thumb.
+    Ok(u32::try_from(address)? & !1)
+}

@@ -1,0 +1,202 @@
+//! `cargo xtask start-up`: what the image for the arm does to the chip's registers before its loop begins, seen from
+//! outside, and held against what a chip needs and the emulator does not show (RM0090, ES0182, DS8626).
+//!
+//! The emulator has no GPIO, clock tree, watchdog, supply monitor or flash controller. It logs every access to them
+//! instead, in their order; what is read there is 0.
+
+use std::fs;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::emulate::{QEMU, need_qemu};
+use crate::run::{self, Outcome, Running};
+
+/// How long the image may take to start.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// An access to a register that the emulator does not have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Access<'a> {
+    /// Device, offset.
+    Read(&'a str, u32),
+    /// Device, offset, value; 0 where the log does not tell it.
+    Write(&'a str, u32, u32),
+}
+use Access::{Read, Write};
+
+/// Names that the emulator gives to what stands at the address of the independent watchdog, of the debug unit, and of
+/// the flash controller.
+const WATCHDOG: &str = "I2S2ext";
+const PRIVATE: &str = "PPB";
+const FLASH: &str = "Flash Int";
+
+/// Offsets (RM0090, sections 7.3, 8.4, 5.4, 3.9, 21.4, 38.16).
+const CLOCK_ENABLES: [u32; 3] = [0x30, 0x40, 0x44];
+const MODE: u32 = 0x00;
+const PULL: u32 = 0x0C;
+const SET_RESET: u32 = 0x18;
+const DEBUG_CONTROL: u32 = 0x4_2004;
+const CLOCK_CONTROL: u32 = 0x00;
+
+/// Pump and valve, PC6 and PC7: driven low, and made outputs after that.
+const PUMP_AND_VALVE_OFF: [Access<'_>; 4] = [
+    Write("GPIOC", SET_RESET, 1 << 22),
+    Write("GPIOC", MODE, 1 << 12),
+    Write("GPIOC", SET_RESET, 1 << 23),
+    Write("GPIOC", MODE, 1 << 14),
+];
+/// PA10 becomes the host link's input: the last of the start.
+const HOST_LINK_OPEN: Access<'_> = Write("GPIOA", MODE, 2 << 20);
+/// Start, unlock, divisor, reload value, wait for both, feed.
+const WATCHDOG_STARTED: [Access<'_>; 6] = [
+    Write(WATCHDOG, 0x00, 0xCCCC),
+    Write(WATCHDOG, 0x00, 0x5555),
+    Write(WATCHDOG, 0x04, 4),
+    Write(WATCHDOG, 0x08, 1_000),
+    Read(WATCHDOG, 0x0C),
+    Write(WATCHDOG, 0x00, 0xAAAA),
+];
+/// Level 6, switched on.
+const SUPPLY_WATCHED: Access<'_> = Write("PWR", 0x00, 6 << 5 | 1 << 4);
+/// An erase is started; the data cache is reset after it.
+const ERASE: u32 = 1 << 16;
+const CACHE_RESET: Access<'_> = Write(FLASH, 0x00, 1 << 12);
+
+/// Runs the image and checks its start.
+pub(crate) fn check() -> Outcome {
+    need_qemu()?;
+    run::build_image()?;
+    let log = log_of_start()?;
+    let accesses: Vec<_> = log.lines().filter_map(access).collect();
+    for (what, holds) in RULES {
+        if !holds(&accesses) {
+            Err(format!("the image does not start as a chip needs it: {what}"))?;
+        }
+        println!("{what}");
+    }
+    Ok(())
+}
+
+/// What has to hold, and how to see it.
+type Rule = (&'static str, fn(&[Access<'_>]) -> bool);
+
+const RULES: &[Rule] = &[
+    ("pump and valve are off before anything else is touched but their clock", |accesses| {
+        let writes = accesses.iter().filter(|access| is_write(access)).skip(1);
+        writes.take(PUMP_AND_VALVE_OFF.len()).eq(&PUMP_AND_VALVE_OFF)
+    }),
+    ("a sleeping core can be attached to before the clock is started", |accesses| {
+        let debug = position(accesses, Write(PRIVATE, DEBUG_CONTROL, 0));
+        let clock = position(accesses, Read("RCC", CLOCK_CONTROL));
+        debug.zip(clock).is_some_and(|(debug, clock)| debug < clock)
+    }),
+    ("each clock enable is read back at once", |accesses| {
+        let is_enable =
+            |access: &Access<'_>| matches!(access, Write("RCC", at, _) if CLOCK_ENABLES.contains(at));
+        let read_back = |pair: &[Access<'_>]| match pair {
+            [enable @ Write(_, at, _), next] if is_enable(enable) => *next == Read("RCC", *at),
+            _ => true,
+        };
+        accesses.iter().filter(|access| is_enable(access)).count() >= CLOCK_ENABLES.len()
+            && accesses.windows(2).all(read_back)
+    }),
+    ("the servo line has no pull inside the chip", |accesses| {
+        let pulls =
+            |access: &Access<'_>| matches!(access, Write("GPIOA", PULL, value) if value >> 4 & 3 != 0);
+        accesses.contains(&Write("GPIOA", PULL, 0)) && !accesses.iter().any(pulls)
+    }),
+    ("the watchdog is fed once its registers have taken their values", |accesses| {
+        accesses.iter().filter(|access| is_at(access, WATCHDOG)).take(6).eq(&WATCHDOG_STARTED)
+    }),
+    ("the supply is watched at level 6 before the flash is touched", |accesses| {
+        let watched = position(accesses, SUPPLY_WATCHED);
+        let touched = accesses.iter().position(|access| is_write(access) && is_at(access, FLASH));
+        watched.zip(touched).is_some_and(|(watched, touched)| watched < touched)
+    }),
+    ("the data cache is reset after an erase", |accesses| {
+        let is_erase =
+            |access: &Access<'_>| matches!(access, Write(FLASH, 0x10, value) if value & ERASE != 0);
+        let erase = accesses.iter().rposition(is_erase);
+        let reset = accesses.iter().rposition(|access| *access == CACHE_RESET);
+        erase.zip(reset).is_some_and(|(erase, reset)| erase < reset)
+    }),
+];
+
+fn is_write(access: &Access<'_>) -> bool {
+    matches!(access, Write(..))
+}
+
+fn is_at(access: &Access<'_>, device: &str) -> bool {
+    let (Read(at, _) | Write(at, ..)) = access;
+    *at == device
+}
+
+fn position(accesses: &[Access<'_>], wanted: Access<'_>) -> Option<usize> {
+    accesses.iter().position(|access| *access == wanted)
+}
+
+/// The emulator's log, up to where the host link is open.
+fn log_of_start() -> Outcome<String> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("log");
+    let machine = Command::new(QEMU)
+        .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-nodefaults"])
+        .args(["-serial", "null", "-serial", "null", "-d", "unimp,guest_errors", "-D"])
+        .arg(&path)
+        .arg("-kernel")
+        .arg(run::IMAGE.path())
+        .stdin(Stdio::null())
+        .spawn()?;
+    let _machine = Running(machine);
+    let deadline = Instant::now() + PATIENCE;
+    while Instant::now() < deadline {
+        let log = fs::read_to_string(&path).unwrap_or_default();
+        // The log is written in pieces: the last line may be cut off.
+        let whole = log.rsplit_once('\n').map_or("", |(lines, _)| lines);
+        if whole.lines().filter_map(access).any(|access| access == HOST_LINK_OPEN) {
+            return Ok(whole.to_owned());
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    Err("the image did not open its host link")?
+}
+
+/// What a line of the log says: `GPIOC: unimplemented device write (size 4, offset 0x018, value 0x00400000)`, or
+/// `Write of unassigned area of PPB: offset 0x42004`.
+fn access(line: &str) -> Option<Access<'_>> {
+    if let Some((kind, offset)) = line.split_once(" of unassigned area of PPB: offset 0x") {
+        let offset = number(offset)?;
+        return Some(if kind == "Read" { Read(PRIVATE, offset) } else { Write(PRIVATE, offset, 0) });
+    }
+    let (device, what) = line.split_once(": unimplemented device ")?;
+    let (_, words) = what.split_once("offset 0x")?;
+    match words.trim_end_matches(')').split_once(", value 0x") {
+        Some((offset, value)) => Some(Write(device, number(offset)?, number(value)?)),
+        None => Some(Read(device, number(words.trim_end_matches(')'))?)),
+    }
+}
+
+fn number(digits: &str) -> Option<u32> {
+    u32::from_str_radix(digits.trim(), 16).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lines_of_the_log_are_understood() {
+        for (line, expected) in [
+            ("RCC: unimplemented device read  (size 4, offset 0x030)", Some(Read("RCC", 0x30))),
+            (
+                "GPIOC: unimplemented device write (size 4, offset 0x018, value 0x00400000)",
+                Some(Write("GPIOC", 0x18, 0x40_0000)),
+            ),
+            ("Write of unassigned area of PPB: offset 0x42004", Some(Write(PRIVATE, 0x4_2004, 0))),
+            ("Read of unassigned area of PPB: offset 0x42000", Some(Read(PRIVATE, 0x4_2000))),
+            ("qemu-system-arm: terminating on signal 15", None),
+        ] {
+            assert_eq!(access(line), expected, "{line}");
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! The crates of the workspace and their dependencies, as `cargo metadata` reports them.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde::Deserialize;
+
+use crate::run::{Outcome, root};
+
+/// The part of the metadata that is read here.
+#[derive(Deserialize)]
+struct Metadata {
+    packages: Vec<Package>,
+}
+
+/// A crate.
+#[derive(Deserialize)]
+pub(crate) struct Package {
+    /// Its name.
+    pub(crate) name: String,
+    manifest_path: PathBuf,
+    targets: Vec<Target>,
+    dependencies: Vec<Dependency>,
+}
+
+#[derive(Deserialize)]
+struct Target {
+    kind: Vec<String>,
+    src_path: PathBuf,
+}
+
+#[derive(Deserialize)]
+struct Dependency {
+    name: String,
+    /// `dev`, `build`, or none.
+    kind: Option<String>,
+    /// The folder, if the dependency is a crate of the workspace.
+    path: Option<PathBuf>,
+}
+
+/// The crates of the workspace, in the order of their names.
+pub(crate) fn packages() -> Outcome<Vec<Package>> {
+    let mut cargo = Command::new("cargo");
+    cargo.args(["metadata", "--no-deps", "--format-version", "1"]).current_dir(root());
+    let output = cargo.stderr(Stdio::inherit()).output()?;
+    if !output.status.success() {
+        Err("`cargo metadata` failed")?;
+    }
+    let mut packages = serde_json::from_slice::<Metadata>(&output.stdout)?.packages;
+    packages.sort_by(|one, other| one.name.cmp(&other.name));
+    Ok(packages)
+}
+
+impl Package {
+    /// The folder, from the root of the workspace.
+    pub(crate) fn folder(&self) -> Outcome<PathBuf> {
+        let folder = self.manifest_path.parent().unwrap_or(Path::new(""));
+        Ok(folder.strip_prefix(root())?.to_owned())
+    }
+
+    /// The root files of the library and the programs.
+    pub(crate) fn roots(&self) -> Vec<PathBuf> {
+        let is_root = |target: &&Target| target.kind.iter().any(|kind| kind == "lib" || kind == "bin");
+        self.targets.iter().filter(is_root).map(|target| target.src_path.clone()).collect()
+    }
+
+    /// The crates of the workspace that this one is built on. Its tests may use more.
+    pub(crate) fn uses(&self) -> BTreeSet<&str> {
+        let is_normal = |dependency: &&Dependency| dependency.kind.is_none() && dependency.path.is_some();
+        self.dependencies.iter().filter(is_normal).map(|dependency| dependency.name.as_str()).collect()
+    }
+}
