@@ -18,11 +18,13 @@ pub struct Servos {
     /// Bit n for servo n.
     pub answering: u8,
     pub counts: [u16; 7],
+    /// The position in each servo's last answer, in counts.
+    pub told: [u16; 7],
 }
 
 impl Servos {
     pub const fn new() -> Self {
-        Self { answering: 0x7F, counts: [512; 7] }
+        Self { answering: 0x7F, counts: [512; 7], told: [512; 7] }
     }
 
     /// Takes a command; what is said to it.
@@ -37,7 +39,8 @@ impl Servos {
         }
     }
 
-    fn answer(&self, id: u8, count: u8) -> FrameBuffer {
+    fn answer(&mut self, id: u8, count: u8) -> FrameBuffer {
+        self.told[usize::from(id)] = self.counts[usize::from(id)];
         let reading = Reading {
             position_counts: self.counts[usize::from(id)],
             speed: 0,

@@ -97,7 +97,7 @@ impl Shell {
                     self.now_us,
                     &command,
                     self.controller.registers(),
-                    &self.servos.counts,
+                    &self.servos.told,
                 );
                 if let Some(answer) = self.servos.take(&command) {
                     self.controller.servo_bytes(now, &answer);

@@ -66,7 +66,7 @@ impl Watch {
         assert!(registers.image() == self.settings, "answered before the settings were saved");
     }
 
-    /// `positions` are where the servos really are, in counts.
+    /// `positions` are those of the servos' last answers, in counts.
     pub fn told_servos(
         &mut self,
         now_us: u64,
@@ -117,8 +117,8 @@ impl Watch {
         let offset = OFFSET.range.decode(registers.get(OFFSET.of(joint)));
         let goal = degrees(angle_from_counts(joint, counts, i8::try_from(offset).unwrap()));
         let place = f64::from(registers.get(PRESENT_POSITION.of(joint)));
-        // Half a degree is what the register rounds off, and a third of one is a count. The register keeps the old
-        // angle until the next measurement where an offset has just changed.
+        // Half a degree is what the register rounds off, and a third of one is a count. After a change of the offset
+        // the register keeps the old angle until the next measurement, so the last answer counts too.
         let is_here = (goal.clamp(0.0, 180.0) - place).abs() < 1.0 || counts == position;
         assert!(
             state.goal.is_some_and(is_near) || is_here,
