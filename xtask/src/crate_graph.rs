@@ -18,7 +18,7 @@ type Group = (&'static str, &'static [&'static str]);
 const GROUPS: [Group; 3] = [
     ("product", &["protocol-core", "motion-core", "firmware-stm32", "host-sim", "sevenbot"]),
     ("proof", &["flash-model", "system-tests", "torture", "xtask"]),
-    ("measurement", &["bench", "bench-servers", "footprint"]),
+    ("measurement", &["bench", "footprint", "peers"]),
 ];
 
 /// Draws the picture.

@@ -14,7 +14,7 @@ use spdx::{Expression, LicenseReq};
 use crate::run::{Outcome, cargo, root};
 
 /// The workspaces whose dependencies are checked.
-const MANIFESTS: [&str; 2] = ["Cargo.toml", "fuzz/Cargo.toml"];
+const MANIFESTS: [&str; 2] = ["Cargo.toml", "verification/fuzz/Cargo.toml"];
 
 /// What `deny.toml` says.
 #[derive(Deserialize)]

@@ -1,12 +1,13 @@
 //! `cargo xtask fuzz`: inputs that a fuzzer makes up, for so long each target, with the stable compiler.
 //!
 //! ```text
-//!   fuzz/fuzz_targets ── cargo build, with the compiler's coverage counters ──> target/fuzz/build
-//!   fuzz/corpus ───────> one program for each target ──> target/fuzz/TARGET   new inputs that reach more
-//!                                                    └─> target/fuzz/failures inputs that break a rule
+//!   fuzz_targets ── cargo build, with the compiler's coverage counters ──> target/fuzz/build
+//!   corpus ───────> one program for each target ──> target/fuzz/TARGET   new inputs that reach more
+//!                                               └─> target/fuzz/failures inputs that break a rule
 //! ```
 //!
-//! The next run goes on from the inputs of the last. Knows nothing of what the targets try: `fuzz/README.md` does.
+//! The next run goes on from the inputs of the last. Knows nothing of what the targets try: `verification/fuzz/README.md`
+//! does. `fuzz_targets` and `corpus` are beside it.
 
 use std::fs;
 use std::io;
@@ -20,7 +21,7 @@ use clap::Args;
 use crate::run::{Outcome, root, run, target_directory};
 use crate::trials::Trials;
 
-/// The programs of `fuzz/`.
+/// The programs of `verification/fuzz/`.
 const TARGETS: [&str; 6] = ["controller", "deframer", "host_reply", "image_file", "journal", "register_ops"];
 /// Bytes of an input, at most.
 const LONGEST: usize = 512;
@@ -73,7 +74,7 @@ fn build() -> Outcome<PathBuf> {
     let folder = target_directory().join("fuzz/build");
     let host = host()?;
     let words = format!(
-        "build --quiet --release --manifest-path fuzz/Cargo.toml --target {host} --target-dir {}",
+        "build --quiet --release --manifest-path verification/fuzz/Cargo.toml --target {host} --target-dir {}",
         folder.display()
     );
     run("cargo", &words, &[("RUSTFLAGS", COVERAGE)])?;
@@ -95,7 +96,7 @@ fn one(programs: &Path, target: &str, seconds: u64, seed: u32) -> io::Result<Out
         fs::create_dir_all(folder)?;
     }
     let mut command = Command::new(programs.join(target));
-    command.current_dir(root()).arg(found).arg(format!("fuzz/corpus/{target}"));
+    command.current_dir(root()).arg(found).arg(format!("verification/fuzz/corpus/{target}"));
     command.arg(format!("-artifact_prefix={}/{target}-", failures.display()));
     command.args([format!("-seed={seed}"), format!("-max_len={LONGEST}")]);
     command.args([format!("-max_total_time={seconds}"), "-print_final_stats=1".to_owned()]);
@@ -144,8 +145,8 @@ mod tests {
     #[test]
     fn every_target_has_its_program_and_its_corpus() {
         for target in TARGETS {
-            assert!(root().join(format!("fuzz/fuzz_targets/{target}.rs")).exists(), "{target}");
-            assert!(root().join(format!("fuzz/corpus/{target}")).is_dir(), "{target}");
+            assert!(root().join(format!("verification/fuzz/fuzz_targets/{target}.rs")).exists(), "{target}");
+            assert!(root().join(format!("verification/fuzz/corpus/{target}")).is_dir(), "{target}");
         }
     }
 }

@@ -63,7 +63,7 @@ const ALLOWED: &[Allowed] = &[
         reason: "a failure is printed by the output, whose errors are failures",
     },
     Allowed {
-        folder: "torture",
+        folder: "verification/torture",
         files: &["world/mod.rs", "world/power.rs", "world/trouble.rs"],
         reason: "power cuts and faults change the world that schedules them",
     },

@@ -1,0 +1,180 @@
+//! `cargo xtask bench`: time of a request on the parse-and-answer path, beside four peers: two Modbus RTU servers,
+//! postcard with COBS, and MAVLink.
+//!
+//! All servers get the same operations, as one stream in pieces of 64 bytes that are independent of frame limits.
+//! They append their replies to one vector. Each reply to undamaged traffic is compared, byte by byte, with an
+//! independent model. Our replies to damaged traffic are compared too. The rounds of the servers are interleaved, so
+//! that other load on the machine affects all alike. Each round begins with a fresh server, and the median of the
+//! rounds is printed.
+//!
+//! The rule of the comparison is equal payload bytes:
+//! * A read of 7 returns the same 7 bytes in every protocol, and a write of 7 stores the same 7 bytes.
+//! * A Modbus register holds two bytes, so Modbus reads and writes whole registers: 4 of them, 8 bytes, for 7, and 31 of
+//!   them, 62 bytes, for 61. The rounding costs the Modbus servers one byte in each request.
+//!
+//! All servers do this work:
+//! * find the frames in the stream, and check a CRC-16 over each;
+//! * check that the bytes exist, and read or write them;
+//! * build the whole reply to a read, with its CRC.
+//!
+//! These differences come from the protocols:
+//! * Our server also checks each written value against its range, checks access rights, and keeps the state for its
+//!   timeouts (D4, D15, D16). No peer does.
+//! * A Modbus server answers a write; the others do not.
+//! * Frames differ in length (the table prints it): MAVLink names sender and receiver.
+//! * COBS finds a frame by a zero, MAVLink by its header; a damaged zero or length can hide the frames that follow. On a
+//!   line, silence separates Modbus frames. In a stream, a Modbus server skips one byte when a frame is invalid.
+//!
+//! The peers get a receive buffer that moves its bytes as rarely as ours.
+
+use std::error::Error;
+use std::time::{Duration, Instant};
+
+mod operation;
+mod protocol;
+mod server;
+mod traffic;
+
+use peers::{MavlinkServer, ModbusCoreServer, OurServer, PostcardServer, RmodbusServer};
+use protocol::Protocol;
+use server::Serve;
+use traffic::{CASES, Case, Traffic};
+
+/// Requests in a round.
+const REQUESTS: usize = 2_000;
+/// Rounds of each server and each case.
+const ROUNDS: usize = 301;
+
+/// A server under comparison.
+struct Candidate {
+    name: &'static str,
+    protocol: Protocol,
+    start: fn() -> Box<dyn Serve>,
+}
+
+/// Our server, then the peers.
+static CANDIDATES: [Candidate; 5] = [
+    Candidate {
+        name: "protocol-core",
+        protocol: Protocol::SevenBot,
+        start: || Box::new(OurServer::default()),
+    },
+    Candidate {
+        name: "modbus-core",
+        protocol: Protocol::ModbusRtu,
+        start: || Box::new(ModbusCoreServer::default()),
+    },
+    Candidate {
+        name: "rmodbus",
+        protocol: Protocol::ModbusRtu,
+        start: || Box::new(RmodbusServer::default()),
+    },
+    Candidate {
+        name: "postcard+cobs",
+        protocol: Protocol::Postcard,
+        start: || Box::new(PostcardServer::default()),
+    },
+    Candidate { name: "mavlink", protocol: Protocol::Mavlink, start: || Box::new(MavlinkServer::default()) },
+];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    pin_to_one_core();
+    println!(
+        "Time of a request, median of {ROUNDS} interleaved rounds of {REQUESTS} requests; peers in multiples of ours"
+    );
+    let names = CANDIDATES.each_ref().map(|candidate| format!("{:>14}", candidate.name)).concat();
+    println!("{:20}{names}{:>13}", "", "ours / best");
+    for case in CASES {
+        print_row(case, &measure(case)?);
+    }
+    Ok(())
+}
+
+/// The rounds of one server in one case.
+struct Measurement {
+    candidate: &'static Candidate,
+    traffic: Traffic,
+    times: Vec<Duration>,
+    carried_out: usize,
+}
+
+impl Measurement {
+    fn new(candidate: &'static Candidate, case: &Case) -> Self {
+        let traffic = Traffic::new(case, candidate.protocol, REQUESTS);
+        Self { candidate, traffic, times: Vec::with_capacity(ROUNDS), carried_out: 0 }
+    }
+
+    /// Runs one round and compares its replies with the model's.
+    fn run(&mut self, replies: &mut Vec<u8>) -> Result<(), String> {
+        replies.clear();
+        let mut server = (self.candidate.start)();
+        let start = Instant::now();
+        server.serve(&self.traffic.requests, replies);
+        self.times.push(start.elapsed());
+        self.carried_out = server.carried_out();
+        let all = self.carried_out == self.traffic.undamaged && *replies == self.traffic.replies;
+        let is_ours = self.candidate.protocol == Protocol::SevenBot;
+        if !all && (is_ours || self.traffic.undamaged == REQUESTS) {
+            let Self { carried_out, traffic: Traffic { undamaged, .. }, .. } = self;
+            let name = self.candidate.name;
+            return Err(format!("{name} carried out {carried_out} of {undamaged}, or answered wrongly"));
+        }
+        Ok(())
+    }
+
+    /// The median of the rounds, in nanoseconds a request.
+    fn nanoseconds(&self) -> f64 {
+        let mut times = self.times.clone();
+        times.sort_unstable();
+        let median = times.get(times.len() / 2).copied().unwrap_or_default();
+        median.as_secs_f64() * 1e9 / REQUESTS as f64
+    }
+
+    fn bytes_a_request(&self) -> String {
+        let mean = |bytes: &[u8]| bytes.len() as f64 / REQUESTS as f64;
+        format!("{:.0} + {:.0}", mean(&self.traffic.requests), mean(&self.traffic.replies))
+    }
+
+    /// The share of the undamaged requests that was carried out.
+    fn answered(&self) -> String {
+        format!("{:.2} %", 100.0 * self.carried_out as f64 / self.traffic.undamaged as f64)
+    }
+}
+
+/// Runs the rounds of one case.
+fn measure(case: &Case) -> Result<[Measurement; CANDIDATES.len()], String> {
+    let mut measurements = CANDIDATES.each_ref().map(|candidate| Measurement::new(candidate, case));
+    let mut replies = Vec::with_capacity(REQUESTS * 256);
+    for _ in 0..ROUNDS {
+        for measurement in &mut measurements {
+            measurement.run(&mut replies).map_err(|why| format!("{}: {why}", case.name))?;
+        }
+    }
+    Ok(measurements)
+}
+
+/// Prints our time of a request, the peers' as multiples of it, and our time divided by the best peer's.
+fn print_row(case: &Case, measurements: &[Measurement]) {
+    let Some((ours, peers)) = measurements.split_first() else { return };
+    let time = ours.nanoseconds();
+    let multiples: String =
+        peers.iter().map(|measurement| format!("{:12.2} x", measurement.nanoseconds() / time)).collect();
+    let best = peers.iter().map(Measurement::nanoseconds).fold(f64::INFINITY, f64::min);
+    println!("{:20}{time:11.1} ns{multiples}{:13.2}", case.name, time / best);
+    print_cells("  bytes in + out", measurements, Measurement::bytes_a_request);
+    if ours.traffic.undamaged < REQUESTS {
+        print_cells("  undamaged, done", measurements, Measurement::answered);
+    }
+}
+
+fn print_cells(title: &str, measurements: &[Measurement], cell: impl Fn(&Measurement) -> String) {
+    let cells: String = measurements.iter().map(|measurement| format!("{:>14}", cell(measurement))).collect();
+    println!("{title:20}{cells}");
+}
+
+/// Pins this program to one core, where the system supports it.
+fn pin_to_one_core() {
+    if let Some(core) = core_affinity::get_core_ids().and_then(|cores| cores.last().copied()) {
+        core_affinity::set_for_current(core);
+    }
+}

@@ -1,0 +1,8 @@
+//! Parts of protocol-core's own tests that are of use from other seeds and inputs.
+
+#[path = "../../../protocol-core/tests/disturbed_line/mod.rs"]
+pub(crate) mod disturbed_line;
+#[path = "../../../protocol-core/tests/journal_world/mod.rs"]
+pub(crate) mod journal_world;
+#[path = "../../../protocol-core/tests/stream/mod.rs"]
+pub(crate) mod stream;
