@@ -177,6 +177,9 @@ impl Hold {
         match command {
             Command::Goal(joint, angle) => {
                 let held = &mut self.joints[joint];
+                if held.goal.is_none() {
+                    held.goals = [Span::at(angle); 2];
+                }
                 held.goal = Some(angle);
                 let [new, _] = &mut held.goals;
                 new.reach(angle);
@@ -210,18 +213,17 @@ impl Hold {
         }
         let held = &mut self.joints[joint];
         let Some(goal) = held.goal else { return Ok(()) };
+        let [mut goals, old] = held.goals;
+        goals.reach(old.low);
+        goals.reach(old.high);
         if let Some((_, until)) = held.excuse {
             if torque == Some(Torque::On) && now >= until {
                 held.excuse = None;
-                held.goals = [Span::at(goal); 2];
-                held.span = Span::at(goal);
+                held.span = goals;
                 held.span.reach(angle);
             }
             return Ok(());
         }
-        let [mut goals, old] = held.goals;
-        goals.reach(old.low);
-        goals.reach(old.high);
         held.span.shrink(goals, angle, by);
         let Held { span, .. } = *held;
         ensure(span.excess(angle) <= TOLERANCE, || {
