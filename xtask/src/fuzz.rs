@@ -1,4 +1,4 @@
-//! `cargo xtask fuzz`: inputs that a fuzzer makes up, for so long each target, with the stable compiler.
+//! `cargo xtask fuzz`: inputs that a fuzzer makes up, so long or so many for each target, with the stable compiler.
 //!
 //! ```text
 //!   fuzz_targets ── cargo build, with the compiler's coverage counters ──> target/fuzz/build
@@ -40,29 +40,53 @@ pub(crate) struct Options {
     /// Where the fuzzer's chance begins; another one in each run if this is left out
     #[arg(long)]
     pub(crate) seed: Option<u32>,
+    /// What `cargo xtask test` does: so many inputs, the same every time
+    #[arg(long, conflicts_with_all = ["seconds", "seed"])]
+    pub(crate) fixed: bool,
 }
 
 /// Fuzzes every target, and prints the table.
 pub(crate) fn check(options: &Options) -> Outcome {
+    if options.fixed {
+        return fixed();
+    }
     let seed = options.seed.unwrap_or_else(another_seed);
     let mut trials = Trials::default();
     all(options.seconds, seed, &mut trials)?;
     trials.finish(u64::from(seed))
 }
 
-/// Likewise, and adds the results to `trials`. As many targets at once as there are processors.
+/// The fixed form: the same inputs every time, as long as the code is the same.
+pub(crate) fn fixed() -> Outcome {
+    println!("fuzzing: so many inputs for each target, seed {FIXED_SEED}");
+    let mut trials = Trials::default();
+    each(FIXED_SEED, None, &mut trials)?;
+    trials.finish(u64::from(FIXED_SEED))
+}
+
+/// Fuzzes every target for so long, and adds the results to `trials`.
 pub(crate) fn all(seconds: u64, seed: u32, trials: &mut Trials) -> Outcome {
-    let programs = build()?;
     println!("fuzzing: {seconds} s for each target, seed {seed}");
+    each(seed, Some(seconds), trials)
+}
+
+/// As many targets at once as there are processors. In the fixed form without `seconds`.
+fn each(seed: u32, seconds: Option<u64>, trials: &mut Trials) -> Outcome {
+    let programs = build()?;
     let at_once = available_parallelism().map_or(1, usize::from);
     for targets in TARGETS.chunks(at_once) {
         let outputs: Vec<_> = thread::scope(|scope| {
             let programs = &programs;
-            let start = |&target| scope.spawn(move || one(programs, target, seconds, seed));
+            let start = |&(target, inputs)| {
+                scope.spawn(move || match seconds {
+                    Some(seconds) => one(programs, target, seed, &format!("-max_total_time={seconds}")),
+                    None => one_anew(programs, target, seed, &format!("-runs={inputs}")),
+                })
+            };
             let running: Vec<_> = targets.iter().map(start).collect();
             running.into_iter().map(ScopedJoinHandle::join).collect()
         });
-        for (target, output) in targets.iter().zip(outputs) {
+        for ((target, _), output) in targets.iter().zip(outputs) {
             report(target, &output.map_err(|_| "a thread panicked")??, trials);
         }
     }
@@ -89,17 +113,30 @@ fn host() -> Outcome<String> {
     Ok(host.ok_or("`rustc -vV` names no host")?.to_owned())
 }
 
-fn one(programs: &Path, target: &str, seconds: u64, seed: u32) -> io::Result<Output> {
-    let found = target_directory().join("fuzz").join(target);
-    let failures = failures();
-    for folder in [&found, &failures] {
-        fs::create_dir_all(folder)?;
+/// Goes on from the inputs of the last run.
+fn one(programs: &Path, target: &str, seed: u32, amount: &str) -> io::Result<Output> {
+    fuzz(programs, target, seed, amount, &target_directory().join("fuzz").join(target))
+}
+
+/// Begins with the corpus alone.
+fn one_anew(programs: &Path, target: &str, seed: u32, amount: &str) -> io::Result<Output> {
+    let found = target_directory().join("fuzz/fixed").join(target);
+    if found.exists() {
+        fs::remove_dir_all(&found)?;
     }
+    fuzz(programs, target, seed, amount, &found)
+}
+
+fn fuzz(programs: &Path, target: &str, seed: u32, amount: &str, found: &Path) -> io::Result<Output> {
+    let failures = failures();
+    fs::create_dir_all(found)?;
+    fs::create_dir_all(&failures)?;
     let mut command = Command::new(programs.join(target));
     command.current_dir(root()).arg(found).arg(format!("verification/fuzz/corpus/{target}"));
     command.arg(format!("-artifact_prefix={}/{target}-", failures.display()));
-    command.args([format!("-seed={seed}"), format!("-max_len={LONGEST}")]);
-    command.args([format!("-max_total_time={seconds}"), "-print_final_stats=1".to_owned()]);
+    command.args([format!("-seed={seed}"), format!("-max_len={LONGEST}"), amount.to_owned()]);
+    // Inputs that another program adds meanwhile would make two runs differ.
+    command.args(["-reload=0", "-print_final_stats=1"]);
     command.output()
 }
 
@@ -144,7 +181,7 @@ mod tests {
 
     #[test]
     fn every_target_has_its_program_and_its_corpus() {
-        for target in TARGETS {
+        for (target, _) in TARGETS {
             assert!(root().join(format!("verification/fuzz/fuzz_targets/{target}.rs")).exists(), "{target}");
             assert!(root().join(format!("verification/fuzz/corpus/{target}")).is_dir(), "{target}");
         }

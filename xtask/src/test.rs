@@ -33,9 +33,7 @@ impl Options {
     }
 }
 
-/// Seconds of fuzzing for each target. The corpora are tried whole, with the tests.
-const FUZZ_SECONDS: u64 = 20;
-/// Likewise, in the long form.
+/// Seconds of fuzzing for each target, from another seed in each run.
 const LONG_FUZZ_SECONDS: u64 = 300;
 
 /// What is done, in this order, until one fails. Tests come last: theirs is the last word.
@@ -68,9 +66,7 @@ const STEPS: &[Step] = &[
         worlds::test(&worlds::ADAPTER)
     }),
     whole("virtual days in which everything goes wrong", torture::short),
-    whole("inputs that a fuzzer makes up", || {
-        fuzz::check(&fuzz::Options { seconds: FUZZ_SECONDS, seed: None })
-    }),
+    whole("inputs that a fuzzer makes up", fuzz::fixed),
     long("more virtual days in which everything goes wrong", torture::long),
     long("the settings' tests in their long form", || {
         let mut trials = trials::Trials::default();
@@ -78,7 +74,7 @@ const STEPS: &[Step] = &[
         trials.finish(1)
     }),
     long("more inputs that a fuzzer makes up", || {
-        fuzz::check(&fuzz::Options { seconds: LONG_FUZZ_SECONDS, seed: None })
+        fuzz::check(&fuzz::Options { seconds: LONG_FUZZ_SECONDS, seed: None, fixed: false })
     }),
     quick("tests, and the system tests on the simulator", || {
         // More threads than processors: most system tests wait for an arm that moves.
