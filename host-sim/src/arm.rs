@@ -10,11 +10,11 @@ use rustix::event::epoll::EventFlags;
 use tracing::{Span, error, info};
 
 use crate::clients::Clients;
-use crate::pace;
-use crate::plant::Plant;
 use crate::pty::Pty;
-use crate::servo_bus::ServoBus;
-use crate::world::World;
+use arm_sim::pace;
+use arm_sim::plant::Plant;
+use arm_sim::servo_bus::ServoBus;
+use arm_sim::world::World;
 
 /// A world, a port, and whether the port is full.
 #[derive(Debug)]

@@ -7,9 +7,9 @@ use motion_core::servo_bus::TorqueCodes;
 use protocol_core::registers::JOINTS;
 use tracing::level_filters::LevelFilter;
 
-use crate::adapter::Latency;
 use crate::eeprom::Eeprom;
-use crate::faults::FaultAt;
+use arm_sim::adapter::Latency;
+use arm_sim::faults::FaultAt;
 
 /// The chip id of a simulated arm that was given none: "SIM", and 1.
 const DEFAULT_CHIP_ID: &str = "53494d000001";

@@ -7,12 +7,13 @@ use std::io::{self, Write};
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
+use arm_sim::flash::{ERASED, Flash, SIZE};
+use arm_sim::store::is_damaged;
 use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
 
-use crate::flash::{ERASED, Flash, SIZE};
+use crate::image_file::ImageFile;
 use crate::numbered;
-use crate::store::is_damaged;
 
 /// Where the settings live.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -106,7 +107,7 @@ impl Eeprom {
             TryLockError::Error(cause) => refused("lock", cause),
         })?;
         check_size(&file, &path)?;
-        let flash = Flash::in_file(file);
+        let flash = Flash::on(ImageFile(file));
         let copy = flash.copy().map_err(|cause| refused("read", cause))?;
         if is_damaged(copy) { Err(ImageError::Damaged(path)) } else { Ok(flash) }
     }

@@ -20,29 +20,22 @@
 
 #![deny(unsafe_code)]
 
-pub mod adapter;
 pub mod arm;
+pub mod bus_line;
 pub mod bus_statistics;
 pub mod cli;
 pub mod clients;
 pub mod clock;
 pub mod eeprom;
-pub mod faults;
-pub mod flash;
 mod holders;
+pub mod image_file;
 pub mod link;
 pub mod numbered;
-pub mod pace;
-pub mod plant;
 pub mod pty;
 pub mod real_servos;
 pub mod serial;
-pub mod servo;
-pub mod servo_bus;
 pub mod servo_socket;
 pub mod servos_only;
 pub mod shell;
 pub mod signals;
-pub mod store;
 pub mod trace;
-pub mod world;

@@ -23,11 +23,11 @@ use rustix::io::Errno;
 use tracing::{info, warn};
 
 use crate::arm::Arm;
+use crate::bus_line::BusLine;
 use crate::bus_statistics::{BusStatistics, Figures};
 use crate::clients::Clients;
 use crate::clock::{Clock, sleep_until};
 use crate::serial::Serial;
-use crate::servo_bus::BusLine;
 use crate::signals::{Signals, Wish};
 
 /// Bytes taken from the servo bus at a time.

@@ -19,8 +19,8 @@ use rustix::process::umask;
 use tracing::{debug, info};
 
 use crate::clock::{Clock, sleep_until};
-use crate::plant::Plant;
 use crate::signals::{Signals, Wish};
+use arm_sim::plant::Plant;
 
 /// Why there is no socket. Each message says what to do.
 #[derive(Debug, thiserror::Error)]

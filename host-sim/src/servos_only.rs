@@ -17,13 +17,13 @@ use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 use tracing::{debug, info};
 
-use crate::adapter::{Adapter, Latency};
 use crate::clients::Clients;
 use crate::clock::{Clock, sleep_until};
 use crate::link::{Link, LinkError};
-use crate::plant::Plant;
 use crate::pty::Pty;
 use crate::signals::{Signals, Wish};
+use arm_sim::adapter::{Adapter, Latency};
+use arm_sim::plant::Plant;
 
 /// Bytes taken from the client at a time.
 const PIECE: usize = 4_096;

@@ -192,10 +192,10 @@ mod tests {
     use tracing::Span;
 
     use super::*;
-    use crate::flash::Flash;
-    use crate::plant::Plant;
     use crate::pty::Pty;
-    use crate::world::{Setup, World};
+    use arm_sim::flash::Flash;
+    use arm_sim::plant::Plant;
+    use arm_sim::world::{Setup, World};
 
     fn arm(pty: Pty) -> Arm<Flash> {
         let setup = Setup { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };

@@ -12,6 +12,7 @@
 
 use std::fmt::Write as _;
 
+use arm_sim::world::Tap;
 use protocol_core::registers::Register;
 use protocol_core::registers::map::find;
 use protocol_core::time::{Duration, Instant};
@@ -40,21 +41,20 @@ impl Trace {
         let gap = Duration::ZERO;
         Self { from_host: Listener::new("->", gap), to_host: Listener::new("<-", gap), sink }
     }
+}
 
-    /// The link starts, or starts over: unfinished frames are forgotten. `gap` is the silence the arm itself
-    /// goes by (D4).
-    pub fn restart(&mut self, gap: Duration) {
+impl Tap for Trace {
+    /// Unfinished frames are forgotten.
+    fn restart(&mut self, gap: Duration) {
         self.from_host = Listener::new("->", gap);
         self.to_host = Listener::new("<-", gap);
     }
 
-    /// Bytes the arm took from the host; none: the host's line is silent as of `now`.
-    pub fn from_host(&mut self, now: Instant, bytes: &[u8]) {
+    fn received(&mut self, now: Instant, bytes: &[u8]) {
         self.from_host.hear(now, bytes, &mut self.sink);
     }
 
-    /// Bytes the arm sent to the host.
-    pub fn to_host(&mut self, now: Instant, bytes: &[u8]) {
+    fn sent(&mut self, now: Instant, bytes: &[u8]) {
         self.to_host.hear(now, bytes, &mut self.sink);
     }
 }
@@ -244,14 +244,14 @@ mod tests {
 
     impl Session {
         fn host(&mut self, bytes: &[u8]) -> Vec<String> {
-            self.trace.from_host(self.now, bytes);
+            self.trace.received(self.now, bytes);
             self.lines.take()
         }
 
         fn silence(&mut self) -> Vec<String> {
             for _ in 0..3 {
                 self.now = self.now + ABANDON_AFTER;
-                self.trace.from_host(self.now, &[]);
+                self.trace.received(self.now, &[]);
             }
             self.lines.take()
         }
@@ -259,7 +259,7 @@ mod tests {
         fn arm(&mut self, address: u8, values: &[u8]) -> Vec<String> {
             let mut bytes = FrameBuffer::new();
             Reply { address, values }.encode(&mut bytes);
-            self.trace.to_host(self.now, &bytes);
+            self.trace.sent(self.now, &bytes);
             self.lines.take()
         }
     }

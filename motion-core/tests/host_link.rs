@@ -4,7 +4,7 @@
 
 mod rig;
 
-use host_sim::servo::Fault;
+use arm_sim::servo::Fault;
 use motion_core::{Controller, Storage};
 use protocol_core::registers::map::fault;
 use protocol_core::registers::{Image, Joint};
@@ -171,7 +171,7 @@ fn d14_a_report_without_room_is_skipped_and_answers_go_first() {
 fn d14_the_baud_rate_bounds_feedback() {
     let mut image = Image([0; Image::LENGTH]);
     image.0[4] = 7; // 9600 baud
-    let mut rig = Rig::with(host_sim::plant::Plant::new(Instant::ZERO), Some(&image), Storage::Ready);
+    let mut rig = Rig::with(arm_sim::plant::Plant::new(Instant::ZERO), Some(&image), Storage::Ready);
     assert_eq!(rig.controller.baud(), 9_600);
     rig.write(53, &[50]);
     rig.run_ms(10_000);
@@ -235,7 +235,7 @@ fn d19_a_full_storage_refuses_changes_and_nothing_else() {
 
 #[test]
 fn d19_a_broken_storage_leaves_settings_in_ram() {
-    let mut rig = Rig::with(host_sim::plant::Plant::new(Instant::ZERO), None, Storage::Broken);
+    let mut rig = Rig::with(arm_sim::plant::Plant::new(Instant::ZERO), None, Storage::Broken);
     rig.storage = Storage::Broken;
     assert_eq!(rig.get(241) & 1, 1);
     rig.write(28, &[0]);

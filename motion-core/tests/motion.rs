@@ -4,7 +4,7 @@
 
 mod rig;
 
-use host_sim::servo::Fault;
+use arm_sim::servo::Fault;
 use motion_core::Vacuum;
 use protocol_core::registers::Joint;
 use protocol_core::time::Duration;

@@ -10,7 +10,7 @@ use crate::run::{Outcome, run};
 /// for the most part arms that nothing leads to: docs/reliability.md lists them.
 const RUN: &str = "llvm-cov --package protocol-core --package motion-core --summary-only \
                    --fail-under-lines 100 --fail-under-functions 100 --fail-under-regions 99 \
-                   --ignore-filename-regex (host-sim|flash-model|tests)/ \
+                   --ignore-filename-regex (arm-sim|flash-model|tests)/ \
                    -- --skip any_one_wrong_bit --skip a_cut_at_every_step --skip a_second_cut --skip cuts_at_random";
 
 /// Runs the tests, prints a table by file, and fails if something is not covered.

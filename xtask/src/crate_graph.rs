@@ -16,7 +16,7 @@ type Group = (&'static str, &'static [&'static str]);
 
 /// Every crate belongs to one group.
 const GROUPS: [Group; 3] = [
-    ("product", &["protocol-core", "motion-core", "firmware-stm32", "host-sim", "sevenbot"]),
+    ("product", &["protocol-core", "motion-core", "arm-sim", "firmware-stm32", "host-sim", "sevenbot"]),
     ("proof", &["flash-model", "system-tests", "torture", "xtask"]),
     ("measurement", &["bench", "footprint", "peers"]),
 ];
@@ -68,7 +68,7 @@ mod tests {
             assert!(picture.contains(&format!("        {}[", package.name)), "{}", package.name);
         }
         assert!(picture.contains("    motion-core --> protocol-core\n"));
-        assert!(!picture.contains("motion-core --> host-sim"), "only its tests use it");
+        assert!(!picture.contains("motion-core --> arm-sim"), "only its tests use it");
     }
 
     #[test]

@@ -10,6 +10,8 @@ pub(crate) type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
 /// The target of the chip.
 pub(crate) const CHIP: &str = "thumbv7em-none-eabihf";
+/// The target of a browser.
+const BROWSER: &str = "wasm32-unknown-unknown";
 
 /// Every package that builds for the host as a whole. All commands that build for the host choose the same packages: another
 /// choice may mean other features, and then a second build of much of it.
@@ -102,6 +104,12 @@ pub(crate) fn link() -> Outcome<&'static [Linked]> {
 pub(crate) fn build_image() -> Outcome {
     run("rustup", &format!("--quiet target add {CHIP}"), &[])?;
     cargo("fw --quiet")
+}
+
+/// Builds the simulated arm for a browser, where there is no operating system.
+pub(crate) fn build_for_browser() -> Outcome {
+    run("rustup", &format!("--quiet target add {BROWSER}"), &[])?;
+    cargo(&format!("build --package arm-sim --target {BROWSER}"))
 }
 
 /// Builds the programs of `footprint` with a profile.

@@ -14,9 +14,9 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::thread::sleep;
 use std::time::Duration as RealTime;
 
+use arm_sim::plant::Plant;
+use arm_sim::servo::Fault;
 use host_sim::clock::Clock;
-use host_sim::plant::Plant;
-use host_sim::servo::Fault;
 use host_sim::servo_socket::exchange;
 use object::read::elf::ElfFile32;
 use object::{Object, ObjectSymbol};

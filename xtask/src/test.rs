@@ -5,7 +5,7 @@
 
 use clap::Args;
 
-use crate::run::{CHIP, HOST, Outcome, cargo, run};
+use crate::run::{CHIP, HOST, Outcome, build_for_browser, cargo, run};
 use crate::steps::{Extent, Step, long, quick, whole};
 use crate::{
     count, crate_graph, decisions, deny, drawings, footprint, fuzz, install, modules, no_panic, registers_md,
@@ -60,6 +60,7 @@ const STEPS: &[Step] = &[
     whole("flash, RAM and stack are within their budgets", || footprint::check(false)),
     whole("the image starts as a chip needs it", start_up::check),
     whole("instructions are within their budgets", || count::check(false)),
+    quick("the simulated arm builds for a browser, without an operating system", build_for_browser),
     quick("programs under test", || cargo(&format!("build {HOST}"))),
     whole("system tests, the image for the arm in an emulator", || worlds::test(&worlds::EMULATOR)),
     whole("system tests, the controller on this computer with servos behind a USB adapter", || {

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // Each test file uses its part.
 
-use host_sim::plant::Plant;
+use arm_sim::plant::Plant;
 use motion_core::servo_bus::frame::{Decoder, Instruction, register};
 use motion_core::{Config, Controller, Output, Storage, TorqueCodes, Vacuum};
 use protocol_core::registers::{Image, Joint};

@@ -6,10 +6,10 @@
 
 use std::fmt::{self, Display};
 
-use host_sim::flash::Flash;
-use host_sim::plant::Plant;
-use host_sim::servo::Fault;
-use host_sim::world::{Setup, World};
+use arm_sim::flash::Flash;
+use arm_sim::plant::Plant;
+use arm_sim::servo::Fault;
+use arm_sim::world::{Setup, World};
 use motion_core::TorqueCodes;
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{FrameBuffer as ServoFrame, register, sync_write};

@@ -6,9 +6,9 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use arbitrary::Arbitrary;
+use arm_sim::flash::{ERASED, SECTOR_SIZE, SIZE};
+use arm_sim::store::Store;
 use host_sim::eeprom::{Eeprom, ImageError};
-use host_sim::flash::{ERASED, SECTOR_SIZE, SIZE};
-use host_sim::store::Store;
 use motion_core::Storage;
 use protocol_core::registers::{Access, Image, MAP, Region, RegisterFile};
 use tempfile::NamedTempFile;
@@ -61,7 +61,7 @@ pub fn run(input: &Input<'_>) {
     }
 }
 
-type FileStore = Store<host_sim::flash::Flash>;
+type FileStore = Store<arm_sim::flash::Flash>;
 
 fn start(path: &Path) -> Result<(FileStore, Option<Image>), ImageError> {
     Ok(Store::open(Eeprom::File(path.to_owned()).open(None)?))

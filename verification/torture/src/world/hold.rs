@@ -10,7 +10,7 @@
 //! long as it moves towards its goal only. Behind the joint the span shrinks more slowly than a servo moves, so a
 //! joint that lags behind is inside, and a joint that falls is not.
 
-use host_sim::plant::Plant;
+use arm_sim::plant::Plant;
 use motion_core::calibration::{MicroDegrees, angle_from_counts};
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{Decoder, Instruction, register};

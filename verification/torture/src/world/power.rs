@@ -1,7 +1,7 @@
 //! Power-up, power-down, and what one arm's world has that another's has not.
 
+use arm_sim::plant;
 use flash_model::{Cut, EraseTear, ProgramTear};
-use host_sim::plant;
 use motion_core::{Config, Controller, TorqueCodes};
 use protocol_core::registers::map::baud_rate;
 use protocol_core::time::{Duration, Instant};

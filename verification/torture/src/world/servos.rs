@@ -7,8 +7,8 @@
 
 use std::collections::VecDeque;
 
-use host_sim::plant::{self, Plant};
-use host_sim::servo::Fault;
+use arm_sim::plant::{self, Plant};
+use arm_sim::servo::Fault;
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{Decoder, Reading};
 use protocol_core::registers::Joint;

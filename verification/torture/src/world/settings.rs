@@ -3,9 +3,9 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use arm_sim::store::Store;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use flash_model::{Cut, Error, Flash, Operation};
-use host_sim::store::Store;
 use motion_core::Storage;
 use protocol_core::registers::Image;
 

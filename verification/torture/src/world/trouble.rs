@@ -1,6 +1,6 @@
 //! What goes wrong next.
 
-use host_sim::servo::Fault;
+use arm_sim::servo::Fault;
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{FrameBuffer, register, sync_write};
 use protocol_core::registers::Joint;

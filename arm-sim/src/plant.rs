@@ -24,7 +24,7 @@ use protocol_core::registers::map::TARGET_POSITION;
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::{Duration, Instant};
 
-use crate::servo::motor::STEP;
+use crate::servo::units::STEP;
 use crate::servo::{Fault, Make, Servo};
 use wire::Wire;
 

@@ -1,18 +1,15 @@
-//! The chip's two journal sectors as a simulated NOR flash: in memory, or in an image file.
+//! The chip's two journal sectors as a simulated NOR flash.
 //!
-//! It behaves like the real one where that matters to the journal: programming only clears bits, erasing
-//! sets a whole sector, nothing is undone by a restart. Every operation reaches the file before it returns
-//! and in the order it was asked for, so a `kill -9` leaves what a power cut would. It knows nothing of
-//! what is stored.
+//! It behaves like the real one where that matters to the journal: programming only clears bits, erasing sets a whole
+//! sector, and a restart changes nothing. The bytes are in memory, or wherever other [`Cells`] keep them. This file
+//! knows nothing about the stored data.
 
 use std::cell::RefCell;
-use std::fs::File;
+use std::fmt::Debug;
 use std::io;
-use std::os::unix::fs::FileExt;
 use std::rc::Rc;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
-use tracing::warn;
 
 /// Bytes of one sector (STM32F405, sectors 0 to 3).
 pub const SECTOR_SIZE: usize = 16 * 1024;
@@ -30,9 +27,9 @@ pub enum FlashError {
     /// The range does not fall on words, or on sectors for an erase.
     #[error("not aligned to a word or sector")]
     NotAligned,
-    /// The image file failed.
+    /// The cells failed.
     #[error(transparent)]
-    File(#[from] io::Error),
+    Cells(#[from] io::Error),
 }
 
 impl NorFlashError for FlashError {
@@ -40,83 +37,76 @@ impl NorFlashError for FlashError {
         match self {
             Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
             Self::NotAligned => NorFlashErrorKind::NotAligned,
-            Self::File(_) => NorFlashErrorKind::Other,
+            Self::Cells(_) => NorFlashErrorKind::Other,
         }
+    }
+}
+
+/// What keeps the [`SIZE`] bytes of the sectors.
+pub trait Cells: Debug {
+    /// Reads the bytes from `offset` on. The range is inside the sectors.
+    ///
+    /// # Errors
+    /// The cells failed.
+    fn read(&self, offset: usize, bytes: &mut [u8]) -> io::Result<()>;
+
+    /// Replaces the bytes from `offset` on. The range is inside the sectors.
+    ///
+    /// # Errors
+    /// The cells failed.
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> io::Result<()>;
+}
+
+impl Cells for Vec<u8> {
+    fn read(&self, offset: usize, bytes: &mut [u8]) -> io::Result<()> {
+        let end = offset + bytes.len();
+        bytes.copy_from_slice(self.get(offset..end).ok_or(io::ErrorKind::UnexpectedEof)?);
+        Ok(())
+    }
+
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> io::Result<()> {
+        let end = offset + bytes.len();
+        self.get_mut(offset..end).ok_or(io::ErrorKind::UnexpectedEof)?.copy_from_slice(bytes);
+        Ok(())
     }
 }
 
 /// The two sectors. Clones are handles to the same cells: the flash outlives the firmware that runs from
 /// one power-up to the next.
 #[derive(Clone, Debug)]
-pub struct Flash(Rc<RefCell<Cells>>);
-
-#[derive(Debug)]
-enum Cells {
-    Memory(Vec<u8>),
-    File(File),
-}
+pub struct Flash(Rc<RefCell<dyn Cells>>);
 
 impl Flash {
     /// Blank sectors that are forgotten with the process.
     #[must_use]
     pub fn in_memory() -> Self {
-        Self::from_bytes(vec![ERASED; SIZE])
+        Self::on(vec![ERASED; SIZE])
     }
 
-    /// Sectors in a file, which must be [`SIZE`] bytes long.
+    /// Sectors whose bytes these cells keep.
     #[must_use]
-    pub fn in_file(file: File) -> Self {
-        Self(Rc::new(RefCell::new(Cells::File(file))))
+    pub fn on(cells: impl Cells + 'static) -> Self {
+        Self(Rc::new(RefCell::new(cells)))
     }
 
     /// What the sectors hold now, in memory: to try something that must not touch the original.
     ///
     /// # Errors
-    /// The image file could not be read.
+    /// The cells could not be read.
     pub fn copy(&self) -> io::Result<Self> {
         let mut bytes = vec![0; SIZE];
         self.0.borrow().read(0, &mut bytes)?;
-        Ok(Self::from_bytes(bytes))
+        Ok(Self::on(bytes))
     }
 
     /// Is every byte erased?
     ///
     /// # Errors
-    /// The image file could not be read.
+    /// The cells could not be read.
     pub fn is_blank(&self) -> io::Result<bool> {
         let mut bytes = vec![0; SIZE];
         self.0.borrow().read(0, &mut bytes)?;
         Ok(bytes.iter().all(|&byte| byte == ERASED))
-    }
-
-    fn from_bytes(bytes: Vec<u8>) -> Self {
-        Self(Rc::new(RefCell::new(Cells::Memory(bytes))))
-    }
-}
-
-impl Cells {
-    fn read(&self, offset: usize, bytes: &mut [u8]) -> io::Result<()> {
-        match self {
-            Self::File(file) => file.read_exact_at(bytes, offset as u64),
-            Self::Memory(cells) => {
-                let source = cells.get(offset..offset + bytes.len()).ok_or(io::ErrorKind::UnexpectedEof)?;
-                bytes.copy_from_slice(source);
-                Ok(())
-            }
-        }
-    }
-
-    fn write(&mut self, offset: usize, bytes: &[u8]) -> io::Result<()> {
-        match self {
-            Self::File(file) => file
-                .write_all_at(bytes, offset as u64)
-                .inspect_err(|error| warn!("cannot write to the settings image: {error}")),
-            Self::Memory(cells) => {
-                let end = offset + bytes.len();
-                cells.get_mut(offset..end).ok_or(io::ErrorKind::UnexpectedEof)?.copy_from_slice(bytes);
-                Ok(())
-            }
-        }
     }
 }
 
@@ -174,24 +164,17 @@ impl NorFlash for Flash {
 mod tests {
     use super::*;
 
-    fn in_a_file() -> Flash {
-        let mut file = tempfile::tempfile().unwrap();
-        io::Write::write_all(&mut file, &[ERASED; SIZE]).unwrap();
-        Flash::in_file(file)
-    }
-
     #[test]
     fn programming_clears_bits_and_erasing_sets_a_whole_sector() {
-        for mut flash in [Flash::in_memory(), in_a_file()] {
-            let mut cells = [0; 4];
-            flash.write(8, &[0xF0; 4]).unwrap();
-            flash.write(8, &[0x3C; 4]).unwrap();
-            flash.read(8, &mut cells).unwrap();
-            assert_eq!(cells, [0x30; 4]);
-            assert!(!flash.is_blank().unwrap());
-            flash.erase(0, 16 * 1024).unwrap();
-            assert!(flash.is_blank().unwrap());
-        }
+        let mut flash = Flash::in_memory();
+        let mut cells = [0; 4];
+        flash.write(8, &[0xF0; 4]).unwrap();
+        flash.write(8, &[0x3C; 4]).unwrap();
+        flash.read(8, &mut cells).unwrap();
+        assert_eq!(cells, [0x30; 4]);
+        assert!(!flash.is_blank().unwrap());
+        flash.erase(0, 16 * 1024).unwrap();
+        assert!(flash.is_blank().unwrap());
     }
 
     #[test]

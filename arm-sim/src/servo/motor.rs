@@ -16,19 +16,12 @@ use motion_core::calibration::angle_from_counts;
 use motion_core::servo_bus::Reading;
 use motion_core::servo_bus::servo::Goal;
 use protocol_core::registers::Joint;
-use protocol_core::time::Duration;
 
 use super::gear::{Drag, Gear};
+use super::units::{COUNT, COUNT_PER_SECOND};
 
-/// How far a call of [`Motor::step`] goes.
-pub(crate) const STEP: Duration = Duration::from_millis(1);
-
-/// Positions are kept in millionths of a count, so that a count per second is whole in every step.
-pub(crate) const COUNT: i64 = 1_000_000;
 /// The other mechanical end of the servo; the first is 0.
 const END: i64 = Reading::MAX_POSITION as i64 * COUNT;
-/// One count per second, per step.
-pub(crate) const COUNT_PER_SECOND: i64 = COUNT / 1_000;
 /// 62 revolutions a minute, in micro-degrees per second.
 const MAX_SPEED: i64 = 372_000_000;
 /// The position makes up for a part of what it lags behind in each step: a time constant of 20 ms.
@@ -110,7 +103,7 @@ impl Motor {
         self.target = self.position;
     }
 
-    /// Lets [`STEP`] pass.
+    /// Lets a [`STEP`](super::units::STEP) pass.
     pub(crate) fn step(&mut self, hold: Hold) {
         self.hold = hold;
         if let Hold::Outside | Hold::Released(_) = hold {

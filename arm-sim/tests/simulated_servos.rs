@@ -1,7 +1,7 @@
 //! The simulated servos as their master meets them: bytes on a wire and a time that is handed in.
 
-use host_sim::plant::{Plant, Settings};
-use host_sim::servo::Fault;
+use arm_sim::plant::{Plant, Settings};
+use arm_sim::servo::Fault;
 use motion_core::servo_bus::frame::{
     Decoder, FrameBuffer, Reading, error, ping, read, register, sync_write, write,
 };

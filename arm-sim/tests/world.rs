@@ -2,12 +2,12 @@
 
 #![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
 
-use std::fs::OpenOptions;
+use std::io;
 
-use host_sim::flash::{Flash, SIZE};
-use host_sim::pace;
-use host_sim::plant::Plant;
-use host_sim::world::{Setup, World};
+use arm_sim::flash::{Cells, ERASED, Flash};
+use arm_sim::pace;
+use arm_sim::plant::Plant;
+use arm_sim::world::{Setup, World};
 use motion_core::servo_bus::TorqueCodes;
 use protocol_core::registers::map::{
     BAUD_RATE, DEVICE_ID, EEPROM_LOCK, FAULTS, FEEDBACK_FREQUENCY, MOVING_JOINTS, PRESENT_POSITION, SPEED,
@@ -212,12 +212,24 @@ fn a_halted_controller_is_silent_until_it_is_restarted() {
     assert_eq!(hear(&mut world).len(), ANSWER_LENGTH);
 }
 
+/// Erased cells that cannot be written.
+#[derive(Debug)]
+struct ReadOnly;
+
+impl Cells for ReadOnly {
+    fn read(&self, _: usize, bytes: &mut [u8]) -> io::Result<()> {
+        bytes.fill(ERASED);
+        Ok(())
+    }
+
+    fn write(&mut self, _: usize, _: &[u8]) -> io::Result<()> {
+        Err(io::ErrorKind::PermissionDenied.into())
+    }
+}
+
 #[test]
-fn a_failing_image_file_is_a_fault_and_the_arm_goes_on() {
-    let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), [0xFF; SIZE]).unwrap();
-    let read_only = OpenOptions::new().read(true).open(file.path()).unwrap();
-    let mut world = world(false, Flash::in_file(read_only));
+fn a_flash_that_fails_is_a_fault_and_the_arm_goes_on() {
+    let mut world = world(false, Flash::on(ReadOnly));
     for (address, value) in [(EEPROM_LOCK.address, 0), (DEVICE_ID.address, 42)] {
         world.host_sends(at_millis(1_000), &write(address, value));
         world.advance(at_millis(1_000), true);

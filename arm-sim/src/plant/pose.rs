@@ -3,7 +3,7 @@
 use motion_core::calibration::angle_from_counts;
 use protocol_core::registers::Joint;
 
-use crate::servo::motor::COUNT;
+use crate::servo::units::COUNT;
 
 /// So many counts of either kind of servo are a whole number of thousandths of a degree.
 const SPAN: u16 = 850;

@@ -5,7 +5,8 @@
 
 mod fault;
 mod gear;
-pub(crate) mod motor;
+mod motor;
+pub(crate) mod units;
 mod warmth;
 
 use motion_core::servo_bus::frame::{BROADCAST, Frame, FrameBuffer, Instruction, error, register};

@@ -13,7 +13,7 @@
 
 use protocol_core::registers::Joint;
 
-use super::motor::{COUNT_PER_SECOND, STEP};
+use super::units::{COUNT_PER_SECOND, STEP};
 
 /// What a servo is made of.
 #[derive(Clone, Copy, Debug)]

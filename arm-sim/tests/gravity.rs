@@ -2,10 +2,10 @@
 
 #![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
 
-use host_sim::flash::Flash;
-use host_sim::plant::{Plant, Settings};
-use host_sim::servo::Fault;
-use host_sim::world::{Setup, World};
+use arm_sim::flash::Flash;
+use arm_sim::plant::{Plant, Settings};
+use arm_sim::servo::Fault;
+use arm_sim::world::{Setup, World};
 use motion_core::TorqueCodes;
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{Decoder, FrameBuffer, Reading, read, register, sync_write};

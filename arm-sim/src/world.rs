@@ -26,7 +26,6 @@ use crate::pace::Pacer;
 use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
 use crate::store::Store;
-use crate::trace::Trace;
 
 /// How long the controller waits for a servo's answer.
 const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
@@ -49,6 +48,16 @@ pub struct Setup {
     pub torque_codes: TorqueCodes,
 }
 
+/// Sees the bytes on the host link, and changes nothing.
+pub trait Tap: std::fmt::Debug {
+    /// The link starts, or starts again. `gap` is the idle time by which the arm separates frames (D4).
+    fn restart(&mut self, gap: Duration);
+    /// The arm took these bytes from the host. No bytes: the host's line is idle at `now`.
+    fn received(&mut self, now: Instant, bytes: &[u8]);
+    /// The arm sent these bytes to the host.
+    fn sent(&mut self, now: Instant, bytes: &[u8]);
+}
+
 /// An arm with a host link.
 #[derive(Debug)]
 pub struct World<F, B = Plant> {
@@ -59,7 +68,7 @@ pub struct World<F, B = Plant> {
     bus: B,
     to_arm: Pacer,
     to_host: Pacer,
-    trace: Option<Trace>,
+    tap: Option<Box<dyn Tap>>,
     now: Instant,
     /// When the controller wants to be asked again.
     controller_due: Instant,
@@ -93,7 +102,7 @@ impl<F: NorFlash + Clone, B: ServoBus> World<F, B> {
             bus,
             to_arm,
             to_host,
-            trace: None,
+            tap: None,
             now,
             controller_due: now,
             is_halted: false,
@@ -142,8 +151,8 @@ impl<F: NorFlash + Clone, B: ServoBus> World<F, B> {
         info!("arm on, host link at {baud} baud");
         self.to_arm = self.line();
         self.to_host = self.line();
-        if let Some(trace) = &mut self.trace {
-            trace.restart(gap(baud));
+        if let Some(tap) = &mut self.tap {
+            tap.restart(gap(baud));
         }
     }
 
@@ -151,10 +160,10 @@ impl<F: NorFlash + Clone, B: ServoBus> World<F, B> {
         Pacer::new(self.setup.is_paced.then(|| self.controller.baud()))
     }
 
-    /// Tells `trace` what goes over the host link from now on.
-    pub fn watch(&mut self, mut trace: Trace) {
-        trace.restart(gap(self.controller.baud()));
-        self.trace = Some(trace);
+    /// Shows `tap` the bytes on the host link from now on.
+    pub fn watch(&mut self, mut tap: impl Tap + 'static) {
+        tap.restart(gap(self.controller.baud()));
+        self.tap = Some(Box::new(tap));
     }
 
     /// How many bytes the host can send at this moment.
@@ -256,8 +265,8 @@ impl<F: NorFlash + Clone, B: ServoBus> World<F, B> {
     /// Hands over what has arrived from the host, as much as the controller takes. Says whether it was any.
     fn controller_takes_bytes(&mut self) -> bool {
         let taken = self.controller.host_bytes(self.now, self.to_arm.arrived());
-        if let (Some(trace), Some(bytes)) = (&mut self.trace, self.to_arm.arrived().get(..taken)) {
-            trace.from_host(self.now, bytes);
+        if let (Some(tap), Some(bytes)) = (&mut self.tap, self.to_arm.arrived().get(..taken)) {
+            tap.received(self.now, bytes);
         }
         self.to_arm.take(taken);
         taken > 0
@@ -265,8 +274,8 @@ impl<F: NorFlash + Clone, B: ServoBus> World<F, B> {
 
     fn controller_hears(&mut self, silence: &[u8; 0]) {
         self.controller.host_bytes(self.now, silence);
-        if let Some(trace) = &mut self.trace {
-            trace.from_host(self.now, silence);
+        if let Some(tap) = &mut self.tap {
+            tap.received(self.now, silence);
         }
     }
 
@@ -275,8 +284,8 @@ impl<F: NorFlash + Clone, B: ServoBus> World<F, B> {
         loop {
             match self.controller.poll(self.now, self.to_host.room()) {
                 Output::ToHost(bytes) => {
-                    if let Some(trace) = &mut self.trace {
-                        trace.to_host(self.now, bytes);
+                    if let Some(tap) = &mut self.tap {
+                        tap.sent(self.now, bytes);
                     }
                     self.to_host.push(self.now, bytes);
                 }

@@ -1,0 +1,53 @@
+//! The controller's end of a line to real servos.
+
+use arm_sim::servo_bus::ServoBus;
+use protocol_core::time::{Duration, Instant};
+
+/// Holds the bytes of both directions until the owner of the port moves them.
+#[derive(Clone, Debug)]
+pub struct BusLine {
+    answer_delay: Duration,
+    to_servos: Vec<u8>,
+    from_servos: Vec<u8>,
+}
+
+impl BusLine {
+    /// A line on which answers arrive at most so much later than on the wire.
+    #[must_use]
+    pub const fn new(answer_delay: Duration) -> Self {
+        Self { answer_delay, to_servos: Vec::new(), from_servos: Vec::new() }
+    }
+
+    /// Takes bytes that arrived from the servos.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.from_servos.extend_from_slice(bytes);
+    }
+
+    /// Gives the bytes that are to go to the servos.
+    pub fn take(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.to_servos)
+    }
+}
+
+impl ServoBus for BusLine {
+    const IS_REAL: bool = true;
+
+    fn answer_delay(&self) -> Duration {
+        self.answer_delay
+    }
+
+    fn bytes(&mut self, _: Instant, bytes: &[u8]) {
+        self.to_servos.extend_from_slice(bytes);
+    }
+
+    fn poll(&mut self, _: Instant) -> Vec<u8> {
+        std::mem::take(&mut self.from_servos)
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        None
+    }
+
+    /// Nobody here can switch off the supply of real servos.
+    fn power_cycle(&mut self, _: Instant) {}
+}
