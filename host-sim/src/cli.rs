@@ -82,8 +82,8 @@ pub struct Options {
     #[arg(long, value_name = "PATH")]
     pub link: Option<PathBuf>,
 
-    /// Keep the settings in FILE; 'none' forgets them [default: 7bot/eeprom.bin in the state directory,
-    /// $XDG_STATE_HOME or ~/.local/state]
+    /// Keep the settings in FILE; 'none' forgets them [default: 7bot/eeprom.bin, or 7bot/servos.bin with
+    /// --servos, in the state directory, $XDG_STATE_HOME or ~/.local/state]
     #[arg(long, value_name = "FILE", value_parser = |text: &str| Ok::<_, String>(Eeprom::from(text)))]
     pub eeprom: Option<Eeprom>,
 

@@ -20,10 +20,17 @@ use crate::numbered;
 pub enum Eeprom {
     /// In memory: forgotten at the end.
     Memory,
-    /// In the user's state directory.
-    UsersOwn,
+    /// In this file of the user's state directory.
+    UsersOwn(&'static str),
     /// In this file.
     File(PathBuf),
+}
+
+impl Eeprom {
+    /// The simulated arm's default.
+    pub const SIMULATED: Self = Self::UsersOwn("eeprom.bin");
+    /// The default of an arm of real servos: its offsets are not those of the simulated arm.
+    pub const REAL_SERVOS: Self = Self::UsersOwn("servos.bin");
 }
 
 impl From<&str> for Eeprom {
@@ -75,7 +82,7 @@ impl Eeprom {
         let path = match self {
             Self::Memory => return Ok(None),
             Self::File(path) => path.clone(),
-            Self::UsersOwn => users_own(|name| std::env::var_os(name).map(PathBuf::from))?,
+            Self::UsersOwn(file) => users_own(|name| std::env::var_os(name).map(PathBuf::from))?.join(file),
         };
         Ok(Some(numbered::path(&path, arm)))
     }
@@ -88,7 +95,7 @@ impl Eeprom {
     pub fn open(&self, arm: Option<u16>) -> Result<Flash, ImageError> {
         let Some(path) = self.path(arm)? else { return Ok(Flash::in_memory()) };
         let refused = |verb, cause| ImageError::Refused { verb, path: path.clone(), cause };
-        if *self == Self::UsersOwn
+        if matches!(self, Self::UsersOwn(_))
             && let Some(directory) = path.parent()
         {
             let made = DirBuilder::new().recursive(true).mode(0o700).create(directory);
@@ -121,7 +128,7 @@ fn open_existing(path: &Path) -> io::Result<File> {
 fn users_own(variable: impl Fn(&str) -> Option<PathBuf>) -> Result<PathBuf, ImageError> {
     let absolute = |name| variable(name).filter(|path| path.is_absolute());
     let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")));
-    Ok(state.ok_or(ImageError::NoStateDirectory)?.join("7bot/eeprom.bin"))
+    Ok(state.ok_or(ImageError::NoStateDirectory)?.join("7bot"))
 }
 
 /// Makes a blank image appear under its name whole or not at all. If another simulator made one in the
@@ -176,11 +183,11 @@ mod tests {
         let none = |_: &str| None;
         assert!(matches!(users_own(none), Err(ImageError::NoStateDirectory)));
         let home = |name: &str| (name == "HOME").then(|| "/home/ada".into());
-        assert_eq!(users_own(home).unwrap(), Path::new("/home/ada/.local/state/7bot/eeprom.bin"));
+        assert_eq!(users_own(home).unwrap(), Path::new("/home/ada/.local/state/7bot"));
         let both = |name: &str| Some(if name == "HOME" { "/home/ada" } else { "/state" }.into());
-        assert_eq!(users_own(both).unwrap(), Path::new("/state/7bot/eeprom.bin"));
+        assert_eq!(users_own(both).unwrap(), Path::new("/state/7bot"));
         let relative = |name: &str| Some(if name == "HOME" { "/home/ada" } else { "state" }.into());
-        assert_eq!(users_own(relative).unwrap(), Path::new("/home/ada/.local/state/7bot/eeprom.bin"));
+        assert_eq!(users_own(relative).unwrap(), Path::new("/home/ada/.local/state/7bot"));
     }
 
     #[test]

@@ -221,7 +221,8 @@ fn arm<B: ServoBus>(
     // An error, so that whatever is shown is shown with it.
     let span = number.map_or_else(Span::none, |number| error_span!("arm", number));
     let inside = span.enter();
-    let flash = options.eeprom.as_ref().unwrap_or(&Eeprom::UsersOwn).open(number)?;
+    let default = if options.servos.is_some() { Eeprom::REAL_SERVOS } else { Eeprom::SIMULATED };
+    let flash = options.eeprom.as_ref().unwrap_or(&default).open(number)?;
     let chip_id = numbered::chip_id(options.chip_id, number);
     let setup = Setup { chip_id, is_paced: !options.unpaced, torque_codes: options.torque_codes };
     let mut world = World::new(clock.now(), setup, flash, bus);

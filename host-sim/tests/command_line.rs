@@ -70,6 +70,11 @@ fn without_an_option_the_image_is_in_the_state_directory() {
     assert_eq!(fs::metadata(&image).unwrap().permissions().mode() & 0o777, 0o600);
     let line = complaint(&mut sim::command(state.path(), &[]));
     assert!(line.contains("--eeprom FILE") && line.contains("--eeprom none"), "{line}");
+    let bus = state.path().join("bus");
+    let bus = bus.to_str().unwrap();
+    let _servos = Sim::start(&["--servos-only", "--link", bus]);
+    let _second = Sim::start_in(state.path(), &["--servos", bus]);
+    assert!(state.path().join("7bot/servos.bin").exists(), "real servos have settings of their own");
 }
 
 #[test]
