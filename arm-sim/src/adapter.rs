@@ -10,6 +10,8 @@
 use std::str::FromStr;
 
 use protocol_core::time::{Duration, Instant};
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// An FTDI chip sends a block at once when it holds so many bytes: a packet of 64 less two bytes of status.
 const BLOCK: usize = 62;
@@ -47,7 +49,7 @@ impl FromStr for Latency {
 #[derive(Clone, Debug)]
 pub struct Adapter {
     latency: Latency,
-    random: u64,
+    random: SplitMix64,
     block: Vec<u8>,
     /// When the block is handed over, if it is not full before.
     due: Instant,
@@ -56,8 +58,8 @@ pub struct Adapter {
 impl Adapter {
     /// An adapter with an empty buffer.
     #[must_use]
-    pub const fn new(latency: Latency, seed: u64) -> Self {
-        Self { latency, random: seed, block: Vec::new(), due: Instant::ZERO }
+    pub fn new(latency: Latency, seed: u64) -> Self {
+        Self { latency, random: SplitMix64::seed_from_u64(seed), block: Vec::new(), due: Instant::ZERO }
     }
 
     /// Takes bytes that the servos have sent by `now`.
@@ -84,15 +86,7 @@ impl Adapter {
     fn delay(&mut self) -> Duration {
         let (shortest, longest) = (self.latency.shortest.as_micros(), self.latency.longest.as_micros());
         // The remainder is even enough: the bounds are far below 2^64.
-        Duration::from_micros(shortest + self.random() % (longest - shortest + 1))
-    }
-
-    /// SplitMix64.
-    fn random(&mut self) -> u64 {
-        self.random = self.random.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mixed = (self.random ^ (self.random >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
+        Duration::from_micros(shortest + self.random.next_u64() % (longest - shortest + 1))
     }
 }
 

@@ -11,17 +11,17 @@ pub struct Dice(Random);
 impl Dice {
     /// The dice of this seed.
     #[must_use]
-    pub const fn new(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         Self(Random::new(seed))
     }
 
     /// Any number.
-    pub const fn any(&mut self) -> u64 {
+    pub fn any(&mut self) -> u64 {
         self.0.next()
     }
 
     /// Any byte.
-    pub const fn byte(&mut self) -> u8 {
+    pub fn byte(&mut self) -> u8 {
         let [byte, ..] = self.0.next().to_be_bytes();
         byte
     }
@@ -37,12 +37,12 @@ impl Dice {
     }
 
     /// True so many times in a million.
-    pub const fn in_a_million(&mut self, times: u64) -> bool {
+    pub fn in_a_million(&mut self, times: u64) -> bool {
         self.0.below(1_000_000) < times
     }
 
     /// True one time in so many.
-    pub const fn one_in(&mut self, many: u64) -> bool {
+    pub fn one_in(&mut self, many: u64) -> bool {
         self.0.below(many) == 0
     }
 
