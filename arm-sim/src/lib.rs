@@ -5,7 +5,7 @@
 //!          ┌─────────────────────────────────────────────────────────────┐
 //!   bytes ─▶ Pacer ──▶ motion_core::Controller ──▶ bytes ──▶ Plant:      │
 //!   bytes ◀─ Pacer ◀──     │                   ◀── bytes ◀── 7 × Servo   │
-//!          │               └─▶ Store: protocol_core::journal on a Flash  │
+//!          │               └─▶ Settings: the journal on a Flash          │
 //!          └─────────────────────────────────────────────────────────────┘
 //! ```
 //!
@@ -21,5 +21,5 @@ pub mod pace;
 pub mod plant;
 pub mod servo;
 pub mod servo_bus;
-pub mod store;
+mod settings_log;
 pub mod world;

@@ -3,7 +3,7 @@
 //! ```text
 //!   host_sends ──▶ Pacer ──▶ ┌────────────┐ ──▶ Plant
 //!                            │ Controller │ ◀──
-//!   host_hears ◀── Pacer ◀── └────────────┘ ──▶ Store
+//!   host_hears ◀── Pacer ◀── └────────────┘ ──▶ Settings
 //! ```
 //!
 //! In the place of the plant there may be a line to real servos: see [`crate::servo_bus`].
@@ -18,6 +18,7 @@ use motion_core::vacuum::Vacuum;
 use motion_core::{Config, Controller, Output};
 use protocol_core::registers::RegisterFile;
 use protocol_core::registers::map::fault;
+use protocol_core::settings::Settings;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer::gap;
 use tracing::info;
@@ -25,7 +26,7 @@ use tracing::info;
 use crate::pace::Pacer;
 use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
-use crate::store::Store;
+use crate::settings_log;
 
 /// How long the controller waits for a servo's answer.
 const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
@@ -62,7 +63,9 @@ pub trait Tap: std::fmt::Debug {
 #[derive(Debug)]
 pub struct World<F, B = Plant> {
     setup: Setup,
-    store: Store<F>,
+    /// Clones are handles to the same cells.
+    flash: F,
+    settings: Settings<F>,
     controller: Controller,
     /// What is behind the controller.
     bus: B,
@@ -93,11 +96,12 @@ impl<F: NorFlash + Clone, B: ServoBus> World<F, B> {
     /// Switches an arm on at `now`, with the settings that `flash` holds.
     #[must_use]
     pub fn new(now: Instant, setup: Setup, flash: F, bus: B) -> Self {
-        let (store, controller) = power_up(now, setup, flash, 0, bus.answer_delay());
+        let (settings, controller) = power_up(now, setup, flash.clone(), 0, bus.answer_delay());
         let (to_arm, to_host) = (Pacer::new(None), Pacer::new(None));
         let mut world = Self {
             setup,
-            store,
+            flash,
+            settings,
             controller,
             bus,
             to_arm,
@@ -134,8 +138,8 @@ impl<F: NorFlash + Clone, B: ServoBus> World<F, B> {
     }
 
     fn start_controller(&mut self, now: Instant, faults: u8) {
-        (self.store, self.controller) =
-            power_up(now, self.setup, self.store.flash().clone(), faults, self.bus.answer_delay());
+        (self.settings, self.controller) =
+            power_up(now, self.setup, self.flash.clone(), faults, self.bus.answer_delay());
         self.controller_due = now;
         self.is_halted = false;
         self.start_link();
@@ -292,8 +296,8 @@ impl<F: NorFlash + Clone, B: ServoBus> World<F, B> {
                 Output::ToServos(bytes) => self.bus.bytes(self.now, bytes),
                 Output::Vacuum(vacuum) => tell(vacuum),
                 Output::Save(image) => {
-                    let storage = self.store.save(&image);
-                    self.controller.set_storage(storage);
+                    self.controller.set_storage(self.settings.save(&image));
+                    settings_log::saved(&self.settings);
                 }
                 Output::Wait(until) => {
                     self.controller_due = until;
@@ -316,8 +320,9 @@ fn power_up<F: NorFlash + Clone>(
     flash: F,
     faults: u8,
     answer_delay: Duration,
-) -> (Store<F>, Controller) {
-    let (store, stored) = Store::open(flash);
+) -> (Settings<F>, Controller) {
+    let settings = Settings::open(flash);
+    settings_log::opened(&settings);
     let config = Config {
         chip_id: setup.chip_id,
         faults,
@@ -325,9 +330,9 @@ fn power_up<F: NorFlash + Clone>(
         guard_time: GUARD_TIME,
         torque_codes: setup.torque_codes,
     };
-    let mut controller = Controller::new(now, config, stored.as_ref(), store.state());
+    let mut controller = Controller::new(now, config, settings.found(), settings.storage());
     controller.set_answer_delay(answer_delay);
-    (store, controller)
+    (settings, controller)
 }
 
 fn tell(vacuum: Vacuum) {

@@ -11,7 +11,6 @@ pub mod led_pattern;
 pub mod line_errors;
 pub mod question;
 pub mod reset_cause;
-pub mod settings;
 pub mod stack_guard;
 pub mod tick;
 pub mod timeline;

@@ -29,9 +29,9 @@ use cortex_m_rt::entry;
 use defmt_rtt as _;
 use firmware_stm32::flash::Flash;
 use firmware_stm32::reset_cause::{self, ResetCause};
-use firmware_stm32::settings::Settings;
 use firmware_stm32::watchdog_gate::WatchdogGate;
 use motion_core::{Config, Controller};
+use protocol_core::settings::Settings;
 use protocol_core::time::Instant;
 use stm32f4::stm32f405 as pac;
 
@@ -61,6 +61,7 @@ fn main() -> ! {
     let faults = source.faults() | reset_cause::faults(flags, cause);
 
     let settings = Settings::open(Flash::new(ChipFlashRegisters::new(chip.FLASH, chip.PWR, &watchdog)));
+    defmt::info!("settings: {}, room for {=usize}", settings.opened(), settings.room());
     let config = Config {
         chip_id: board::chip_id(source),
         faults,

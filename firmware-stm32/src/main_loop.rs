@@ -5,10 +5,10 @@ use core::convert::Infallible;
 use embedded_io::{BufRead, Write};
 use firmware_stm32::bus_pause::PauseWait;
 use firmware_stm32::flash::Flash;
-use firmware_stm32::settings::Settings;
 use firmware_stm32::watchdog_gate::WatchdogGate;
 use motion_core::{Controller, Output, Vacuum};
 use protocol_core::registers::map::{FAULTS, fault as fault_bit};
+use protocol_core::settings::Settings;
 use protocol_core::time::{Duration, Instant};
 
 use crate::board;
@@ -68,7 +68,9 @@ impl MainLoop<'_> {
                 Output::Vacuum(vacuum) => self.switch(vacuum),
                 Output::Save(image) => {
                     self.wait_for_pause();
-                    arm.set_storage(self.settings.save(image));
+                    let storage = self.settings.save(&image);
+                    defmt::info!("save: {}, room for {=usize}", storage, self.settings.room());
+                    arm.set_storage(storage);
                     // The save took up to 5 ms, so read the clock again before the next poll.
                     return now;
                 }

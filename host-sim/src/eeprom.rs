@@ -8,7 +8,7 @@ use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 use arm_sim::flash::{ERASED, Flash, SIZE};
-use arm_sim::store::is_damaged;
+use protocol_core::journal::{Journal, Opened};
 use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
 
@@ -116,7 +116,11 @@ impl Eeprom {
         check_size(&file, &path)?;
         let flash = Flash::on(ImageFile(file));
         let copy = flash.copy().map_err(|cause| refused("read", cause))?;
-        if is_damaged(copy) { Err(ImageError::Damaged(path)) } else { Ok(flash) }
+        // Opening the journal erases what is there, so a copy is opened.
+        match Journal::open(copy) {
+            (_, Opened::Damaged) => Err(ImageError::Damaged(path)),
+            _ => Ok(flash),
+        }
     }
 }
 

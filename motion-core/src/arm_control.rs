@@ -12,10 +12,11 @@ use protocol_core::registers::map::{
     FRAMES_ACCEPTED, FRAMES_CORRUPTED, MOTOR_STATE, SERVO_BUS_ERRORS, SUPPLY_VOLTAGE, VACUUM_PUMP, refusal,
 };
 use protocol_core::registers::{Accepted, Image, Joint, RegisterFile};
+use protocol_core::settings::Storage;
 use protocol_core::time::Instant;
 
 use crate::bus_scheduler::BusScheduler;
-use crate::config::{Config, Storage};
+use crate::config::Config;
 use crate::joints::{Joints, Measured, offset};
 use crate::motor_state::MotorState;
 use crate::servo_bus::{Outcome, Reading};

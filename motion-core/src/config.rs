@@ -19,15 +19,3 @@ pub struct Config {
     /// The code table of the servos' torque switch (their register 40).
     pub torque_codes: TorqueCodes,
 }
-
-/// The state of the settings storage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Storage {
-    /// The storage takes another image.
-    Ready,
-    /// The storage is full until the next restart. Writes that change a setting are refused (D19).
-    Full,
-    /// The storage does not keep data. Settings live in RAM only.
-    Broken,
-}

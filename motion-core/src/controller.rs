@@ -13,10 +13,11 @@
 
 use protocol_core::registers::map::{BAUD_RATE, FEEDBACK_FREQUENCY, baud_rate};
 use protocol_core::registers::{Image, JOINTS, RegisterFile};
+use protocol_core::settings::Storage;
 use protocol_core::time::{Duration, Instant};
 
 use crate::arm_control::ArmControl;
-use crate::config::{Config, Storage};
+use crate::config::Config;
 use crate::host_port::{HostEvent, HostPort};
 use crate::vacuum::Vacuum;
 

@@ -33,8 +33,9 @@ pub mod vacuum;
 
 use protocol_core::time::Duration;
 
-pub use config::{Config, Storage};
+pub use config::Config;
 pub use controller::{Controller, Output};
+pub use protocol_core::settings::Storage;
 pub use servo_bus::TorqueCodes;
 pub use vacuum::Vacuum;
 

@@ -5,8 +5,8 @@ use protocol_core::registers::map::{
     FAULTS, FRAMES_REFUSED, LAST_REFUSAL, LAST_REFUSED_REGISTER, MISSING_SERVOS, MOVING_JOINTS,
     SERVO_TEMPERATURE, SUPPLY_VOLTAGE, fault,
 };
+use protocol_core::settings::Storage;
 
-use crate::config::Storage;
 use crate::joints::Joints;
 
 /// Bits of all seven joints.

@@ -4,7 +4,7 @@
 //!   bytes ──▶ wire::Deframer ──▶ wire::Frame ──▶ request::Request ──▶ registers::RegisterFile
 //!                                                                          │        │
 //!   bytes ◀── wire::Frame ◀──────────────────── request::Reply ◀───────────┘        ▼
-//!                                                                         Image ──▶ journal::Journal
+//!                                                                         Image ──▶ settings::Settings ──▶ journal::Journal
 //! ```
 //!
 //! Firmware, simulator and host tools share this crate, so both ends of the wire use the same definitions. The crate uses
@@ -18,5 +18,6 @@ pub mod chip_id;
 pub mod journal;
 pub mod registers;
 pub mod request;
+pub mod settings;
 pub mod time;
 pub mod wire;

@@ -7,10 +7,9 @@ use std::sync::LazyLock;
 
 use arbitrary::Arbitrary;
 use arm_sim::flash::{ERASED, SECTOR_SIZE, SIZE};
-use arm_sim::store::Store;
 use host_sim::eeprom::{Eeprom, ImageError};
-use motion_core::Storage;
 use protocol_core::registers::{Access, Image, MAP, Region, RegisterFile};
+use protocol_core::settings::{Settings, Storage};
 use tempfile::NamedTempFile;
 
 static FILE: LazyLock<NamedTempFile> = LazyLock::new(|| NamedTempFile::new_in("/dev/shm").expect("a file"));
@@ -57,33 +56,34 @@ pub fn run(input: &Input<'_>) {
         Err(ImageError::NotAnImage { .. }) => assert_ne!(bytes.len(), SIZE),
         Err(ImageError::Damaged(_)) => assert!(fs::read(FILE.path()).is_ok_and(|now| now == bytes)),
         Err(other) => panic!("{other}"),
-        Ok((store, settings)) => live(store, settings, input.next),
+        Ok(settings) => live(settings, input.next),
     }
 }
 
-type FileStore = Store<arm_sim::flash::Flash>;
+type FileSettings = Settings<arm_sim::flash::Flash>;
 
-fn start(path: &Path) -> Result<(FileStore, Option<Image>), ImageError> {
-    Ok(Store::open(Eeprom::File(path.to_owned()).open(None)?))
+fn start(path: &Path) -> Result<FileSettings, ImageError> {
+    Ok(Settings::open(Eeprom::File(path.to_owned()).open(None)?))
 }
 
-fn live(mut store: FileStore, settings: Option<Image>, next: [u8; Image::LENGTH]) {
-    check_settings(settings.as_ref());
+fn live(mut settings: FileSettings, next: [u8; Image::LENGTH]) {
+    check_settings(settings.found());
     // Two blank sectors are where a first save goes; whatever else is there, a start makes room.
-    assert_eq!(store.state(), Storage::Ready);
-    store = restart(store, settings);
+    assert_eq!(settings.storage(), Storage::Ready);
+    let found = settings.found().copied();
+    settings = restart(settings, found);
     let next = RegisterFile::new([0; 6], Some(&Image(next))).image();
-    assert_eq!(store.save(&next), Storage::Ready);
-    restart(store, Some(next));
+    assert_eq!(settings.save(&next), Storage::Ready);
+    restart(settings, Some(next));
 }
 
-fn restart(store: FileStore, expected: Option<Image>) -> FileStore {
+fn restart(settings: FileSettings, expected: Option<Image>) -> FileSettings {
     // The image is locked for as long as it is open.
-    drop(store);
+    drop(settings);
     match start(FILE.path()) {
-        Ok((store, settings)) => {
-            assert_eq!(settings, expected);
-            store
+        Ok(settings) => {
+            assert_eq!(settings.found().copied(), expected);
+            settings
         }
         Err(error) => panic!("{error}"),
     }

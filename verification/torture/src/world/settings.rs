@@ -3,7 +3,6 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use arm_sim::store::Store;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use flash_model::{Cut, Error, Flash, Operation};
 use motion_core::Storage;
@@ -100,7 +99,7 @@ pub(super) trait Settings: std::fmt::Debug {
 #[derive(Debug)]
 pub(super) struct Flashed<const SECTOR: usize> {
     flash: Handle<SECTOR>,
-    store: Option<Store<Handle<SECTOR>>>,
+    store: Option<protocol_core::settings::Settings<Handle<SECTOR>>>,
     /// What the next start may find.
     possible: Vec<Option<Image>>,
     is_worn: bool,
@@ -146,7 +145,8 @@ impl<const SECTOR: usize> Settings for Flashed<SECTOR> {
     fn start(&mut self, seed: u64, cut: Option<Cut>) -> Check<End<Found>> {
         self.flash.0.borrow_mut().flash.power_up(seed);
         self.prepare(cut);
-        let (store, image) = Store::open(self.flash.clone());
+        let store = protocol_core::settings::Settings::open(self.flash.clone());
+        let image = store.found().copied();
         self.check_use(2, 18)?;
         if !self.is_powered() {
             return Ok(End::Cut);
@@ -154,7 +154,7 @@ impl<const SECTOR: usize> Settings for Flashed<SECTOR> {
         // From here to the next start an erase is a misuse.
         self.flash.0.borrow_mut().flash.forbid_erase();
         self.saves = 0;
-        let storage = store.state();
+        let storage = store.storage();
         self.store = Some(store);
         self.check_storage(storage)?;
         let possible = self.possible.contains(&image);

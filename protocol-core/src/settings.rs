@@ -1,54 +1,77 @@
-//! The stored settings: the journal on a flash, and the state of the storage as the controller needs it.
+//! The stored settings: the journal on a flash, and whether it takes another save.
 
 use embedded_storage::nor_flash::NorFlash;
-use motion_core::Storage;
-use protocol_core::journal::{Journal, Opened, SaveError};
-use protocol_core::registers::Image;
+
+use crate::journal::{Journal, Opened, SaveError};
+use crate::registers::Image;
+
+/// The state of the settings storage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Storage {
+    /// The storage takes another image.
+    Ready,
+    /// The storage is full until the next restart. Writes that change a setting are refused (D19).
+    Full,
+    /// The storage does not keep data. Settings live in RAM only.
+    Broken,
+}
 
 /// The journal, and the settings that it held at start.
 #[derive(Debug)]
 pub struct Settings<F> {
     journal: Journal<F>,
     opened: Opened,
+    storage: Storage,
 }
 
 impl<F: NorFlash> Settings<F> {
     /// Opens the journal. Only this function erases sectors.
     pub fn open(flash: F) -> Self {
         let (journal, opened) = Journal::open(flash);
-        #[cfg(target_os = "none")]
-        defmt::info!("settings: {}, room for {=usize}", opened, journal.room());
-        Self { journal, opened }
+        let storage = match opened {
+            Opened::Broken(_) => Storage::Broken,
+            _ => ready_or_full(&journal),
+        };
+        Self { journal, opened, storage }
+    }
+
+    /// The result of opening the journal.
+    pub const fn opened(&self) -> &Opened {
+        &self.opened
     }
 
     /// The settings that the journal held at start, if any.
+    #[must_use]
     pub const fn found(&self) -> Option<&Image> {
         self.opened.image()
     }
 
-    /// The state of the storage after start.
-    pub fn storage(&self) -> Storage {
-        match self.opened {
-            Opened::Broken(_) => Storage::Broken,
-            _ => self.ready_or_full(),
-        }
+    /// The state of the storage after start, or after the last save.
+    #[must_use]
+    pub const fn storage(&self) -> Storage {
+        self.storage
+    }
+
+    /// The number of saves for which there is room before the next start.
+    #[must_use]
+    pub fn room(&self) -> usize {
+        self.journal.room()
     }
 
     /// Saves `image` and returns the state of the storage after that.
-    pub fn save(&mut self, image: Image) -> Storage {
-        let saved = self.journal.save(&image);
-        #[cfg(target_os = "none")]
-        defmt::info!("save: {}, room for {=usize}", saved, self.journal.room());
-        match saved {
-            Ok(()) => self.ready_or_full(),
+    pub fn save(&mut self, image: &Image) -> Storage {
+        self.storage = match self.journal.save(image) {
+            Ok(()) => ready_or_full(&self.journal),
             Err(SaveError::Full) => Storage::Full,
             Err(SaveError::Broken) => Storage::Broken,
-        }
+        };
+        self.storage
     }
+}
 
-    fn ready_or_full(&self) -> Storage {
-        if self.journal.room() > 0 { Storage::Ready } else { Storage::Full }
-    }
+fn ready_or_full<F: NorFlash>(journal: &Journal<F>) -> Storage {
+    if journal.room() > 0 { Storage::Ready } else { Storage::Full }
 }
 
 #[cfg(test)]
@@ -70,7 +93,7 @@ mod tests {
     fn saved_settings_are_found_at_the_next_start() {
         let mut settings = Settings::open(Flash::<SECTOR>::new(2));
         assert_eq!((settings.found(), settings.storage()), (None, Storage::Ready));
-        assert_eq!(settings.save(IMAGE), Storage::Ready);
+        assert_eq!(settings.save(&IMAGE), Storage::Ready);
         let settings = Settings::open(settings.journal.release());
         assert_eq!((settings.found(), settings.storage()), (Some(&IMAGE), Storage::Ready));
     }
@@ -80,10 +103,10 @@ mod tests {
         let mut settings = Settings::open(Flash::<SECTOR>::new(2));
         let room = settings.journal.room();
         for save in 1..room {
-            assert_eq!(settings.save(image(save)), Storage::Ready, "save {save} of {room}");
+            assert_eq!(settings.save(&image(save)), Storage::Ready, "save {save} of {room}");
         }
-        assert_eq!(settings.save(image(room)), Storage::Full);
-        assert_eq!(settings.save(image(0)), Storage::Full, "a save without room");
+        assert_eq!(settings.save(&image(room)), Storage::Full);
+        assert_eq!(settings.save(&image(0)), Storage::Full, "a save without room");
         let settings = Settings::open(settings.journal.release());
         assert_eq!((settings.found(), settings.storage()), (Some(&image(room)), Storage::Ready));
     }
@@ -92,6 +115,6 @@ mod tests {
     fn a_flash_that_changes_nothing_is_a_broken_storage() {
         let mut settings = Settings::open(Flash::<SECTOR>::inert(&[0; 2 * SECTOR]));
         assert_eq!((settings.found(), settings.storage()), (None, Storage::Broken));
-        assert_eq!(settings.save(IMAGE), Storage::Broken);
+        assert_eq!(settings.save(&IMAGE), Storage::Broken);
     }
 }
