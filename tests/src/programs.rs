@@ -8,14 +8,14 @@ use std::sync::OnceLock;
 #[must_use]
 pub fn host_sim() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| program("host-sim"))
+    PATH.get_or_init(|| program("host-sim", "host-sim"))
 }
 
 /// The command line tool.
 #[must_use]
 pub fn sevenbot() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| program("sevenbot"))
+    PATH.get_or_init(|| program("sevenbot-cli", "sevenbot"))
 }
 
 /// How long the tool waits for an answer, in milliseconds: the machine may have much else to do.
@@ -33,14 +33,14 @@ pub fn tool() -> Command {
 #[must_use]
 pub fn xtask() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| program("xtask"))
+    PATH.get_or_init(|| program("xtask", "xtask"))
 }
 
-/// The program of this package. It stands two folders above the test: `target/debug/deps/test-0123`.
-fn program(package: &str) -> PathBuf {
+/// The program `name` of this package. It stands two folders above the test: `target/debug/deps/test-0123`.
+fn program(package: &str, name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a test knows where it is");
     let folder = test.ancestors().nth(2).expect("cargo's folders");
-    let path = folder.join(package).with_extension(std::env::consts::EXE_EXTENSION);
+    let path = folder.join(name).with_extension(std::env::consts::EXE_EXTENSION);
     if !path.exists() {
         build(package, folder);
     }

@@ -16,7 +16,18 @@ type Group = (&'static str, &'static [&'static str]);
 
 /// Every crate belongs to one group.
 const GROUPS: [Group; 3] = [
-    ("product", &["protocol-core", "motion-core", "arm-sim", "firmware-stm32", "host-sim", "sevenbot"]),
+    (
+        "product",
+        &[
+            "protocol-core",
+            "motion-core",
+            "arm-sim",
+            "firmware-stm32",
+            "host-sim",
+            "sevenbot",
+            "sevenbot-cli",
+        ],
+    ),
     ("proof", &["flash-model", "system-tests", "torture", "xtask"]),
     ("measurement", &["bench", "footprint", "peers"]),
 ];

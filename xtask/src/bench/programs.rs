@@ -26,7 +26,7 @@ const SIZES: [usize; 4] = [1, 10, 100, 1_000];
 
 /// Measures and prints.
 pub(crate) fn measure() -> Outcome {
-    cargo("build --quiet --release --package host-sim --package sevenbot")?;
+    cargo("build --quiet --release --package host-sim --package sevenbot-cli")?;
     // A port open for each arm: more than a process may have by itself.
     let limit = getrlimit(Resource::Nofile);
     setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit })?;

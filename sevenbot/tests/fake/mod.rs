@@ -4,6 +4,7 @@
 #![allow(dead_code)]
 
 use std::io::{ErrorKind, Read, Write};
+use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 
 use protocol_core::request::{Reply, Request};
@@ -13,6 +14,9 @@ use serialport::{SerialPort, TTYPort};
 
 /// Registers 0 to 7 of an arm like ours.
 pub(crate) const IDENTITY: [u8; 8] = [7, 30, 1, 2, 3, 4, 5, 6];
+
+/// Where the arm of [`under_way`] is.
+pub(crate) const POSE: [u8; 7] = [120, 90, 65, 90, 90, 90, 0];
 
 /// The frame of a reply.
 pub(crate) fn reply(address: u8, values: &[u8]) -> Vec<u8> {
@@ -85,4 +89,94 @@ pub(crate) fn makers_arm() -> (String, TTYPort) {
             Vec::new()
         }
     })
+}
+
+/// What a line does to a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Damage {
+    Lost,
+    Garbled,
+    /// A reply comes together with the next one; a request is lost.
+    Late,
+}
+
+/// The registers of an arm in the servo state whose joints 1 and 7 are on their way, the last from 0 degrees.
+pub(crate) fn under_way() -> Arc<Mutex<[u8; 256]>> {
+    let mut registers = [0; 256];
+    registers[..8].copy_from_slice(&IDENTITY);
+    registers[28..30].copy_from_slice(&[1, 1]);
+    registers[46..53].copy_from_slice(&[170, 90, 65, 90, 90, 90, 80]);
+    registers[54..61].copy_from_slice(&POSE);
+    registers[240] = 1;
+    registers[243] = 0b100_0001;
+    Arc::new(Mutex::new(registers))
+}
+
+/// Does what a request says; returns the reply.
+pub(crate) fn obey(registers: &mut [u8; 256], request: &Request<'_>) -> Vec<u8> {
+    match *request {
+        Request::Read { address, count } => {
+            let first = usize::from(address);
+            reply(address, &registers[first..first + usize::from(count)])
+        }
+        Request::Write { address, values } => {
+            let first = usize::from(address);
+            registers[first..first + values.len()].copy_from_slice(values);
+            registers[243] = 0;
+            Vec::new()
+        }
+    }
+}
+
+/// An arm with these registers, on a line that harms its frame number `harmed`, requests and replies counted together.
+pub(crate) fn on_a_bad_line(
+    registers: &Arc<Mutex<[u8; 256]>>,
+    harmed: usize,
+    damage: Damage,
+) -> (String, TTYPort) {
+    let registers = Arc::clone(registers);
+    let (mut frame, mut late) = (0, Vec::new());
+    let mut is_harmed = move || {
+        frame += 1;
+        frame - 1 == harmed
+    };
+    arm_that(move |_, request| {
+        let mut registers = registers.lock().unwrap();
+        if is_harmed() {
+            registers[248] += u8::from(damage == Damage::Garbled);
+            return Vec::new();
+        }
+        let mut bytes = obey(&mut registers, request);
+        if !bytes.is_empty() && is_harmed() {
+            match damage {
+                Damage::Lost => bytes.clear(),
+                Damage::Garbled => bytes[5] ^= 1,
+                Damage::Late => late = std::mem::take(&mut bytes),
+            }
+            return bytes;
+        }
+        [std::mem::take(&mut late), bytes].concat()
+    })
+}
+
+/// An arm that takes so many writes, and then loses them all. It tells of each write.
+pub(crate) fn deaf_after(takes: usize) -> (String, TTYPort, mpsc::Receiver<()>) {
+    let registers = under_way();
+    let (tell, told) = mpsc::channel();
+    let mut writes = 0;
+    let (name, port) = arm_that(move |_, request| {
+        let mut registers = registers.lock().unwrap();
+        if matches!(request, Request::Write { .. }) {
+            writes += 1;
+            let _ = tell.send(());
+            if writes > takes {
+                return Vec::new();
+            }
+        }
+        let reply = obey(&mut registers, request);
+        // A move never ends here.
+        registers[243] = 0b100_0001;
+        reply
+    });
+    (name, port, told)
 }

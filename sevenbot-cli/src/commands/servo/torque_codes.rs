@@ -6,8 +6,8 @@
 use std::io::{self, IsTerminal, Write};
 
 use clap::Args;
-use motion_core::servo_bus::frame::register::TORQUE_SWITCH;
 use serde::Serialize;
+use sevenbot::servo_bench::register::TORQUE_SWITCH;
 use sevenbot::servo_bench::{ServoBus, TorqueCodes};
 
 use super::{Rate, failure, id, open};
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn the_table_agrees_with_the_controller() {
-        use motion_core::servo_bus::Torque;
+        use sevenbot::servo_bench::Torque;
         for code in [Code::Zero, Code::Two] {
             assert_eq!(code.table().code(Torque::Free), code.number());
             assert_eq!(code.table().code(Torque::Damping), code.other().number());

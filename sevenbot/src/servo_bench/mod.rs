@@ -34,8 +34,8 @@ mod tests;
 pub use bus::{Answer, Options, ServoBus};
 pub use error::{Error, Heard};
 pub use line::Line;
-pub use motion_core::servo_bus::frame::BAUD_RATES;
-pub use motion_core::servo_bus::{Reading, TorqueCodes};
+pub use motion_core::servo_bus::frame::{BAUD_RATES, register};
+pub use motion_core::servo_bus::{Reading, Torque, TorqueCodes};
 
 /// The highest id that a servo can have.
 pub const MAX_ID: u8 = 253;

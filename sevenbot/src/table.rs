@@ -1,34 +1,15 @@
-//! The register table for readers and for other languages, written from the table the arm is built from.
+//! The register table in words, as a document and for other languages, written from the table the arm is built from.
 
 use std::fmt::Write as _;
 
 use protocol_core::registers::map::BAUD_RATES;
 use protocol_core::registers::{Access, JOINTS, MAP, Range, Region, Register};
-use serde_json::{Value, json};
 
 use crate::span::Span;
 
 /// The rows that are settings: kept over power cuts, and writable.
 pub fn settings() -> impl Iterator<Item = &'static Register> {
     MAP.iter().filter(|row| row.region == Region::Eeprom && row.access == Access::ReadWrite)
-}
-
-/// Columns for a terminal.
-#[must_use]
-pub fn text() -> String {
-    let head = ["address", "name", "region", "access", "range", "default", "unit"].map(str::to_owned);
-    let rows: Vec<_> = std::iter::once(head).chain(MAP.iter().map(cells)).collect();
-    let width =
-        |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
-    let mut text = String::new();
-    for row in &rows {
-        let padded = row.iter().enumerate().map(|(column, cell)| {
-            let width = width(column).unwrap_or_default();
-            format!("{cell:<width$}")
-        });
-        push_line(&mut text, padded.collect::<Vec<_>>().join("  ").trim_end());
-    }
-    text
 }
 
 /// The table of `docs/registers.md`.
@@ -46,14 +27,6 @@ pub fn markdown() -> String {
         push_line(&mut page, &line);
     }
     page
-}
-
-/// One array with an object for each row, in one line.
-#[must_use]
-pub fn json() -> String {
-    let rows: Vec<Value> = MAP.iter().map(object).collect();
-    let text = serde_json::to_string(&rows).unwrap_or_default();
-    format!("{text}\n")
 }
 
 /// Constants for C and C++.
@@ -100,7 +73,8 @@ fn push_line(text: &mut String, line: &str) {
 }
 
 /// Address, name, region, access, range, default, unit.
-fn cells(row: &Register) -> [String; 7] {
+#[must_use]
+pub fn cells(row: &Register) -> [String; 7] {
     [
         addresses(row),
         row.name.to_owned(),
@@ -124,31 +98,13 @@ fn numbers(row: &Register) -> Vec<(&'static str, i16)> {
     numbers
 }
 
-fn object(row: &Register) -> Value {
-    let (low, high) = range(row).unzip();
-    let defaults = row.defaults.map(|byte| row.range.decode(byte));
-    let [default, ..] = defaults;
-    json!({
-        "address": row.address,
-        "count": row.count,
-        "name": row.name,
-        "per_joint": row.per_joint,
-        "region": region(row.region),
-        "access": access(row.access),
-        "min": low,
-        "max": high,
-        "sign_magnitude": matches!(row.range, Range::SignMagnitude(_)),
-        "default": if row.per_joint { json!(defaults) } else { json!(default) },
-        "unit": row.unit.symbol(),
-        "meaning": words(row),
-    })
-}
-
 fn addresses(row: &Register) -> String {
     if row.count == 1 { row.address.to_string() } else { Span::of(row).to_string() }
 }
 
-const fn region(region: Region) -> &'static str {
+/// A region in a word.
+#[must_use]
+pub const fn region(region: Region) -> &'static str {
     match region {
         Region::Rom => "ROM",
         Region::Eeprom => "EEPROM",
@@ -156,7 +112,9 @@ const fn region(region: Region) -> &'static str {
     }
 }
 
-const fn access(access: Access) -> &'static str {
+/// An access in a word.
+#[must_use]
+pub const fn access(access: Access) -> &'static str {
     match access {
         Access::ReadOnly => "RO",
         Access::ReadWrite => "RW",
@@ -165,7 +123,8 @@ const fn access(access: Access) -> &'static str {
 }
 
 /// The numbers of a row, where they are fewer than a byte has, or may be written.
-fn range(row: &Register) -> Option<(i16, i16)> {
+#[must_use]
+pub fn range(row: &Register) -> Option<(i16, i16)> {
     let is_any_byte = row.range == Range::UpTo(u8::MAX) && row.access != Access::ReadWrite;
     (!is_any_byte).then(|| row.range.bounds())
 }
@@ -178,7 +137,9 @@ fn default(row: &Register) -> String {
     }
 }
 
-fn words(row: &Register) -> String {
+/// What a row is for.
+#[must_use]
+pub fn words(row: &Register) -> String {
     row.doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")
 }
 
@@ -193,14 +154,10 @@ mod tests {
 
     #[test]
     fn each_form_has_every_row() {
-        let json: Vec<Value> = serde_json::from_str(&json()).expect("JSON");
-        assert_eq!(json.len(), MAP.len());
         for row in MAP {
             assert!(c_header().contains(&format!("#define SEVENBOT_{} {}\n", row.name, row.address)));
             assert!(python().contains(&format!("\n{} = {}\n", row.name, row.address)));
-            assert!(text().lines().any(|line| line.split_whitespace().nth(1) == Some(row.name)));
         }
-        assert_eq!(text().lines().count(), MAP.len() + 1);
         assert!(c_header().contains("SEVENBOT_OFFSET_MIN -16"));
     }
 }

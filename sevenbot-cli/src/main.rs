@@ -31,7 +31,7 @@ use std::time::Duration;
 
 use clap::Parser;
 use sevenbot::Options;
-use tracing::level_filters::LevelFilter;
+use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::fmt::time::uptime;
 
 use crate::cli::Cli;

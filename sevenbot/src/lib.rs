@@ -52,7 +52,7 @@ pub mod words;
 pub use arm::{Arm, Options, Report};
 pub use error::{Error, Heard, OpenError};
 pub use identity::{Firmware, Identity};
-pub use protocol_core::registers::{Joint, Register, map};
+pub use protocol_core::registers::{Joint, Range, Register, map};
 pub use snapshot::Snapshot;
 pub use span::Span;
 pub use status::Status;

@@ -4,6 +4,7 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
+#[path = "../../sevenbot/tests/fake/mod.rs"]
 mod fake;
 
 use std::process::{Command, Output, Stdio};

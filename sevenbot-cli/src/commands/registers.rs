@@ -1,0 +1,108 @@
+//! `registers`: the table that both ends of the wire are built from, for readers and for other languages.
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use sevenbot::map::MAP;
+use sevenbot::{Range, Register, table};
+
+use crate::failure::Failure;
+use crate::session::Session;
+
+/// Print the register table: it needs no arm.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot registers
+  sevenbot registers --format c > sevenbot_registers.h
+  sevenbot registers --format python > sevenbot_registers.py")]
+pub(crate) struct RegistersArgs {
+    /// What to write it as.
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Format {
+    /// Columns.
+    Text,
+    /// The table of docs/registers.md.
+    Markdown,
+    /// One array; also --json.
+    Json,
+    /// A header for C and C++.
+    C,
+    /// A module.
+    Python,
+}
+
+pub(crate) fn run(session: &mut Session, args: &RegistersArgs) -> Result<(), Failure> {
+    let format = if session.output.is_json() { Format::Json } else { args.format };
+    let text = match format {
+        Format::Text => text(),
+        Format::Markdown => table::markdown(),
+        Format::Json => json(),
+        Format::C => table::c_header(),
+        Format::Python => table::python(),
+    };
+    session.output.raw(text.as_bytes())
+}
+
+/// Columns for a terminal.
+fn text() -> String {
+    let head = ["address", "name", "region", "access", "range", "default", "unit"].map(str::to_owned);
+    let rows: Vec<_> = std::iter::once(head).chain(MAP.iter().map(table::cells)).collect();
+    let width =
+        |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
+    let mut text = String::new();
+    for row in &rows {
+        let padded = row.iter().enumerate().map(|(column, cell)| {
+            let width = width(column).unwrap_or_default();
+            format!("{cell:<width$}")
+        });
+        text.push_str(padded.collect::<Vec<_>>().join("  ").trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+/// One array with an object for each row, in one line.
+fn json() -> String {
+    let rows: Vec<Value> = MAP.iter().map(object).collect();
+    let text = serde_json::to_string(&rows).unwrap_or_default();
+    format!("{text}\n")
+}
+
+fn object(row: &Register) -> Value {
+    let (low, high) = table::range(row).unzip();
+    let defaults = row.defaults.map(|byte| row.range.decode(byte));
+    let [default, ..] = defaults;
+    json!({
+        "address": row.address,
+        "count": row.count,
+        "name": row.name,
+        "per_joint": row.per_joint,
+        "region": table::region(row.region),
+        "access": table::access(row.access),
+        "min": low,
+        "max": high,
+        "sign_magnitude": matches!(row.range, Range::SignMagnitude(_)),
+        "default": if row.per_joint { json!(defaults) } else { json!(default) },
+        "unit": row.unit.symbol(),
+        "meaning": table::words(row),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_form_has_every_row() {
+        let json: Vec<Value> = serde_json::from_str(&json()).expect("JSON");
+        assert_eq!(json.len(), MAP.len());
+        for row in MAP {
+            assert!(text().lines().any(|line| line.split_whitespace().nth(1) == Some(row.name)));
+        }
+        assert_eq!(text().lines().count(), MAP.len() + 1);
+    }
+}

@@ -1,0 +1,84 @@
+//! The commands that stop the arm, against arms that lose what is written to them.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
+
+#[path = "../../sevenbot/tests/fake/mod.rs"]
+mod fake;
+
+use std::process::{Command, Output, Stdio};
+use std::sync::{Arc, mpsc};
+use std::time::Duration;
+
+use fake::{Damage, POSE, arm_that, deaf_after, obey, on_a_bad_line, under_way};
+use protocol_core::request::Request;
+
+fn command(port: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sevenbot"));
+    command.args(["--port", port, "--timeout", "10000"]).args(arguments);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+#[track_caller]
+fn may_be_moving(output: &Output) {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("the arm may still be moving"), "{said}");
+    assert!(said.contains("switch the supply of the servos off"), "{said}");
+    assert!(!said.contains("the arm holds"), "{said}");
+}
+
+#[test]
+fn commands_that_the_arm_does_not_take_say_that_it_may_be_moving() {
+    for arguments in [["stop"].as_slice(), &["home"], &["home", "--wait"], &["state", "damping", "--yes"]] {
+        let (port, _held, _told) = deaf_after(0);
+        may_be_moving(&command(&port, arguments).output().unwrap());
+    }
+}
+
+#[test]
+fn ctrl_c_that_cannot_stop_the_arm_says_so() {
+    let (port, _held, told) = deaf_after(1);
+    let tool = command(&port, &["pose", "10", "_", "_", "_", "_", "_", "_", "--wait"]).spawn().unwrap();
+    told.recv_timeout(Duration::from_secs(60)).expect("the pose is written");
+    assert!(Command::new("kill").args(["-INT", &tool.id().to_string()]).status().unwrap().success());
+    may_be_moving(&tool.wait_with_output().unwrap());
+}
+
+#[test]
+fn ctrl_c_stops_a_pose_and_says_that_the_arm_holds() {
+    let registers = under_way();
+    let shown = Arc::clone(&registers);
+    let (tell, told) = mpsc::channel();
+    let (port, _held) = arm_that(move |_, request| {
+        let mut registers = registers.lock().unwrap();
+        let reply = obey(&mut registers, request);
+        if matches!(request, Request::Write { .. }) {
+            let _ = tell.send(());
+            registers[243] = u8::from(registers[46] != POSE[0]);
+        }
+        reply
+    });
+    let tool = command(&port, &["pose", "10", "_", "_", "_", "_", "_", "_", "--wait"]).spawn().unwrap();
+    told.recv_timeout(Duration::from_secs(60)).expect("the pose is written");
+    assert!(Command::new("kill").args(["-INT", &tool.id().to_string()]).status().unwrap().success());
+    let output = tool.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(said.contains("the arm holds where it is"), "{said}");
+    assert_eq!(shown.lock().unwrap()[46..53], POSE);
+}
+
+#[test]
+fn a_stop_of_an_arm_that_is_not_driven_writes_nothing() {
+    let registers = under_way();
+    registers.lock().unwrap()[29] = 2;
+    let shown = Arc::clone(&registers);
+    let (port, _held) = on_a_bad_line(&registers, usize::MAX, Damage::Lost);
+    let output = command(&port, &["stop"]).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("state 2, forceless"), "{said}");
+    assert_eq!(shown.lock().unwrap()[46], 170);
+}
