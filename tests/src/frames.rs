@@ -1,4 +1,4 @@
-//! Frames, a second time: written down from `docs/protocol.md`, section 1, not taken from the product.
+//! Frames, a second time: written down from `docs/protocol.md`, section 2, not taken from the product.
 
 use crc::{CRC_16_MODBUS, Crc};
 

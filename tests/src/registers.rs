@@ -1,4 +1,4 @@
-//! Register numbers, a second time: `docs/protocol.md`, sections 2 and 4.
+//! Register numbers, a second time: `docs/protocol.md`, sections 3 to 6.
 
 /// First of the eight registers of the ROM.
 pub const DEVICE_CODE: u8 = 0;

@@ -1,4 +1,4 @@
-//! What registers hold and take: `docs/protocol.md`, sections 2 and 4.
+//! What registers hold and take: `docs/protocol.md`, sections 3 to 6.
 
 use system_tests::registers::{
     BAUD_RATE, CHIP_ID, DEVICE_CODE, DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FIRMWARE_VERSION,

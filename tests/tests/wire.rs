@@ -1,4 +1,4 @@
-//! Frames on the line: `docs/protocol.md`, section 1.
+//! Frames on the line: `docs/protocol.md`, section 2.
 
 use std::thread::sleep;
 use std::time::{Duration, Instant};

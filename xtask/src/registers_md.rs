@@ -13,16 +13,15 @@ const INTRODUCTION: &str = "\
 <!-- Generated from protocol-core/src/registers/map.rs by `cargo xtask docs`. Change the table there. -->
 
 One register is one byte. A read of any address answers; an address that is not listed here reads 0.
-What a write does is in [protocol.md](protocol.md), as are the decisions that D-numbers refer to.
+[protocol.md](protocol.md) defines the effect of a write, and the decisions D1 to D20.
 
-* **Region**: ROM is fixed for a chip and its firmware; EEPROM survives power cuts and is written only while
-  the EEPROM lock is open; RAM starts from its defaults at every power-up.
+* **Region**: ROM is fixed for a chip and its firmware. EEPROM survives power cuts and is writable only while
+  the EEPROM lock is open. RAM starts from its defaults at every power-up.
 * **Access**: RW reads and writes, RO reads only, reserved reads 0. A write to RO or reserved has no effect.
-* **Range**: the numbers a write may bring. In a range with negative numbers bit 7 is the sign and the rest
+* **Range**: the values that a write may have. In a range with negative values bit 7 is the sign and the rest
   the magnitude: -5 is 0x85.
 * **Default**: the value after power-up; in EEPROM, of a new arm. A row of seven registers has one for each
-  joint, 1 to 7, and lists them where they differ. What the arm itself knows, measures or counts replaces it
-  as soon as it is there.
+  joint, 1 to 7, and lists them if they differ. The arm replaces a default once it knows, measures or counts the value.
 
 ";
 

@@ -1,4 +1,4 @@
-//! THE TABLE: every register of the 7Bot V2 (docs/protocol.md, sections 2 and 4).
+//! THE TABLE: every register of the 7Bot V2 (docs/protocol.md, sections 3 to 6).
 //!
 //! No other file holds a register address as a number.
 
@@ -15,24 +15,24 @@ macro_rules! register_map {
 }
 
 register_map! {
-    /// Tells a 7Bot V2 from other devices on a serial port.
+    /// Identifies a 7Bot V2 on a serial port.
     DEVICE_CODE = rom(0).default(7);
     /// Version of the firmware. The maker's are 1.0, 2.1 and 2.2; this project begins at 3.0 (D7).
     FIRMWARE_VERSION = rom(1).default(30).unit(Unit::VersionTenths);
-    /// The chip's own number, most significant byte first (D8).
+    /// Unique number of the chip, most significant byte first (D8).
     CHIP_ID = rom(2).run(6);
-    /// Kept free by the maker.
+    /// Reserved by the maker.
     RESERVED_8 = eeprom(8).run(3).reserved();
     /// The user's number for this arm.
     DEVICE_ID = eeprom(11);
     /// Code of the host link's baud rate: 115200, 250000, 500000, 1000000, 57600, 38400, 19200, 9600.
-    /// In force after the next restart.
+    /// Takes effect at the next restart.
     BAUD_RATE = eeprom(12).up_to(7);
-    /// Assembly error of the joint: angle seen = servo angle + offset (D9). -10 to 10 is a good assembly.
+    /// Assembly error of the joint: present angle = servo angle + offset (D9). -10 to 10 is a good assembly.
     OFFSET = eeprom(13).each_joint().plus_minus(16).unit(Unit::Degree);
-    /// Kept free by the maker.
+    /// Reserved by the maker.
     RESERVED_20 = eeprom(20).run(8).reserved();
-    /// 0: EEPROM registers can be written. 1: they are protected.
+    /// 0: EEPROM registers are writable. 1: they are protected.
     EEPROM_LOCK = ram(28).up_to(1).default(1);
     /// 0: damping protection. 1: servo, the joints are driven. 2: forceless, the arm can be moved by hand (D13).
     MOTOR_STATE = ram(29).up_to(2).default(1);
@@ -42,14 +42,14 @@ register_map! {
     VACUUM_PUMP = ram(31).up_to(1);
     /// Speed of the joint's moves; 0 is the motor's maximum, 372 °/s (D10, D11).
     SPEED = ram(32).each_joint().up_to(100).default(60).unit(Unit::SpeedStep);
-    /// Duration of the joint's moves; counts only where the joint's speed is 0 (D11).
+    /// Duration of the joint's moves; used only while the joint's speed is 0 (D11).
     TIME = ram(39).each_joint().up_to(100).unit(Unit::Decisecond);
-    /// Where the joint should be. Writing it starts a move. Starts as the measured position (D12).
+    /// Target of the joint. A write starts a move. Set to the measured position at start-up (D12).
     TARGET_POSITION =
         ram(46).each_joint().up_to(180).default_each([90, 90, 65, 90, 90, 90, 80]).unit(Unit::Degree);
-    /// How often the arm sends its present positions unasked; 0: never. Bounded by the baud rate (D14).
+    /// Rate of the reports of present positions; 0: no reports. Limited by the baud rate (D14).
     FEEDBACK_FREQUENCY = ram(53).up_to(50).unit(Unit::Hertz);
-    /// Where the joint is, as measured.
+    /// Measured position of the joint.
     PRESENT_POSITION = ram(54).each_joint().up_to(180).read_only().unit(Unit::Degree);
     /// Layout version of the status block, this project's addition.
     STATUS_VERSION = ram(240).read_only().default(1);
@@ -63,15 +63,15 @@ register_map! {
     /// Why the last refused frame was refused: 0 none yet, 1 malformed range, 2 value out of range,
     /// 3 settings storage full.
     LAST_REFUSAL = ram(244).read_only();
-    /// The register that made it so.
+    /// The register that caused the last refusal.
     LAST_REFUSED_REGISTER = ram(245).read_only();
     /// Frames accepted: low byte, high byte, wrapping.
     FRAMES_ACCEPTED = ram(246).run(2).read_only();
     /// Frames with a wrong CRC: low byte, high byte, wrapping.
     FRAMES_CORRUPTED = ram(248).run(2).read_only();
-    /// Frames refused, for the reasons of LAST_REFUSAL: low byte, high byte, wrapping.
+    /// Frames refused: low byte, high byte, wrapping.
     FRAMES_REFUSED = ram(250).run(2).read_only();
-    /// Time-outs and wrong checksums on the servo bus: low byte, high byte, wrapping.
+    /// Timeouts and wrong checksums on the servo bus: low byte, high byte, wrapping.
     SERVO_BUS_ERRORS = ram(252).run(2).read_only();
     /// Supply voltage of the servos; 0: unknown.
     SUPPLY_VOLTAGE = ram(254).read_only().unit(Unit::Decivolt);

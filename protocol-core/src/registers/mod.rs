@@ -1,4 +1,4 @@
-//! The registers of the arm: 256 registers of one byte (docs/protocol.md, section 2).
+//! The registers of the arm: 256 registers of one byte (docs/protocol.md, sections 3 and 4).
 //!
 //! ```text
 //!  spec   the types of a row                       (no addresses)

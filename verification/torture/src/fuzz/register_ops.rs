@@ -1,4 +1,4 @@
-//! The register file against a model written from `docs/protocol.md`, section 2, and from nothing else: its own
+//! The register file against a model written from `docs/protocol.md`, section 3, and from nothing else: its own
 //! table, in which every address stands as a number.
 
 use arbitrary::Arbitrary;
