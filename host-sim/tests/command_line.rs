@@ -217,7 +217,7 @@ fn trace_tells_frames_in_words_on_standard_error() {
     Client::open(sim.port()).read(DEVICE_ID.address, 1);
     sim.end_with(Signal::TERM);
     let told = sim.rest_of_stderr();
-    assert!(told.contains("-> read device_id\n") && told.contains("<- device_id = 0\n"), "{told}");
+    assert!(told.contains("-> read device-id\n") && told.contains("<- answer device-id = 0\n"), "{told}");
     assert!(!told.contains('\u{1b}'), "no colours in a pipe: {told}");
 }
 

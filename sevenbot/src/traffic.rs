@@ -56,6 +56,19 @@ pub enum Traffic {
     Noise(Vec<u8>),
 }
 
+impl Traffic {
+    /// A frame that goes in direction `D`.
+    #[must_use]
+    pub fn from_frame<D: Direction>(frame: &Frame<'_>) -> Self {
+        let (address, count, values) = (frame.address, frame.count, frame.data.to_vec());
+        match frame.function {
+            Function::Write => Self::Write { address, values },
+            Function::Read if D::data_length(Function::Read, 1) == 0 => Self::Read { address, count },
+            Function::Read => Self::Answer { address, values },
+        }
+    }
+}
+
 impl From<&Request<'_>> for Traffic {
     fn from(request: &Request<'_>) -> Self {
         match *request {
@@ -148,21 +161,14 @@ fn judge(bytes: &[u8]) -> Verdict {
 /// What the bytes are if they go in direction `D`. A malformed range still has a length; other damage is no frame.
 fn reading<D: Direction>(bytes: &[u8]) -> Verdict {
     match (frame::parse::<D>(bytes), bytes) {
-        (ParseOutcome::Complete(found, length), _) => Verdict::Frame(heard::<D>(&found), length),
+        (ParseOutcome::Complete(found, length), _) => {
+            Verdict::Frame(Traffic::from_frame::<D>(&found), length)
+        }
         (ParseOutcome::Defective(Defect::MalformedRange { address }, length), [_, _, _, _, count, ..]) => {
             Verdict::Frame(Traffic::TooFar { address, count: *count }, length)
         }
         (ParseOutcome::Incomplete(_), _) => Verdict::Unfinished,
         _ => Verdict::NoFrame,
-    }
-}
-
-fn heard<D: Direction>(found: &Frame<'_>) -> Traffic {
-    let (address, count, values) = (found.address, found.count, found.data.to_vec());
-    match found.function {
-        Function::Write => Traffic::Write { address, values },
-        Function::Read if D::data_length(Function::Read, 1) == 0 => Traffic::Read { address, count },
-        Function::Read => Traffic::Answer { address, values },
     }
 }
 
