@@ -11,8 +11,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use crate::run::{Outcome, root};
-use crate::table::Column::{Left, Right};
-use crate::table::Table;
+use torture::text_table::Column::{Left, Right};
+use torture::text_table::TextTable;
 
 /// How much worse than committed a figure may get, in percent.
 const TOLERANCE: u64 = 5;
@@ -77,7 +77,7 @@ pub(crate) fn hold(file: &str, figures: &[Figure], accept: bool) -> Outcome {
 }
 
 fn compare(budgets: &[Budget], figures: &[Figure]) -> Vec<String> {
-    let mut table = Table::new([Right("measured"), Right("committed"), Right("at most"), Left("figure")]);
+    let mut table = TextTable::new([Right("measured"), Right("committed"), Right("at most"), Left("figure")]);
     let mut faults = Vec::new();
     for figure in figures {
         let budget = budgets.iter().find(|budget| budget.name == figure.name);

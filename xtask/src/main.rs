@@ -30,7 +30,6 @@ mod size;
 mod stack;
 mod start_up;
 mod steps;
-mod table;
 mod test;
 mod thumb_decode;
 mod times;

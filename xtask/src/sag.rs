@@ -28,7 +28,7 @@ use protocol_core::wire::FrameBuffer;
 use tempfile::TempDir;
 use torture::dice::Dice;
 use torture::sag::{
-    DISTURBANCE_TIME, FOREARM, Failure, NOISE_BYTES, POSE, SETTLE_TIME, Sag, Table, WATCHDOG_TIME,
+    DISTURBANCE_TIME, FOREARM, NOISE_BYTES, POSE, SETTLE_TIME, Sag, SagCause, SagTable, WATCHDOG_TIME,
 };
 
 use crate::emulate::monitor::{self, Monitor};
@@ -47,12 +47,12 @@ pub(crate) fn measure() -> Outcome {
     need_qemu()?;
     run::build_image()?;
     let sags: Outcome<Vec<_>> =
-        Failure::ALL.into_iter().map(|failure| Ok((failure, sag_over(failure)?))).collect();
-    println!("{}", Table(sags?));
+        SagCause::ALL.into_iter().map(|failure| Ok((failure, sag_over(failure)?))).collect();
+    println!("{}", SagTable(sags?));
     Ok(())
 }
 
-fn sag_over(failure: Failure) -> Outcome<Sag> {
+fn sag_over(failure: SagCause) -> Outcome<Sag> {
     let mut bench = Bench::new()?;
     bench.bring_about(failure)?;
     bench.run(SETTLE_TIME)?;
@@ -126,18 +126,18 @@ impl Bench {
         }
     }
 
-    fn bring_about(&mut self, failure: Failure) -> Outcome {
+    fn bring_about(&mut self, failure: SagCause) -> Outcome {
         match failure {
-            Failure::WarmRestart => self.monitor.execute("system_reset", ""),
-            Failure::Watchdog => {
+            SagCause::WarmRestart => self.monitor.execute("system_reset", ""),
+            SagCause::Watchdog => {
                 self.monitor.execute("stop", "")?;
                 self.run(WATCHDOG_TIME)?;
                 self.monitor.execute("system_reset", "")?;
                 self.monitor.execute("cont", "")
             }
-            Failure::Panic => Debugger::attach(&self.folder)?.continue_at(panic_handler()?),
-            Failure::Noise => self.noise(),
-            Failure::SilentServo => {
+            SagCause::Panic => Debugger::attach(&self.folder)?.continue_at(panic_handler()?),
+            SagCause::Noise => self.noise(),
+            SagCause::SilentServo => {
                 // Not one of its answers comes within the measurement.
                 self.plant.set_fault(FOREARM, Some(Fault::Late(Duration::from_millis(3_600_000))));
                 self.run(DISTURBANCE_TIME)?;

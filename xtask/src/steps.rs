@@ -3,9 +3,9 @@
 use std::time::{Duration, Instant};
 
 use crate::run::Outcome;
-use crate::table::Column::{Left, Right};
-use crate::table::Table;
 use crate::times::Times;
+use torture::text_table::Column::{Left, Right};
+use torture::text_table::TextTable;
 
 /// How much is done. Each extent includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -66,8 +66,8 @@ pub(crate) fn carry_out(steps: &[Step], extent: Extent) -> Outcome {
 /// The last row of the table.
 const ALL: &str = "all of these";
 
-fn table(taken: &[(&str, Times)], all: Duration) -> Table {
-    let mut table = Table::new([Left("step"), Right("seconds"), Right("processor")]);
+fn table(taken: &[(&str, Times)], all: Duration) -> TextTable {
+    let mut table = TextTable::new([Left("step"), Right("seconds"), Right("processor")]);
     for (heading, times) in taken {
         let [passed, worked] = times.cells();
         table.add([*heading, &passed, &worked]);

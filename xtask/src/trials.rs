@@ -6,19 +6,19 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
 use crate::run::{Outcome, root};
-use crate::table::Column::{Left, Right};
-use crate::table::Table;
+use torture::text_table::Column::{Left, Right};
+use torture::text_table::TextTable;
 
 /// The trials so far.
 pub(crate) struct Trials {
-    table: Table,
+    table: TextTable,
     has_failure: bool,
 }
 
 impl Default for Trials {
     fn default() -> Self {
         let columns = [Left("what was tried"), Right("how many"), Left("what went wrong")];
-        Self { table: Table::new(columns), has_failure: false }
+        Self { table: TextTable::new(columns), has_failure: false }
     }
 }
 

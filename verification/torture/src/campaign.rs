@@ -1,4 +1,4 @@
-//! Many worlds, on all processors, until the budget is used up or a rule is violated.
+//! Runs worlds on all processors until the time is used up or a rule is violated.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -8,170 +8,179 @@ use std::time::{Duration as RealTime, Instant as RealInstant};
 
 use protocol_core::time::Duration;
 
-use crate::parser::{self, Line};
+use crate::parser_trial::{self, ParserTrial};
 use crate::scenario::{Scenario, of_seed};
-use crate::tally::Tally;
-use crate::world::{Failure, World};
+use crate::world::{FailedWorld, TortureWorld};
+use crate::world_counts::WorldCounts;
 
-/// The length of a world.
-const HOUR: Duration = Duration::from_millis(3_600_000);
-/// Between two looks at how far it is.
-const LOOK: RealTime = RealTime::from_millis(500);
+/// The virtual time of a world.
+const WORLD_TIME: Duration = Duration::from_millis(3_600_000);
+/// The period of progress reports.
+const PROGRESS_PERIOD: RealTime = RealTime::from_millis(500);
 
-/// How much is tried.
+/// The time of a campaign.
 #[derive(Clone, Copy, Debug)]
-pub enum Budget {
-    /// So much virtual time.
+pub enum TimeBudget {
+    /// Virtual time.
     Virtual(Duration),
-    /// So much real time.
+    /// Real time.
     Real(RealTime),
 }
 
-/// What is tried.
+/// What a campaign runs.
 #[derive(Clone, Copy, Debug)]
-pub struct Plan {
-    /// The seed of the first world; the others follow.
+pub struct CampaignPlan {
+    /// The seed of the first world. The next world has the next seed.
     pub seed: u64,
-    /// How much.
-    pub budget: Budget,
-    /// Only this scenario; `None`: they take turns.
+    /// The time of all worlds.
+    pub budget: TimeBudget,
+    /// The scenario of all worlds; `None` if each seed selects its own.
     pub scenario: Option<&'static Scenario>,
-    /// Good frames for each kind of disturbance of the parser's line.
+    /// Good frames for each kind of disturbance in the trials of the parser.
     pub frames: usize,
 }
 
-/// What came of it.
+/// The result of a campaign.
 #[derive(Debug, Default)]
-pub struct Outcome {
-    /// Worlds and their counts, by scenario.
-    pub worlds: BTreeMap<&'static str, (u64, Tally)>,
-    /// The violation with the lowest seed.
-    pub failure: Option<Box<Failure>>,
-    /// The parser's lines.
-    pub lines: Vec<Line>,
-    /// How long the worlds took.
-    pub worlds_took: RealTime,
+pub struct CampaignResult {
+    /// The number of worlds and their counts, by scenario.
+    pub worlds: BTreeMap<&'static str, (u64, WorldCounts)>,
+    /// The failed world with the lowest seed.
+    pub failure: Option<Box<FailedWorld>>,
+    /// The trials of the parser.
+    pub parser_trials: Vec<ParserTrial>,
+    /// The real time of the worlds.
+    pub elapsed: RealTime,
 }
 
-impl Outcome {
-    /// All worlds together.
+impl CampaignResult {
+    /// The number of worlds and their counts.
     #[must_use]
-    pub fn total(&self) -> (u64, Tally) {
-        self.worlds.values().fold((0, Tally::default()), |(worlds, mut sum), (more, tally)| {
-            sum += *tally;
+    pub fn total(&self) -> (u64, WorldCounts) {
+        self.worlds.values().fold((0, WorldCounts::default()), |(worlds, mut sum), (more, counts)| {
+            sum += *counts;
             (worlds + more, sum)
         })
     }
 
-    /// Was nothing violated?
+    /// True if no rule was violated.
     #[must_use]
-    pub fn is_good(&self) -> bool {
-        self.failure.is_none() && self.lines.iter().all(Line::is_good)
+    pub fn passed(&self) -> bool {
+        self.failure.is_none() && self.parser_trials.iter().all(ParserTrial::passed)
     }
 }
 
-/// What a worker has to say.
-enum News {
-    World(&'static Scenario, Tally),
-    Failure(Box<Failure>),
+/// A message of a worker: the result of a world.
+enum WorkerMessage {
+    Completed(&'static Scenario, WorldCounts),
+    Failed(Box<FailedWorld>),
 }
 
-/// What is left to do.
-struct Left {
+/// The worlds that no worker has started.
+struct RemainingWork {
     seed: u64,
     time: Duration,
-    is_over: bool,
+    is_stopped: bool,
 }
 
-/// Tries the plan, and says now and then how far it is.
-pub fn run(plan: &Plan, mut progress: impl FnMut(&Outcome, RealTime)) -> Outcome {
-    let mut outcome = Outcome::default();
+/// Runs the plan. Calls `progress` with the result so far, periodically.
+pub fn run(plan: &CampaignPlan, mut progress: impl FnMut(&CampaignResult, RealTime)) -> CampaignResult {
+    let mut result = CampaignResult::default();
     let start = RealInstant::now();
     let time = match plan.budget {
-        Budget::Virtual(time) => time,
-        Budget::Real(_) => Duration::from_micros(u64::MAX),
+        TimeBudget::Virtual(time) => time,
+        TimeBudget::Real(_) => Duration::from_micros(u64::MAX),
     };
-    let left = Mutex::new(Left { seed: plan.seed, time, is_over: false });
+    let remaining = Mutex::new(RemainingWork { seed: plan.seed, time, is_stopped: false });
     thread::scope(|scope| {
         let (sender, receiver) = channel();
         for _ in 0..workers() {
             let sender = sender.clone();
-            scope.spawn(|| work(plan, &left, start, sender));
+            scope.spawn(|| work(plan, &remaining, start, sender));
         }
         drop(sender);
-        collect(&mut outcome, &receiver, &left, |outcome| progress(outcome, start.elapsed()));
+        collect(&mut result, &receiver, &remaining, |result| progress(result, start.elapsed()));
     });
-    outcome.worlds_took = start.elapsed();
-    if outcome.failure.is_none() && plan.frames > 0 {
-        outcome.lines = lines(plan);
+    result.elapsed = start.elapsed();
+    if result.failure.is_none() && plan.frames > 0 {
+        result.parser_trials = parser_trials(plan);
     }
-    outcome
+    result
 }
 
 fn workers() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// World after world.
-fn work(plan: &Plan, left: &Mutex<Left>, start: RealInstant, news: Sender<News>) {
-    while let Some((seed, time)) = next_world(plan, left, start) {
+/// Runs worlds until none remain.
+fn work(
+    plan: &CampaignPlan,
+    remaining: &Mutex<RemainingWork>,
+    start: RealInstant,
+    messages: Sender<WorkerMessage>,
+) {
+    while let Some((seed, time)) = next_world(plan, remaining, start) {
         let scenario = plan.scenario.unwrap_or_else(|| of_seed(seed));
-        let end = match World::new(seed, scenario).run(time) {
-            Ok(tally) => News::World(scenario, tally),
-            Err(failure) => News::Failure(failure),
+        let message = match TortureWorld::new(seed, scenario).run(time) {
+            Ok(counts) => WorkerMessage::Completed(scenario, counts),
+            Err(failure) => WorkerMessage::Failed(failure),
         };
-        // Nobody listens any more: then nobody wants more worlds.
-        if news.send(end).is_err() {
+        // The receiver is gone, so the campaign is over.
+        if messages.send(message).is_err() {
             return;
         }
     }
 }
 
-fn next_world(plan: &Plan, left: &Mutex<Left>, start: RealInstant) -> Option<(u64, Duration)> {
-    let mut left = left.lock().ok()?;
-    let is_late = matches!(plan.budget, Budget::Real(limit) if start.elapsed() >= limit);
-    if left.is_over || is_late || left.time == Duration::ZERO {
+fn next_world(
+    plan: &CampaignPlan,
+    remaining: &Mutex<RemainingWork>,
+    start: RealInstant,
+) -> Option<(u64, Duration)> {
+    let mut remaining = remaining.lock().ok()?;
+    let is_late = matches!(plan.budget, TimeBudget::Real(limit) if start.elapsed() >= limit);
+    if remaining.is_stopped || is_late || remaining.time == Duration::ZERO {
         return None;
     }
-    let (seed, time) = (left.seed, left.time.min(HOUR));
-    left.seed = seed.wrapping_add(1);
-    left.time = Duration::from_micros(left.time.as_micros() - time.as_micros());
+    let (seed, time) = (remaining.seed, remaining.time.min(WORLD_TIME));
+    remaining.seed = seed.wrapping_add(1);
+    remaining.time = Duration::from_micros(remaining.time.as_micros() - time.as_micros());
     Some((seed, time))
 }
 
 fn collect(
-    outcome: &mut Outcome,
-    news: &Receiver<News>,
-    left: &Mutex<Left>,
-    mut progress: impl FnMut(&Outcome),
+    result: &mut CampaignResult,
+    messages: &Receiver<WorkerMessage>,
+    remaining: &Mutex<RemainingWork>,
+    mut progress: impl FnMut(&CampaignResult),
 ) {
     loop {
-        match news.recv_timeout(LOOK) {
-            Ok(News::World(scenario, tally)) => {
-                let (worlds, sum) = outcome.worlds.entry(scenario.name).or_default();
+        match messages.recv_timeout(PROGRESS_PERIOD) {
+            Ok(WorkerMessage::Completed(scenario, counts)) => {
+                let (worlds, sum) = result.worlds.entry(scenario.name).or_default();
                 *worlds += 1;
-                *sum += tally;
+                *sum += counts;
             }
-            Ok(News::Failure(failure)) => {
-                left.lock().into_iter().for_each(|mut left| left.is_over = true);
-                let is_first = outcome.failure.as_ref().is_none_or(|other| failure.seed < other.seed);
+            Ok(WorkerMessage::Failed(failure)) => {
+                remaining.lock().into_iter().for_each(|mut remaining| remaining.is_stopped = true);
+                let is_first = result.failure.as_ref().is_none_or(|other| failure.seed < other.seed);
                 if is_first {
-                    outcome.failure = Some(failure);
+                    result.failure = Some(failure);
                 }
             }
-            Err(RecvTimeoutError::Timeout) => progress(outcome),
+            Err(RecvTimeoutError::Timeout) => progress(result),
             Err(RecvTimeoutError::Disconnected) => return,
         }
     }
 }
 
-/// The parser's lines, on all processors.
-fn lines(plan: &Plan) -> Vec<Line> {
-    let next = Mutex::new(0..parser::KINDS);
+/// Runs the trials of the parser on all processors.
+fn parser_trials(plan: &CampaignPlan) -> Vec<ParserTrial> {
+    let next = Mutex::new(0..parser_trial::DISTURBANCES);
     let work = || {
         let mut done = Vec::new();
         while let Some(kind) = next.lock().ok().and_then(|mut next| next.next()) {
-            done.extend(parser::run(kind, plan.seed, plan.frames).map(|line| (kind, line)));
+            done.extend(parser_trial::run(kind, plan.seed, plan.frames).map(|trial| (kind, trial)));
         }
         done
     };
@@ -180,5 +189,5 @@ fn lines(plan: &Plan) -> Vec<Line> {
         workers.into_iter().flat_map(|worker| worker.join().unwrap_or_default()).collect()
     });
     done.sort_by_key(|(kind, _)| *kind);
-    done.into_iter().map(|(_, line)| line).collect()
+    done.into_iter().map(|(_, trial)| trial).collect()
 }

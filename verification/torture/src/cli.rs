@@ -5,15 +5,15 @@ use std::time::Duration as RealTime;
 use clap::{Parser, Subcommand};
 use protocol_core::time::Duration;
 
-use crate::campaign::{Budget, Plan};
+use crate::campaign::{CampaignPlan, TimeBudget};
 use crate::load;
 use crate::scenario::{self, SCENARIOS, Scenario};
 
-/// What is tried when nothing else is asked for.
+/// Virtual days by default.
 const DAYS: f64 = 30.0;
 
-/// The whole arm in worlds where everything goes wrong: the real controller, simulated servos, a flash that
-/// loses power, a host. Virtual time, one seed a world, the same every time.
+/// Simulates the whole arm with injected faults: the real controller, simulated servos, a flash that loses power, and
+/// a host. Time is virtual, and a seed reproduces its world exactly.
 #[derive(Clone, Debug, Parser)]
 #[command(
     version,
@@ -24,42 +24,42 @@ EXIT STATUS
   1   one was: seed, virtual time and what led to it are printed
   2   an option cannot be used"
 )]
-pub struct Options {
+pub struct CampaignArgs {
     #[command(subcommand)]
-    /// Something else to do.
-    pub command: Option<Command>,
+    /// Another command than the simulation.
+    pub command: Option<TortureCommand>,
 
-    /// How many virtual days [default: 30]
+    /// Virtual days to simulate [default: 30]
     #[arg(long, conflicts_with = "minutes", value_parser = positive)]
     pub days: Option<f64>,
 
-    /// Go on for so many minutes of real time
+    /// Simulate for this many minutes of real time
     #[arg(long, value_parser = positive)]
     pub minutes: Option<f64>,
 
-    /// The seed of the first world; the others follow
+    /// Seed of the first world; the next world has the next seed
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 
-    /// Only worlds of this kind
+    /// Simulate only this scenario
     #[arg(long, value_name = "NAME", value_parser = scenario)]
     pub scenario: Option<&'static Scenario>,
 
-    /// How many good frames for each kind of disturbance of the parser's line; 0: none
+    /// Good frames for each kind of disturbance in the trials of the parser; 0 for no trials
     #[arg(long, default_value_t = 1_000_000)]
     pub frames: usize,
 
-    /// Print the rows of the table with tabs in them, for other programs
+    /// Print the rows of the table with tabs between the columns
     #[arg(long)]
     pub rows: bool,
 }
 
-/// Something else to do.
+/// Another command than the simulation.
 #[derive(Clone, Debug, Subcommand)]
-pub enum Command {
-    /// Keep a port as busy as the line allows, and count what does not come back
-    Load(load::Options),
-    /// Measure how far the arm sags over restarts of the controller, noise, and a silent servo
+pub enum TortureCommand {
+    /// Saturate a port with requests and count the missing replies
+    Load(load::LoadArgs),
+    /// Measure how far the arm sags during restarts of the controller, noise, and a silent servo
     Sag,
 }
 
@@ -73,15 +73,15 @@ fn scenario(name: &str) -> Result<&'static Scenario, String> {
     scenario::find(name).ok_or_else(|| format!("use one of {}", names()))
 }
 
-impl Options {
-    /// What is to be tried.
+impl CampaignArgs {
+    /// The campaign that the arguments ask for.
     #[must_use]
-    pub fn plan(&self) -> Plan {
+    pub fn plan(&self) -> CampaignPlan {
         let budget = match self.minutes {
-            Some(minutes) => Budget::Real(RealTime::from_secs_f64(minutes * 60.0)),
-            None => Budget::Virtual(virtual_days(self.days.unwrap_or(DAYS))),
+            Some(minutes) => TimeBudget::Real(RealTime::from_secs_f64(minutes * 60.0)),
+            None => TimeBudget::Virtual(virtual_days(self.days.unwrap_or(DAYS))),
         };
-        Plan { seed: self.seed, budget, scenario: self.scenario, frames: self.frames }
+        CampaignPlan { seed: self.seed, budget, scenario: self.scenario, frames: self.frames }
     }
 }
 
@@ -94,23 +94,25 @@ fn virtual_days(days: f64) -> Duration {
 mod tests {
     use super::*;
 
-    fn parse(arguments: &str) -> Result<Options, clap::Error> {
-        Options::try_parse_from(std::iter::once("torture").chain(arguments.split_whitespace()))
+    fn parse(arguments: &str) -> Result<CampaignArgs, clap::Error> {
+        CampaignArgs::try_parse_from(std::iter::once("torture").chain(arguments.split_whitespace()))
     }
 
     #[test]
     fn the_command_line_is_sound() {
-        <Options as clap::CommandFactory>::command().debug_assert();
+        <CampaignArgs as clap::CommandFactory>::command().debug_assert();
     }
 
     #[test]
     fn a_plan_is_read_from_it() {
         let plan = parse("--days 0.5 --seed 7 --scenario storm").unwrap().plan();
-        assert!(matches!(plan.budget, Budget::Virtual(time) if time == Duration::from_millis(43_200_000)));
+        assert!(
+            matches!(plan.budget, TimeBudget::Virtual(time) if time == Duration::from_millis(43_200_000))
+        );
         assert_eq!((plan.seed, plan.scenario.map(|scenario| scenario.name)), (7, Some("storm")));
-        assert!(matches!(parse("sag").unwrap().command, Some(Command::Sag)));
+        assert!(matches!(parse("sag").unwrap().command, Some(TortureCommand::Sag)));
         let plan = parse("--minutes 2").unwrap().plan();
-        assert!(matches!(plan.budget, Budget::Real(time) if time == RealTime::from_secs(120)));
+        assert!(matches!(plan.budget, TimeBudget::Real(time) if time == RealTime::from_secs(120)));
     }
 
     #[test]

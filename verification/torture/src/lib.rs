@@ -1,31 +1,32 @@
-//! The whole arm in worlds where everything goes wrong, again and again.
+//! Simulations of the whole arm with injected faults.
 //!
 //! ```text
-//!   cli ──▶ Plan ──▶ campaign ──▶ World (one seed, one scenario, an hour) ──▶ Tally or Failure ──▶ table
-//!                            └──▶ parser: good frames on a disturbed line ──▶ Line ───────────────▶
-//!   cli ──▶ load: a client that saturates a port
-//!   cli ──▶ sag: how far the arm sags when something fails
-//!   fuzz: what the fuzzer tries, for `verification/fuzz/` and for the test of its corpora
+//!   cli ─▶ CampaignPlan ─▶ campaign ─▶ TortureWorld (one seed, one scenario, an hour) ─▶ WorldCounts or FailedWorld ─┐
+//!                                 └──▶ parser_trial: good frames on a disturbed line ─▶ ParserTrial ─────────────────┤
+//!   cli ─▶ load: a client that saturates a port                                               result_table ◀─────────┘
+//!   cli ─▶ sag: how far the arm sags during a failure
+//!   fuzz: the targets of `verification/fuzz/`, and of the test of its corpora
 //! ```
 //!
-//! Nothing sleeps and nothing reads a clock in [`world`]: the same seed gives the same world on every machine.
-//! A violated rule ends the run with the seed that shows it again.
+//! [`world`] uses virtual time only: a seed gives the same world on every machine. A violated rule ends the campaign with
+//! the seed that reproduces it.
 
 pub mod campaign;
 pub mod cli;
 pub mod dice;
-// A panic is how these say that something does not hold; nothing but the fuzzer and tests calls them.
+// Fuzz targets report a violated rule by a panic. Only the fuzzer and tests call them.
 #[allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 pub mod fuzz;
 pub mod load;
-pub mod parser;
+pub mod parser_trial;
 pub mod per_joint;
+pub mod result_table;
 pub mod sag;
 pub mod scenario;
-// Written for tests, where a panic is how a failure is told. What of it runs in a campaign has none to tell.
+// Test code, which reports a failure by a panic. The parts that a campaign uses report none.
 #[allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 mod shared;
-pub mod table;
-pub mod tally;
+pub mod text_table;
 pub mod violation;
 pub mod world;
+pub mod world_counts;

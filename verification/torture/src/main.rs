@@ -1,66 +1,66 @@
-//! Tries the arm in worlds where everything goes wrong, or loads a port.
+//! Simulates the arm with injected faults, saturates a port, or measures the sag.
 
 use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use torture::campaign::{self, Outcome, Plan};
-use torture::cli::{Command, Options};
+use torture::campaign::{self, CampaignPlan, CampaignResult};
+use torture::cli::{CampaignArgs, TortureCommand};
 use torture::load;
+use torture::result_table::{ResultTable, days};
 use torture::sag;
-use torture::table::{Table, days};
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    match &options.command {
-        Some(Command::Load(options)) => load_port(options),
-        Some(Command::Sag) => measure_sag(),
-        None => try_worlds(&options.plan(), options.rows),
+    let args = CampaignArgs::parse();
+    match &args.command {
+        Some(TortureCommand::Load(args)) => load_port(args),
+        Some(TortureCommand::Sag) => measure_sag(),
+        None => run_campaign(&args.plan(), args.rows),
     }
 }
 
-fn try_worlds(plan: &Plan, as_rows: bool) -> ExitCode {
-    let is_seen = io::stderr().is_terminal();
-    let outcome = campaign::run(plan, |outcome, elapsed| {
-        if is_seen {
-            show_progress(outcome, elapsed);
+fn run_campaign(plan: &CampaignPlan, as_rows: bool) -> ExitCode {
+    let has_terminal = io::stderr().is_terminal();
+    let result = campaign::run(plan, |result, elapsed| {
+        if has_terminal {
+            show_progress(result, elapsed);
         }
     });
-    if is_seen {
+    if has_terminal {
         let _ = write!(io::stderr(), "\r{:60}\r", "");
     }
-    if let Some(failure) = &outcome.failure {
+    if let Some(failure) = &result.failure {
         let scenario =
             plan.scenario.map_or_else(String::new, |scenario| format!(" --scenario {}", scenario.name));
-        say(&format!("{}\nThe same again: torture --seed {}{scenario}\n", failure.story, failure.seed));
+        print_line(&format!("{}\nTo repeat: torture --seed {}{scenario}\n", failure.log, failure.seed));
     }
-    let table = Table(plan, &outcome);
+    let table = ResultTable(plan, &result);
     if as_rows {
-        table.rows().iter().for_each(|row| say(&row.join("\t")));
-        say(&table.pace());
+        table.rows().iter().for_each(|row| print_line(&row.join("\t")));
+        print_line(&table.pace());
     } else {
-        say(&table.to_string());
+        print_line(&table.to_string());
     }
-    if outcome.is_good() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    if result.passed() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-fn show_progress(outcome: &Outcome, elapsed: Duration) {
-    let (worlds, tally) = outcome.total();
-    let line = format!("{worlds} worlds, {:.2} virtual days in {} s", days(tally.micros), elapsed.as_secs());
+fn show_progress(result: &CampaignResult, elapsed: Duration) {
+    let (worlds, counts) = result.total();
+    let line = format!("{worlds} worlds, {:.2} virtual days in {} s", days(counts.micros), elapsed.as_secs());
     let _ = write!(io::stderr(), "\r{line:60}");
 }
 
 fn measure_sag() -> ExitCode {
-    say(&sag::Table::measure().to_string());
+    print_line(&sag::SagTable::measure().to_string());
     ExitCode::SUCCESS
 }
 
-fn load_port(options: &load::Options) -> ExitCode {
-    match load::run(options) {
-        Ok(tally) => {
-            say(&tally.to_string());
-            ExitCode::from(u8::from(!tally.is_clean()))
+fn load_port(args: &load::LoadArgs) -> ExitCode {
+    match load::run(args) {
+        Ok(counts) => {
+            print_line(&counts.to_string());
+            ExitCode::from(u8::from(!counts.is_clean()))
         }
         Err(failure) => {
             let _ = writeln!(io::stderr(), "error: {failure}");
@@ -69,7 +69,7 @@ fn load_port(options: &load::Options) -> ExitCode {
     }
 }
 
-/// Nobody has to read it.
-fn say(text: &str) {
+/// Prints a line. A closed pipe is no error.
+fn print_line(text: &str) {
     let _ = writeln!(io::stdout(), "{text}");
 }

@@ -1,15 +1,15 @@
-//! One value a joint.
+//! An array with one value per joint.
 
 use std::ops::{Index, IndexMut};
 
 use protocol_core::registers::{JOINTS, Joint};
 
-/// One value a joint.
+/// One value per joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PerJoint<T>(pub [T; JOINTS]);
 
 impl<T: Copy> PerJoint<T> {
-    /// The same for all.
+    /// The same value for all joints.
     pub const fn all(value: T) -> Self {
         Self([value; JOINTS])
     }
@@ -24,7 +24,7 @@ impl<T> Index<Joint> for PerJoint<T> {
     }
 }
 
-#[allow(clippy::indexing_slicing)] // Likewise.
+#[allow(clippy::indexing_slicing)] // A joint's index is below the number of joints.
 impl<T> IndexMut<Joint> for PerJoint<T> {
     fn index_mut(&mut self, joint: Joint) -> &mut T {
         &mut self.0[usize::from(joint.index())]

@@ -1,8 +1,8 @@
-//! How far the arm sags while the controller, the servo bus or a servo fails (`torture sag`).
+//! Measures how far the arm sags while the controller, the servo bus or a servo fails (`torture sag`).
 //!
-//! The arm holds a pose that loads joints 2 and 3. Then one thing fails, and the largest distance of each joint from
-//! where it stood is the sag: true angles of the simulator's plant with gravity, sampled each millisecond of virtual
-//! time. This file knows neither registers of servos nor rules about frames.
+//! The arm holds a pose that loads joints 2 and 3. Then one failure occurs. The sag is the largest distance of each joint
+//! from its angle before the failure. The angles are the true angles of the plant with gravity, sampled once per
+//! millisecond of virtual time.
 
 use std::fmt::{self, Display};
 
@@ -23,40 +23,40 @@ use crate::dice::Dice;
 
 /// Targets in degrees: the rear arm leans to the front, the forearm points down by 35 degrees.
 pub const POSE: [u8; JOINTS] = [90, 60, 100, 90, 90, 90, 80];
-/// How long the arm has for the way to [`POSE`], and how long it is watched after each failure.
+/// The time for the move to [`POSE`], and the time of the measurement after each failure.
 pub const SETTLE_TIME: Duration = Duration::from_millis(5_000);
-/// The joint angles are sampled this often.
+/// The sampling period of the joint angles.
 const SAMPLE_TIME: Duration = Duration::from_millis(1);
-/// From the moment the program hangs until the watchdog has restarted it.
+/// The time from a hang of the program to the restart by the watchdog.
 pub const WATCHDOG_TIME: Duration = Duration::from_millis(2_000);
-/// How long noise lasts, and how long the answers of a silent servo are lost.
+/// The duration of noise, and of the silence of a servo.
 pub const DISTURBANCE_TIME: Duration = Duration::from_millis(3_000);
-/// Noise puts this many random bytes on the line in each millisecond.
+/// Random bytes of noise per millisecond.
 pub const NOISE_BYTES: usize = 4;
-/// What the firmware does after a panic: the same frame three times, each after a pause.
+/// The panic handler of the firmware sends the same frame three times, with a pause before each.
 const PANIC_FRAMES: usize = 3;
 const PANIC_PAUSE: Duration = Duration::from_millis(2);
 
 /// Joint 3, which lifts the forearm.
 pub const FOREARM: Joint = Joint::ALL[2];
 
-/// What fails.
+/// A failure that may cause a sag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Failure {
+pub enum SagCause {
     /// The controller alone restarts at once.
     WarmRestart,
     /// The program hangs for two seconds, then the watchdog restarts the controller.
     Watchdog,
-    /// The program panics: it puts every servo into state 0 three times, then restarts.
+    /// The program panics, puts every servo into state 0 three times, and restarts.
     Panic,
-    /// Three seconds of random bytes on the line to the servos, while each answer comes with a wrong checksum.
+    /// Three seconds of random bytes to the servos, while each reply has an invalid checksum.
     Noise,
-    /// The answers of joint 3 are lost for three seconds.
+    /// The replies of joint 3 are lost for three seconds.
     SilentServo,
 }
 
-impl Failure {
-    /// Each of them, in the order of the table.
+impl SagCause {
+    /// All failures, in the order of the table.
     pub const ALL: [Self; 5] =
         [Self::WarmRestart, Self::Watchdog, Self::Panic, Self::Noise, Self::SilentServo];
 
@@ -71,21 +71,21 @@ impl Failure {
     }
 }
 
-/// The largest distance of each joint from where it stood, in thousandths of a degree.
+/// The largest distance of each joint from its angle before the failure, in thousandths of a degree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sag([u32; JOINTS]);
 
 impl Sag {
-    /// Measures the sag while this fails and for five seconds afterwards.
+    /// Measures the sag during a failure and for five seconds afterwards.
     #[must_use]
-    pub fn over(failure: Failure) -> Self {
-        let mut bench = Bench::new();
-        bench.bring_about(failure);
-        bench.run(SETTLE_TIME);
-        bench.sag
+    pub fn over(cause: SagCause) -> Self {
+        let mut arm = PosedArm::new();
+        arm.inject(cause);
+        arm.run(SETTLE_TIME);
+        arm.sag
     }
 
-    /// Takes a sample of the joint angles, which stood at `rest`.
+    /// Adds a sample of the joint angles. Their values before the failure are `rest`.
     pub fn sample(&mut self, rest: &[i32; JOINTS], angles: [i32; JOINTS]) {
         for ((largest, rest), angle) in self.0.iter_mut().zip(rest).zip(angles) {
             *largest = (*largest).max(angle.abs_diff(*rest));
@@ -98,7 +98,7 @@ impl Sag {
         self.0.get(usize::from(joint.index())).copied().unwrap_or(0)
     }
 
-    /// The joint that sagged most.
+    /// The joint with the largest sag.
     #[must_use]
     pub fn worst(&self) -> Joint {
         Joint::ALL.into_iter().rev().max_by_key(|&joint| self.of(joint)).unwrap_or(FOREARM)
@@ -106,34 +106,34 @@ impl Sag {
 }
 
 /// An arm that holds [`POSE`].
-struct Bench {
+struct PosedArm {
     world: World<Flash>,
     now: Instant,
     rest: [i32; JOINTS],
     sag: Sag,
 }
 
-impl Bench {
+impl PosedArm {
     fn new() -> Self {
         let now = Instant::ZERO;
         let setup = Setup { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };
         let world = World::new(now, setup, Flash::in_memory(), Plant::new(now));
-        let mut bench = Self { world, now, rest: [0; JOINTS], sag: Sag::default() };
-        bench.run(SETTLE_TIME);
+        let mut arm = Self { world, now, rest: [0; JOINTS], sag: Sag::default() };
+        arm.run(SETTLE_TIME);
         let mut frame = FrameBuffer::new();
         Request::Write { address: TARGET_POSITION.address, values: &POSE }.encode(&mut frame);
-        bench.world.host_sends(bench.now, &frame);
-        bench.run(SETTLE_TIME);
-        bench.rest = bench.angles();
-        bench.sag = Sag::default();
-        bench
+        arm.world.host_sends(arm.now, &frame);
+        arm.run(SETTLE_TIME);
+        arm.rest = arm.angles();
+        arm.sag = Sag::default();
+        arm
     }
 
     fn angles(&self) -> [i32; JOINTS] {
         Joint::ALL.map(|joint| self.world.plant().angle(joint))
     }
 
-    /// Lets time pass and samples the angles.
+    /// Simulates this time and samples the angles.
     fn run(&mut self, time: Duration) {
         let until = self.now + time;
         while self.now < until {
@@ -144,18 +144,18 @@ impl Bench {
         }
     }
 
-    fn bring_about(&mut self, failure: Failure) {
-        match failure {
-            Failure::WarmRestart => self.world.restart_controller(self.now),
-            Failure::Watchdog => {
+    fn inject(&mut self, cause: SagCause) {
+        match cause {
+            SagCause::WarmRestart => self.world.restart_controller(self.now),
+            SagCause::Watchdog => {
                 self.world.halt_controller(self.now);
                 self.run(WATCHDOG_TIME);
                 self.world.restart_controller(self.now);
             }
-            Failure::Panic => self.panic(),
-            Failure::Noise => self.noise(),
-            Failure::SilentServo => {
-                // Not one of its answers comes within the measurement.
+            SagCause::Panic => self.panic(),
+            SagCause::Noise => self.noise(),
+            SagCause::SilentServo => {
+                // No reply arrives before the end of the measurement.
                 self.world
                     .plant_mut()
                     .set_fault(FOREARM, Some(Fault::Late(Duration::from_millis(3_600_000))));
@@ -183,11 +183,11 @@ impl Bench {
     }
 
     fn noise(&mut self) {
-        let mut dice = Dice::new(1);
+        let mut rng = Dice::new(1);
         self.set_all_faults(Some(Fault::Garbled(1)));
         let until = self.now + DISTURBANCE_TIME;
         while self.now < until {
-            let noise = [(); NOISE_BYTES].map(|()| dice.byte());
+            let noise = [(); NOISE_BYTES].map(|()| rng.byte());
             self.world.plant_mut().bytes(self.now, &noise);
             self.run(SAMPLE_TIME);
         }
@@ -199,30 +199,30 @@ impl Bench {
     }
 }
 
-/// The sag over each failure.
+/// The sag for each failure.
 #[derive(Clone, Debug)]
-pub struct Table(pub Vec<(Failure, Sag)>);
+pub struct SagTable(pub Vec<(SagCause, Sag)>);
 
-impl Table {
-    /// Measures them all.
+impl SagTable {
+    /// Measures the sag for all failures.
     #[must_use]
     pub fn measure() -> Self {
-        Self(Failure::ALL.into_iter().map(|failure| (failure, Sag::over(failure))).collect())
+        Self(SagCause::ALL.into_iter().map(|cause| (cause, Sag::over(cause))).collect())
     }
 }
 
-impl Display for Table {
+impl Display for SagTable {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(out, "| failure | worst joint | joint 3 |\n| --- | --- | --- |")?;
-        for (failure, sag) in &self.0 {
+        for (cause, sag) in &self.0 {
             let forearm = degrees(sag.of(FOREARM));
-            write!(out, "\n| {} | {} | {forearm}° |", failure.name(), in_words(sag))?;
+            write!(out, "\n| {} | {} | {forearm}° |", cause.name(), worst_cell(sag))?;
         }
         Ok(())
     }
 }
 
-fn in_words(sag: &Sag) -> String {
+fn worst_cell(sag: &Sag) -> String {
     let worst = sag.worst();
     match sag.of(worst) {
         0 => "0.00°".to_owned(),
@@ -230,7 +230,7 @@ fn in_words(sag: &Sag) -> String {
     }
 }
 
-/// Degrees with two decimals, rounded up: a joint that moved at all shows it.
+/// Degrees with two decimals, rounded up, so that no motion is shown as 0.
 fn degrees(millidegrees: u32) -> String {
     let hundredths = millidegrees.div_ceil(10);
     format!("{}.{:02}", hundredths / 100, hundredths % 100)
@@ -240,29 +240,29 @@ fn degrees(millidegrees: u32) -> String {
 mod tests {
     use super::*;
 
-    /// In thousandths of a degree: a servo of the plant droops by less than this under the arm's weight.
-    const HOLDS_WITHIN: u32 = 100;
+    /// The droop of a joint under the weight of the arm is below this, in thousandths of a degree.
+    const MAX_DROOP: u32 = 100;
 
     #[test]
     fn an_arm_that_fails_holds_its_pose() {
-        for failure in [Failure::WarmRestart, Failure::Watchdog, Failure::Noise, Failure::SilentServo] {
-            let sag = Sag::over(failure);
-            assert!(sag.of(sag.worst()) <= HOLDS_WITHIN, "{failure:?}: {sag:?}");
+        for cause in [SagCause::WarmRestart, SagCause::Watchdog, SagCause::Noise, SagCause::SilentServo] {
+            let sag = Sag::over(cause);
+            assert!(sag.of(sag.worst()) <= MAX_DROOP, "{cause:?}: {sag:?}");
         }
     }
 
     #[test]
     fn an_arm_that_panics_sinks_and_is_caught() {
-        let sag = Sag::over(Failure::Panic);
+        let sag = Sag::over(SagCause::Panic);
         assert!((1..=350).contains(&sag.of(sag.worst())), "{sag:?}");
     }
 
     #[test]
     fn the_plant_shows_a_fall() {
-        let mut bench = Bench::new();
-        bench.world.plant_mut().restart_servo(bench.now, FOREARM);
-        bench.run(Duration::from_millis(500));
-        assert!(bench.sag.of(FOREARM) > 5_000, "{:?}", bench.sag);
+        let mut arm = PosedArm::new();
+        arm.world.plant_mut().restart_servo(arm.now, FOREARM);
+        arm.run(Duration::from_millis(500));
+        assert!(arm.sag.of(FOREARM) > 5_000, "{:?}", arm.sag);
     }
 
     #[test]

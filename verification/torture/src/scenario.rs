@@ -1,54 +1,59 @@
-//! The worlds there are: what goes wrong in them, and how often.
+//! The scenarios of worlds: which faults are injected, and how often.
 
 use protocol_core::time::Duration;
 
-/// Something that goes wrong.
+use InjectedFault::{
+    BusDisturbance, BusEcho, FlashWear, Hand, HostLinkCorruption, HostStopsReading, Panic, PowerCut,
+    PowerCutInSave, Restart, ServoFault, ServoRestart, ShellStall, Watchdog,
+};
+
+/// A fault to inject.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Trouble {
-    /// A servo goes missing, is late, garbled or stuck; or it is well again.
-    Servo,
-    /// A servo starts again.
-    Reset,
-    /// The servo bus is disturbed more, or less: lost, doubled, wrong, late bytes.
-    Bus,
-    /// The controller hears itself on the servo bus, or no longer.
-    Echo,
-    /// The host's line is disturbed more, or less.
-    Line,
-    /// The host does not read for a while.
-    Deaf,
-    /// The shell is late, by up to seconds.
-    Stall,
-    /// The power is cut, at once.
-    Cut,
-    /// The power is cut while settings are saved.
-    SaveCut,
-    /// The controller starts again; the servos keep their power.
+pub enum InjectedFault {
+    /// A servo becomes missing, late, garbled or stuck, or recovers.
+    ServoFault,
+    /// A servo restarts.
+    ServoRestart,
+    /// The rates of corrupted and delayed frames on the servo bus change.
+    BusDisturbance,
+    /// The servo bus starts or stops to echo the controller's bytes.
+    BusEcho,
+    /// The rate of corrupted requests changes.
+    HostLinkCorruption,
+    /// The host stops reading for up to 5 s.
+    HostStopsReading,
+    /// The shell stalls for up to 5 s.
+    ShellStall,
+    /// The power is cut.
+    PowerCut,
+    /// The power is cut during the next save.
+    PowerCutInSave,
+    /// The controller restarts. The servos keep their power.
     Restart,
-    /// The controller hangs until its watchdog restarts it; likewise.
+    /// The controller hangs until its watchdog restarts it. The servos keep their power.
     Watchdog,
-    /// The controller panics, damps the servos and starts again; likewise.
-    Fault,
-    /// A sector does not erase, or a cell does not program, from now on.
-    Wear,
-    /// Somebody turns a joint by hand.
+    /// The controller panics, damps the servos and restarts. The servos keep their power.
+    Panic,
+    /// A sector becomes unerasable, or a bit unprogrammable.
+    FlashWear,
+    /// A hand turns a joint.
     Hand,
 }
 
 /// A kind of world.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Scenario {
-    /// What it is called on the command line.
+    /// Its name on the command line.
     pub name: &'static str,
-    /// What happens in it.
-    pub about: &'static str,
-    /// One trouble in this time, on average.
-    pub every: Duration,
-    /// Which; what stands here twice happens twice as often.
-    pub troubles: &'static [Trouble],
-    /// How many of a thousand writes change settings.
+    /// Its description in the table of results.
+    pub description: &'static str,
+    /// The mean time between two faults.
+    pub mean_interval: Duration,
+    /// The faults, each with the same probability. A fault may be listed twice.
+    pub faults: &'static [InjectedFault],
+    /// Writes of settings in a thousand writes.
     pub settings_per_mille: u64,
-    /// How many of a hundred starts are cut.
+    /// Power cuts in a hundred starts.
     pub cut_starts_percent: u64,
 }
 
@@ -56,94 +61,96 @@ const fn seconds(seconds: u64) -> Duration {
     Duration::from_millis(seconds * 1_000)
 }
 
-/// All of them. Worlds take turns.
+const NO_FAULTS: Scenario = Scenario {
+    name: "",
+    description: "",
+    mean_interval: seconds(4),
+    faults: &[],
+    settings_per_mille: 20,
+    cut_starts_percent: 0,
+};
+
+/// All scenarios. Consecutive seeds select them in turn.
 pub static SCENARIOS: [Scenario; 8] = [
     Scenario {
         name: "calm",
-        about: "nothing goes wrong, and nothing may look as if it did",
-        every: seconds(600),
-        troubles: &[Trouble::Hand],
-        settings_per_mille: 20,
-        cut_starts_percent: 0,
+        description: "no faults, and none reported",
+        mean_interval: seconds(600),
+        faults: &[Hand],
+        ..NO_FAULTS
     },
     Scenario {
         name: "servos",
-        about: "servos missing, late, garbled, stuck, starting again, echoing, turned by hand",
-        every: seconds(4),
-        troubles: &[Trouble::Servo, Trouble::Servo, Trouble::Reset, Trouble::Echo, Trouble::Hand],
-        settings_per_mille: 20,
-        cut_starts_percent: 0,
+        description: "missing, late, garbled, stuck, restarting and echoing servos, joints turned by hand",
+        faults: &[ServoFault, ServoFault, ServoRestart, BusEcho, Hand],
+        ..NO_FAULTS
     },
     Scenario {
         name: "lines",
-        about: "lost, doubled, wrong and late bytes on both lines, a host that does not read",
-        every: seconds(4),
-        troubles: &[Trouble::Bus, Trouble::Line, Trouble::Line, Trouble::Deaf],
-        settings_per_mille: 20,
-        cut_starts_percent: 0,
+        description: "lost, doubled, wrong and late bytes on both lines, a host that does not read",
+        faults: &[BusDisturbance, HostLinkCorruption, HostLinkCorruption, HostStopsReading],
+        ..NO_FAULTS
     },
     Scenario {
         name: "stalls",
-        about: "the shell is late, by up to seconds",
-        every: seconds(2),
-        troubles: &[Trouble::Stall, Trouble::Stall, Trouble::Hand, Trouble::Servo],
-        settings_per_mille: 20,
-        cut_starts_percent: 0,
+        description: "stalls of the shell of up to 5 s",
+        mean_interval: seconds(2),
+        faults: &[ShellStall, ShellStall, Hand, ServoFault],
+        ..NO_FAULTS
     },
     Scenario {
         name: "holds",
-        about: "restarts, hangs and panics of the controller alone, a disturbed servo bus, silent servos",
-        every: seconds(3),
-        troubles: &[
-            Trouble::Restart,
-            Trouble::Restart,
-            Trouble::Watchdog,
-            Trouble::Fault,
-            Trouble::Bus,
-            Trouble::Servo,
-            Trouble::Servo,
-            Trouble::Reset,
-            Trouble::Hand,
+        description: "restarts, hangs and panics of the controller alone, a disturbed servo bus, silent servos",
+        mean_interval: seconds(3),
+        faults: &[
+            Restart,
+            Restart,
+            Watchdog,
+            Panic,
+            BusDisturbance,
+            ServoFault,
+            ServoFault,
+            ServoRestart,
+            Hand,
         ],
-        settings_per_mille: 20,
-        cut_starts_percent: 0,
+        ..NO_FAULTS
     },
     Scenario {
         name: "power",
-        about: "power cuts at any instant, in saves, in starts",
-        every: seconds(6),
-        troubles: &[Trouble::Cut, Trouble::SaveCut, Trouble::SaveCut, Trouble::Restart, Trouble::Hand],
+        description: "power cuts at any time, during saves and starts",
+        mean_interval: seconds(6),
+        faults: &[PowerCut, PowerCutInSave, PowerCutInSave, Restart, Hand],
         settings_per_mille: 400,
         cut_starts_percent: 30,
     },
     Scenario {
         name: "worn",
-        about: "power cuts, on a flash that wears out",
-        every: seconds(6),
-        troubles: &[Trouble::Cut, Trouble::SaveCut, Trouble::SaveCut, Trouble::Wear],
+        description: "power cuts, and a flash that wears out",
+        mean_interval: seconds(6),
+        faults: &[PowerCut, PowerCutInSave, PowerCutInSave, FlashWear],
         settings_per_mille: 400,
         cut_starts_percent: 30,
     },
     Scenario {
         name: "storm",
-        about: "everything at once",
-        every: seconds(2),
-        troubles: &[
-            Trouble::Servo,
-            Trouble::Servo,
-            Trouble::Reset,
-            Trouble::Bus,
-            Trouble::Echo,
-            Trouble::Line,
-            Trouble::Deaf,
-            Trouble::Stall,
-            Trouble::Stall,
-            Trouble::Cut,
-            Trouble::SaveCut,
-            Trouble::Restart,
-            Trouble::Watchdog,
-            Trouble::Fault,
-            Trouble::Hand,
+        description: "all faults",
+        mean_interval: seconds(2),
+        faults: &[
+            ServoFault,
+            ServoFault,
+            ServoRestart,
+            BusDisturbance,
+            BusEcho,
+            HostLinkCorruption,
+            HostStopsReading,
+            ShellStall,
+            ShellStall,
+            PowerCut,
+            PowerCutInSave,
+            Restart,
+            Watchdog,
+            Panic,
+            Hand,
         ],
         settings_per_mille: 100,
         cut_starts_percent: 20,
@@ -156,10 +163,10 @@ pub fn find(name: &str) -> Option<&'static Scenario> {
     SCENARIOS.iter().find(|scenario| scenario.name == name)
 }
 
-/// The scenario of a seed, where none was asked for.
+/// The scenario that a seed selects.
 #[must_use]
 pub fn of_seed(seed: u64) -> &'static Scenario {
-    let place = usize::try_from(seed % SCENARIOS.len() as u64).unwrap_or(0);
+    let index = usize::try_from(seed % SCENARIOS.len() as u64).unwrap_or(0);
     let [first, ..] = &SCENARIOS;
-    SCENARIOS.get(place).unwrap_or(first)
+    SCENARIOS.get(index).unwrap_or(first)
 }

@@ -1,4 +1,4 @@
-//! Parts of protocol-core's own tests that are of use from other seeds and inputs.
+//! Parts of protocol-core's tests, for other seeds and inputs.
 
 #[path = "../../../protocol-core/tests/disturbed_line/mod.rs"]
 pub(crate) mod disturbed_line;

@@ -1,8 +1,8 @@
-//! What must never happen, and did.
+//! Violated rules.
 
 use std::fmt::{self, Display};
 
-/// A rule that was broken, in words.
+/// The description of a violated rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Violation(pub String);
 
@@ -12,10 +12,10 @@ impl Display for Violation {
     }
 }
 
-/// What a check comes to.
+/// The result of a check.
 pub type Check<T = ()> = Result<T, Violation>;
 
-/// Breaks a rule, with `what` as the words, unless it `holds`.
+/// Returns a violation with the description `what`, unless the rule `holds`.
 ///
 /// # Errors
 /// The rule does not hold.

@@ -1,4 +1,4 @@
-//! Every input that the fuzzer found worth keeping is tried again, with no fuzzer.
+//! Runs every input of the fuzz corpora without a fuzzer.
 
 #![allow(clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
 
@@ -17,10 +17,10 @@ fn corpus(target: &str) -> Vec<PathBuf> {
 }
 
 #[test]
-fn nothing_in_the_corpora_breaks_a_rule() {
+fn no_input_of_the_corpora_violates_a_rule() {
     for (target, run) in TARGETS {
         let files = corpus(target);
-        assert!(files.len() >= 20, "{target} has a corpus of {}", files.len());
+        assert!(files.len() >= 20, "the corpus of {target} has {} inputs", files.len());
         for file in &files {
             let bytes = fs::read(file).unwrap();
             catch_unwind(AssertUnwindSafe(|| run(&bytes)))

@@ -2,9 +2,9 @@
 
 use crate::count::{self, Told};
 use crate::run::{Linked, Outcome, build_footprint, cargo};
-use crate::table::Column::{Left, Right};
-use crate::table::Table;
 use crate::{emulate, footprint};
+use torture::text_table::Column::{Left, Right};
+use torture::text_table::TextTable;
 
 /// The servers compared, each with the program that counts its instructions. Ours comes first.
 const CANDIDATES: &[(&str, &str)] = &[
@@ -31,7 +31,7 @@ fn print_chip(profile: &'static str) -> Outcome {
     let all = CANDIDATES.iter().map(|&(_, name)| costs(&Linked { name, profile }));
     let all: Vec<Costs> = all.collect::<Outcome<_>>()?;
     let names = CANDIDATES.iter().map(|&(name, _)| Right(name));
-    let mut table = Table::new([Left("")].into_iter().chain(names).chain([Right("ours / best")]));
+    let mut table = TextTable::new([Left("")].into_iter().chain(names).chain([Right("ours / best")]));
     for (what, ours) in all.first().into_iter().flatten() {
         let cost = |costs: &Costs| costs.iter().find(|(name, _)| name == what).and_then(|&(_, cost)| cost);
         let best = all.iter().skip(1).filter_map(cost).min();

@@ -14,8 +14,8 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use super::simulator::{Simulator, take_answer};
 use crate::count::frame;
 use crate::run::{Outcome, cargo, target_directory};
-use crate::table::Column::Right;
-use crate::table::Table;
+use torture::text_table::Column::Right;
+use torture::text_table::TextTable;
 
 /// How often a program is started.
 const STARTS: usize = 51;
@@ -100,7 +100,7 @@ fn print_arms(program: &Path) -> Outcome {
         "arms a core",
         "memory",
     ];
-    let mut table = Table::new(columns.map(Right));
+    let mut table = TextTable::new(columns.map(Right));
     let mut memory = Vec::new();
     for size in SIZES {
         let folder = tempfile::tempdir()?;

@@ -57,11 +57,6 @@ const ALLOWED: &[Allowed] = &[
         files: &["failure.rs", "output.rs"],
         reason: "a failure is printed by the output, whose errors are failures",
     },
-    Allowed {
-        folder: "verification/torture",
-        files: &["world/mod.rs", "world/power.rs", "world/trouble.rs"],
-        reason: "power cuts and faults change the world that schedules them",
-    },
 ];
 
 /// Checks every crate of the workspace.

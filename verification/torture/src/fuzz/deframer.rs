@@ -1,9 +1,9 @@
-//! The deframer against the slow model of the framing tests (D1 to D5), in two ways:
+//! The deframer against the simple model of the framing tests (D1 to D5), in two ways:
 //!
-//! - asked after every piece, it says the same as the model, in the same order;
-//! - asked late, or not to the end, while bytes wait for room, it says all that the model says of the stream
-//!   without its short silences, and nothing that does not stand in the stream. (Which frames inside a frame
-//!   come out then depends on when it was asked, as D4 has it.)
+//! - If frames are pulled after every piece, the deframer returns the results of the model in the same order.
+//! - If frames are pulled late, while bytes wait for room, the deframer returns at least the results of the model for the
+//!   stream without its short silences, and no result that the stream does not contain. Then it depends on the time of a
+//!   pull which frames inside a frame are returned (D4).
 
 use std::iter;
 
@@ -14,23 +14,23 @@ use protocol_core::wire::{Deframer, ToArm};
 
 const LONG_SILENCE_US: u64 = 100_000;
 
-/// What is tried.
+/// The input of a run.
 #[derive(Arbitrary, Debug)]
 pub struct Input<'a> {
-    steps: Vec<Step<'a>>,
+    steps: Vec<StreamStep<'a>>,
     piece: u8,
-    late: bool,
+    is_late: bool,
 }
 
 #[derive(Arbitrary, Debug)]
-enum Step<'a> {
+enum StreamStep<'a> {
     Bytes(&'a [u8]),
-    /// A header that may promise too much.
+    /// A header whose count may exceed the data.
     Header {
         function: u8,
         count: u8,
     },
-    /// A frame, whole or short of some bytes, right or with a wrong byte.
+    /// A frame, perhaps truncated or corrupted.
     Frame {
         is_write: bool,
         address: u8,
@@ -38,16 +38,12 @@ enum Step<'a> {
         missing: u8,
         damage: Option<(u8, u8)>,
     },
-    Silence {
-        half_millis: u8,
-    },
-    /// Only if asked late: somebody looks, this often.
-    Look {
-        times: u8,
-    },
+    SilenceHalfMillis(u8),
+    /// In late mode only: frames are pulled this often.
+    Pull(u8),
 }
 
-impl Step<'_> {
+impl StreamStep<'_> {
     fn event(&self) -> Option<Event> {
         let bytes = match *self {
             Self::Bytes(bytes) => bytes.to_vec(),
@@ -65,108 +61,109 @@ impl Step<'_> {
                 }
                 bytes
             }
-            Self::Silence { half_millis } => return Some(Event::Silence(u64::from(half_millis) * 500)),
-            Self::Look { .. } => return None,
+            Self::SilenceHalfMillis(time) => return Some(Event::Silence(u64::from(time) * 500)),
+            Self::Pull(_) => return None,
         };
         (!bytes.is_empty()).then_some(Event::Bytes(bytes))
     }
 }
 
-/// Tries it. Panics where something does not hold.
+/// Runs the deframer. Panics if its results differ from the model.
 pub fn run(input: &Input<'_>) {
-    if input.late {
-        asked_late(&input.steps);
+    if input.is_late {
+        pull_late(&input.steps);
     } else {
-        asked_at_once(&input.steps, usize::from(input.piece).max(1));
+        pull_at_once(&input.steps, usize::from(input.piece).max(1));
     }
 }
 
-fn asked_at_once(steps: &[Step<'_>], piece: usize) {
-    let events: Vec<Event> = steps.iter().filter_map(Step::event).collect();
+fn pull_at_once(steps: &[StreamStep<'_>], piece: usize) {
+    let events: Vec<Event> = steps.iter().filter_map(StreamStep::event).collect();
     let mut model = Model::default();
     let expected: Vec<Received> = events.iter().flat_map(|event| model.take(event)).collect();
     assert_eq!(receive::<ToArm>(&events, piece), expected);
 }
 
-fn asked_late(steps: &[Step<'_>]) {
-    let mut line = Line::new();
+fn pull_late(steps: &[StreamStep<'_>]) {
+    let mut line = LateReader::new();
     for step in steps {
         match (step, step.event()) {
             (_, Some(Event::Bytes(bytes))) => line.waiting.extend(bytes),
             (_, Some(Event::Silence(micros))) => line.now_us += micros,
-            (Step::Look { times }, None) => line.look((*times).into()),
+            (StreamStep::Pull(times), None) => line.pull_frames((*times).into()),
             _ => {}
         }
-        line.offer();
+        line.deliver();
     }
     line.end();
     line.check();
 }
 
-/// A line with a deframer at its end, and bytes that wait for room in it.
-struct Line {
+/// A deframer from which frames are pulled late, and bytes that wait for room in it.
+struct LateReader {
     deframer: Deframer<ToArm>,
     waiting: Vec<u8>,
     now_us: u64,
     last_byte_us: u64,
-    said: Vec<Received>,
-    /// Sees the long silences only.
+    returned: Vec<Received>,
+    /// The model receives the long silences only.
     model: Model,
-    due: Vec<Received>,
+    expected: Vec<Received>,
 }
 
-impl Line {
+impl LateReader {
     fn new() -> Self {
         Self {
             deframer: Deframer::new(Duration::from_micros(GAP_US)),
             waiting: Vec::new(),
             now_us: 0,
             last_byte_us: 0,
-            said: Vec::new(),
+            returned: Vec::new(),
             model: Model::default(),
-            due: Vec::new(),
+            expected: Vec::new(),
         }
     }
 
-    /// Hands over what waits, or the silence.
-    fn offer(&mut self) {
+    /// Passes the waiting bytes, or the silence, to the deframer.
+    fn deliver(&mut self) {
         let taken = self.deframer.push(Instant::from_micros(self.now_us), &self.waiting);
         if !self.waiting.is_empty() {
             self.last_byte_us = self.now_us;
             let bytes = self.waiting.drain(..taken).collect::<Vec<_>>();
             if taken > 0 {
-                self.due.extend(self.model.take(&Event::Bytes(bytes)));
+                self.expected.extend(self.model.take(&Event::Bytes(bytes)));
             }
         } else if self.now_us - self.last_byte_us >= LONG_SILENCE_US {
-            self.due.extend(self.model.take(&Event::Silence(LONG_SILENCE_US)));
+            self.expected.extend(self.model.take(&Event::Silence(LONG_SILENCE_US)));
         }
     }
 
-    fn look(&mut self, times: usize) {
-        self.said.extend(iter::from_fn(|| pull(&mut self.deframer)).take(times));
+    fn pull_frames(&mut self, times: usize) {
+        self.returned.extend(iter::from_fn(|| pull(&mut self.deframer)).take(times));
     }
 
     fn end(&mut self) {
         while !self.waiting.is_empty() {
-            drain(&mut self.deframer, &mut self.said);
-            self.offer();
+            drain(&mut self.deframer, &mut self.returned);
+            self.deliver();
         }
-        drain(&mut self.deframer, &mut self.said);
+        drain(&mut self.deframer, &mut self.returned);
         self.now_us += LONG_SILENCE_US;
-        self.offer();
-        drain(&mut self.deframer, &mut self.said);
+        self.deliver();
+        drain(&mut self.deframer, &mut self.returned);
     }
 
     fn check(&self) {
         let everything = self.model.everything();
-        let count = |list: &[Received], what: &Received| list.iter().filter(|said| *said == what).count();
-        for what in iter::chain(&self.said, &self.due) {
-            let (least, said) = (count(&self.due, what), count(&self.said, what));
-            let most = count(&everything, what);
+        let count =
+            |list: &[Received], result: &Received| list.iter().filter(|returned| *returned == result).count();
+        for result in iter::chain(&self.returned, &self.expected) {
+            let (min, returned) = (count(&self.expected, result), count(&self.returned, result));
+            let max = count(&everything, result);
             assert!(
-                (least..=most).contains(&said),
-                "{what:?} was said {said} times, not {least} to {most}: {:?}",
-                self.said
+                (min..=max).contains(&returned),
+                "{result:?} was returned {returned} times, not {min} to {max}: {:?}",
+                self.returned
             );
         }
     }

@@ -1,5 +1,5 @@
-//! What the host tools make of the bytes an arm may send: frames, snapshots, words. All of it but the port. And
-//! of what a user may type for a register.
+//! The host library with any bytes from the arm: frames, snapshots and names of registers. Also any text for the name of a
+//! register.
 
 use arbitrary::Arbitrary;
 use protocol_core::request::Reply;
@@ -8,18 +8,18 @@ use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
 use sevenbot::map::find;
 use sevenbot::{Snapshot, names, words};
 
-/// What came, cut into pieces of this size; and what was typed.
+/// Bytes in pieces of this size, and a text.
 #[derive(Arbitrary, Debug)]
 pub struct Input<'a> {
     piece: u8,
-    sent: Vec<Sent<'a>>,
+    sent: Vec<SentBytes<'a>>,
     text: &'a str,
 }
 
 #[derive(Arbitrary, Debug)]
-enum Sent<'a> {
+enum SentBytes<'a> {
     Bytes(&'a [u8]),
-    /// A reply, whole or short of some bytes, right or with a wrong byte.
+    /// A reply, perhaps truncated or corrupted.
     Reply {
         address: u8,
         values: &'a [u8],
@@ -28,7 +28,7 @@ enum Sent<'a> {
     },
 }
 
-impl Sent<'_> {
+impl SentBytes<'_> {
     fn bytes(&self) -> Vec<u8> {
         let (address, values, missing, damage) = match *self {
             Self::Bytes(bytes) => return bytes.to_vec(),
@@ -46,12 +46,12 @@ impl Sent<'_> {
     }
 }
 
-/// Tries it. Panics where something does not hold.
+/// Runs the library. Panics if an invariant is violated.
 pub fn run(input: &Input<'_>) {
     let Input { piece, sent, text } = input;
-    let bytes: Vec<u8> = sent.iter().flat_map(Sent::bytes).collect();
+    let bytes: Vec<u8> = sent.iter().flat_map(SentBytes::bytes).collect();
     let in_pieces = snapshots(&bytes, usize::from(*piece).max(1));
-    assert_eq!(in_pieces, snapshots(&bytes, bytes.len().max(1)), "any cutting gives the same");
+    assert_eq!(in_pieces, snapshots(&bytes, bytes.len().max(1)), "the size of the pieces has no effect");
     in_pieces.iter().for_each(check);
     if let Ok(span) = names::parse(text) {
         assert!(usize::from(span.address()) + usize::from(span.count()) <= 256, "{text}: {span}");
@@ -69,7 +69,7 @@ fn snapshots(bytes: &[u8], piece: usize) -> Vec<Snapshot> {
             pull(&mut deframer, &mut snapshots);
         }
     }
-    // The gap, then the silence after which a frame is given up.
+    // The gap, then the timeout of a frame.
     for millis in [2, 100] {
         deframer.push(Instant::ZERO + Duration::from_millis(millis), &[]);
         pull(&mut deframer, &mut snapshots);
@@ -91,13 +91,12 @@ fn check(snapshot: &Snapshot) {
     assert!(usize::from(span.address()) + usize::from(span.count()) <= 256, "{span}");
     let mut again = FrameBuffer::new();
     Reply { address: snapshot.address, values: &snapshot.values }.encode(&mut again);
-    assert_eq!(snapshots(&again, again.len()), std::slice::from_ref(snapshot), "what was heard can be said");
+    assert_eq!(snapshots(&again, again.len()), std::slice::from_ref(snapshot), "parse after encode");
     assert_eq!(words::raw_entries(snapshot).len(), snapshot.values.len());
     check_names(snapshot);
 }
 
-/// Every register of the snapshot is shown, alone or with the others of its row, and by a name that the tools
-/// take for it.
+/// Every register of the snapshot has an entry, alone or for its whole row. The library parses the entry's name.
 fn check_names(snapshot: &Snapshot) {
     let mut entries = words::entries(snapshot).into_iter().peekable();
     let mut row = None;
@@ -107,7 +106,7 @@ fn check_names(snapshot: &Snapshot) {
             let named = names::parse(&entry.name).map_or(address, |span| span.address());
             assert_eq!(named, address, "{}", entry.name);
         } else {
-            assert!(row.is_some_and(|row| row.holds(address)), "{address} is not shown");
+            assert!(row.is_some_and(|row| row.holds(address)), "{address} has no entry");
         }
     }
     assert_eq!(entries.next(), None);

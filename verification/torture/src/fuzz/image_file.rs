@@ -1,5 +1,5 @@
-//! The simulator's settings image with any content: it is refused and left alone, or it serves settings that
-//! are in range (D19), the same after every start, and takes new ones.
+//! The simulator's settings image with any content. It is refused and not changed, or its settings are in range (D19), the
+//! same after every start, and can be replaced.
 
 use std::fs;
 use std::path::Path;
@@ -15,28 +15,28 @@ use tempfile::NamedTempFile;
 static FILE: LazyLock<NamedTempFile> = LazyLock::new(|| NamedTempFile::new_in("/dev/shm").expect("a file"));
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// What is tried.
+/// The input of a run.
 #[derive(Arbitrary, Debug)]
 pub struct Input<'a> {
     filled_with: u8,
-    patches: Vec<Patch<'a>>,
-    /// By how much it is too short.
+    patches: Vec<ImagePatch<'a>>,
+    /// The number of missing bytes.
     missing: u8,
     next: [u8; Image::LENGTH],
 }
 
 #[derive(Arbitrary, Debug)]
-enum Patch<'a> {
+enum ImagePatch<'a> {
     Bytes {
         at: u16,
         bytes: &'a [u8],
     },
-    /// The mark of a sector that was blank.
+    /// The mark of a blank sector.
     Mark {
         is_second: bool,
         generation: u32,
     },
-    /// A slot with a right checksum, sealed or not.
+    /// A slot with a valid checksum, sealed or not.
     Record {
         at: u16,
         generation: u32,
@@ -48,7 +48,7 @@ enum Patch<'a> {
     },
 }
 
-/// Tries it. Panics where something does not hold.
+/// Opens the image. Panics if an invariant is violated.
 pub fn run(input: &Input<'_>) {
     let bytes = content(input);
     fs::write(FILE.path(), &bytes).expect("a file can be written");
@@ -56,7 +56,7 @@ pub fn run(input: &Input<'_>) {
         Err(ImageError::NotAnImage { .. }) => assert_ne!(bytes.len(), SIZE),
         Err(ImageError::Damaged(_)) => assert!(fs::read(FILE.path()).is_ok_and(|now| now == bytes)),
         Err(other) => panic!("{other}"),
-        Ok(settings) => live(settings, input.next),
+        Ok(settings) => check_store(settings, input.next),
     }
 }
 
@@ -66,9 +66,9 @@ fn start(path: &Path) -> Result<FileSettings, ImageError> {
     Ok(Settings::open(Eeprom::File(path.to_owned()).open(None)?))
 }
 
-fn live(mut settings: FileSettings, next: [u8; Image::LENGTH]) {
+fn check_store(mut settings: FileSettings, next: [u8; Image::LENGTH]) {
     check_settings(settings.found());
-    // Two blank sectors are where a first save goes; whatever else is there, a start makes room.
+    // The first save goes into blank sectors. Otherwise the start has made room.
     assert_eq!(settings.storage(), Storage::Ready);
     let found = settings.found().copied();
     settings = restart(settings, found);
@@ -78,7 +78,7 @@ fn live(mut settings: FileSettings, next: [u8; Image::LENGTH]) {
 }
 
 fn restart(settings: FileSettings, expected: Option<Image>) -> FileSettings {
-    // The image is locked for as long as it is open.
+    // An open image is locked.
     drop(settings);
     match start(FILE.path()) {
         Ok(settings) => {
@@ -89,7 +89,7 @@ fn restart(settings: FileSettings, expected: Option<Image>) -> FileSettings {
     }
 }
 
-/// What the arm makes of what was stored.
+/// Checks the settings in the registers after a start.
 fn check_settings(stored: Option<&Image>) {
     let file = RegisterFile::new([0; 6], stored);
     for row in MAP.iter().filter(|row| row.region == Region::Eeprom) {
@@ -106,18 +106,18 @@ fn content(input: &Input<'_>) -> Vec<u8> {
         vec![if input.filled_with.is_multiple_of(4) { ERASED } else { input.filled_with }; SIZE];
     for patch in &input.patches {
         match patch {
-            Patch::Bytes { at, bytes } => put(&mut content, usize::from(*at) % SIZE, bytes),
-            Patch::Mark { is_second, generation } => {
+            ImagePatch::Bytes { at, bytes } => put(&mut content, usize::from(*at) % SIZE, bytes),
+            ImagePatch::Mark { is_second, generation } => {
                 let mark = CRC.checksum(&generation.to_le_bytes()).to_le_bytes();
                 put(&mut content, usize::from(*is_second) * SECTOR_SIZE, &mark);
             }
-            Patch::Record { at, generation, settings, is_sealed } => {
+            ImagePatch::Record { at, generation, settings, is_sealed } => {
                 let mut slot = [generation.to_le_bytes().as_slice(), settings].concat();
                 slot.extend(CRC.checksum(&slot).to_le_bytes());
                 slot.extend(if *is_sealed { [0x5E, 0xA1, 0xC3, 0x96] } else { [ERASED; 4] });
                 put(&mut content, usize::from(*at) * 32 % SIZE, &slot);
             }
-            Patch::Flip { bit } => content[*bit as usize / 8 % SIZE] ^= 1 << (bit % 8),
+            ImagePatch::Flip { bit } => content[*bit as usize / 8 % SIZE] ^= 1 << (bit % 8),
         }
     }
     content.truncate(SIZE - usize::from(input.missing % 8 == 7));

@@ -1,43 +1,43 @@
-//! The settings' journal through power cycles of any kind, cut at any step in any way (D19), on the strict
-//! flash: what must hold is what the journal's own tests check in every power cycle.
+//! The journal of the settings with any power cuts (D19), on the strict flash model. The invariants are those of the
+//! journal's own tests.
 
 use crate::shared::journal_world::World;
 use arbitrary::Arbitrary;
 use flash_model::{Cut, EraseTear, ProgramTear};
 
-/// What is tried.
+/// The input of a run.
 #[derive(Arbitrary, Debug)]
 pub struct Input {
-    size: Size,
-    cycles: Vec<Cycle>,
+    size: SectorSize,
+    cycles: Vec<PowerCycle>,
 }
 
-/// Of a sector. Small ones are full sooner.
+/// The size of a sector. A small one is full sooner.
 #[derive(Arbitrary, Debug)]
-enum Size {
+enum SectorSize {
     Bytes512,
     Bytes1024,
     Bytes2048,
 }
 
 #[derive(Arbitrary, Debug)]
-struct Cycle {
+struct PowerCycle {
     saves: u8,
-    cut: Option<PowerCut>,
-    /// Decides how half programmed cells read at the start.
+    cut: Option<CutInput>,
+    /// Decides how marginal bits read at the start.
     reads_as: u8,
 }
 
 #[derive(Arbitrary, Debug)]
-struct PowerCut {
+struct CutInput {
     after: u8,
     program: u8,
     erase: u8,
     seed: u8,
 }
 
-impl From<&PowerCut> for Cut {
-    fn from(cut: &PowerCut) -> Self {
+impl From<&CutInput> for Cut {
+    fn from(cut: &CutInput) -> Self {
         Self {
             after: cut.after.into(),
             program: ProgramTear::ALL[usize::from(cut.program) % ProgramTear::ALL.len()],
@@ -47,18 +47,18 @@ impl From<&PowerCut> for Cut {
     }
 }
 
-/// Tries it. Panics where something does not hold.
+/// Runs the power cycles. Panics if an invariant is violated.
 pub fn run(input: &Input) {
     match input.size {
-        Size::Bytes512 => live::<512>(&input.cycles),
-        Size::Bytes1024 => live::<1_024>(&input.cycles),
-        Size::Bytes2048 => live::<2_048>(&input.cycles),
+        SectorSize::Bytes512 => run_cycles::<512>(&input.cycles),
+        SectorSize::Bytes1024 => run_cycles::<1_024>(&input.cycles),
+        SectorSize::Bytes2048 => run_cycles::<2_048>(&input.cycles),
     }
 }
 
-fn live<const SECTOR: usize>(cycles: &[Cycle]) {
+fn run_cycles<const SECTOR: usize>(cycles: &[PowerCycle]) {
     let mut world = World::<SECTOR>::new();
-    for Cycle { saves, cut, reads_as } in cycles {
+    for PowerCycle { saves, cut, reads_as } in cycles {
         world.seed ^= u64::from(*reads_as);
         world.cycle(usize::from(saves % 32), cut.as_ref().map(Cut::from));
     }

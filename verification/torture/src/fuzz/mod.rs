@@ -1,7 +1,7 @@
-//! What the fuzzer tries: each target makes something of its input, and panics where a rule does not hold.
+//! The fuzz targets. Each runs its input and panics if an invariant is violated.
 //!
-//! `verification/fuzz/` feeds them from the fuzzer. [`TARGETS`] feeds them from files, with no fuzzer and any compiler: so
-//! the corpora are a test like any other.
+//! `verification/fuzz/` passes the inputs of the fuzzer. [`TARGETS`] passes the inputs in files, so that the corpora are a
+//! test for any compiler.
 
 use arbitrary::{Arbitrary, Unstructured};
 
@@ -12,10 +12,10 @@ pub mod image_file;
 pub mod journal;
 pub mod register_ops;
 
-/// A target by its name, and what tries the bytes of a corpus file on it.
+/// The name of a target, and a function that runs the bytes of a corpus file.
 pub type Target = (&'static str, fn(&[u8]));
 
-/// All of them.
+/// All targets.
 pub const TARGETS: [Target; 6] = [
     ("controller", |bytes| feed(bytes, |input| controller::run(&input))),
     ("deframer", |bytes| feed(bytes, |input| deframer::run(&input))),
@@ -25,7 +25,7 @@ pub const TARGETS: [Target; 6] = [
     ("register_ops", |bytes| feed(bytes, |input| register_ops::run(&input))),
 ];
 
-/// Makes of the bytes what the fuzzer makes of them.
+/// Makes the input from the bytes in the same way as the fuzzer.
 fn feed<'a, T: Arbitrary<'a>>(bytes: &'a [u8], run: impl FnOnce(T)) {
     if let Ok(input) = T::arbitrary_take_rest(Unstructured::new(bytes)) {
         run(input);

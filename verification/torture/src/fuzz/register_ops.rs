@@ -1,18 +1,17 @@
-//! The register file against a model written from `docs/protocol.md`, section 3, and from nothing else: its own
-//! table, in which every address stands as a number.
+//! The register file against a model with its own table, written from `docs/protocol.md`, section 3, alone.
 
 use arbitrary::Arbitrary;
 use protocol_core::registers::map::{FRAMES_ACCEPTED, FRAMES_CORRUPTED};
 use protocol_core::registers::{Image, RegisterFile};
 
-/// What happens to the registers.
+/// The input of a run.
 #[derive(Arbitrary, Debug)]
 pub struct Input<'a> {
-    steps: Vec<Step<'a>>,
+    steps: Vec<RegisterStep<'a>>,
 }
 
 #[derive(Arbitrary, Debug)]
-enum Step<'a> {
+enum RegisterStep<'a> {
     Write {
         address: u8,
         values: &'a [u8],
@@ -21,7 +20,7 @@ enum Step<'a> {
         address: u8,
         count: u8,
     },
-    /// The arm sets a measured value, or counts.
+    /// The arm sets a measured value.
     Measure {
         joint: u8,
         degrees: u8,
@@ -30,19 +29,19 @@ enum Step<'a> {
         corrupted: bool,
         times: u16,
     },
-    /// Off and on, with the settings saved.
+    /// A restart with the saved settings.
     Restart {
         chip_id: [u8; 6],
     },
-    /// Off and on, with settings from a flash gone bad.
+    /// A restart with the settings of a faulty flash.
     RestartWith {
         stored: [u8; Image::LENGTH],
     },
 }
 
-/// Tries it. Panics where something does not hold.
+/// Runs the operations. Panics if the register file differs from the model.
 pub fn run(input: &Input<'_>) {
-    let mut arm = Pair::new([0; 6], &[0xFF; Image::LENGTH]);
+    let mut arm = FileAndModel::new([0; 6], &[0xFF; Image::LENGTH]);
     for step in &input.steps {
         arm.step(step);
     }
@@ -50,36 +49,39 @@ pub fn run(input: &Input<'_>) {
     assert_eq!(arm.file.get(255), arm.model.0[255]);
 }
 
-/// The file, and what should be in it.
-struct Pair {
+/// The register file and its model.
+struct FileAndModel {
     file: RegisterFile,
-    model: Model,
+    model: TableModel,
 }
 
-impl Pair {
+impl FileAndModel {
     fn new(chip_id: [u8; 6], stored: &[u8; Image::LENGTH]) -> Self {
-        Self { file: RegisterFile::new(chip_id, Some(&Image(*stored))), model: Model::new(chip_id, stored) }
+        Self {
+            file: RegisterFile::new(chip_id, Some(&Image(*stored))),
+            model: TableModel::new(chip_id, stored),
+        }
     }
 
-    fn step(&mut self, step: &Step<'_>) {
+    fn step(&mut self, step: &RegisterStep<'_>) {
         match *step {
-            Step::Write { address, values } => self.write(address, &values[..values.len().min(255)]),
-            Step::Read { address, count } => {
+            RegisterStep::Write { address, values } => self.write(address, &values[..values.len().min(255)]),
+            RegisterStep::Read { address, count } => {
                 let start = usize::from(address);
                 let expected = self.model.0.get(start..start + usize::from(count)).unwrap_or(&[]);
                 assert_eq!(self.file.read(address, count), expected);
             }
-            Step::Measure { joint, degrees } => {
+            RegisterStep::Measure { joint, degrees } => {
                 self.file.set(54 + joint % 7, degrees);
                 self.model.0[usize::from(54 + joint % 7)] = degrees;
             }
-            Step::Count { corrupted, times } => self.count(corrupted, times % 300),
-            Step::Restart { chip_id } => {
+            RegisterStep::Count { corrupted, times } => self.count(corrupted, times % 300),
+            RegisterStep::Restart { chip_id } => {
                 let Image(stored) = self.file.image();
                 assert_eq!(stored, self.model.settings());
                 *self = Self::new(chip_id, &stored);
             }
-            Step::RestartWith { stored } => *self = Self::new([9; 6], &stored),
+            RegisterStep::RestartWith { stored } => *self = Self::new([9; 6], &stored),
         }
     }
 
@@ -93,7 +95,7 @@ impl Pair {
                 return;
             }
         };
-        let after = expected.expect("a write that the table refuses");
+        let after = expected.expect("the model refuses this write");
         let changes = (8..=27_u8).find(|&at| after.0[usize::from(at)] != self.model.0[usize::from(at)]);
         assert_eq!(self.file.first_changed_setting(&accepted), changes);
         let end = usize::from(address) + values.len();
@@ -114,11 +116,11 @@ impl Pair {
     }
 }
 
-/// All 256 values.
+/// The values of all 256 registers.
 #[derive(Clone)]
-struct Model([u8; 256]);
+struct TableModel([u8; 256]);
 
-impl Model {
+impl TableModel {
     fn new(chip_id: [u8; 6], stored: &[u8; Image::LENGTH]) -> Self {
         let mut values = [0; 256];
         values[..2].copy_from_slice(&[7, 30]);
@@ -143,7 +145,7 @@ impl Model {
         }
     }
 
-    /// All values after a write, or the register that refuses it (D15 to D17).
+    /// The values after a write, or the first register that is out of range (D15 to D17).
     fn after(&self, address: u8, values: &[u8]) -> Result<Self, u8> {
         let mut after = self.clone();
         for (at, &value) in (address..=255).zip(values).filter(|(at, _)| self.takes_effect(*at)) {
@@ -160,7 +162,7 @@ impl Model {
     }
 }
 
-/// The column "range" of the registers that can be written.
+/// The column "range" of the writable registers.
 fn is_in_range(address: u8, value: u8) -> bool {
     let max = match address {
         12 => 7,

@@ -1,4 +1,4 @@
-//! How much memory another process holds, and how that changes. Linux: reads `/proc`.
+//! The memory of another process over time, from `/proc` of Linux.
 
 use std::fmt::{self, Display};
 use std::fs;
@@ -8,17 +8,17 @@ use std::fs;
 pub(super) struct Memory {
     first: Option<u64>,
     last: u64,
-    most: u64,
+    max: u64,
 }
 
 impl Memory {
-    /// Looks at a process. One that is gone changes nothing.
-    pub(super) fn look(&mut self, pid: u32) {
+    /// Adds a measurement. A process that has ended changes nothing.
+    pub(super) fn measure(&mut self, pid: u32) {
         let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
         let Some(resident) = resident_kib(&status) else { return };
         self.first.get_or_insert(resident);
         self.last = resident;
-        self.most = self.most.max(resident);
+        self.max = self.max.max(resident);
     }
 }
 
@@ -30,8 +30,8 @@ fn resident_kib(status: &str) -> Option<u64> {
 impl Display for Memory {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.first {
-            None => write!(out, "not watched"),
-            Some(first) => write!(out, "{first} KiB at first, {} at last, {} at most", self.last, self.most),
+            None => write!(out, "not measured"),
+            Some(first) => write!(out, "{first} KiB at first, {} at last, {} at most", self.last, self.max),
         }
     }
 }
@@ -41,16 +41,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn this_process_holds_memory_and_one_that_is_not_there_does_not() {
+    fn only_a_running_process_is_measured() {
         let mut memory = Memory::default();
-        memory.look(u32::MAX);
-        assert_eq!(memory.to_string(), "not watched");
-        memory.look(std::process::id());
-        assert!(memory.first.is_some_and(|kib| kib > 0 && kib == memory.last && kib == memory.most));
+        memory.measure(u32::MAX);
+        assert_eq!(memory.to_string(), "not measured");
+        memory.measure(std::process::id());
+        assert!(memory.first.is_some_and(|kib| kib > 0 && kib == memory.last && kib == memory.max));
     }
 
     #[test]
-    fn the_resident_memory_is_one_line_of_many() {
+    fn the_resident_memory_is_read_from_its_line() {
         assert_eq!(resident_kib("VmHWM:\t  20 kB\nVmRSS:\t   1234 kB\n"), Some(1_234));
         assert_eq!(resident_kib("VmRSS:\t   many kB\n"), None);
     }

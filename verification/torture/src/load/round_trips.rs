@@ -1,14 +1,14 @@
-//! How long answers took: the median and the worst of very many, in little memory.
+//! A histogram of round-trip times. Its size does not depend on their number.
 
 use std::fmt::{self, Display};
 use std::time::Duration;
 
-/// The resolution, in microseconds.
+/// The width of a bucket in microseconds.
 const BUCKET_MICROS: u128 = 10;
-/// What took longer than this many buckets (a second) counts as the last one.
+/// The number of buckets. The last one, at a second, also counts longer times.
 const BUCKETS: usize = 100_000;
 
-/// A histogram of round trips.
+/// The round trips of a load.
 #[derive(Debug)]
 pub(super) struct RoundTrips {
     counts: Vec<u64>,
@@ -28,7 +28,7 @@ impl RoundTrips {
         self.worst = self.worst.max(took);
     }
 
-    /// So many thousandths of all round trips took no longer than this, in milliseconds.
+    /// The time in milliseconds that this many thousandths of the round trips do not exceed.
     fn quantile_ms(&self, thousandths: u64) -> f64 {
         let rank = self.counts.iter().sum::<u64>() * thousandths / 1_000;
         let mut seen = 0;
@@ -44,9 +44,9 @@ impl RoundTrips {
 
 impl Display for RoundTrips {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (median, most) = (self.quantile_ms(500), self.quantile_ms(999));
+        let (median, p999) = (self.quantile_ms(500), self.quantile_ms(999));
         let worst = self.worst.as_secs_f64() * 1_000.0;
-        write!(out, "median {median:.2} ms, 99.9 % within {most:.2} ms, worst {worst:.2} ms")
+        write!(out, "median {median:.2} ms, 99.9 % within {p999:.2} ms, worst {worst:.2} ms")
     }
 }
 
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_median_stands_in_the_middle_and_the_worst_is_exact() {
+    fn quantiles_are_rounded_to_buckets_and_the_worst_time_is_exact() {
         let mut trips = RoundTrips::default();
         assert_eq!(trips.to_string(), "median 0.00 ms, 99.9 % within 0.00 ms, worst 0.00 ms");
         (1..=99).for_each(|millis| trips.add(Duration::from_millis(millis)));

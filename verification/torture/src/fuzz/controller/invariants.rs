@@ -1,5 +1,5 @@
-//! What must hold whatever happens: replies tell the registers, the arm never jumps and is never driven where it
-//! must not be, the valve is never held, and the status block tells the truth.
+//! The invariants: replies match the registers, goals do not jump, torque is off outside motor state servo, the valve
+//! closes, and the status block is right.
 
 use motion_core::calibration::{MicroDegrees, angle_from_counts};
 use motion_core::servo_bus::Torque;
@@ -10,45 +10,45 @@ use protocol_core::registers::map::{
 use protocol_core::registers::{Access, Image, Joint, MAP, RegisterFile};
 use protocol_core::wire::frame::{Function, ParseOutcome, ToHost, parse};
 
-use super::servos::Command;
+use super::ideal_servos::ServoCommand;
 
-/// Counts of the largest step of a control cycle at a speed of 1, and at the motor's maximum: 0.019 and 3.72
-/// degrees at 850 / 180 counts a degree.
+/// Counts of the largest step in a control cycle: per unit of speed (0.019 degrees) and for the motor (3.72 degrees), at
+/// 850 / 180 counts per degree.
 const COUNTS_PER_SPEED: f64 = 0.019 * 850.0 / 180.0;
-const MOST_COUNTS: f64 = 3.72 * 850.0 / 180.0;
+const MAX_COUNTS: f64 = 3.72 * 850.0 / 180.0;
 const CYCLE_US: u64 = 10_000;
 const VALVE_TIME_US: u64 = 500_000;
 
 #[derive(Clone, Copy, Default)]
-struct Joints {
-    /// The goal that the servo follows, since when, and since how many calls; `None` while its torque is off.
+struct JointGoal {
+    /// The goal of the servo, its time, and the number of polls at that time; `None` while its torque is off.
     goal: Option<(u16, u64, u32)>,
-    /// The fastest it may have been told to go since then, in counts a cycle.
-    fastest: f64,
+    /// The highest speed since then, in counts per cycle.
+    max_speed: f64,
 }
 
-pub struct Watch {
+pub struct InvariantChecker {
     config: Config,
     storage: Storage,
-    /// What the storage was last given.
+    /// The settings in the storage.
     pub settings: Image,
     calls: u32,
-    joints: [Joints; 7],
+    joints: [JointGoal; 7],
     is_driven: [bool; 7],
-    /// Since when the motor state has been another than servo.
+    /// The time since which the motor state is not servo.
     released_at: Option<u64>,
     valve_opened_at: Option<u64>,
     vacuum: Vacuum,
 }
 
-impl Watch {
+impl InvariantChecker {
     pub fn new(config: Config, storage: Storage, registers: &RegisterFile) -> Self {
         Self {
             config,
             storage,
             settings: registers.image(),
             calls: 0,
-            joints: [Joints::default(); 7],
+            joints: [JointGoal::default(); 7],
             is_driven: [false; 7],
             released_at: None,
             valve_opened_at: None,
@@ -56,44 +56,44 @@ impl Watch {
         }
     }
 
-    /// Replies are whole frames, and tell the registers as they are.
-    pub fn told_host(&self, bytes: &[u8], registers: &RegisterFile) {
+    /// A frame to the host is complete, and its values are those of the registers.
+    pub fn frame_to_host(&self, bytes: &[u8], registers: &RegisterFile) {
         let ParseOutcome::Complete(reply, length) = parse::<ToHost>(bytes) else {
             panic!("{bytes:?} is not a frame")
         };
         assert!(length == bytes.len() && reply.function == Function::Read);
         assert_eq!(reply.data, registers.read(reply.address, reply.count));
-        assert!(registers.image() == self.settings, "answered before the settings were saved");
+        assert!(registers.image() == self.settings, "a reply before the settings were saved");
     }
 
-    /// `positions` are those of the servos' last answers, in counts.
-    pub fn told_servos(
+    /// Checks a command to the servos. `positions` are those of their last replies, in counts.
+    pub fn command_to_servos(
         &mut self,
         now_us: u64,
-        command: &Command,
+        command: &ServoCommand,
         registers: &RegisterFile,
         positions: &[u16; 7],
     ) {
         match command {
-            Command::Ask(id, _) => assert!(*id < 7),
-            Command::Torque(codes) => self.told_torque(codes, registers),
-            Command::Goals(goals) => {
-                assert_eq!(registers.get(MOTOR_STATE.address), motor_state::SERVO, "driven in state 0 or 2");
+            ServoCommand::Read(id, _) => assert!(*id < 7),
+            ServoCommand::Torque(codes) => self.torque_command(codes, registers),
+            ServoCommand::Goals(goals) => {
+                assert_eq!(registers.get(MOTOR_STATE.address), motor_state::SERVO, "goals in state 0 or 2");
                 for &(id, counts) in goals {
                     let position = positions.get(usize::from(id)).copied().unwrap_or(u16::MAX);
-                    self.told_goal(now_us, id, counts, position, registers);
+                    self.goal_command(now_us, id, counts, position, registers);
                 }
             }
         }
     }
 
-    fn told_torque(&mut self, codes: &[Option<u8>; 7], registers: &RegisterFile) {
+    fn torque_command(&mut self, codes: &[Option<u8>; 7], registers: &RegisterFile) {
         let is_servo = registers.get(MOTOR_STATE.address) == motor_state::SERVO;
         for ((joint, state), code) in Joint::ALL.iter().zip(&mut self.joints).zip(codes) {
             let Some(code) = *code else { continue };
             let on = code == self.config.torque_codes.code(Torque::On);
-            assert_eq!(on, is_servo, "on in state 0 or 2, or freed in state 1");
-            assert!(!on || state.goal.is_some(), "{joint:?} wakes up with an old goal");
+            assert_eq!(on, is_servo, "the torque does not match the motor state");
+            assert!(!on || state.goal.is_some(), "{joint:?} is given torque without a goal");
             state.goal = state.goal.filter(|_| on);
             self.is_driven[usize::from(joint.index())] = on;
         }
@@ -102,33 +102,33 @@ impl Watch {
         }
     }
 
-    /// A goal is within reach of the one before, or of where the joint is.
-    fn told_goal(&mut self, now_us: u64, id: u8, counts: u16, position: u16, registers: &RegisterFile) {
+    /// A goal is within reach of the last one, or at the joint's position.
+    fn goal_command(&mut self, now_us: u64, id: u8, counts: u16, position: u16, registers: &RegisterFile) {
         let Some(joint) = Joint::from_index(id) else { panic!("there is no servo {id}") };
         assert_eq!(registers.get(MISSING_SERVOS.address) & joint.bit(), 0, "{joint:?} is missing");
         let state = &mut self.joints[usize::from(id)];
         let calls = self.calls;
         let is_near = |(before, at, call): (u16, u64, u32)| {
-            // A late cycle is made up for, and one may be over just now; but none without a call.
+            // One late cycle is caught up, and one may just have ended. Each cycle needs a poll.
             let cycles = ((now_us - at) / CYCLE_US + 2).min((calls - call).into());
-            f64::from(before.abs_diff(counts)) <= state.fastest * cycles as f64 + 2.0
+            f64::from(before.abs_diff(counts)) <= state.max_speed * cycles as f64 + 2.0
         };
         let degrees = |MicroDegrees(micro)| f64::from(micro) / 1e6;
         let offset = OFFSET.range.decode(registers.get(OFFSET.of(joint)));
         let goal = degrees(angle_from_counts(joint, counts, i8::try_from(offset).unwrap()));
         let place = f64::from(registers.get(PRESENT_POSITION.of(joint)));
-        // Half a degree is what the register rounds off, and a third of one is a count. After a change of the offset
-        // the register keeps the old angle until the next measurement, so the last answer counts too.
+        // The register is rounded by up to 0.5 degrees, and a count is 0.3 degrees. After a change of the offset the
+        // register keeps the old angle until the next reading, so the position in the last reply counts too.
         let is_here = (goal.clamp(0.0, 180.0) - place).abs() < 1.0 || counts == position;
         assert!(
             state.goal.is_some_and(is_near) || is_here,
             "{joint:?} jumps to {counts} from {:?}",
             state.goal
         );
-        *state = Joints { goal: Some((counts, now_us, calls)), fastest: fastest(registers, joint) };
+        *state = JointGoal { goal: Some((counts, now_us, calls)), max_speed: max_speed(registers, joint) };
     }
 
-    pub fn switched(&mut self, now_us: u64, vacuum: Vacuum) {
+    pub fn vacuum_switched(&mut self, now_us: u64, vacuum: Vacuum) {
         assert!(vacuum != self.vacuum && !(vacuum.pump && vacuum.valve));
         self.vacuum = vacuum;
         self.valve_opened_at = vacuum.valve.then_some(now_us);
@@ -138,17 +138,17 @@ impl Watch {
         (self.settings, self.storage) = (settings, storage);
     }
 
-    /// After every call.
-    pub fn polled(&mut self, registers: &RegisterFile) {
+    /// Checks the state after every poll.
+    pub fn after_poll(&mut self, registers: &RegisterFile) {
         self.calls += 1;
         for (joint, state) in Joint::ALL.into_iter().zip(&mut self.joints) {
-            state.fastest = state.fastest.max(fastest(registers, joint));
+            state.max_speed = state.max_speed.max(max_speed(registers, joint));
         }
     }
 
-    /// Once there is nothing more to do for now.
-    pub fn idle(&mut self, now_us: u64, registers: &RegisterFile) {
-        self.polled(registers);
+    /// Checks the state when the controller waits.
+    pub fn after_wait(&mut self, now_us: u64, registers: &RegisterFile) {
+        self.after_poll(registers);
         for row in MAP.iter().filter(|row| row.access == Access::ReadWrite) {
             for address in (row.address..).take(row.count.into()) {
                 assert!(row.range.contains(registers.get(address)), "register {address}");
@@ -161,7 +161,7 @@ impl Watch {
         self.check_release(now_us, registers);
     }
 
-    /// Torque goes as soon as the bus is free.
+    /// Torque is switched off as soon as the bus is free.
     fn check_release(&mut self, now_us: u64, registers: &RegisterFile) {
         if registers.get(MOTOR_STATE.address) == motor_state::SERVO {
             self.released_at = None;
@@ -173,10 +173,10 @@ impl Watch {
     }
 }
 
-/// How many counts a joint may move in one cycle.
-fn fastest(registers: &RegisterFile, joint: Joint) -> f64 {
+/// The speed limit of a joint in counts per cycle.
+fn max_speed(registers: &RegisterFile, joint: Joint) -> f64 {
     match registers.get(SPEED.of(joint)) {
-        0 => MOST_COUNTS,
+        0 => MAX_COUNTS,
         speed => f64::from(speed) * COUNTS_PER_SPEED,
     }
 }

@@ -1,27 +1,32 @@
-//! A table of text: columns as wide as their longest cell, two spaces between them.
+//! A text table: columns as wide as their longest cell, with two spaces between them.
 
 use std::fmt::{self, Display};
 
-/// A column with its heading, aligned to this side.
-pub(crate) enum Column {
+/// A column with its heading.
+#[derive(Clone, Copy, Debug)]
+pub enum Column {
+    /// Aligned to the left.
     Left(&'static str),
+    /// Aligned to the right.
     Right(&'static str),
 }
 
 /// A table with its rows.
-pub(crate) struct Table {
+#[derive(Clone, Debug)]
+pub struct TextTable {
     columns: Vec<Column>,
     rows: Vec<Vec<String>>,
 }
 
-impl Table {
+impl TextTable {
     /// A table without rows.
-    pub(crate) fn new(columns: impl IntoIterator<Item = Column>) -> Self {
+    #[must_use]
+    pub fn new(columns: impl IntoIterator<Item = Column>) -> Self {
         Self { columns: columns.into_iter().collect(), rows: Vec::new() }
     }
 
     /// Adds a row: one cell for each column. Missing cells are empty.
-    pub(crate) fn add(&mut self, cells: impl IntoIterator<Item = impl ToString>) {
+    pub fn add(&mut self, cells: impl IntoIterator<Item = impl ToString>) {
         self.rows.push(cells.into_iter().map(|cell| cell.to_string()).collect());
     }
 
@@ -48,7 +53,7 @@ impl Column {
     }
 }
 
-impl Display for Table {
+impl Display for TextTable {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let headings = self.columns.iter().map(|column| column.heading().to_owned()).collect();
         let columns = self.columns.iter().enumerate();
@@ -70,7 +75,7 @@ mod tests {
 
     #[test]
     fn columns_are_as_wide_as_their_longest_cell() {
-        let mut table = Table::new([Left("name"), Right("bytes"), Left("")]);
+        let mut table = TextTable::new([Left("name"), Right("bytes"), Left("")]);
         table.add(["a longer name", "7", "note"]);
         table.add(["µ", "123456"]);
         let expected = "\

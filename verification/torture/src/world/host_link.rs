@@ -1,12 +1,10 @@
-//! The host link, both ways: when which byte is through, and how much room there is.
-//!
-//! Knows nothing of frames.
+//! The two directions of the host link: arrival times and free space. Does not know frames.
 
 use std::collections::VecDeque;
 
 use protocol_core::time::{Duration, Instant};
 
-/// Nanoseconds of ten bits at one baud.
+/// Nanoseconds per byte at one baud: ten bits.
 const TEN_BITS_NS: u64 = 10_000_000_000;
 
 fn time_of(bytes: usize, baud: u32) -> Duration {
@@ -14,55 +12,55 @@ fn time_of(bytes: usize, baud: u32) -> Duration {
     Duration::from_micros(nanos.div_ceil(1_000))
 }
 
-/// From the host to the arm. No byte is lost for want of room: it waits.
+/// From the host to the arm. Bytes that the arm has no room for wait.
 #[derive(Debug)]
-pub(super) struct ToArm {
+pub(super) struct HostToArm {
     baud: u32,
     free_at: Instant,
-    flying: VecDeque<(Instant, Vec<u8>)>,
+    in_transit: VecDeque<(Instant, Vec<u8>)>,
     waiting: VecDeque<u8>,
     last_taken_at: Instant,
 }
 
-impl ToArm {
+impl HostToArm {
     pub(super) const fn new(baud: u32) -> Self {
         Self {
             baud,
             free_at: Instant::ZERO,
-            flying: VecDeque::new(),
+            in_transit: VecDeque::new(),
             waiting: VecDeque::new(),
             last_taken_at: Instant::ZERO,
         }
     }
 
-    /// Sends bytes after a pause; says when they are through.
+    /// Transmits bytes after a pause. Returns the arrival time of the last byte.
     pub(super) fn send(&mut self, now: Instant, pause: Duration, bytes: &[u8]) -> Instant {
         self.free_at = self.free_at.max(now) + pause;
-        // They are through one by one, and nobody looks more often than once in a millisecond.
+        // One entry per millisecond is enough: the shell does not run more often.
         let batch = usize::try_from(self.baud / 10_000).unwrap_or(1).max(1);
         for part in bytes.chunks(batch) {
             self.free_at = self.free_at + time_of(part.len(), self.baud);
-            self.flying.push_back((self.free_at, part.to_vec()));
+            self.in_transit.push_back((self.free_at, part.to_vec()));
         }
         self.free_at
     }
 
-    /// When the line is free again.
+    /// The time at which the line is free.
     pub(super) const fn free_at(&self) -> Instant {
         self.free_at
     }
 
     pub(super) fn next_arrival(&self) -> Option<Instant> {
-        self.flying.front().map(|(at, _)| *at)
+        self.in_transit.front().map(|(at, _)| *at)
     }
 
     pub(super) fn arrive(&mut self, now: Instant) {
-        while self.flying.front().is_some_and(|(at, _)| *at <= now) {
-            self.flying.pop_front().into_iter().for_each(|(_, bytes)| self.waiting.extend(bytes));
+        while self.in_transit.front().is_some_and(|(at, _)| *at <= now) {
+            self.in_transit.pop_front().into_iter().for_each(|(_, bytes)| self.waiting.extend(bytes));
         }
     }
 
-    /// What waits to be taken, or the first part of it.
+    /// The bytes that wait for room in the arm, or the first part of them.
     pub(super) fn waiting(&self) -> &[u8] {
         self.waiting.as_slices().0
     }
@@ -72,25 +70,25 @@ impl ToArm {
         self.last_taken_at = now;
     }
 
-    /// When the arm last took bytes: before that, it knows of no silence.
+    /// The last time the arm took bytes. It measures silence from then on.
     pub(super) const fn last_taken_at(&self) -> Instant {
         self.last_taken_at
     }
 }
 
-/// From the arm to the host: a buffer that drains.
+/// From the arm to the host: a transmit buffer that drains at the baud rate.
 #[derive(Debug)]
-pub(super) struct ToHost {
+pub(super) struct ArmToHost {
     baud: u32,
     level: usize,
-    /// As of when.
+    /// The time at which `level` was computed.
     now: Instant,
     /// The host does not read before this time.
     blocked_until: Instant,
 }
 
-impl ToHost {
-    /// Two of the longest frames.
+impl ArmToHost {
+    /// Room for two of the longest frames, in bytes.
     const CAPACITY: usize = 524;
 
     pub(super) const fn new(baud: u32, now: Instant) -> Self {
@@ -118,7 +116,7 @@ impl ToHost {
         Self::CAPACITY.saturating_sub(self.level)
     }
 
-    /// When there will be room for the longest frame.
+    /// The time at which there is room for the longest frame.
     pub(super) fn room_at(&self, now: Instant) -> Instant {
         let excess = self.level.saturating_sub(Self::CAPACITY / 2);
         let byte = time_of(1, self.baud).as_micros().max(1);

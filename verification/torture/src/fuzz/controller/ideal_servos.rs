@@ -1,37 +1,35 @@
-//! Seven servos without inertia: each is where its last goal was, and answers at once if it is there at all.
-//!
-//! What they are told is handed to the watch in words. Knows nothing of time.
+//! Seven servos without inertia. Each is at its last goal and replies at once, if it replies at all.
 
 use motion_core::servo_bus::frame::{Decoder, FrameBuffer, Instruction, Reading, register, status};
 
-/// A frame for the servos, taken apart. Servos count from 0.
+/// A decoded command. Servos count from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Command {
-    /// Which servo, and how many registers from its position on.
-    Ask(u8, u8),
-    /// The code for each servo that is named.
+pub enum ServoCommand {
+    /// A read of this many registers of a servo, from its position on.
+    Read(u8, u8),
+    /// The torque code for each servo in the frame.
     Torque([Option<u8>; 7]),
     Goals(Vec<(u8, u16)>),
 }
 
-pub struct Servos {
-    /// Bit n for servo n.
-    pub answering: u8,
+pub struct IdealServos {
+    /// The servos that reply: bit n for servo n.
+    pub responding: u8,
     pub counts: [u16; 7],
-    /// The position in each servo's last answer, in counts.
-    pub told: [u16; 7],
+    /// The position in each servo's last reply, in counts.
+    pub reported_positions: [u16; 7],
 }
 
-impl Servos {
+impl IdealServos {
     pub const fn new() -> Self {
-        Self { answering: 0x7F, counts: [512; 7], told: [512; 7] }
+        Self { responding: 0x7F, counts: [512; 7], reported_positions: [512; 7] }
     }
 
-    /// Takes a command; what is said to it.
-    pub fn take(&mut self, command: &Command) -> Option<FrameBuffer> {
+    /// Executes a command. Returns the reply.
+    pub fn execute(&mut self, command: &ServoCommand) -> Option<FrameBuffer> {
         match command {
-            Command::Ask(id, count) if self.answering >> id & 1 == 1 => Some(self.answer(*id, *count)),
-            Command::Goals(goals) => {
+            ServoCommand::Read(id, count) if self.responding >> id & 1 == 1 => Some(self.answer(*id, *count)),
+            ServoCommand::Goals(goals) => {
                 goals.iter().for_each(|&(id, counts)| self.counts[usize::from(id)] = counts);
                 None
             }
@@ -40,7 +38,7 @@ impl Servos {
     }
 
     fn answer(&mut self, id: u8, count: u8) -> FrameBuffer {
-        self.told[usize::from(id)] = self.counts[usize::from(id)];
+        self.reported_positions[usize::from(id)] = self.counts[usize::from(id)];
         let reading = Reading {
             position_counts: self.counts[usize::from(id)],
             speed: 0,
@@ -56,27 +54,27 @@ impl Servos {
     }
 }
 
-/// What the controller says to the servos: always one whole frame, and one of three.
-pub fn decode(bytes: &[u8]) -> Command {
+/// Decodes a command of the controller: exactly one frame, of one of three kinds.
+pub fn decode(bytes: &[u8]) -> ServoCommand {
     let mut decoder = Decoder::new();
     decoder.push(bytes);
-    let frame = decoder.pull().expect("a whole frame").expect("a right checksum");
-    assert_eq!(frame.params.len() + 6, bytes.len(), "one frame and no more");
+    let frame = decoder.pull().expect("a complete frame").expect("a valid checksum");
+    assert_eq!(frame.params.len() + 6, bytes.len(), "exactly one frame");
     match (Instruction::from_code(frame.code), frame.params) {
         (Some(Instruction::Read), [register::PRESENT_POSITION, count @ 8..=11]) => {
-            Command::Ask(frame.id, *count)
+            ServoCommand::Read(frame.id, *count)
         }
         (Some(Instruction::SyncWrite), [register::TORQUE_SWITCH, 1, items @ ..]) => {
             assert!(!items.is_empty() && items.len().is_multiple_of(2));
             let mut codes = [None; 7];
             items.chunks_exact(2).for_each(|item| codes[usize::from(item[0])] = Some(item[1]));
-            Command::Torque(codes)
+            ServoCommand::Torque(codes)
         }
         (Some(Instruction::SyncWrite), [register::GOAL_POSITION, 6, items @ ..]) => {
             assert!(!items.is_empty() && items.len() % 7 == 0);
             let item = |item: &[u8]| (item[0], u16::from_be_bytes([item[1], item[2]]));
-            Command::Goals(items.chunks_exact(7).map(item).collect())
+            ServoCommand::Goals(items.chunks_exact(7).map(item).collect())
         }
-        other => panic!("the controller said {other:?}"),
+        other => panic!("the controller sent {other:?}"),
     }
 }

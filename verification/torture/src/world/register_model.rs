@@ -1,6 +1,5 @@
-//! What the registers must hold, from docs/protocol.md alone: the host's idea of the arm.
-//!
-//! Slow and plain. What only the arm can know (where joints are, which servos answer) it leaves open.
+//! A model of the registers, from docs/protocol.md alone. It does not model measured values, such as positions and
+//! missing servos.
 
 use motion_core::Storage;
 use protocol_core::registers::map::{
@@ -9,45 +8,51 @@ use protocol_core::registers::map::{
 };
 use protocol_core::registers::{Access, Image, Joint, Region, Register, RegisterFile};
 
-use super::asked::Asked;
+use super::host_request::HostRequest;
 use crate::per_joint::PerJoint;
 use crate::violation::{Check, ensure};
 
-/// The first address of the EEPROM region, and the first behind it.
+/// The first address of the EEPROM region, and the first after it.
 const EEPROM: (u8, u8) = (8, 28);
 
-/// What has to follow from a request.
+/// The required effect of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Effect {
-    /// It is answered with this many registers from here on.
-    Answer { address: u8, count: u8 },
-    /// Nothing that the host hears of at once. It was accepted or not.
-    Silence { accepted: bool },
-    /// This is to be saved.
+pub(super) enum RequestEffect {
+    /// A reply with `count` registers from `address` on.
+    Reply { address: u8, count: u8 },
+    /// Neither a reply nor a save.
+    NoReply { accepted: bool },
+    /// A save of these settings.
     Save(Image),
 }
 
-/// The registers.
+/// The modelled registers.
 #[derive(Debug)]
-pub(super) struct Model {
+pub(super) struct RegisterModel {
     values: [u8; 256],
-    rules: Vec<Option<&'static Register>>,
+    rows: Vec<Option<&'static Register>>,
     storage: Storage,
     accepted: u16,
     refused: u16,
-    /// Joints whose target was named by the host since they were last released, lost, or found elsewhere.
-    pub(super) aimed: PerJoint<bool>,
+    /// True if the host's last target is in force: no release, loss of the servo or correction by the arm followed it.
+    pub(super) has_host_target: PerJoint<bool>,
 }
 
-/// The registers whose values follow from requests alone, in runs: first and last.
-const KNOWN: &[(u8, u8)] = &[(0, 45), (53, 53), (61, 240), (244, 247), (250, 251)];
+/// The first and last addresses of the registers whose values follow from requests alone.
+const MODELLED: &[(u8, u8)] = &[(0, 45), (53, 53), (61, 240), (244, 247), (250, 251)];
 
-impl Model {
-    /// An arm after power-up with what the storage held.
+impl RegisterModel {
+    /// The registers after power-up with the stored settings.
     pub(super) fn new(chip_id: [u8; 6], stored: Option<&Image>, storage: Storage) -> Self {
-        let rules: Vec<_> = (0..=255).map(protocol_core::registers::map::find).collect();
-        let mut model =
-            Self { values: [0; 256], rules, storage, accepted: 0, refused: 0, aimed: PerJoint::all(false) };
+        let rows: Vec<_> = (0..=255).map(protocol_core::registers::map::find).collect();
+        let mut model = Self {
+            values: [0; 256],
+            rows,
+            storage,
+            accepted: 0,
+            refused: 0,
+            has_host_target: PerJoint::all(false),
+        };
         for row in MAP {
             (row.address..=row.address + (row.count - 1)).for_each(|at| model.set(at, row.default_at(at)));
         }
@@ -56,17 +61,17 @@ impl Model {
         model
     }
 
-    /// A stored value outside its range counts as its default (D19), and reserved registers read 0.
+    /// Loads stored settings. A value outside its range is replaced by its default (D19), and reserved registers read 0.
     fn load(&mut self, image: &Image) {
         for (at, byte) in (EEPROM.0..EEPROM.1).zip(image.0) {
-            if self.rule(at).is_some_and(|row| row.access == Access::ReadWrite && row.range.contains(byte)) {
+            if self.row(at).is_some_and(|row| row.access == Access::ReadWrite && row.range.contains(byte)) {
                 self.set(at, byte);
             }
         }
     }
 
-    fn rule(&self, at: u8) -> Option<&'static Register> {
-        self.rules.get(usize::from(at)).copied().flatten()
+    fn row(&self, at: u8) -> Option<&'static Register> {
+        self.rows.get(usize::from(at)).copied().flatten()
     }
 
     pub(super) fn get(&self, at: u8) -> u8 {
@@ -89,27 +94,27 @@ impl Model {
         self.storage = storage;
     }
 
-    /// The settings as they stand.
+    /// The present settings.
     pub(super) fn image(&self) -> Image {
         let mut image = Image([0; Image::LENGTH]);
         image.0.iter_mut().zip(EEPROM.0..EEPROM.1).for_each(|(byte, at)| *byte = self.get(at));
         image
     }
 
-    /// Carries out a request.
-    pub(super) fn take(&mut self, asked: &Asked) -> Effect {
-        match asked {
-            Asked::Read { address, count } if usize::from(*address) + usize::from(*count) > 256 => {
+    /// Executes a request.
+    pub(super) fn execute(&mut self, request: &HostRequest) -> RequestEffect {
+        match request {
+            HostRequest::Read { address, count } if usize::from(*address) + usize::from(*count) > 256 => {
                 self.refuse(refusal::MALFORMED_RANGE, *address)
             }
-            Asked::Write { address, values } if usize::from(*address) + values.len() > 256 => {
+            HostRequest::Write { address, values } if usize::from(*address) + values.len() > 256 => {
                 self.refuse(refusal::MALFORMED_RANGE, *address)
             }
-            Asked::Read { address, count } => {
+            HostRequest::Read { address, count } => {
                 self.accept();
-                Effect::Answer { address: *address, count: *count }
+                RequestEffect::Reply { address: *address, count: *count }
             }
-            Asked::Write { address, values } => self.write(*address, values),
+            HostRequest::Write { address, values } => self.write(*address, values),
         }
     }
 
@@ -120,31 +125,31 @@ impl Model {
         self.set(FRAMES_ACCEPTED.address + 1, high);
     }
 
-    fn refuse(&mut self, reason: u8, at: u8) -> Effect {
+    fn refuse(&mut self, reason: u8, at: u8) -> RequestEffect {
         self.refused = self.refused.wrapping_add(1);
         let [low, high] = self.refused.to_le_bytes();
         self.set(FRAMES_REFUSED.address, low);
         self.set(FRAMES_REFUSED.address + 1, high);
         self.set(LAST_REFUSAL.address, reason);
         self.set(LAST_REFUSED_REGISTER.address, at);
-        Effect::Silence { accepted: false }
+        RequestEffect::NoReply { accepted: false }
     }
 
-    /// The registers that a write would change, were all values right.
+    /// The registers that a write changes if all values are in range.
     fn effective<'a>(&self, address: u8, values: &'a [u8]) -> impl Iterator<Item = (u8, u8)> + use<'a> {
         let is_open = self.get(EEPROM_LOCK.address) == 0;
-        let rules = self.rules.clone();
+        let rows = self.rows.clone();
         (address..=255).zip(values.iter().copied()).filter(move |(at, _)| {
-            rules.get(usize::from(*at)).copied().flatten().is_some_and(|row| {
+            rows.get(usize::from(*at)).copied().flatten().is_some_and(|row| {
                 row.access == Access::ReadWrite && (row.region != Region::Eeprom || is_open)
             })
         })
     }
 
-    fn write(&mut self, address: u8, values: &[u8]) -> Effect {
+    fn write(&mut self, address: u8, values: &[u8]) -> RequestEffect {
         let mut items = self.effective(address, values);
-        let wrong = items.find(|(at, value)| self.rule(*at).is_some_and(|row| !row.range.contains(*value)));
-        if let Some((at, _)) = wrong {
+        let refused = items.find(|(at, value)| self.row(*at).is_some_and(|row| !row.range.contains(*value)));
+        if let Some((at, _)) = refused {
             return self.refuse(refusal::OUT_OF_RANGE, at);
         }
         let is_setting = |at| (EEPROM.0..EEPROM.1).contains(&at);
@@ -155,7 +160,11 @@ impl Model {
         }
         self.apply(address, values);
         self.accept();
-        if changed.is_some() { Effect::Save(self.image()) } else { Effect::Silence { accepted: true } }
+        if changed.is_some() {
+            RequestEffect::Save(self.image())
+        } else {
+            RequestEffect::NoReply { accepted: true }
+        }
     }
 
     fn apply(&mut self, address: u8, values: &[u8]) {
@@ -163,50 +172,50 @@ impl Model {
         let items: Vec<_> = self.effective(address, values).collect();
         items.iter().for_each(|(at, value)| self.set(*at, *value));
         if self.is_servo() != was_servo {
-            self.aimed = PerJoint::all(false);
+            self.has_host_target = PerJoint::all(false);
         }
         for (at, _) in items {
             if let Some(joint) = TARGET_POSITION.joint_at(at) {
-                self.aimed[joint] = self.is_servo();
+                self.has_host_target[joint] = self.is_servo();
             }
         }
     }
 
-    /// How often reports are wanted, in Hz.
+    /// The report frequency in Hz.
     pub(super) fn frequency(&self) -> u8 {
         self.get(FEEDBACK_FREQUENCY.address)
     }
 
-    /// Compares with the arm's own registers.
-    pub(super) fn compare(&self, arm: &RegisterFile) -> Check {
-        for (first, last) in KNOWN {
+    /// Compares the model with the registers of the arm.
+    pub(super) fn compare(&self, registers: &RegisterFile) -> Check {
+        for (first, last) in MODELLED {
             let range = usize::from(*first)..=usize::from(*last);
             let ours = self.values.get(range).unwrap_or(&[]);
-            let theirs = arm.read(*first, last - first + 1);
+            let theirs = registers.read(*first, last - first + 1);
             ensure(ours == theirs, || {
                 let differs = (*first..).zip(ours.iter().zip(theirs)).find(|(_, (a, b))| a != b);
                 let (at, (wanted, found)) = differs.unwrap_or((0, (&0, &0)));
-                format!("register {at} holds {found}, and {wanted} is right")
+                format!("register {at} holds {found} instead of {wanted}")
             })?;
         }
         Ok(())
     }
 
-    /// A target that the host did not name is where the joint was measured (D12, D13).
-    pub(super) fn compare_targets(&mut self, arm: &RegisterFile) -> Check {
+    /// A target that differs from the model is the measured position (D12, D13). The model takes it over.
+    pub(super) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
         for joint in Joint::ALL {
-            let (at, found) = (TARGET_POSITION.of(joint), arm.get(TARGET_POSITION.of(joint)));
+            let (at, found) = (TARGET_POSITION.of(joint), registers.get(TARGET_POSITION.of(joint)));
             if found == self.get(at) {
                 continue;
             }
-            let present = arm.get(PRESENT_POSITION.of(joint));
+            let present = registers.get(PRESENT_POSITION.of(joint));
             ensure(found == present, || {
                 let wanted = self.get(at);
                 let number = joint.number();
-                format!("target {number} is {found}; the host said {wanted}, and the joint was at {present}")
+                format!("target {number} is {found}: the host wrote {wanted}, and the joint was at {present}")
             })?;
             self.set(at, found);
-            self.aimed[joint] = false;
+            self.has_host_target[joint] = false;
         }
         Ok(())
     }

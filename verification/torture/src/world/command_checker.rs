@@ -1,0 +1,349 @@
+//! Checks the commands to the servos (D10, D12, D13).
+//!
+//! - No goal is out of reach at the allowed speed.
+//! - Goals are sent only in motor state servo, and torque switches follow the motor state.
+//! - Until the end of start-up, and to silent servos, only reads are sent.
+
+use motion_core::calibration::{MicroDegrees, counts_from_angle};
+use motion_core::servo_bus::Torque;
+use motion_core::servo_bus::frame::Decoder;
+use motion_core::{CYCLE, TorqueCodes};
+use protocol_core::registers::map::{
+    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, OFFSET, SPEED, TARGET_POSITION, motor_state,
+};
+use protocol_core::registers::{Joint, RegisterFile};
+use protocol_core::time::{Duration, Instant};
+
+use super::disturbed_bus::DisturbedBus;
+use super::register_model::RegisterModel;
+use crate::per_joint::PerJoint;
+use crate::violation::{Check, Violation, ensure};
+
+/// One count in the unit of the arithmetic here, 1e-9 counts.
+const NANOCOUNTS: i64 = 1_000_000_000;
+/// A late shell catches up one control cycle, and the present cycle may be incomplete.
+const SLACK: Duration = Duration::from_millis(20);
+/// Rounding to whole counts at both ends of a move.
+const ROUNDING: i64 = NANOCOUNTS + NANOCOUNTS / 100;
+/// Start-up ends after this time at the latest (D12).
+const MAX_START_UP: Duration = Duration::from_millis(500);
+/// Start-up ends earlier if each servo has sent this many replies.
+const START_UP_REPLIES: u8 = 2;
+/// The number of reads without a reply after which a servo is silent: three have failed (D12), one may be in progress.
+const MAX_UNANSWERED: u8 = 4;
+
+/// The range of goals that a joint can reach.
+#[derive(Clone, Copy, Debug)]
+struct ReachableRange {
+    /// Bounds in 1e-9 counts. They move outwards at the allowed speed, and each goal limits them again.
+    upper: i64,
+    lower: i64,
+    last_goal: u16,
+    speed: i64,
+    at: Instant,
+}
+
+/// Counts of one control cycle at 372 degrees/s. A set-point may be ahead of the last goal by one cycle, and by one more
+/// for each cycle in which a read delays the goals.
+const ONE_CYCLE: u16 = 19;
+
+/// The commands that the servos have received.
+#[derive(Debug)]
+pub(super) struct CommandChecker {
+    codes: TorqueCodes,
+    /// The largest distance of a set-point from the last goal, in counts.
+    ahead: u16,
+    started_at: Instant,
+    ranges: PerJoint<Option<ReachableRange>>,
+    /// The last goal of a joint whose servo was lost, and its tolerance in counts. A found servo may continue from that
+    /// goal (D12). The tolerance grows when offsets change.
+    kept_goals: PerJoint<Option<(u16, u16)>>,
+    /// True if the last command switched the torque on. False for a lost servo.
+    is_on: PerJoint<bool>,
+    /// Decodes the bytes that the controller receives.
+    decoder: Decoder,
+    replies: PerJoint<u8>,
+    /// Reads since the last reply.
+    unanswered: PerJoint<u8>,
+    wire_free_at: Instant,
+    pub(super) count: u64,
+    pub(super) engagements: u64,
+}
+
+/// The state of the arm when a command is sent.
+pub(super) struct CommandContext<'a> {
+    pub(super) now: Instant,
+    pub(super) registers: &'a RegisterFile,
+    pub(super) model: &'a RegisterModel,
+    pub(super) bus: &'a DisturbedBus,
+}
+
+impl CommandChecker {
+    pub(super) fn new(now: Instant, codes: TorqueCodes, servo_timeout: Duration) -> Self {
+        let cycles = 1 + servo_timeout.as_micros() / CYCLE.as_micros();
+        Self {
+            codes,
+            ahead: ONE_CYCLE.saturating_mul(u16::try_from(cycles).unwrap_or(u16::MAX)),
+            started_at: now,
+            ranges: PerJoint::all(None),
+            kept_goals: PerJoint::all(None),
+            is_on: PerJoint::all(false),
+            decoder: Decoder::new(),
+            replies: PerJoint::all(0),
+            unanswered: PerJoint::all(0),
+            wire_free_at: now,
+            count: 0,
+            engagements: 0,
+        }
+    }
+
+    /// Counts the replies in bytes that the controller receives.
+    pub(super) fn replies_received(&mut self, bytes: &[u8]) {
+        for piece in bytes.chunks(Decoder::CAPACITY / 2) {
+            self.decoder.push(piece);
+            while let Some(heard) = self.decoder.pull() {
+                let Some(frame) = heard.ok().filter(|frame| frame.params.len() >= 8) else { continue };
+                let Some(joint) = Joint::from_index(frame.id) else { continue };
+                self.replies[joint] = self.replies[joint].saturating_add(1);
+                self.unanswered[joint] = 0;
+            }
+        }
+    }
+
+    pub(super) fn is_on(&self, joint: Joint) -> bool {
+        self.is_on[joint]
+    }
+
+    /// The last goal of a joint that is driven.
+    pub(super) fn goal(&self, joint: Joint) -> Option<u16> {
+        self.ranges[joint].map(|range| range.last_goal)
+    }
+
+    /// The joint is no longer driven. Its next goal need not be near the last one.
+    pub(super) fn forget(&mut self, joint: Joint) {
+        self.ranges[joint] = None;
+        self.kept_goals[joint] = None;
+    }
+
+    /// The joint's servo was lost. It may hold its last goal.
+    pub(super) fn servo_lost(&mut self, joint: Joint) {
+        self.kept_goals[joint] = self.goal(joint).map(|goal| (goal, self.ahead)).or(self.kept_goals[joint]);
+        self.ranges[joint] = None;
+        self.is_on[joint] = false;
+    }
+
+    /// A written speed is allowed until the next frame, even if another write replaces it.
+    pub(super) fn speed_written(&mut self, model: &RegisterModel) {
+        for (joint, range) in Joint::ALL.into_iter().zip(&mut self.ranges.0) {
+            if let Some(range) = range {
+                range.speed = range.speed.max(limit(joint, model.get(SPEED.of(joint))));
+            }
+        }
+    }
+
+    /// Offsets changed: the controller computes its set-points again, from whole counts.
+    pub(super) fn offsets_changed(&mut self) {
+        for range in self.ranges.0.iter_mut().flatten() {
+            range.upper += NANOCOUNTS;
+            range.lower -= NANOCOUNTS;
+        }
+        self.kept_goals.0.iter_mut().flatten().for_each(|(_, tolerance)| *tolerance += 1);
+    }
+
+    /// Checks a frame to the servos.
+    pub(super) fn check(&mut self, frame: &[u8], context: &CommandContext<'_>) -> Check {
+        self.count += 1;
+        ensure(context.now >= self.wire_free_at, || "a frame before the end of the last one".to_owned())?;
+        self.wire_free_at = context.now + Duration::from_micros(10 * frame.len() as u64);
+        let [0xFF, 0xFF, id, length, body @ .., sum] = frame else { return Err(invalid_frame(frame)) };
+        let covered = body.iter().fold(id.wrapping_add(*length), |sum, byte| sum.wrapping_add(*byte));
+        let is_whole = usize::from(*length) == body.len() + 1 && *sum == !covered;
+        match body {
+            _ if !is_whole => Err(invalid_frame(frame)),
+            [2, 56, 8..=16] if *id < 7 => {
+                let joint = Joint::from_index(*id).ok_or_else(|| invalid_frame(frame))?;
+                self.unanswered[joint] = self.unanswered[joint].saturating_add(1);
+                // The controller does the same: bytes from before a read are not its reply.
+                self.decoder.clear();
+                Ok(())
+            }
+            _ if self.is_starting(context.now) => {
+                Err(Violation(format!("{frame:02x?} before the end of start-up")))
+            }
+            [0x83, 40, 1, items @ ..] if *id == 0xFE => self.check_torque_switches(items, context),
+            [0x83, 42, 6, items @ ..] if *id == 0xFE => self.check_goals(items, context),
+            _ => Err(invalid_frame(frame)),
+        }
+    }
+
+    fn is_starting(&self, now: Instant) -> bool {
+        now < self.started_at + MAX_START_UP
+            && self.replies.0.iter().any(|replies| *replies < START_UP_REPLIES)
+    }
+
+    /// Torque switches are set to the motor state in register 29 (D13).
+    fn check_torque_switches(&mut self, items: &[u8], context: &CommandContext<'_>) -> Check {
+        let state = context.registers.get(MOTOR_STATE.address);
+        let torque = match state {
+            motor_state::SERVO => Torque::On,
+            motor_state::FORCELESS => Torque::Free,
+            _ => Torque::Damping,
+        };
+        for item in items.chunks(2) {
+            let [id, code] = *item else { return Err(invalid_frame(items)) };
+            let Some(joint) = Joint::from_index(id) else { return Err(invalid_frame(items)) };
+            ensure(code == self.codes.code(torque), || {
+                format!("the torque switch of joint {} is set to {code} in state {state}", joint.number())
+            })?;
+            let is_on = torque == Torque::On;
+            if is_on {
+                self.check_responding(joint, "is given torque", context)?;
+            }
+            if is_on && !self.is_on[joint] {
+                let range = self.ranges[joint].ok_or_else(|| {
+                    Violation(format!("joint {} is given torque without a goal", joint.number()))
+                })?;
+                self.check_position(joint, range.last_goal, "is given torque", context)?;
+                self.kept_goals[joint] = None;
+                self.engagements += 1;
+            }
+            self.is_on[joint] = is_on;
+        }
+        Ok(())
+    }
+
+    /// A silent servo receives only reads (D12).
+    fn check_responding(&self, joint: Joint, what: &str, context: &CommandContext<'_>) -> Check {
+        let is_flagged = context.registers.get(MISSING_SERVOS.address) & joint.bit() != 0;
+        // On a disturbed bus the controller may decode a reply that this decoder misses.
+        let is_silent = self.unanswered[joint] >= MAX_UNANSWERED && context.bus.is_undisturbed(context.now);
+        ensure(!is_flagged && !is_silent, || {
+            let (number, unanswered) = (joint.number(), self.unanswered[joint]);
+            format!("joint {number} {what} while its servo is silent: {unanswered} reads without a reply")
+        })
+    }
+
+    /// A joint starts from its position, or from a near goal that it kept while its servo was lost (D12).
+    fn check_position(&self, joint: Joint, goal: u16, what: &str, context: &CommandContext<'_>) -> Check {
+        let bus = context.bus;
+        let is_kept =
+            self.kept_goals[joint].is_some_and(|(kept, tolerance)| goal.abs_diff(kept) <= tolerance);
+        let degrees = if is_kept { 4 } else { 1 };
+        let fall = if bus.has_torque(joint) { 0 } else { MAX_FALL };
+        // The joint may move after its reading, and a reply may be old.
+        let moved = bus.reply_age(joint).as_micros() * 1_757 / 1_000_000;
+        let error = bus.position_tolerance(joint, context.now);
+        let tolerance = u64::from(degrees * degree(joint) + fall) + moved + error;
+        let position = bus.position(joint);
+        let is_near =
+            u64::from(goal.abs_diff(position)) <= tolerance || bus.may_be_misread(joint, context.now);
+        ensure(is_near, || {
+            format!("joint {} {what} at {position} counts with the goal {goal}", joint.number())
+        })
+    }
+
+    fn check_goals(&mut self, items: &[u8], context: &CommandContext<'_>) -> Check {
+        let state = context.registers.get(MOTOR_STATE.address);
+        ensure(state == motor_state::SERVO, || format!("goals are sent in motor state {state}"))?;
+        let mut has_goal = PerJoint::all(false);
+        for item in items.chunks(7) {
+            let &[id, high, low, ref rest @ ..] = item else { return Err(invalid_frame(items)) };
+            let Some(joint) = Joint::from_index(id) else { return Err(invalid_frame(items)) };
+            ensure(*rest == [0, 10, 0, 0], || {
+                format!("time and speed of joint {}: {rest:?}", joint.number())
+            })?;
+            has_goal[joint] = true;
+            self.check_responding(joint, "is driven", context)?;
+            self.check_goal(joint, u16::from_be_bytes([high, low]), context)?;
+        }
+        for joint in Joint::ALL.into_iter().filter(|joint| !has_goal[*joint]) {
+            self.ranges[joint] = None;
+        }
+        Ok(())
+    }
+
+    fn check_goal(&mut self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
+        let speed = limit(joint, context.registers.get(SPEED.of(joint)));
+        let position = i64::from(goal) * NANOCOUNTS;
+        let Some(before) = self.ranges[joint] else {
+            self.check_position(joint, goal, "is driven", context)?;
+            let range =
+                ReachableRange { upper: position, lower: position, last_goal: goal, speed, at: context.now };
+            self.ranges[joint] = Some(range);
+            return Ok(());
+        };
+        let fastest = speed.max(before.speed);
+        let moved = fastest * micros(context.now - before.at);
+        let tolerance = fastest * micros(SLACK) + ROUNDING;
+        let (upper, lower) = (before.upper + moved, before.lower - moved);
+        ensure(position <= upper + tolerance && position >= lower - tolerance, || {
+            let (number, register) = (joint.number(), context.registers.get(SPEED.of(joint)));
+            format!(
+                "joint {number} gets the goal {goal} after {}, out of reach with speed {register}",
+                before.last_goal
+            )
+        })?;
+        // The range of a higher speed does not apply to a lower one.
+        let is_slower = speed < before.speed;
+        let (upper, lower) =
+            if is_slower { (position, position) } else { (upper.min(position), lower.max(position)) };
+        self.ranges[joint] = Some(ReachableRange { upper, lower, last_goal: goal, speed, at: context.now });
+        check_arrival(joint, goal, context)
+    }
+}
+
+fn invalid_frame(bytes: &[u8]) -> Violation {
+    Violation(format!("not a command to servos: {bytes:02x?}"))
+}
+
+fn micros(time: Duration) -> i64 {
+    i64::try_from(time.as_micros()).unwrap_or(i64::MAX).min(10_000_000)
+}
+
+/// The speed limit in 1e-9 counts per microsecond, rounded up. A unit of the speed register is 1.9 degrees/s. The value
+/// 0 means 372 degrees/s.
+fn limit(joint: Joint, speed: u8) -> i64 {
+    let tenths = if speed == 0 { 3_720 } else { i64::from(speed) * 19 };
+    tenths * counts_per_half_turn(joint) * 100 / 180 + 1
+}
+
+fn counts_per_half_turn(joint: Joint) -> i64 {
+    if joint.number() < 5 { 850 } else { 625 }
+}
+
+/// Counts of a degree, with the rounding of a reading.
+fn degree(joint: Joint) -> u16 {
+    if joint.number() < 5 { 5 } else { 4 }
+}
+
+/// Counts that a joint without torque may fall after its reading: 130 degrees/s for 20 ms. The controller reads again
+/// before it gives torque later than that.
+const MAX_FALL: u16 = 12;
+
+/// The servo position of a joint's target register.
+pub(super) fn target_counts(joint: Joint, registers: &RegisterFile) -> u16 {
+    let offset = OFFSET.range.decode(registers.get(OFFSET.of(joint)));
+    let target = MicroDegrees::from_degrees(registers.get(TARGET_POSITION.of(joint)));
+    counts_from_angle(joint, target, i8::try_from(offset).unwrap_or(0))
+}
+
+/// The goal of a joint that has arrived is its target. A target that the host did not write is the measured position,
+/// rounded to degrees and limited to 0..=180.
+fn check_arrival(joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
+    if context.registers.get(MOVING_JOINTS.address) & joint.bit() != 0 {
+        return Ok(());
+    }
+    let target = context.registers.get(TARGET_POSITION.of(joint));
+    let tolerance = match (context.model.has_host_target[joint], target) {
+        (true, _) => 1,
+        (false, 0 | 180) => return Ok(()),
+        (false, _) => degree(joint) / 2 + 1,
+    };
+    let wanted = target_counts(joint, context.registers);
+    ensure(goal.abs_diff(wanted) <= tolerance, || {
+        format!(
+            "joint {} has arrived at {target} degrees ({wanted} counts), but its goal is {goal}",
+            joint.number()
+        )
+    })
+}

@@ -1,0 +1,207 @@
+//! Generates the requests of the host: any request, at any rate, with any corruption.
+
+use protocol_core::registers::map::{
+    DEVICE_ID, EEPROM_LOCK, FEEDBACK_FREQUENCY, MOTOR_STATE, OFFSET, PRESENT_POSITION, SPEED, STATUS_VERSION,
+    TARGET_POSITION, TIME, VACUUM_PUMP, motor_state,
+};
+use protocol_core::time::{Duration, Instant};
+
+use super::corruption::{corrupt, noise};
+use super::host_request::{HostRequest, SentStream};
+use crate::dice::Dice;
+
+/// A pause inside a frame. From 100 ms on the arm drops the frame.
+const MAX_PAUSE: Duration = Duration::from_millis(90);
+
+/// How often the host sends requests.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum RequestRate {
+    /// One every few seconds.
+    Idle,
+    /// A few per second.
+    Steady,
+    /// Many at once, a few times per second.
+    Bursts,
+}
+
+/// A frame, or bytes that replace it, with pauses.
+#[derive(Clone, Debug)]
+pub(super) struct Transmission {
+    /// The parts, and the pause before each.
+    pub(super) parts: Vec<(Duration, Vec<u8>)>,
+    /// The request, unless it was corrupted.
+    pub(super) request: Option<HostRequest>,
+}
+
+/// The generator, with the bytes that it sent last.
+#[derive(Debug)]
+pub(super) struct RequestGenerator {
+    rate: RequestRate,
+    rate_until: Instant,
+    pub(super) next_at: Instant,
+    /// The number of corrupted transmissions in a million.
+    pub(super) corrupted_per_million: u64,
+    settings_per_mille: u64,
+    stream: SentStream,
+}
+
+impl RequestGenerator {
+    pub(super) fn new(now: Instant, settings_per_mille: u64) -> Self {
+        let (rate, stream) = (RequestRate::Steady, SentStream::default());
+        Self { rate, rate_until: now, next_at: now, corrupted_per_million: 0, settings_per_mille, stream }
+    }
+
+    /// The arm starts: it has received nothing.
+    pub(super) fn reset(&mut self, now: Instant) {
+        self.stream = SentStream::default();
+        self.next_at = self.next_at.max(now);
+    }
+
+    /// The next transmissions. Sets `next_at` to the time of the next call.
+    pub(super) fn next_transmissions(&mut self, now: Instant, rng: &mut Dice) -> Vec<Transmission> {
+        if now >= self.rate_until {
+            self.rate = rng.one_of(
+                &[RequestRate::Idle, RequestRate::Steady, RequestRate::Steady, RequestRate::Bursts],
+                RequestRate::Idle,
+            );
+            self.rate_until = now + rng.any_scale(Duration::from_millis(500), Duration::from_millis(120_000));
+        }
+        let (count, pause) = match self.rate {
+            RequestRate::Idle => (1, Duration::from_millis(2_500)),
+            RequestRate::Steady => (1 + rng.below(2), Duration::from_millis(300)),
+            RequestRate::Bursts => (1 + rng.below(20), Duration::from_millis(400)),
+        };
+        self.next_at = now + rng.wait(pause);
+        loop {
+            let transmissions: Vec<_> = (0..count).map(|_| self.transmission(rng)).collect();
+            let mut stream = self.stream.clone();
+            transmissions
+                .iter()
+                .for_each(|transmission| stream.add(&transmission.bytes(), transmission.request.is_some()));
+            if !stream.has_unintended_frame() {
+                stream.trim();
+                self.stream = stream;
+                return transmissions;
+            }
+        }
+    }
+
+    fn transmission(&self, rng: &mut Dice) -> Transmission {
+        let request = self.any_request(rng);
+        if self.corrupted_per_million > 0 && rng.in_a_million(self.corrupted_per_million) {
+            let bytes = if rng.one_in(4) { noise(40, rng) } else { corrupt(&request.bytes(), rng) };
+            return Transmission { parts: vec![(any_pause(rng), bytes)], request: None };
+        }
+        Transmission { parts: split(request.bytes(), rng), request: Some(request) }
+    }
+
+    fn any_request(&self, rng: &mut Dice) -> HostRequest {
+        if rng.one_in(2) { self.read(rng) } else { self.write(rng) }
+    }
+
+    fn read(&self, rng: &mut Dice) -> HostRequest {
+        let (address, count) = match rng.below(6) {
+            0 => (STATUS_VERSION.address, 16),
+            1 => (PRESENT_POSITION.address, 7),
+            2 => (TARGET_POSITION.address, 7),
+            3 => (0, 255),
+            // Any range, one in eight with any length.
+            _ => (rng.byte(), if rng.one_in(8) { rng.byte() } else { rng.up_to(20) }),
+        };
+        HostRequest::Read { address, count }
+    }
+
+    fn write(&self, rng: &mut Dice) -> HostRequest {
+        let (address, values) = if rng.in_a_million(self.settings_per_mille * 1_000) {
+            settings(rng)
+        } else {
+            match rng.below(16) {
+                0..=5 => targets(rng),
+                6 | 7 => per_joint(SPEED.address, 100, rng),
+                8 => per_joint(TIME.address, 100, rng),
+                9 | 10 => (MOTOR_STATE.address, vec![state(rng)]),
+                11 => (FEEDBACK_FREQUENCY.address, vec![rng.up_to(50)]),
+                12 => (VACUUM_PUMP.address, vec![rng.up_to(1)]),
+                13 => pose(rng),
+                14 => (rng.byte(), (0..rng.below(12)).map(|_| rng.byte()).collect()),
+                _ => (rng.byte(), vec![rng.up_to(30); rng.below(256)]),
+            }
+        };
+        HostRequest::Write { address, values }
+    }
+}
+
+impl Transmission {
+    fn bytes(&self) -> Vec<u8> {
+        self.parts.iter().flat_map(|(_, bytes)| bytes.iter().copied()).collect()
+    }
+}
+
+/// Any motor state: servo twice as often as the others.
+fn state(rng: &mut Dice) -> u8 {
+    let states = [motor_state::DAMPING, motor_state::SERVO, motor_state::SERVO, motor_state::FORCELESS];
+    rng.one_of(&states, motor_state::SERVO)
+}
+
+fn targets(rng: &mut Dice) -> (u8, Vec<u8>) {
+    if rng.one_in(2) {
+        return (TARGET_POSITION.of(rng.joint()), vec![rng.up_to(180)]);
+    }
+    (TARGET_POSITION.address, (0..7).map(|_| rng.up_to(180)).collect())
+}
+
+/// A value for one joint or for all.
+fn per_joint(address: u8, most: u8, rng: &mut Dice) -> (u8, Vec<u8>) {
+    let value = if rng.one_in(4) { 0 } else { rng.up_to(most) };
+    if rng.one_in(2) { (address + rng.joint().index(), vec![value]) } else { (address, vec![value; 7]) }
+}
+
+/// All registers from the motor state to the targets in one frame.
+fn pose(rng: &mut Dice) -> (u8, Vec<u8>) {
+    let head = [state(rng), rng.up_to(1), rng.up_to(1)];
+    let speeds = [rng.up_to(100); 7];
+    let times = [rng.up_to(100); 7];
+    let targets = (0..7).map(|_| rng.up_to(180));
+    let values = head.into_iter().chain(speeds).chain(times).chain(targets.collect::<Vec<_>>());
+    (MOTOR_STATE.address, values.collect())
+}
+
+/// Settings or the lock. One write in a few is out of range.
+fn settings(rng: &mut Dice) -> (u8, Vec<u8>) {
+    match rng.below(6) {
+        0 | 1 => (EEPROM_LOCK.address, vec![u8::from(rng.one_in(6))]),
+        2 => (DEVICE_ID.address, vec![rng.byte()]),
+        3 => (DEVICE_ID.address, vec![rng.byte(), rng.up_to(8)]),
+        4 => (OFFSET.of(rng.joint()), vec![offset(rng)]),
+        _ => (OFFSET.address, (0..7).map(|_| offset(rng)).collect()),
+    }
+}
+
+fn offset(rng: &mut Dice) -> u8 {
+    let most = if rng.one_in(40) { 127 } else { 16 };
+    rng.up_to(most) | rng.one_of(&[0, 0x80], 0)
+}
+
+fn any_pause(rng: &mut Dice) -> Duration {
+    if rng.one_in(3) {
+        rng.any_scale(Duration::from_micros(10), Duration::from_millis(300))
+    } else {
+        Duration::ZERO
+    }
+}
+
+/// Splits a frame at random, with pauses inside it that the protocol permits.
+fn split(bytes: Vec<u8>, rng: &mut Dice) -> Vec<(Duration, Vec<u8>)> {
+    let mut parts = Vec::new();
+    let mut rest = bytes;
+    let mut pause = any_pause(rng);
+    while rng.one_in(4) && rest.len() > 1 {
+        let tail = rest.split_off(1 + rng.below(rest.len() - 1));
+        parts.push((pause, rest));
+        rest = tail;
+        pause =
+            if rng.one_in(2) { rng.any_scale(Duration::from_micros(10), MAX_PAUSE) } else { Duration::ZERO };
+    }
+    parts.push((pause, rest));
+    parts
+}

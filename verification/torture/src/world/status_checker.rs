@@ -1,0 +1,317 @@
+//! Checks the status block, the positions, the reports and the valve against the true state of the arm, four times a
+//! second of virtual time.
+//!
+//! The constants below state how long the arm may take until its status is right.
+
+use motion_core::Vacuum;
+use motion_core::calibration::angle_from_counts;
+use motion_core::report_timer::highest_frequency;
+use protocol_core::registers::map::{
+    FAULTS, FRAMES_CORRUPTED, MISSING_SERVOS, MOVING_JOINTS, OFFSET, PRESENT_POSITION, SERVO_BUS_ERRORS,
+    SERVO_TEMPERATURE, SPEED, SUPPLY_VOLTAGE, TARGET_POSITION, TIME, fault,
+};
+use protocol_core::registers::{Joint, Register, RegisterFile};
+use protocol_core::time::{Duration, Instant};
+
+use super::command_checker::{CommandChecker, target_counts};
+use super::disturbed_bus::{Availability, DisturbedBus};
+use super::register_model::RegisterModel;
+use crate::per_joint::PerJoint;
+use crate::violation::{Check, ensure};
+
+/// The time between two checks.
+pub(super) const CHECK_PERIOD: Duration = Duration::from_millis(250);
+/// A lost or found servo is reported within this time, even after a restart and with all other servos silent.
+const DETECTION_TIME: Duration = Duration::from_millis(2_500);
+/// Torque is off this long after a change to another motor state than servo.
+const RELEASE_TIME: Duration = Duration::from_millis(300);
+/// The time that a move may take beyond its distance at its speed.
+const MOVE_MARGIN: Duration = Duration::from_millis(1_000);
+/// The longest time that the valve may be open (D20).
+const MAX_VALVE_TIME: Duration = Duration::from_millis(501);
+
+/// The observed state of an arm since its start.
+#[derive(Debug)]
+pub(super) struct StatusChecker {
+    pub(super) next_at: Instant,
+    /// The last start of the arm or end of a stall of the shell.
+    unsettled_at: Instant,
+    /// The last write that can move joints.
+    motion_at: Instant,
+    /// The last write of the motor state.
+    state_at: Instant,
+    /// The time by which each joint has to be at rest.
+    settled_by: PerJoint<Instant>,
+    /// The last position of each joint, and the time of its last change.
+    last_moves: PerJoint<(u16, Instant)>,
+    missing: u8,
+    corrupted: u16,
+    bus_errors: u16,
+    /// True if the host link was disturbed since the start.
+    pub(super) link_was_disturbed: bool,
+    /// Headers in malformed requests. The arm may count each of them as a corrupted frame once.
+    pub(super) false_headers: u16,
+    reports: ReportCount,
+    valve_open_since: Option<Instant>,
+}
+
+/// The reports since the last change of their frequency.
+#[derive(Clone, Copy, Debug)]
+struct ReportCount {
+    frequency: u32,
+    since: Instant,
+    count: u64,
+    /// True if a stall or a full link held up reports.
+    disturbed: bool,
+}
+
+/// The true state of the arm, and its registers.
+pub(super) struct StatusContext<'a> {
+    pub(super) now: Instant,
+    pub(super) registers: &'a RegisterFile,
+    pub(super) model: &'a RegisterModel,
+    pub(super) bus: &'a DisturbedBus,
+    pub(super) command_checker: &'a CommandChecker,
+}
+
+fn counter(registers: &RegisterFile, row: &Register) -> u16 {
+    u16::from_le_bytes([registers.get(row.address), registers.get(row.address.wrapping_add(1))])
+}
+
+impl StatusChecker {
+    pub(super) fn new(now: Instant) -> Self {
+        Self {
+            next_at: now + CHECK_PERIOD,
+            unsettled_at: now,
+            motion_at: now,
+            state_at: now,
+            settled_by: PerJoint::all(now),
+            last_moves: PerJoint::all((0, now)),
+            missing: 0,
+            corrupted: 0,
+            bus_errors: 0,
+            link_was_disturbed: false,
+            false_headers: 0,
+            reports: ReportCount { frequency: 0, since: now, count: 0, disturbed: false },
+            valve_open_since: None,
+        }
+    }
+
+    /// The shell stalls until `now`, for a time of `by`.
+    pub(super) fn shell_was_late(&mut self, now: Instant, by: Duration) {
+        self.unsettled_at = now;
+        self.reports.disturbed = true;
+        self.settled_by.0.iter_mut().for_each(|at| *at = *at + by + Duration::from_millis(20));
+        self.valve_open_since = self.valve_open_since.map(|since| since + by);
+    }
+
+    /// The host link has no room for a report.
+    pub(super) const fn link_is_full(&mut self) {
+        self.reports.disturbed = true;
+    }
+
+    pub(super) fn vacuum_switched(&mut self, now: Instant, vacuum: Vacuum) -> Check {
+        ensure(!(vacuum.pump && vacuum.valve), || "the pump runs with the valve open".to_owned())?;
+        self.valve_open_since = vacuum.valve.then_some(now);
+        Ok(())
+    }
+
+    /// The pump register was written: a release opens the valve for the full time, even if it is open already.
+    pub(super) fn vacuum_written(&mut self, now: Instant) {
+        self.valve_open_since = self.valve_open_since.map(|_| now);
+    }
+
+    /// A write with an effect on the report frequency was accepted.
+    pub(super) fn frequency_written(&mut self, now: Instant, frequency: u8, baud: u32) {
+        let frequency = u32::from(frequency).min(highest_frequency(baud));
+        if frequency == self.reports.frequency {
+            return;
+        }
+        self.reports = ReportCount { frequency, since: now, count: 0, disturbed: false };
+    }
+
+    pub(super) fn report_sent(&mut self, now: Instant) -> Check {
+        self.reports.count += 1;
+        let ReportCount { frequency, since, count, .. } = self.reports;
+        let due = (now - since).as_micros() * u64::from(frequency) / 1_000_000;
+        ensure(count <= due + 1, || format!("{count} reports instead of {due} at {frequency} Hz"))
+    }
+
+    /// A write can move joints, or a servo was found: computes the time by which each joint has to be at rest.
+    pub(super) fn motion_changed(&mut self, context: &StatusContext<'_>) {
+        self.motion_at = context.now;
+        for joint in Joint::ALL {
+            let time = move_time(joint, distance(joint, context), context.registers);
+            self.settled_by[joint] = context.now + time + MOVE_MARGIN;
+        }
+    }
+
+    pub(super) const fn state_written(&mut self, now: Instant) {
+        self.state_at = now;
+    }
+
+    /// Offsets changed: the positions change with the next reading.
+    pub(super) fn offsets_changed(&mut self, now: Instant) {
+        self.last_moves.0.iter_mut().for_each(|(_, since)| *since = now);
+    }
+
+    /// The servos that are newly reported as missing, and those that no longer are; `None` if nothing changed.
+    pub(super) fn missing_changed(&mut self, registers: &RegisterFile) -> Option<(u8, u8)> {
+        let missing = registers.get(MISSING_SERVOS.address);
+        let before = std::mem::replace(&mut self.missing, missing);
+        (before != missing).then_some((missing & !before, before & !missing))
+    }
+
+    /// Checks the whole status.
+    pub(super) fn check(&mut self, context: &StatusContext<'_>) -> Check {
+        self.next_at = context.now + CHECK_PERIOD;
+        for joint in Joint::ALL {
+            self.check_joint(joint, context)?;
+        }
+        self.check_faults(context)?;
+        self.check_counters(context)?;
+        self.check_reports(context.now)?;
+        let open = self.valve_open_since.map_or(Duration::ZERO, |since| context.now - since);
+        ensure(open <= MAX_VALVE_TIME, || format!("the valve has been open for {} us", open.as_micros()))
+    }
+
+    /// The time since the last stall, start, and the time `then`.
+    fn settled_time(&self, now: Instant, then: Instant) -> Duration {
+        now - then.max(self.unsettled_at)
+    }
+
+    fn is_responding(&self, joint: Joint, context: &StatusContext<'_>) -> bool {
+        matches!(context.bus.availability(joint), Availability::Responding(since) if self.settled_time(context.now, since) > DETECTION_TIME)
+    }
+
+    fn check_joint(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
+        let (number, now) = (joint.number(), context.now);
+        let is_missing = context.registers.get(MISSING_SERVOS.address) & joint.bit() != 0;
+        let is_moving = context.registers.get(MOVING_JOINTS.address) & joint.bit() != 0;
+        match context.bus.availability(joint) {
+            Availability::Silent(since) if self.settled_time(now, since) > DETECTION_TIME => {
+                ensure(is_missing, || format!("servo {number} is silent and not reported as missing"))?;
+            }
+            Availability::Responding(since) if self.settled_time(now, since) > DETECTION_TIME => {
+                ensure(!is_missing, || format!("servo {number} responds and is reported as missing"))?;
+                self.check_position(joint, context)?;
+                self.check_torque(joint, context)?;
+            }
+            _ => {}
+        }
+        let is_late = is_moving && now > self.settled_by[joint];
+        ensure(!is_late, || format!("joint {number} has been moving for too long"))?;
+        ensure(!(is_moving && is_missing), || format!("joint {number} is reported as moving and missing"))?;
+        let is_free = context.model.is_servo() || !context.command_checker.is_on(joint);
+        ensure(is_free || self.settled_time(now, self.state_at) < RELEASE_TIME, || {
+            format!("joint {number} still has torque")
+        })
+    }
+
+    /// The position register of a joint at rest holds its position.
+    fn check_position(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
+        let position = context.bus.position(joint);
+        let (last, since) = self.last_moves[joint];
+        if last != position {
+            self.last_moves[joint] = (position, context.now);
+        }
+        // Between two checks, a write may have moved the joint away and back.
+        if last != position || self.settled_time(context.now, since.max(self.motion_at)) < DETECTION_TIME {
+            return Ok(());
+        }
+        let offset = OFFSET.range.decode(context.registers.get(OFFSET.of(joint)));
+        let angle = angle_from_counts(joint, position, i8::try_from(offset).unwrap_or(0)).nearest_degree();
+        let shown = context.registers.get(PRESENT_POSITION.of(joint));
+        ensure(shown.abs_diff(angle) == 0, || {
+            format!("joint {} is at {angle} degrees, and its register holds {shown}", joint.number())
+        })
+    }
+
+    /// A servo that responds has torque in motor state servo.
+    fn check_torque(&self, joint: Joint, context: &StatusContext<'_>) -> Check {
+        let is_due =
+            context.model.is_servo() && self.settled_time(context.now, self.state_at) > DETECTION_TIME;
+        let is_on = context.command_checker.is_on(joint);
+        ensure(is_on || !is_due, || format!("servo {} responds and has no torque", joint.number()))
+    }
+
+    fn check_faults(&self, context: &StatusContext<'_>) -> Check {
+        let faults = context.registers.get(FAULTS.address);
+        let is_flagged = faults & fault::SERVO_BUS != 0;
+        let is_missing = context.registers.get(MISSING_SERVOS.address) != 0;
+        ensure(is_flagged || !is_missing, || "a missing servo without the servo bus fault".to_owned())?;
+        if !Joint::ALL.into_iter().all(|joint| self.is_responding(joint, context)) {
+            return Ok(());
+        }
+        let status = || Joint::ALL.into_iter().map(|joint| context.bus.last_status(joint));
+        let has_alarm = status().any(|status| status.alarms != 0);
+        ensure(is_flagged == has_alarm, || {
+            format!("the faults are {faults:#b}, with an alarm of a servo: {has_alarm}")
+        })?;
+        let hottest = status().map(|status| status.celsius).max().unwrap_or(0);
+        let shown = context.registers.get(SERVO_TEMPERATURE.address);
+        ensure(shown.abs_diff(hottest) <= 1, || format!("{shown} degrees Celsius instead of {hottest}"))?;
+        let supply = context.registers.get(SUPPLY_VOLTAGE.address);
+        let is_right = status().any(|status| status.decivolts.abs_diff(supply) <= 1);
+        ensure(is_right, || format!("no servo measured the supply {supply}"))
+    }
+
+    /// Counters only increase, and do not change without an error.
+    fn check_counters(&mut self, context: &StatusContext<'_>) -> Check {
+        let corrupted = counter(context.registers, &FRAMES_CORRUPTED);
+        let more = corrupted.wrapping_sub(std::mem::replace(&mut self.corrupted, corrupted));
+        ensure(more < 0x8000, || format!("{more} more corrupted frames in one check period"))?;
+        ensure(more <= self.false_headers || self.link_was_disturbed, || {
+            format!("{more} corrupted frames on an undisturbed link, at most {}", self.false_headers)
+        })?;
+        self.false_headers = self.false_headers.saturating_sub(more);
+        let errors = counter(context.registers, &SERVO_BUS_ERRORS);
+        let more = errors.wrapping_sub(std::mem::replace(&mut self.bus_errors, errors));
+        ensure(more < 0x8000, || format!("{more} more servo bus errors in one check period"))?;
+        let all_well = Joint::ALL.into_iter().all(|joint| self.is_responding(joint, context));
+        ensure(more == 0 || !all_well, || format!("{more} servo bus errors while all servos respond"))
+    }
+
+    fn check_reports(&self, now: Instant) -> Check {
+        let ReportCount { frequency, since, count, disturbed } = self.reports;
+        let due = (now - since).as_micros() * u64::from(frequency) / 1_000_000;
+        ensure(disturbed || count + 2 >= due, || {
+            format!("{count} reports instead of {due} at {frequency} Hz")
+        })
+    }
+}
+
+/// The largest distance that a joint may have to move, in counts.
+fn distance(joint: Joint, context: &StatusContext<'_>) -> u16 {
+    let target = target_counts(joint, context.registers);
+    match context.command_checker.goal(joint) {
+        // A set-point may lie beyond the end of the servo's range.
+        Some(goal @ 1..1_023) if (1..1_023).contains(&target) => goal.abs_diff(target) + 5,
+        _ => 1_100,
+    }
+}
+
+/// The time that a joint may take for this distance in counts.
+fn move_time(joint: Joint, distance: u16, registers: &RegisterFile) -> Duration {
+    let degrees = u64::from(distance) * 180 / if joint.number() < 5 { 850 } else { 625 } + 2;
+    let speed = u64::from(registers.get(SPEED.of(joint)));
+    let at_speed = |tenths: u64| Duration::from_millis(degrees * 10_000 / tenths);
+    match speed {
+        // The time register applies as it was when the target was written, so assume the largest time.
+        0 => at_speed(3_720).max(Duration::from_millis(u64::from(MAX_TIME_UNITS) * 100)),
+        _ => at_speed(speed * 19),
+    }
+}
+
+/// The largest value of a time register.
+const MAX_TIME_UNITS: u8 = {
+    let (_, most) = TIME.range.bounds();
+    most.to_le_bytes()[0]
+};
+
+/// True if a write to these registers can move joints.
+pub(super) fn affects_motion(first: u8, count: usize) -> bool {
+    let last = usize::from(first) + count;
+    let (from, to) = (OFFSET.address, TARGET_POSITION.address + TARGET_POSITION.count);
+    first < to && last > usize::from(from)
+}

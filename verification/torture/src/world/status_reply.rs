@@ -1,0 +1,44 @@
+//! Status replies of servos in the bytes on the servo bus.
+
+use motion_core::servo_bus::frame::{Decoder, Reading};
+use protocol_core::registers::Joint;
+
+/// The fields of a servo's last reply, before any corruption.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct StatusFields {
+    pub(super) alarms: u8,
+    pub(super) decivolts: u8,
+    pub(super) celsius: u8,
+}
+
+/// The parameters of each status reply with a valid checksum in `bytes`.
+pub(super) fn status_replies(bytes: &[u8]) -> Vec<(Joint, Vec<u8>)> {
+    let mut decoder = Decoder::new();
+    decoder.push(bytes);
+    let mut found = Vec::new();
+    while let Some(result) = decoder.pull() {
+        if let Ok(frame) = result
+            && let Some(joint) = Joint::from_index(frame.id)
+            && frame.params.len() >= usize::from(Reading::REGISTERS)
+        {
+            found.push((joint, frame.params.to_vec()));
+        }
+    }
+    found
+}
+
+/// The status in `bytes`, if they are exactly one reply with a valid checksum.
+pub(super) fn whole_status(bytes: &[u8]) -> Option<(Joint, StatusFields)> {
+    let &[0xFF, 0xFF, id, length, alarms, _, _, _, _, _, _, decivolts, celsius, ref rest @ ..] = bytes else {
+        return None;
+    };
+    let is_whole = usize::from(length) == rest.len() + 9 && has_valid_checksum(bytes);
+    Joint::from_index(id)
+        .filter(|_| is_whole)
+        .map(|joint| (joint, StatusFields { alarms, decivolts, celsius }))
+}
+
+fn has_valid_checksum(frame: &[u8]) -> bool {
+    let [_, _, covered @ .., checksum] = frame else { return false };
+    covered.iter().fold(0, |sum: u8, byte| sum.wrapping_add(*byte)) == !checksum
+}

@@ -1,0 +1,50 @@
+//! The number of events in worlds.
+
+use std::ops::AddAssign;
+
+macro_rules! counts {
+    ($(#[doc = $doc:literal] $name:ident,)*) => {
+        /// The counts of one world, or of many.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct WorldCounts { $(#[doc = $doc] pub $name: u64,)* }
+
+        impl AddAssign for WorldCounts {
+            fn add_assign(&mut self, other: Self) {
+                $(self.$name += other.$name;)*
+            }
+        }
+    };
+}
+
+counts! {
+    /// Virtual time, in microseconds.
+    micros,
+    /// Complete requests.
+    requests,
+    /// Checked replies.
+    replies,
+    /// Checked reports.
+    reports,
+    /// Bursts of requests with corruption.
+    corrupted_bursts,
+    /// Checked frames to the servos.
+    commands,
+    /// Corrupted or delayed frames on the servo bus.
+    disturbed_servo_frames,
+    /// Corrupted replies of servos with a valid checksum.
+    undetected_errors,
+    /// Changes of a servo fault, and restarts of a servo.
+    servo_faults,
+    /// Stalls of the shell.
+    stalls,
+    /// Power cuts and restarts.
+    power_cuts,
+    /// Power cuts during a start.
+    cut_starts,
+    /// Power cuts during a save.
+    cut_saves,
+    /// Saved settings.
+    saves,
+    /// Times that a joint was given torque.
+    engagements,
+}
