@@ -223,7 +223,8 @@ fn center_stops_a_servo_that_pushes_against_something() {
 fn center_stops_at_ctrl_c() {
     let bus = ServoBus::start(&[], 6);
     let mut terminal = bus.terminal(&["center", "6", "--yes", "--speed", "20"]);
-    terminal.wait_for("of 497 counts");
+    // 497 counts, or fewer where the first reading comes late.
+    terminal.wait_for(" of 4");
     terminal.keys("\x03");
     terminal.wait_for("its torque is off");
     assert_eq!(terminal.wait().code(), Some(130));
