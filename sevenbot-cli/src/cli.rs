@@ -2,7 +2,7 @@
 //!
 //! Knows no arm, and of the commands only what they are called: their arguments stand with them.
 
-use clap::{Args, Parser, Subcommand, value_parser};
+use clap::{Args, CommandFactory, Parser, Subcommand, value_parser};
 
 use crate::commands::{
     backup, baud, calibrate, effector, get, info, monitor, play, ports, pose, record, registers, servo, set,
@@ -110,8 +110,8 @@ impl Command {
             Self::Sniff(args) => sniff::run(session, &args),
             Self::Servo(args) => servo::run(session, &args),
             Self::Registers(args) => registers::run(session, &args),
-            Self::Completions(args) => shell::completions(session, &args),
-            Self::Man(args) => shell::man(session, &args),
+            Self::Completions(args) => shell::completions(session, &args, Cli::command()),
+            Self::Man(args) => shell::man(session, &args, Cli::command()),
         }
     }
 }
@@ -119,7 +119,6 @@ impl Command {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_consistent() {

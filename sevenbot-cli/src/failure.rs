@@ -4,10 +4,11 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use sevenbot::servo_bench;
+use sevenbot::servo_bench::ServoError;
 use sevenbot::{Error, OpenError};
 
-use crate::output::BAD;
+use crate::advice::{self, owned};
+use crate::style::BAD;
 
 /// The exit status after Ctrl-C, as shells have it: 128 and the number of SIGINT.
 pub(crate) const INTERRUPTED: u8 = 130;
@@ -39,7 +40,7 @@ pub(crate) enum Failure {
     /// The arm went away.
     Wire(Error),
     /// An exchange with a servo failed.
-    Servo { port: String, error: servo_bench::Error },
+    Servo { port: String, error: ServoError },
     /// No servo answers at any of the rates and ids that were tried.
     NoServo { port: String, has_echo: bool },
     /// The port of a servo adapter was wanted, but this one leads to an arm's controller.
@@ -86,7 +87,7 @@ impl Failure {
             Self::Usage(_) => 2,
             Self::NoArm { .. } | Self::SeveralArms { .. } => 3,
             Self::Open { .. } | Self::NoRate { .. } | Self::Wire(_) => 3,
-            Self::Servo { error: servo_bench::Error::NotTaken { .. }, .. } | Self::Advised { .. } => 1,
+            Self::Servo { error: ServoError::NotTaken { .. }, .. } | Self::Advised { .. } => 1,
             Self::Servo { .. } | Self::NoServo { .. } | Self::HostLink { .. } => 3,
             Self::Interrupted => INTERRUPTED,
         })
@@ -148,9 +149,9 @@ impl Failure {
                     .to_vec()
             }
             Self::MayMove(_) => SAFETY.map(str::to_owned).to_vec(),
-            Self::Open { error, .. } => error.advice(),
-            Self::Wire(error) => error.advice(),
-            Self::Servo { error, .. } => owned(error.advice()),
+            Self::Open { error, .. } => advice::opening(error),
+            Self::Wire(error) => owned(advice::exchange(error)),
+            Self::Servo { error, .. } => owned(advice::servo(error)),
             Self::Advised { advice, .. } => owned(advice),
             Self::HostLink { .. } => {
                 owned(&["use an adapter on the servo bus, and take the arm's controller off that bus"])
@@ -171,8 +172,4 @@ fn no_servo(has_echo: bool) -> Vec<String> {
         "is the arm's controller off the bus? Two masters disturb each other",
     ];
     owned(&[echo, &checks].concat())
-}
-
-fn owned(lines: &[&str]) -> Vec<String> {
-    lines.iter().map(|&line| line.to_owned()).collect()
 }

@@ -11,6 +11,7 @@
 
 #![forbid(unsafe_code)]
 
+mod advice;
 mod cli;
 mod commands;
 mod confirm;
@@ -24,6 +25,7 @@ mod progress;
 mod reports;
 mod session;
 mod settings_file;
+mod style;
 
 use std::io;
 use std::process::ExitCode;

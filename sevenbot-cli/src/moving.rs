@@ -5,7 +5,7 @@
 
 use std::time::{Duration, Instant};
 
-use sevenbot::joints::{JointSnapshot, frames_for};
+use sevenbot::joints::{JointSnapshot, NoBase, frames_for};
 use sevenbot::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
 use sevenbot::units::move_duration;
 use sevenbot::words::{joints, motor_state_word};
@@ -35,7 +35,11 @@ pub(crate) type Targets = [Option<u8>; 7];
 /// Where a joint goes by a step from where it is sent already, in degrees. It may be out of range.
 pub(crate) fn stepped(joints: &JointSnapshot, joint: Joint, degrees: i16) -> Result<i16, Failure> {
     let base = joints.step_base(joint).map_err(|reason| {
-        Failure::Arm(format!("joint {} takes no step: {reason}; nothing was moved", joint.number()))
+        let advice = match reason {
+            NoBase::Silent => "",
+            NoBase::PowerUpTarget { .. } => "; `sevenbot stop` makes its position its target",
+        };
+        Failure::Arm(format!("joint {} takes no step: {reason}{advice}; nothing was moved", joint.number()))
     })?;
     Ok(i16::from(base).saturating_add(degrees))
 }

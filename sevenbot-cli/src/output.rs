@@ -11,19 +11,10 @@
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
 
-use anstyle::{AnsiColor, Style};
 use serde::Serialize;
 
 use crate::failure::Failure;
-
-/// For headings.
-pub(crate) const BOLD: Style = Style::new().bold();
-/// For what is well.
-pub(crate) const GOOD: Style = AnsiColor::Green.on_default();
-/// For what is not.
-pub(crate) const BAD: Style = AnsiColor::Red.on_default().bold();
-/// For what deserves a look.
-pub(crate) const DOUBTFUL: Style = AnsiColor::Yellow.on_default().bold();
+use crate::style::{BOLD, DOUBTFUL};
 
 /// Something found out: its fields as serde names them, or lines for a reader.
 pub(crate) trait Facts: Serialize {

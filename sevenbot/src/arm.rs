@@ -12,11 +12,11 @@ use protocol_core::registers::map::{
 };
 use protocol_core::request::Request;
 
-use crate::error::{Error, Heard, OpenError};
+use crate::error::{Error, OpenError};
 use crate::identity::Identity;
 use crate::link::Link;
 use crate::pending::{Pending, REPORT};
-use crate::ports;
+use crate::serial::Serial;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 use crate::units::{Angle, MoveTime, Speed};
@@ -121,7 +121,7 @@ impl Arm {
     /// # Errors
     /// The port cannot be opened, nothing answers, or something else does.
     pub fn open_with(path: &str, options: Options) -> Result<Self, OpenError> {
-        let port = ports::open(path, options.baud)?;
+        let port = Serial::open(path, options.baud)?;
         let link = Link::new(port, options.baud);
         let nobody = Identity::from(Snapshot { address: 0, values: Vec::new() });
         let path = path.to_owned();
@@ -197,7 +197,7 @@ impl Arm {
     /// The registers reach past 255, and nothing was sent; or the port is gone, or takes no more bytes.
     pub fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Error> {
         Span::of_values(address, values).ok_or(Error::OutsideMap { address, count: values.len() })?;
-        self.link.send(&Request::Write { address, values })
+        Ok(self.link.send(&Request::Write { address, values })?)
     }
 
     /// Where the joints are, joint 1 first.
@@ -285,7 +285,7 @@ impl Arm {
 
     fn no_answer(&mut self, span: Span) -> Error {
         let Options { attempts, reply_timeout, .. } = self.options;
-        let heard: Heard = self.link.take_heard();
+        let heard = self.link.take_heard();
         Error::NoAnswer { span, attempts: attempts.max(1), waited: reply_timeout, heard }
     }
 

@@ -17,7 +17,7 @@ use crate::span::Span;
 /// match Arm::open("/dev/ttyUSB0", 115_200) {
 ///     Ok(_) => println!("an arm"),
 ///     Err(OpenError::WrongDevice { code }) => println!("something else, with device code {code}"),
-///     Err(error) => println!("{error}; {}", error.advice().join("; ")),
+///     Err(error) => println!("{error}"),
 /// }
 /// ```
 #[derive(Clone, Debug)]
@@ -116,10 +116,36 @@ pub enum Error {
         /// What was heard instead.
         heard: Heard,
     },
-    /// The port takes no more bytes: its other side does not read.
+    /// The port failed.
+    Port(PortError),
+}
+
+/// Why an open port failed.
+///
+/// ```
+/// use sevenbot::PortError;
+///
+/// let gone = PortError::Lost(std::io::ErrorKind::BrokenPipe);
+/// assert_eq!(gone.to_string(), "the connection is gone: broken pipe");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PortError {
+    /// The port takes no more bytes: nothing reads at its other end.
     Stalled,
     /// The port is gone: a cable was pulled, or a simulator ended.
-    PortLost(io::ErrorKind),
+    Lost(io::ErrorKind),
+}
+
+impl From<PortError> for Error {
+    fn from(error: PortError) -> Self {
+        Self::Port(error)
+    }
+}
+
+impl From<PortError> for OpenError {
+    fn from(error: PortError) -> Self {
+        Self::Silent(error.into())
+    }
 }
 
 /// What was heard on the line while an answer was missing.
@@ -130,9 +156,11 @@ pub enum Error {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Heard {
-    /// Bytes of any kind.
+    /// Bytes of any kind, echoes among them.
     pub bytes: usize,
-    /// Whole frames, but not the answer.
+    /// Echoes of what was sent. Only the bus of the servos can have them.
+    pub echoes: usize,
+    /// Whole frames, but neither the answer nor an echo.
     pub other_frames: usize,
     /// Frames whose checksum was wrong.
     pub damaged_frames: usize,
@@ -151,19 +179,32 @@ impl fmt::Display for Error {
                 let millis = waited.as_millis();
                 write!(out, "no answer to a read of {span} ({attempts} tries of {millis} ms): {heard}")
             }
-            Self::Stalled => out.write_str("the port takes no more bytes: nobody reads at its other end"),
-            Self::PortLost(kind) => write!(out, "the connection is gone: {kind}"),
+            Self::Port(error) => error.fmt(out),
         }
     }
 }
 
 impl std::error::Error for Error {}
 
+impl fmt::Display for PortError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stalled => out.write_str("the port takes no more bytes: nothing reads at its other end"),
+            Self::Lost(kind) => write!(out, "the connection is gone: {kind}"),
+        }
+    }
+}
+
+impl std::error::Error for PortError {}
+
 impl fmt::Display for Heard {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self { bytes: 0, .. } => out.write_str("nothing was heard"),
-            Self { damaged_frames: 0, other_frames: 0, bytes } => {
+            Self { damaged_frames: 0, other_frames: 0, echoes: 1.., .. } => {
+                out.write_str("only the echo of the question was heard")
+            }
+            Self { damaged_frames: 0, other_frames: 0, bytes, .. } => {
                 write!(out, "{bytes} bytes were heard, none of them a frame")
             }
             Self { damaged_frames, other_frames, .. } => {
@@ -171,73 +212,6 @@ impl fmt::Display for Heard {
             }
         }
     }
-}
-
-impl OpenError {
-    /// What a user should check, most likely first; empty where the message says it all.
-    #[must_use]
-    pub fn advice(&self) -> Vec<String> {
-        let lines: &[&str] = match self {
-            Self::PermissionDenied { group } => return vec![join(group.as_deref())],
-            Self::Silent(error) => return error.advice(),
-            Self::NotFound => &[
-                "is the arm plugged in, or the simulator started?",
-                "the name may have changed: unplugging and plugging in again gives ports new numbers",
-                "`sevenbot ports` lists what is there",
-            ],
-            Self::Busy => &[
-                "close the other program: a terminal, a browser page, a second sevenbot",
-                "on Linux, `fuser -v PORT` names it",
-            ],
-            Self::Unusable(_) => {
-                &["does this name belong to a serial port, and does it take this baud rate?"]
-            }
-            Self::WrongDevice { .. } => {
-                &["is this the right port? `sevenbot ports` says which ones lead to arms"]
-            }
-        };
-        owned(lines)
-    }
-}
-
-fn join(group: Option<&str>) -> String {
-    match group {
-        Some("root") => "only root may open it: a udev rule, or another kernel driver, made it so".to_owned(),
-        Some(group) => {
-            format!("join the group that may: `sudo usermod -aG {group} $USER`, then log out and in again")
-        }
-        None if cfg!(unix) => {
-            "`ls -lL` of the port shows who may open it: only its owner, or a group too (often dialout or uucp), \
-             which you can join; then log in again"
-                .to_owned()
-        }
-        None => "is another program using it, or does it need an administrator?".to_owned(),
-    }
-}
-
-impl Error {
-    /// What a user should check, most likely first; empty where the message says it all.
-    #[must_use]
-    pub fn advice(&self) -> Vec<String> {
-        owned(match self {
-            Self::OutsideMap { .. } => &[],
-            Self::NoAnswer { heard: Heard { bytes: 0, .. }, .. } => &[
-                "has the arm power, and is its cable plugged in at both ends?",
-                "is this the right port? `sevenbot ports` says which ones lead to arms",
-                "is the baud rate right (--baud)? `sevenbot --port PORT baud --find` tries all of them",
-            ],
-            Self::NoAnswer { .. } => &[
-                "something sends, but it does not make sense: most often the baud rate is wrong (--baud); \
-                 `sevenbot --port PORT baud --find` tries all of them",
-                "is this the right port, and no other program reading from it?",
-            ],
-            Self::Stalled | Self::PortLost(_) => &["was the cable pulled, or the simulator ended?"],
-        })
-    }
-}
-
-fn owned(lines: &[&str]) -> Vec<String> {
-    lines.iter().map(|&line| line.to_owned()).collect()
 }
 
 #[cfg(test)]
@@ -254,13 +228,7 @@ mod tests {
         assert_eq!(nothing, "no answer to a read of 54..60 (3 tries of 500 ms): nothing was heard");
         let garbage = said(Heard { bytes: 12, ..Heard::default() });
         assert!(garbage.ends_with("12 bytes were heard, none of them a frame"), "{garbage}");
-        let frames = said(Heard { bytes: 50, other_frames: 2, damaged_frames: 1 });
+        let frames = said(Heard { bytes: 50, other_frames: 2, damaged_frames: 1, echoes: 0 });
         assert!(frames.ends_with("1 damaged and 2 other frames were heard"), "{frames}");
-    }
-
-    #[test]
-    fn a_denied_permission_names_the_group_to_join() {
-        let denied = OpenError::PermissionDenied { group: Some("dialout".to_owned()) };
-        assert!(denied.advice().concat().contains("usermod -aG dialout $USER"));
     }
 }

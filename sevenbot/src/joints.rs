@@ -92,8 +92,7 @@ impl fmt::Display for NoBase {
             Self::Silent => out.write_str("its servo does not answer"),
             Self::PowerUpTarget { target, present } => write!(
                 out,
-                "it stands at {present}°, and its target of {target}° may be the value of power-up; \
-                 `sevenbot stop` makes its position its target"
+                "it stands at {present}°, and its target of {target}° may be the value of power-up"
             ),
         }
     }

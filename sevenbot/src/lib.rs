@@ -39,6 +39,7 @@ mod permission;
 pub mod playback;
 pub mod ports;
 pub mod recording;
+pub mod serial;
 pub mod servo_bench;
 pub mod snapshot;
 mod span;
@@ -50,7 +51,7 @@ pub mod units;
 pub mod words;
 
 pub use arm::{Arm, Options, Report};
-pub use error::{Error, Heard, OpenError};
+pub use error::{Error, Heard, OpenError, PortError};
 pub use identity::{Firmware, Identity};
 pub use protocol_core::registers::{Joint, Range, Register, map};
 pub use snapshot::Snapshot;

@@ -2,28 +2,22 @@
 //!
 //! Knows neither which reply answers which request, nor what a register means.
 
-use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
 use protocol_core::request::{Reply, Request};
 use protocol_core::time;
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
-use serialport::SerialPort;
 use tracing::{debug, trace};
 
-use crate::error::{Error, Heard};
+use crate::error::{Heard, PortError};
+use crate::serial::Serial;
 use crate::snapshot::Snapshot;
 use crate::traffic::Traffic;
 
-/// The shortest time-out that every platform takes for what it is.
-const SHORTEST_WAIT: Duration = Duration::from_millis(1);
-/// How long the port may refuse to take more bytes.
-const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
-
 /// A serial port that speaks in frames.
 pub(crate) struct Link {
-    port: Box<dyn SerialPort>,
+    port: Serial,
     deframer: Deframer<ToHost>,
     /// What the port brought and the deframer has not taken yet.
     waiting: Vec<u8>,
@@ -32,7 +26,7 @@ pub(crate) struct Link {
 }
 
 impl Link {
-    pub(crate) fn new(port: Box<dyn SerialPort>, baud: u32) -> Self {
+    pub(crate) fn new(port: Serial, baud: u32) -> Self {
         Self {
             port,
             deframer: Deframer::new(gap(baud)),
@@ -42,19 +36,15 @@ impl Link {
         }
     }
 
-    pub(crate) fn send(&mut self, request: &Request<'_>) -> Result<(), Error> {
+    pub(crate) fn send(&mut self, request: &Request<'_>) -> Result<(), PortError> {
         let mut frame = FrameBuffer::new();
         request.encode(&mut frame);
         trace!("-> {}", Traffic::from(request));
-        self.port.set_timeout(WRITE_TIMEOUT).map_err(lost)?;
-        self.port.write_all(&frame).map_err(|error| match error.kind() {
-            ErrorKind::TimedOut => Error::Stalled,
-            kind => Error::PortLost(kind),
-        })
+        self.port.send(&frame)
     }
 
     /// The next reply, asked for or not; `None` when none came before `deadline`.
-    pub(crate) fn receive(&mut self, deadline: Instant) -> Result<Option<Snapshot>, Error> {
+    pub(crate) fn receive(&mut self, deadline: Instant) -> Result<Option<Snapshot>, PortError> {
         loop {
             if let Some(reply) = self.pull() {
                 return Ok(Some(reply));
@@ -71,7 +61,7 @@ impl Link {
     }
 
     /// The next reply among the bytes that are already here.
-    pub(crate) fn receive_waiting(&mut self) -> Result<Option<Snapshot>, Error> {
+    pub(crate) fn receive_waiting(&mut self) -> Result<Option<Snapshot>, PortError> {
         loop {
             if let Some(reply) = self.pull() {
                 return Ok(Some(reply));
@@ -79,10 +69,9 @@ impl Link {
             if self.feed() {
                 continue;
             }
-            if self.port.bytes_to_read().map_err(lost)? == 0 {
+            if !self.read(Duration::ZERO)? {
                 return Ok(None);
             }
-            self.read(SHORTEST_WAIT)?;
         }
     }
 
@@ -115,31 +104,23 @@ impl Link {
         if self.waiting.is_empty() {
             return false;
         }
-        let now = self.now();
+        let now = self.time_at(Instant::now());
         let taken = self.deframer.push(now, &self.waiting);
         self.waiting.drain(..taken.min(self.waiting.len()));
         taken > 0
     }
 
-    /// Reads what is there; waits for it no longer than `patience`, and tells the deframer of the silence.
-    fn read(&mut self, patience: Duration) -> Result<(), Error> {
-        let mut chunk = [0; 1024];
-        self.port.set_timeout(patience.max(SHORTEST_WAIT)).map_err(lost)?;
-        match self.port.read(&mut chunk) {
-            Ok(0) => Err(Error::PortLost(ErrorKind::UnexpectedEof)),
-            Ok(length) => {
-                self.heard.bytes += length;
-                self.waiting.extend(chunk.iter().take(length));
-                Ok(())
-            }
-            Err(error) if error.kind() == ErrorKind::TimedOut => {
-                let now = self.now();
-                self.deframer.push(now, &[]);
-                Ok(())
-            }
-            Err(error) if error.kind() == ErrorKind::Interrupted => Ok(()),
-            Err(error) => Err(Error::PortLost(error.kind())),
+    /// Takes what comes within `patience`. If nothing does, returns `false` and tells the deframer of the silence.
+    fn read(&mut self, patience: Duration) -> Result<bool, PortError> {
+        // Not the time after the wait: a process that was suspended meanwhile may find bytes in the port.
+        let end = self.time_at(Instant::now() + patience);
+        let bytes = self.port.receive(patience)?;
+        self.heard.bytes += bytes.len();
+        if bytes.is_empty() {
+            self.deframer.push(end, &[]);
         }
+        self.waiting.extend(&bytes);
+        Ok(!bytes.is_empty())
     }
 
     /// The deadline, or an earlier point where silence would tell the deframer something.
@@ -149,12 +130,8 @@ impl Link {
         silence.map_or(deadline, |at| at.min(deadline)).max(Instant::now())
     }
 
-    fn now(&self) -> time::Instant {
-        let micros = self.start.elapsed().as_micros();
+    fn time_at(&self, at: Instant) -> time::Instant {
+        let micros = at.duration_since(self.start).as_micros();
         time::Instant::from_micros(u64::try_from(micros).unwrap_or(u64::MAX))
     }
-}
-
-fn lost(error: serialport::Error) -> Error {
-    Error::PortLost(std::io::Error::from(error).kind())
 }

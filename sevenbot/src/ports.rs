@@ -3,10 +3,10 @@
 //! Knows how to ask a stranger who it is, quickly; what to make of the answer is the caller's.
 
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use protocol_core::registers::map::{BAUD_RATES, DEVICE_ID};
-use serialport::{SerialPort, SerialPortType};
+use serialport::SerialPortType;
 
 use crate::arm::{Arm, Options};
 use crate::error::OpenError;
@@ -16,11 +16,6 @@ use crate::span::Span;
 /// How long an arm may take to say who it is: eight registers take 2 ms at 115 200 baud and 25 ms at 9600,
 /// USB adapters add up to 16 ms each way, and an arm's own work little.
 const PROBE_TIMEOUT: Duration = Duration::from_millis(200);
-/// A lock may outlive its owner: a process that was started meanwhile holds it too until it has become another
-/// program, and on a busy machine that takes a while.
-const LET_GO: Duration = Duration::from_secs(1);
-/// How long to wait before a locked port is tried again.
-const TRY_AGAIN: Duration = Duration::from_millis(20);
 /// A port that just opened may bring rubbish first.
 const PROBE_ATTEMPTS: u32 = 2;
 
@@ -78,32 +73,6 @@ fn port(info: serialport::SerialPortInfo) -> Port {
         SerialPortType::Unknown => String::new(),
     };
     Port { name: info.port_name, description }
-}
-
-/// Opens a port, whoever is behind it. Nobody else can open it meanwhile.
-///
-/// # Errors
-/// It cannot be opened.
-pub fn open(name: &str, baud: u32) -> Result<Box<dyn SerialPort>, OpenError> {
-    let deadline = Instant::now() + LET_GO;
-    loop {
-        match open_once(name, baud).map_err(|error| OpenError::of(name, error)) {
-            Err(OpenError::Busy) if Instant::now() < deadline => thread::sleep(TRY_AGAIN),
-            opened => return opened,
-        }
-    }
-}
-
-fn open_once(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
-    let open = |baud| serialport::new(name, baud).open();
-    open(baud).or_else(|error| {
-        // A pseudo-terminal on macOS takes no baud rate; the serialport crate asks for 0 there.
-        if cfg!(target_os = "macos") && error.kind() == serialport::ErrorKind::Unknown {
-            open(0)
-        } else {
-            Err(error)
-        }
-    })
 }
 
 /// Asks all these ports at once who is there.

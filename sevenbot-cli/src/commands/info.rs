@@ -13,8 +13,9 @@ use sevenbot::words::{faults, joints, meaning, refusal_word};
 use sevenbot::{Arm, Firmware, Joint, Register, Snapshot, Span, Status};
 
 use crate::failure::Failure;
-use crate::output::{BAD, BOLD, Facts, GOOD};
+use crate::output::Facts;
 use crate::session::Session;
+use crate::style::{BAD, BOLD, GOOD};
 
 /// Show who the arm is, its settings, and how it is.
 #[derive(Debug, Args)]

@@ -7,8 +7,9 @@ use serde::Serialize;
 use sevenbot::ports::{Port, Probed, available, probe};
 
 use crate::failure::Failure;
-use crate::output::{Facts, GOOD};
+use crate::output::Facts;
 use crate::session::Session;
+use crate::style::GOOD;
 
 /// List serial ports, and which of them lead to an arm.
 #[derive(Debug, Args)]

@@ -3,11 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Command, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 use clap_mangen::Man;
 
-use crate::cli::Cli;
 use crate::failure::Failure;
 use crate::session::Session;
 
@@ -39,14 +38,18 @@ pub(crate) struct ManArgs {
     dir: Option<PathBuf>,
 }
 
-pub(crate) fn completions(session: &mut Session, args: &CompletionsArgs) -> Result<(), Failure> {
+pub(crate) fn completions(
+    session: &mut Session,
+    args: &CompletionsArgs,
+    mut program: Command,
+) -> Result<(), Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "sevenbot", &mut script);
+    clap_complete::generate(args.shell, &mut program, "sevenbot", &mut script);
     session.output.raw(&script)
 }
 
-pub(crate) fn man(session: &mut Session, args: &ManArgs) -> Result<(), Failure> {
-    let mut program = Cli::command().disable_help_subcommand(true);
+pub(crate) fn man(session: &mut Session, args: &ManArgs, program: Command) -> Result<(), Failure> {
+    let mut program = program.disable_help_subcommand(true);
     // Gives every command what it inherits: the global options, and its full name.
     program.build();
     match (&args.dir, &args.command) {

@@ -7,12 +7,13 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde::Serialize;
+use sevenbot::serial::Serial;
 use sevenbot::traffic::{Listener, Traffic};
-use sevenbot::{Error, ports};
 
 use crate::failure::Failure;
-use crate::output::{DOUBTFUL, Facts, Output};
+use crate::output::{Facts, Output};
 use crate::session::Session;
+use crate::style::DOUBTFUL;
 
 /// Show what goes over a line, frame by frame, in words.
 #[derive(Debug, Args)]
@@ -68,26 +69,17 @@ fn port(session: &mut Session) -> Result<(), Failure> {
     let name = session.port.clone().ok_or_else(|| {
         Failure::Usage("what to listen to? use --port PORT, or name a file; - is standard input".to_owned())
     })?;
-    let opened = ports::open(&name, session.options.baud);
+    let opened = Serial::open(&name, session.options.baud);
     let mut port = opened.map_err(|error| Failure::Open { port: name, error })?;
-    let lost = |kind| Failure::Wire(Error::PortLost(kind));
-    port.set_timeout(SILENCE).map_err(|error| lost(io::Error::from(error).kind()))?;
     let mut listener = Listener::default();
-    let mut chunk = [0; 4096];
     let start = Instant::now();
     loop {
-        let is_silent = match port.read(&mut chunk) {
-            Ok(0) => return Err(lost(ErrorKind::UnexpectedEof)),
-            Ok(length) => {
-                listener.hear(chunk.get(..length).unwrap_or(&chunk));
-                false
-            }
-            Err(error) if error.kind() == ErrorKind::Interrupted => false,
-            Err(error) if error.kind() == ErrorKind::TimedOut => true,
-            Err(error) => return Err(lost(error.kind())),
-        };
+        let bytes = port.receive(SILENCE).map_err(|error| Failure::Wire(error.into()))?;
+        listener.hear(&bytes);
         let seconds = start.elapsed().as_secs_f64();
-        while let Some(heard) = if is_silent { listener.next_before_silence() } else { listener.next() } {
+        while let Some(heard) =
+            if bytes.is_empty() { listener.next_before_silence() } else { listener.next() }
+        {
             session.output.show(&Line::new(Some(seconds), &heard))?;
         }
     }

@@ -10,24 +10,24 @@ use motion_core::servo_bus::frame::{self, Decoder, Frame, FrameBuffer, Instructi
 
 use tracing::trace;
 
-use super::error::{Error, Heard};
-use super::line::{Line, SerialLine};
-use crate::error::OpenError;
-use crate::ports;
+use super::error::ServoError;
+use super::line::Line;
+use crate::error::{Heard, OpenError};
+use crate::serial::Serial;
 
 /// The line is at rest once nothing came for so long: longer than the latency timer of an FTDI chip, 16 ms.
 const AT_REST: Duration = Duration::from_millis(25);
 
 /// How to talk to servos.
 #[derive(Clone, Copy, Debug)]
-pub struct Options {
+pub struct BusOptions {
     /// How long to wait for one answer.
     pub reply_timeout: Duration,
     /// How often to ask before giving up, at least once.
     pub attempts: u32,
 }
 
-impl Default for Options {
+impl Default for BusOptions {
     fn default() -> Self {
         Self { reply_timeout: Duration::from_millis(200), attempts: 3 }
     }
@@ -45,7 +45,7 @@ pub struct Answer {
 /// The servo bus, of which this is the only master.
 pub struct ServoBus {
     line: Box<dyn Line>,
-    options: Options,
+    options: BusOptions,
     decoder: Decoder,
     /// What came and the decoder has not taken yet.
     waiting: Vec<u8>,
@@ -66,13 +66,13 @@ impl ServoBus {
     ///
     /// # Errors
     /// It cannot be opened.
-    pub fn open(path: &str, baud: u32, options: Options) -> Result<Self, OpenError> {
-        Ok(Self::over(Box::new(SerialLine::new(ports::open(path, baud)?)), options))
+    pub fn open(path: &str, baud: u32, options: BusOptions) -> Result<Self, OpenError> {
+        Ok(Self::over(Box::new(Serial::open(path, baud)?), options))
     }
 
     /// The bus behind any line.
     #[must_use]
-    pub fn over(line: Box<dyn Line>, options: Options) -> Self {
+    pub fn over(line: Box<dyn Line>, options: BusOptions) -> Self {
         Self {
             line,
             options,
@@ -92,7 +92,7 @@ impl ServoBus {
 
     /// How it talks to servos.
     #[must_use]
-    pub const fn options(&self) -> Options {
+    pub const fn options(&self) -> BusOptions {
         self.options
     }
 
@@ -106,7 +106,7 @@ impl ServoBus {
     ///
     /// # Errors
     /// The adapter does not know the rate.
-    pub fn set_baud(&mut self, baud: u32) -> Result<(), Error> {
+    pub fn set_baud(&mut self, baud: u32) -> Result<(), ServoError> {
         self.line.set_baud(baud)?;
         self.rest(Duration::ZERO)?;
         self.late.clear();
@@ -117,15 +117,15 @@ impl ServoBus {
     ///
     /// # Errors
     /// The servo does not answer, or the port is gone.
-    pub fn read(&mut self, id: u8, register: u8, count: u8) -> Result<Answer, Error> {
+    pub fn read(&mut self, id: u8, register: u8, count: u8) -> Result<Answer, ServoError> {
         self.heard = Heard::default();
         for _ in 0..self.options.attempts.max(1) {
             if let Some(answer) = self.ask(id, register, count, self.options.reply_timeout)? {
                 return Ok(answer);
             }
         }
-        let Options { attempts, reply_timeout: waited } = self.options;
-        let no_answer = Error::NoAnswer { id, attempts: attempts.max(1), waited, heard: self.heard };
+        let BusOptions { attempts, reply_timeout: waited } = self.options;
+        let no_answer = ServoError::NoAnswer { id, attempts: attempts.max(1), waited, heard: self.heard };
         // A late answer must not be taken for that to the next question.
         self.rest(AT_REST)?;
         Err(no_answer)
@@ -136,7 +136,7 @@ impl ServoBus {
     ///
     /// # Errors
     /// The servo does not answer or does not hold the values, or the port is gone.
-    pub fn write(&mut self, id: u8, register: u8, values: &[u8]) -> Result<(), Error> {
+    pub fn write(&mut self, id: u8, register: u8, values: &[u8]) -> Result<(), ServoError> {
         let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
         for _ in 0..self.options.attempts.max(1) {
             self.send_write(id, register, values)?;
@@ -144,14 +144,14 @@ impl ServoBus {
                 return Ok(());
             }
         }
-        Err(Error::NotTaken { id, register })
+        Err(ServoError::NotTaken { id, register })
     }
 
     /// Writes registers and does not look whether that worked.
     ///
     /// # Errors
     /// The port is gone.
-    pub fn send_write(&mut self, id: u8, register: u8, values: &[u8]) -> Result<(), Error> {
+    pub fn send_write(&mut self, id: u8, register: u8, values: &[u8]) -> Result<(), ServoError> {
         let mut request = FrameBuffer::new();
         frame::write(&mut request, id, register, values);
         // An acknowledgement ends the wait; where a servo gives none, this is the time it needs to take the values.
@@ -165,7 +165,7 @@ impl ServoBus {
         register: u8,
         count: u8,
         patience: Duration,
-    ) -> Result<Option<Answer>, Error> {
+    ) -> Result<Option<Answer>, ServoError> {
         // The question for two registers has the length of its answer, so three are read.
         let asked = if count == 2 { 3 } else { count };
         let mut request = FrameBuffer::new();
@@ -179,7 +179,7 @@ impl ServoBus {
     }
 
     /// How many more answers with this id come within `patience`: more than none means several servos with one id.
-    pub(crate) fn further_answers(&mut self, id: u8, patience: Duration) -> Result<usize, Error> {
+    pub(crate) fn further_answers(&mut self, id: u8, patience: Duration) -> Result<usize, ServoError> {
         self.late.clear();
         self.rest(patience)?;
         Ok(self.late.iter().filter(|&&late| late == id).count())
@@ -196,7 +196,7 @@ impl ServoBus {
     }
 
     /// Waits until nothing came for `silence`. Frames that came meanwhile are late answers.
-    pub(crate) fn rest(&mut self, silence: Duration) -> Result<(), Error> {
+    pub(crate) fn rest(&mut self, silence: Duration) -> Result<(), ServoError> {
         loop {
             self.look_for(&[], |_| false);
             if !self.receive(silence)? {
@@ -212,7 +212,7 @@ impl ServoBus {
         request: &[u8],
         patience: Duration,
         is_answer: impl Fn(&Frame<'_>) -> bool,
-    ) -> Result<Option<Answer>, Error> {
+    ) -> Result<Option<Answer>, ServoError> {
         self.rest(Duration::ZERO)?;
         trace!("-> {request:02x?}");
         self.line.send(request)?;
@@ -227,7 +227,7 @@ impl ServoBus {
     }
 
     /// Takes what comes within `patience`; `false` if nothing did.
-    fn receive(&mut self, patience: Duration) -> Result<bool, Error> {
+    fn receive(&mut self, patience: Duration) -> Result<bool, ServoError> {
         let bytes = self.line.receive(patience)?;
         if !bytes.is_empty() {
             trace!("<- {bytes:02x?}");

@@ -9,7 +9,7 @@ use motion_core::servo_bus::Reading;
 use motion_core::servo_bus::frame::{error, register};
 
 use super::bus::ServoBus;
-use super::error::Error;
+use super::error::ServoError;
 use super::facts::{Facts, error_words};
 
 /// The middle of the range of 0 to 1023 counts.
@@ -76,13 +76,13 @@ pub enum CenterError {
     /// The user wanted it to stop.
     Interrupted,
     /// The exchange failed.
-    Bus(Error),
+    Bus(ServoError),
     /// The torque could not be switched off. The servo may still be moving.
     StillOn(Box<CenterError>),
 }
 
-impl From<Error> for CenterError {
-    fn from(error: Error) -> Self {
+impl From<ServoError> for CenterError {
+    fn from(error: ServoError) -> Self {
         Self::Bus(error)
     }
 }

@@ -6,7 +6,7 @@ use motion_core::servo_bus::frame::{BAUD_RATES, error, register};
 use protocol_core::registers::Joint;
 
 use super::bus::ServoBus;
-use super::error::Error;
+use super::error::ServoError;
 
 /// Registers of the EEPROM that are read: up to the conditions that make the LED blink.
 const SETTINGS: u8 = register::LED_CONDITIONS + 1;
@@ -59,7 +59,7 @@ impl Facts {
     ///
     /// # Errors
     /// The servo does not answer, or the port is gone.
-    pub fn read(bus: &mut ServoBus, id: u8) -> Result<Self, Error> {
+    pub fn read(bus: &mut ServoBus, id: u8) -> Result<Self, ServoError> {
         let settings = Block::read(bus, id, 0, SETTINGS)?;
         let orders = Block::read(bus, id, register::TORQUE_SWITCH, ORDERS)?;
         let measured = Block::read(bus, id, register::PRESENT_POSITION, MEASURED)?;
@@ -125,7 +125,7 @@ struct Block {
 }
 
 impl Block {
-    fn read(bus: &mut ServoBus, id: u8, first: u8, count: u8) -> Result<Self, Error> {
+    fn read(bus: &mut ServoBus, id: u8, first: u8, count: u8) -> Result<Self, ServoError> {
         let answer = bus.read(id, first, count)?;
         Ok(Self { first, errors: answer.errors, values: answer.values })
     }

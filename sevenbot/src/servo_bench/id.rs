@@ -8,7 +8,7 @@ use std::time::Duration;
 use motion_core::servo_bus::frame::register;
 
 use super::bus::ServoBus;
-use super::error::Error;
+use super::error::ServoError;
 use super::scan::{Answers, Found, Plan, Step, scan};
 
 /// Register 48, the lock of the EEPROM.
@@ -24,7 +24,7 @@ pub enum IdError {
         answering: Vec<Found>,
     },
     /// The servo does not open its EEPROM. Nothing else was written.
-    StaysLocked(Error),
+    StaysLocked(ServoError),
     /// The servo did not take the new id: it still answers to the old one.
     Unchanged,
     /// The servo answers to neither id.
@@ -32,15 +32,15 @@ pub enum IdError {
     /// Something answers to the old id and to the new one.
     AnswersToBoth,
     /// The servo has its new id, but its EEPROM is still unlocked.
-    StaysOpen(Error),
+    StaysOpen(ServoError),
     /// The port failed after the EEPROM was unlocked.
-    HalfWay(Error),
+    HalfWay(ServoError),
     /// The exchange failed before anything was written.
-    Bus(Error),
+    Bus(ServoError),
 }
 
-impl From<Error> for IdError {
-    fn from(error: Error) -> Self {
+impl From<ServoError> for IdError {
+    fn from(error: ServoError) -> Self {
         Self::Bus(error)
     }
 }
@@ -84,29 +84,6 @@ fn word(found: &Found) -> String {
 
 impl std::error::Error for IdError {}
 
-impl IdError {
-    /// What a user should do now.
-    #[must_use]
-    pub fn advice(&self) -> &'static [&'static str] {
-        match self {
-            Self::NotAlone { answering } if answering.is_empty() => {
-                &["`sevenbot servo scan` tries all baud rates", "do the servos have their own power?"]
-            }
-            Self::NotAlone { .. } => &["unplug the other servos; nothing was written"],
-            Self::StaysLocked(_) | Self::Unchanged => {
-                &["switch the servo's power off and on, and try again: it still has its old id"]
-            }
-            Self::Lost | Self::HalfWay(_) => &[
-                "switch the servo's power off and on, then look with `sevenbot servo scan`",
-                "the servo has either its old id or its new one; then try again",
-            ],
-            Self::AnswersToBoth => &["unplug all servos but one, then look with `sevenbot servo scan`"],
-            Self::StaysOpen(_) => &["switch the servo's power off and on: that locks it"],
-            Self::Bus(error) => error.advice(),
-        }
-    }
-}
-
 /// Changes the id of the only servo on the bus from `old` to `new`, and makes sure of it.
 ///
 /// # Errors
@@ -148,7 +125,7 @@ fn change(bus: &mut ServoBus, old: u8, new: u8) -> Result<(), IdError> {
 fn is_there(bus: &mut ServoBus, id: u8) -> Result<bool, IdError> {
     match bus.read(id, register::ID, 1) {
         Ok(answer) => Ok(answer.values == [id]),
-        Err(Error::NoAnswer { .. }) => Ok(false),
+        Err(ServoError::NoAnswer { .. }) => Ok(false),
         Err(error) => Err(IdError::HalfWay(error)),
     }
 }

@@ -1,17 +1,11 @@
 //! The bytes of the servo bus, and the time: what a [`ServoBus`](super::ServoBus) needs of the world.
 
-use std::io::{ErrorKind, Read, Write};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use serialport::SerialPort;
-
-use super::error::Error;
-
-/// The shortest timeout that every platform takes for what it is.
-const SHORTEST_WAIT: Duration = Duration::from_millis(1);
-/// How long the port may refuse to take more bytes.
-const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
+use super::error::ServoError;
+use crate::error::PortError;
+use crate::serial::Serial;
 
 /// A line to the servos, such as a serial port with a half-duplex adapter behind it.
 pub trait Line {
@@ -19,19 +13,19 @@ pub trait Line {
     ///
     /// # Errors
     /// The line is gone, or takes no more bytes.
-    fn send(&mut self, bytes: &[u8]) -> Result<(), Error>;
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError>;
 
     /// The bytes that are here, or the first that come within `patience`. Empty when none came.
     ///
     /// # Errors
     /// The line is gone.
-    fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, Error>;
+    fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, PortError>;
 
     /// Sends and receives at another baud rate from now on.
     ///
     /// # Errors
-    /// [`Error::NoSuchRate`] when the adapter does not know the rate.
-    fn set_baud(&mut self, baud: u32) -> Result<(), Error>;
+    /// [`ServoError::NoSuchRate`] when the adapter does not know the rate.
+    fn set_baud(&mut self, baud: u32) -> Result<(), ServoError>;
 
     /// The time since some instant in the past.
     fn now(&self) -> Duration;
@@ -41,53 +35,21 @@ pub trait Line {
 /// takes longer anyway; a UART that drives the bus itself may not.
 const GUARD_TIME: Duration = Duration::from_micros(100);
 
-/// A serial port.
-pub(crate) struct SerialLine {
-    port: Box<dyn SerialPort>,
-    start: Instant,
-}
-
-impl SerialLine {
-    pub(crate) fn new(port: Box<dyn SerialPort>) -> Self {
-        Self { port, start: Instant::now() }
-    }
-}
-
-impl Line for SerialLine {
-    fn send(&mut self, bytes: &[u8]) -> Result<(), Error> {
+impl Line for Serial {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         sleep(GUARD_TIME);
-        self.port.set_timeout(WRITE_TIMEOUT).map_err(lost)?;
-        self.port.write_all(bytes).map_err(|error| match error.kind() {
-            ErrorKind::TimedOut => Error::Stalled,
-            kind => Error::PortLost(kind),
-        })
+        self.send(bytes)
     }
 
-    fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, Error> {
-        let mut chunk = [0; 1024];
-        if patience.is_zero() && self.port.bytes_to_read().map_err(lost)? == 0 {
-            return Ok(Vec::new());
-        }
-        self.port.set_timeout(patience.max(SHORTEST_WAIT)).map_err(lost)?;
-        match self.port.read(&mut chunk) {
-            Ok(0) => Err(Error::PortLost(ErrorKind::UnexpectedEof)),
-            Ok(length) => Ok(chunk.into_iter().take(length).collect()),
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {
-                Ok(Vec::new())
-            }
-            Err(error) => Err(Error::PortLost(error.kind())),
-        }
+    fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, PortError> {
+        self.receive(patience)
     }
 
-    fn set_baud(&mut self, baud: u32) -> Result<(), Error> {
-        self.port.set_baud_rate(baud).map_err(|_| Error::NoSuchRate { baud })
+    fn set_baud(&mut self, baud: u32) -> Result<(), ServoError> {
+        if self.set_baud(baud) { Ok(()) } else { Err(ServoError::NoSuchRate { baud }) }
     }
 
     fn now(&self) -> Duration {
-        self.start.elapsed()
+        self.now()
     }
-}
-
-fn lost(error: serialport::Error) -> Error {
-    Error::PortLost(std::io::Error::from(error).kind())
 }

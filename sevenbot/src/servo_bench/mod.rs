@@ -10,10 +10,10 @@
 //! controller has to be off the bus, or off. Everything blocks, with timeouts.
 //!
 //! ```no_run
-//! use sevenbot::servo_bench::{Options, ServoBus, facts::Facts};
+//! use sevenbot::servo_bench::{BusOptions, ServoBus, facts::Facts};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let mut bus = ServoBus::open("/dev/ttyUSB0", 1_000_000, Options::default())?;
+//! let mut bus = ServoBus::open("/dev/ttyUSB0", 1_000_000, BusOptions::default())?;
 //! println!("{:?}", Facts::read(&mut bus, 0)?);
 //! # Ok(())
 //! # }
@@ -31,8 +31,8 @@ mod simulated;
 #[cfg(test)]
 mod tests;
 
-pub use bus::{Answer, Options, ServoBus};
-pub use error::{Error, Heard};
+pub use bus::{Answer, BusOptions, ServoBus};
+pub use error::ServoError;
 pub use line::Line;
 pub use motion_core::servo_bus::frame::{BAUD_RATES, register};
 pub use motion_core::servo_bus::{Reading, Torque, TorqueCodes};

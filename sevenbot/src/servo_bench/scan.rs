@@ -14,7 +14,7 @@ use std::time::Duration;
 use motion_core::servo_bus::frame::register;
 
 use super::bus::ServoBus;
-use super::error::Error;
+use super::error::ServoError;
 
 /// Bytes of the question and its answer, and as many again for a byte time each between them.
 const BYTES: u32 = 30;
@@ -94,12 +94,12 @@ impl Plan {
 ///
 /// # Errors
 /// The port is gone.
-pub fn scan(bus: &mut ServoBus, plan: &Plan, mut tell: impl FnMut(Step)) -> Result<Scan, Error> {
+pub fn scan(bus: &mut ServoBus, plan: &Plan, mut tell: impl FnMut(Step)) -> Result<Scan, ServoError> {
     let (mut found, mut unknown_rates, mut asked) = (Vec::new(), Vec::new(), 0);
     for &baud in &plan.rates {
         match bus.set_baud(baud) {
             Ok(()) => {}
-            Err(Error::NoSuchRate { .. }) => {
+            Err(ServoError::NoSuchRate { .. }) => {
                 unknown_rates.push(baud);
                 continue;
             }
@@ -125,7 +125,7 @@ fn candidates(
     plan: &Plan,
     wait: Duration,
     mut tell: impl FnMut(usize),
-) -> Result<Vec<u8>, Error> {
+) -> Result<Vec<u8>, ServoError> {
     let mut candidates = Vec::new();
     let (mut damaged_before, mut done) = (None, 0);
     bus.take_damaged();
@@ -152,7 +152,7 @@ fn candidates(
 }
 
 /// Asks one id patiently. `None`: nothing answers to it.
-fn verify(bus: &mut ServoBus, id: u8, wait: Duration) -> Result<Option<Answers>, Error> {
+fn verify(bus: &mut ServoBus, id: u8, wait: Duration) -> Result<Option<Answers>, ServoError> {
     bus.take_damaged();
     let options = bus.options();
     for _ in 0..options.attempts.max(1) {

@@ -9,9 +9,10 @@ use motion_core::servo_bus::Reading;
 use motion_core::servo_bus::frame::{Decoder, FrameBuffer};
 use motion_core::servo_bus::servo::Servo;
 
-use super::bus::{Options, ServoBus};
-use super::error::Error;
+use super::bus::{BusOptions, ServoBus};
+use super::error::ServoError;
 use super::line::Line;
+use crate::error::PortError;
 
 /// One servo, and what is wrong with it.
 pub(super) struct Simulated {
@@ -88,11 +89,11 @@ pub(super) struct World {
 pub(super) struct Wire(pub(super) Rc<RefCell<World>>);
 
 impl Line for Wire {
-    fn send(&mut self, bytes: &[u8]) -> Result<(), Error> {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         let world = &mut *self.0.borrow_mut();
         let now = world.now;
         if world.frames_until_lost.is_some_and(|frames| world.sent.len() >= frames) {
-            return Err(Error::PortLost(std::io::ErrorKind::BrokenPipe));
+            return Err(PortError::Lost(std::io::ErrorKind::BrokenPipe));
         }
         world.sent.push(bytes.to_vec());
         if world.has_echo {
@@ -107,7 +108,7 @@ impl Line for Wire {
         Ok(())
     }
 
-    fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, Error> {
+    fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, PortError> {
         let world = &mut *self.0.borrow_mut();
         let deadline = world.now + patience;
         match world.on_its_way.pop_front_if(|(at, _)| *at <= deadline) {
@@ -122,10 +123,10 @@ impl Line for Wire {
         }
     }
 
-    fn set_baud(&mut self, baud: u32) -> Result<(), Error> {
+    fn set_baud(&mut self, baud: u32) -> Result<(), ServoError> {
         let world = &mut *self.0.borrow_mut();
         if !world.rates.is_empty() && !world.rates.contains(&baud) {
-            return Err(Error::NoSuchRate { baud });
+            return Err(ServoError::NoSuchRate { baud });
         }
         world.baud = baud;
         Ok(())
@@ -140,5 +141,5 @@ impl Line for Wire {
 pub(super) fn bus(servos: Vec<Simulated>) -> (ServoBus, Rc<RefCell<World>>) {
     let world = World { servos, baud: 1_000_000, ..World::default() };
     let world = Rc::new(RefCell::new(world));
-    (ServoBus::over(Box::new(Wire(Rc::clone(&world))), Options::default()), world)
+    (ServoBus::over(Box::new(Wire(Rc::clone(&world))), BusOptions::default()), world)
 }

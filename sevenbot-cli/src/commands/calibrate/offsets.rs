@@ -9,7 +9,8 @@ use serde::Serialize;
 use sevenbot::map::OFFSET;
 use sevenbot::{Joint, Snapshot};
 
-use crate::output::{BAD, BOLD, DOUBTFUL, Facts, GOOD};
+use crate::output::Facts;
+use crate::style::{BAD, BOLD, DOUBTFUL, GOOD};
 
 /// Offsets up to this show a good assembly, says the maker's table.
 const GOOD_UP_TO: i16 = 10;

@@ -148,7 +148,7 @@ impl Watcher {
         let refusal = refusal.message().unwrap_or_default();
         self.tell(News::Refused(refusal)).map_err(|Ended| Break::Ended)?;
         match lost {
-            Some(error @ (Error::PortLost(_) | Error::Stalled)) => Err(error.into()),
+            Some(error @ Error::Port(_)) => Err(error.into()),
             _ => Ok(()),
         }
     }

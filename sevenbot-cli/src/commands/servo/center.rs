@@ -7,7 +7,7 @@ use serde::Serialize;
 use sevenbot::servo_bench::center::{CenterError, Limits, MIDDLE, center};
 use sevenbot::servo_bench::{Reading, ServoBus};
 
-use super::{Rate, failure, id, open};
+use super::port::{Rate, failure, id, open};
 use crate::confirm::confirm;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;

@@ -6,10 +6,11 @@ use clap::Args;
 use serde::Serialize;
 use sevenbot::servo_bench::facts::{Facts as Registers, error_words};
 
-use super::{Rate, failure, id, open};
+use super::port::{Rate, failure, id, open};
 use crate::failure::Failure;
-use crate::output::{BAD, BOLD, Facts, GOOD};
+use crate::output::Facts;
 use crate::session::Session;
+use crate::style::{BAD, BOLD, GOOD};
 
 /// Show what one servo measures, what it was told, and its limits.
 ///

@@ -1,16 +1,15 @@
 //! `servo`: single servos through an adapter on the servo bus, without the arm's controller.
 //!
-//! Chooses the port and explains failures. What is done with the servos is in one file a subcommand.
+//! What is done with the servos is in one file a subcommand.
 
 mod center;
 mod info;
+mod port;
 mod scan;
 mod set_id;
 mod torque_codes;
 
-use clap::{Args, Subcommand, builder::RangedI64ValueParser, value_parser};
-use sevenbot::servo_bench::{BAUD_RATES, Error, Heard, MAX_ID, Options, ServoBus};
-use sevenbot::{Arm, ports};
+use clap::{Args, Subcommand};
 
 use crate::failure::Failure;
 use crate::session::Session;
@@ -57,56 +56,4 @@ pub(crate) fn run(session: &mut Session, args: &ServoArgs) -> Result<(), Failure
         ServoCommand::Center(args) => center::run(session, args),
         ServoCommand::TorqueCodes(args) => torque_codes::run(session, args),
     }
-}
-
-/// The baud rate of the bus, where only one is wanted.
-#[derive(Clone, Copy, Debug, Args)]
-struct Rate {
-    /// Baud rate of the servo bus.
-    #[arg(long, value_name = "RATE", default_value_t = 1_000_000, value_parser = rate)]
-    rate: u32,
-}
-
-/// One of the eight rates of an SCS servo.
-fn rate(text: &str) -> Result<u32, String> {
-    let known = text.parse().ok().filter(|rate| BAUD_RATES.contains(rate));
-    known.ok_or_else(|| format!("servos know {}", BAUD_RATES.map(|rate| rate.to_string()).join(", ")))
-}
-
-/// An id that a servo can have.
-fn id() -> RangedI64ValueParser<u8> {
-    value_parser!(u8).range(..=i64::from(MAX_ID))
-}
-
-/// The adapter's port. It cannot be guessed: asking every port would send to whatever is there.
-fn port(session: &Session) -> Result<String, Failure> {
-    let how = "`sevenbot servo` needs the adapter's port: use --port PORT or set SEVENBOT_PORT";
-    session.port.clone().ok_or_else(|| Failure::Usage(how.to_owned()))
-}
-
-/// Opens the bus.
-fn open(session: &Session, baud: u32) -> Result<ServoBus, Failure> {
-    let port = port(session)?;
-    let options = Options { reply_timeout: session.options.reply_timeout, ..Options::default() };
-    ServoBus::open(&port, baud, options).map_err(|error| Failure::Open { port, error })
-}
-
-/// The failure for an exchange that went wrong. Where no servo was heard, an arm is looked for: its host link is the
-/// port that is most often taken for an adapter.
-fn failure(session: &Session, bus: ServoBus, error: Error) -> Failure {
-    let is_silent =
-        matches!(error, Error::NoAnswer { heard: Heard { other_frames: 0, damaged_frames: 0, .. }, .. });
-    match port(session) {
-        Err(failure) => failure,
-        Ok(port) if is_silent && leads_to_arm(session, bus, &port) => Failure::HostLink { port },
-        Ok(port) => Failure::Servo { port, error },
-    }
-}
-
-/// Does the controller of an arm answer on this port, at any of its rates?
-fn leads_to_arm(session: &Session, bus: ServoBus, port: &str) -> bool {
-    // The port can be opened only once.
-    drop(bus);
-    let patient = sevenbot::Options { attempts: 1, ..session.options };
-    Arm::open_with(port, patient).is_ok() || ports::find_baud(port, |_| ()).is_ok()
 }

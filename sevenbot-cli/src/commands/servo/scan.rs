@@ -10,11 +10,12 @@ use sevenbot::Joint;
 use sevenbot::servo_bench::scan::{Answers, Found, Plan, Scan, scan};
 use sevenbot::servo_bench::{BAUD_RATES, MAX_ID};
 
-use super::{leads_to_arm, open, port, rate};
+use super::port::{leads_to_arm, open, port, rate};
 use crate::failure::Failure;
-use crate::output::{DOUBTFUL, Facts, warn};
+use crate::output::{Facts, warn};
 use crate::progress::Progress;
 use crate::session::Session;
+use crate::style::DOUBTFUL;
 
 /// Find the servos on the bus, at all eight baud rates.
 ///

@@ -7,8 +7,9 @@ use clap::{Args, value_parser};
 use serde::Serialize;
 use sevenbot::servo_bench::id::{IdError, everything_at, set_id};
 
+use super::port::{Rate, failure, id, open};
 use super::scan::with_progress;
-use super::{Rate, failure, id, open};
+use crate::advice::servo;
 use crate::failure::Failure;
 use crate::output::Facts;
 use crate::session::Session;
@@ -60,6 +61,26 @@ pub(super) fn run(session: &mut Session, args: &SetIdArgs) -> Result<(), Failure
     match with_progress(&plan, |tell| set_id(&mut bus, &plan, old, new, tell)) {
         Ok(()) => session.output.show(&Changed { old_id: old, id: new }),
         Err(IdError::Bus(error)) => Err(failure(session, bus, error)),
-        Err(error) => Err(Failure::Advised { message: error.to_string(), advice: error.advice() }),
+        Err(error) => Err(Failure::Advised { message: error.to_string(), advice: advice(&error) }),
+    }
+}
+
+/// What a user should do now.
+fn advice(error: &IdError) -> &'static [&'static str] {
+    match error {
+        IdError::NotAlone { answering } if answering.is_empty() => {
+            &["`sevenbot servo scan` tries all baud rates", "do the servos have their own power?"]
+        }
+        IdError::NotAlone { .. } => &["unplug the other servos; nothing was written"],
+        IdError::StaysLocked(_) | IdError::Unchanged => {
+            &["switch the servo's power off and on, and try again: it still has its old id"]
+        }
+        IdError::Lost | IdError::HalfWay(_) => &[
+            "switch the servo's power off and on, then look with `sevenbot servo scan`",
+            "the servo has either its old id or its new one; then try again",
+        ],
+        IdError::AnswersToBoth => &["unplug all servos but one, then look with `sevenbot servo scan`"],
+        IdError::StaysOpen(_) => &["switch the servo's power off and on: that locks it"],
+        IdError::Bus(error) => servo(error),
     }
 }

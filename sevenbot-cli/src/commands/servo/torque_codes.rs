@@ -8,9 +8,9 @@ use std::io::{self, IsTerminal, Write};
 use clap::Args;
 use serde::Serialize;
 use sevenbot::servo_bench::register::TORQUE_SWITCH;
-use sevenbot::servo_bench::{ServoBus, TorqueCodes};
+use sevenbot::servo_bench::{ServoBus, ServoError, TorqueCodes};
 
-use super::{Rate, failure, id, open};
+use super::port::{Rate, failure, id, open};
 use crate::confirm::confirm;
 use crate::failure::Failure;
 use crate::output::Facts;
@@ -152,10 +152,7 @@ pub(super) fn run(session: &mut Session, args: &TorqueCodesArgs) -> Result<(), F
 }
 
 /// The code with which the joint turns lighter. The outer failure is the person's, the inner one the bus's.
-fn ask_which_is_lighter(
-    bus: &mut ServoBus,
-    id: u8,
-) -> Result<Result<Code, sevenbot::servo_bench::Error>, Failure> {
+fn ask_which_is_lighter(bus: &mut ServoBus, id: u8) -> Result<Result<Code, ServoError>, Failure> {
     let (mut code, mut has_felt_both) = (Code::Zero, false);
     if let Err(error) = switch(bus, id, code) {
         return Ok(Err(error));
@@ -189,7 +186,7 @@ fn same() -> Failure {
     }
 }
 
-fn switch(bus: &mut ServoBus, id: u8, code: Code) -> Result<(), sevenbot::servo_bench::Error> {
+fn switch(bus: &mut ServoBus, id: u8, code: Code) -> Result<(), ServoError> {
     bus.write(id, TORQUE_SWITCH, &[code.number()])
 }
 

@@ -1,0 +1,60 @@
+//! The adapter's port and the arguments that all subcommands share, and what a failed exchange may mean.
+
+use clap::{Args, builder::RangedI64ValueParser, value_parser};
+use sevenbot::servo_bench::{BAUD_RATES, BusOptions, MAX_ID, ServoBus, ServoError};
+use sevenbot::{Arm, Heard, Options, ports};
+
+use crate::failure::Failure;
+use crate::session::Session;
+
+/// The baud rate of the bus, where only one is wanted.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct Rate {
+    /// Baud rate of the servo bus.
+    #[arg(long, value_name = "RATE", default_value_t = 1_000_000, value_parser = rate)]
+    pub(super) rate: u32,
+}
+
+/// One of the eight rates of an SCS servo.
+pub(super) fn rate(text: &str) -> Result<u32, String> {
+    let known = text.parse().ok().filter(|rate| BAUD_RATES.contains(rate));
+    known.ok_or_else(|| format!("servos know {}", BAUD_RATES.map(|rate| rate.to_string()).join(", ")))
+}
+
+/// An id that a servo can have.
+pub(super) fn id() -> RangedI64ValueParser<u8> {
+    value_parser!(u8).range(..=i64::from(MAX_ID))
+}
+
+/// The adapter's port. It cannot be guessed: asking every port would send to whatever is there.
+pub(super) fn port(session: &Session) -> Result<String, Failure> {
+    let how = "`sevenbot servo` needs the adapter's port: use --port PORT or set SEVENBOT_PORT";
+    session.port.clone().ok_or_else(|| Failure::Usage(how.to_owned()))
+}
+
+/// Opens the bus.
+pub(super) fn open(session: &Session, baud: u32) -> Result<ServoBus, Failure> {
+    let port = port(session)?;
+    let options = BusOptions { reply_timeout: session.options.reply_timeout, ..BusOptions::default() };
+    ServoBus::open(&port, baud, options).map_err(|error| Failure::Open { port, error })
+}
+
+/// The failure for an exchange that went wrong. Where no servo was heard, an arm is looked for: its host link is the
+/// port that is most often taken for an adapter.
+pub(super) fn failure(session: &Session, bus: ServoBus, error: ServoError) -> Failure {
+    let is_silent =
+        matches!(error, ServoError::NoAnswer { heard: Heard { other_frames: 0, damaged_frames: 0, .. }, .. });
+    match port(session) {
+        Err(failure) => failure,
+        Ok(port) if is_silent && leads_to_arm(session, bus, &port) => Failure::HostLink { port },
+        Ok(port) => Failure::Servo { port, error },
+    }
+}
+
+/// Does the controller of an arm answer on this port, at any of its rates?
+pub(super) fn leads_to_arm(session: &Session, bus: ServoBus, port: &str) -> bool {
+    // The port can be opened only once.
+    drop(bus);
+    let patient = Options { attempts: 1, ..session.options };
+    Arm::open_with(port, patient).is_ok() || ports::find_baud(port, |_| ()).is_ok()
+}
