@@ -1,8 +1,8 @@
-//! The joints at one instant, and what follows from it: what a stop has to write, and where a step begins.
+//! The joints at one instant, and what follows from it: which positions are measured, and where a relative step begins.
 //!
 //! ```text
-//!   motor state, targets, positions, silent and moving joints ──▶ JointSnapshot ──▶ targets that hold the arm
-//!                                                                              └──▶ the base of a relative step
+//!   motor state, targets, positions, silent and moving joints ──▶ JointSnapshot ──▶ the base of a relative step
+//!                                                                              └──▶ targets that hold the arm (hold.rs)
 //! ```
 //!
 //! A position of 0 is 0 degrees or, in the first half second after power-up, a joint that was not measured yet. No
@@ -17,56 +17,17 @@ use protocol_core::registers::map::{MOTOR_STATE, PRESENT_POSITION, TARGET_POSITI
 use protocol_core::registers::{Joint, Register};
 
 use crate::arm::Arm;
-use crate::change::{Cause, Unchanged, verdict};
 use crate::error::Error;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 use crate::status::Status;
 
 /// After power-up an arm measures its joints, or calls them silent, within 500 ms (D12). The rest is for the answer.
-const START_UP: Duration = Duration::from_millis(700);
+pub(crate) const START_UP: Duration = Duration::from_millis(700);
 /// Time between two looks at an arm that starts.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
-/// How often targets are written before their loss counts as a failure.
-const HOLD_ATTEMPTS: u32 = 5;
+pub(crate) const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// A joint this near to its target stands there: a loaded servo stops a few degrees short.
 const STANDS_WITHIN_DEGREES: u8 = 5;
-
-/// Why it is not known that the arm holds.
-///
-/// ```
-/// use sevenbot::joints::NotHeld;
-///
-/// let reason = NotHeld::NotTaken(Vec::new());
-/// assert!(reason.to_string().contains("did not take"));
-/// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum NotHeld {
-    /// The arm could not be asked.
-    Wire(Error),
-    /// The targets do not hold what was written, however often it was.
-    NotTaken(Vec<Unchanged>),
-}
-
-impl From<Error> for NotHeld {
-    fn from(error: Error) -> Self {
-        Self::Wire(error)
-    }
-}
-
-impl fmt::Display for NotHeld {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Wire(error) => error.fmt(out),
-            Self::NotTaken(unchanged) => {
-                out.write_str("the arm did not take the targets that hold it")?;
-                unchanged.first().map_or(Ok(()), |first| write!(out, ": {first}"))
-            }
-        }
-    }
-}
-
-impl std::error::Error for NotHeld {}
 
 /// Why a relative step of a joint has no known start.
 ///
@@ -98,16 +59,6 @@ impl fmt::Display for NoBase {
     }
 }
 
-/// A target that a stop has written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Sent {
-    degrees: u8,
-    /// It was 0, and may not have been measured.
-    was_doubtful: bool,
-}
-
-const NOTHING_SENT: [Option<Sent>; 7] = [None; 7];
-
 impl Arm {
     /// The joints at this instant.
     ///
@@ -117,54 +68,6 @@ impl Arm {
         let status = self.status()?;
         let registers = self.read_span(Span::between(&MOTOR_STATE, &PRESENT_POSITION))?;
         Ok(JointSnapshot { registers, status })
-    }
-
-    /// Makes every joint hold where it is, and makes sure that it took: the targets are written, read back, and written
-    /// again where they differ. Returns the joints as they were read back.
-    ///
-    /// Where the motors do not drive the joints (state 0 or 2) there is nothing to write. A joint whose servo is silent
-    /// gets the position that was measured last as its target, for the time when it answers again; one that was never
-    /// measured is left alone. A joint that may not be measured yet, because the arm was just switched on, is waited
-    /// for, up to 0.7 s; the others are held before.
-    ///
-    /// # Errors
-    /// No answer, or the arm does not take the targets: it may be moving.
-    pub fn hold(&mut self) -> Result<JointSnapshot, NotHeld> {
-        self.patiently(Self::hold_until_seen)
-    }
-
-    fn hold_until_seen(&mut self) -> Result<JointSnapshot, NotHeld> {
-        let start = Instant::now();
-        let mut before = None;
-        let mut sent = NOTHING_SENT;
-        let mut losses = 0;
-        loop {
-            let joints = self.joints()?;
-            if !joints.is_driven() {
-                return Ok(joints);
-            }
-            let is_up = start.elapsed() >= START_UP;
-            let before: &JointSnapshot = before.get_or_insert_with(|| joints.clone());
-            let lost = joints.lost(&sent, before);
-            losses += u32::from(!lost.is_empty());
-            if losses >= HOLD_ATTEMPTS {
-                return Err(NotHeld::NotTaken(lost));
-            }
-            let targets = joints.to_hold(&sent, is_up);
-            for (address, degrees) in frames_for(&TARGET_POSITION, &targets) {
-                self.write(address, &degrees)?;
-            }
-            for ((sent, target), joint) in sent.iter_mut().zip(targets).zip(Joint::ALL) {
-                let was_doubtful = joints.is_doubtful(joint, is_up);
-                *sent = target.map(|degrees| Sent { degrees, was_doubtful }).or(*sent);
-            }
-            if targets == [None; 7] {
-                if !Joint::ALL.into_iter().any(|joint| joints.is_doubtful(joint, is_up)) {
-                    return Ok(joints);
-                }
-                sleep(LOOK_EVERY);
-            }
-        }
     }
 
     /// Waits until each joint has a target of its own rather than that of power-up, which after the arm's start takes
@@ -199,7 +102,7 @@ pub struct JointSnapshot {
     /// From the motor state to the present positions.
     registers: Snapshot,
     /// `None` from firmware without a status block.
-    status: Option<Status>,
+    pub(crate) status: Option<Status>,
 }
 
 impl JointSnapshot {
@@ -245,11 +148,11 @@ impl JointSnapshot {
         self.status.as_ref().map_or(0, Status::missing)
     }
 
-    fn is_missing(&self, joint: Joint) -> bool {
+    pub(crate) fn is_missing(&self, joint: Joint) -> bool {
         self.missing() & joint.bit() != 0
     }
 
-    fn is_moving(&self, joint: Joint) -> bool {
+    pub(crate) fn is_moving(&self, joint: Joint) -> bool {
         self.status.as_ref().is_some_and(|status| status.is_moving(joint))
     }
 
@@ -280,53 +183,11 @@ impl JointSnapshot {
     }
 
     /// May the position of 0 mean that the joint is not measured yet? `is_up`: the arm has been up for long enough.
-    fn is_doubtful(&self, joint: Joint, is_up: bool) -> bool {
+    pub(crate) fn is_doubtful(&self, joint: Joint, is_up: bool) -> bool {
         let is_start_up_over = is_up || self.missing() != 0;
         // Power-up targets are not 0, and a target that the host wrote in start-up counts as on its way.
         let was_measured = self.target(joint) == 0 && !self.is_moving(joint);
         self.present(joint) == 0 && !is_start_up_over && !was_measured
-    }
-
-    /// The targets to write now, so that the joints hold where they are, after `sent` was written.
-    fn to_hold(&self, sent: &[Option<Sent>; 7], is_up: bool) -> [Option<u8>; 7] {
-        let mut targets = [None; 7];
-        for ((target, sent), joint) in targets.iter_mut().zip(sent).zip(Joint::ALL) {
-            let is_done = sent.is_some_and(|sent| {
-                let is_measured_now = sent.was_doubtful && self.present(joint) != 0;
-                self.target(joint) == sent.degrees && !is_measured_now
-            });
-            *target = self.place_to_hold(joint, is_up).filter(|_| !is_done);
-        }
-        targets
-    }
-
-    /// Where the joint is to be held; `None` while that is not known.
-    fn place_to_hold(&self, joint: Joint, is_up: bool) -> Option<u8> {
-        let present = self.present(joint);
-        let is_unknown = present == 0 && self.is_missing(joint);
-        // A doubtful joint on its way has left 0 degrees just now, or another host sent it somewhere during start-up.
-        // It cannot wait, and in start-up it is not driven before it was measured, which the next look shows.
-        let may_wait = self.is_doubtful(joint, is_up) && !self.is_moving(joint);
-        (!is_unknown && !may_wait).then_some(present)
-    }
-
-    /// The targets that do not hold what was sent.
-    fn lost(&self, sent: &[Option<Sent>; 7], before: &Self) -> Vec<Unchanged> {
-        let cause = match (&before.status, &self.status) {
-            (Some(before), Some(after)) => verdict(before, after),
-            _ => Cause::Unknown,
-        };
-        let pairs = Joint::ALL.into_iter().zip(sent).filter_map(|(joint, sent)| Some((joint, (*sent)?)));
-        pairs
-            .map(|(joint, sent)| (joint, sent.degrees, self.target(joint)))
-            .filter(|(_, wanted, found)| wanted != found)
-            .map(|(joint, wanted, found)| Unchanged {
-                address: TARGET_POSITION.of(joint),
-                wanted,
-                found,
-                cause,
-            })
-            .collect()
     }
 }
 
@@ -345,13 +206,13 @@ pub fn frames_for(row: &Register, values: &[Option<u8>; 7]) -> Vec<(u8, Vec<u8>)
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use protocol_core::registers::map::{MISSING_SERVOS, MOVING_JOINTS};
 
-    const UP: [u8; 7] = [120, 90, 65, 90, 90, 90, 80];
+    pub(crate) const UP: [u8; 7] = [120, 90, 65, 90, 90, 90, 80];
 
-    fn look(targets: [u8; 7], positions: [u8; 7], missing: u8, moving: u8) -> JointSnapshot {
+    pub(crate) fn look(targets: [u8; 7], positions: [u8; 7], missing: u8, moving: u8) -> JointSnapshot {
         let mut registers = Snapshot { address: MOTOR_STATE.address, values: vec![0; 32] };
         registers.values[0] = motor_state::SERVO;
         registers.values[17..24].copy_from_slice(&targets);
@@ -362,57 +223,8 @@ mod tests {
         JointSnapshot { registers, status: Some(Status::from(status)) }
     }
 
-    fn power_up(positions: [u8; 7], missing: u8, moving: u8) -> JointSnapshot {
+    pub(crate) fn power_up(positions: [u8; 7], missing: u8, moving: u8) -> JointSnapshot {
         look(TARGET_POSITION.defaults, positions, missing, moving)
-    }
-
-    #[test]
-    fn every_measured_joint_is_held_where_it_is() {
-        let joints = look([170, 90, 65, 90, 90, 90, 80], UP, 0, 1);
-        assert_eq!(joints.to_hold(&NOTHING_SENT, false), UP.map(Some));
-        assert!(!joints.is_doubtful(Joint::ALL[0], false));
-    }
-
-    #[test]
-    fn what_was_written_is_written_again_only_where_it_did_not_take() {
-        let sent = UP.map(|degrees| Some(Sent { degrees, was_doubtful: false }));
-        assert_eq!(look(UP, UP, 0, 0).to_hold(&sent, false), [None; 7]);
-        let lost = look([170, 90, 65, 90, 90, 90, 80], [125, 90, 65, 90, 90, 90, 80], 0, 1);
-        let again = lost.to_hold(&sent, false);
-        assert_eq!(again, [Some(125), None, None, None, None, None, None], "from where it is by now");
-    }
-
-    #[test]
-    fn a_joint_that_leaves_zero_degrees_is_stopped_at_once() {
-        let joints = look([170, 90, 65, 90, 90, 90, 80], [0, 90, 65, 90, 90, 90, 80], 0, 1);
-        assert_eq!(joints.to_hold(&NOTHING_SENT, false)[0], Some(0));
-        assert!(joints.is_doubtful(Joint::ALL[0], false), "it may be start-up: look again");
-        let at_rest = look([0, 90, 65, 90, 90, 90, 80], [0, 90, 65, 90, 90, 90, 80], 0, 0);
-        assert!(!at_rest.is_doubtful(Joint::ALL[0], false), "at rest at 0 degrees it was measured there");
-    }
-
-    #[test]
-    fn a_joint_that_is_not_measured_yet_is_not_sent_to_zero() {
-        let joints = power_up([0; 7], 0, 0);
-        assert_eq!(joints.to_hold(&NOTHING_SENT, false), [None; 7]);
-        assert!(joints.is_doubtful(Joint::ALL[0], false));
-        assert_eq!(joints.to_hold(&NOTHING_SENT, true)[0], Some(0), "after start-up 0 is 0 degrees");
-        let another_is_missing = power_up([0; 7], 0b10, 0);
-        assert_eq!(another_is_missing.to_hold(&NOTHING_SENT, false)[0], Some(0), "start-up is over");
-    }
-
-    #[test]
-    fn a_target_of_start_up_is_replaced_as_soon_as_the_joint_is_measured() {
-        let sent = [Some(Sent { degrees: 0, was_doubtful: true }); 7];
-        let joints = look([0; 7], UP, 0, 0x7F);
-        assert_eq!(joints.to_hold(&sent, false), UP.map(Some));
-    }
-
-    #[test]
-    fn a_silent_joint_is_held_where_it_was_measured_last_and_never_at_zero() {
-        let joints = look([170, 90, 170, 90, 90, 90, 80], [120, 90, 0, 90, 90, 90, 80], 0b101, 0);
-        let held = joints.to_hold(&NOTHING_SENT, true);
-        assert_eq!((held[0], held[2]), (Some(120), None));
     }
 
     #[test]

@@ -30,6 +30,7 @@
 pub mod arm;
 pub mod change;
 pub mod error;
+pub mod hold;
 pub mod identity;
 pub mod joints;
 mod link;

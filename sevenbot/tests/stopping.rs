@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use fake::{Damage, IDENTITY, POSE, arm_that, deaf_after, obey, on_a_bad_line, reply, under_way};
 use protocol_core::request::Request;
-use sevenbot::joints::NotHeld;
+use sevenbot::hold::NotHeld;
 use sevenbot::{Arm, Error, Options};
 
 /// Frames wait this long; the many attempts give a busy machine ten seconds.

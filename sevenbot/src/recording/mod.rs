@@ -15,39 +15,18 @@ use std::time::Duration;
 
 use protocol_core::registers::Joint;
 
-use crate::units::{Angle, Speed};
+use crate::units::Speed;
+
+mod line;
+
+pub use line::{LineError, Moment};
 
 /// The first word of every recording.
 const FORMAT: &str = "7bot-recording";
 /// The version of the format, the second word.
 const VERSION: &str = "1";
-/// Time, seven angles, vacuum.
-const FIELDS: usize = 9;
-/// A recording ends within a day, so that no arithmetic on its times can overflow.
-const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
 /// Angles are rounded to whole degrees, so two of them may seem one degree further apart than they were.
 const ROUNDING_DEGREES: f64 = 1.0;
-
-/// Where the arm was at one time.
-///
-/// ```
-/// use sevenbot::Angle;
-/// use sevenbot::recording::Moment;
-/// use std::time::Duration;
-///
-/// let pose = [Angle::from_register(90); 7];
-/// let moment = Moment { time: Duration::from_millis(1500), pose, vacuum: true };
-/// assert_eq!(moment.to_string(), "1.500  90  90  90  90  90  90  90   1");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Moment {
-    /// Since the beginning of the recording.
-    pub time: Duration,
-    /// Joint 1 first.
-    pub pose: [Angle; 7],
-    /// Does the pump suck?
-    pub vacuum: bool,
-}
 
 /// A movement: moments in rising order of time, at least one.
 ///
@@ -93,43 +72,6 @@ pub enum RecordingError {
     },
 }
 
-/// What is wrong with a line of a recording.
-///
-/// ```
-/// use sevenbot::recording::{LineError, Recording, RecordingError};
-///
-/// let refused = Recording::parse("7bot-recording 1\n0 90 90 65\n");
-/// assert_eq!(refused, Err(RecordingError::Line { number: 2, cause: LineError::Fields(4) }));
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-pub enum LineError {
-    /// A moment has nine fields.
-    Fields(usize),
-    /// This is no time in seconds.
-    Time(String),
-    /// It is not later than the moment before it.
-    NotLater,
-    /// This is no angle in whole degrees from 0 to 180.
-    Angle {
-        /// The joint it was meant for.
-        joint: Joint,
-        /// What stands there.
-        text: String,
-    },
-    /// This is neither 0 nor 1.
-    Vacuum(String),
-    /// No joint can move so fast.
-    TooFast {
-        /// The joint that would have to.
-        joint: Joint,
-        /// How fast it would have to move, in degrees/s.
-        degrees_per_second: f64,
-    },
-}
-
-// Speeds come from finite numbers, never from NaN.
-impl Eq for LineError {}
-
 impl Recording {
     /// The recording that a text holds.
     ///
@@ -141,7 +83,7 @@ impl Recording {
         let mut moments: Vec<(usize, Moment)> = Vec::new();
         for (number, line) in lines {
             let at_line = |cause| RecordingError::Line { number, cause };
-            let moment = moment(line).map_err(at_line)?;
+            let moment = line::parse(line).map_err(at_line)?;
             if moments.last().is_some_and(|(_, before)| moment.time <= before.time) {
                 return Err(at_line(LineError::NotLater));
             }
@@ -197,33 +139,6 @@ fn header(line: Option<&str>) -> Result<(), RecordingError> {
     }
 }
 
-fn moment(line: &str) -> Result<Moment, LineError> {
-    let fields: Vec<&str> = line.split_whitespace().collect();
-    let [time, pose @ .., vacuum] = fields.as_slice() else { return Err(LineError::Fields(fields.len())) };
-    if fields.len() != FIELDS {
-        return Err(LineError::Fields(fields.len()));
-    }
-    let mut angles = [Angle::from_register(0); 7];
-    for ((angle, text), joint) in angles.iter_mut().zip(pose).zip(Joint::ALL) {
-        let parsed = text.parse().ok().and_then(Angle::from_degrees);
-        *angle = parsed.ok_or_else(|| LineError::Angle { joint, text: (*text).to_owned() })?;
-    }
-    Ok(Moment { time: seconds(time)?, pose: angles, vacuum: suck(vacuum)? })
-}
-
-fn seconds(text: &str) -> Result<Duration, LineError> {
-    let parsed = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    parsed.filter(|time| *time <= LONGEST).ok_or_else(|| LineError::Time(text.to_owned()))
-}
-
-fn suck(text: &str) -> Result<bool, LineError> {
-    match text {
-        "0" => Ok(false),
-        "1" => Ok(true),
-        _ => Err(LineError::Vacuum(text.to_owned())),
-    }
-}
-
 fn too_fast(from: &Moment, to: &Moment, factor: f64) -> Option<LineError> {
     let seconds = (to.time - from.time).as_secs_f64() / factor;
     let reach = Speed::MAXIMUM.degrees_per_second() * seconds + ROUNDING_DEGREES;
@@ -238,16 +153,6 @@ fn too_fast(from: &Moment, to: &Moment, factor: f64) -> Option<LineError> {
 #[must_use]
 pub fn head() -> String {
     format!("{FORMAT} {VERSION}\n# seconds  joints 1 to 7 in degrees  vacuum (1: suck)\n")
-}
-
-impl fmt::Display for Moment {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{:.3}", self.time.as_secs_f64())?;
-        for angle in self.pose {
-            write!(out, " {:3}", angle.degrees())?;
-        }
-        write!(out, "   {}", u8::from(self.vacuum))
-    }
 }
 
 impl fmt::Display for RecordingError {
@@ -266,28 +171,6 @@ impl fmt::Display for RecordingError {
 }
 
 impl std::error::Error for RecordingError {}
-
-impl fmt::Display for LineError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Fields(found) => {
-                write!(out, "{found} fields instead of {FIELDS}: seconds, seven angles, vacuum")
-            }
-            Self::Time(text) => write!(out, "`{text}` is no time in seconds, or more than a day"),
-            Self::NotLater => out.write_str("the time is not later than the one before"),
-            Self::Angle { joint, text } => {
-                let number = joint.number();
-                write!(out, "joint {number} cannot go to `{text}`: whole degrees from 0 to 180")
-            }
-            Self::Vacuum(text) => write!(out, "`{text}` is no vacuum: 1 to suck, 0 to release"),
-            Self::TooFast { joint, degrees_per_second } => {
-                let (number, limit) = (joint.number(), Speed::MAXIMUM.degrees_per_second());
-                write!(out, "joint {number} would have to turn at {degrees_per_second:.0} °/s; ")?;
-                write!(out, "the motors reach {limit:.0}")
-            }
-        }
-    }
-}
 
 #[cfg(test)]
 mod tests {

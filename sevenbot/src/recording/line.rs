@@ -1,0 +1,131 @@
+//! One line of a recording: a moment, as text and back.
+
+use std::fmt;
+use std::time::Duration;
+
+use protocol_core::registers::Joint;
+
+use crate::units::{Angle, Speed};
+
+/// Time, seven angles, vacuum.
+const FIELDS: usize = 9;
+/// A recording ends within a day, so that no arithmetic on its times can overflow.
+const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
+
+/// Where the arm was at one time.
+///
+/// ```
+/// use sevenbot::Angle;
+/// use sevenbot::recording::Moment;
+/// use std::time::Duration;
+///
+/// let pose = [Angle::from_register(90); 7];
+/// let moment = Moment { time: Duration::from_millis(1500), pose, vacuum: true };
+/// assert_eq!(moment.to_string(), "1.500  90  90  90  90  90  90  90   1");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Moment {
+    /// Since the beginning of the recording.
+    pub time: Duration,
+    /// Joint 1 first.
+    pub pose: [Angle; 7],
+    /// Does the pump suck?
+    pub vacuum: bool,
+}
+
+/// What is wrong with a line of a recording.
+///
+/// ```
+/// use sevenbot::recording::{LineError, Recording, RecordingError};
+///
+/// let refused = Recording::parse("7bot-recording 1\n0 90 90 65\n");
+/// assert_eq!(refused, Err(RecordingError::Line { number: 2, cause: LineError::Fields(4) }));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub enum LineError {
+    /// A moment has nine fields.
+    Fields(usize),
+    /// This is no time in seconds.
+    Time(String),
+    /// It is not later than the moment before it.
+    NotLater,
+    /// This is no angle in whole degrees from 0 to 180.
+    Angle {
+        /// The joint it was meant for.
+        joint: Joint,
+        /// What stands there.
+        text: String,
+    },
+    /// This is neither 0 nor 1.
+    Vacuum(String),
+    /// No joint can move so fast.
+    TooFast {
+        /// The joint that would have to.
+        joint: Joint,
+        /// How fast it would have to move, in degrees/s.
+        degrees_per_second: f64,
+    },
+}
+
+// Speeds come from finite numbers, never from NaN.
+impl Eq for LineError {}
+
+/// The moment that a line holds.
+pub(super) fn parse(line: &str) -> Result<Moment, LineError> {
+    let fields: Vec<&str> = line.split_whitespace().collect();
+    let [time, pose @ .., vacuum] = fields.as_slice() else { return Err(LineError::Fields(fields.len())) };
+    if fields.len() != FIELDS {
+        return Err(LineError::Fields(fields.len()));
+    }
+    let mut angles = [Angle::from_register(0); 7];
+    for ((angle, text), joint) in angles.iter_mut().zip(pose).zip(Joint::ALL) {
+        let parsed = text.parse().ok().and_then(Angle::from_degrees);
+        *angle = parsed.ok_or_else(|| LineError::Angle { joint, text: (*text).to_owned() })?;
+    }
+    Ok(Moment { time: seconds(time)?, pose: angles, vacuum: suck(vacuum)? })
+}
+
+fn seconds(text: &str) -> Result<Duration, LineError> {
+    let parsed = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    parsed.filter(|time| *time <= LONGEST).ok_or_else(|| LineError::Time(text.to_owned()))
+}
+
+fn suck(text: &str) -> Result<bool, LineError> {
+    match text {
+        "0" => Ok(false),
+        "1" => Ok(true),
+        _ => Err(LineError::Vacuum(text.to_owned())),
+    }
+}
+
+impl fmt::Display for Moment {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{:.3}", self.time.as_secs_f64())?;
+        for angle in self.pose {
+            write!(out, " {:3}", angle.degrees())?;
+        }
+        write!(out, "   {}", u8::from(self.vacuum))
+    }
+}
+
+impl fmt::Display for LineError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fields(found) => {
+                write!(out, "{found} fields instead of {FIELDS}: seconds, seven angles, vacuum")
+            }
+            Self::Time(text) => write!(out, "`{text}` is no time in seconds, or more than a day"),
+            Self::NotLater => out.write_str("the time is not later than the one before"),
+            Self::Angle { joint, text } => {
+                let number = joint.number();
+                write!(out, "joint {number} cannot go to `{text}`: whole degrees from 0 to 180")
+            }
+            Self::Vacuum(text) => write!(out, "`{text}` is no vacuum: 1 to suck, 0 to release"),
+            Self::TooFast { joint, degrees_per_second } => {
+                let (number, limit) = (joint.number(), Speed::MAXIMUM.degrees_per_second());
+                write!(out, "joint {number} would have to turn at {degrees_per_second:.0} °/s; ")?;
+                write!(out, "the motors reach {limit:.0}")
+            }
+        }
+    }
+}
