@@ -230,8 +230,9 @@ impl CommandChecker {
             self.kept_goals[joint].is_some_and(|(kept, tolerance)| goal.abs_diff(kept) <= tolerance);
         let degrees = if is_kept { 4 } else { 1 };
         let fall = if bus.has_torque(joint) { 0 } else { MAX_FALL };
-        // The joint may move after its reading, and a reply may be old.
-        let moved = bus.reply_age(joint).as_micros() * 1_757 / 1_000_000;
+        // After its reading the joint may go on moving: the servo may execute a corrupted goal. A reply may be old.
+        let speed = u64::from(bus.last_status(joint).speed);
+        let moved = (bus.reply_age(joint).as_micros() * 1_757 + FRESH_FOR.as_micros() * speed) / 1_000_000;
         let error = bus.position_tolerance(joint, context.now);
         let tolerance = u64::from(degrees * degree(joint) + fall) + moved + error;
         let position = bus.position(joint);
@@ -316,8 +317,9 @@ fn degree(joint: Joint) -> u16 {
     if joint.number() < 5 { 5 } else { 4 }
 }
 
-/// Counts that a joint without torque may fall after its reading: 130 degrees/s for 20 ms. The controller reads again
-/// before it gives torque later than that.
+/// The controller reads a joint again before it gives torque later than this after a reading.
+const FRESH_FOR: Duration = Duration::from_millis(20);
+/// Counts that a joint without torque may fall in that time, at 130 degrees/s.
 const MAX_FALL: u16 = 12;
 
 /// The servo position of a joint's target register.

@@ -7,6 +7,8 @@ use protocol_core::registers::Joint;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct StatusFields {
     pub(super) alarms: u8,
+    /// In counts per second, without its sign.
+    pub(super) speed: u16,
     pub(super) decivolts: u8,
     pub(super) celsius: u8,
 }
@@ -29,13 +31,15 @@ pub(super) fn status_replies(bytes: &[u8]) -> Vec<(Joint, Vec<u8>)> {
 
 /// The status in `bytes`, if they are exactly one reply with a valid checksum.
 pub(super) fn whole_status(bytes: &[u8]) -> Option<(Joint, StatusFields)> {
-    let &[0xFF, 0xFF, id, length, alarms, _, _, _, _, _, _, decivolts, celsius, ref rest @ ..] = bytes else {
+    let &[0xFF, 0xFF, id, length, alarms, _, _, s1, s0, _, _, decivolts, celsius, ref rest @ ..] = bytes
+    else {
         return None;
     };
     let is_whole = usize::from(length) == rest.len() + 9 && has_valid_checksum(bytes);
+    let speed = u16::from_be_bytes([s1 & 0x7F, s0]);
     Joint::from_index(id)
         .filter(|_| is_whole)
-        .map(|joint| (joint, StatusFields { alarms, decivolts, celsius }))
+        .map(|joint| (joint, StatusFields { alarms, speed, decivolts, celsius }))
 }
 
 fn has_valid_checksum(frame: &[u8]) -> bool {
