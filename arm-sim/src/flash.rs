@@ -1,136 +1,84 @@
 //! The chip's two journal sectors as a simulated NOR flash.
 //!
 //! It behaves like the real one where that matters to the journal: programming only clears bits, erasing sets a whole
-//! sector, and a restart changes nothing. The bytes are in memory, or wherever other [`Cells`] keep them. This file
-//! knows nothing about the stored data.
+//! sector, and a restart changes nothing. The bytes are in memory, or in other [`Cells`]. The content does not matter
+//! here.
 
-use std::cell::RefCell;
-use std::fmt::Debug;
-use std::io;
-use std::rc::Rc;
+use alloc::rc::Rc;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cell::RefCell;
+use core::fmt::Debug;
 
-use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
+};
 
 /// Bytes of one sector (STM32F405, sectors 0 to 3).
 pub const SECTOR_SIZE: usize = 16 * 1024;
-/// Bytes of the two journal sectors, and so of an image.
+/// Bytes of the two journal sectors, and of a settings image.
 pub const SIZE: usize = 2 * SECTOR_SIZE;
-/// What an erased byte reads.
+/// The value of an erased byte.
 pub const ERASED: u8 = 0xFF;
 
-/// Why a flash operation failed.
-#[derive(Debug, thiserror::Error)]
-pub enum FlashError {
-    /// The range is not inside the two sectors.
-    #[error("outside the two journal sectors")]
-    OutOfBounds,
-    /// The range does not fall on words, or on sectors for an erase.
-    #[error("not aligned to a word or sector")]
-    NotAligned,
-    /// The cells failed.
-    #[error(transparent)]
-    Cells(#[from] io::Error),
-}
-
-impl NorFlashError for FlashError {
-    fn kind(&self) -> NorFlashErrorKind {
-        match self {
-            Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
-            Self::NotAligned => NorFlashErrorKind::NotAligned,
-            Self::Cells(_) => NorFlashErrorKind::Other,
-        }
-    }
-}
-
-/// What keeps the [`SIZE`] bytes of the sectors.
+/// Where the [`SIZE`] bytes of the sectors are kept.
 pub trait Cells: Debug {
-    /// Reads the bytes from `offset` on. The range is inside the sectors.
+    /// Reads the bytes from `offset` on.
     ///
     /// # Errors
     /// The cells failed.
-    fn read(&self, offset: usize, bytes: &mut [u8]) -> io::Result<()>;
+    fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind>;
 
-    /// Replaces the bytes from `offset` on. The range is inside the sectors.
+    /// Replaces the bytes from `offset` on.
     ///
     /// # Errors
     /// The cells failed.
-    fn write(&mut self, offset: usize, bytes: &[u8]) -> io::Result<()>;
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), NorFlashErrorKind>;
 }
 
 impl Cells for Vec<u8> {
-    fn read(&self, offset: usize, bytes: &mut [u8]) -> io::Result<()> {
-        let end = offset + bytes.len();
-        bytes.copy_from_slice(self.get(offset..end).ok_or(io::ErrorKind::UnexpectedEof)?);
+    fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        let source = self.get(offset..offset + bytes.len()).ok_or(NorFlashErrorKind::OutOfBounds)?;
+        bytes.copy_from_slice(source);
         Ok(())
     }
 
-    fn write(&mut self, offset: usize, bytes: &[u8]) -> io::Result<()> {
-        let end = offset + bytes.len();
-        self.get_mut(offset..end).ok_or(io::ErrorKind::UnexpectedEof)?.copy_from_slice(bytes);
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        let target = self.get_mut(offset..offset + bytes.len()).ok_or(NorFlashErrorKind::OutOfBounds)?;
+        target.copy_from_slice(bytes);
         Ok(())
     }
 }
 
-/// The two sectors. Clones are handles to the same cells: the flash outlives the firmware that runs from
-/// one power-up to the next.
+/// The two sectors. Clones share their cells, because the flash outlives the controller that runs between two
+/// power-ups.
 #[derive(Clone, Debug)]
 pub struct Flash(Rc<RefCell<dyn Cells>>);
 
 impl Flash {
-    /// Blank sectors that are forgotten with the process.
+    /// Erased sectors in memory.
     #[must_use]
     pub fn in_memory() -> Self {
         Self::on(vec![ERASED; SIZE])
     }
 
-    /// Sectors whose bytes these cells keep.
+    /// Sectors on these cells.
     #[must_use]
     pub fn on(cells: impl Cells + 'static) -> Self {
         Self(Rc::new(RefCell::new(cells)))
     }
-
-    /// What the sectors hold now, in memory: to try something that must not touch the original.
-    ///
-    /// # Errors
-    /// The cells could not be read.
-    pub fn copy(&self) -> io::Result<Self> {
-        let mut bytes = vec![0; SIZE];
-        self.0.borrow().read(0, &mut bytes)?;
-        Ok(Self::on(bytes))
-    }
-
-    /// Is every byte erased?
-    ///
-    /// # Errors
-    /// The cells could not be read.
-    pub fn is_blank(&self) -> io::Result<bool> {
-        let mut bytes = vec![0; SIZE];
-        self.0.borrow().read(0, &mut bytes)?;
-        Ok(bytes.iter().all(|&byte| byte == ERASED))
-    }
-}
-
-/// The place of `length` bytes at `offset`, if they are inside the sectors and both ends are multiples of
-/// `unit`.
-fn place(offset: u32, length: usize, unit: usize) -> Result<usize, FlashError> {
-    let offset = usize::try_from(offset).map_err(|_| FlashError::OutOfBounds)?;
-    if !offset.is_multiple_of(unit) || !length.is_multiple_of(unit) {
-        return Err(FlashError::NotAligned);
-    }
-    let inside = offset.checked_add(length).is_some_and(|end| end <= SIZE);
-    if inside { Ok(offset) } else { Err(FlashError::OutOfBounds) }
 }
 
 impl ErrorType for Flash {
-    type Error = FlashError;
+    type Error = NorFlashErrorKind;
 }
 
 impl ReadNorFlash for Flash {
     const READ_SIZE: usize = 1;
 
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
-        let offset = place(offset, bytes.len(), Self::READ_SIZE)?;
-        Ok(self.0.borrow().read(offset, bytes)?)
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        check_read(self, offset, bytes.len())?;
+        self.0.borrow().read(index(offset)?, bytes)
     }
 
     fn capacity(&self) -> usize {
@@ -142,59 +90,69 @@ impl NorFlash for Flash {
     const WRITE_SIZE: usize = 4;
     const ERASE_SIZE: usize = SECTOR_SIZE;
 
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-        let length = to.checked_sub(from).ok_or(FlashError::OutOfBounds)?;
-        let length = usize::try_from(length).map_err(|_| FlashError::OutOfBounds)?;
-        let offset = place(from, length, Self::ERASE_SIZE)?;
-        Ok(self.0.borrow_mut().write(offset, &vec![ERASED; length])?)
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        check_erase(self, from, to)?;
+        let (start, end) = (index(from)?, index(to)?);
+        self.0.borrow_mut().write(start, &vec![ERASED; end - start])
     }
 
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
-        let offset = place(offset, bytes.len(), Self::WRITE_SIZE)?;
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        check_write(self, offset, bytes.len())?;
+        let start = index(offset)?;
         let mut cells = self.0.borrow_mut();
         let mut programmed = vec![0; bytes.len()];
-        cells.read(offset, &mut programmed)?;
-        // A program pulse clears bits, it never sets one.
+        cells.read(start, &mut programmed)?;
+        // Programming clears bits and never sets one.
         programmed.iter_mut().zip(bytes).for_each(|(cell, byte)| *cell &= byte);
-        Ok(cells.write(offset, &programmed)?)
+        cells.write(start, &programmed)
     }
+}
+
+fn index(offset: u32) -> Result<usize, NorFlashErrorKind> {
+    usize::try_from(offset).map_err(|_| NorFlashErrorKind::OutOfBounds)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::NorFlashErrorKind::{NotAligned, OutOfBounds};
     use super::*;
+
+    fn is_blank(mut flash: Flash) -> bool {
+        let mut bytes = [0; SIZE];
+        flash.read(0, &mut bytes).unwrap();
+        bytes == [ERASED; SIZE]
+    }
 
     #[test]
     fn programming_clears_bits_and_erasing_sets_a_whole_sector() {
         let mut flash = Flash::in_memory();
-        let mut cells = [0; 4];
+        let mut bytes = [0; 4];
         flash.write(8, &[0xF0; 4]).unwrap();
         flash.write(8, &[0x3C; 4]).unwrap();
-        flash.read(8, &mut cells).unwrap();
-        assert_eq!(cells, [0x30; 4]);
-        assert!(!flash.is_blank().unwrap());
+        flash.read(8, &mut bytes).unwrap();
+        assert_eq!(bytes, [0x30; 4]);
+        assert!(!is_blank(flash.clone()));
         flash.erase(0, 16 * 1024).unwrap();
-        assert!(flash.is_blank().unwrap());
+        assert!(is_blank(flash));
     }
 
     #[test]
-    fn what_the_chip_would_refuse_is_refused() {
+    fn what_the_chip_refuses_is_refused() {
         let mut flash = Flash::in_memory();
-        assert!(matches!(flash.write(2, &[0; 4]), Err(FlashError::NotAligned)));
-        assert!(matches!(flash.write(4, &[0; 3]), Err(FlashError::NotAligned)));
-        assert!(matches!(flash.erase(0, 1024), Err(FlashError::NotAligned)));
-        assert!(matches!(flash.erase(16 * 1024, 0), Err(FlashError::OutOfBounds)));
-        assert!(matches!(flash.erase(32 * 1024, 48 * 1024), Err(FlashError::OutOfBounds)));
-        assert!(matches!(flash.read(32 * 1024 - 1, &mut [0; 2]), Err(FlashError::OutOfBounds)));
-        assert!(flash.is_blank().unwrap());
+        assert_eq!(flash.write(2, &[0; 4]), Err(NotAligned));
+        assert_eq!(flash.write(4, &[0; 3]), Err(NotAligned));
+        assert_eq!(flash.erase(0, 1024), Err(NotAligned));
+        assert_eq!(flash.erase(16 * 1024, 0), Err(OutOfBounds));
+        assert_eq!(flash.erase(32 * 1024, 48 * 1024), Err(OutOfBounds));
+        assert_eq!(flash.read(32 * 1024 - 1, &mut [0; 2]), Err(OutOfBounds));
+        assert!(is_blank(flash));
     }
 
     #[test]
-    fn a_clone_is_the_same_flash_and_a_copy_is_not() {
+    fn clones_share_their_cells() {
         let mut flash = Flash::in_memory();
-        let (clone, copy) = (flash.clone(), flash.copy().unwrap());
+        let clone = flash.clone();
         flash.write(0, &[0; 4]).unwrap();
-        assert!(!clone.is_blank().unwrap());
-        assert!(copy.is_blank().unwrap());
+        assert!(!is_blank(clone));
     }
 }

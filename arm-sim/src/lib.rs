@@ -1,20 +1,22 @@
-//! A simulated 7Bot V2 arm: the firmware's own controller, and seven simulated servos under the weight of the arm.
+//! A simulated 7Bot V2 arm: the controller of the firmware, and seven simulated servos under the weight of the arm.
 //!
 //! ```text
-//!           World: time is an argument
-//!          ┌─────────────────────────────────────────────────────────────┐
-//!   bytes ─▶ Pacer ──▶ motion_core::Controller ──▶ bytes ──▶ Plant:      │
-//!   bytes ◀─ Pacer ◀──     │                   ◀── bytes ◀── 7 × Servo   │
-//!          │               └─▶ Settings: the journal on a Flash          │
-//!          └─────────────────────────────────────────────────────────────┘
+//!           Simulation: time is an argument
+//!          ┌───────────────────────────────────────────────────────────┐
+//!   bytes ─▶ Pacer ──▶ motion_core::Controller ──▶ bytes ──▶ Plant:    │
+//!   bytes ◀─ Pacer ◀──     │                   ◀── bytes ◀── 7 × Servo │
+//!          │               └─▶ Settings: the journal on a Flash        │
+//!          └───────────────────────────────────────────────────────────┘
 //! ```
 //!
-//! The crate uses no operating system: it has no clock, file or thread, and it runs in a browser. The same calls give
-//! the same bytes on every machine.
+//! The crate is `no_std`: it has no clock, file or thread, and it runs in a browser. The same calls give the same bytes
+//! on every machine.
 
+#![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
-pub mod adapter;
+extern crate alloc;
+
 pub mod faults;
 pub mod flash;
 pub mod pace;
@@ -22,4 +24,5 @@ pub mod plant;
 pub mod servo;
 pub mod servo_bus;
 mod settings_log;
-pub mod world;
+pub mod simulation;
+pub mod usb_adapter;

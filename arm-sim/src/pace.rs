@@ -1,41 +1,41 @@
-//! A serial line's sense of time: bytes take ten bits each at the baud rate, one after the other.
+//! The timing of a serial line: a byte takes ten bits at the baud rate.
 //!
 //! ```text
-//!   push ──▶ [ flying: still on the line ][ arrived: waiting to be taken ] ──▶ take
+//!   push ──▶ [ in transit: on the line ][ arrived: can be taken ] ──▶ take
 //! ```
 //!
-//! The line never loses a byte: it has room for so many and refuses more, and what has arrived stays until
-//! somebody takes it. Knows nothing of what the bytes mean, nor of who sends them.
+//! The line loses no bytes: it accepts as many as it has room for, and arrived bytes stay until they are taken. The
+//! content of the bytes does not matter here.
 
-use std::collections::VecDeque;
+use alloc::collections::VecDeque;
 
 use protocol_core::time::Instant;
 use protocol_core::wire::MAX_LENGTH;
 
-/// Bytes one direction holds: two of the longest frames, so that one can be queued while another is sent.
+/// Bytes that a direction holds: two of the longest frames, so that one can wait while the other is sent.
 pub const CAPACITY: usize = 2 * MAX_LENGTH;
 /// Start bit, eight data bits, stop bit.
 const BITS_PER_BYTE: u64 = 10;
-/// Arrivals are handed over in batches of so many microseconds, not byte by byte: one wake-up costs more
-/// than a byte, and no serial adapter is finer than this either.
+/// The deadline covers the bytes of so many microseconds: a wake-up for each byte costs more than the byte, and serial
+/// adapters are no finer.
 const BATCH_MICROS: u64 = 1_000;
 
 /// One direction of a serial line.
 #[derive(Debug)]
 pub struct Pacer {
-    /// In bits per second; `None`: bytes arrive at once.
+    /// In bits per second. `None`: bytes arrive at once.
     baud: Option<u64>,
     queue: VecDeque<u8>,
-    /// How many bytes at the front of the queue have arrived.
+    /// Number of bytes at the front of the queue that have arrived.
     arrived: usize,
-    /// Since when the line has been busy without a pause.
+    /// The line has been busy without a pause since then.
     busy_since: Instant,
-    /// How many bytes have arrived since then.
+    /// Number of bytes that have arrived since then.
     sent: u64,
 }
 
 impl Pacer {
-    /// A line at rest. `baud` is in bits per second; `None` or 0: bytes arrive at once.
+    /// An idle line. `baud` is in bits per second; `None` or 0: bytes arrive at once.
     #[must_use]
     pub fn new(baud: Option<u32>) -> Self {
         Self {
@@ -47,22 +47,22 @@ impl Pacer {
         }
     }
 
-    /// How many more bytes the line holds.
+    /// Number of bytes that the line accepts.
     #[must_use]
     pub fn room(&self) -> usize {
         CAPACITY.saturating_sub(self.queue.len())
     }
 
-    /// Is nothing on the line, and nothing waiting to be taken?
+    /// Are there no bytes, neither in transit nor arrived?
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.queue.is_empty()
     }
 
-    /// Begins to send bytes at `now`, and says how many found room.
+    /// Starts to send bytes at `now`. Returns how many were accepted.
     pub fn push(&mut self, now: Instant, bytes: &[u8]) -> usize {
         self.advance(now);
-        if self.flying() == 0 {
+        if self.in_transit() == 0 {
             self.busy_since = now;
             self.sent = 0;
         }
@@ -72,45 +72,45 @@ impl Pacer {
         taken.len()
     }
 
-    /// Lets the bytes arrive that are due by `now`.
+    /// Marks the bytes that have arrived by `now`.
     pub fn advance(&mut self, now: Instant) {
         let due = match self.baud {
-            None => self.flying(),
+            None => self.in_transit(),
             Some(baud) => {
                 let elapsed = (now - self.busy_since).as_micros();
                 let since = elapsed.saturating_mul(baud) / (BITS_PER_BYTE * 1_000_000);
-                usize::try_from(since.saturating_sub(self.sent)).unwrap_or(usize::MAX).min(self.flying())
+                usize::try_from(since.saturating_sub(self.sent)).unwrap_or(usize::MAX).min(self.in_transit())
             }
         };
         self.arrived += due;
         self.sent += due as u64;
     }
 
-    /// Bytes that have arrived, from the first on; possibly not all of them at once.
+    /// The first bytes that have arrived, possibly not all of them.
     #[must_use]
     pub fn arrived(&self) -> &[u8] {
         let (front, _) = self.queue.as_slices();
         front.get(..self.arrived).unwrap_or(front)
     }
 
-    /// Takes the first `count` of the bytes that have arrived off the line.
+    /// Removes the first `count` of the bytes that have arrived.
     pub fn take(&mut self, count: usize) {
         let count = count.min(self.arrived);
         self.queue.drain(..count);
         self.arrived -= count;
     }
 
-    /// When the next batch will have arrived; `None` if nothing is on its way.
+    /// When the next batch has arrived; `None` if no byte is in transit.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
-        let flying = self.flying() as u64;
-        let baud = self.baud.filter(|_| flying > 0)?;
-        let batch = (baud * BATCH_MICROS / (BITS_PER_BYTE * 1_000_000)).clamp(1, flying);
+        let in_transit = self.in_transit() as u64;
+        let baud = self.baud.filter(|_| in_transit > 0)?;
+        let batch = (baud * BATCH_MICROS / (BITS_PER_BYTE * 1_000_000)).clamp(1, in_transit);
         let micros = ((self.sent + batch) * BITS_PER_BYTE * 1_000_000).div_ceil(baud);
         Some(self.busy_since + protocol_core::time::Duration::from_micros(micros))
     }
 
-    fn flying(&self) -> usize {
+    fn in_transit(&self) -> usize {
         self.queue.len() - self.arrived
     }
 }
@@ -157,16 +157,16 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_was_idle_or_blocked_does_not_make_up_for_it() {
+    fn an_idle_line_saves_no_time_for_later() {
         let mut line = Pacer::new(Some(100_000));
         line.push(micros(0), b"a");
         line.push(micros(50_000), b"b");
-        assert_eq!(line.arrived(), b"a", "nobody took it, and it is still there");
+        assert_eq!(line.arrived(), b"a", "it was not taken, and it is still there");
         assert_eq!(line.deadline(), Some(micros(50_100)));
     }
 
     #[test]
-    fn what_does_not_fit_is_left_with_the_sender() {
+    fn bytes_without_room_are_not_accepted() {
         let mut line = Pacer::new(Some(9_600));
         assert_eq!(line.push(micros(0), &[1; CAPACITY + 5]), CAPACITY);
         assert_eq!((line.room(), line.push(micros(0), &[2])), (0, 0));
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_message_is_handed_over_whole_and_a_long_one_by_the_millisecond() {
+    fn the_deadline_is_the_end_of_a_short_message_or_a_millisecond_of_a_long_one() {
         let mut line = Pacer::new(Some(100_000));
         line.push(micros(0), b"short");
         assert_eq!(line.deadline(), Some(micros(500)));

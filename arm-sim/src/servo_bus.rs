@@ -1,27 +1,29 @@
 //! The servo bus behind the controller: simulated servos, or real ones.
 
+use alloc::vec::Vec;
+
 use protocol_core::time::{Duration, Instant};
 
 use crate::plant::Plant;
 
-/// A servo bus as the controller uses it.
+/// A servo bus from the side of the controller.
 pub trait ServoBus {
-    /// Is it there in real time? Then what was missed cannot be made up for.
+    /// Do the servos run in real time? Then a caller that is late cannot catch up.
     const IS_REAL: bool;
 
-    /// How much later than on the wire an answer may arrive.
+    /// An answer may arrive this much later than on the wire.
     fn answer_delay(&self) -> Duration;
 
-    /// Takes bytes that the controller began to send at `now`.
+    /// Takes bytes that the controller starts to send at `now`.
     fn bytes(&mut self, now: Instant, bytes: &[u8]);
 
-    /// Gives the bytes that are through to the controller by `now`.
+    /// Returns the bytes that the controller has received by `now`.
     fn poll(&mut self, now: Instant) -> Vec<u8>;
 
-    /// When bytes will be through to the controller; `None` if none are on their way, or nobody can know.
+    /// When the next bytes arrive. `None` if there are none, or if the time is unknown.
     fn deadline(&self) -> Option<Instant>;
 
-    /// Power off and on, where that is possible.
+    /// Switches the power of the servos off and on, if that is possible.
     fn power_cycle(&mut self, now: Instant);
 }
 

@@ -12,18 +12,18 @@ pub struct BusLine {
 }
 
 impl BusLine {
-    /// A line on which answers arrive at most so much later than on the wire.
+    /// A line with this longest delay between the wire and this computer.
     #[must_use]
     pub const fn new(answer_delay: Duration) -> Self {
         Self { answer_delay, to_servos: Vec::new(), from_servos: Vec::new() }
     }
 
-    /// Takes bytes that arrived from the servos.
+    /// Adds bytes that have arrived from the servos.
     pub fn push(&mut self, bytes: &[u8]) {
         self.from_servos.extend_from_slice(bytes);
     }
 
-    /// Gives the bytes that are to go to the servos.
+    /// Removes the bytes to the servos.
     pub fn take(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.to_servos)
     }
@@ -48,6 +48,6 @@ impl ServoBus for BusLine {
         None
     }
 
-    /// Nobody here can switch off the supply of real servos.
+    /// Has no effect: the supply of real servos cannot be switched from here.
     fn power_cycle(&mut self, _: Instant) {}
 }

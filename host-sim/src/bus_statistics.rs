@@ -1,6 +1,6 @@
-//! What goes over a servo bus, counted: questions, answers, goals, and how long answers take.
+//! Statistics of a servo bus: questions, answers, goals and round-trip times.
 //!
-//! Listens to the bytes of both directions and changes nothing. Time is an argument.
+//! They are taken from the bytes of both directions. Time is an argument.
 
 use std::fmt;
 
@@ -8,45 +8,45 @@ use motion_core::CYCLE;
 use motion_core::servo_bus::frame::{BROADCAST, Decoder, Instruction, register};
 use protocol_core::time::{Duration, Instant};
 
-/// The resolution of round trips.
+/// The resolution of round-trip times.
 const GRAIN_US: u64 = 100;
-/// Round trips that take longer than this count as this long: 100 ms.
+/// Longer round-trip times count as this many steps of the resolution: 100 ms.
 const GRAINS: usize = 1_000;
 
-/// Counts since a moment.
+/// Counts since a point in time.
 #[derive(Debug)]
 pub struct BusStatistics {
     since: Instant,
     decoder: Decoder,
-    /// Who was asked last, and when, unless the answer has come.
+    /// The id and the time of the last question, until its answer.
     asked: Option<(u8, Instant)>,
     questions: u64,
     goals: u64,
-    /// Bytes that arrived, whatever they are.
+    /// Bytes that arrived, in answers or not.
     bytes: u64,
     answers: u64,
     round_trips: Vec<u32>,
 }
 
-/// Figures of a stretch of time.
+/// Figures of a period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
-    /// Questions in a control cycle of 10 ms.
+    /// Questions per control cycle of 10 ms.
     pub questions_per_cycle: f64,
-    /// Frames with goals in a second.
+    /// Frames with goals per second.
     pub goals_per_second: f64,
-    /// Half of the answers took no longer than this, from the question handed to the port to the answer read from it.
+    /// The median time from writing a question to the port to reading its answer.
     pub median: Duration,
-    /// 99 of 100 took no longer than this.
+    /// The 99th percentile of this time.
     pub p99: Duration,
-    /// Questions that were answered.
+    /// Number of answers.
     pub answers: u64,
-    /// Bytes that came, answers or not.
+    /// Bytes that arrived, in answers or not.
     pub bytes: u64,
 }
 
 impl BusStatistics {
-    /// Nothing counted yet.
+    /// Starts a period.
     #[must_use]
     pub fn new(now: Instant) -> Self {
         Self {
@@ -61,7 +61,7 @@ impl BusStatistics {
         }
     }
 
-    /// These bytes are handed to the port: whole frames.
+    /// Counts bytes that are written to the port: whole frames.
     pub fn sent(&mut self, now: Instant, bytes: &[u8]) {
         let mut decoder = Decoder::new();
         for piece in bytes.chunks(Decoder::CAPACITY / 2) {
@@ -78,8 +78,8 @@ impl BusStatistics {
         }
     }
 
-    /// These bytes were read from the port.
-    pub fn heard(&mut self, now: Instant, bytes: &[u8]) {
+    /// Counts bytes that were read from the port.
+    pub fn received(&mut self, now: Instant, bytes: &[u8]) {
         self.bytes += bytes.len() as u64;
         for piece in bytes.chunks(Decoder::CAPACITY / 2) {
             self.decoder.push(piece);
@@ -99,7 +99,7 @@ impl BusStatistics {
         }
     }
 
-    /// The figures since the last call, or since the beginning.
+    /// Ends the period and starts another one.
     pub fn take(&mut self, now: Instant) -> Figures {
         let figures = self.figures(now);
         let asked = self.asked;
@@ -127,7 +127,7 @@ impl BusStatistics {
             seen += u64::from(count);
             seen < wanted
         });
-        // The end of the grain.
+        // The end of the step.
         Duration::from_micros((grains.count() as u64 + 1) * GRAIN_US)
     }
 }
@@ -171,9 +171,9 @@ mod tests {
             statistics.sent(start, &[goals.as_slice(), question.as_slice()].concat());
             let takes = if round < 98 { 2 } else { 9 };
             // An echo, and the answer in two pieces.
-            statistics.heard(start, &question);
-            statistics.heard(start, &answer[..5]);
-            statistics.heard(start + Duration::from_millis(takes), &answer[5..]);
+            statistics.received(start, &question);
+            statistics.received(start, &answer[..5]);
+            statistics.received(start + Duration::from_millis(takes), &answer[5..]);
         }
         let figures = statistics.take(at(1_000));
         assert!(

@@ -1,4 +1,4 @@
-//! The command line, which is a contract: options, exit statuses, one line an error.
+//! The command line: options, exit statuses, and errors in one line. Scripts rely on all of it.
 
 use std::path::PathBuf;
 
@@ -8,10 +8,10 @@ use protocol_core::registers::JOINTS;
 use tracing::level_filters::LevelFilter;
 
 use crate::eeprom::Eeprom;
-use arm_sim::adapter::Latency;
-use arm_sim::faults::FaultAt;
+use arm_sim::faults::ArmFault;
+use arm_sim::usb_adapter::Latency;
 
-/// The chip id of a simulated arm that was given none: "SIM", and 1.
+/// The default chip id of a simulated arm: "SIM" and 1.
 const DEFAULT_CHIP_ID: &str = "53494d000001";
 
 const LESSON: &str = "\
@@ -70,7 +70,7 @@ EXIT STATUS
   1   the operating system failed while the simulator ran
   2   an option or a file cannot be used; standard error says why, in one line";
 
-/// Ids of servos: one value of one option.
+/// The ids of servos: one value of an option.
 pub type Ids = Vec<u8>;
 
 /// A 7Bot V2 arm without the arm: any serial client can open the port it makes.
@@ -107,7 +107,7 @@ pub struct Options {
     /// garbled, garbled=EVERY_NTH or restarting=MILLISECONDS (the servo restarts that often); or bus=echo; or
     /// arm=supported (it does not fall without torque); or arm=goal-starts-torque (in a servo that restarted)
     #[arg(long = "fault", value_name = "JOINT=KIND")]
-    pub faults: Vec<FaultAt>,
+    pub faults: Vec<ArmFault>,
 
     /// Run only the seven servos, for another controller to drive through a unix socket at PATH
     #[arg(
@@ -163,7 +163,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// How much to say.
+    /// The log level.
     #[must_use]
     pub const fn level(&self) -> LevelFilter {
         match (self.quiet, self.verbose) {
@@ -175,13 +175,13 @@ impl Options {
     }
 }
 
-/// Up to seven ids of servos, with commas in between. Several servos may have the same.
+/// Parses up to seven ids of servos, separated by commas. Ids may repeat.
 fn ids(text: &str) -> Result<Ids, &'static str> {
     let ids: Option<Ids> = text.split(',').map(|id| id.parse().ok().filter(|&id| id <= 253)).collect();
     ids.filter(|ids| ids.len() <= JOINTS).ok_or("use up to seven ids from 0 to 253, as 0,1,2")
 }
 
-/// Which of the two published tables of register 40.
+/// Parses the name of one of the two published tables of register 40.
 fn torque_codes(word: &str) -> Result<TorqueCodes, &'static str> {
     match word {
         "older" => Ok(TorqueCodes::DampingOnFree),
@@ -190,7 +190,7 @@ fn torque_codes(word: &str) -> Result<TorqueCodes, &'static str> {
     }
 }
 
-/// Twelve hexadecimal digits, most significant first.
+/// Parses twelve hexadecimal digits, most significant first.
 fn chip_id(text: &str) -> Result<[u8; 6], &'static str> {
     const WANTED: &str = "use exactly 12 hexadecimal digits, for example 53494d000001";
     if text.len() != 12 || !text.bytes().all(|digit| digit.is_ascii_hexdigit()) {
@@ -201,13 +201,13 @@ fn chip_id(text: &str) -> Result<[u8; 6], &'static str> {
     Ok(id)
 }
 
-/// What clap says about a wrong command line, in one line: its first sentence, its tip, and where to look.
+/// An error of clap in one line: its first sentence, its tip, and a reference to the help.
 #[must_use]
 pub fn in_one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let mut words = text.lines().map(str::trim);
     let first = words.next().unwrap_or_default().trim_start_matches("error: ");
-    // A list stands on lines of its own.
+    // clap puts lists on separate lines.
     let listed = if first.ends_with(':') { words.next().unwrap_or_default() } else { "" };
     let space = if listed.is_empty() { "" } else { " " };
     let tip = words.find(|line| line.starts_with("tip: ")).map(|tip| format!(" ({tip})")).unwrap_or_default();
@@ -223,12 +223,12 @@ mod tests {
     }
 
     #[test]
-    fn the_command_line_is_sound() {
+    fn the_command_line_is_consistent() {
         <Options as clap::CommandFactory>::command().debug_assert();
     }
 
     #[test]
-    fn every_option_is_understood() {
+    fn every_option_is_parsed() {
         let options = parse("--link a --eeprom none --unpaced --chip-id 0123456789AB --trace -vv").unwrap();
         assert_eq!(options.chip_id, [0x01, 0x23, 0x45, 0x67, 0x89, 0xAB]);
         assert_eq!(options.eeprom, Some(Eeprom::Memory));
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_in_one_line() {
+    fn errors_are_in_one_line() {
         for (arguments, says) in [
             ("--eprom x", "--eeprom"),
             ("--chip-id 12", "exactly 12 hexadecimal digits"),

@@ -1,14 +1,14 @@
-//! Is anybody at the other end of a port? Counts who opens and closes terminals, through inotify.
+//! Counts the clients of ports: who has a terminal open, by inotify.
 //!
-//! The simulator keeps its ports open itself, so the kernel never says by itself that the last client has
-//! gone. inotify reports each open and each close, but it merges equal reports that follow each other
-//! unread: two opens in a row would count as one. Watching the directory besides the terminals puts a
-//! report from the directory between any two from a terminal, and nothing is merged.
+//! The simulator itself keeps its ports open, so the kernel does not report that the last client has closed a port.
+//! inotify reports each open and each close. But it merges equal reports that follow each other unread: two opens in a
+//! row would count as one. The directory of the terminals is watched too, which puts a report of the directory between
+//! any two of a terminal, so that none are merged.
 //!
-//! The queue of reports is bounded. When it has overflowed, the counts are wrong; then the open files of all
-//! processes are looked at instead, until nobody has the port open and counting can begin anew.
+//! The queue of reports is bounded, and after an overflow the counts are wrong. Then the open files of all processes are
+//! searched instead, until no client has the port open and counting starts again.
 //!
-//! One instance for all ports: a user has 128 of them, by default.
+//! All ports share one inotify instance, because the default limit of a user is 128.
 
 use std::collections::HashMap;
 use std::io;
@@ -22,55 +22,55 @@ use tracing::warn;
 
 use crate::holders::has_other_holder;
 
-/// Room for a few dozen reports at a time.
+/// Bytes for a few dozen reports.
 const BUFFER_LENGTH: usize = 2_048;
 
-/// Who has which port open besides the simulator.
+/// The clients of all ports.
 #[derive(Debug)]
 pub struct Clients {
     inotify: OwnedFd,
-    ports: HashMap<i32, Presence>,
-    /// There is news of a port since the last call of [`Clients::take_fresh`].
-    is_fresh: bool,
+    ports: HashMap<i32, Port>,
+    /// Clients opened or closed a port since the last call of [`Clients::take_has_changed`].
+    has_changed: bool,
 }
 
 /// A port whose clients are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Watch(i32);
 
-/// Clients of one port.
+/// The clients of one port.
 #[derive(Debug)]
-struct Presence {
+struct Port {
     terminal: PathBuf,
-    /// How many there are; where reports were lost, 1 for any number.
+    /// Number of clients. After an overflow, 1 stands for any number.
     count: usize,
-    /// Reports were lost since nobody had it open.
+    /// Reports were lost since the port had no client.
     has_lost_count: bool,
-    /// Something happened since the count was last found to be right.
+    /// The count has to be checked.
     is_stale: bool,
-    news: Traffic,
+    news: PortNews,
 }
 
-/// What happened at a port since it was last asked about.
+/// What happened at a port since the last call of [`Clients::take_news`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Traffic {
-    /// Somebody opened it.
-    pub came: bool,
-    /// At some moment the last client had gone.
-    pub emptied: bool,
+pub struct PortNews {
+    /// A client opened it.
+    pub was_opened: bool,
+    /// The last client closed it.
+    pub was_emptied: bool,
 }
 
 impl Clients {
-    /// No ports yet.
+    /// Creates an inotify instance, without ports.
     ///
     /// # Errors
-    /// inotify is not to be had, for example because this user's limit of instances is reached.
+    /// The system refuses one, for example because this user's limit is reached.
     pub fn new() -> io::Result<Self> {
         let inotify = inotify::init(CreateFlags::NONBLOCK | CreateFlags::CLOEXEC)?;
-        Ok(Self { inotify, ports: HashMap::new(), is_fresh: false })
+        Ok(Self { inotify, ports: HashMap::new(), has_changed: false })
     }
 
-    /// Counts the clients of a terminal from now on. Nobody but the simulator may have it open yet.
+    /// Counts the clients of a terminal from now on. Only the simulator may have it open before.
     ///
     /// # Errors
     /// inotify refuses.
@@ -82,42 +82,42 @@ impl Clients {
         let watch = inotify::add_watch(&self.inotify, terminal, events)?;
         let terminal = terminal.to_owned();
         let presence =
-            Presence { terminal, count: 0, has_lost_count: false, is_stale: false, news: Traffic::default() };
+            Port { terminal, count: 0, has_lost_count: false, is_stale: false, news: PortNews::default() };
         self.ports.insert(watch, presence);
         Ok(Watch(watch))
     }
 
-    /// How many clients have a port open.
+    /// Number of clients that have a port open.
     #[must_use]
     pub fn count(&self, port: Watch) -> usize {
         self.ports.get(&port.0).map_or(0, |port| port.count)
     }
 
-    /// What [`Clients::look`] has found out about a port since this was last asked.
-    pub fn news(&mut self, port: Watch) -> Traffic {
+    /// What happened at a port since the last call, as of the last [`Clients::update`].
+    pub fn take_news(&mut self, port: Watch) -> PortNews {
         self.ports.get_mut(&port.0).map(|port| take(&mut port.news)).unwrap_or_default()
     }
 
-    /// Is there any?
+    /// Would [`Clients::take_news`] return something?
     #[must_use]
     pub fn has_news(&self, port: Watch) -> bool {
-        self.ports.get(&port.0).is_some_and(|port| port.news != Traffic::default())
+        self.ports.get(&port.0).is_some_and(|port| port.news != PortNews::default())
     }
 
-    /// Has [`Clients::look`] found out about any port since this was last asked?
-    pub fn take_fresh(&mut self) -> bool {
-        take(&mut self.is_fresh)
+    /// Did clients open or close any port since the last call, as of the last [`Clients::update`]?
+    pub fn take_has_changed(&mut self) -> bool {
+        take(&mut self.has_changed)
     }
 
-    /// Takes note of everybody who came and went since the last call.
+    /// Updates the counts from the reports since the last call.
     ///
     /// # Errors
     /// inotify fails.
-    pub fn look(&mut self) -> io::Result<()> {
+    pub fn update(&mut self) -> io::Result<()> {
         self.read_reports()?;
         for port in self.ports.values_mut().filter(|port| port.is_stale) {
             port.recount();
-            self.is_fresh = true;
+            self.has_changed = true;
         }
         Ok(())
     }
@@ -129,12 +129,12 @@ impl Clients {
             match reader.next() {
                 Ok(event) if event.events().contains(ReadFlags::QUEUE_OVERFLOW) => {
                     warn!("lost count of clients: looking at the open files of all processes instead");
-                    self.ports.values_mut().for_each(Presence::lose_count);
+                    self.ports.values_mut().for_each(Port::lose_count);
                 }
                 Ok(event) => {
                     if let Some(port) = self.ports.get_mut(&event.wd()) {
-                        port.take_note(event.events());
-                        self.is_fresh = true;
+                        port.count_event(event.events());
+                        self.has_changed = true;
                     }
                 }
                 Err(Errno::INTR) => {}
@@ -145,32 +145,32 @@ impl Clients {
     }
 }
 
-impl Presence {
+impl Port {
     const fn lose_count(&mut self) {
         self.has_lost_count = true;
         self.is_stale = true;
     }
 
-    /// Finds out whether anybody is there, where reports cannot tell.
+    /// Checks whether there is a client, after reports were lost.
     fn recount(&mut self) {
-        let was_there = self.count > 0;
-        let is_there = has_other_holder(&self.terminal);
-        self.count = usize::from(is_there);
-        self.news.came |= is_there && !was_there;
-        self.news.emptied |= !is_there;
-        self.has_lost_count = is_there;
+        let had_client = self.count > 0;
+        let has_client = has_other_holder(&self.terminal);
+        self.count = usize::from(has_client);
+        self.news.was_opened |= has_client && !had_client;
+        self.news.was_emptied |= !has_client;
+        self.has_lost_count = has_client;
         self.is_stale = false;
     }
 
-    fn take_note(&mut self, event: ReadFlags) {
+    fn count_event(&mut self, event: ReadFlags) {
         if self.has_lost_count {
             self.is_stale = true;
         } else if event.contains(ReadFlags::OPEN) {
             self.count += 1;
-            self.news.came = true;
+            self.news.was_opened = true;
         } else if event.intersects(ReadFlags::CLOSE_WRITE | ReadFlags::CLOSE_NOWRITE) {
             self.count = self.count.saturating_sub(1);
-            self.news.emptied |= self.count == 0;
+            self.news.was_emptied |= self.count == 0;
         }
     }
 }
@@ -204,24 +204,24 @@ mod tests {
             let mut clients = Clients::new().unwrap();
             let mut pty = Pty::open(Some(&mut clients)).unwrap();
             let first = open(&pty);
-            clients.look().unwrap();
-            pty.take_note_of(&mut clients).unwrap();
+            clients.update().unwrap();
+            pty.update_clients(&mut clients).unwrap();
             assert!(pty.has_client());
             // Each opens and closes, and each report is followed by one of the directory: four reports.
             (0..limit() / 4 + 100).for_each(|_| drop(open(&pty)));
             let last = stays.then(|| open(&pty));
             drop(first);
-            clients.look().unwrap();
-            assert!(clients.take_fresh());
-            pty.take_note_of(&mut clients).unwrap();
+            clients.update().unwrap();
+            assert!(clients.take_has_changed());
+            pty.update_clients(&mut clients).unwrap();
             assert_eq!(pty.has_client(), stays);
             drop(last);
-            clients.look().unwrap();
-            pty.take_note_of(&mut clients).unwrap();
+            clients.update().unwrap();
+            pty.update_clients(&mut clients).unwrap();
             assert!(!pty.has_client());
             let _next = open(&pty);
-            clients.look().unwrap();
-            pty.take_note_of(&mut clients).unwrap();
+            clients.update().unwrap();
+            pty.update_clients(&mut clients).unwrap();
             assert!(pty.has_client(), "counted as ever");
         }
     }

@@ -1,15 +1,15 @@
-//! The simulator's clock: the computer's, less the time the process was stopped.
+//! The simulator's clock: that of the computer, without the time for which the process was stopped.
 
 use std::time::Instant as SystemInstant;
 
 use protocol_core::time::{Duration, Instant};
 use rustix::event::Timespec;
 
-/// A process that was away for longer than this was stopped (Ctrl-Z, a debugger), and so was its arm.
-/// Shorter absences are a busy computer, and are made up for.
+/// After a longer absence, the process was stopped (Ctrl-Z, a debugger), and the arm with it. After a shorter absence, on
+/// a busy computer, the arm catches up.
 const LONGEST_ABSENCE: Duration = Duration::from_millis(1_000);
 
-/// Microseconds since it was made.
+/// Microseconds since its creation.
 #[derive(Debug)]
 pub struct Clock {
     start: SystemInstant,
@@ -24,7 +24,7 @@ impl Default for Clock {
 }
 
 impl Clock {
-    /// The time now. Has to be asked once a second at least: what is longer counts as stopped.
+    /// The time now. Must be called at least once a second: a longer pause counts as a stop.
     pub fn now(&mut self) -> Instant {
         let micros = u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX);
         self.at(Instant::from_micros(micros))
@@ -44,8 +44,7 @@ impl Clock {
     }
 }
 
-/// How long to sleep from `now` to `deadline`, in the operating system's words; at most half the absence
-/// the clock puts up with.
+/// The time from `now` to `deadline`, but at most half of the longest absence, for calls of the operating system.
 #[must_use]
 pub fn sleep_until(now: Instant, deadline: Instant) -> Timespec {
     let micros = (deadline - now).as_micros().min(LONGEST_ABSENCE.as_micros() / 2);
@@ -58,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_busy_computer_is_made_up_for_and_a_stopped_process_is_not() {
+    fn the_clock_catches_up_after_a_delay_but_not_after_a_stop() {
         let mut clock = Clock::default();
         assert_eq!(clock.at(Instant::from_micros(900_000)).as_micros(), 900_000);
         assert_eq!(clock.at(Instant::from_micros(60_000_000)).as_micros(), 1_900_000);
@@ -67,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn sleep_is_short_enough_not_to_count_as_a_stop() {
+    fn a_sleep_does_not_count_as_a_stop() {
         let sleep = sleep_until(Instant::ZERO, Instant::FAR_FUTURE);
         assert_eq!((sleep.tv_sec, sleep.tv_nsec), (0, 500_000_000));
         assert_eq!(sleep_until(Instant::from_micros(5), Instant::from_micros(9)).tv_nsec, 4_000);

@@ -1,10 +1,8 @@
-//! The settings image on disk: where it is, that it is ours alone, and that it is one.
-//!
-//! Knows nothing of what an image holds.
+//! The settings image on disk: its path, its lock, and the check that it is an image.
 
 use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
-use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
+use std::os::unix::fs::{DirBuilderExt, FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 use arm_sim::flash::{ERASED, Flash, SIZE};
@@ -13,12 +11,12 @@ use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
 
 use crate::image_file::ImageFile;
-use crate::numbered;
+use crate::per_arm;
 
-/// Where the settings live.
+/// Where the settings are stored.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Eeprom {
-    /// In memory: forgotten at the end.
+    /// In memory: lost at the end.
     Memory,
     /// In this file of the user's state directory.
     UsersOwn(&'static str),
@@ -27,7 +25,7 @@ pub enum Eeprom {
 }
 
 impl Eeprom {
-    /// The simulated arm's default.
+    /// The default of a simulated arm.
     pub const SIMULATED: Self = Self::UsersOwn("eeprom.bin");
     /// The default of an arm of real servos: its offsets are not those of the simulated arm.
     pub const REAL_SERVOS: Self = Self::UsersOwn("servos.bin");
@@ -39,7 +37,7 @@ impl From<&str> for Eeprom {
     }
 }
 
-/// Why there is no image to work with. Each message says what to do.
+/// Why the image cannot be used. Each message says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// Neither `XDG_STATE_HOME` nor `HOME` is set.
@@ -50,23 +48,23 @@ pub enum ImageError {
     /// Another process holds the lock.
     #[error("settings image {} is in use by another simulator: end that one, or use --eeprom FILE with a file of its own, or --eeprom none", .0.display())]
     Locked(PathBuf),
-    /// It is not 32 KiB long, or no file at all.
+    /// It is not a file of 32 KiB.
     #[error("{} is no settings image ({found}, not a file of {SIZE} bytes): delete it, or name another with --eeprom FILE", path.display())]
     NotAnImage {
         /// The path.
         path: PathBuf,
-        /// What is there.
+        /// A description of what the path is.
         found: String,
     },
-    /// It has the right size, but neither is it blank nor does it hold a single intact record.
+    /// It has the right size, but is not blank and has no valid record.
     #[error("settings image {} is damaged: delete it to start with default settings, or name another with --eeprom FILE", .0.display())]
     Damaged(PathBuf),
     /// The operating system refused.
     #[error("cannot {verb} settings image {}: {cause}: choose another with --eeprom FILE, or use --eeprom none", path.display())]
     Refused {
-        /// What was tried.
+        /// The operation.
         verb: &'static str,
-        /// On what.
+        /// The path.
         path: PathBuf,
         /// The system's reason.
         cause: io::Error,
@@ -74,7 +72,7 @@ pub enum ImageError {
 }
 
 impl Eeprom {
-    /// The image's path; `None` in memory. Each arm with a number has a file of its own.
+    /// The path of the image; `None` for memory. Each arm with a number has its own file.
     ///
     /// # Errors
     /// [`ImageError::NoStateDirectory`].
@@ -84,11 +82,11 @@ impl Eeprom {
             Self::File(path) => path.clone(),
             Self::UsersOwn(file) => users_own(|name| std::env::var_os(name).map(PathBuf::from))?.join(file),
         };
-        Ok(Some(numbered::path(&path, arm)))
+        Ok(Some(per_arm::path(&path, arm)))
     }
 
-    /// The flash that stands for the image, made blank if there is none yet, and locked against other
-    /// simulators for as long as it is open.
+    /// Opens the image as a flash, and creates a blank image if there is none. It is locked against other simulators while
+    /// it is open.
     ///
     /// # Errors
     /// See [`ImageError`].
@@ -114,12 +112,12 @@ impl Eeprom {
             TryLockError::Error(cause) => refused("lock", cause),
         })?;
         check_size(&file, &path)?;
-        let flash = Flash::on(ImageFile(file));
-        let copy = flash.copy().map_err(|cause| refused("read", cause))?;
-        // Opening the journal erases what is there, so a copy is opened.
-        match Journal::open(copy) {
+        let mut copy = vec![0; SIZE];
+        file.read_exact_at(&mut copy, 0).map_err(|cause| refused("read", cause))?;
+        // Opening a damaged journal erases the flash, so a copy is opened.
+        match Journal::open(Flash::on(copy)) {
             (_, Opened::Damaged) => Err(ImageError::Damaged(path)),
-            _ => Ok(flash),
+            _ => Ok(Flash::on(ImageFile(file))),
         }
     }
 }
@@ -128,15 +126,14 @@ fn open_existing(path: &Path) -> io::Result<File> {
     OpenOptions::new().read(true).write(true).open(path)
 }
 
-/// The user's own image, by the XDG base directory specification: a relative path there counts as unset.
+/// The user's state directory. By the XDG base directory specification, a relative path counts as unset.
 fn users_own(variable: impl Fn(&str) -> Option<PathBuf>) -> Result<PathBuf, ImageError> {
     let absolute = |name| variable(name).filter(|path| path.is_absolute());
     let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")));
     Ok(state.ok_or(ImageError::NoStateDirectory)?.join("7bot"))
 }
 
-/// Makes a blank image appear under its name whole or not at all. If another simulator made one in the
-/// meantime, that one stays.
+/// Creates a blank image atomically. If another simulator has created one in the meantime, that one stays.
 fn make_blank(path: &Path) -> io::Result<()> {
     let mut draft = path.as_os_str().to_owned();
     draft.push(format!(".{}.new", std::process::id()));
@@ -156,7 +153,7 @@ fn write_blank(path: &Path) -> io::Result<()> {
 fn publish(draft: &Path, path: &Path) -> io::Result<()> {
     match renameat_with(CWD, draft, CWD, path, RenameFlags::NOREPLACE) {
         Err(Errno::EXIST) => fs::remove_file(draft),
-        // Some network file systems know no such flag.
+        // Some network file systems do not support the flag.
         Err(Errno::INVAL | Errno::NOSYS) => fs::rename(draft, path),
         other => Ok(other?),
     }
@@ -183,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_users_own_image_is_where_the_xdg_specification_says() {
+    fn the_path_follows_the_xdg_specification() {
         let none = |_: &str| None;
         assert!(matches!(users_own(none), Err(ImageError::NoStateDirectory)));
         let home = |name: &str| (name == "HOME").then(|| "/home/ada".into());
@@ -195,12 +192,12 @@ mod tests {
     }
 
     #[test]
-    fn a_new_image_is_blank_private_locked_and_leaves_no_draft() {
+    fn a_new_image_is_blank_private_and_locked_and_leaves_no_draft() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("arm.bin");
         let eeprom = Eeprom::File(path.clone());
         let flash = eeprom.open(None).unwrap();
-        assert!(flash.is_blank().unwrap());
+        assert_eq!(fs::read(&path).unwrap(), [ERASED; SIZE]);
         assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
         assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
         assert!(matches!(eeprom.open(None), Err(ImageError::Locked(_))));
@@ -209,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn an_image_that_appears_meanwhile_is_not_replaced() {
+    fn an_image_of_another_simulator_is_not_replaced() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("arm.bin");
         fs::write(&path, [7; SIZE]).unwrap();
@@ -219,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_image_is_refused_and_left_alone() {
+    fn other_files_are_refused_and_not_changed() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("notes.txt");
         fs::write(&path, "shopping list").unwrap();

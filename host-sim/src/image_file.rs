@@ -1,10 +1,10 @@
 //! The cells of a simulated flash in a file.
 
 use std::fs::File;
-use std::io;
 use std::os::unix::fs::FileExt;
 
 use arm_sim::flash::Cells;
+use embedded_storage::nor_flash::NorFlashErrorKind;
 use tracing::warn;
 
 /// A settings image, which is [`SIZE`](arm_sim::flash::SIZE) bytes long. Every operation reaches the file before it
@@ -13,13 +13,18 @@ use tracing::warn;
 pub struct ImageFile(pub File);
 
 impl Cells for ImageFile {
-    fn read(&self, offset: usize, bytes: &mut [u8]) -> io::Result<()> {
-        self.0.read_exact_at(bytes, offset as u64)
+    fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        self.0.read_exact_at(bytes, offset as u64).map_err(|error| {
+            warn!("cannot read the settings image: {error}");
+            NorFlashErrorKind::Other
+        })
     }
 
-    fn write(&mut self, offset: usize, bytes: &[u8]) -> io::Result<()> {
-        let written = self.0.write_all_at(bytes, offset as u64);
-        written.inspect_err(|error| warn!("cannot write to the settings image: {error}"))
+    fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        self.0.write_all_at(bytes, offset as u64).map_err(|error| {
+            warn!("cannot write to the settings image: {error}");
+            NorFlashErrorKind::Other
+        })
     }
 }
 
@@ -32,16 +37,27 @@ mod tests {
 
     #[test]
     fn programming_and_erasing_reach_the_file() {
-        let mut file = tempfile::tempfile().unwrap();
-        io::Write::write_all(&mut file, &[ERASED; SIZE]).unwrap();
-        let mut flash = Flash::on(ImageFile(file));
-        let mut cells = [0; 4];
+        let file = tempfile::tempfile().unwrap();
+        file.write_all_at(&[ERASED; SIZE], 0).unwrap();
+        let mut flash = Flash::on(ImageFile(file.try_clone().unwrap()));
+        let mut bytes = [0; 4];
         flash.write(8, &[0xF0; 4]).unwrap();
         flash.write(8, &[0x3C; 4]).unwrap();
-        flash.read(8, &mut cells).unwrap();
-        assert_eq!(cells, [0x30; 4]);
-        assert!(!flash.is_blank().unwrap());
+        flash.read(8, &mut bytes).unwrap();
+        assert_eq!(bytes, [0x30; 4]);
+        file.read_exact_at(&mut bytes, 8).unwrap();
+        assert_eq!(bytes, [0x30; 4]);
         flash.erase(0, 16 * 1024).unwrap();
-        assert!(flash.is_blank().unwrap());
+        file.read_exact_at(&mut bytes, 8).unwrap();
+        assert_eq!(bytes, [ERASED; 4]);
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_written_is_an_error() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), [ERASED; SIZE]).unwrap();
+        let mut flash = Flash::on(ImageFile(File::open(file.path()).unwrap()));
+        assert_eq!(flash.write(0, &[0; 4]), Err(NorFlashErrorKind::Other));
+        assert_eq!(flash.erase(0, 16 * 1024), Err(NorFlashErrorKind::Other));
     }
 }

@@ -1,41 +1,37 @@
-//! A 7Bot V2 arm in a terminal: the firmware's own controller, with a pseudo-terminal for the host's end and
-//! seven simulated servos for the arm's.
+//! The simulator: 7Bot V2 arms on pseudo-terminals, or the controller on this computer with real servos.
 //!
 //! ```text
-//!              shell (clock, file descriptors, signals)
-//!   ┌──────────────────────────────────────────────────────────────────────┐
-//!   │        World (time is a number)                                      │
-//!   │  pty  ┌────────────────────────────────────────────────────────────┐ │
-//!  ═╪═════▶ │ pace ──▶ motion_core::Controller ──▶ bytes ──▶ Plant       │ │
-//!  ═╪═◀════ │ pace ◀──     │                   ◀── bytes ◀── 7 × Servo   │ │
-//!   │       └──────────────┼─────────────────────────────────────────────┘ │
-//!   │                      ▼ protocol_core::journal ──▶ flash ──▶ a file   │
-//!   └──────────────────────────────────────────────────────────────────────┘
+//!             EventLoop: clock, file descriptors, signals
+//!            ┌───────────────────────────────────────────────────────┐
+//!            │ PtyArm ×N                                             │
+//!  client ◀──▶ Pty ◀──▶ arm_sim::Simulation: controller, servos      │
+//!            │                    └─▶ Flash in an ImageFile          │
+//!            └───────────────────────────────────────────────────────┘
 //! ```
 //!
-//! One shell carries any number of worlds: see [`shell`] and [`arm`].
+//! `--servos` runs [`real_servos`] instead: one arm whose servo bus is a serial port. `--servos-only` and
+//! `--servo-socket` run the simulated servos without a controller.
 //!
-//! Everything but the chip is the real thing. [`world`] knows neither clocks nor file descriptors, so a
-//! test can run it through an hour in a second. Linux only: presence of a client is seen through inotify.
+//! The crate runs on Linux only, because inotify reports when clients open and close a pseudo-terminal.
 
 #![deny(unsafe_code)]
 
-pub mod arm;
 pub mod bus_line;
 pub mod bus_statistics;
 pub mod cli;
 pub mod clients;
 pub mod clock;
 pub mod eeprom;
+pub mod event_loop;
 mod holders;
 pub mod image_file;
-pub mod link;
-pub mod numbered;
+pub mod per_arm;
 pub mod pty;
+pub mod pty_arm;
 pub mod real_servos;
 pub mod serial;
 pub mod servo_socket;
 pub mod servos_only;
-pub mod shell;
 pub mod signals;
+pub mod symlink;
 pub mod trace;

@@ -1,4 +1,4 @@
-//! The simulator's command line: 7Bot V2 arms on pseudo-terminals, until a signal ends them.
+//! The program `host-sim`: arms on pseudo-terminals until a signal ends them.
 
 use std::fmt::Display;
 use std::io::{self, BufWriter, IsTerminal, Write};
@@ -6,25 +6,26 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use arm_sim::flash::Flash;
-use arm_sim::plant::{self, Plant};
+use arm_sim::plant::Plant;
+use arm_sim::servo::ServoConfig;
 use arm_sim::servo_bus::ServoBus;
-use arm_sim::world::{Setup, World};
+use arm_sim::simulation::{ArmConfig, Simulation};
 use clap::Parser;
-use host_sim::arm::Arm;
 use host_sim::bus_line::BusLine;
 use host_sim::cli::{Options, in_one_line};
 use host_sim::clients::Clients;
 use host_sim::clock::Clock;
 use host_sim::eeprom::{Eeprom, ImageError};
-use host_sim::link::{Link, LinkError};
-use host_sim::numbered;
+use host_sim::event_loop::EventLoop;
+use host_sim::per_arm;
 use host_sim::pty::Pty;
+use host_sim::pty_arm::PtyArm;
 use host_sim::real_servos::{self, RealServos};
 use host_sim::serial::{Serial, SerialError};
 use host_sim::servo_socket::{ServoSocket, SocketError};
 use host_sim::servos_only::{self, ServosOnly, ServosOnlyError};
-use host_sim::shell::Shell;
 use host_sim::signals::Signals;
+use host_sim::symlink::{Symlink, SymlinkError};
 use host_sim::trace::Trace;
 use protocol_core::time::Duration;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -32,16 +33,16 @@ use tracing::{Span, error_span};
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
 
-/// Under this name frames are logged: `--trace` shows them whatever else is shown.
+/// The log target of frames. `--trace` shows it at any log level.
 const FRAMES: &str = "frames";
 
-/// Why the simulator did not run, or not to the end.
+/// Why the program failed.
 #[derive(Debug, thiserror::Error)]
 enum Failure {
     #[error(transparent)]
     Image(#[from] ImageError),
     #[error(transparent)]
-    Link(#[from] LinkError),
+    Symlink(#[from] SymlinkError),
     #[error(transparent)]
     Serial(#[from] SerialError),
     #[error(transparent)]
@@ -57,14 +58,14 @@ enum Failure {
 impl From<ServosOnlyError> for Failure {
     fn from(error: ServosOnlyError) -> Self {
         match error {
-            ServosOnlyError::Link(link) => Self::Link(link),
+            ServosOnlyError::Symlink(error) => Self::Symlink(error),
             ServosOnlyError::System(cause) => Self::Running(cause),
         }
     }
 }
 
 impl Failure {
-    /// The exit status, as `--help` has it.
+    /// The exit status, as in `--help`.
     const fn status(&self) -> u8 {
         if matches!(self, Self::Running(_)) { 1 } else { 2 }
     }
@@ -73,28 +74,28 @@ impl Failure {
 fn main() -> ExitCode {
     let options = match Options::try_parse() {
         Ok(options) => options,
-        Err(answer) => return answer_only(&answer),
+        Err(error) => return print_help_or_error(&error),
     };
     log_to_stderr(&options);
     match run(&options) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => complain(&failure, failure.status()),
+        Err(failure) => print_error(&failure, failure.status()),
     }
 }
 
-/// Says in one line why there is nothing to run, or nothing more.
-fn complain(reason: &dyn Display, status: u8) -> ExitCode {
+/// Prints an error in one line.
+fn print_error(reason: &dyn Display, status: u8) -> ExitCode {
     let _ = writeln!(io::stderr(), "error: {reason}");
     ExitCode::from(status)
 }
 
-/// Prints the help or the version that was asked for, or what is wrong with the command line.
-fn answer_only(answer: &clap::Error) -> ExitCode {
-    if !answer.use_stderr() {
-        let _ = answer.print();
+/// Prints the help, the version, or the error in the command line.
+fn print_help_or_error(error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        let _ = error.print();
         return ExitCode::SUCCESS;
     }
-    complain(&in_one_line(answer), 2)
+    print_error(&in_one_line(error), 2)
 }
 
 fn log_to_stderr(options: &Options) {
@@ -122,11 +123,11 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// The arm's other half, in the standard pose, with the faults that it was given.
+/// The simulated servos in the standard pose, with the faults of the command line.
 fn plant(options: &Options, clock: &mut Clock) -> Plant {
-    let settings = plant::Settings { torque_codes: options.torque_codes, ..plant::Settings::default() };
-    let mut plant = Plant::with_settings(clock.now(), settings);
-    options.faults.iter().for_each(|fault| fault.befall(&mut plant));
+    let config = ServoConfig { torque_codes: options.torque_codes, ..ServoConfig::default() };
+    let mut plant = Plant::with_config(clock.now(), config);
+    options.faults.iter().for_each(|fault| fault.apply(&mut plant));
     plant
 }
 
@@ -138,7 +139,7 @@ fn run_servo_socket(
 ) -> Result<(), Failure> {
     let plant = plant(options, clock);
     let socket = ServoSocket::listen(path)?;
-    say_ready(&[path.to_owned()]);
+    print_ready(&[path.to_owned()]);
     socket.serve(plant, clock, signals).map_err(Failure::Running)
 }
 
@@ -147,17 +148,17 @@ fn run_servos_only(options: &Options, clock: &mut Clock, signals: &mut Signals) 
     if let Some(ids) = &options.ids {
         plant.set_ids(ids);
     }
-    let setup = servos_only::Setup {
+    let config = servos_only::AdapterConfig {
         link: options.link.clone(),
         baud: options.servo_baud,
         latency: options.usb_latency,
         seed: options.seed,
     };
-    let mut servos = ServosOnly::new(setup, plant)?;
+    let mut servos = ServosOnly::new(config, plant)?;
     if options.trace {
-        servos.watch(|direction, bytes| tracing::info!(target: FRAMES, "{direction} {bytes:02x?}"));
+        servos.set_trace(|direction, bytes| tracing::info!(target: FRAMES, "{direction} {bytes:02x?}"));
     }
-    say_ready(servos.path().as_slice());
+    print_ready(servos.path().as_slice());
     Ok(servos.serve(clock, signals)?)
 }
 
@@ -171,17 +172,17 @@ fn run_real_servos(
     let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
     let pty = Pty::open(clients.as_mut()).map_err(Failure::Port)?;
     let path = pty.path().to_owned();
-    let _link = options.link.as_ref().map(|link| Link::new(link, &path)).transpose()?;
+    let _symlink = options.link.as_ref().map(|link| Symlink::new(link, &path)).transpose()?;
     let line = BusLine::new(Duration::from_millis(options.usb_timeout.into()));
     let arm = arm(options, None, pty, clock, line)?;
-    let setup = real_servos::Setup {
+    let config = real_servos::BusConfig {
         port: port.to_owned(),
         baud: options.servo_baud,
         torque_codes: options.torque_codes,
         holds_on_exit: options.hold_on_exit,
     };
-    let servos = RealServos::new(clock.now(), setup, arm, clients, serial);
-    say_ready(&[path]);
+    let servos = RealServos::new(clock.now(), config, arm, clients, serial);
+    print_ready(&[path]);
     servos.run(clock, signals).map_err(Failure::Running)
 }
 
@@ -193,21 +194,21 @@ fn run_arms(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Resu
     let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
     let mut arms = Vec::with_capacity(numbers.len());
     let mut ports = Vec::with_capacity(numbers.len());
-    // They stand for as long as the shell runs.
-    let mut links = Vec::new();
+    // They exist as long as the loop runs.
+    let mut symlinks = Vec::new();
     for number in numbers {
         let pty = Pty::open(clients.as_mut()).map_err(Failure::Port)?;
         let port = pty.path().to_owned();
         if let Some(link) = &options.link {
-            links.push(Link::new(&numbered::path(link, number), &port)?);
+            symlinks.push(Symlink::new(&per_arm::path(link, number), &port)?);
         }
         ports.push(port);
         let plant = plant(options, clock);
         arms.push(arm(options, number, pty, clock, plant)?);
     }
-    let shell = Shell::new(arms, clients).map_err(Failure::Running)?;
-    say_ready(&ports);
-    shell.run(clock, signals).map_err(Failure::Running)
+    let event_loop = EventLoop::new(arms, clients).map_err(Failure::Running)?;
+    print_ready(&ports);
+    event_loop.run(clock, signals).map_err(Failure::Running)
 }
 
 /// Switches an arm on.
@@ -217,31 +218,30 @@ fn arm<B: ServoBus>(
     pty: Pty,
     clock: &mut Clock,
     bus: B,
-) -> Result<Arm<Flash, B>, Failure> {
-    // An error, so that whatever is shown is shown with it.
+) -> Result<PtyArm<Flash, B>, Failure> {
+    // At level error, so that every log level shows it.
     let span = number.map_or_else(Span::none, |number| error_span!("arm", number));
     let inside = span.enter();
     let default = if options.servos.is_some() { Eeprom::REAL_SERVOS } else { Eeprom::SIMULATED };
     let flash = options.eeprom.as_ref().unwrap_or(&default).open(number)?;
-    let chip_id = numbered::chip_id(options.chip_id, number);
-    let setup = Setup { chip_id, is_paced: !options.unpaced, torque_codes: options.torque_codes };
-    let mut world = World::new(clock.now(), setup, flash, bus);
+    let chip_id = per_arm::chip_id(options.chip_id, number);
+    let config = ArmConfig { chip_id, is_paced: !options.unpaced, torque_codes: options.torque_codes };
+    let mut simulation = Simulation::new(clock.now(), config, flash, bus);
     if options.trace {
-        world.watch(Trace::new(Box::new(|line| tracing::info!(target: FRAMES, "{line}"))));
+        simulation.set_tap(Trace::new(Box::new(|line| tracing::info!(target: FRAMES, "{line}"))));
     }
     drop(inside);
-    Ok(Arm::new(world, pty, span))
+    Ok(PtyArm::new(simulation, pty, span))
 }
 
-/// An arm takes three open files, and a process may have 1024 unless it asks for more. If that is not enough, the
-/// first arm that finds none says so.
+/// Raises the limit of open files, 1024 by default. An arm needs three. If the limit is too low, opening the port fails.
 fn allow_as_many_files_as_possible() {
     let limit = getrlimit(Resource::Nofile);
     let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
 }
 
-/// The first and only lines on standard output, one a port. Nobody has to read them.
-fn say_ready(ports: &[PathBuf]) {
+/// Prints one line per port to standard output. Errors are ignored: nothing has to read these lines.
+fn print_ready(ports: &[PathBuf]) {
     let mut out = BufWriter::new(io::stdout().lock());
     let written = ports.iter().try_for_each(|port| writeln!(out, "ready {}", port.display()));
     let _ = written.and_then(|()| out.flush());

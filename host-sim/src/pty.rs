@@ -1,12 +1,12 @@
-//! The port: a pseudo-terminal whose far end any serial client can open.
+//! The port: a pseudo-terminal that any serial client can open.
 //!
 //! ```text
 //!   simulator ◀──▶ master ═══ kernel ═══ terminal (/dev/pts/N) ◀──▶ client, and the one after it
 //! ```
 //!
-//! The simulator keeps the terminal open as well. So the port stays, raw, while no client is there, and
-//! whatever a client left behind (an exclusive claim, another terminal mode, unread bytes) can be cleared
-//! away before the next one comes. Knows nothing of frames and of time.
+//! The simulator also keeps the terminal open. So the port and its raw mode stay without a client. Before the next client
+//! comes, the simulator resets what a client left: an exclusive lock, another terminal mode, unread bytes. There are no
+//! frames and no time here.
 
 use std::ffi::OsStr;
 use std::io;
@@ -31,14 +31,14 @@ pub struct Pty {
     master: OwnedFd,
     terminal: OwnedFd,
     path: PathBuf,
-    /// `None` where the system cannot tell who is there: then somebody always counts as there.
+    /// `None` if the system does not report clients: then one client is assumed at all times.
     watch: Option<Watch>,
     client_count: usize,
 }
 
 impl Pty {
-    /// Opens a pseudo-terminal in raw mode that only this user can open, and has its clients counted, if the
-    /// system lets them be.
+    /// Opens a pseudo-terminal in raw mode that only this user can open. Its clients are counted if the system reports
+    /// them.
     ///
     /// # Errors
     /// The system has none left, or refuses.
@@ -65,24 +65,24 @@ impl Pty {
         port
     }
 
-    /// Says what follows from not seeing clients.
+    /// Warns that clients are not reported, and of the consequence.
     pub fn warn_of(error: &io::Error) {
         warn!("cannot see clients come and go ({error}): output piles up unread");
     }
 
-    /// The name under which clients open it.
+    /// The path that clients open.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What is readable when a client wrote something.
+    /// The file descriptor that becomes readable when a client writes.
     #[must_use]
     pub fn master(&self) -> BorrowedFd<'_> {
         self.master.as_fd()
     }
 
-    /// Reads what clients have written; 0: nothing waits.
+    /// Reads bytes of clients. 0 means that there are none.
     ///
     /// # Errors
     /// The pseudo-terminal failed.
@@ -90,7 +90,7 @@ impl Pty {
         none_if_blocked(rustix::io::read(&self.master, bytes))
     }
 
-    /// Writes to whoever reads; says how many bytes found room.
+    /// Writes bytes to the clients. Returns how many were accepted.
     ///
     /// # Errors
     /// The pseudo-terminal failed.
@@ -106,46 +106,45 @@ impl Pty {
         Ok(tcgetattr(&self.terminal)?.output_speed())
     }
 
-    /// Has a client the port open?
+    /// Does a client have the port open?
     #[must_use]
     pub const fn has_client(&self) -> bool {
         self.watch.is_none() || self.client_count > 0
     }
 
-    /// Were clients seen to come or go since the last call of [`Pty::take_note_of`]?
+    /// Did clients open or close the port since the last call of [`Pty::update_clients`]?
     #[must_use]
     pub fn has_news(&self, clients: &Clients) -> bool {
         self.watch.is_some_and(|watch| clients.has_news(watch))
     }
 
-    /// Takes note of clients that were seen to come or go. When the last has gone, what it left is cleared
-    /// away; says whether that happened.
+    /// Updates the number of clients. Returns whether the last client has closed the port; then the port is reset.
     ///
     /// # Errors
     /// The pseudo-terminal failed.
-    pub fn take_note_of(&mut self, clients: &mut Clients) -> io::Result<bool> {
+    pub fn update_clients(&mut self, clients: &mut Clients) -> io::Result<bool> {
         let Some(watch) = self.watch else { return Ok(false) };
-        let traffic = clients.news(watch);
+        let news = clients.take_news(watch);
         let count = clients.count(watch);
         self.client_count = count;
-        if traffic.emptied {
-            self.clear_away(count == 0)?;
+        if news.was_emptied {
+            self.reset(count == 0)?;
         }
-        match (traffic.came, traffic.emptied, count) {
+        match (news.was_opened, news.was_emptied, count) {
             (true, _, 1..) => info!("port open ({count} client{})", if count == 1 { "" } else { "s" }),
             (_, true, 0) => info!("port closed"),
             _ => {}
         }
-        Ok(traffic.emptied)
+        Ok(news.was_emptied)
     }
 
-    /// Unread answers go, and with them the last client's exclusive claim; its unread *requests* stay. The
-    /// terminal mode is only put right while nobody is there who may have chosen it.
-    fn clear_away(&self, deserted: bool) -> io::Result<()> {
+    /// Drops unread answers and the exclusive lock of the last client; its unread *requests* stay. The terminal mode is
+    /// reset only without a client that may have set it.
+    fn reset(&self, is_unused: bool) -> io::Result<()> {
         tcflush(&self.terminal, QueueSelector::IFlush)?;
         ioctl_tiocnxcl(&self.terminal)?;
         let mut mode = tcgetattr(&self.terminal)?;
-        if deserted && !is_raw(&mode) {
+        if is_unused && !is_raw(&mode) {
             debug!("the last client left a terminal mode that alters bytes; raw again");
             make_raw(&self.terminal, &mut mode)?;
         }
@@ -158,7 +157,7 @@ fn make_raw(terminal: &OwnedFd, mode: &mut Termios) -> io::Result<()> {
     Ok(tcsetattr(terminal, OptionalActions::Now, mode)?)
 }
 
-/// Does every byte pass unaltered, both ways, and none come back as an echo?
+/// Do all bytes pass unchanged in both directions, without an echo?
 fn is_raw(mode: &Termios) -> bool {
     let altering = InputModes::ISTRIP
         | InputModes::INLCR
@@ -166,9 +165,9 @@ fn is_raw(mode: &Termios) -> bool {
         | InputModes::ICRNL
         | InputModes::IXON
         | InputModes::IXOFF;
-    let meddling = LocalModes::ECHO | LocalModes::ECHONL | LocalModes::ICANON | LocalModes::ISIG;
+    let processing = LocalModes::ECHO | LocalModes::ECHONL | LocalModes::ICANON | LocalModes::ISIG;
     !mode.input_modes.intersects(altering)
-        && !mode.local_modes.intersects(meddling)
+        && !mode.local_modes.intersects(processing)
         && !mode.output_modes.contains(OutputModes::OPOST)
 }
 
@@ -195,16 +194,16 @@ mod tests {
         (Pty::open(Some(&mut clients)).unwrap(), clients)
     }
 
-    fn look((pty, clients): &mut (Pty, Clients)) -> bool {
-        clients.look().unwrap();
-        pty.take_note_of(clients).unwrap()
+    fn update((pty, clients): &mut (Pty, Clients)) -> bool {
+        clients.update().unwrap();
+        pty.update_clients(clients).unwrap()
     }
 
     fn client(pty: &Pty) -> File {
         OpenOptions::new().read(true).write(true).open(pty.path()).unwrap()
     }
 
-    /// Bytes reach the master by way of a kernel thread, so they may take a moment.
+    /// A kernel thread passes the bytes to the master, which takes some time.
     fn read_exactly(pty: &Pty, length: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
         for _ in 0..10_000 {
@@ -220,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn every_byte_passes_unaltered_both_ways() {
+    fn all_bytes_pass_unchanged_in_both_directions() {
         let (pty, _) = open();
         let mode = std::fs::metadata(pty.path()).unwrap().permissions().mode();
         assert_eq!(mode & 0o777, 0o600);
@@ -235,16 +234,16 @@ mod tests {
     }
 
     #[test]
-    fn clients_are_counted_even_when_nobody_looks_for_a_while() {
+    fn clients_are_counted_even_if_reports_are_read_late() {
         let mut port = open();
         assert!(!port.0.has_client());
         let (first, second) = (client(&port.0), client(&port.0));
-        assert!(!look(&mut port));
+        assert!(!update(&mut port));
         drop(first);
-        assert!(!look(&mut port));
-        assert!(port.0.has_client(), "two came at once, one is left");
+        assert!(!update(&mut port));
+        assert!(port.0.has_client(), "one of two clients is left");
         drop(second);
-        assert!(look(&mut port));
+        assert!(update(&mut port));
         assert!(!port.0.has_client());
     }
 
@@ -253,19 +252,19 @@ mod tests {
         let mut clients = Clients::new().unwrap();
         let mut ptys = [(); 3].map(|()| Pty::open(Some(&mut clients)).unwrap());
         let _client = client(&ptys[1]);
-        clients.look().unwrap();
-        ptys.iter_mut().for_each(|pty| assert!(!pty.take_note_of(&mut clients).unwrap()));
+        clients.update().unwrap();
+        ptys.iter_mut().for_each(|pty| assert!(!pty.update_clients(&mut clients).unwrap()));
         assert_eq!(ptys.each_ref().map(Pty::has_client), [false, true, false]);
     }
 
     #[test]
-    fn requests_of_a_client_that_left_are_kept_and_its_unread_answers_are_not() {
+    fn requests_of_a_client_that_left_stay_and_its_unread_answers_do_not() {
         let mut port = open();
         let mut visitor = client(&port.0);
         visitor.write_all(b"request").unwrap();
         while port.0.write(&[b'x'; 4_096]).unwrap() > 0 {}
         drop(visitor);
-        assert!(look(&mut port));
+        assert!(update(&mut port));
         let (pty, _) = port;
         assert_eq!(read_exactly(&pty, 7), b"request");
         let next = client(&pty);
@@ -280,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn the_next_client_finds_the_port_free_and_raw() {
+    fn the_next_client_gets_a_free_port_in_raw_mode() {
         let mut port = open();
         let visitor = client(&port.0);
         ioctl_tiocexcl(&visitor).unwrap();
@@ -289,14 +288,14 @@ mod tests {
         mode.local_modes |= LocalModes::ECHO | LocalModes::ICANON;
         tcsetattr(&visitor, OptionalActions::Now, &mode).unwrap();
         drop(visitor);
-        look(&mut port);
+        update(&mut port);
         let (pty, _) = port;
         assert!(is_raw(&tcgetattr(&pty.terminal).unwrap()));
-        // Root may open a claimed terminal, so ask for the claim itself.
+        // Root may open a locked terminal, so read the lock itself.
         assert!(!is_exclusive(&pty.terminal));
     }
 
-    /// TIOCGEXCL, which has no safe wrapper.
+    /// TIOCGEXCL has no safe wrapper.
     #[allow(unsafe_code)]
     fn is_exclusive(terminal: &OwnedFd) -> bool {
         use rustix::ioctl::{Getter, ioctl, opcode};

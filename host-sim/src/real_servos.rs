@@ -1,11 +1,11 @@
 //! The controller on this computer, with real servos behind a USB adapter.
 //!
 //! ```text
-//!   client ◀──▶ Pty ◀──▶ World: the controller ◀──▶ BusLine ◀──▶ Serial ◀──▶ adapter, servos
+//!   client ◀──▶ Pty ◀──▶ Simulation: the controller ◀──▶ BusLine ◀──▶ Serial ◀──▶ adapter, servos
 //! ```
 //!
-//! In real time: what was missed is not made up for. An adapter that is pulled out is waited for. Nothing but the
-//! controller decides what the servos are told, except at the end: then they are damped.
+//! This runs in real time: a late caller does not catch up. If the adapter is unplugged, the program waits for it. Only
+//! the controller sends frames to the servos, except at the end, when the servos are damped.
 
 use std::io;
 use std::os::fd::AsFd;
@@ -22,71 +22,71 @@ use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 use tracing::{info, warn};
 
-use crate::arm::Arm;
 use crate::bus_line::BusLine;
 use crate::bus_statistics::{BusStatistics, Figures};
 use crate::clients::Clients;
 use crate::clock::{Clock, sleep_until};
+use crate::pty_arm::PtyArm;
 use crate::serial::Serial;
-use crate::signals::{Signals, Wish};
+use crate::signals::{SignalAction, Signals};
 
-/// Bytes taken from the servo bus at a time.
+/// Bytes per read from the servo bus.
 const PIECE: usize = 4_096;
-/// After this long it is told for the first time how the bus does.
+/// The first line about the servo bus is logged after this time.
 const FIRST_REPORT: Duration = Duration::from_millis(2_000);
-/// And then again each time this has passed.
-const REPORTS: Duration = Duration::from_millis(10_000);
-/// How often the port is looked for after the adapter was pulled out.
-const SEARCHES: Duration = Duration::from_millis(500);
-/// How often the frame that damps the servos is sent at the end, as after a fault of the controller.
+/// The period of these lines.
+const REPORT_PERIOD: Duration = Duration::from_millis(10_000);
+/// The period of attempts to open the port after the adapter was unplugged.
+const SEARCH_PERIOD: Duration = Duration::from_millis(500);
+/// The frame that damps the servos is sent so many times, as after a fault of the controller.
 const REPEATS: usize = 3;
-/// The wire rests so long before each of them: longer than a servo takes to answer.
+/// The pause before each of them: longer than a servo needs to answer.
 const PAUSE: std::time::Duration = std::time::Duration::from_millis(5);
-/// All seven joints in register 242.
+/// Register 242 if all joints are missing.
 const ALL_MISSING: u8 = 0x7F;
 
-/// Where the servos are, and what becomes of them at the end.
+/// The port of the servos, and what happens to them at the end.
 #[derive(Clone, Debug)]
-pub struct Setup {
+pub struct BusConfig {
     /// The adapter's port.
     pub port: PathBuf,
     /// The baud rate of the servo bus.
     pub baud: u32,
-    /// What the codes of the servos' torque switch mean.
+    /// The meaning of the codes in the servos' torque switch.
     pub torque_codes: TorqueCodes,
-    /// At the end the servos keep their goals and their torque.
+    /// At the end the servos keep goals and torque.
     pub holds_on_exit: bool,
 }
 
 /// An arm whose servos are real.
 #[derive(Debug)]
 pub struct RealServos<F> {
-    setup: Setup,
-    arm: Arm<F, BusLine>,
+    config: BusConfig,
+    arm: PtyArm<F, BusLine>,
     clients: Option<Clients>,
     /// `None` while the adapter is unplugged.
     serial: Option<Serial>,
-    /// When to look for the port again.
+    /// When to try to open the port again.
     search_at: Instant,
     statistics: BusStatistics,
     report_at: Instant,
-    /// Register 242 as it was last told.
+    /// Register 242 as it was last logged.
     missing: Option<u8>,
 }
 
 impl<F: NorFlash + Clone> RealServos<F> {
-    /// Puts an arm in front of the servos behind `serial`.
+    /// Connects an arm to the servos on `serial`.
     #[must_use]
     pub fn new(
         now: Instant,
-        setup: Setup,
-        arm: Arm<F, BusLine>,
+        config: BusConfig,
+        arm: PtyArm<F, BusLine>,
         clients: Option<Clients>,
         serial: Serial,
     ) -> Self {
-        tell_opened(&setup, &serial);
+        log_opened(&config, &serial);
         Self {
-            setup,
+            config,
             arm,
             clients,
             serial: Some(serial),
@@ -97,35 +97,35 @@ impl<F: NorFlash + Clone> RealServos<F> {
         }
     }
 
-    /// Runs until a signal says otherwise, and damps the servos then.
+    /// Runs until a signal ends it, and then damps the servos.
     ///
     /// # Errors
     /// The operating system fails: the host's port, or poll(2).
     pub fn run(mut self, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
-        let outcome = self.run_until_the_end(clock, signals);
-        self.leave();
-        outcome
+        let result = self.run_loop(clock, signals);
+        self.damp_servos();
+        result
     }
 
-    fn run_until_the_end(&mut self, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
+    fn run_loop(&mut self, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
         loop {
             let now = clock.now();
-            for wish in signals.wishes() {
-                match wish {
-                    Wish::End => return Ok(()),
-                    // The supply of the servos is out of reach.
-                    Wish::PowerCycle => self.arm.power_cycle(now),
-                    Wish::RestartController => self.arm.restart_controller(now),
-                    Wish::Unplug => {}
+            for action in signals.actions() {
+                match action {
+                    SignalAction::End => return Ok(()),
+                    // This program cannot switch the supply of the servos.
+                    SignalAction::PowerCycle => self.arm.power_cycle(now),
+                    SignalAction::RestartController => self.arm.restart_controller(now),
+                    SignalAction::Unplug => {}
                 }
             }
-            self.hear_servos(now);
-            // Also when no bytes come: unread reports would keep poll(2) from waiting.
+            self.read_bus(now);
+            // In each turn: with unread reports, poll(2) does not wait.
             if let Some(clients) = &mut self.clients {
-                clients.look()?;
+                clients.update()?;
             }
-            let due = self.arm.turn(now, self.clients.as_mut())?;
-            self.tell_servos(now);
+            let due = self.arm.poll(now, self.clients.as_mut())?;
+            self.write_bus(now);
             self.look_for_port(now);
             self.report(now);
             let due = due.min(self.report_at);
@@ -134,49 +134,49 @@ impl<F: NorFlash + Clone> RealServos<F> {
         }
     }
 
-    fn hear_servos(&mut self, now: Instant) {
+    fn read_bus(&mut self, now: Instant) {
         let Some(serial) = &self.serial else { return };
         let mut bytes = [0; PIECE];
         match serial.read(&mut bytes) {
             Ok(count) => {
                 let bytes = bytes.get(..count).unwrap_or(&[]);
-                self.statistics.heard(now, bytes);
+                self.statistics.received(now, bytes);
                 self.arm.bus().push(bytes);
             }
             Err(error) => self.lose_port(now, &error),
         }
     }
 
-    fn tell_servos(&mut self, now: Instant) {
+    fn write_bus(&mut self, now: Instant) {
         let bytes = self.arm.bus().take();
         let Some(serial) = self.serial.as_ref().filter(|_| !bytes.is_empty()) else { return };
         match serial.write(&bytes) {
             Ok(count) if count == bytes.len() => self.statistics.sent(now, &bytes),
-            // Half a frame is no frame: the controller sees that nobody answers.
+            // The controller finds that the servo does not answer.
             Ok(_) => warn!("the adapter takes no more bytes: a frame is lost"),
             Err(error) => self.lose_port(now, &error),
         }
     }
 
     fn lose_port(&mut self, now: Instant, error: &io::Error) {
-        let port = self.setup.port.display();
+        let port = self.config.port.display();
         warn!("{port}: the adapter is gone ({error}): plug it in again; the servos hold what they were told");
         self.serial = None;
-        self.search_at = now + SEARCHES;
+        self.search_at = now + SEARCH_PERIOD;
     }
 
-    /// Opens the port again, but not before the controller has missed every servo: it sends nothing but questions then,
-    /// and servos that restarted in the meantime are not driven by goals meant for before.
+    /// Opens the port again, but only after the controller has flagged every servo as missing. Then it sends questions
+    /// only, so a servo that has restarted does not get an old goal.
     fn look_for_port(&mut self, now: Instant) {
         if self.serial.is_some() || now < self.search_at {
             return;
         }
-        self.search_at = now + SEARCHES;
+        self.search_at = now + SEARCH_PERIOD;
         if self.arm.register(MISSING_SERVOS.address) != ALL_MISSING {
             return;
         }
-        if let Ok(serial) = Serial::open(&self.setup.port, self.setup.baud) {
-            tell_opened(&self.setup, &serial);
+        if let Ok(serial) = Serial::open(&self.config.port, self.config.baud) {
+            log_opened(&self.config, &serial);
             self.serial = Some(serial);
             self.statistics = BusStatistics::new(now);
             self.report_at = now + FIRST_REPORT;
@@ -188,33 +188,33 @@ impl<F: NorFlash + Clone> RealServos<F> {
         if now < self.report_at {
             return;
         }
-        self.report_at = now + REPORTS;
+        self.report_at = now + REPORT_PERIOD;
         let figures = self.statistics.take(now);
         let missing = self.arm.register(MISSING_SERVOS.address);
-        let is_news = self.missing.replace(missing) != Some(missing);
-        if is_news && self.serial.is_some() {
-            tell_servos_found(&self.setup, missing, &figures);
+        let has_changed = self.missing.replace(missing) != Some(missing);
+        if has_changed && self.serial.is_some() {
+            log_servos_found(&self.config, missing, &figures);
         }
         info!("servo bus: {} servos, {figures}", (!missing & ALL_MISSING).count_ones());
     }
 
-    /// Damps the servos, unless they are to hold.
-    fn leave(&mut self) {
-        if self.setup.holds_on_exit {
+    /// Damps the servos, unless the options say otherwise.
+    fn damp_servos(&self) {
+        if self.config.holds_on_exit {
             return info!("the servos hold their goals, as --hold-on-exit says");
         }
         let Some(serial) = &self.serial else {
             return warn!("the adapter is unplugged: the servos could not be damped");
         };
         let mut frame = FrameBuffer::new();
-        let code = self.setup.torque_codes.code(Torque::Damping);
+        let code = self.config.torque_codes.code(Torque::Damping);
         sync_write(
             &mut frame,
             register::TORQUE_SWITCH,
             Joint::ALL.map(|joint| (joint.index(), [code])).into_iter(),
         );
         for _ in 0..REPEATS {
-            // An answer may still be on the wire, and a frame that meets it is lost.
+            // A frame that collides with an answer is lost.
             sleep(PAUSE);
             let sent = serial.write(&frame).and_then(|_| serial.drain());
             if let Err(error) = sent {
@@ -224,7 +224,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
         info!("state 0: the servos are damped");
     }
 
-    /// Sleeps until something arrives, a client comes or goes, a signal comes, or something is due.
+    /// Sleeps until bytes arrive, a client comes or goes, a signal comes, or a deadline.
     fn sleep(&self, clock: &mut Clock, due: Instant, signals: &Signals) -> io::Result<()> {
         let time = sleep_until(clock.now(), due);
         let signals = signals.as_fd();
@@ -243,7 +243,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
     }
 }
 
-fn tell_opened(setup: &Setup, serial: &Serial) {
+fn log_opened(config: &BusConfig, serial: &Serial) {
     let latency = match serial.latency() {
         None => "no latency timer found (fine with CH340, CH343, CP210x and CDC adapters)".to_owned(),
         Some(timer) if timer.now <= 1 => {
@@ -254,23 +254,23 @@ fn tell_opened(setup: &Setup, serial: &Serial) {
             timer.now
         ),
     };
-    let table = match setup.torque_codes {
+    let table = match config.torque_codes {
         TorqueCodes::DampingOnFree => "older (0 damping, 1 on, 2 free)",
         TorqueCodes::FreeOnDamping => "current (0 free, 1 on, 2 damping)",
     };
-    info!("{}: open at {} baud, {latency}", setup.port.display(), setup.baud);
+    info!("{}: open at {} baud, {latency}", config.port.display(), config.baud);
     info!(
         "register 40 of the servos: {table}, as --torque-codes says; 'sevenbot servo torque-codes' finds out"
     );
 }
 
-/// Says which servos were found. Where none was, what the bus carries tells what is wrong.
-fn tell_servos_found(setup: &Setup, missing: u8, figures: &Figures) {
+/// Logs which servos were found. If there are none, the bytes on the bus give the advice.
+fn log_servos_found(config: &BusConfig, missing: u8, figures: &Figures) {
     let name = |found: bool| {
         let joints = Joint::ALL.into_iter().filter(|joint| (missing & joint.bit() == 0) == found);
         joints.map(|joint| joint.index().to_string()).collect::<Vec<_>>().join(" ")
     };
-    let baud = setup.baud;
+    let baud = config.baud;
     if missing == ALL_MISSING && figures.bytes == 0 {
         warn!(
             "no servo answers at {baud} baud, and nothing comes back at all: is the servos' supply on, the cable plugged in? 'sevenbot servo scan' tries all baud rates"

@@ -1,7 +1,7 @@
 //! The serial port of a USB adapter with real servos behind it.
 //!
-//! Opens it for this process alone, raw, at any baud rate, and sets the latency timer of the adapter where it has one.
-//! Knows nothing of frames.
+//! The port is opened for this process only, in raw mode, at any baud rate. If the adapter has a latency timer, it is set
+//! to its minimum.
 
 use std::fs;
 use std::io;
@@ -15,33 +15,33 @@ use rustix::termios::{
     ControlModes, OptionalActions, QueueSelector, Termios, ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr,
 };
 
-/// The latency timer that is asked for, in milliseconds: the shortest there is.
+/// The shortest setting of the latency timer, in milliseconds.
 const SHORTEST_LATENCY_MS: u32 = 1;
 
-/// Why there is no port. Each message says what to do.
+/// Why the port cannot be used. Each message says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum SerialError {
-    /// Nothing has that name.
+    /// The path does not exist.
     #[error("--servos {}: there is no such port: plug the adapter in; ports that are there: {}", path.display(), ports())]
     Absent {
         /// The port.
         path: PathBuf,
     },
-    /// This user may not open it.
+    /// This user has no permission to open it.
     #[error("--servos {}: you may not open it: join the group that owns it (number {group}, most often dialout: sudo usermod -aG dialout $USER) and log in again", path.display())]
     Forbidden {
         /// The port.
         path: PathBuf,
-        /// The group that may.
+        /// The group that has the permission.
         group: u32,
     },
     /// Another program has it.
     #[error("--servos {}: another program uses the port: end that one; 'fuser {}' tells its number", .0.display(), .0.display())]
     InUse(PathBuf),
-    /// It is something else.
+    /// It is not a serial port.
     #[error("--servos {}: that is no serial port: ports that are there: {}", .0.display(), ports())]
     NoPort(PathBuf),
-    /// The adapter cannot do that baud rate.
+    /// The adapter does not support the baud rate.
     #[error("--servos {}: the adapter refuses {baud} baud ({cause}): choose another --servo-baud, or an adapter that can", path.display())]
     Baud {
         /// The port.
@@ -65,20 +65,20 @@ pub enum SerialError {
 #[derive(Debug)]
 pub struct Serial {
     port: OwnedFd,
-    latency: Option<Latency>,
+    latency: Option<LatencyTimer>,
 }
 
 /// The latency timer of the adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Latency {
-    /// In milliseconds, as it was found.
+pub struct LatencyTimer {
+    /// Before the port was opened, in milliseconds.
     pub found: u32,
-    /// In milliseconds, as it is now.
+    /// Now, in milliseconds.
     pub now: u32,
 }
 
 impl Serial {
-    /// Opens a port for this process alone.
+    /// Opens a port for this process only.
     ///
     /// # Errors
     /// See [`SerialError`].
@@ -96,26 +96,26 @@ impl Serial {
         Ok(Self { port, latency: shorten_latency(path) })
     }
 
-    /// The latency timer, where the adapter has one that can be seen.
+    /// The latency timer, if the adapter has one and the kernel shows it.
     #[must_use]
-    pub const fn latency(&self) -> Option<Latency> {
+    pub const fn latency(&self) -> Option<LatencyTimer> {
         self.latency
     }
 
-    /// Reads what has arrived; 0: nothing.
+    /// Reads bytes that have arrived. 0 means that there are none.
     ///
     /// # Errors
     /// The adapter was unplugged, or the operating system failed.
     pub fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
         match rustix::io::read(&self.port, bytes) {
-            // In raw mode a read waits for a byte, or says that it would have to.
+            // In raw mode a read without bytes returns EAGAIN, so 0 bytes mean that the adapter is gone.
             Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
             Err(Errno::AGAIN | Errno::INTR) => Ok(0),
             other => Ok(other?),
         }
     }
 
-    /// Sends bytes; says how many found room.
+    /// Sends bytes. Returns how many were accepted.
     ///
     /// # Errors
     /// The adapter was unplugged, or the operating system failed.
@@ -126,7 +126,7 @@ impl Serial {
         }
     }
 
-    /// Waits until everything is sent.
+    /// Waits until all bytes are sent.
     ///
     /// # Errors
     /// The adapter was unplugged, or the operating system failed.
@@ -163,7 +163,7 @@ fn refused(path: &Path, cause: Errno) -> SerialError {
     }
 }
 
-/// The serial ports of USB adapters there are, in words.
+/// The serial ports of USB adapters, for a message.
 fn ports() -> String {
     let devices = fs::read_dir("/dev").into_iter().flatten().flatten();
     let mut ports: Vec<String> = devices
@@ -175,9 +175,9 @@ fn ports() -> String {
     if ports.is_empty() { "none".to_owned() } else { ports.join(" ") }
 }
 
-/// An FTDI chip has a latency timer, 16 ms by default. The kernel shows it in a file, which only root may write in
+/// Sets the latency timer of an FTDI chip, 16 ms by default. The kernel shows it in a file, which only root can write on
 /// most systems.
-fn shorten_latency(path: &Path) -> Option<Latency> {
+fn shorten_latency(path: &Path) -> Option<LatencyTimer> {
     let device = fs::canonicalize(path).ok()?;
     let file = Path::new("/sys/bus/usb-serial/devices").join(device.file_name()?).join("latency_timer");
     let read = || fs::read_to_string(&file).ok()?.trim().parse().ok();
@@ -185,5 +185,5 @@ fn shorten_latency(path: &Path) -> Option<Latency> {
     if found > SHORTEST_LATENCY_MS {
         let _ = fs::write(&file, SHORTEST_LATENCY_MS.to_string());
     }
-    Some(Latency { found, now: read().unwrap_or(found) })
+    Some(LatencyTimer { found, now: read().unwrap_or(found) })
 }

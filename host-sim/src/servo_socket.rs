@@ -1,8 +1,7 @@
-//! Only the seven servos, on a unix socket: for a controller that runs elsewhere (the firmware in an
-//! emulator), whose servo bus ends here.
+//! Simulated servos on a unix socket, for a controller in another process: the firmware in an emulator.
 //!
-//! One controller at a time; the next one is taken in when it has gone, and meets the servos as they are. A
-//! bus has no back-pressure: what the controller does not take is lost.
+//! One controller can be connected at a time. The servos keep their state from one controller to the next. A bus has no
+//! flow control: bytes that the controller does not read are lost.
 
 use std::fs;
 use std::io::{self, Read, Write};
@@ -19,16 +18,16 @@ use rustix::process::umask;
 use tracing::{debug, info};
 
 use crate::clock::{Clock, sleep_until};
-use crate::signals::{Signals, Wish};
+use crate::signals::{SignalAction, Signals};
 use arm_sim::plant::Plant;
 
-/// Why there is no socket. Each message says what to do.
+/// Why the socket was not created. Each message says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum SocketError {
-    /// Something that is no socket has that name.
+    /// The path exists and is not a socket.
     #[error("--servo-socket {}: that is no socket, so it is not replaced: remove it, or choose another path", .0.display())]
     Taken(PathBuf),
-    /// Somebody listens there.
+    /// Another process listens there.
     #[error("--servo-socket {}: another simulator listens there: end that one, or choose another path", .0.display())]
     InUse(PathBuf),
     /// The operating system refused.
@@ -41,7 +40,7 @@ pub enum SocketError {
     },
 }
 
-/// A listening socket; its file goes when this is dropped, if it is still ours.
+/// A listening socket. Dropping it removes the file, unless another simulator has replaced it.
 #[derive(Debug)]
 pub struct ServoSocket {
     listener: UnixListener,
@@ -50,7 +49,7 @@ pub struct ServoSocket {
 }
 
 impl ServoSocket {
-    /// Listens at `path`, for this user only, replacing a socket that a dead simulator may have left.
+    /// Listens at `path`, for this user only. Replaces a socket that an earlier simulator may have left.
     ///
     /// # Errors
     /// See [`SocketError`].
@@ -64,7 +63,7 @@ impl ServoSocket {
             Ok(_) => fs::remove_file(path).map_err(refused)?,
             Err(_) => {}
         }
-        // The mask, as the file must not be open to others for a moment.
+        // With this mask, other users cannot open the file at any time.
         let mask = umask(Mode::RWXG | Mode::RWXO | Mode::XUSR);
         let listener = UnixListener::bind(path);
         umask(mask);
@@ -74,7 +73,7 @@ impl ServoSocket {
         Ok(Self { listener, path: path.to_owned(), inode })
     }
 
-    /// Serves one controller after the other until a signal says otherwise.
+    /// Serves one controller after another until a signal ends it.
     ///
     /// # Errors
     /// The operating system fails: poll(2), or accepting a connection.
@@ -83,15 +82,15 @@ impl ServoSocket {
         plant.ignore_collisions();
         loop {
             let now = clock.now();
-            for wish in signals.wishes() {
-                match wish {
-                    Wish::End => return Ok(()),
-                    Wish::Unplug => {}
-                    Wish::PowerCycle => {
+            for action in signals.actions() {
+                match action {
+                    SignalAction::End => return Ok(()),
+                    SignalAction::Unplug => {}
+                    SignalAction::PowerCycle => {
                         info!("power cycle");
                         plant.power_cycle(now);
                     }
-                    Wish::RestartController => info!("no controller here to restart"),
+                    SignalAction::RestartController => info!("no controller here to restart"),
                 }
             }
             if controller.is_none() {
@@ -117,7 +116,7 @@ impl ServoSocket {
                 stream.set_nonblocking(true)?;
                 Ok(Some(stream))
             }
-            Err(error) if is_for_later(&error) => Ok(None),
+            Err(error) if is_temporary(&error) => Ok(None),
             Err(error) => Err(error),
         }
     }
@@ -131,16 +130,16 @@ impl Drop for ServoSocket {
     }
 }
 
-/// Everything the controller has sent goes to the servos, and what they have to say back.
+/// Passes the bytes of the controller to the servos, and their answers back.
 ///
 /// # Errors
-/// The controller has gone.
+/// The controller has disconnected.
 pub fn exchange(stream: &mut UnixStream, plant: &mut Plant, now: Instant) -> io::Result<()> {
     let mut bytes = [0; 4_096];
     match stream.read(&mut bytes) {
         Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
         Ok(count) => plant.bytes(now, bytes.get(..count).unwrap_or(&[])),
-        Err(error) if is_for_later(&error) => {}
+        Err(error) if is_temporary(&error) => {}
         Err(error) => return Err(error),
     }
     let answers = plant.poll(now);
@@ -149,7 +148,7 @@ pub fn exchange(stream: &mut UnixStream, plant: &mut Plant, now: Instant) -> io:
     }
     match stream.write(&answers) {
         Ok(count) if count == answers.len() => Ok(()),
-        Err(error) if !is_for_later(&error) => Err(error),
+        Err(error) if !is_temporary(&error) => Err(error),
         _ => {
             debug!("the controller does not read: an answer is lost");
             Ok(())
@@ -157,7 +156,7 @@ pub fn exchange(stream: &mut UnixStream, plant: &mut Plant, now: Instant) -> io:
     }
 }
 
-fn is_for_later(error: &io::Error) -> bool {
+fn is_temporary(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted | io::ErrorKind::ConnectionAborted

@@ -1,12 +1,12 @@
-//! Only the servos, on a pseudo-terminal: what a computer sees that has a servo bus behind a USB adapter.
+//! Simulated servos behind a simulated USB adapter, on a pseudo-terminal.
 //!
 //! ```text
 //!   client ◀──▶ Pty ──▶ Plant: the servos and their wire
-//!                   ◀── Adapter ◀──┘
+//!                   ◀── UsbAdapter ◀──┘
 //! ```
 //!
-//! For a controller that runs elsewhere, and for whoever talks to servos directly. Raw bytes of the servo bus; the
-//! servos hear a client only at their own baud rate. Signals switch the servos off and on and pull the adapter.
+//! The client is a controller in another process, or a tool for servos. The port carries the bytes of the servo bus. The
+//! servos receive bytes only at their own baud rate. Signals switch the servos off and on, and unplug the adapter.
 
 use std::io;
 use std::os::fd::AsFd;
@@ -19,34 +19,34 @@ use tracing::{debug, info};
 
 use crate::clients::Clients;
 use crate::clock::{Clock, sleep_until};
-use crate::link::{Link, LinkError};
 use crate::pty::Pty;
-use crate::signals::{Signals, Wish};
-use arm_sim::adapter::{Adapter, Latency};
+use crate::signals::{SignalAction, Signals};
+use crate::symlink::{Symlink, SymlinkError};
 use arm_sim::plant::Plant;
+use arm_sim::usb_adapter::{Latency, UsbAdapter};
 
-/// Bytes taken from the client at a time.
+/// Bytes per read from the client.
 const PIECE: usize = 4_096;
 
-/// What the bus and its adapter are like.
+/// The bus and its adapter.
 #[derive(Clone, Debug)]
-pub struct Setup {
-    /// Where a symbolic link to the port stands while the adapter is plugged in.
+pub struct AdapterConfig {
+    /// The path of a symbolic link to the port, which exists while the adapter is plugged in.
     pub link: Option<PathBuf>,
     /// The baud rate of the servos, in bits per second.
     pub baud: u32,
-    /// How long the adapter keeps bytes.
+    /// The latency of the adapter.
     pub latency: Latency,
-    /// What its delays are drawn from.
+    /// The seed of its delays.
     pub seed: u64,
 }
 
-/// Why there is no port, or no more.
+/// Why the port does not work.
 #[derive(Debug, thiserror::Error)]
 pub enum ServosOnlyError {
-    /// The link cannot be made.
+    /// The symbolic link cannot be created.
     #[error(transparent)]
-    Link(#[from] LinkError),
+    Symlink(#[from] SymlinkError),
     /// The operating system failed.
     #[error("the operating system failed: {0}")]
     System(#[from] io::Error),
@@ -55,13 +55,13 @@ pub enum ServosOnlyError {
 /// The servos, their wire and the adapter, which may be unplugged.
 #[derive(Debug)]
 pub struct ServosOnly {
-    setup: Setup,
+    config: AdapterConfig,
     plant: Plant,
-    adapter: Adapter,
+    adapter: UsbAdapter,
     port: Option<Port>,
-    /// Bytes from the servos that were handed over, and that the port did not take yet.
+    /// Bytes from the adapter that were not written to the port.
     to_client: Vec<u8>,
-    /// Shows each piece of bytes on the wire.
+    /// Gets the direction and the bytes on the wire.
     trace: Option<fn(&str, &[u8])>,
 }
 
@@ -70,58 +70,58 @@ pub struct ServosOnly {
 struct Port {
     pty: Pty,
     clients: Option<Clients>,
-    /// It stands as long as the port.
-    _link: Option<Link>,
+    /// It exists as long as the port.
+    _symlink: Option<Symlink>,
 }
 
 impl Port {
     fn open(link: Option<&PathBuf>) -> Result<Self, ServosOnlyError> {
         let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
         let pty = Pty::open(clients.as_mut())?;
-        let link = link.map(|link| Link::new(link, pty.path())).transpose()?;
-        Ok(Self { pty, clients, _link: link })
+        let symlink = link.map(|link| Symlink::new(link, pty.path())).transpose()?;
+        Ok(Self { pty, clients, _symlink: symlink })
     }
 }
 
 impl ServosOnly {
-    /// Plugs the adapter of these servos in.
+    /// Plugs in the adapter of these servos.
     ///
     /// # Errors
-    /// There is no pseudo-terminal, or no link to it.
-    pub fn new(setup: Setup, mut plant: Plant) -> Result<Self, ServosOnlyError> {
+    /// The pseudo-terminal or the link cannot be created.
+    pub fn new(config: AdapterConfig, mut plant: Plant) -> Result<Self, ServosOnlyError> {
         plant.ignore_collisions();
-        let port = Some(Port::open(setup.link.as_ref())?);
-        let adapter = Adapter::new(setup.latency, setup.seed);
-        Ok(Self { setup, plant, adapter, port, to_client: Vec::new(), trace: None })
+        let port = Some(Port::open(config.link.as_ref())?);
+        let adapter = UsbAdapter::new(config.latency, config.seed);
+        Ok(Self { config, plant, adapter, port, to_client: Vec::new(), trace: None })
     }
 
-    /// Shows all bytes on the wire with `trace`: the direction, and the bytes.
-    pub fn watch(&mut self, trace: fn(&str, &[u8])) {
+    /// Passes direction and bytes on the wire to `trace` from now on.
+    pub fn set_trace(&mut self, trace: fn(&str, &[u8])) {
         self.trace = Some(trace);
     }
 
-    /// The port's name; `None` while the adapter is unplugged.
+    /// The path of the port; `None` while the adapter is unplugged.
     #[must_use]
     pub fn path(&self) -> Option<PathBuf> {
         self.port.as_ref().map(|port| port.pty.path().to_owned())
     }
 
-    /// Serves clients until a signal says otherwise.
+    /// Serves clients until a signal ends it.
     ///
     /// # Errors
     /// The operating system fails.
     pub fn serve(mut self, clock: &mut Clock, signals: &mut Signals) -> Result<(), ServosOnlyError> {
         loop {
             let now = clock.now();
-            for wish in signals.wishes() {
-                match wish {
-                    Wish::End => return Ok(()),
-                    Wish::PowerCycle => self.power_cycle(now),
-                    Wish::Unplug => self.unplug_or_plug_in()?,
-                    Wish::RestartController => {}
+            for action in signals.actions() {
+                match action {
+                    SignalAction::End => return Ok(()),
+                    SignalAction::PowerCycle => self.power_cycle(now),
+                    SignalAction::Unplug => self.unplug_or_plug_in()?,
+                    SignalAction::RestartController => {}
                 }
             }
-            self.turn(now)?;
+            self.poll(now)?;
             self.sleep(clock, signals)?;
         }
     }
@@ -131,39 +131,39 @@ impl ServosOnly {
         self.plant.power_cycle(now);
     }
 
-    /// Only the adapter: the servos keep their power.
+    /// Unplugs or plugs in the adapter. The servos keep their power.
     fn unplug_or_plug_in(&mut self) -> Result<(), ServosOnlyError> {
         self.to_client.clear();
-        self.adapter = Adapter::new(self.setup.latency, self.setup.seed);
+        self.adapter = UsbAdapter::new(self.config.latency, self.config.seed);
         if self.port.take().is_some() {
             info!("adapter unplugged");
             return Ok(());
         }
-        let port = Port::open(self.setup.link.as_ref())?;
+        let port = Port::open(self.config.link.as_ref())?;
         info!("adapter plugged in, on {}", port.pty.path().display());
         self.port = Some(port);
         Ok(())
     }
 
-    fn turn(&mut self, now: Instant) -> io::Result<()> {
-        self.hear_client(now)?;
+    fn poll(&mut self, now: Instant) -> io::Result<()> {
+        self.read_client(now)?;
         let bytes = self.plant.poll(now);
         self.show("<-", &bytes);
         self.adapter.push(now, &bytes);
         let block = self.adapter.take(now);
         self.to_client.extend(block);
-        self.tell_client()
+        self.write_client()
     }
 
-    /// Whatever the client has sent goes on the wire, unless its baud rate is not the servos'.
-    fn hear_client(&mut self, now: Instant) -> io::Result<()> {
+    /// Puts the bytes of the client on the wire, if it uses the servos' baud rate.
+    fn read_client(&mut self, now: Instant) -> io::Result<()> {
         let Some(Port { pty, clients, .. }) = &mut self.port else { return Ok(()) };
         let mut bytes = [0; PIECE];
         let count = pty.read(&mut bytes)?;
         let baud = pty.baud()?;
         if let Some(clients) = clients {
-            clients.look()?;
-            if pty.take_note_of(clients)? {
+            clients.update()?;
+            if pty.update_clients(clients)? {
                 self.to_client.clear();
             }
         }
@@ -171,8 +171,8 @@ impl ServosOnly {
         if bytes.is_empty() {
             return Ok(());
         }
-        if baud != self.setup.baud {
-            debug!("{count} bytes at {baud} baud: no servo hears them, theirs is {}", self.setup.baud);
+        if baud != self.config.baud {
+            debug!("{count} bytes at {baud} baud: no servo hears them, theirs is {}", self.config.baud);
             return Ok(());
         }
         self.show("->", bytes);
@@ -180,8 +180,8 @@ impl ServosOnly {
         Ok(())
     }
 
-    /// A bus has no back-pressure: what the client does not take is lost.
-    fn tell_client(&mut self) -> io::Result<()> {
+    /// A bus has no flow control: bytes that the client does not read are lost.
+    fn write_client(&mut self) -> io::Result<()> {
         let bytes = std::mem::take(&mut self.to_client);
         let Some(Port { pty, .. }) = &self.port else { return Ok(()) };
         if pty.has_client() && !bytes.is_empty() && pty.write(&bytes)? < bytes.len() {
@@ -196,8 +196,7 @@ impl ServosOnly {
         }
     }
 
-    /// Sleeps until the client sends, comes or goes, until the servos or the adapter have something due, or until a
-    /// signal comes.
+    /// Sleeps until the client sends, comes or goes, until a deadline of the servos or the adapter, or until a signal.
     fn sleep(&self, clock: &mut Clock, signals: &Signals) -> io::Result<()> {
         let due = [self.plant.deadline(), self.adapter.deadline()].into_iter().flatten().min();
         let time = sleep_until(clock.now(), due.unwrap_or(Instant::FAR_FUTURE));

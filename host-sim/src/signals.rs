@@ -1,4 +1,4 @@
-//! Signals as words: what the user asks of a running simulator from another terminal.
+//! Signals, by which a user controls a running simulator from another terminal.
 
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
@@ -8,12 +8,12 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 use signal_hook::iterator::backend::SignalDelivery;
 use signal_hook::iterator::exfiltrator::SignalOnly;
 
-/// What a signal asks for.
+/// The action that a signal requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wish {
+pub enum SignalAction {
     /// SIGHUP: switch the arm off and on.
     PowerCycle,
-    /// SIGUSR1, where it is caught: pull the adapter out, or plug it in again.
+    /// SIGUSR1, where it is caught: unplug the adapter, or plug it in again.
     Unplug,
     /// SIGUSR2: restart the controller, with the servos under power.
     RestartController,
@@ -21,7 +21,7 @@ pub enum Wish {
     End,
 }
 
-/// Signals caught since they were last asked for.
+/// The signals that were caught and not yet returned.
 #[derive(Debug)]
 pub struct Signals(SignalDelivery<UnixStream, SignalOnly>);
 
@@ -47,17 +47,17 @@ impl Signals {
         Ok(Self(SignalDelivery::with_pipe(read, write, SignalOnly, signals)?))
     }
 
-    /// What was asked for since the last call, each at most once. A wish to end comes last.
-    pub fn wishes(&mut self) -> Vec<Wish> {
-        let wish = |signal| match signal {
-            SIGHUP => Wish::PowerCycle,
-            SIGUSR1 => Wish::Unplug,
-            SIGUSR2 => Wish::RestartController,
-            _ => Wish::End,
+    /// The actions since the last call, each at most once. [`SignalAction::End`] is the last.
+    pub fn actions(&mut self) -> Vec<SignalAction> {
+        let action = |signal| match signal {
+            SIGHUP => SignalAction::PowerCycle,
+            SIGUSR1 => SignalAction::Unplug,
+            SIGUSR2 => SignalAction::RestartController,
+            _ => SignalAction::End,
         };
-        let mut wishes: Vec<Wish> = self.0.pending().map(wish).collect();
-        wishes.sort_by_key(|&wish| wish == Wish::End);
-        wishes
+        let mut actions: Vec<SignalAction> = self.0.pending().map(action).collect();
+        actions.sort_by_key(|&action| action == SignalAction::End);
+        actions
     }
 }
 

@@ -9,45 +9,45 @@
 //!
 //! The trace has deframers of its own, so it does not change the traffic. It does not show the effect of a request.
 
-use arm_sim::world::Tap;
+use arm_sim::simulation::Tap;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{
     Defect, Deframer, Direction, Frame, FrameBuffer, MAX_LENGTH, ToArm, ToHost, frame,
 };
 use sevenbot::traffic::Traffic;
 
-/// Bytes that no frame explains by the time so many more have come never will be explained.
-const LONGEST_DOUBT: usize = 2 * MAX_LENGTH;
+/// After so many bytes without a frame, the bytes are noise.
+const MAX_PENDING: usize = 2 * MAX_LENGTH;
 
-/// Both directions of the host link, in words.
+/// Both directions of the host link as text.
 pub struct Trace {
-    from_host: Listener<ToArm>,
-    to_host: Listener<ToHost>,
+    from_host: LineTrace<ToArm>,
+    to_host: LineTrace<ToHost>,
     sink: Box<dyn FnMut(&str)>,
 }
 
 impl Trace {
-    /// Tells `sink` one line a frame.
+    /// Passes a line for each frame to `sink`.
     #[must_use]
     pub fn new(sink: Box<dyn FnMut(&str)>) -> Self {
         let gap = Duration::ZERO;
-        Self { from_host: Listener::new("->", gap), to_host: Listener::new("<-", gap), sink }
+        Self { from_host: LineTrace::new("->", gap), to_host: LineTrace::new("<-", gap), sink }
     }
 }
 
 impl Tap for Trace {
-    /// Unfinished frames are forgotten.
+    /// Drops unfinished frames.
     fn restart(&mut self, gap: Duration) {
-        self.from_host = Listener::new("->", gap);
-        self.to_host = Listener::new("<-", gap);
+        self.from_host = LineTrace::new("->", gap);
+        self.to_host = LineTrace::new("<-", gap);
     }
 
     fn received(&mut self, now: Instant, bytes: &[u8]) {
-        self.from_host.hear(now, bytes, &mut self.sink);
+        self.from_host.push(now, bytes, &mut self.sink);
     }
 
     fn sent(&mut self, now: Instant, bytes: &[u8]) {
-        self.to_host.hear(now, bytes, &mut self.sink);
+        self.to_host.push(now, bytes, &mut self.sink);
     }
 }
 
@@ -58,20 +58,20 @@ impl std::fmt::Debug for Trace {
 }
 
 /// One direction.
-struct Listener<D> {
+struct LineTrace<D> {
     arrow: &'static str,
     deframer: Deframer<D>,
-    /// Bytes that belong to no frame so far.
-    unexplained: Vec<u8>,
+    /// Bytes that are not yet part of a frame or of noise.
+    pending: Vec<u8>,
 }
 
-impl<D: Direction> Listener<D> {
+impl<D: Direction> LineTrace<D> {
     const fn new(arrow: &'static str, gap: Duration) -> Self {
-        Self { arrow, deframer: Deframer::new(gap), unexplained: Vec::new() }
+        Self { arrow, deframer: Deframer::new(gap), pending: Vec::new() }
     }
 
-    fn hear(&mut self, now: Instant, bytes: &[u8], sink: &mut dyn FnMut(&str)) {
-        self.unexplained.extend(bytes);
+    fn push(&mut self, now: Instant, bytes: &[u8], sink: &mut dyn FnMut(&str)) {
+        self.pending.extend(bytes);
         let mut rest = bytes;
         loop {
             let taken = self.deframer.push(now, rest);
@@ -79,10 +79,10 @@ impl<D: Direction> Listener<D> {
             while let Some(found) = self.deframer.pull() {
                 let line = match found {
                     Ok(frame) => {
-                        explain(&mut self.unexplained, self.arrow, &frame, sink);
+                        remove_frame(&mut self.pending, self.arrow, &frame, sink);
                         Traffic::from_frame::<D>(&frame).to_string()
                     }
-                    Err(defect) => defect_in_words(defect).to_owned(),
+                    Err(defect) => defect_text(defect).to_owned(),
                 };
                 sink(&format!("{} {line}", self.arrow));
             }
@@ -90,30 +90,30 @@ impl<D: Direction> Listener<D> {
                 break;
             }
         }
-        if self.deframer.deadline().is_none() || self.unexplained.len() > LONGEST_DOUBT {
-            tell_noise(&self.unexplained, self.arrow, sink);
-            self.unexplained.clear();
+        if self.deframer.deadline().is_none() || self.pending.len() > MAX_PENDING {
+            print_noise(&self.pending, self.arrow, sink);
+            self.pending.clear();
         }
     }
 }
 
-/// Strikes a frame, and whatever stands before it, off the unexplained bytes.
-fn explain(unexplained: &mut Vec<u8>, arrow: &str, found: &Frame<'_>, sink: &mut dyn FnMut(&str)) {
+/// Removes a frame and the noise before it from the pending bytes.
+fn remove_frame(pending: &mut Vec<u8>, arrow: &str, found: &Frame<'_>, sink: &mut dyn FnMut(&str)) {
     let mut bytes = FrameBuffer::new();
     frame::encode(&mut bytes, found.function, found.address, found.count, found.data);
-    let place = unexplained.windows(bytes.len()).position(|window| window == bytes.as_slice());
-    let Some(start) = place else { return };
-    let noise: Vec<u8> = unexplained.drain(..start + bytes.len()).take(start).collect();
-    tell_noise(&noise, arrow, sink);
+    let start = pending.windows(bytes.len()).position(|window| window == bytes.as_slice());
+    let Some(start) = start else { return };
+    let noise: Vec<u8> = pending.drain(..start + bytes.len()).take(start).collect();
+    print_noise(&noise, arrow, sink);
 }
 
-fn tell_noise(bytes: &[u8], arrow: &str, sink: &mut dyn FnMut(&str)) {
+fn print_noise(bytes: &[u8], arrow: &str, sink: &mut dyn FnMut(&str)) {
     if !bytes.is_empty() {
         sink(&format!("{arrow} {}", Traffic::Noise(bytes.to_vec())));
     }
 }
 
-const fn defect_in_words(defect: Defect) -> &'static str {
+const fn defect_text(defect: Defect) -> &'static str {
     match defect {
         Defect::WrongCrc => "a frame with a wrong CRC",
         Defect::MalformedRange { .. } => "a frame that reaches past register 255: refused",
@@ -205,6 +205,6 @@ mod tests {
         for _ in 0..1_000 {
             session.host(b"\xaa\x77\x06\x00\xff");
         }
-        assert!(session.trace.from_host.unexplained.len() <= LONGEST_DOUBT);
+        assert!(session.trace.from_host.pending.len() <= MAX_PENDING);
     }
 }

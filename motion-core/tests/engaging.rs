@@ -4,7 +4,7 @@
 
 mod rig;
 
-use arm_sim::servo::Fault;
+use arm_sim::servo::ServoFault;
 use protocol_core::registers::Joint;
 use protocol_core::time::Duration;
 use rig::{Rig, STANDARD_COUNTS, ToServos, write};
@@ -22,8 +22,10 @@ fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
         for (joint, counts) in (1..).zip(STANDARD_COUNTS) {
             rig.hand(joint, counts);
         }
-        let late = Fault::Late(Duration::from_micros(phase * 25));
-        for (fault, joint) in [late, Fault::Garbled(2), Fault::Garbled(2)].into_iter().zip(Joint::ALL) {
+        let late = ServoFault::Late(Duration::from_micros(phase * 25));
+        for (fault, joint) in
+            [late, ServoFault::Garbled(2), ServoFault::Garbled(2)].into_iter().zip(Joint::ALL)
+        {
             rig.plant.set_fault(joint, Some(fault));
         }
         rig.run_us(50_000 + phase * 100);

@@ -4,7 +4,7 @@
 
 mod rig;
 
-use arm_sim::servo::Fault;
+use arm_sim::servo::ServoFault;
 use protocol_core::registers::Joint;
 use protocol_core::time::Duration;
 use rig::{Rig, STANDARD_POSE, ToServos};
@@ -25,7 +25,7 @@ fn elbow_was_only_asked(rig: &Rig) -> bool {
 
 /// Makes the elbow's servo lose its answers, and waits until that shows.
 fn silence_elbow(rig: &mut Rig) {
-    rig.plant.set_fault(ELBOW, Some(Fault::Garbled(1)));
+    rig.plant.set_fault(ELBOW, Some(ServoFault::Garbled(1)));
     rig.run_ms(200);
     assert_eq!(rig.get(242), ELBOW.bit());
     rig.forget();
@@ -38,7 +38,7 @@ fn d12_nothing_but_questions_is_sent_until_start_up_is_over() {
         rig.write(46, &[120, 80, 70]);
         rig.run_ms(1_000);
         if is_missing {
-            rig.plant.set_fault(ELBOW, Some(Fault::Missing));
+            rig.plant.set_fault(ELBOW, Some(ServoFault::Missing));
         }
         rig.restart_controller();
         rig.forget();
@@ -67,8 +67,8 @@ fn d12_no_joint_is_freed_or_damped_by_a_restart_of_the_controller() {
 
 #[test]
 fn d12_a_silent_servo_hears_nothing_but_questions_whatever_made_it_silent() {
-    let late = |millis| Fault::Late(Duration::from_millis(millis));
-    for fault in [Fault::Missing, late(30), Fault::Garbled(1)] {
+    let late = |millis| ServoFault::Late(Duration::from_millis(millis));
+    for fault in [ServoFault::Missing, late(30), ServoFault::Garbled(1)] {
         let mut rig = Rig::started();
         rig.plant.set_fault(ELBOW, Some(fault));
         rig.run_ms(200);
@@ -102,7 +102,7 @@ fn d12_a_joint_that_answers_again_near_its_set_point_is_driven_on_from_there() {
 #[test]
 fn d12_a_joint_that_answers_again_elsewhere_holds_there() {
     let mut rig = Rig::started();
-    rig.plant.set_fault(ELBOW, Some(Fault::Missing));
+    rig.plant.set_fault(ELBOW, Some(ServoFault::Missing));
     rig.run_ms(200);
     rig.hand(3, 600); // a = (600 - 141) * 180 / 850 = 97.2, reversed: 82.8
     rig.plant.set_fault(ELBOW, None);
@@ -114,7 +114,7 @@ fn d12_a_joint_that_answers_again_elsewhere_holds_there() {
 fn d12_a_joint_that_answers_again_goes_to_the_target_written_meanwhile() {
     for counts in [684, 600] {
         let mut rig = Rig::started();
-        rig.plant.set_fault(ELBOW, Some(Fault::Missing));
+        rig.plant.set_fault(ELBOW, Some(ServoFault::Missing));
         rig.run_ms(200);
         rig.write(48, &[70]);
         rig.hand(3, counts);
@@ -138,7 +138,7 @@ fn d12_three_bad_replies_do_not_free_a_healthy_servo() {
 fn d13_from_damping_or_forceless_to_servo_there_is_no_torque_state_between() {
     for state in [DAMPING, FORCELESS] {
         let mut rig = Rig::started();
-        rig.plant.set_fault(ELBOW, Some(Fault::Missing));
+        rig.plant.set_fault(ELBOW, Some(ServoFault::Missing));
         rig.write(29, &[state]);
         rig.run_ms(500);
         rig.forget();

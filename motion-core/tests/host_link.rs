@@ -4,7 +4,7 @@
 
 mod rig;
 
-use arm_sim::servo::Fault;
+use arm_sim::servo::ServoFault;
 use motion_core::{Controller, Storage};
 use protocol_core::registers::map::fault;
 use protocol_core::registers::{Image, Joint};
@@ -258,7 +258,7 @@ fn faults_that_the_shell_sees_are_shown_until_restart() {
 #[test]
 fn a_fault_that_two_can_see_is_shown_when_both_do() {
     let mut rig = Rig::started();
-    rig.plant.set_fault(Joint::ALL[2], Some(Fault::Missing));
+    rig.plant.set_fault(Joint::ALL[2], Some(ServoFault::Missing));
     rig.run_ms(200);
     rig.controller.set_storage(Storage::Broken);
     assert_eq!(rig.get(241), fault::SERVO_BUS | fault::SETTINGS_STORAGE);

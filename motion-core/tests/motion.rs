@@ -4,7 +4,7 @@
 
 mod rig;
 
-use arm_sim::servo::Fault;
+use arm_sim::servo::ServoFault;
 use motion_core::Vacuum;
 use protocol_core::registers::Joint;
 use protocol_core::time::Duration;
@@ -44,7 +44,7 @@ fn d12_power_up_measures_then_holds_then_drives() {
 #[test]
 fn d12_a_joint_that_cannot_be_read_is_left_alone_until_it_answers() {
     let mut rig = Rig::new();
-    rig.plant.set_fault(joint(3), Some(Fault::Missing));
+    rig.plant.set_fault(joint(3), Some(ServoFault::Missing));
     rig.run_ms(1_000);
     assert_eq!(rig.targets(), STANDARD_POSE);
     assert_eq!(rig.read(241, 2), [2, 0b100]);
@@ -251,8 +251,10 @@ fn d20_the_pump_and_the_valve() {
 
 #[test]
 fn a_servo_that_falls_silent_is_flagged_and_the_others_go_on() {
-    let late = |millis| Fault::Late(Duration::from_millis(millis));
-    for fault in [Fault::Missing, late(9), late(10), late(12), late(30), late(100), Fault::Garbled(1)] {
+    let late = |millis| ServoFault::Late(Duration::from_millis(millis));
+    for fault in
+        [ServoFault::Missing, late(9), late(10), late(12), late(30), late(100), ServoFault::Garbled(1)]
+    {
         let mut rig = Rig::started();
         rig.plant.set_fault(joint(5), Some(fault));
         rig.run_ms(200);
@@ -272,7 +274,7 @@ fn a_servo_that_falls_silent_is_flagged_and_the_others_go_on() {
 #[test]
 fn each_servo_is_asked_once_in_a_cycle_and_a_missing_one_ten_times_a_second() {
     let mut rig = Rig::started();
-    rig.plant.set_fault(joint(4), Some(Fault::Missing));
+    rig.plant.set_fault(joint(4), Some(ServoFault::Missing));
     rig.run_ms(200);
     rig.forget();
     rig.run_ms(1_000);
@@ -288,7 +290,7 @@ fn each_servo_is_asked_once_in_a_cycle_and_a_missing_one_ten_times_a_second() {
 #[test]
 fn a_joint_that_comes_back_while_a_hand_turns_it_gets_torque_only_at_rest() {
     let mut rig = Rig::started();
-    rig.plant.set_fault(joint(3), Some(Fault::Missing));
+    rig.plant.set_fault(joint(3), Some(ServoFault::Missing));
     rig.run_ms(200);
     rig.plant.set_fault(joint(3), None);
     rig.forget();
@@ -307,7 +309,7 @@ fn a_joint_that_comes_back_while_a_hand_turns_it_gets_torque_only_at_rest() {
 #[test]
 fn an_answer_garbled_now_and_then_costs_an_error_and_not_the_joint() {
     let mut rig = Rig::started();
-    rig.plant.set_fault(joint(5), Some(Fault::Garbled(4)));
+    rig.plant.set_fault(joint(5), Some(ServoFault::Garbled(4)));
     rig.write(46, &[90, 90, 65, 90, 120]);
     rig.run_ms(2_000);
     assert_eq!(rig.get(242), 0);
@@ -318,7 +320,7 @@ fn an_answer_garbled_now_and_then_costs_an_error_and_not_the_joint() {
 #[test]
 fn a_stuck_servo_is_told_by_its_position_and_its_alarm() {
     let mut rig = Rig::started();
-    rig.plant.set_fault(joint(2), Some(Fault::Stuck));
+    rig.plant.set_fault(joint(2), Some(ServoFault::Stuck));
     rig.write(46, &[90, 120]);
     rig.run_ms(10_000);
     assert_eq!(rig.present()[1], 90);
@@ -341,7 +343,7 @@ fn voltage_and_temperature_are_shown_and_forgotten_with_the_servos() {
     let mut rig = Rig::started();
     let shown = rig.read(254, 2);
     assert!((60..=90).contains(&shown[0]) && (15..=60).contains(&shown[1]), "{shown:?}");
-    Joint::ALL.into_iter().for_each(|joint| rig.plant.set_fault(joint, Some(Fault::Missing)));
+    Joint::ALL.into_iter().for_each(|joint| rig.plant.set_fault(joint, Some(ServoFault::Missing)));
     rig.run_ms(500);
     assert_eq!(rig.read(242, 1), [0x7F]);
     assert_eq!(rig.read(254, 2), [0, 0]);

@@ -15,7 +15,7 @@ use std::thread::sleep;
 use std::time::Duration as RealTime;
 
 use arm_sim::plant::Plant;
-use arm_sim::servo::Fault;
+use arm_sim::servo::ServoFault;
 use host_sim::clock::Clock;
 use host_sim::servo_socket::exchange;
 use object::read::elf::ElfFile32;
@@ -139,7 +139,7 @@ impl Bench {
             SagCause::Noise => self.noise(),
             SagCause::SilentServo => {
                 // Not one of its answers comes within the measurement.
-                self.plant.set_fault(FOREARM, Some(Fault::Late(Duration::from_millis(3_600_000))));
+                self.plant.set_fault(FOREARM, Some(ServoFault::Late(Duration::from_millis(3_600_000))));
                 self.run(DISTURBANCE_TIME)?;
                 self.plant.set_fault(FOREARM, None);
                 Ok(())
@@ -149,7 +149,7 @@ impl Bench {
 
     fn noise(&mut self) -> Outcome {
         let mut dice = Dice::new(1);
-        self.set_all_faults(Some(Fault::Garbled(1)));
+        self.set_all_faults(Some(ServoFault::Garbled(1)));
         let mut now = self.clock.now();
         let until = now + DISTURBANCE_TIME;
         while now < until {
@@ -160,7 +160,7 @@ impl Bench {
         Ok(())
     }
 
-    fn set_all_faults(&mut self, fault: Option<Fault>) {
+    fn set_all_faults(&mut self, fault: Option<ServoFault>) {
         Joint::ALL.into_iter().for_each(|joint| self.plant.set_fault(joint, fault));
     }
 }

@@ -1,14 +1,14 @@
-//! Positions of servos to angles of joints, finer than a count: where the weight pulls.
+//! The angle of a joint from the position of its servo, finer than a count.
 
 use motion_core::calibration::angle_from_counts;
 use protocol_core::registers::Joint;
 
 use crate::servo::units::COUNT;
 
-/// So many counts of either kind of servo are a whole number of thousandths of a degree.
+/// For either kind of servo, the angle of so many counts is a whole number of thousandths of a degree.
 const SPAN: u16 = 850;
 
-/// The angle of a joint in thousandths of a degree, of its servo's position in millionths of a count.
+/// The angle of a joint in thousandths of a degree, at a servo position in millionths of a count.
 pub(crate) fn angle(joint: Joint, position: i64) -> i64 {
     let (first, last) = ends(joint);
     let span = i64::from(SPAN) * COUNT;
@@ -43,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tenth_of_a_count_shows() {
+    fn a_tenth_of_a_count_changes_the_angle() {
         let joint = Joint::ALL[0];
         assert_eq!(angle(joint, 511 * COUNT + COUNT / 10) - angle(joint, 511 * COUNT), 21);
         assert_eq!(Joint::ALL.map(is_reversed), [false, true, true, true, true, true, false]);

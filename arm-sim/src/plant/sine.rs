@@ -1,6 +1,6 @@
-//! Sine in integers: the same value on every machine, which the sine of a system's library is not.
+//! Sine in integers. It has the same value on every machine, unlike the sine of a system library.
 
-/// What [`sine`] gives for one.
+/// The value that stands for 1 in results of [`sine`].
 pub(crate) const ONE: i64 = 1_000_000;
 
 /// Thousandths of a degree in a quarter turn.

@@ -1,16 +1,16 @@
-//! The weight of the arm: which torque gravity puts on each joint in a pose.
+//! The weight of the arm: the torque of gravity on each joint in a pose.
 //!
 //! ```text
 //!          elbow ───────────── joint 5 ── tool        T2: rear arm above the horizontal
 //!         ╱        forearm                            T3 - 65: forearm below the horizontal,
-//!   rear ╱                                                     whatever T2 is (parallelogram)
+//!   rear ╱                                                     independent of T2 (parallelogram)
 //!       ╱                                             T4, T5: roll and pitch of the tool
 //!   shoulder
 //! ```
 //!
-//! Three point masses. Lengths are the maker's; masses and their places are assumed, as no arm was weighed.
-//! Joints 1 (vertical axis), 6 (the tool's own axis) and 7 (the claw) carry no weight. Integers only.
-//! Knows nothing of servos or friction.
+//! The model has three point masses. The lengths are the maker's; masses and their positions are assumed, as no arm was
+//! weighed. Joints 1 (vertical axis), 6 (the tool's own axis) and 7 (the claw) carry no weight. All values are integers.
+//! Servos and friction are not part of the model.
 
 use protocol_core::registers::JOINTS;
 
@@ -18,35 +18,34 @@ use super::sine::{ONE, cosine, sine};
 
 /// Shoulder to elbow, in millimetres (the maker's length a).
 const REAR_ARM_MM: i64 = 120;
-/// From the elbow pin square to the axis of the forearm, in millimetres (the maker's length h).
+/// Elbow pin to the axis of the forearm, at a right angle, in millimetres (the maker's length h).
 const ELBOW_OFFSET_MM: i64 = 25;
 /// Elbow to joint 5, in hundredths of a millimetre (the maker's length c).
 const FOREARM_CENTI_MM: i64 = 19_850;
 
 /// The rear arm, in grams: assumed.
 const REAR_ARM_G: i64 = 120;
-/// Its centre of mass, from the shoulder, in millimetres: assumed to be in the middle.
+/// Its centre of mass, from the shoulder, in millimetres: assumed in the middle.
 const REAR_ARM_CENTRE_MM: i64 = 60;
 /// The forearm with the servos of joints 4 and 5, in grams: assumed.
 const FOREARM_G: i64 = 200;
 /// Its centre of mass, from the elbow, in millimetres: assumed.
 const FOREARM_CENTRE_MM: i64 = 110;
-/// What joint 5 carries (the servos of joints 6 and 7, the claw or the cup), in grams: assumed.
+/// The tool: the servos of joints 6 and 7, and the claw or the cup, in grams: assumed.
 const TOOL_G: i64 = 100;
 /// Its centre of mass, from the axis of joint 5, in millimetres: assumed.
 const TOOL_CENTRE_MM: i64 = 50;
 
-/// The weight of a gram, in thousandths of a millinewton: so grams times millimetres times this are nanonewton
-/// metres.
+/// The weight of a gram in micronewton. Grams times millimetres times this are nanonewton metres.
 const GRAVITY: i64 = 9_807;
 
-/// What joint 2 lifts: a moment in gram millimetres.
+/// The moment on joint 2, in gram millimetres.
 const SHOULDER: i64 = REAR_ARM_G * REAR_ARM_CENTRE_MM + (FOREARM_G + TOOL_G) * REAR_ARM_MM;
-/// What joint 3 lifts along the forearm.
+/// The moment on joint 3 along the forearm.
 const FOREARM: i64 = FOREARM_G * FOREARM_CENTRE_MM + TOOL_G * FOREARM_CENTI_MM / 100;
-/// What joint 3 lifts square to the forearm.
+/// The moment on joint 3 at a right angle to the forearm.
 const ELBOW: i64 = (FOREARM_G + TOOL_G) * ELBOW_OFFSET_MM;
-/// What joints 3, 4 and 5 lift along the tool.
+/// The moment on joints 3, 4 and 5 along the tool.
 const TOOL: i64 = TOOL_G * TOOL_CENTRE_MM;
 /// The angle of joint 3 at which the forearm is level, in thousandths of a degree.
 const LEVEL: i64 = 65_000;
@@ -88,7 +87,7 @@ mod tests {
         [90_000, rear * 1_000, forearm * 1_000, roll * 1_000, pitch * 1_000, 90_000, 80_000]
     }
 
-    /// The height of the centre of mass times the mass, by floating point: what the torques derive from.
+    /// The potential energy in floating point. The torques are its derivatives.
     fn energy(pose: [i64; JOINTS]) -> f64 {
         let radians = |millidegrees: i64| (millidegrees as f64 / 1_000.0).to_radians();
         let [_, rear, forearm, roll, pitch, _, _] = pose.map(radians);
@@ -103,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn torques_are_the_slope_of_the_energy() {
+    fn torques_are_the_derivatives_of_the_energy() {
         for (rear, forearm, roll, pitch) in
             [(90, 65, 90, 90), (30, 90, 90, 90), (120, 40, 60, 20), (60, 120, 150, 130), (0, 0, 0, 0)]
         {
@@ -122,15 +121,15 @@ mod tests {
     }
 
     #[test]
-    fn the_level_forearm_is_heavy_and_the_upright_rear_arm_is_not() {
+    fn the_level_forearm_has_weight_and_the_upright_rear_arm_has_none() {
         let [base, rear, forearm, roll, pitch, wrist, claw] = torques(pose(90, 65, 90, 90));
         assert_eq!([base, rear, roll, wrist, claw], [0; 5]);
         assert_eq!([forearm, pitch], [459_457, 49_035], "towards greater angles: down");
         assert_eq!(
             torques(pose(0, 65, 90, 90))[1],
             -423_662,
-            "a rear arm that leans to the front falls there"
+            "a rear arm that leans to the front falls to the front"
         );
-        assert!(torques(pose(120, 65, 90, 90))[1] > 0, "and one that leans back falls back");
+        assert!(torques(pose(120, 65, 90, 90))[1] > 0, "a rear arm that leans back falls back");
     }
 }

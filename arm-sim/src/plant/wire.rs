@@ -1,42 +1,43 @@
-//! The one wire of the servo bus at 1 Mbaud: when which byte is through.
+//! The wire of the servo bus at 1 Mbaud: when each byte arrives.
 //!
-//! A servo drives the line until some time after its last stop bit. A frame of the master that overlaps with
-//! that is lost, and it damages the bytes of the servo that it overlaps with. Two frames of the master cannot
-//! overlap: the second waits for the first. Servos that speak at once are heard one after the other, so
-//! collisions between servos are not simulated. Knows nothing of what the bytes mean.
+//! A servo drives the line until some time after its last stop bit. A frame of the master that overlaps with this time is
+//! lost, and it damages the bytes of the servo that it overlaps with. Two frames of the master cannot overlap: the second
+//! one waits for the first. Servos that send at the same time are received one after the other, so collisions between
+//! servos are not simulated. The content of the bytes does not matter here.
 
-use std::collections::VecDeque;
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
 
 use protocol_core::time::{Duration, Instant};
 
 /// Time on the wire of one byte at 1 Mbaud, ten bits, in microseconds.
 const BYTE_TIME_US: u64 = 10;
-/// How long a servo drives the line after its last stop bit: "some microseconds" is all that is known, so this is
+/// How long a servo drives the line after its last stop bit. The datasheet says "some microseconds", so this is
 /// assumed.
 pub(crate) const DRIVE_TIME: Duration = Duration::from_micros(20);
-/// What a collision does to each byte.
+/// A collision changes these bits of each byte.
 const DAMAGE: u8 = 0x55;
 
-/// Bytes that go over the wire in one go.
+/// Bytes without a pause between them.
 #[derive(Clone, Debug)]
 struct Transmission {
-    /// When its first byte begins, or later where the wire is taken.
+    /// The start of the first byte, if the wire is free by then.
     start: Instant,
     bytes: VecDeque<u8>,
-    /// A servo sends it; otherwise it is the master's own echo.
+    /// The sender is a servo; otherwise this is the echo of the master.
     is_from_servo: bool,
 }
 
-/// What is on its way to the master.
+/// The bytes to the master that have not arrived.
 #[derive(Clone, Debug)]
 pub(crate) struct Wire {
-    /// In the order of their starts.
+    /// In the order of the starts.
     queue: VecDeque<Transmission>,
-    /// When the last byte to the master is through.
+    /// The end of the last byte to the master.
     free_at: Instant,
-    /// When the last byte from the master is through.
-    master_done: Instant,
-    /// Until when the servo that sent last drives the line.
+    /// The end of the last byte from the master.
+    master_done_at: Instant,
+    /// The servo that sent last drives the line until then.
     driven_until: Instant,
 }
 
@@ -45,21 +46,21 @@ impl Wire {
         Self {
             queue: VecDeque::new(),
             free_at: Instant::ZERO,
-            master_done: Instant::ZERO,
+            master_done_at: Instant::ZERO,
             driven_until: Instant::ZERO,
         }
     }
 
-    /// The master sends so many bytes at `now`, behind what it is sending already: begin and end of it.
-    pub(crate) fn master_sends(&mut self, now: Instant, count: usize) -> (Instant, Instant) {
-        let begin = self.master_done.max(now);
-        self.master_done = begin + time_of(count);
-        (begin, self.master_done)
+    /// Reserves the wire for so many bytes of the master, at `now` or after its earlier bytes. Returns start and end.
+    pub(crate) fn reserve(&mut self, now: Instant, count: usize) -> (Instant, Instant) {
+        let start = self.master_done_at.max(now);
+        self.master_done_at = start + time_of(count);
+        (start, self.master_done_at)
     }
 
-    /// Does a frame of the master from `begin` to `end` collide with a servo? If so, what the servo still sends is
-    /// damaged.
-    pub(crate) fn collides(&mut self, begin: Instant, end: Instant) -> bool {
+    /// Returns whether bytes of the master from `begin` to `end` collide with a servo. If so, the rest of the servo's
+    /// bytes is damaged.
+    pub(crate) fn collide(&mut self, begin: Instant, end: Instant) -> bool {
         let mut has_collided = begin < self.driven_until;
         let mut free_at = self.free_at;
         for transmission in &mut self.queue {
@@ -76,31 +77,31 @@ impl Wire {
         has_collided
     }
 
-    /// Plans the bytes of a servo to the master, from `start` on.
+    /// Lets a servo send bytes from `start` on.
     pub(crate) fn send(&mut self, start: Instant, bytes: &[u8]) {
-        self.plan(Transmission { start, bytes: bytes.iter().copied().collect(), is_from_servo: true });
+        self.insert(Transmission { start, bytes: bytes.iter().copied().collect(), is_from_servo: true });
     }
 
-    /// Lets the master hear its own bytes, from `start` on; damaged, if they collided.
+    /// Lets the master receive its own bytes, from `start` on; damaged if they collided.
     pub(crate) fn echo(&mut self, start: Instant, bytes: &[u8], has_collided: bool) {
         let damage = if has_collided { DAMAGE } else { 0 };
         let bytes = bytes.iter().map(|byte| byte ^ damage).collect();
-        self.plan(Transmission { start, bytes, is_from_servo: false });
+        self.insert(Transmission { start, bytes, is_from_servo: false });
     }
 
-    fn plan(&mut self, transmission: Transmission) {
-        let place = self.queue.partition_point(|earlier| earlier.start <= transmission.start);
-        self.queue.insert(place, transmission);
+    fn insert(&mut self, transmission: Transmission) {
+        let index = self.queue.partition_point(|earlier| earlier.start <= transmission.start);
+        self.queue.insert(index, transmission);
     }
 
-    /// Takes the bytes that are through by `now`.
+    /// Takes the bytes that have arrived by `now`.
     pub(crate) fn take(&mut self, now: Instant) -> Vec<u8> {
-        let mut through = Vec::new();
+        let mut arrived = Vec::new();
         while let Some(first) = self.queue.front_mut() {
             let start = first.start.max(self.free_at);
             let whole_bytes = (now - start).as_micros() / BYTE_TIME_US;
             let count = usize::try_from(whole_bytes).unwrap_or(usize::MAX).min(first.bytes.len());
-            through.extend(first.bytes.drain(..count));
+            arrived.extend(first.bytes.drain(..count));
             if count > 0 {
                 self.free_at = start + time_of(count);
             }
@@ -112,15 +113,15 @@ impl Wire {
             }
             self.queue.pop_front();
         }
-        through
+        arrived
     }
 
-    /// When the next answer is through to its last byte.
+    /// When the last byte of the next transmission arrives.
     pub(crate) fn deadline(&self) -> Option<Instant> {
         self.queue.front().map(|first| first.start.max(self.free_at) + time_of(first.bytes.len()))
     }
 
-    /// Power off: nothing comes any more.
+    /// Drops all bytes, as without power.
     pub(crate) fn clear(&mut self) {
         *self = Self::new();
     }
@@ -139,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_byte_is_through_after_ten_microseconds() {
+    fn a_byte_arrives_after_ten_microseconds() {
         let mut wire = Wire::new();
         wire.send(at(100), &[1, 2, 3]);
         assert_eq!(wire.deadline(), Some(at(130)));
@@ -154,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_taken_wire_makes_the_next_wait() {
+    fn a_transmission_waits_until_the_wire_is_free() {
         let mut wire = Wire::new();
         wire.send(at(110), &[3, 4]);
         wire.send(at(100), &[1, 2]);
@@ -165,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn looked_at_late_all_of_it_is_there_in_order() {
+    fn a_late_call_takes_all_bytes_in_order() {
         let mut wire = Wire::new();
         wire.send(at(500), &[5]);
         wire.send(at(110), &[3, 4]);
@@ -183,40 +184,40 @@ mod tests {
             if is_taken {
                 assert_eq!(wire.take(at(120)), [1, 2]);
             }
-            assert!(wire.collides(at(120), at(200)));
-            assert!(wire.collides(at(139), at(200)));
-            assert!(!wire.collides(at(140), at(200)));
+            assert!(wire.collide(at(120), at(200)));
+            assert!(wire.collide(at(139), at(200)));
+            assert!(!wire.collide(at(140), at(200)));
             if !is_taken {
-                assert_eq!(wire.take(at(120)), [1, 2], "its bytes were through before");
+                assert_eq!(wire.take(at(120)), [1, 2], "its bytes had arrived before");
             }
         }
     }
 
     #[test]
-    fn a_frame_that_meets_an_answer_damages_it() {
+    fn a_frame_that_overlaps_with_an_answer_damages_it() {
         for (begin, end) in [(50, 101), (105, 300), (119, 120)] {
             let mut wire = Wire::new();
             wire.send(at(100), &[1, 2]);
-            assert!(!wire.collides(at(50), at(100)), "before it");
-            assert!(wire.collides(at(begin), at(end)));
+            assert!(!wire.collide(at(50), at(100)), "before it");
+            assert!(wire.collide(at(begin), at(end)));
             assert_eq!(wire.take(at(120)), [1 ^ DAMAGE, 2 ^ DAMAGE]);
         }
     }
 
     #[test]
-    fn the_masters_own_echo_is_no_collision() {
+    fn the_echo_of_the_master_is_no_collision() {
         let mut wire = Wire::new();
         wire.echo(at(100), &[1], false);
-        assert!(!wire.collides(at(105), at(200)));
+        assert!(!wire.collide(at(105), at(200)));
         wire.echo(at(110), &[2], true);
         assert_eq!(wire.take(at(200)), [1, 2 ^ DAMAGE]);
     }
 
     #[test]
-    fn the_master_queues_behind_itself() {
+    fn a_frame_of_the_master_waits_for_the_one_before() {
         let mut wire = Wire::new();
-        assert_eq!(wire.master_sends(at(100), 8), (at(100), at(180)));
-        assert_eq!(wire.master_sends(at(110), 2), (at(180), at(200)));
-        assert_eq!(wire.master_sends(at(300), 1), (at(300), at(310)));
+        assert_eq!(wire.reserve(at(100), 8), (at(100), at(180)));
+        assert_eq!(wire.reserve(at(110), 2), (at(180), at(200)));
+        assert_eq!(wire.reserve(at(300), 1), (at(300), at(310)));
     }
 }

@@ -1,27 +1,27 @@
-//! What can go wrong with a servo, and how it is said on a command line.
+//! The faults of a servo, and their names on a command line.
 
-use std::str::FromStr;
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+use core::str::FromStr;
 
 use protocol_core::time::Duration;
 
-/// A defect of one simulated servo.
+/// A fault of a simulated servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// It is unplugged: it hears nothing, says nothing and drives nothing. Plugged in again, it starts
-    /// afresh.
+pub enum ServoFault {
+    /// It has no power: it executes no frame, sends no answer and drives nothing. When the fault is removed, it starts.
     Missing,
-    /// It answers so much later than it should.
+    /// Its answers are this much later than usual.
     Late(Duration),
     /// Every n-th of its answers has a wrong checksum; 1 means all of them.
     Garbled(u32),
     /// Something keeps it from turning.
     Stuck,
-    /// It starts again by itself each time this has passed: its torque and its goal are forgotten, and it hears
-    /// nothing for 200 ms.
+    /// It restarts each time this has passed: torque and goal are lost, and it executes no frame for 200 ms.
     Restarting(Duration),
 }
 
-/// A word that is no fault.
+/// A word that names no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "unknown fault '{0}': use missing, late, late=MILLISECONDS, garbled, garbled=EVERY_NTH, \
@@ -29,13 +29,13 @@ pub enum Fault {
 )]
 pub struct UnknownFault(String);
 
-/// `late` is 30 ms late; `garbled` is always.
-impl FromStr for Fault {
+/// `late` means 30 ms, and `garbled` every answer.
+impl FromStr for ServoFault {
     type Err = UnknownFault;
 
     fn from_str(word: &str) -> Result<Self, UnknownFault> {
         let fault = match word.split_once('=') {
-            None => plain(word),
+            None => without_value(word),
             Some(("late", millis)) => {
                 millis.parse().ok().map(|millis| Self::Late(Duration::from_millis(millis)))
             }
@@ -50,12 +50,12 @@ impl FromStr for Fault {
     }
 }
 
-fn plain(word: &str) -> Option<Fault> {
+fn without_value(word: &str) -> Option<ServoFault> {
     match word {
-        "missing" => Some(Fault::Missing),
-        "late" => Some(Fault::Late(Duration::from_millis(30))),
-        "garbled" => Some(Fault::Garbled(1)),
-        "stuck" => Some(Fault::Stuck),
+        "missing" => Some(ServoFault::Missing),
+        "late" => Some(ServoFault::Late(Duration::from_millis(30))),
+        "garbled" => Some(ServoFault::Garbled(1)),
+        "stuck" => Some(ServoFault::Stuck),
         _ => None,
     }
 }
@@ -65,22 +65,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn faults_are_words() {
-        assert_eq!("missing".parse(), Ok(Fault::Missing));
-        assert_eq!("late".parse(), Ok(Fault::Late(Duration::from_millis(30))));
-        assert_eq!("late=5".parse(), Ok(Fault::Late(Duration::from_millis(5))));
-        assert_eq!("garbled".parse(), Ok(Fault::Garbled(1)));
-        assert_eq!("garbled=10".parse(), Ok(Fault::Garbled(10)));
-        assert_eq!("stuck".parse(), Ok(Fault::Stuck));
-        assert_eq!("restarting=2000".parse(), Ok(Fault::Restarting(Duration::from_millis(2_000))));
+    fn each_fault_has_a_name() {
+        assert_eq!("missing".parse(), Ok(ServoFault::Missing));
+        assert_eq!("late".parse(), Ok(ServoFault::Late(Duration::from_millis(30))));
+        assert_eq!("late=5".parse(), Ok(ServoFault::Late(Duration::from_millis(5))));
+        assert_eq!("garbled".parse(), Ok(ServoFault::Garbled(1)));
+        assert_eq!("garbled=10".parse(), Ok(ServoFault::Garbled(10)));
+        assert_eq!("stuck".parse(), Ok(ServoFault::Stuck));
+        assert_eq!("restarting=2000".parse(), Ok(ServoFault::Restarting(Duration::from_millis(2_000))));
     }
 
     #[test]
-    fn other_words_are_refused_with_a_hint() {
+    fn other_words_are_refused_with_the_possible_ones() {
         for word in
             ["", "Missing", "late=", "late=-1", "garbled=0", "garbled=x", "stuck=1", "restarting=0", "lost"]
         {
-            let error = word.parse::<Fault>().unwrap_err().to_string();
+            let error = word.parse::<ServoFault>().unwrap_err().to_string();
             assert!(error.contains(word) && error.contains("use missing"), "{error}");
         }
     }

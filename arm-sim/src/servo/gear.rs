@@ -1,4 +1,4 @@
-//! What a servo is made of: torque, friction, inertia. And what it does when its motor does not drive it.
+//! The gear of a simulated servo: torque, friction and inertia, and the motion without torque.
 //!
 //! | | joints 1 to 4 | joints 5 to 7 | source |
 //! | --- | --- | --- | --- |
@@ -8,25 +8,26 @@
 //! | drag, damping | 5000 mN m s/rad | 1000 mN m s/rad | assumed |
 //! | inertia, with the arm's share | 20 g m² | 1 g m² | assumed |
 //!
-//! Below its friction a joint at rest stays. Above it, it speeds up until the drag takes up what is left: a level
-//! forearm falls at up to 103 degrees/s without torque, and sinks at 4.1 degrees/s when it is damped. Integers only.
+//! A joint at rest does not move if its load is below the friction. Otherwise it accelerates until the drag equals the
+//! rest of the load: a level forearm falls at up to 103 degrees/s without torque and sinks at 4.1 degrees/s with damping.
+//! All values are integers.
 
 use protocol_core::registers::Joint;
 
 use super::units::{COUNT_PER_SECOND, STEP};
 
-/// What a servo is made of.
+/// The constants of a gear.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gear {
     /// The torque at which it cannot turn, in micronewton metres.
     stall: i64,
-    /// The torque below which it does not begin to turn, and which it loses while it turns; likewise.
+    /// The torque below which it does not start to turn, and which it loses while it turns; likewise.
     friction: i64,
-    /// What it loses to speed, in millinewton metre seconds per radian.
+    /// The torque that it loses per speed, in millinewton metre seconds per radian.
     free_drag: i64,
-    /// Likewise, while its motor brakes.
+    /// Likewise, while the motor brakes.
     damped_drag: i64,
-    /// What has to be set in motion, in gram square metres.
+    /// The moment of inertia, in gram square metres.
     inertia: i64,
     /// Counts in a thousand radians.
     counts_per_kiloradian: i64,
@@ -52,12 +53,12 @@ const SMALL: Gear = Gear {
     counts_per_kiloradian: 198_944,
 };
 
-/// How a motor without torque resists.
+/// The resistance of a motor without torque.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Drag {
-    /// By its gear alone.
+    /// The gear alone.
     Free,
-    /// Its windings are shorted.
+    /// The gear, and the motor with its windings shorted.
     Damped,
 }
 
@@ -91,7 +92,7 @@ impl Gear {
         let last = net * self.counts_per_kiloradian / drag.max(1) * COUNT_PER_SECOND / 1_000_000;
         let rate = drag * STEP_MICROS / self.inertia.max(1);
         let after = speed + (last - speed) * rate.min(1_000_000) / 1_000_000;
-        // Friction stops a joint, and does not turn it back.
+        // Friction stops a joint and does not reverse it.
         if after * towards < COUNT_PER_SECOND && self.holds(torque) { 0 } else { after }
     }
 }
@@ -103,7 +104,7 @@ const STEP_MICROS: i64 = STEP.as_micros().cast_signed();
 mod tests {
     use super::*;
 
-    /// Degrees per second of joint 3 after so many milliseconds at this torque from rest.
+    /// The speed of joint 3 in degrees per second, after so many milliseconds at this torque from rest.
     fn degrees_per_second(torque: i64, drag: Drag, millis: u32) -> i64 {
         let gear = Gear::of(Joint::ALL[2]);
         let speed = (0..millis).fold(0, |speed, _| gear.speed_after(speed, torque, drag));
@@ -117,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_forearm_speeds_up_to_103_degrees_per_second_and_damped_to_4() {
+    fn a_level_forearm_reaches_103_degrees_per_second_free_and_4_damped() {
         let level = 459_448;
         assert_eq!(degrees_per_second(level, Drag::Free, 2_000), 102);
         assert_eq!(degrees_per_second(-level, Drag::Free, 2_000), -102);
@@ -127,15 +128,15 @@ mod tests {
     }
 
     #[test]
-    fn friction_stops_a_joint_that_nothing_pushes_any_more() {
+    fn friction_stops_a_joint_whose_load_is_gone() {
         let gear = Gear::of(Joint::ALL[2]);
         let mut speed = 500_000;
         let mut steps = 0;
         while speed != 0 {
             speed = gear.speed_after(speed, 50_000, Drag::Free);
-            assert!(speed >= 0, "it does not turn back");
+            assert!(speed >= 0, "it reverses");
             steps += 1;
-            assert!(steps < 1_000, "it stops");
+            assert!(steps < 1_000, "it does not stop");
         }
     }
 }

@@ -1,15 +1,13 @@
-//! The servo bus: both ends of the wire that connects seven SCS servos.
+//! The servo bus: the wire that connects seven SCS servos, from the master's side.
 //!
 //! ```text
-//!   frame    frames of both directions                (no time, no turns)
+//!   frame    frames of both directions (no time, no turns)
 //!     ▼
-//!   bus      the master's end: transactions, timeouts (no angles, no registers of the arm)
-//!   servo    the servo's end, for simulators          (no motor)
+//!   bus      transactions, timeouts    (no angles, no registers of the arm)
 //! ```
 
 pub mod bus;
 pub mod frame;
-pub mod servo;
 mod torque;
 
 pub use bus::{Bus, Outcome};

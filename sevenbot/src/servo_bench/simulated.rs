@@ -1,134 +1,149 @@
-//! Servos without a wire, for tests: the servo's end of `motion-core` behind a [`Line`]. Time is a number.
+//! A [`Line`] to simulated servos, for tests, in virtual time.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 use std::time::Duration;
 
-use motion_core::servo_bus::Reading;
-use motion_core::servo_bus::frame::{Decoder, FrameBuffer};
-use motion_core::servo_bus::servo::Servo;
+use arm_sim::servo::{Servo, ServoConfig, ServoFault};
+use motion_core::servo_bus::frame::{Decoder, Frame};
+use protocol_core::registers::Joint;
+use protocol_core::time::Instant;
 
 use super::bus::{BusOptions, ServoBus};
 use super::error::ServoError;
 use super::line::Line;
 use crate::error::PortError;
 
-/// One servo, and what is wrong with it.
+/// The supply voltage in 0.1 V.
+const SUPPLY: u8 = 74;
+/// A step of a servo.
+const STEP: Duration = Duration::from_millis(1);
+
+/// A servo, and the faults that a servo on an arm does not have.
 pub(super) struct Simulated {
     pub(super) servo: Servo,
-    /// How long an answer takes.
-    pub(super) delay: Duration,
-    /// Its answers have a wrong checksum.
-    pub(super) is_garbled: bool,
-    /// It does not turn.
-    pub(super) is_stuck: bool,
-    /// It answers nothing from this time on.
-    pub(super) dies_at: Duration,
-    pub(super) position: u16,
+    /// Its answers carry these error bits besides its own.
+    pub(super) errors: u8,
+    /// It loses its power at this time.
+    pub(super) fails_at: Duration,
 }
 
 impl Simulated {
     pub(super) fn new(id: u8) -> Self {
-        let delay = Duration::from_micros(250);
-        let (is_garbled, is_stuck, dies_at) = (false, false, Duration::MAX);
-        Self { servo: Servo::new(id), delay, is_garbled, is_stuck, dies_at, position: 300 }
+        let mut servo = Servo::new(Joint::ALL[0], ServoConfig::default(), 300, Instant::ZERO);
+        servo.set_id(id);
+        // The registers hold measurements from the first step on.
+        servo.step(Instant::ZERO, SUPPLY);
+        Self { servo, errors: 0, fails_at: Duration::MAX }
     }
 
-    /// One count nearer to the goal, or a load that says that something is in the way.
-    fn turn(&mut self) {
-        let goal = self.servo.goal().position_counts;
-        let is_on = self.servo.torque_switch() == 1;
-        let is_driven = is_on && goal != self.position;
-        if is_driven && !self.is_stuck {
-            self.position = if goal > self.position { self.position + 1 } else { self.position - 1 };
-        }
-        let load = if is_driven && self.is_stuck { 900 } else { 20 };
-        let position_counts = self.position;
-        let reading =
-            Reading { position_counts, speed: 0, load, voltage_decivolts: 74, temperature_celsius: 31 };
-        self.servo.set_reading(&reading);
-        self.servo.set_moving(is_driven);
+    pub(super) fn with(id: u8, fault: ServoFault) -> Self {
+        let mut simulated = Self::new(id);
+        simulated.set_fault(Some(fault));
+        simulated
     }
 
-    fn hear(&mut self, now: Duration, bytes: &[u8]) -> Option<FrameBuffer> {
-        let mut decoder = Decoder::new();
-        decoder.push(bytes);
-        let frame = decoder.pull()?.ok()?;
-        self.turn();
-        let mut answer = self.servo.handle_frame(&frame)?;
-        if self.is_garbled
-            && let Some(sum) = answer.last_mut()
-        {
-            *sum ^= 0x55;
+    pub(super) fn set_fault(&mut self, fault: Option<ServoFault>) {
+        self.servo.set_fault(Instant::ZERO, fault, Instant::ZERO);
+    }
+
+    /// The answer to a frame, and when it arrives.
+    fn answer(&mut self, now: Duration, frame: &Frame<'_>) -> Option<(Duration, Vec<u8>)> {
+        if now >= self.fails_at {
+            self.set_fault(Some(ServoFault::Missing));
         }
-        (now < self.dies_at).then_some(answer)
+        let answer = self.servo.handle_frame(instant(now), frame)?;
+        let mut bytes = answer.bytes.to_vec();
+        bytes[4] |= self.errors;
+        let checksum = bytes.last_mut()?;
+        *checksum = checksum.wrapping_sub(self.errors);
+        let delay = ServoConfig::default().return_delay.as_micros() + answer.delay.as_micros();
+        Some((now + Duration::from_micros(delay), bytes))
     }
 }
 
-/// What the test sees of the world while the bus is in use.
+/// What is at the other end of the line.
 #[derive(Default)]
-pub(super) struct World {
+pub(super) struct Wire {
     pub(super) servos: Vec<Simulated>,
     pub(super) has_echo: bool,
-    /// How long an echo takes.
+    /// The delay of an echo.
     pub(super) echo_delay: Duration,
-    /// The port is gone once so many frames were sent.
+    /// The port is lost after so many frames.
     pub(super) frames_until_lost: Option<usize>,
-    /// Rates that the adapter knows; empty: all.
+    /// The rates of the adapter; empty: all.
     pub(super) rates: Vec<u32>,
     baud: u32,
     now: Duration,
-    /// When each piece is through, in this order.
-    on_its_way: VecDeque<(Duration, Vec<u8>)>,
-    /// Everything that was sent.
+    /// The servos are simulated up to this time.
+    simulated: Duration,
+    /// When each piece arrives, in this order.
+    in_transit: VecDeque<(Duration, Vec<u8>)>,
+    /// Every frame that was sent.
     pub(super) sent: Vec<Vec<u8>>,
 }
 
-/// The line to the servos of a world.
-pub(super) struct Wire(pub(super) Rc<RefCell<World>>);
-
-impl Line for Wire {
-    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        let world = &mut *self.0.borrow_mut();
-        let now = world.now;
-        if world.frames_until_lost.is_some_and(|frames| world.sent.len() >= frames) {
-            return Err(PortError::Lost(std::io::ErrorKind::BrokenPipe));
-        }
-        world.sent.push(bytes.to_vec());
-        if world.has_echo {
-            world.on_its_way.push_back((now + world.echo_delay, bytes.to_vec()));
-        }
-        for servo in world.servos.iter_mut().filter(|servo| servo.servo.baud() == world.baud) {
-            if let Some(answer) = servo.hear(now, bytes) {
-                world.on_its_way.push_back((now + servo.delay, answer.to_vec()));
+impl Wire {
+    fn advance(&mut self) {
+        while self.simulated + STEP <= self.now {
+            self.simulated += STEP;
+            for simulated in &mut self.servos {
+                simulated.servo.step(instant(self.simulated), SUPPLY);
             }
         }
-        world.on_its_way.make_contiguous().sort_by_key(|(at, _)| *at);
+    }
+
+    fn answers(&mut self, bytes: &[u8]) {
+        let mut decoder = Decoder::new();
+        decoder.push(bytes);
+        let Some(Ok(frame)) = decoder.pull() else { return };
+        for simulated in self.servos.iter_mut().filter(|simulated| simulated.servo.baud() == self.baud) {
+            self.in_transit.extend(simulated.answer(self.now, &frame));
+        }
+    }
+}
+
+/// The line to the servos of a wire.
+pub(super) struct WireLine(pub(super) Rc<RefCell<Wire>>);
+
+impl Line for WireLine {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        let wire = &mut *self.0.borrow_mut();
+        if wire.frames_until_lost.is_some_and(|frames| wire.sent.len() >= frames) {
+            return Err(PortError::Lost(std::io::ErrorKind::BrokenPipe));
+        }
+        wire.sent.push(bytes.to_vec());
+        if wire.has_echo {
+            wire.in_transit.push_back((wire.now + wire.echo_delay, bytes.to_vec()));
+        }
+        wire.advance();
+        wire.answers(bytes);
+        wire.in_transit.make_contiguous().sort_by_key(|(at, _)| *at);
         Ok(())
     }
 
     fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, PortError> {
-        let world = &mut *self.0.borrow_mut();
-        let deadline = world.now + patience;
-        match world.on_its_way.pop_front_if(|(at, _)| *at <= deadline) {
+        let wire = &mut *self.0.borrow_mut();
+        let deadline = wire.now + patience;
+        match wire.in_transit.pop_front_if(|(at, _)| *at <= deadline) {
             Some((at, bytes)) => {
-                world.now = world.now.max(at);
+                wire.now = wire.now.max(at);
                 Ok(bytes)
             }
             None => {
-                world.now = deadline;
+                wire.now = deadline;
                 Ok(Vec::new())
             }
         }
     }
 
     fn set_baud(&mut self, baud: u32) -> Result<(), ServoError> {
-        let world = &mut *self.0.borrow_mut();
-        if !world.rates.is_empty() && !world.rates.contains(&baud) {
+        let wire = &mut *self.0.borrow_mut();
+        if !wire.rates.is_empty() && !wire.rates.contains(&baud) {
             return Err(ServoError::NoSuchRate { baud });
         }
-        world.baud = baud;
+        wire.baud = baud;
         Ok(())
     }
 
@@ -137,9 +152,12 @@ impl Line for Wire {
     }
 }
 
-/// A bus with these servos on it, at 1 Mbaud.
-pub(super) fn bus(servos: Vec<Simulated>) -> (ServoBus, Rc<RefCell<World>>) {
-    let world = World { servos, baud: 1_000_000, ..World::default() };
-    let world = Rc::new(RefCell::new(world));
-    (ServoBus::over(Box::new(Wire(Rc::clone(&world))), BusOptions::default()), world)
+fn instant(time: Duration) -> Instant {
+    Instant::from_micros(u64::try_from(time.as_micros()).unwrap())
+}
+
+/// A bus with these servos, at 1 Mbaud.
+pub(super) fn bus(servos: Vec<Simulated>) -> (ServoBus, Rc<RefCell<Wire>>) {
+    let wire = Rc::new(RefCell::new(Wire { servos, baud: 1_000_000, ..Wire::default() }));
+    (ServoBus::over(Box::new(WireLine(Rc::clone(&wire))), BusOptions::default()), wire)
 }

@@ -2,7 +2,10 @@
 
 use std::time::Duration;
 
+use arm_sim::servo::ServoFault;
+use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{FrameBuffer, error, register, write};
+use protocol_core::time::{Duration as SimulatedDuration, Instant};
 
 use super::bus::ServoBus;
 use super::center::{CenterError, Limits, center};
@@ -24,6 +27,10 @@ fn found(bus: &mut ServoBus, plan: &Plan) -> Vec<(u32, u8, Answers)> {
     found.into_iter().map(|Found { baud, id, answers }| (baud, id, answers)).collect()
 }
 
+fn late(micros: u64) -> ServoFault {
+    ServoFault::Late(SimulatedDuration::from_micros(micros))
+}
+
 /// Writes a register of the EEPROM.
 fn set(simulated: &mut Simulated, register: u8, values: &[u8]) {
     for (register, values) in [(register::LOCK, [0].as_slice()), (register, values), (register::LOCK, &[1])] {
@@ -31,7 +38,7 @@ fn set(simulated: &mut Simulated, register: u8, values: &[u8]) {
         write(&mut request, simulated.servo.id(), register, values);
         let mut decoder = motion_core::servo_bus::frame::Decoder::new();
         decoder.push(&request);
-        simulated.servo.handle_frame(&decoder.pull().unwrap().unwrap());
+        simulated.servo.handle_frame(Instant::ZERO, &decoder.pull().unwrap().unwrap());
     }
 }
 
@@ -65,8 +72,8 @@ fn a_scan_of_one_rate_takes_two_seconds_at_most_and_tells_how_far_it_is() {
 
 #[test]
 fn an_echo_is_no_answer_and_does_not_hide_one() {
-    let (mut bus, world) = bus([1, 5].map(Simulated::new).into());
-    world.borrow_mut().has_echo = true;
+    let (mut bus, wire) = bus([1, 5].map(Simulated::new).into());
+    wire.borrow_mut().has_echo = true;
     assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 1, Answers::Good), (FAST, 5, Answers::Good)]);
     assert!(bus.has_echo());
     let Err(ServoError::NoAnswer { heard, .. }) = bus.read(2, register::ID, 1) else {
@@ -77,30 +84,29 @@ fn an_echo_is_no_answer_and_does_not_hide_one() {
 
 #[test]
 fn an_echo_does_not_hide_a_servo_that_reports_a_wrong_voltage() {
-    let mut servo = Simulated::new(4);
-    servo.servo.set_errors(error::VOLTAGE);
-    let (mut bus, world) = bus(vec![servo]);
+    let servo = Simulated { errors: error::VOLTAGE, ..Simulated::new(4) };
+    let (mut bus, wire) = bus(vec![servo]);
     for has_echo in [false, true] {
-        world.borrow_mut().has_echo = has_echo;
+        wire.borrow_mut().has_echo = has_echo;
         assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 4, Answers::Good)]);
     }
     // Two values have the length of a question, and 2 is the code of a question.
-    world.borrow_mut().servos[0].servo.set_errors(2);
+    wire.borrow_mut().servos[0].errors = 2;
     let answer = bus.read(4, register::ID, 2).unwrap();
     assert_eq!((answer.errors, answer.values), (2, vec![4, 0]));
 }
 
 #[test]
 fn a_slow_adapter_hides_no_servo() {
-    let slow = |id| Simulated { delay: Duration::from_millis(60), ..Simulated::new(id) };
+    let slow = |id| Simulated::with(id, late(60_000));
     let (mut bus, _) = bus([0, 3, 253].map(slow).into());
     assert_eq!(found(&mut bus, &plan(&[FAST])), [0, 3, 253].map(|id| (FAST, id, Answers::Good)));
 }
 
 #[test]
 fn late_echoes_are_no_late_answers() {
-    let (mut bus, world) = bus(vec![Simulated::new(3)]);
-    (world.borrow_mut().has_echo, world.borrow_mut().echo_delay) = (true, Duration::from_millis(60));
+    let (mut bus, wire) = bus(vec![Simulated::new(3)]);
+    (wire.borrow_mut().has_echo, wire.borrow_mut().echo_delay) = (true, Duration::from_millis(60));
     assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 3, Answers::Good)]);
     assert!(bus.has_echo());
     // Virtual time: 254 short waits, and patient questions to one id only.
@@ -109,16 +115,15 @@ fn late_echoes_are_no_late_answers() {
 
 #[test]
 fn damaged_answers_and_servos_with_one_id_are_told() {
-    let garbled = |id| Simulated { is_garbled: true, ..Simulated::new(id) };
-    let late = Simulated { delay: Duration::from_micros(600), ..Simulated::new(9) };
-    let (mut bus, _) = bus(vec![garbled(2), Simulated::new(9), late]);
+    let garbled = Simulated::with(2, ServoFault::Garbled(1));
+    let (mut bus, _) = bus(vec![garbled, Simulated::new(9), Simulated::with(9, late(350))]);
     assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 2, Answers::Damaged), (FAST, 9, Answers::Several)]);
 }
 
 #[test]
 fn rates_that_the_adapter_does_not_know_are_told() {
-    let (mut bus, world) = bus(vec![Simulated::new(0)]);
-    world.borrow_mut().rates = vec![500_000, FAST];
+    let (mut bus, wire) = bus(vec![Simulated::new(0)]);
+    wire.borrow_mut().rates = vec![500_000, FAST];
     let scan = scan(&mut bus, &plan(&BAUD_RATES), |_| ()).unwrap();
     assert_eq!(scan.found.len(), 1);
     assert_eq!(scan.unknown_rates, BAUD_RATES[2..]);
@@ -126,10 +131,9 @@ fn rates_that_the_adapter_does_not_know_are_told() {
 
 #[test]
 fn a_late_answer_is_not_taken_for_the_next_one() {
-    let late = Simulated { delay: Duration::from_millis(610), ..Simulated::new(0) };
-    let (mut bus, world) = bus(vec![late]);
+    let (mut bus, wire) = bus(vec![Simulated::with(0, late(610_000))]);
     assert!(matches!(bus.read(0, register::ID, 1), Err(ServoError::NoAnswer { attempts: 3, .. })));
-    world.borrow_mut().servos[0].delay = Duration::from_millis(1);
+    wire.borrow_mut().servos[0].set_fault(None);
     assert_eq!(bus.read(0, register::RESPONSE_LEVEL, 1).unwrap().values, [1]);
 }
 
@@ -152,11 +156,11 @@ fn facts_are_read_high_byte_first() {
 #[test]
 fn an_id_is_changed_and_locked_again() {
     for has_echo in [false, true] {
-        let (mut bus, world) = bus(vec![Simulated::new(1)]);
-        world.borrow_mut().has_echo = has_echo;
+        let (mut bus, wire) = bus(vec![Simulated::new(1)]);
+        wire.borrow_mut().has_echo = has_echo;
         set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap();
-        let servo = &mut world.borrow_mut().servos[0].servo;
-        servo.power_cycle();
+        let servo = &mut wire.borrow_mut().servos[0].servo;
+        servo.power_cycle(Instant::ZERO);
         assert_eq!(servo.id(), 6);
     }
     let (mut bus, _) = bus(vec![Simulated::new(1)]);
@@ -168,14 +172,14 @@ fn an_id_is_changed_and_locked_again() {
 fn an_id_is_changed_on_a_servo_that_acknowledges_nothing() {
     let mut servo = Simulated::new(1);
     set(&mut servo, register::RESPONSE_LEVEL, &[0]);
-    let (mut bus, world) = bus(vec![servo]);
+    let (mut bus, wire) = bus(vec![servo]);
     set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap();
-    assert_eq!(world.borrow().servos[0].servo.id(), 6);
+    assert_eq!(wire.borrow().servos[0].servo.id(), 6);
 }
 
 #[test]
 fn nothing_is_written_unless_the_servo_is_alone() {
-    let garbled = Simulated { is_garbled: true, ..Simulated::new(4) };
+    let garbled = Simulated::with(4, ServoFault::Garbled(1));
     for (servos, says) in [
         (vec![Simulated::new(1), Simulated::new(200)], "these ids answer: 1, 200"),
         (vec![Simulated::new(2)], "these ids answer: 2"),
@@ -183,11 +187,11 @@ fn nothing_is_written_unless_the_servo_is_alone() {
         (vec![Simulated::new(1), Simulated::new(1)], "1 (several servos)"),
         (vec![], "no servo answers"),
     ] {
-        let (mut bus, world) = bus(servos);
+        let (mut bus, wire) = bus(servos);
         let error = set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap_err();
         assert!(matches!(error, IdError::NotAlone { .. }));
         assert!(error.to_string().contains(says), "{error}");
-        assert!(world.borrow().sent.iter().all(|frame| frame[4] == 2), "only reads");
+        assert!(wire.borrow().sent.iter().all(|frame| frame[4] == 2), "only reads");
     }
 }
 
@@ -196,9 +200,9 @@ fn a_servo_that_falls_silent_half_way_is_told() {
     let plan = everything_at(FAST, None);
     let (mut first, _) = bus(vec![Simulated::new(1)]);
     scan(&mut first, &plan, |_| ()).unwrap();
-    let (mut bus, world) = bus(vec![Simulated::new(1)]);
+    let (mut bus, wire) = bus(vec![Simulated::new(1)]);
     // Just after the scan, while the EEPROM is being opened.
-    world.borrow_mut().servos[0].dies_at = first.now() + Duration::from_micros(100);
+    wire.borrow_mut().servos[0].fails_at = first.now() + Duration::from_micros(100);
     let error = set_id(&mut bus, &plan, 1, 6, |_| ()).unwrap_err();
     assert!(matches!(error, IdError::StaysLocked(_)), "{error:?}");
 }
@@ -211,10 +215,10 @@ fn wherever_the_port_is_lost_the_user_learns_what_state_the_servo_may_be_in() {
     let frames = counted.borrow().sent.clone();
     let first_write = frames.iter().position(|frame| frame[4] == 3).unwrap();
     for frames_until_lost in first_write..frames.len() {
-        let (mut bus, world) = bus(vec![Simulated::new(1)]);
-        world.borrow_mut().frames_until_lost = Some(frames_until_lost);
+        let (mut bus, wire) = bus(vec![Simulated::new(1)]);
+        wire.borrow_mut().frames_until_lost = Some(frames_until_lost);
         let error = set_id(&mut bus, &plan, 1, 6, |_| ()).unwrap_err();
-        let id = world.borrow().servos[0].servo.id();
+        let id = wire.borrow().servos[0].servo.id();
         match error {
             IdError::StaysLocked(_) => assert_eq!(id, 1),
             IdError::StaysOpen(_) => assert_eq!(id, 6),
@@ -226,9 +230,9 @@ fn wherever_the_port_is_lost_the_user_learns_what_state_the_servo_may_be_in() {
 
 #[test]
 fn a_servo_goes_to_its_middle_and_starts_where_it_stands() {
-    let (mut bus, world) = bus(vec![Simulated::new(1)]);
+    let (mut bus, wire) = bus(vec![Simulated::new(1)]);
     assert_eq!(center(&mut bus, 1, &Limits::default(), |_| true), Ok(511));
-    let goals: Vec<Vec<u8>> = world
+    let goals: Vec<Vec<u8>> = wire
         .borrow()
         .sent
         .iter()
@@ -241,23 +245,22 @@ fn a_servo_goes_to_its_middle_and_starts_where_it_stands() {
 
 #[test]
 fn a_blocked_servo_loses_its_torque() {
-    let stuck = Simulated { is_stuck: true, ..Simulated::new(1) };
-    let (mut bus, world) = bus(vec![stuck]);
+    let (mut bus, wire) = bus(vec![Simulated::with(1, ServoFault::Stuck)]);
     let error = center(&mut bus, 1, &Limits::default(), |_| true).unwrap_err();
-    assert_eq!(error, CenterError::Overload { position: 300, load: 900, errors: 0 });
-    assert_eq!(world.borrow().servos[0].servo.torque_switch(), 0);
-    let weak = Limits { load: 1_000, ..Limits::default() };
+    assert!(matches!(error, CenterError::Overload { position: 300, load: 601..800, errors: 0 }), "{error:?}");
+    assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
+    let weak = Limits { load: 1_000, stall: Duration::from_millis(500), ..Limits::default() };
     let error = center(&mut bus, 1, &weak, |_| true).unwrap_err();
     assert_eq!(error, CenterError::Stalled { position: 300 });
-    assert_eq!(world.borrow().servos[0].servo.torque_switch(), 0);
+    assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
 }
 
 #[test]
 fn an_interrupted_servo_loses_its_torque() {
-    let (mut bus, world) = bus(vec![Simulated::new(1)]);
+    let (mut bus, wire) = bus(vec![Simulated::new(1)]);
     let error = center(&mut bus, 1, &Limits::default(), |reading| reading.position_counts < 320).unwrap_err();
     assert_eq!(error, CenterError::Interrupted);
-    assert_eq!(world.borrow().servos[0].servo.torque_switch(), 0);
+    assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
 }
 
 #[test]
@@ -265,18 +268,18 @@ fn a_servo_that_cannot_reach_its_middle_is_left_alone() {
     for (limits, says) in [([0, 0, 0, 0], "turn on and on"), ([2, 88, 3, 255], "600 to 1023")] {
         let mut servo = Simulated::new(1);
         set(&mut servo, register::MIN_POSITION, &limits);
-        let (mut bus, world) = bus(vec![servo]);
+        let (mut bus, wire) = bus(vec![servo]);
         let error = center(&mut bus, 1, &Limits::default(), |_| true).unwrap_err();
         assert!(error.to_string().contains(says), "{error}");
-        assert_eq!(world.borrow().servos[0].servo.torque_switch(), 0);
+        assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
     }
 }
 
 #[test]
 fn a_servo_that_falls_silent_may_still_be_moving() {
-    let (mut bus, world) = bus(vec![Simulated::new(1)]);
+    let (mut bus, wire) = bus(vec![Simulated::new(1)]);
     let silence = Duration::from_millis(500);
-    world.borrow_mut().servos[0].dies_at = silence;
+    wire.borrow_mut().servos[0].fails_at = silence;
     let error = center(&mut bus, 1, &Limits::default(), |_| true).unwrap_err();
     assert!(matches!(error, CenterError::StillOn(_)), "{error:?}");
     assert!(error.to_string().contains("may still be moving"), "{error}");

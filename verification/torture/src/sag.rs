@@ -8,8 +8,8 @@ use std::fmt::{self, Display};
 
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
-use arm_sim::servo::Fault;
-use arm_sim::world::{Setup, World};
+use arm_sim::servo::ServoFault;
+use arm_sim::simulation::{ArmConfig, Simulation};
 use motion_core::TorqueCodes;
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{FrameBuffer as ServoFrame, register, sync_write};
@@ -107,7 +107,7 @@ impl Sag {
 
 /// An arm that holds [`POSE`].
 struct PosedArm {
-    world: World<Flash>,
+    world: Simulation<Flash>,
     now: Instant,
     rest: [i32; JOINTS],
     sag: Sag,
@@ -116,13 +116,13 @@ struct PosedArm {
 impl PosedArm {
     fn new() -> Self {
         let now = Instant::ZERO;
-        let setup = Setup { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };
-        let world = World::new(now, setup, Flash::in_memory(), Plant::new(now));
+        let setup = ArmConfig { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };
+        let world = Simulation::new(now, setup, Flash::in_memory(), Plant::new(now));
         let mut arm = Self { world, now, rest: [0; JOINTS], sag: Sag::default() };
         arm.run(SETTLE_TIME);
         let mut frame = FrameBuffer::new();
         Request::Write { address: TARGET_POSITION.address, values: &POSE }.encode(&mut frame);
-        arm.world.host_sends(arm.now, &frame);
+        arm.world.host_send(arm.now, &frame);
         arm.run(SETTLE_TIME);
         arm.rest = arm.angles();
         arm.sag = Sag::default();
@@ -158,7 +158,7 @@ impl PosedArm {
                 // No reply arrives before the end of the measurement.
                 self.world
                     .plant_mut()
-                    .set_fault(FOREARM, Some(Fault::Late(Duration::from_millis(3_600_000))));
+                    .set_fault(FOREARM, Some(ServoFault::Late(Duration::from_millis(3_600_000))));
                 self.run(DISTURBANCE_TIME);
                 self.world.plant_mut().set_fault(FOREARM, None);
             }
@@ -184,7 +184,7 @@ impl PosedArm {
 
     fn noise(&mut self) {
         let mut rng = Dice::new(1);
-        self.set_all_faults(Some(Fault::Garbled(1)));
+        self.set_all_faults(Some(ServoFault::Garbled(1)));
         let until = self.now + DISTURBANCE_TIME;
         while self.now < until {
             let noise = [(); NOISE_BYTES].map(|()| rng.byte());
@@ -194,7 +194,7 @@ impl PosedArm {
         self.set_all_faults(None);
     }
 
-    fn set_all_faults(&mut self, fault: Option<Fault>) {
+    fn set_all_faults(&mut self, fault: Option<ServoFault>) {
         Joint::ALL.into_iter().for_each(|joint| self.world.plant_mut().set_fault(joint, fault));
     }
 }

@@ -16,8 +16,8 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use clap::Args;
-use host_sim::link::Link;
-use host_sim::signals::{Signals, Wish};
+use host_sim::signals::{SignalAction, Signals};
+use host_sim::symlink::Symlink;
 use tempfile::TempDir;
 
 use crate::run::{self, Linked, Outcome, Running, cargo, root};
@@ -87,17 +87,17 @@ pub(crate) fn run(options: &Options) -> Outcome {
     monitor.wait_for_bits(HOST_LINK_CONTROL, RECEIVER_ON)?;
     let mut log = options.log.then(|| Log::open(&image.path())).transpose()?;
     let port = relay.port().to_owned();
-    let _link = options.link.as_deref().map(|path| Link::new(path, &port)).transpose()?;
+    let _link = options.link.as_deref().map(|path| Symlink::new(path, &port)).transpose()?;
     let mut out = io::stdout().lock();
     // Nobody has to read it.
     let _ = writeln!(out, "ready {}", port.display()).and_then(|()| out.flush());
     loop {
-        for wish in signals.wishes() {
-            match wish {
-                Wish::End => return Ok(()),
-                Wish::Unplug => {}
-                Wish::PowerCycle => power_cycle(&servos, &mut monitor)?,
-                Wish::RestartController => monitor.execute("system_reset", "")?,
+        for action in signals.actions() {
+            match action {
+                SignalAction::End => return Ok(()),
+                SignalAction::Unplug => {}
+                SignalAction::PowerCycle => power_cycle(&servos, &mut monitor)?,
+                SignalAction::RestartController => monitor.execute("system_reset", "")?,
             }
         }
         if let Some(log) = &mut log {

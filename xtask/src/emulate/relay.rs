@@ -50,8 +50,8 @@ impl Relay {
         }
         // After the read, so that whoever sent these bytes is known by the time their answer goes out.
         if let Some(clients) = &mut self.clients {
-            clients.look()?;
-            if self.port.take_note_of(clients)? {
+            clients.update()?;
+            if self.port.update_clients(clients)? {
                 self.to_host.clear();
             }
         }

@@ -1,4 +1,4 @@
-//! Counts the instructions of the controller: control cycles with seven servos that follow at once, the answer to a
+//! Counts the instructions of the controller: control cycles with scripted answers of seven servos, the answer to a
 //! request, and a checksum.
 
 #![no_std]
@@ -7,8 +7,7 @@
 use cortex_m_rt::entry;
 use footprint::meter::Meter;
 use footprint::opaque;
-use motion_core::servo_bus::frame::{self, Decoder, Reading};
-use motion_core::servo_bus::servo::Servo;
+use motion_core::servo_bus::frame::{self, Decoder, Instruction, Reading, register};
 use motion_core::{Config, Controller, Output, Storage, TorqueCodes};
 use peers::work::SEVEN_BOT;
 use protocol_core::registers::RegisterFile;
@@ -32,8 +31,8 @@ const CYCLE: u64 = 10;
 struct Rig {
     meter: Meter,
     controller: Controller,
-    servos: [Servo; 7],
-    /// Answer of a servo that the controller has not received yet.
+    answers: ScriptedAnswers,
+    /// Answer that the controller has not received yet.
     answer: frame::FrameBuffer,
     /// Most instructions of a single call of `poll`.
     longest_call: u32,
@@ -51,7 +50,7 @@ fn main() -> ! {
     let mut rig = Rig {
         meter: Meter::default(),
         controller: opaque(Controller::new(Instant::ZERO, config, None, Storage::Ready)),
-        servos: [0, 1, 2, 3, 4, 5, 6].map(Servo::new),
+        answers: ScriptedAnswers { positions: [511; 7] },
         answer: frame::FrameBuffer::new(),
         longest_call: 0,
     };
@@ -94,7 +93,7 @@ fn now(millis: u64) -> Instant {
 impl Rig {
     /// Runs one turn of the main loop. Returns the instructions of the controller.
     fn turn(&mut self, millis: u64) -> u32 {
-        let Self { meter, controller, servos, answer, longest_call } = self;
+        let Self { meter, controller, answers, answer, longest_call } = self;
         let now = now(millis);
         let mut sum = meter.count(|| {
             controller.host_bytes(now, &[]);
@@ -107,12 +106,7 @@ impl Rig {
             sum += poll;
             *longest_call = poll.max(*longest_call);
             match output {
-                Output::ToServos(bytes) => {
-                    servos
-                        .iter_mut()
-                        .filter_map(|servo| hear(servo, bytes))
-                        .for_each(|bytes| *answer = bytes);
-                }
+                Output::ToServos(bytes) => answers.to(bytes).into_iter().for_each(|bytes| *answer = bytes),
                 Output::Wait(_) => return sum,
                 _ => {}
             }
@@ -120,19 +114,41 @@ impl Rig {
     }
 }
 
-/// The answer of a servo, which stands at its goal.
-fn hear(servo: &mut Servo, bytes: &[u8]) -> Option<frame::FrameBuffer> {
-    let mut decoder = Decoder::new();
-    decoder.push(bytes);
-    let frame = decoder.pull()?.ok()?;
-    // A servo without a goal stands in the middle.
-    let goal = servo.goal().position_counts;
-    servo.set_reading(&Reading {
-        position_counts: if goal == 0 { 511 } else { goal },
-        speed: 0,
-        load: 0,
-        voltage_decivolts: 74,
-        temperature_celsius: 30,
-    });
-    servo.handle_frame(&frame)
+/// Answers without servos: each position is the last goal, 511 before the first.
+struct ScriptedAnswers {
+    positions: [u16; 7],
+}
+
+impl ScriptedAnswers {
+    /// The answer to a frame of the controller.
+    fn to(&mut self, bytes: &[u8]) -> Option<frame::FrameBuffer> {
+        let mut decoder = Decoder::new();
+        decoder.push(bytes);
+        let frame = decoder.pull()?.ok()?;
+        match (Instruction::from_code(frame.code)?, frame.params) {
+            (Instruction::SyncWrite, [register::GOAL_POSITION, 6, items @ ..]) => {
+                for item in items.chunks_exact(7) {
+                    let &[id, high, low, ..] = item else { continue };
+                    *self.positions.get_mut(usize::from(id))? = u16::from_be_bytes([high, low]);
+                }
+                None
+            }
+            (Instruction::Read, &[register::PRESENT_POSITION, count]) => {
+                let position_counts = *self.positions.get(usize::from(frame.id))?;
+                let reading = Reading {
+                    position_counts,
+                    speed: 0,
+                    load: 0,
+                    voltage_decivolts: 74,
+                    temperature_celsius: 30,
+                };
+                let mut values = [0; 11];
+                values.get_mut(..8)?.copy_from_slice(&reading.to_bytes());
+                let mut answer = frame::FrameBuffer::new();
+                frame::status(&mut answer, frame.id, 0, values.get(..usize::from(count))?);
+                Some(answer)
+            }
+            _ => None,
+        }
+    }
 }

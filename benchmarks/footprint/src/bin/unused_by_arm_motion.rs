@@ -11,7 +11,6 @@ use motion_core::motor_state::MotorState;
 use motion_core::position_filter::PositionFilter;
 use motion_core::report_timer::ReportTimer;
 use motion_core::servo_bus::frame::{self, Decoder, FrameBuffer, Instruction, Reading};
-use motion_core::servo_bus::servo::Servo;
 use motion_core::servo_bus::{Bus, Torque, TorqueCodes};
 use motion_core::trajectory::Trajectory;
 use motion_core::vacuum::VacuumControl;
@@ -27,7 +26,6 @@ fn main() -> ! {
         servo_frames();
         decoder();
         bus();
-        servo();
     }
 }
 
@@ -102,17 +100,4 @@ fn bus() {
     bus.set_torque(any_time(), Joint::ALL.into_iter().zip(opaque([Torque::Free; JOINTS])));
     bus.set_goals(any_time(), Joint::ALL.into_iter().zip(core::iter::repeat_with(|| opaque(0))));
     opaque(bus.frame());
-}
-
-fn servo() {
-    let mut servo = opaque(Servo::new(opaque(0)));
-    let heard = frame::Frame { id: opaque(0), code: opaque(0), params: any_bytes() };
-    opaque(servo.handle_frame(&heard));
-    opaque((servo.torque_switch(), servo.goal(), servo.take_new_goal()));
-    servo.set_moving(opaque(true));
-    servo.set_errors(opaque(0));
-    opaque(servo.errors());
-    if let Some(reading) = Reading::parse(any_bytes()) {
-        servo.set_reading(&opaque(reading));
-    }
 }

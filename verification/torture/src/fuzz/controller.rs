@@ -1,8 +1,8 @@
 //! The controller with any host bytes, servo replies, delays, host link room and storage results.
 
 mod controller_loop;
-mod ideal_servos;
 mod invariants;
+mod scripted_replies;
 
 use arbitrary::Arbitrary;
 use controller_loop::ControllerLoop;
@@ -122,9 +122,9 @@ impl ControllerLoop {
                 self.request(&Request::Write { address: 31, values: &[sucks.into()] })
             }
             ControllerStep::ServoBytes(bytes) => self.servo_bytes(bytes),
-            ControllerStep::Responding(joints) => self.servos.responding = joints,
+            ControllerStep::Responding(joints) => self.replies.responding = joints,
             ControllerStep::Hand { joint, counts } => {
-                self.servos.counts[usize::from(joint) % Joint::ALL.len()] = counts % 1_024;
+                self.replies.counts[usize::from(joint) % Joint::ALL.len()] = counts % 1_024;
             }
             ControllerStep::HostRoom(room) => self.room = room.into(),
             ControllerStep::NextSave(outcome) => self.next_save = outcome.into(),

@@ -7,8 +7,8 @@
 
 use std::collections::VecDeque;
 
-use arm_sim::plant::{self, Plant};
-use arm_sim::servo::Fault;
+use arm_sim::plant::Plant;
+use arm_sim::servo::{ServoConfig, ServoFault};
 use motion_core::servo_bus::Torque;
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
@@ -54,11 +54,11 @@ pub(super) struct DisturbanceRates {
 pub(super) struct DisturbedBus {
     plant: Plant,
     motion_checker: MotionChecker,
-    settings: plant::Settings,
+    settings: ServoConfig,
     disturbance: DisturbanceRates,
     /// Frames that are delayed on the wire, with the time of their arrival.
     delayed: VecDeque<(Instant, Vec<u8>)>,
-    faults: PerJoint<Option<Fault>>,
+    faults: PerJoint<Option<ServoFault>>,
     /// The time of the last change of each servo's fault.
     since: PerJoint<Instant>,
     disturbed_at: Instant,
@@ -80,11 +80,11 @@ pub(super) struct DisturbedBus {
 impl DisturbedBus {
     pub(super) fn new(
         now: Instant,
-        settings: plant::Settings,
+        settings: ServoConfig,
         [timely_limit, late_limit]: [Duration; 2],
     ) -> Self {
         Self {
-            plant: Plant::with_settings(now, settings),
+            plant: Plant::with_config(now, settings),
             motion_checker: MotionChecker::new(now),
             settings,
             disturbance: DisturbanceRates::default(),
@@ -242,12 +242,12 @@ impl DisturbedBus {
         self.plant.set_echo(has_echo);
     }
 
-    pub(super) fn set_fault(&mut self, now: Instant, joint: Joint, fault: Option<Fault>) {
-        let was_missing = self.faults[joint] == Some(Fault::Missing);
+    pub(super) fn set_fault(&mut self, now: Instant, joint: Joint, fault: Option<ServoFault>) {
+        let was_missing = self.faults[joint] == Some(ServoFault::Missing);
         let _ = self.plant.poll(now);
         self.plant.set_fault(joint, fault);
         self.faults[joint] = fault;
-        if was_missing || fault == Some(Fault::Missing) {
+        if was_missing || fault == Some(ServoFault::Missing) {
             self.motion_checker.exempt(now, joint, Exemption::PowerLoss);
         }
         self.since[joint] = if was_missing { now + BOOT_TIME } else { now };
@@ -256,8 +256,8 @@ impl DisturbedBus {
     /// Restarts a servo, as after a dip of its supply. Its torque is off after that.
     pub(super) fn restart_servo(&mut self, now: Instant, joint: Joint) {
         let fault = self.faults[joint];
-        self.set_fault(now, joint, Some(Fault::Missing));
-        self.set_fault(now, joint, fault.filter(|fault| *fault != Fault::Missing));
+        self.set_fault(now, joint, Some(ServoFault::Missing));
+        self.set_fault(now, joint, fault.filter(|fault| *fault != ServoFault::Missing));
     }
 
     pub(super) fn power_cycle(&mut self, now: Instant) {
@@ -293,7 +293,7 @@ impl DisturbedBus {
     pub(super) fn reply_age(&self, joint: Joint) -> Duration {
         let delayed = if self.disturbance.delayed > 0 { MAX_DELAY } else { Duration::ZERO };
         match self.faults[joint] {
-            Some(Fault::Late(by)) => by.max(delayed),
+            Some(ServoFault::Late(by)) => by.max(delayed),
             _ => delayed,
         }
     }
@@ -303,12 +303,12 @@ impl DisturbedBus {
         // A corrupted reply with a valid checksum ends a silence.
         let silent = Availability::Silent(since.max(self.misread_until[joint]));
         match self.faults[joint] {
-            Some(Fault::Missing | Fault::Garbled(1)) => silent,
+            Some(ServoFault::Missing | ServoFault::Garbled(1)) => silent,
             // After a restart, the controller may take an old reply for the reply to its next read, and so on.
-            Some(Fault::Late(_)) if self.restarted_at > since => Availability::Uncertain,
-            Some(Fault::Late(by)) if by >= self.late_limit => silent,
-            Some(Fault::Late(by)) if by > self.timely_limit => Availability::Uncertain,
-            Some(Fault::Garbled(_)) => Availability::Uncertain,
+            Some(ServoFault::Late(_)) if self.restarted_at > since => Availability::Uncertain,
+            Some(ServoFault::Late(by)) if by >= self.late_limit => silent,
+            Some(ServoFault::Late(by)) if by > self.timely_limit => Availability::Uncertain,
+            Some(ServoFault::Garbled(_)) => Availability::Uncertain,
             _ => Availability::Responding(since.max(self.disturbed_at)),
         }
     }

@@ -1,6 +1,6 @@
 //! Injects the faults of the scenario, one at a time.
 
-use arm_sim::servo::Fault;
+use arm_sim::servo::ServoFault;
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{FrameBuffer, register, sync_write};
 use protocol_core::registers::Joint;
@@ -64,13 +64,13 @@ impl TortureWorld {
         let joint = self.rng.joint();
         let fault = match self.rng.below(10) {
             0..=3 => None,
-            4 | 5 => Some(Fault::Missing),
-            6 => {
-                Some(Fault::Late(self.rng.any_scale(Duration::from_micros(100), Duration::from_millis(150))))
-            }
-            7 => Some(Fault::Garbled(1)),
-            8 => Some(Fault::Garbled(2 + u32::from(self.rng.up_to(20)))),
-            _ => Some(Fault::Stuck),
+            4 | 5 => Some(ServoFault::Missing),
+            6 => Some(ServoFault::Late(
+                self.rng.any_scale(Duration::from_micros(100), Duration::from_millis(150)),
+            )),
+            7 => Some(ServoFault::Garbled(1)),
+            8 => Some(ServoFault::Garbled(2 + u32::from(self.rng.up_to(20)))),
+            _ => Some(ServoFault::Stuck),
         };
         self.log.event(self.now, format!("servo {}: {fault:?}", joint.number()));
         self.bus.set_fault(self.now, joint, fault);

@@ -1,6 +1,6 @@
 //! The parameters that differ between worlds: sector size, servo timeout, torque codes and the shell's timing.
 
-use arm_sim::plant;
+use arm_sim::servo::ServoConfig;
 use motion_core::TorqueCodes;
 use protocol_core::time::Duration;
 
@@ -38,11 +38,11 @@ impl WorldParameters {
         }
     }
 
-    pub(super) fn plant(&self) -> plant::Settings {
-        plant::Settings {
+    pub(super) fn plant(&self) -> ServoConfig {
+        ServoConfig {
             torque_codes: self.torque_codes,
             goal_starts_torque: self.goal_starts_torque,
-            ..plant::Settings::default()
+            ..ServoConfig::default()
         }
     }
 

@@ -5,15 +5,15 @@ use protocol_core::registers::Image;
 use protocol_core::time::Instant;
 use protocol_core::wire::MAX_LENGTH;
 
-use super::ideal_servos::{IdealServos, decode};
 use super::invariants::InvariantChecker;
+use super::scripted_replies::{ScriptedReplies, decode};
 
 /// A hundred thousand years. Later deadlines would overflow.
 const END_OF_TIME_US: u64 = 1 << 62;
 
 pub struct ControllerLoop {
     pub controller: Controller,
-    pub servos: IdealServos,
+    pub replies: ScriptedReplies,
     /// The room of the host link in bytes.
     pub room: usize,
     pub next_save: Storage,
@@ -31,7 +31,7 @@ impl ControllerLoop {
         let checker = InvariantChecker::new(config, storage, controller.registers());
         Self {
             controller,
-            servos: IdealServos::new(),
+            replies: ScriptedReplies::new(),
             room: 4_096,
             next_save: Storage::Ready,
             now_us: 0,
@@ -96,9 +96,9 @@ impl ControllerLoop {
                     self.now_us,
                     &command,
                     self.controller.registers(),
-                    &self.servos.reported_positions,
+                    &self.replies.reported_positions,
                 );
-                if let Some(answer) = self.servos.execute(&command) {
+                if let Some(answer) = self.replies.execute(&command) {
                     self.controller.servo_bytes(now, &answer);
                 }
             }

@@ -10,7 +10,7 @@ use protocol_core::registers::map::{
 use protocol_core::registers::{Access, Image, Joint, MAP, RegisterFile};
 use protocol_core::wire::frame::{Function, ParseOutcome, ToHost, parse};
 
-use super::ideal_servos::ServoCommand;
+use super::scripted_replies::ServoCommand;
 
 /// Counts of the largest step in a control cycle: per unit of speed (0.019 degrees) and for the motor (3.72 degrees), at
 /// 850 / 180 counts per degree.

@@ -1,4 +1,4 @@
-//! Seven servos without inertia. Each is at its last goal and replies at once, if it replies at all.
+//! Scripted replies in place of seven servos: each position is the last goal. There is no time and no motion.
 
 use motion_core::servo_bus::frame::{Decoder, FrameBuffer, Instruction, Reading, register, status};
 
@@ -12,7 +12,7 @@ pub enum ServoCommand {
     Goals(Vec<(u8, u16)>),
 }
 
-pub struct IdealServos {
+pub struct ScriptedReplies {
     /// The servos that reply: bit n for servo n.
     pub responding: u8,
     pub counts: [u16; 7],
@@ -20,7 +20,7 @@ pub struct IdealServos {
     pub reported_positions: [u16; 7],
 }
 
-impl IdealServos {
+impl ScriptedReplies {
     pub const fn new() -> Self {
         Self { responding: 0x7F, counts: [512; 7], reported_positions: [512; 7] }
     }

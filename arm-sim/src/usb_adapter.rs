@@ -1,61 +1,63 @@
-//! A simulated USB adapter between the servo bus and a computer: when bytes of the servos reach the computer.
+//! A simulated USB adapter between the servo bus and a computer: when the computer receives bytes of the servos.
 //!
 //! ```text
-//!   byte from the wire ──▶ block ──▶ the computer, when the block is full or its first byte is old enough
+//!   byte from the wire ──▶ block ──▶ the computer, when the block is full or its latency timer ends
 //! ```
 //!
-//! A USB adapter does not hand over bytes one by one. It gathers them until its latency timer ends or its buffer is
-//! full. Knows no clock and nothing of frames. The same seed gives the same delays.
+//! A USB adapter collects bytes until its latency timer ends or its buffer is full. The same seed gives the same delays.
+//! There are no frames here.
 
-use std::str::FromStr;
+use alloc::vec::Vec;
+use core::str::FromStr;
 
 use protocol_core::time::{Duration, Instant};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// An FTDI chip sends a block at once when it holds so many bytes: a packet of 64 less two bytes of status.
+/// An FTDI chip sends a block at once when it has so many bytes: a packet of 64 without two bytes of status.
 const BLOCK: usize = 62;
-/// The longest delay that can be chosen, in milliseconds.
+/// The longest possible setting, in milliseconds.
 const LONGEST_MS: u64 = 1_000;
 
-/// How long the adapter keeps the first byte of a block: each time another delay within these bounds.
+/// The latency of an adapter: each block gets a random delay within these bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Latency {
     shortest: Duration,
     longest: Duration,
 }
 
-/// A latency that cannot be.
+/// A text that is no latency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("use milliseconds from 0 to {LONGEST_MS}: one number as 16, or two bounds as 1-20")]
-pub struct NoLatency;
+pub struct UnknownLatency;
 
-/// `16` is always 16 ms, `1-20` is anything from 1 to 20 ms.
+/// `16` means 16 ms for each block, `1-20` a random delay from 1 to 20 ms.
 impl FromStr for Latency {
-    type Err = NoLatency;
+    type Err = UnknownLatency;
 
-    fn from_str(text: &str) -> Result<Self, NoLatency> {
+    fn from_str(text: &str) -> Result<Self, UnknownLatency> {
         let (shortest, longest) = text.split_once('-').unwrap_or((text, text));
-        let millis = |text: &str| text.parse().ok().filter(|&millis| millis <= LONGEST_MS).ok_or(NoLatency);
+        let millis =
+            |text: &str| text.parse().ok().filter(|&millis| millis <= LONGEST_MS).ok_or(UnknownLatency);
         let (shortest, longest) = (millis(shortest)?, millis(longest)?);
         if shortest > longest {
-            return Err(NoLatency);
+            return Err(UnknownLatency);
         }
         Ok(Self { shortest: Duration::from_millis(shortest), longest: Duration::from_millis(longest) })
     }
 }
 
-/// An adapter's direction towards the computer.
+/// The direction of an adapter to the computer.
 #[derive(Clone, Debug)]
-pub struct Adapter {
+pub struct UsbAdapter {
     latency: Latency,
     random: SplitMix64,
     block: Vec<u8>,
-    /// When the block is handed over, if it is not full before.
+    /// When the block is sent, unless it is full earlier.
     due: Instant,
 }
 
-impl Adapter {
+impl UsbAdapter {
     /// An adapter with an empty buffer.
     #[must_use]
     pub fn new(latency: Latency, seed: u64) -> Self {
@@ -70,14 +72,14 @@ impl Adapter {
         self.block.extend_from_slice(bytes);
     }
 
-    /// Hands over what the computer receives by `now`: everything in the buffer, or nothing.
+    /// The bytes that the computer receives at `now`: the whole block, or none.
     #[must_use]
     pub fn take(&mut self, now: Instant) -> Vec<u8> {
         let is_due = now >= self.due || self.block.len() >= BLOCK;
-        if is_due { std::mem::take(&mut self.block) } else { Vec::new() }
+        if is_due { core::mem::take(&mut self.block) } else { Vec::new() }
     }
 
-    /// When the block will be handed over; `None` while it is empty.
+    /// When the block is sent; `None` if it is empty.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
         (!self.block.is_empty()).then_some(self.due)
@@ -85,7 +87,7 @@ impl Adapter {
 
     fn delay(&mut self) -> Duration {
         let (shortest, longest) = (self.latency.shortest.as_micros(), self.latency.longest.as_micros());
-        // The remainder is even enough: the bounds are far below 2^64.
+        // The bias of the remainder is negligible: the bounds are far below 2^64.
         Duration::from_micros(shortest + self.random.next_u64() % (longest - shortest + 1))
     }
 }
@@ -104,13 +106,13 @@ mod tests {
         let bounds = Latency { shortest: Duration::from_millis(1), longest: Duration::from_millis(20) };
         assert_eq!("1-20".parse(), Ok(bounds));
         for wrong in ["", "-", "-1", "20-1", "1-", "x", "1001", "1-2-3"] {
-            assert_eq!(wrong.parse::<Latency>(), Err(NoLatency), "{wrong}");
+            assert_eq!(wrong.parse::<Latency>(), Err(UnknownLatency), "{wrong}");
         }
     }
 
     #[test]
-    fn bytes_come_in_one_block_when_the_first_is_old_enough() {
-        let mut adapter = Adapter::new("16".parse().unwrap(), 1);
+    fn a_block_is_sent_when_its_latency_has_passed() {
+        let mut adapter = UsbAdapter::new("16".parse().unwrap(), 1);
         assert_eq!(adapter.deadline(), None);
         adapter.push(at(1_000), b"");
         assert_eq!(adapter.deadline(), None);
@@ -123,8 +125,8 @@ mod tests {
     }
 
     #[test]
-    fn a_full_block_does_not_wait() {
-        let mut adapter = Adapter::new("16".parse().unwrap(), 1);
+    fn a_full_block_is_sent_at_once() {
+        let mut adapter = UsbAdapter::new("16".parse().unwrap(), 1);
         adapter.push(at(0), &[7; BLOCK - 1]);
         assert_eq!(adapter.take(at(1)), b"");
         adapter.push(at(1), &[7]);
@@ -132,9 +134,9 @@ mod tests {
     }
 
     #[test]
-    fn delays_stay_within_their_bounds_and_come_again_with_the_same_seed() {
+    fn delays_are_within_their_bounds_and_the_same_for_the_same_seed() {
         let delays = |seed| {
-            let mut adapter = Adapter::new("1-20".parse().unwrap(), seed);
+            let mut adapter = UsbAdapter::new("1-20".parse().unwrap(), seed);
             let delays: Vec<u64> = (0..1_000).map(|_| adapter.delay().as_micros()).collect();
             delays
         };

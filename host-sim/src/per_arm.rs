@@ -1,9 +1,9 @@
-//! What differs from arm to arm where there are many in one process: names of files, and chip ids.
+//! File names and chip ids of several arms in one process.
 
 use std::path::{Path, PathBuf};
 
-/// The path for the arm with this number: `./7bot` becomes `./7bot-3`, `arm.bin` becomes `arm-3.bin`. `None`: there
-/// is one arm only, and the path stays.
+/// The path of the arm with this number: `./7bot` becomes `./7bot-3`, `arm.bin` becomes `arm-3.bin`. `None`: there is
+/// only one arm, and its path does not change.
 #[must_use]
 pub fn path(path: &Path, number: Option<u16>) -> PathBuf {
     let Some(number) = number else { return path.to_owned() };
@@ -16,7 +16,7 @@ pub fn path(path: &Path, number: Option<u16>) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// The chip id of the arm with this number: the first has the id that was chosen, each other the next one.
+/// The chip id of the arm with this number. The first arm has the id `first`, each further arm the next id.
 #[must_use]
 pub fn chip_id(first: [u8; 6], number: Option<u16>) -> [u8; 6] {
     let [a, b, c, d, e, f] = first;
@@ -30,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_stand_before_the_extension() {
+    fn the_number_is_before_the_extension() {
         for (whole, third) in
             [("./7bot", "./7bot-3"), ("/tmp/a.b/arm.bin", "/tmp/a.b/arm-3.bin"), (".x", ".x-3")]
         {
@@ -40,7 +40,7 @@ mod tests {
     }
 
     #[test]
-    fn chip_ids_count_on() {
+    fn chip_ids_are_consecutive() {
         assert_eq!(chip_id([1, 2, 3, 4, 5, 255], None), [1, 2, 3, 4, 5, 255]);
         assert_eq!(chip_id([1, 2, 3, 4, 5, 255], Some(1)), [1, 2, 3, 4, 5, 255]);
         assert_eq!(chip_id([1, 2, 3, 4, 5, 255], Some(3)), [1, 2, 3, 4, 6, 1]);

@@ -1,13 +1,13 @@
-//! A stable name for the port: a symbolic link that stands as long as the simulator runs.
+//! A stable name for the port: a symbolic link that exists while the simulator runs.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why there is no link. Each message says what to do.
+/// Why the link was not created. Each message says what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum LinkError {
-    /// Something that is not a symbolic link has that name.
+pub enum SymlinkError {
+    /// The path exists and is not a symbolic link.
     #[error("--link {}: that is no symbolic link, so it is not replaced: remove it, or choose another path", .0.display())]
     Taken(PathBuf),
     /// The operating system refused.
@@ -20,22 +20,22 @@ pub enum LinkError {
     },
 }
 
-/// A symbolic link; it goes when this is dropped, if it is still ours.
+/// A symbolic link. Dropping it removes the link, unless another simulator has replaced it.
 #[derive(Debug)]
-pub struct Link {
+pub struct Symlink {
     path: PathBuf,
     port: PathBuf,
 }
 
-impl Link {
-    /// Makes `path` point to `port`, replacing a symbolic link that a dead simulator may have left.
+impl Symlink {
+    /// Creates a link at `path` to `port`. Replaces a symbolic link that an earlier simulator may have left.
     ///
     /// # Errors
-    /// See [`LinkError`].
-    pub fn new(path: &Path, port: &Path) -> Result<Self, LinkError> {
-        let refused = |cause| LinkError::Refused { path: path.to_owned(), cause };
+    /// See [`SymlinkError`].
+    pub fn new(path: &Path, port: &Path) -> Result<Self, SymlinkError> {
+        let refused = |cause| SymlinkError::Refused { path: path.to_owned(), cause };
         match fs::symlink_metadata(path) {
-            Ok(metadata) if !metadata.is_symlink() => return Err(LinkError::Taken(path.to_owned())),
+            Ok(metadata) if !metadata.is_symlink() => return Err(SymlinkError::Taken(path.to_owned())),
             Ok(_) => replace(path, port).map_err(refused)?,
             Err(_) => std::os::unix::fs::symlink(port, path).map_err(refused)?,
         }
@@ -43,7 +43,7 @@ impl Link {
     }
 }
 
-/// Puts a new link in the place of an old one, with no moment at which there is none.
+/// Replaces a link atomically.
 fn replace(path: &Path, port: &Path) -> io::Result<()> {
     let mut draft = path.as_os_str().to_owned();
     draft.push(format!(".{}.new", std::process::id()));
@@ -53,7 +53,7 @@ fn replace(path: &Path, port: &Path) -> io::Result<()> {
     })
 }
 
-impl Drop for Link {
+impl Drop for Symlink {
     fn drop(&mut self) {
         if fs::read_link(&self.path).is_ok_and(|target| target == self.port) {
             let _ = fs::remove_file(&self.path);
@@ -66,11 +66,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_link_lives_as_long_as_its_owner_and_a_stale_one_is_replaced() {
+    fn a_link_exists_as_long_as_its_owner_and_replaces_a_stale_one() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("7bot");
         std::os::unix::fs::symlink("/dev/pts/none", &path).unwrap();
-        let link = Link::new(&path, Path::new("/dev/pts/5")).unwrap();
+        let link = Symlink::new(&path, Path::new("/dev/pts/5")).unwrap();
         assert_eq!(fs::read_link(&path).unwrap(), Path::new("/dev/pts/5"));
         drop(link);
         assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 0);
@@ -80,8 +80,8 @@ mod tests {
     fn a_link_that_another_simulator_took_over_stays() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("7bot");
-        let first = Link::new(&path, Path::new("/dev/pts/5")).unwrap();
-        let _second = Link::new(&path, Path::new("/dev/pts/6")).unwrap();
+        let first = Symlink::new(&path, Path::new("/dev/pts/5")).unwrap();
+        let _second = Symlink::new(&path, Path::new("/dev/pts/6")).unwrap();
         drop(first);
         assert_eq!(fs::read_link(&path).unwrap(), Path::new("/dev/pts/6"));
     }
@@ -91,9 +91,9 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("thesis.tex");
         fs::write(&path, "years").unwrap();
-        assert!(matches!(Link::new(&path, Path::new("/dev/pts/5")), Err(LinkError::Taken(_))));
+        assert!(matches!(Symlink::new(&path, Path::new("/dev/pts/5")), Err(SymlinkError::Taken(_))));
         assert_eq!(fs::read(&path).unwrap(), b"years");
         let inside = directory.path().join("none/7bot");
-        assert!(matches!(Link::new(&inside, Path::new("/dev/pts/5")), Err(LinkError::Refused { .. })));
+        assert!(matches!(Symlink::new(&inside, Path::new("/dev/pts/5")), Err(SymlinkError::Refused { .. })));
     }
 }

@@ -1,6 +1,6 @@
 //! The registers of a servo: their number, access and factory settings, from Feetech's memory table of the SCSCL servos.
 
-use crate::servo_bus::frame::{BROADCAST, register};
+use motion_core::servo_bus::frame::{BROADCAST, register};
 
 /// Number of registers. Register 70 is the last of a read of 15 from the present position.
 pub(super) const COUNT: usize = 71;

@@ -1,11 +1,12 @@
+use motion_core::servo_bus::frame::{error, ping, read, sync_write, write};
+
 use super::*;
-use crate::servo_bus::frame::{error, ping, read, sync_write, write};
 
 const READING: Reading =
     Reading { position_counts: 511, speed: -300, load: 45, voltage_decivolts: 74, temperature_celsius: 31 };
 
 /// The answer of the servo to an encoded frame; empty if there is none.
-fn answer(servo: &mut Servo, encode: impl FnOnce(&mut FrameBuffer)) -> Vec<u8> {
+fn answer(servo: &mut ServoRegisters, encode: impl FnOnce(&mut FrameBuffer)) -> Vec<u8> {
     let (mut buffer, mut decoder) = (FrameBuffer::new(), frame::Decoder::new());
     encode(&mut buffer);
     decoder.push(&buffer);
@@ -15,7 +16,7 @@ fn answer(servo: &mut Servo, encode: impl FnOnce(&mut FrameBuffer)) -> Vec<u8> {
 
 #[test]
 fn answers_byte_for_byte() {
-    let mut servo = Servo::new(2);
+    let mut servo = ServoRegisters::new(2);
     servo.set_reading(&READING);
     assert_eq!(answer(&mut servo, |b| ping(b, 2)), [0xFF, 0xFF, 2, 2, 0, 0xFB]);
     assert_eq!(answer(&mut servo, |b| write(b, 2, 40, &[1])), [0xFF, 0xFF, 2, 2, 0, 0xFB]);
@@ -28,7 +29,7 @@ fn answers_byte_for_byte() {
 
 #[test]
 fn a_long_read_includes_status_and_moving() {
-    let mut servo = Servo::new(0);
+    let mut servo = ServoRegisters::new(0);
     servo.set_reading(&READING);
     servo.set_moving(true);
     servo.set_errors(error::OVERHEAT);
@@ -38,7 +39,7 @@ fn a_long_read_includes_status_and_moving() {
 
 #[test]
 fn frames_to_other_servos_are_ignored() {
-    let mut servo = Servo::new(2);
+    let mut servo = ServoRegisters::new(2);
     assert!(answer(&mut servo, |b| ping(b, 3)).is_empty());
     assert!(answer(&mut servo, |b| write(b, 3, register::TORQUE_SWITCH, &[1])).is_empty());
     assert_eq!(servo.torque_switch(), 0);
@@ -46,7 +47,7 @@ fn frames_to_other_servos_are_ignored() {
 
 #[test]
 fn a_broadcast_is_executed_and_not_answered() {
-    let mut servo = Servo::new(2);
+    let mut servo = ServoRegisters::new(2);
     assert!(answer(&mut servo, |b| ping(b, BROADCAST)).is_empty());
     assert!(answer(&mut servo, |b| read(b, BROADCAST, register::PRESENT_POSITION, 8)).is_empty());
     assert!(answer(&mut servo, |b| write(b, BROADCAST, register::TORQUE_SWITCH, &[1])).is_empty());
@@ -59,20 +60,20 @@ fn each_servo_uses_its_own_item_of_a_sync_write() {
         let item = |id: u8| (id, [1, id, 0, 10 + id, 2, 20 + id]);
         sync_write(b, register::GOAL_POSITION, [4, 2, 6].map(item).into_iter());
     };
-    let mut servo = Servo::new(2);
+    let mut servo = ServoRegisters::new(2);
     assert!(answer(&mut servo, goals).is_empty());
     let goal = Goal { position_counts: 258, time_ms: 12, speed: 534 };
     assert_eq!(servo.goal(), goal);
     assert_eq!(servo.take_new_goal(), Some(goal));
     assert_eq!(servo.take_new_goal(), None, "one write, one move");
-    let mut absent = Servo::new(3);
+    let mut absent = ServoRegisters::new(3);
     answer(&mut absent, goals);
     assert_eq!(absent.take_new_goal(), None);
 }
 
 #[test]
 fn a_write_to_any_goal_register_starts_a_new_goal() {
-    let mut servo = Servo::new(0);
+    let mut servo = ServoRegisters::new(0);
     for (register, starts) in [(40, false), (41, false), (42, true), (46, true), (47, true), (48, false)] {
         answer(&mut servo, |b| write(b, 0, register, &[0]));
         assert_eq!(servo.take_new_goal().is_some(), starts, "register {register}");
@@ -83,7 +84,7 @@ fn a_write_to_any_goal_register_starts_a_new_goal() {
 
 #[test]
 fn measurements_cannot_be_written() {
-    let mut servo = Servo::new(0);
+    let mut servo = ServoRegisters::new(0);
     servo.set_reading(&READING);
     assert!(!answer(&mut servo, |b| write(b, 0, 40, &[9; 31])).is_empty(), "acknowledged nevertheless");
     assert_eq!(answer(&mut servo, |b| read(b, 0, 48, 9))[5..14], [9, 0, 0, 0, 0, 0, 0, 0, 1]);
@@ -91,7 +92,7 @@ fn measurements_cannot_be_written() {
 
 #[test]
 fn a_range_beyond_the_last_register_is_not_answered() {
-    let mut servo = Servo::new(0);
+    let mut servo = ServoRegisters::new(0);
     for (register, count) in [(0, 72), (70, 2), (71, 1), (255, 255)] {
         assert!(answer(&mut servo, |b| read(b, 0, register, count)).is_empty(), "{register}, {count}");
     }
@@ -102,7 +103,7 @@ fn a_range_beyond_the_last_register_is_not_answered() {
 
 #[test]
 fn the_eeprom_respects_its_lock_and_survives_a_power_cycle() {
-    let mut servo = Servo::new(3);
+    let mut servo = ServoRegisters::new(3);
     answer(&mut servo, |b| write(b, 3, register::ID, &[9]));
     assert_eq!(servo.id(), 3, "locked");
     answer(&mut servo, |b| write(b, 3, register::LOCK, &[0]));
@@ -119,7 +120,7 @@ fn the_eeprom_respects_its_lock_and_survives_a_power_cycle() {
 
 #[test]
 fn a_new_servo_has_the_factory_settings_and_versions_cannot_be_written() {
-    let mut servo = Servo::new(7);
+    let mut servo = ServoRegisters::new(7);
     answer(&mut servo, |b| write(b, 7, register::LOCK, &[0]));
     answer(&mut servo, |b| write(b, 7, 0, &[0xEE; 5]));
     let settings = answer(&mut servo, |b| read(b, 7, 0, 21));
@@ -133,7 +134,7 @@ fn a_new_servo_has_the_factory_settings_and_versions_cannot_be_written() {
 
 #[test]
 fn a_goal_stays_within_the_limits_of_the_eeprom() {
-    let mut servo = Servo::new(0);
+    let mut servo = ServoRegisters::new(0);
     answer(&mut servo, |b| write(b, 0, register::LOCK, &[0]));
     answer(&mut servo, |b| write(b, 0, register::MIN_POSITION, &[0, 200, 3, 0]));
     for (wanted, allowed) in [(0, 200), (500, 500), (1023, 768)] {
@@ -144,7 +145,7 @@ fn a_goal_stays_within_the_limits_of_the_eeprom() {
 
 #[test]
 fn malformed_instructions_are_not_answered() {
-    let mut servo = Servo::new(0);
+    let mut servo = ServoRegisters::new(0);
     for (code, params) in
         [(1, [].as_slice()), (2, &[56]), (2, &[56, 8, 0]), (3, &[]), (0x83, &[40]), (9, &[])]
     {

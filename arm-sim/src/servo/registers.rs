@@ -1,60 +1,61 @@
-//! The servo's end of the wire, for simulators: executes instructions and encodes the answers.
+//! The registers of a simulated servo: executes the instructions of frames and encodes the answers.
 //!
-//! This file holds the registers of the servo only. The simulated motor reads its goal here and writes its measurements
-//! back. There is no time here: the caller decides when an answer is sent.
+//! The motor gets its goal from here and writes its measurements back. There is no time here: the caller decides when an
+//! answer is sent.
 
 mod memory;
 
 use memory::{COUNT, MAX_ID, RAM, factory_settings, is_writable};
 
-use super::frame::{self, BAUD_RATES, BROADCAST, Frame, FrameBuffer, Instruction, Reading, register};
+use motion_core::servo_bus::frame::{
+    self, BAUD_RATES, BROADCAST, Frame, FrameBuffer, Instruction, Reading, register,
+};
 
 /// The registers of one servo.
 #[derive(Clone, Debug)]
-pub struct Servo {
+pub(super) struct ServoRegisters {
     registers: [u8; COUNT],
     has_new_goal: bool,
+    /// A frame wrote the torque switch since the servo's start.
+    is_torque_written: bool,
 }
 
 /// A goal of a servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Goal {
+pub(super) struct Goal {
     /// The goal position, 0 to 1023.
-    pub position_counts: u16,
+    pub(super) position_counts: u16,
     /// The duration of the move, in milliseconds; ignored unless the speed is 0.
-    pub time_ms: u16,
+    pub(super) time_ms: u16,
     /// The speed, in counts per second; 0 is the motor's maximum.
-    pub speed: u16,
+    pub(super) speed: u16,
 }
 
-impl Servo {
+impl ServoRegisters {
     /// A servo after its first power-up: the EEPROM holds Feetech's factory settings; torque switch, goal and
     /// measurements are 0.
-    #[must_use]
-    pub fn new(id: u8) -> Self {
-        Self { registers: factory_settings(id), has_new_goal: false }
+    pub(super) fn new(id: u8) -> Self {
+        Self { registers: factory_settings(id), has_new_goal: false, is_torque_written: false }
     }
 
-    /// Switches power off and on: the EEPROM keeps its values, the RAM is as after [`Servo::new`].
-    pub fn power_cycle(&mut self) {
+    /// Switches power off and on: the EEPROM keeps its values, the RAM is as after [`ServoRegisters::new`].
+    pub(super) fn power_cycle(&mut self) {
         let fresh = factory_settings(self.id());
         for (slot, byte) in self.registers.iter_mut().zip(fresh).skip(usize::from(RAM)) {
             *slot = byte;
         }
         self.has_new_goal = false;
+        self.is_torque_written = false;
     }
 
     /// The id of the servo.
-    #[must_use]
-    pub fn id(&self) -> u8 {
+    pub(super) fn id(&self) -> u8 {
         let [id] = self.field(register::ID);
         id
     }
 
     /// The baud rate in bits per second. An invalid code counts as 0.
-    #[must_use]
-    pub fn baud(&self) -> u32 {
+    pub(super) fn baud(&self) -> u32 {
         let [code] = self.field(register::BAUD_RATE);
         BAUD_RATES.get(usize::from(code)).copied().unwrap_or(1_000_000)
     }
@@ -64,7 +65,7 @@ impl Servo {
     /// A write is acknowledged if register 8 is 1. A broadcast, an unknown instruction and a range beyond register 70
     /// have no answer. The acknowledgement of a write that changes the id carries the new id; Feetech's tables do not
     /// say which of the two a real servo sends.
-    pub fn handle_frame(&mut self, frame: &Frame<'_>) -> Option<FrameBuffer> {
+    pub(super) fn handle_frame(&mut self, frame: &Frame<'_>) -> Option<FrameBuffer> {
         let is_addressed = frame.id == self.id();
         if !is_addressed && frame.id != BROADCAST {
             return None;
@@ -107,15 +108,17 @@ impl Servo {
         let start = usize::from(register);
         let is_locked = self.field(register::LOCK) != [0];
         let slots = self.registers.get_mut(start..start + data.len())?;
-        let (mut address, mut is_goal) = (register, false);
+        let (mut address, mut is_goal, mut is_torque) = (register, false, false);
         for (slot, &byte) in slots.iter_mut().zip(data) {
             if is_writable(address, is_locked) && !(address == register::ID && byte > MAX_ID) {
                 *slot = byte;
             }
             is_goal |= (register::GOAL_POSITION..register::LOCK).contains(&address);
+            is_torque |= address == register::TORQUE_SWITCH;
             address = address.wrapping_add(1);
         }
         self.has_new_goal |= is_goal;
+        self.is_torque_written |= is_torque;
         Some(())
     }
 
@@ -130,15 +133,23 @@ impl Servo {
     }
 
     /// The code in the torque switch. Its meaning is a setting of the arm.
-    #[must_use]
-    pub fn torque_switch(&self) -> u8 {
+    pub(super) fn torque_switch(&self) -> u8 {
         let [code] = self.field(register::TORQUE_SWITCH);
         code
     }
 
+    /// Sets the code in the torque switch, as no frame did.
+    pub(super) fn set_torque_switch(&mut self, code: u8) {
+        self.set_field(register::TORQUE_SWITCH, [code]);
+    }
+
+    /// Did a frame write the torque switch since the servo's start?
+    pub(super) const fn is_torque_written(&self) -> bool {
+        self.is_torque_written
+    }
+
     /// The goal, within the position limits of the EEPROM and 1023.
-    #[must_use]
-    pub fn goal(&self) -> Goal {
+    pub(super) fn goal(&self) -> Goal {
         let word = |register| u16::from_be_bytes(self.field(register));
         let (lowest, highest) = (word(register::MIN_POSITION), word(register::MAX_POSITION));
         Goal {
@@ -152,28 +163,27 @@ impl Servo {
     }
 
     /// The goal, if any part of it was written since the last call. A new goal starts a move, even to the same position.
-    pub fn take_new_goal(&mut self) -> Option<Goal> {
+    pub(super) fn take_new_goal(&mut self) -> Option<Goal> {
         core::mem::take(&mut self.has_new_goal).then(|| self.goal())
     }
 
     /// Sets the measurements.
-    pub fn set_reading(&mut self, reading: &Reading) {
+    pub(super) fn set_reading(&mut self, reading: &Reading) {
         self.set_field(register::PRESENT_POSITION, reading.to_bytes());
     }
 
     /// Sets the moving flag.
-    pub fn set_moving(&mut self, moving: bool) {
+    pub(super) fn set_moving(&mut self, moving: bool) {
         self.set_field(register::MOVING, [u8::from(moving)]);
     }
 
     /// Sets the error bits, see [`frame::error`]. They appear in a register and in every answer.
-    pub fn set_errors(&mut self, errors: u8) {
+    pub(super) fn set_errors(&mut self, errors: u8) {
         self.set_field(register::STATUS, [errors]);
     }
 
     /// The error bits, see [`frame::error`].
-    #[must_use]
-    pub fn errors(&self) -> u8 {
+    pub(super) fn errors(&self) -> u8 {
         let [errors] = self.field(register::STATUS);
         errors
     }

@@ -1,0 +1,334 @@
+//! An arm in virtual time: host line, controller, servo bus and settings.
+//!
+//! ```text
+//!   host_send ────▶ Pacer ──▶ ┌────────────┐ ──▶ ServoBus: Plant, or real servos
+//!                             │ Controller │ ◀──
+//!   host_received ◀─ Pacer ◀─ └────────────┘ ──▶ Settings
+//! ```
+//!
+//! The simulation advances from event to event, each at its own time. So the result does not depend on how often
+//! [`Simulation::advance`] is called: a late caller makes neither the arm slower nor its servos late.
+
+use alloc::boxed::Box;
+use core::fmt::Debug;
+
+use embedded_storage::nor_flash::NorFlash;
+use motion_core::servo_bus::TorqueCodes;
+use motion_core::vacuum::Vacuum;
+use motion_core::{Config, Controller, Output};
+use protocol_core::registers::RegisterFile;
+use protocol_core::registers::map::fault;
+use protocol_core::settings::Settings;
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::deframer::gap;
+use tracing::info;
+
+use crate::pace::Pacer;
+use crate::plant::Plant;
+use crate::servo_bus::ServoBus;
+use crate::settings_log;
+
+/// How long the controller waits for a servo's answer.
+const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
+/// The pause of the controller before each frame on the servo bus: that of the reference board.
+const GUARD_TIME: Duration = Duration::from_micros(100);
+/// A deadline that stays in the past is checked again after this. Wake-ups without bytes on the host line are at
+/// multiples of it, so that many arms wake up together.
+const TICK: Duration = Duration::from_millis(1);
+/// Without a client the next wake-up may be this much later: nobody can observe the difference.
+const TICK_WITHOUT_CLIENT: Duration = Duration::from_millis(50);
+
+/// What differs from one simulated arm to another.
+#[derive(Clone, Copy, Debug)]
+pub struct ArmConfig {
+    /// The chip id, most significant byte first (D8).
+    pub chip_id: [u8; 6],
+    /// Bytes on the host line take the time that the baud rate requires. Otherwise they arrive at once.
+    pub is_paced: bool,
+    /// The meaning of the codes in the servos' torque switch.
+    pub torque_codes: TorqueCodes,
+}
+
+/// Gets a copy of the bytes on the host line.
+pub trait Tap: Debug {
+    /// The line starts, or starts again. `gap` is the idle time by which the arm separates frames (D4).
+    fn restart(&mut self, gap: Duration);
+    /// The arm received these bytes from the host. No bytes: the host's line is idle at `now`.
+    fn received(&mut self, now: Instant, bytes: &[u8]);
+    /// The arm sent these bytes to the host.
+    fn sent(&mut self, now: Instant, bytes: &[u8]);
+}
+
+/// An arm with a host line, with settings on the flash `F` and servos on the bus `B`.
+#[derive(Debug)]
+pub struct Simulation<F, B = Plant> {
+    config: ArmConfig,
+    /// Clones share their cells.
+    flash: F,
+    settings: Settings<F>,
+    controller: Controller,
+    bus: B,
+    to_arm: Pacer,
+    to_host: Pacer,
+    tap: Option<Box<dyn Tap>>,
+    now: Instant,
+    /// When the controller has to be polled again.
+    controller_due: Instant,
+    /// The controller does nothing until it is restarted.
+    is_halted: bool,
+}
+
+impl<F: NorFlash + Clone> Simulation<F> {
+    /// The simulated servos.
+    #[must_use]
+    pub const fn plant(&self) -> &Plant {
+        &self.bus
+    }
+
+    /// The simulated servos, for example to set a fault.
+    pub const fn plant_mut(&mut self) -> &mut Plant {
+        &mut self.bus
+    }
+}
+
+impl<F: NorFlash + Clone, B: ServoBus> Simulation<F, B> {
+    /// Switches an arm on at `now`, with the settings on `flash`.
+    #[must_use]
+    pub fn new(now: Instant, config: ArmConfig, flash: F, bus: B) -> Self {
+        let (settings, controller) = power_up(now, config, flash.clone(), 0, bus.answer_delay());
+        let (to_arm, to_host) = (Pacer::new(None), Pacer::new(None));
+        let mut simulation = Self {
+            config,
+            flash,
+            settings,
+            controller,
+            bus,
+            to_arm,
+            to_host,
+            tap: None,
+            now,
+            controller_due: now,
+            is_halted: false,
+        };
+        simulation.start_host_line();
+        simulation
+    }
+
+    /// Switches the arm off and on at `now`. RAM and the bytes on the host line are lost; the flash stays.
+    pub fn power_cycle(&mut self, now: Instant) {
+        self.advance(now, false);
+        self.bus.power_cycle(now);
+        self.start_controller(now, 0);
+    }
+
+    /// Restarts only the controller at `now`, as its watchdog does. RAM and the bytes on the host line are lost. The
+    /// servos keep power, torque and goals.
+    pub fn restart_controller(&mut self, now: Instant) {
+        self.advance(now, false);
+        self.start_controller(now, fault::WATCHDOG_RESTART);
+    }
+
+    /// Stops the controller at `now`, as a program that hangs. It sends and receives nothing until
+    /// [`Simulation::restart_controller`] or [`Simulation::power_cycle`]. The servos keep their goals.
+    pub fn halt_controller(&mut self, now: Instant) {
+        self.advance(now, false);
+        self.is_halted = true;
+        self.controller_due = Instant::FAR_FUTURE;
+    }
+
+    fn start_controller(&mut self, now: Instant, faults: u8) {
+        (self.settings, self.controller) =
+            power_up(now, self.config, self.flash.clone(), faults, self.bus.answer_delay());
+        self.controller_due = now;
+        self.is_halted = false;
+        self.start_host_line();
+    }
+
+    /// The servo bus.
+    pub const fn bus(&mut self) -> &mut B {
+        &mut self.bus
+    }
+
+    fn start_host_line(&mut self) {
+        let baud = self.controller.baud();
+        info!("arm on, host link at {baud} baud");
+        self.to_arm = self.idle_line();
+        self.to_host = self.idle_line();
+        if let Some(tap) = &mut self.tap {
+            tap.restart(gap(baud));
+        }
+    }
+
+    fn idle_line(&self) -> Pacer {
+        Pacer::new(self.config.is_paced.then(|| self.controller.baud()))
+    }
+
+    /// Copies the bytes on the host line to `tap` from now on.
+    pub fn set_tap(&mut self, mut tap: impl Tap + 'static) {
+        tap.restart(gap(self.controller.baud()));
+        self.tap = Some(Box::new(tap));
+    }
+
+    /// Number of bytes that the host can send now.
+    #[must_use]
+    pub fn host_room(&self) -> usize {
+        self.to_arm.room()
+    }
+
+    /// The host starts to send bytes at `now`. Returns how many were accepted.
+    pub fn host_send(&mut self, now: Instant, bytes: &[u8]) -> usize {
+        self.advance(now, false);
+        self.to_arm.push(now, bytes)
+    }
+
+    /// The first bytes that have arrived at the host, possibly not all of them. They fill the line until
+    /// [`Simulation::host_take`], and the arm holds back answers while the line is full (D5).
+    #[must_use]
+    pub fn host_received(&self) -> &[u8] {
+        self.to_host.arrived()
+    }
+
+    /// Removes the first `count` of the bytes that have arrived at the host.
+    pub fn host_take(&mut self, count: usize) {
+        self.to_host.take(count);
+    }
+
+    /// The host disconnects: the bytes on the line to it are lost.
+    pub fn host_disconnect(&mut self) {
+        self.to_host = self.idle_line();
+    }
+
+    /// The registers.
+    #[must_use]
+    pub fn registers(&self) -> &RegisterFile {
+        self.controller.registers()
+    }
+
+    /// Simulates all events up to `now`. `host_is_idle` tells that the host has sent nothing since the last call, apart
+    /// from the bytes in [`Simulation::host_send`].
+    pub fn advance(&mut self, now: Instant, host_is_idle: bool) {
+        // Real servos cannot catch up: an answer that has arrived but was not read has not timed out.
+        while !B::IS_REAL
+            && let Some(event) = self.next_event().filter(|&event| event < now)
+        {
+            self.process(event, host_is_idle);
+        }
+        self.process(now, host_is_idle);
+    }
+
+    /// When to call [`Simulation::advance`] next, unless the host sends bytes. Without a client the call can be later:
+    /// the events keep their times.
+    #[must_use]
+    pub fn deadline(&self, has_client: bool) -> Instant {
+        let line = self.line_deadline().unwrap_or(Instant::FAR_FUTURE).max(self.now);
+        if B::IS_REAL {
+            let later = self.now + TICK;
+            return line.min(if self.controller_due > self.now { self.controller_due } else { later });
+        }
+        let inside = self.bus.deadline().unwrap_or(Instant::FAR_FUTURE).min(self.controller_due);
+        let unobserved = self.now + TICK_WITHOUT_CLIENT;
+        if has_client {
+            let observed = self.controller.host_deadline().max(self.now + TICK);
+            line.min(next_tick(observed.min(inside.max(unobserved))))
+        } else {
+            next_tick(line.min(inside).max(unobserved))
+        }
+    }
+
+    fn line_deadline(&self) -> Option<Instant> {
+        [self.to_arm.deadline(), self.to_host.deadline()].into_iter().flatten().min()
+    }
+
+    /// The next event after `self.now`. A deadline that stays in the past depends on something else, for example on an
+    /// idle line, and is checked again after a tick.
+    fn next_event(&self) -> Option<Instant> {
+        let candidates = [self.line_deadline(), self.bus.deadline(), Some(self.controller_due)];
+        let later = |deadline| if deadline > self.now { deadline } else { self.now + TICK };
+        candidates.into_iter().flatten().map(later).min()
+    }
+
+    fn process(&mut self, now: Instant, host_is_idle: bool) {
+        self.now = now;
+        self.to_arm.advance(now);
+        self.to_host.advance(now);
+        let from_servos = self.bus.poll(now);
+        if self.is_halted {
+            return;
+        }
+        self.controller.servo_bytes(now, &from_servos);
+        if host_is_idle && self.to_arm.is_empty() {
+            self.pass_host_bytes();
+        }
+        self.poll_controller();
+        while !self.to_arm.arrived().is_empty() && self.pass_host_bytes() > 0 {
+            self.poll_controller();
+        }
+    }
+
+    /// Passes the bytes that have arrived from the host, possibly none, to the controller. Returns how many it took.
+    fn pass_host_bytes(&mut self) -> usize {
+        let taken = self.controller.host_bytes(self.now, self.to_arm.arrived());
+        if let (Some(tap), Some(bytes)) = (&mut self.tap, self.to_arm.arrived().get(..taken)) {
+            tap.received(self.now, bytes);
+        }
+        self.to_arm.take(taken);
+        taken
+    }
+
+    /// Executes the outputs of the controller until it waits.
+    fn poll_controller(&mut self) {
+        loop {
+            match self.controller.poll(self.now, self.to_host.room()) {
+                Output::ToHost(bytes) => {
+                    if let Some(tap) = &mut self.tap {
+                        tap.sent(self.now, bytes);
+                    }
+                    self.to_host.push(self.now, bytes);
+                }
+                Output::ToServos(bytes) => self.bus.bytes(self.now, bytes),
+                Output::Vacuum(vacuum) => log_vacuum(vacuum),
+                Output::Save(image) => {
+                    self.controller.set_storage(self.settings.save(&image));
+                    settings_log::saved(&self.settings);
+                }
+                Output::Wait(until) => {
+                    self.controller_due = until;
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// The first multiple of [`TICK`] at or after a time.
+fn next_tick(at: Instant) -> Instant {
+    let micros = at.as_micros().checked_next_multiple_of(TICK.as_micros());
+    micros.map_or(Instant::FAR_FUTURE, Instant::from_micros)
+}
+
+fn power_up<F: NorFlash + Clone>(
+    now: Instant,
+    arm: ArmConfig,
+    flash: F,
+    faults: u8,
+    answer_delay: Duration,
+) -> (Settings<F>, Controller) {
+    let settings = Settings::open(flash);
+    settings_log::opened(&settings);
+    let config = Config {
+        chip_id: arm.chip_id,
+        faults,
+        servo_timeout: SERVO_TIMEOUT,
+        guard_time: GUARD_TIME,
+        torque_codes: arm.torque_codes,
+    };
+    let mut controller = Controller::new(now, config, settings.found(), settings.storage());
+    controller.set_answer_delay(answer_delay);
+    (settings, controller)
+}
+
+fn log_vacuum(vacuum: Vacuum) {
+    let pump = if vacuum.pump { "on" } else { "off" };
+    let valve = if vacuum.valve { "open" } else { "closed" };
+    info!("vacuum: pump {pump}, valve {valve}");
+}

@@ -1,0 +1,231 @@
+//! The loop that serves arms on pseudo-terminals: clock, file descriptors and signals.
+//!
+//! One thread sleeps until a client writes, comes or goes, until a signal comes, or until an arm is due. An idle arm
+//! costs nothing. An arm whose port fails ends; the others continue.
+
+use std::io;
+use std::mem::MaybeUninit;
+use std::os::fd::{AsFd, OwnedFd};
+
+use embedded_storage::nor_flash::NorFlash;
+use protocol_core::time::Instant;
+use rustix::event::epoll::{self, CreateFlags, Event, EventData, EventFlags};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+
+use crate::clients::Clients;
+use crate::clock::{Clock, sleep_until};
+use crate::pty_arm::PtyArm;
+use crate::signals::{SignalAction, Signals};
+
+/// Events per call; the other events follow in the next call.
+const EVENTS: usize = 64;
+/// The timeout of calls that do not wait.
+const NO_WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 0 };
+/// The event data of the signals. Smaller numbers are those of the arms.
+const SIGNALS: u64 = u64::MAX;
+/// The event data of the clients.
+const CLIENTS: u64 = u64::MAX - 1;
+
+/// The arms of a process.
+#[derive(Debug)]
+pub struct EventLoop<F> {
+    arms: Vec<Entry<F>>,
+    /// `None` if the system does not report clients.
+    clients: Option<Clients>,
+    epoll: OwnedFd,
+}
+
+/// An arm, and when to poll it.
+#[derive(Debug)]
+struct Entry<F> {
+    arm: PtyArm<F>,
+    due: Instant,
+    /// The events of its port that epoll reports.
+    interest: EventFlags,
+    /// Its port failed: it is not polled any more.
+    has_failed: bool,
+}
+
+impl<F: NorFlash + Clone> EventLoop<F> {
+    /// A loop for these arms. `clients` counts their clients.
+    ///
+    /// # Errors
+    /// The operating system refuses an epoll instance or an entry in it.
+    pub fn new(arms: Vec<PtyArm<F>>, clients: Option<Clients>) -> io::Result<Self> {
+        let epoll = epoll::create(CreateFlags::CLOEXEC)?;
+        for (number, arm) in (0..).zip(&arms) {
+            epoll::add(&epoll, arm, EventData::new_u64(number), arm.interest())?;
+        }
+        if let Some(clients) = &clients {
+            epoll::add(&epoll, clients, EventData::new_u64(CLIENTS), EventFlags::IN)?;
+        }
+        let entry =
+            |arm: PtyArm<F>| Entry { interest: arm.interest(), arm, due: Instant::ZERO, has_failed: false };
+        Ok(Self { arms: arms.into_iter().map(entry).collect(), clients, epoll })
+    }
+
+    /// Runs until a signal ends it.
+    ///
+    /// # Errors
+    /// The operating system fails: inotify, epoll, or the port of the last arm.
+    pub fn run(mut self, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
+        epoll::add(&self.epoll, signals.as_fd(), EventData::new_u64(SIGNALS), EventFlags::IN)?;
+        loop {
+            let mut space = [MaybeUninit::uninit(); EVENTS];
+            let events = self.wait(clock, &mut space)?;
+            let now = clock.now();
+            // Signals come first: bytes that a client sends after a signal must reach the arm after it.
+            if self.apply_signals(signals, now) {
+                return Ok(());
+            }
+            for event in events {
+                match event.data.u64() {
+                    SIGNALS => {}
+                    CLIENTS => self.clients.as_mut().map_or(Ok(()), Clients::update)?,
+                    number => self.poll_arm(usize::try_from(number).unwrap_or(usize::MAX), now)?,
+                }
+            }
+            self.wake_arms_with_news(now);
+            for number in 0..self.arms.len() {
+                if self.arms.get(number).is_some_and(|entry| entry.due <= now) {
+                    self.poll_arm(number, now)?;
+                }
+            }
+        }
+    }
+
+    /// Sleeps until an event or a deadline. poll(2) is slow with many ports, and epoll_wait(2) has no timeouts below a
+    /// millisecond before Linux 5.11. So poll(2) waits for the epoll instance.
+    fn wait<'space>(
+        &self,
+        clock: &mut Clock,
+        space: &'space mut [MaybeUninit<Event>; EVENTS],
+    ) -> io::Result<&'space mut [Event]> {
+        let earliest = self.arms.iter().map(|entry| entry.due).min().unwrap_or(Instant::FAR_FUTURE);
+        let time = sleep_until(clock.now(), earliest);
+        let result = match poll(&mut [PollFd::new(&self.epoll, PollFlags::IN)], Some(&time)) {
+            Ok(0) => return Ok(&mut []),
+            Ok(_) => epoll::wait(&self.epoll, space, Some(&NO_WAIT)),
+            Err(error) => Err(error),
+        };
+        match result {
+            Ok((events, _)) => Ok(events),
+            Err(Errno::INTR) => Ok(&mut []),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Executes the actions of signals. Returns whether the loop ends.
+    fn apply_signals(&mut self, signals: &mut Signals, now: Instant) -> bool {
+        for action in signals.actions() {
+            match action {
+                SignalAction::End => return true,
+                SignalAction::Unplug => {}
+                SignalAction::PowerCycle => self.for_each_arm(now, PtyArm::power_cycle),
+                SignalAction::RestartController => self.for_each_arm(now, PtyArm::restart_controller),
+            }
+        }
+        false
+    }
+
+    fn for_each_arm(&mut self, now: Instant, action: impl Fn(&mut PtyArm<F>, Instant)) {
+        for entry in self.arms.iter_mut().filter(|entry| !entry.has_failed) {
+            action(&mut entry.arm, now);
+            entry.due = now;
+        }
+    }
+
+    /// An arm is due at once if clients opened or closed its port.
+    fn wake_arms_with_news(&mut self, now: Instant) {
+        let Some(clients) = &mut self.clients else { return };
+        if clients.take_has_changed() {
+            let arms = self.arms.iter_mut().filter(|entry| !entry.has_failed && entry.arm.has_news(clients));
+            arms.for_each(|entry| entry.due = now);
+        }
+    }
+
+    /// Polls an arm. If its port fails, the arm ends; an error means that no arm is left.
+    fn poll_arm(&mut self, number: usize, now: Instant) -> io::Result<()> {
+        let Some(entry) = self.arms.get_mut(number).filter(|entry| !entry.has_failed) else { return Ok(()) };
+        let Err(failure) = entry.poll(number, now, self.clients.as_mut(), &self.epoll) else { return Ok(()) };
+        entry.fail(&failure, &self.epoll);
+        if self.arms.iter().all(|entry| entry.has_failed) { Err(failure) } else { Ok(()) }
+    }
+}
+
+impl<F: NorFlash + Clone> Entry<F> {
+    fn poll(
+        &mut self,
+        number: usize,
+        now: Instant,
+        clients: Option<&mut Clients>,
+        epoll: &OwnedFd,
+    ) -> io::Result<()> {
+        self.due = self.arm.poll(now, clients)?;
+        if self.interest != self.arm.interest() {
+            self.interest = self.arm.interest();
+            let number = u64::try_from(number).unwrap_or(u64::MAX);
+            epoll::modify(epoll, &self.arm, EventData::new_u64(number), self.interest)?;
+        }
+        Ok(())
+    }
+
+    fn fail(&mut self, failure: &io::Error, epoll: &OwnedFd) {
+        self.arm.report_failure(failure);
+        // This fails if epoll itself has failed.
+        let _ = epoll::delete(epoll, &self.arm);
+        self.due = Instant::FAR_FUTURE;
+        self.has_failed = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+    use std::io::Write;
+
+    use arm_sim::flash::Flash;
+    use arm_sim::plant::Plant;
+    use arm_sim::simulation::{ArmConfig, Simulation};
+    use motion_core::TorqueCodes;
+    use protocol_core::registers::map::SPEED;
+    use protocol_core::request::Request;
+    use protocol_core::time::Duration;
+    use protocol_core::wire::FrameBuffer;
+    use tracing::Span;
+
+    use super::*;
+    use crate::pty::Pty;
+
+    fn arm(pty: Pty) -> PtyArm<Flash> {
+        let config = ArmConfig { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };
+        let plant = Plant::new(Instant::ZERO);
+        PtyArm::new(Simulation::new(Instant::ZERO, config, Flash::in_memory(), plant), pty, Span::none())
+    }
+
+    #[test]
+    fn an_arm_whose_port_fails_ends_and_the_others_continue() {
+        let good = Pty::open(None).unwrap();
+        let mut client = File::options().write(true).open(good.path()).unwrap();
+        let mut event_loop = EventLoop::new(vec![arm(Pty::broken()), arm(good)], None).unwrap();
+        let now = Instant::ZERO + Duration::from_millis(1_000);
+        event_loop.poll_arm(0, now).unwrap();
+        assert!(event_loop.arms[0].has_failed);
+        let mut frame = FrameBuffer::new();
+        Request::Write { address: SPEED.address, values: &[7] }.encode(&mut frame);
+        client.write_all(&frame).unwrap();
+        for number in [1, 0] {
+            event_loop.poll_arm(number, now).unwrap();
+        }
+        assert_eq!(event_loop.arms[1].arm.register(SPEED.address), 7);
+        assert_eq!(event_loop.arms[0].due, Instant::FAR_FUTURE, "it is not polled again");
+    }
+
+    #[test]
+    fn the_loop_fails_when_the_last_arm_has_failed() {
+        let mut event_loop = EventLoop::new(vec![arm(Pty::broken()), arm(Pty::broken())], None).unwrap();
+        event_loop.poll_arm(1, Instant::ZERO).unwrap();
+        assert!(event_loop.poll_arm(0, Instant::ZERO).is_err());
+    }
+}

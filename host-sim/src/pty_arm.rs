@@ -1,0 +1,143 @@
+//! An arm on a pseudo-terminal: passes bytes between a [`Simulation`] and a [`Pty`].
+
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd};
+
+use arm_sim::pace;
+use arm_sim::plant::Plant;
+use arm_sim::servo_bus::ServoBus;
+use arm_sim::simulation::Simulation;
+use embedded_storage::nor_flash::NorFlash;
+use protocol_core::time::Instant;
+use rustix::event::PollFlags;
+use rustix::event::epoll::EventFlags;
+use tracing::{Span, error, info};
+
+use crate::clients::Clients;
+use crate::pty::Pty;
+
+/// An arm on a pseudo-terminal.
+#[derive(Debug)]
+pub struct PtyArm<F, B = Plant> {
+    simulation: Simulation<F, B>,
+    pty: Pty,
+    /// The client does not read, and the kernel's buffers are full.
+    is_blocked: bool,
+    /// The span of its log lines.
+    span: Span,
+}
+
+impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
+    /// Connects an arm to a pseudo-terminal. Its log lines are in `span`.
+    #[must_use]
+    pub const fn new(simulation: Simulation<F, B>, pty: Pty, span: Span) -> Self {
+        Self { simulation, pty, is_blocked: false, span }
+    }
+
+    /// Switches it off and on.
+    pub fn power_cycle(&mut self, now: Instant) {
+        let _inside = self.span.enter();
+        info!("power cycle");
+        self.simulation.power_cycle(now);
+    }
+
+    /// Restarts its controller. The servos keep their power.
+    pub fn restart_controller(&mut self, now: Instant) {
+        let _inside = self.span.enter();
+        info!("restart of the controller");
+        self.simulation.restart_controller(now);
+    }
+
+    /// Logs that its port failed.
+    pub(crate) fn report_failure(&self, failure: &io::Error) {
+        let _inside = self.span.enter();
+        error!("the port failed ({failure}): this arm ends");
+    }
+
+    /// Passes bytes in both directions and simulates the arm up to `now`. Returns when to call again.
+    ///
+    /// # Errors
+    /// The operating system fails: the port or inotify.
+    pub fn poll(&mut self, now: Instant, clients: Option<&mut Clients>) -> io::Result<Instant> {
+        let _inside = self.span.clone().entered();
+        let mut bytes = [0; pace::CAPACITY];
+        let room = bytes.get_mut(..self.simulation.host_room()).unwrap_or(&mut []);
+        let can_read = !room.is_empty();
+        let count = if can_read { self.pty.read(room)? } else { 0 };
+        if let Some(clients) = clients {
+            // After the read: the client that sent these bytes has to be counted before its answer is written.
+            if count > 0 {
+                clients.update()?;
+            }
+            if self.pty.update_clients(clients)? {
+                self.simulation.host_disconnect();
+            }
+        }
+        if count > 0 {
+            self.simulation.host_send(now, bytes.get(..count).unwrap_or(&[]));
+        }
+        // A read without bytes means that the host has sent nothing up to now.
+        let is_idle = can_read && count == 0;
+        self.simulation.advance(now, is_idle);
+        while self.deliver()? {
+            self.simulation.advance(now, is_idle);
+        }
+        Ok(self.simulation.deadline(self.pty.has_client()))
+    }
+
+    /// Writes the arrived bytes to the client, or drops them without a client. Returns whether the line has more room.
+    fn deliver(&mut self) -> io::Result<bool> {
+        let mut has_delivered = false;
+        self.is_blocked = false;
+        while !self.is_blocked && !self.simulation.host_received().is_empty() {
+            let bytes = self.simulation.host_received();
+            let offered = bytes.len();
+            let taken = if self.pty.has_client() { self.pty.write(bytes)? } else { offered };
+            self.simulation.host_take(taken);
+            self.is_blocked = taken < offered;
+            has_delivered |= taken > 0;
+        }
+        Ok(has_delivered)
+    }
+
+    /// Did clients open or close the port since the last [`PtyArm::poll`]?
+    #[must_use]
+    pub fn has_news(&self, clients: &Clients) -> bool {
+        self.pty.has_news(clients)
+    }
+
+    /// The servo bus.
+    pub const fn bus(&mut self) -> &mut B {
+        self.simulation.bus()
+    }
+
+    /// The value of a register.
+    #[must_use]
+    pub fn register(&self, address: u8) -> u8 {
+        self.simulation.registers().get(address)
+    }
+
+    /// [`PtyArm::interest`] for poll(2).
+    #[must_use]
+    pub fn poll_interest(&self) -> PollFlags {
+        let mut interest = PollFlags::empty();
+        interest.set(PollFlags::IN, self.interest().contains(EventFlags::IN));
+        interest.set(PollFlags::OUT, self.interest().contains(EventFlags::OUT));
+        interest
+    }
+
+    /// The events of the port after which [`PtyArm::poll`] has to be called.
+    #[must_use]
+    pub fn interest(&self) -> EventFlags {
+        let mut interest = EventFlags::empty();
+        interest.set(EventFlags::IN, self.simulation.host_room() > 0);
+        interest.set(EventFlags::OUT, self.is_blocked);
+        interest
+    }
+}
+
+impl<F, B> AsFd for PtyArm<F, B> {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.pty.master()
+    }
+}
