@@ -19,51 +19,51 @@ THE FIRST MINUTE
   host-sim --link ./7bot                       an arm behind ./7bot, until Ctrl-C
   sevenbot --port ./7bot pose 120 90 65 90 90 90 80
   sevenbot --port ./7bot monitor               watch it move there
-  sevenbot --port ./7bot stop                  hold it where it is; `home` leads it back
-  host-sim --link ./7bot --trace               the same, with every frame in words
-  host-sim --eeprom none --fault 3=missing     no memory, and joint 3 does not answer
+  sevenbot --port ./7bot stop                  hold it where it is; `home` moves it back
+  host-sim --link ./7bot --trace               the same, with every frame as text
+  host-sim --eeprom none --fault 3=missing     no stored settings, and joint 3 does not answer
   host-sim --arms 3 --link ./7bot              three arms, behind ./7bot-1, ./7bot-2 and ./7bot-3
   In the source tree: cargo sim -- --link ./7bot, and cargo sevenbot --port ./7bot pose ...
 
-  Any serial client can open the port; the baud rate it asks for does not matter. The first line on
-  standard output is 'ready <tty path>', as soon as it can be opened; with --arms there is one such
-  line for each arm, in their order. All else is on standard error.
+  Any serial client can open the port, at any baud rate. The first line on standard output is
+  'ready <tty path>', as soon as the port can be opened; with --arms there is one such line for each
+  arm, in their order. Everything else is on standard error.
 
 THE ARM HAS WEIGHT
   Without torque, a loaded joint falls, and in state damping it sinks. After power-up a hand holds
-  each joint until it has torque. --fault arm=supported keeps it up at all times.
+  each joint until it has torque. With --fault arm=supported it never falls.
 
 MANY ARMS
-  --arms N runs arms 1 to N in one process. Where an option names a file, each arm has its own, with
-  its number before the extension: --eeprom arm.bin keeps the settings of arm 2 in arm-2.bin. Chip
-  ids count on from --chip-id, faults befall all arms, and so do signals.
+  --arms N runs arms 1 to N in one process. If an option names a file, each arm has its own, with its
+  number before the extension: --eeprom arm.bin keeps the settings of arm 2 in arm-2.bin. Chip ids
+  are consecutive, starting with --chip-id. Faults and signals apply to all arms.
 
 REAL SERVOS
   host-sim --servos /dev/ttyUSB0 --link ./7bot the controller on this computer, real servos behind an
-                                               adapter for bus servos; clients use ./7bot as ever
-  'ready' comes when the adapter's port is open. Standard error tells which servos were found and how
-  the bus does. An adapter that is pulled out is waited for, and the arm holds meanwhile. At the end
-  the servos are damped, so that the arm sinks slowly; --hold-on-exit leaves them holding. Never
+                                               adapter for bus servos; clients use ./7bot
+  'ready' appears when the adapter's port is open. Standard error shows the servos that were found and
+  statistics of the bus. If the adapter is unplugged, host-sim waits for it, and the arm holds. At the
+  end the servos are damped, so that the arm sinks slowly; --hold-on-exit leaves them holding. Never
   connect a second controller to the same servos.
-  An answer may come --usb-timeout later than on the wire. The default suits an adapter that gathers
-  bytes for 16 ms; goals do not wait for answers. A shorter time asks more often where a servo is
-  missing; one that is too short for the adapter loses answers.
-  An FTDI adapter has a latency timer, 16 ms by default. It is set to 1 ms through its file in sysfs,
-  which most systems let only root write. ASYNC_LOW_LATENCY (setserial low_latency) is not set.
+  An answer may arrive --usb-timeout later than on the wire. The default suits an adapter that
+  collects bytes for 16 ms; goals do not wait for answers. With a shorter time, more questions are
+  sent if a servo is missing. A time that is too short for the adapter loses answers.
+  An FTDI adapter has a latency timer, 16 ms by default. host-sim sets it to 1 ms through its file in
+  sysfs, which only root can write on most systems. ASYNC_LOW_LATENCY (setserial low_latency) is not set.
 
 SERVOS ONLY
-  host-sim --servos-only --link ./bus          seven servos, as a computer sees them behind a USB adapter
+  host-sim --servos-only --link ./bus          seven servos, as behind a USB adapter
   host-sim --servos-only --link ./bus --usb-latency 1-20 --fault bus=echo --trace
-  The port carries raw frames of the servo bus. The servos hear a client only at their own baud rate,
-  --servo-baud, so set the port to it. --trace prints the bytes on the wire. A fault is named by its
-  joint, from 1 to 7, also where --ids gives the joint's servo another id.
+  The port carries raw frames of the servo bus. The servos receive bytes only at their own baud rate,
+  --servo-baud, so set the port to it. --trace prints the bytes on the wire. A fault has the number of
+  its joint, from 1 to 7, even if --ids gives the joint's servo another id.
 
 SIGNALS
-  SIGHUP            a power cycle: RAM registers are lost, settings are kept, the port stays
-  SIGUSR1           with --servos-only: unplugs the adapter, and plugs it in again; the servos keep
-                    their power. The port and its link are gone meanwhile
-  SIGUSR2           a restart of the controller alone: the servos keep their power, torque and goals
-  SIGINT, SIGTERM   a clean end
+  SIGHUP            a power cycle: RAM registers are lost, settings and the port stay
+  SIGUSR1           with --servos-only: unplugs the adapter, and plugs it in again. The servos keep
+                    their power. Without the adapter, the port and its link do not exist
+  SIGUSR2           a restart of the controller only: the servos keep power, torque and goals
+  SIGINT, SIGTERM   the end
 
 EXIT STATUS
   0   ended by a signal, or after --help or --version
@@ -73,7 +73,7 @@ EXIT STATUS
 /// The ids of servos: one value of an option.
 pub type Ids = Vec<u8>;
 
-/// A 7Bot V2 arm without the arm: any serial client can open the port it makes.
+/// A simulated 7Bot V2 arm on a port that any serial client can open.
 #[derive(Clone, Debug, Parser)]
 #[command(version, about, after_help = LESSON)]
 #[command(group = ArgGroup::new("adapter").args(["servos", "servos_only"]))]

@@ -1,4 +1,4 @@
-//! The built simulator as a user meets it: its first line, its files, its signals, its exit statuses.
+//! The built simulator from the side of the user: first line, files, signals, exit statuses.
 
 #![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
 
@@ -30,7 +30,7 @@ fn the_first_line_names_a_port_that_can_be_opened_and_is_the_only_one() {
 }
 
 #[test]
-fn the_link_stands_while_the_simulator_runs() {
+fn the_link_exists_while_the_simulator_runs() {
     let directory = tempfile::tempdir().unwrap();
     let link = directory.path().join("7bot");
     std::os::unix::fs::symlink("/dev/pts/stale", &link).unwrap();
@@ -42,7 +42,7 @@ fn the_link_stands_while_the_simulator_runs() {
 }
 
 #[test]
-fn a_file_in_the_place_of_the_link_is_left_alone() {
+fn a_file_at_the_path_of_the_link_is_not_changed() {
     let directory = tempfile::tempdir().unwrap();
     let link = directory.path().join("thesis.tex");
     fs::write(&link, "years").unwrap();
@@ -52,7 +52,7 @@ fn a_file_in_the_place_of_the_link_is_left_alone() {
 }
 
 #[test]
-fn one_image_serves_one_simulator() {
+fn only_one_simulator_can_use_an_image() {
     let directory = tempfile::tempdir().unwrap();
     let image = directory.path().join("arm.bin");
     let image = image.to_str().unwrap();
@@ -62,7 +62,7 @@ fn one_image_serves_one_simulator() {
 }
 
 #[test]
-fn without_an_option_the_image_is_in_the_state_directory() {
+fn by_default_the_image_is_in_the_state_directory() {
     let state = tempfile::tempdir().unwrap();
     let _first = Sim::start_in(state.path(), &[]);
     let image = state.path().join("7bot/eeprom.bin");
@@ -78,7 +78,7 @@ fn without_an_option_the_image_is_in_the_state_directory() {
 }
 
 #[test]
-fn what_is_no_settings_image_is_refused_and_left_alone() {
+fn a_file_that_is_no_settings_image_is_refused_and_not_changed() {
     let directory = tempfile::tempdir().unwrap();
     let image = directory.path().join("arm.bin");
     for (content, says) in [(vec![0xA5; 32_768], "damaged"), (vec![0xFF; 100], "100 bytes long")] {
@@ -105,7 +105,7 @@ fn a_wrong_command_line_is_refused_in_one_line() {
 }
 
 #[test]
-fn help_teaches() {
+fn help_has_examples() {
     let state = tempfile::tempdir().unwrap();
     let output = sim::command(state.path(), &["--help"]).output().unwrap();
     assert_eq!(output.status.code(), Some(0));
@@ -138,7 +138,7 @@ fn sighup_is_a_power_cycle_and_the_port_stays() {
 }
 
 #[test]
-fn sigusr2_restarts_the_controller_and_the_servos_go_on_holding() {
+fn sigusr2_restarts_the_controller_and_the_servos_hold() {
     let sim = Sim::start(&["--eeprom", "none"]);
     let mut client = Client::open(sim.port());
     client.write(TARGET_POSITION.address, &[100]);
@@ -169,7 +169,7 @@ fn settings_survive_a_kill() {
 }
 
 #[test]
-fn a_client_that_leaves_at_once_is_still_obeyed_and_the_next_starts_clean() {
+fn requests_of_a_client_that_leaves_are_executed_and_the_next_client_gets_no_old_answers() {
     let sim = Sim::start(&["--eeprom", "none"]);
     let mut first = Client::open(sim.port());
     for _ in 0..200 {
@@ -188,7 +188,7 @@ fn a_client_that_reads_late_gets_every_answer() {
     let sim = Sim::start(&["--eeprom", "none", "--unpaced"]);
     let mut client = Client::open(sim.port());
     let mut reader = Client::open(sim.port());
-    // 34 KB of answers: far more than the kernel holds, so the simulator has to wait.
+    // 34 KB of answers do not fit the kernel's buffers, so the simulator has to wait.
     let writer = std::thread::spawn(move || (0..500).for_each(|_| client.send_read(0, 61)));
     std::thread::sleep(Duration::from_millis(300));
     for _ in 0..500 {
@@ -198,7 +198,7 @@ fn a_client_that_reads_late_gets_every_answer() {
 }
 
 #[test]
-fn nobody_has_to_listen_to_what_it_says() {
+fn the_simulator_runs_with_closed_outputs() {
     let directory = tempfile::tempdir().unwrap();
     let link = directory.path().join("7bot");
     let arguments = ["--eeprom", "none", "--trace", "-vv", "--link", link.to_str().unwrap()];
@@ -212,7 +212,7 @@ fn nobody_has_to_listen_to_what_it_says() {
 }
 
 #[test]
-fn trace_tells_frames_in_words_on_standard_error() {
+fn trace_shows_frames_as_text_on_standard_error() {
     let mut sim = Sim::start(&["--eeprom", "none", "-q", "--trace"]);
     Client::open(sim.port()).read(DEVICE_ID.address, 1);
     sim.end_with(Signal::TERM);
@@ -222,7 +222,7 @@ fn trace_tells_frames_in_words_on_standard_error() {
 }
 
 #[test]
-fn faults_from_the_command_line_befall_the_arm() {
+fn faults_of_the_command_line_take_effect() {
     let sim = Sim::start(&[
         "--eeprom",
         "none",
@@ -237,7 +237,7 @@ fn faults_from_the_command_line_befall_the_arm() {
 }
 
 #[test]
-fn the_servos_alone_answer_on_a_socket() {
+fn servos_without_a_controller_answer_on_a_socket() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("servos.sock");
     let arguments = ["--servo-socket", path.to_str().unwrap()];
@@ -265,7 +265,7 @@ fn a_stale_servo_socket_is_replaced() {
     ping(&mut UnixStream::connect(&path).unwrap());
 }
 
-/// Pings servo 0 until it answers: it is deaf for a while after power-up.
+/// Pings servo 0 until it answers: it has to start first.
 fn ping(bus: &mut UnixStream) -> [u8; 6] {
     bus.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
     for _ in 0..300 {

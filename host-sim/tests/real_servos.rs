@@ -1,4 +1,4 @@
-//! The built simulator as the controller of servos behind a USB adapter, which a second process simulates.
+//! The built simulator as a controller with servos behind a USB adapter, which a second process simulates.
 //!
 //! ```text
 //!   client ──▶ host-sim --servos ──▶ link ──▶ host-sim --servos-only --trace ──▶ log
@@ -23,10 +23,10 @@ const ALL_MISSING: u8 = 0x7F;
 const DAMPING: u8 = 0;
 const ON: u8 = 1;
 const STANDARD_POSE: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];
-/// Longer than a busy machine delays an answer, in milliseconds.
+/// In milliseconds: longer than the delay of an answer on a busy machine.
 const PATIENT: [&str; 2] = ["--usb-timeout", "300"];
 
-/// Seven servos behind an adapter, and a controller that drives them.
+/// Seven servos behind an adapter, and their controller.
 struct Rig {
     controller: Sim,
     servos: Sim,
@@ -37,7 +37,7 @@ struct Rig {
 type Frame = (u8, Vec<u8>);
 
 impl Rig {
-    /// Starts the servos with these options, and a controller with those.
+    /// Starts the servos and the controller, each with its options.
     fn start(servos: &[&str], controller: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let bus = folder.path().join("bus");
@@ -62,22 +62,22 @@ impl Rig {
         Client::open(self.controller.port())
     }
 
-    /// What the controller has said so far.
-    fn controller_says(&self) -> String {
+    /// The log of the controller so far.
+    fn controller_log(&self) -> String {
         fs::read_to_string(self.folder.path().join("controller")).unwrap()
     }
 
-    /// What the servos have said so far: their trace.
+    /// The trace of the servos so far.
     fn trace(&self) -> String {
         fs::read_to_string(self.folder.path().join("servos")).unwrap()
     }
 
-    /// Was every torque switch that was set so far set to this?
+    /// Had all writes to a torque switch this value?
     fn has_set_all_torque_to(&self, code: u8) -> bool {
         torque_sets(&self.trace()).iter().all(|&(_, set)| set == code)
     }
 
-    /// The torque switch of a servo, once the controller has ended.
+    /// The torque switch of a servo, after the controller has ended.
     fn torque_switch(&self, id: u8) -> u8 {
         let mut bus = Bus::open(&self.bus(), 1_000_000);
         let checksum = !(id + 4 + 2 + register::TORQUE_SWITCH + 1);
@@ -100,7 +100,7 @@ impl Rig {
     }
 }
 
-/// The frames that the controller sent, as a trace has them.
+/// The frames of the controller in a trace.
 fn frames(trace: &str) -> Vec<Frame> {
     let pieces = trace.lines().filter_map(|line| line.split_once("-> [")?.1.strip_suffix(']'));
     let bytes = pieces.flat_map(|piece| piece.split(", ").map(|byte| u8::from_str_radix(byte, 16).unwrap()));
@@ -115,7 +115,7 @@ fn frames(trace: &str) -> Vec<Frame> {
     frames
 }
 
-/// Servos' ids, and what their torque switches were set to. A frame has the register, its length, and pairs of both.
+/// The ids and values of all writes to torque switches. A frame has the register, its length, and pairs of both.
 fn torque_sets(trace: &str) -> Vec<(u8, u8)> {
     let frames = frames(trace);
     assert!(frames.iter().all(|(code, _)| *code != Instruction::Write as u8), "no servo is written to alone");
@@ -134,14 +134,14 @@ fn wait_for_pose(client: &mut Client, pose: [u8; 7]) {
 }
 
 #[test]
-fn at_the_end_the_servos_are_damped() {
+fn the_servos_are_damped_at_the_end() {
     for signal in [Signal::TERM, Signal::INT] {
         let mut rig = Rig::start(&["--usb-latency", "1-4"], &PATIENT);
         rig.wait_until_driven();
         assert!(rig.has_set_all_torque_to(ON));
         assert_eq!(rig.controller.end_with(signal), Some(0));
         assert_eq!(rig.torque_switches(), [DAMPING; 7], "after {signal:?}");
-        assert!(rig.controller_says().contains("state 0: the servos are damped"));
+        assert!(rig.controller_log().contains("state 0: the servos are damped"));
     }
 }
 
@@ -157,7 +157,7 @@ fn hold_on_exit_leaves_the_servos_holding() {
     }
 }
 
-/// The next controller takes the arm over where it stands.
+/// The next controller engages the arm at its position.
 #[test]
 fn d12_a_second_controller_finds_the_arm_holding_and_lets_no_joint_go() {
     let mut rig = Rig::start(&[], &[PATIENT.as_slice(), &["--hold-on-exit"]].concat());
@@ -175,9 +175,9 @@ fn d12_a_second_controller_finds_the_arm_holding_and_lets_no_joint_go() {
     assert!(rig.has_set_all_torque_to(ON));
 }
 
-/// D12: silent joints are left holding, and come back only after they were measured.
+/// D12: silent joints hold, and engage only after a measurement.
 #[test]
-fn d12_an_adapter_that_is_pulled_out_is_waited_for_and_nothing_falls() {
+fn d12_the_arm_holds_while_the_adapter_is_unplugged() {
     let rig = Rig::start(&["--usb-latency", "1-4"], &PATIENT);
     let mut client = rig.wait_until_driven();
     let pose = STANDARD_POSE.map(|degrees| degrees - 20);
@@ -187,7 +187,7 @@ fn d12_an_adapter_that_is_pulled_out_is_waited_for_and_nothing_falls() {
     wait_until("the link is gone", || !rig.bus().is_symlink());
     client.read_until(MISSING_SERVOS.address, &[ALL_MISSING]);
     assert_eq!(client.read(FAULTS.address, 1)[0] & fault::SERVO_BUS, fault::SERVO_BUS);
-    assert!(rig.controller_says().contains("the adapter is gone"));
+    assert!(rig.controller_log().contains("the adapter is gone"));
     rig.servos.signal(Signal::USR1);
     client.read_until(MISSING_SERVOS.address, &[0]);
     wait_until("the fault is over", || client.read(FAULTS.address, 1)[0] & fault::SERVO_BUS == 0);
@@ -202,7 +202,7 @@ fn d12_an_adapter_that_is_pulled_out_is_waited_for_and_nothing_falls() {
 }
 
 #[test]
-fn an_echo_of_the_adapter_changes_nothing() {
+fn an_echo_of_the_adapter_has_no_effect() {
     for fault in [[].as_slice(), &["--fault", "bus=echo"]] {
         let rig = Rig::start(&[&["--usb-latency", "1-4"], fault].concat(), &PATIENT);
         let mut client = rig.wait_until_driven();
@@ -215,9 +215,9 @@ fn an_echo_of_the_adapter_changes_nothing() {
     }
 }
 
-/// The arm is served all the same: servos may get their power later.
+/// The program continues: the servos may get their power later.
 #[test]
-fn a_bus_on_which_no_servo_answers_is_told_with_what_to_check() {
+fn without_an_answer_of_any_servo_the_log_says_what_to_check() {
     let faults: Vec<String> = (1..=7).map(|joint| format!("{joint}=missing")).collect();
     let missing: Vec<&str> = faults.iter().flat_map(|fault| ["--fault", fault]).collect();
     let echo = [missing.as_slice(), &["--fault", "bus=echo"]].concat();
@@ -229,10 +229,10 @@ fn a_bus_on_which_no_servo_answers_is_told_with_what_to_check() {
         let mut client = rig.client();
         client.read_until(MISSING_SERVOS.address, &[ALL_MISSING]);
         wait_until("it says what is wrong", || {
-            let said = rig.controller_says();
+            let said = rig.controller_log();
             said.contains("no servo answers at 1000000 baud") && said.contains(says)
         });
-        assert!(rig.controller_says().contains("sevenbot servo scan"));
+        assert!(rig.controller_log().contains("sevenbot servo scan"));
         assert_eq!(rig.controller.end_with(Signal::TERM), Some(0));
     }
 }
@@ -252,9 +252,9 @@ fn a_port_that_cannot_be_used_is_refused_in_one_line() {
     }
 }
 
-/// Answers that come after the time-out are dropped, and a longer time-out takes them.
+/// Answers after the timeout are dropped. A longer timeout accepts them.
 #[test]
-fn answers_beyond_the_time_out_are_not_taken_for_measurements() {
+fn answers_after_the_timeout_are_no_measurements() {
     let faults: Vec<String> = (1..=7).map(|joint| format!("{joint}=late=60")).collect();
     let late: Vec<&str> = faults.iter().flat_map(|fault| ["--fault", fault]).collect();
     let servos = [late.as_slice(), &["--fault", "arm=supported"]].concat();
@@ -262,7 +262,7 @@ fn answers_beyond_the_time_out_are_not_taken_for_measurements() {
     let mut client = rig.client();
     let unmeasured = client.read(PRESENT_POSITION.address, 7);
     client.read_until(MISSING_SERVOS.address, &[ALL_MISSING]);
-    wait_until("it says that bytes come", || rig.controller_says().contains("but bytes come"));
+    wait_until("it says that bytes come", || rig.controller_log().contains("but bytes come"));
     assert!(rig.trace().contains("<- [ff, ff, 0"), "the servos do answer");
     for _ in 0..50 {
         let positions = client.read(PRESENT_POSITION.address, 7);

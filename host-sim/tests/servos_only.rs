@@ -12,7 +12,7 @@ use std::time::Duration;
 use rustix::process::Signal;
 use sim::{Bus, Sim};
 
-/// What a servo says to a ping.
+/// The answer of a servo to a ping.
 fn pong(id: u8) -> Vec<u8> {
     vec![0xFF, 0xFF, id, 2, 0, !(id + 2)]
 }
@@ -38,7 +38,7 @@ fn servos_answer_at_their_own_baud_rate_only() {
 }
 
 #[test]
-fn servos_have_the_ids_that_were_chosen_also_after_a_power_cycle() {
+fn servos_keep_the_chosen_ids_over_a_power_cycle() {
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("bus");
     let sim = start(&link, &["--ids", "42,3"]);
@@ -51,7 +51,7 @@ fn servos_have_the_ids_that_were_chosen_also_after_a_power_cycle() {
 }
 
 #[test]
-fn an_echo_and_the_answer_come_in_one_block() {
+fn echo_and_answer_are_in_one_block() {
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("bus");
     let mut sim = start(&link, &["--usb-latency", "20", "--fault", "bus=echo", "--trace", "-q"]);
@@ -72,13 +72,13 @@ fn an_echo_and_the_answer_come_in_one_block() {
 }
 
 #[test]
-fn a_pulled_adapter_leaves_the_servos_as_they_are() {
+fn the_servos_keep_their_state_while_the_adapter_is_unplugged() {
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("bus");
     let sim = start(&link, &[]);
     let mut bus = Bus::open(&link, 1_000_000);
     bus.ping_until_answered(0);
-    // Damped is 2 in one of the tables: a value that no servo starts with.
+    // No servo starts with the value 2, which is damping in one of the tables.
     bus.ask(&[0xFF, 0xFF, 0, 4, 3, 40, 2, !49], 6);
     sim.signal(Signal::USR1);
     sim::wait_until("the link is gone", || !link.is_symlink());

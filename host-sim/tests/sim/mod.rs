@@ -1,4 +1,4 @@
-//! Runs the built simulator, and talks to it as a serial client does.
+//! Runs the built simulator, with a serial client.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -13,10 +13,10 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, kill_process};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-/// Nothing takes this long on the slowest machine.
+/// The time limit of all waits, for the slowest machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A running simulator; it is killed when this is dropped.
+/// A running simulator. Dropping it kills the process.
 pub(crate) struct Sim {
     child: Child,
     port: PathBuf,
@@ -25,19 +25,19 @@ pub(crate) struct Sim {
     _state: tempfile::TempDir,
 }
 
-/// The simulator with these arguments, and a state directory that is not the user's.
+/// The simulator with these arguments and this state directory.
 pub(crate) fn command(state: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_host-sim"));
     command.args(arguments).env("XDG_STATE_HOME", state).stdin(Stdio::null());
     command
 }
 
-/// What a simulator that refuses its arguments says: one line, and exit status 2.
+/// The error of a simulator that refuses its arguments: one line, and exit status 2.
 pub(crate) fn refused(arguments: &[&str]) -> String {
     complaint(&mut command(tempfile::tempdir().unwrap().path(), arguments))
 }
 
-/// Likewise, of a command.
+/// Likewise, for a command.
 pub(crate) fn complaint(command: &mut Command) -> String {
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let status = wait(&mut child);
@@ -48,7 +48,7 @@ pub(crate) fn complaint(command: &mut Command) -> String {
     said
 }
 
-/// Waits for the exit status; `None` if it was killed, as it is once patience ends.
+/// Waits for the exit status. `None` if the process was killed, for example after the time limit.
 fn wait(child: &mut Child) -> Option<i32> {
     let patience_ends = Instant::now() + PATIENCE;
     while Instant::now() < patience_ends {
@@ -74,7 +74,7 @@ impl Sim {
         Self::spawn(command(state, arguments), tempfile::tempdir().unwrap())
     }
 
-    /// Likewise, with its standard error in a file: whoever says much must not wait for a reader.
+    /// Likewise, with its standard error in a file, so that much output needs no reader.
     pub(crate) fn start_with_log(arguments: &[&str], log: &Path) -> Self {
         let state = tempfile::tempdir().unwrap();
         let command = command(state.path(), arguments);
@@ -96,7 +96,7 @@ impl Sim {
         Self { child, port, stdout: Some(stdout), stderr, _state: state }
     }
 
-    /// What the first line named.
+    /// The port in the first line.
     pub(crate) fn port(&self) -> &Path {
         &self.port
     }
@@ -111,18 +111,18 @@ impl Sim {
         wait(&mut self.child)
     }
 
-    /// Stops reading what it says, as a closed terminal does.
+    /// Closes its outputs, as a closed terminal does.
     pub(crate) fn close_output(&mut self) {
         self.stdout = None;
         self.stderr = None;
     }
 
-    /// What it said after the first line; it must have ended.
+    /// Its standard output after the first line. The process must have ended.
     pub(crate) fn rest_of_stdout(&mut self) -> String {
         read_to_end(self.stdout.as_mut().unwrap())
     }
 
-    /// Everything it said on standard error; it must have ended.
+    /// Its standard error. The process must have ended.
     pub(crate) fn rest_of_stderr(&mut self) -> String {
         read_to_end(self.stderr.as_mut().unwrap())
     }
