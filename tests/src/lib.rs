@@ -1,29 +1,31 @@
-//! System tests know bytes only: frames through a serial port, against the simulator, the firmware in an
+//! System tests know bytes only: frames through a serial port. The arm under test is the simulator, the firmware in an
 //! emulator (`ARM=emulator`), the controller on this computer with servos behind a simulated USB adapter
-//! (`ARM=adapter`), or whatever answers on `ARM_PORT`.
+//! (`ARM=adapter`), or the arm on `ARM_PORT`.
 //!
 //! ```text
-//!   tests/*.rs ──▶ Bench ──▶ Line ──▶ serial port ──▶ OwnArm, one a test: may be killed, faulty, ...
-//!                    │                           └──▶ ARM_PORT: one arm for all tests, one after another
-//!                    └── Target: what can be done to the arm itself
+//!   tests/*.rs ──▶ TestArm ──▶ ArmClient ──▶ serial port ──▶ StartedArm: one for each test
+//!                     │                                 └──▶ ExternalArm on ARM_PORT: one for all tests, in turn
+//!                     └── ArmControl: power cycles, kills
 //! ```
 //!
-//! Nothing here is shared with the product: frames, checksum and register numbers are written down a second
-//! time, from `docs/protocol.md`, so that a mistake on one side shows on the other.
+//! The tests share no code with the product. Frames, checksum and register numbers are written from `docs/protocol.md`
+//! again, so that a mistake on one side makes a test fail.
 //!
-//! A test that needs what its arm cannot do is skipped, by name and with the reason, on standard error. `cargo xtask
-//! test` names the tests for each kind of arm instead, and sets `ARM_MEETS_ALL_NEEDS`: then it is a failure.
+//! A test whose arm lacks a capability is skipped, with its name and the reason on standard error. `cargo xtask test`
+//! leaves out such tests by name and sets `ARM_MEETS_ALL_NEEDS`, which makes a skipped test a failure.
 
-pub mod bench;
+pub mod arm_client;
+pub mod arm_control;
 pub mod frames;
-pub mod line;
-pub mod own;
+pub mod process;
 pub mod programs;
 pub mod registers;
-pub mod target;
+pub mod started_arm;
 pub mod terminal;
+pub mod test_arm;
+pub mod wait;
 
-pub use bench::{Bench, Setup, near, with_arm};
+pub use arm_client::ArmClient;
+pub use arm_control::Need;
 pub use frames::{read_request, write_request};
-pub use line::Line;
-pub use target::Need;
+pub use test_arm::{TestArm, TestSetup, near, with_arm};

@@ -1,4 +1,4 @@
-//! The programs under test: where they are, and how they are built when they are not.
+//! The paths of the programs under test. A missing program is built.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -18,10 +18,10 @@ pub fn sevenbot() -> &'static Path {
     PATH.get_or_init(|| program("sevenbot-cli", "sevenbot"))
 }
 
-/// How long the tool waits for an answer, in milliseconds: the machine may have much else to do.
+/// The timeout of the tool in milliseconds. It is long, because the machine may be busy.
 pub const TOOL_TIMEOUT: (&str, &str) = ("SEVENBOT_TIMEOUT", "10000");
 
-/// The command line tool, patient.
+/// The command line tool, with a long timeout.
 #[must_use]
 pub fn tool() -> Command {
     let mut tool = Command::new(sevenbot());
@@ -29,16 +29,16 @@ pub fn tool() -> Command {
     tool
 }
 
-/// The chores, one of which is the emulator.
+/// The program that starts the emulator.
 #[must_use]
 pub fn xtask() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| program("xtask", "xtask"))
 }
 
-/// The program `name` of this package. It stands two folders above the test: `target/debug/deps/test-0123`.
+/// The program `name` of a package. It is two folders above the test, as in `target/debug/deps/test-0123`.
 fn program(package: &str, name: &str) -> PathBuf {
-    let test = std::env::current_exe().expect("a test knows where it is");
+    let test = std::env::current_exe().expect("the path of the test");
     let folder = test.ancestors().nth(2).expect("cargo's folders");
     let path = folder.join(name).with_extension(std::env::consts::EXE_EXTENSION);
     if !path.exists() {

@@ -1,27 +1,25 @@
-//! A terminal with a program in it: keys in, and what its screen shows.
+//! A terminal with a program: key strokes in, the contents of the screen out.
 
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
 use std::path::Path;
 use std::process::{Child, ExitStatus};
 use std::sync::{Arc, Mutex};
-use std::thread::{self, sleep};
-use std::time::{Duration, Instant};
+use std::thread;
 
 use pty_process::Size;
 use pty_process::blocking::{Command, Pty, open};
 use vt100::Parser;
 
-use crate::line::PATIENCE;
+use crate::process;
 use crate::programs::TOOL_TIMEOUT;
+use crate::wait::wait_for;
 
-/// The size of every terminal here: what everybody has at least.
+/// The size of the terminal: the least that the tool supports.
 const ROWS: NonZeroU16 = NonZeroU16::new(24).unwrap();
 const COLUMNS: NonZeroU16 = NonZeroU16::new(80).unwrap();
-/// Time between two looks at a screen.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// A terminal, and the program that runs in it. Both go together.
+/// A terminal and its program, which is killed with it.
 pub struct Terminal {
     pty: Arc<Pty>,
     screen: Arc<Mutex<Parser>>,
@@ -42,7 +40,7 @@ impl Terminal {
         let output = Arc::clone(&pty);
         thread::spawn(move || {
             let mut chunk = [0; 4096];
-            // An error is how a pseudo-terminal says that nobody is on its other side any more.
+            // A pseudo-terminal returns an error when its program has ended.
             while let Ok(length @ 1..) = (&*output).read(&mut chunk) {
                 painter.lock().expect("a screen").process(&chunk[..length]);
             }
@@ -50,61 +48,50 @@ impl Terminal {
         Self { pty, screen, program }
     }
 
-    /// Types.
+    /// Types keys.
     pub fn keys(&self, keys: &str) {
         (&*self.pty).write_all(keys.as_bytes()).expect("the terminal takes keys");
     }
 
-    /// What the screen shows, row by row.
+    /// The contents of the screen, row by row.
     #[must_use]
-    pub fn shows(&self) -> String {
+    pub fn contents(&self) -> String {
         self.screen.lock().expect("a screen").screen().contents()
     }
 
-    /// Is the program drawing on a screen of its own, which leaves what was there before untouched?
+    /// True if the program draws on the alternate screen, which does not change the normal one.
     #[must_use]
-    pub fn is_on_own_screen(&self) -> bool {
+    pub fn is_on_alternate_screen(&self) -> bool {
         self.screen.lock().expect("a screen").screen().alternate_screen()
     }
 
-    /// Waits until the screen shows a text, and gives all that it shows.
+    /// Waits until the screen contains a text, and returns its contents.
     #[track_caller]
     pub fn wait_for(&self, text: &str) -> String {
         self.wait_until(text, |screen| screen.contains(text))
     }
 
-    /// Waits until the screen shows what is wanted.
+    /// Waits for a condition on the contents of the screen, and returns them.
     #[track_caller]
-    pub fn wait_until(&self, what: &str, is_shown: impl Fn(&str) -> bool) -> String {
-        let deadline = Instant::now() + PATIENCE;
-        loop {
-            let screen = self.shows();
-            if is_shown(&screen) {
-                return screen;
-            }
-            assert!(Instant::now() < deadline, "waited in vain for {what}; the screen shows:\n{screen}");
-            sleep(LOOK_EVERY);
-        }
+    pub fn wait_until(&self, condition: &str, holds: impl Fn(&str) -> bool) -> String {
+        wait_for(condition, || {
+            let contents = self.contents();
+            if holds(&contents) { Ok(contents) } else { Err(format!("the screen shows:\n{contents}")) }
+        })
     }
 
-    /// Waits until the program has ended.
+    /// Waits for the end of the program.
     #[track_caller]
     pub fn wait(&mut self) -> ExitStatus {
-        let deadline = Instant::now() + PATIENCE;
-        loop {
-            if let Some(status) = self.program.try_wait().expect("a program to wait for") {
-                return status;
-            }
-            assert!(Instant::now() < deadline, "it does not end; the screen shows:\n{}", self.shows());
-            sleep(LOOK_EVERY);
-        }
+        wait_for("the program ends", || {
+            let status = self.program.try_wait().expect("a program to wait for");
+            status.ok_or_else(|| format!("the screen shows:\n{}", self.contents()))
+        })
     }
 }
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        // Errors mean that it has ended already.
-        let _ = self.program.kill();
-        let _ = self.program.wait();
+        process::kill(&mut self.program);
     }
 }

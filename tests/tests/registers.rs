@@ -1,32 +1,32 @@
-//! What registers hold and take: `docs/protocol.md`, sections 3 to 6.
+//! Values of registers: `docs/protocol.md`, sections 3 to 6.
 
 use system_tests::registers::{
     BAUD_RATE, CHIP_ID, DEVICE_CODE, DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FIRMWARE_VERSION,
     FRAMES_ACCEPTED, FRAMES_REFUSED, LAST_REFUSAL, MOTOR_STATE, OFFSET, PRESENT_POSITION, SPEED, STATUS,
     SUPPLY_VOLTAGE, TARGET_POSITION, TIME, VACUUM_PUMP,
 };
-use system_tests::{Bench, Need, Setup, with_arm};
+use system_tests::{Need, TestArm, TestSetup, with_arm};
 
-/// Settings that a test changed are put back: a real arm is somebody's.
-fn with_open_lock(arm: &mut Bench, test: impl FnOnce(&mut Bench)) {
+/// Runs a test with the EEPROM lock open.
+fn with_open_lock(arm: &mut TestArm, test: impl FnOnce(&mut TestArm)) {
     arm.write(EEPROM_LOCK, &[0]);
     test(arm);
     arm.write(EEPROM_LOCK, &[1]);
 }
 
-/// D7: a host can tell this firmware from the maker's, which are 10, 21 and 22.
+/// D7: the version differs from those of the maker's firmware, 10, 21 and 22.
 #[test]
-fn d07_the_arm_says_what_it_is() {
-    with_arm(Setup::any(), |arm| {
+fn d07_device_code_and_version_identify_the_firmware() {
+    with_arm(TestSetup::any(), |arm| {
         assert_eq!(arm.register(DEVICE_CODE), 7);
         assert_eq!(arm.register(FIRMWARE_VERSION), 30);
     });
 }
 
-/// D8: six bytes, the most significant first.
+/// D8: six bytes, most significant byte first.
 #[test]
-fn d08_the_chip_id_is_the_one_it_was_given() {
-    with_arm(Setup::any().chip_id("0123456789ab"), |arm| {
+fn d08_the_registers_hold_the_chip_id() {
+    with_arm(TestSetup::any().chip_id("0123456789ab"), |arm| {
         assert_eq!(arm.read(CHIP_ID, 6), [0x01, 0x23, 0x45, 0x67, 0x89, 0xAB]);
     });
 }
@@ -34,32 +34,32 @@ fn d08_the_chip_id_is_the_one_it_was_given() {
 /// Section 2: the defaults of a new arm.
 #[test]
 fn a_new_arm_has_the_documented_defaults() {
-    with_arm(Setup::any().needs(Need::FreshArm), |arm| {
+    with_arm(TestSetup::any().needs(Need::FreshArm), |arm| {
         assert_eq!(arm.read(8, 20), [0; 20], "settings");
         assert_eq!(arm.read(EEPROM_LOCK, 4), [1, 1, 0, 0]);
         assert_eq!(arm.read(SPEED, 7), [60; 7]);
         assert_eq!(arm.read(TIME, 7), [0; 7]);
         assert_eq!(arm.read(53, 1), [0]);
-        assert_eq!(arm.read(61, 179), [0; 179], "no registers: they answer, and read 0");
-        let faults = u8::from(!arm.can(Need::Persistence));
+        assert_eq!(arm.read(61, 179), [0; 179], "unused addresses read 0");
+        let faults = u8::from(!arm.has(Need::Persistence));
         assert_eq!(
             arm.read(STATUS, 3),
             [1, faults, 0],
-            "layout 1, no fault but that of the storage, all servos there"
+            "layout 1, a fault only without storage, no missing servo"
         );
     });
 }
 
-/// D9: an offset may be -16 to 16 in sign and magnitude; minus zero is zero.
+/// D9: an offset is -16 to 16 in sign and magnitude. Minus zero is zero.
 #[test]
 fn d09_offsets_are_sign_and_magnitude() {
-    with_arm(Setup::any(), |arm| {
+    with_arm(TestSetup::any(), |arm| {
         with_open_lock(arm, |arm| {
             for byte in [0x85, 0x80, 0x90, 0x10, 0x00] {
                 let refused = arm.counter(FRAMES_REFUSED);
                 arm.write(OFFSET, &[byte]);
-                let held = arm.register(OFFSET);
-                assert!(held == byte || (byte == 0x80 && held == 0), "{byte:#x} became {held:#x}");
+                let value = arm.register(OFFSET);
+                assert!(value == byte || (byte == 0x80 && value == 0), "{byte:#x} became {value:#x}");
                 assert_eq!(arm.counter(FRAMES_REFUSED), refused);
             }
             for byte in [0x11, 0x91, 0x7F, 0xFF] {
@@ -71,72 +71,72 @@ fn d09_offsets_are_sign_and_magnitude() {
     });
 }
 
-/// D15: read-only and reserved registers keep their values; what else the frame holds takes effect.
+/// D15: read-only and reserved registers keep their values. The other values of the frame take effect.
 #[test]
-fn d15_bytes_on_read_only_registers_have_no_effect_and_the_others_do() {
-    with_arm(Setup::any(), |arm| {
+fn d15_only_bytes_on_read_only_registers_have_no_effect() {
+    with_arm(TestSetup::any(), |arm| {
         let before = arm.read(0, 61);
         let refused = arm.counter(FRAMES_REFUSED);
-        let mut wanted = before.clone();
-        for (register, value) in (0..).zip(&mut wanted) {
+        let mut expected = before.clone();
+        for (register, value) in (0..).zip(&mut expected) {
             match register {
-                // ROM, settings under the lock, measured positions: values that would do in any register.
+                // ROM, locked settings and measured positions, with values that are in range.
                 0..=27 | 54.. => *value ^= 1,
                 EFFECTOR_TYPE | VACUUM_PUMP => *value = 1,
                 _ => {}
             }
         }
-        arm.write(0, &wanted);
+        arm.write(0, &expected);
         let after = arm.read(0, 54);
         assert_eq!(after[..28], before[..28], "ROM and settings");
         assert_eq!(after[30..32], [1, 1], "effector and pump");
         assert_eq!(after[32..54], before[32..54]);
-        assert_eq!(arm.counter(FRAMES_REFUSED), refused, "it is no error");
+        assert_eq!(arm.counter(FRAMES_REFUSED), refused, "this is no refusal");
         arm.write(VACUUM_PUMP, &[0]);
     });
 }
 
-/// D15: settings need the lock open.
+/// D15: a write of settings needs the open lock.
 #[test]
 fn d15_settings_are_written_only_while_the_lock_is_open() {
-    with_arm(Setup::any(), |arm| {
+    with_arm(TestSetup::any(), |arm| {
         let before = arm.register(DEVICE_ID);
-        let wanted = before ^ 0x55;
-        arm.write(DEVICE_ID, &[wanted]);
+        let expected = before ^ 0x55;
+        arm.write(DEVICE_ID, &[expected]);
         assert_eq!(arm.register(DEVICE_ID), before);
         with_open_lock(arm, |arm| {
-            arm.write(DEVICE_ID, &[wanted]);
-            assert_eq!(arm.register(DEVICE_ID), wanted);
+            arm.write(DEVICE_ID, &[expected]);
+            assert_eq!(arm.register(DEVICE_ID), expected);
         });
         arm.write(DEVICE_ID, &[before]);
-        assert_eq!(arm.register(DEVICE_ID), wanted, "locked again");
+        assert_eq!(arm.register(DEVICE_ID), expected, "locked again");
     });
 }
 
-/// D15: the lock counts as it stood before the frame, whichever way the frame turns it.
+/// D15: the state of the lock before the frame applies, even if the frame changes it.
 #[test]
-fn d15_the_lock_counts_as_it_stood_before_the_frame() {
-    with_arm(Setup::any(), |arm| {
+fn d15_the_state_of_the_lock_before_the_frame_applies() {
+    with_arm(TestSetup::any(), |arm| {
         let before = arm.read(DEVICE_ID, 18);
         let mut frame = before.clone();
         frame[0] ^= 0x55;
         frame[17] = 0;
         arm.write(DEVICE_ID, &frame);
-        assert_eq!(arm.read(DEVICE_ID, 1), before[..1], "the frame that opens the lock finds it closed");
+        assert_eq!(arm.read(DEVICE_ID, 1), before[..1], "the lock was closed before the frame");
         assert_eq!(arm.register(EEPROM_LOCK), 0);
         frame[17] = 1;
         arm.write(DEVICE_ID, &frame);
-        assert_eq!(arm.read(DEVICE_ID, 1), frame[..1], "the frame that closes the lock finds it open");
+        assert_eq!(arm.read(DEVICE_ID, 1), frame[..1], "the lock was open before the frame");
         assert_eq!(arm.register(EEPROM_LOCK), 1);
     });
 }
 
-/// D16: one value out of range, and the whole frame has no effect: no half poses.
+/// D16: with one value out of range, the whole frame has no effect.
 #[test]
-fn d16_a_frame_with_one_bad_value_is_rejected_whole_and_counted() {
-    with_arm(Setup::any(), |arm| {
+fn d16_a_frame_with_one_bad_value_is_refused_and_counted() {
+    with_arm(TestSetup::any(), |arm| {
         let before = arm.read(EFFECTOR_TYPE, 31);
-        // The first and the last register of each kind, one past its range.
+        // Registers with a value just above their range.
         let bad = [
             (EEPROM_LOCK, 2),
             (MOTOR_STATE, 3),
@@ -159,10 +159,10 @@ fn d16_a_frame_with_one_bad_value_is_rejected_whole_and_counted() {
     });
 }
 
-/// D16: a value that would have no effect anyway is not judged.
+/// D16: the range of a value without an effect is not checked.
 #[test]
-fn d16_values_without_effect_may_be_anything() {
-    with_arm(Setup::any(), |arm| {
+fn d16_values_without_effect_may_be_out_of_range() {
+    with_arm(TestSetup::any(), |arm| {
         let refused = arm.counter(FRAMES_REFUSED);
         arm.write(BAUD_RATE, &[200]);
         arm.write(PRESENT_POSITION, &[255; 7]);
@@ -172,23 +172,23 @@ fn d16_values_without_effect_may_be_anything() {
     });
 }
 
-/// D16, D17: the largest value of every register is taken, all of them in one frame.
+/// D16, D17: one frame writes the largest value of every register.
 #[test]
 fn d17_a_frame_takes_effect_whole() {
-    with_arm(Setup::any(), |arm| {
-        let mut wanted = vec![1, 1, 1, 0];
-        wanted.extend([100; 14]);
-        // Targets as they are: nothing here is to move.
-        wanted.extend(arm.read(TARGET_POSITION, 7));
-        arm.write(EEPROM_LOCK, &wanted);
-        assert_eq!(arm.read(EEPROM_LOCK, 25), wanted);
+    with_arm(TestSetup::any(), |arm| {
+        let mut expected = vec![1, 1, 1, 0];
+        expected.extend([100; 14]);
+        // The present targets, so that no joint moves.
+        expected.extend(arm.read(TARGET_POSITION, 7));
+        arm.write(EEPROM_LOCK, &expected);
+        assert_eq!(arm.read(EEPROM_LOCK, 25), expected);
     });
 }
 
-/// D20: the pump's register can be set and cleared. What pump and valve do shows on no line to the host.
+/// D20: the register of the pump can be set and cleared. The host link does not show pump and valve themselves.
 #[test]
 fn d20_the_pump_is_a_register() {
-    with_arm(Setup::any(), |arm| {
+    with_arm(TestSetup::any(), |arm| {
         for state in [1, 0] {
             arm.write(VACUUM_PUMP, &[state]);
             assert_eq!(arm.register(VACUUM_PUMP), state);
@@ -196,10 +196,10 @@ fn d20_the_pump_is_a_register() {
     });
 }
 
-/// Section 4: accepted frames are counted, reads and writes alike, and the answer knows of its own request.
+/// Section 4: accepted reads and writes are counted, with the read of the counter itself.
 #[test]
 fn accepted_frames_are_counted() {
-    with_arm(Setup::any(), |arm| {
+    with_arm(TestSetup::any(), |arm| {
         let first = arm.counter(FRAMES_ACCEPTED);
         arm.write(EFFECTOR_TYPE, &[1]);
         arm.read(0, 1);
@@ -207,10 +207,10 @@ fn accepted_frames_are_counted() {
     });
 }
 
-/// Section 4: voltage and temperature are those of the servos, once these were asked.
+/// Section 4: voltage and temperature are readings of the servos.
 #[test]
 fn voltage_and_temperature_are_measured() {
-    with_arm(Setup::any(), |arm| {
+    with_arm(TestSetup::any(), |arm| {
         arm.wait_until("voltage and temperature are known", |arm| {
             let measured = arm.read(SUPPLY_VOLTAGE, 2);
             (40..=90).contains(&measured[0]) && (10..=80).contains(&measured[1])

@@ -1,98 +1,88 @@
-//! The image for the first power-up of a board, in the emulator, as far as it goes there: what each step says on the
-//! host link, and what has left the servo line in the end. The log says the same as the host link.
+//! The self-test image for the first power-up of a board, in the emulator: the messages of each step on the host link, and
+//! the frames on the servo line.
 //!
-//! Runs with `ARM=emulator`: there is nothing of it in the simulator.
+//! Runs with `ARM=emulator` only.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Child, Command};
+use std::time::Duration;
 use std::{env, fs, thread};
 
-use rustix::process::{Pid, Signal, kill_process};
 use serialport::SerialPort;
-use system_tests::line::PATIENCE;
+use system_tests::process::{self, Signal, send_signal};
 use system_tests::programs::xtask;
+use system_tests::wait::wait_for;
 use tempfile::TempDir;
 
 /// Instructions to servos (hardware of the SCS series): ping, read, sync write.
 const PING: u8 = 0x01;
 const READ: u8 = 0x02;
 const SYNC_WRITE: u8 = 0x83;
-/// A fault sets the torque switch (register 40) of seven servos to 0, damping, three times.
+/// The fault handler sends this three times: it sets the torque switch (register 40) of seven servos to 0, damping.
 const DAMPING: [u8; 22] = [0xFF, 0xFF, 0xFE, 18, 0x83, 40, 1, 0, 0, 1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 0, 0x2E];
 const REPEATS: usize = 3;
-/// After so many frames without an echo there is none.
-const ECHOES_TRIED: usize = 20;
+/// The number of frames without an echo after which the image reports no echo.
+const ECHO_TRIES: usize = 20;
 
-/// The image in an emulator, and a line to it.
-struct PowerUp {
+/// The image in an emulator, with its port.
+struct SelfTest {
     process: Child,
     port: Box<dyn SerialPort>,
-    heard: String,
+    received: String,
     servo_line: PathBuf,
     _folder: TempDir,
 }
 
-impl PowerUp {
-    /// Starts it, with more options for the emulator.
+impl SelfTest {
+    /// Starts the image, with options of the emulator.
     fn start(options: &[&str]) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let servo_line = folder.path().join("servo-line");
-        let mut process = Command::new(xtask())
-            .args(["emulate", "--no-build", "--self-test", "--servo-line"])
-            .arg(&servo_line)
-            .args(options)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the emulator starts");
-        let mut ready = String::new();
-        let output = process.stdout.take().expect("a pipe");
-        BufReader::new(output).read_line(&mut ready).expect("a line");
-        let path = ready.trim_end().strip_prefix("ready ").expect("the name of the port").to_owned();
-        let port = serialport::new(path, 115_200).timeout(Duration::from_millis(100)).open();
+        let mut command = Command::new(xtask());
+        command.args(["emulate", "--no-build", "--self-test", "--servo-line"]).arg(&servo_line).args(options);
+        let (process, ports) = process::start(&mut command, 1).expect("the emulator is ready");
+        let port =
+            serialport::new(ports[0].to_string_lossy(), 115_200).timeout(Duration::from_millis(100)).open();
         let port = port.expect("the port opens");
-        Self { process, port, heard: String::new(), servo_line, _folder: folder }
+        Self { process, port, received: String::new(), servo_line, _folder: folder }
     }
 
-    /// Sends a command and waits for a line that begins so; gives the whole line.
+    /// Sends a command, and returns the next line with this beginning.
     fn command(&mut self, letter: u8, beginning: &str) -> String {
         self.port.write_all(&[letter]).expect("the port takes bytes");
         self.line(beginning)
     }
 
-    /// Waits for a line that begins so; what comes before it is forgotten.
+    /// Returns the next line with this beginning. Skips the lines before it.
     fn line(&mut self, beginning: &str) -> String {
-        let deadline = Instant::now() + PATIENCE;
-        loop {
-            while let Some((line, rest)) = self.heard.split_once("\r\n") {
+        wait_for(beginning, || {
+            while let Some((line, rest)) = self.received.split_once("\r\n") {
                 let (line, rest) = (line.to_owned(), rest.to_owned());
-                self.heard = rest;
+                self.received = rest;
                 if line.starts_with(beginning) {
-                    return line;
+                    return Ok(line);
                 }
             }
-            assert!(Instant::now() < deadline, "no line {beginning:?}, but {:?}", self.heard);
             let mut bytes = [0; 256];
             let count = self.port.read(&mut bytes).unwrap_or(0);
-            self.heard.push_str(&String::from_utf8_lossy(&bytes[..count]));
-        }
+            self.received.push_str(&String::from_utf8_lossy(&bytes[..count]));
+            Err(format!("{:?}", self.received))
+        })
     }
 }
 
-impl Drop for PowerUp {
+impl Drop for SelfTest {
     fn drop(&mut self) {
-        if let Some(id) = i32::try_from(self.process.id()).ok().and_then(Pid::from_raw) {
-            let _ = kill_process(id, Signal::TERM);
-        }
+        // The emulator has to end its own processes.
+        send_signal(&self.process, Signal::TERM);
         let _ = self.process.wait();
     }
 }
 
-/// The frames in a file, from header to checksum; it has to hold nothing else.
+/// The frames in a file. It must contain nothing else.
 fn frames(path: &Path) -> Vec<Vec<u8>> {
-    let bytes = fs::read(path).expect("what the image sent");
+    let bytes = fs::read(path).expect("the bytes on the servo line");
     let mut rest = bytes.as_slice();
     let mut frames = Vec::new();
     while let [0xFF, 0xFF, _, length, ..] = *rest {
@@ -102,12 +92,12 @@ fn frames(path: &Path) -> Vec<Vec<u8>> {
         frames.push(frame.to_vec());
         rest = after;
     }
-    assert!(rest.is_empty(), "no frame: {rest:02x?}");
+    assert!(rest.is_empty(), "not a frame: {rest:02x?}");
     frames
 }
 
-/// On a busy machine an answer may come too late, and simulated servos are not ready at once: so this is tried again.
-fn one_servo(image: &mut PowerUp) {
+/// Tries step c until it passes. Replies may be late on a busy machine, and the servos take time to start.
+fn check_one_servo(image: &mut SelfTest) {
     for _ in 0..20 {
         let mut lines = vec![image.command(b'c', "c: ")];
         while !lines.last().is_some_and(|line| line == "c: passed" || line == "c: FAILED") {
@@ -121,11 +111,11 @@ fn one_servo(image: &mut PowerUp) {
             return;
         }
     }
-    panic!("step c has never passed");
+    panic!("step c does not pass");
 }
 
-/// Likewise; this step goes on by itself until the next command.
-fn seven_servos(image: &mut PowerUp) {
+/// Tries step d until it passes. The image repeats this step until the next command.
+fn check_seven_servos(image: &mut SelfTest) {
     let mut poses = image.command(b'd', "d: counts");
     for _ in 0..20 {
         if image.line("d: ") == "d: passed" {
@@ -135,50 +125,50 @@ fn seven_servos(image: &mut PowerUp) {
         }
         poses = image.line("d: counts");
     }
-    panic!("step d has never passed");
+    panic!("step d does not pass");
 }
 
-/// Not chosen: the simulator has nothing of it.
-fn is_left_out() -> bool {
-    let is_left_out = env::var_os("ARM").is_none_or(|arm| arm != "emulator");
-    if is_left_out {
+/// Reports that the test is skipped, unless the arm is the emulator.
+fn is_skipped() -> bool {
+    let is_skipped = env::var_os("ARM").is_none_or(|arm| arm != "emulator");
+    if is_skipped {
         eprintln!("skipped self_test: the image for the first power-up runs with ARM=emulator");
     }
-    is_left_out
+    is_skipped
 }
 
-/// The simulated servo line gives back every byte, as one wire does. On a busy machine one may come too late.
+/// The simulated servo line echoes every byte, like a single wire. On a busy machine an echo may be late.
 #[test]
-fn a_thousand_echoes_prove_the_servo_line() {
-    if is_left_out() {
+fn a_thousand_echoes_test_the_servo_line() {
+    if is_skipped() {
         return;
     }
-    let mut image = PowerUp::start(&["--fault", "bus=echo"]);
+    let mut image = SelfTest::start(&["--fault", "bus=echo"]);
     for _ in 0..20 {
         let echoes = image.command(b'b', "b: ");
         if image.line("b: ") == "b: passed" {
             assert!(echoes.starts_with("b: 1000 echoes right, 0 wrong, 0 missing, "), "{echoes}");
-            one_servo(&mut image);
+            check_one_servo(&mut image);
             return;
         }
     }
-    panic!("step b has never passed");
+    panic!("step b does not pass");
 }
 
-/// One after another, as the steps are taken on a board.
+/// Runs the steps in the order that is used with a board.
 #[test]
-fn each_step_of_the_first_power_up_says_what_it_finds_and_none_can_give_torque() {
-    if is_left_out() {
+fn each_step_reports_its_results_and_none_gives_torque() {
+    if is_skipped() {
         return;
     }
-    let mut image = PowerUp::start(&[]);
+    let mut image = SelfTest::start(&[]);
     assert_eq!(image.command(b'a', "a: clock"), "a: clock Emulated, RCC_CSR 00000000, brown-out level 3");
-    assert_eq!(image.line("a: VDD"), "a: VDD None mV", "the emulator has no reference to measure");
+    assert_eq!(image.line("a: VDD"), "a: VDD None mV", "the emulator has no voltage reference");
     assert_eq!(image.line("a: chip id"), "a: chip id 7b0700000001");
     image.line("a: passed");
     image.command(b'b', "b: no echo");
-    one_servo(&mut image);
-    seven_servos(&mut image);
+    check_one_servo(&mut image);
+    check_seven_servos(&mut image);
     image.command(b'e', "e: p panic");
 
     image.command(b'p', "self-test, last run ended in Some(Panic)");
@@ -189,13 +179,13 @@ fn each_step_of_the_first_power_up_says_what_it_finds_and_none_can_give_torque()
     image.line("a: passed");
     image.command(b'w', "w: the emulator has no watchdog");
 
-    // The emulator writes as it goes; what is asked last is in the file when its answer is here.
+    // The emulator writes the file continuously, a little behind the host link.
     thread::sleep(Duration::from_millis(100));
     let frames = frames(&image.servo_line);
-    let (faults, questions): (Vec<_>, Vec<_>) = frames.iter().partition(|frame| frame[4] == SYNC_WRITE);
-    let least = ECHOES_TRIED + 1 + 102 + 14;
-    assert!(questions.len() >= least, "{}: echoes, a search, one servo, seven servos", questions.len());
-    assert!(questions.iter().all(|frame| [PING, READ].contains(&frame[4])), "only questions");
+    let (faults, reads): (Vec<_>, Vec<_>) = frames.iter().partition(|frame| frame[4] == SYNC_WRITE);
+    let min = ECHO_TRIES + 1 + 102 + 14;
+    assert!(reads.len() >= min, "{}: echoes, a search, one servo, seven servos", reads.len());
+    assert!(reads.iter().all(|frame| [PING, READ].contains(&frame[4])), "only pings and reads");
     assert_eq!(faults.len(), 3 * REPEATS, "panic, hard fault, stack overflow");
     assert!(faults.iter().all(|frame| frame[..] == DAMPING), "{faults:02x?}");
 }

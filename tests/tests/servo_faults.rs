@@ -1,5 +1,4 @@
-//! Servos that fail: the status block says so, and the other joints go on. `docs/protocol.md`, D12 and
-//! section 4.
+//! Faults of servos: the status block reports them, and the other joints continue. `docs/protocol.md`, D12 and section 4.
 
 use std::thread::sleep;
 use std::time::Duration;
@@ -8,110 +7,110 @@ use system_tests::registers::{
     FAULTS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, SERVO_BUS_ERRORS, STANDARD_POSE,
     TARGET_POSITION,
 };
-use system_tests::{Bench, Setup, near, with_arm};
+use system_tests::{TestArm, TestSetup, near, with_arm};
 
 /// The fault bit of the servo bus.
 const SERVO_BUS: u8 = 1 << 1;
-/// Joint 3, whose servo is the faulty one everywhere here: its place in poses, and its bit.
+/// The index and the bit of joint 3, which has the faulty servo in all tests.
 const FAULTY: usize = 2;
 const FAULTY_BIT: u8 = 1 << FAULTY;
 
-fn wait_for_missing(arm: &mut Bench, joints: u8) {
-    arm.wait_until("the status block names the missing servos", |arm| arm.register(MISSING_SERVOS) == joints);
+fn wait_for_missing(arm: &mut TestArm, joints: u8) {
+    arm.wait_until("the missing servos are reported", |arm| arm.register(MISSING_SERVOS) == joints);
 }
 
-/// Sends all joints somewhere, and waits until all but the faulty one are there.
-fn others_go_on(arm: &mut Bench) {
+/// Moves all joints, and waits until all but the faulty one are at their targets.
+fn move_others(arm: &mut TestArm) {
     for shift in [15, 0] {
         let pose = STANDARD_POSE.map(|degrees| degrees - shift);
         arm.write(TARGET_POSITION, &pose);
-        arm.wait_until("the healthy joints are there", |arm| {
+        arm.wait_until("the other joints are at their targets", |arm| {
             let pairs = arm.positions().into_iter().zip(pose).enumerate();
-            pairs.into_iter().all(|(joint, (is, wanted))| joint == FAULTY || near(is, wanted))
+            pairs.into_iter().all(|(joint, (actual, expected))| joint == FAULTY || near(actual, expected))
         });
     }
 }
 
-/// A servo that never answers; its joint is not driven, and its target is the standard pose's (D12).
+/// A servo that never replies: its joint is not driven, and its target is the default (D12).
 #[test]
-fn d12_a_missing_servo_is_named_and_the_others_go_on() {
-    with_arm(Setup::any().fault("3=missing"), |arm| {
+fn d12_a_missing_servo_is_reported_and_the_others_continue() {
+    with_arm(TestSetup::any().fault("3=missing"), |arm| {
         wait_for_missing(arm, FAULTY_BIT);
         assert_eq!(arm.register(FAULTS) & SERVO_BUS, SERVO_BUS);
         assert_eq!(arm.register(TARGET_POSITION + 2), STANDARD_POSE[FAULTY]);
-        others_go_on(arm);
+        move_others(arm);
         let errors = arm.counter(SERVO_BUS_ERRORS);
-        arm.wait_until("each time it is asked counts", |arm| arm.counter(SERVO_BUS_ERRORS) != errors);
+        arm.wait_until("reads without a reply are counted", |arm| arm.counter(SERVO_BUS_ERRORS) != errors);
         assert_eq!(arm.register(MISSING_SERVOS), FAULTY_BIT);
     });
 }
 
-/// A servo whose answers are damaged is as good as missing, and its damage is never taken for a position.
+/// A servo with corrupted replies only is missing, and none of them changes its position.
 #[test]
-fn a_garbled_servo_is_named_and_its_damage_never_becomes_a_position() {
-    with_arm(Setup::any().fault("3=garbled"), |arm| {
+fn a_garbled_servo_is_reported_and_its_position_does_not_change() {
+    with_arm(TestSetup::any().fault("3=garbled"), |arm| {
         wait_for_missing(arm, FAULTY_BIT);
         assert_eq!(arm.register(FAULTS) & SERVO_BUS, SERVO_BUS);
         let before = arm.register(PRESENT_POSITION + 2);
         let errors = arm.counter(SERVO_BUS_ERRORS);
-        others_go_on(arm);
+        move_others(arm);
         assert_ne!(arm.counter(SERVO_BUS_ERRORS), errors);
         assert_eq!(arm.register(PRESENT_POSITION + 2), before);
     });
 }
 
-/// Now and then a damaged answer: it is counted, and the joint goes on all the same.
+/// Some corrupted replies: they are counted, and the joint continues.
 #[test]
-fn a_servo_that_is_garbled_now_and_then_goes_on() {
-    with_arm(Setup::any().fault("3=garbled=10"), |arm| {
+fn a_servo_with_some_corrupted_replies_continues() {
+    with_arm(TestSetup::any().fault("3=garbled=10"), |arm| {
         arm.wait_for_pose(&STANDARD_POSE);
         let errors = arm.counter(SERVO_BUS_ERRORS);
-        others_go_on(arm);
+        move_others(arm);
         arm.wait_for_pose(&STANDARD_POSE);
         assert_ne!(arm.counter(SERVO_BUS_ERRORS), errors);
         assert_eq!(arm.register(MISSING_SERVOS), 0);
     });
 }
 
-/// Answers that come far too late are dropped, not taken for those of the servo asked next. (The emulated arm waits
-/// for 50 ms, the one behind a USB adapter for 300 ms.)
+/// Late replies are dropped, and not assigned to the next servo. The servo timeout is 50 ms in the emulator, and 300 ms with
+/// a USB adapter.
 #[test]
-fn a_late_servo_is_named_and_confuses_no_other() {
-    with_arm(Setup::any().fault("3=late=600"), |arm| {
+fn a_late_servo_is_reported_and_has_no_effect_on_others() {
+    with_arm(TestSetup::any().fault("3=late=600"), |arm| {
         wait_for_missing(arm, FAULTY_BIT);
-        others_go_on(arm);
+        move_others(arm);
         for _ in 0..50 {
             let positions = arm.positions();
-            let wild = positions.iter().zip(STANDARD_POSE).enumerate();
-            let wild = wild.filter(|&(joint, (is, wanted))| joint != FAULTY && !near(*is, wanted));
-            assert_eq!(wild.count(), 0, "{positions:?}");
+            let mut joints = positions.iter().zip(STANDARD_POSE).enumerate();
+            let is_held =
+                joints.all(|(joint, (&actual, expected))| joint == FAULTY || near(actual, expected));
+            assert!(is_held, "{positions:?}");
         }
         assert_eq!(arm.register(MISSING_SERVOS), FAULTY_BIT);
     });
 }
 
-/// A joint that cannot turn shows where it really is, and its servo's complaint as a fault of the bus.
+/// The position of a stuck joint is right, and the alarm of its servo is reported as a servo bus fault.
 #[test]
-fn a_stuck_joint_shows_where_it_is_and_raises_the_fault() {
-    with_arm(Setup::any().fault("3=stuck"), |arm| {
+fn a_stuck_joint_reports_its_position_and_the_fault() {
+    with_arm(TestSetup::any().fault("3=stuck"), |arm| {
         arm.wait_for_pose(&STANDARD_POSE);
-        others_go_on(arm);
+        move_others(arm);
         arm.write(TARGET_POSITION + 2, &[STANDARD_POSE[FAULTY] - 30]);
-        arm.wait_until("the overload shows", |arm| arm.register(FAULTS) & SERVO_BUS != 0);
+        arm.wait_until("the overload is reported", |arm| arm.register(FAULTS) & SERVO_BUS != 0);
         arm.wait_until("set-points have arrived", |arm| arm.register(MOVING_JOINTS) == 0);
         assert!(near(arm.register(PRESENT_POSITION + 2), STANDARD_POSE[FAULTY]));
-        assert_eq!(arm.register(MISSING_SERVOS), 0, "it answers");
+        assert_eq!(arm.register(MISSING_SERVOS), 0, "its servo replies");
     });
 }
 
-/// A servo's overload lasts until its torque was off: so the status block shows whether letting go (D13) really
-/// reaches the servos.
+/// The overload alarm of a servo lasts until its torque is off. So it shows that the motor states reach the servos (D13).
 #[test]
-fn d13_an_overloaded_servo_is_well_again_after_its_torque_was_off() {
-    with_arm(Setup::any().fault("3=stuck"), |arm| {
+fn d13_an_overload_alarm_ends_when_the_torque_is_off() {
+    with_arm(TestSetup::any().fault("3=stuck"), |arm| {
         arm.wait_for_pose(&STANDARD_POSE);
         arm.write(TARGET_POSITION + 2, &[STANDARD_POSE[FAULTY] - 30]);
-        arm.wait_until("the overload shows", |arm| arm.register(FAULTS) & SERVO_BUS != 0);
+        arm.wait_until("the overload is reported", |arm| arm.register(FAULTS) & SERVO_BUS != 0);
         for state in [0, 2] {
             arm.write(MOTOR_STATE, &[state]);
             arm.wait_until("the overload is gone", |arm| arm.register(FAULTS) & SERVO_BUS == 0);
@@ -122,22 +121,22 @@ fn d13_an_overloaded_servo_is_well_again_after_its_torque_was_off() {
     });
 }
 
-/// The controller hears its own requests on the one wire, and is not confused.
+/// The controller receives its own frames on the single wire, and ignores them.
 #[test]
 fn an_echo_on_the_wire_changes_nothing() {
-    with_arm(Setup::any().fault("bus=echo"), |arm| {
+    with_arm(TestSetup::any().fault("bus=echo"), |arm| {
         arm.wait_for_pose(&STANDARD_POSE);
-        others_go_on(arm);
+        move_others(arm);
         arm.wait_for_pose(&STANDARD_POSE);
         assert_eq!(arm.register(FAULTS) & SERVO_BUS, 0);
         assert_eq!(arm.register(MISSING_SERVOS), 0);
     });
 }
 
-/// Several servos at once, and no servo at all: the host is answered as ever.
+/// Without servos, the arm replies to its host.
 #[test]
-fn an_arm_without_servos_answers_its_host() {
-    let mut setup = Setup::any();
+fn an_arm_without_servos_replies_to_its_host() {
+    let mut setup = TestSetup::any();
     for joint in 1..=7 {
         setup = setup.fault(&format!("{joint}=missing"));
     }

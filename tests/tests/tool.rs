@@ -1,36 +1,34 @@
-//! The command line tool, run as a user runs it: arguments in, text and exit status out.
+//! The command line tool: arguments in, text and exit status out.
 
-mod said;
+mod tool_output;
 
 use std::io::Read;
-use std::process::Stdio;
 
-use said::{done, failed, said, without_arm, words};
-use system_tests::programs::tool;
 use system_tests::registers::{
     DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FEEDBACK_FREQUENCY, MOTOR_STATE, OFFSET, SPEED, STANDARD_POSE,
     TARGET_POSITION, TIME,
 };
-use system_tests::{Need, Setup, near, with_arm};
+use system_tests::{Need, TestSetup, near, with_arm};
+use tool_output::{all_output, failed, run_without_arm, succeeded, words};
 
 #[test]
-fn info_says_who_the_arm_is_and_how_it_is() {
-    with_arm(Setup::any().chip_id("0123456789ab"), |arm| {
+fn info_shows_identity_and_status() {
+    with_arm(TestSetup::any().chip_id("0123456789ab"), |arm| {
         arm.write_setting(OFFSET, &[0, 0x85]);
-        let text = done(arm.sevenbot(&["info"]));
+        let text = succeeded(arm.sevenbot(&["info"]));
         assert_eq!(words(&text, "firmware"), ["firmware", "3.0"]);
         assert_eq!(words(&text, "chip id"), ["chip", "id", "0123456789AB"]);
         assert_eq!(words(&text, "offsets"), ["offsets", "0", "-5", "0", "0", "0", "0", "0", "°"]);
         assert_eq!(words(&text, "motor state"), ["motor", "state", "servo"]);
         assert_eq!(words(&text, "faults"), ["faults", "none"]);
-        assert!(!text.contains('\x1b'), "no colours into a pipe");
+        assert!(!text.contains('\x1b'), "no colours in a pipe");
     });
 }
 
 #[test]
-fn info_tells_by_its_exit_status_that_a_servo_is_missing() {
-    with_arm(Setup::any().fault("3=missing"), |arm| {
-        arm.wait_until("the arm has noticed", |arm| arm.register(242) == 0b100);
+fn info_has_exit_status_1_if_a_servo_is_missing() {
+    with_arm(TestSetup::any().fault("3=missing"), |arm| {
+        arm.wait_until("the missing servo is reported", |arm| arm.register(242) == 0b100);
         let text = failed(&arm.sevenbot(&["info"]), 1);
         assert_eq!(words(&text, "servos missing"), ["servos", "missing", "joint", "3"]);
         assert!(text.contains("error:") && text.contains("servo bus"), "{text}");
@@ -39,9 +37,9 @@ fn info_tells_by_its_exit_status_that_a_servo_is_missing() {
 
 #[test]
 fn get_shows_registers_by_name_number_and_range() {
-    with_arm(Setup::any(), |arm| {
+    with_arm(TestSetup::any(), |arm| {
         arm.write(SPEED, &[1, 2, 3, 4, 5, 6, 7]);
-        let text = done(arm.sevenbot(&["get", "SPEED.3", "motor_state", "12", "32..33", "chip-id"]));
+        let text = succeeded(arm.sevenbot(&["get", "SPEED.3", "motor_state", "12", "32..33", "chip-id"]));
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
         assert_eq!(lines[0], ["34", "speed.3", "3", "5.7", "°/s"]);
         assert_eq!(lines[1], ["29", "motor-state", "1", "servo"]);
@@ -50,31 +48,31 @@ fn get_shows_registers_by_name_number_and_range() {
         assert_eq!(lines[4][..3], ["33", "speed.2", "2"]);
         assert_eq!(lines[5][..2], ["2", "chip-id"]);
         assert_eq!(lines.len(), 6);
-        let raw = done(arm.sevenbot(&["get", "--raw", "28..29"]));
+        let raw = succeeded(arm.sevenbot(&["get", "--raw", "28..29"]));
         assert_eq!(words(&raw, "28"), ["28", "eeprom-lock", "0x01"]);
     });
 }
 
 #[test]
-fn set_writes_reads_back_and_shows() {
-    with_arm(Setup::any(), |arm| {
-        let text = done(arm.sevenbot(&["set", "speed", "30"]));
+fn set_writes_reads_back_and_prints() {
+    with_arm(TestSetup::any(), |arm| {
+        let text = succeeded(arm.sevenbot(&["set", "speed", "30"]));
         assert_eq!(text.lines().count(), 7);
         assert_eq!(arm.read(SPEED, 7), [30; 7]);
-        done(arm.sevenbot(&["set", "speed.2", "0x11", "--raw"]));
+        succeeded(arm.sevenbot(&["set", "speed.2", "0x11", "--raw"]));
         assert_eq!(arm.read(SPEED, 3), [30, 17, 30]);
-        done(arm.sevenbot(&["set", "30..31", "1", "0"]));
+        succeeded(arm.sevenbot(&["set", "30..31", "1", "0"]));
         assert_eq!(arm.read(EFFECTOR_TYPE, 2), [1, 0]);
     });
 }
 
 #[test]
-fn set_says_that_the_lock_protects_settings_and_unlocks_on_demand() {
-    with_arm(Setup::any(), |arm| {
+fn set_reports_the_lock_and_opens_it_on_request() {
+    with_arm(TestSetup::any(), |arm| {
         let text = failed(&arm.sevenbot(&["set", "offset.2", "-5"]), 1);
         assert!(text.contains("EEPROM lock") && text.contains("--unlock"), "{text}");
         assert_eq!(arm.register(OFFSET + 1), 0);
-        let text = done(arm.sevenbot(&["set", "--unlock", "offset.2", "-5"]));
+        let text = succeeded(arm.sevenbot(&["set", "--unlock", "offset.2", "-5"]));
         assert_eq!(words(&text, "14"), ["14", "offset.2", "-5", "°"]);
         assert_eq!(arm.register(OFFSET + 1), 0x85);
         assert_eq!(arm.register(EEPROM_LOCK), 1, "closed again");
@@ -82,22 +80,22 @@ fn set_says_that_the_lock_protects_settings_and_unlocks_on_demand() {
 }
 
 #[test]
-fn set_says_what_is_out_of_range_before_and_after_sending() {
-    with_arm(Setup::any(), |arm| {
+fn set_reports_values_out_of_range() {
+    with_arm(TestSetup::any(), |arm| {
         let before = arm.read(TARGET_POSITION, 7);
         let text = failed(&arm.sevenbot(&["set", "target-position.3", "181"]), 1);
         assert!(text.contains("target-position.3 takes 0 to 180"), "{text}");
         let pose = ["set", "target", "--raw", "10", "20", "30", "40", "50", "60", "200"];
         let text = failed(&arm.sevenbot(&pose), 1);
         assert!(text.contains("target-position.7 takes 0 to 180"), "{text}");
-        assert_eq!(text.matches("error:").count(), 1, "one reason for all seven: {text}");
+        assert_eq!(text.matches("error:").count(), 1, "one error for all seven: {text}");
         assert_eq!(arm.read(TARGET_POSITION, 7), before);
     });
 }
 
 #[test]
-fn set_says_what_is_read_only_and_what_is_no_register() {
-    with_arm(Setup::any(), |arm| {
+fn set_reports_read_only_and_unknown_registers() {
+    with_arm(TestSetup::any(), |arm| {
         let text = failed(&arm.sevenbot(&["set", "present-position.1", "10"]), 1);
         assert!(text.contains("read only"), "{text}");
         let text = failed(&arm.sevenbot(&["set", "100", "10"]), 1);
@@ -106,8 +104,8 @@ fn set_says_what_is_read_only_and_what_is_no_register() {
 }
 
 #[test]
-fn set_says_that_the_storage_is_full() {
-    with_arm(Setup::any().needs(Need::ExpendableStorage), |arm| {
+fn set_reports_a_full_storage() {
+    with_arm(TestSetup::any().needs(Need::ExpendableStorage), |arm| {
         arm.write(EEPROM_LOCK, &[0]);
         let mut id = 0_u8;
         while arm.register(DEVICE_ID) == id {
@@ -120,30 +118,30 @@ fn set_says_that_the_storage_is_full() {
 }
 
 #[test]
-fn pose_moves_the_arm_and_waits_for_it() {
-    with_arm(Setup::any(), |arm| {
-        let text = done(
+fn pose_moves_the_arm_and_waits() {
+    with_arm(TestSetup::any(), |arm| {
+        let text = succeeded(
             arm.sevenbot(&["pose", "--wait", "--speed", "100", "120", "90", "65", "90", "90", "90", "80"]),
         );
         let positions: Vec<u8> = text.split_whitespace().map(|word| word.parse().expect("degrees")).collect();
         assert!(near(positions[0], 120), "{positions:?}");
         assert_eq!(arm.read(SPEED, 7), [100; 7]);
         arm.wait_for_pose(&[120, 90, 65, 90, 90, 90, 80]);
-        done(arm.sevenbot(&["pose", "--wait", "--time", "5", "90", "90", "65", "90", "90", "90", "80"]));
-        assert_eq!(arm.read(SPEED, 7), [0; 7], "or the time would not count");
+        succeeded(arm.sevenbot(&["pose", "--wait", "--time", "5", "90", "90", "65", "90", "90", "90", "80"]));
+        assert_eq!(arm.read(SPEED, 7), [0; 7], "speed 0, so that the time applies");
         assert_eq!(arm.read(TIME, 7), [5; 7]);
         arm.wait_for_pose(&STANDARD_POSE);
     });
 }
 
 #[test]
-fn pose_says_why_the_arm_does_not_get_there() {
-    with_arm(Setup::any(), |arm| {
+fn pose_reports_why_the_arm_does_not_reach_the_pose() {
+    with_arm(TestSetup::any(), |arm| {
         arm.write(MOTOR_STATE, &[2]);
         let text = failed(&arm.sevenbot(&["pose", "90", "90", "65", "90", "90", "90", "80"]), 1);
         assert!(text.contains("forceless"), "{text}");
     });
-    with_arm(Setup::any().fault("3=stuck"), |arm| {
+    with_arm(TestSetup::any().fault("3=stuck"), |arm| {
         arm.wait_for_pose(&STANDARD_POSE);
         let text = failed(&arm.sevenbot(&["pose", "--wait", "90", "90", "100", "90", "90", "90", "80"]), 1);
         assert!(text.contains("joint 3 is at 65°, not 100°"), "{text}");
@@ -151,11 +149,11 @@ fn pose_says_why_the_arm_does_not_get_there() {
 }
 
 #[test]
-fn monitor_into_a_pipe_is_one_line_a_sample() {
-    with_arm(Setup::any(), |arm| {
-        // Reports in between are no answers, and must not disturb.
+fn monitor_prints_a_line_per_sample_into_a_pipe() {
+    with_arm(TestSetup::any(), |arm| {
+        // Reports between the replies must have no effect.
         arm.write(FEEDBACK_FREQUENCY, &[50]);
-        let text = done(arm.sevenbot(&["monitor", "--samples", "5", "--hz", "50"]));
+        let text = succeeded(arm.sevenbot(&["monitor", "--samples", "5", "--hz", "50"]));
         arm.write(FEEDBACK_FREQUENCY, &[0]);
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
         assert_eq!(lines.len(), 6, "{text}");
@@ -163,46 +161,43 @@ fn monitor_into_a_pipe_is_one_line_a_sample() {
         for line in &lines[1..] {
             assert_eq!(line.len(), 16, "{text}");
             let degrees = line[1..15].iter().map(|word| word.parse::<u8>().expect("degrees"));
-            assert!(degrees.zip([STANDARD_POSE, STANDARD_POSE].concat()).all(|(is, was)| near(is, was)));
-            assert_eq!(line[15], "-", "nothing moves");
+            assert!(
+                degrees
+                    .zip([STANDARD_POSE, STANDARD_POSE].concat())
+                    .all(|(actual, expected)| near(actual, expected))
+            );
+            assert_eq!(line[15], "-", "no joint moves");
         }
     });
 }
 
 #[test]
-fn monitor_into_a_pipe_that_closes_ends_quietly() {
-    with_arm(Setup::any(), |arm| {
-        let port = arm.lend_port();
-        let mut monitor = tool()
-            .args(["monitor", "--hz", "50", "--port"])
-            .arg(&port)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("sevenbot runs");
+fn monitor_ends_without_an_error_when_its_pipe_closes() {
+    with_arm(TestSetup::any(), |arm| {
+        let mut monitor = arm.spawn_sevenbot(&["monitor", "--hz", "50"]);
         let mut output = monitor.stdout.take().expect("a pipe");
         output.read_exact(&mut [0; 20]).expect("the first line");
         drop(output);
-        let output = monitor.wait_with_output().expect("it ends");
-        assert_eq!(said(&output), "");
+        let output = monitor.wait_with_output().expect("the tool ends");
+        assert_eq!(all_output(&output), "");
         assert_eq!(output.status.code(), Some(0));
         arm.reopen(115_200);
     });
 }
 
 #[test]
-fn without_a_connection_the_tool_says_what_to_check() {
-    let run = without_arm;
+fn without_a_connection_the_tool_suggests_what_to_check() {
+    let run = run_without_arm;
     let text = failed(&run(&["info"]), 3);
     assert!(text.contains("--port") && text.contains("SEVENBOT_PORT"), "{text}");
     let text = failed(&run(&["--port", "/dev/no-such-port", "info"]), 3);
     assert!(text.contains("/dev/no-such-port: there is no such port"), "{text}");
     let text = failed(&run(&["get", "nonsense"]), 2);
     assert!(text.contains("no register of this name"), "{text}");
-    with_arm(Setup::any(), |arm| {
+    with_arm(TestSetup::any(), |arm| {
         let port = arm.lend_port();
-        let holder = system_tests::Line::open(&port, 115_200);
-        let text = failed(&run(&["--port", port.to_str().expect("a name"), "info"]), 3);
+        let holder = system_tests::ArmClient::open(&port, 115_200);
+        let text = failed(&run(&["--port", port.to_str().expect("UTF-8"), "info"]), 3);
         assert!(text.contains("another program has this port open"), "{text}");
         drop(holder);
         arm.reopen(115_200);
@@ -210,8 +205,8 @@ fn without_a_connection_the_tool_says_what_to_check() {
 }
 
 #[test]
-fn help_teaches_by_example_and_documents_exit_statuses() {
-    let help = |arguments: &[&str]| done(without_arm(arguments));
+fn help_contains_examples_and_exit_statuses() {
+    let help = |arguments: &[&str]| succeeded(run_without_arm(arguments));
     let text = help(&["--help"]);
     assert!(text.contains("Examples:") && text.contains("Exit status:"), "{text}");
     for command in ["get", "set", "pose", "monitor"] {

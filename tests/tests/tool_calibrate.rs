@@ -1,46 +1,46 @@
-//! `sevenbot calibrate`: offsets found, written, reset, and still there after a restart.
+//! `sevenbot calibrate`: offsets are determined, written, reset and kept over a restart.
 
-mod said;
+mod tool_output;
 
 use std::io::Write;
 use std::process::{Output, Stdio};
 
-use said::{done, failed, said, words};
-use system_tests::own::{OwnArm, World};
+use system_tests::arm_control::ArmControl;
 use system_tests::programs::{sevenbot, tool};
 use system_tests::registers::{EEPROM_LOCK, MOTOR_STATE, OFFSET};
-use system_tests::target::Target;
+use system_tests::started_arm::{ArmKind, StartedArm};
 use system_tests::terminal::Terminal;
-use system_tests::{Bench, Need, Setup, near, with_arm};
+use system_tests::{Need, TestArm, TestSetup, near, with_arm};
+use tool_output::{all_output, failed, succeeded, words};
 
-/// The tool with lines for it to read.
-fn with_input(arm: &mut Bench, arguments: &[&str], input: &str) -> Output {
+/// Runs the tool with this text on its standard input.
+fn with_input(arm: &mut TestArm, arguments: &[&str], input: &str) -> Output {
     let mut tool = tool();
     tool.arg("--port").arg(arm.lend_port()).args(arguments);
     let tool = tool.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     let mut tool = tool.expect("sevenbot runs");
     let mut lines = tool.stdin.take().expect("a pipe");
-    lines.write_all(input.as_bytes()).expect("it reads");
+    lines.write_all(input.as_bytes()).expect("the tool reads");
     drop(lines);
-    let output = tool.wait_with_output().expect("it ends");
+    let output = tool.wait_with_output().expect("the tool ends");
     arm.reopen(115_200);
     output
 }
 
 #[test]
-fn calibration_makes_joints_read_what_they_really_are() {
-    with_arm(Setup::any().supported().needs(Need::Persistence), |arm| {
-        // Forceless, no joint goes anywhere: what changes is only the reading.
+fn calibration_corrects_the_measured_angles() {
+    with_arm(TestSetup::any().supported().needs(Need::Persistence), |arm| {
+        // Forceless, so that no joint moves and only the readings change.
         arm.write(MOTOR_STATE, &[2]);
-        let walk = "nonsense\n+5\n93\n100\n87\n\n\n\n\n\n";
-        let output = with_input(arm, &["calibrate", "--yes"], walk);
-        let said = said(&output);
-        let text = done(output);
-        assert!(said.contains("forceless"), "why +5 did nothing: {said}");
+        let answers = "nonsense\n+5\n93\n100\n87\n\n\n\n\n\n";
+        let output = with_input(arm, &["calibrate", "--yes"], answers);
+        let all = all_output(&output);
+        let text = succeeded(output);
+        assert!(all.contains("forceless"), "the reason why +5 has no effect: {all}");
         assert_eq!(words(&text, "1 "), ["1", "3°", "good", "(was", "0°)"]);
-        // Mounted the other way round, the offset counts on the servo's side.
+        // Joint 2 is mounted in reverse, and its offset has the sign of the servo.
         assert_eq!(words(&text, "2 "), ["2", "-10°", "good", "(was", "0°)"]);
-        assert!(said.contains("bad"), "22 degrees are too much: {said}");
+        assert!(all.contains("bad"), "22 degrees are too much: {all}");
         assert_eq!(words(&text, "3 "), ["3", "0°", "good"]);
         let positions = arm.positions();
         assert!(near(positions[0], 93) && near(positions[1], 100), "{positions:?}");
@@ -48,10 +48,10 @@ fn calibration_makes_joints_read_what_they_really_are() {
 }
 
 #[test]
-fn calibration_shows_and_resets_and_wants_somebody_to_answer() {
-    with_arm(Setup::any(), |arm| {
+fn calibration_shows_and_resets_offsets_and_needs_answers() {
+    with_arm(TestSetup::any(), |arm| {
         arm.write_setting(OFFSET, &[0x85, 12, 0, 0, 0, 0, 0]);
-        let text = done(arm.sevenbot(&["calibrate", "--show"]));
+        let text = succeeded(arm.sevenbot(&["calibrate", "--show"]));
         assert_eq!(words(&text, "1 "), ["1", "-5°", "good"]);
         assert_eq!(words(&text, "2 "), ["2", "12°", "acceptable"]);
         let text = failed(&arm.sevenbot(&["calibrate", "--reset"]), 2);
@@ -59,54 +59,54 @@ fn calibration_shows_and_resets_and_wants_somebody_to_answer() {
         let text = failed(&with_input(arm, &["calibrate", "--yes"], "\n95\n"), 2);
         assert!(text.contains("the input has ended"), "{text}");
         assert_eq!(arm.read(OFFSET, 7), [0x85, 12, 0, 0, 0, 0, 0], "nothing was written");
-        done(arm.sevenbot(&["calibrate", "--reset", "--yes"]));
+        succeeded(arm.sevenbot(&["calibrate", "--reset", "--yes"]));
         assert_eq!(arm.read(OFFSET, 7), [0; 7]);
         assert_eq!(arm.register(EEPROM_LOCK), 1, "closed again");
     });
 }
 
-/// The tool in a terminal, on an arm that nobody else has open.
-fn at_terminal(arm: &OwnArm, arguments: &[&str]) -> Terminal {
+/// Runs the tool in a terminal.
+fn calibrate_in_terminal(arm: &StartedArm, arguments: &[&str]) -> Terminal {
     let port = arm.port().to_str().expect("UTF-8");
     Terminal::run(sevenbot(), &[&["--port", port, "calibrate"], arguments].concat())
 }
 
 #[test]
-fn offsets_are_looked_for_again_after_a_restart() {
-    // One of its own: the tool is not alone with it, somebody has to switch it off and on.
-    let mut arm = OwnArm::start(World::Simulator, Vec::new());
-    let mut walk = at_terminal(&arm, &[]);
-    walk.wait_for("joint 1: reads 90°");
-    walk.keys("93\r");
+fn offsets_are_verified_after_a_restart() {
+    // The arm is switched off and on while the tool has its port open.
+    let mut arm = StartedArm::start(ArmKind::Simulator, Vec::new());
+    let mut terminal = calibrate_in_terminal(&arm, &[]);
+    terminal.wait_for("joint 1: reads 90°");
+    terminal.keys("93\r");
     for joint in 2..=7 {
-        walk.wait_for(&format!("joint {joint}:"));
-        walk.keys("\r");
+        terminal.wait_for(&format!("joint {joint}:"));
+        terminal.keys("\r");
     }
-    walk.wait_for("Write these offsets?");
-    walk.keys("y\r");
-    walk.wait_for("switch the arm off and on");
+    terminal.wait_for("Write these offsets?");
+    terminal.keys("y\r");
+    terminal.wait_for("switch the arm off and on");
     arm.power_cycle();
-    walk.keys("\r");
-    let screen = walk.wait_for("the offsets are still there");
+    terminal.keys("\r");
+    let screen = terminal.wait_for("the offsets are still there");
     assert!(!screen.contains("not switched off"), "{screen}");
-    assert!(walk.wait().success(), "{}", walk.shows());
+    assert!(terminal.wait().success(), "{}", terminal.contents());
 
-    let mut reset = at_terminal(&arm, &["--reset"]);
+    let mut reset = calibrate_in_terminal(&arm, &["--reset"]);
     reset.wait_for("Write these offsets?");
     reset.keys("y\r");
     reset.wait_for("switch the arm off and on");
     reset.keys("\r");
     reset.wait_for("the arm was not switched off");
-    assert!(reset.wait().success(), "{}", reset.shows());
+    assert!(reset.wait().success(), "{}", reset.contents());
 }
 
 #[test]
-fn ctrl_c_at_a_question_ends_it_at_once() {
-    let arm = OwnArm::start(World::Simulator, Vec::new());
-    let mut walk = at_terminal(&arm, &[]);
-    walk.wait_for("joint 1: reads 90°");
-    walk.keys("+2\r");
-    walk.wait_for("joint 1: reads 92°");
-    walk.keys("\x03");
-    assert_eq!(walk.wait().code(), Some(130), "{}", walk.shows());
+fn ctrl_c_at_a_prompt_ends_the_tool() {
+    let arm = StartedArm::start(ArmKind::Simulator, Vec::new());
+    let mut terminal = calibrate_in_terminal(&arm, &[]);
+    terminal.wait_for("joint 1: reads 90°");
+    terminal.keys("+2\r");
+    terminal.wait_for("joint 1: reads 92°");
+    terminal.keys("\x03");
+    assert_eq!(terminal.wait().code(), Some(130), "{}", terminal.contents());
 }

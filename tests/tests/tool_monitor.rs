@@ -1,32 +1,27 @@
-//! `sevenbot monitor`, in a terminal as a user has one, and as lines.
+//! `sevenbot monitor` in a terminal, and with output in lines.
 
-mod said;
+mod tool_output;
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
-use std::thread::sleep;
-use std::time::{Duration, Instant};
-
-use said::{done, failed};
-
-use system_tests::line::PATIENCE;
-use system_tests::own::{OwnArm, World};
-use system_tests::programs::{sevenbot, tool};
+use system_tests::programs::sevenbot;
 use system_tests::registers::{MOTOR_STATE, TARGET_POSITION};
+use system_tests::started_arm::{ArmKind, StartedArm};
 use system_tests::terminal::Terminal;
-use system_tests::{Need, Setup, near, with_arm};
+use system_tests::wait::wait_until;
+use system_tests::{Need, TestSetup, near, with_arm};
+use tool_output::{failed, succeeded};
 
 const RIGHT: &str = "\x1b[C";
 const SHIFT_LEFT: &str = "\x1b[1;2D";
 
-/// The monitor in a terminal, on a port that nobody else has open.
+/// Runs the monitor in a terminal.
 fn monitor(port: &Path, options: &[&str]) -> Terminal {
     let port = port.to_str().expect("port names are UTF-8");
     Terminal::run(sevenbot(), &[&["monitor", "--port", port], options].concat())
 }
 
-/// The row of a joint on the monitor's screen, without what leads to it.
+/// The words in the row of a joint on the screen.
 fn row(screen: &str, joint: u8) -> Vec<&str> {
     let number = joint.to_string();
     let rows = screen.lines().map(|line| line.trim_start_matches([' ', '▸']).split_whitespace().collect());
@@ -34,13 +29,13 @@ fn row(screen: &str, joint: u8) -> Vec<&str> {
     rows.next().unwrap_or_default()
 }
 
-/// The screen with everything masked that is another each time: the port, counts, times, and the past.
+/// The screen without the parts that differ between runs: port, counts, times, and plots.
 fn masked(screen: &str, port: &Path) -> String {
     let port = port.to_str().expect("port names are UTF-8");
     let mask = |line: &str| {
-        // The weight of the arm loads the motors, and the supply is at the edge between the two figures.
+        // The weight of the arm loads the motors, so that the supply is between these two values.
         let line = line.replace(port, "PORT").replace("supply 7.3 V", "supply 7.4 V");
-        // Braille: the plot begins when the monitor does.
+        // Braille patterns of the plots.
         let line: String =
             line.chars().filter(|symbol| !('\u{2801}'..='\u{28ff}').contains(symbol)).collect();
         let line = if line.contains("round trip") { " link ... round trip ..." } else { line.as_str() };
@@ -56,72 +51,72 @@ fn masked(screen: &str, port: &Path) -> String {
 
 #[test]
 fn the_screen_shows_the_arm() {
-    // An arm that keeps no settings has a fault to show.
-    with_arm(Setup::any().needs(Need::FreshArm).needs(Need::Persistence), |arm| {
+    // An arm without storage reports a fault.
+    with_arm(TestSetup::any().needs(Need::FreshArm).needs(Need::Persistence), |arm| {
         let port = arm.lend_port();
         let mut terminal = monitor(&port, &[]);
-        let screen = terminal.wait_until("a round trip", |screen| {
+        let screen = terminal.wait_until("a round trip is shown", |screen| {
             screen.contains("faults none") && screen.contains("round trip") && row(screen, 7).len() > 4
         });
-        assert!(terminal.is_on_own_screen());
+        assert!(terminal.is_on_alternate_screen());
         insta::assert_snapshot!(masked(&screen, &port));
         terminal.keys("?");
         terminal.wait_for("select a joint");
         terminal.keys("?");
-        terminal.wait_until("no help", |screen| !screen.contains("select a joint"));
+        terminal.wait_until("the help is closed", |screen| !screen.contains("select a joint"));
         terminal.keys(" ");
         terminal.wait_for("frozen");
         terminal.keys("q");
         assert!(terminal.wait().success());
-        assert!(!terminal.is_on_own_screen(), "the terminal is given back");
+        assert!(!terminal.is_on_alternate_screen(), "the normal screen is restored");
         arm.reopen(115_200);
     });
 }
 
 #[test]
-fn keys_nudge_a_joint_and_change_speeds() {
-    with_arm(Setup::any(), |arm| {
+fn keys_move_a_joint_and_change_speeds() {
+    with_arm(TestSetup::any(), |arm| {
         let before = arm.read(TARGET_POSITION, 7);
         let port = arm.lend_port();
         let mut terminal = monitor(&port, &[]);
-        terminal.wait_for("round trip");
+        terminal.wait_for("114.0 °/s");
         terminal.keys("3");
         terminal.wait_for("▸   3");
         for key in [RIGHT, RIGHT, RIGHT, "]", "]", SHIFT_LEFT] {
             terminal.keys(key);
         }
-        let wanted = before[2] + 13;
-        let is_there = |screen: &str| row(screen, 3).get(1) == Some(&format!("{wanted}°").as_str());
-        terminal.wait_until("joint 3 sent 13 degrees further", is_there);
+        let expected = before[2] + 13;
+        let is_sent = |screen: &str| row(screen, 3).get(1) == Some(&format!("{expected}°").as_str());
+        terminal.wait_until("the target of joint 3 is 13 degrees further", is_sent);
         terminal.keys("--");
         terminal.wait_for("95.0 °/s");
-        terminal.wait_until("joint 3 there", |screen| {
+        terminal.wait_until("joint 3 is at its target", |screen| {
             let present = row(screen, 3).get(2).and_then(|word| word.trim_end_matches('°').parse().ok());
-            present.is_some_and(|present| near(present, wanted))
+            present.is_some_and(|present| near(present, expected))
         });
-        // Ctrl-C makes the arm hold where it is, which the nudged joint has reached.
+        // Ctrl-C makes the arm hold its position, which for joint 3 is its target.
         terminal.keys("\x03");
         terminal.wait_for("the arm holds where it is");
         assert!(terminal.wait().success());
         arm.reopen(115_200);
-        assert!(near(arm.read(TARGET_POSITION, 7)[2], wanted));
+        assert!(near(arm.read(TARGET_POSITION, 7)[2], expected));
         arm.write(TARGET_POSITION, &before);
         arm.wait_for_pose(&before);
     });
 }
 
 #[test]
-fn letting_the_arm_fall_takes_a_yes() {
-    with_arm(Setup::any(), |arm| {
+fn the_state_forceless_needs_a_confirmation() {
+    with_arm(TestSetup::any(), |arm| {
         let port = arm.lend_port();
         let mut terminal = monitor(&port, &[]);
-        terminal.wait_for("round trip");
+        terminal.wait_for("114.0 °/s");
         terminal.keys("s");
         terminal.wait_for("motor state");
         terminal.keys("f");
         terminal.wait_for("The arm will fall");
         terminal.keys("n");
-        terminal.wait_until("no question", |screen| !screen.contains("The arm will fall"));
+        terminal.wait_until("the prompt is closed", |screen| !screen.contains("The arm will fall"));
         terminal.keys("s");
         terminal.wait_for("motor state");
         terminal.keys("f");
@@ -138,19 +133,19 @@ fn letting_the_arm_fall_takes_a_yes() {
 }
 
 #[test]
-fn an_arm_that_went_away_is_found_again() {
-    // One of its own, because its port has to keep its name.
+fn an_arm_that_was_restarted_is_found_again() {
+    // The link keeps its path when the arm restarts.
     let folder = tempfile::tempdir().expect("a temporary folder");
     let link = folder.path().join("7bot");
     let options = vec![("--link".to_owned(), link.to_str().expect("UTF-8").to_owned())];
-    let arm = OwnArm::start(World::Simulator, options.clone());
+    let arm = StartedArm::start(ArmKind::Simulator, options.clone());
     let mut terminal = monitor(&link, &[]);
     terminal.wait_for("114.0 °/s");
     drop(arm);
     let screen = terminal.wait_for("no arm, looking again");
-    assert!(screen.contains("114.0 °/s"), "what was last known is still there:\n{screen}");
-    let _arm = OwnArm::start(World::Simulator, options);
-    terminal.wait_until("the arm again", |screen| {
+    assert!(screen.contains("114.0 °/s"), "the last values are shown:\n{screen}");
+    let _arm = StartedArm::start(ArmKind::Simulator, options);
+    terminal.wait_until("the arm is shown again", |screen| {
         screen.contains("firmware 3.0") && screen.contains("servo") && !screen.contains("no arm")
     });
     terminal.keys("q");
@@ -162,17 +157,17 @@ fn lines(text: &str) -> Vec<Vec<&str>> {
 }
 
 #[test]
-fn csv_goes_to_a_file_and_is_whole_when_the_cable_is_pulled() {
-    with_arm(Setup::any().needs(Need::Kill), |arm| {
+fn csv_is_complete_up_to_a_lost_connection() {
+    with_arm(TestSetup::any().needs(Need::Kill), |arm| {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let file = folder.path().join("move.csv");
-        let port = arm.lend_port();
-        let mut command = tool();
-        command.args(["monitor", "--hz", "50", "--csv"]).arg(&file).arg("--port").arg(&port);
-        let tool = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("sevenbot runs");
-        wait_for_lines(&file, 10);
+        let path = file.to_str().expect("UTF-8");
+        let tool = arm.spawn_sevenbot(&["monitor", "--hz", "50", "--csv", path]);
+        wait_until("there are ten lines", || {
+            fs::read_to_string(&file).is_ok_and(|text| text.lines().count() >= 10)
+        });
         arm.kill_and_restart();
-        let output = tool.wait_with_output().expect("it ends");
+        let output = tool.wait_with_output().expect("the tool ends");
         assert!(failed(&output, 3).contains("the connection is gone"));
         let text = fs::read_to_string(&file).expect("a file");
         assert!(text.ends_with('\n'));
@@ -183,19 +178,10 @@ fn csv_goes_to_a_file_and_is_whole_when_the_cable_is_pulled() {
     });
 }
 
-/// Waits until a program has written so many lines.
-fn wait_for_lines(file: &Path, count: usize) {
-    let deadline = Instant::now() + PATIENCE;
-    while fs::read_to_string(file).map_or(0, |text| text.lines().count()) < count {
-        assert!(Instant::now() < deadline, "no lines in {}", file.display());
-        sleep(Duration::from_millis(10));
-    }
-}
-
 #[test]
-fn json_is_a_value_a_line() {
-    with_arm(Setup::any().needs(Need::Persistence), |arm| {
-        let text = done(arm.sevenbot(&["monitor", "--json", "--samples", "3", "--hz", "50"]));
+fn json_output_has_a_line_per_sample() {
+    with_arm(TestSetup::any().needs(Need::Persistence), |arm| {
+        let text = succeeded(arm.sevenbot(&["monitor", "--json", "--samples", "3", "--hz", "50"]));
         assert_eq!(text.lines().count(), 3, "{text}");
         for line in text.lines() {
             assert!(line.starts_with("{\"seconds\":") && line.ends_with('}'), "{line}");
@@ -205,12 +191,12 @@ fn json_is_a_value_a_line() {
 }
 
 #[test]
-fn a_picture_of_the_screen_can_be_had_for_documents() {
-    with_arm(Setup::any(), |arm| {
+fn the_screen_can_be_saved_as_a_picture() {
+    with_arm(TestSetup::any(), |arm| {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let file = folder.path().join("monitor.svg");
         let path = file.to_str().expect("UTF-8");
-        done(arm.sevenbot(&["monitor", "--picture", path, "--samples", "5", "--hz", "50"]));
+        succeeded(arm.sevenbot(&["monitor", "--picture", path, "--samples", "5", "--hz", "50"]));
         let picture = fs::read_to_string(&file).expect("a picture");
         assert!(picture.starts_with("<svg") && picture.contains(">7Bot<") && picture.contains("<circle"));
     });

@@ -1,28 +1,26 @@
-//! `sevenbot record` and `play`: movements to files and back, with the cable in and out.
+//! `sevenbot record` and `play`: recordings of moves, also with a lost connection.
 
-mod said;
+mod tool_output;
 
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::thread::sleep;
-use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process};
-use said::{done, failed, said};
-use system_tests::line::PATIENCE;
-use system_tests::own::{OwnArm, World};
+use system_tests::arm_control::ArmControl;
+use system_tests::process::{Signal, send_signal};
 use system_tests::programs::{TOOL_TIMEOUT, sevenbot, tool};
 use system_tests::registers::{
     FEEDBACK_FREQUENCY, MOTOR_STATE, SPEED, STANDARD_POSE, TARGET_POSITION, VACUUM_PUMP,
 };
-use system_tests::target::Target;
+use system_tests::started_arm::{ArmKind, StartedArm};
 use system_tests::terminal::Terminal;
-use system_tests::{Bench, Need, Setup, near, with_arm};
+use system_tests::wait::wait_until;
+use system_tests::{Need, TestArm, TestSetup, near, with_arm};
 use tempfile::TempDir;
+use tool_output::{all_output, failed, succeeded};
 
-/// To the left and back, and the pump on.
+/// A recording: joint 1 moves by 30 degrees and back, and the pump is switched on.
 const WAVE: &str = "\
 7bot-recording 1
 # by hand
@@ -31,7 +29,7 @@ const WAVE: &str = "\
 1.0  90 90 65 90 90 90 80  1
 ";
 
-/// A folder for a file of this name with this in it.
+/// A path in a new folder, with a file unless the text is empty.
 fn file(name: &str, text: &str) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join(name);
@@ -45,120 +43,105 @@ fn text(path: &Path) -> &str {
     path.to_str().expect("UTF-8")
 }
 
-/// The moments of a recording, field by field.
+/// The fields of the moments of a recording.
 fn moments(path: &Path) -> Vec<Vec<f64>> {
     let text = fs::read_to_string(path).unwrap_or_default();
-    let whole = text.lines().filter(|line| line.starts_with(|first: char| first.is_ascii_digit()));
-    let moments = whole.filter(|line| !line.starts_with("7bot"));
+    let lines = text.lines().filter(|line| line.starts_with(|first: char| first.is_ascii_digit()));
+    let moments = lines.filter(|line| !line.starts_with("7bot"));
     moments
         .map(|line| line.split_whitespace().map(|word| word.parse().expect("a number")).collect())
         .collect()
 }
 
-/// The tool in the background, on an arm whose port it borrows.
-fn begin(arm: &mut Bench, arguments: &[&str]) -> Child {
-    let mut tool = tool();
-    tool.arg("--port").arg(arm.lend_port()).args(arguments);
-    tool.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("sevenbot runs")
-}
-
-/// Plays a long recording in the background, and waits until the arm is under way.
-fn begin_to_play(arm: &mut Bench, arguments: &[&str]) -> Child {
-    let mut tool = begin(arm, &[&["play", "--verbose"], arguments].concat());
+/// Plays a recording, and waits until the arm moves.
+fn start_to_play(arm: &mut TestArm, arguments: &[&str]) -> Child {
+    let mut tool = arm.spawn_sevenbot(&[&["play", "--verbose"], arguments].concat());
     let mut frames = tool.stderr.take().expect("a pipe");
-    let mut came = Vec::new();
-    while !String::from_utf8_lossy(&came).contains("-> write vacuum-pump") {
+    let mut received = Vec::new();
+    while !String::from_utf8_lossy(&received).contains("-> write vacuum-pump") {
         let mut chunk = [0; 256];
         let length = frames.read(&mut chunk).expect("text");
-        assert_ne!(length, 0, "ended before the arm moved:\n{}", String::from_utf8_lossy(&came));
-        came.extend(&chunk[..length]);
+        assert_ne!(length, 0, "ended before the arm moved:\n{}", String::from_utf8_lossy(&received));
+        received.extend(&chunk[..length]);
     }
     tool.stderr = Some(frames);
     tool
 }
 
-fn interrupt(tool: &Child) {
-    let id = i32::try_from(tool.id()).ok().and_then(Pid::from_raw).expect("a process id");
-    kill_process(id, Signal::INT).expect("it is running");
-}
-
 #[track_caller]
 fn wait_for_moments(path: &Path, count: usize) {
-    let deadline = Instant::now() + PATIENCE;
-    while moments(path).len() < count {
-        assert!(Instant::now() < deadline, "no moments in {}", path.display());
-        sleep(Duration::from_millis(10));
-    }
+    wait_until("the moments are recorded", || moments(path).len() >= count);
 }
 
 fn end(tool: Child) -> Output {
-    tool.wait_with_output().expect("it ends")
+    tool.wait_with_output().expect("the tool ends")
 }
 
 #[test]
-fn a_move_is_recorded_and_played_and_drawn() {
-    with_arm(Setup::any(), |arm| {
-        let (folder, tape) = file("move.txt", "");
+fn a_move_is_recorded_played_and_plotted() {
+    with_arm(TestSetup::any(), |arm| {
+        let (folder, recording) = file("move.txt", "");
         let drawing = folder.path().join("move.svg");
-        arm.wait_until("a recording begins before the move is over", |arm| {
+        arm.wait_until("a recording begins before the end of the move", |arm| {
             arm.drive_to(&STANDARD_POSE);
             // 30 degrees at 5.7 degrees/s.
-            done(arm.sevenbot(&["pose", "120", "90", "65", "90", "90", "90", "80", "--speed", "3"]));
-            let report = done(arm.sevenbot(&["record", text(&tape), "--driven", "--yes", "--seconds", "7"]));
+            succeeded(arm.sevenbot(&["pose", "120", "90", "65", "90", "90", "90", "80", "--speed", "3"]));
+            let report =
+                succeeded(arm.sevenbot(&["record", text(&recording), "--driven", "--yes", "--seconds", "7"]));
             assert!(report.contains("moments in"), "{report}");
-            moments(&tape)[0][1] < 115.0
+            moments(&recording)[0][1] < 115.0
         });
-        let moments = moments(&tape);
+        let moments = moments(&recording);
         let last = &moments[moments.len() - 1];
         assert!((last[1] - 120.0).abs() <= 2.0, "{last:?}");
         assert!(moments.iter().all(|moment| moment.len() == 9));
         assert!(moments.windows(2).all(|pair| pair[0][0] < pair[1][0]));
-        assert_eq!(arm.register(FEEDBACK_FREQUENCY), 0, "it reports no more");
+        assert_eq!(arm.register(FEEDBACK_FREQUENCY), 0, "reports are off again");
 
         arm.write(TARGET_POSITION, &STANDARD_POSE);
         arm.wait_for_pose(&STANDARD_POSE);
-        done(arm.sevenbot(&["play", text(&tape), "--speed", "4", "--plot", text(&drawing)]));
+        succeeded(arm.sevenbot(&["play", text(&recording), "--speed", "4", "--plot", text(&drawing)]));
         assert!(near(arm.positions()[0], 120), "{:?}", arm.positions());
-        assert_eq!(arm.read(SPEED, 7), [3; 7], "as they were before");
+        assert_eq!(arm.read(SPEED, 7), [3; 7], "the speeds are restored");
         assert_eq!(arm.register(FEEDBACK_FREQUENCY), 0);
         let drawing = fs::read_to_string(drawing).expect("a drawing");
-        assert_eq!(drawing.matches("<polyline class=\"measured\"").count(), 8, "seven and the legend's");
+        assert_eq!(drawing.matches("<polyline class=\"measured\"").count(), 8, "seven plots and the legend");
         arm.write(TARGET_POSITION, &STANDARD_POSE);
         arm.wait_for_pose(&STANDARD_POSE);
     });
 }
 
 #[test]
-fn a_hand_guides_the_arm_and_the_arm_holds_what_it_was_shown() {
-    with_arm(Setup::any().supported(), |arm| {
-        let (_folder, tape) = file("hand.txt", "");
-        let text_of = failed(&arm.sevenbot(&["record", text(&tape)]), 2);
+fn an_arm_moved_by_hand_holds_its_position_after_the_recording() {
+    with_arm(TestSetup::any().supported(), |arm| {
+        let (_folder, recording) = file("hand.txt", "");
+        let text_of = failed(&arm.sevenbot(&["record", text(&recording)]), 2);
         assert!(text_of.contains("goes limp") && text_of.contains("--yes"), "{text_of}");
-        assert!(!tape.exists(), "nothing was begun");
-        let tool = begin(arm, &["record", text(&tape), "--yes"]);
-        wait_for_moments(&tape, 5);
-        interrupt(&tool);
+        assert!(!recording.exists(), "no recording was started");
+        let tool = arm.spawn_sevenbot(&["record", text(&recording), "--yes"]);
+        wait_for_moments(&recording, 5);
+        send_signal(&tool, Signal::INT);
         let output = end(tool);
-        let said = said(&output);
-        assert_eq!(output.status.code(), Some(0), "Ctrl-C is how it ends: {said}");
-        assert!(said.contains("the arm holds"), "{said}");
+        let printed = all_output(&output);
+        assert_eq!(output.status.code(), Some(0), "Ctrl-C ends a recording: {printed}");
+        assert!(printed.contains("the arm holds"), "{printed}");
         arm.reopen(115_200);
         assert_eq!(arm.register(MOTOR_STATE), 1);
         let (targets, positions) = (arm.read(TARGET_POSITION, 7), arm.positions());
         assert!(
-            targets.iter().zip(&positions).all(|(target, is)| near(*target, *is)),
-            "it holds where it is"
+            targets.iter().zip(&positions).all(|(target, actual)| near(*target, *actual)),
+            "the targets are the positions"
         );
-        let again = failed(&arm.sevenbot(&["record", text(&tape), "--driven"]), 2);
+        let again = failed(&arm.sevenbot(&["record", text(&recording), "--driven"]), 2);
         assert!(again.contains("is there already"), "{again}");
     });
 }
 
 #[test]
-fn a_movement_written_by_hand_is_played_with_its_pump_again_and_again() {
-    with_arm(Setup::any(), |arm| {
-        let (_folder, tape) = file("wave.txt", WAVE);
-        let text = done(arm.sevenbot(&["play", text(&tape), "--loop=2", "--json"]));
+fn a_written_recording_is_played_in_a_loop_with_its_pump() {
+    with_arm(TestSetup::any(), |arm| {
+        let (_folder, recording) = file("wave.txt", WAVE);
+        let text = succeeded(arm.sevenbot(&["play", text(&recording), "--loop=2", "--json"]));
         assert!(text.contains("\"times\":2"), "{text}");
         assert_eq!(arm.register(VACUUM_PUMP), 1);
         arm.wait_for_pose(&STANDARD_POSE);
@@ -167,11 +150,11 @@ fn a_movement_written_by_hand_is_played_with_its_pump_again_and_again() {
 }
 
 #[test]
-fn nothing_moves_when_a_file_is_wrong() {
-    with_arm(Setup::any(), |arm| {
-        let refused = |arm: &mut Bench, lines: &str, options: &[&str]| {
-            let (_folder, tape) = file("wrong.txt", lines);
-            failed(&arm.sevenbot(&[&["play", text(&tape)], options].concat()), 1)
+fn a_file_with_an_error_moves_nothing() {
+    with_arm(TestSetup::any(), |arm| {
+        let refused = |arm: &mut TestArm, lines: &str, options: &[&str]| {
+            let (_folder, recording) = file("wrong.txt", lines);
+            failed(&arm.sevenbot(&[&["play", text(&recording)], options].concat()), 1)
         };
         let text = refused(arm, "hello\n", &[]);
         assert!(text.contains("wrong.txt") && text.contains("no recording"), "{text}");
@@ -192,43 +175,43 @@ fn nothing_moves_when_a_file_is_wrong() {
 }
 
 #[test]
-fn an_interrupted_play_leaves_the_arm_holding() {
-    with_arm(Setup::any(), |arm| {
-        let (_folder, tape) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
-        let tool = begin_to_play(arm, &[text(&tape)]);
-        interrupt(&tool);
+fn an_interrupted_play_holds_the_arm() {
+    with_arm(TestSetup::any(), |arm| {
+        let (_folder, recording) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
+        let tool = start_to_play(arm, &[text(&recording)]);
+        send_signal(&tool, Signal::INT);
         let text = failed(&end(tool), 130);
         assert!(text.contains("the arm holds where it is"), "{text}");
         arm.reopen(115_200);
         arm.wait_until_still();
         let (targets, positions) = (arm.read(TARGET_POSITION, 7), arm.positions());
-        assert!(targets.iter().zip(&positions).all(|(target, is)| near(*target, *is)), "{targets:?}");
-        assert!(targets[0] < 180, "not at its end");
-        assert_eq!(arm.read(SPEED, 7), [60; 7], "as they were before");
+        assert!(targets.iter().zip(&positions).all(|(target, actual)| near(*target, *actual)), "{targets:?}");
+        assert!(targets[0] < 180, "before the end of the recording");
+        assert_eq!(arm.read(SPEED, 7), [60; 7], "the speeds are restored");
         assert_eq!(arm.register(FEEDBACK_FREQUENCY), 0);
     });
 }
 
 #[test]
-fn a_pulled_cable_ends_a_recording_that_is_whole_up_to_there() {
-    with_arm(Setup::any().needs(Need::Kill), |arm| {
-        let (_folder, tape) = file("cut.txt", "");
-        let tool = begin(arm, &["record", text(&tape), "--driven"]);
-        wait_for_moments(&tape, 10);
+fn a_recording_is_complete_up_to_a_lost_connection() {
+    with_arm(TestSetup::any().needs(Need::Kill), |arm| {
+        let (_folder, recording) = file("cut.txt", "");
+        let tool = arm.spawn_sevenbot(&["record", text(&recording), "--driven"]);
+        wait_for_moments(&recording, 10);
         arm.kill_and_restart();
         let text = failed(&end(tool), 3);
         assert!(text.contains("the connection is gone") && text.contains("is complete up to"), "{text}");
-        let moments = moments(&tape);
+        let moments = moments(&recording);
         assert!(moments.len() >= 10 && moments.iter().all(|moment| moment.len() == 9), "{moments:?}");
-        done(arm.sevenbot(&["play", tape.to_str().expect("UTF-8"), "--speed", "5"]));
+        succeeded(arm.sevenbot(&["play", recording.to_str().expect("UTF-8"), "--speed", "5"]));
     });
 }
 
 #[test]
-fn a_full_disk_ends_a_recording_that_is_whole_up_to_there() {
-    with_arm(Setup::any(), |arm| {
-        let (_folder, tape) = file("full.txt", "");
-        // No file may grow beyond 1 or 2 KiB, as the shell counts; the signal that says so is ignored.
+fn a_recording_is_complete_up_to_a_full_disk() {
+    with_arm(TestSetup::any(), |arm| {
+        let (_folder, recording) = file("full.txt", "");
+        // Limits files to 1 or 2 KiB, depending on the shell, and ignores the signal at the limit.
         let limited = "trap '' XFSZ; ulimit -f 2; exec \"$0\" \"$@\"";
         let mut tool = Command::new("sh");
         tool.env(TOOL_TIMEOUT.0, TOOL_TIMEOUT.1)
@@ -236,59 +219,59 @@ fn a_full_disk_ends_a_recording_that_is_whole_up_to_there() {
             .arg(sevenbot())
             .arg("--port")
             .arg(arm.lend_port());
-        let output = tool.args(["record", text(&tape), "--driven", "--hz", "50"]).output();
-        let said = failed(&output.expect("a shell"), 1);
-        assert!(said.contains("is complete up to") && said.contains("full.txt: "), "{said}");
+        let output = tool.args(["record", text(&recording), "--driven", "--hz", "50"]).output();
+        let error = failed(&output.expect("a shell"), 1);
+        assert!(error.contains("is complete up to") && error.contains("full.txt: "), "{error}");
         arm.reopen(115_200);
-        assert!(fs::read_to_string(&tape).expect("a file").ends_with('\n'), "no half line");
-        done(arm.sevenbot(&["play", text(&tape), "--speed", "10"]));
-        assert_eq!(arm.register(FEEDBACK_FREQUENCY), 0, "it reports no more");
+        assert!(fs::read_to_string(&recording).expect("a file").ends_with('\n'), "a complete last line");
+        succeeded(arm.sevenbot(&["play", text(&recording), "--speed", "10"]));
+        assert_eq!(arm.register(FEEDBACK_FREQUENCY), 0, "reports are off again");
     });
 }
 
 #[test]
-fn a_pulled_cable_ends_a_play_with_a_drawing_of_what_was() {
-    with_arm(Setup::any().needs(Need::Kill), |arm| {
-        let (folder, tape) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
+fn a_lost_connection_during_play_leaves_a_plot() {
+    with_arm(TestSetup::any().needs(Need::Kill), |arm| {
+        let (folder, recording) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
         let drawing = folder.path().join("cut.svg");
-        let tool = begin_to_play(arm, &[text(&tape), "--plot", text(&drawing)]);
+        let tool = start_to_play(arm, &[text(&recording), "--plot", text(&drawing)]);
         arm.kill_and_restart();
-        let said = failed(&end(tool), 3);
-        assert!(said.contains("the connection is gone"), "{said}");
+        let text = failed(&end(tool), 3);
+        assert!(text.contains("the connection is gone"), "{text}");
         assert!(fs::read_to_string(&drawing).expect("a drawing").ends_with("</svg>\n"));
     });
 }
 
 #[test]
-fn a_restarted_arm_that_no_longer_reports_is_not_waited_for() {
-    // One of its own: whoever has the port open cannot ask for the restart.
-    let mut arm = OwnArm::start(World::Simulator, Vec::new());
-    let (_folder, tape) = file("restart.txt", "");
+fn a_restart_of_the_arm_ends_a_recording() {
+    // The arm is restarted while the tool has its port open.
+    let mut arm = StartedArm::start(ArmKind::Simulator, Vec::new());
+    let (_folder, recording) = file("restart.txt", "");
     let mut tool = tool();
-    tool.arg("--port").arg(arm.port()).args(["record", text(&tape), "--driven"]);
+    tool.arg("--port").arg(arm.port()).args(["record", text(&recording), "--driven"]);
     let tool = tool.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
-    wait_for_moments(&tape, 3);
+    wait_for_moments(&recording, 3);
     arm.power_cycle();
     let text = failed(&end(tool.expect("sevenbot runs")), 1);
     assert!(text.contains("switched off and on"), "{text}");
 }
 
 #[test]
-fn keys_teach_a_movement_on_a_terminal() {
-    with_arm(Setup::any(), |arm| {
-        let (_folder, tape) = file("taught.txt", "");
+fn keys_move_the_arm_during_a_recording() {
+    with_arm(TestSetup::any(), |arm| {
+        let (_folder, recording) = file("taught.txt", "");
         let port = arm.lend_port();
-        let arguments = ["record", text(&tape), "--driven", "--port", port.to_str().expect("UTF-8")];
+        let arguments = ["record", text(&recording), "--driven", "--port", port.to_str().expect("UTF-8")];
         let mut terminal = Terminal::run(sevenbot(), &arguments);
         terminal.wait_for("moments");
         terminal.keys("2\x1b[1;2C\x1b[C ");
         terminal.wait_for("pump sucks");
-        wait_for_moments(&tape, moments(&tape).len() + 40);
+        wait_for_moments(&recording, moments(&recording).len() + 40);
         terminal.keys("q");
-        assert!(terminal.wait().success(), "{}", terminal.shows());
+        assert!(terminal.wait().success(), "{}", terminal.contents());
         arm.reopen(115_200);
         assert_eq!((arm.read(TARGET_POSITION, 7)[1], arm.register(VACUUM_PUMP)), (101, 1));
-        let moments = moments(&tape);
+        let moments = moments(&recording);
         let last = &moments[moments.len() - 1];
         assert!((last[2] - 101.0).abs() <= 2.0 && last[8] == 1.0, "{last:?}");
         arm.write(VACUUM_PUMP, &[0]);

@@ -1,67 +1,54 @@
-//! `sevenbot servo`: single servos behind a simulated adapter, without an arm's controller.
+//! `sevenbot servo`: servos behind a simulated USB adapter, without the controller of an arm.
 
-mod said;
+mod tool_output;
 
-use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
-use std::thread;
 
-use rustix::process::{Pid, Signal, kill_process};
-use said::{done, failed, without_arm, words};
-use system_tests::line::PATIENCE;
+use system_tests::process::{self, Signal, send_signal};
 use system_tests::programs::{host_sim, sevenbot, tool};
 use system_tests::terminal::Terminal;
-use system_tests::{Line, Setup, with_arm};
+use system_tests::wait::wait_until;
+use system_tests::{ArmClient, TestSetup, with_arm};
+use tool_output::{failed, run_without_arm, succeeded, words};
 
-/// The rate that servos have from the factory, and a short list of ids: the ids of an arm.
+/// The default baud rate of servos, and the ids of an arm.
 const ARM_IDS: [&str; 4] = ["--rates", "1000000", "--ids", "0-6"];
-/// How long the tool waits for an answer that may come, in milliseconds. An id that nothing answers to costs three of
-/// these.
-const PATIENT: &str = "2000";
+/// A long timeout of the tool for replies, in milliseconds. An id without a servo takes three timeouts.
+const LONG_TIMEOUT: &str = "2000";
 
-/// Servos on a bus behind a simulated adapter. They go with the test.
-struct ServoBus {
+/// A simulated adapter with servos.
+struct SimulatedAdapter {
     process: Child,
     port: PathBuf,
     baud: u32,
 }
 
-impl ServoBus {
-    /// Starts them, and waits until the servo with the id `up` answers.
-    fn start(options: &[&str], up: u8) -> Self {
-        Self::start_at(1_000_000, options, up)
+impl SimulatedAdapter {
+    /// Starts it with the default baud rate, and waits until the servo with the id `first` replies.
+    fn start(options: &[&str], first: u8) -> Self {
+        Self::start_at(1_000_000, options, first)
     }
 
-    fn start_at(baud: u32, options: &[&str], up: u8) -> Self {
-        let mut process = Command::new(host_sim())
-            .arg("--servos-only")
-            .args(options)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("host-sim runs");
-        let mut line = String::new();
-        BufReader::new(process.stdout.take().expect("a pipe")).read_line(&mut line).expect("a line");
-        let port = line.trim_end().strip_prefix("ready ").expect("the bus is ready").into();
-        let bus = Self { process, port, baud };
-        bus.wait_for(up);
+    fn start_at(baud: u32, options: &[&str], first: u8) -> Self {
+        let mut command = Command::new(host_sim());
+        command.arg("--servos-only").args(options).stderr(Stdio::null());
+        let (process, mut ports) = process::start(&mut command, 1).expect("the adapter is ready");
+        let bus = Self { process, port: ports.swap_remove(0), baud };
+        bus.wait_for(first);
         bus
     }
 
-    /// Servos are deaf for a while after power-up.
+    /// Waits until a servo has started.
     fn wait_for(&self, id: u8) {
-        let deadline = std::time::Instant::now() + PATIENCE;
         let (id, rate) = (id.to_string(), self.baud.to_string());
-        while self.servo(&["info", &id, "--rate", &rate]).status.code() == Some(3) {
-            assert!(std::time::Instant::now() < deadline, "servo {id} does not come up");
-            thread::yield_now();
-        }
+        wait_until("the servo has started", || {
+            self.servo(&["info", &id, "--rate", &rate]).status.code() != Some(3)
+        });
     }
 
     fn servo(&self, arguments: &[&str]) -> Output {
-        self.servo_within(PATIENT, arguments)
+        self.servo_within(LONG_TIMEOUT, arguments)
     }
 
     fn servo_within(&self, millis: &str, arguments: &[&str]) -> Output {
@@ -71,101 +58,102 @@ impl ServoBus {
     }
 
     fn power_cycle(&self) {
-        let id = i32::try_from(self.process.id()).ok().and_then(Pid::from_raw).expect("a process id");
-        kill_process(id, Signal::HUP).expect("the bus is there");
+        send_signal(&self.process, Signal::HUP);
     }
 
     fn terminal(&self, arguments: &[&str]) -> Terminal {
-        let port = self.port.to_str().expect("a name");
-        Terminal::run(sevenbot(), &[&["--port", port, "--timeout", PATIENT, "servo"], arguments].concat())
+        let port = self.port.to_str().expect("UTF-8");
+        Terminal::run(
+            sevenbot(),
+            &[&["--port", port, "--timeout", LONG_TIMEOUT, "servo"], arguments].concat(),
+        )
     }
 }
 
-impl Drop for ServoBus {
+impl Drop for SimulatedAdapter {
     fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
+        process::kill(&mut self.process);
     }
 }
 
-/// The ids of a scan's lines.
+/// The ids in the output of a scan.
 fn ids(text: &str) -> Vec<u8> {
     let lines = text.lines().filter_map(|line| line.strip_prefix("id "));
     lines.filter_map(|line| line.split_whitespace().next()?.parse().ok()).collect()
 }
 
 #[test]
-fn scan_finds_the_servos_and_tells_an_echo() {
-    for (fault, says) in [(None, "gives no echo"), (Some("bus=echo"), "echoes what is sent")] {
+fn scan_finds_the_servos_and_an_echo() {
+    for (fault, expected) in [(None, "gives no echo"), (Some("bus=echo"), "echoes what is sent")] {
         let options: Vec<&str> = fault.map_or(vec![], |fault| vec!["--fault", fault]);
-        let bus = ServoBus::start(&options, 0);
-        let text = done(bus.servo(&[&["scan"], ARM_IDS.as_slice()].concat()));
+        let bus = SimulatedAdapter::start(&options, 0);
+        let text = succeeded(bus.servo(&[&["scan"], ARM_IDS.as_slice()].concat()));
         assert_eq!(ids(&text), [0, 1, 2, 3, 4, 5, 6], "{text}");
         assert_eq!(words(&text, "id 6"), ["id", "6", "1000000", "baud", "joint", "7"]);
-        assert!(text.contains(says), "{text}");
+        assert!(text.contains(expected), "{text}");
     }
 }
 
 #[test]
-fn scan_asks_all_ids_through_a_slow_adapter() {
-    let bus = ServoBus::start(&["--ids", "0,42,3", "--usb-latency", "1-20"], 42);
-    let text = done(bus.servo(&["scan", "--rates", "1000000"]));
+fn scan_tries_all_ids_through_a_slow_adapter() {
+    let bus = SimulatedAdapter::start(&["--ids", "0,42,3", "--usb-latency", "1-20"], 42);
+    let text = succeeded(bus.servo(&["scan", "--rates", "1000000"]));
     assert_eq!(ids(&text), [0, 3, 42], "{text}");
     assert_eq!(words(&text, "id 42")[4..], ["no", "joint's", "id"]);
 }
 
 #[test]
 fn scan_tries_other_rates() {
-    let bus = ServoBus::start_at(115_200, &["--servo-baud", "115200", "--ids", "1"], 1);
+    let bus = SimulatedAdapter::start_at(115_200, &["--servo-baud", "115200", "--ids", "1"], 1);
     let rates = ["--rates", "1000000,115200,38400", "--ids", "0-3", "--wait", "500"];
-    let text = done(bus.servo(&[&["scan"], rates.as_slice()].concat()));
+    let text = succeeded(bus.servo(&[&["scan"], rates.as_slice()].concat()));
     assert_eq!(words(&text, "id 1"), ["id", "1", "115200", "baud", "joint", "2"]);
     assert_eq!(ids(&text), [1], "{text}");
-    done(bus.servo(&["set-id", "1", "2", "--rate", "115200"]));
+    succeeded(bus.servo(&["set-id", "1", "2", "--rate", "115200"]));
 }
 
 #[test]
-fn scan_tells_missing_and_garbled_servos() {
-    let bus = ServoBus::start(&["--fault", "3=missing", "--fault", "5=garbled"], 0);
+fn scan_reports_missing_and_garbled_servos() {
+    let bus = SimulatedAdapter::start(&["--fault", "3=missing", "--fault", "5=garbled"], 0);
     let text = failed(&bus.servo(&[&["scan"], ARM_IDS.as_slice()].concat()), 1);
     assert_eq!(ids(&text), [0, 1, 3, 4, 5, 6], "{text}");
     assert!(text.contains("error: id 4 at 1000000 baud: damaged answers"), "{text}");
 }
 
 #[test]
-fn scan_tells_two_servos_with_one_id() {
-    let bus = ServoBus::start(&["--ids", "3,3,5"], 5);
+fn scan_reports_two_servos_with_one_id() {
+    let bus = SimulatedAdapter::start(&["--ids", "3,3,5"], 5);
     let text = failed(&bus.servo(&[&["scan"], ARM_IDS.as_slice()].concat()), 1);
     assert_eq!(ids(&text), [3, 5], "{text}");
     assert!(text.contains("id 3 at 1000000 baud: several servos"), "{text}");
 }
 
 #[test]
-fn scan_says_what_to_check_where_no_servo_is() {
-    let bus = ServoBus::start(&[], 0);
+fn scan_without_servos_suggests_what_to_check() {
+    let bus = SimulatedAdapter::start(&[], 0);
     let text = failed(&bus.servo_within("300", &["scan", "--rates", "500000", "--ids", "0-2"]), 3);
     assert!(text.contains("no servo answers") && text.contains("their own power"), "{text}");
 }
 
 #[test]
 fn facts_are_json_on_demand() {
-    let bus = ServoBus::start(&["--ids", "0,42"], 0);
-    let json = done(bus.servo(&["scan", "--rates", "1000000", "--ids", "0-42", "--json"]));
-    let masked = json.replace(bus.port.to_str().expect("a name"), "PORT");
+    let bus = SimulatedAdapter::start(&["--ids", "0,42"], 0);
+    let json = succeeded(bus.servo(&["scan", "--rates", "1000000", "--ids", "0-42", "--json"]));
+    let masked = json.replace(bus.port.to_str().expect("UTF-8"), "PORT");
     insta::assert_snapshot!(masked.trim_end());
-    let json = done(bus.servo(&["info", "0", "--json"]));
+    let json = succeeded(bus.servo(&["info", "0", "--json"]));
     insta::assert_snapshot!(json.trim_end());
 }
 
 #[test]
 fn info_shows_a_servo_in_words() {
-    let bus = ServoBus::start(&["--fault", "bus=echo"], 6);
-    insta::assert_snapshot!(done(bus.servo(&["info", "6"])));
+    let bus = SimulatedAdapter::start(&["--fault", "bus=echo"], 6);
+    insta::assert_snapshot!(succeeded(bus.servo(&["info", "6"])));
 }
 
 #[test]
-fn info_says_what_to_check_when_a_servo_is_silent() {
-    let bus = ServoBus::start(&["--ids", "0", "--fault", "bus=echo"], 0);
+fn info_of_a_silent_servo_suggests_what_to_check() {
+    let bus = SimulatedAdapter::start(&["--ids", "0", "--fault", "bus=echo"], 0);
     for arguments in [["info", "9", "--rate", "1000000"], ["info", "0", "--rate", "38400"]] {
         let text = failed(&bus.servo_within("300", &arguments), 3);
         assert!(text.contains("does not answer (3 tries of 300 ms)"), "{text}");
@@ -176,65 +164,65 @@ fn info_says_what_to_check_when_a_servo_is_silent() {
 }
 
 #[test]
-fn set_id_changes_the_only_servo_for_good() {
+fn set_id_changes_the_only_servo_permanently() {
     for options in [["--ids", "1"].as_slice(), &["--ids", "1", "--fault", "bus=echo"]] {
-        let bus = ServoBus::start(options, 1);
-        let text = done(bus.servo(&["set-id", "1", "3"]));
+        let bus = SimulatedAdapter::start(options, 1);
+        let text = succeeded(bus.servo(&["set-id", "1", "3"]));
         assert!(text.contains("the servo has id 3 now"), "{text}");
         bus.power_cycle();
         bus.wait_for(3);
-        let text = done(bus.servo(&["info", "3"]));
+        let text = succeeded(bus.servo(&["info", "3"]));
         assert_eq!(words(&text, "EEPROM lock"), ["EEPROM", "lock", "locked"]);
         failed(&bus.servo(&["set-id", "1", "4"]), 1);
     }
 }
 
 #[test]
-fn set_id_refuses_unless_one_servo_answers() {
-    let bus = ServoBus::start(&["--ids", "1,200"], 200);
+fn set_id_refuses_unless_one_servo_replies() {
+    let bus = SimulatedAdapter::start(&["--ids", "1,200"], 200);
     let text = failed(&bus.servo(&["set-id", "1", "3"]), 1);
     assert!(text.contains("these ids answer: 1, 200") && text.contains("nothing was written"), "{text}");
-    done(bus.servo(&["info", "1"]));
+    succeeded(bus.servo(&["info", "1"]));
     let text = failed(&bus.servo(&["set-id", "1", "1"]), 2);
     assert!(text.contains("both 1"), "{text}");
 }
 
 #[test]
-fn center_turns_a_servo_to_its_middle() {
-    let bus = ServoBus::start(&[], 6);
+fn center_turns_a_servo_to_its_middle_position() {
+    let bus = SimulatedAdapter::start(&[], 6);
     let text = failed(&bus.servo(&["center", "6"]), 2);
     assert!(text.contains("--yes says yes"), "{text}");
-    let text = done(bus.servo(&["center", "6", "--yes", "--speed", "500"]));
+    let text = succeeded(bus.servo(&["center", "6", "--yes", "--speed", "500"]));
     assert!(text.contains("servo 6 holds at 51"), "{text}");
-    let text = done(bus.servo(&["info", "6"]));
+    let text = succeeded(bus.servo(&["info", "6"]));
     assert_eq!(words(&text, "torque switch")[2..], ["1", "(on)"]);
 }
 
 #[test]
-fn center_stops_a_servo_that_pushes_against_something() {
-    let bus = ServoBus::start(&["--fault", "7=stuck"], 6);
+fn center_stops_a_blocked_servo() {
+    let bus = SimulatedAdapter::start(&["--fault", "7=stuck"], 6);
     let text = failed(&bus.servo(&["center", "6", "--yes", "--speed", "500"]), 1);
     assert!(text.contains("stopped at") && text.contains("torque is off"), "{text}");
-    let text = done(bus.servo(&["info", "6"]));
+    let text = succeeded(bus.servo(&["info", "6"]));
     assert_eq!(words(&text, "torque switch")[2], "0");
 }
 
 #[test]
 fn center_stops_at_ctrl_c() {
-    let bus = ServoBus::start(&[], 6);
+    let bus = SimulatedAdapter::start(&[], 6);
     let mut terminal = bus.terminal(&["center", "6", "--yes", "--speed", "20"]);
-    // 497 counts, or fewer where the first reading comes late.
+    // 497 counts, or fewer if the first reading is late.
     terminal.wait_for(" of 4");
     terminal.keys("\x03");
     terminal.wait_for("its torque is off");
     assert_eq!(terminal.wait().code(), Some(130));
-    let text = done(bus.servo(&["info", "6"]));
+    let text = succeeded(bus.servo(&["info", "6"]));
     assert_eq!(words(&text, "torque switch")[2], "0");
 }
 
 #[test]
-fn torque_codes_asks_a_person_and_names_the_table() {
-    let bus = ServoBus::start(&[], 0);
+fn torque_codes_prompts_and_names_the_table() {
+    let bus = SimulatedAdapter::start(&[], 0);
     let text = failed(&bus.servo(&["torque-codes"]), 2);
     assert!(text.contains("run it in a terminal"), "{text}");
     for (answer, table) in [("2", "older table"), ("0", "current table")] {
@@ -249,16 +237,16 @@ fn torque_codes_asks_a_person_and_names_the_table() {
         terminal.keys(&format!("{answer}\n"));
         terminal.wait_for(table);
         assert!(terminal.wait().success());
-        let text = done(bus.servo(&["info", "0"]));
-        assert_eq!(words(&text, "torque switch")[2], "0", "left without torque");
+        let text = succeeded(bus.servo(&["info", "0"]));
+        assert_eq!(words(&text, "torque switch")[2], "0", "the torque is off at the end");
     }
 }
 
 #[test]
-fn the_host_link_of_an_arm_is_no_servo_bus() {
-    with_arm(Setup::any(), |arm| {
+fn the_host_link_of_an_arm_is_refused() {
+    with_arm(TestSetup::any(), |arm| {
         for arguments in [["info", "0"].as_slice(), &["scan", "--rates", "1000000", "--ids", "0-1"]] {
-            let text = failed(&arm.sevenbot(&[&["--timeout", PATIENT, "servo"], arguments].concat()), 3);
+            let text = failed(&arm.sevenbot(&[&["--timeout", LONG_TIMEOUT, "servo"], arguments].concat()), 3);
             assert!(text.contains("this is the arm's host link"), "{text}");
             assert!(text.contains("use an adapter on the servo bus"), "{text}");
         }
@@ -266,23 +254,23 @@ fn the_host_link_of_an_arm_is_no_servo_bus() {
 }
 
 #[test]
-fn ports_that_cannot_be_opened_are_explained() {
-    let text = failed(&without_arm(&["servo", "scan"]), 2);
+fn errors_of_ports_are_explained() {
+    let text = failed(&run_without_arm(&["servo", "scan"]), 2);
     assert!(text.contains("needs the adapter's port"), "{text}");
-    let text = failed(&without_arm(&["--port", "/dev/no-such-port", "servo", "info", "0"]), 3);
+    let text = failed(&run_without_arm(&["--port", "/dev/no-such-port", "servo", "info", "0"]), 3);
     assert!(text.contains("there is no such port"), "{text}");
-    let bus = ServoBus::start(&["--ids", "0"], 0);
-    let holder = Line::open(&bus.port, 1_000_000);
+    let bus = SimulatedAdapter::start(&["--ids", "0"], 0);
+    let holder = ArmClient::open(&bus.port, 1_000_000);
     let text = failed(&bus.servo(&["info", "0"]), 3);
     assert!(text.contains("another program has this port open"), "{text}");
     drop(holder);
 }
 
 #[test]
-fn help_teaches_by_example() {
+fn help_contains_examples() {
     for command in ["", "scan", "info", "set-id", "center", "torque-codes"] {
         let arguments = ["servo", command, "--help"].into_iter().filter(|word| !word.is_empty());
-        let text = done(without_arm(&arguments.collect::<Vec<_>>()));
+        let text = succeeded(run_without_arm(&arguments.collect::<Vec<_>>()));
         assert!(text.contains("Examples:"), "{command}: {text}");
     }
 }

@@ -1,49 +1,50 @@
-//! The commands about the wire itself: ports, traffic, the register table, and what shells want to know.
+//! The commands for ports, traffic, the register table, completions and manual pages.
 
-mod said;
+mod tool_output;
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 
-use said::{done, failed, without_arm, words};
 use system_tests::frames::reply;
+use system_tests::process;
 use system_tests::programs::tool;
 use system_tests::registers::{DEVICE_ID, FEEDBACK_FREQUENCY};
-use system_tests::{Setup, read_request, with_arm, write_request};
+use system_tests::{TestSetup, read_request, with_arm, write_request};
+use tool_output::{failed, run_without_arm, succeeded, words};
 
 #[test]
-fn ports_tells_an_arm_from_other_things() {
-    with_arm(Setup::any().chip_id("0123456789ab"), |arm| {
+fn ports_identifies_arms() {
+    with_arm(TestSetup::any().chip_id("0123456789ab"), |arm| {
         arm.write_setting(DEVICE_ID, &[42]);
         let port = arm.lend_port();
-        let port = port.to_str().expect("a name");
-        let text = done(without_arm(&["ports", port, "/dev/null", "/dev/no-such-port"]));
+        let port = port.to_str().expect("UTF-8");
+        let text = succeeded(run_without_arm(&["ports", port, "/dev/null", "/dev/no-such-port"]));
         let found = words(&text, port).join(" ");
         assert!(found.ends_with("7Bot V2, id 42, firmware 3.0, chip 0123456789AB"), "{text}");
         assert!(words(&text, "/dev/null").join(" ").contains("cannot be used"), "{text}");
         assert!(words(&text, "/dev/no-such-port").join(" ").contains("there is no such port"), "{text}");
-        let text = done(without_arm(&["ports", port, "--json"]));
+        let text = succeeded(run_without_arm(&["ports", port, "--json"]));
         assert!(text.contains("\"arm\":{\"device_id\":42,\"firmware\":\"3.0\""), "{text}");
         arm.reopen(115_200);
     });
 }
 
 #[test]
-fn sniff_tells_what_a_capture_holds() {
+fn sniff_prints_the_frames_of_a_capture() {
     let positions = [90, 90, 65, 90, 90, 90, 80];
-    let mut damaged = reply(54, &positions);
-    damaged[8] ^= 1;
+    let mut corrupted = reply(54, &positions);
+    corrupted[8] ^= 1;
     let capture = [
         read_request(54, 7),
         reply(54, &positions),
         vec![1, 2, 3],
         write_request(28, &[0, 1]),
-        damaged,
+        corrupted,
         write_request(250, &[0; 7]),
         read_request(0, 0)[..4].to_vec(),
     ];
-    let told = "\
+    let expected = "\
 read present-position 1..7
 answer present-position 1..7 = 90 90 65 90 90 90 80 °
 3 bytes that are no frame: 01 02 03
@@ -55,10 +56,10 @@ a damaged frame or a part of one, 4 bytes: AA 77 03 00
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("capture.bin");
     fs::write(&path, capture.concat()).expect("a file");
-    let path = path.to_str().expect("a name");
-    assert_eq!(done(without_arm(&["sniff", path])), told);
-    assert_eq!(through_standard_input(&capture.concat()), told);
-    let json = done(without_arm(&["sniff", path, "--json"]));
+    let path = path.to_str().expect("UTF-8");
+    assert_eq!(succeeded(run_without_arm(&["sniff", path])), expected);
+    assert_eq!(through_standard_input(&capture.concat()), expected);
+    let json = succeeded(run_without_arm(&["sniff", path, "--json"]));
     assert_eq!(
         json.lines().nth(3),
         Some(
@@ -66,8 +67,8 @@ a damaged frame or a part of one, 4 bytes: AA 77 03 00
              \"words\":\"write eeprom-lock = 0 (open), motor-state = 1 (servo)\"}"
         )
     );
-    assert!(failed(&without_arm(&["sniff", "no-such-file"]), 1).contains("no-such-file"));
-    assert!(failed(&without_arm(&["sniff"]), 2).contains("--port"));
+    assert!(failed(&run_without_arm(&["sniff", "no-such-file"]), 1).contains("no-such-file"));
+    assert!(failed(&run_without_arm(&["sniff"]), 2).contains("--port"));
 }
 
 fn through_standard_input(bytes: &[u8]) -> String {
@@ -77,27 +78,20 @@ fn through_standard_input(bytes: &[u8]) -> String {
         .stdout(Stdio::piped())
         .spawn()
         .expect("sevenbot runs");
-    tool.stdin.take().expect("a pipe").write_all(bytes).expect("it reads");
-    done(tool.wait_with_output().expect("it ends"))
+    tool.stdin.take().expect("a pipe").write_all(bytes).expect("the tool reads");
+    succeeded(tool.wait_with_output().expect("the tool ends"))
 }
 
 #[test]
-fn sniff_listens_to_a_port() {
-    with_arm(Setup::any(), |arm| {
+fn sniff_prints_the_frames_of_a_port() {
+    with_arm(TestSetup::any(), |arm| {
         arm.write(FEEDBACK_FREQUENCY, &[20]);
         assert_eq!(arm.register(FEEDBACK_FREQUENCY), 20);
-        let mut tool = tool()
-            .arg("--port")
-            .arg(arm.lend_port())
-            .arg("sniff")
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("sevenbot runs");
+        let mut tool = arm.spawn_sevenbot(&["sniff"]);
         let lines = BufReader::new(tool.stdout.take().expect("a pipe")).lines().map_while(Result::ok);
         let reports = lines.filter(|line| line.contains("  answer present-position 1..7 = 9"));
         assert_eq!(reports.take(3).count(), 3);
-        tool.kill().expect("it listens for ever");
-        tool.wait().expect("it ended");
+        process::kill(&mut tool);
         arm.reopen(115_200);
         arm.write(FEEDBACK_FREQUENCY, &[0]);
     });
@@ -105,47 +99,47 @@ fn sniff_listens_to_a_port() {
 
 #[test]
 fn verbose_shows_every_frame() {
-    with_arm(Setup::any(), |arm| {
+    with_arm(TestSetup::any(), |arm| {
         let output = arm.sevenbot(&["get", "motor-state", "--verbose"]);
         let frames = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(frames.contains("-> read motor-state\n"), "{frames}");
         assert!(frames.contains("<- answer motor-state = 1 (servo)\n"), "{frames}");
-        assert_eq!(done(output).lines().count(), 1, "the facts stay by themselves");
+        assert_eq!(succeeded(output).lines().count(), 1, "frames are not on standard output");
     });
 }
 
 #[test]
-fn the_table_is_printed_for_readers_and_for_compilers() {
-    let registers = |form: &str| done(without_arm(&["registers", "--format", form]));
+fn the_register_table_is_printed_in_all_formats() {
+    let registers = |form: &str| succeeded(run_without_arm(&["registers", "--format", form]));
     assert_eq!(words(&registers("text"), "46..52")[..2], ["46..52", "TARGET_POSITION"]);
     assert!(registers("markdown").contains("| 46..52 | `TARGET_POSITION` | RAM | RW | 0..180 |"));
     assert!(registers("json").contains("{\"access\":\"RW\",\"address\":46,"), "{}", registers("json"));
-    assert_eq!(done(without_arm(&["registers", "--json"])), registers("json"));
-    accepted_by("cc", &["-std=c99", "-Wall", "-Werror", "-fsyntax-only", "-x", "c"], &registers("c"));
-    accepted_by("python3", &["-m", "py_compile"], &registers("python"));
+    assert_eq!(succeeded(run_without_arm(&["registers", "--json"])), registers("json"));
+    assert_accepted_by("cc", &["-std=c99", "-Wall", "-Werror", "-fsyntax-only", "-x", "c"], &registers("c"));
+    assert_accepted_by("python3", &["-m", "py_compile"], &registers("python"));
 }
 
-/// Does a program have nothing against this text?
-fn accepted_by(program: &str, options: &[&str], text: &str) {
+/// Checks that a program accepts this text.
+fn assert_accepted_by(program: &str, options: &[&str], text: &str) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("registers");
     fs::write(&path, text).expect("a file");
     let output = Command::new(program).args(options).arg(&path).output();
-    done(output.unwrap_or_else(|error| panic!("{program} has to be installed for this test: {error}")));
+    succeeded(output.unwrap_or_else(|error| panic!("{program} has to be installed for this test: {error}")));
 }
 
 #[test]
-fn shells_and_manual_readers_are_served() {
+fn completions_and_manual_pages_are_printed() {
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
-        let script = done(without_arm(&["completions", shell]));
+        let script = succeeded(run_without_arm(&["completions", shell]));
         assert!(script.contains("sevenbot") && script.contains("restore"), "{shell}");
     }
-    accepted_by("bash", &["-n"], &done(without_arm(&["completions", "bash"])));
-    assert!(done(without_arm(&["man"])).contains(".TH sevenbot 1"));
-    assert!(done(without_arm(&["man", "pose"])).contains(".TH sevenbot-pose 1"));
-    assert!(failed(&without_arm(&["man", "dance"]), 2).contains("no command dance"));
+    assert_accepted_by("bash", &["-n"], &succeeded(run_without_arm(&["completions", "bash"])));
+    assert!(succeeded(run_without_arm(&["man"])).contains(".TH sevenbot 1"));
+    assert!(succeeded(run_without_arm(&["man", "pose"])).contains(".TH sevenbot-pose 1"));
+    assert!(failed(&run_without_arm(&["man", "dance"]), 2).contains("no command dance"));
     let folder = tempfile::tempdir().expect("a folder");
-    done(without_arm(&["man", "--dir", folder.path().to_str().expect("a name")]));
+    succeeded(run_without_arm(&["man", "--dir", folder.path().to_str().expect("UTF-8")]));
     for page in ["sevenbot.1", "sevenbot-pose.1", "sevenbot-man.1"] {
         assert!(folder.path().join(page).exists(), "{page}");
     }

@@ -1,7 +1,7 @@
 //! The system tests on arms of other kinds than the simulator's own: which tests each kind can pass.
 //!
 //! A test that needs what such an arm does not have is left out by its name. The tests are run so that one that is
-//! left out by mistake, or not at all, fails: see `with_arm` in `tests/src/bench.rs`.
+//! left out by mistake, or not at all, fails: see `with_arm` in `tests/src/test_arm.rs`.
 
 use crate::run::{Outcome, run};
 
@@ -23,12 +23,12 @@ pub(crate) const EMULATOR: World = World {
     files: &["wire", "registers", "motion", "servo_faults", "tool", "self_test"],
     left_out: &[
         // The emulated chip has no unique id to choose.
-        "d08_the_chip_id_is_the_one_it_was_given",
-        "info_says_who_the_arm_is_and_how_it_is",
+        "d08_the_registers_hold_the_chip_id",
+        "info_shows_identity_and_status",
         // A setting has to be kept over a restart.
         "d14_reports_take_at_most_half_of_a_slow_line",
         // The storage has to take settings until it is full.
-        "set_says_that_the_storage_is_full",
+        "set_reports_a_full_storage",
     ],
 };
 

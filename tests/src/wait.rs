@@ -1,0 +1,27 @@
+//! The way to wait in tests: poll until something is true, and fail after a timeout.
+
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// The timeout of all waits. It is long, because the machine may be busy.
+pub const TIMEOUT: Duration = Duration::from_secs(60);
+const POLL_PERIOD: Duration = Duration::from_millis(10);
+
+/// Polls until there is a value. The error of a poll describes the state after a timeout.
+#[track_caller]
+pub fn wait_for<T>(event: &str, mut poll: impl FnMut() -> Result<T, String>) -> T {
+    let deadline = Instant::now() + TIMEOUT;
+    loop {
+        match poll() {
+            Ok(value) => return value,
+            Err(state) => assert!(Instant::now() < deadline, "timeout: {event}: {state}"),
+        }
+        sleep(POLL_PERIOD);
+    }
+}
+
+/// Polls until the condition holds.
+#[track_caller]
+pub fn wait_until(condition: &str, mut holds: impl FnMut() -> bool) {
+    wait_for(condition, || if holds() { Ok(()) } else { Err("not yet".to_owned()) });
+}
