@@ -7,7 +7,7 @@
 use cortex_m_rt::entry;
 use footprint::meter::Meter;
 use footprint::opaque;
-use motion_core::servo_bus::frame::{self, Decoder, Instruction, Reading, register};
+use motion_core::servo_bus::frame::{self, Instruction, register};
 use motion_core::{Config, Controller, Output, Storage, TorqueCodes};
 use peers::work::SEVEN_BOT;
 use protocol_core::registers::RegisterFile;
@@ -27,6 +27,9 @@ const START: u64 = 1_000;
 const CYCLES: u64 = 100;
 /// Milliseconds of a control cycle. The controller is polled once per millisecond.
 const CYCLE: u64 = 10;
+
+const READ: u8 = Instruction::Read as u8;
+const SYNC_WRITE: u8 = Instruction::SyncWrite as u8;
 
 struct Rig {
     meter: Meter,
@@ -122,30 +125,20 @@ struct ScriptedAnswers {
 impl ScriptedAnswers {
     /// The answer to a frame of the controller.
     fn to(&mut self, bytes: &[u8]) -> Option<frame::FrameBuffer> {
-        let mut decoder = Decoder::new();
-        decoder.push(bytes);
-        let frame = decoder.pull()?.ok()?;
-        match (Instruction::from_code(frame.code)?, frame.params) {
-            (Instruction::SyncWrite, [register::GOAL_POSITION, 6, items @ ..]) => {
+        match bytes {
+            [0xFF, 0xFF, frame::BROADCAST, _, SYNC_WRITE, register::GOAL_POSITION, 6, items @ .., _] => {
                 for item in items.chunks_exact(7) {
                     let &[id, high, low, ..] = item else { continue };
                     *self.positions.get_mut(usize::from(id))? = u16::from_be_bytes([high, low]);
                 }
                 None
             }
-            (Instruction::Read, &[register::PRESENT_POSITION, count]) => {
-                let position_counts = *self.positions.get(usize::from(frame.id))?;
-                let reading = Reading {
-                    position_counts,
-                    speed: 0,
-                    load: 0,
-                    voltage_decivolts: 74,
-                    temperature_celsius: 30,
-                };
-                let mut values = [0; 11];
-                values.get_mut(..8)?.copy_from_slice(&reading.to_bytes());
+            &[0xFF, 0xFF, id, 4, READ, register::PRESENT_POSITION, count, _] => {
+                let [high, low] = self.positions.get(usize::from(id))?.to_be_bytes();
+                // Position, speed, load, 7.4 V, 30 degrees, and registers that are 0.
+                let values = [high, low, 0, 0, 0, 0, 74, 30, 0, 0, 0];
                 let mut answer = frame::FrameBuffer::new();
-                frame::status(&mut answer, frame.id, 0, values.get(..usize::from(count))?);
+                frame::status(&mut answer, id, 0, values.get(..usize::from(count))?);
                 Some(answer)
             }
             _ => None,
