@@ -142,10 +142,6 @@ fn a_third_cut_at_every_step_before_the_others_are_mended() {
     cut_everything_again::<512>([1], 1, 3);
 }
 
-fn below(limit: usize, random: &mut Random) -> usize {
-    usize::try_from(random.below(limit as u64)).unwrap()
-}
-
 /// Power cycles of any length, most of them cut somewhere.
 fn cut_at_random<const SECTOR: usize>(cycles: u64, most_saves: usize) {
     let seed = std::env::var("JOURNAL_SEED").map_or(2_026, |seed| seed.parse().unwrap());
@@ -154,10 +150,10 @@ fn cut_at_random<const SECTOR: usize>(cycles: u64, most_saves: usize) {
     let mut world = World::<SECTOR>::new();
     let mut cuts = 0;
     for _ in 0..cycles {
-        let saves = below(most_saves, &mut random);
-        let after = below(10 + 8 * saves, &mut random);
-        let program = ProgramTear::ALL[below(ProgramTear::ALL.len(), &mut random)];
-        let erase = EraseTear::ALL[below(EraseTear::ALL.len(), &mut random)];
+        let saves = random.index(most_saves);
+        let after = random.index(10 + 8 * saves);
+        let program = ProgramTear::ALL[random.index(ProgramTear::ALL.len())];
+        let erase = EraseTear::ALL[random.index(EraseTear::ALL.len())];
         let cut = Cut { after, program, erase, seed: random.next() };
         let end = world.cycle(saves, (random.below(8) > 0).then_some(cut));
         cuts += u64::from(end == End::Cut);

@@ -6,10 +6,11 @@
 
 #![allow(dead_code)] // Each who runs it uses its part.
 
+use flash_model::Random;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, ToArm};
 
-use super::stream::{GAP_US, Random, Received, drain, frame};
+use super::stream::{GAP_US, Received, drain, frame};
 
 const BYTE_US: u64 = 87;
 const BURST: usize = 4;
@@ -54,15 +55,15 @@ impl Disturbance {
 
     /// What it makes of a frame.
     fn spoil(self, random: &mut Random, mut victim: Vec<u8>) -> Vec<u8> {
-        let place = random.below(victim.len());
+        let place = random.index(victim.len());
         match self {
-            Noise => return (0..=random.below(40)).map(|_| noise(random)).collect(),
+            Noise => return (0..=random.index(40)).map(|_| noise(random)).collect(),
             TruncatedFrame => victim.truncate(place),
-            FlippedBit => victim[place] ^= 1 << random.below(8),
+            FlippedBit => victim[place] ^= 1 << random.index(8),
             LostByte => drop(victim.remove(place)),
             DoubledByte => victim.insert(place, victim[place]),
             FalseLongHeader => {
-                let count = u8::try_from(200 + random.below(56)).unwrap();
+                let count = u8::try_from(200 + random.index(56)).unwrap();
                 return vec![0xAA, 0x77, 6, random.byte(), count];
             }
             Pauses | BackToBack => victim.clear(),
@@ -74,15 +75,15 @@ impl Disturbance {
 /// Noise that is rich in headers.
 fn noise(random: &mut Random) -> u8 {
     let likely = [0xAA, 0x77, 0xAA, 0x77, 0x06, 0x03];
-    if random.below(2) == 0 { likely[random.below(likely.len())] } else { random.byte() }
+    if random.index(2) == 0 { likely[random.index(likely.len())] } else { random.byte() }
 }
 
 /// A frame like any other. Victims of a disturbance have odd addresses and the rest even ones, so that a victim
 /// that comes out after all is not mistaken for another frame.
 fn any_frame(random: &mut Random, victim: bool) -> Vec<u8> {
-    let data: Vec<u8> = (0..random.below(20)).map(|_| random.byte()).collect();
-    let address = u8::try_from(random.below(110)).unwrap() * 2 + u8::from(victim);
-    frame(if random.below(2) == 0 { 3 } else { 6 }, address, &data)
+    let data: Vec<u8> = (0..random.index(20)).map(|_| random.byte()).collect();
+    let address = u8::try_from(random.index(110)).unwrap() * 2 + u8::from(victim);
+    frame(if random.index(2) == 0 { 3 } else { 6 }, address, &data)
 }
 
 /// What a run came to.
@@ -104,7 +105,7 @@ pub fn run(disturbance: Disturbance, seed: u64, frames: usize) -> Tally {
         line.begin_burst(&burst);
         for frame in &burst {
             if disturbance == Pauses {
-                let (head, tail) = frame.split_at(random.below(frame.len()));
+                let (head, tail) = frame.split_at(random.index(frame.len()));
                 line.bytes(head);
                 line.silence(PAUSE_US);
                 line.bytes(tail);

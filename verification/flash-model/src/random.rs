@@ -26,9 +26,20 @@ impl Random {
         u32::from_le_bytes([a, b, c, d])
     }
 
+    /// The next byte.
+    pub fn byte(&mut self) -> u8 {
+        let [byte, ..] = self.next().to_be_bytes();
+        byte
+    }
+
     /// A number below `limit`; 0 if `limit` is 0. Nearly uniform for limits far below 2^64.
     pub fn below(&mut self, limit: u64) -> u64 {
         self.next().checked_rem(limit).unwrap_or(0)
+    }
+
+    /// An index below `limit`.
+    pub fn index(&mut self, limit: usize) -> usize {
+        usize::try_from(self.below(limit as u64)).unwrap_or(0)
     }
 
     /// One of the set bits of `bits`; 0 if no bit is set.

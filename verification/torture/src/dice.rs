@@ -22,13 +22,12 @@ impl Dice {
 
     /// Any byte.
     pub fn byte(&mut self) -> u8 {
-        let [byte, ..] = self.0.next().to_be_bytes();
-        byte
+        self.0.byte()
     }
 
     /// A number from 0 to below `limit`, as a place or a count.
     pub fn below(&mut self, limit: usize) -> usize {
-        usize::try_from(self.0.below(limit as u64)).unwrap_or(0)
+        self.0.index(limit)
     }
 
     /// A byte from 0 to `most`.
