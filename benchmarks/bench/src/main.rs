@@ -1,5 +1,5 @@
-//! `cargo xtask bench`: time of a request on the parse-and-answer path, beside four peers: two Modbus RTU servers,
-//! postcard with COBS, and MAVLink.
+//! `cargo xtask bench`: the time per request of the parse-and-reply path, and of four peers: two Modbus RTU servers, postcard
+//! with COBS, and MAVLink.
 //!
 //! All servers get the same operations, as one stream in pieces of 64 bytes that are independent of frame limits.
 //! They append their replies to one vector. Each reply to undamaged traffic is compared, byte by byte, with an
@@ -20,7 +20,7 @@
 //! These differences come from the protocols:
 //! * Our server also checks each written value against its range, checks access rights, and keeps the state for its
 //!   timeouts (D4, D15, D16). No peer does.
-//! * A Modbus server answers a write; the others do not.
+//! * A Modbus server replies to a write; the others do not.
 //! * Frames differ in length (the table prints it): MAVLink names sender and receiver.
 //! * COBS finds a frame by a zero, MAVLink by its header; a damaged zero or length can hide the frames that follow. On a
 //!   line, silence separates Modbus frames. In a stream, a Modbus server skips one byte when a frame is invalid.
@@ -32,13 +32,13 @@ use std::time::{Duration, Instant};
 
 mod operation;
 mod protocol;
+mod request_stream;
 mod server;
-mod traffic;
 
 use peers::{MavlinkServer, ModbusCoreServer, OurServer, PostcardServer, RmodbusServer};
 use protocol::Protocol;
+use request_stream::{CASES, Case, RequestStream};
 use server::Serve;
-use traffic::{CASES, Case, Traffic};
 
 /// Requests in a round.
 const REQUESTS: usize = 2_000;
@@ -46,43 +46,47 @@ const REQUESTS: usize = 2_000;
 const ROUNDS: usize = 301;
 
 /// A server under comparison.
-struct Candidate {
+struct MeasuredServer {
     name: &'static str,
     protocol: Protocol,
     start: fn() -> Box<dyn Serve>,
 }
 
 /// Our server, then the peers.
-static CANDIDATES: [Candidate; 5] = [
-    Candidate {
+static SERVERS: [MeasuredServer; 5] = [
+    MeasuredServer {
         name: "protocol-core",
         protocol: Protocol::SevenBot,
         start: || Box::new(OurServer::default()),
     },
-    Candidate {
+    MeasuredServer {
         name: "modbus-core",
         protocol: Protocol::ModbusRtu,
         start: || Box::new(ModbusCoreServer::default()),
     },
-    Candidate {
+    MeasuredServer {
         name: "rmodbus",
         protocol: Protocol::ModbusRtu,
         start: || Box::new(RmodbusServer::default()),
     },
-    Candidate {
+    MeasuredServer {
         name: "postcard+cobs",
         protocol: Protocol::Postcard,
         start: || Box::new(PostcardServer::default()),
     },
-    Candidate { name: "mavlink", protocol: Protocol::Mavlink, start: || Box::new(MavlinkServer::default()) },
+    MeasuredServer {
+        name: "mavlink",
+        protocol: Protocol::Mavlink,
+        start: || Box::new(MavlinkServer::default()),
+    },
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    pin_to_one_core();
+    pin_to_core();
     println!(
         "Time of a request, median of {ROUNDS} interleaved rounds of {REQUESTS} requests; peers in multiples of ours"
     );
-    let names = CANDIDATES.each_ref().map(|candidate| format!("{:>14}", candidate.name)).concat();
+    let names = SERVERS.each_ref().map(|server| format!("{:>14}", server.name)).concat();
     println!("{:20}{names}{:>13}", "", "ours / best");
     for case in CASES {
         print_row(case, &measure(case)?);
@@ -92,37 +96,37 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// The rounds of one server in one case.
 struct Measurement {
-    candidate: &'static Candidate,
-    traffic: Traffic,
+    server: &'static MeasuredServer,
+    stream: RequestStream,
     times: Vec<Duration>,
-    carried_out: usize,
+    executed: usize,
 }
 
 impl Measurement {
-    fn new(candidate: &'static Candidate, case: &Case) -> Self {
-        let traffic = Traffic::new(case, candidate.protocol, REQUESTS);
-        Self { candidate, traffic, times: Vec::with_capacity(ROUNDS), carried_out: 0 }
+    fn new(server: &'static MeasuredServer, case: &Case) -> Self {
+        let stream = RequestStream::new(case, server.protocol, REQUESTS);
+        Self { server, stream, times: Vec::with_capacity(ROUNDS), executed: 0 }
     }
 
     /// Runs one round and compares its replies with the model's.
     fn run(&mut self, replies: &mut Vec<u8>) -> Result<(), String> {
         replies.clear();
-        let mut server = (self.candidate.start)();
+        let mut server = (self.server.start)();
         let start = Instant::now();
-        server.serve(&self.traffic.requests, replies);
+        server.serve(&self.stream.requests, replies);
         self.times.push(start.elapsed());
-        self.carried_out = server.carried_out();
-        let all = self.carried_out == self.traffic.undamaged && *replies == self.traffic.replies;
-        let is_ours = self.candidate.protocol == Protocol::SevenBot;
-        if !all && (is_ours || self.traffic.undamaged == REQUESTS) {
-            let Self { carried_out, traffic: Traffic { undamaged, .. }, .. } = self;
-            let name = self.candidate.name;
-            return Err(format!("{name} carried out {carried_out} of {undamaged}, or answered wrongly"));
+        self.executed = server.executed();
+        let all = self.executed == self.stream.undamaged && *replies == self.stream.replies;
+        let is_ours = self.server.protocol == Protocol::SevenBot;
+        if !all && (is_ours || self.stream.undamaged == REQUESTS) {
+            let Self { executed, stream: RequestStream { undamaged, .. }, .. } = self;
+            let name = self.server.name;
+            return Err(format!("{name} executed {executed} of {undamaged} requests, or sent a wrong reply"));
         }
         Ok(())
     }
 
-    /// The median of the rounds, in nanoseconds a request.
+    /// The median of the rounds, in nanoseconds per request.
     fn nanoseconds(&self) -> f64 {
         let mut times = self.times.clone();
         times.sort_unstable();
@@ -130,20 +134,20 @@ impl Measurement {
         median.as_secs_f64() * 1e9 / REQUESTS as f64
     }
 
-    fn bytes_a_request(&self) -> String {
+    fn bytes_per_request(&self) -> String {
         let mean = |bytes: &[u8]| bytes.len() as f64 / REQUESTS as f64;
-        format!("{:.0} + {:.0}", mean(&self.traffic.requests), mean(&self.traffic.replies))
+        format!("{:.0} + {:.0}", mean(&self.stream.requests), mean(&self.stream.replies))
     }
 
-    /// The share of the undamaged requests that was carried out.
-    fn answered(&self) -> String {
-        format!("{:.2} %", 100.0 * self.carried_out as f64 / self.traffic.undamaged as f64)
+    /// The share of the undamaged requests that was executed.
+    fn share_executed(&self) -> String {
+        format!("{:.2} %", 100.0 * self.executed as f64 / self.stream.undamaged as f64)
     }
 }
 
 /// Runs the rounds of one case.
-fn measure(case: &Case) -> Result<[Measurement; CANDIDATES.len()], String> {
-    let mut measurements = CANDIDATES.each_ref().map(|candidate| Measurement::new(candidate, case));
+fn measure(case: &Case) -> Result<[Measurement; SERVERS.len()], String> {
+    let mut measurements = SERVERS.each_ref().map(|server| Measurement::new(server, case));
     let mut replies = Vec::with_capacity(REQUESTS * 256);
     for _ in 0..ROUNDS {
         for measurement in &mut measurements {
@@ -161,9 +165,9 @@ fn print_row(case: &Case, measurements: &[Measurement]) {
         peers.iter().map(|measurement| format!("{:12.2} x", measurement.nanoseconds() / time)).collect();
     let best = peers.iter().map(Measurement::nanoseconds).fold(f64::INFINITY, f64::min);
     println!("{:20}{time:11.1} ns{multiples}{:13.2}", case.name, time / best);
-    print_cells("  bytes in + out", measurements, Measurement::bytes_a_request);
-    if ours.traffic.undamaged < REQUESTS {
-        print_cells("  undamaged, done", measurements, Measurement::answered);
+    print_cells("  bytes in + out", measurements, Measurement::bytes_per_request);
+    if ours.stream.undamaged < REQUESTS {
+        print_cells("  undamaged, done", measurements, Measurement::share_executed);
     }
 }
 
@@ -173,7 +177,7 @@ fn print_cells(title: &str, measurements: &[Measurement], cell: impl Fn(&Measure
 }
 
 /// Pins this program to one core, where the system supports it.
-fn pin_to_one_core() {
+fn pin_to_core() {
     if let Some(core) = core_affinity::get_core_ids().and_then(|cores| cores.last().copied()) {
         core_affinity::set_for_current(core);
     }

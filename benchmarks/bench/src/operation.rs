@@ -1,7 +1,7 @@
 //! One operation on the registers: a read or a write. It does not know how requests are framed.
 
 /// A read or a write of consecutive bytes of the register map.
-pub(crate) struct Operation {
+pub(crate) struct RegisterOperation {
     /// Address of the first byte.
     pub(crate) first: u8,
     /// Number of bytes.
@@ -10,7 +10,7 @@ pub(crate) struct Operation {
     pub(crate) written: Vec<u8>,
 }
 
-impl Operation {
+impl RegisterOperation {
     /// A read of `count` bytes.
     pub(crate) const fn read(first: u8, count: u8) -> Self {
         Self { first, count, written: Vec::new() }
@@ -21,12 +21,12 @@ impl Operation {
         Self { first, count: u8::try_from(written.len()).unwrap_or(u8::MAX), written }
     }
 
-    /// Whether it reads.
+    /// True for a read.
     pub(crate) const fn is_read(&self) -> bool {
         self.written.is_empty()
     }
 
-    /// Carries a write out.
+    /// Executes a write.
     pub(crate) fn apply(&self, registers: &mut [u8]) {
         for (register, &value) in registers.iter_mut().skip(usize::from(self.first)).zip(&self.written) {
             *register = value;

@@ -7,7 +7,7 @@
 use crc::{CRC_16_MCRF4XX, CRC_16_MODBUS, Crc};
 use peers::work::STATION;
 
-use crate::operation::Operation;
+use crate::operation::RegisterOperation;
 
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 const MAVLINK_CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MCRF4XX);
@@ -36,8 +36,8 @@ pub(crate) enum Protocol {
 
 impl Protocol {
     /// The request for an operation. `registers` holds the values before it.
-    pub(crate) fn request(self, operation: &Operation, registers: &[u8]) -> Vec<u8> {
-        let &Operation { first, count, .. } = operation;
+    pub(crate) fn request(self, operation: &RegisterOperation, registers: &[u8]) -> Vec<u8> {
+        let &RegisterOperation { first, count, .. } = operation;
         let written = operation.written.as_slice();
         let is_read = operation.is_read();
         let function = if is_read { 3 } else { 6 };
@@ -51,8 +51,8 @@ impl Protocol {
     }
 
     /// The reply to an operation; empty if there is none. `registers` holds the values after it.
-    pub(crate) fn reply(self, operation: &Operation, registers: &[u8]) -> Vec<u8> {
-        let &Operation { first, count, .. } = operation;
+    pub(crate) fn reply(self, operation: &RegisterOperation, registers: &[u8]) -> Vec<u8> {
+        let &RegisterOperation { first, count, .. } = operation;
         let read = operation.values(registers, count);
         match self {
             Self::ModbusRtu => modbus_reply(operation, registers),
@@ -65,11 +65,11 @@ impl Protocol {
 }
 
 /// The first Modbus register of an operation, and the number of registers. The first byte has an even address.
-const fn modbus_registers(operation: &Operation) -> (u8, u8) {
+const fn modbus_registers(operation: &RegisterOperation) -> (u8, u8) {
     (operation.first / 2, operation.count.div_ceil(2))
 }
 
-fn modbus_request(operation: &Operation, registers: &[u8]) -> Vec<u8> {
+fn modbus_request(operation: &RegisterOperation, registers: &[u8]) -> Vec<u8> {
     let (first, count) = modbus_registers(operation);
     if operation.is_read() {
         return with_crc(vec![STATION, 3, 0, first, 0, count]);
@@ -81,7 +81,7 @@ fn modbus_request(operation: &Operation, registers: &[u8]) -> Vec<u8> {
     with_crc([&[STATION, 16, 0, first, 0, count, 2 * count], values.as_slice()].concat())
 }
 
-fn modbus_reply(operation: &Operation, registers: &[u8]) -> Vec<u8> {
+fn modbus_reply(operation: &RegisterOperation, registers: &[u8]) -> Vec<u8> {
     let (first, count) = modbus_registers(operation);
     if !operation.is_read() {
         return with_crc(vec![STATION, 16, 0, first, 0, count]);
@@ -141,23 +141,23 @@ mod tests {
     #[test]
     fn frames_match_the_specifications() {
         let registers = registers();
-        let read = Operation::read(54, 7);
-        let write = Operation::write(46, POSE.to_vec());
+        let read = RegisterOperation::read(54, 7);
+        let write = RegisterOperation::write(46, POSE.to_vec());
         assert_eq!(Protocol::SevenBot.request(&read, &registers), *b"\xaa\x77\x03\x36\x07\x81\xce");
         assert_eq!(Protocol::SevenBot.request(&write, &registers), *b"\xaa\x77\x06\x2e\x07ZZAZZZP\xf9\x91");
         assert_eq!(Protocol::SevenBot.reply(&read, &registers), *b"\xaa\x77\x03\x36\x07ZZAZZZP\x43\x81");
-        let twenty = Operation::read(0, 20);
+        let twenty = RegisterOperation::read(0, 20);
         assert_eq!(Protocol::ModbusRtu.request(&twenty, &registers), [1, 3, 0, 0, 0, 10, 0xC5, 0xCD]);
     }
 
     #[test]
     fn modbus_carries_seven_bytes_in_four_registers() {
         let registers = registers();
-        let read = Operation::read(46, 7);
+        let read = RegisterOperation::read(46, 7);
         assert_eq!(Protocol::ModbusRtu.request(&read, &registers)[..6], [1, 3, 0, 23, 0, 4]);
         let reply = Protocol::ModbusRtu.reply(&read, &registers);
         assert_eq!(reply[..reply.len() - 2], *b"\x01\x03\x08ZZAZZZP\x09");
-        let write = Operation::write(46, vec![1, 2, 3, 4, 5, 6, 7]);
+        let write = RegisterOperation::write(46, vec![1, 2, 3, 4, 5, 6, 7]);
         let request = Protocol::ModbusRtu.request(&write, &registers);
         assert_eq!(request[..request.len() - 2], [1, 16, 0, 23, 0, 4, 8, 1, 2, 3, 4, 5, 6, 7, 9]);
         assert_eq!(Protocol::ModbusRtu.reply(&write, &registers)[..6], [1, 16, 0, 23, 0, 4]);
@@ -175,10 +175,10 @@ mod tests {
     fn requests_counted_on_the_chip_equal_those_timed_here() {
         let registers = initial_values();
         let check = |protocol: Protocol, requests: Requests| {
-            assert_eq!(protocol.request(&Operation::read(46, 7), &registers), requests.read_of_7);
-            let write = Operation::write(46, POSE.to_vec());
+            assert_eq!(protocol.request(&RegisterOperation::read(46, 7), &registers), requests.read_of_7);
+            let write = RegisterOperation::write(46, POSE.to_vec());
             assert_eq!(protocol.request(&write, &registers), requests.write_of_7);
-            assert_eq!(protocol.request(&Operation::read(0, 61), &registers), requests.read_of_61);
+            assert_eq!(protocol.request(&RegisterOperation::read(0, 61), &registers), requests.read_of_61);
         };
         check(Protocol::SevenBot, SEVEN_BOT);
         check(Protocol::ModbusRtu, MODBUS_RTU);

@@ -10,8 +10,8 @@ pub(crate) trait Serve {
     /// Takes a whole stream and appends the replies.
     fn serve(&mut self, stream: &[u8], replies: &mut Vec<u8>);
 
-    /// The number of requests carried out so far.
-    fn carried_out(&self) -> usize;
+    /// The number of requests executed so far.
+    fn executed(&self) -> usize;
 }
 
 impl<S: Server> Serve for S {
@@ -23,7 +23,7 @@ impl<S: Server> Serve for S {
         self.end(&mut reply);
     }
 
-    fn carried_out(&self) -> usize {
-        Server::carried_out(self)
+    fn executed(&self) -> usize {
+        Server::executed(self)
     }
 }

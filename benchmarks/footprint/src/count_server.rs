@@ -6,6 +6,17 @@ use peers::work::Requests;
 use crate::meter::Meter;
 use crate::opaque;
 
+/// The main function of a program that counts the instructions of one server.
+#[macro_export]
+macro_rules! count_program {
+    ($server:ty, $requests:expr) => {
+        #[cortex_m_rt::entry]
+        fn main() -> ! {
+            $crate::count_server::run::<$server>($requests)
+        }
+    };
+}
+
 /// Counts the instructions of each request, prints them, and never returns.
 pub fn run<S: Server + Default>(requests: Requests) -> ! {
     let meter = Meter::default();
@@ -16,19 +27,19 @@ pub fn run<S: Server + Default>(requests: Requests) -> ! {
     by_byte(&meter, &mut server, "read of 7, byte by byte", requests.read_of_7);
     by_byte(&meter, &mut server, "write of 7, byte by byte", requests.write_of_7);
     by_byte(&meter, &mut server, "read of 61, byte by byte", requests.read_of_61);
-    meter.tell("requests carried out", u32::try_from(server.carried_out()).unwrap_or(0));
-    meter.tell("state with all registers, bytes", u32::try_from(size_of::<S>()).unwrap_or(0));
+    meter.print("requests carried out", u32::try_from(server.executed()).unwrap_or(0));
+    meter.print("state with all registers, bytes", u32::try_from(size_of::<S>()).unwrap_or(0));
     meter.end()
 }
 
 fn whole(meter: &Meter, server: &mut impl Server, name: &str, request: &[u8]) {
     let request = opaque(request);
-    meter.tell(name, meter.count(|| feed(server, request)));
+    meter.print(name, meter.count(|| feed(server, request)));
 }
 
 fn by_byte(meter: &Meter, server: &mut impl Server, name: &str, request: &[u8]) {
     let request = opaque(request);
-    meter.tell(name, meter.count(|| request.chunks(1).for_each(|byte| feed(server, byte))));
+    meter.print(name, meter.count(|| request.chunks(1).for_each(|byte| feed(server, byte))));
 }
 
 /// The counted call. `cargo xtask bench` finds its stack use by this function's name.

@@ -15,12 +15,12 @@ use core::panic::PanicInfo;
 
 use protocol_core::time::Instant;
 
-/// Returns `value`. The compiler cannot know it any more.
+/// Returns `value`, hidden from the compiler.
 pub fn opaque<T>(value: T) -> T {
     black_box(value)
 }
 
-/// Bytes of unknown number and value, for the compiler.
+/// Bytes whose number and values the compiler does not know.
 #[must_use]
 pub fn any_bytes() -> &'static [u8] {
     opaque(&[])

@@ -6,16 +6,16 @@ use core::sync::atomic::{Ordering, compiler_fence};
 use crate::opaque;
 
 /// The address of a peripheral's register.
-type Register = *mut u32;
+type RegisterAddress = *mut u32;
 
 /// TIM2 (RM0090, section 18.4): control register.
-const TIM2_CR1: Register = 0x4000_0000 as Register;
+const TIM2_CR1: RegisterAddress = 0x4000_0000 as RegisterAddress;
 /// TIM2: count.
-const TIM2_CNT: Register = 0x4000_0024 as Register;
+const TIM2_CNT: RegisterAddress = 0x4000_0024 as RegisterAddress;
 /// USART1 (RM0090, section 30.6): data register.
-const USART1_DR: Register = 0x4001_1004 as Register;
+const USART1_DR: RegisterAddress = 0x4001_1004 as RegisterAddress;
 /// USART1: control register.
-const USART1_CR1: Register = 0x4001_100C as Register;
+const USART1_CR1: RegisterAddress = 0x4001_100C as RegisterAddress;
 /// Bits UE and TE.
 const ENABLE_TRANSMITTER: u32 = 1 << 13 | 1 << 3;
 
@@ -49,16 +49,16 @@ impl Meter {
 
     /// Sends a figure.
     #[inline(never)]
-    pub fn tell(&self, name: &str, figure: u32) {
+    pub fn print(&self, name: &str, figure: u32) {
         name.bytes().for_each(send);
         send(b'\t');
-        let mut place = 1_000_000_000;
-        while place > 0 {
-            let [digit, ..] = (figure / place % 10).to_le_bytes();
-            if figure >= place || place == 1 {
+        let mut unit = 1_000_000_000;
+        while unit > 0 {
+            let [digit, ..] = (figure / unit % 10).to_le_bytes();
+            if figure >= unit || unit == 1 {
                 send(b'0' + digit);
             }
-            place /= 10;
+            unit /= 10;
         }
         send(b'\n');
     }
@@ -81,7 +81,7 @@ fn count_so_far() -> u32 {
     unsafe { TIM2_CNT.read_volatile() }
 }
 
-fn write(register: Register, value: u32) {
+fn write(register: RegisterAddress, value: u32) {
     // SAFETY: `register` is one of the constants above, and no other code here uses these peripherals.
     unsafe { register.write_volatile(value) }
 }

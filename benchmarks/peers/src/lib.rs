@@ -18,7 +18,7 @@ pub use ours::OurServer;
 pub use postcard::PostcardServer;
 pub use rmodbus::RmodbusServer;
 
-/// Parses a stream of requests and answers them.
+/// Parses a stream of requests and replies to them.
 pub trait Server {
     /// Takes the next piece of the stream and passes each reply to `reply`.
     fn feed(&mut self, piece: &[u8], reply: &mut impl FnMut(&[u8]));
@@ -26,6 +26,6 @@ pub trait Server {
     /// The line has been silent longer than any timeout: no unfinished frame will be completed.
     fn end(&mut self, reply: &mut impl FnMut(&[u8]));
 
-    /// The number of requests carried out so far.
-    fn carried_out(&self) -> usize;
+    /// The number of requests executed so far.
+    fn executed(&self) -> usize;
 }

@@ -23,13 +23,13 @@ const FILLER: [u8; 64] = [0; 64];
 const FILLERS: usize = 5;
 
 /// The received bytes, as the source that the reader reads from.
-struct Line(Inbox);
+struct ReceivedBytes(Inbox);
 
-impl ErrorType for Line {
+impl ErrorType for ReceivedBytes {
     type Error = Infallible;
 }
 
-impl Read for Line {
+impl Read for ReceivedBytes {
     fn read(&mut self, room: &mut [u8]) -> Result<usize, Infallible> {
         let bytes = self.0.bytes();
         let count = bytes.len().min(room.len());
@@ -72,23 +72,23 @@ impl Dialect for Tunnel {
 
 /// The peer mavlink.
 pub struct MavlinkServer {
-    reader: MavlinkReader<Line>,
+    reader: MavlinkReader<ReceivedBytes>,
     registers: [u8; 256],
-    /// Buffer for the reply, created once instead of once a request.
+    /// Buffer for the reply, created once instead of once per request.
     data: TUNNEL_DATA,
     frame: MAVLinkV2MessageRaw,
-    carried_out: usize,
+    executed: usize,
 }
 
 impl Default for MavlinkServer {
     /// A server that has received nothing.
     fn default() -> Self {
         Self {
-            reader: MavlinkReader::new(Line(Inbox::new())),
+            reader: MavlinkReader::new(ReceivedBytes(Inbox::new())),
             registers: initial_values(),
             data: empty(),
             frame: MAVLinkV2MessageRaw::new(),
-            carried_out: 0,
+            executed: 0,
         }
     }
 }
@@ -105,10 +105,15 @@ const fn empty() -> TUNNEL_DATA {
 }
 
 impl MavlinkServer {
-    /// Carries a request out and returns the reply to a read. `None` if the message is not a valid request.
-    fn answer(&mut self, from: MavHeader, asked: &TUNNEL_DATA, reply: &mut impl FnMut(&[u8])) -> Option<()> {
-        let asked_bytes = asked.payload.get(..usize::from(asked.payload_length))?;
-        let (&[function, address, count], written) = asked_bytes.split_first_chunk()?;
+    /// Executes a request and returns the reply to a read. `None` if the message is not a valid request.
+    fn answer(
+        &mut self,
+        from: MavHeader,
+        request: &TUNNEL_DATA,
+        reply: &mut impl FnMut(&[u8]),
+    ) -> Option<()> {
+        let data = request.payload.get(..usize::from(request.payload_length))?;
+        let (&[function, address, count], written) = data.split_first_chunk()?;
         let (first, length) = (usize::from(address), usize::from(count));
         let registers = self.registers.get_mut(first..first + length)?;
         match function {
@@ -129,7 +134,7 @@ impl MavlinkServer {
             WRITE if written.len() == length => registers.copy_from_slice(written),
             _ => return None,
         }
-        self.carried_out += 1;
+        self.executed += 1;
         Some(())
     }
 }
@@ -139,7 +144,7 @@ impl Server for MavlinkServer {
         self.reader.get_mut().0.push(piece);
         loop {
             match self.reader.read_message_with_dialect(&Tunnel, MavlinkVersion::V2) {
-                Ok((from, asked)) => _ = self.answer(from, &asked, reply),
+                Ok((from, request)) => _ = self.answer(from, &request, reply),
                 Err(MessageReadError::Parse { .. }) => {}
                 // The received bytes are used up.
                 Err(MessageReadError::Io) => return,
@@ -154,7 +159,7 @@ impl Server for MavlinkServer {
         }
     }
 
-    fn carried_out(&self) -> usize {
-        self.carried_out
+    fn executed(&self) -> usize {
+        self.executed
     }
 }

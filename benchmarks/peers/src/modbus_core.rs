@@ -16,12 +16,12 @@ use crate::work::{REGISTERS, STATION, initial_words};
 /// The peer modbus-core.
 pub struct ModbusCoreServer {
     inbox: Inbox,
-    registers: Registers,
-    carried_out: usize,
+    registers: ModbusRegisters,
+    executed: usize,
 }
 
-/// The registers, and buffers for the values read and for the reply: created once instead of once a request.
-struct Registers {
+/// The registers, and buffers for the values read and for the reply: created once instead of once per request.
+struct ModbusRegisters {
     words: [u16; REGISTERS],
     data: [u8; 250],
     frame: [u8; rtu::MAX_FRAME_LEN],
@@ -37,8 +37,9 @@ type Refusal = Exception;
 impl Default for ModbusCoreServer {
     /// A server that has received nothing.
     fn default() -> Self {
-        let registers = Registers { words: initial_words(), data: [0; 250], frame: [0; rtu::MAX_FRAME_LEN] };
-        Self { inbox: Inbox::new(), registers, carried_out: 0 }
+        let registers =
+            ModbusRegisters { words: initial_words(), data: [0; 250], frame: [0; rtu::MAX_FRAME_LEN] };
+        Self { inbox: Inbox::new(), registers, executed: 0 }
     }
 }
 
@@ -61,7 +62,7 @@ impl ModbusCoreServer {
         if slave == STATION
             && let Ok(request) = Request::try_from(pdu)
         {
-            self.carried_out += usize::from(self.registers.answer(request, reply));
+            self.executed += usize::from(self.registers.answer(request, reply));
         }
         self.inbox.take(length + ENVELOPE);
         true
@@ -90,27 +91,27 @@ impl Server for ModbusCoreServer {
         }
     }
 
-    fn carried_out(&self) -> usize {
-        self.carried_out
+    fn executed(&self) -> usize {
+        self.executed
     }
 }
 
-impl Registers {
-    /// Carries a request out and returns the reply. Returns `true` if the request was carried out.
+impl ModbusRegisters {
+    /// Executes a request and returns the reply. Returns `true` if it was executed.
     fn answer(&mut self, request: Request<'_>, reply: &mut impl FnMut(&[u8])) -> bool {
-        let result = carry_out(&mut self.words, request, &mut self.data);
-        let carried_out = result.is_ok();
+        let result = execute(&mut self.words, request, &mut self.data);
+        let executed = result.is_ok();
         let function = FunctionCode::from(request);
         let pdu = ResponsePdu(result.map_err(|exception| ExceptionResponse { function, exception }));
         let response = ResponseAdu { hdr: Header { slave: STATION }, pdu };
         if let Ok(length) = encode_response(response, &mut self.frame) {
             reply(self.frame.get(..length).unwrap_or(&[]));
         }
-        carried_out
+        executed
     }
 }
 
-fn carry_out<'data>(
+fn execute<'data>(
     registers: &mut [u16],
     request: Request<'_>,
     data: &'data mut [u8],
@@ -125,9 +126,9 @@ fn carry_out<'data>(
         }
         Request::WriteMultipleRegisters(first, words) => {
             let start = usize::from(first);
-            let places = registers.get_mut(start..start + words.len()).ok_or(Refusal::IllegalDataAddress)?;
-            for (place, word) in places.iter_mut().zip(words) {
-                *place = word;
+            let targets = registers.get_mut(start..start + words.len()).ok_or(Refusal::IllegalDataAddress)?;
+            for (target, word) in targets.iter_mut().zip(words) {
+                *target = word;
             }
             let count = u16::try_from(words.len()).map_err(|_| Refusal::IllegalDataValue)?;
             Ok(Response::WriteMultipleRegisters(first, count))

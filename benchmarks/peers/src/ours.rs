@@ -14,7 +14,7 @@ pub struct OurServer {
     deframer: Deframer<ToArm>,
     registers: RegisterFile,
     reply: FrameBuffer,
-    carried_out: usize,
+    executed: usize,
 }
 
 impl Default for OurServer {
@@ -25,7 +25,7 @@ impl Default for OurServer {
             deframer: Deframer::new(gap(115_200)),
             registers: RegisterFile::new([1, 2, 3, 4, 5, 6], None),
             reply: FrameBuffer::new(),
-            carried_out: 0,
+            executed: 0,
         }
     }
 }
@@ -38,12 +38,12 @@ impl OurServer {
                 Request::Read { address, count } => {
                     Reply { address, values: self.registers.read(address, count) }.encode(&mut self.reply);
                     reply(&self.reply);
-                    self.carried_out += 1;
+                    self.executed += 1;
                 }
                 Request::Write { address, values } => {
                     if let Ok(accepted) = self.registers.check(address, values) {
                         self.registers.apply(&accepted);
-                        self.carried_out += 1;
+                        self.executed += 1;
                     }
                 }
             }
@@ -70,7 +70,7 @@ impl Server for OurServer {
         }
     }
 
-    fn carried_out(&self) -> usize {
-        self.carried_out
+    fn executed(&self) -> usize {
+        self.executed
     }
 }

@@ -18,21 +18,21 @@ const ROOM: usize = 272;
 
 /// A request.
 #[derive(Deserialize)]
-enum Request<'a> {
+enum PostcardRequest<'a> {
     Read { address: u8, count: u8 },
     Write { address: u8, values: &'a [u8] },
 }
 
 /// The reply to a read.
 #[derive(Serialize)]
-struct Reply<'a> {
+struct PostcardReply<'a> {
     address: u8,
-    #[serde(serialize_with = "at_once")]
+    #[serde(serialize_with = "as_bytes")]
     values: &'a [u8],
 }
 
 /// Serialises the values as one byte string: serde serialises a slice element by element.
-fn at_once<S: Serializer>(values: &&[u8], serializer: S) -> Result<S::Ok, S::Error> {
+fn as_bytes<S: Serializer>(values: &&[u8], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_bytes(values)
 }
 
@@ -41,23 +41,23 @@ pub struct PostcardServer {
     inbox: Inbox,
     /// The number of bytes at the front of the inbox that are known to hold no zero.
     searched: usize,
-    work: Work,
+    server: RegisterServer,
 }
 
 /// The registers, and buffers for a frame before and after COBS encoding.
-struct Work {
+struct RegisterServer {
     registers: [u8; 256],
     plain: [u8; ROOM],
     stuffed: [u8; ROOM],
-    carried_out: usize,
+    executed: usize,
 }
 
 impl Default for PostcardServer {
     /// A server that has received nothing.
     fn default() -> Self {
         let (plain, stuffed) = ([0; ROOM], [0; ROOM]);
-        let work = Work { registers: initial_values(), plain, stuffed, carried_out: 0 };
-        Self { inbox: Inbox::new(), searched: 0, work }
+        let server = RegisterServer { registers: initial_values(), plain, stuffed, executed: 0 };
+        Self { inbox: Inbox::new(), searched: 0, server }
     }
 }
 
@@ -67,7 +67,7 @@ impl Server for PostcardServer {
         while let Some(length) = self.frame_length() {
             let frame = self.inbox.bytes().get(..length).unwrap_or(&[]);
             // An invalid frame is skipped, up to the zero that ends it.
-            let _ = self.work.answer(frame, reply);
+            let _ = self.server.answer(frame, reply);
             self.inbox.take(length + 1);
         }
     }
@@ -75,8 +75,8 @@ impl Server for PostcardServer {
     /// Does nothing: a frame ends with a zero, never with a timeout.
     fn end(&mut self, _: &mut impl FnMut(&[u8])) {}
 
-    fn carried_out(&self) -> usize {
-        self.work.carried_out
+    fn executed(&self) -> usize {
+        self.server.executed
     }
 }
 
@@ -91,26 +91,27 @@ impl PostcardServer {
     }
 }
 
-impl Work {
-    /// Carries a request out and returns the reply to a read. `None` if the frame is not a valid request.
+impl RegisterServer {
+    /// Executes a request and returns the reply to a read. `None` if the frame is not a valid request.
     fn answer(&mut self, frame: &[u8], reply: &mut impl FnMut(&[u8])) -> Option<()> {
         let report = cobs::decode(frame, &mut self.plain).ok()?;
         let plain = self.plain.get(..report.frame_size())?;
         match from_bytes_u16(plain, CRC.digest()).ok()? {
-            Request::Read { address, count } => {
+            PostcardRequest::Read { address, count } => {
                 let first = usize::from(address);
                 let values = self.registers.get(first..first + usize::from(count))?;
-                let plain = to_slice_u16(&Reply { address, values }, &mut self.plain, CRC.digest()).ok()?;
+                let plain =
+                    to_slice_u16(&PostcardReply { address, values }, &mut self.plain, CRC.digest()).ok()?;
                 let length = cobs::try_encode(plain, &mut self.stuffed).ok()?;
                 *self.stuffed.get_mut(length)? = 0;
                 reply(self.stuffed.get(..=length)?);
             }
-            Request::Write { address, values } => {
+            PostcardRequest::Write { address, values } => {
                 let first = usize::from(address);
                 self.registers.get_mut(first..first + values.len())?.copy_from_slice(values);
             }
         }
-        self.carried_out += 1;
+        self.executed += 1;
         Some(())
     }
 }

@@ -15,7 +15,7 @@ pub struct RmodbusServer {
     inbox: Inbox,
     registers: ModbusStorage<1, 1, 1, REGISTERS>,
     reply: heapless::Vec<u8, 256>,
-    carried_out: usize,
+    executed: usize,
 }
 
 impl Default for RmodbusServer {
@@ -24,7 +24,7 @@ impl Default for RmodbusServer {
         let mut registers = ModbusStorage::new();
         // Cannot fail: both hold the same number of registers.
         let _ = registers.set_holdings_bulk(0, &initial_words());
-        Self { inbox: Inbox::new(), registers, reply: heapless::Vec::new(), carried_out: 0 }
+        Self { inbox: Inbox::new(), registers, reply: heapless::Vec::new(), executed: 0 }
     }
 }
 
@@ -32,12 +32,12 @@ impl RmodbusServer {
     /// Parses one request at the front. Returns `false` if it needs more bytes.
     fn answer_one(&mut self, reply: &mut impl FnMut(&[u8])) -> bool {
         let Ok(length) = guess_request_frame_len(self.inbox.bytes(), ModbusProto::Rtu) else {
-            return self.skip_byte_of_no_frame();
+            return self.skip_invalid_byte();
         };
         let Some(bytes) = self.inbox.bytes().get(..usize::from(length)) else { return false };
         let mut frame = ModbusFrame::new(STATION, bytes, ModbusProto::Rtu, &mut self.reply);
-        let is_a_request = frame.parse().is_ok() && frame.processing_required;
-        if !is_a_request {
+        let is_request = frame.parse().is_ok() && frame.processing_required;
+        if !is_request {
             self.inbox.take(1);
             return true;
         }
@@ -49,21 +49,21 @@ impl RmodbusServer {
         let answered = processed.is_ok() && frame.error.is_none() && frame.finalize_response().is_ok();
         if answered {
             reply(&self.reply);
-            self.carried_out += 1;
+            self.executed += 1;
         }
         self.inbox.take(usize::from(length));
         true
     }
 
     /// Drops one byte if the length cannot be guessed although enough bytes have arrived.
-    fn skip_byte_of_no_frame(&mut self) -> bool {
+    fn skip_invalid_byte(&mut self) -> bool {
         /// The length of every valid frame can be guessed from this many bytes.
-        const ENOUGH: usize = 7;
-        let is_no_frame = self.inbox.bytes().len() >= ENOUGH;
-        if is_no_frame {
+        const MIN_BYTES: usize = 7;
+        let is_invalid = self.inbox.bytes().len() >= MIN_BYTES;
+        if is_invalid {
             self.inbox.take(1);
         }
-        is_no_frame
+        is_invalid
     }
 }
 
@@ -81,7 +81,7 @@ impl Server for RmodbusServer {
         }
     }
 
-    fn carried_out(&self) -> usize {
-        self.carried_out
+    fn executed(&self) -> usize {
+        self.executed
     }
 }

@@ -19,7 +19,7 @@ fn main() -> ! {
         opaque(deframer.push(any_time(), any_bytes()));
         while let Some(found) = deframer.pull() {
             match found {
-                Ok(frame) => carry_out(Request::from_frame(frame), &mut registers, &mut reply),
+                Ok(frame) => execute(Request::from_frame(frame), &mut registers, &mut reply),
                 Err(defect) => {
                     opaque(defect);
                 }
@@ -29,7 +29,7 @@ fn main() -> ! {
     }
 }
 
-fn carry_out(request: Request<'_>, registers: &mut RegisterFile, reply: &mut FrameBuffer) {
+fn execute(request: Request<'_>, registers: &mut RegisterFile, reply: &mut FrameBuffer) {
     match request {
         Request::Read { address, count } => {
             Reply { address, values: registers.read(address, count) }.encode(reply);

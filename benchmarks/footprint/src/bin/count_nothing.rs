@@ -4,10 +4,8 @@
 #![no_std]
 #![no_main]
 
-use cortex_m_rt::entry;
-use footprint::{count_server, opaque};
+use footprint::opaque;
 use peers::Server;
-use peers::work::SEVEN_BOT;
 
 /// A server that returns each piece as the reply.
 #[derive(Default)]
@@ -20,12 +18,9 @@ impl Server for Nothing {
 
     fn end(&mut self, _: &mut impl FnMut(&[u8])) {}
 
-    fn carried_out(&self) -> usize {
+    fn executed(&self) -> usize {
         opaque(0)
     }
 }
 
-#[entry]
-fn main() -> ! {
-    count_server::run::<Nothing>(SEVEN_BOT)
-}
+footprint::count_program!(Nothing, peers::work::SEVEN_BOT);

@@ -3,12 +3,4 @@
 #![no_std]
 #![no_main]
 
-use cortex_m_rt::entry;
-use footprint::count_server;
-use peers::PostcardServer;
-use peers::work::POSTCARD;
-
-#[entry]
-fn main() -> ! {
-    count_server::run::<PostcardServer>(POSTCARD)
-}
+footprint::count_program!(peers::PostcardServer, peers::work::POSTCARD);

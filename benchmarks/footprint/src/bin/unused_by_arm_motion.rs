@@ -51,19 +51,19 @@ fn one_joint() {
     opaque((drive.is_driven(), drive.is_moving(), drive.set_point()));
     drive.mark_silent();
     drive.release();
-    let mut sensor = opaque(PositionFilter::UNKNOWN);
-    opaque(sensor.answered(any_time(), opaque(0)));
-    opaque(sensor.failed(any_time()));
-    opaque((sensor.is_known(), sensor.position(), sensor.wants_asking(any_time())));
+    let mut filter = opaque(PositionFilter::UNKNOWN);
+    opaque(filter.answered(any_time(), opaque(0)));
+    opaque(filter.failed(any_time()));
+    opaque((filter.is_known(), filter.position(), filter.wants_asking(any_time())));
 }
 
 fn timers() {
-    let mut feedback = opaque(ReportTimer::OFF);
-    feedback.set(any_time(), opaque(0), opaque(0));
-    opaque((feedback.poll_due(any_time()), feedback.due()));
-    let mut gripper = opaque(VacuumControl::default());
-    gripper.set(any_time(), opaque(true));
-    opaque((gripper.poll(any_time()), gripper.deadline()));
+    let mut reports = opaque(ReportTimer::OFF);
+    reports.set(any_time(), opaque(0), opaque(0));
+    opaque((reports.poll_due(any_time()), reports.due()));
+    let mut vacuum = opaque(VacuumControl::default());
+    vacuum.set(any_time(), opaque(true));
+    opaque((vacuum.poll(any_time()), vacuum.deadline()));
     opaque(MotorState::from_register(opaque(0)).torque(opaque(true)));
 }
 

@@ -18,13 +18,13 @@ use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
 fn main() -> ! {
     loop {
         opaque(chip_id::reduce(opaque([0; 12])));
-        hosts_end();
+        host_side();
         table();
         register_file();
     }
 }
 
-fn hosts_end() {
+fn host_side() {
     let mut frame = FrameBuffer::new();
     Request::Read { address: opaque(0), count: opaque(0) }.encode(&mut frame);
     opaque(frame.as_slice());
@@ -42,11 +42,11 @@ fn table() {
     opaque(map::baud_rate(opaque(0)));
     let joint = Joint::new(opaque(1)).or(Joint::from_index(opaque(0)));
     if let (Some(row), Some(joint)) = (map::find(opaque(0)), joint) {
-        look_at(row, joint);
+        register_row(row, joint);
     }
 }
 
-fn look_at(row: &Register, joint: Joint) {
+fn register_row(row: &Register, joint: Joint) {
     opaque((joint.number(), joint.index(), joint.bit()));
     opaque((row.of(joint), row.joint_at(opaque(0)), row.default_at(opaque(0)), row.unit.symbol()));
     opaque((row.range.decode(opaque(0)), row.range.encode(opaque(0)), row.range.bounds()));

@@ -4,14 +4,14 @@ use fastrand::Rng;
 use peers::work::initial_values;
 use protocol_core::registers::map::TARGET_POSITION;
 
-use crate::operation::Operation;
+use crate::operation::RegisterOperation;
 use crate::protocol::Protocol;
 
 /// One row of the table.
 pub(crate) struct Case {
     pub(crate) name: &'static str,
     /// Generates the next operation.
-    operation: fn(&mut Rng) -> Operation,
+    operation: fn(&mut Rng) -> RegisterOperation,
     /// Damaged requests in a thousand.
     damaged_per_mille: u32,
 }
@@ -28,20 +28,23 @@ pub(crate) const CASES: &[Case] = &[
 // A Modbus register begins at an even byte.
 const _: () = assert!(TARGET_POSITION.address.is_multiple_of(2));
 
-const fn read_joints(_: &mut Rng) -> Operation {
-    Operation::read(TARGET_POSITION.address, TARGET_POSITION.count)
+const fn read_joints(_: &mut Rng) -> RegisterOperation {
+    RegisterOperation::read(TARGET_POSITION.address, TARGET_POSITION.count)
 }
 
-fn write_joints(rng: &mut Rng) -> Operation {
-    Operation::write(TARGET_POSITION.address, (0..TARGET_POSITION.count).map(|_| rng.u8(..=180)).collect())
+fn write_joints(rng: &mut Rng) -> RegisterOperation {
+    RegisterOperation::write(
+        TARGET_POSITION.address,
+        (0..TARGET_POSITION.count).map(|_| rng.u8(..=180)).collect(),
+    )
 }
 
-const fn read_all(_: &mut Rng) -> Operation {
-    Operation::read(0, 61)
+const fn read_all(_: &mut Rng) -> RegisterOperation {
+    RegisterOperation::read(0, 61)
 }
 
 /// A host in a control loop: 50 % reads of seven, 40 % writes of seven, 10 % reads of 61.
-fn mix(rng: &mut Rng) -> Operation {
+fn mix(rng: &mut Rng) -> RegisterOperation {
     match rng.u8(..10) {
         0..5 => read_joints(rng),
         5..9 => write_joints(rng),
@@ -50,7 +53,7 @@ fn mix(rng: &mut Rng) -> Operation {
 }
 
 /// A stream of requests, and its expected result.
-pub(crate) struct Traffic {
+pub(crate) struct RequestStream {
     /// All requests, without gaps.
     pub(crate) requests: Vec<u8>,
     /// The replies to the undamaged requests.
@@ -59,10 +62,10 @@ pub(crate) struct Traffic {
     pub(crate) undamaged: usize,
 }
 
-impl Traffic {
+impl RequestStream {
     /// `count` requests of a case. Every protocol gets the same operations, and the same requests are damaged.
     pub(crate) fn new(case: &Case, protocol: Protocol, count: usize) -> Self {
-        let mut traffic = Self { requests: Vec::new(), replies: Vec::new(), undamaged: 0 };
+        let mut stream = Self { requests: Vec::new(), replies: Vec::new(), undamaged: 0 };
         let mut registers = initial_values();
         let mut rng = Rng::with_seed(0x7B07);
         for _ in 0..count {
@@ -74,12 +77,12 @@ impl Traffic {
                 flip(&mut request, byte, bits);
             } else {
                 operation.apply(&mut registers);
-                traffic.replies.extend(protocol.reply(&operation, &registers));
-                traffic.undamaged += 1;
+                stream.replies.extend(protocol.reply(&operation, &registers));
+                stream.undamaged += 1;
             }
-            traffic.requests.extend(request);
+            stream.requests.extend(request);
         }
-        traffic
+        stream
     }
 }
 
