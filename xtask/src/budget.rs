@@ -1,29 +1,26 @@
-//! Figures that are held: each is compared with what was committed, and with what it may be at most. Less is better
-//! in all of them.
+//! Compares figures with their committed values and limits. Lower figures are better.
 //!
 //! ```text
 //!   xtask/budgets/size.txt:    name | committed | at most
 //! ```
-//!
-//! Knows nothing of where a figure comes from.
 
 use std::fs;
 use std::path::PathBuf;
 
-use crate::run::{Outcome, root};
+use crate::run::{TaskResult, root};
 use torture::text_table::Column::{Left, Right};
 use torture::text_table::TextTable;
 
-/// How much worse than committed a figure may get, in percent.
+/// The accepted increase over the committed value, in percent.
 const TOLERANCE: u64 = 5;
-/// What stands at the beginning of each file of budgets.
+/// The first lines of each file of budgets.
 const INTRODUCTION: &str = "\
 # name | committed | at most
 # Less is better. `cargo xtask test` fails where a figure is more than 5 % above the one committed, or above the most
 # that it may be; `cargo xtask size --accept` and `cargo xtask count --accept` commit what they measure.
 ";
 
-/// Something that was measured or counted.
+/// A measured or counted value.
 pub(crate) struct Figure {
     name: String,
     value: u64,
@@ -39,71 +36,74 @@ impl Figure {
 struct Budget {
     name: String,
     committed: u64,
-    most: Option<u64>,
+    max: Option<u64>,
 }
 
 impl Budget {
     fn parse(line: &str) -> Option<Self> {
         let mut cells = line.split('|').map(str::trim);
-        let (name, committed, most) = (cells.next()?, cells.next()?, cells.next()?);
-        let most = if most == "-" { None } else { Some(most.parse().ok()?) };
-        Some(Self { name: name.to_owned(), committed: committed.parse().ok()?, most })
+        let (name, committed, max) = (cells.next()?, cells.next()?, cells.next()?);
+        let max = if max == "-" { None } else { Some(max.parse().ok()?) };
+        Some(Self { name: name.to_owned(), committed: committed.parse().ok()?, max })
     }
 
-    /// What is wrong with a figure.
-    fn fault_of(&self, value: u64) -> Option<String> {
+    /// The violated limit, if any.
+    fn violation(&self, value: u64) -> Option<String> {
         let limit = self.committed + self.committed * TOLERANCE / 100;
-        match self.most {
-            Some(most) if value > most => Some(format!("may be {most} at most")),
-            _ if value > limit => Some(format!("was {}: more than {TOLERANCE} % worse", self.committed)),
+        match self.max {
+            Some(max) if value > max => Some(format!("the limit is {max}")),
+            _ if value > limit => {
+                Some(format!("was {}: the increase is above {TOLERANCE} %", self.committed))
+            }
             _ => None,
         }
     }
 }
 
-/// Prints the figures, and fails if one is worse than its budget in `xtask/budgets/<file>.txt` allows. With
-/// `accept` they are committed instead; what each may be at most stays.
-pub(crate) fn hold(file: &str, figures: &[Figure], accept: bool) -> Outcome {
+/// Prints the figures and compares them with `xtask/budgets/<file>.txt`. With `accept`, commits them instead, and keeps the
+/// limits.
+pub(crate) fn check(file: &str, figures: &[Figure], accept: bool) -> TaskResult {
     let path = root().join("xtask/budgets").join(file).with_extension("txt");
     let text = fs::read_to_string(&path).unwrap_or_default();
     let lines = text.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());
     let budgets = lines.map(|line| Budget::parse(line).ok_or(format!("{}: {line}", path.display())));
     let budgets = budgets.collect::<Result<Vec<_>, _>>()?;
-    let faults = compare(&budgets, figures);
+    let violations = compare(&budgets, figures);
     if accept {
         return write(&path, &budgets, figures);
     }
-    if faults.is_empty() { Ok(()) } else { Err(faults.join("; ").into()) }
+    if violations.is_empty() { Ok(()) } else { Err(violations.join("; ").into()) }
 }
 
 fn compare(budgets: &[Budget], figures: &[Figure]) -> Vec<String> {
     let mut table = TextTable::new([Right("measured"), Right("committed"), Right("at most"), Left("figure")]);
-    let mut faults = Vec::new();
+    let mut violations = Vec::new();
     for figure in figures {
         let budget = budgets.iter().find(|budget| budget.name == figure.name);
-        let fault = match budget {
-            Some(budget) => budget.fault_of(figure.value),
+        let violation = match budget {
+            Some(budget) => budget.violation(figure.value),
             None => Some("has no budget".to_owned()),
         };
         let committed = budget.map_or_else(String::new, |budget| budget.committed.to_string());
-        let most = budget.and_then(|budget| budget.most).map_or_else(String::new, |most| most.to_string());
-        let mark = fault.as_ref().map_or_else(String::new, |fault| format!("   <-- {fault}"));
-        table.add([figure.value.to_string(), committed, most, format!("{}{mark}", figure.name)]);
-        faults.extend(fault.map(|fault| format!("{}: {}, {fault}", figure.name, figure.value)));
+        let max = budget.and_then(|budget| budget.max).map_or_else(String::new, |max| max.to_string());
+        let mark = violation.as_ref().map_or_else(String::new, |violation| format!("   <-- {violation}"));
+        table.add([figure.value.to_string(), committed, max, format!("{}{mark}", figure.name)]);
+        violations
+            .extend(violation.map(|violation| format!("{}: {}, {violation}", figure.name, figure.value)));
     }
     print!("{table}");
     let is_measured = |budget: &&Budget| figures.iter().any(|figure| figure.name == budget.name);
-    let lost = budgets.iter().filter(|budget| !is_measured(budget));
-    faults.extend(lost.map(|budget| format!("{}: has a budget and was not measured", budget.name)));
-    faults
+    let unmeasured = budgets.iter().filter(|budget| !is_measured(budget));
+    violations.extend(unmeasured.map(|budget| format!("{}: has a budget and was not measured", budget.name)));
+    violations
 }
 
-fn write(path: &PathBuf, budgets: &[Budget], figures: &[Figure]) -> Outcome {
+fn write(path: &PathBuf, budgets: &[Budget], figures: &[Figure]) -> TaskResult {
     let mut text = INTRODUCTION.to_owned();
     for Figure { name, value } in figures {
-        let most = budgets.iter().find(|budget| budget.name == *name).and_then(|budget| budget.most);
-        let most = most.map_or_else(|| "-".to_owned(), |most| most.to_string());
-        text.push_str(&format!("{name} | {value} | {most}\n"));
+        let max = budgets.iter().find(|budget| budget.name == *name).and_then(|budget| budget.max);
+        let max = max.map_or_else(|| "-".to_owned(), |max| max.to_string());
+        text.push_str(&format!("{name} | {value} | {max}\n"));
     }
     println!("committed to {}", path.display());
     Ok(fs::write(path, text)?)
@@ -118,17 +118,17 @@ mod tests {
     }
 
     #[test]
-    fn five_percent_worse_is_let_pass_and_more_is_not() {
-        let free = Budget { most: None, ..budget() };
-        assert_eq!(free.fault_of(15_000), None);
-        assert_eq!(free.fault_of(21_000), None);
-        assert!(free.fault_of(21_001).is_some());
+    fn an_increase_of_five_percent_passes_and_more_fails() {
+        let free = Budget { max: None, ..budget() };
+        assert_eq!(free.violation(15_000), None);
+        assert_eq!(free.violation(21_000), None);
+        assert!(free.violation(21_001).is_some());
     }
 
     #[test]
-    fn nothing_may_be_above_the_most_that_it_may_be() {
-        assert_eq!(budget().fault_of(20_500), None);
-        assert!(budget().fault_of(20_501).is_some());
+    fn a_figure_above_its_limit_fails() {
+        assert_eq!(budget().violation(20_500), None);
+        assert!(budget().violation(20_501).is_some());
     }
 
     #[test]
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_no_budget_is_told() {
+    fn an_invalid_line_is_an_error() {
         assert!(Budget::parse("image: program, bytes | many | -").is_none());
         assert!(Budget::parse("image: program, bytes").is_none());
     }

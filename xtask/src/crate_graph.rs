@@ -2,16 +2,16 @@
 
 use std::fmt::Write;
 
-use crate::generated::Section;
-use crate::run::Outcome;
+use crate::generated::GeneratedSection;
+use crate::run::TaskResult;
 use crate::workspace::{self, Package};
 
-const SECTION: Section = Section {
+const SECTION: GeneratedSection = GeneratedSection {
     document: "docs/design.md",
     begin: "<!-- begin: made by `cargo xtask docs` from `cargo metadata` -->\n",
 };
 
-/// A kind of crate and its crates.
+/// A group of crates.
 type Group = (&'static str, &'static [&'static str]);
 
 /// Every crate belongs to one group.
@@ -33,19 +33,19 @@ const GROUPS: [Group; 3] = [
 ];
 
 /// Draws the picture.
-pub(crate) fn write() -> Outcome {
+pub(crate) fn write() -> TaskResult {
     SECTION.write(&picture(&workspace::packages()?)?)
 }
 
 /// Fails if the picture is not the one that [`write()`] draws.
-pub(crate) fn check() -> Outcome {
+pub(crate) fn check() -> TaskResult {
     SECTION.check(&picture(&workspace::packages()?)?)?;
     println!("docs/design.md shows the crates and their dependencies");
     Ok(())
 }
 
 /// A flowchart in the language of Mermaid.
-fn picture(packages: &[Package]) -> Outcome<String> {
+fn picture(packages: &[Package]) -> TaskResult<String> {
     let mut text = "```mermaid\nflowchart TD\n".to_owned();
     for (group, crates) in GROUPS {
         writeln!(text, "    subgraph {group}")?;

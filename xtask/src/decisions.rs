@@ -1,42 +1,42 @@
-//! The table in docs/protocol.md that says which tests hold each decision, D1 to D20: made from the tests' names.
+//! The table in docs/protocol.md of the tests for each decision, D1 to D20, generated from the names of the tests.
 //!
-//! A test that holds D3 and D4 is called `d03_d04_...`. Knows nothing of what a decision says.
+//! A test of D3 and D4 has a name like `d03_d04_...`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::generated::Section;
-use crate::run::{Outcome, root};
+use crate::generated::GeneratedSection;
+use crate::run::{TaskResult, root};
 
-/// The decisions there are.
+/// The numbers of the decisions.
 const DECISIONS: std::ops::RangeInclusive<u8> = 1..=20;
-const SECTION: Section = Section {
+const SECTION: GeneratedSection = GeneratedSection {
     document: "docs/protocol.md",
     begin: "<!-- begin: made by `cargo xtask docs` from the names of the tests -->\n",
 };
 
 /// Writes the table.
-pub(crate) fn write() -> Outcome {
+pub(crate) fn write() -> TaskResult {
     SECTION.write(&table()?)
 }
 
 /// Fails if the table is stale, or if a decision has no test.
-pub(crate) fn check() -> Outcome {
+pub(crate) fn check() -> TaskResult {
     SECTION.check(&table()?)
 }
 
-fn table() -> Outcome<String> {
+fn table() -> TaskResult<String> {
     let mut tests: BTreeMap<u8, Vec<String>> = BTreeMap::new();
     let mut files = Vec::new();
     find_sources(root(), &mut files)?;
     files.sort();
     for file in files {
         let source = fs::read_to_string(&file)?;
-        let place = file.strip_prefix(root())?.display().to_string();
+        let file = file.strip_prefix(root())?.display().to_string();
         for (name, decision) in source.lines().filter_map(test_name).flat_map(decisions) {
-            tests.entry(decision).or_default().push(format!("`{place}`: {name}"));
+            tests.entry(decision).or_default().push(format!("`{file}`: {name}"));
         }
     }
     let mut table = String::from("| decision | held by |\n| --- | --- |\n");
@@ -50,7 +50,7 @@ fn table() -> Outcome<String> {
 }
 
 /// All Rust files of the project below `folder`.
-fn find_sources(folder: &Path, files: &mut Vec<PathBuf>) -> Outcome {
+fn find_sources(folder: &Path, files: &mut Vec<PathBuf>) -> TaskResult {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -63,13 +63,13 @@ fn find_sources(folder: &Path, files: &mut Vec<PathBuf>) -> Outcome {
     Ok(())
 }
 
-/// The name in a line that begins a function named after decisions.
+/// The name of a test of decisions that is defined in this line.
 fn test_name(line: &str) -> Option<&str> {
     let name = line.trim_start().strip_prefix("fn ")?.split('(').next()?;
     number(name).map(|_| name)
 }
 
-/// The decisions a test's name begins with, each with the rest of the name in words.
+/// The decisions in the name of a test, each with the rest of the name as text.
 fn decisions(name: &str) -> Vec<(String, u8)> {
     let mut numbers = Vec::new();
     let mut rest = name;
@@ -80,7 +80,7 @@ fn decisions(name: &str) -> Vec<(String, u8)> {
     numbers.into_iter().map(|decision| (rest.replace('_', " "), decision)).collect()
 }
 
-/// The number in a beginning like `d07_`.
+/// The number of a prefix like `d07`.
 fn number(name: &str) -> Option<u8> {
     let (digits, _) = name.strip_prefix('d')?.split_once('_')?;
     (digits.len() == 2).then(|| digits.parse().ok())?

@@ -11,15 +11,15 @@ use std::process::{Command, Stdio};
 use serde::Deserialize;
 use spdx::{Expression, LicenseReq};
 
-use crate::run::{Outcome, cargo, root};
+use crate::run::{TaskResult, cargo, root};
 
 /// The workspaces whose dependencies are checked.
 const MANIFESTS: [&str; 2] = ["Cargo.toml", "verification/fuzz/Cargo.toml"];
 
-/// What `deny.toml` says.
+/// The contents of `deny.toml`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Rules {
+struct DenyRules {
     graph: Graph,
     licenses: Licenses,
     bans: Bans,
@@ -69,78 +69,78 @@ struct Sources {
     allow_registry: Vec<String>,
 }
 
-/// The only strictness that is implemented for a key.
+/// The only implemented value of a key.
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Warn {
     Warn,
 }
 
-/// Likewise.
+/// The only implemented value of another key.
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Deny {
     Deny,
 }
 
-/// What is needed of the answer of `cargo metadata`.
+/// The part of the output of `cargo metadata` that is read here.
 #[derive(Deserialize)]
-struct Metadata {
-    packages: Vec<Package>,
+struct PackageList {
+    packages: Vec<CheckedPackage>,
 }
 
 #[derive(Clone, Deserialize)]
-struct Package {
+struct CheckedPackage {
     name: String,
     version: String,
     license: Option<String>,
-    /// `None`: a package of this repository.
+    /// `None` for a package of this repository.
     source: Option<String>,
-    dependencies: Vec<Dependency>,
+    dependencies: Vec<CheckedDependency>,
 }
 
 #[derive(Clone, Deserialize)]
-struct Dependency {
+struct CheckedDependency {
     name: String,
     req: String,
     path: Option<String>,
 }
 
 /// Checks licences, versions and sources.
-pub(crate) fn rules() -> Outcome {
-    let rules: Rules = toml::from_str(&fs::read_to_string(root().join("deny.toml"))?)?;
+pub(crate) fn rules() -> TaskResult {
+    let rules: DenyRules = toml::from_str(&fs::read_to_string(root().join("deny.toml"))?)?;
     let packages = packages(&rules.graph)?;
     for duplicate in duplicates(&packages) {
         println!("warning: more than one version of {duplicate}");
     }
-    let offences = rules.offences(&packages);
-    if offences.is_empty() {
-        println!("{} packages: licences, versions and sources are as deny.toml says", packages.len());
+    let violations = rules.violations(&packages);
+    if violations.is_empty() {
+        println!("{} packages: licences, versions and sources follow deny.toml", packages.len());
         Ok(())
     } else {
-        Err(format!("deny.toml forbids:\n{}", offences.join("\n")).into())
+        Err(format!("deny.toml forbids:\n{}", violations.join("\n")).into())
     }
 }
 
-/// Likewise, and the advisories.
-pub(crate) fn check() -> Outcome {
+/// Checks licences, versions, sources and advisories.
+pub(crate) fn check() -> TaskResult {
     rules()?;
-    if works("deny fetch db") {
+    if succeeds("deny fetch db") {
         cargo("deny check --disable-fetch advisories")
     } else {
-        println!("advisories: NOT CHECKED, cargo-deny is not installed or its database is out of reach");
+        println!("advisories: NOT CHECKED, cargo-deny is not installed or its database cannot be downloaded");
         Ok(())
     }
 }
 
-fn works(words: &str) -> bool {
+fn succeeds(words: &str) -> bool {
     let mut program = Command::new("cargo");
     program.args(words.split(' ')).current_dir(root()).stdout(Stdio::null()).stderr(Stdio::null());
     program.status().is_ok_and(|status| status.success())
 }
 
-/// The packages that are built for any of the targets, ours included, each version once.
-fn packages(graph: &Graph) -> Outcome<Vec<Package>> {
+/// The packages in the builds for all targets, each version once, with our own.
+fn packages(graph: &Graph) -> TaskResult<Vec<CheckedPackage>> {
     let mut found = BTreeMap::new();
     for manifest in MANIFESTS {
         for target in &graph.targets {
@@ -151,8 +151,8 @@ fn packages(graph: &Graph) -> Outcome<Vec<Package>> {
             if !output.status.success() {
                 Err(format!("`cargo metadata` failed for {manifest} and {target}"))?;
             }
-            let metadata: Metadata = serde_json::from_slice(&output.stdout)?;
-            let named = |package: Package| ((package.name.clone(), package.version.clone()), package);
+            let metadata: PackageList = serde_json::from_slice(&output.stdout)?;
+            let named = |package: CheckedPackage| ((package.name.clone(), package.version.clone()), package);
             found.extend(metadata.packages.into_iter().map(named));
         }
     }
@@ -160,18 +160,18 @@ fn packages(graph: &Graph) -> Outcome<Vec<Package>> {
 }
 
 /// Names with more than one version.
-fn duplicates(packages: &[Package]) -> BTreeSet<&str> {
+fn duplicates(packages: &[CheckedPackage]) -> BTreeSet<&str> {
     let mut seen = BTreeSet::new();
     packages.iter().map(|package| package.name.as_str()).filter(|name| !seen.insert(*name)).collect()
 }
 
-impl Rules {
-    /// What breaks a rule, one line for each offence.
-    fn offences(&self, packages: &[Package]) -> Vec<String> {
-        let of_package = |package: &Package| {
-            let offences = [self.license(package), self.source(package), self.wildcard(package)];
+impl DenyRules {
+    /// The violations of the rules, one line each.
+    fn violations(&self, packages: &[CheckedPackage]) -> Vec<String> {
+        let of_package = |package: &CheckedPackage| {
+            let violations = [self.license(package), self.source(package), self.wildcard(package)];
             let name = format!("{} {}", package.name, package.version);
-            offences.into_iter().flatten().map(move |offence| format!("{name}: {offence}"))
+            violations.into_iter().flatten().map(move |violation| format!("{name}: {violation}"))
         };
         let unused = |exception: &&Exception| !packages.iter().any(|package| package.name == exception.name);
         let unused = self.licenses.exceptions.iter().filter(unused);
@@ -179,8 +179,8 @@ impl Rules {
         packages.iter().flat_map(of_package).chain(unused).collect()
     }
 
-    /// The licence has to be allowed for all crates, or for this one.
-    fn license(&self, package: &Package) -> Option<String> {
+    /// A licence is allowed for all crates or for this one.
+    fn license(&self, package: &CheckedPackage) -> Option<String> {
         let Some(license) = &package.license else {
             return Some("has no licence".to_owned());
         };
@@ -195,7 +195,7 @@ impl Rules {
     }
 
     /// A dependency comes from an allowed registry, never from a git repository.
-    fn source(&self, package: &Package) -> Option<String> {
+    fn source(&self, package: &CheckedPackage) -> Option<String> {
         let source = package.source.as_ref()?;
         let registry = source.strip_prefix("registry+").or_else(|| source.strip_prefix("sparse+"));
         let is_allowed = registry
@@ -203,13 +203,13 @@ impl Rules {
         (!is_allowed).then(|| format!("source `{source}` is not allowed"))
     }
 
-    /// No package of ours takes any version of a dependency, whatever it is.
-    fn wildcard(&self, package: &Package) -> Option<String> {
+    /// Our packages do not depend on any version of a crate.
+    fn wildcard(&self, package: &CheckedPackage) -> Option<String> {
         let is_exempt =
-            |dependency: &&Dependency| dependency.path.is_some() && self.bans.allow_wildcard_paths;
+            |dependency: &&CheckedDependency| dependency.path.is_some() && self.bans.allow_wildcard_paths;
         let mut wild = package.dependencies.iter().filter(|dependency| dependency.req == "*");
-        let offence = wild.find(|dependency| package.source.is_none() && !is_exempt(dependency))?;
-        Some(format!("takes any version of {}", offence.name))
+        let violation = wild.find(|dependency| package.source.is_none() && !is_exempt(dependency))?;
+        Some(format!("takes any version of {}", violation.name))
     }
 }
 
@@ -220,12 +220,12 @@ mod tests {
 
     const CRATES_IO: &str = "registry+https://github.com/rust-lang/crates.io-index";
 
-    fn rules() -> Rules {
+    fn rules() -> DenyRules {
         toml::from_str(&fs::read_to_string(root().join("deny.toml")).unwrap()).unwrap()
     }
 
-    fn package(license: Option<&str>, source: Option<&str>) -> Package {
-        Package {
+    fn package(license: Option<&str>, source: Option<&str>) -> CheckedPackage {
+        CheckedPackage {
             name: "example".to_owned(),
             version: "1.0.0".to_owned(),
             license: license.map(str::to_owned),
@@ -237,15 +237,15 @@ mod tests {
     #[test]
     fn a_licence_is_allowed_when_its_expression_can_be_met() {
         let rules = rules();
-        let offence = |license| rules.license(&package(license, Some(CRATES_IO)));
+        let violation = |license| rules.license(&package(license, Some(CRATES_IO)));
         for allowed in ["MIT", "MIT OR GPL-3.0-only", "MIT/Apache-2.0", "Apache-2.0 AND MIT"] {
-            assert_eq!(offence(Some(allowed)), None, "{allowed}");
+            assert_eq!(violation(Some(allowed)), None, "{allowed}");
         }
         for refused in ["GPL-3.0-only", "MIT AND GPL-3.0-only", "MPL-2.0", "Apache-2.0 WITH LLVM-exception"] {
-            assert!(offence(Some(refused)).unwrap().contains("is not allowed"), "{refused}");
+            assert!(violation(Some(refused)).unwrap().contains("is not allowed"), "{refused}");
         }
-        assert!(offence(Some("ask me")).unwrap().contains("is no licence expression"));
-        assert!(offence(None).unwrap().contains("has no licence"));
+        assert!(violation(Some("ask me")).unwrap().contains("is no licence expression"));
+        assert!(violation(None).unwrap().contains("has no licence"));
     }
 
     #[test]
@@ -255,27 +255,27 @@ mod tests {
         assert!(rules.license(&serialport).is_some());
         serialport.name = "serialport".to_owned();
         assert_eq!(rules.license(&serialport), None);
-        let offences = rules.offences(&[serialport]);
-        assert!(offences.iter().any(|offence| offence.contains("for unicode-ident")), "{offences:?}");
-        assert!(!offences.iter().any(|offence| offence.contains("serialport")), "{offences:?}");
+        let violations = rules.violations(&[serialport]);
+        assert!(violations.iter().any(|violation| violation.contains("for unicode-ident")), "{violations:?}");
+        assert!(!violations.iter().any(|violation| violation.contains("serialport")), "{violations:?}");
     }
 
     #[test]
     fn sources_are_crates_io_and_this_repository() {
         let rules = rules();
-        let offence = |source| rules.source(&package(Some("MIT"), source));
-        assert_eq!(offence(Some(CRATES_IO)), None);
-        assert_eq!(offence(None), None);
-        assert!(offence(Some("git+https://example.org/x#1")).is_some());
-        assert!(offence(Some("registry+https://example.org/index")).is_some());
+        let violation = |source| rules.source(&package(Some("MIT"), source));
+        assert_eq!(violation(Some(CRATES_IO)), None);
+        assert_eq!(violation(None), None);
+        assert!(violation(Some("git+https://example.org/x#1")).is_some());
+        assert!(violation(Some("registry+https://example.org/index")).is_some());
     }
 
     #[test]
-    fn any_version_of_a_dependency_is_refused_but_of_a_folder() {
+    fn a_dependency_on_any_version_is_refused_unless_it_is_a_folder() {
         let rules = rules();
         let mut ours = package(Some("MIT"), None);
-        let any = Dependency { name: "any".to_owned(), req: "*".to_owned(), path: None };
-        ours.dependencies = vec![Dependency { path: Some("any".to_owned()), ..any.clone() }];
+        let any = CheckedDependency { name: "any".to_owned(), req: "*".to_owned(), path: None };
+        ours.dependencies = vec![CheckedDependency { path: Some("any".to_owned()), ..any.clone() }];
         assert_eq!(rules.wildcard(&ours), None);
         ours.dependencies.push(any);
         assert!(rules.wildcard(&ours).is_some());
@@ -285,13 +285,14 @@ mod tests {
     fn a_key_that_is_not_checked_is_refused() {
         let text = fs::read_to_string(root().join("deny.toml")).unwrap();
         assert!(
-            toml::from_str::<Rules>(&text.replace("wildcards = \"deny\"", "wildcards = \"warn\"")).is_err()
+            toml::from_str::<DenyRules>(&text.replace("wildcards = \"deny\"", "wildcards = \"warn\""))
+                .is_err()
         );
-        assert!(toml::from_str::<Rules>(&format!("{text}\nprivate = true\n")).is_err());
+        assert!(toml::from_str::<DenyRules>(&format!("{text}\nprivate = true\n")).is_err());
     }
 
     #[test]
-    fn two_versions_of_one_crate_are_told() {
+    fn two_versions_of_one_crate_are_reported() {
         let (first, mut second) = (package(None, None), package(None, None));
         assert!(duplicates(std::slice::from_ref(&first)).is_empty());
         second.version = "2.0.0".to_owned();

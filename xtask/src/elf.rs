@@ -1,5 +1,4 @@
-//! What the linker put into a program for the chip: sections, functions, who calls whom, and from which
-//! line of the source. Knows nothing of what is looked for.
+//! A linked program for the chip: sections, functions, calls, and lines of source.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
@@ -11,88 +10,88 @@ use object::read::elf::ElfFile32;
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use rustc_demangle::demangle;
 
-use crate::jump_table::Body;
-use crate::run::{Outcome, root};
+use crate::jump_table::FunctionCode;
+use crate::run::{TaskResult, root};
 use crate::thumb_decode::{self, Effect, halfword};
 
 type Lines<'data> = addr2line::Context<EndianSlice<'data, LittleEndian>>;
 
 /// A linked program.
 pub(crate) struct Program<'data> {
-    /// Everything that has a name and a size, functions and data.
+    /// Functions and data with a name and a size.
     pub(crate) symbols: Vec<Symbol>,
-    /// The sections that take room on the chip.
+    /// The sections in the chip's memory.
     pub(crate) sections: Vec<Section>,
-    code: Vec<Code<'data>>,
+    code: Vec<CodeSection<'data>>,
     /// The effect of the instruction at each address.
     instructions: BTreeMap<u64, Effect>,
-    /// Where exceptions lead, reset first, each handler once.
+    /// The addresses of the exception handlers, reset first, each handler once.
     handlers: Vec<u64>,
     lines: Lines<'data>,
 }
 
 /// A function or a piece of data.
 pub(crate) struct Symbol {
-    /// Its name as the source has it.
+    /// Its name in the source.
     pub(crate) name: String,
-    /// Where it begins.
+    /// Its address.
     pub(crate) address: u64,
     /// Its length in bytes.
     pub(crate) size: u64,
-    /// Is it code?
+    /// True for a function.
     pub(crate) is_function: bool,
 }
 
-/// A section with room on the chip.
+/// A section in the chip's memory.
 pub(crate) struct Section {
     /// Its name: `.text`.
     pub(crate) name: String,
-    /// Where it begins.
+    /// Its address.
     pub(crate) address: u64,
     /// Its length in bytes.
     pub(crate) size: u64,
 }
 
 /// A line of source.
-pub(crate) struct Place {
-    /// The file: inside the workspace from its root, elsewhere from its package.
+pub(crate) struct SourceLine {
+    /// The file: its path in the workspace, or in its package.
     pub(crate) file: String,
-    /// Is the file one of this workspace?
+    /// True for a file of this workspace.
     pub(crate) is_ours: bool,
-    /// The line's number.
+    /// The number of the line.
     line: u32,
 }
 
-struct Code<'data> {
+struct CodeSection<'data> {
     start: u64,
     bytes: &'data [u8],
-    /// Constants and tables of jumps between the instructions.
+    /// The data between the instructions: constants and jump tables.
     data: Vec<Range<u64>>,
 }
 
 impl<'data> Program<'data> {
     /// Reads a linked ELF file.
-    pub(crate) fn read(file: &'data [u8]) -> Outcome<Self> {
+    pub(crate) fn read(file: &'data [u8]) -> TaskResult<Self> {
         let elf: ElfFile32<'_> = ElfFile32::parse(file)?;
         let code = code(&elf)?;
         Ok(Self {
             symbols: elf.symbols().filter_map(|symbol| Symbol::of(&symbol)).collect(),
             sections: elf.sections().filter_map(|section| Section::of(&section)).collect(),
-            instructions: code.iter().flat_map(Code::instructions).collect(),
+            instructions: code.iter().flat_map(CodeSection::instructions).collect(),
             code,
             handlers: handlers(&elf)?,
             lines: lines(&elf)?,
         })
     }
 
-    /// The addresses from which the code at `target` is called or jumped to.
+    /// The addresses of the calls and jumps to `target`.
     pub(crate) fn calls_to(&self, target: u64) -> Vec<u64> {
         let leads_there = |effect| matches!(effect, Effect::Call(to) | Effect::Jump(to) if to == target);
         let calls = self.instructions.iter().filter(|&(_, &effect)| leads_there(effect));
         calls.map(|(&at, _)| at).collect()
     }
 
-    /// The functions, each once, whatever other names it has.
+    /// The functions, each once, even with several names.
     pub(crate) fn functions(&self) -> impl Iterator<Item = &Symbol> {
         self.symbols.iter().filter(|symbol| symbol.is_function && symbol.size > 0)
     }
@@ -108,12 +107,12 @@ impl<'data> Program<'data> {
         let first = usize::try_from(function.address - code.start).ok()?;
         let bytes = code.bytes.get(first..)?.get(..usize::try_from(function.size).ok()?)?;
         let instructions: Vec<_> = self.instructions_of(function).map(|(at, _)| at).collect();
-        Body { start: function.address, bytes, instructions: &instructions }.targets(at)
+        FunctionCode { start: function.address, bytes, instructions: &instructions }.targets(at)
     }
 
     /// The addresses of the instructions with this effect.
-    pub(crate) fn places_of(&self, wanted: Effect) -> Vec<u64> {
-        self.instructions.iter().filter(|&(_, &effect)| effect == wanted).map(|(&at, _)| at).collect()
+    pub(crate) fn addresses_of(&self, effect: Effect) -> Vec<u64> {
+        self.instructions.iter().filter(|&(_, &other)| other == effect).map(|(&at, _)| at).collect()
     }
 
     /// The effect of the instruction at each address.
@@ -121,48 +120,47 @@ impl<'data> Program<'data> {
         self.instructions.iter().map(|(&at, &effect)| (at, effect)).collect()
     }
 
-    /// Where the function of this name begins.
-    pub(crate) fn address_of(&self, name: &str) -> Outcome<u64> {
+    /// The address of the function with this name.
+    pub(crate) fn address_of(&self, name: &str) -> TaskResult<u64> {
         let symbol = self.functions().find(|symbol| symbol.name == name);
         Ok(symbol.ok_or_else(|| format!("no function is called {name}"))?.address)
     }
 
-    /// Where exceptions lead, reset first, each handler once.
+    /// The addresses of the exception handlers, reset first, each handler once.
     pub(crate) fn handlers(&self) -> &[u64] {
         &self.handlers
     }
 
-    /// The function that holds `address`.
+    /// The function that contains `address`.
     pub(crate) fn function_at(&self, address: u64) -> Option<&Symbol> {
         self.symbols.iter().find(|symbol| symbol.is_function && symbol.holds(address))
     }
 
-    /// The places in the source behind `address`, innermost first: more than one where functions were
-    /// inlined.
-    pub(crate) fn source_of(&self, address: u64) -> Outcome<Vec<Place>> {
+    /// The lines of source for `address`, innermost first. There are several for inlined functions.
+    pub(crate) fn source_of(&self, address: u64) -> TaskResult<Vec<SourceLine>> {
         let mut places = Vec::new();
         let mut frames = self.lines.find_frames(address).skip_all_loads()?;
         while let Some(frame) = frames.next()? {
             if let Some((file, line)) = frame.location.and_then(|place| place.file.zip(place.line)) {
-                places.push(Place::new(file, line));
+                places.push(SourceLine::new(file, line));
             }
         }
         Ok(places)
     }
 
-    /// Stretches of code that come from one line: address and length in bytes.
-    pub(crate) fn stretches(&self) -> Outcome<Vec<(u64, u64)>> {
-        let mut stretches = Vec::new();
+    /// Ranges of code from one line of source: address and length in bytes.
+    pub(crate) fn line_ranges(&self) -> TaskResult<Vec<(u64, u64)>> {
+        let mut line_ranges = Vec::new();
         for code in &self.code {
             let end = code.start + code.bytes.len() as u64;
             let found = self.lines.find_location_range(code.start, end)?;
-            stretches.extend(found.map(|(address, length, _)| (address, length)));
+            line_ranges.extend(found.map(|(address, length, _)| (address, length)));
         }
-        Ok(stretches)
+        Ok(line_ranges)
     }
 }
 
-impl Place {
+impl SourceLine {
     fn new(path: &str, line: u32) -> Self {
         let ours = Path::new(path).strip_prefix(root()).ok().and_then(Path::to_str);
         let theirs = path.split_once("/library/").or_else(|| path.split_once("/registry/src/index."));
@@ -171,7 +169,7 @@ impl Place {
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for SourceLine {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{}:{}", self.file, self.line)
     }
@@ -182,14 +180,14 @@ impl Symbol {
         let is_function = symbol.kind() == SymbolKind::Text;
         let is_wanted = is_function || symbol.kind() == SymbolKind::Data;
         let name = symbol.name().ok().filter(|name| is_wanted && !name.is_empty())?;
-        // Bit 0 of a function's address only says that it is Thumb code.
+        // Bit 0 of a function's address marks Thumb code.
         let address = if is_function { symbol.address() & !1 } else { symbol.address() };
         Some(Self { name: format!("{:#}", demangle(name)), address, size: symbol.size(), is_function })
     }
 }
 
 impl Symbol {
-    /// Is `address` in it?
+    /// True if this function or data contains `address`.
     pub(crate) fn holds(&self, address: u64) -> bool {
         self.range().contains(&address)
     }
@@ -208,8 +206,8 @@ impl Section {
     }
 }
 
-impl Code<'_> {
-    /// The instructions, where each is and what it does, less the data between them.
+impl CodeSection<'_> {
+    /// The address and the effect of each instruction, without the data between them.
     fn instructions(&self) -> impl Iterator<Item = (u64, Effect)> {
         let mut rest = self.bytes;
         let mut at = self.start;
@@ -228,7 +226,7 @@ impl Code<'_> {
     }
 }
 
-fn code<'data>(elf: &ElfFile32<'data>) -> Outcome<Vec<Code<'data>>> {
+fn code<'data>(elf: &ElfFile32<'data>) -> TaskResult<Vec<CodeSection<'data>>> {
     let marks = marks(elf);
     let sections = elf.sections().filter(|section| section.kind() == object::SectionKind::Text);
     sections
@@ -236,14 +234,14 @@ fn code<'data>(elf: &ElfFile32<'data>) -> Outcome<Vec<Code<'data>>> {
             let (start, bytes) = (section.address(), section.data()?);
             let end = start + bytes.len() as u64;
             let stops = marks.iter().skip(1).map(|&(at, _)| at).chain([end]);
-            let stretches = marks.iter().zip(stops).filter(|((at, _), _)| (start..end).contains(at));
-            let data = stretches.filter(|((_, is_code), _)| !is_code).map(|(&(at, _), stop)| at..stop);
-            Ok(Code { start, bytes, data: data.collect() })
+            let line_ranges = marks.iter().zip(stops).filter(|((at, _), _)| (start..end).contains(at));
+            let data = line_ranges.filter(|((_, is_code), _)| !is_code).map(|(&(at, _), stop)| at..stop);
+            Ok(CodeSection { start, bytes, data: data.collect() })
         })
         .collect()
 }
 
-/// Where instructions begin and where data, in order: the mapping symbols of the ELF for the ARM architecture.
+/// The starts of instructions (true) and data, in order: the mapping symbols of the ELF for the ARM architecture.
 fn marks(elf: &ElfFile32<'_>) -> Vec<(u64, bool)> {
     let mut marks: Vec<_> = elf
         .symbols()
@@ -259,8 +257,8 @@ fn marks(elf: &ElfFile32<'_>) -> Vec<(u64, bool)> {
     marks
 }
 
-/// The vector table, less its first word, the stack pointer, and its empty places.
-fn handlers(elf: &ElfFile32<'_>) -> Outcome<Vec<u64>> {
+/// The vector table without the stack pointer and unused entries.
+fn handlers(elf: &ElfFile32<'_>) -> TaskResult<Vec<u64>> {
     let table = elf.section_by_name(".vector_table").ok_or("no vector table")?.data()?;
     let mut handlers = Vec::new();
     for word in table.as_chunks().0.iter().skip(1) {
@@ -272,8 +270,8 @@ fn handlers(elf: &ElfFile32<'_>) -> Outcome<Vec<u64>> {
     Ok(handlers)
 }
 
-fn lines<'data>(elf: &ElfFile32<'data>) -> Outcome<Lines<'data>> {
-    let section = |id: gimli::SectionId| -> Outcome<_> {
+fn lines<'data>(elf: &ElfFile32<'data>) -> TaskResult<Lines<'data>> {
+    let section = |id: gimli::SectionId| -> TaskResult<_> {
         let section = elf.section_by_name(id.name());
         let bytes = section.map_or(Ok([].as_slice()), |section| section.data())?;
         Ok(EndianSlice::new(bytes, LittleEndian))

@@ -1,16 +1,16 @@
-//! Installs what the steps of `cargo xtask test` need. What is there already is neither fetched nor asked for.
+//! Installs the tools that the steps of `cargo xtask test` need, unless they are installed.
 
 use std::process::{Command, Stdio};
 
 use crate::emulate::QEMU;
-use crate::run::{CHIP, Outcome, run};
+use crate::run::{CHIP, TaskResult, run};
 
-/// A program that does not come with Rust.
+/// A program that Rust does not include.
 struct Tool {
     program: &'static str,
-    /// The package of Debian and Ubuntu that holds it.
+    /// Its package in Debian and Ubuntu.
     package: &'static str,
-    /// What it is for.
+    /// Its purpose.
     purpose: &'static str,
 }
 
@@ -20,8 +20,8 @@ const TOOLS: [Tool; 3] = [
     Tool { program: "python3", package: "python3", purpose: "checks the register table for Python" },
 ];
 
-/// Installs what is missing.
-pub(crate) fn all() -> Outcome {
+/// Installs the missing tools.
+pub(crate) fn all() -> TaskResult {
     run("rustup", "component add clippy rustfmt", &[])?;
     run("rustup", &format!("target add {CHIP}"), &[])?;
     let missing: Vec<_> = TOOLS.iter().filter(|tool| !tool.works()).collect();
@@ -35,7 +35,8 @@ pub(crate) fn all() -> Outcome {
     let packages = packages.join(" ");
     let installed = run("apt-get", "update", &[])
         .and_then(|()| run("apt-get", &format!("install -y --no-install-recommends {packages}"), &[]));
-    installed.map_err(|why| format!("{why}; `sudo apt-get install {packages}` brings what is missing").into())
+    installed
+        .map_err(|why| format!("{why}; `sudo apt-get install {packages}` installs the missing tools").into())
 }
 
 impl Tool {

@@ -14,7 +14,7 @@ use yaxpeax_arm::armv7::{ConditionCode, Instruction, Opcode, Operand, RegShiftSt
 use crate::thumb_decode::{self, decode};
 
 /// The code of a function.
-pub(crate) struct Body<'a> {
+pub(crate) struct FunctionCode<'a> {
     /// The address of its first byte.
     pub(crate) start: u64,
     /// Its instructions and data.
@@ -25,7 +25,7 @@ pub(crate) struct Body<'a> {
 
 const PC: u8 = 15;
 
-impl Body<'_> {
+impl FunctionCode<'_> {
     /// The targets of the indirect jump at `at`; `None` if it uses no table that can be read.
     pub(crate) fn targets(&self, at: u64) -> Option<Vec<u64>> {
         let targets = match self.instruction(at)?.opcode {
@@ -38,7 +38,7 @@ impl Body<'_> {
         (are_code && !targets.is_empty()).then_some(targets)
     }
 
-    /// The table behind TBB or TBH: from the end of the instruction to the next one.
+    /// The table after TBB or TBH: from the end of the instruction to the next one.
     fn table_behind(&self, at: u64) -> Option<&[u8]> {
         let is_relative_to_pc = match self.instruction(at)?.operands.first()? {
             Operand::RegDerefPreindexReg(base, ..) | Operand::RegDerefPreindexRegShift(base, ..) => {
@@ -52,7 +52,7 @@ impl Body<'_> {
 
     fn byte_offsets(&self, at: u64) -> Option<Vec<u64>> {
         let table = self.table_behind(at)?;
-        // One byte of zero aligns the next instruction.
+        // A zero byte may align the next instruction.
         let offsets = table.strip_suffix(&[0]).unwrap_or(table);
         Some(offsets.iter().map(|&offset| at + 4 + 2 * u64::from(offset)).collect())
     }
@@ -62,7 +62,7 @@ impl Body<'_> {
         Some(offsets.map(|offset| at + 4 + 2 * u64::from(offset)).collect())
     }
 
-    /// The addresses of the branches that `MOV PC, rN` selects one of.
+    /// The addresses of the branches from which `MOV PC, rN` selects.
     fn branches(&self, at: u64) -> Option<Vec<u64>> {
         let index = self.instructions.binary_search(&at).ok()?;
         let [base, add, jump] = *self.instructions.get(index.checked_sub(2)?..=index)? else { return None };
@@ -74,7 +74,7 @@ impl Body<'_> {
         Some(entries.take_while(|&entry| self.is_long_branch(entry)).collect())
     }
 
-    /// Is the instruction at `at` an unconditional branch of 4 bytes?
+    /// True if the instruction at `at` is an unconditional branch of 4 bytes.
     fn is_long_branch(&self, at: u64) -> bool {
         let is_start = self.instructions.binary_search(&at).is_ok();
         let bytes = self.index(at).and_then(|index| self.bytes.get(index..)).unwrap_or_default();
@@ -150,7 +150,7 @@ mod tests {
             }
             at += if is_data { 2 } else { thumb_decode::length(first) };
         }
-        let body = Body { start: START, bytes: &bytes, instructions: &instructions };
+        let body = FunctionCode { start: START, bytes: &bytes, instructions: &instructions };
         let targets = body.targets(START + 2 * jump)?;
         Some(targets.into_iter().map(|target| target - START).collect())
     }
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_that_leads_out_of_the_code_is_refused() {
+    fn a_table_with_targets_outside_the_code_is_refused() {
         let into_the_table = [0xE8DF, 0xF010, 0, 3, 0x4770, 0x4770];
         assert_eq!(targets(&into_the_table, 0, 2..4), None);
         let behind_the_function = [0xE8DF, 0xF010, 2, 9, 0x4770, 0x4770];

@@ -1,6 +1,4 @@
-//! The project's chores: the only scripts there are. `cargo xtask help` lists them.
-//!
-//! Knows how the project is checked, measured and documented; knows nothing of how an arm works.
+//! The tasks of the project: checks, measurements and generated documents. `cargo xtask help` lists them.
 
 use std::process::ExitCode;
 
@@ -30,83 +28,83 @@ mod size;
 mod stack;
 mod start_up;
 mod steps;
+mod system_tests;
 mod test;
 mod thumb_decode;
 mod times;
 mod torture;
 mod trials;
 mod workspace;
-mod worlds;
 
-use run::Outcome;
+use run::TaskResult;
 
-/// The project's chores.
+/// Checks, measurements and generated documents of the project
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask")]
-struct Arguments {
+struct XtaskArgs {
     #[command(subcommand)]
-    chore: Chore,
+    task: Task,
 }
 
 #[derive(Subcommand)]
-enum Chore {
-    /// Install what the tests need, then run every check and every test; each step says how long it took.
-    Test(test::Options),
-    /// Write the generated documents: docs/registers.md, the table of tests in docs/protocol.md, the picture of the
-    /// crates in docs/design.md, and docs/circuits.
+enum Task {
+    /// Install what the tests need, then run all checks and tests, and print the time of each step
+    Test(test::TestArgs),
+    /// Write the generated documents: docs/registers.md, the table of tests in docs/protocol.md, the crates in docs/design.md,
+    /// and docs/circuits
     Docs {
-        /// Change nothing; fail if a document is stale
+        /// Change nothing; fail if a document is out of date
         #[arg(long)]
         check: bool,
     },
-    /// Try to break the arm: worlds in which everything goes wrong, a disturbed line, power cuts, a fuzzer.
+    /// Search for faults: simulated worlds, a disturbed line, power cuts, fuzzing.
     ///
-    /// Prints one table: what was tried, how many, what went wrong, from which seed. The same seed tries the
-    /// same worlds; how many, the time decides.
-    Torture(torture::Options),
-    /// Feed six parts of it with inputs that a fuzzer makes up (needs a C++ compiler).
-    Fuzz(fuzz::Options),
-    /// Check licences, versions and sources of all dependencies, and the advisories where they can be had.
+    /// Prints one table: trials, their number, failures and seeds. A seed reproduces its worlds. The time determines their
+    /// number.
+    Torture(torture::TortureArgs),
+    /// Fuzz six parts of the arm and the library (needs a C++ compiler)
+    Fuzz(fuzz::FuzzArgs),
+    /// Check licences, versions and sources of all dependencies, and the advisories if they can be downloaded
     Deny,
-    /// Fail if files of a crate depend on each other in a cycle.
+    /// Fail if files of a crate depend on each other in a cycle
     Modules,
-    /// Link the cores for the chip and fail if a panic can be reached.
+    /// Link the cores for the chip and fail if a panic is reachable
     NoPanic,
-    /// Print what the cores and the image cost on the chip, in bytes, and hold it against the budgets.
+    /// Print the size of the cores and the image on the chip, and compare it with the budgets
     Size {
-        /// Print where the bytes are, by section and by file of source, and no more
+        /// Print the sizes by section and source file only
         #[arg(long)]
         by_file: bool,
         #[command(flatten)]
         accept: Accept,
     },
-    /// Check what the image for the arm does to the chip's registers at start, by the emulator's log of them.
+    /// Check the accesses of the image to the chip's registers at start, in the log of the emulator
     StartUp,
-    /// Count instructions in the emulator, and hold them against the budgets.
+    /// Count instructions in the emulator, and compare them with the budgets
     Count(Accept),
-    /// Show what the tests of the cores run through, and fail if it is less than it was.
+    /// Print the coverage of the cores, and fail below its limits
     Coverage,
-    /// Compare the parse-and-answer path with its peers: Modbus, postcard with COBS, MAVLink.
-    Bench(bench::Options),
-    /// Run the image for the arm in an emulator, simulated servos on its bus, and print the port it is on.
+    /// Compare the parse-and-reply path with its peers: Modbus, postcard with COBS, MAVLink
+    Bench(bench::BenchArgs),
+    /// Run the image for the arm in an emulator with simulated servos, and print its port.
     ///
-    /// SIGHUP (`kill -HUP`) switches the arm off and on, SIGUSR2 restarts the chip alone, Ctrl-C ends it. The
-    /// emulator keeps no settings: its flash ignores what it is told, and the status block says so (fault bit 0).
-    Emulate(emulate::Options),
-    /// Measure how far the arm sags in the emulator over restarts, a panic, noise and a silent servo.
+    /// SIGHUP (`kill -HUP`) switches the arm off and on, SIGUSR2 restarts the chip alone, Ctrl-C ends it. The emulator keeps no
+    /// settings: its flash does not change, and the status block reports fault bit 0.
+    Emulate(emulate::EmulateArgs),
+    /// Measure how far the emulated arm sags during restarts, a panic, noise and a silent servo
     Sag,
 }
 
-/// What becomes of the figures.
+/// What to do with the figures.
 #[derive(clap::Args)]
 struct Accept {
-    /// Commit the figures as they are instead of comparing them
+    /// Commit the figures instead of comparing them
     #[arg(long)]
     accept: bool,
 }
 
 fn main() -> ExitCode {
-    match carry_out(&Arguments::parse().chore) {
+    match run_task(&XtaskArgs::parse().task) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             eprintln!("error: {failure}");
@@ -117,8 +115,8 @@ fn main() -> ExitCode {
 
 /// A generated document.
 struct Document {
-    write: fn() -> Outcome,
-    check: fn() -> Outcome,
+    write: fn() -> TaskResult,
+    check: fn() -> TaskResult,
 }
 
 const DOCUMENTS: [Document; 4] = [
@@ -128,23 +126,23 @@ const DOCUMENTS: [Document; 4] = [
     Document { write: drawings::write, check: drawings::check },
 ];
 
-fn carry_out(chore: &Chore) -> Outcome {
-    match chore {
-        Chore::Test(options) => test::run_steps(options),
-        Chore::Docs { check: true } => DOCUMENTS.iter().try_for_each(|document| (document.check)()),
-        Chore::Docs { check: false } => DOCUMENTS.iter().try_for_each(|document| (document.write)()),
-        Chore::Modules => modules::check(),
-        Chore::Torture(options) => torture::run(options),
-        Chore::Fuzz(options) => fuzz::check(options),
-        Chore::Deny => deny::check(),
-        Chore::NoPanic => no_panic::check(),
-        Chore::Size { by_file: true, .. } => size::print(),
-        Chore::Size { accept, .. } => footprint::check(accept.accept),
-        Chore::StartUp => start_up::check(),
-        Chore::Count(Accept { accept }) => count::check(*accept),
-        Chore::Coverage => coverage::check(),
-        Chore::Emulate(options) => emulate::run(options),
-        Chore::Sag => sag::measure(),
-        Chore::Bench(options) => bench::run(options),
+fn run_task(task: &Task) -> TaskResult {
+    match task {
+        Task::Test(options) => test::run_steps(options),
+        Task::Docs { check: true } => DOCUMENTS.iter().try_for_each(|document| (document.check)()),
+        Task::Docs { check: false } => DOCUMENTS.iter().try_for_each(|document| (document.write)()),
+        Task::Modules => modules::check(),
+        Task::Torture(options) => torture::run(options),
+        Task::Fuzz(options) => fuzz::check(options),
+        Task::Deny => deny::check(),
+        Task::NoPanic => no_panic::check(),
+        Task::Size { by_file: true, .. } => size::print(),
+        Task::Size { accept, .. } => footprint::check(accept.accept),
+        Task::StartUp => start_up::check(),
+        Task::Count(Accept { accept }) => count::check(*accept),
+        Task::Coverage => coverage::check(),
+        Task::Emulate(options) => emulate::run(options),
+        Task::Sag => sag::measure(),
+        Task::Bench(options) => bench::run(options),
     }
 }

@@ -1,18 +1,17 @@
-//! `cargo xtask no-panic`: the cores, linked for the chip, hold no path to a panic, and neither does the
-//! firmware.
+//! `cargo xtask no-panic`: the cores, linked for the chip, and the firmware contain no reachable panic.
 //!
 //! The linker leaves out what nothing refers to. So if the panic handler, or anything of `core` that leads
 //! to it, is in the program, then some line can panic; which one, the debug information says.
 
-use crate::elf::{Place, Program, Symbol};
-use crate::run::{Outcome, link};
+use crate::elf::{Program, SourceLine, Symbol};
+use crate::run::{TaskResult, link};
 
-/// Packages that may panic. defmt-rtt does where a log frame begins inside another, which takes a logger
-/// that interrupts itself: it runs in a critical section.
-const EXCUSED: &[&str] = &["/defmt-rtt-"];
+/// Packages that may panic. defmt-rtt panics if a log frame begins inside another. This cannot happen, because the logger
+/// runs in a critical section.
+const EXEMPT: &[&str] = &["/defmt-rtt-"];
 
-/// Links the cores and the firmware, and fails if a panic can be reached.
-pub(crate) fn check() -> Outcome {
+/// Links the cores and the firmware, and fails if a panic is reachable.
+pub(crate) fn check() -> TaskResult {
     let mut reachable = 0;
     for linked in link()? {
         let file = linked.read()?;
@@ -25,7 +24,7 @@ pub(crate) fn check() -> Outcome {
         }
         reachable += panics.len();
     }
-    if reachable == 0 { Ok(()) } else { Err("a panic can be reached; the lines above say where from".into()) }
+    if reachable == 0 { Ok(()) } else { Err("a panic is reachable: see above".into()) }
 }
 
 /// A function that panics.
@@ -34,41 +33,41 @@ struct Panic<'a> {
     calls: Vec<Call<'a>>,
 }
 
-/// A call of it, from a function that does not exist to panic.
+/// A call of a panic, from a function with another purpose.
 struct Call<'a> {
     caller: &'a str,
-    /// Innermost first.
-    places: Vec<Place>,
+    /// Lines of source, innermost first.
+    lines: Vec<SourceLine>,
 }
 
-/// The functions that panic, less those that only the [`EXCUSED`] and other panics call.
-fn panics<'a>(program: &'a Program<'_>) -> Outcome<Vec<Panic<'a>>> {
+/// The functions that panic, without those that only [`EXEMPT`] packages and other panics call.
+fn panics<'a>(program: &'a Program<'_>) -> TaskResult<Vec<Panic<'a>>> {
     let mut found = Vec::new();
     for symbol in program.symbols.iter().filter(|symbol| is_panic(symbol)) {
-        let (calls, is_innocent) = calls_to(program, symbol)?;
-        if !is_innocent {
+        let (calls, is_exempt_only) = calls_to(program, symbol)?;
+        if !is_exempt_only {
             found.push(Panic { name: &symbol.name, calls });
         }
     }
     Ok(found)
 }
 
-/// The calls of a panic that are not excused, and whether all there are come from panics or are excused. A
-/// panic that nothing calls is not innocent: its address must have been taken.
-fn calls_to<'a>(program: &'a Program<'_>, panic: &Symbol) -> Outcome<(Vec<Call<'a>>, bool)> {
+/// The calls of a panic that are not exempt, and whether all its calls are from panics or exempt. A panic without calls is
+/// not exempt, because its address must be in use.
+fn calls_to<'a>(program: &'a Program<'_>, panic: &Symbol) -> TaskResult<(Vec<Call<'a>>, bool)> {
     let addresses = program.calls_to(panic.address);
     let mut calls = Vec::new();
     for &address in &addresses {
         let caller = program.function_at(address);
-        let places = program.source_of(address)?;
-        let excused = |place: &Place| EXCUSED.iter().any(|package| place.file.contains(package));
-        if !caller.is_some_and(is_panic) && !places.iter().any(excused) {
+        let lines = program.source_of(address)?;
+        let is_exempt = |line: &SourceLine| EXEMPT.iter().any(|package| line.file.contains(package));
+        if !caller.is_some_and(is_panic) && !lines.iter().any(is_exempt) {
             let caller = caller.map_or("code without a name", |caller| &caller.name);
-            calls.push(Call { caller, places });
+            calls.push(Call { caller, lines });
         }
     }
-    let is_innocent = calls.is_empty() && !addresses.is_empty();
-    Ok((calls, is_innocent))
+    let is_exempt_only = calls.is_empty() && !addresses.is_empty();
+    Ok((calls, is_exempt_only))
 }
 
 impl Panic<'_> {
@@ -76,14 +75,14 @@ impl Panic<'_> {
         println!("  {}", self.name);
         for call in &self.calls {
             println!("    called in {}", call.caller);
-            for place in &call.places {
-                println!("      {place}");
+            for line in &call.lines {
+                println!("      {line}");
             }
         }
     }
 }
 
-/// Is this the panic handler, or a function of `core` that leads to it?
+/// True for the panic handler, and for functions of `core` that call it.
 fn is_panic(symbol: &Symbol) -> bool {
     let name = symbol.name.as_str();
     let of_core = name.starts_with("core::") || name.starts_with('<');
@@ -97,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn panics_are_told_from_other_functions() {
+    fn panics_differ_from_other_functions() {
         let panics =
             |name: &str| is_panic(&Symbol { name: name.to_owned(), address: 0, size: 0, is_function: true });
         assert!(panics("core::panicking::panic_bounds_check"));

@@ -1,11 +1,11 @@
-//! `cargo xtask docs`: the register table as a page to read, written from the table the arm is built from.
+//! `cargo xtask docs`: docs/registers.md, generated from the register table of the arm.
 
 use std::fs;
 use std::path::PathBuf;
 
 use sevenbot::table;
 
-use crate::run::{Outcome, root};
+use crate::run::{TaskResult, root};
 
 const INTRODUCTION: &str = "\
 # Registers
@@ -26,18 +26,18 @@ One register is one byte. A read of any address answers; an address that is not 
 ";
 
 /// Writes the page.
-pub(crate) fn write() -> Outcome {
+pub(crate) fn write() -> TaskResult {
     Ok(fs::write(path(), page())?)
 }
 
-/// Fails if the page is not what [`write()`] would write.
-pub(crate) fn check() -> Outcome {
+/// Fails if the page differs from the one that [`write()`] writes.
+pub(crate) fn check() -> TaskResult {
     let found = fs::read_to_string(path()).unwrap_or_default();
     if found == page() {
-        println!("docs/registers.md says what the table says");
+        println!("docs/registers.md is up to date");
         return Ok(());
     }
-    Err("docs/registers.md is not what the register table says; run `cargo xtask docs`".into())
+    Err("docs/registers.md is out of date: run `cargo xtask docs`".into())
 }
 
 fn path() -> PathBuf {

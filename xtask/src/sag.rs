@@ -1,13 +1,13 @@
-//! `cargo xtask sag`: how far the arm sags when something fails, with the image in the emulator as the controller.
+//! `cargo xtask sag`: measures how far the arm sags during a failure, with the image in the emulator as the controller.
 //!
 //! ```text
-//!   Bench ── host link ── USART1 ┌──────────┐ USART2 ── servo bus ── Plant (true angles)
-//!         ── monitor ─────────── │   qemu   │
-//!         ── debugger ────────── │ the image│
-//!                                └──────────┘
+//!   EmulatedArm ── host link ── USART1 ┌──────────┐ USART2 ── servo bus ── Plant (true angles)
+//!               ── monitor ─────────── │   qemu   │
+//!               ── debugger ────────── │ the image│
+//!                                      └──────────┘
 //! ```
 //!
-//! The failures and the table are those of `torture sag`. Time is the clock's, so a busy machine raises the figures.
+//! The failures and the table are those of `torture sag`. It measures in real time, so a busy machine increases the figures.
 
 use std::io::{BufReader, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -33,35 +33,35 @@ use torture::sag::{
 
 use crate::emulate::monitor::{self, Monitor};
 use crate::emulate::{HOST_LINK_CONTROL, RECEIVER_ON, need_qemu, servo_socket, start_machine};
-use crate::run::{self, Outcome, Running};
+use crate::run::{self, ChildProcess, TaskResult};
 
-/// Between two looks at the servo bus and two samples of the angles.
-const TURN: RealTime = RealTime::from_micros(200);
-/// Noise comes this often.
+/// The period of the servo bus and of the samples.
+const SAMPLE_PERIOD: RealTime = RealTime::from_micros(200);
+/// The period of the noise.
 const NOISE_PERIOD: Duration = Duration::from_millis(1);
-/// The function that a panic ends in.
+/// The symbol of the panic handler.
 const PANIC_HANDLER: &str = "rust_begin_unwind";
 
-/// Builds the image, measures the sag over each failure and prints the table.
-pub(crate) fn measure() -> Outcome {
+/// Builds the image, measures the sag for each failure and prints the table.
+pub(crate) fn measure() -> TaskResult {
     need_qemu()?;
     run::build_image()?;
-    let sags: Outcome<Vec<_>> =
-        SagCause::ALL.into_iter().map(|failure| Ok((failure, sag_over(failure)?))).collect();
+    let sags: TaskResult<Vec<_>> =
+        SagCause::ALL.into_iter().map(|cause| Ok((cause, sag_over(cause)?))).collect();
     println!("{}", SagTable(sags?));
     Ok(())
 }
 
-fn sag_over(failure: SagCause) -> Outcome<Sag> {
-    let mut bench = Bench::new()?;
-    bench.bring_about(failure)?;
-    bench.run(SETTLE_TIME)?;
-    Ok(bench.sag)
+fn sag_over(cause: SagCause) -> TaskResult<Sag> {
+    let mut arm = EmulatedArm::new()?;
+    arm.inject(cause)?;
+    arm.run(SETTLE_TIME)?;
+    Ok(arm.sag)
 }
 
 /// An emulated arm that holds [`POSE`].
-struct Bench {
-    _machine: Running,
+struct EmulatedArm {
+    _machine: ChildProcess,
     folder: TempDir,
     monitor: Monitor,
     servos: UnixStream,
@@ -71,8 +71,8 @@ struct Bench {
     sag: Sag,
 }
 
-impl Bench {
-    fn new() -> Outcome<Self> {
+impl EmulatedArm {
+    fn new() -> TaskResult<Self> {
         let folder = tempfile::tempdir()?;
         let listen = |name| UnixListener::bind(folder.path().join(name));
         let (host, commands, servos) = (listen("host")?, listen("monitor")?, listen("servos")?);
@@ -86,20 +86,20 @@ impl Bench {
         let mut plant = Plant::new(clock.now());
         plant.ignore_collisions();
         let (rest, sag) = ([0; JOINTS], Sag::default());
-        let mut bench = Self { _machine: machine, folder, monitor, servos, plant, clock, rest, sag };
-        bench.run(SETTLE_TIME)?;
+        let mut arm = Self { _machine: machine, folder, monitor, servos, plant, clock, rest, sag };
+        arm.run(SETTLE_TIME)?;
         let mut frame = FrameBuffer::new();
         Request::Write { address: TARGET_POSITION.address, values: &POSE }.encode(&mut frame);
         host.write_all(&frame)?;
-        bench.run(SETTLE_TIME)?;
-        bench.rest = bench.angles();
-        bench.sag = Sag::default();
-        bench.is_in_pose()?;
-        Ok(bench)
+        arm.run(SETTLE_TIME)?;
+        arm.rest = arm.angles();
+        arm.sag = Sag::default();
+        arm.check_pose()?;
+        Ok(arm)
     }
 
-    /// An arm that does not stand in its pose would measure nothing.
-    fn is_in_pose(&self) -> Outcome {
+    /// Fails if the arm is not in its pose.
+    fn check_pose(&self) -> TaskResult {
         let is_off = |(angle, degrees): (&i32, u8)| angle.abs_diff(i32::from(degrees) * 1_000) > 1_000;
         if self.rest.iter().zip(POSE).any(is_off) {
             Err(format!("the arm did not reach its pose: {:?} thousandths of a degree", self.rest))?;
@@ -111,8 +111,8 @@ impl Bench {
         Joint::ALL.map(|joint| self.plant.angle(joint))
     }
 
-    /// Lets time pass and samples the angles. Returns the time.
-    fn run(&mut self, time: Duration) -> Outcome<Instant> {
+    /// Runs the servos and samples the angles for this time. Returns the time at its end.
+    fn run(&mut self, time: Duration) -> TaskResult<Instant> {
         let until = self.clock.now() + time;
         loop {
             let now = self.clock.now();
@@ -122,12 +122,12 @@ impl Bench {
             if now >= until {
                 return Ok(now);
             }
-            sleep(TURN);
+            sleep(SAMPLE_PERIOD);
         }
     }
 
-    fn bring_about(&mut self, failure: SagCause) -> Outcome {
-        match failure {
+    fn inject(&mut self, cause: SagCause) -> TaskResult {
+        match cause {
             SagCause::WarmRestart => self.monitor.execute("system_reset", ""),
             SagCause::Watchdog => {
                 self.monitor.execute("stop", "")?;
@@ -138,7 +138,7 @@ impl Bench {
             SagCause::Panic => Debugger::attach(&self.folder)?.continue_at(panic_handler()?),
             SagCause::Noise => self.noise(),
             SagCause::SilentServo => {
-                // Not one of its answers comes within the measurement.
+                // No reply arrives before the end of the measurement.
                 self.plant.set_fault(FOREARM, Some(ServoFault::Late(Duration::from_millis(3_600_000))));
                 self.run(DISTURBANCE_TIME)?;
                 self.plant.set_fault(FOREARM, None);
@@ -147,7 +147,7 @@ impl Bench {
         }
     }
 
-    fn noise(&mut self) -> Outcome {
+    fn noise(&mut self) -> TaskResult {
         let mut dice = Dice::new(1);
         self.set_all_faults(Some(ServoFault::Garbled(1)));
         let mut now = self.clock.now();
@@ -165,22 +165,22 @@ impl Bench {
     }
 }
 
-/// The emulator's debugger port (GDB remote serial protocol). The chip stands still while it is attached.
+/// The emulator's debugger port (GDB remote serial protocol). The chip is stopped while it is attached.
 struct Debugger(BufReader<UnixStream>);
 
 impl Debugger {
-    fn attach(folder: &TempDir) -> Outcome<Self> {
+    fn attach(folder: &TempDir) -> TaskResult<Self> {
         let stream = UnixStream::connect(folder.path().join("debugger"))?;
         stream.set_read_timeout(Some(RealTime::from_secs(60)))?;
         Ok(Self(BufReader::new(stream)))
     }
 
-    /// Lets the chip go on at `address`, and leaves.
-    fn continue_at(mut self, address: u32) -> Outcome {
-        // The emulator sets single registers only for who knows its description of them.
+    /// Continues at `address`, and detaches.
+    fn continue_at(mut self, address: u32) -> TaskResult {
+        // The emulator accepts single registers only after a read of their description.
         self.command("qSupported")?;
         self.command("qXfer:features:read:target.xml:0,40")?;
-        // Register 15 is the program counter; its bytes go in the order of the chip's memory.
+        // Register 15 is the program counter, in the byte order of the chip's memory.
         let reply = self.command(&format!("Pf={:08x}", address.swap_bytes()))?;
         if reply != "OK" {
             Err(format!("the emulator does not set the program counter: {reply}"))?;
@@ -188,19 +188,19 @@ impl Debugger {
         self.command("D").map(drop)
     }
 
-    fn command(&mut self, words: &str) -> Outcome<String> {
+    fn command(&mut self, words: &str) -> TaskResult<String> {
         let sum = words.bytes().fold(0, u8::wrapping_add);
         write!(self.0.get_mut(), "${words}#{sum:02x}")?;
         loop {
             let reply = self.reply()?;
-            // The emulator may first tell that the chip stands still.
+            // The emulator may first report that the chip is stopped.
             if !reply.starts_with('T') {
                 return Ok(reply);
             }
         }
     }
 
-    fn reply(&mut self) -> Outcome<String> {
+    fn reply(&mut self) -> TaskResult<String> {
         let mut reply = Vec::new();
         // Acknowledgement, `$`, reply, `#`, two digits.
         while !reply.ends_with(b"#") {
@@ -215,12 +215,12 @@ impl Debugger {
     }
 }
 
-/// Where the panic handler begins.
-fn panic_handler() -> Outcome<u32> {
+/// The address of the panic handler.
+fn panic_handler() -> TaskResult<u32> {
     let file = run::IMAGE.read()?;
     let elf: ElfFile32<'_> = ElfFile32::parse(file.as_slice())?;
     let symbol = elf.symbols().find(|symbol| symbol.name().is_ok_and(|name| name.contains(PANIC_HANDLER)));
     let address = symbol.ok_or("the image has no panic handler")?.address();
-    // The lowest bit says that the code is Thumb.
+    // Bit 0 marks Thumb code.
     Ok(u32::try_from(address)? & !1)
 }

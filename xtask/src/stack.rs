@@ -1,54 +1,52 @@
-//! How deep the stack of a program for the chip can get, from the very file that is flashed: what each function
-//! pushes, who calls whom, and what interrupts whom.
+//! The largest stack of a program for the chip, from the file that is flashed: pushes, calls and exceptions.
 //!
-//! A bound, not an estimate: of a function every push counts, on whichever path it lies. What would make it none
-//! is refused: recursion, calls through a pointer, a stack that grows in a loop.
+//! The result is an upper bound, because all pushes of a function count, on any path. Recursion, calls through a pointer, and
+//! a stack that grows in a loop are refused.
 
 use std::collections::BTreeMap;
 
 use crate::elf::{Program, Symbol};
-use crate::run::Outcome;
+use crate::run::TaskResult;
 use crate::thumb_decode::Effect;
 
-/// What the core pushes when an interrupt comes: 26 words where the program uses floating point, and one that
-/// aligns (ARMv7-M reference manual, B1.5.7).
+/// Bytes that the core pushes for an exception: 26 words with floating point, and one for alignment (ARMv7-M reference
+/// manual, B1.5.7).
 const EXCEPTION_FRAME: u64 = 27 * 4;
-/// Functions that set the stack pointer on purpose: both begin a stack from its top.
-const BEGIN_A_STACK: &[&str] = &["Reset", "HardFault"];
+/// Functions that set the stack pointer, to the top of the stack.
+const SETS_STACK: &[&str] = &["Reset", "HardFault"];
 
-/// Where the logger panics if a log frame begins inside another: a call that closes a circle, since a panic is logged.
-/// The panic handler logs only when it is entered for the first time (`crash.rs`, `ENTERED`), so a circle is run
-/// through once, and its beginning once more.
+/// The logger panics if a log frame begins inside another. This call closes a cycle, because the panic handler logs. The
+/// handler logs only when it is entered for the first time (`crash.rs`, `ENTERED`), so the cycle is executed once.
 const GUARDS: (&[&str], &str) = (&["_defmt_acquire", "_defmt_release"], "core::panicking::panic_fmt");
 
-/// How deep the stack gets from a function on.
+/// The stack of a function and its callees.
 #[derive(Clone, Default)]
 pub(crate) struct Depth {
-    /// In bytes.
+    /// Its size in bytes.
     pub(crate) bytes: u64,
-    /// The way there, outermost first, with what each function takes itself.
+    /// The functions of the deepest path, outermost first, with the bytes of each.
     pub(crate) path: Vec<(String, u64)>,
 }
 
-/// What of a function counts here.
-struct Function<'a> {
+/// The stack use of a function.
+struct StackFunction<'a> {
     symbol: &'a Symbol,
     pushed: u64,
-    /// Where the functions begin that it calls or goes on to.
+    /// The addresses of the functions that it calls or continues with.
     calls: Vec<u64>,
 }
 
 /// All functions of a program, by their addresses.
-pub(crate) struct CallGraph<'a>(BTreeMap<u64, Function<'a>>);
+pub(crate) struct CallGraph<'a>(BTreeMap<u64, StackFunction<'a>>);
 
 impl<'a> CallGraph<'a> {
-    /// Reads the code of a program.
-    pub(crate) fn of(program: &'a Program<'_>) -> Outcome<Self> {
+    /// Reads the functions of a program.
+    pub(crate) fn of(program: &'a Program<'_>) -> TaskResult<Self> {
         let mut graph = BTreeMap::new();
         let (guards, panic) = GUARDS;
         let panic = program.address_of(panic).ok();
         for symbol in program.functions() {
-            let mut function = Function::of(symbol, program)?;
+            let mut function = StackFunction::of(symbol, program)?;
             if guards.contains(&function.name()) {
                 function.calls.retain(|&to| Some(to) != panic);
             }
@@ -61,48 +59,52 @@ impl<'a> CallGraph<'a> {
         Ok(graph)
     }
 
-    fn check_calls(&self, function: &Function<'_>) -> Outcome {
+    fn check_calls(&self, function: &StackFunction<'_>) -> TaskResult {
         match function.calls.iter().find(|to| !self.0.contains_key(to)) {
-            Some(to) => Err(format!("{} goes on at {to:#x}: no function is known there", function.name()))?,
+            Some(to) => Err(format!("{} continues at {to:#x}, where no function is known", function.name()))?,
             None => Ok(()),
         }
     }
 
-    /// How deep the stack gets from the function at `address` on.
-    pub(crate) fn depth(&self, address: u64) -> Outcome<Depth> {
-        self.descend(address, &mut Vec::new(), &mut BTreeMap::new())
+    /// The stack of the function at `address`.
+    pub(crate) fn depth(&self, address: u64) -> TaskResult<Depth> {
+        self.depth_from(address, &mut Vec::new(), &mut BTreeMap::new())
     }
 
-    fn descend(&self, at: u64, way: &mut Vec<u64>, known: &mut BTreeMap<u64, Depth>) -> Outcome<Depth> {
-        if let Some(depth) = known.get(&at) {
+    fn depth_from(
+        &self,
+        at: u64,
+        callers: &mut Vec<u64>,
+        depths: &mut BTreeMap<u64, Depth>,
+    ) -> TaskResult<Depth> {
+        if let Some(depth) = depths.get(&at) {
             return Ok(depth.clone());
         }
         let function = self.0.get(&at).ok_or_else(|| format!("no function is known at {at:#x}"))?;
-        if way.contains(&at) {
-            Err(format!("{} can come to call itself: the stack has no bound", function.name()))?;
+        if callers.contains(&at) {
+            Err(format!("{} may call itself: the stack has no bound", function.name()))?;
         }
-        way.push(at);
+        callers.push(at);
         let mut deepest = Depth::default();
         for &callee in &function.calls {
-            let depth = self.descend(callee, way, known)?;
+            let depth = self.depth_from(callee, callers, depths)?;
             deepest = if depth.bytes > deepest.bytes { depth } else { deepest };
         }
-        way.pop();
+        callers.pop();
         deepest.bytes += function.pushed;
         deepest.path.insert(0, (function.name().to_owned(), function.pushed));
-        known.insert(at, deepest.clone());
+        depths.insert(at, deepest.clone());
         Ok(deepest)
     }
 
-    /// How deep the stack of the whole program gets: from reset, with every other exception coming once, each in
-    /// the worst moment of the one before. That is more than priorities allow. A hard fault begins a stack of its
-    /// own.
-    pub(crate) fn worst(&self, program: &Program<'_>) -> Outcome<Depth> {
+    /// The stack of the whole program: from reset, with every other exception once, at the worst moment of the one before.
+    /// Priorities allow less than that. A hard fault starts a new stack.
+    pub(crate) fn worst(&self, program: &Program<'_>) -> TaskResult<Depth> {
         let [reset, handlers @ ..] = program.handlers() else { Err("no vector table")? };
         let mut whole = self.depth(*reset)?;
         for &handler in handlers {
             let depth = self.depth(handler)?;
-            let begins_anew = depth.path.first().is_some_and(|(name, _)| begins_a_stack(name));
+            let begins_anew = depth.path.first().is_some_and(|(name, _)| sets_stack(name));
             if begins_anew {
                 whole = if depth.bytes > whole.bytes { depth } else { whole };
                 continue;
@@ -120,8 +122,8 @@ impl<'a> CallGraph<'a> {
     }
 }
 
-impl<'a> Function<'a> {
-    fn of(symbol: &'a Symbol, program: &Program<'_>) -> Outcome<Self> {
+impl<'a> StackFunction<'a> {
+    fn of(symbol: &'a Symbol, program: &Program<'_>) -> TaskResult<Self> {
         let mut function = Self { symbol, pushed: 0, calls: Vec::new() };
         let (mut pushes, mut loops) = (Vec::new(), Vec::new());
         for (at, effect) in program.instructions_of(symbol) {
@@ -139,15 +141,15 @@ impl<'a> Function<'a> {
                     }
                     None => function.refuse(at, "calls through a pointer")?,
                 },
-                Effect::Unknown => function.refuse(at, "holds an unknown instruction")?,
-                Effect::SetStackPointer if !begins_a_stack(&symbol.name) => {
+                Effect::Unknown => function.refuse(at, "contains an unknown instruction")?,
+                Effect::SetStackPointer if !sets_stack(&symbol.name) => {
                     function.refuse(at, "sets the stack pointer")?;
                 }
                 _ => {}
             }
         }
         match pushes.iter().find(|at| loops.iter().any(|range| range.contains(at))) {
-            Some(&at) => function.refuse(at, "lets the stack grow in a loop").map(|()| function),
+            Some(&at) => function.refuse(at, "grows the stack in a loop").map(|()| function),
             None => Ok(function),
         }
     }
@@ -156,11 +158,11 @@ impl<'a> Function<'a> {
         &self.symbol.name
     }
 
-    fn refuse(&self, at: u64, what: &str) -> Outcome {
-        Err(format!("{} {what}, at {at:#x}: the stack has no bound that is known", self.name()))?
+    fn refuse(&self, at: u64, what: &str) -> TaskResult {
+        Err(format!("{} {what}, at {at:#x}: no bound of the stack is known", self.name()))?
     }
 }
 
-fn begins_a_stack(name: &str) -> bool {
-    BEGIN_A_STACK.contains(&name)
+fn sets_stack(name: &str) -> bool {
+    SETS_STACK.contains(&name)
 }

@@ -1,31 +1,26 @@
-//! `cargo xtask start-up`: what the image for the arm does to the chip's registers before its loop begins, seen from
-//! outside, and held against what a chip needs and the emulator does not show (RM0090, ES0182, DS8626).
+//! `cargo xtask start-up`: checks the accesses of the image to the chip's registers before its loop begins. The rules follow
+//! from the chip, and the emulator does not show their violation (RM0090, ES0182, DS8626).
 //!
-//! The emulator has no GPIO, clock tree, watchdog, supply monitor or flash controller. It logs every access to them
-//! instead, in their order; what is read there is 0.
+//! The emulator has no GPIO, clock tree, watchdog, supply monitor or flash controller. It logs the accesses to them, and reads
+//! return 0.
 
 use std::fs;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 use crate::emulate::{QEMU, need_qemu};
-use crate::run::{self, Outcome, Running};
+use crate::run::{self, ChildProcess, TaskResult, wait_for};
 
-/// How long the image may take to start.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-/// An access to a register that the emulator does not have.
+/// An access to a register that the emulator lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Access<'a> {
-    /// Device, offset.
+enum RegisterAccess<'a> {
+    /// Device and offset.
     Read(&'a str, u32),
-    /// Device, offset, value; 0 where the log does not tell it.
+    /// Device, offset and value; 0 if the log does not contain the value.
     Write(&'a str, u32, u32),
 }
-use Access::{Read, Write};
+use RegisterAccess::{Read, Write};
 
-/// Names that the emulator gives to what stands at the address of the independent watchdog, of the debug unit, and of
-/// the flash controller.
+/// The emulator's names of the independent watchdog, the debug unit and the flash controller.
 const WATCHDOG: &str = "I2S2ext";
 const PRIVATE: &str = "PPB";
 const FLASH: &str = "Flash Int";
@@ -38,17 +33,17 @@ const SET_RESET: u32 = 0x18;
 const DEBUG_CONTROL: u32 = 0x4_2004;
 const CLOCK_CONTROL: u32 = 0x00;
 
-/// Pump and valve, PC6 and PC7: driven low, and made outputs after that.
-const PUMP_AND_VALVE_OFF: [Access<'_>; 4] = [
+/// Pump and valve, PC6 and PC7: first driven low, then made outputs.
+const PUMP_AND_VALVE_OFF: [RegisterAccess<'_>; 4] = [
     Write("GPIOC", SET_RESET, 1 << 22),
     Write("GPIOC", MODE, 1 << 12),
     Write("GPIOC", SET_RESET, 1 << 23),
     Write("GPIOC", MODE, 1 << 14),
 ];
-/// PA10 becomes the host link's input: the last of the start.
-const HOST_LINK_OPEN: Access<'_> = Write("GPIOA", MODE, 2 << 20);
+/// PA10 becomes the input of the host link, which ends the start.
+const HOST_LINK_OPEN: RegisterAccess<'_> = Write("GPIOA", MODE, 2 << 20);
 /// Start, unlock, divisor, reload value, wait for both, feed.
-const WATCHDOG_STARTED: [Access<'_>; 6] = [
+const WATCHDOG_STARTED: [RegisterAccess<'_>; 6] = [
     Write(WATCHDOG, 0x00, 0xCCCC),
     Write(WATCHDOG, 0x00, 0x5555),
     Write(WATCHDOG, 0x04, 4),
@@ -56,44 +51,44 @@ const WATCHDOG_STARTED: [Access<'_>; 6] = [
     Read(WATCHDOG, 0x0C),
     Write(WATCHDOG, 0x00, 0xAAAA),
 ];
-/// Level 6, switched on.
-const SUPPLY_WATCHED: Access<'_> = Write("PWR", 0x00, 6 << 5 | 1 << 4);
-/// An erase is started; the data cache is reset after it.
+/// Level 6, enabled.
+const SUPPLY_WATCHED: RegisterAccess<'_> = Write("PWR", 0x00, 6 << 5 | 1 << 4);
+/// An erase starts. The data cache is reset after it.
 const ERASE: u32 = 1 << 16;
-const CACHE_RESET: Access<'_> = Write(FLASH, 0x00, 1 << 12);
+const CACHE_RESET: RegisterAccess<'_> = Write(FLASH, 0x00, 1 << 12);
 
 /// Runs the image and checks its start.
-pub(crate) fn check() -> Outcome {
+pub(crate) fn check() -> TaskResult {
     need_qemu()?;
     run::build_image()?;
     let log = log_of_start()?;
     let accesses: Vec<_> = log.lines().filter_map(access).collect();
     for (what, holds) in RULES {
         if !holds(&accesses) {
-            Err(format!("the image does not start as a chip needs it: {what}"))?;
+            Err(format!("the start of the image violates a rule: {what}"))?;
         }
         println!("{what}");
     }
     Ok(())
 }
 
-/// What has to hold, and how to see it.
-type Rule = (&'static str, fn(&[Access<'_>]) -> bool);
+/// A rule and its check.
+type StartUpRule = (&'static str, fn(&[RegisterAccess<'_>]) -> bool);
 
-const RULES: &[Rule] = &[
-    ("pump and valve are off before anything else is touched but their clock", |accesses| {
+const RULES: &[StartUpRule] = &[
+    ("pump and valve are off before any other access except to their clock", |accesses| {
         let writes = accesses.iter().filter(|access| is_write(access)).skip(1);
         writes.take(PUMP_AND_VALVE_OFF.len()).eq(&PUMP_AND_VALVE_OFF)
     }),
-    ("a sleeping core can be attached to before the clock is started", |accesses| {
+    ("a debugger can attach to the sleeping core before the clock is started", |accesses| {
         let debug = position(accesses, Write(PRIVATE, DEBUG_CONTROL, 0));
         let clock = position(accesses, Read("RCC", CLOCK_CONTROL));
         debug.zip(clock).is_some_and(|(debug, clock)| debug < clock)
     }),
     ("each clock enable is read back at once", |accesses| {
         let is_enable =
-            |access: &Access<'_>| matches!(access, Write("RCC", at, _) if CLOCK_ENABLES.contains(at));
-        let read_back = |pair: &[Access<'_>]| match pair {
+            |access: &RegisterAccess<'_>| matches!(access, Write("RCC", at, _) if CLOCK_ENABLES.contains(at));
+        let read_back = |pair: &[RegisterAccess<'_>]| match pair {
             [enable @ Write(_, at, _), next] if is_enable(enable) => *next == Read("RCC", *at),
             _ => true,
         };
@@ -101,42 +96,41 @@ const RULES: &[Rule] = &[
             && accesses.windows(2).all(read_back)
     }),
     ("the servo line has no pull inside the chip", |accesses| {
-        let pulls =
-            |access: &Access<'_>| matches!(access, Write("GPIOA", PULL, value) if value >> 4 & 3 != 0);
+        let pulls = |access: &RegisterAccess<'_>| matches!(access, Write("GPIOA", PULL, value) if value >> 4 & 3 != 0);
         accesses.contains(&Write("GPIOA", PULL, 0)) && !accesses.iter().any(pulls)
     }),
     ("the watchdog is fed once its registers have taken their values", |accesses| {
         accesses.iter().filter(|access| is_at(access, WATCHDOG)).take(6).eq(&WATCHDOG_STARTED)
     }),
-    ("the supply is watched at level 6 before the flash is touched", |accesses| {
+    ("the supply is monitored at level 6 before any access to the flash", |accesses| {
         let watched = position(accesses, SUPPLY_WATCHED);
         let touched = accesses.iter().position(|access| is_write(access) && is_at(access, FLASH));
         watched.zip(touched).is_some_and(|(watched, touched)| watched < touched)
     }),
     ("the data cache is reset after an erase", |accesses| {
         let is_erase =
-            |access: &Access<'_>| matches!(access, Write(FLASH, 0x10, value) if value & ERASE != 0);
+            |access: &RegisterAccess<'_>| matches!(access, Write(FLASH, 0x10, value) if value & ERASE != 0);
         let erase = accesses.iter().rposition(is_erase);
         let reset = accesses.iter().rposition(|access| *access == CACHE_RESET);
         erase.zip(reset).is_some_and(|(erase, reset)| erase < reset)
     }),
 ];
 
-fn is_write(access: &Access<'_>) -> bool {
+fn is_write(access: &RegisterAccess<'_>) -> bool {
     matches!(access, Write(..))
 }
 
-fn is_at(access: &Access<'_>, device: &str) -> bool {
+fn is_at(access: &RegisterAccess<'_>, device: &str) -> bool {
     let (Read(at, _) | Write(at, ..)) = access;
     *at == device
 }
 
-fn position(accesses: &[Access<'_>], wanted: Access<'_>) -> Option<usize> {
-    accesses.iter().position(|access| *access == wanted)
+fn position(accesses: &[RegisterAccess<'_>], expected: RegisterAccess<'_>) -> Option<usize> {
+    accesses.iter().position(|access| *access == expected)
 }
 
-/// The emulator's log, up to where the host link is open.
-fn log_of_start() -> Outcome<String> {
+/// The log of the emulator until the host link is open.
+fn log_of_start() -> TaskResult<String> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("log");
     let machine = Command::new(QEMU)
@@ -147,23 +141,19 @@ fn log_of_start() -> Outcome<String> {
         .arg(run::IMAGE.path())
         .stdin(Stdio::null())
         .spawn()?;
-    let _machine = Running(machine);
-    let deadline = Instant::now() + PATIENCE;
-    while Instant::now() < deadline {
+    let _machine = ChildProcess(machine);
+    wait_for("the image opens its host link", || {
         let log = fs::read_to_string(&path).unwrap_or_default();
-        // The log is written in pieces: the last line may be cut off.
+        // The last line of the log may be incomplete.
         let whole = log.rsplit_once('\n').map_or("", |(lines, _)| lines);
-        if whole.lines().filter_map(access).any(|access| access == HOST_LINK_OPEN) {
-            return Ok(whole.to_owned());
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    Err("the image did not open its host link")?
+        let is_open = whole.lines().filter_map(access).any(|access| access == HOST_LINK_OPEN);
+        Ok(is_open.then(|| whole.to_owned()))
+    })
 }
 
-/// What a line of the log says: `GPIOC: unimplemented device write (size 4, offset 0x018, value 0x00400000)`, or
-/// `Write of unassigned area of PPB: offset 0x42004`.
-fn access(line: &str) -> Option<Access<'_>> {
+/// Parses a line of the log: `GPIOC: unimplemented device write (size 4, offset 0x018, value 0x00400000)`, or `Write of
+/// unassigned area of PPB: offset 0x42004`.
+fn access(line: &str) -> Option<RegisterAccess<'_>> {
     if let Some((kind, offset)) = line.split_once(" of unassigned area of PPB: offset 0x") {
         let offset = number(offset)?;
         return Some(if kind == "Read" { Read(PRIVATE, offset) } else { Write(PRIVATE, offset, 0) });
@@ -185,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_lines_of_the_log_are_understood() {
+    fn lines_of_the_log_are_parsed() {
         for (line, expected) in [
             ("RCC: unimplemented device read  (size 4, offset 0x030)", Some(Read("RCC", 0x30))),
             (

@@ -72,7 +72,7 @@ fn effect_of(at: u64, length: u64, instruction: &Instruction) -> Effect {
         SMC, SRS, STR, STRB, STRD, STRH, SUB, TBB, TBH, TEQ, TST, WFI,
     };
     let [first, second, third, _] = instruction.operands;
-    // The decoder counts the short conditional branches from the next instruction, all others from 4 bytes behind theirs.
+    // The decoder counts short conditional branches from the next instruction, and all others from the address plus 4.
     let is_short_condition = instruction.condition != ConditionCode::AL && length == 2;
     let target = |origin: u64, halfwords: i32| (at + origin).wrapping_add_signed(2 * i64::from(halfwords));
     match (instruction.opcode, first, second) {
@@ -148,7 +148,7 @@ fn moved_stack(instruction: &Instruction) -> Option<Effect> {
     })
 }
 
-/// An instruction that writes its first operand.
+/// The effect of an instruction that writes its first operand.
 fn written(first: Operand, second: Operand) -> Effect {
     let Operand::Reg(register) = first else { return Effect::None };
     match (register.number(), second) {
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn long_branches_lead_where_the_reference_manual_says() {
+    fn long_branches_have_the_documented_targets() {
         let to = |distance: i64| AT.wrapping_add_signed(4 + distance);
         assert_eq!(of(0xF7FF, 0xFFFE), Call(to(-4)), "BL to itself");
         assert_eq!(of(0xF000, 0xF800), Call(to(0)), "BL to the next instruction");
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn short_branches_lead_where_the_reference_manual_says() {
+    fn short_branches_have_the_documented_targets() {
         assert_eq!(of(0xE7FE, 0), Jump(AT), "B to itself");
         assert_eq!(of(0xD0FD, 0), Jump(AT - 2), "BEQ");
         assert_eq!(of(0xB110, 0), Jump(AT + 8), "CBZ r0");
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_pushed_are_known() {
+    fn pushes_have_their_size() {
         assert_eq!(of(0xB5F0, 0), Push(20), "PUSH r4-r7, lr");
         assert_eq!(of(0xE92D, 0x0F00), Push(16), "PUSH.W r8-r11");
         assert_eq!(of(0xB082, 0), Push(8), "SUB SP, #8");

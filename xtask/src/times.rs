@@ -1,5 +1,4 @@
-//! Time that passed, and processor time of the programs that ran meanwhile. On a machine that does other things too,
-//! only the second one tells what a step costs.
+//! Real time, and processor time of child processes. On a busy machine, only the processor time shows the cost of a step.
 
 use std::fmt::{self, Display};
 use std::fs;
@@ -7,41 +6,42 @@ use std::ops::Sub;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-/// Ticks of a second in /proc: 100 on every Linux (USER_HZ).
+/// The length of a tick in /proc: 1/100 s on every Linux (USER_HZ).
 const TICK: Duration = Duration::from_millis(10);
 
-/// When the first time was taken.
+/// The time of the first measurement.
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
-/// Both times, since the first look at the clock or between two looks.
+/// Real time and processor time since the first measurement, or between two measurements.
 #[derive(Clone, Copy)]
 pub(crate) struct Times {
-    /// On the clock.
-    pub(crate) passed: Duration,
-    /// On all processors, of all programs that have ended; `None` where the system does not tell.
-    pub(crate) worked: Option<Duration>,
+    /// Real time.
+    pub(crate) elapsed: Duration,
+    /// Processor time of all child processes that have ended; `None` if the system does not report it.
+    pub(crate) processor: Option<Duration>,
 }
 
 impl Times {
-    /// Up to now.
+    /// The times since the first measurement.
     pub(crate) fn now() -> Self {
         let start = *START;
         Self {
-            passed: start.elapsed(),
-            worked: fs::read_to_string("/proc/self/stat").ok().and_then(|stat| worked(&stat)),
+            elapsed: start.elapsed(),
+            processor: fs::read_to_string("/proc/self/stat").ok().and_then(|stat| processor(&stat)),
         }
     }
 
     /// Two cells of a table, in seconds.
     pub(crate) fn cells(&self) -> [String; 2] {
-        let worked = self.worked.map_or("?".to_owned(), |worked| format!("{:.1}", worked.as_secs_f64()));
-        [format!("{:.0}", self.passed.as_secs_f64()), worked]
+        let processor =
+            self.processor.map_or("?".to_owned(), |processor| format!("{:.1}", processor.as_secs_f64()));
+        [format!("{:.0}", self.elapsed.as_secs_f64()), processor]
     }
 }
 
-/// The processor time of the children that were waited for, and of theirs: proc_pid_stat(5), fields 16 and 17.
-fn worked(stat: &str) -> Option<Duration> {
-    // The second field is a name in brackets, which may hold anything.
+/// The processor time of the children that were waited for, and of their children: proc_pid_stat(5), fields 16 and 17.
+fn processor(stat: &str) -> Option<Duration> {
+    // The second field is a name in brackets, which may contain any characters.
     let (_, rest) = stat.rsplit_once(") ")?;
     let ticks = rest.split(' ').skip(13).take(2).map(|field| field.parse::<u64>().ok());
     let ticks = ticks.sum::<Option<u64>>()?;
@@ -52,15 +52,16 @@ impl Sub for Times {
     type Output = Self;
 
     fn sub(self, before: Self) -> Self {
-        let worked = self.worked.zip(before.worked).map(|(now, then)| now.saturating_sub(then));
-        Self { passed: self.passed.saturating_sub(before.passed), worked }
+        let processor = self.processor.zip(before.processor).map(|(now, then)| now.saturating_sub(then));
+        Self { elapsed: self.elapsed.saturating_sub(before.elapsed), processor }
     }
 }
 
 impl Display for Times {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{:.0} s", self.passed.as_secs_f64())?;
-        self.worked.map_or(Ok(()), |worked| write!(out, ", {:.1} s of processor time", worked.as_secs_f64()))
+        write!(out, "{:.0} s", self.elapsed.as_secs_f64())?;
+        self.processor
+            .map_or(Ok(()), |processor| write!(out, ", {:.1} s of processor time", processor.as_secs_f64()))
     }
 }
 
@@ -69,9 +70,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_children_s_time_is_found_behind_any_name() {
+    fn processor_time_is_found_after_any_name() {
         let stat = "12 (a) b) S 1 2 3 4 5 6 7 8 9 10 11 12 300 45 20 0";
-        assert_eq!(worked(stat), Some(Duration::from_millis(3_450)));
-        assert_eq!(worked("nonsense"), None);
+        assert_eq!(processor(stat), Some(Duration::from_millis(3_450)));
+        assert_eq!(processor("nonsense"), None);
     }
 }

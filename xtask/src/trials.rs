@@ -1,11 +1,11 @@
-//! The results of trials: what was tried, how often, and what went wrong.
+//! The results of trials: their number and their failures.
 //!
-//! A program reports a trial as a line of three columns with a tab between them. Knows nothing of what is tried.
+//! A program reports a trial as a line of three columns, separated by tabs.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
-use crate::run::{Outcome, root};
+use crate::run::{TaskResult, root};
 use torture::text_table::Column::{Left, Right};
 use torture::text_table::TextTable;
 
@@ -17,26 +17,26 @@ pub(crate) struct Trials {
 
 impl Default for Trials {
     fn default() -> Self {
-        let columns = [Left("what was tried"), Right("how many"), Left("what went wrong")];
+        let columns = [Left("trial"), Right("number"), Left("failures")];
         Self { table: TextTable::new(columns), has_failure: false }
     }
 }
 
 impl Trials {
     /// Adds a trial.
-    pub(crate) fn add(&mut self, tried: &str, many: &str, wrong: &str) {
-        self.table.add([tried, many, wrong]);
+    pub(crate) fn add(&mut self, trial: &str, number: &str, failures: &str) {
+        self.table.add([trial, number, failures]);
     }
 
     /// Adds a trial that failed or could not be completed.
-    pub(crate) fn fail(&mut self, tried: &str, many: &str, wrong: &str) {
+    pub(crate) fn fail(&mut self, trial: &str, number: &str, failures: &str) {
         self.has_failure = true;
-        self.add(tried, many, wrong);
+        self.add(trial, number, failures);
     }
 
-    /// Runs a program at the root of the workspace and adds the trials it reports. Prints the rest of its output.
-    /// A program that fails is a failed trial; later trials still run.
-    pub(crate) fn take(&mut self, words: &str, variables: &[(&str, &str)]) -> Outcome {
+    /// Runs a program in the root of the workspace, and adds the trials that it reports. Prints the rest of its output. If the
+    /// program fails, this is a failed trial, and later trials still run.
+    pub(crate) fn take(&mut self, words: &str, variables: &[(&str, &str)]) -> TaskResult {
         let mut words_apart = words.split_whitespace();
         let mut program = Command::new(words_apart.next().unwrap_or_default());
         program.args(words_apart).envs(variables.iter().copied()).current_dir(root()).stdout(Stdio::piped());
@@ -53,15 +53,15 @@ impl Trials {
     fn add_line(&mut self, line: &str) {
         let columns: Vec<_> = line.split('\t').collect();
         match *columns {
-            [tried, many, wrong] => self.add(tried, many, wrong),
+            [trial, number, failures] => self.add(trial, number, failures),
             _ => println!("{line}"),
         }
     }
 
-    /// Prints the trials, and fails if one failed.
-    pub(crate) fn finish(&self, seed: u64) -> Outcome {
+    /// Prints the table of trials. Fails if one of them failed.
+    pub(crate) fn finish(&self, seed: u64) -> TaskResult {
         println!("\n{}\nseed {seed}", self.table);
-        if self.has_failure { Err("something went wrong: it is in the table".into()) } else { Ok(()) }
+        if self.has_failure { Err("a trial failed: see the table".into()) } else { Ok(()) }
     }
 }
 
@@ -72,19 +72,12 @@ mod tests {
     #[test]
     fn a_line_with_two_tabs_is_a_trial() {
         let mut trials = Trials::default();
-        trials.add_line("worlds\t12\tnothing");
+        trials.add_line("worlds\t12\tnone");
         trials.add_line("not\ta row");
         trials.add("more", "3", "");
         let shown = trials.table.to_string();
         let lines: Vec<_> = shown.lines().collect();
-        assert_eq!(
-            lines,
-            [
-                "what was tried  how many  what went wrong",
-                "worlds                12  nothing",
-                "more                   3",
-            ]
-        );
+        assert_eq!(lines, ["trial   number  failures", "worlds      12  none", "more         3",]);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use serde::Deserialize;
 
-use crate::run::{Outcome, root};
+use crate::run::{TaskResult, root};
 
 /// The part of the metadata that is read here.
 #[derive(Deserialize)]
@@ -20,12 +20,12 @@ pub(crate) struct Package {
     /// Its name.
     pub(crate) name: String,
     manifest_path: PathBuf,
-    targets: Vec<Target>,
+    targets: Vec<CrateTarget>,
     dependencies: Vec<Dependency>,
 }
 
 #[derive(Deserialize)]
-struct Target {
+struct CrateTarget {
     kind: Vec<String>,
     src_path: PathBuf,
 }
@@ -33,14 +33,14 @@ struct Target {
 #[derive(Deserialize)]
 struct Dependency {
     name: String,
-    /// `dev`, `build`, or none.
+    /// `dev`, `build`, or `None` for a normal dependency.
     kind: Option<String>,
     /// The folder, if the dependency is a crate of the workspace.
     path: Option<PathBuf>,
 }
 
 /// The crates of the workspace, in the order of their names.
-pub(crate) fn packages() -> Outcome<Vec<Package>> {
+pub(crate) fn packages() -> TaskResult<Vec<Package>> {
     let mut cargo = Command::new("cargo");
     cargo.args(["metadata", "--no-deps", "--format-version", "1"]).current_dir(root());
     let output = cargo.stderr(Stdio::inherit()).output()?;
@@ -53,19 +53,19 @@ pub(crate) fn packages() -> Outcome<Vec<Package>> {
 }
 
 impl Package {
-    /// The folder, from the root of the workspace.
-    pub(crate) fn folder(&self) -> Outcome<PathBuf> {
+    /// Its folder, relative to the root of the workspace.
+    pub(crate) fn folder(&self) -> TaskResult<PathBuf> {
         let folder = self.manifest_path.parent().unwrap_or(Path::new(""));
         Ok(folder.strip_prefix(root())?.to_owned())
     }
 
-    /// The root files of the library and the programs.
+    /// The root files of its library and programs.
     pub(crate) fn roots(&self) -> Vec<PathBuf> {
-        let is_root = |target: &&Target| target.kind.iter().any(|kind| kind == "lib" || kind == "bin");
+        let is_root = |target: &&CrateTarget| target.kind.iter().any(|kind| kind == "lib" || kind == "bin");
         self.targets.iter().filter(is_root).map(|target| target.src_path.clone()).collect()
     }
 
-    /// The crates of the workspace that this one is built on. Its tests may use more.
+    /// The crates of the workspace that it depends on, without those of its tests.
     pub(crate) fn uses(&self) -> BTreeSet<&str> {
         let is_normal = |dependency: &&Dependency| dependency.kind.is_none() && dependency.path.is_some();
         self.dependencies.iter().filter(is_normal).map(|dependency| dependency.name.as_str()).collect()

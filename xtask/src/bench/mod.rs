@@ -1,22 +1,22 @@
-//! `cargo xtask bench`: speed beside peers, and figures of the host programs. It only prints; `count` and `size` check
-//! budgets.
+//! `cargo xtask bench`: comparison with peers, and measurements of the host programs. It has no budgets; `count` and `size`
+//! have.
 
 mod peers;
 mod programs;
 mod simulator;
 
-use crate::run::Outcome;
+use crate::run::TaskResult;
 
-/// Options of `cargo xtask bench`.
+/// Arguments of `cargo xtask bench`.
 #[derive(clap::Args)]
-pub(crate) struct Options {
-    /// Instead, measure the programs: their size and start, a round trip, and what 1, 10, 100 and 1000 simulated
-    /// arms in one process take
+pub(crate) struct BenchArgs {
+    /// Measure the host programs instead: their size, start and round trip, and the load of 1, 10, 100 and 1000 simulated
+    /// arms in one process
     #[arg(long)]
     programs: bool,
 }
 
 /// Measures and prints.
-pub(crate) fn run(options: &Options) -> Outcome {
-    if options.programs { programs::measure() } else { peers::compare() }
+pub(crate) fn run(args: &BenchArgs) -> TaskResult {
+    if args.programs { programs::measure() } else { peers::compare() }
 }

@@ -1,13 +1,13 @@
-//! Compares the parse-and-answer path with its peers: time on this machine; instructions and bytes on the chip.
+//! Compares the parse-and-reply path with its peers: time on this machine; instructions and bytes on the chip.
 
-use crate::count::{self, Told};
-use crate::run::{Linked, Outcome, build_footprint, cargo};
+use crate::count::{self, NamedCount};
+use crate::run::{ChipProgram, TaskResult, build_footprint, cargo};
 use crate::{emulate, footprint};
 use torture::text_table::Column::{Left, Right};
 use torture::text_table::TextTable;
 
-/// The servers compared, each with the program that counts its instructions. Ours comes first.
-const CANDIDATES: &[(&str, &str)] = &[
+/// The compared servers, each with the program that counts its instructions. Ours comes first.
+const SERVERS: &[(&str, &str)] = &[
     ("protocol-core", "count_ours"),
     ("modbus-core", "count_modbus_core"),
     ("rmodbus", "count_rmodbus"),
@@ -16,7 +16,7 @@ const CANDIDATES: &[(&str, &str)] = &[
 ];
 
 /// Prints both comparisons.
-pub(crate) fn compare() -> Outcome {
+pub(crate) fn compare() -> TaskResult {
     emulate::need_qemu()?;
     cargo("run --quiet --release --package bench")?;
     for &(profile, words) in count::PROFILES {
@@ -27,10 +27,10 @@ pub(crate) fn compare() -> Outcome {
     Ok(())
 }
 
-fn print_chip(profile: &'static str) -> Outcome {
-    let all = CANDIDATES.iter().map(|&(_, name)| costs(&Linked { name, profile }));
-    let all: Vec<Costs> = all.collect::<Outcome<_>>()?;
-    let names = CANDIDATES.iter().map(|&(name, _)| Right(name));
+fn print_chip(profile: &'static str) -> TaskResult {
+    let all = SERVERS.iter().map(|&(_, name)| costs(&ChipProgram { name, profile }));
+    let all: Vec<Costs> = all.collect::<TaskResult<_>>()?;
+    let names = SERVERS.iter().map(|&(name, _)| Right(name));
     let mut table = TextTable::new([Left("")].into_iter().chain(names).chain([Right("ours / best")]));
     for (what, ours) in all.first().into_iter().flatten() {
         let cost = |costs: &Costs| costs.iter().find(|(name, _)| name == what).and_then(|&(_, cost)| cost);
@@ -43,12 +43,12 @@ fn print_chip(profile: &'static str) -> Outcome {
     Ok(())
 }
 
-/// Each cost by its name; `None` if it has no known bound.
+/// The costs by name; `None` for a cost without a known bound.
 type Costs = Vec<(String, Option<u64>)>;
 
-fn costs(program: &Linked) -> Outcome<Costs> {
+fn costs(program: &ChipProgram) -> TaskResult<Costs> {
     let counted = count::of(program)?;
-    let mut costs: Costs = counted.into_iter().map(|(name, count): Told| (name, Some(count))).collect();
+    let mut costs: Costs = counted.into_iter().map(|(name, count): NamedCount| (name, Some(count))).collect();
     // Calls through pointers and panics leave a peer's stack without a known bound.
     costs.push(("stack, bytes".to_owned(), footprint::stack_of_path(program).ok()));
     costs.push(("flash, bytes".to_owned(), Some(footprint::flash_of_path(program)?)));

@@ -1,5 +1,4 @@
-//! The programs on this machine: how large, how soon they are there, how long an answer takes, and how many arms
-//! one simulator carries.
+//! Measures the host programs: size, start, round trip, and the load of many arms in one simulator.
 
 use std::fs;
 use std::io::Write;
@@ -11,23 +10,23 @@ use protocol_core::registers::map::PRESENT_POSITION;
 use protocol_core::request::Request;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-use super::simulator::{Simulator, take_answer};
+use super::simulator::{Simulator, receive_reply};
 use crate::count::frame;
-use crate::run::{Outcome, cargo, target_directory};
+use crate::run::{TaskResult, cargo, target_directory};
 use torture::text_table::Column::Right;
 use torture::text_table::TextTable;
 
-/// How often a program is started.
+/// Number of starts of a program.
 const STARTS: usize = 51;
-/// How often an answer is waited for.
+/// Number of measured round trips.
 const ROUND_TRIPS: usize = 5_001;
-/// How many arms one simulator carries, one size after the other.
+/// Numbers of arms in one simulator.
 const SIZES: [usize; 4] = [1, 10, 100, 1_000];
 
 /// Measures and prints.
-pub(crate) fn measure() -> Outcome {
+pub(crate) fn measure() -> TaskResult {
     cargo("build --quiet --release --package host-sim --package sevenbot-cli")?;
-    // A port open for each arm: more than a process may have by itself.
+    // Each arm needs an open port: more files than a process may open by default.
     let limit = getrlimit(Resource::Nofile);
     setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit })?;
     let (host_sim, sevenbot) = (release("host-sim"), release("sevenbot"));
@@ -36,12 +35,12 @@ pub(crate) fn measure() -> Outcome {
     }
     let arm = Simulator::start(&host_sim, 1, &["--eeprom", "none", "--unpaced"])?;
     let port = arm.port().display().to_string();
-    print_times("sevenbot --version", starts(&sevenbot, &["--version"])?);
-    print_times(
+    print_percentiles("sevenbot --version", starts(&sevenbot, &["--version"])?);
+    print_percentiles(
         "sevenbot get target-position, unpaced",
         starts(&sevenbot, &["--port", &port, "get", "target-position"])?,
     );
-    print_times("read of 7 and its answer, unpaced", round_trips(&arm)?);
+    print_percentiles("read of 7 and its reply, unpaced", round_trips(&arm)?);
     drop(arm);
     print_arms(&host_sim)
 }
@@ -50,8 +49,8 @@ fn release(program: &str) -> PathBuf {
     target_directory().join("release").join(program)
 }
 
-/// How long a program takes from its start to its end, each time.
-fn starts(program: &Path, arguments: &[&str]) -> Outcome<Vec<Duration>> {
+/// The run times of a program.
+fn starts(program: &Path, arguments: &[&str]) -> TaskResult<Vec<Duration>> {
     let run = || {
         let start = Instant::now();
         let status = Command::new(program).args(arguments).stdout(Stdio::null()).status()?;
@@ -61,43 +60,43 @@ fn starts(program: &Path, arguments: &[&str]) -> Outcome<Vec<Duration>> {
     (0..STARTS).map(|_| run()).collect()
 }
 
-fn round_trips(arm: &Simulator) -> Outcome<Vec<Duration>> {
+fn round_trips(arm: &Simulator) -> TaskResult<Vec<Duration>> {
     let mut ports = arm.open()?;
     let port = ports.first_mut().ok_or("no port")?;
     let question = frame(Request::Read { address: PRESENT_POSITION.address, count: PRESENT_POSITION.count });
     let mut trip = || {
         let start = Instant::now();
         port.write_all(&question)?;
-        take_answer(port)?;
+        receive_reply(port)?;
         Ok(start.elapsed())
     };
     (0..ROUND_TRIPS).map(|_| trip()).collect()
 }
 
-/// The median, and what one in a hundred is above.
-fn print_times(what: &str, mut times: Vec<Duration>) {
+/// Prints the median and the 99th percentile.
+fn print_percentiles(what: &str, mut times: Vec<Duration>) {
     times.sort_unstable();
     let percentile = |part: usize| times.get(times.len() * part / 100).copied().unwrap_or_default();
     let millis = |time: Duration| time.as_secs_f64() * 1e3;
     println!("{:10.3} ms, 99 of 100 under {:.3} ms: {what}", millis(percentile(50)), millis(percentile(99)));
 }
 
-/// What arms take of a core when nobody asks, and with a host each that asks at 100 Hz, worked out from what was
-/// measured: most of an answer costs the same however often there is one.
-fn print_arms(program: &Path) -> Outcome {
+/// Prints the load of idle arms, and of arms with a host at 100 Hz each. The latter is computed from the cost of a reply,
+/// which hardly depends on the rate.
+fn print_arms(program: &Path) -> TaskResult {
     println!(
         "\nArms in one process, each with its settings in a file and its bytes paced at 115200 baud. Shares of a core;"
     );
-    println!("busy: all joints move, and a host asks for the positions. Memory: anonymous, KiB");
+    println!("busy: all joints move, and a host polls the positions. Memory: anonymous, KiB");
     let columns = [
         "arms",
         "idle",
-        "an arm",
-        "asked at",
+        "per arm",
+        "polled at",
         "busy",
-        "an answer",
-        "an arm at 100 Hz",
-        "arms a core",
+        "per reply",
+        "per arm at 100 Hz",
+        "arms per core",
         "memory",
     ];
     let mut table = TextTable::new(columns.map(Right));
@@ -109,16 +108,16 @@ fn print_arms(program: &Path) -> Outcome {
         let idle = arms.share_idle()?;
         let (busy, rate) = arms.share_polled()?;
         let kibibytes = arms.memory()?;
-        let answer = (busy - idle).max(0.0) / (rate * size as f64);
+        let reply = (busy - idle).max(0.0) / (rate * size as f64);
         let each = idle / size as f64;
-        let at_100_hz = each + 100.0 * answer;
+        let at_100_hz = each + 100.0 * reply;
         table.add([
             size.to_string(),
             format!("{:.2} %", 100.0 * idle),
             format!("{:.3} %", 100.0 * each),
             format!("{rate:.1} Hz"),
             format!("{:.2} %", 100.0 * busy),
-            format!("{:.1} us", 1e6 * answer),
+            format!("{:.1} us", 1e6 * reply),
             format!("{:.3} %", 100.0 * at_100_hz),
             format!("{:.0}", at_100_hz.recip()),
             kibibytes.to_string(),
@@ -128,7 +127,7 @@ fn print_arms(program: &Path) -> Outcome {
     print!("{table}");
     if let ([(1, one), ..], [.., (most, all)]) = (memory.as_slice(), memory.as_slice()) {
         let more = all.saturating_sub(*one) as f64 / (most - 1) as f64;
-        println!("each arm more takes {more:.1} KiB");
+        println!("each further arm takes {more:.1} KiB");
     }
     Ok(())
 }

@@ -1,16 +1,16 @@
-//! The cores and their peers alone: programs of `footprint` that count themselves and tell the figures.
+//! Programs of `footprint` that count the instructions of the cores and their peers, and print the counts.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
 use crate::emulate;
-use crate::run::{Linked, Outcome, Running};
+use crate::run::{ChildProcess, ChipProgram, TaskResult};
 
-/// A name and a number, as a program told them.
-pub(crate) type Told = (String, u64);
+/// A name and a number that a program printed.
+pub(crate) type NamedCount = (String, u64);
 
-/// Runs a program in the emulator, and gives what it tells.
-pub(crate) fn figures(program: &Linked) -> Outcome<Vec<Told>> {
+/// Runs a program in the emulator and returns its counts.
+pub(crate) fn figures(program: &ChipProgram) -> TaskResult<Vec<NamedCount>> {
     let child = Command::new(emulate::QEMU)
         .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-nodefaults"])
         .args(["-chardev", "stdio,id=figures,signal=off", "-serial", "chardev:figures"])
@@ -20,7 +20,7 @@ pub(crate) fn figures(program: &Linked) -> Outcome<Vec<Told>> {
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .spawn()?;
-    let mut child = Running(child);
+    let mut child = ChildProcess(child);
     let output = child.0.stdout.take().ok_or("the emulator has no output")?;
     let mut figures = Vec::new();
     for line in BufReader::new(output).lines() {
@@ -29,5 +29,5 @@ pub(crate) fn figures(program: &Linked) -> Outcome<Vec<Told>> {
             None => return Ok(figures),
         }
     }
-    Err(format!("{} ended before it had told its figures", program.name))?
+    Err(format!("{} ended before its last count", program.name))?
 }

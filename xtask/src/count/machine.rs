@@ -1,5 +1,5 @@
-//! The image under observation: in the emulator, one instruction at a time, with a log that can be switched on and
-//! off. Time there goes by instructions, so however slow the log is, the arm does not notice.
+//! The image in the emulator, one instruction at a time, with an optional log. Virtual time depends on instructions only, so
+//! the log does not affect the arm.
 
 use std::fs::{self, File};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -13,51 +13,49 @@ use protocol_core::request::Request;
 use protocol_core::wire::FrameBuffer;
 use tempfile::TempDir;
 
-use super::trace::{self, Event};
+use super::trace::{self, TraceEvent};
 use crate::emulate;
 use crate::emulate::monitor::{self, Monitor};
-use crate::run::{IMAGE, Outcome, Running};
+use crate::run::{ChildProcess, IMAGE, TIMEOUT, TaskResult};
 
-/// How long a reply may take, on a machine that does other things too.
-const PATIENCE: Duration = Duration::from_secs(60);
-/// Time enough for the arm to have done what it was told and to sleep again.
-const CALM: Duration = Duration::from_millis(20);
+/// The time after which the arm has processed a request and sleeps.
+const IDLE_TIME: Duration = Duration::from_millis(20);
 
 /// The arm in the emulator.
 pub(crate) struct Machine {
     monitor: Monitor,
     host: UnixStream,
     log: PathBuf,
-    // In this order: the emulator ends before what is on its lines, and that before the sockets.
-    _machine: Running,
-    _servos: Option<Running>,
+    // In this order: the emulator ends before the processes on its lines, and these before the sockets.
+    _machine: ChildProcess,
+    _servos: Option<ChildProcess>,
     _folder: TempDir,
 }
 
 impl Machine {
-    /// Starts the image with seven servos, and waits until its arm is in position.
-    pub(crate) fn with_servos() -> Outcome<Self> {
+    /// Starts the image with seven servos, and waits until its arm is in its pose.
+    pub(crate) fn with_servos() -> TaskResult<Self> {
         let folder = tempfile::tempdir()?;
         let servos = emulate::start_servos(&folder, &[])?;
         let bus = emulate::servo_socket(&folder);
         let mut machine = Self::start(folder, Some(servos), &bus, "shift=0,sleep=on")?;
-        // Twice: before the servos are looked at, none is known to be missing.
+        // Twice: before their first read, no servos are reported as missing.
         for _ in 0..2 {
             sleep(Duration::from_secs(1));
             while machine.read(MISSING_SERVOS.address, 1)? != [0] {
-                sleep(CALM);
+                sleep(IDLE_TIME);
             }
         }
         Ok(machine)
     }
 
-    /// Starts the image with nobody on its lines. Nothing waits for real time then: what it does is the same in
-    /// every run, to the instruction.
-    pub(crate) fn alone() -> Outcome<Self> {
+    /// Starts the image without connections. Virtual time does not wait for real time, so every run executes the same
+    /// instructions.
+    pub(crate) fn alone() -> TaskResult<Self> {
         Self::start(tempfile::tempdir()?, None, "null", "shift=0,sleep=off")
     }
 
-    fn start(folder: TempDir, servos: Option<Running>, bus: &str, icount: &str) -> Outcome<Self> {
+    fn start(folder: TempDir, servos: Option<ChildProcess>, bus: &str, icount: &str) -> TaskResult<Self> {
         let host = UnixListener::bind(folder.path().join("host"))?;
         let commands = UnixListener::bind(folder.path().join("monitor"))?;
         let log = folder.path().join("log");
@@ -65,49 +63,49 @@ impl Machine {
         let options = ["-icount", icount, "-singlestep", "-D", &log_option];
         let machine = emulate::start_machine(&IMAGE, &folder, bus, &options)?;
         let host = monitor::accept(&host)?;
-        host.set_read_timeout(Some(PATIENCE))?;
+        host.set_read_timeout(Some(TIMEOUT))?;
         let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
         monitor.wait_for_bits(emulate::HOST_LINK_CONTROL, emulate::RECEIVER_ON)?;
         Ok(Self { monitor, host, log, _machine: machine, _servos: servos, _folder: folder })
     }
 
-    /// Sends bytes to the arm, and lets it get calm.
-    pub(crate) fn send(&mut self, bytes: &[u8]) -> Outcome {
+    /// Sends bytes to the arm, and waits until it sleeps.
+    pub(crate) fn send(&mut self, bytes: &[u8]) -> TaskResult {
         self.host.write_all(bytes)?;
-        sleep(CALM);
+        sleep(IDLE_TIME);
         Ok(())
     }
 
     /// Waits for a reply with this many values.
-    pub(crate) fn reply(&mut self, count: u8) -> Outcome<Vec<u8>> {
+    pub(crate) fn reply(&mut self, count: u8) -> TaskResult<Vec<u8>> {
         let mut reply = vec![0; 7 + usize::from(count)];
-        self.host.read_exact(&mut reply).map_err(|why| format!("the arm does not answer: {why}"))?;
+        self.host.read_exact(&mut reply).map_err(|why| format!("the arm does not reply: {why}"))?;
         Ok(reply.get(5..5 + usize::from(count)).unwrap_or_default().to_vec())
     }
 
-    /// Reads registers over the wire.
-    pub(crate) fn read(&mut self, address: u8, count: u8) -> Outcome<Vec<u8>> {
+    /// Reads registers through the host link.
+    pub(crate) fn read(&mut self, address: u8, count: u8) -> TaskResult<Vec<u8>> {
         self.host.write_all(&frame(Request::Read { address, count }))?;
         self.reply(count)
     }
 
-    /// Waits until the arm has answered all that it was asked, and forgets the answers.
-    pub(crate) fn settle(&mut self) -> Outcome {
+    /// Waits for all pending replies, and drops them.
+    pub(crate) fn settle(&mut self) -> TaskResult {
         self.host.write_all(&frame(Request::Read { address: 0, count: 0 }))?;
         loop {
             let mut head = [0; 5];
-            self.host.read_exact(&mut head).map_err(|why| format!("the arm does not answer: {why}"))?;
+            self.host.read_exact(&mut head).map_err(|why| format!("the arm does not reply: {why}"))?;
             let [.., count] = head;
             self.host.read_exact(&mut vec![0; usize::from(count) + 2])?;
-            // Answers keep the order of their requests (D5), and only this one is empty.
+            // Replies have the order of their requests (D5), and only this one is empty.
             if count == 0 {
                 return Ok(());
             }
         }
     }
 
-    /// Logs what the arm executes meanwhile.
-    pub(crate) fn watch(&mut self, act: impl FnOnce(&mut Self) -> Outcome) -> Outcome<Vec<Event>> {
+    /// Logs the instructions during `act`.
+    pub(crate) fn watch(&mut self, act: impl FnOnce(&mut Self) -> TaskResult) -> TaskResult<Vec<TraceEvent>> {
         let before = fs::metadata(&self.log).map_or(0, |log| log.len());
         for event in ["read", "write"] {
             self.command(&format!("trace-event memory_region_ops_{event} on"))?;
@@ -123,12 +121,12 @@ impl Machine {
         Ok(trace::parse(&log))
     }
 
-    fn command(&mut self, line: &str) -> Outcome {
+    fn command(&mut self, line: &str) -> TaskResult {
         self.monitor.execute("human-monitor-command", &format!(r#""command-line":"{line}""#))
     }
 }
 
-/// A request as it goes on the wire.
+/// The frame of a request.
 pub(crate) fn frame(request: Request<'_>) -> Vec<u8> {
     let mut buffer = FrameBuffer::new();
     request.encode(&mut buffer);

@@ -1,4 +1,4 @@
-//! What the emulator did, instruction by instruction: its log of `-singlestep -d exec`, taken apart.
+//! Parses the emulator's log of `-singlestep -d exec`.
 //!
 //! ```text
 //!   Trace 0: 0x7f81a8 [00800409/0800c096/00000010/ff020201] USART1    about to execute; bit 0: in a handler
@@ -12,28 +12,28 @@ use std::ops::Range;
 
 use crate::thumb_decode::Effect;
 
-/// What happened.
+/// An event of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Event {
+pub(crate) enum TraceEvent {
     /// An instruction was executed.
     Step {
-        /// Where it stands.
+        /// Its address.
         at: u64,
-        /// Was it part of an exception's handler?
+        /// True in an exception handler.
         in_handler: bool,
     },
-    /// It read a register of a peripheral.
+    /// A peripheral's register was read.
     Read(u64),
-    /// It wrote to a register of a peripheral.
+    /// A peripheral's register was written.
     Wrote(u64),
 }
 
-/// Takes a log apart.
-pub(crate) fn parse(log: &str) -> Vec<Event> {
+/// Parses a log.
+pub(crate) fn parse(log: &str) -> Vec<TraceEvent> {
     let mut events = Vec::new();
     for line in log.lines() {
         if line.starts_with("Stopped ") || line.starts_with("cpu_io_recompile") {
-            if let Some(Event::Step { .. }) = events.last() {
+            if let Some(TraceEvent::Step { .. }) = events.last() {
                 events.pop();
             }
         } else {
@@ -43,63 +43,62 @@ pub(crate) fn parse(log: &str) -> Vec<Event> {
     events
 }
 
-fn event(line: &str) -> Option<Event> {
+fn event(line: &str) -> Option<TraceEvent> {
     if line.starts_with("Trace ") {
         let mut fields = line.split_once('[')?.1.split('/');
         let flags = hexadecimal(fields.next()?)?;
-        return Some(Event::Step { at: hexadecimal(fields.next()?)?, in_handler: flags & 1 == 1 });
+        return Some(TraceEvent::Step { at: hexadecimal(fields.next()?)?, in_handler: flags & 1 == 1 });
     }
     let access = line.strip_prefix("memory_region_ops_")?;
     let address = hexadecimal(access.split_once("addr 0x")?.1.split(' ').next()?)?;
-    Some(if access.starts_with("read") { Event::Read(address) } else { Event::Wrote(address) })
+    Some(if access.starts_with("read") { TraceEvent::Read(address) } else { TraceEvent::Wrote(address) })
 }
 
 fn hexadecimal(digits: &str) -> Option<u64> {
     u64::from_str_radix(digits, 16).ok()
 }
 
-/// How many instructions were executed.
-pub(crate) fn steps(events: &[Event]) -> u64 {
-    events.iter().filter(|event| matches!(event, Event::Step { .. })).count() as u64
+/// The number of executed instructions.
+pub(crate) fn steps(events: &[TraceEvent]) -> u64 {
+    events.iter().filter(|event| matches!(event, TraceEvent::Step { .. })).count() as u64
 }
 
-/// Was this instruction executed?
-pub(crate) fn is_step_at(event: &Event, address: u64) -> bool {
-    matches!(event, Event::Step { at, .. } if *at == address)
+/// True if this is the execution of the instruction at `address`.
+pub(crate) fn is_step_at(event: &TraceEvent, address: u64) -> bool {
+    matches!(event, TraceEvent::Step { at, .. } if *at == address)
 }
 
-/// How often a register was accessed in this way.
-pub(crate) fn times(events: &[Event], access: Event) -> usize {
+/// The number of these accesses to a register.
+pub(crate) fn times(events: &[TraceEvent], access: TraceEvent) -> usize {
     events.iter().filter(|event| **event == access).count()
 }
 
-/// The stretches between one event and the next that are alike: what begins with such an event and ends before
-/// the next.
-pub(crate) fn between(events: &[Event], is_mark: impl Fn(&Event) -> bool) -> Vec<Range<usize>> {
+/// The ranges of events that begin with a mark and end before the next one.
+pub(crate) fn between(events: &[TraceEvent], is_mark: impl Fn(&TraceEvent) -> bool) -> Vec<Range<usize>> {
     let marks: Vec<_> =
         events.iter().enumerate().filter(|(_, event)| is_mark(event)).map(|(at, _)| at).collect();
     marks.iter().zip(marks.iter().skip(1)).map(|(&from, &to)| from..to).collect()
 }
 
-/// The calls of the handler at `entry`, from its first instruction to its return, less those that another of
-/// `entries` interrupts.
+/// The calls of the handler at `entry`, from its first instruction to its return, without those that another of `entries`
+/// interrupts.
 pub(crate) fn handler_calls<'a>(
-    events: &'a [Event],
+    events: &'a [TraceEvent],
     entry: u64,
     entries: &[u64],
     effects: &HashMap<u64, Effect>,
-) -> Vec<&'a [Event]> {
+) -> Vec<&'a [TraceEvent]> {
     let starts = events.iter().enumerate().filter(|(_, event)| is_step_at(event, entry));
     let calls = starts.filter_map(|(start, _)| call(events.get(start..)?, effects));
-    let is_entry = |event: &Event| entries.iter().any(|&entry| is_step_at(event, entry));
+    let is_entry = |event: &TraceEvent| entries.iter().any(|&entry| is_step_at(event, entry));
     calls.filter(|call| !call.iter().skip(1).any(is_entry)).collect()
 }
 
-/// What was executed of the function that `events` begin with, and of those it called.
-fn call<'a>(events: &'a [Event], effects: &HashMap<u64, Effect>) -> Option<&'a [Event]> {
+/// The instructions of the function that `events` begin with, and of those that it calls.
+fn call<'a>(events: &'a [TraceEvent], effects: &HashMap<u64, Effect>) -> Option<&'a [TraceEvent]> {
     let mut depth = 0_u32;
     let end = events.iter().position(|event| {
-        let Event::Step { at, .. } = event else { return false };
+        let TraceEvent::Step { at, .. } = event else { return false };
         match effects.get(at) {
             Some(Effect::Call(_)) => depth += 1,
             Some(Effect::Return) if depth == 0 => return true,
@@ -129,14 +128,14 @@ Trace 0: 0x7f81a810adc0 [00800408/0800e7a4/00000010/ff020201] _ZN14firmware_stm3
 ";
 
     #[test]
-    fn what_was_announced_and_not_executed_does_not_count() {
+    fn announced_instructions_count_only_if_executed() {
         let events = parse(LOG);
         assert_eq!(steps(&events), 5);
-        assert_eq!(times(&events, Event::Read(0x4001_1000)), 1);
+        assert_eq!(times(&events, TraceEvent::Read(0x4001_1000)), 1);
     }
 
-    const fn step(at: u64) -> Event {
-        Event::Step { at, in_handler: true }
+    const fn step(at: u64) -> TraceEvent {
+        TraceEvent::Step { at, in_handler: true }
     }
 
     #[test]
@@ -157,8 +156,14 @@ Trace 0: 0x7f81a810adc0 [00800408/0800e7a4/00000010/ff020201] _ZN14firmware_stm3
     }
 
     #[test]
-    fn stretches_run_from_mark_to_mark() {
-        let events = [Event::Read(1), Event::Read(2), Event::Read(1), Event::Read(1), Event::Read(3)];
-        assert_eq!(between(&events, |event| *event == Event::Read(1)), [0..2, 2..3]);
+    fn ranges_begin_and_end_at_marks() {
+        let events = [
+            TraceEvent::Read(1),
+            TraceEvent::Read(2),
+            TraceEvent::Read(1),
+            TraceEvent::Read(1),
+            TraceEvent::Read(3),
+        ];
+        assert_eq!(between(&events, |event| *event == TraceEvent::Read(1)), [0..2, 2..3]);
     }
 }

@@ -4,7 +4,7 @@ use super::drawing::Drawing;
 use super::part::{Enable, Kind, Part, Side, connector, dot, gate, label, mosfet, two, wire};
 use super::sheet::Anchor;
 
-/// Every drawing there is.
+/// All drawings.
 pub(super) fn all() -> [Drawing; 4] {
     [servo_bus(), servo_bus_buffered(), power(), vacuum()]
 }
@@ -90,7 +90,7 @@ fn power() -> Drawing {
         dot(33, 12),
         two(Kind::Switch, (46, 12), (54, 12), "S1  emergency stop"),
         wire(&[(54, 12), (96, 12)]),
-        // The regulator: one frame, with terminals on both sides.
+        // The regulator: a frame with terminals on both sides.
         wire(&[(33, 12), (33, 24), (36, 24)]),
         connector(36, 13, Side::Left, "Regulator", &[(24, "in"), (30, "GND")]),
         connector(51, 13, Side::Right, "", &[(24, "5 V"), (30, "GND")]),
@@ -102,7 +102,7 @@ fn power() -> Drawing {
         wire(&[(78, 32), (78, 46)]),
         dot(78, 46),
         connector(96, 12, Side::Left, "7 servos", &[(12, "V+"), (46, "GND")]),
-        // The star: each consumer has a ground wire of its own to one point.
+        // The star: a separate ground wire for each consumer.
         dot(20, 42),
         wire(&[(15, 42), (33, 42), (33, 30), (36, 30)]),
         wire(&[(20, 42), (20, 46), (96, 46)]),
@@ -133,7 +133,7 @@ fn vacuum() -> Drawing {
     Drawing { name: "vacuum", title: "Pump and valve", size: (93, 73), parts }
 }
 
-/// One output with its load, `y` grid units down.
+/// An output with its load, `y` grid units from the top.
 fn driver(y: i32, number: i32, pin: &str, load: &str) -> Vec<Part> {
     vec![
         connector(15, 10, Side::Right, "Board", &[(y, pin), (y + 18, "GND")]),

@@ -9,7 +9,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use crate::run::{Outcome, root};
+use crate::run::{TaskResult, root};
 
 mod circuits;
 mod drawing;
@@ -25,7 +25,7 @@ fn path(drawing: &Drawing) -> PathBuf {
 }
 
 /// Writes every drawing.
-pub(crate) fn write() -> Outcome {
+pub(crate) fn write() -> TaskResult {
     fs::create_dir_all(folder())?;
     for drawing in circuits::all() {
         fs::write(path(&drawing), drawing.svg())?;
@@ -33,15 +33,15 @@ pub(crate) fn write() -> Outcome {
     Ok(())
 }
 
-/// Fails if a drawing is not what [`write()`] would write.
-pub(crate) fn check() -> Outcome {
+/// Fails if a drawing differs from the one that [`write()`] writes.
+pub(crate) fn check() -> TaskResult {
     for drawing in circuits::all() {
         let path = path(&drawing);
         if fs::read_to_string(&path).unwrap_or_default() != drawing.svg() {
-            return Err(format!("{} is stale: run `cargo xtask docs`", path.display()).into());
+            return Err(format!("{} is out of date: run `cargo xtask docs`", path.display()).into());
         }
     }
-    println!("docs/circuits shows what the tables of parts say");
+    println!("docs/circuits is up to date");
     Ok(())
 }
 

@@ -1,8 +1,6 @@
-//! The words a schematic is made of: wires, parts with two or more terminals, connectors, labels.
-//!
-//! Knows the shape and the terminals of each; knows nothing of any circuit.
+//! The parts of a schematic: wires, components, connectors, labels. Each has a shape and terminals.
 
-use super::sheet::{Anchor, At, Place, Sheet};
+use super::sheet::{Anchor, At, Placement, Sheet};
 
 /// A part with two terminals, drawn along the line between them.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -10,9 +8,9 @@ pub(super) enum Kind {
     Resistor,
     /// A capacitor whose first terminal is the plus.
     Electrolytic,
-    /// From anode to cathode.
+    /// Drawn from anode to cathode.
     Diode,
-    /// A bidirectional clamp against ESD.
+    /// A bidirectional ESD clamp.
     Clamp,
     Fuse,
     Switch,
@@ -32,14 +30,14 @@ pub(super) enum Part {
         gate: At,
         text: String,
     },
-    /// A three-state gate: input, output; enabled from above, or from below by a low level.
+    /// A three-state gate: input, output, and an enable input above (active high) or below (active low).
     Gate {
         input: At,
         output: At,
         enable: Enable,
         text: String,
     },
-    /// A frame with terminals on one side, each a name and its height on the sheet.
+    /// A frame with terminals on one side, each with its name and height on the sheet.
     Connector {
         x: i32,
         width: i32,
@@ -54,19 +52,19 @@ pub(super) enum Part {
     },
 }
 
-/// The side of a connector that its wires come from.
+/// The side of a connector with the wires.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
     Left,
     Right,
 }
 
-/// How a three-state gate is enabled.
+/// The enable input of a three-state gate.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Enable {
-    /// High, from above.
+    /// Active high, above the gate.
     High,
-    /// Low, from below.
+    /// Active low, below the gate.
     Low,
 }
 
@@ -75,7 +73,7 @@ pub(super) fn wire(points: &[At]) -> Part {
     Part::Wire(points.to_vec())
 }
 
-/// Wires are joined here.
+/// A junction of wires.
 pub(super) fn dot(x: i32, y: i32) -> Part {
     Part::Dot((x, y))
 }
@@ -95,19 +93,19 @@ pub(super) fn gate(input: At, output: At, enable: Enable, text: &str) -> Part {
     Part::Gate { input, output, enable, text: text.to_owned() }
 }
 
-/// A connector, or anything else whose inside is not drawn. Its terminals are at `x`.
+/// A connector, or another part that is drawn as a frame. Its terminals are at `x`.
 pub(super) fn connector(x: i32, width: i32, faces: Side, text: &str, pins: &[(i32, &str)]) -> Part {
     let pins = pins.iter().map(|&(y, name)| (y, name.to_owned())).collect();
     Part::Connector { x, width, faces, pins, text: text.to_owned() }
 }
 
-/// Text that stands by itself.
+/// A label without a part.
 pub(super) fn label(at: At, anchor: Anchor, text: &str) -> Part {
     Part::Label { at, anchor, text: text.to_owned() }
 }
 
 impl Part {
-    /// The texts of this part: where each stands, and how.
+    /// The texts of this part, with position and alignment.
     pub(super) fn texts(&self) -> Vec<(At, Anchor, &str)> {
         match self {
             Self::Wire(_) | Self::Dot(_) => Vec::new(),
@@ -145,8 +143,8 @@ fn middle((x1, y1): At, (x2, y2): At) -> (f64, f64) {
     (f64::from(x1 + x2) / 2.0, f64::from(y1 + y2) / 2.0)
 }
 
-/// Which way it is from one point to another on the same row or column.
-fn turn((x1, y1): At, (x2, y2): At) -> i32 {
+/// The direction from one point to another in the same row or column, in degrees.
+fn direction((x1, y1): At, (x2, y2): At) -> i32 {
     match (x2 - x1, y2 - y1) {
         (0, 0..) => 90,
         (0, _) => 270,
@@ -155,7 +153,7 @@ fn turn((x1, y1): At, (x2, y2): At) -> i32 {
     }
 }
 
-/// The text of a part with two terminals: above it, or on the right of one that stands upright.
+/// The text of a part with two terminals: above it, or on the right of a vertical one.
 fn beside((x1, y1): At, (x2, y2): At, text: &str) -> (At, Anchor, &str) {
     if x1 == x2 {
         ((x1 + 2, (y1 + y2) / 2), Anchor::Start, text)
@@ -165,7 +163,7 @@ fn beside((x1, y1): At, (x2, y2): At, text: &str) -> (At, Anchor, &str) {
 }
 
 fn draw_two(sheet: &mut Sheet, kind: Kind, from: At, to: At) {
-    let place = Place { at: middle(from, to), turn: turn(from, to) };
+    let placement = Placement { at: middle(from, to), turn: direction(from, to) };
     let half = ((to.0 - from.0).abs() + (to.1 - from.1).abs()) * 5;
     let (body, gap) = match kind {
         Kind::Resistor => ("M-20 -7H20V7H-20Z", 20),
@@ -175,29 +173,29 @@ fn draw_two(sheet: &mut Sheet, kind: Kind, from: At, to: At) {
         Kind::Clamp => ("M-6 -14L0 -10V10L6 14 M-12 -8L0 0L-12 8Z M12 -8L0 0L12 8Z", 12),
         Kind::Switch => ("M-18 0L16 -14", 18),
     };
-    sheet.symbol(place, &format!("M-{half} 0H-{gap} M{gap} 0H{half} {body}"));
+    sheet.symbol(placement, &format!("M-{half} 0H-{gap} M{gap} 0H{half} {body}"));
     match kind {
-        Kind::Diode => sheet.filled(place, "M-10 -10V10L10 0Z"),
-        Kind::Switch => sheet.filled(place, "M-18 -4a4 4 0 1 0 .1 0Z M18 -4a4 4 0 1 0 .1 0Z"),
+        Kind::Diode => sheet.filled(placement, "M-10 -10V10L10 0Z"),
+        Kind::Switch => sheet.filled(placement, "M-18 -4a4 4 0 1 0 .1 0Z M18 -4a4 4 0 1 0 .1 0Z"),
         _ => {}
     }
 }
 
-/// With the body diode's arrow at the source left out: gate bar, channel, and three leads.
+/// Gate, channel and three leads, without the body diode.
 fn draw_mosfet(sheet: &mut Sheet, (x, y): At) {
-    let place = Place { at: (f64::from(x), f64::from(y)), turn: 0 };
+    let placement = Placement { at: (f64::from(x), f64::from(y)), turn: 0 };
     sheet.symbol(
-        place,
+        placement,
         "M0 0H14 M14 -14V14 M20 -16V-6 M20 -5V5 M20 6V16 M20 -11H30V-30 M20 11H30V30 M30 11V0H20",
     );
-    sheet.filled(place, "M21 0L28 -4V4Z");
+    sheet.filled(placement, "M21 0L28 -4V4Z");
 }
 
 fn draw_gate(sheet: &mut Sheet, input: At, output: At, enable: Enable) {
-    let place = Place { at: middle(input, output), turn: turn(input, output) };
+    let placement = Placement { at: middle(input, output), turn: direction(input, output) };
     let half = (output.0 - input.0).abs() * 5;
-    sheet.symbol(place, &format!("M-{half} 0H-20 M-20 -22V22L20 0Z M20 0H{half}"));
-    let upright = Place { turn: 0, ..place };
+    sheet.symbol(placement, &format!("M-{half} 0H-20 M-20 -22V22L20 0Z M20 0H{half}"));
+    let upright = Placement { turn: 0, ..placement };
     match enable {
         Enable::High => sheet.symbol(upright, "M0 -40V-11"),
         Enable::Low => sheet.symbol(upright, "M0 40V19 M-4 15a4 4 0 1 0 8 0a4 4 0 1 0 -8 0Z"),
@@ -238,7 +236,7 @@ fn connector_texts<'a>(
 
 #[cfg(test)]
 impl Part {
-    /// Where wires may end at this part.
+    /// The points at which wires may end.
     pub(super) fn terminals(&self) -> Vec<At> {
         match self {
             Self::Wire(_) | Self::Dot(_) | Self::Label { .. } => Vec::new(),

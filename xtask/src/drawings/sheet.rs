@@ -1,4 +1,4 @@
-//! A sheet of SVG: lines, filled shapes and text, on a grid of 10 pixels. Knows nothing of electronics.
+//! A sheet of SVG: lines, filled shapes and text, on a grid of 10 pixels.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ const GRID: i32 = 10;
 /// Distance between two lines of text, in pixels.
 const LINE: i32 = 17;
 
-/// The reader's colour scheme decides between dark ink on white and light ink on a dark ground.
+/// The reader's colour scheme selects dark lines on white or light lines on black.
 const STYLE: &str = "\
   <style>
     .ground { fill: #ffffff }
@@ -26,7 +26,7 @@ const STYLE: &str = "\
   </style>
 ";
 
-/// Which end of a text stands at its point.
+/// The part of a text that is at its point.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -34,16 +34,16 @@ pub(super) enum Anchor {
     End,
 }
 
-/// Where a symbol stands and which way it points: its own x axis runs from its first terminal to its second.
+/// The position and direction of a symbol. Its own x axis points from its first terminal to its second.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct Placement {
     /// The middle of the symbol.
     pub(super) at: (f64, f64),
     /// Clockwise, in degrees.
     pub(super) turn: i32,
 }
 
-/// The SVG under way.
+/// An incomplete SVG.
 pub(super) struct Sheet {
     svg: String,
 }
@@ -69,17 +69,17 @@ impl Sheet {
         let _ = writeln!(self.svg, "  <polyline class=\"line\" points=\"{}\"/>", points.join(" "));
     }
 
-    /// A symbol from SVG path data in pixels round its own middle, as lines.
-    pub(super) fn symbol(&mut self, place: Place, path: &str) {
-        self.path("line", place, path);
+    /// Draws a symbol from SVG path data, in pixels round its middle, as lines.
+    pub(super) fn symbol(&mut self, placement: Placement, path: &str) {
+        self.path("line", placement, path);
     }
 
-    /// The same, filled.
-    pub(super) fn filled(&mut self, place: Place, path: &str) {
-        self.path("solid", place, path);
+    /// Draws a filled symbol.
+    pub(super) fn filled(&mut self, placement: Placement, path: &str) {
+        self.path("solid", placement, path);
     }
 
-    fn path(&mut self, class: &str, Place { at: (x, y), turn }: Place, path: &str) {
+    fn path(&mut self, class: &str, Placement { at: (x, y), turn }: Placement, path: &str) {
         let (x, y) = (x * f64::from(GRID), y * f64::from(GRID));
         let _ = writeln!(
             self.svg,
@@ -87,7 +87,7 @@ impl Sheet {
         );
     }
 
-    /// A frame round a part with several terminals.
+    /// Draws the frame of a part with several terminals.
     pub(super) fn frame(&mut self, (x, y): At, (width, height): At) {
         let [x, y, width, height] = [x, y, width, height].map(|length| length * GRID);
         let _ = writeln!(
@@ -96,13 +96,13 @@ impl Sheet {
         );
     }
 
-    /// A dot where wires meet.
+    /// Draws the dot of a junction.
     pub(super) fn dot(&mut self, (x, y): At) {
         let _ =
             writeln!(self.svg, "  <circle class=\"solid\" cx=\"{}\" cy=\"{}\" r=\"4\"/>", x * GRID, y * GRID);
     }
 
-    /// Text of one or more lines, its middle at the height of the point.
+    /// Writes text of one or more lines. The point is at half of their height.
     pub(super) fn text(&mut self, at: At, anchor: Anchor, text: &str) {
         self.write_text(at, anchor, "label", text);
     }
@@ -115,7 +115,7 @@ impl Sheet {
         };
         let lines: Vec<&str> = text.lines().collect();
         let rows = i32::try_from(lines.len()).unwrap_or(1);
-        // A baseline 5 pixels below the point centres 14-pixel letters on it.
+        // A baseline 5 pixels below the point centres letters of 14 pixels.
         let mut baseline = y * GRID + 5 - (rows - 1) * LINE / 2;
         for line in lines {
             let _ = writeln!(

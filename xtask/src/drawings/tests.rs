@@ -4,7 +4,7 @@ use super::circuits;
 use super::part::Part;
 use super::sheet::{Anchor, At};
 
-/// Is a point on the wire through these points?
+/// True if a point is on the wire through these points.
 fn is_on(points: &[At], (x, y): At) -> bool {
     points.windows(2).any(|pair| {
         let [(x1, y1), (x2, y2)] = *pair else { return false };
@@ -13,10 +13,10 @@ fn is_on(points: &[At], (x, y): At) -> bool {
 }
 
 /// A box in pixels: left, top, right, bottom.
-type Extent = [i32; 4];
+type TextBox = [i32; 4];
 
-/// What a text covers; 8 pixels a letter are more than it takes on average.
-fn extent((x, y): At, anchor: Anchor, text: &str) -> Extent {
+/// The box of a text, with 8 pixels for each letter, which is more than the average.
+fn text_box((x, y): At, anchor: Anchor, text: &str) -> TextBox {
     let letters = text.lines().map(|line| line.chars().count()).max().unwrap_or_default();
     let width = i32::try_from(letters).unwrap() * 8;
     let height = i32::try_from(text.lines().count()).unwrap() * 17;
@@ -28,12 +28,12 @@ fn extent((x, y): At, anchor: Anchor, text: &str) -> Extent {
     [left, y * 10 - height / 2, left + width, y * 10 + height / 2]
 }
 
-fn overlap(a: Extent, b: Extent) -> bool {
+fn overlap(a: TextBox, b: TextBox) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
 #[test]
-fn wires_are_straight_and_end_at_something() {
+fn wires_are_straight_and_connected() {
     for drawing in circuits::all() {
         let terminals: BTreeSet<At> = drawing.parts.iter().flat_map(Part::terminals).collect();
         let wires: Vec<&Vec<At>> = drawing
@@ -90,13 +90,13 @@ fn dots_join_wires() {
 }
 
 #[test]
-fn texts_stay_apart_and_on_the_sheet() {
+fn texts_are_on_the_sheet_and_do_not_overlap() {
     for drawing in circuits::all() {
-        let texts: Vec<(Extent, &str)> = drawing
+        let texts: Vec<(TextBox, &str)> = drawing
             .parts
             .iter()
             .flat_map(Part::texts)
-            .map(|(at, anchor, text)| (extent(at, anchor, text), text))
+            .map(|(at, anchor, text)| (text_box(at, anchor, text), text))
             .collect();
         for (index, (a, text)) in texts.iter().enumerate() {
             let [left, top, right, bottom] = *a;

@@ -4,8 +4,8 @@
 //!   _SEGGER_RTT: │ name: 16 bytes │ channels up, down │ name │ buffer │ size │ written to │ read to │ flags │
 //! ```
 //!
-//! A debugger would move "read to"; here nobody does, and the firmware never waits for it. So a burst of more than
-//! one buffer between two looks is lost.
+//! No debugger advances "read to" here, and the firmware does not wait for it. So the log loses a burst that exceeds the
+//! buffer between two polls.
 
 use std::io::Write;
 use std::path::Path;
@@ -15,42 +15,42 @@ use object::read::elf::ElfFile32;
 use object::{Object, ObjectSymbol};
 
 use super::monitor::Monitor;
-use crate::run::{Outcome, Running};
+use crate::run::{ChildProcess, TaskResult};
 
 /// Bytes of the control block with its first channel.
 const CONTROL_BLOCK: u32 = 48;
 
-/// Follows the log.
+/// The reader of the log.
 pub(super) struct Log {
     control_block: u32,
     printed_to: usize,
-    /// In this order: a closed input ends the printer by itself.
+    /// In this order: the printer ends when its input is closed.
     input: ChildStdin,
-    _printer: Running,
+    _printer: ChildProcess,
 }
 
 impl Log {
-    pub(super) fn open(image: &Path) -> Outcome<Self> {
+    pub(super) fn open(image: &Path) -> TaskResult<Self> {
         let printer = Command::new("defmt-print")
             .arg("-e")
             .arg(image)
             .stdin(Stdio::piped())
             .stdout(std::io::stderr())
             .spawn();
-        let mut printer = Running(printer.map_err(|why| {
-            format!("cannot start defmt-print ({why}): `cargo install defmt-print --locked` brings it")
+        let mut printer = ChildProcess(printer.map_err(|why| {
+            format!("cannot start defmt-print ({why}): `cargo install defmt-print --locked` installs it")
         })?);
         let input = printer.0.stdin.take().ok_or("defmt-print has no input")?;
         let control_block = address_of("_SEGGER_RTT", image)?;
         Ok(Self { control_block, printed_to: 0, input, _printer: printer })
     }
 
-    /// Prints what is new.
-    pub(super) fn follow(&mut self, monitor: &mut Monitor) -> Outcome {
+    /// Prints the new part of the log.
+    pub(super) fn print_new(&mut self, monitor: &mut Monitor) -> TaskResult {
         let block = monitor.memory(self.control_block, CONTROL_BLOCK)?;
         let field = |at: usize| {
             let bytes = block.get(at..).and_then(|rest| rest.first_chunk()).copied();
-            bytes.map(u32::from_le_bytes).ok_or("the control block of the log is cut off")
+            bytes.map(u32::from_le_bytes).ok_or("the control block of the log is incomplete")
         };
         let (buffer, size, written_to) = (field(28)?, field(32)?, field(36)? as usize);
         if written_to == self.printed_to || size == 0 {
@@ -61,7 +61,7 @@ impl Log {
         let new =
             if start <= end { ring.get(start..end).map(<[u8]>::to_vec) } else { wrapped(&ring, start, end) };
         self.printed_to = end;
-        self.input.write_all(&new.ok_or("the control block of the log makes no sense")?)?;
+        self.input.write_all(&new.ok_or("the control block of the log is invalid")?)?;
         Ok(self.input.flush()?)
     }
 }
@@ -70,7 +70,7 @@ fn wrapped(ring: &[u8], start: usize, end: usize) -> Option<Vec<u8>> {
     Some([ring.get(start..)?, ring.get(..end)?].concat())
 }
 
-fn address_of(name: &str, image: &Path) -> Outcome<u32> {
+fn address_of(name: &str, image: &Path) -> TaskResult<u32> {
     let file = std::fs::read(image)?;
     let elf: ElfFile32<'_> = ElfFile32::parse(file.as_slice())?;
     let symbol = elf.symbols().find(|symbol| symbol.name() == Ok(name));

@@ -1,5 +1,5 @@
-//! `cargo xtask emulate`: the image for the arm, unmodified, in an emulator, with simulated servos on its bus
-//! and a port for any serial client.
+//! `cargo xtask emulate`: the unmodified image for the arm in an emulator, with simulated servos, and a port for any serial
+//! client.
 //!
 //! ```text
 //!   client ══ port ══ Relay ── socket ── USART1 ┌──────────┐ USART2 ── socket ── host-sim --servo-socket
@@ -8,7 +8,7 @@
 //!                                               └──────────┘
 //! ```
 //!
-//! QEMU can make a port by itself, but looks for clients only once a second, and forgets what comes before.
+//! The ports of QEMU itself detect clients only once a second, and drop bytes before that.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixListener;
@@ -20,7 +20,7 @@ use host_sim::signals::{SignalAction, Signals};
 use host_sim::symlink::Symlink;
 use tempfile::TempDir;
 
-use crate::run::{self, Linked, Outcome, Running, cargo, root};
+use crate::run::{self, ChildProcess, ChipProgram, TaskResult, cargo, root};
 
 mod log;
 pub(crate) mod monitor;
@@ -30,21 +30,21 @@ use log::Log;
 use monitor::Monitor;
 use relay::Relay;
 
-/// The emulator's program, in a package of the same name.
+/// The emulator, and its package.
 pub(crate) const QEMU: &str = "qemu-system-arm";
 
-/// For those who do not have it.
+/// Instructions for the installation.
 const HOW_TO_GET_QEMU: &str =
-    "`sudo apt-get install qemu-system-arm` brings it on Debian and Ubuntu, `brew install qemu` on a Mac";
-/// USART1's first control register (RM0090, section 30.6). What comes before it is set up is lost.
+    "`sudo apt-get install qemu-system-arm` installs it on Debian and Ubuntu, `brew install qemu` on a Mac";
+/// USART1's first control register (RM0090, section 30.6). Bytes before its setup are lost.
 pub(crate) const HOST_LINK_CONTROL: u32 = 0x4001_100C;
-/// Its bits UE and RE.
+/// The bits UE and RE of this register.
 pub(crate) const RECEIVER_ON: u32 = 1 << 13 | 1 << 2;
 
-/// How the emulated arm is set up.
+/// The setup of the emulated arm.
 #[derive(Args)]
-pub(crate) struct Options {
-    /// Make this symbolic link to the port, for as long as the emulator runs
+pub(crate) struct EmulateArgs {
+    /// Make this symbolic link to the port while the emulator runs
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
     /// Break a servo: JOINT=KIND, as in `host-sim --fault`; can be repeated
@@ -53,19 +53,19 @@ pub(crate) struct Options {
     /// Print the firmware's log on standard error (needs defmt-print: `cargo install defmt-print`)
     #[arg(long)]
     log: bool,
-    /// Run the image for the first power-up of a board instead of the one for the arm
+    /// Run the self-test image for the first power-up of a board
     #[arg(long)]
     self_test: bool,
-    /// Write what the image sends to the servos into this file
+    /// Write the bytes to the servos into this file
     #[arg(long, value_name = "PATH")]
     servo_line: Option<PathBuf>,
-    /// Take the image and the simulator as they were built last
+    /// Use the image and the simulator of the last build
     #[arg(long)]
     no_build: bool,
 }
 
 /// Runs the image until a signal ends it. SIGHUP switches the arm off and on, SIGUSR2 resets the chip alone.
-pub(crate) fn run(options: &Options) -> Outcome {
+pub(crate) fn run(options: &EmulateArgs) -> TaskResult {
     need_qemu()?;
     if !options.no_build {
         run::build_image()?;
@@ -89,7 +89,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let port = relay.port().to_owned();
     let _link = options.link.as_deref().map(|path| Symlink::new(path, &port)).transpose()?;
     let mut out = io::stdout().lock();
-    // Nobody has to read it.
+    // A closed pipe is no error.
     let _ = writeln!(out, "ready {}", port.display()).and_then(|()| out.flush());
     loop {
         for action in signals.actions() {
@@ -101,53 +101,53 @@ pub(crate) fn run(options: &Options) -> Outcome {
             }
         }
         if let Some(log) = &mut log {
-            log.follow(&mut monitor)?;
+            log.print_new(&mut monitor)?;
         }
-        relay.turn()?;
+        relay.transfer()?;
         relay.sleep(&signals, log.is_some())?;
     }
 }
 
-/// Is the emulator there?
+/// True if the emulator is installed.
 fn has_qemu() -> bool {
     Command::new(QEMU).arg("--version").stdout(Stdio::null()).status().is_ok_and(|status| status.success())
 }
 
-pub(crate) fn need_qemu() -> Outcome {
+pub(crate) fn need_qemu() -> TaskResult {
     if has_qemu() {
         return Ok(());
     }
     Err(format!("{QEMU} is missing: {HOW_TO_GET_QEMU}, or let `cargo xtask test` install it"))?
 }
 
-/// The seven servos, listening on a socket.
-pub(crate) fn start_servos(folder: &TempDir, faults: &[String]) -> Outcome<Running> {
+/// Starts the seven servos on a socket.
+pub(crate) fn start_servos(folder: &TempDir, faults: &[String]) -> TaskResult<ChildProcess> {
     let mut command = Command::new(run::target_directory().join("debug").join("host-sim"));
     command.arg("--quiet").arg("--servo-socket").arg(folder.path().join("servos"));
     faults.iter().for_each(|fault| {
         command.arg("--fault").arg(fault);
     });
-    let mut child = Running(command.stdout(Stdio::piped()).spawn()?);
+    let mut child = ChildProcess(command.stdout(Stdio::piped()).spawn()?);
     let mut line = String::new();
     if let Some(output) = child.0.stdout.take() {
         BufReader::new(output).read_line(&mut line)?;
     }
-    if line.starts_with("ready ") { Ok(child) } else { Err("host-sim did not start; see above why")? }
+    if line.starts_with("ready ") { Ok(child) } else { Err("host-sim did not start: see above")? }
 }
 
-/// Where the servos listen, in the emulator's words.
+/// The socket of the servos, as an option of the emulator.
 pub(crate) fn servo_socket(folder: &TempDir) -> String {
     format!("socket,path={}", folder.path().join("servos").display())
 }
 
-/// The emulated chip, with an image in it. It connects to the sockets in `folder` before it starts. `servos` is what is on its servo bus,
-/// `options` are more words for the emulator.
+/// Starts the emulator with an image. It connects to the sockets in `folder` before it starts. `servos` is the character
+/// device of the servo bus, and `options` are further options of the emulator.
 pub(crate) fn start_machine(
-    image: &Linked,
+    image: &ChipProgram,
     folder: &TempDir,
     servos: &str,
     options: &[&str],
-) -> Outcome<Running> {
+) -> TaskResult<ChildProcess> {
     let path = |name: &str| folder.path().join(name).display().to_string();
     let child = Command::new(QEMU)
         .current_dir(root())
@@ -163,10 +163,10 @@ pub(crate) fn start_machine(
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .spawn()?;
-    Ok(Running(child))
+    Ok(ChildProcess(child))
 }
 
-fn power_cycle(servos: &Running, monitor: &mut Monitor) -> Outcome {
+fn power_cycle(servos: &ChildProcess, monitor: &mut Monitor) -> TaskResult {
     let id = i32::try_from(servos.0.id()).ok().and_then(rustix::process::Pid::from_raw);
     let id = id.ok_or("host-sim has no process id")?;
     rustix::process::kill_process(id, rustix::process::Signal::HUP)?;

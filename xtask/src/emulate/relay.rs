@@ -1,4 +1,4 @@
-//! Bytes between a port and the emulator's socket, both ways. Knows nothing of frames.
+//! Relays bytes between a port and the emulator's socket in both directions.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::fd::AsFd;
@@ -11,12 +11,12 @@ use host_sim::signals::Signals;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
-use crate::run::Outcome;
+use crate::run::TaskResult;
 
-/// How much may wait to get into the emulator: no more is read from the port meanwhile.
+/// The most bytes that wait for the emulator. With so many, the port is not read.
 const CAPACITY: usize = 4_096;
-/// How often there is something to do besides bytes, if there is.
-const OFTEN: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
+/// The period of other tasks.
+const POLL_PERIOD: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
 /// A port and the socket behind it.
 pub(super) struct Relay {
@@ -28,7 +28,7 @@ pub(super) struct Relay {
 }
 
 impl Relay {
-    /// Opens a port for what is behind the socket.
+    /// Opens a port for the other end of the socket.
     pub(super) fn new(socket: UnixStream) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
@@ -36,41 +36,41 @@ impl Relay {
         Ok(Self { clients, port, socket, to_arm: Vec::new(), to_host: Vec::new() })
     }
 
-    /// The name under which clients open the port.
+    /// The path of the port.
     pub(super) fn port(&self) -> &Path {
         self.port.path()
     }
 
-    /// Moves what can be moved.
-    pub(super) fn turn(&mut self) -> Outcome {
+    /// Transfers the available bytes.
+    pub(super) fn transfer(&mut self) -> TaskResult {
         let mut bytes = [0; CAPACITY];
         if self.to_arm.is_empty() {
             let count = self.port.read(&mut bytes)?;
             self.to_arm.extend(bytes.iter().take(count));
         }
-        // After the read, so that whoever sent these bytes is known by the time their answer goes out.
+        // After the read, so that the sender of these bytes is known before the reply arrives.
         if let Some(clients) = &mut self.clients {
             clients.update()?;
             if self.port.update_clients(clients)? {
                 self.to_host.clear();
             }
         }
-        let count = later(self.socket.write(&self.to_arm))?.unwrap_or(0);
+        let count = if_ready(self.socket.write(&self.to_arm))?.unwrap_or(0);
         self.to_arm.drain(..count);
         if self.to_host.is_empty() {
-            match later(self.socket.read(&mut bytes))? {
+            match if_ready(self.socket.read(&mut bytes))? {
                 Some(0) => Err("the emulator has ended")?,
                 count => self.to_host.extend(bytes.iter().take(count.unwrap_or(0))),
             }
         }
-        // With nobody there, bytes go nowhere, as on a wire.
+        // Without a client, bytes are dropped, as on a wire.
         let count = if self.port.has_client() { self.port.write(&self.to_host)? } else { self.to_host.len() };
         self.to_host.drain(..count);
         Ok(())
     }
 
-    /// Sleeps until there is something to move, a client, a signal, or, if `often`, for a moment.
-    pub(super) fn sleep(&self, signals: &Signals, often: bool) -> io::Result<()> {
+    /// Sleeps until there are bytes, a client or a signal, or for the poll period if `polls`.
+    pub(super) fn sleep(&self, signals: &Signals, polls: bool) -> io::Result<()> {
         let if_empty = |bytes: &[u8], flags| if bytes.is_empty() { flags } else { PollFlags::empty() };
         let if_waiting = |bytes: &[u8], flags| if bytes.is_empty() { PollFlags::empty() } else { flags };
         let port = if_empty(&self.to_arm, PollFlags::IN) | if_waiting(&self.to_host, PollFlags::OUT);
@@ -83,15 +83,15 @@ impl Relay {
             PollFd::from_borrowed_fd(signals, PollFlags::IN),
             PollFd::from_borrowed_fd(clients, PollFlags::IN),
         ];
-        match poll(&mut wanted, often.then_some(&OFTEN)) {
+        match poll(&mut wanted, polls.then_some(&POLL_PERIOD)) {
             Ok(_) | Err(Errno::INTR) => Ok(()),
             Err(error) => Err(error.into()),
         }
     }
 }
 
-/// `None` where the answer is "not now".
-fn later(outcome: io::Result<usize>) -> io::Result<Option<usize>> {
+/// `None` if the operation would block.
+fn if_ready(outcome: io::Result<usize>) -> io::Result<Option<usize>> {
     match outcome {
         Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(None),
         other => other.map(Some),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::tree::Uses;
 
-/// Every largest set of two or more files that reach each other.
+/// The largest sets of two or more files that reach each other.
 pub(crate) fn find(uses: &Uses) -> BTreeSet<BTreeSet<PathBuf>> {
     let reach = |from: &Path| reachable(uses, from);
     let reached: Vec<_> = uses.keys().map(|file| (file, reach(file))).collect();
@@ -16,7 +16,7 @@ pub(crate) fn find(uses: &Uses) -> BTreeSet<BTreeSet<PathBuf>> {
     reached.iter().map(|(file, reaches)| cycle_of(file, reaches)).filter(|cycle| cycle.len() > 1).collect()
 }
 
-/// The files that `from` uses, and those that they use.
+/// The files that `from` uses directly or indirectly.
 fn reachable(uses: &Uses, from: &Path) -> BTreeSet<PathBuf> {
     let mut found = BTreeSet::new();
     let mut pending = vec![from.to_owned()];

@@ -11,7 +11,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::run::Outcome;
+use crate::run::TaskResult;
 use crate::workspace;
 
 mod cycles;
@@ -19,7 +19,7 @@ mod source;
 mod tree;
 
 /// Checks every crate of the workspace.
-pub(crate) fn check() -> Outcome {
+pub(crate) fn check() -> TaskResult {
     let mut faults = Vec::new();
     let mut files = 0;
     for package in workspace::packages()? {

@@ -1,4 +1,4 @@
-//! One file of Rust source: its modules, its items, and the paths in it. Knows nothing of other files.
+//! A Rust source file: its modules, items, and paths.
 
 use std::iter::Peekable;
 use std::mem;
@@ -7,21 +7,21 @@ use std::str::FromStr;
 use proc_macro2::token_stream::IntoIter;
 use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 
-use crate::run::Outcome;
+use crate::run::TaskResult;
 
-/// A path: `["crate", "run", "Outcome"]`.
+/// A path: `["crate", "run", "TaskResult"]`.
 pub(crate) type Path = Vec<String>;
 
-/// What a file contains, less its tests.
+/// The contents of a file, without tests.
 #[derive(Debug, Default)]
 pub(crate) struct Source {
     /// Modules in files of their own: `mod name;`.
     pub(crate) modules: Vec<String>,
-    /// Names of items that are defined here.
+    /// Names of defined items.
     pub(crate) items: Vec<String>,
-    /// Names that `use` brings in, each with its path. The name of a glob import is `*`.
+    /// Names that `use` imports, with their paths. The name of a glob import is `*`.
     pub(crate) imports: Vec<(String, Path)>,
-    /// The paths of imports that `pub use` passes on to other files.
+    /// The paths of imports that `pub use` re-exports.
     pub(crate) reexports: Vec<Path>,
     /// Other paths.
     pub(crate) paths: Vec<Path>,
@@ -35,7 +35,7 @@ const ITEMS: [&str; 10] =
 
 impl Source {
     /// Reads a file.
-    pub(crate) fn parse(text: &str) -> Outcome<Self> {
+    pub(crate) fn parse(text: &str) -> TaskResult<Self> {
         let mut source = Self::default();
         source.read(TokenStream::from_str(text).map_err(|why| why.to_string())?);
         Ok(source)
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn imports_are_taken_apart() {
+    fn imports_are_parsed() {
         let source =
             Source::parse("use crate::a::{self, b as c, d::{E, F}}; pub use super::g::*; use h;").unwrap();
         let expected = [
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn imports_that_are_passed_on_are_known() {
+    fn reexports_are_found() {
         let source =
             Source::parse("pub use a::B; pub(crate) use c::D; use e::F; pub fn g() { use h::I; }").unwrap();
         assert_eq!(source.reexports, [path("a::B"), path("c::D")]);
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn modules_in_files_are_told_from_modules_in_braces() {
+    fn modules_in_files_differ_from_inline_modules() {
         let source =
             Source::parse("mod a; pub(crate) mod b; mod c { fn d() {} } #[cfg(test)] mod e;").unwrap();
         assert_eq!(source.modules, ["a", "b"]);

@@ -1,19 +1,19 @@
-//! The files of a crate as a tree of modules, and the file that a path means.
+//! The files of a crate as a tree of modules, and the file of each path.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path as FilePath, PathBuf};
 
 use super::source::{Path, Source};
-use crate::run::Outcome;
+use crate::run::TaskResult;
 
-/// Imports followed for one path, at most.
+/// The largest number of imports to follow for one path.
 const MAX_IMPORTS: usize = 16;
 
-/// A module: its path from the crate's root. The root's is empty.
+/// The path of a module from the crate's root, which has an empty path.
 type Module = Vec<String>;
 
-/// The modules of a crate, each in its file.
+/// The modules of a crate with their files.
 pub(crate) struct Tree(BTreeMap<Module, (PathBuf, Source)>);
 
 /// The files that a file uses.
@@ -21,7 +21,7 @@ pub(crate) type Uses = BTreeMap<PathBuf, BTreeSet<PathBuf>>;
 
 impl Tree {
     /// Reads a crate from its root, `lib.rs` or `main.rs`.
-    pub(crate) fn read(root: &FilePath) -> Outcome<Self> {
+    pub(crate) fn read(root: &FilePath) -> TaskResult<Self> {
         let mut tree = Self(BTreeMap::new());
         let folder = root.parent().unwrap_or(root).to_owned();
         tree.add(Module::new(), root.to_owned(), &folder)?;
@@ -29,7 +29,7 @@ impl Tree {
     }
 
     /// Adds a module and those below it, which are in `folder`.
-    fn add(&mut self, module: Module, file: PathBuf, folder: &FilePath) -> Outcome {
+    fn add(&mut self, module: Module, file: PathBuf, folder: &FilePath) -> TaskResult {
         let text = fs::read_to_string(&file).map_err(|why| format!("{}: {why}", file.display()))?;
         let source = Source::parse(&text).map_err(|why| format!("{}: {why}", file.display()))?;
         for name in &source.modules {
@@ -47,7 +47,7 @@ impl Tree {
         self.0.len()
     }
 
-    /// The files that each file uses. An import that `pub use` passes on counts only in the files that use it.
+    /// The files that each file uses. A re-exported import counts only in the files that use it.
     pub(crate) fn uses(&self) -> Uses {
         let mut uses = Uses::new();
         for (module, (file, source)) in &self.0 {
@@ -61,7 +61,7 @@ impl Tree {
         uses
     }
 
-    /// The module that holds the item at the end of a path in `module`; `None` for items of other crates.
+    /// The module with the item at the end of a path in `module`; `None` for items of other crates.
     fn resolve(&self, module: &Module, path: &Path, imports_left: usize) -> Option<Module> {
         let imports_left = imports_left.checked_sub(1)?;
         let (first, mut rest) = path.split_first()?;
@@ -87,7 +87,7 @@ impl Tree {
         Some(at)
     }
 
-    /// The module that holds `name`, looked for in the module `at`.
+    /// The module that contains `name`, searched from the module `at`.
     fn find(&self, at: &Module, name: &str, behind: &[String], is_ours: bool, left: usize) -> Option<Module> {
         let (_, source) = self.0.get(at)?;
         if source.items.iter().any(|item| item == name) {

@@ -1,0 +1,49 @@
+//! The system tests on other kinds of arms than the simulator.
+//!
+//! A test is skipped by its name if the arm lacks a capability. A test that is skipped without need, or not skipped, fails:
+//! see `with_arm` in `tests/src/test_arm.rs`.
+
+use crate::run::{TaskResult, run};
+
+/// The system tests for a kind of arm.
+pub(crate) struct SystemTests {
+    /// The value of the variable `ARM`.
+    arm: &'static str,
+    /// The files of `tests/tests` to run.
+    files: &'static [&'static str],
+    /// The skipped tests, each after its reason.
+    skipped: &'static [&'static str],
+}
+
+/// The image for the arm in the emulator.
+pub(crate) const EMULATOR: SystemTests = SystemTests {
+    arm: "emulator",
+    // Most tests of the tool test its own code, which does not depend on the arm. The emulator's flash does not change, so the
+    // tests of the settings are left out.
+    files: &["wire", "registers", "motion", "servo_faults", "tool", "self_test"],
+    skipped: &[
+        // The chip id of the emulator cannot be chosen.
+        "d08_the_registers_hold_the_chip_id",
+        "info_shows_identity_and_status",
+        // The test needs a setting after a restart.
+        "d14_reports_take_at_most_half_of_a_slow_line",
+        // The test fills the storage.
+        "set_reports_a_full_storage",
+    ],
+};
+
+/// The controller on this computer, with simulated servos behind a simulated USB adapter.
+pub(crate) const ADAPTER: SystemTests = SystemTests {
+    arm: "adapter",
+    files: &["wire", "registers", "motion", "settings", "servo_faults", "tool"],
+    skipped: &[],
+};
+
+/// Runs the system tests on this kind of arm.
+pub(crate) fn run_on(tests: &SystemTests) -> TaskResult {
+    // Selects tests of the whole workspace, so that no package is built again with other features.
+    let files: String = tests.files.iter().map(|file| format!(" --test {file}")).collect();
+    let skipped: String = tests.skipped.iter().map(|test| format!(" --skip {test}")).collect();
+    let words = format!("test --workspace --exclude footprint{files} -- {skipped}");
+    run("cargo", &words, &[("ARM", tests.arm), ("ARM_MEETS_ALL_NEEDS", "1")])
+}
