@@ -102,7 +102,10 @@ fn nudge(view: &mut View, degrees: i16) -> Outcome {
             view.say("the motors are off: s, then h, makes the arm hold where it is");
             Outcome::Shown
         }
-        None => Outcome::Shown,
+        None => {
+            view.say("there is no arm: nothing was written");
+            Outcome::Shown
+        }
     }
 }
 
