@@ -5,7 +5,7 @@ use std::num::NonZeroU16;
 use std::path::Path;
 use std::process::{Child, ExitStatus};
 use std::sync::{Arc, Mutex};
-use std::thread;
+use std::thread::{self, JoinHandle};
 
 use pty_process::Size;
 use pty_process::blocking::{Command, Pty, open};
@@ -24,6 +24,8 @@ pub struct Terminal {
     pty: Arc<Pty>,
     screen: Arc<Mutex<Parser>>,
     program: Child,
+    /// Draws the output on the screen, until the program has ended.
+    painter: Option<JoinHandle<()>>,
 }
 
 impl Terminal {
@@ -36,16 +38,16 @@ impl Terminal {
         let command = command.env(TOOL_TIMEOUT.0, TOOL_TIMEOUT.1);
         let program = command.spawn(terminal).expect("the program starts");
         let screen = Arc::new(Mutex::new(Parser::new(ROWS, COLUMNS, 0)));
-        let (pty, painter) = (Arc::new(pty), Arc::clone(&screen));
+        let (pty, drawn) = (Arc::new(pty), Arc::clone(&screen));
         let output = Arc::clone(&pty);
-        thread::spawn(move || {
+        let painter = thread::spawn(move || {
             let mut chunk = [0; 4096];
             // A pseudo-terminal returns an error when its program has ended.
             while let Ok(length @ 1..) = (&*output).read(&mut chunk) {
-                painter.lock().expect("a screen").process(&chunk[..length]);
+                drawn.lock().expect("a screen").process(&chunk[..length]);
             }
         });
-        Self { pty, screen, program }
+        Self { pty, screen, program, painter: Some(painter) }
     }
 
     /// Types keys.
@@ -80,13 +82,15 @@ impl Terminal {
         })
     }
 
-    /// Waits for the end of the program.
+    /// Waits for the end of the program, and until its output is on the screen.
     #[track_caller]
     pub fn wait(&mut self) -> ExitStatus {
-        wait_for("the program ends", || {
+        let status = wait_for("the program ends", || {
             let status = self.program.try_wait().expect("a program to wait for");
             status.ok_or_else(|| format!("the screen shows:\n{}", self.contents()))
-        })
+        });
+        self.painter.take().map(JoinHandle::join);
+        status
     }
 }
 

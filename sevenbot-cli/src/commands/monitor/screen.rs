@@ -1,6 +1,6 @@
 //! The monitor on a terminal: draws the view, listens to keys, and leaves the terminal as it was.
 
-use std::io;
+use std::io::{self, IsTerminal};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -62,15 +62,42 @@ fn show(
 ) -> io::Result<()> {
     // In raw mode Ctrl-C is a key; other signals to end still come.
     let interrupt = Interrupt::catch();
+    let reads_stdin = io::stdin().is_terminal();
     while !interrupt.has_come() {
         view.tick(start.elapsed());
         news.try_iter().for_each(|news| view.hear(news));
         terminal.draw(|frame| draw(frame, view))?;
-        if event::poll(FRAME)? && !react(view, &event::read()?, wishes) {
+        if !wait_for_input(FRAME, reads_stdin)? {
+            break;
+        }
+        if event::poll(Duration::ZERO)? && !react(view, &event::read()?, wishes) {
             break;
         }
     }
     Ok(())
+}
+
+/// Waits until there may be an event. Returns false if the terminal is gone: crossterm would read its end for ever.
+#[cfg(unix)]
+fn wait_for_input(timeout: Duration, reads_stdin: bool) -> io::Result<bool> {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+    if !reads_stdin {
+        return event::poll(timeout).map(|_| true);
+    }
+    let stdin = io::stdin();
+    let mut input = [PollFd::new(&stdin, PollFlags::IN)];
+    match poll(&mut input, Timespec::try_from(timeout).ok().as_ref()) {
+        Ok(_) | Err(rustix::io::Errno::INTR) => {
+            Ok(!input.iter().any(|fd| fd.revents().contains(PollFlags::HUP)))
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+#[cfg(not(unix))]
+fn wait_for_input(timeout: Duration, _reads_stdin: bool) -> io::Result<bool> {
+    event::poll(timeout).map(|_| true)
 }
 
 /// Does what an event asks for; `false` when that is to end.
