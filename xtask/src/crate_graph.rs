@@ -21,6 +21,7 @@ const GROUPS: [Group; 3] = [
         &[
             "protocol-core",
             "motion-core",
+            "kinematics",
             "arm-sim",
             "firmware-stm32",
             "host-sim",

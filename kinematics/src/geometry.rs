@@ -1,0 +1,63 @@
+//! Dimensions and limits of the arm, from the maker's published firmware and its page that draws the arm.
+//!
+//! ```text
+//!                  normal n
+//!                     ▲
+//!      elbow offset ┌─┴────────── forearm u ────────● wrist ── tool ──│ tip, centre of the disc
+//!             elbow ●                               joints 4, 5, 6
+//!                  /
+//!                 / rear arm
+//!                /
+//!    ┌ shoulder ●       z up
+//!    │                  │
+//!    └──── base axis    └── heading
+//! ```
+//!
+//! A parallelogram keeps the forearm's angle to the horizontal when joint 2 moves. Its link is drawn by the maker from
+//! the lever, on the shoulder axis, to the forearm behind the elbow. It limits the angle between rear arm and forearm.
+//!
+//! Lengths are millimetres, angles degrees as the registers have them.
+
+/// From the base axis to the shoulder axis, along the heading.
+pub const SHOULDER_FORWARD: f64 = 29.35;
+/// From the top plate up to the shoulder axis.
+pub const SHOULDER_HEIGHT: f64 = 74.5;
+/// From the shoulder axis to the elbow axis.
+pub const REAR_ARM: f64 = 120.0;
+/// From the elbow axis to the axis of the forearm, at right angles to it.
+pub const ELBOW_OFFSET: f64 = 25.0;
+/// Along the axis of the forearm to the wrist, where the axes of joints 4, 5 and 6 meet.
+pub const FOREARM: f64 = 198.5;
+/// From the wrist to the outer face of the disc that joint 6 turns.
+pub const TOOL: f64 = 22.46;
+/// Radius of that disc.
+pub const DISC_RADIUS: f64 = 20.0;
+/// From the shoulder axis to the end of the parallelogram's lever. It moves no other point.
+pub const LEVER: f64 = 40.0;
+
+/// From the elbow axis to the wrist: the hypotenuse of [`FOREARM`] and [`ELBOW_OFFSET`].
+pub(crate) const ELBOW_TO_WRIST: f64 = 200.068_113_401_411_37;
+/// The angle between that line and the axis of the forearm.
+pub(crate) const ELBOW_TO_WRIST_ANGLE: f64 = 7.178_298_211_576_967;
+
+/// The angle of joint 3 at which the forearm is level. Larger angles lower the wrist.
+pub const LEVEL_FOREARM: f64 = 65.0;
+/// The largest angle of a joint. The smallest is 0.
+pub const JOINT_MAX: f64 = 180.0;
+/// The smallest value of [`linkage`](crate::limits::linkage): the elbow is as far open as the parallelogram lets it be.
+pub const LINKAGE_MIN: f64 = 19.0;
+/// The largest value of [`linkage`](crate::limits::linkage).
+pub const LINKAGE_MAX: f64 = 161.0;
+/// The largest angle of joint 7: its servo ends at 1023 counts.
+pub const CLAW_MAX: f64 = 84.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_from_elbow_to_wrist_is_that_of_its_two_parts() {
+        assert!((ELBOW_TO_WRIST - FOREARM.hypot(ELBOW_OFFSET)).abs() < 1e-13);
+        assert!((ELBOW_TO_WRIST_ANGLE - ELBOW_OFFSET.atan2(FOREARM).to_degrees()).abs() < 1e-13);
+    }
+}

@@ -1,0 +1,200 @@
+//! Inverse kinematics in closed form: angles of the joints that bring the arm to a position.
+//!
+//! ```text
+//!   IK6:  wrist = tip - tool × 22.46 mm ──▶ IK5 ──▶ T1, T2, T3
+//!         tool in the forearm's frame ────────────▶ T4, T5
+//!   IK7:  disc in the hand's frame ───────────────▶ T6
+//! ```
+//!
+//! A wrist has two headings: towards it, and away from it with the wrist behind the base axis. Joint 1 reaches one of
+//! them, or both where y is 0. The parallelogram allows one of the two bends of the elbow, and joint 4 one of the two
+//! rolls of the hand. So there is one solution but for the cases that [`ik5`] and [`ik6`] name.
+
+use crate::float::Float;
+use crate::forward::{ArmFrames, HandFrames};
+use crate::geometry::{
+    ELBOW_TO_WRIST, ELBOW_TO_WRIST_ANGLE, LEVEL_FOREARM, LINKAGE_MAX, LINKAGE_MIN, REAR_ARM,
+    SHOULDER_FORWARD, SHOULDER_HEIGHT, TOOL,
+};
+use crate::limits::{TOLERANCE, joint_angle};
+use crate::vector::Vector;
+
+/// A wrist that is nearer to the base axis, in mm, has no heading.
+pub(crate) const NO_HEADING: f64 = 0.001;
+
+/// Why no angles of the joints reach a position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoSolution {
+    /// The wrist is too far from the shoulder: the linkage allows 318.47 mm.
+    TooFar,
+    /// The wrist is too near to the shoulder: the linkage allows 106.47 mm.
+    TooNear,
+    /// The joint of this number, 1 to 3, would have to turn beyond 0 or 180 degrees.
+    Joint(u8),
+    /// The wrist is within reach, but the hand cannot bend far enough back to point the tool there.
+    ToolDirection,
+    /// The wrist is on the base axis, where joint 1 has no defined angle.
+    NoHeading,
+    /// The direction of the tool is zero.
+    NoToolDirection,
+    /// The direction of the disc is zero or parallel to the tool.
+    NoDiscDirection,
+    /// A number is infinite or NaN.
+    NotFinite,
+}
+
+/// The angles of joints 1 to 3, in degrees, that bring the wrist to a point in millimetres.
+///
+/// Where y is 0 and both headings lead there, the solution faces the point.
+///
+/// # Errors
+///
+/// Why there are none with the arm towards the point: the distance, then joint 1, then joints 2 and 3.
+pub fn ik5<F: Float>(wrist: Vector<F>) -> Result<[F; 3], NoSolution> {
+    with_either_heading(wrist, Ok)
+}
+
+/// The angles of joints 1 to 5, in degrees, that bring the tip to a point in millimetres and point the tool in a
+/// direction of any length.
+///
+/// Where y of the wrist is 0 and both headings lead there, the solution faces it if the hand can point there then.
+/// Where the tool is in line with the forearm, joint 4 may have any angle, and gets 90 degrees. Where the hand bends
+/// to the side, joint 4 may be 0 or 180 degrees, and gets the one with joint 5 below 90.
+///
+/// # Errors
+///
+/// Why there are none.
+pub fn ik6<F: Float>(tip: Vector<F>, tool: Vector<F>) -> Result<[F; 5], NoSolution> {
+    let Reach { arm: [t1, t2, t3], hand: [t4, t5], .. } = Reach::of(tip, tool)?;
+    Ok([t1, t2, t3, t4, t5])
+}
+
+/// The angles of joints 1 to 6, in degrees, that bring the tip to a point in millimetres, point the tool in a direction
+/// of any length, and turn the disc in that of `disc`, as far as it is at right angles to the tool.
+///
+/// A claw is the same after half a turn, so joint 6 gets 0 to 180 degrees and the disc may point the opposite way.
+///
+/// # Errors
+///
+/// Why there are none.
+pub fn ik7<F: Float>(tip: Vector<F>, tool: Vector<F>, disc: Vector<F>) -> Result<[F; 6], NoSolution> {
+    let Reach { arm: [t1, t2, t3], hand: [t4, t5], frames } = Reach::of(tip, tool)?;
+    let disc = direction(disc, NoSolution::NoDiscDirection)?;
+    let hand = HandFrames::of(&frames, [t4, t5, F::of(0.0)]);
+    let (ahead, right) = (disc.dot(hand.disc_zero), disc.dot(hand.disc_right));
+    if ahead.abs().larger(right.abs()) < rounding() {
+        return Err(NoSolution::NoDiscDirection);
+    }
+    Ok([t1, t2, t3, t4, t5, half_turns_removed(right.atan2(ahead))])
+}
+
+/// Angles of joints 1 to 5, and the frames of the arm.
+struct Reach<F> {
+    arm: [F; 3],
+    hand: [F; 2],
+    frames: ArmFrames<F>,
+}
+
+impl<F: Float> Reach<F> {
+    fn of(tip: Vector<F>, tool: Vector<F>) -> Result<Self, NoSolution> {
+        let tool = direction(tool, NoSolution::NoToolDirection)?;
+        with_either_heading(tip - tool * F::of(TOOL), |arm| {
+            let frames = ArmFrames::of(arm);
+            Ok(Self { arm, hand: roll_and_bend(&frames, tool)?, frames })
+        })
+    }
+}
+
+/// Solves joints 1 to 3 for a wrist with the arm towards it, or else away from it, and then the `rest`.
+fn with_either_heading<F: Float, T>(
+    wrist: Vector<F>,
+    rest: impl Fn([F; 3]) -> Result<T, NoSolution>,
+) -> Result<T, NoSolution> {
+    if !wrist.is_finite() {
+        return Err(NoSolution::NotFinite);
+    }
+    let radius = (wrist.x * wrist.x + wrist.y * wrist.y).sqrt();
+    if radius < F::of(NO_HEADING) {
+        return Err(NoSolution::NoHeading);
+    }
+    let solve = |heading: F, radius: F| {
+        let [t2, t3] = in_plane(radius - F::of(SHOULDER_FORWARD), wrist.z - F::of(SHOULDER_HEIGHT))?;
+        rest([joint(1, heading)?, t2, t3])
+    };
+    let towards = unwrapped(wrist.y.atan2(wrist.x));
+    let away = unwrapped(if towards > F::of(0.0) { towards - half_turn() } else { towards + half_turn() });
+    solve(towards, radius).or_else(|why| {
+        solve(away, -radius).map_err(|other| match other {
+            // This heading got further.
+            NoSolution::ToolDirection => other,
+            _ => why,
+        })
+    })
+}
+
+/// Angles of joints 2 and 3 for a wrist in the plane of the arm: `forward` of the shoulder and `up` from it, in mm.
+fn in_plane<F: Float>(forward: F, up: F) -> Result<[F; 2], NoSolution> {
+    let (one, rear_arm, rest) = (F::of(1.0), F::of(REAR_ARM), F::of(ELBOW_TO_WRIST));
+    let squares = F::of(REAR_ARM * REAR_ARM + ELBOW_TO_WRIST * ELBOW_TO_WRIST);
+    // The elbow's angle by the law of cosines. A cosine outside -1 to 1, infinite ones too, becomes 180 or 0 degrees.
+    let cosine = (squares - (forward * forward + up * up)) / F::of(2.0 * REAR_ARM * ELBOW_TO_WRIST);
+    let sine = ((one - cosine) * (one + cosine)).larger(F::of(0.0)).sqrt();
+    let linkage = F::of(180.0 + ELBOW_TO_WRIST_ANGLE) - sine.atan2(cosine);
+    if linkage < F::of(LINKAGE_MIN - TOLERANCE) {
+        return Err(NoSolution::TooFar);
+    }
+    if linkage > F::of(LINKAGE_MAX + TOLERANCE) {
+        return Err(NoSolution::TooNear);
+    }
+    // Seen from the shoulder, the rear arm is above the wrist by the angle of the point (ahead, above).
+    let (ahead, above) = (rear_arm - rest * cosine, rest * sine);
+    let t2 = unwrapped((up * ahead + forward * above).atan2(forward * ahead - up * above));
+    Ok([joint(2, t2)?, joint(3, linkage + F::of(LEVEL_FOREARM) - t2)?])
+}
+
+/// Angles of joints 4 and 5 that point the tool in a direction of length 1.
+fn roll_and_bend<F: Float>(arm: &ArmFrames<F>, tool: Vector<F>) -> Result<[F; 2], NoSolution> {
+    let zero = F::of(0.0);
+    let (up, right, along) = (tool.dot(arm.normal), -tool.dot(arm.left), tool.dot(arm.along));
+    let sideways = (up * up + right * right).sqrt();
+    let bend = along.atan2(sideways);
+    let [t4, t5] = if sideways < rounding() {
+        [F::of(90.0), bend]
+    } else if up > -rounding::<F>() {
+        [up.larger(zero).atan2(right), bend]
+    } else {
+        [(-up).atan2(-right), half_turn::<F>() - bend]
+    };
+    joint_angle(t5).map(|t5| [t4, t5]).ok_or(NoSolution::ToolDirection)
+}
+
+/// A direction with length 1, or `none` if it has none.
+fn direction<F: Float>(vector: Vector<F>, none: NoSolution) -> Result<Vector<F>, NoSolution> {
+    if vector.is_finite() { vector.unit().ok_or(none) } else { Err(NoSolution::NotFinite) }
+}
+
+/// An angle that the joint of this number can take.
+fn joint<F: Float>(number: u8, degrees: F) -> Result<F, NoSolution> {
+    joint_angle(degrees).ok_or(NoSolution::Joint(number))
+}
+
+/// Smaller components of a direction of length 1 are rounding.
+fn rounding<F: Float>() -> F {
+    F::EPSILON * F::of(16.0)
+}
+
+fn half_turn<F: Float>() -> F {
+    F::of(180.0)
+}
+
+/// The same angle with -180 degrees turned into 180: rounding decides which of them it is.
+fn unwrapped<F: Float>(degrees: F) -> F {
+    if degrees < F::of(TOLERANCE - 180.0) { degrees + F::of(360.0) } else { degrees }
+}
+
+/// An angle of -180 to 180 degrees modulo 180: 0 to 180, with 180 and what rounds to it turned into 0.
+fn half_turns_removed<F: Float>(degrees: F) -> F {
+    let zero = F::of(0.0);
+    let positive = if degrees < zero { degrees + half_turn() } else { degrees.larger(zero) };
+    if positive > half_turn::<F>() * (F::of(1.0) - rounding()) { zero } else { positive }
+}

@@ -1,0 +1,33 @@
+//! Kinematics of a 7Bot V2 arm: joint angles to positions in millimetres, and back.
+//!
+//! ```text
+//!   [T1 .. T6] ──▶ forward ──▶ Frames: every point and direction of the arm
+//!
+//!   wrist ──────────────────▶ ik5 ──▶ [T1 .. T3]
+//!   tip, tool ──────────────▶ ik6 ──▶ [T1 .. T5]     or NoSolution: why not
+//!   tip, tool, disc ────────▶ ik7 ──▶ [T1 .. T6]
+//!
+//!   point out of reach ─────▶ nearest ──▶ the nearest point within reach
+//! ```
+//!
+//! T1 to T7 are the angles of joints 1 to 7 in degrees, as the registers have them. T7, the claw, moves no point.
+//! Positions are millimetres from where the base axis meets the top plate: x to the right, y forward, z up.
+//!
+//! The functions are generic over `f32` for the chip and `f64` for the host. They use only exact operations and `libm`,
+//! so all machines get the same bits. The crate uses no heap. It has no unsafe code and no path to a panic.
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+mod float;
+pub mod forward;
+pub mod geometry;
+pub mod inverse;
+pub mod limits;
+pub mod nearest;
+mod vector;
+
+pub use float::Float;
+pub use forward::{Frames, forward};
+pub use inverse::{NoSolution, ik5, ik6, ik7};
+pub use vector::Vector;
