@@ -104,6 +104,7 @@ const LINKED: &[ChipProgram] = &[
     ANSWER,
     ChipProgram { name: "arm", profile: SMALL },
     ChipProgram { name: "journal", profile: SMALL },
+    ChipProgram { name: "kinematics", profile: SMALL },
     ChipProgram { name: "unused_by_arm_motion", profile: SMALL },
     ChipProgram { name: "unused_by_arm_protocol", profile: SMALL },
     IMAGE,
@@ -122,10 +123,10 @@ pub(crate) fn build_image() -> TaskResult {
     cargo("fw --quiet")
 }
 
-/// Builds the simulated arm for a browser, without an operating system.
+/// Builds the simulated arm and its kinematics for a browser, without an operating system.
 pub(crate) fn build_for_browser() -> TaskResult {
     run("rustup", &format!("--quiet target add {BROWSER}"), &[])?;
-    cargo(&format!("build --package arm-sim --target {BROWSER}"))
+    cargo(&format!("build --package arm-sim --package kinematics --target {BROWSER}"))
 }
 
 /// Builds the programs of `footprint` with a profile.

@@ -9,6 +9,7 @@
 
 pub mod count_server;
 pub mod meter;
+pub mod poses;
 
 use core::hint::black_box;
 use core::panic::PanicInfo;
