@@ -73,15 +73,15 @@ pub(crate) fn figures() -> TaskResult<Vec<Figure>> {
     let delayed = addresses.behind_a_false_header(&mut machine)?;
     let moving = while_moving(&mut machine)?;
     let mut figures = vec![
-        Figure::new("image: 10 ms with nobody on its lines", silence),
+        Figure::new("image: 10 ms without traffic", silence),
         Figure::new("image: read of 7, last byte in to first byte out", read),
         Figure::new("image: read of 7, last byte in to asleep again", read_whole),
         Figure::new("image: write of 7, last byte in to asleep again", write),
         Figure::new("image: last byte but one of a request, in to asleep again", last_but_one),
-        Figure::new("image: byte that is not worth a turn of the loop, in to asleep again", first),
+        Figure::new("image: byte that needs no pass of the loop, in to asleep again", first),
         Figure::new("image: milliseconds that 34 reads are held up by a false header", delayed),
     ];
-    figures.extend(addresses.turns(&moving)?);
+    figures.extend(addresses.passes(&moving)?);
     figures.extend(addresses.interrupts(&moving)?);
     Ok(figures)
 }
@@ -124,8 +124,8 @@ impl ImageAddresses {
         self.sleeps.iter().any(|&at| trace::is_step_at(event, at))
     }
 
-    /// The most instructions in ten milliseconds of the idle arm: one control cycle, ten polls of its lines, and reads of
-    /// missing servos.
+    /// Instructions in ten milliseconds of the idle arm: one control cycle, ten polls of its lines, and reads of missing
+    /// servos. The median, because a log may or may not contain the log line of each second.
     fn silence(&self) -> TaskResult<u64> {
         let mut machine = Machine::alone()?;
         // The pattern repeats in virtual time, which runs fast.
@@ -137,8 +137,8 @@ impl ImageAddresses {
                 ticks.into_iter().filter_map(|tick| Some(trace::steps(events.get(tick)?))).collect();
             if millis.len() >= PATTERN_MILLIS {
                 // Ten ticks are less than 10 ms, because a control cycle begins before its tick.
-                let most = millis.windows(11).map(|millis| millis.iter().sum()).max();
-                return Ok(most.unwrap_or(0));
+                let sums = millis.windows(11).map(|millis| millis.iter().sum()).collect();
+                return median(sums, "ten milliseconds of silence");
             }
         }
         Err("the log shows too few milliseconds of silence".into())
@@ -214,25 +214,25 @@ impl ImageAddresses {
     }
 
     /// Iterations of the loop from a wake-up to the sleep, without received bytes.
-    fn turns(&self, events: &[TraceEvent]) -> TaskResult<[Figure; 2]> {
+    fn passes(&self, events: &[TraceEvent]) -> TaskResult<[Figure; 2]> {
         let (mut cycles, mut others) = (Vec::new(), Vec::new());
-        for turn in trace::between(events, |event| self.is_sleep(event)) {
-            let turn = events.get(turn).unwrap_or_default();
-            if trace::times(turn, TraceEvent::Read(SERVO_DATA)) > 0 {
+        for pass in trace::between(events, |event| self.is_sleep(event)) {
+            let pass = events.get(pass).unwrap_or_default();
+            if trace::times(pass, TraceEvent::Read(SERVO_DATA)) > 0 {
                 continue;
             }
-            match trace::times(turn, TraceEvent::Wrote(SERVO_DATA)) {
-                GOAL_FRAME_BYTES.. => cycles.push(trace::steps(turn)),
-                0 => others.push(trace::steps(turn)),
+            match trace::times(pass, TraceEvent::Wrote(SERVO_DATA)) {
+                GOAL_FRAME_BYTES.. => cycles.push(trace::steps(pass)),
+                0 => others.push(trace::steps(pass)),
                 _ => {}
             }
         }
         Ok([
             Figure::new(
-                "image: turn of the loop that moves seven joints",
+                "image: pass of the loop that moves seven joints",
                 median(cycles, "a control cycle")?,
             ),
-            Figure::new("image: turn of the loop with nothing to do", median(others, "an idle turn")?),
+            Figure::new("image: pass of the loop with nothing to do", median(others, "an idle pass")?),
         ])
     }
 
