@@ -133,7 +133,7 @@ fn with_either_heading<F: Float, T>(
 }
 
 /// Angles of joints 2 and 3 for a wrist in the plane of the arm: `forward` of the shoulder and `up` from it, in mm.
-fn in_plane<F: Float>(forward: F, up: F) -> Result<[F; 2], NoSolution> {
+pub(crate) fn in_plane<F: Float>(forward: F, up: F) -> Result<[F; 2], NoSolution> {
     let (one, rear_arm, rest) = (F::of(1.0), F::of(REAR_ARM), F::of(ELBOW_TO_WRIST));
     let squares = F::of(REAR_ARM * REAR_ARM + ELBOW_TO_WRIST * ELBOW_TO_WRIST);
     // The elbow's angle by the law of cosines. A cosine outside -1 to 1, infinite ones too, becomes 180 or 0 degrees.
@@ -153,7 +153,7 @@ fn in_plane<F: Float>(forward: F, up: F) -> Result<[F; 2], NoSolution> {
 }
 
 /// Angles of joints 4 and 5 that point the tool in a direction of length 1.
-fn roll_and_bend<F: Float>(arm: &ArmFrames<F>, tool: Vector<F>) -> Result<[F; 2], NoSolution> {
+pub(crate) fn roll_and_bend<F: Float>(arm: &ArmFrames<F>, tool: Vector<F>) -> Result<[F; 2], NoSolution> {
     let zero = F::of(0.0);
     let (up, right, along) = (tool.dot(arm.normal), -tool.dot(arm.left), tool.dot(arm.along));
     let sideways = (up * up + right * right).sqrt();
@@ -169,7 +169,7 @@ fn roll_and_bend<F: Float>(arm: &ArmFrames<F>, tool: Vector<F>) -> Result<[F; 2]
 }
 
 /// A direction with length 1, or `none` if it has none.
-fn direction<F: Float>(vector: Vector<F>, none: NoSolution) -> Result<Vector<F>, NoSolution> {
+pub(crate) fn direction<F: Float>(vector: Vector<F>, none: NoSolution) -> Result<Vector<F>, NoSolution> {
     if vector.is_finite() { vector.unit().ok_or(none) } else { Err(NoSolution::NotFinite) }
 }
 

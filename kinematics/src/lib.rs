@@ -19,6 +19,7 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+pub mod branches;
 mod float;
 pub mod forward;
 pub mod geometry;
@@ -27,6 +28,7 @@ pub mod limits;
 pub mod nearest;
 mod vector;
 
+pub use branches::{ik5_all, ik6_all};
 pub use float::Float;
 pub use forward::{Frames, forward};
 pub use inverse::{NoSolution, ik5, ik6, ik7};
