@@ -130,22 +130,22 @@ mod tests {
 
     use super::*;
 
-    struct Session {
+    struct TraceRecorder {
         trace: Trace,
         lines: Rc<RefCell<Vec<String>>>,
         now: Instant,
     }
 
-    fn session() -> Session {
+    fn session() -> TraceRecorder {
         let lines = Rc::new(RefCell::new(Vec::new()));
         let heard = Rc::clone(&lines);
         let sink = Box::new(move |line: &str| heard.borrow_mut().push(line.to_owned()));
         let mut trace = Trace::new(sink);
         trace.restart(gap(115_200));
-        Session { trace, lines, now: Instant::ZERO }
+        TraceRecorder { trace, lines, now: Instant::ZERO }
     }
 
-    impl Session {
+    impl TraceRecorder {
         fn host(&mut self, bytes: &[u8]) -> Vec<String> {
             self.trace.received(self.now, bytes);
             self.lines.take()

@@ -1,7 +1,7 @@
 //! What a user should check after a failure, most likely first. Empty where the message says it all.
 
 use sevenbot::servo_bench::ServoError;
-use sevenbot::{Error, Heard, OpenError};
+use sevenbot::{Error, OpenError, ReceiveCounts};
 
 /// After a port or an arm did not open.
 pub(crate) fn opening(error: &OpenError) -> Vec<String> {
@@ -46,7 +46,7 @@ fn join(group: Option<&str>) -> String {
 pub(crate) const fn exchange(error: &Error) -> &'static [&'static str] {
     match error {
         Error::OutsideMap { .. } => &[],
-        Error::NoAnswer { heard: Heard { bytes: 0, .. }, .. } => &[
+        Error::NoAnswer { received: ReceiveCounts { bytes: 0, .. }, .. } => &[
             "has the arm power, and is its cable plugged in at both ends?",
             "is this the right port? `sevenbot ports` says which ones lead to arms",
             "is the baud rate right (--baud)? `sevenbot --port PORT baud --find` tries all of them",
@@ -63,7 +63,7 @@ pub(crate) const fn exchange(error: &Error) -> &'static [&'static str] {
 /// After an exchange with a servo failed.
 pub(crate) const fn servo(error: &ServoError) -> &'static [&'static str] {
     match error {
-        ServoError::NoAnswer { heard: Heard { damaged_frames: 1.., .. }, .. } => &[
+        ServoError::NoAnswer { received: ReceiveCounts { damaged_frames: 1.., .. }, .. } => &[
             "damaged answers: two servos with the same id, a loose plug, or a pull-up that is too weak",
             "leave one servo on the bus, and try again",
         ],

@@ -4,11 +4,11 @@
 
 use clap::{Args, CommandFactory, Parser, Subcommand, value_parser};
 
+use crate::command_error::CommandError;
 use crate::commands::{
     backup, baud, calibrate, effector, get, info, monitor, play, ports, pose, record, registers, servo, set,
     shell, sniff, state, stop,
 };
-use crate::failure::Failure;
 use crate::session::Session;
 
 const EXAMPLES: &str = "\
@@ -88,7 +88,7 @@ pub(crate) enum Command {
 }
 
 impl Command {
-    pub(crate) fn run(self, session: &mut Session) -> Result<(), Failure> {
+    pub(crate) fn run(self, session: &mut Session) -> Result<(), CommandError> {
         match self {
             Self::Ports(args) => ports::run(session, &args),
             Self::Info(_) => info::run(session),

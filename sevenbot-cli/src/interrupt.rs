@@ -10,18 +10,18 @@ use std::time::{Duration, Instant};
 
 use sevenbot::Arm;
 use sevenbot::joints::JointSnapshot;
-use sevenbot::words::{self, motor_state_word};
+use sevenbot::register_text::{self, motor_state_name};
 
-use crate::failure::{Failure, INTERRUPTED};
-use crate::output::{note, warn};
+use crate::command_error::{CommandError, INTERRUPTED};
+use crate::printer::{note, warn};
 
 /// How often Ctrl-C was pressed, or another wish to end came.
-static WISHES: AtomicU32 = AtomicU32::new(0);
+static REQUESTS: AtomicU32 = AtomicU32::new(0);
 /// Does the arm move, so that it would have to be stopped?
 static MOVING: AtomicBool = AtomicBool::new(false);
-static CATCHING: Once = Once::new();
+static HANDLER: Once = Once::new();
 /// A wait looks this often whether it should end.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+const POLL_PERIOD: Duration = Duration::from_millis(20);
 
 /// The user's wish to end, from now on.
 #[derive(Clone, Copy, Debug)]
@@ -32,9 +32,9 @@ impl Interrupt {
     /// they end the program, as without.
     pub(crate) fn catch() -> Self {
         MOVING.store(true, Ordering::SeqCst);
-        CATCHING.call_once(|| {
+        HANDLER.call_once(|| {
             let _ = ctrlc::set_handler(|| {
-                if !MOVING.load(Ordering::SeqCst) || WISHES.fetch_add(1, Ordering::SeqCst) > 0 {
+                if !MOVING.load(Ordering::SeqCst) || REQUESTS.fetch_add(1, Ordering::SeqCst) > 0 {
                     std::process::exit(i32::from(INTERRUPTED));
                 }
             });
@@ -48,27 +48,22 @@ impl Interrupt {
     }
 
     /// The user pressed Ctrl-C where that is a key and no signal. The signal ends the program from now on.
-    pub(crate) fn wish() {
-        WISHES.fetch_add(1, Ordering::SeqCst);
+    pub(crate) fn request() {
+        REQUESTS.fetch_add(1, Ordering::SeqCst);
     }
 
     /// Did the user want a command to end, in whatever thread it runs?
-    pub(crate) fn is_wished() -> bool {
-        WISHES.load(Ordering::SeqCst) > 0
-    }
-
-    /// Does the user want it to end?
-    pub(crate) fn has_come(self) -> bool {
-        Self::is_wished()
+    pub(crate) fn is_requested() -> bool {
+        REQUESTS.load(Ordering::SeqCst) > 0
     }
 
     /// Fails if the user wants it to end.
-    pub(crate) fn check(self) -> Result<(), Failure> {
-        if self.has_come() { Err(Failure::Interrupted) } else { Ok(()) }
+    pub(crate) fn check(self) -> Result<(), CommandError> {
+        if Self::is_requested() { Err(CommandError::Interrupted) } else { Ok(()) }
     }
 
     /// Sleeps; less if the user wants it to end, which is then a failure.
-    pub(crate) fn sleep(self, duration: Duration) -> Result<(), Failure> {
+    pub(crate) fn sleep(self, duration: Duration) -> Result<(), CommandError> {
         let end = Instant::now() + duration;
         loop {
             self.check()?;
@@ -76,50 +71,50 @@ impl Interrupt {
             if left.is_zero() {
                 return Ok(());
             }
-            sleep(left.min(LOOK_EVERY));
+            sleep(left.min(POLL_PERIOD));
         }
     }
 }
 
 /// Does work that may move the arm. Interrupted at any time, it leaves the arm holding where it is.
-pub(crate) fn or_hold<T>(
+pub(crate) fn hold_on_interrupt<T>(
     arm: &mut Arm,
-    work: impl FnOnce(&mut Arm, Interrupt) -> Result<T, Failure>,
-) -> Result<T, Failure> {
+    work: impl FnOnce(&mut Arm, Interrupt) -> Result<T, CommandError>,
+) -> Result<T, CommandError> {
     let interrupt = Interrupt::catch();
     let done = work(arm, interrupt);
     Interrupt::release();
-    if !interrupt.has_come() {
+    if !Interrupt::is_requested() {
         return done;
     }
     let interrupt = Interrupt::catch();
     let held = hold(arm);
     Interrupt::release();
-    say_how_it_stands(&held?);
+    report_hold(&held?);
     interrupt.check()?;
     done
 }
 
 /// Makes the arm hold where it is, and makes sure of it.
-pub(crate) fn hold(arm: &mut Arm) -> Result<JointSnapshot, Failure> {
-    arm.hold().map_err(|reason| Failure::MayMove(reason.to_string()))
+pub(crate) fn hold(arm: &mut Arm) -> Result<JointSnapshot, CommandError> {
+    arm.hold().map_err(|reason| CommandError::MayMove(reason.to_string()))
 }
 
 /// Says what an arm does that was made to hold.
-pub(crate) fn say_how_it_stands(joints: &JointSnapshot) {
+pub(crate) fn report_hold(joints: &JointSnapshot) {
     if joints.is_driven() {
         note("the arm holds where it is");
     }
-    warn_of_exceptions(joints);
+    warn_about_unheld_joints(joints);
 }
 
 /// Warns of joints that a stop does not reach.
-pub(crate) fn warn_of_exceptions(joints: &JointSnapshot) {
+pub(crate) fn warn_about_unheld_joints(joints: &JointSnapshot) {
     if !joints.is_driven() {
-        let (state, word) = (joints.motor_state(), motor_state_word(joints.motor_state()));
+        let (state, word) = (joints.motor_state(), motor_state_name(joints.motor_state()));
         warn(format_args!("the motors are in state {state}, {word}: they do not drive the joints"));
     } else if joints.missing() != 0 {
-        let silent = words::joints(joints.missing());
+        let silent = register_text::joints(joints.missing());
         warn(format_args!(
             "no answer from the servos of {silent}: where they are is not known. Switch the supply of the servos \
              off before you reach into the arm"

@@ -3,7 +3,7 @@
 //! ```text
 //!   cli ──▶ Session ──▶ commands ──▶ sevenbot (the library) ──▶ arm
 //!                          │
-//!                          └──▶ Output (facts, as text or JSON), or a Failure (words and exit status)
+//!                          └──▶ Printer (facts, as text or JSON), or a CommandError (words and exit status)
 //! ```
 //!
 //! Parses, runs one command, and says how it ended. What the commands do is theirs; how the arm is spoken
@@ -13,31 +13,32 @@
 
 mod advice;
 mod cli;
+mod command_error;
 mod commands;
 mod confirm;
-mod failure;
-mod growing;
 mod interrupt;
-mod moving;
-mod output;
+mod joint_move;
+mod line_file;
 mod plot;
+mod printer;
 mod progress;
 mod reports;
 mod session;
 mod settings_file;
 mod style;
+mod write_result;
 
 use std::io;
 use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use sevenbot::Options;
+use sevenbot::ArmOptions;
 use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::fmt::time::uptime;
 
 use crate::cli::Cli;
-use crate::output::Output;
+use crate::printer::Printer;
 use crate::session::Session;
 
 fn main() -> ExitCode {
@@ -45,12 +46,12 @@ fn main() -> ExitCode {
     if global.verbose {
         show_frames();
     }
-    let output = Output::stdout(global.json);
+    let printer = Printer::stdout(global.json);
     // A variable that was emptied is as good as one that was unset.
     let port = global.port.filter(|port| !port.is_empty());
     let reply_timeout = Duration::from_millis(global.timeout.into());
-    let options = Options { baud: global.baud, reply_timeout, ..Options::default() };
-    let mut session = Session { port, options, output };
+    let options = ArmOptions { baud: global.baud, reply_timeout, ..ArmOptions::default() };
+    let mut session = Session { port, options, printer };
     match command.run(&mut session) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

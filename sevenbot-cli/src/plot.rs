@@ -33,7 +33,7 @@ const PANEL: f64 = 78.0;
 const GAP: f64 = 14.0;
 
 /// No panel shows less than this, or a joint at rest would look restless, in degrees.
-const LEAST_SPAN: f64 = 20.0;
+const MIN_DEGREES_SHOWN: f64 = 20.0;
 
 const STYLE: &str = "\
 text { font: 12px sans-serif; fill: #444 } .title { font-size: 15px; fill: #111 } .joint { font-weight: bold }
@@ -43,7 +43,7 @@ text { font: 12px sans-serif; fill: #444 } .title { font-size: 15px; fill: #111 
 
 /// The drawing of seven joints' tracks.
 pub(crate) fn svg(title: &str, tracks: &[Track; 7]) -> String {
-    let seconds = Scale::of_time(tracks);
+    let seconds = AxisScale::of_time(tracks);
     let height = TOP + 7.0 * (PANEL + GAP) - GAP + BOTTOM;
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" \
@@ -71,8 +71,8 @@ fn heading(out: &mut String, title: &str) {
     }
 }
 
-fn panel(out: &mut String, number: u8, track: &Track, top: f64, seconds: &Scale) {
-    let degrees = Scale::of_degrees(track, top);
+fn panel(out: &mut String, number: u8, track: &Track, top: f64, seconds: &AxisScale) {
+    let degrees = AxisScale::of_degrees(track, top);
     let width = WIDTH - LEFT - RIGHT;
     let _ = writeln!(
         out,
@@ -90,7 +90,7 @@ fn panel(out: &mut String, number: u8, track: &Track, top: f64, seconds: &Scale)
     }
 }
 
-fn axis_of_time(out: &mut String, seconds: &Scale, bottom: f64) {
+fn axis_of_time(out: &mut String, seconds: &AxisScale, bottom: f64) {
     for tick in seconds.ticks(10.0) {
         text(out, "middle", seconds.at(tick), bottom + 18.0, &format!("{tick}"));
     }
@@ -112,7 +112,7 @@ pub(crate) fn escaped(text: &str) -> String {
 }
 
 /// From a quantity to a place on the drawing.
-struct Scale {
+struct AxisScale {
     low: f64,
     high: f64,
     /// Where `low` is drawn.
@@ -121,20 +121,20 @@ struct Scale {
     to: f64,
 }
 
-impl Scale {
+impl AxisScale {
     fn of_time(tracks: &[Track; 7]) -> Self {
         let times = tracks.iter().flat_map(|track| track.target.iter().chain(&track.measured));
         let high = times.map(|point| point.0).fold(0.1, f64::max);
         Self { low: 0.0, high, from: LEFT, to: WIDTH - RIGHT }
     }
 
-    /// Wide enough for the track, and some air.
+    /// Wide enough for the track, and some padding.
     fn of_degrees(track: &Track, top: f64) -> Self {
         let all = || track.target.iter().chain(&track.measured).map(|point| point.1);
         let (low, high) = (all().fold(180.0, f64::min), all().fold(0.0, f64::max));
         let (low, high) = if low > high { (0.0, 180.0) } else { (low, high) };
-        let air = ((LEAST_SPAN - (high - low)) / 2.0).max(3.0);
-        Self { low: low - air, high: high + air, from: top + PANEL, to: top }
+        let padding = ((MIN_DEGREES_SHOWN - (high - low)) / 2.0).max(3.0);
+        Self { low: low - padding, high: high + padding, from: top + PANEL, to: top }
     }
 
     fn at(&self, value: f64) -> f64 {
@@ -159,8 +159,8 @@ impl Scale {
 mod tests {
     use super::*;
 
-    fn scale(low: f64, high: f64) -> Scale {
-        Scale { low, high, from: 0.0, to: 100.0 }
+    fn scale(low: f64, high: f64) -> AxisScale {
+        AxisScale { low, high, from: 0.0, to: 100.0 }
     }
 
     #[test]

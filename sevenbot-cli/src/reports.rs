@@ -3,20 +3,20 @@
 use sevenbot::map::FEEDBACK_FREQUENCY;
 use sevenbot::{Arm, Span};
 
-use crate::commands::all_taken;
-use crate::failure::Failure;
+use crate::command_error::CommandError;
+use crate::write_result::all_taken;
 
 /// Does work while the arm reports its positions so many times a second.
-pub(crate) fn reporting<T>(
+pub(crate) fn with_reports<T>(
     arm: &mut Arm,
     hz: u8,
-    work: impl FnOnce(&mut Arm) -> Result<T, Failure>,
-) -> Result<T, Failure> {
+    work: impl FnOnce(&mut Arm) -> Result<T, CommandError>,
+) -> Result<T, CommandError> {
     let before = arm.read_span(Span::of(&FEEDBACK_FREQUENCY))?.byte(&FEEDBACK_FREQUENCY);
     all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[hz])?)?;
     let done = work(arm);
     // An arm that went away cannot be told anything.
-    if done.as_ref().is_err_and(Failure::is_of_the_wire) {
+    if done.as_ref().is_err_and(CommandError::is_connection_lost) {
         return done;
     }
     let restored = arm.write_checked(FEEDBACK_FREQUENCY.address, &[before]);

@@ -2,27 +2,27 @@
 //!
 //! Knows how a port is chosen; what is said through it is the command's.
 
-use sevenbot::ports::{self, Probed};
-use sevenbot::{Arm, Firmware, OpenError, Options};
+use sevenbot::ports::{self, ProbeResult};
+use sevenbot::{Arm, ArmOptions, Firmware, OpenError};
 
-use crate::failure::Failure;
-use crate::output::{Output, note, warn};
+use crate::command_error::CommandError;
+use crate::printer::{Printer, note, warn};
 
 /// One run of the program.
 pub(crate) struct Session {
     /// The port asked for; none: the only one that leads to an arm.
     pub(crate) port: Option<String>,
     /// How to talk to the arm.
-    pub(crate) options: Options,
+    pub(crate) options: ArmOptions,
     /// Where facts are shown.
-    pub(crate) output: Output,
+    pub(crate) printer: Printer,
 }
 
 impl Session {
     /// Opens the arm, and says what its firmware cannot do.
-    pub(crate) fn connect(&self) -> Result<Arm, Failure> {
+    pub(crate) fn connect(&self) -> Result<Arm, CommandError> {
         let port = self.port_name()?;
-        let arm = Arm::open_with(&port, self.options).map_err(|error| Failure::Open { port, error })?;
+        let arm = Arm::open_with(&port, self.options).map_err(|error| CommandError::Open { port, error })?;
         let version = arm.identity().version();
         match arm.identity().firmware() {
             Firmware::Ours => {}
@@ -40,7 +40,7 @@ impl Session {
     }
 
     /// The port asked for, or else the only one that leads to an arm.
-    pub(crate) fn port_name(&self) -> Result<String, Failure> {
+    pub(crate) fn port_name(&self) -> Result<String, CommandError> {
         match &self.port {
             Some(port) => Ok(port.clone()),
             None => the_only(ports::probe(ports::available(), self.options.baud)),
@@ -48,35 +48,35 @@ impl Session {
     }
 }
 
-fn the_only(probed: Vec<Probed>) -> Result<String, Failure> {
+fn the_only(probed: Vec<ProbeResult>) -> Result<String, CommandError> {
     let (arms, others): (Vec<_>, Vec<_>) = probed.into_iter().partition(|found| found.answer.is_ok());
-    let names = |found: &[Probed]| found.iter().map(|found| found.port.name.clone()).collect::<Vec<_>>();
+    let names = |found: &[ProbeResult]| found.iter().map(|found| found.port.name.clone()).collect::<Vec<_>>();
     match arms.as_slice() {
         [only] => {
             note(format_args!("using {}, the only port that leads to an arm", only.port.name));
             Ok(only.port.name.clone())
         }
-        [] => Err(Failure::NoArm { tried: others.into_iter().filter_map(reason).collect() }),
-        several => Err(Failure::SeveralArms { ports: names(several) }),
+        [] => Err(CommandError::NoArm { tried: others.into_iter().filter_map(reason).collect() }),
+        several => Err(CommandError::SeveralArms { ports: names(several) }),
     }
 }
 
 /// A port that was tried, and why it is none of ours.
-fn reason(found: Probed) -> Option<(String, OpenError)> {
+fn reason(found: ProbeResult) -> Option<(String, OpenError)> {
     Some((found.port.name, found.answer.err()?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sevenbot::ports::Port;
+    use sevenbot::ports::PortInfo;
 
     #[test]
     fn ports_that_lead_nowhere_are_named_with_their_reasons() {
-        let port = Port { name: "COM1".to_owned(), description: String::new() };
-        let found = the_only(vec![Probed { port, answer: Err(OpenError::Busy) }]);
-        let Err(Failure::NoArm { tried }) = found else { panic!("no arm: {found:?}") };
+        let port = PortInfo { name: "COM1".to_owned(), description: String::new() };
+        let found = the_only(vec![ProbeResult { port, answer: Err(OpenError::Busy) }]);
+        let Err(CommandError::NoArm { tried }) = found else { panic!("no arm: {found:?}") };
         assert!(matches!(tried.as_slice(), [(name, OpenError::Busy)] if name == "COM1"));
-        assert!(matches!(the_only(Vec::new()), Err(Failure::NoArm { tried }) if tried.is_empty()));
+        assert!(matches!(the_only(Vec::new()), Err(CommandError::NoArm { tried }) if tried.is_empty()));
     }
 }

@@ -20,10 +20,10 @@ use serde::{Deserialize, Serialize};
 use sevenbot::map::{BAUD_RATE, BAUD_RATES, baud_rate};
 use sevenbot::names::{name_of, name_of_register};
 use sevenbot::table::settings;
-use sevenbot::{Register, Snapshot, Span, words};
+use sevenbot::{Register, Snapshot, Span, register_text};
 use toml::{Table, Value};
 
-use crate::failure::Failure;
+use crate::command_error::CommandError;
 
 /// The format of the file. Another one is refused: it would be misunderstood.
 const FORMAT: u32 = 1;
@@ -55,10 +55,10 @@ impl SettingsFile {
     }
 
     /// As it stands in the file.
-    pub(crate) fn text(&self) -> Result<String, Failure> {
+    pub(crate) fn text(&self) -> Result<String, CommandError> {
         let body = toml::to_string(self);
         let body =
-            body.map_err(|error| Failure::Arm(format!("these settings cannot be written: {error}")))?;
+            body.map_err(|error| CommandError::Arm(format!("these settings cannot be written: {error}")))?;
         Ok(format!(
             "# Settings of a 7Bot V2. `sevenbot restore FILE` writes them back; what is left out stays as it \
              is.\n{body}"
@@ -66,23 +66,26 @@ impl SettingsFile {
     }
 
     /// Reads a file.
-    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
-        let text = fs::read_to_string(path).map_err(|error| Failure::file(path, error))?;
-        let file: Self = toml::from_str(&text).map_err(|error| Failure::file(path, error))?;
+    pub(crate) fn read(path: &Path) -> Result<Self, CommandError> {
+        let text = fs::read_to_string(path).map_err(|error| CommandError::file(path, error))?;
+        let file: Self = toml::from_str(&text).map_err(|error| CommandError::file(path, error))?;
         if file.format == FORMAT {
             Ok(file)
         } else {
-            Err(Failure::file(path, format!("its format is {}; this program knows {FORMAT}", file.format)))
+            Err(CommandError::file(
+                path,
+                format!("its format is {}; this program knows {FORMAT}", file.format),
+            ))
         }
     }
 
     /// The registers with what stands in the file, over what they hold now.
-    pub(crate) fn over(&self, path: &Path, now: &Snapshot) -> Result<Snapshot, Failure> {
+    pub(crate) fn applied_to(&self, path: &Path, now: &Snapshot) -> Result<Snapshot, CommandError> {
         let mut wanted = now.clone();
         for (name, value) in &self.settings {
             let row = settings().find(|row| name_of(row) == *name);
-            let row = row.ok_or_else(|| Failure::file(path, format!("{name} is no setting")))?;
-            let bytes = bytes(row, value).map_err(|reason| Failure::file(path, reason))?;
+            let row = row.ok_or_else(|| CommandError::file(path, format!("{name} is no setting")))?;
+            let bytes = bytes(row, value).map_err(|reason| CommandError::file(path, reason))?;
             let places = (row.address..).zip(bytes);
             places.for_each(|(address, byte)| put(&mut wanted, address, byte));
         }
@@ -126,7 +129,11 @@ fn byte(row: &Register, address: u8, value: &Value) -> Result<u8, String> {
     let byte =
         number.and_then(|number| i16::try_from(number).ok()).and_then(|number| row.range.encode(number));
     byte.ok_or_else(|| {
-        format!("{value} is out of range: {} takes {}", name_of_register(address), words::range(address))
+        format!(
+            "{value} is out of range: {} takes {}",
+            name_of_register(address),
+            register_text::range(address)
+        )
     })
 }
 
@@ -144,8 +151,8 @@ mod tests {
     }
 
     fn refused(settings: &str) -> String {
-        match file(settings).over(Path::new("x"), &registers()) {
-            Err(Failure::File { reason, .. }) => reason,
+        match file(settings).applied_to(Path::new("x"), &registers()) {
+            Err(CommandError::File { reason, .. }) => reason,
             other => panic!("{other:?}"),
         }
     }
@@ -155,13 +162,13 @@ mod tests {
         let settings = settings().map(|row| (name_of(row), value(row, &registers()))).collect::<Table>();
         let text = toml::to_string(&settings).expect("TOML");
         assert_eq!(text, "baud-rate = 1000000\ndevice-id = 42\noffset = [0, -5, 0, 0, 0, 0, 16]\n");
-        let back = file(&text).over(Path::new("x"), &Snapshot { values: vec![0; 9], ..registers() });
+        let back = file(&text).applied_to(Path::new("x"), &Snapshot { values: vec![0; 9], ..registers() });
         assert_eq!(back.expect("what was written is read"), registers());
     }
 
     #[test]
     fn what_is_left_out_stays_as_it_is() {
-        let wanted = file("device-id = 7").over(Path::new("x"), &registers()).expect("a setting");
+        let wanted = file("device-id = 7").applied_to(Path::new("x"), &registers()).expect("a setting");
         assert_eq!(wanted.values, [7, 3, 0, 0x85, 0, 0, 0, 0, 16]);
     }
 

@@ -9,4 +9,4 @@ pub(crate) const GOOD: Style = AnsiColor::Green.on_default();
 /// For what is not.
 pub(crate) const BAD: Style = AnsiColor::Red.on_default().bold();
 /// For what deserves a look.
-pub(crate) const DOUBTFUL: Style = AnsiColor::Yellow.on_default().bold();
+pub(crate) const WARNING: Style = AnsiColor::Yellow.on_default().bold();

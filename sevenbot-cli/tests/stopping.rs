@@ -10,7 +10,9 @@ use std::process::{Command, Output, Stdio};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use fake::{Damage, POSE, arm_that, deaf_after, obey, on_a_bad_line, under_way};
+use fake::{
+    LineFault, POSE, arm_on_faulty_line, arm_that_loses_writes_after, execute, moving_registers, scripted_arm,
+};
 use protocol_core::request::Request;
 
 fn command(port: &str, arguments: &[&str]) -> Command {
@@ -32,36 +34,36 @@ fn may_be_moving(output: &Output) {
 #[test]
 fn commands_that_the_arm_does_not_take_say_that_it_may_be_moving() {
     for arguments in [["stop"].as_slice(), &["home"], &["home", "--wait"], &["state", "damping", "--yes"]] {
-        let (port, _held, _told) = deaf_after(0);
+        let (port, _held, _told) = arm_that_loses_writes_after(0);
         may_be_moving(&command(&port, arguments).output().unwrap());
     }
 }
 
 #[test]
 fn ctrl_c_that_cannot_stop_the_arm_says_so() {
-    let (port, _held, told) = deaf_after(1);
+    let (port, _held, writes) = arm_that_loses_writes_after(1);
     let tool = command(&port, &["pose", "10", "_", "_", "_", "_", "_", "_", "--wait"]).spawn().unwrap();
-    told.recv_timeout(Duration::from_secs(60)).expect("the pose is written");
+    writes.recv_timeout(Duration::from_secs(60)).expect("the pose is written");
     assert!(Command::new("kill").args(["-INT", &tool.id().to_string()]).status().unwrap().success());
     may_be_moving(&tool.wait_with_output().unwrap());
 }
 
 #[test]
 fn ctrl_c_stops_a_pose_and_says_that_the_arm_holds() {
-    let registers = under_way();
+    let registers = moving_registers();
     let shown = Arc::clone(&registers);
-    let (tell, told) = mpsc::channel();
-    let (port, _held) = arm_that(move |_, request| {
+    let (report_write, writes) = mpsc::channel();
+    let (port, _held) = scripted_arm(move |_, request| {
         let mut registers = registers.lock().unwrap();
-        let reply = obey(&mut registers, request);
+        let reply = execute(&mut registers, request);
         if matches!(request, Request::Write { .. }) {
-            let _ = tell.send(());
+            let _ = report_write.send(());
             registers[243] = u8::from(registers[46] != POSE[0]);
         }
         reply
     });
     let tool = command(&port, &["pose", "10", "_", "_", "_", "_", "_", "_", "--wait"]).spawn().unwrap();
-    told.recv_timeout(Duration::from_secs(60)).expect("the pose is written");
+    writes.recv_timeout(Duration::from_secs(60)).expect("the pose is written");
     assert!(Command::new("kill").args(["-INT", &tool.id().to_string()]).status().unwrap().success());
     let output = tool.wait_with_output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
@@ -72,10 +74,10 @@ fn ctrl_c_stops_a_pose_and_says_that_the_arm_holds() {
 
 #[test]
 fn a_stop_of_an_arm_that_is_not_driven_writes_nothing() {
-    let registers = under_way();
+    let registers = moving_registers();
     registers.lock().unwrap()[29] = 2;
     let shown = Arc::clone(&registers);
-    let (port, _held) = on_a_bad_line(&registers, usize::MAX, Damage::Lost);
+    let (port, _held) = arm_on_faulty_line(&registers, usize::MAX, LineFault::Lost);
     let output = command(&port, &["stop"]).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{said}");

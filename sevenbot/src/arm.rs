@@ -13,10 +13,10 @@ use protocol_core::registers::map::{
 use protocol_core::request::Request;
 
 use crate::error::{Error, OpenError};
+use crate::frame_port::FramePort;
 use crate::identity::Identity;
-use crate::link::Link;
-use crate::pending::{Pending, REPORT};
-use crate::serial::Serial;
+use crate::open_port::OpenPort;
+use crate::pending::{PendingReads, REPORT};
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 use crate::units::{Angle, MoveTime, Speed};
@@ -28,19 +28,19 @@ pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
 const REPORTS_KEPT: usize = 1_000;
 
 /// How often to ask, at least, after something was written.
-const PATIENT_ATTEMPTS: u32 = 3;
+const MIN_ATTEMPTS: u32 = 3;
 
 /// How to talk to an arm.
 ///
 /// ```
-/// use sevenbot::Options;
+/// use sevenbot::ArmOptions;
 /// use std::time::Duration;
 ///
-/// let patient = Options { reply_timeout: Duration::from_secs(2), ..Options::default() };
+/// let patient = ArmOptions { reply_timeout: Duration::from_secs(2), ..ArmOptions::default() };
 /// assert_eq!(patient.baud, 115_200);
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Options {
+pub struct ArmOptions {
     /// In bits per second. The arm starts with the rate in its register 12.
     pub baud: u32,
     /// How long to wait for one answer.
@@ -49,7 +49,7 @@ pub struct Options {
     pub attempts: u32,
 }
 
-impl Default for Options {
+impl Default for ArmOptions {
     fn default() -> Self {
         Self { baud: 115_200, reply_timeout: Duration::from_millis(500), attempts: 3 }
     }
@@ -93,11 +93,11 @@ pub struct Report {
 /// # }
 /// ```
 pub struct Arm {
-    link: Link,
+    link: FramePort,
     path: String,
-    options: Options,
+    options: ArmOptions,
     identity: Identity,
-    pending: Pending,
+    pending: PendingReads,
     reports: VecDeque<Report>,
 }
 
@@ -113,19 +113,19 @@ impl Arm {
     /// # Errors
     /// The port cannot be opened, nothing answers, or something else does.
     pub fn open(path: &str, baud: u32) -> Result<Self, OpenError> {
-        Self::open_with(path, Options { baud, ..Options::default() })
+        Self::open_with(path, ArmOptions { baud, ..ArmOptions::default() })
     }
 
     /// As [`Arm::open`], with time-outs of one's own.
     ///
     /// # Errors
     /// The port cannot be opened, nothing answers, or something else does.
-    pub fn open_with(path: &str, options: Options) -> Result<Self, OpenError> {
-        let port = Serial::open(path, options.baud)?;
-        let link = Link::new(port, options.baud);
+    pub fn open_with(path: &str, options: ArmOptions) -> Result<Self, OpenError> {
+        let port = OpenPort::open(path, options.baud)?;
+        let link = FramePort::new(port, options.baud);
         let nobody = Identity::from(Snapshot { address: 0, values: Vec::new() });
         let path = path.to_owned();
-        let (pending, reports) = (Pending::default(), VecDeque::new());
+        let (pending, reports) = (PendingReads::default(), VecDeque::new());
         let mut arm = Self { link, path, options, identity: nobody, pending, reports };
         arm.identity = Identity::from(arm.read_span(Span::between(&DEVICE_CODE, &CHIP_ID))?);
         match arm.identity.device_code() {
@@ -148,7 +148,7 @@ impl Arm {
 
     /// How it is talked to.
     #[must_use]
-    pub const fn options(&self) -> Options {
+    pub const fn options(&self) -> ArmOptions {
         self.options
     }
 
@@ -168,7 +168,7 @@ impl Arm {
     /// No answer, however often asked; or the port is gone.
     pub fn read_span(&mut self, span: Span) -> Result<Snapshot, Error> {
         self.take_waiting_replies()?;
-        self.link.take_heard();
+        self.link.take_received();
         let mut asked = Vec::new();
         for _ in 0..self.options.attempts.max(1) {
             let range = self.pending.add(span);
@@ -182,16 +182,16 @@ impl Arm {
     }
 
     /// Does work that asks at least three times for each answer, however the arm was opened.
-    pub(crate) fn patiently<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> T {
+    pub(crate) fn with_min_attempts<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> T {
         let attempts = self.options.attempts;
-        self.options.attempts = attempts.max(PATIENT_ATTEMPTS);
+        self.options.attempts = attempts.max(MIN_ATTEMPTS);
         let done = work(self);
         self.options.attempts = attempts;
         done
     }
 
     /// Gives new values to the registers from `address` on, in one frame: all of them or none (D16, D17).
-    /// The arm does not answer a write; [`crate::change`] finds out what became of it.
+    /// The arm does not answer a write; [`crate::checked_write`] finds out what became of it.
     ///
     /// # Errors
     /// The registers reach past 255, and nothing was sent; or the port is gone, or takes no more bytes.
@@ -255,12 +255,12 @@ impl Arm {
         self.reports.drain(..)
     }
 
-    /// The next report, kept or still to come; `None` when none came for `patience`.
+    /// The next report, kept or still to come; `None` when none came for `timeout`.
     ///
     /// # Errors
     /// The port is gone.
-    pub fn next_report(&mut self, patience: Duration) -> Result<Option<Report>, Error> {
-        let deadline = Instant::now() + patience;
+    pub fn next_report(&mut self, timeout: Duration) -> Result<Option<Report>, Error> {
+        let deadline = Instant::now() + timeout;
         while self.reports.is_empty() {
             match self.link.receive(deadline)? {
                 Some(reply) => self.keep_report(&reply),
@@ -284,9 +284,9 @@ impl Arm {
     }
 
     fn no_answer(&mut self, span: Span) -> Error {
-        let Options { attempts, reply_timeout, .. } = self.options;
-        let heard = self.link.take_heard();
-        Error::NoAnswer { span, attempts: attempts.max(1), waited: reply_timeout, heard }
+        let ArmOptions { attempts, reply_timeout, .. } = self.options;
+        let received = self.link.take_received();
+        Error::NoAnswer { span, attempts: attempts.max(1), waited: reply_timeout, received }
     }
 
     /// Takes what has come since the last read: reports, and late replies.

@@ -90,7 +90,7 @@ impl std::error::Error for OpenError {}
 /// let mut arm = Arm::open("/dev/ttyUSB0", 115_200)?;
 /// match arm.positions() {
 ///     Ok(positions) => println!("{positions:?}"),
-///     Err(Error::NoAnswer { heard, .. }) => println!("no answer: {heard}"),
+///     Err(Error::NoAnswer { received, .. }) => println!("no answer: {received}"),
 ///     Err(error) => println!("{error}"),
 /// }
 /// # Ok(())
@@ -113,8 +113,8 @@ pub enum Error {
         attempts: u32,
         /// How long each attempt waited.
         waited: Duration,
-        /// What was heard instead.
-        heard: Heard,
+        /// What was received instead.
+        received: ReceiveCounts,
     },
     /// The port failed.
     Port(PortError),
@@ -148,14 +148,14 @@ impl From<PortError> for OpenError {
     }
 }
 
-/// What was heard on the line while an answer was missing.
+/// What was received on the line while an answer was missing.
 ///
 /// ```
-/// let heard = sevenbot::Heard { bytes: 12, ..Default::default() };
-/// assert_eq!(heard.to_string(), "12 bytes were heard, none of them a frame");
+/// let received = sevenbot::ReceiveCounts { bytes: 12, ..Default::default() };
+/// assert_eq!(received.to_string(), "12 bytes were received, none of them a frame");
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Heard {
+pub struct ReceiveCounts {
     /// Bytes of any kind, echoes among them.
     pub bytes: usize,
     /// Echoes of what was sent. Only the bus of the servos can have them.
@@ -175,9 +175,9 @@ impl fmt::Display for Error {
                     "{count} registers from {address} on: the last register is 255, and one frame takes 255 values"
                 )
             }
-            Self::NoAnswer { span, attempts, waited, heard } => {
+            Self::NoAnswer { span, attempts, waited, received } => {
                 let millis = waited.as_millis();
-                write!(out, "no answer to a read of {span} ({attempts} tries of {millis} ms): {heard}")
+                write!(out, "no answer to a read of {span} ({attempts} tries of {millis} ms): {received}")
             }
             Self::Port(error) => error.fmt(out),
         }
@@ -197,18 +197,18 @@ impl fmt::Display for PortError {
 
 impl std::error::Error for PortError {}
 
-impl fmt::Display for Heard {
+impl fmt::Display for ReceiveCounts {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self { bytes: 0, .. } => out.write_str("nothing was heard"),
+            Self { bytes: 0, .. } => out.write_str("nothing was received"),
             Self { damaged_frames: 0, other_frames: 0, echoes: 1.., .. } => {
-                out.write_str("only the echo of the question was heard")
+                out.write_str("only the echo of the question was received")
             }
             Self { damaged_frames: 0, other_frames: 0, bytes, .. } => {
-                write!(out, "{bytes} bytes were heard, none of them a frame")
+                write!(out, "{bytes} bytes were received, none of them a frame")
             }
             Self { damaged_frames, other_frames, .. } => {
-                write!(out, "{damaged_frames} damaged and {other_frames} other frames were heard")
+                write!(out, "{damaged_frames} damaged and {other_frames} other frames were received")
             }
         }
     }
@@ -220,15 +220,15 @@ mod tests {
 
     #[test]
     fn a_missing_answer_says_what_was_heard_instead() {
-        let said = |heard| {
+        let said = |received| {
             let span = Span::new(54, 7).expect("a span");
-            Error::NoAnswer { span, attempts: 3, waited: Duration::from_millis(500), heard }.to_string()
+            Error::NoAnswer { span, attempts: 3, waited: Duration::from_millis(500), received }.to_string()
         };
-        let nothing = said(Heard::default());
-        assert_eq!(nothing, "no answer to a read of 54..60 (3 tries of 500 ms): nothing was heard");
-        let garbage = said(Heard { bytes: 12, ..Heard::default() });
-        assert!(garbage.ends_with("12 bytes were heard, none of them a frame"), "{garbage}");
-        let frames = said(Heard { bytes: 50, other_frames: 2, damaged_frames: 1, echoes: 0 });
-        assert!(frames.ends_with("1 damaged and 2 other frames were heard"), "{frames}");
+        let nothing = said(ReceiveCounts::default());
+        assert_eq!(nothing, "no answer to a read of 54..60 (3 tries of 500 ms): nothing was received");
+        let garbage = said(ReceiveCounts { bytes: 12, ..ReceiveCounts::default() });
+        assert!(garbage.ends_with("12 bytes were received, none of them a frame"), "{garbage}");
+        let frames = said(ReceiveCounts { bytes: 50, other_frames: 2, damaged_frames: 1, echoes: 0 });
+        assert!(frames.ends_with("1 damaged and 2 other frames were received"), "{frames}");
     }
 }

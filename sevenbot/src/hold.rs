@@ -14,9 +14,9 @@ use protocol_core::registers::Joint;
 use protocol_core::registers::map::TARGET_POSITION;
 
 use crate::arm::Arm;
-use crate::change::{Cause, Unchanged, verdict};
+use crate::checked_write::{MismatchCause, WriteMismatch, cause_from_counters};
 use crate::error::Error;
-use crate::joints::{JointSnapshot, LOOK_EVERY, START_UP, frames_for};
+use crate::joints::{JointSnapshot, POLL_PERIOD, START_UP_TIME, frames_for};
 
 /// How often targets are written before their loss counts as a failure.
 const HOLD_ATTEMPTS: u32 = 5;
@@ -24,29 +24,29 @@ const HOLD_ATTEMPTS: u32 = 5;
 /// Why it is not known that the arm holds.
 ///
 /// ```
-/// use sevenbot::hold::NotHeld;
+/// use sevenbot::hold::HoldError;
 ///
-/// let reason = NotHeld::NotTaken(Vec::new());
+/// let reason = HoldError::NotTaken(Vec::new());
 /// assert!(reason.to_string().contains("did not take"));
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum NotHeld {
+pub enum HoldError {
     /// The arm could not be asked.
-    Wire(Error),
+    Exchange(Error),
     /// The targets do not hold what was written, however often it was.
-    NotTaken(Vec<Unchanged>),
+    NotTaken(Vec<WriteMismatch>),
 }
 
-impl From<Error> for NotHeld {
+impl From<Error> for HoldError {
     fn from(error: Error) -> Self {
-        Self::Wire(error)
+        Self::Exchange(error)
     }
 }
 
-impl fmt::Display for NotHeld {
+impl fmt::Display for HoldError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Wire(error) => error.fmt(out),
+            Self::Exchange(error) => error.fmt(out),
             Self::NotTaken(unchanged) => {
                 out.write_str("the arm did not take the targets that hold it")?;
                 unchanged.first().map_or(Ok(()), |first| write!(out, ": {first}"))
@@ -55,17 +55,17 @@ impl fmt::Display for NotHeld {
     }
 }
 
-impl std::error::Error for NotHeld {}
+impl std::error::Error for HoldError {}
 
 /// A target that a stop has written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Sent {
+struct SentTarget {
     degrees: u8,
     /// It was 0, and may not have been measured.
-    was_doubtful: bool,
+    may_be_unmeasured: bool,
 }
 
-const NOTHING_SENT: [Option<Sent>; 7] = [None; 7];
+const NOTHING_SENT: [Option<SentTarget>; 7] = [None; 7];
 
 impl Arm {
     /// Makes every joint hold where it is, and makes sure that it took: the targets are written, read back, and written
@@ -78,11 +78,11 @@ impl Arm {
     ///
     /// # Errors
     /// No answer, or the arm does not take the targets: it may be moving.
-    pub fn hold(&mut self) -> Result<JointSnapshot, NotHeld> {
-        self.patiently(Self::hold_until_seen)
+    pub fn hold(&mut self) -> Result<JointSnapshot, HoldError> {
+        self.with_min_attempts(Self::hold_until_verified)
     }
 
-    fn hold_until_seen(&mut self) -> Result<JointSnapshot, NotHeld> {
+    fn hold_until_verified(&mut self) -> Result<JointSnapshot, HoldError> {
         let start = Instant::now();
         let mut before = None;
         let mut sent = NOTHING_SENT;
@@ -92,26 +92,26 @@ impl Arm {
             if !joints.is_driven() {
                 return Ok(joints);
             }
-            let is_up = start.elapsed() >= START_UP;
+            let is_past_start_up = start.elapsed() >= START_UP_TIME;
             let before: &JointSnapshot = before.get_or_insert_with(|| joints.clone());
-            let lost = joints.lost(&sent, before);
+            let lost = joints.lost_targets(&sent, before);
             losses += u32::from(!lost.is_empty());
             if losses >= HOLD_ATTEMPTS {
-                return Err(NotHeld::NotTaken(lost));
+                return Err(HoldError::NotTaken(lost));
             }
-            let targets = joints.to_hold(&sent, is_up);
+            let targets = joints.targets_to_write(&sent, is_past_start_up);
             for (address, degrees) in frames_for(&TARGET_POSITION, &targets) {
                 self.write(address, &degrees)?;
             }
             for ((sent, target), joint) in sent.iter_mut().zip(targets).zip(Joint::ALL) {
-                let was_doubtful = joints.is_doubtful(joint, is_up);
-                *sent = target.map(|degrees| Sent { degrees, was_doubtful }).or(*sent);
+                let may_be_unmeasured = joints.may_be_unmeasured(joint, is_past_start_up);
+                *sent = target.map(|degrees| SentTarget { degrees, may_be_unmeasured }).or(*sent);
             }
             if targets == [None; 7] {
-                if !Joint::ALL.into_iter().any(|joint| joints.is_doubtful(joint, is_up)) {
+                if !Joint::ALL.into_iter().any(|joint| joints.may_be_unmeasured(joint, is_past_start_up)) {
                     return Ok(joints);
                 }
-                sleep(LOOK_EVERY);
+                sleep(POLL_PERIOD);
             }
         }
     }
@@ -119,39 +119,39 @@ impl Arm {
 
 impl JointSnapshot {
     /// The targets to write now, so that the joints hold where they are, after `sent` was written.
-    fn to_hold(&self, sent: &[Option<Sent>; 7], is_up: bool) -> [Option<u8>; 7] {
+    fn targets_to_write(&self, sent: &[Option<SentTarget>; 7], is_past_start_up: bool) -> [Option<u8>; 7] {
         let mut targets = [None; 7];
         for ((target, sent), joint) in targets.iter_mut().zip(sent).zip(Joint::ALL) {
             let is_done = sent.is_some_and(|sent| {
-                let is_measured_now = sent.was_doubtful && self.present(joint) != 0;
+                let is_measured_now = sent.may_be_unmeasured && self.present(joint) != 0;
                 self.target(joint) == sent.degrees && !is_measured_now
             });
-            *target = self.place_to_hold(joint, is_up).filter(|_| !is_done);
+            *target = self.hold_target(joint, is_past_start_up).filter(|_| !is_done);
         }
         targets
     }
 
     /// Where the joint is to be held; `None` while that is not known.
-    fn place_to_hold(&self, joint: Joint, is_up: bool) -> Option<u8> {
+    fn hold_target(&self, joint: Joint, is_past_start_up: bool) -> Option<u8> {
         let present = self.present(joint);
         let is_unknown = present == 0 && self.is_missing(joint);
         // A doubtful joint on its way has left 0 degrees just now, or another host sent it somewhere during start-up.
         // It cannot wait, and in start-up it is not driven before it was measured, which the next look shows.
-        let may_wait = self.is_doubtful(joint, is_up) && !self.is_moving(joint);
-        (!is_unknown && !may_wait).then_some(present)
+        let can_wait = self.may_be_unmeasured(joint, is_past_start_up) && !self.is_moving(joint);
+        (!is_unknown && !can_wait).then_some(present)
     }
 
     /// The targets that do not hold what was sent.
-    fn lost(&self, sent: &[Option<Sent>; 7], before: &Self) -> Vec<Unchanged> {
+    fn lost_targets(&self, sent: &[Option<SentTarget>; 7], before: &Self) -> Vec<WriteMismatch> {
         let cause = match (&before.status, &self.status) {
-            (Some(before), Some(after)) => verdict(before, after),
-            _ => Cause::Unknown,
+            (Some(before), Some(after)) => cause_from_counters(before, after),
+            _ => MismatchCause::Unknown,
         };
         let pairs = Joint::ALL.into_iter().zip(sent).filter_map(|(joint, sent)| Some((joint, (*sent)?)));
         pairs
             .map(|(joint, sent)| (joint, sent.degrees, self.target(joint)))
             .filter(|(_, wanted, found)| wanted != found)
-            .map(|(joint, wanted, found)| Unchanged {
+            .map(|(joint, wanted, found)| WriteMismatch {
                 address: TARGET_POSITION.of(joint),
                 wanted,
                 found,
@@ -164,54 +164,57 @@ impl JointSnapshot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::joints::tests::{UP, look, power_up};
+    use crate::joints::tests::{POSE, joint_snapshot, power_up};
 
     #[test]
     fn every_measured_joint_is_held_where_it_is() {
-        let joints = look([170, 90, 65, 90, 90, 90, 80], UP, 0, 1);
-        assert_eq!(joints.to_hold(&NOTHING_SENT, false), UP.map(Some));
-        assert!(!joints.is_doubtful(Joint::ALL[0], false));
+        let joints = joint_snapshot([170, 90, 65, 90, 90, 90, 80], POSE, 0, 1);
+        assert_eq!(joints.targets_to_write(&NOTHING_SENT, false), POSE.map(Some));
+        assert!(!joints.may_be_unmeasured(Joint::ALL[0], false));
     }
 
     #[test]
     fn what_was_written_is_written_again_only_where_it_did_not_take() {
-        let sent = UP.map(|degrees| Some(Sent { degrees, was_doubtful: false }));
-        assert_eq!(look(UP, UP, 0, 0).to_hold(&sent, false), [None; 7]);
-        let lost = look([170, 90, 65, 90, 90, 90, 80], [125, 90, 65, 90, 90, 90, 80], 0, 1);
-        let again = lost.to_hold(&sent, false);
+        let sent = POSE.map(|degrees| Some(SentTarget { degrees, may_be_unmeasured: false }));
+        assert_eq!(joint_snapshot(POSE, POSE, 0, 0).targets_to_write(&sent, false), [None; 7]);
+        let lost = joint_snapshot([170, 90, 65, 90, 90, 90, 80], [125, 90, 65, 90, 90, 90, 80], 0, 1);
+        let again = lost.targets_to_write(&sent, false);
         assert_eq!(again, [Some(125), None, None, None, None, None, None], "from where it is by now");
     }
 
     #[test]
     fn a_joint_that_leaves_zero_degrees_is_stopped_at_once() {
-        let joints = look([170, 90, 65, 90, 90, 90, 80], [0, 90, 65, 90, 90, 90, 80], 0, 1);
-        assert_eq!(joints.to_hold(&NOTHING_SENT, false)[0], Some(0));
-        assert!(joints.is_doubtful(Joint::ALL[0], false), "it may be start-up: look again");
-        let at_rest = look([0, 90, 65, 90, 90, 90, 80], [0, 90, 65, 90, 90, 90, 80], 0, 0);
-        assert!(!at_rest.is_doubtful(Joint::ALL[0], false), "at rest at 0 degrees it was measured there");
+        let joints = joint_snapshot([170, 90, 65, 90, 90, 90, 80], [0, 90, 65, 90, 90, 90, 80], 0, 1);
+        assert_eq!(joints.targets_to_write(&NOTHING_SENT, false)[0], Some(0));
+        assert!(joints.may_be_unmeasured(Joint::ALL[0], false), "it may be start-up: look again");
+        let at_rest = joint_snapshot([0, 90, 65, 90, 90, 90, 80], [0, 90, 65, 90, 90, 90, 80], 0, 0);
+        assert!(
+            !at_rest.may_be_unmeasured(Joint::ALL[0], false),
+            "at rest at 0 degrees it was measured there"
+        );
     }
 
     #[test]
     fn a_joint_that_is_not_measured_yet_is_not_sent_to_zero() {
         let joints = power_up([0; 7], 0, 0);
-        assert_eq!(joints.to_hold(&NOTHING_SENT, false), [None; 7]);
-        assert!(joints.is_doubtful(Joint::ALL[0], false));
-        assert_eq!(joints.to_hold(&NOTHING_SENT, true)[0], Some(0), "after start-up 0 is 0 degrees");
+        assert_eq!(joints.targets_to_write(&NOTHING_SENT, false), [None; 7]);
+        assert!(joints.may_be_unmeasured(Joint::ALL[0], false));
+        assert_eq!(joints.targets_to_write(&NOTHING_SENT, true)[0], Some(0), "after start-up 0 is 0 degrees");
         let another_is_missing = power_up([0; 7], 0b10, 0);
-        assert_eq!(another_is_missing.to_hold(&NOTHING_SENT, false)[0], Some(0), "start-up is over");
+        assert_eq!(another_is_missing.targets_to_write(&NOTHING_SENT, false)[0], Some(0), "start-up is over");
     }
 
     #[test]
     fn a_target_of_start_up_is_replaced_as_soon_as_the_joint_is_measured() {
-        let sent = [Some(Sent { degrees: 0, was_doubtful: true }); 7];
-        let joints = look([0; 7], UP, 0, 0x7F);
-        assert_eq!(joints.to_hold(&sent, false), UP.map(Some));
+        let sent = [Some(SentTarget { degrees: 0, may_be_unmeasured: true }); 7];
+        let joints = joint_snapshot([0; 7], POSE, 0, 0x7F);
+        assert_eq!(joints.targets_to_write(&sent, false), POSE.map(Some));
     }
 
     #[test]
     fn a_silent_joint_is_held_where_it_was_measured_last_and_never_at_zero() {
-        let joints = look([170, 90, 170, 90, 90, 90, 80], [120, 90, 0, 90, 90, 90, 80], 0b101, 0);
-        let held = joints.to_hold(&NOTHING_SENT, true);
+        let joints = joint_snapshot([170, 90, 170, 90, 90, 90, 80], [120, 90, 0, 90, 90, 90, 80], 0b101, 0);
+        let held = joints.targets_to_write(&NOTHING_SENT, true);
         assert_eq!((held[0], held[2]), (Some(120), None));
     }
 }

@@ -20,22 +20,22 @@ use crate::arm::Arm;
 use crate::error::Error;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
-use crate::status::Status;
+use crate::status_block::StatusBlock;
 
 /// After power-up an arm measures its joints, or calls them silent, within 500 ms (D12). The rest is for the answer.
-pub(crate) const START_UP: Duration = Duration::from_millis(700);
+pub(crate) const START_UP_TIME: Duration = Duration::from_millis(700);
 /// Time between two looks at an arm that starts.
-pub(crate) const LOOK_EVERY: Duration = Duration::from_millis(20);
+pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(20);
 /// A joint this near to its target stands there: a loaded servo stops a few degrees short.
-const STANDS_WITHIN_DEGREES: u8 = 5;
+const AT_TARGET_DEGREES: u8 = 5;
 
 /// Why a relative step of a joint has no known start.
 ///
 /// ```
-/// assert_eq!(sevenbot::joints::NoBase::Silent.to_string(), "its servo does not answer");
+/// assert_eq!(sevenbot::joints::StepBaseError::Silent.to_string(), "its servo does not answer");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NoBase {
+pub enum StepBaseError {
     /// Its servo does not answer.
     Silent,
     /// Its target is still the value of power-up, and it stands elsewhere.
@@ -47,7 +47,7 @@ pub enum NoBase {
     },
 }
 
-impl fmt::Display for NoBase {
+impl fmt::Display for StepBaseError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Silent => out.write_str("its servo does not answer"),
@@ -76,14 +76,14 @@ impl Arm {
     /// # Errors
     /// As [`Arm::read`].
     pub fn wait_until_settled(&mut self) -> Result<JointSnapshot, Error> {
-        let deadline = Instant::now() + START_UP;
+        let deadline = Instant::now() + START_UP_TIME;
         loop {
             let joints = self.joints()?;
             let is_settled = !Joint::ALL.into_iter().any(|joint| joints.has_power_up_target(joint));
             if is_settled || Instant::now() >= deadline {
                 return Ok(joints);
             }
-            sleep(LOOK_EVERY);
+            sleep(POLL_PERIOD);
         }
     }
 }
@@ -102,7 +102,7 @@ pub struct JointSnapshot {
     /// From the motor state to the present positions.
     registers: Snapshot,
     /// `None` from firmware without a status block.
-    pub(crate) status: Option<Status>,
+    pub(crate) status: Option<StatusBlock>,
 }
 
 impl JointSnapshot {
@@ -145,7 +145,7 @@ impl JointSnapshot {
     /// The joints whose servo does not answer, by their [`Joint::bit`]s.
     #[must_use]
     pub fn missing(&self) -> u8 {
-        self.status.as_ref().map_or(0, Status::missing)
+        self.status.as_ref().map_or(0, StatusBlock::missing)
     }
 
     pub(crate) fn is_missing(&self, joint: Joint) -> bool {
@@ -160,11 +160,11 @@ impl JointSnapshot {
     ///
     /// # Errors
     /// It is not known where the joint is, or whether the target was ever its own.
-    pub fn step_base(&self, joint: Joint) -> Result<u8, NoBase> {
+    pub fn step_base(&self, joint: Joint) -> Result<u8, StepBaseError> {
         let (target, present) = (self.target(joint), self.present(joint));
         match () {
-            () if self.is_missing(joint) => Err(NoBase::Silent),
-            () if self.has_power_up_target(joint) => Err(NoBase::PowerUpTarget { target, present }),
+            () if self.is_missing(joint) => Err(StepBaseError::Silent),
+            () if self.has_power_up_target(joint) => Err(StepBaseError::PowerUpTarget { target, present }),
             () => Ok(target),
         }
     }
@@ -179,12 +179,12 @@ impl JointSnapshot {
             && self.is_driven()
             && !self.is_missing(joint)
             && !self.is_moving(joint)
-            && target.abs_diff(present) > STANDS_WITHIN_DEGREES
+            && target.abs_diff(present) > AT_TARGET_DEGREES
     }
 
-    /// May the position of 0 mean that the joint is not measured yet? `is_up`: the arm has been up for long enough.
-    pub(crate) fn is_doubtful(&self, joint: Joint, is_up: bool) -> bool {
-        let is_start_up_over = is_up || self.missing() != 0;
+    /// May the position of 0 mean that the joint is not measured yet? `is_past_start_up`: the arm has been up for long enough.
+    pub(crate) fn may_be_unmeasured(&self, joint: Joint, is_past_start_up: bool) -> bool {
+        let is_start_up_over = is_past_start_up || self.missing() != 0;
         // Power-up targets are not 0, and a target that the host wrote in start-up counts as on its way.
         let was_measured = self.target(joint) == 0 && !self.is_moving(joint);
         self.present(joint) == 0 && !is_start_up_over && !was_measured
@@ -210,9 +210,14 @@ pub(crate) mod tests {
     use super::*;
     use protocol_core::registers::map::{MISSING_SERVOS, MOVING_JOINTS};
 
-    pub(crate) const UP: [u8; 7] = [120, 90, 65, 90, 90, 90, 80];
+    pub(crate) const POSE: [u8; 7] = [120, 90, 65, 90, 90, 90, 80];
 
-    pub(crate) fn look(targets: [u8; 7], positions: [u8; 7], missing: u8, moving: u8) -> JointSnapshot {
+    pub(crate) fn joint_snapshot(
+        targets: [u8; 7],
+        positions: [u8; 7],
+        missing: u8,
+        moving: u8,
+    ) -> JointSnapshot {
         let mut registers = Snapshot { address: MOTOR_STATE.address, values: vec![0; 32] };
         registers.values[0] = motor_state::SERVO;
         registers.values[17..24].copy_from_slice(&targets);
@@ -220,23 +225,33 @@ pub(crate) mod tests {
         let mut status = Snapshot { address: 240, values: vec![0; 16] };
         status.values[usize::from(MISSING_SERVOS.address - 240)] = missing;
         status.values[usize::from(MOVING_JOINTS.address - 240)] = moving;
-        JointSnapshot { registers, status: Some(Status::from(status)) }
+        JointSnapshot { registers, status: Some(StatusBlock::from(status)) }
     }
 
     pub(crate) fn power_up(positions: [u8; 7], missing: u8, moving: u8) -> JointSnapshot {
-        look(TARGET_POSITION.defaults, positions, missing, moving)
+        joint_snapshot(TARGET_POSITION.defaults, positions, missing, moving)
     }
 
     #[test]
     fn a_step_does_not_begin_at_a_target_of_power_up() {
         let base = |joints: &JointSnapshot| joints.step_base(Joint::ALL[0]);
-        assert_eq!(base(&power_up(UP, 0, 0)), Err(NoBase::PowerUpTarget { target: 90, present: 120 }));
-        assert_eq!(base(&power_up([0; 7], 0, 0)), Err(NoBase::PowerUpTarget { target: 90, present: 0 }));
-        assert_eq!(base(&power_up(UP, 1, 0)), Err(NoBase::Silent));
-        assert_eq!(base(&power_up(UP, 0, 1)), Ok(90), "on its way there");
+        assert_eq!(
+            base(&power_up(POSE, 0, 0)),
+            Err(StepBaseError::PowerUpTarget { target: 90, present: 120 })
+        );
+        assert_eq!(
+            base(&power_up([0; 7], 0, 0)),
+            Err(StepBaseError::PowerUpTarget { target: 90, present: 0 })
+        );
+        assert_eq!(base(&power_up(POSE, 1, 0)), Err(StepBaseError::Silent));
+        assert_eq!(base(&power_up(POSE, 0, 1)), Ok(90), "on its way there");
         assert_eq!(base(&power_up([92, 90, 65, 90, 90, 90, 80], 0, 0)), Ok(90), "it stands there");
-        assert_eq!(base(&look([100, 90, 65, 90, 90, 90, 80], UP, 0, 0)), Ok(100), "no power-up value");
-        assert_eq!(base(&look([0; 7], [0; 7], 0, 0)), Ok(0), "0 degrees is a position");
+        assert_eq!(
+            base(&joint_snapshot([100, 90, 65, 90, 90, 90, 80], POSE, 0, 0)),
+            Ok(100),
+            "no power-up value"
+        );
+        assert_eq!(base(&joint_snapshot([0; 7], [0; 7], 0, 0)), Ok(0), "0 degrees is a position");
     }
 
     #[test]

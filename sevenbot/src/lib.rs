@@ -1,7 +1,7 @@
 //! Talks to a 7Bot V2 arm over its serial port: the other end of the wire.
 //!
 //! ```text
-//!   Arm ── read, write, typed values ──▶ Link ──▶ serial port ──▶ arm, simulator, or emulated firmware
+//!   Arm ── read, write, typed values ──▶ FramePort ──▶ serial port ──▶ arm, simulator, or emulated firmware
 //!    ▲                                    │
 //!    ├── answers ◀── matched by range ────┤
 //!    └── reports ◀── sent unasked (D14) ──┘
@@ -28,34 +28,34 @@
 #![forbid(unsafe_code)]
 
 pub mod arm;
-pub mod change;
+pub mod checked_write;
 pub mod error;
+mod frame_port;
 pub mod hold;
 pub mod identity;
 pub mod joints;
-mod link;
 pub mod names;
+pub mod open_port;
 mod pending;
 mod permission;
 pub mod playback;
 pub mod ports;
 pub mod recording;
-pub mod serial;
+pub mod register_text;
 pub mod servo_bench;
 pub mod snapshot;
 mod span;
-pub mod status;
+pub mod status_block;
 pub mod table;
 pub mod traffic;
-mod traffic_words;
+mod traffic_text;
 pub mod units;
-pub mod words;
 
-pub use arm::{Arm, Options, Report};
-pub use error::{Error, Heard, OpenError, PortError};
+pub use arm::{Arm, ArmOptions, Report};
+pub use error::{Error, OpenError, PortError, ReceiveCounts};
 pub use identity::{Firmware, Identity};
 pub use protocol_core::registers::{Joint, Range, Register, map};
 pub use snapshot::Snapshot;
 pub use span::Span;
-pub use status::Status;
+pub use status_block::StatusBlock;
 pub use units::{Angle, MoveTime, Speed};

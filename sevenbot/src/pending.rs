@@ -18,9 +18,9 @@ pub(crate) const REPORT: Span = Span::of(&PRESENT_POSITION);
 
 /// The reads without a reply, oldest first.
 #[derive(Debug, Default)]
-pub(crate) struct Pending(VecDeque<Span>);
+pub(crate) struct PendingReads(VecDeque<Span>);
 
-impl Pending {
+impl PendingReads {
     /// Adds a read of these registers. Returns the registers to ask for: these, and a few more where the reply could
     /// be taken for another one. A span of more than 239 registers may have no room for that.
     pub(crate) fn add(&mut self, wanted: Span) -> Span {
@@ -51,7 +51,7 @@ mod tests {
 
     #[test]
     fn a_read_that_is_asked_again_asks_for_another_range() {
-        let mut pending = Pending::default();
+        let mut pending = PendingReads::default();
         assert_eq!(pending.add(span(29, 3)), span(29, 3));
         assert_eq!(pending.add(span(29, 3)), span(29, 4));
         assert_eq!(pending.add(span(29, 4)), span(29, 5), "taken by the second");
@@ -62,12 +62,12 @@ mod tests {
 
     #[test]
     fn a_read_of_the_positions_is_no_report() {
-        assert_eq!(Pending::default().add(REPORT), span(54, 8));
+        assert_eq!(PendingReads::default().add(REPORT), span(54, 8));
     }
 
     #[test]
     fn what_never_comes_is_forgotten() {
-        let mut pending = Pending::default();
+        let mut pending = PendingReads::default();
         for _ in 0..1_000 {
             let asked = pending.add(span(240, 16));
             assert!(usize::from(asked.count()) <= 16 + REMEMBERED);

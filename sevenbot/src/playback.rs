@@ -12,16 +12,16 @@ use crate::units::{Angle, MoveTime, Speed};
 
 /// The longest piece of an even movement that is sent at once. Speeds have steps of 1.9 degrees/s, so a long
 /// piece would end early.
-const LONGEST_PIECE: Duration = Duration::from_millis(50);
+const MAX_SEGMENT: Duration = Duration::from_millis(50);
 /// Joints move so much faster than they need to: a host that was held up for a moment sends late, and what it
 /// lost has to be made up for.
-const HASTE: f64 = 1.2;
+const SPEED_RESERVE: f64 = 1.2;
 /// A single degree that is followed by rest is spread over no more than this.
-const LONGEST_DEGREE: Duration = Duration::from_millis(250);
+const MAX_DEGREE_DURATION: Duration = Duration::from_millis(250);
 /// The fastest joint's speed on the way to where a recording begins, in degrees/s.
 const APPROACH_DEGREES_PER_SECOND: f64 = 30.0;
 /// What even the shortest way there takes.
-const SHORTEST_APPROACH: Duration = Duration::from_millis(500);
+const MIN_APPROACH: Duration = Duration::from_millis(500);
 
 /// What is sent to the arm at one time: one frame, carried out as one.
 ///
@@ -65,14 +65,14 @@ impl Step {
 /// times as fast as it was made. The last step's time is that of its sending: the arm arrives a piece later.
 #[must_use]
 pub fn steps(recording: &Recording, factor: f64) -> Vec<Step> {
-    let points = pieces(recording, factor);
-    let ways = Ways { points: &points };
+    let points = segments(recording, factor);
+    let waypoints = Waypoints { points: &points };
     let mut speeds = [Speed::MAXIMUM; 7];
     let pairs = points.iter().zip(points.iter().skip(1)).enumerate();
     let mut steps: Vec<Step> = pairs
         .map(|(index, (from, to))| {
             for (joint, speed) in speeds.iter_mut().enumerate() {
-                *speed = ways.speed(index, joint).unwrap_or(*speed);
+                *speed = waypoints.speed(index, joint).unwrap_or(*speed);
             }
             Step { time: from.time, vacuum: from.vacuum, speeds, targets: to.pose }
         })
@@ -92,23 +92,23 @@ pub fn steps(recording: &Recording, factor: f64) -> Vec<Step> {
 pub fn approach(from: [Angle; 7], to: Moment) -> Step {
     let degrees = |joint| distance(&from, &to.pose, joint);
     let longest = (0..7).map(degrees).fold(0.0, f64::max);
-    let duration = Duration::from_secs_f64(longest / APPROACH_DEGREES_PER_SECOND).max(SHORTEST_APPROACH);
+    let duration = Duration::from_secs_f64(longest / APPROACH_DEGREES_PER_SECOND).max(MIN_APPROACH);
     let mut speeds = [Speed::MAXIMUM; 7];
     for (joint, speed) in speeds.iter_mut().enumerate() {
-        *speed = covering(degrees(joint), duration);
+        *speed = speed_for(degrees(joint), duration);
     }
     Step { time: Duration::ZERO, vacuum: to.vacuum, speeds, targets: to.pose }
 }
 
 /// The moments, with more of them between where they are far apart; times from 0, changed by the factor.
-fn pieces(recording: &Recording, factor: f64) -> Vec<Moment> {
+fn segments(recording: &Recording, factor: f64) -> Vec<Moment> {
     let mut points: Vec<Moment> = Vec::new();
     let mut start = None;
     for moment in recording.moments() {
         let time = (moment.time - *start.get_or_insert(moment.time)).div_f64(factor);
         let to = Moment { time, ..moment };
         if let Some(&from) = points.last() {
-            points.extend(between(from, to));
+            points.extend(interpolated(from, to));
         }
         points.push(to);
     }
@@ -116,15 +116,15 @@ fn pieces(recording: &Recording, factor: f64) -> Vec<Moment> {
 }
 
 /// What lies between two moments, evenly, no two further apart than a piece may be.
-fn between(from: Moment, to: Moment) -> impl Iterator<Item = Moment> {
+fn interpolated(from: Moment, to: Moment) -> impl Iterator<Item = Moment> {
     let span = to.time - from.time;
-    let count = span.as_millis().div_ceil(LONGEST_PIECE.as_millis());
+    let count = span.as_millis().div_ceil(MAX_SEGMENT.as_millis());
     let count = if from.pose == to.pose { 1 } else { u32::try_from(count).unwrap_or(u32::MAX) };
     (1..count).map(move |index| {
         let share = f64::from(index) / f64::from(count);
         let mut pose = from.pose;
         for (angle, end) in pose.iter_mut().zip(to.pose) {
-            *angle = part_way(*angle, end, share);
+            *angle = interpolate(*angle, end, share);
         }
         Moment { time: from.time + span.mul_f64(share), pose, vacuum: from.vacuum }
     })
@@ -132,7 +132,7 @@ fn between(from: Moment, to: Moment) -> impl Iterator<Item = Moment> {
 
 /// The angle at a share, 0 to 1, of the way between two others.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two angles")]
-fn part_way(from: Angle, to: Angle, share: f64) -> Angle {
+fn interpolate(from: Angle, to: Angle, share: f64) -> Angle {
     let (from, to) = (f64::from(from.degrees()), f64::from(to.degrees()));
     Angle::from_register((from + (to - from) * share).round() as u8)
 }
@@ -143,9 +143,9 @@ fn part_way(from: Angle, to: Angle, share: f64) -> Angle {
     clippy::cast_sign_loss,
     reason = "clamped to the register's range"
 )]
-fn covering(degrees: f64, duration: Duration) -> Speed {
+fn speed_for(degrees: f64, duration: Duration) -> Speed {
     let step = Speed::from_steps(1).map_or(1.0, Speed::degrees_per_second);
-    let steps = (HASTE * degrees / duration.as_secs_f64() / step).ceil().clamp(1.0, 255.0);
+    let steps = (SPEED_RESERVE * degrees / duration.as_secs_f64() / step).ceil().clamp(1.0, 255.0);
     Speed::from_steps(steps as u8).unwrap_or(Speed::MAXIMUM)
 }
 
@@ -155,11 +155,11 @@ fn distance(from: &[Angle; 7], to: &[Angle; 7], joint: usize) -> f64 {
 }
 
 /// The ways the joints go from point to point.
-struct Ways<'a> {
+struct Waypoints<'a> {
     points: &'a [Moment],
 }
 
-impl Ways<'_> {
+impl Waypoints<'_> {
     /// How far a joint goes from one point to the next.
     fn degrees(&self, index: usize, joint: usize) -> f64 {
         let pair = self.points.get(index).zip(self.points.get(index + 1));
@@ -177,14 +177,14 @@ impl Ways<'_> {
         let until = match degrees {
             0.0 => return None,
             // A slow movement is a degree now and then. Each is spread over the time to the next one.
-            1.0 => self.next_way(index, joint).min(self.time(index) + LONGEST_DEGREE),
+            1.0 => self.next_move(index, joint).min(self.time(index) + MAX_DEGREE_DURATION),
             _ => self.time(index + 1),
         };
-        Some(covering(degrees, until.saturating_sub(self.time(index))))
+        Some(speed_for(degrees, until.saturating_sub(self.time(index))))
     }
 
     /// When a joint that moves now moves again; the end, if it does not.
-    fn next_way(&self, index: usize, joint: usize) -> Duration {
+    fn next_move(&self, index: usize, joint: usize) -> Duration {
         let mut later = index + 1..self.points.len();
         let next = later.find(|&later| self.degrees(later, joint) > 0.0);
         self.time(next.unwrap_or(usize::MAX))

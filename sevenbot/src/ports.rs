@@ -8,7 +8,7 @@ use std::time::Duration;
 use protocol_core::registers::map::{BAUD_RATES, DEVICE_ID};
 use serialport::SerialPortType;
 
-use crate::arm::{Arm, Options};
+use crate::arm::{Arm, ArmOptions};
 use crate::error::OpenError;
 use crate::identity::Identity;
 use crate::span::Span;
@@ -27,7 +27,7 @@ const PROBE_ATTEMPTS: u32 = 2;
 /// }
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Port {
+pub struct PortInfo {
     /// What to open it by.
     pub name: String,
     /// What it is plugged into, in the system's words; empty where those are none.
@@ -42,17 +42,17 @@ pub struct Port {
 /// println!("{} arms", arms.count());
 /// ```
 #[derive(Debug)]
-pub struct Probed {
+pub struct ProbeResult {
     /// The port.
-    pub port: Port,
+    pub port: PortInfo,
     /// Who answered there, with the number its user gave it; or why nobody did.
     pub answer: Result<(Identity, u8), OpenError>,
 }
 
 /// The serial ports the system knows of. Pseudo-terminals, such as a simulator's, are not among them.
 #[must_use]
-pub fn available() -> Vec<Port> {
-    let mut ports: Vec<Port> =
+pub fn available() -> Vec<PortInfo> {
+    let mut ports: Vec<PortInfo> =
         serialport::available_ports().unwrap_or_default().into_iter().map(port).collect();
     ports.sort_by(|one, other| one.name.cmp(&other.name));
     // macOS has each port twice: tty waits for a carrier that no arm raises, cu does not.
@@ -62,7 +62,7 @@ pub fn available() -> Vec<Port> {
     ports
 }
 
-fn port(info: serialport::SerialPortInfo) -> Port {
+fn port(info: serialport::SerialPortInfo) -> PortInfo {
     let description = match info.port_type {
         SerialPortType::UsbPort(usb) => {
             let words = [usb.manufacturer, usb.product].into_iter().flatten().collect::<Vec<_>>().join(" ");
@@ -72,7 +72,7 @@ fn port(info: serialport::SerialPortInfo) -> Port {
         SerialPortType::PciPort => "PCI".to_owned(),
         SerialPortType::Unknown => String::new(),
     };
-    Port { name: info.port_name, description }
+    PortInfo { name: info.port_name, description }
 }
 
 /// Asks all these ports at once who is there.
@@ -86,8 +86,8 @@ fn port(info: serialport::SerialPortInfo) -> Port {
 /// }
 /// ```
 #[must_use]
-pub fn probe(ports: Vec<Port>, baud: u32) -> Vec<Probed> {
-    let ask = |port: Port| thread::spawn(move || Probed { answer: ask(&port.name, baud), port });
+pub fn probe(ports: Vec<PortInfo>, baud: u32) -> Vec<ProbeResult> {
+    let ask = |port: PortInfo| thread::spawn(move || ProbeResult { answer: ask(&port.name, baud), port });
     let asked: Vec<_> = ports.into_iter().map(ask).collect();
     asked.into_iter().filter_map(|thread| thread.join().ok()).collect()
 }
@@ -99,7 +99,7 @@ fn ask(name: &str, baud: u32) -> Result<(Identity, u8), OpenError> {
 }
 
 fn open_quickly(name: &str, baud: u32) -> Result<Arm, OpenError> {
-    Arm::open_with(name, Options { baud, reply_timeout: PROBE_TIMEOUT, attempts: PROBE_ATTEMPTS })
+    Arm::open_with(name, ArmOptions { baud, reply_timeout: PROBE_TIMEOUT, attempts: PROBE_ATTEMPTS })
 }
 
 /// Finds the baud rate an arm listens at, by trying all eight of them (register 12).

@@ -23,7 +23,7 @@ pub fn markdown() -> String {
     for row in MAP {
         let [address, name, rest @ ..] = cells(row);
         let joints = if row.per_joint { format!("Joint 1..{JOINTS}. ") } else { String::new() };
-        let line = format!("| {address} | `{name}` | {} | {joints}{} |", rest.join(" | "), words(row));
+        let line = format!("| {address} | `{name}` | {} | {joints}{} |", rest.join(" | "), description(row));
         push_line(&mut page, &line);
     }
     page
@@ -39,8 +39,8 @@ pub fn c_header() -> String {
 "
     .to_owned();
     for row in MAP {
-        push_line(&mut header, &format!("\n/* {} */", words(row)));
-        for (suffix, number) in numbers(row) {
+        push_line(&mut header, &format!("\n/* {} */", description(row)));
+        for (suffix, number) in constants(row) {
             push_line(&mut header, &format!("#define SEVENBOT_{}{suffix} {number}", row.name));
         }
     }
@@ -57,8 +57,8 @@ pub fn python() -> String {
     let mut module =
         "\"\"\"Registers of the 7Bot V2. Written by `sevenbot registers --format python`.\"\"\"\n".to_owned();
     for row in MAP {
-        push_line(&mut module, &format!("\n# {}", words(row)));
-        for (suffix, number) in numbers(row) {
+        push_line(&mut module, &format!("\n# {}", description(row)));
+        for (suffix, number) in constants(row) {
             push_line(&mut module, &format!("{}{suffix} = {number}", row.name));
         }
     }
@@ -87,15 +87,15 @@ pub fn cells(row: &Register) -> [String; 7] {
 }
 
 /// What a program wants to know of a row: the end of the constant's name, and its value.
-fn numbers(row: &Register) -> Vec<(&'static str, i16)> {
-    let mut numbers = vec![("", i16::from(row.address))];
+fn constants(row: &Register) -> Vec<(&'static str, i16)> {
+    let mut constants = vec![("", i16::from(row.address))];
     if row.count > 1 {
-        numbers.push(("_COUNT", i16::from(row.count)));
+        constants.push(("_COUNT", i16::from(row.count)));
     }
     if let Some((low, high)) = range(row).filter(|_| row.access == Access::ReadWrite) {
-        numbers.extend([("_MIN", low), ("_MAX", high)]);
+        constants.extend([("_MIN", low), ("_MAX", high)]);
     }
-    numbers
+    constants
 }
 
 fn addresses(row: &Register) -> String {
@@ -122,7 +122,7 @@ pub const fn access(access: Access) -> &'static str {
     }
 }
 
-/// The numbers of a row, where they are fewer than a byte has, or may be written.
+/// The constants of a row, where they are fewer than a byte has, or may be written.
 #[must_use]
 pub fn range(row: &Register) -> Option<(i16, i16)> {
     let is_any_byte = row.range == Range::UpTo(u8::MAX) && row.access != Access::ReadWrite;
@@ -130,16 +130,16 @@ pub fn range(row: &Register) -> Option<(i16, i16)> {
 }
 
 fn default(row: &Register) -> String {
-    let numbers = row.defaults.map(|byte| row.range.decode(byte).to_string());
-    match numbers.as_slice() {
+    let constants = row.defaults.map(|byte| row.range.decode(byte).to_string());
+    match constants.as_slice() {
         [first, rest @ ..] if rest.iter().all(|number| number == first) => first.clone(),
-        _ => numbers.join(" "),
+        _ => constants.join(" "),
     }
 }
 
 /// What a row is for.
 #[must_use]
-pub fn words(row: &Register) -> String {
+pub fn description(row: &Register) -> String {
     row.doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")
 }
 

@@ -1,4 +1,4 @@
-//! Traffic of both directions, as a listener on the line hears it: frames, and what is none.
+//! Traffic of both directions, as a parser on the line hears it: frames, and what is none.
 //!
 //! ```text
 //!   .. 01 02 AA 77 03 36 07 81 CE AA 77 03 36 07 5A 5A .. 43 81 ..
@@ -14,7 +14,7 @@ use protocol_core::wire::{Function, ToArm, ToHost};
 
 use crate::snapshot::Snapshot;
 
-/// Something heard.
+/// One thing heard on the line.
 ///
 /// ```
 /// use sevenbot::traffic::Traffic;
@@ -87,62 +87,62 @@ impl From<&Snapshot> for Traffic {
 /// Hears bytes, and says what they are.
 ///
 /// ```
-/// use sevenbot::traffic::{Traffic, Listener};
+/// use sevenbot::traffic::{Traffic, TrafficParser};
 ///
-/// let mut listener = Listener::default();
-/// listener.hear(b"\x01\xAA\x77\x03\x36\x07\x81\xCE");
-/// assert_eq!(listener.next(), Some(Traffic::Noise(vec![1])));
-/// assert_eq!(listener.next(), Some(Traffic::Read { address: 54, count: 7 }));
-/// assert_eq!(listener.next(), None);
+/// let mut parser = TrafficParser::default();
+/// parser.push(b"\x01\xAA\x77\x03\x36\x07\x81\xCE");
+/// assert_eq!(parser.next(), Some(Traffic::Noise(vec![1])));
+/// assert_eq!(parser.next(), Some(Traffic::Read { address: 54, count: 7 }));
+/// assert_eq!(parser.next(), None);
 /// ```
 #[derive(Clone, Debug, Default)]
-pub struct Listener {
+pub struct TrafficParser {
     waiting: Vec<u8>,
     /// So many of the waiting bytes are no frame, or no beginning of one.
     noise: usize,
 }
 
 /// What the beginning of some bytes is.
-enum Verdict {
+enum LeadingBytes {
     Frame(Traffic, usize),
     Unfinished,
     NoFrame,
 }
 
-impl Listener {
+impl TrafficParser {
     /// Bytes came.
-    pub fn hear(&mut self, bytes: &[u8]) {
+    pub fn push(&mut self, bytes: &[u8]) {
         self.waiting.extend(bytes);
     }
 
-    /// What was heard next; `None` while that depends on bytes to come.
+    /// The next item; `None` while that depends on bytes to come.
     #[expect(clippy::should_implement_trait, reason = "none now does not mean none later")]
     pub fn next(&mut self) -> Option<Traffic> {
         self.advance(false)
     }
 
-    /// What was heard next, now that nothing more belongs to it: the line is silent, or at its end.
-    pub fn next_before_silence(&mut self) -> Option<Traffic> {
+    /// The next item, now that nothing more belongs to it: the line is silent, or at its end.
+    pub fn next_at_gap(&mut self) -> Option<Traffic> {
         self.advance(true)
     }
 
-    fn advance(&mut self, is_over: bool) -> Option<Traffic> {
+    fn advance(&mut self, is_gap: bool) -> Option<Traffic> {
         while let Some(rest) = self.waiting.get(self.noise..).filter(|rest| !rest.is_empty()) {
-            match judge(rest) {
-                Verdict::Frame(..) if self.noise > 0 => return Some(self.take_noise()),
-                Verdict::Frame(heard, length) => {
+            match parse_leading(rest) {
+                LeadingBytes::Frame(..) if self.noise > 0 => return Some(self.take_noise()),
+                LeadingBytes::Frame(item, length) => {
                     self.waiting.drain(..length);
-                    return Some(heard);
+                    return Some(item);
                 }
-                Verdict::Unfinished if !is_over => return None,
-                Verdict::Unfinished | Verdict::NoFrame => self.noise += 1,
+                LeadingBytes::Unfinished if !is_gap => return None,
+                LeadingBytes::Unfinished | LeadingBytes::NoFrame => self.noise += 1,
             }
             // Noise without an end is told in pieces.
             if self.noise >= MAX_LENGTH {
                 return Some(self.take_noise());
             }
         }
-        (is_over && self.noise > 0).then(|| self.take_noise())
+        (is_gap && self.noise > 0).then(|| self.take_noise())
     }
 
     fn take_noise(&mut self) -> Traffic {
@@ -150,25 +150,25 @@ impl Listener {
     }
 }
 
-fn judge(bytes: &[u8]) -> Verdict {
-    match (reading::<ToArm>(bytes), reading::<ToHost>(bytes)) {
-        (found @ Verdict::Frame(..), _) | (_, found @ Verdict::Frame(..)) => found,
-        (Verdict::Unfinished, _) | (_, Verdict::Unfinished) => Verdict::Unfinished,
-        _ => Verdict::NoFrame,
+fn parse_leading(bytes: &[u8]) -> LeadingBytes {
+    match (parse_direction::<ToArm>(bytes), parse_direction::<ToHost>(bytes)) {
+        (found @ LeadingBytes::Frame(..), _) | (_, found @ LeadingBytes::Frame(..)) => found,
+        (LeadingBytes::Unfinished, _) | (_, LeadingBytes::Unfinished) => LeadingBytes::Unfinished,
+        _ => LeadingBytes::NoFrame,
     }
 }
 
 /// What the bytes are if they go in direction `D`. A malformed range still has a length; other damage is no frame.
-fn reading<D: Direction>(bytes: &[u8]) -> Verdict {
+fn parse_direction<D: Direction>(bytes: &[u8]) -> LeadingBytes {
     match (frame::parse::<D>(bytes), bytes) {
         (ParseOutcome::Complete(found, length), _) => {
-            Verdict::Frame(Traffic::from_frame::<D>(&found), length)
+            LeadingBytes::Frame(Traffic::from_frame::<D>(&found), length)
         }
         (ParseOutcome::Defective(Defect::MalformedRange { address }, length), [_, _, _, _, count, ..]) => {
-            Verdict::Frame(Traffic::TooFar { address, count: *count }, length)
+            LeadingBytes::Frame(Traffic::TooFar { address, count: *count }, length)
         }
-        (ParseOutcome::Incomplete(_), _) => Verdict::Unfinished,
-        _ => Verdict::NoFrame,
+        (ParseOutcome::Incomplete(_), _) => LeadingBytes::Unfinished,
+        _ => LeadingBytes::NoFrame,
     }
 }
 
@@ -182,45 +182,45 @@ mod tests {
     const UNLOCK: &[u8] = b"\xaa\x77\x06\x1c\x01\x00\x2c\xc4";
     const ANSWER: &[u8] = b"\xaa\x77\x03\x36\x07\x5a\x5a\x41\x5a\x5a\x5a\x50\x43\x81";
 
-    fn all(listener: &mut Listener) -> Vec<Traffic> {
-        std::iter::from_fn(|| listener.next_before_silence()).collect()
+    fn drain(parser: &mut TrafficParser) -> Vec<Traffic> {
+        std::iter::from_fn(|| parser.next_at_gap()).collect()
     }
 
-    fn heard_in(bytes: &[u8]) -> Vec<Traffic> {
-        let mut listener = Listener::default();
-        listener.hear(bytes);
-        all(&mut listener)
+    fn parse_all(bytes: &[u8]) -> Vec<Traffic> {
+        let mut parser = TrafficParser::default();
+        parser.push(bytes);
+        drain(&mut parser)
     }
 
     fn conversation() -> (Vec<u8>, Vec<Traffic>) {
         let bytes = [READ, ANSWER, b"\x01\x02\xaa", UNLOCK].concat();
-        let heard = vec![
+        let item = vec![
             Traffic::Read { address: 54, count: 7 },
             Traffic::Answer { address: 54, values: vec![90, 90, 65, 90, 90, 90, 80] },
             Traffic::Noise(vec![1, 2, 0xAA]),
             Traffic::Write { address: 28, values: vec![0] },
         ];
-        (bytes, heard)
+        (bytes, item)
     }
 
     #[test]
     fn both_directions_are_told_apart() {
-        let (bytes, heard) = conversation();
-        assert_eq!(heard_in(&bytes), heard);
+        let (bytes, item) = conversation();
+        assert_eq!(parse_all(&bytes), item);
     }
 
     #[test]
     fn any_cutting_gives_the_same() {
-        let (bytes, heard) = conversation();
+        let (bytes, item) = conversation();
         for size in 1..bytes.len() {
-            let mut listener = Listener::default();
+            let mut parser = TrafficParser::default();
             let mut told = Vec::new();
             for piece in bytes.chunks(size) {
-                listener.hear(piece);
-                told.extend(std::iter::from_fn(|| listener.next()));
+                parser.push(piece);
+                told.extend(std::iter::from_fn(|| parser.next()));
             }
-            told.extend(all(&mut listener));
-            assert_eq!(told, heard, "pieces of {size}");
+            told.extend(drain(&mut parser));
+            assert_eq!(told, item, "pieces of {size}");
         }
     }
 
@@ -228,37 +228,37 @@ mod tests {
     fn damage_is_noise_and_the_frame_behind_it_is_heard() {
         let mut damaged = ANSWER.to_vec();
         damaged[6] ^= 1;
-        let heard = heard_in(&[&damaged, READ].concat());
-        assert_eq!(heard, [Traffic::Noise(damaged), Traffic::Read { address: 54, count: 7 }]);
-        assert_eq!(heard_in(&READ[..4]), [Traffic::Noise(READ[..4].to_vec())], "cut short");
+        let item = parse_all(&[&damaged, READ].concat());
+        assert_eq!(item, [Traffic::Noise(damaged), Traffic::Read { address: 54, count: 7 }]);
+        assert_eq!(parse_all(&READ[..4]), [Traffic::Noise(READ[..4].to_vec())], "cut short");
     }
 
     #[test]
     fn an_unfinished_frame_is_waited_for_until_silence() {
-        let mut listener = Listener::default();
+        let mut parser = TrafficParser::default();
         let header = b"\xaa\x77\x06\x00\xff";
-        listener.hear(&[header, READ].concat());
-        assert_eq!(listener.next(), None, "a long write may go on like this");
-        assert_eq!(listener.next_before_silence(), Some(Traffic::Noise(header.to_vec())));
-        assert_eq!(listener.next(), Some(Traffic::Read { address: 54, count: 7 }));
+        parser.push(&[header, READ].concat());
+        assert_eq!(parser.next(), None, "a long write may go on like this");
+        assert_eq!(parser.next_at_gap(), Some(Traffic::Noise(header.to_vec())));
+        assert_eq!(parser.next(), Some(Traffic::Read { address: 54, count: 7 }));
     }
 
     #[test]
     fn a_range_beyond_the_last_register_is_a_frame_that_reaches_too_far() {
         let mut frame = FrameBuffer::new();
         Request::Read { address: 250, count: 7 }.encode(&mut frame);
-        assert_eq!(heard_in(&frame), [Traffic::TooFar { address: 250, count: 7 }]);
+        assert_eq!(parse_all(&frame), [Traffic::TooFar { address: 250, count: 7 }]);
         Reply { address: 250, values: &[0; 7] }.encode(&mut frame);
-        assert_eq!(heard_in(&frame), [Traffic::TooFar { address: 250, count: 7 }]);
+        assert_eq!(parse_all(&frame), [Traffic::TooFar { address: 250, count: 7 }]);
     }
 
     #[test]
     fn noise_without_an_end_does_not_pile_up() {
-        let mut listener = Listener::default();
+        let mut parser = TrafficParser::default();
         for _ in 0..100 {
-            listener.hear(&[0x55; 100]);
-            while listener.next().is_some() {}
+            parser.push(&[0x55; 100]);
+            while parser.next().is_some() {}
         }
-        assert!(listener.waiting.len() < MAX_LENGTH);
+        assert!(parser.waiting.len() < MAX_LENGTH);
     }
 }

@@ -10,18 +10,18 @@ use std::io::{Read, Write};
 use std::thread;
 use std::time::Duration;
 
-use fake::{IDENTITY, arm_of, reply};
+use fake::{IDENTITY, answering_arm, reply};
 use serialport::{SerialPort, TTYPort};
-use sevenbot::{Arm, Error, Heard, OpenError, Options};
+use sevenbot::{Arm, ArmOptions, Error, OpenError, ReceiveCounts};
 
 /// Patient: a busy machine may take long to answer, and only tests of silence wait to the end.
-fn options() -> Options {
-    Options { reply_timeout: Duration::from_secs(2), ..Options::default() }
+fn options() -> ArmOptions {
+    ArmOptions { reply_timeout: Duration::from_secs(2), ..ArmOptions::default() }
 }
 
 #[test]
 fn a_read_that_got_lost_is_asked_again() {
-    let (name, _port) = arm_of(|read, _, _| if read < 2 { vec![] } else { reply(0, &IDENTITY) });
+    let (name, _port) = answering_arm(|read, _, _| if read < 2 { vec![] } else { reply(0, &IDENTITY) });
     let arm = Arm::open_with(&name, options()).expect("the third try is answered");
     assert_eq!(arm.identity().version(), "3.0");
     assert_eq!(arm.identity().chip_id(), [1, 2, 3, 4, 5, 6]);
@@ -29,22 +29,22 @@ fn a_read_that_got_lost_is_asked_again() {
 
 #[test]
 fn a_silent_port_is_told_from_garbage() {
-    let heard = |bytes: &'static [u8]| {
-        let (name, _port) = arm_of(move |_, _, _| bytes.to_vec());
+    let received = |bytes: &'static [u8]| {
+        let (name, _port) = answering_arm(move |_, _, _| bytes.to_vec());
         match Arm::open_with(&name, options()) {
-            Err(OpenError::Silent(Error::NoAnswer { attempts: 3, heard, .. })) => heard,
+            Err(OpenError::Silent(Error::NoAnswer { attempts: 3, received, .. })) => received,
             other => panic!("{other:?}"),
         }
     };
-    assert_eq!(heard(b""), Heard::default());
-    assert_eq!(heard(b"garbage"), Heard { bytes: 21, ..Heard::default() });
-    let damaged = heard(&[0xAA, 0x77, 0x03, 0x00, 0x00, 0x11, 0x11]);
-    assert_eq!(damaged, Heard { bytes: 21, damaged_frames: 3, ..Heard::default() });
+    assert_eq!(received(b""), ReceiveCounts::default());
+    assert_eq!(received(b"garbage"), ReceiveCounts { bytes: 21, ..ReceiveCounts::default() });
+    let damaged = received(&[0xAA, 0x77, 0x03, 0x00, 0x00, 0x11, 0x11]);
+    assert_eq!(damaged, ReceiveCounts { bytes: 21, damaged_frames: 3, ..ReceiveCounts::default() });
 }
 
 #[test]
 fn another_device_is_refused_by_its_code() {
-    let (name, _port) = arm_of(|_, _, _| reply(0, &[9, 30, 0, 0, 0, 0, 0, 0]));
+    let (name, _port) = answering_arm(|_, _, _| reply(0, &[9, 30, 0, 0, 0, 0, 0, 0]));
     assert!(matches!(Arm::open_with(&name, options()), Err(OpenError::WrongDevice { code: 9 })));
 }
 
@@ -52,14 +52,14 @@ fn another_device_is_refused_by_its_code() {
 fn an_echo_of_the_request_is_no_answer() {
     // A one-wire adapter sends back what it was told to send: seen from here, a reply cut short.
     let echo = [0xAA, 0x77, 0x03, 0x00, 0x08, 0x50, 0x27];
-    let (name, _port) = arm_of(move |_, _, _| [echo.as_slice(), &reply(0, &IDENTITY)].concat());
+    let (name, _port) = answering_arm(move |_, _, _| [echo.as_slice(), &reply(0, &IDENTITY)].concat());
     assert!(Arm::open_with(&name, options()).is_ok());
 }
 
 #[test]
 fn reports_in_between_are_neither_answers_nor_lost() {
     let positions = |first: u8| reply(54, &[first, 20, 30, 40, 50, 60, 70]);
-    let (name, _port) = arm_of(move |read, address, count| match read {
+    let (name, _port) = answering_arm(move |read, address, count| match read {
         0 => reply(0, &IDENTITY),
         // Two reports and an answer nobody asked for, then the one that was asked for.
         1 => [positions(1), positions(2), reply(12, &[9]), reply(address, &vec![3; count.into()])].concat(),
@@ -77,7 +77,7 @@ fn reports_in_between_are_neither_answers_nor_lost() {
 
 #[test]
 fn a_late_answer_is_not_taken_for_the_next_one() {
-    let (name, _port) = arm_of(|read, address, _| match read {
+    let (name, _port) = answering_arm(|read, address, _| match read {
         0 => reply(0, &IDENTITY),
         // The second answer is as good as the first, but comes too late to be wanted.
         1 => [reply(address, &[1]), reply(address, &[99])].concat(),
@@ -93,7 +93,7 @@ fn a_late_answer_is_not_taken_for_the_next_one() {
 fn a_port_that_is_not_there_says_so() {
     assert!(matches!(Arm::open("/dev/no-such-port", 115_200), Err(OpenError::NotFound)));
     assert!(matches!(Arm::open("/dev/null", 115_200), Err(OpenError::Unusable(_))));
-    let (name, _port) = arm_of(|_, _, _| reply(0, &IDENTITY));
+    let (name, _port) = answering_arm(|_, _, _| reply(0, &IDENTITY));
     let _first = Arm::open_with(&name, options()).unwrap();
     assert!(matches!(Arm::open_with(&name, options()), Err(OpenError::Busy)));
 }

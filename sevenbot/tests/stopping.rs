@@ -7,37 +7,41 @@ mod fake;
 
 use std::time::Duration;
 
-use fake::{Damage, IDENTITY, POSE, arm_that, deaf_after, obey, on_a_bad_line, reply, under_way};
+use fake::{
+    IDENTITY, LineFault, POSE, arm_on_faulty_line, arm_that_loses_writes_after, execute, moving_registers,
+    reply, scripted_arm,
+};
 use protocol_core::request::Request;
-use sevenbot::hold::NotHeld;
-use sevenbot::{Arm, Error, Options};
+use sevenbot::hold::HoldError;
+use sevenbot::{Arm, ArmOptions, Error};
 
 /// Frames wait this long; the many attempts give a busy machine ten seconds.
-const PATIENT: Options = Options { baud: 115_200, reply_timeout: Duration::from_millis(200), attempts: 50 };
+const OPTIONS: ArmOptions =
+    ArmOptions { baud: 115_200, reply_timeout: Duration::from_millis(200), attempts: 50 };
 
 #[test]
 fn a_stop_survives_the_loss_of_any_frame() {
-    for damage in [Damage::Lost, Damage::Garbled, Damage::Late] {
-        for harmed in 0..14 {
-            let registers = under_way();
-            let (name, _port) = on_a_bad_line(&registers, harmed, damage);
-            let mut arm = Arm::open_with(&name, PATIENT).unwrap();
-            let held = arm.hold().unwrap_or_else(|error| panic!("{damage:?} {harmed}: {error}"));
-            assert_eq!(held.targets(), POSE, "{damage:?} {harmed}");
-            assert_eq!(registers.lock().unwrap()[46..53], POSE, "{damage:?} {harmed}");
+    for fault in [LineFault::Lost, LineFault::Garbled, LineFault::Late] {
+        for faulty_frame in 0..14 {
+            let registers = moving_registers();
+            let (name, _port) = arm_on_faulty_line(&registers, faulty_frame, fault);
+            let mut arm = Arm::open_with(&name, OPTIONS).unwrap();
+            let held = arm.hold().unwrap_or_else(|error| panic!("{fault:?} {faulty_frame}: {error}"));
+            assert_eq!(held.targets(), POSE, "{fault:?} {faulty_frame}");
+            assert_eq!(registers.lock().unwrap()[46..53], POSE, "{fault:?} {faulty_frame}");
         }
     }
 }
 
 #[test]
 fn a_checked_write_survives_the_loss_of_any_frame() {
-    for damage in [Damage::Lost, Damage::Garbled, Damage::Late] {
-        for harmed in 0..14 {
-            let registers = under_way();
-            let (name, _port) = on_a_bad_line(&registers, harmed, damage);
-            let mut arm = Arm::open_with(&name, PATIENT).unwrap();
-            assert_eq!(arm.write_checked(29, &[0]), Ok(vec![]), "{damage:?} {harmed}");
-            assert_eq!(registers.lock().unwrap()[29], 0, "{damage:?} {harmed}");
+    for fault in [LineFault::Lost, LineFault::Garbled, LineFault::Late] {
+        for faulty_frame in 0..14 {
+            let registers = moving_registers();
+            let (name, _port) = arm_on_faulty_line(&registers, faulty_frame, fault);
+            let mut arm = Arm::open_with(&name, OPTIONS).unwrap();
+            assert_eq!(arm.write_checked(29, &[0]), Ok(vec![]), "{fault:?} {faulty_frame}");
+            assert_eq!(registers.lock().unwrap()[29], 0, "{fault:?} {faulty_frame}");
         }
     }
 }
@@ -45,7 +49,7 @@ fn a_checked_write_survives_the_loss_of_any_frame() {
 #[test]
 fn a_late_reply_is_not_the_reply_to_the_next_read_of_the_same_registers() {
     let mut reads = 0;
-    let (name, _port) = arm_that(move |_, request| {
+    let (name, _port) = scripted_arm(move |_, request| {
         let Request::Read { address, count } = *request else { return Vec::new() };
         reads += 1;
         let values = |value| reply(address, &vec![value; count.into()]);
@@ -59,28 +63,28 @@ fn a_late_reply_is_not_the_reply_to_the_next_read_of_the_same_registers() {
             _ => panic!("a read too many"),
         }
     });
-    let mut arm = Arm::open_with(&name, PATIENT).unwrap();
+    let mut arm = Arm::open_with(&name, OPTIONS).unwrap();
     assert_eq!(arm.read(10, 4), Ok(vec![1; 4]));
     assert_eq!(arm.read(10, 4), Ok(vec![3; 4]), "not the late one");
 }
 
 #[test]
 fn a_report_is_not_the_reply_to_a_read_of_the_positions() {
-    let registers = under_way();
-    let (name, _port) = arm_that(move |_, request| {
+    let registers = moving_registers();
+    let (name, _port) = scripted_arm(move |_, request| {
         let report = reply(54, &[9; 7]);
-        [report, obey(&mut registers.lock().unwrap(), request)].concat()
+        [report, execute(&mut registers.lock().unwrap(), request)].concat()
     });
-    let mut arm = Arm::open_with(&name, PATIENT).unwrap();
+    let mut arm = Arm::open_with(&name, OPTIONS).unwrap();
     assert_eq!(arm.positions().unwrap().map(sevenbot::Angle::degrees), POSE);
     assert_eq!(arm.reports().count(), 2);
 }
 
 #[test]
 fn ranges_past_the_last_register_are_not_sent() {
-    let registers = under_way();
-    let (name, _port) = on_a_bad_line(&registers, usize::MAX, Damage::Lost);
-    let mut arm = Arm::open_with(&name, PATIENT).unwrap();
+    let registers = moving_registers();
+    let (name, _port) = arm_on_faulty_line(&registers, usize::MAX, LineFault::Lost);
+    let mut arm = Arm::open_with(&name, OPTIONS).unwrap();
     assert_eq!(arm.write(250, &[0; 10]), Err(Error::OutsideMap { address: 250, count: 10 }));
     assert_eq!(arm.write(0, &[0; 256]), Err(Error::OutsideMap { address: 0, count: 256 }));
     assert_eq!(arm.read(250, 7), Err(Error::OutsideMap { address: 250, count: 7 }));
@@ -89,11 +93,11 @@ fn ranges_past_the_last_register_are_not_sent() {
 
 #[test]
 fn a_stop_that_the_arm_does_not_take_is_an_error() {
-    let (name, _port, told) = deaf_after(0);
-    let mut arm = Arm::open_with(&name, PATIENT).unwrap();
-    assert!(matches!(arm.hold(), Err(NotHeld::NotTaken(targets)) if targets.len() == 2));
+    let (name, _port, writes) = arm_that_loses_writes_after(0);
+    let mut arm = Arm::open_with(&name, OPTIONS).unwrap();
+    assert!(matches!(arm.hold(), Err(HoldError::NotTaken(targets)) if targets.len() == 2));
     assert_eq!(
-        told.try_iter().count(),
+        writes.try_iter().count(),
         1 + 4 * 2,
         "all joints once, then both that did not take it, each in a frame"
     );

@@ -8,17 +8,17 @@ use clap::Args;
 use serde::Serialize;
 use sevenbot::map::{BAUD_RATE, find};
 use sevenbot::names::name_of_register;
-use sevenbot::words::meaning;
+use sevenbot::register_text::meaning;
 use sevenbot::{Arm, Snapshot};
 
-use super::all_taken;
 use super::set::unlocked;
+use crate::command_error::CommandError;
 use crate::confirm::confirm;
-use crate::failure::Failure;
-use crate::interrupt::or_hold;
-use crate::output::{Facts, note, warn};
+use crate::interrupt::hold_on_interrupt;
+use crate::printer::{Printable, note, warn};
 use crate::session::Session;
 use crate::settings_file::{SettingsFile, span};
+use crate::write_result::all_taken;
 
 /// Write the settings of the arm to a file.
 #[derive(Debug, Args)]
@@ -52,12 +52,12 @@ pub(crate) struct RestoreArgs {
     yes: bool,
 }
 
-pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), Failure> {
+pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let registers = arm.read_span(span())?;
     let text = SettingsFile::of(arm.identity(), &registers).text()?;
     if args.file.as_os_str() == "-" {
-        return session.output.raw(text.as_bytes());
+        return session.printer.print_raw(text.as_bytes());
     }
     write_whole(&args.file, &text, args.force)?;
     note(format_args!("settings are in {}", args.file.display()));
@@ -65,31 +65,31 @@ pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), Fai
 }
 
 /// Writes a file that is there as a whole or not at all; into what is no plain file it just writes.
-fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), Failure> {
+fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), CommandError> {
     let is_special = fs::symlink_metadata(path).is_ok_and(|there| !there.is_file());
     if may_replace && is_special {
-        return fs::write(path, text).map_err(|error| Failure::file(path, error));
+        return fs::write(path, text).map_err(|error| CommandError::file(path, error));
     }
     if may_replace {
         let beside = path.with_extension("toml.new");
         return fs::write(&beside, text)
             .and_then(|()| fs::rename(&beside, path))
-            .map_err(|error| Failure::file(path, error));
+            .map_err(|error| CommandError::file(path, error));
     }
     let written = File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
     written.map_err(|error| match error.kind() {
-        io::ErrorKind::AlreadyExists => Failure::file(path, "it is there already; --force replaces it"),
-        _ => Failure::file(path, error),
+        io::ErrorKind::AlreadyExists => CommandError::file(path, "it is there already; --force replaces it"),
+        _ => CommandError::file(path, error),
     })
 }
 
-pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), Failure> {
+pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), CommandError> {
     let file = SettingsFile::read(&args.file)?;
     let mut arm = session.connect()?;
     let now = arm.read_span(span())?;
-    let wanted = file.over(&args.file, &now)?;
+    let wanted = file.applied_to(&args.file, &now)?;
     let changes = changes(&now, &wanted);
-    session.output.show(&Changes { changes: &changes })?;
+    session.printer.print(&Changes { changes: &changes })?;
     if changes.is_empty() {
         return Ok(());
     }
@@ -110,10 +110,10 @@ pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), F
 }
 
 /// All settings in one frame: a power cut leaves all the old ones or all the new ones (D19).
-fn write(arm: &mut Arm, wanted: &Snapshot) -> Result<(), Failure> {
+fn write(arm: &mut Arm, wanted: &Snapshot) -> Result<(), CommandError> {
     // New offsets move the arm a little.
     let write = |arm: &mut Arm| arm.write_checked(wanted.address, &wanted.values);
-    all_taken(&or_hold(arm, |arm, _| unlocked(arm, write))?)
+    all_taken(&hold_on_interrupt(arm, |arm, _| unlocked(arm, write))?)
 }
 
 #[derive(Debug, Serialize)]
@@ -129,7 +129,7 @@ struct Changes<'a> {
     changes: &'a [Change],
 }
 
-impl Facts for Changes<'_> {
+impl Printable for Changes<'_> {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         if self.changes.is_empty() {
             return writeln!(out, "the arm has these settings already");

@@ -7,11 +7,11 @@ use serde::Serialize;
 use sevenbot::map::{BAUD_RATE, BAUD_RATES, baud_rate};
 use sevenbot::{OpenError, Span, ports};
 
-use super::all_taken;
 use super::set::unlocked;
-use crate::failure::Failure;
-use crate::output::{Facts, note};
+use crate::command_error::CommandError;
+use crate::printer::{Printable, note};
 use crate::session::Session;
+use crate::write_result::all_taken;
 
 /// Show, change or find the baud rate of the arm.
 #[derive(Debug, Args)]
@@ -41,12 +41,12 @@ fn rate(text: &str) -> Result<u32, String> {
 }
 
 #[derive(Serialize)]
-struct Rates {
+struct BaudRates {
     baud: u32,
     baud_after_restart: u32,
 }
 
-impl Facts for Rates {
+impl Printable for BaudRates {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         let Self { baud, baud_after_restart } = self;
         writeln!(out, "now            {baud} baud")?;
@@ -54,16 +54,16 @@ impl Facts for Rates {
     }
 }
 
-pub(crate) fn run(session: &mut Session, args: &BaudArgs) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &BaudArgs) -> Result<(), CommandError> {
     let mut arm = if args.find { find(session)? } else { session.connect()? };
     let baud = arm.options().baud;
     if let Some(rate) = args.rate {
         let code = BAUD_RATES.iter().zip(0..).find_map(|(&known, code)| (known == rate).then_some(code));
-        let code = code.ok_or_else(|| Failure::Usage(format!("the arm does not know {rate} baud")))?;
+        let code = code.ok_or_else(|| CommandError::Usage(format!("the arm does not know {rate} baud")))?;
         all_taken(&unlocked(&mut arm, |arm| arm.write_checked(BAUD_RATE.address, &[code]))?)?;
     }
     let baud_after_restart = baud_rate(arm.read_span(Span::of(&BAUD_RATE))?.byte(&BAUD_RATE));
-    session.output.show(&Rates { baud, baud_after_restart })?;
+    session.printer.print(&BaudRates { baud, baud_after_restart })?;
     if args.rate.is_some() && baud != baud_after_restart {
         note(format_args!(
             "switch the arm off and on, and then say --baud {baud_after_restart}; until then it listens at \
@@ -75,13 +75,13 @@ pub(crate) fn run(session: &mut Session, args: &BaudArgs) -> Result<(), Failure>
     Ok(())
 }
 
-fn find(session: &Session) -> Result<sevenbot::Arm, Failure> {
+fn find(session: &Session) -> Result<sevenbot::Arm, CommandError> {
     let port = session.port.clone().ok_or_else(|| {
-        Failure::Usage("--find needs --port: it would send to every device of this machine".to_owned())
+        CommandError::Usage("--find needs --port: it would send to every device of this machine".to_owned())
     })?;
     let tell = |baud| note(format_args!("trying {baud} baud"));
     ports::find_baud(&port, tell).map_err(|error| match error {
-        OpenError::Silent(_) => Failure::NoRate { port },
-        error => Failure::Open { port, error },
+        OpenError::Silent(_) => CommandError::NoRate { port },
+        error => CommandError::Open { port, error },
     })
 }

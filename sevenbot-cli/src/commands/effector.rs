@@ -2,23 +2,23 @@
 
 use clap::{Args, ValueEnum};
 use sevenbot::map::{EFFECTOR_TYPE, VACUUM_PUMP};
-use sevenbot::words::entries;
+use sevenbot::register_text::entries;
 use sevenbot::{Register, Span};
 
-use super::all_taken;
-use super::get::Registers;
-use crate::failure::Failure;
+use super::get::RegisterList;
+use crate::command_error::CommandError;
 use crate::session::Session;
+use crate::write_result::all_taken;
 
 /// Show or switch the vacuum pump.
 #[derive(Debug, Args)]
 pub(crate) struct VacuumArgs {
     /// What the pump should do.
-    vacuum: Option<Vacuum>,
+    vacuum: Option<PumpState>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Vacuum {
+enum PumpState {
     /// The pump runs, the valve is closed.
     #[value(alias = "suck")]
     On,
@@ -42,20 +42,20 @@ enum Effector {
     Gripper,
 }
 
-pub(crate) fn vacuum(session: &mut Session, args: &VacuumArgs) -> Result<(), Failure> {
-    let value = args.vacuum.map(|wanted| matches!(wanted, Vacuum::On).into());
+pub(crate) fn vacuum(session: &mut Session, args: &VacuumArgs) -> Result<(), CommandError> {
+    let value = args.vacuum.map(|wanted| matches!(wanted, PumpState::On).into());
     show_or_set(session, &VACUUM_PUMP, value)
 }
 
-pub(crate) fn effector(session: &mut Session, args: &EffectorArgs) -> Result<(), Failure> {
+pub(crate) fn effector(session: &mut Session, args: &EffectorArgs) -> Result<(), CommandError> {
     let value = args.effector.map(|wanted| matches!(wanted, Effector::Gripper).into());
     show_or_set(session, &EFFECTOR_TYPE, value)
 }
 
-fn show_or_set(session: &mut Session, row: &Register, value: Option<u8>) -> Result<(), Failure> {
+fn show_or_set(session: &mut Session, row: &Register, value: Option<u8>) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     if let Some(value) = value {
         all_taken(&arm.write_checked(row.address, &[value])?)?;
     }
-    session.output.show(&Registers::from(entries(&arm.read_span(Span::of(row))?)))
+    session.printer.print(&RegisterList::from(entries(&arm.read_span(Span::of(row))?)))
 }

@@ -7,10 +7,10 @@ use serde::Serialize;
 use serde_json::Value;
 use sevenbot::Span;
 use sevenbot::names;
-use sevenbot::words::{Entry, entries, raw_entries};
+use sevenbot::register_text::{RegisterEntry, entries, raw_entries};
 
-use crate::failure::Failure;
-use crate::output::Facts;
+use crate::command_error::CommandError;
+use crate::printer::Printable;
 use crate::session::Session;
 
 /// How registers are named, for the help of every command that takes such names.
@@ -36,24 +36,24 @@ pub(crate) struct GetArgs {
     raw: bool,
 }
 
-pub(crate) fn run(session: &mut Session, args: &GetArgs) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &GetArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let mut shown = Vec::new();
     for &span in &args.registers {
         let snapshot = arm.read_span(span)?;
         shown.extend(if args.raw { raw_entries(&snapshot) } else { entries(&snapshot) });
     }
-    session.output.show(&Registers::from(shown))
+    session.printer.print(&RegisterList::from(shown))
 }
 
 /// Registers as they are shown.
 #[derive(Debug, Serialize)]
-pub(crate) struct Registers {
-    registers: Vec<Line>,
+pub(crate) struct RegisterList {
+    registers: Vec<RegisterLine>,
 }
 
 #[derive(Debug, Serialize)]
-struct Line {
+struct RegisterLine {
     address: u8,
     name: String,
     bytes: Vec<u8>,
@@ -63,15 +63,15 @@ struct Line {
     text: String,
 }
 
-impl From<Vec<Entry>> for Registers {
-    fn from(entries: Vec<Entry>) -> Self {
-        Self { registers: entries.into_iter().map(Line::from).collect() }
+impl From<Vec<RegisterEntry>> for RegisterList {
+    fn from(entries: Vec<RegisterEntry>) -> Self {
+        Self { registers: entries.into_iter().map(RegisterLine::from).collect() }
     }
 }
 
-impl From<Entry> for Line {
-    fn from(entry: Entry) -> Self {
-        let Entry { address, name, bytes, value: text, meaning } = entry;
+impl From<RegisterEntry> for RegisterLine {
+    fn from(entry: RegisterEntry) -> Self {
+        let RegisterEntry { address, name, bytes, value: text, meaning } = entry;
         // Not every value is a number: the chip id is a name, and raw bytes are shown with 0x.
         let value = match (text.parse::<i32>(), bytes.as_slice()) {
             (Ok(number), _) => Value::from(number),
@@ -83,9 +83,9 @@ impl From<Entry> for Line {
 }
 
 /// One line an entry, in columns.
-impl Facts for Registers {
+impl Printable for RegisterList {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
-        for Line { address, name, text, meaning, .. } in &self.registers {
+        for RegisterLine { address, name, text, meaning, .. } in &self.registers {
             let line = format!("{address:>3}  {name:<24} {text:>5}  {meaning}");
             writeln!(out, "{}", line.trim_end())?;
         }

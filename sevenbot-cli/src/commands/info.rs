@@ -9,11 +9,11 @@ use sevenbot::map::{
     baud_rate,
 };
 use sevenbot::names::name_of_register;
-use sevenbot::words::{faults, joints, meaning, refusal_word};
-use sevenbot::{Arm, Firmware, Joint, Register, Snapshot, Span, Status};
+use sevenbot::register_text::{faults, joints, meaning, refusal_reason};
+use sevenbot::{Arm, Firmware, Joint, Register, Snapshot, Span, StatusBlock};
 
-use crate::failure::Failure;
-use crate::output::Facts;
+use crate::command_error::CommandError;
+use crate::printer::Printable;
 use crate::session::Session;
 use crate::style::{BAD, BOLD, GOOD};
 
@@ -23,29 +23,29 @@ use crate::style::{BAD, BOLD, GOOD};
 Exit status 1 when the arm reports a fault or a servo does not answer.")]
 pub(crate) struct InfoArgs {}
 
-pub(crate) fn run(session: &mut Session) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let settings = arm.read_span(Span::between(&DEVICE_ID, &FEEDBACK_FREQUENCY))?;
     let status = arm.status()?;
-    session.output.show(&Info {
-        identity: Identity::of(&arm),
-        settings: Settings::from(&settings),
+    session.printer.print(&ArmInfo {
+        identity: ArmIdentity::of(&arm),
+        settings: ArmSettings::from(&settings),
         health: status.as_ref().map(Health::from),
     })?;
     status.as_ref().map_or(Ok(()), healthy)
 }
 
 #[derive(Serialize)]
-struct Info {
+struct ArmInfo {
     #[serde(flatten)]
-    identity: Identity,
-    settings: Settings,
+    identity: ArmIdentity,
+    settings: ArmSettings,
     /// None from the maker's firmware.
     health: Option<Health>,
 }
 
 #[derive(Serialize)]
-struct Identity {
+struct ArmIdentity {
     port: String,
     baud: u32,
     firmware: String,
@@ -54,7 +54,7 @@ struct Identity {
 }
 
 #[derive(Serialize)]
-struct Settings {
+struct ArmSettings {
     device_id: u8,
     baud_rate: u32,
     offsets_degrees: [i16; 7],
@@ -83,7 +83,7 @@ struct Health {
     servo_bus_errors: u16,
 }
 
-impl Identity {
+impl ArmIdentity {
     fn of(arm: &Arm) -> Self {
         let identity = arm.identity();
         Self {
@@ -96,7 +96,7 @@ impl Identity {
     }
 }
 
-impl From<&Snapshot> for Settings {
+impl From<&Snapshot> for ArmSettings {
     fn from(registers: &Snapshot) -> Self {
         let word = |row: &Register| meaning(row, registers.byte(row));
         Self {
@@ -112,8 +112,8 @@ impl From<&Snapshot> for Settings {
     }
 }
 
-impl From<&Status> for Health {
-    fn from(status: &Status) -> Self {
+impl From<&StatusBlock> for Health {
+    fn from(status: &StatusBlock) -> Self {
         Self {
             healthy: status.is_healthy(),
             faults: faults(status.faults()),
@@ -126,7 +126,7 @@ impl From<&Status> for Health {
             frames_damaged: status.frames_corrupted(),
             frames_refused: status.frames_refused(),
             last_refusal: status.last_refusal().map(|(reason, register)| {
-                format!("{} ({})", refusal_word(reason), name_of_register(register))
+                format!("{} ({})", refusal_reason(reason), name_of_register(register))
             }),
             servo_bus_errors: status.servo_bus_errors(),
         }
@@ -137,9 +137,9 @@ fn line(out: &mut dyn Write, name: &str, value: &str) -> io::Result<()> {
     writeln!(out, "  {name:<20}{value}")
 }
 
-impl Facts for Info {
+impl Printable for ArmInfo {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
-        let Identity { port, baud, firmware, chip_id, .. } = &self.identity;
+        let ArmIdentity { port, baud, firmware, chip_id, .. } = &self.identity;
         writeln!(out, "{BOLD}7Bot V2{BOLD:#} on {port} at {baud} baud")?;
         line(out, "firmware", firmware)?;
         line(out, "chip id", chip_id)?;
@@ -151,7 +151,7 @@ impl Facts for Info {
     }
 }
 
-impl Facts for Settings {
+impl Printable for ArmSettings {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         let offsets = self.offsets_degrees.map(|degrees| degrees.to_string()).join(" ");
         let feedback = match self.feedback_hertz {
@@ -176,17 +176,17 @@ fn joint_numbers<S: Serializer>(bits: &u8, serializer: S) -> Result<S::Ok, S::Er
         .collect_seq(Joint::ALL.iter().filter(|joint| bits & joint.bit() != 0).map(|joint| joint.number()))
 }
 
-impl Facts for Health {
+impl Printable for Health {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
-        let judged = |is_good: bool, words: &str| {
+        let styled = |is_good: bool, words: &str| {
             let style = if is_good { GOOD } else { BAD };
             format!("{style}{words}{style:#}")
         };
         let supply = self.supply_volts.map(|volts| format!("{volts:.1} V"));
         let hottest = self.hottest_servo_celsius.map(|degrees| format!("{degrees} °C"));
         writeln!(out, "{BOLD}Health{BOLD:#}")?;
-        line(out, "faults", &judged(self.fault_bits == 0, &self.faults))?;
-        line(out, "servos missing", &judged(self.missing_joints == 0, &joints(self.missing_joints)))?;
+        line(out, "faults", &styled(self.fault_bits == 0, &self.faults))?;
+        line(out, "servos missing", &styled(self.missing_joints == 0, &joints(self.missing_joints)))?;
         line(out, "moving", &joints(self.moving_joints))?;
         line(out, "supply", supply.as_deref().unwrap_or("unknown"))?;
         line(out, "hottest servo", hottest.as_deref().unwrap_or("unknown"))?;
@@ -205,15 +205,15 @@ impl Health {
     }
 }
 
-fn healthy(status: &Status) -> Result<(), Failure> {
+fn healthy(status: &StatusBlock) -> Result<(), CommandError> {
     let faulty = faults(status.faults());
     match (status.faults(), status.missing()) {
         (0, 0) => Ok(()),
-        (0, missing) => Err(Failure::Arm(format!("no answer from the servos of {}", joints(missing)))),
-        (_, 0) => Err(Failure::Arm(format!("the arm reports a fault: {faulty}"))),
+        (0, missing) => Err(CommandError::Arm(format!("no answer from the servos of {}", joints(missing)))),
+        (_, 0) => Err(CommandError::Arm(format!("the arm reports a fault: {faulty}"))),
         (_, missing) => {
             let missing = joints(missing);
-            Err(Failure::Arm(format!("the arm reports a fault: {faulty}; no answer from {missing}")))
+            Err(CommandError::Arm(format!("the arm reports a fault: {faulty}; no answer from {missing}")))
         }
     }
 }

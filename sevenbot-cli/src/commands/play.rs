@@ -17,15 +17,15 @@ use sevenbot::playback::{self, Step};
 use sevenbot::recording::{Moment, Recording};
 use sevenbot::{Angle, Arm, Snapshot, Span};
 
-use super::all_taken;
-use crate::failure::Failure;
-use crate::interrupt::{Interrupt, or_hold};
-use crate::moving::{Move, driven};
-use crate::output::Facts;
+use crate::command_error::CommandError;
+use crate::interrupt::{Interrupt, hold_on_interrupt};
+use crate::joint_move::{JointMove, driven_joints};
 use crate::plot::{self, Track};
+use crate::printer::Printable;
 use crate::progress::Progress;
-use crate::reports::reporting;
+use crate::reports::with_reports;
 use crate::session::Session;
+use crate::write_result::all_taken;
 
 /// Play a recorded movement.
 ///
@@ -55,11 +55,11 @@ pub(crate) struct PlayArgs {
 /// How often the arm reports while it plays, in Hz.
 const FEEDBACK_HZ: u8 = 30;
 /// No report for so long, and something is wrong.
-const SILENCE: Duration = Duration::from_secs(2);
+const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
 /// How long Ctrl-C may wait.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+const POLL_PERIOD: Duration = Duration::from_millis(20);
 /// How long the drawing goes on behind the end: servos lag.
-const AFTERMATH: Duration = Duration::from_millis(300);
+const PLOT_TAIL: Duration = Duration::from_millis(300);
 
 /// What was played.
 #[derive(Debug, Serialize)]
@@ -68,7 +68,7 @@ struct Played {
     seconds: f64,
 }
 
-impl Facts for Played {
+impl Printable for Played {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         let Self { times, seconds, .. } = self;
         let times = if *times == 1 { String::new() } else { format!(", {times} times") };
@@ -76,33 +76,33 @@ impl Facts for Played {
     }
 }
 
-pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), CommandError> {
     let recording = load(args)?;
     let mut arm = session.connect()?;
-    driven(&mut arm)?;
+    driven_joints(&mut arm)?;
     let before = arm.read_span(Span::between(&SPEED, &TIME))?;
     let mut player = Player::new(&recording, args.speed);
     let times = args.times.unwrap_or(1);
-    let done = reporting(&mut arm, FEEDBACK_HZ, |arm| {
-        or_hold(arm, |arm, interrupt| player.play(arm, interrupt, times))
+    let done = with_reports(&mut arm, FEEDBACK_HZ, |arm| {
+        hold_on_interrupt(arm, |arm, interrupt| player.play(arm, interrupt, times))
     });
     // An arm that went away cannot be told anything.
-    let is_gone = done.as_ref().is_err_and(Failure::is_of_the_wire);
-    let tidied = if is_gone { Ok(()) } else { restore_pace(&mut arm, &before) };
+    let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
+    let restored = if is_gone { Ok(()) } else { restore_pace(&mut arm, &before) };
     if let Some(path) = &args.plot {
-        fs::write(path, player.drawing(args)).map_err(|error| Failure::file(path, error))?;
+        fs::write(path, player.plot(args)).map_err(|error| CommandError::file(path, error))?;
     }
-    done.and(tidied)?;
+    done.and(restored)?;
     let Player { played, seconds, .. } = player;
-    session.output.show(&Played { times: played, seconds })
+    session.printer.print(&Played { times: played, seconds })
 }
 
 /// The recording, if an arm can follow it.
-fn load(args: &PlayArgs) -> Result<Recording, Failure> {
-    let text = fs::read_to_string(&args.file).map_err(|error| Failure::file(&args.file, error))?;
+fn load(args: &PlayArgs) -> Result<Recording, CommandError> {
+    let text = fs::read_to_string(&args.file).map_err(|error| CommandError::file(&args.file, error))?;
     let recording = Recording::parse(&text);
     let checked = recording.and_then(|recording| recording.check_speeds(args.speed).map(|()| recording));
-    checked.map_err(|error| Failure::file(&args.file, error))
+    checked.map_err(|error| CommandError::file(&args.file, error))
 }
 
 fn factor(text: &str) -> Result<f64, String> {
@@ -111,7 +111,7 @@ fn factor(text: &str) -> Result<f64, String> {
 }
 
 /// Restores the speeds and times that the arm had before.
-fn restore_pace(arm: &mut Arm, before: &Snapshot) -> Result<(), Failure> {
+fn restore_pace(arm: &mut Arm, before: &Snapshot) -> Result<(), CommandError> {
     all_taken(&arm.write_checked(before.address, &before.values)?)
 }
 
@@ -122,7 +122,7 @@ struct Player {
     /// Where the joints were the first time through, since its beginning.
     measured: Vec<(Duration, [Angle; 7])>,
     /// When a report last came.
-    heard: Instant,
+    last_report: Instant,
     played: u32,
     seconds: f64,
 }
@@ -131,82 +131,82 @@ impl Player {
     fn new(recording: &Recording, factor: f64) -> Self {
         let seconds = recording.duration().as_secs_f64() / factor;
         let (moments, steps) = (recording.moments().collect(), playback::steps(recording, factor));
-        Self { moments, steps, measured: Vec::new(), heard: Instant::now(), played: 0, seconds }
+        Self { moments, steps, measured: Vec::new(), last_report: Instant::now(), played: 0, seconds }
     }
 
     /// Plays so many times; 0 is until somebody has seen enough.
-    fn play(&mut self, arm: &mut Arm, interrupt: Interrupt, times: u32) -> Result<(), Failure> {
+    fn play(&mut self, arm: &mut Arm, interrupt: Interrupt, times: u32) -> Result<(), CommandError> {
         while times == 0 || self.played < times {
             self.approach(arm, interrupt)?;
-            self.run_through(arm, interrupt)?;
+            self.play_once(arm, interrupt)?;
             self.played = self.played.saturating_add(1);
         }
         Ok(())
     }
 
     /// Goes slowly to where it begins.
-    fn approach(&self, arm: &mut Arm, interrupt: Interrupt) -> Result<(), Failure> {
+    fn approach(&self, arm: &mut Arm, interrupt: Interrupt) -> Result<(), CommandError> {
         let Some(first) = self.moments.first() else { return Ok(()) };
         let step = playback::approach(arm.positions()?, *first);
         let pace = step.registers();
         let pace = pace.get(..pace.len().saturating_sub(step.targets.len())).unwrap_or_default();
         all_taken(&arm.write_checked(VACUUM_PUMP.address, pace)?)?;
-        to_pose(arm, interrupt, step.targets)
+        move_to(arm, interrupt, step.targets)
     }
 
     /// Goes from the first step to the last.
-    fn run_through(&mut self, arm: &mut Arm, interrupt: Interrupt) -> Result<(), Failure> {
+    fn play_once(&mut self, arm: &mut Arm, interrupt: Interrupt) -> Result<(), CommandError> {
         let steps = std::mem::take(&mut self.steps);
-        let done = self.take(&steps, arm, interrupt);
+        let done = self.send(&steps, arm, interrupt);
         self.steps = steps;
         done?;
         let end = self.steps.last().map(|step| step.targets);
-        end.map_or(Ok(()), |targets| to_pose(arm, interrupt, targets))
+        end.map_or(Ok(()), |targets| move_to(arm, interrupt, targets))
     }
 
-    fn take(&mut self, steps: &[Step], arm: &mut Arm, interrupt: Interrupt) -> Result<(), Failure> {
+    fn send(&mut self, steps: &[Step], arm: &mut Arm, interrupt: Interrupt) -> Result<(), CommandError> {
         let progress = Progress::new(u64::try_from(steps.len()).unwrap_or(u64::MAX), "steps");
         arm.reports().for_each(drop);
         let start = Instant::now();
-        self.heard = start;
+        self.last_report = start;
         for (number, step) in (1..).zip(steps) {
-            self.listen_until(start, step.time, arm, interrupt)?;
+            self.take_reports_until(start, step.time, arm, interrupt)?;
             arm.write(VACUUM_PUMP.address, &step.registers())?;
             progress.set(number);
         }
         let end = steps.last().map_or(Duration::ZERO, |step| step.time);
-        self.listen_until(start, end + AFTERMATH, arm, interrupt)
+        self.take_reports_until(start, end + PLOT_TAIL, arm, interrupt)
     }
 
     /// Waits, and takes reports meanwhile.
-    fn listen_until(
+    fn take_reports_until(
         &mut self,
         start: Instant,
         time: Duration,
         arm: &mut Arm,
         interrupt: Interrupt,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), CommandError> {
         loop {
             interrupt.check()?;
             let left = time.saturating_sub(start.elapsed());
             if left.is_zero() {
                 return Ok(());
             }
-            match arm.next_report(left.min(LOOK_EVERY))? {
+            match arm.next_report(left.min(POLL_PERIOD))? {
                 Some(report) => {
-                    self.heard = report.received;
+                    self.last_report = report.received;
                     if self.played == 0 {
                         self.measured
                             .push((report.received.saturating_duration_since(start), report.positions));
                     }
                 }
-                None if self.heard.elapsed() > SILENCE => return Err(silent(arm)),
+                None if self.last_report.elapsed() > REPORT_TIMEOUT => return Err(silent(arm)),
                 None => {}
             }
         }
     }
 
-    fn drawing(&self, args: &PlayArgs) -> String {
+    fn plot(&self, args: &PlayArgs) -> String {
         let mut tracks: [Track; 7] = Default::default();
         let start = self.moments.first().map_or(Duration::ZERO, |moment| moment.time);
         for moment in &self.moments {
@@ -226,16 +226,16 @@ impl Player {
     }
 }
 
-fn to_pose(arm: &mut Arm, interrupt: Interrupt, targets: [Angle; 7]) -> Result<(), Failure> {
-    let there = Move::begin(arm, targets.map(|angle| Some(angle.degrees())))?;
+fn move_to(arm: &mut Arm, interrupt: Interrupt, targets: [Angle; 7]) -> Result<(), CommandError> {
+    let there = JointMove::begin(arm, targets.map(|angle| Some(angle.degrees())))?;
     there.finish(arm, interrupt).map(drop)
 }
 
 /// Why no report comes any more.
-fn silent(arm: &mut Arm) -> Failure {
-    match driven(arm) {
+fn silent(arm: &mut Arm) -> CommandError {
+    match driven_joints(arm) {
         Err(failure) => failure,
-        Ok(_) => Failure::Arm(
+        Ok(_) => CommandError::Arm(
             "the arm has stopped to report its positions: was it switched off and on again?".to_owned(),
         ),
     }

@@ -4,10 +4,10 @@ use std::io::{self, Write};
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot::ports::{Port, Probed, available, probe};
+use sevenbot::ports::{PortInfo, ProbeResult, available, probe};
 
-use crate::failure::Failure;
-use crate::output::Facts;
+use crate::command_error::CommandError;
+use crate::printer::Printable;
 use crate::session::Session;
 use crate::style::GOOD;
 
@@ -25,47 +25,47 @@ pub(crate) struct PortsArgs {
     ports: Vec<String>,
 }
 
-pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), CommandError> {
     let named = args.ports.iter().chain(&session.port);
-    let named = named.map(|name| Port { name: name.clone(), description: String::new() });
-    let mut asked: Vec<Port> = if args.ports.is_empty() { available() } else { Vec::new() };
+    let named = named.map(|name| PortInfo { name: name.clone(), description: String::new() });
+    let mut asked: Vec<PortInfo> = if args.ports.is_empty() { available() } else { Vec::new() };
     for port in named {
         if asked.iter().all(|known| known.name != port.name) {
             asked.push(port);
         }
     }
-    let ports = probe(asked, session.options.baud).into_iter().map(Line::from).collect();
-    session.output.show(&Ports { ports })
+    let ports = probe(asked, session.options.baud).into_iter().map(PortLine::from).collect();
+    session.printer.print(&Ports { ports })
 }
 
 #[derive(Serialize)]
 struct Ports {
-    ports: Vec<Line>,
+    ports: Vec<PortLine>,
 }
 
 #[derive(Serialize)]
-struct Line {
+struct PortLine {
     port: String,
     description: String,
-    arm: Option<Found>,
+    arm: Option<FoundArm>,
     no_arm: Option<String>,
 }
 
 #[derive(Serialize)]
-struct Found {
+struct FoundArm {
     device_id: u8,
     firmware: String,
     chip_id: String,
 }
 
-impl From<Probed> for Line {
-    fn from(probed: Probed) -> Self {
-        let Probed { port: Port { name: port, description }, answer } = probed;
+impl From<ProbeResult> for PortLine {
+    fn from(probed: ProbeResult) -> Self {
+        let ProbeResult { port: PortInfo { name: port, description }, answer } = probed;
         match answer {
             Ok((identity, device_id)) => {
                 let chip_id = identity.chip_name();
                 let firmware = identity.version();
-                let arm = Some(Found { device_id, firmware, chip_id });
+                let arm = Some(FoundArm { device_id, firmware, chip_id });
                 Self { port, description, arm, no_arm: None }
             }
             Err(reason) => Self { port, description, arm: None, no_arm: Some(reason.to_string()) },
@@ -73,7 +73,7 @@ impl From<Probed> for Line {
     }
 }
 
-impl Facts for Ports {
+impl Printable for Ports {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         if self.ports.is_empty() {
             return writeln!(out, "this machine has no serial port");
@@ -86,11 +86,11 @@ impl Facts for Ports {
     }
 }
 
-impl Line {
+impl PortLine {
     fn write_text(&self, width: usize, out: &mut dyn Write) -> io::Result<()> {
         let Self { port, description, arm, no_arm } = self;
         match arm {
-            Some(Found { device_id, firmware, chip_id }) => writeln!(
+            Some(FoundArm { device_id, firmware, chip_id }) => writeln!(
                 out,
                 "{port:<width$}  {GOOD}7Bot V2{GOOD:#}, id {device_id}, firmware {firmware}, chip {chip_id}"
             )?,

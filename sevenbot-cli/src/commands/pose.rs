@@ -9,12 +9,12 @@ use sevenbot::joints::{JointSnapshot, frames_for};
 use sevenbot::map::{SPEED, TARGET_POSITION, TIME};
 use sevenbot::{Angle, Arm, Joint, Speed};
 
-use super::all_taken;
-use crate::failure::Failure;
-use crate::interrupt::or_hold;
-use crate::moving::{Move, Targets, driven, stepped};
-use crate::output::Facts;
+use crate::command_error::CommandError;
+use crate::interrupt::hold_on_interrupt;
+use crate::joint_move::{JointMove, Targets, driven_joints, step_target};
+use crate::printer::Printable;
 use crate::session::Session;
+use crate::write_result::all_taken;
 
 /// Send joints to a pose.
 #[derive(Debug, Args)]
@@ -34,9 +34,9 @@ pub(crate) struct PoseArgs {
     /// alone.
     #[arg(value_names = ["A1", "A2", "A3", "A4", "A5", "A6", "A7"], num_args = 7, required = true,
           action = ArgAction::Set, allow_negative_numbers = true)]
-    angles: Vec<Goal>,
+    angles: Vec<PoseArg>,
     #[command(flatten)]
-    how: HowArgs,
+    pace: PaceArgs,
 }
 
 /// Send all joints to the standard pose.
@@ -46,11 +46,11 @@ Examples:
   sevenbot home --speed 20 --wait")]
 pub(crate) struct HomeArgs {
     #[command(flatten)]
-    how: HowArgs,
+    pace: PaceArgs,
 }
 
 #[derive(Debug, Args)]
-struct HowArgs {
+struct PaceArgs {
     /// Speed of these joints in steps of 1.9 degrees per second, 1 to 100; 0 is the motors' maximum.
     #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=100))]
     speed: Option<u8>,
@@ -64,13 +64,13 @@ struct HowArgs {
 
 /// Where one joint should go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Goal {
+enum PoseArg {
     At(u8),
     By(i16),
     Leave,
 }
 
-impl FromStr for Goal {
+impl FromStr for PoseArg {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -88,44 +88,44 @@ impl FromStr for Goal {
     }
 }
 
-impl Goal {
+impl PoseArg {
     /// In degrees, for a joint that stands and is sent where these joints are.
-    fn degrees(self, joint: Joint, joints: &JointSnapshot) -> Result<Option<u8>, Failure> {
+    fn degrees(self, joint: Joint, joints: &JointSnapshot) -> Result<Option<u8>, CommandError> {
         let Self::By(step) = self else {
             return Ok(if let Self::At(degrees) = self { Some(degrees) } else { None });
         };
-        let degrees = stepped(joints, joint, step)?;
+        let degrees = step_target(joints, joint, step)?;
         let angle = u8::try_from(degrees).ok().and_then(Angle::from_degrees);
         angle.map(|angle| Some(angle.degrees())).ok_or_else(|| {
             let number = joint.number();
-            Failure::Arm(format!(
+            CommandError::Arm(format!(
                 "joint {number} would go to {degrees}°: it takes 0 to 180; nothing was moved"
             ))
         })
     }
 }
 
-pub(crate) fn run(session: &mut Session, args: &PoseArgs) -> Result<(), Failure> {
-    take(session, &args.angles, &args.how)
+pub(crate) fn run(session: &mut Session, args: &PoseArgs) -> Result<(), CommandError> {
+    move_to(session, &args.angles, &args.pace)
 }
 
-pub(crate) fn home(session: &mut Session, args: &HomeArgs) -> Result<(), Failure> {
-    take(session, &TARGET_POSITION.defaults.map(Goal::At), &args.how)
+pub(crate) fn home(session: &mut Session, args: &HomeArgs) -> Result<(), CommandError> {
+    move_to(session, &TARGET_POSITION.defaults.map(PoseArg::At), &args.pace)
 }
 
-fn take(session: &mut Session, goals: &[Goal], how: &HowArgs) -> Result<(), Failure> {
+fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
-    let reached = or_hold(&mut arm, |arm, interrupt| {
-        let targets = targets(goals, &driven(arm)?)?;
-        set_pace(arm, &targets, how)?;
+    let reached = hold_on_interrupt(&mut arm, |arm, interrupt| {
+        let targets = targets(goals, &driven_joints(arm)?)?;
+        set_speed_and_time(arm, &targets, pace)?;
         interrupt.check()?;
-        let begun = Move::begin(arm, targets)?;
-        how.wait.then(|| begun.finish(arm, interrupt)).transpose()
+        let begun = JointMove::begin(arm, targets)?;
+        pace.wait.then(|| begun.finish(arm, interrupt)).transpose()
     })?;
-    reached.map_or(Ok(()), |positions_degrees| session.output.show(&Stand { positions_degrees }))
+    reached.map_or(Ok(()), |positions_degrees| session.printer.print(&Positions { positions_degrees }))
 }
 
-fn targets(goals: &[Goal], joints: &JointSnapshot) -> Result<Targets, Failure> {
+fn targets(goals: &[PoseArg], joints: &JointSnapshot) -> Result<Targets, CommandError> {
     let mut targets = [None; 7];
     for ((target, goal), joint) in targets.iter_mut().zip(goals).zip(Joint::ALL) {
         *target = goal.degrees(joint, joints)?;
@@ -134,22 +134,22 @@ fn targets(goals: &[Goal], joints: &JointSnapshot) -> Result<Targets, Failure> {
 }
 
 /// Paces the joints that are to move, and only those.
-fn set_pace(arm: &mut Arm, targets: &Targets, how: &HowArgs) -> Result<(), Failure> {
-    let for_movers = |steps: u8| targets.map(|target| target.map(|_| steps));
-    let speed = how.speed.or(how.time.map(|_| Speed::MAXIMUM.steps()));
-    let speeds = speed.map(|steps| frames_for(&SPEED, &for_movers(steps)));
-    let times = how.time.map(|steps| frames_for(&TIME, &for_movers(steps)));
+fn set_speed_and_time(arm: &mut Arm, targets: &Targets, pace: &PaceArgs) -> Result<(), CommandError> {
+    let for_targets = |steps: u8| targets.map(|target| target.map(|_| steps));
+    let speed = pace.speed.or(pace.time.map(|_| Speed::MAXIMUM.steps()));
+    let speeds = speed.map(|steps| frames_for(&SPEED, &for_targets(steps)));
+    let times = pace.time.map(|steps| frames_for(&TIME, &for_targets(steps)));
     let frames: Vec<_> = speeds.into_iter().chain(times).flatten().collect();
     if frames.is_empty() { Ok(()) } else { all_taken(&arm.write_all_checked(&frames)?) }
 }
 
 /// Where the arm is.
 #[derive(Serialize)]
-pub(crate) struct Stand {
+pub(crate) struct Positions {
     pub(crate) positions_degrees: [u8; 7],
 }
 
-impl Facts for Stand {
+impl Printable for Positions {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{}", self.positions_degrees.map(|degrees| degrees.to_string()).join(" "))
     }
@@ -161,13 +161,13 @@ mod tests {
 
     #[test]
     fn goals_are_absolute_relative_or_none() {
-        assert_eq!("120".parse(), Ok(Goal::At(120)));
-        assert_eq!("+10".parse(), Ok(Goal::By(10)));
-        assert_eq!("-10".parse(), Ok(Goal::By(-10)));
-        assert_eq!("_".parse(), Ok(Goal::Leave));
-        assert_eq!(".".parse(), Ok(Goal::Leave));
+        assert_eq!("120".parse(), Ok(PoseArg::At(120)));
+        assert_eq!("+10".parse(), Ok(PoseArg::By(10)));
+        assert_eq!("-10".parse(), Ok(PoseArg::By(-10)));
+        assert_eq!("_".parse(), Ok(PoseArg::Leave));
+        assert_eq!(".".parse(), Ok(PoseArg::Leave));
         for text in ["181", "", "+", "_5", "9.5", "--5"] {
-            assert!(text.parse::<Goal>().is_err(), "{text}");
+            assert!(text.parse::<PoseArg>().is_err(), "{text}");
         }
     }
 }

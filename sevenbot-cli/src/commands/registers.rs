@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use sevenbot::map::MAP;
 use sevenbot::{Range, Register, table};
 
-use crate::failure::Failure;
+use crate::command_error::CommandError;
 use crate::session::Session;
 
 /// Print the register table: it needs no arm.
@@ -35,8 +35,8 @@ enum Format {
     Python,
 }
 
-pub(crate) fn run(session: &mut Session, args: &RegistersArgs) -> Result<(), Failure> {
-    let format = if session.output.is_json() { Format::Json } else { args.format };
+pub(crate) fn run(session: &mut Session, args: &RegistersArgs) -> Result<(), CommandError> {
+    let format = if session.printer.is_json() { Format::Json } else { args.format };
     let text = match format {
         Format::Text => text(),
         Format::Markdown => table::markdown(),
@@ -44,7 +44,7 @@ pub(crate) fn run(session: &mut Session, args: &RegistersArgs) -> Result<(), Fai
         Format::C => table::c_header(),
         Format::Python => table::python(),
     };
-    session.output.raw(text.as_bytes())
+    session.printer.print_raw(text.as_bytes())
 }
 
 /// Columns for a terminal.
@@ -88,7 +88,7 @@ fn object(row: &Register) -> Value {
         "sign_magnitude": matches!(row.range, Range::SignMagnitude(_)),
         "default": if row.per_joint { json!(defaults) } else { json!(default) },
         "unit": row.unit.symbol(),
-        "meaning": table::words(row),
+        "meaning": table::description(row),
     })
 }
 

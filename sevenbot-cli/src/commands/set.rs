@@ -1,18 +1,18 @@
 //! `set`: writes registers in one frame, reads them back, and says what did not take and why.
 
 use clap::Args;
-use sevenbot::change::{Cause, Unchanged};
+use sevenbot::checked_write::{MismatchCause, WriteMismatch};
 use sevenbot::map::{BAUD_RATE, EEPROM_LOCK, find};
 use sevenbot::names::{self, name_of_register};
-use sevenbot::words::{self, entries};
+use sevenbot::register_text::{self, entries};
 use sevenbot::{Arm, Error, Span};
 
-use super::all_taken;
-use super::get::{NAMES, Registers};
-use crate::failure::Failure;
-use crate::interrupt::or_hold;
-use crate::output::note;
+use super::get::{NAMES, RegisterList};
+use crate::command_error::CommandError;
+use crate::interrupt::hold_on_interrupt;
+use crate::printer::note;
 use crate::session::Session;
+use crate::write_result::all_taken;
 
 /// Write registers, read them back, and say what did not take and why.
 #[derive(Debug, Args)]
@@ -50,17 +50,17 @@ fn number(text: &str) -> Result<i32, String> {
     parsed.map_err(|_| "not a number".to_owned())
 }
 
-pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandError> {
     let span = args.register;
     let bytes = bytes(span, &args.values, args.raw)?;
     let mut arm = session.connect()?;
     // Targets, offsets and the motor state move the arm.
-    let unchanged = or_hold(&mut arm, |arm, _| {
+    let unchanged = hold_on_interrupt(&mut arm, |arm, _| {
         let write = |arm: &mut Arm| arm.write_checked(span.address(), &bytes);
         if args.unlock { unlocked(arm, write) } else { Ok(write(arm)?) }
     })?;
-    session.output.show(&Registers::from(entries(&arm.read_span(span)?)))?;
-    remark(span, args, &unchanged);
+    session.printer.print(&RegisterList::from(entries(&arm.read_span(span)?)))?;
+    note_causes(span, args, &unchanged);
     all_taken(&unchanged)
 }
 
@@ -68,7 +68,7 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), Failure> 
 pub(crate) fn unlocked<T>(
     arm: &mut Arm,
     work: impl FnOnce(&mut Arm) -> Result<T, Error>,
-) -> Result<T, Failure> {
+) -> Result<T, CommandError> {
     all_taken(&arm.write_checked(EEPROM_LOCK.address, &[0])?)?;
     let done = work(arm);
     let closed = arm.write_checked(EEPROM_LOCK.address, &[1]);
@@ -77,8 +77,8 @@ pub(crate) fn unlocked<T>(
     Ok(done)
 }
 
-fn remark(span: Span, args: &SetArgs, unchanged: &[Unchanged]) {
-    if unchanged.iter().any(|register| register.cause == Cause::Locked) && !args.unlock {
+fn note_causes(span: Span, args: &SetArgs, unchanged: &[WriteMismatch]) {
+    if unchanged.iter().any(|register| register.cause == MismatchCause::Locked) && !args.unlock {
         note("settings are protected by the EEPROM lock, register 28: --unlock opens it for this write");
     } else if unchanged.is_empty() && span.addresses().any(|address| BAUD_RATE.holds(address)) {
         note("the new baud rate is in force after the next restart of the arm");
@@ -86,14 +86,14 @@ fn remark(span: Span, args: &SetArgs, unchanged: &[Unchanged]) {
 }
 
 /// The bytes for a span: one value per register, or one for all.
-fn bytes(span: Span, values: &[i32], raw: bool) -> Result<Vec<u8>, Failure> {
+fn bytes(span: Span, values: &[i32], raw: bool) -> Result<Vec<u8>, CommandError> {
     let registers = usize::from(span.count());
     let values = match values {
         [only] => vec![*only; registers],
         all if all.len() == registers => all.to_vec(),
         all => {
             let given = all.len();
-            return Err(Failure::Usage(format!(
+            return Err(CommandError::Usage(format!(
                 "{given} values for {registers} registers: one each, or one for all"
             )));
         }
@@ -102,18 +102,18 @@ fn bytes(span: Span, values: &[i32], raw: bool) -> Result<Vec<u8>, Failure> {
     pairs.map(|(address, value)| if raw { raw_byte(value) } else { byte(address, value) }).collect()
 }
 
-fn raw_byte(value: i32) -> Result<u8, Failure> {
-    u8::try_from(value).map_err(|_| Failure::Usage(format!("{value} is no byte: 0 to 255")))
+fn raw_byte(value: i32) -> Result<u8, CommandError> {
+    u8::try_from(value).map_err(|_| CommandError::Usage(format!("{value} is no byte: 0 to 255")))
 }
 
 /// The byte for a number in the table's units. One out of range is not even sent: the maker's firmware
 /// would take it.
-fn byte(address: u8, value: i32) -> Result<u8, Failure> {
+fn byte(address: u8, value: i32) -> Result<u8, CommandError> {
     let Some(row) = find(address) else { return raw_byte(value) };
     i16::try_from(value).ok().and_then(|value| row.range.encode(value)).ok_or_else(|| {
-        let (name, range) = (name_of_register(address), words::range(address));
+        let (name, range) = (name_of_register(address), register_text::range(address));
         let hint = if *row == BAUD_RATE { "; `sevenbot baud` takes bits per second" } else { "" };
-        Failure::Arm(format!("{value} is out of range: {name} takes {range}; nothing was written{hint}"))
+        CommandError::Arm(format!("{value} is out of range: {name} takes {range}; nothing was written{hint}"))
     })
 }
 
@@ -142,10 +142,10 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_refused_before_it_is_sent() {
         let target = Span::one(TARGET_POSITION.address);
-        let Err(Failure::Arm(said)) = bytes(target, &[181], false) else { panic!("out of range") };
+        let Err(CommandError::Arm(said)) = bytes(target, &[181], false) else { panic!("out of range") };
         assert!(said.contains("target-position.1 takes 0 to 180"), "{said}");
         assert_eq!(bytes(target, &[181], true).ok(), Some(vec![181]), "--raw sends it");
-        assert!(matches!(bytes(target, &[256], true), Err(Failure::Usage(_))));
-        assert!(matches!(bytes(target, &[1, 2], false), Err(Failure::Usage(_))));
+        assert!(matches!(bytes(target, &[256], true), Err(CommandError::Usage(_))));
+        assert!(matches!(bytes(target, &[1, 2], false), Err(CommandError::Usage(_))));
     }
 }

@@ -7,7 +7,7 @@ use clap::{Args, Command};
 use clap_complete::Shell;
 use clap_mangen::Man;
 
-use crate::failure::Failure;
+use crate::command_error::CommandError;
 use crate::session::Session;
 
 /// Print the completions for a shell.
@@ -42,13 +42,13 @@ pub(crate) fn completions(
     session: &mut Session,
     args: &CompletionsArgs,
     mut program: Command,
-) -> Result<(), Failure> {
+) -> Result<(), CommandError> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut program, "sevenbot", &mut script);
-    session.output.raw(&script)
+    session.printer.print_raw(&script)
 }
 
-pub(crate) fn man(session: &mut Session, args: &ManArgs, program: Command) -> Result<(), Failure> {
+pub(crate) fn man(session: &mut Session, args: &ManArgs, program: Command) -> Result<(), CommandError> {
     let mut program = program.disable_help_subcommand(true);
     // Gives every command what it inherits: the global options, and its full name.
     program.build();
@@ -56,14 +56,15 @@ pub(crate) fn man(session: &mut Session, args: &ManArgs, program: Command) -> Re
         (Some(folder), _) => write_all(&program, folder),
         (None, Some(name)) => {
             let command = program.find_subcommand(name);
-            let command = command.ok_or_else(|| Failure::Usage(format!("there is no command {name}")))?;
-            session.output.raw(&page(command.clone())?)
+            let command =
+                command.ok_or_else(|| CommandError::Usage(format!("there is no command {name}")))?;
+            session.printer.print_raw(&page(command.clone())?)
         }
-        (None, None) => session.output.raw(&page(program)?),
+        (None, None) => session.printer.print_raw(&page(program)?),
     }
 }
 
-fn page(command: Command) -> Result<Vec<u8>, Failure> {
+fn page(command: Command) -> Result<Vec<u8>, CommandError> {
     let mut page = Vec::new();
     let title = title(&command);
     Man::new(command).title(title).render(&mut page)?;
@@ -75,11 +76,11 @@ fn title(command: &Command) -> String {
     command.get_display_name().unwrap_or_else(|| command.get_name()).to_owned()
 }
 
-fn write_all(program: &Command, folder: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(folder).map_err(|error| Failure::file(folder, error))?;
+fn write_all(program: &Command, folder: &Path) -> Result<(), CommandError> {
+    fs::create_dir_all(folder).map_err(|error| CommandError::file(folder, error))?;
     for command in std::iter::once(program).chain(program.get_subcommands()) {
         let path = folder.join(format!("{}.1", title(command)));
-        fs::write(&path, page(command.clone())?).map_err(|error| Failure::file(&path, error))?;
+        fs::write(&path, page(command.clone())?).map_err(|error| CommandError::file(&path, error))?;
     }
     Ok(())
 }

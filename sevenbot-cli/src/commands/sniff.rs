@@ -7,13 +7,13 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot::serial::Serial;
-use sevenbot::traffic::{Listener, Traffic};
+use sevenbot::open_port::OpenPort;
+use sevenbot::traffic::{Traffic, TrafficParser};
 
-use crate::failure::Failure;
-use crate::output::{Facts, Output};
+use crate::command_error::CommandError;
+use crate::printer::{Printable, Printer};
 use crate::session::Session;
-use crate::style::DOUBTFUL;
+use crate::style::WARNING;
 
 /// Show what goes over a line, frame by frame, in words.
 #[derive(Debug, Args)]
@@ -32,61 +32,61 @@ pub(crate) struct SniffArgs {
 }
 
 /// Silence that no frame goes on after (D4).
-const SILENCE: Duration = Duration::from_millis(100);
+const GAP: Duration = Duration::from_millis(100);
 
-pub(crate) fn run(session: &mut Session, args: &SniffArgs) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &SniffArgs) -> Result<(), CommandError> {
     match &args.file {
-        Some(path) if path.as_os_str() == "-" => file(&mut session.output, path, &mut io::stdin().lock()),
+        Some(path) if path.as_os_str() == "-" => file(&mut session.printer, path, &mut io::stdin().lock()),
         Some(path) => {
-            let mut opened = File::open(path).map_err(|error| Failure::file(path, error))?;
-            file(&mut session.output, path, &mut opened)
+            let mut opened = File::open(path).map_err(|error| CommandError::file(path, error))?;
+            file(&mut session.printer, path, &mut opened)
         }
         None => port(session),
     }
 }
 
-fn file(output: &mut Output, path: &Path, source: &mut dyn Read) -> Result<(), Failure> {
-    let mut listener = Listener::default();
+fn file(printer: &mut Printer, path: &Path, source: &mut dyn Read) -> Result<(), CommandError> {
+    let mut parser = TrafficParser::default();
     let mut chunk = [0; 4096];
     loop {
         match source.read(&mut chunk) {
             Ok(0) => break,
-            Ok(length) => listener.hear(chunk.get(..length).unwrap_or(&chunk)),
+            Ok(length) => parser.push(chunk.get(..length).unwrap_or(&chunk)),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(Failure::file(path, error)),
+            Err(error) => return Err(CommandError::file(path, error)),
         }
-        while let Some(heard) = listener.next() {
-            output.show(&Line::new(None, &heard))?;
+        while let Some(item) = parser.next() {
+            printer.print(&TrafficLine::new(None, &item))?;
         }
     }
-    while let Some(heard) = listener.next_before_silence() {
-        output.show(&Line::new(None, &heard))?;
+    while let Some(item) = parser.next_at_gap() {
+        printer.print(&TrafficLine::new(None, &item))?;
     }
     Ok(())
 }
 
-fn port(session: &mut Session) -> Result<(), Failure> {
+fn port(session: &mut Session) -> Result<(), CommandError> {
     let name = session.port.clone().ok_or_else(|| {
-        Failure::Usage("what to listen to? use --port PORT, or name a file; - is standard input".to_owned())
+        CommandError::Usage(
+            "what to listen to? use --port PORT, or name a file; - is standard input".to_owned(),
+        )
     })?;
-    let opened = Serial::open(&name, session.options.baud);
-    let mut port = opened.map_err(|error| Failure::Open { port: name, error })?;
-    let mut listener = Listener::default();
+    let opened = OpenPort::open(&name, session.options.baud);
+    let mut port = opened.map_err(|error| CommandError::Open { port: name, error })?;
+    let mut parser = TrafficParser::default();
     let start = Instant::now();
     loop {
-        let bytes = port.receive(SILENCE).map_err(|error| Failure::Wire(error.into()))?;
-        listener.hear(&bytes);
+        let bytes = port.receive(GAP).map_err(|error| CommandError::Exchange(error.into()))?;
+        parser.push(&bytes);
         let seconds = start.elapsed().as_secs_f64();
-        while let Some(heard) =
-            if bytes.is_empty() { listener.next_before_silence() } else { listener.next() }
-        {
-            session.output.show(&Line::new(Some(seconds), &heard))?;
+        while let Some(item) = if bytes.is_empty() { parser.next_at_gap() } else { parser.next() } {
+            session.printer.print(&TrafficLine::new(Some(seconds), &item))?;
         }
     }
 }
 
 #[derive(Serialize)]
-struct Line {
+struct TrafficLine {
     /// Since listening began; none in a file.
     seconds: Option<f64>,
     kind: &'static str,
@@ -96,11 +96,11 @@ struct Line {
     words: String,
 }
 
-impl Line {
-    fn new(seconds: Option<f64>, heard: &Traffic) -> Self {
-        let words = heard.to_string();
+impl TrafficLine {
+    fn new(seconds: Option<f64>, item: &Traffic) -> Self {
+        let words = item.to_string();
         let count_of = |values: &[u8]| u8::try_from(values.len()).ok();
-        let (kind, address, count, bytes) = match heard {
+        let (kind, address, count, bytes) = match item {
             Traffic::Read { address, count } => ("read", Some(*address), Some(*count), &[][..]),
             Traffic::Answer { address, values } => {
                 ("answer", Some(*address), count_of(values), values.as_slice())
@@ -115,14 +115,14 @@ impl Line {
     }
 }
 
-impl Facts for Line {
+impl Printable for TrafficLine {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         if let Some(seconds) = self.seconds {
             write!(out, "{seconds:>9.3}  ")?;
         }
         let Self { words, .. } = self;
         match self.kind {
-            "noise" | "too-far" => writeln!(out, "{DOUBTFUL}{words}{DOUBTFUL:#}"),
+            "noise" | "too-far" => writeln!(out, "{WARNING}{words}{WARNING:#}"),
             _ => writeln!(out, "{words}"),
         }
     }

@@ -2,15 +2,15 @@
 
 use clap::{Args, ValueEnum};
 use sevenbot::map::{MOTOR_STATE, motor_state};
-use sevenbot::words::entries;
+use sevenbot::register_text::entries;
 use sevenbot::{Arm, Span};
 
-use super::get::Registers;
-use super::motors_obey;
+use super::get::RegisterList;
+use crate::command_error::CommandError;
 use crate::confirm::confirm;
-use crate::failure::Failure;
-use crate::interrupt::or_hold;
+use crate::interrupt::hold_on_interrupt;
 use crate::session::Session;
+use crate::write_result::motors_obey;
 
 /// Show or change the state of the motors.
 #[derive(Debug, Args)]
@@ -23,14 +23,14 @@ Examples:
 Exit status 1 when it is not known that the arm took the state: it may be moving then.")]
 pub(crate) struct StateArgs {
     /// The state wanted.
-    state: Option<Wanted>,
+    state: Option<MotorStateArg>,
     /// The arm is held, or may fall: do not ask.
     #[arg(long)]
     yes: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Wanted {
+enum MotorStateArg {
     /// The joints are driven.
     Servo,
     /// The joints are not driven, but braked.
@@ -39,7 +39,7 @@ enum Wanted {
     Forceless,
 }
 
-impl Wanted {
+impl MotorStateArg {
     const fn code(self) -> u8 {
         match self {
             Self::Servo => motor_state::SERVO,
@@ -49,19 +49,19 @@ impl Wanted {
     }
 }
 
-pub(crate) fn run(session: &mut Session, args: &StateArgs) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &StateArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     if let Some(wanted) = args.state {
         change(&mut arm, wanted, args.yes)?;
     }
-    session.output.show(&Registers::from(entries(&arm.read_span(Span::of(&MOTOR_STATE))?)))
+    session.printer.print(&RegisterList::from(entries(&arm.read_span(Span::of(&MOTOR_STATE))?)))
 }
 
-fn change(arm: &mut Arm, wanted: Wanted, yes: bool) -> Result<(), Failure> {
+fn change(arm: &mut Arm, wanted: MotorStateArg, yes: bool) -> Result<(), CommandError> {
     let present = arm.read_span(Span::of(&MOTOR_STATE))?.byte(&MOTOR_STATE);
     if present == motor_state::SERVO && wanted.code() != motor_state::SERVO {
-        let how = if matches!(wanted, Wanted::Damping) { "sink" } else { "fall" };
+        let how = if matches!(wanted, MotorStateArg::Damping) { "sink" } else { "fall" };
         confirm(&format!("The arm will {how} unless somebody holds it. Go on?"), yes)?;
     }
-    or_hold(arm, |arm, _| motors_obey(arm.write_checked(MOTOR_STATE.address, &[wanted.code()])))
+    hold_on_interrupt(arm, |arm, _| motors_obey(arm.write_checked(MOTOR_STATE.address, &[wanted.code()])))
 }

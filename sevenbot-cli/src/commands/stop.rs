@@ -1,9 +1,9 @@
 //! `stop`: every joint holds where it is.
 
-use super::pose::Stand;
-use crate::failure::Failure;
-use crate::interrupt::{hold, warn_of_exceptions};
-use crate::output::warn;
+use super::pose::Positions;
+use crate::command_error::CommandError;
+use crate::interrupt::{hold, warn_about_unheld_joints};
+use crate::printer::warn;
 use crate::session::Session;
 
 /// Stop: every joint holds where it is.
@@ -15,13 +15,13 @@ Where the motors are off (state 0 or 2) nothing is written.
 Exit status 1 when it is not known that the arm holds: it may still be moving then.")]
 pub(crate) struct StopArgs {}
 
-pub(crate) fn run(session: &mut Session) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
     let connected = session.connect();
     let mut arm = connected.inspect_err(|_| {
         warn("the arm was not told to stop and may be moving; the switch of the servos' supply stops it");
     })?;
     let joints = hold(&mut arm)?;
-    warn_of_exceptions(&joints);
+    warn_about_unheld_joints(&joints);
     let positions_degrees = if joints.is_driven() { joints.targets() } else { joints.positions() };
-    session.output.show(&Stand { positions_degrees })
+    session.printer.print(&Positions { positions_degrees })
 }

@@ -8,14 +8,14 @@ use std::time::Duration;
 use motion_core::servo_bus::Reading;
 use motion_core::servo_bus::frame::{error, register};
 
-use super::bus::ServoBus;
+use super::bus_master::BusMaster;
 use super::error::ServoError;
-use super::facts::{Facts, error_words};
+use super::servo_info::{ServoInfo, error_words};
 
 /// The middle of the range of 0 to 1023 counts.
 pub const MIDDLE: u16 = 511;
 /// A servo that is so close to its goal has arrived: its dead zone is 2 counts on either side.
-const CLOSE: u16 = 4;
+const ARRIVED_COUNTS: u16 = 4;
 /// The torque switch: on has this code in both of Feetech's tables.
 const TORQUE_ON: [u8; 1] = [1];
 /// Damping in the older table, free in the current one: no torque in either.
@@ -23,24 +23,24 @@ const TORQUE_OFF: [u8; 1] = [0];
 /// Registers from the present position to the moving flag.
 const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;
 /// A load over the limit in so many readings in a row ends the move. One reading may be a start from rest.
-const HEAVY_READINGS: u32 = 5;
+const OVERLOAD_READINGS: u32 = 5;
 
 /// How a servo is moved.
 #[derive(Clone, Copy, Debug)]
-pub struct Limits {
+pub struct CenterOptions {
     /// In counts per second.
     pub speed: u16,
     /// The load that ends the move, in 0.1 % of the stall torque.
     pub load: u16,
     /// How often to look at the servo.
-    pub look_every: Duration,
+    pub poll_period: Duration,
     /// A servo that comes no closer for so long has met something.
     pub stall: Duration,
 }
 
-impl Default for Limits {
+impl Default for CenterOptions {
     fn default() -> Self {
-        Self { speed: 100, load: 600, look_every: Duration::from_millis(20), stall: Duration::from_secs(3) }
+        Self { speed: 100, load: 600, poll_period: Duration::from_millis(20), stall: Duration::from_secs(3) }
     }
 }
 
@@ -53,7 +53,7 @@ pub enum CenterError {
         limits: (u16, u16),
     },
     /// It reports errors before it moves. Nothing was written.
-    Unfit {
+    ReportsErrors {
         /// The bits.
         errors: u8,
     },
@@ -78,7 +78,7 @@ pub enum CenterError {
     /// The exchange failed.
     Bus(ServoError),
     /// The torque could not be switched off. The servo may still be moving.
-    StillOn(Box<CenterError>),
+    TorqueStillOn(Box<CenterError>),
 }
 
 impl From<ServoError> for CenterError {
@@ -99,7 +99,7 @@ impl fmt::Display for CenterError {
                     "the servo's limits, {lowest} to {highest} counts, leave out its middle, {MIDDLE}"
                 )
             }
-            Self::Unfit { errors } => write!(out, "the servo reports: {}", error_words(*errors)),
+            Self::ReportsErrors { errors } => write!(out, "the servo reports: {}", error_words(*errors)),
             Self::Unmeasured => out.write_str("the servo gives no position between 0 and 1023 counts"),
             Self::Overload { position, load, errors } => {
                 let percent = f64::from(*load) / 10.0;
@@ -114,7 +114,7 @@ impl fmt::Display for CenterError {
             }
             Self::Interrupted => out.write_str("interrupted"),
             Self::Bus(error) => error.fmt(out),
-            Self::StillOn(cause) => {
+            Self::TorqueStillOn(cause) => {
                 write!(out, "the servo may still be moving, its torque could not be switched off: {cause}")
             }
         }
@@ -125,29 +125,29 @@ impl std::error::Error for CenterError {}
 
 /// Brings a servo to the middle, and gives where it stands then, in counts. It holds there, with torque.
 ///
-/// `tell` is told of each reading. It answers whether to go on.
+/// `on_reading` is told of each reading. It answers whether to go on.
 ///
 /// # Errors
 /// See [`CenterError`].
 pub fn center(
-    bus: &mut ServoBus,
+    bus: &mut BusMaster,
     id: u8,
-    limits: &Limits,
-    mut tell: impl FnMut(&Reading) -> bool,
+    options: &CenterOptions,
+    mut on_reading: impl FnMut(&Reading) -> bool,
 ) -> Result<u16, CenterError> {
-    let start = check(&Facts::read(bus, id)?)?;
-    let done = drive(bus, id, limits, start, &mut tell);
+    let start = check(&ServoInfo::read(bus, id)?)?;
+    let done = drive(bus, id, options, start, &mut on_reading);
     done.map_err(|cause| match bus.write(id, register::TORQUE_SWITCH, &TORQUE_OFF) {
         Ok(()) => cause,
-        Err(_) => CenterError::StillOn(Box::new(cause)),
+        Err(_) => CenterError::TorqueStillOn(Box::new(cause)),
     })
 }
 
 /// Where the servo stands, if it is fit to be moved to its middle.
-fn check(facts: &Facts) -> Result<u16, CenterError> {
+fn check(facts: &ServoInfo) -> Result<u16, CenterError> {
     let (lowest, highest) = facts.position_limits;
     if facts.errors != 0 {
-        return Err(CenterError::Unfit { errors: facts.errors });
+        return Err(CenterError::ReportsErrors { errors: facts.errors });
     }
     if facts.turns_endlessly() || !(lowest..=highest).contains(&MIDDLE) {
         return Err(CenterError::OutOfReach { limits: facts.position_limits });
@@ -156,26 +156,26 @@ fn check(facts: &Facts) -> Result<u16, CenterError> {
 }
 
 fn drive(
-    bus: &mut ServoBus,
+    bus: &mut BusMaster,
     id: u8,
-    limits: &Limits,
+    options: &CenterOptions,
     start: u16,
-    tell: &mut impl FnMut(&Reading) -> bool,
+    on_reading: &mut impl FnMut(&Reading) -> bool,
 ) -> Result<u16, CenterError> {
-    bus.write(id, register::GOAL_POSITION, &goal(start, limits.speed))?;
+    bus.write(id, register::GOAL_POSITION, &goal(start, options.speed))?;
     bus.write(id, register::TORQUE_SWITCH, &TORQUE_ON)?;
-    bus.write(id, register::GOAL_POSITION, &goal(MIDDLE, limits.speed))?;
-    let mut watch = Watch { closest: start.abs_diff(MIDDLE), since: bus.now(), heavy: 0 };
+    bus.write(id, register::GOAL_POSITION, &goal(MIDDLE, options.speed))?;
+    let mut check = MoveCheck { closest: start.abs_diff(MIDDLE), since: bus.now(), overloaded: 0 };
     loop {
-        bus.rest(limits.look_every)?;
-        let (reading, errors, is_moving) = look(bus, id)?;
-        if !tell(&reading) {
+        bus.wait_for_silence(options.poll_period)?;
+        let (reading, errors, is_moving) = measure(bus, id)?;
+        if !on_reading(&reading) {
             return Err(CenterError::Interrupted);
         }
-        watch.judge(&reading, errors, bus.now(), limits)?;
-        let is_close = reading.position_counts.abs_diff(MIDDLE) <= CLOSE;
+        check.update(&reading, errors, bus.now(), options)?;
+        let is_close = reading.position_counts.abs_diff(MIDDLE) <= ARRIVED_COUNTS;
         // A servo that hunts around its goal says for ever that it moves.
-        if is_close && (!is_moving || watch.stands_still(bus.now(), limits)) {
+        if is_close && (!is_moving || check.is_stalled(bus.now(), options)) {
             return Ok(reading.position_counts);
         }
     }
@@ -187,7 +187,7 @@ fn goal(position: u16, speed: u16) -> [u8; 6] {
     [p1, p0, 0, 0, s1, s0]
 }
 
-fn look(bus: &mut ServoBus, id: u8) -> Result<(Reading, u8, bool), CenterError> {
+fn measure(bus: &mut BusMaster, id: u8) -> Result<(Reading, u8, bool), CenterError> {
     let answer = bus.read(id, register::PRESENT_POSITION, MEASURED)?;
     let reading = answer.values.get(..usize::from(Reading::REGISTERS)).and_then(Reading::parse);
     let is_moving = answer.values.last().is_some_and(|&moving| moving != 0);
@@ -195,39 +195,39 @@ fn look(bus: &mut ServoBus, id: u8) -> Result<(Reading, u8, bool), CenterError> 
 }
 
 /// What was seen of the move so far.
-struct Watch {
+struct MoveCheck {
     /// The smallest distance to the middle, in counts.
     closest: u16,
     /// When that was.
     since: Duration,
     /// Readings in a row with too much load.
-    heavy: u32,
+    overloaded: u32,
 }
 
-impl Watch {
-    fn judge(
+impl MoveCheck {
+    fn update(
         &mut self,
         reading: &Reading,
         errors: u8,
         now: Duration,
-        limits: &Limits,
+        options: &CenterOptions,
     ) -> Result<(), CenterError> {
         let &Reading { position_counts: position, load, .. } = reading;
-        self.heavy = if load.unsigned_abs() > limits.load { self.heavy + 1 } else { 0 };
-        if self.heavy >= HEAVY_READINGS || errors & (error::OVERLOAD | error::OVERHEAT) != 0 {
+        self.overloaded = if load.unsigned_abs() > options.load { self.overloaded + 1 } else { 0 };
+        if self.overloaded >= OVERLOAD_READINGS || errors & (error::OVERLOAD | error::OVERHEAT) != 0 {
             return Err(CenterError::Overload { position, load, errors });
         }
         let distance = position.abs_diff(MIDDLE);
         if distance < self.closest {
             (self.closest, self.since) = (distance, now);
         }
-        if distance > CLOSE && self.stands_still(now, limits) {
+        if distance > ARRIVED_COUNTS && self.is_stalled(now, options) {
             return Err(CenterError::Stalled { position });
         }
         Ok(())
     }
 
-    fn stands_still(&self, now: Duration, limits: &Limits) -> bool {
-        now.saturating_sub(self.since) > limits.stall
+    fn is_stalled(&self, now: Duration, options: &CenterOptions) -> bool {
+        now.saturating_sub(self.since) > options.stall
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use crate::error::{Heard, PortError};
+use crate::error::{PortError, ReceiveCounts};
 
 /// Why an exchange with a servo failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,8 +16,8 @@ pub enum ServoError {
         attempts: u32,
         /// How long each attempt waited.
         waited: Duration,
-        /// What was heard instead.
-        heard: Heard,
+        /// What was received instead.
+        received: ReceiveCounts,
     },
     /// The servo answers, but the register does not hold what was written.
     NotTaken {
@@ -44,9 +44,9 @@ impl From<PortError> for ServoError {
 impl fmt::Display for ServoError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoAnswer { id, attempts, waited, heard } => {
+            Self::NoAnswer { id, attempts, waited, received } => {
                 let millis = waited.as_millis();
-                write!(out, "servo {id} does not answer ({attempts} tries of {millis} ms): {heard}")
+                write!(out, "servo {id} does not answer ({attempts} tries of {millis} ms): {received}")
             }
             Self::NotTaken { id, register } => {
                 write!(out, "servo {id} answers, but its register {register} does not hold what was written")

@@ -13,19 +13,19 @@ use std::time::Duration;
 
 use motion_core::servo_bus::frame::register;
 
-use super::bus::ServoBus;
+use super::bus_master::BusMaster;
 use super::error::ServoError;
 
 /// Bytes of the question and its answer, and as many again for a byte time each between them.
-const BYTES: u32 = 30;
+const EXCHANGE_BYTES: u32 = 30;
 /// What a servo may take besides: its return delay is 0.5 ms at most.
 const RETURN_DELAY: Duration = Duration::from_millis(4);
 /// How long to listen for late answers at the end of each rate.
-const LATE: Duration = Duration::from_millis(200);
+const LATE_ANSWERS: Duration = Duration::from_millis(200);
 
 /// What to look for.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct ScanPlan {
     /// Baud rates, in the order they are tried.
     pub rates: Vec<u32>,
     /// Ids.
@@ -36,7 +36,7 @@ pub struct Plan {
 
 /// How far a scan is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Step {
+pub struct ScanProgress {
     /// The rate that is being tried.
     pub baud: u32,
     /// How many questions of the first pass are done, over all rates.
@@ -47,18 +47,18 @@ pub struct Step {
 
 /// An id that something answers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Found {
+pub struct FoundServo {
     /// The baud rate.
     pub baud: u32,
     /// The id.
     pub id: u8,
     /// What the answers were like.
-    pub answers: Answers,
+    pub answers: AnswerQuality,
 }
 
 /// What the answers of an id were like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Answers {
+pub enum AnswerQuality {
     /// One servo answers.
     Good,
     /// Several answers came to one question: several servos have this id.
@@ -69,16 +69,16 @@ pub enum Answers {
 
 /// What a scan brought.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Scan {
+pub struct ScanResult {
     /// By rate as planned, then by id.
-    pub found: Vec<Found>,
+    pub found: Vec<FoundServo>,
     /// Rates that the adapter does not know.
     pub unknown_rates: Vec<u32>,
-    /// Was an echo of the questions heard?
+    /// Was an echo of the questions received?
     pub has_echo: bool,
 }
 
-impl Plan {
+impl ScanPlan {
     /// How many questions the first pass takes.
     #[must_use]
     pub fn questions(&self) -> usize {
@@ -86,15 +86,19 @@ impl Plan {
     }
 
     fn wait_at(&self, baud: u32) -> Duration {
-        self.wait.unwrap_or(Duration::from_secs(1) * (10 * BYTES) / baud.max(1) + RETURN_DELAY)
+        self.wait.unwrap_or(Duration::from_secs(1) * (10 * EXCHANGE_BYTES) / baud.max(1) + RETURN_DELAY)
     }
 }
 
-/// Looks for servos. `tell` is told how far it is.
+/// Looks for servos. `on_progress` is told how far it is.
 ///
 /// # Errors
 /// The port is gone.
-pub fn scan(bus: &mut ServoBus, plan: &Plan, mut tell: impl FnMut(Step)) -> Result<Scan, ServoError> {
+pub fn scan(
+    bus: &mut BusMaster,
+    plan: &ScanPlan,
+    mut on_progress: impl FnMut(ScanProgress),
+) -> Result<ScanResult, ServoError> {
     let (mut found, mut unknown_rates, mut asked) = (Vec::new(), Vec::new(), 0);
     for &baud in &plan.rates {
         match bus.set_baud(baud) {
@@ -108,29 +112,29 @@ pub fn scan(bus: &mut ServoBus, plan: &Plan, mut tell: impl FnMut(Step)) -> Resu
         let wait = plan.wait_at(baud);
         let before = found.len();
         let candidates = candidates(bus, plan, wait, |in_rate| {
-            tell(Step { baud, asked: asked + in_rate, found: before });
+            on_progress(ScanProgress { baud, asked: asked + in_rate, found: before });
         })?;
         for id in candidates {
-            found.extend(verify(bus, id, wait)?.map(|answers| Found { baud, id, answers }));
+            found.extend(verify(bus, id, wait)?.map(|answers| FoundServo { baud, id, answers }));
         }
         asked += plan.ids.len();
-        tell(Step { baud, asked, found: found.len() });
+        on_progress(ScanProgress { baud, asked, found: found.len() });
     }
-    Ok(Scan { found, unknown_rates, has_echo: bus.has_echo() })
+    Ok(ScanResult { found, unknown_rates, has_echo: bus.has_echo() })
 }
 
 /// The ids of this rate that something came from in answer to a short question, in ascending order.
 fn candidates(
-    bus: &mut ServoBus,
-    plan: &Plan,
+    bus: &mut BusMaster,
+    plan: &ScanPlan,
     wait: Duration,
-    mut tell: impl FnMut(usize),
+    mut on_progress: impl FnMut(usize),
 ) -> Result<Vec<u8>, ServoError> {
     let mut candidates = Vec::new();
     let (mut damaged_before, mut done) = (None, 0);
     bus.take_damaged();
     for id in plan.ids.clone() {
-        let is_answered = bus.ask(id, register::ID, 1, wait)?.is_some();
+        let is_answered = bus.try_read(id, register::ID, 1, wait)?.is_some();
         let is_damaged = bus.take_damaged() > 0;
         if is_answered || is_damaged {
             candidates.push(id);
@@ -139,9 +143,9 @@ fn candidates(
         candidates.extend(damaged_before.filter(|_| is_damaged));
         damaged_before = Some(id);
         done += 1;
-        tell(done);
+        on_progress(done);
     }
-    bus.rest(LATE)?;
+    bus.wait_for_silence(LATE_ANSWERS)?;
     if bus.take_damaged() > 0 {
         candidates.extend(damaged_before);
     }
@@ -152,15 +156,15 @@ fn candidates(
 }
 
 /// Asks one id patiently. `None`: nothing answers to it.
-fn verify(bus: &mut ServoBus, id: u8, wait: Duration) -> Result<Option<Answers>, ServoError> {
+fn verify(bus: &mut BusMaster, id: u8, wait: Duration) -> Result<Option<AnswerQuality>, ServoError> {
     bus.take_damaged();
     let options = bus.options();
     for _ in 0..options.attempts.max(1) {
         // Answers of two servos with one id differ in what they measure, and damage each other.
-        if bus.ask(id, register::PRESENT_POSITION, 8, options.reply_timeout)?.is_some() {
-            let several = bus.further_answers(id, wait)? > 0;
-            return Ok(Some(if several { Answers::Several } else { Answers::Good }));
+        if bus.try_read(id, register::PRESENT_POSITION, 8, options.reply_timeout)?.is_some() {
+            let several = bus.extra_answers(id, wait)? > 0;
+            return Ok(Some(if several { AnswerQuality::Several } else { AnswerQuality::Good }));
         }
     }
-    Ok((bus.take_damaged() > 0).then_some(Answers::Damaged))
+    Ok((bus.take_damaged() > 0).then_some(AnswerQuality::Damaged))
 }

@@ -1,4 +1,4 @@
-//! A [`Line`] to simulated servos, for tests, in virtual time.
+//! A [`ServoLine`] to simulated servos, for tests, in virtual time.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -10,9 +10,9 @@ use motion_core::servo_bus::frame::{Decoder, Frame};
 use protocol_core::registers::Joint;
 use protocol_core::time::Instant;
 
-use super::bus::{BusOptions, ServoBus};
+use super::bus_master::{BusMaster, BusOptions};
 use super::error::ServoError;
-use super::line::Line;
+use super::servo_line::ServoLine;
 use crate::error::PortError;
 
 /// The supply voltage in 0.1 V.
@@ -21,7 +21,7 @@ const SUPPLY: u8 = 74;
 const STEP: Duration = Duration::from_millis(1);
 
 /// A servo, and the faults that a servo on an arm does not have.
-pub(super) struct Simulated {
+pub(super) struct SimulatedServo {
     pub(super) servo: Servo,
     /// Its answers carry these error bits besides its own.
     pub(super) errors: u8,
@@ -29,7 +29,7 @@ pub(super) struct Simulated {
     pub(super) fails_at: Duration,
 }
 
-impl Simulated {
+impl SimulatedServo {
     pub(super) fn new(id: u8) -> Self {
         let mut servo = Servo::new(Joint::ALL[0], ServoConfig::default(), 300, Instant::ZERO);
         servo.set_id(id);
@@ -65,8 +65,8 @@ impl Simulated {
 
 /// What is at the other end of the line.
 #[derive(Default)]
-pub(super) struct Wire {
-    pub(super) servos: Vec<Simulated>,
+pub(super) struct SimulatedWire {
+    pub(super) servos: Vec<SimulatedServo>,
     pub(super) has_echo: bool,
     /// The delay of an echo.
     pub(super) echo_delay: Duration,
@@ -84,7 +84,7 @@ pub(super) struct Wire {
     pub(super) sent: Vec<Vec<u8>>,
 }
 
-impl Wire {
+impl SimulatedWire {
     fn advance(&mut self) {
         while self.simulated + STEP <= self.now {
             self.simulated += STEP;
@@ -105,9 +105,9 @@ impl Wire {
 }
 
 /// The line to the servos of a wire.
-pub(super) struct WireLine(pub(super) Rc<RefCell<Wire>>);
+pub(super) struct SimulatedLine(pub(super) Rc<RefCell<SimulatedWire>>);
 
-impl Line for WireLine {
+impl ServoLine for SimulatedLine {
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         let wire = &mut *self.0.borrow_mut();
         if wire.frames_until_lost.is_some_and(|frames| wire.sent.len() >= frames) {
@@ -123,9 +123,9 @@ impl Line for WireLine {
         Ok(())
     }
 
-    fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, PortError> {
+    fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
         let wire = &mut *self.0.borrow_mut();
-        let deadline = wire.now + patience;
+        let deadline = wire.now + timeout;
         match wire.in_transit.pop_front_if(|(at, _)| *at <= deadline) {
             Some((at, bytes)) => {
                 wire.now = wire.now.max(at);
@@ -157,7 +157,7 @@ fn instant(time: Duration) -> Instant {
 }
 
 /// A bus with these servos, at 1 Mbaud.
-pub(super) fn bus(servos: Vec<Simulated>) -> (ServoBus, Rc<RefCell<Wire>>) {
-    let wire = Rc::new(RefCell::new(Wire { servos, baud: 1_000_000, ..Wire::default() }));
-    (ServoBus::over(Box::new(WireLine(Rc::clone(&wire))), BusOptions::default()), wire)
+pub(super) fn bus(servos: Vec<SimulatedServo>) -> (BusMaster, Rc<RefCell<SimulatedWire>>) {
+    let wire = Rc::new(RefCell::new(SimulatedWire { servos, baud: 1_000_000, ..SimulatedWire::default() }));
+    (BusMaster::with_line(Box::new(SimulatedLine(Rc::clone(&wire))), BusOptions::default()), wire)
 }

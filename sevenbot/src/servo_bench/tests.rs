@@ -7,24 +7,24 @@ use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{FrameBuffer, error, register, write};
 use protocol_core::time::{Duration as SimulatedDuration, Instant};
 
-use super::bus::ServoBus;
-use super::center::{CenterError, Limits, center};
+use super::bus_master::BusMaster;
+use super::center::{CenterError, CenterOptions, center};
 use super::error::ServoError;
-use super::facts::{Facts, error_words};
-use super::id::{IdError, everything_at, set_id};
-use super::scan::{Answers, Found, Plan, Scan, scan};
-use super::simulated::{Simulated, bus};
+use super::scan::{AnswerQuality, FoundServo, ScanPlan, ScanResult, scan};
+use super::servo_info::{ServoInfo, error_words};
+use super::set_id::{SetIdError, all_ids, set_id};
+use super::simulated::{SimulatedServo, bus};
 use super::{BAUD_RATES, MAX_ID};
 
 const FAST: u32 = 1_000_000;
 
-fn plan(rates: &[u32]) -> Plan {
-    Plan { rates: rates.to_vec(), ids: 0..=MAX_ID, wait: None }
+fn plan(rates: &[u32]) -> ScanPlan {
+    ScanPlan { rates: rates.to_vec(), ids: 0..=MAX_ID, wait: None }
 }
 
-fn found(bus: &mut ServoBus, plan: &Plan) -> Vec<(u32, u8, Answers)> {
-    let Scan { found, .. } = scan(bus, plan, |_| ()).unwrap();
-    found.into_iter().map(|Found { baud, id, answers }| (baud, id, answers)).collect()
+fn found(bus: &mut BusMaster, plan: &ScanPlan) -> Vec<(u32, u8, AnswerQuality)> {
+    let ScanResult { found, .. } = scan(bus, plan, |_| ()).unwrap();
+    found.into_iter().map(|FoundServo { baud, id, answers }| (baud, id, answers)).collect()
 }
 
 fn late(micros: u64) -> ServoFault {
@@ -32,7 +32,7 @@ fn late(micros: u64) -> ServoFault {
 }
 
 /// Writes a register of the EEPROM.
-fn set(simulated: &mut Simulated, register: u8, values: &[u8]) {
+fn set(simulated: &mut SimulatedServo, register: u8, values: &[u8]) {
     for (register, values) in [(register::LOCK, [0].as_slice()), (register, values), (register::LOCK, &[1])] {
         let mut request = FrameBuffer::new();
         write(&mut request, simulated.servo.id(), register, values);
@@ -44,23 +44,23 @@ fn set(simulated: &mut Simulated, register: u8, values: &[u8]) {
 
 #[test]
 fn a_scan_finds_every_servo_at_every_rate() {
-    let mut servos: Vec<_> = [7, 0, 253].map(Simulated::new).into();
+    let mut servos: Vec<_> = [7, 0, 253].map(SimulatedServo::new).into();
     for (code, id) in (0..8).zip(100..) {
-        let mut servo = Simulated::new(id);
+        let mut servo = SimulatedServo::new(id);
         set(&mut servo, register::BAUD_RATE, &[code]);
         servos.push(servo);
     }
     let (mut bus, _) = bus(servos);
-    let mut wanted: Vec<_> = [0, 7].map(|id| (FAST, id, Answers::Good)).into();
-    wanted.extend(BAUD_RATES.into_iter().zip(100..).map(|(baud, id)| (baud, id, Answers::Good)));
-    wanted.insert(3, (FAST, 253, Answers::Good));
+    let mut wanted: Vec<_> = [0, 7].map(|id| (FAST, id, AnswerQuality::Good)).into();
+    wanted.extend(BAUD_RATES.into_iter().zip(100..).map(|(baud, id)| (baud, id, AnswerQuality::Good)));
+    wanted.insert(3, (FAST, 253, AnswerQuality::Good));
     assert_eq!(found(&mut bus, &plan(&BAUD_RATES)), wanted);
     assert!(!bus.has_echo());
 }
 
 #[test]
 fn a_scan_of_one_rate_takes_two_seconds_at_most_and_tells_how_far_it_is() {
-    let (mut bus, _) = bus(vec![Simulated::new(3)]);
+    let (mut bus, _) = bus(vec![SimulatedServo::new(3)]);
     let start = bus.now();
     let mut last = None;
     scan(&mut bus, &plan(&[FAST]), |step| last = Some(step)).unwrap();
@@ -72,23 +72,26 @@ fn a_scan_of_one_rate_takes_two_seconds_at_most_and_tells_how_far_it_is() {
 
 #[test]
 fn an_echo_is_no_answer_and_does_not_hide_one() {
-    let (mut bus, wire) = bus([1, 5].map(Simulated::new).into());
+    let (mut bus, wire) = bus([1, 5].map(SimulatedServo::new).into());
     wire.borrow_mut().has_echo = true;
-    assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 1, Answers::Good), (FAST, 5, Answers::Good)]);
+    assert_eq!(
+        found(&mut bus, &plan(&[FAST])),
+        [(FAST, 1, AnswerQuality::Good), (FAST, 5, AnswerQuality::Good)]
+    );
     assert!(bus.has_echo());
-    let Err(ServoError::NoAnswer { heard, .. }) = bus.read(2, register::ID, 1) else {
+    let Err(ServoError::NoAnswer { received, .. }) = bus.read(2, register::ID, 1) else {
         panic!("nobody is there")
     };
-    assert_eq!(heard.to_string(), "only the echo of the question was heard");
+    assert_eq!(received.to_string(), "only the echo of the question was received");
 }
 
 #[test]
 fn an_echo_does_not_hide_a_servo_that_reports_a_wrong_voltage() {
-    let servo = Simulated { errors: error::VOLTAGE, ..Simulated::new(4) };
+    let servo = SimulatedServo { errors: error::VOLTAGE, ..SimulatedServo::new(4) };
     let (mut bus, wire) = bus(vec![servo]);
     for has_echo in [false, true] {
         wire.borrow_mut().has_echo = has_echo;
-        assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 4, Answers::Good)]);
+        assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 4, AnswerQuality::Good)]);
     }
     // Two values have the length of a question, and 2 is the code of a question.
     wire.borrow_mut().servos[0].errors = 2;
@@ -98,16 +101,16 @@ fn an_echo_does_not_hide_a_servo_that_reports_a_wrong_voltage() {
 
 #[test]
 fn a_slow_adapter_hides_no_servo() {
-    let slow = |id| Simulated::with(id, late(60_000));
+    let slow = |id| SimulatedServo::with(id, late(60_000));
     let (mut bus, _) = bus([0, 3, 253].map(slow).into());
-    assert_eq!(found(&mut bus, &plan(&[FAST])), [0, 3, 253].map(|id| (FAST, id, Answers::Good)));
+    assert_eq!(found(&mut bus, &plan(&[FAST])), [0, 3, 253].map(|id| (FAST, id, AnswerQuality::Good)));
 }
 
 #[test]
 fn late_echoes_are_no_late_answers() {
-    let (mut bus, wire) = bus(vec![Simulated::new(3)]);
+    let (mut bus, wire) = bus(vec![SimulatedServo::new(3)]);
     (wire.borrow_mut().has_echo, wire.borrow_mut().echo_delay) = (true, Duration::from_millis(60));
-    assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 3, Answers::Good)]);
+    assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 3, AnswerQuality::Good)]);
     assert!(bus.has_echo());
     // Virtual time: 254 short waits, and patient questions to one id only.
     assert!(bus.now() < Duration::from_secs(3), "{:?}", bus.now());
@@ -115,14 +118,17 @@ fn late_echoes_are_no_late_answers() {
 
 #[test]
 fn damaged_answers_and_servos_with_one_id_are_told() {
-    let garbled = Simulated::with(2, ServoFault::Garbled(1));
-    let (mut bus, _) = bus(vec![garbled, Simulated::new(9), Simulated::with(9, late(350))]);
-    assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 2, Answers::Damaged), (FAST, 9, Answers::Several)]);
+    let garbled = SimulatedServo::with(2, ServoFault::Garbled(1));
+    let (mut bus, _) = bus(vec![garbled, SimulatedServo::new(9), SimulatedServo::with(9, late(350))]);
+    assert_eq!(
+        found(&mut bus, &plan(&[FAST])),
+        [(FAST, 2, AnswerQuality::Damaged), (FAST, 9, AnswerQuality::Several)]
+    );
 }
 
 #[test]
 fn rates_that_the_adapter_does_not_know_are_told() {
-    let (mut bus, wire) = bus(vec![Simulated::new(0)]);
+    let (mut bus, wire) = bus(vec![SimulatedServo::new(0)]);
     wire.borrow_mut().rates = vec![500_000, FAST];
     let scan = scan(&mut bus, &plan(&BAUD_RATES), |_| ()).unwrap();
     assert_eq!(scan.found.len(), 1);
@@ -131,7 +137,7 @@ fn rates_that_the_adapter_does_not_know_are_told() {
 
 #[test]
 fn a_late_answer_is_not_taken_for_the_next_one() {
-    let (mut bus, wire) = bus(vec![Simulated::with(0, late(610_000))]);
+    let (mut bus, wire) = bus(vec![SimulatedServo::with(0, late(610_000))]);
     assert!(matches!(bus.read(0, register::ID, 1), Err(ServoError::NoAnswer { attempts: 3, .. })));
     wire.borrow_mut().servos[0].set_fault(None);
     assert_eq!(bus.read(0, register::RESPONSE_LEVEL, 1).unwrap().values, [1]);
@@ -139,10 +145,10 @@ fn a_late_answer_is_not_taken_for_the_next_one() {
 
 #[test]
 fn facts_are_read_high_byte_first() {
-    let mut servo = Simulated::new(1);
+    let mut servo = SimulatedServo::new(1);
     set(&mut servo, register::MIN_POSITION, &[0, 20, 3, 0xEB]);
     let (mut bus, _) = bus(vec![servo]);
-    let facts = Facts::read(&mut bus, 1).unwrap();
+    let facts = ServoInfo::read(&mut bus, 1).unwrap();
     assert_eq!(facts.position_limits, (20, 1003));
     assert_eq!((facts.max_torque, facts.max_temperature, facts.voltage_limits), (1_000, 80, (50, 250)));
     assert_eq!((facts.baud, facts.is_unlocked, facts.acknowledges_writes), (Some(FAST), false, true));
@@ -156,40 +162,40 @@ fn facts_are_read_high_byte_first() {
 #[test]
 fn an_id_is_changed_and_locked_again() {
     for has_echo in [false, true] {
-        let (mut bus, wire) = bus(vec![Simulated::new(1)]);
+        let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
         wire.borrow_mut().has_echo = has_echo;
-        set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap();
+        set_id(&mut bus, &all_ids(FAST, None), 1, 6, |_| ()).unwrap();
         let servo = &mut wire.borrow_mut().servos[0].servo;
         servo.power_cycle(Instant::ZERO);
         assert_eq!(servo.id(), 6);
     }
-    let (mut bus, _) = bus(vec![Simulated::new(1)]);
-    set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap();
+    let (mut bus, _) = bus(vec![SimulatedServo::new(1)]);
+    set_id(&mut bus, &all_ids(FAST, None), 1, 6, |_| ()).unwrap();
     assert_eq!(bus.read(6, register::LOCK, 1).unwrap().values, [1]);
 }
 
 #[test]
 fn an_id_is_changed_on_a_servo_that_acknowledges_nothing() {
-    let mut servo = Simulated::new(1);
+    let mut servo = SimulatedServo::new(1);
     set(&mut servo, register::RESPONSE_LEVEL, &[0]);
     let (mut bus, wire) = bus(vec![servo]);
-    set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap();
+    set_id(&mut bus, &all_ids(FAST, None), 1, 6, |_| ()).unwrap();
     assert_eq!(wire.borrow().servos[0].servo.id(), 6);
 }
 
 #[test]
 fn nothing_is_written_unless_the_servo_is_alone() {
-    let garbled = Simulated::with(4, ServoFault::Garbled(1));
+    let garbled = SimulatedServo::with(4, ServoFault::Garbled(1));
     for (servos, says) in [
-        (vec![Simulated::new(1), Simulated::new(200)], "these ids answer: 1, 200"),
-        (vec![Simulated::new(2)], "these ids answer: 2"),
-        (vec![Simulated::new(1), garbled], "1, 4 (damaged answers)"),
-        (vec![Simulated::new(1), Simulated::new(1)], "1 (several servos)"),
+        (vec![SimulatedServo::new(1), SimulatedServo::new(200)], "these ids answer: 1, 200"),
+        (vec![SimulatedServo::new(2)], "these ids answer: 2"),
+        (vec![SimulatedServo::new(1), garbled], "1, 4 (damaged answers)"),
+        (vec![SimulatedServo::new(1), SimulatedServo::new(1)], "1 (several servos)"),
         (vec![], "no servo answers"),
     ] {
         let (mut bus, wire) = bus(servos);
-        let error = set_id(&mut bus, &everything_at(FAST, None), 1, 6, |_| ()).unwrap_err();
-        assert!(matches!(error, IdError::NotAlone { .. }));
+        let error = set_id(&mut bus, &all_ids(FAST, None), 1, 6, |_| ()).unwrap_err();
+        assert!(matches!(error, SetIdError::NotAlone { .. }));
         assert!(error.to_string().contains(says), "{error}");
         assert!(wire.borrow().sent.iter().all(|frame| frame[4] == 2), "only reads");
     }
@@ -197,32 +203,32 @@ fn nothing_is_written_unless_the_servo_is_alone() {
 
 #[test]
 fn a_servo_that_falls_silent_half_way_is_told() {
-    let plan = everything_at(FAST, None);
-    let (mut first, _) = bus(vec![Simulated::new(1)]);
+    let plan = all_ids(FAST, None);
+    let (mut first, _) = bus(vec![SimulatedServo::new(1)]);
     scan(&mut first, &plan, |_| ()).unwrap();
-    let (mut bus, wire) = bus(vec![Simulated::new(1)]);
+    let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
     // Just after the scan, while the EEPROM is being opened.
     wire.borrow_mut().servos[0].fails_at = first.now() + Duration::from_micros(100);
     let error = set_id(&mut bus, &plan, 1, 6, |_| ()).unwrap_err();
-    assert!(matches!(error, IdError::StaysLocked(_)), "{error:?}");
+    assert!(matches!(error, SetIdError::StaysLocked(_)), "{error:?}");
 }
 
 #[test]
 fn wherever_the_port_is_lost_the_user_learns_what_state_the_servo_may_be_in() {
-    let plan = everything_at(FAST, None);
-    let (mut bus_to_count, counted) = bus(vec![Simulated::new(1)]);
+    let plan = all_ids(FAST, None);
+    let (mut bus_to_count, counted) = bus(vec![SimulatedServo::new(1)]);
     set_id(&mut bus_to_count, &plan, 1, 6, |_| ()).unwrap();
     let frames = counted.borrow().sent.clone();
     let first_write = frames.iter().position(|frame| frame[4] == 3).unwrap();
     for frames_until_lost in first_write..frames.len() {
-        let (mut bus, wire) = bus(vec![Simulated::new(1)]);
+        let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
         wire.borrow_mut().frames_until_lost = Some(frames_until_lost);
         let error = set_id(&mut bus, &plan, 1, 6, |_| ()).unwrap_err();
         let id = wire.borrow().servos[0].servo.id();
         match error {
-            IdError::StaysLocked(_) => assert_eq!(id, 1),
-            IdError::StaysOpen(_) => assert_eq!(id, 6),
-            IdError::HalfWay(_) => {}
+            SetIdError::StaysLocked(_) => assert_eq!(id, 1),
+            SetIdError::StaysOpen(_) => assert_eq!(id, 6),
+            SetIdError::IdUncertain(_) => {}
             error => panic!("frame {frames_until_lost}: {error:?}"),
         }
     }
@@ -230,8 +236,8 @@ fn wherever_the_port_is_lost_the_user_learns_what_state_the_servo_may_be_in() {
 
 #[test]
 fn a_servo_goes_to_its_middle_and_starts_where_it_stands() {
-    let (mut bus, wire) = bus(vec![Simulated::new(1)]);
-    assert_eq!(center(&mut bus, 1, &Limits::default(), |_| true), Ok(511));
+    let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
+    assert_eq!(center(&mut bus, 1, &CenterOptions::default(), |_| true), Ok(511));
     let goals: Vec<Vec<u8>> = wire
         .borrow()
         .sent
@@ -245,11 +251,11 @@ fn a_servo_goes_to_its_middle_and_starts_where_it_stands() {
 
 #[test]
 fn a_blocked_servo_loses_its_torque() {
-    let (mut bus, wire) = bus(vec![Simulated::with(1, ServoFault::Stuck)]);
-    let error = center(&mut bus, 1, &Limits::default(), |_| true).unwrap_err();
+    let (mut bus, wire) = bus(vec![SimulatedServo::with(1, ServoFault::Stuck)]);
+    let error = center(&mut bus, 1, &CenterOptions::default(), |_| true).unwrap_err();
     assert!(matches!(error, CenterError::Overload { position: 300, load: 601..800, errors: 0 }), "{error:?}");
     assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
-    let weak = Limits { load: 1_000, stall: Duration::from_millis(500), ..Limits::default() };
+    let weak = CenterOptions { load: 1_000, stall: Duration::from_millis(500), ..CenterOptions::default() };
     let error = center(&mut bus, 1, &weak, |_| true).unwrap_err();
     assert_eq!(error, CenterError::Stalled { position: 300 });
     assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
@@ -257,8 +263,9 @@ fn a_blocked_servo_loses_its_torque() {
 
 #[test]
 fn an_interrupted_servo_loses_its_torque() {
-    let (mut bus, wire) = bus(vec![Simulated::new(1)]);
-    let error = center(&mut bus, 1, &Limits::default(), |reading| reading.position_counts < 320).unwrap_err();
+    let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
+    let error =
+        center(&mut bus, 1, &CenterOptions::default(), |reading| reading.position_counts < 320).unwrap_err();
     assert_eq!(error, CenterError::Interrupted);
     assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
 }
@@ -266,10 +273,10 @@ fn an_interrupted_servo_loses_its_torque() {
 #[test]
 fn a_servo_that_cannot_reach_its_middle_is_left_alone() {
     for (limits, says) in [([0, 0, 0, 0], "turn on and on"), ([2, 88, 3, 255], "600 to 1023")] {
-        let mut servo = Simulated::new(1);
+        let mut servo = SimulatedServo::new(1);
         set(&mut servo, register::MIN_POSITION, &limits);
         let (mut bus, wire) = bus(vec![servo]);
-        let error = center(&mut bus, 1, &Limits::default(), |_| true).unwrap_err();
+        let error = center(&mut bus, 1, &CenterOptions::default(), |_| true).unwrap_err();
         assert!(error.to_string().contains(says), "{error}");
         assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
     }
@@ -277,10 +284,10 @@ fn a_servo_that_cannot_reach_its_middle_is_left_alone() {
 
 #[test]
 fn a_servo_that_falls_silent_may_still_be_moving() {
-    let (mut bus, wire) = bus(vec![Simulated::new(1)]);
+    let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
     let silence = Duration::from_millis(500);
     wire.borrow_mut().servos[0].fails_at = silence;
-    let error = center(&mut bus, 1, &Limits::default(), |_| true).unwrap_err();
-    assert!(matches!(error, CenterError::StillOn(_)), "{error:?}");
+    let error = center(&mut bus, 1, &CenterOptions::default(), |_| true).unwrap_err();
+    assert!(matches!(error, CenterError::TorqueStillOn(_)), "{error:?}");
     assert!(error.to_string().contains("may still be moving"), "{error}");
 }

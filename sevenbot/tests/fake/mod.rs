@@ -15,7 +15,7 @@ use serialport::{SerialPort, TTYPort};
 /// Registers 0 to 7 of an arm like ours.
 pub(crate) const IDENTITY: [u8; 8] = [7, 30, 1, 2, 3, 4, 5, 6];
 
-/// Where the arm of [`under_way`] is.
+/// Where the arm of [`moving_registers`] is.
 pub(crate) const POSE: [u8; 7] = [120, 90, 65, 90, 90, 90, 0];
 
 /// The frame of a reply.
@@ -27,9 +27,11 @@ pub(crate) fn reply(address: u8, values: &[u8]) -> Vec<u8> {
 
 /// An arm that answers the n-th read (the first is number 0) with whatever bytes the script says, on a port
 /// of this name.
-pub(crate) fn arm_of(mut script: impl FnMut(usize, u8, u8) -> Vec<u8> + Send + 'static) -> (String, TTYPort) {
+pub(crate) fn answering_arm(
+    mut script: impl FnMut(usize, u8, u8) -> Vec<u8> + Send + 'static,
+) -> (String, TTYPort) {
     let mut reads = 0;
-    arm_that(move |_, request| match request {
+    scripted_arm(move |_, request| match request {
         Request::Read { address, count } => {
             reads += 1;
             script(reads - 1, *address, *count)
@@ -40,7 +42,7 @@ pub(crate) fn arm_of(mut script: impl FnMut(usize, u8, u8) -> Vec<u8> + Send + '
 
 /// An arm that does with each request what the script says, given its own end of the line too, on a port of
 /// this name. It ends when nobody has the port open any more.
-pub(crate) fn arm_that(
+pub(crate) fn scripted_arm(
     mut script: impl FnMut(&TTYPort, &Request<'_>) -> Vec<u8> + Send + 'static,
 ) -> (String, TTYPort) {
     let (mut master, slave) = TTYPort::pair().unwrap();
@@ -76,7 +78,7 @@ pub(crate) fn makers_arm() -> (String, TTYPort) {
     registers[28..30].copy_from_slice(&[1, 1]);
     registers[32..39].fill(60);
     registers[54..61].copy_from_slice(&[90, 90, 65, 90, 90, 90, 80]);
-    arm_that(move |_, request| match *request {
+    scripted_arm(move |_, request| match *request {
         Request::Read { address, count } => {
             assert!(address < 240, "the status block is not asked for");
             let first = usize::from(address);
@@ -93,7 +95,7 @@ pub(crate) fn makers_arm() -> (String, TTYPort) {
 
 /// What a line does to a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Damage {
+pub(crate) enum LineFault {
     Lost,
     Garbled,
     /// A reply comes together with the next one; a request is lost.
@@ -101,7 +103,7 @@ pub(crate) enum Damage {
 }
 
 /// The registers of an arm in the servo state whose joints 1 and 7 are on their way, the last from 0 degrees.
-pub(crate) fn under_way() -> Arc<Mutex<[u8; 256]>> {
+pub(crate) fn moving_registers() -> Arc<Mutex<[u8; 256]>> {
     let mut registers = [0; 256];
     registers[..8].copy_from_slice(&IDENTITY);
     registers[28..30].copy_from_slice(&[1, 1]);
@@ -113,7 +115,7 @@ pub(crate) fn under_way() -> Arc<Mutex<[u8; 256]>> {
 }
 
 /// Does what a request says; returns the reply.
-pub(crate) fn obey(registers: &mut [u8; 256], request: &Request<'_>) -> Vec<u8> {
+pub(crate) fn execute(registers: &mut [u8; 256], request: &Request<'_>) -> Vec<u8> {
     match *request {
         Request::Read { address, count } => {
             let first = usize::from(address);
@@ -128,30 +130,30 @@ pub(crate) fn obey(registers: &mut [u8; 256], request: &Request<'_>) -> Vec<u8> 
     }
 }
 
-/// An arm with these registers, on a line that harms its frame number `harmed`, requests and replies counted together.
-pub(crate) fn on_a_bad_line(
+/// An arm with these registers, on a line that harms its frame number `faulty_frame`, requests and replies counted together.
+pub(crate) fn arm_on_faulty_line(
     registers: &Arc<Mutex<[u8; 256]>>,
-    harmed: usize,
-    damage: Damage,
+    faulty_frame: usize,
+    fault: LineFault,
 ) -> (String, TTYPort) {
     let registers = Arc::clone(registers);
     let (mut frame, mut late) = (0, Vec::new());
-    let mut is_harmed = move || {
+    let mut is_faulty = move || {
         frame += 1;
-        frame - 1 == harmed
+        frame - 1 == faulty_frame
     };
-    arm_that(move |_, request| {
+    scripted_arm(move |_, request| {
         let mut registers = registers.lock().unwrap();
-        if is_harmed() {
-            registers[248] += u8::from(damage == Damage::Garbled);
+        if is_faulty() {
+            registers[248] += u8::from(fault == LineFault::Garbled);
             return Vec::new();
         }
-        let mut bytes = obey(&mut registers, request);
-        if !bytes.is_empty() && is_harmed() {
-            match damage {
-                Damage::Lost => bytes.clear(),
-                Damage::Garbled => bytes[5] ^= 1,
-                Damage::Late => late = std::mem::take(&mut bytes),
+        let mut bytes = execute(&mut registers, request);
+        if !bytes.is_empty() && is_faulty() {
+            match fault {
+                LineFault::Lost => bytes.clear(),
+                LineFault::Garbled => bytes[5] ^= 1,
+                LineFault::Late => late = std::mem::take(&mut bytes),
             }
             return bytes;
         }
@@ -160,23 +162,23 @@ pub(crate) fn on_a_bad_line(
 }
 
 /// An arm that takes so many writes, and then loses them all. It tells of each write.
-pub(crate) fn deaf_after(takes: usize) -> (String, TTYPort, mpsc::Receiver<()>) {
-    let registers = under_way();
-    let (tell, told) = mpsc::channel();
-    let mut writes = 0;
-    let (name, port) = arm_that(move |_, request| {
+pub(crate) fn arm_that_loses_writes_after(takes: usize) -> (String, TTYPort, mpsc::Receiver<()>) {
+    let registers = moving_registers();
+    let (report_write, writes) = mpsc::channel();
+    let mut count = 0;
+    let (name, port) = scripted_arm(move |_, request| {
         let mut registers = registers.lock().unwrap();
         if matches!(request, Request::Write { .. }) {
-            writes += 1;
-            let _ = tell.send(());
-            if writes > takes {
+            count += 1;
+            let _ = report_write.send(());
+            if count > takes {
                 return Vec::new();
             }
         }
-        let reply = obey(&mut registers, request);
+        let reply = execute(&mut registers, request);
         // A move never ends here.
         registers[243] = 0b100_0001;
         reply
     });
-    (name, port, told)
+    (name, port, writes)
 }

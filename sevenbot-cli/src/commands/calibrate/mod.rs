@@ -17,15 +17,15 @@ use clap::Args;
 use sevenbot::map::{OFFSET, PRESENT_POSITION};
 use sevenbot::{Angle, Arm, Joint, Span};
 
-use self::offsets::{Grade, Offsets, Table, corrected};
-use super::all_taken;
+use self::offsets::{Grade, OffsetTable, Offsets, corrected};
 use super::set::unlocked;
+use crate::command_error::CommandError;
 use crate::confirm::confirm;
-use crate::failure::Failure;
-use crate::interrupt::or_hold;
-use crate::moving::{Move, driven, stepped};
-use crate::output::{Facts, note, warn};
+use crate::interrupt::hold_on_interrupt;
+use crate::joint_move::{JointMove, driven_joints, step_target};
+use crate::printer::{Printable, note, warn};
 use crate::session::Session;
+use crate::write_result::all_taken;
 
 /// Find the offsets of the joints, and store them.
 ///
@@ -60,24 +60,26 @@ pub(crate) struct CalibrateArgs {
 }
 
 /// How long an arm may take to come back from a restart.
-const RESTART: Duration = Duration::from_secs(20);
-const LOOK_EVERY: Duration = Duration::from_millis(500);
+const RESTART_TIMEOUT: Duration = Duration::from_secs(20);
+const POLL_PERIOD: Duration = Duration::from_millis(500);
 
-pub(crate) fn run(session: &mut Session, args: &CalibrateArgs) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &CalibrateArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let before = read(&mut arm)?;
     if args.show {
-        return session.output.show(&Table::new(before, before));
+        return session.printer.print(&OffsetTable::new(before, before));
     }
     if !args.yes && !io::stdin().is_terminal() {
         let how = "--yes says yes; --show only shows them";
-        return Err(Failure::Usage(format!("nobody is there to say whether offsets may be written: {how}")));
+        return Err(CommandError::Usage(format!(
+            "nobody is there to say whether offsets may be written: {how}"
+        )));
     }
-    let wanted = if args.reset { Offsets([0; 7]) } else { walk(&mut arm, before)? };
+    let wanted = if args.reset { Offsets([0; 7]) } else { ask_offsets(&mut arm, before)? };
     store(session, arm, args, before, wanted)
 }
 
-fn read(arm: &mut Arm) -> Result<Offsets, Failure> {
+fn read(arm: &mut Arm) -> Result<Offsets, CommandError> {
     Ok(arm.read_span(Span::of(&OFFSET))?.into())
 }
 
@@ -88,68 +90,69 @@ fn store(
     args: &CalibrateArgs,
     before: Offsets,
     wanted: Offsets,
-) -> Result<(), Failure> {
+) -> Result<(), CommandError> {
     if wanted != before {
         let mut err = anstream::stderr();
-        Table::new(before, wanted).write_text(&mut err)?;
+        OffsetTable::new(before, wanted).write_text(&mut err)?;
         confirm("Write these offsets? The arm moves a little by them.", args.yes)?;
         let write = |arm: &mut Arm| arm.write_checked(OFFSET.address, &wanted.bytes());
-        all_taken(&or_hold(&mut arm, |arm, _| unlocked(arm, write))?)?;
+        all_taken(&hold_on_interrupt(&mut arm, |arm, _| unlocked(arm, write))?)?;
         if !args.yes {
             restart(session, arm, wanted)?;
         }
     }
-    session.output.show(&Table::new(before, wanted))
+    session.printer.print(&OffsetTable::new(before, wanted))
 }
 
 /// Goes through the joints; gives the offsets that were found.
-fn walk(arm: &mut Arm, before: Offsets) -> Result<Offsets, Failure> {
+fn ask_offsets(arm: &mut Arm, before: Offsets) -> Result<Offsets, CommandError> {
     let mut wanted = before;
     arm.wait_until_settled()?;
     say(
         "Type +N or -N to move a joint, the angle it really stands at, or Enter to keep its offset; q ends.",
     )?;
     for joint in Joint::ALL {
-        wanted = wanted.with(joint, at_joint(arm, joint, before.of(joint))?);
+        wanted = wanted.with(joint, ask_offset(arm, joint, before.of(joint))?);
     }
     Ok(wanted)
 }
 
 /// What may be typed at a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Answer {
+enum CalibrationInput {
     Keep,
     Quit,
     /// Degrees.
     Nudge(i16),
-    Truth(Angle),
+    Actual(Angle),
 }
 
-impl Answer {
+impl CalibrationInput {
     fn parse(line: &str) -> Option<Self> {
         let line = line.trim();
         match line {
             "" => Some(Self::Keep),
             "q" | "Q" => Some(Self::Quit),
             _ if line.starts_with(['+', '-']) => line.parse().ok().map(Self::Nudge),
-            _ => line.parse().ok().and_then(Angle::from_degrees).map(Self::Truth),
+            _ => line.parse().ok().and_then(Angle::from_degrees).map(Self::Actual),
         }
     }
 }
 
 /// The offset of one joint.
-fn at_joint(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, Failure> {
+fn ask_offset(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, CommandError> {
     loop {
-        let seen = arm.read_span(Span::of(&PRESENT_POSITION))?.at(PRESENT_POSITION.of(joint));
+        let measured = arm.read_span(Span::of(&PRESENT_POSITION))?.at(PRESENT_POSITION.of(joint));
         let number = joint.number();
         let grade = Grade::of(offset).word();
-        match Answer::parse(&ask(&format!("joint {number}: reads {seen}°, offset {offset}° ({grade}) > "))?)
-        {
-            Some(Answer::Keep) => return Ok(offset),
-            Some(Answer::Quit) => return Err(Failure::Arm("nothing was written".to_owned())),
-            Some(Answer::Nudge(degrees)) => nudge(arm, joint, degrees)?,
-            Some(Answer::Truth(truth)) => {
-                let found = corrected(joint, offset, seen, truth.degrees());
+        match CalibrationInput::parse(&ask(&format!(
+            "joint {number}: reads {measured}°, offset {offset}° ({grade}) > "
+        ))?) {
+            Some(CalibrationInput::Keep) => return Ok(offset),
+            Some(CalibrationInput::Quit) => return Err(CommandError::Arm("nothing was written".to_owned())),
+            Some(CalibrationInput::Nudge(degrees)) => nudge(arm, joint, degrees)?,
+            Some(CalibrationInput::Actual(actual)) => {
+                let found = corrected(joint, offset, measured, actual.degrees());
                 let grade = Grade::of(found);
                 let style = grade.style();
                 say(&format!("  offset {found}°: {style}{}{style:#}", grade.word()))?;
@@ -164,15 +167,15 @@ fn at_joint(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, Failure> {
 }
 
 /// Moves one joint. What keeps it from moving is told, and does not end the walk.
-fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), Failure> {
-    let moved = or_hold(arm, |arm, interrupt| {
-        let wanted = stepped(&driven(arm)?, joint, degrees)?.max(0);
+fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> {
+    let moved = hold_on_interrupt(arm, |arm, interrupt| {
+        let wanted = step_target(&driven_joints(arm)?, joint, degrees)?.max(0);
         let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
         let targets = Joint::ALL.map(|other| (other == joint).then_some(wanted));
-        Move::begin(arm, targets)?.finish(arm, interrupt)
+        JointMove::begin(arm, targets)?.finish(arm, interrupt)
     });
     match moved {
-        Err(Failure::Arm(reason)) => warn(reason),
+        Err(CommandError::Arm(reason)) => warn(reason),
         Err(failure) => return Err(failure),
         Ok(_) => {}
     }
@@ -180,8 +183,9 @@ fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), Failure> {
 }
 
 /// Has the arm switched off and on, and looks whether it has forgotten anything.
-fn restart(session: &Session, mut arm: Arm, wanted: Offsets) -> Result<(), Failure> {
-    let accepted = |arm: &mut Arm| Ok::<_, Failure>(arm.status()?.map(|status| status.frames_accepted()));
+fn restart(session: &Session, mut arm: Arm, wanted: Offsets) -> Result<(), CommandError> {
+    let accepted =
+        |arm: &mut Arm| Ok::<_, CommandError>(arm.status()?.map(|status| status.frames_accepted()));
     let before = accepted(&mut arm)?;
     // Without its supply the port may go, and come back as another one.
     drop(arm);
@@ -191,35 +195,35 @@ fn restart(session: &Session, mut arm: Arm, wanted: Offsets) -> Result<(), Failu
         warn("the arm was not switched off: its counters go on");
     }
     if read(&mut arm)? != wanted {
-        return Err(Failure::Arm("the arm has forgotten its offsets over the restart".to_owned()));
+        return Err(CommandError::Arm("the arm has forgotten its offsets over the restart".to_owned()));
     }
     note("the offsets are still there");
     Ok(())
 }
 
-fn reconnect(session: &Session) -> Result<Arm, Failure> {
-    let deadline = Instant::now() + RESTART;
+fn reconnect(session: &Session) -> Result<Arm, CommandError> {
+    let deadline = Instant::now() + RESTART_TIMEOUT;
     loop {
         match session.connect() {
-            Err(_) if Instant::now() < deadline => sleep(LOOK_EVERY),
+            Err(_) if Instant::now() < deadline => sleep(POLL_PERIOD),
             ended => return ended,
         }
     }
 }
 
-fn say(line: &str) -> Result<(), Failure> {
+fn say(line: &str) -> Result<(), CommandError> {
     Ok(writeln!(anstream::stderr(), "{line}")?)
 }
 
 /// A line from the user.
-fn ask(question: &str) -> Result<String, Failure> {
+fn ask(question: &str) -> Result<String, CommandError> {
     let mut err = anstream::stderr();
     write!(err, "{question}")?;
     err.flush()?;
     let mut line = String::new();
     if io::stdin().read_line(&mut line)? == 0 {
         writeln!(err)?;
-        return Err(Failure::Usage("the input has ended, and there were questions left".to_owned()));
+        return Err(CommandError::Usage("the input has ended, and there were questions left".to_owned()));
     }
     Ok(line)
 }
@@ -230,13 +234,13 @@ mod tests {
 
     #[test]
     fn answers_are_nudges_angles_or_words() {
-        assert_eq!(Answer::parse("\n"), Some(Answer::Keep));
-        assert_eq!(Answer::parse(" +5 \n"), Some(Answer::Nudge(5)));
-        assert_eq!(Answer::parse("-2\r\n"), Some(Answer::Nudge(-2)));
-        assert_eq!(Answer::parse("90"), Angle::from_degrees(90).map(Answer::Truth));
-        assert_eq!(Answer::parse("q"), Some(Answer::Quit));
+        assert_eq!(CalibrationInput::parse("\n"), Some(CalibrationInput::Keep));
+        assert_eq!(CalibrationInput::parse(" +5 \n"), Some(CalibrationInput::Nudge(5)));
+        assert_eq!(CalibrationInput::parse("-2\r\n"), Some(CalibrationInput::Nudge(-2)));
+        assert_eq!(CalibrationInput::parse("90"), Angle::from_degrees(90).map(CalibrationInput::Actual));
+        assert_eq!(CalibrationInput::parse("q"), Some(CalibrationInput::Quit));
         for nonsense in ["181", "ninety", "+", "9 0"] {
-            assert_eq!(Answer::parse(nonsense), None, "{nonsense}");
+            assert_eq!(CalibrationInput::parse(nonsense), None, "{nonsense}");
         }
     }
 }

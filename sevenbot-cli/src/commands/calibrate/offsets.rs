@@ -9,8 +9,8 @@ use serde::Serialize;
 use sevenbot::map::OFFSET;
 use sevenbot::{Joint, Snapshot};
 
-use crate::output::Facts;
-use crate::style::{BAD, BOLD, DOUBTFUL, GOOD};
+use crate::printer::Printable;
+use crate::style::{BAD, BOLD, GOOD, WARNING};
 
 /// Offsets up to this show a good assembly, says the maker's table.
 const GOOD_UP_TO: i16 = 10;
@@ -47,15 +47,15 @@ impl Grade {
     pub(super) const fn style(self) -> Style {
         match self {
             Self::Good => GOOD,
-            Self::Acceptable => DOUBTFUL,
+            Self::Acceptable => WARNING,
             Self::Bad => BAD,
         }
     }
 }
 
-/// The offset with which a joint that reads `seen` degrees would read `truth`.
-pub(super) fn corrected(joint: Joint, offset: i16, seen: u8, truth: u8) -> i16 {
-    let error = i16::from(truth) - i16::from(seen);
+/// The offset with which a joint that reads `measured` degrees would read `actual`.
+pub(super) fn corrected(joint: Joint, offset: i16, measured: u8, actual: u8) -> i16 {
+    let error = i16::from(actual) - i16::from(measured);
     // Where the servo is mounted the other way round, the offset counts on the servo's side.
     if is_reversed(joint) { offset - error } else { offset + error }
 }
@@ -95,12 +95,12 @@ impl Offsets {
 
 /// The offsets, as they are told.
 #[derive(Debug, Serialize)]
-pub(super) struct Table {
-    joints: Vec<Row>,
+pub(super) struct OffsetTable {
+    joints: Vec<OffsetRow>,
 }
 
 #[derive(Debug, Serialize)]
-struct Row {
+struct OffsetRow {
     joint: u8,
     offset_degrees: i16,
     grade: Grade,
@@ -109,22 +109,22 @@ struct Row {
     before: Option<i16>,
 }
 
-impl Table {
+impl OffsetTable {
     /// What they are, and what they were.
     pub(super) fn new(before: Offsets, now: Offsets) -> Self {
         let row = |joint: Joint| {
             let (was, is) = (before.of(joint), now.of(joint));
             let before = (was != is).then_some(was);
-            Row { joint: joint.number(), offset_degrees: is, grade: Grade::of(is), before }
+            OffsetRow { joint: joint.number(), offset_degrees: is, grade: Grade::of(is), before }
         };
         Self { joints: Joint::ALL.into_iter().map(row).collect() }
     }
 }
 
-impl Facts for Table {
+impl Printable for OffsetTable {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{BOLD}joint  offset{BOLD:#}")?;
-        for Row { joint, offset_degrees, grade, before } in &self.joints {
+        for OffsetRow { joint, offset_degrees, grade, before } in &self.joints {
             let (style, word) = (grade.style(), grade.word());
             let was = before.map_or_else(String::new, |was| format!("  (was {was}°)"));
             writeln!(out, "{joint:>5}  {offset_degrees:>5}°  {style}{word}{style:#}{was}")?;

@@ -19,12 +19,12 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Clear, Dataset, GraphType, Paragraph};
 use sevenbot::map::motor_state;
-use sevenbot::words::{faults, joints, motor_state_word};
+use sevenbot::register_text::{faults, joints, motor_state_name};
 use sevenbot::{Angle, Joint};
 
 use super::keys::HELP;
 use super::sample::Sample;
-use super::view::{Connection, Dialog, PAST, Past, View};
+use super::view::{Connection, Dialog, PLOT_SPAN, PastPose, View};
 
 /// One colour a joint, in the table and in the plot: those that terminals can be told to change.
 const COLOURS: [Color; 7] =
@@ -92,7 +92,7 @@ fn title_right(view: &View) -> Line<'static> {
         (Connection::Open { .. }, Some(sample)) => {
             let state = sample.motor_state();
             let style = if state == motor_state::SERVO { GOOD } else { BAD };
-            Span::styled(format!("{} ", motor_state_word(state)), style)
+            Span::styled(format!("{} ", motor_state_name(state)), style)
         }
     };
     let frozen = view.is_frozen.then(|| Span::styled("frozen  ", BOLD));
@@ -156,25 +156,25 @@ fn draw_plot(frame: &mut Frame<'_>, view: &View, area: Rect) {
     let mut order = Joint::ALL.to_vec();
     order.sort_by_key(|&joint| joint == view.selected);
     let curves: Vec<(Joint, Vec<(f64, f64)>)> =
-        order.into_iter().flat_map(|joint| stretches(view, joint)).collect();
+        order.into_iter().flat_map(|joint| curve_segments(view, joint)).collect();
     let datasets = curves.iter().map(|(joint, points)| {
         let line = Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line);
         line.style(colour(*joint)).data(points)
     });
     let degrees = Axis::default().bounds([0.0, 180.0]).labels(["0°", "90°", "180°"]).style(FAINT);
-    let past = PAST.as_secs_f64();
+    let past = PLOT_SPAN.as_secs_f64();
     let seconds = Axis::default().bounds([-past, 0.0]).labels(["-20 s", "-10 s", "now"]).style(FAINT);
     frame.render_widget(Chart::new(datasets.collect()).x_axis(seconds).y_axis(degrees), area);
 }
 
 /// A joint's past as lines: seconds before now, and degrees. A new line begins behind every gap.
-fn stretches(view: &View, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
+fn curve_segments(view: &View, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
     let index = usize::from(joint.number()).wrapping_sub(1);
-    let point = |(time, pose): &Past| {
+    let point = |(time, pose): &PastPose| {
         let before = view.now.saturating_sub(*time).as_secs_f64();
         (-before, f64::from(pose.get(index).copied().unwrap_or(0)))
     };
-    let past: Vec<Past> = view.past.iter().copied().collect();
+    let past: Vec<PastPose> = view.past.iter().copied().collect();
     let lines = past.chunk_by(|one, next| next.0.saturating_sub(one.0) <= LONGEST_GAP);
     lines.map(|line| (joint, line.iter().map(point).collect())).collect()
 }
@@ -264,7 +264,7 @@ fn centred(area: Rect, width: usize, height: usize) -> Rect {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::monitor::view::News;
+    use crate::commands::monitor::view::ArmEvent;
     use crate::commands::monitor::view::tests::watching;
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn an_arm_that_went_away() {
         let mut view = watching();
-        view.hear(News::Lost("the connection is gone: broken pipe".to_owned()));
+        view.update(ArmEvent::Lost("the connection is gone: broken pipe".to_owned()));
         insta::assert_snapshot!(screen(&view, 80, 24));
     }
 

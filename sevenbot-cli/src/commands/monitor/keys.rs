@@ -4,7 +4,7 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use sevenbot::Joint;
 use sevenbot::map::motor_state;
 
-use super::view::{Dialog, Pace, View, Wish};
+use super::view::{Dialog, SpeedChange, UiCommand, View};
 
 /// Degrees of a nudge, and of one with Shift.
 const NUDGE: i16 = 1;
@@ -24,11 +24,11 @@ pub(crate) const HELP: [(&str, &str); 9] = [
 
 /// What a key leads to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Outcome {
+pub(crate) enum KeyAction {
     /// The view has changed, or nothing has.
-    Shown,
+    Redraw,
     /// The arm is to do this.
-    Ask(Wish),
+    Send(UiCommand),
     /// The monitor ends.
     Quit,
     /// The arm is to hold where it is, and the monitor ends.
@@ -36,10 +36,10 @@ pub(crate) enum Outcome {
 }
 
 /// A key was pressed.
-pub(crate) fn press(view: &mut View, key: KeyEvent) -> Outcome {
+pub(crate) fn press(view: &mut View, key: KeyEvent) -> KeyAction {
     let is_ctrl_c = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
     if is_ctrl_c {
-        return Outcome::Stop;
+        return KeyAction::Stop;
     }
     match view.dialog {
         None => press_in_view(view, key),
@@ -47,11 +47,11 @@ pub(crate) fn press(view: &mut View, key: KeyEvent) -> Outcome {
     }
 }
 
-fn press_in_view(view: &mut View, key: KeyEvent) -> Outcome {
+fn press_in_view(view: &mut View, key: KeyEvent) -> KeyAction {
     let is_shifted = key.modifiers.contains(KeyModifiers::SHIFT);
     let degrees = if is_shifted { BIG_NUDGE } else { NUDGE };
     match key.code {
-        KeyCode::Char('q') | KeyCode::Esc => return Outcome::Quit,
+        KeyCode::Char('q') | KeyCode::Esc => return KeyAction::Quit,
         KeyCode::Char('?' | 'h') | KeyCode::F(1) => view.dialog = Some(Dialog::Help),
         KeyCode::Char(' ') => view.is_frozen = !view.is_frozen,
         KeyCode::Char('s') => view.dialog = Some(Dialog::ChooseState),
@@ -65,28 +65,30 @@ fn press_in_view(view: &mut View, key: KeyEvent) -> Outcome {
         // Not every terminal tells Shift and an arrow from the arrow alone.
         KeyCode::Char('[') => return nudge(view, -BIG_NUDGE),
         KeyCode::Char(']') => return nudge(view, BIG_NUDGE),
-        KeyCode::Char('+' | '=') => return change(view, Pace::Faster),
-        KeyCode::Char('-' | '_') => return change(view, Pace::Slower),
+        KeyCode::Char('+' | '=') => return change(view, SpeedChange::Faster),
+        KeyCode::Char('-' | '_') => return change(view, SpeedChange::Slower),
         _ => {}
     }
-    Outcome::Shown
+    KeyAction::Redraw
 }
 
-fn press_in_dialog(view: &mut View, dialog: Dialog, key: KeyCode) -> Outcome {
+fn press_in_dialog(view: &mut View, dialog: Dialog, key: KeyCode) -> KeyAction {
     view.dialog = None;
     match (dialog, key) {
-        (Dialog::ChooseState, KeyCode::Char('h' | '1')) => Outcome::Ask(Wish::State(motor_state::SERVO)),
+        (Dialog::ChooseState, KeyCode::Char('h' | '1')) => {
+            KeyAction::Send(UiCommand::State(motor_state::SERVO))
+        }
         (Dialog::ChooseState, KeyCode::Char('d' | '0')) => release(view, motor_state::DAMPING),
         (Dialog::ChooseState, KeyCode::Char('f' | '2')) => release(view, motor_state::FORCELESS),
-        (Dialog::ConfirmState(state), KeyCode::Char('y' | 'Y')) => Outcome::Ask(Wish::State(state)),
-        _ => Outcome::Shown,
+        (Dialog::ConfirmState(state), KeyCode::Char('y' | 'Y')) => KeyAction::Send(UiCommand::State(state)),
+        _ => KeyAction::Redraw,
     }
 }
 
 /// Asks first where the arm would fall.
-fn release(view: &mut View, state: u8) -> Outcome {
+fn release(view: &mut View, state: u8) -> KeyAction {
     view.dialog = Some(Dialog::ConfirmState(state));
-    Outcome::Shown
+    KeyAction::Redraw
 }
 
 fn select(view: &mut View, number: i16) {
@@ -95,22 +97,24 @@ fn select(view: &mut View, number: i16) {
     }
 }
 
-fn nudge(view: &mut View, degrees: i16) -> Outcome {
+fn nudge(view: &mut View, degrees: i16) -> KeyAction {
     match view.arm().map(|arm| arm.motor_state()) {
-        Some(motor_state::SERVO) => Outcome::Ask(Wish::Nudge { joint: view.selected, degrees }),
+        Some(motor_state::SERVO) => KeyAction::Send(UiCommand::Nudge { joint: view.selected, degrees }),
         Some(_) => {
-            view.say("the motors are off: s, then h, makes the arm hold where it is");
-            Outcome::Shown
+            view.show_note("the motors are off: s, then h, makes the arm hold where it is");
+            KeyAction::Redraw
         }
         None => {
-            view.say("there is no arm: nothing was written");
-            Outcome::Shown
+            view.show_note("there is no arm: nothing was written");
+            KeyAction::Redraw
         }
     }
 }
 
-fn change(view: &View, pace: Pace) -> Outcome {
-    view.arm().map_or(Outcome::Shown, |_| Outcome::Ask(Wish::Pace { joint: view.selected, pace }))
+fn change(view: &View, change: SpeedChange) -> KeyAction {
+    view.arm().map_or(KeyAction::Redraw, |_| {
+        KeyAction::Send(UiCommand::SpeedChange { joint: view.selected, change })
+    })
 }
 
 #[cfg(test)]
@@ -118,7 +122,7 @@ mod tests {
     use super::*;
     use crate::commands::monitor::view::tests::watching;
 
-    fn pressed(view: &mut View, keys: &[KeyCode]) -> Vec<Outcome> {
+    fn pressed(view: &mut View, keys: &[KeyCode]) -> Vec<KeyAction> {
         keys.iter().map(|&key| press(view, KeyEvent::from(key))).collect()
     }
 
@@ -127,9 +131,9 @@ mod tests {
         let mut view = watching();
         let outcomes = pressed(&mut view, &[KeyCode::Up, KeyCode::Char('3'), KeyCode::Down, KeyCode::Left]);
         let joint = Joint::ALL[3];
-        assert_eq!(outcomes[3], Outcome::Ask(Wish::Nudge { joint, degrees: -1 }));
+        assert_eq!(outcomes[3], KeyAction::Send(UiCommand::Nudge { joint, degrees: -1 }));
         let shifted = KeyEvent::new(KeyCode::Right, KeyModifiers::SHIFT);
-        assert_eq!(press(&mut view, shifted), Outcome::Ask(Wish::Nudge { joint, degrees: 10 }));
+        assert_eq!(press(&mut view, shifted), KeyAction::Send(UiCommand::Nudge { joint, degrees: 10 }));
     }
 
     #[test]
@@ -137,12 +141,12 @@ mod tests {
         let mut view = watching();
         let let_go = [KeyCode::Char('s'), KeyCode::Char('f'), KeyCode::Char('y')];
         let outcomes = pressed(&mut view, &let_go);
-        assert_eq!(outcomes, [Outcome::Shown, Outcome::Shown, Outcome::Ask(Wish::State(2))]);
+        assert_eq!(outcomes, [KeyAction::Redraw, KeyAction::Redraw, KeyAction::Send(UiCommand::State(2))]);
         let changed_my_mind = [KeyCode::Char('s'), KeyCode::Char('d'), KeyCode::Enter];
-        assert_eq!(pressed(&mut view, &changed_my_mind), [Outcome::Shown; 3]);
+        assert_eq!(pressed(&mut view, &changed_my_mind), [KeyAction::Redraw; 3]);
         assert_eq!(view.dialog, None);
         let hold = pressed(&mut view, &[KeyCode::Char('s'), KeyCode::Char('h')]);
-        assert_eq!(hold[1], Outcome::Ask(Wish::State(1)));
+        assert_eq!(hold[1], KeyAction::Send(UiCommand::State(1)));
     }
 
     #[test]
@@ -151,13 +155,13 @@ mod tests {
         pressed(&mut view, &[KeyCode::Char('?')]);
         assert_eq!(view.dialog, Some(Dialog::Help));
         let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
-        assert_eq!(press(&mut view, ctrl_c), Outcome::Stop);
+        assert_eq!(press(&mut view, ctrl_c), KeyAction::Stop);
     }
 
     #[test]
     fn without_an_arm_keys_ask_for_nothing() {
         let mut view = View::new("COM3");
         let keys = [KeyCode::Left, KeyCode::Char('+'), KeyCode::Char(']')];
-        assert_eq!(pressed(&mut view, &keys), [Outcome::Shown; 3]);
+        assert_eq!(pressed(&mut view, &keys), [KeyAction::Redraw; 3]);
     }
 }

@@ -5,21 +5,21 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use sevenbot::{Joint, Status};
+use sevenbot::{Joint, StatusBlock};
 
 use super::sample::Sample;
-use crate::output::Facts;
+use crate::printer::Printable;
 
 /// How a sample becomes a line of text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Layout {
+pub(crate) enum LineFormat {
     /// Seconds, seven targets, seven positions, and which joints move: for eyes, and for `cut`.
     Columns,
     /// All there is, for spreadsheets.
     Csv,
 }
 
-impl Layout {
+impl LineFormat {
     /// The names of the columns.
     pub(crate) fn head(self) -> String {
         let joints = |word: &str| Joint::ALL.map(|joint| format!("{word}.{}", joint.number()));
@@ -58,7 +58,7 @@ fn csv(sample: &Sample) -> String {
     let joints = |field: fn(&Sample, Joint) -> String| Joint::ALL.map(|joint| field(sample, joint)).join(",");
     let status = sample.status.as_ref();
     let number = |value: Option<u8>| value.map_or_else(String::new, |value| value.to_string());
-    let volts = status.and_then(Status::supply_volts);
+    let volts = status.and_then(StatusBlock::supply_volts);
     [
         format!("{:.3}", sample.time.as_secs_f64()),
         joints(|sample, joint| sample.target(joint).to_string()),
@@ -66,10 +66,10 @@ fn csv(sample: &Sample) -> String {
         joints(|sample, joint| format!("{:.1}", sample.speed(joint).degrees_per_second())),
         joints(|sample, joint| u8::from(sample.is_moving(joint)).to_string()),
         sample.motor_state().to_string(),
-        number(status.map(Status::faults)),
-        number(status.map(Status::missing)),
+        number(status.map(StatusBlock::faults)),
+        number(status.map(StatusBlock::missing)),
         volts.map_or_else(String::new, |volts| format!("{volts:.1}")),
-        number(status.and_then(Status::hottest_celsius)),
+        number(status.and_then(StatusBlock::hottest_celsius)),
         format!("{:.1}", sample.round_trip.as_secs_f64() * 1e3),
     ]
     .join(",")
@@ -81,7 +81,7 @@ fn numbers(is_so: impl Fn(Joint) -> bool) -> Vec<u8> {
 
 /// One sample as JSON.
 #[derive(Debug, Serialize)]
-pub(crate) struct Line {
+pub(crate) struct SampleJson {
     seconds: f64,
     targets: [u8; 7],
     positions: [u8; 7],
@@ -95,7 +95,7 @@ pub(crate) struct Line {
     round_trip_ms: f64,
 }
 
-impl From<&Sample> for Line {
+impl From<&Sample> for SampleJson {
     fn from(sample: &Sample) -> Self {
         let status = sample.status.as_ref();
         Self {
@@ -106,9 +106,9 @@ impl From<&Sample> for Line {
             moving: numbers(|joint| sample.is_moving(joint)),
             missing: numbers(|joint| sample.is_missing(joint)),
             motor_state: sample.motor_state(),
-            faults: status.map(Status::faults),
-            supply_volts: status.and_then(Status::supply_volts),
-            hottest_celsius: status.and_then(Status::hottest_celsius),
+            faults: status.map(StatusBlock::faults),
+            supply_volts: status.and_then(StatusBlock::supply_volts),
+            hottest_celsius: status.and_then(StatusBlock::hottest_celsius),
             round_trip_ms: thousandths(sample.round_trip.as_secs_f64() * 1e3),
         }
     }
@@ -119,7 +119,7 @@ fn thousandths(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }
 
-impl Facts for Line {
+impl Printable for SampleJson {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{:.3} {:?}", self.seconds, self.positions)
     }

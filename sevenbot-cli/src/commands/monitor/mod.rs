@@ -2,12 +2,13 @@
 //!
 //! ```text
 //!              ┌─ screen: draws, takes keys ──┐
-//!   terminal ──┤     │ wishes      ▲ news     ├── View ── draw ── picture (SVG)
+//!   terminal ──┤     │ commands      ▲ events     ├── View ── draw ── picture (SVG)
 //!              └─ watch: owns the arm, a ─────┘
 //!                 thread of its own
 //!   otherwise ── lines: columns, CSV, JSON
 //! ```
 
+mod arm_thread;
 mod draw;
 mod keys;
 mod lines;
@@ -15,7 +16,6 @@ mod picture;
 mod sample;
 mod screen;
 mod view;
-mod watch;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -25,11 +25,11 @@ use std::time::{Duration, Instant};
 use clap::{Args, value_parser};
 use sevenbot::Arm;
 
-use self::lines::{Layout, Line};
+use self::lines::{LineFormat, SampleJson};
 use self::sample::Sample;
-use self::view::{News, PAST, View};
-use crate::failure::Failure;
-use crate::growing::Growing;
+use self::view::{ArmEvent, PLOT_SPAN, View};
+use crate::command_error::CommandError;
+use crate::line_file::LineFile;
 use crate::session::Session;
 
 /// Watch the arm: targets, positions, movement, health, and how well it is understood.
@@ -64,12 +64,16 @@ impl MonitorArgs {
     }
 }
 
-pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), Failure> {
-    let on_screen = session.output.is_for_the_screen() && args.csv.is_none() && args.samples.is_none();
+pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandError> {
+    let on_screen = session.printer.is_terminal() && args.csv.is_none() && args.samples.is_none();
     match (&args.picture, &args.csv) {
         (Some(path), _) => {
-            let view = if on_screen { screen::run(session, args.period())? } else { unseen(session, args)? };
-            fs::write(path, picture::picture(&view)).map_err(|error| Failure::file(path, error))
+            let view = if on_screen {
+                screen::run(session, args.period())?
+            } else {
+                view_without_screen(session, args)?
+            };
+            fs::write(path, picture::picture(&view)).map_err(|error| CommandError::file(path, error))
         }
         (None, Some(path)) => write_csv(session, args, path),
         (None, None) if on_screen => screen::run(session, args.period()).map(drop),
@@ -81,52 +85,54 @@ pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), Failu
 fn each_sample(
     arm: &mut Arm,
     args: &MonitorArgs,
-    enough: u64,
-    mut use_it: impl FnMut(Sample) -> Result<(), Failure>,
-) -> Result<(), Failure> {
+    count: u64,
+    mut take: impl FnMut(Sample) -> Result<(), CommandError>,
+) -> Result<(), CommandError> {
     let start = Instant::now();
     let mut due = start;
-    for _ in 0..enough {
+    for _ in 0..count {
         sleep(due.saturating_duration_since(Instant::now()));
         // A sample that could not be taken in time is left out, not made up for.
         due = (due + args.period()).max(Instant::now());
-        use_it(Sample::take(arm, start)?)?;
+        take(Sample::take(arm, start)?)?;
     }
     Ok(())
 }
 
-fn show_lines(session: &mut Session, args: &MonitorArgs) -> Result<(), Failure> {
+fn show_lines(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
-    let output = &mut session.output;
-    if !output.is_json() {
-        output.raw(format!("{}\n", Layout::Columns.head()).as_bytes())?;
+    let printer = &mut session.printer;
+    if !printer.is_json() {
+        printer.print_raw(format!("{}\n", LineFormat::Columns.head()).as_bytes())?;
     }
     each_sample(&mut arm, args, args.samples.unwrap_or(u64::MAX), |sample| {
-        if output.is_json() {
-            output.show(&Line::from(&sample))
+        if printer.is_json() {
+            printer.print(&SampleJson::from(&sample))
         } else {
-            output.raw(format!("{}\n", Layout::Columns.line(&sample)).as_bytes())
+            printer.print_raw(format!("{}\n", LineFormat::Columns.line(&sample)).as_bytes())
         }
     })
 }
 
-fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), Failure> {
+fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
-    let mut file = Growing::create(path)?;
+    let mut file = LineFile::create(path)?;
     let mut write = |line: String| file.add(&format!("{line}\n"));
-    write(Layout::Csv.head())?;
-    each_sample(&mut arm, args, args.samples.unwrap_or(u64::MAX), |sample| write(Layout::Csv.line(&sample)))
+    write(LineFormat::Csv.head())?;
+    each_sample(&mut arm, args, args.samples.unwrap_or(u64::MAX), |sample| {
+        write(LineFormat::Csv.line(&sample))
+    })
 }
 
 /// A view without a screen: of as many samples as asked for, or as a plot holds.
-fn unseen(session: &Session, args: &MonitorArgs) -> Result<View, Failure> {
+fn view_without_screen(session: &Session, args: &MonitorArgs) -> Result<View, CommandError> {
     let mut arm = session.connect()?;
     let mut view = View::new(arm.port());
-    view.hear(News::Found { port: arm.port().to_owned(), firmware: arm.identity().version() });
-    let enough = args.samples.unwrap_or(PAST.as_secs() * u64::from(args.hz));
-    each_sample(&mut arm, args, enough, |sample| {
+    view.update(ArmEvent::Found { port: arm.port().to_owned(), firmware: arm.identity().version() });
+    let count = args.samples.unwrap_or(PLOT_SPAN.as_secs() * u64::from(args.hz));
+    each_sample(&mut arm, args, count, |sample| {
         view.tick(sample.time);
-        view.hear(News::Sample(sample));
+        view.update(ArmEvent::Sample(sample));
         Ok(())
     })?;
     Ok(view)

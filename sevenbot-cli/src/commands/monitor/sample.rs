@@ -5,7 +5,7 @@
 use std::time::{Duration, Instant};
 
 use sevenbot::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION};
-use sevenbot::{Arm, Error, Joint, Snapshot, Span, Speed, Status};
+use sevenbot::{Arm, Error, Joint, Snapshot, Span, Speed, StatusBlock};
 
 /// Everything that is shown of an arm.
 #[derive(Clone, Debug)]
@@ -15,7 +15,7 @@ pub(crate) struct Sample {
     /// From the motor state to the present positions.
     pub(crate) registers: Snapshot,
     /// Firmware without a status block has none.
-    pub(crate) status: Option<Status>,
+    pub(crate) status: Option<StatusBlock>,
     /// From a question to its answer.
     pub(crate) round_trip: Duration,
 }

@@ -8,69 +8,70 @@ use std::time::{Duration, Instant};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
 
+use super::arm_thread::ArmThread;
 use super::draw::draw;
-use super::keys::{Outcome, press};
-use super::view::{News, View, Wish};
-use super::watch::Watcher;
-use crate::failure::Failure;
-use crate::interrupt::{Interrupt, say_how_it_stands};
-use crate::output::warn;
+use super::keys::{KeyAction, press};
+use super::view::{ArmEvent, UiCommand, View};
+use crate::command_error::CommandError;
+use crate::interrupt::{Interrupt, report_hold};
+use crate::printer::warn;
 use crate::session::Session;
 
-/// How long a key may wait for the picture, and the picture for news.
+/// How long a key may wait for the picture, and the picture for events.
 const FRAME: Duration = Duration::from_millis(40);
 
 /// Shows the arm until the user has seen enough; gives the last view back.
-pub(crate) fn run(session: &Session, period: Duration) -> Result<View, Failure> {
+pub(crate) fn run(session: &Session, period: Duration) -> Result<View, CommandError> {
     // A port that cannot be chosen is a failure; one that does not answer yet is waited for.
     let port = session.port_name()?;
     let start = Instant::now();
     let mut view = View::new(&port);
-    let (news, hear) = mpsc::channel();
-    let (wish, wishes) = mpsc::channel();
+    let (events, hear) = mpsc::channel();
+    let (command, commands) = mpsc::channel();
     let asked = session.port.clone();
     let options = session.options;
-    let watcher = Watcher { port: asked, last_port: port, options, period, start, news, wishes, arm: None };
+    let watcher =
+        ArmThread { port: asked, last_port: port, options, period, start, events, commands, arm: None };
     let watching = thread::spawn(|| watcher.run());
-    let shown = on_terminal(|terminal| show(terminal, &mut view, start, &hear, &wish));
-    // Without a wish to come the watcher ends, after those that it has already.
-    drop(wish);
+    let shown = on_terminal(|terminal| show(terminal, &mut view, start, &hear, &command));
+    // Without a command to come the watcher ends, after those that it has already.
+    drop(command);
     let held = watching.join().ok().flatten();
     shown?;
     match held {
-        Some(held) => say_how_it_stands(&held?),
-        None if Interrupt::is_wished() => warn("there is no arm that could be made to hold"),
+        Some(held) => report_hold(&held?),
+        None if Interrupt::is_requested() => warn("there is no arm that could be made to hold"),
         None => {}
     }
     Ok(view)
 }
 
 /// Does something on the whole screen, and gives it back as it was, even after a failure.
-fn on_terminal(work: impl FnOnce(&mut DefaultTerminal) -> io::Result<()>) -> Result<(), Failure> {
+fn on_terminal(work: impl FnOnce(&mut DefaultTerminal) -> io::Result<()>) -> Result<(), CommandError> {
     let mut terminal = ratatui::try_init()?;
     let done = work(&mut terminal);
     let restored = ratatui::try_restore();
-    done.and(restored).map_err(Failure::from)
+    done.and(restored).map_err(CommandError::from)
 }
 
 fn show(
     terminal: &mut DefaultTerminal,
     view: &mut View,
     start: Instant,
-    news: &Receiver<News>,
-    wishes: &Sender<Wish>,
+    events: &Receiver<ArmEvent>,
+    commands: &Sender<UiCommand>,
 ) -> io::Result<()> {
     // In raw mode Ctrl-C is a key; other signals to end still come.
-    let interrupt = Interrupt::catch();
+    Interrupt::catch();
     let reads_stdin = io::stdin().is_terminal();
-    while !interrupt.has_come() {
+    while !Interrupt::is_requested() {
         view.tick(start.elapsed());
-        news.try_iter().for_each(|news| view.hear(news));
+        events.try_iter().for_each(|event| view.update(event));
         terminal.draw(|frame| draw(frame, view))?;
         if !wait_for_input(FRAME, reads_stdin)? {
             break;
         }
-        if event::poll(Duration::ZERO)? && !react(view, &event::read()?, wishes) {
+        if event::poll(Duration::ZERO)? && !react(view, &event::read()?, commands) {
             break;
         }
     }
@@ -101,16 +102,16 @@ fn wait_for_input(timeout: Duration, _reads_stdin: bool) -> io::Result<bool> {
 }
 
 /// Does what an event asks for; `false` when that is to end.
-fn react(view: &mut View, event: &Event, wishes: &Sender<Wish>) -> bool {
+fn react(view: &mut View, event: &Event, commands: &Sender<UiCommand>) -> bool {
     match event {
         // Some terminals report releases too.
         Event::Key(key) if key.kind != KeyEventKind::Release => match press(view, *key) {
-            Outcome::Shown => true,
+            KeyAction::Redraw => true,
             // The watcher only ends after this end of the channel does.
-            Outcome::Ask(wish) => wishes.send(wish).is_ok(),
-            Outcome::Quit => false,
-            Outcome::Stop => {
-                Interrupt::wish();
+            KeyAction::Send(command) => commands.send(command).is_ok(),
+            KeyAction::Quit => false,
+            KeyAction::Stop => {
+                Interrupt::request();
                 false
             }
         },

@@ -1,29 +1,29 @@
 //! What the monitor shows, as data: no terminal, no arm, no clock.
 //!
 //! ```text
-//!   news from the arm ──▶ ┌──────┐
+//!   events from the arm ──▶ ┌──────┐
 //!                         │ View │ ──▶ draw: the same picture for a terminal, a test, an SVG
 //!   keys ─── keys.rs ───▶ └──────┘
-//!               └──▶ wishes to the arm
+//!               └──▶ commands to the arm
 //! ```
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use sevenbot::{Joint, Status};
+use sevenbot::{Joint, StatusBlock};
 
 use super::sample::Sample;
 
 /// How much of the past is plotted.
-pub(crate) const PAST: Duration = Duration::from_secs(20);
+pub(crate) const PLOT_SPAN: Duration = Duration::from_secs(20);
 /// How long a note stays.
-const NOTE_STAYS: Duration = Duration::from_secs(6);
+const NOTE_DURATION: Duration = Duration::from_secs(6);
 /// The weight of a new round trip in the mean.
 const MEAN_WEIGHT: f64 = 0.1;
 
 /// What there is to tell about an arm.
 #[derive(Clone, Debug)]
-pub(crate) enum News {
+pub(crate) enum ArmEvent {
     /// It answers: this is its port, and its firmware's version.
     Found { port: String, firmware: String },
     /// It does not, for this reason.
@@ -32,29 +32,29 @@ pub(crate) enum News {
     Sample(Sample),
     /// A question was not answered, but so many damaged frames were heard.
     Unanswered { damaged: usize },
-    /// A wish was not fulfilled.
+    /// A command was not fulfilled.
     Refused(String),
 }
 
 /// What the arm is asked to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wish {
+pub(crate) enum UiCommand {
     /// Move a joint's target by so many degrees.
     Nudge { joint: Joint, degrees: i16 },
     /// All joints faster or slower than this one is now.
-    Pace { joint: Joint, pace: Pace },
+    SpeedChange { joint: Joint, change: SpeedChange },
     /// This motor state.
     State(u8),
 }
 
 /// A change of speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Pace {
+pub(crate) enum SpeedChange {
     Faster,
     Slower,
 }
 
-impl Pace {
+impl SpeedChange {
     /// A change, in the register's steps.
     const CHANGE: u8 = 5;
     /// The highest speed below the maximum, which is 0 (D10).
@@ -112,7 +112,7 @@ impl LinkQuality {
         let mean = if self.answers == 0 { last } else { self.round_trip_ms };
         self.round_trip_ms = mean + (last - mean) * MEAN_WEIGHT;
         self.answers += 1;
-        if let Some(now) = sample.status.as_ref().map(Status::frames_corrupted) {
+        if let Some(now) = sample.status.as_ref().map(StatusBlock::frames_corrupted) {
             self.corrupted = Some((self.corrupted.map_or(now, |(first, _)| first), now));
         }
     }
@@ -124,7 +124,7 @@ impl LinkQuality {
 }
 
 /// The positions of all joints, joint 1 first, and when they were those.
-pub(crate) type Past = (Duration, [u8; 7]);
+pub(crate) type PastPose = (Duration, [u8; 7]);
 
 /// All that is shown.
 #[derive(Clone, Debug)]
@@ -133,8 +133,8 @@ pub(crate) struct View {
     pub(crate) connection: Connection,
     /// The last sample, or the one that is frozen.
     pub(crate) sample: Option<Sample>,
-    /// Of the last [`PAST`], oldest first.
-    pub(crate) past: VecDeque<Past>,
+    /// Of the last [`PLOT_SPAN`], oldest first.
+    pub(crate) past: VecDeque<PastPose>,
     /// The right end of the plot.
     pub(crate) now: Duration,
     pub(crate) link: LinkQuality,
@@ -170,46 +170,46 @@ impl View {
         }
     }
 
-    /// Takes news in.
-    pub(crate) fn hear(&mut self, news: News) {
-        match news {
-            News::Found { port, firmware } => {
+    /// Takes events in.
+    pub(crate) fn update(&mut self, event: ArmEvent) {
+        match event {
+            ArmEvent::Found { port, firmware } => {
                 self.port = port;
                 self.connection = Connection::Open { firmware };
                 // Its counters may have begun anew.
                 self.link.corrupted = None;
             }
-            News::Lost(reason) => self.connection = Connection::Looking(reason),
-            News::Sample(sample) => self.see(sample),
-            News::Unanswered { damaged } => {
+            ArmEvent::Lost(reason) => self.connection = Connection::Looking(reason),
+            ArmEvent::Sample(sample) => self.add_sample(sample),
+            ArmEvent::Unanswered { damaged } => {
                 self.link.unanswered += 1;
                 self.link.damaged += damaged;
             }
-            News::Refused(reason) => self.say(reason),
+            ArmEvent::Refused(reason) => self.show_note(reason),
         }
     }
 
-    fn see(&mut self, sample: Sample) {
+    fn add_sample(&mut self, sample: Sample) {
         self.link.answer(&sample);
         if self.is_frozen {
             return;
         }
         self.past.push_back((sample.time, Joint::ALL.map(|joint| sample.present(joint))));
-        while self.past.front().is_some_and(|(time, _)| *time + PAST < sample.time) {
+        while self.past.front().is_some_and(|(time, _)| *time + PLOT_SPAN < sample.time) {
             self.past.pop_front();
         }
         self.sample = Some(sample);
     }
 
     /// Shows a note for a while.
-    pub(crate) fn say(&mut self, note: impl Into<String>) {
+    pub(crate) fn show_note(&mut self, note: impl Into<String>) {
         self.note = Some((self.clock, note.into()));
     }
 
     /// The note, while it is fresh.
     pub(crate) fn note(&self) -> Option<&str> {
         let (since, note) = self.note.as_ref()?;
-        (self.clock < *since + NOTE_STAYS).then_some(note)
+        (self.clock < *since + NOTE_DURATION).then_some(note)
     }
 
     /// Is there an arm, and is it known how it is?
@@ -247,7 +247,7 @@ pub(crate) mod tests {
         Sample {
             time: Duration::from_millis(millis),
             registers,
-            status: Some(Status::from(status)),
+            status: Some(StatusBlock::from(status)),
             round_trip: Duration::from_micros(4200),
         }
     }
@@ -255,10 +255,10 @@ pub(crate) mod tests {
     /// A view of that arm, after 10 s.
     pub(crate) fn watching() -> View {
         let mut view = View::new("/dev/ttyUSB0");
-        view.hear(News::Found { port: "/dev/ttyUSB0".to_owned(), firmware: "3.0".to_owned() });
+        view.update(ArmEvent::Found { port: "/dev/ttyUSB0".to_owned(), firmware: "3.0".to_owned() });
         for tenth in 0..100_u8 {
             view.tick(Duration::from_millis(u64::from(tenth) * 100));
-            view.hear(News::Sample(sample(u64::from(tenth) * 100, 90 + tenth / 5)));
+            view.update(ArmEvent::Sample(sample(u64::from(tenth) * 100, 90 + tenth / 5)));
         }
         view
     }
@@ -266,7 +266,7 @@ pub(crate) mod tests {
     #[test]
     fn the_past_ends_after_twenty_seconds() {
         let mut view = watching();
-        view.hear(News::Sample(sample(25_000, 120)));
+        view.update(ArmEvent::Sample(sample(25_000, 120)));
         assert_eq!(view.past.front().map(|past| past.0), Some(Duration::from_secs(5)));
     }
 
@@ -275,7 +275,7 @@ pub(crate) mod tests {
         let mut view = watching();
         view.is_frozen = true;
         view.tick(Duration::from_secs(60));
-        view.hear(News::Sample(sample(60_000, 120)));
+        view.update(ArmEvent::Sample(sample(60_000, 120)));
         assert_eq!(view.link.answers, 101);
         assert_eq!((view.now, view.past.len()), (Duration::from_millis(9900), 100));
     }
@@ -284,26 +284,26 @@ pub(crate) mod tests {
     fn an_arm_that_is_away_cannot_be_asked_for_anything() {
         let mut view = watching();
         assert!(view.arm().is_some());
-        view.hear(News::Lost("gone".to_owned()));
+        view.update(ArmEvent::Lost("gone".to_owned()));
         assert!(view.arm().is_none());
         assert!(view.sample.is_some(), "what was last known is still shown");
     }
 
     #[test]
     fn speeds_end_at_the_maximum_and_at_the_slowest() {
-        let from = |pace: Pace, first| {
-            let speeds = std::iter::successors(Some(first), move |&steps| Some(pace.after(steps)));
+        let from = |change: SpeedChange, first| {
+            let speeds = std::iter::successors(Some(first), move |&steps| Some(change.after(steps)));
             speeds.take(5).collect::<Vec<u8>>()
         };
-        assert_eq!(from(Pace::Faster, 93), [93, 98, 100, 0, 0]);
-        assert_eq!(from(Pace::Slower, 8), [8, 3, 1, 1, 1]);
-        assert_eq!(from(Pace::Slower, 0), [0, 100, 95, 90, 85]);
+        assert_eq!(from(SpeedChange::Faster, 93), [93, 98, 100, 0, 0]);
+        assert_eq!(from(SpeedChange::Slower, 8), [8, 3, 1, 1, 1]);
+        assert_eq!(from(SpeedChange::Slower, 0), [0, 100, 95, 90, 85]);
     }
 
     #[test]
     fn a_note_goes_after_a_while() {
         let mut view = watching();
-        view.say("no");
+        view.show_note("no");
         assert_eq!(view.note(), Some("no"));
         view.tick(Duration::from_secs(30));
         assert_eq!(view.note(), None);

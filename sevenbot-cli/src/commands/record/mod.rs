@@ -1,14 +1,14 @@
 //! `record`: what a hand shows the arm, or what the arm does, to a file.
 //!
 //! ```text
-//!   arm ── reports, sent unasked ──▶ Stamps (when each was measured) ──▶ one line each ──▶ file
-//!                                     Pendant (keys: pump, nudges, end) ──┘
+//!   arm ── reports, sent unasked ──▶ ReportClock (when each was measured) ──▶ one line each ──▶ file
+//!                                     TeachPendant (keys: pump, nudges, end) ──┘
 //! ```
 //!
 //! However it ends, the file is whole up to there, and an arm that is still there holds where it is.
 
-mod pendant;
-mod stamps;
+mod report_clock;
+mod teach_pendant;
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -20,17 +20,17 @@ use sevenbot::map::{FEEDBACK_FREQUENCY, MOTOR_STATE, VACUUM_PUMP, motor_state};
 use sevenbot::recording::{self, Moment};
 use sevenbot::{Arm, Span};
 
-use self::pendant::Pendant;
-use self::stamps::Stamps;
-use super::motors_obey;
+use self::report_clock::ReportClock;
+use self::teach_pendant::TeachPendant;
+use crate::command_error::CommandError;
 use crate::confirm::confirm;
-use crate::failure::Failure;
-use crate::growing::Growing;
-use crate::interrupt::{Interrupt, hold, say_how_it_stands};
-use crate::moving::driven;
-use crate::output::{Facts, note};
-use crate::reports::reporting;
+use crate::interrupt::{Interrupt, hold, report_hold};
+use crate::joint_move::driven_joints;
+use crate::line_file::LineFile;
+use crate::printer::{Printable, note};
+use crate::reports::with_reports;
 use crate::session::Session;
+use crate::write_result::motors_obey;
 
 /// Record a movement: guide the arm by hand, or watch it move.
 ///
@@ -65,9 +65,9 @@ pub(crate) struct RecordArgs {
 }
 
 /// No report for so long, and something is wrong. The slowest rate is one a second.
-const SILENCE: Duration = Duration::from_secs(3);
+const REPORT_TIMEOUT: Duration = Duration::from_secs(3);
 /// How long a key, or Ctrl-C, may wait.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+const POLL_PERIOD: Duration = Duration::from_millis(20);
 
 /// What was recorded.
 #[derive(Debug, Serialize)]
@@ -77,51 +77,52 @@ struct Recorded {
     seconds: f64,
 }
 
-impl Facts for Recorded {
+impl Printable for Recorded {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{}: {} moments in {:.1} s", self.file, self.moments, self.seconds)
     }
 }
 
-pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let replaced = args.file.exists();
     if replaced {
         confirm(&format!("{} is there already. Replace it?", args.file.display()), args.yes)?;
     }
     if args.driven {
-        driven(&mut arm)?;
+        driven_joints(&mut arm)?;
     } else {
         confirm("The arm goes limp, and falls unless somebody holds it. Go on?", args.yes)?;
     }
-    let mut tape = Tape::create(&args.file)?;
-    let interrupt = Interrupt::catch();
+    let mut recording = RecordingFile::create(&args.file)?;
+    Interrupt::catch();
     let baud = session.options.baud;
-    let done = limp(&mut arm, args)
-        .and_then(|()| reporting(&mut arm, args.hz, |arm| roll(arm, args, baud, &mut tape, interrupt)));
+    let done = set_motors(&mut arm, args).and_then(|()| {
+        with_reports(&mut arm, args.hz, |arm| record_reports(arm, args, baud, &mut recording))
+    });
     // An arm that went away cannot be told to hold; it was left as it is.
-    let is_gone = done.as_ref().is_err_and(Failure::is_of_the_wire);
-    let held = if is_gone && !interrupt.has_come() { Ok(()) } else { leave(&mut arm, args, interrupt) };
-    let Tape { moments, seconds, .. } = tape;
+    let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
+    let held = if is_gone && !Interrupt::is_requested() { Ok(()) } else { hold_at_end(&mut arm, args) };
+    let RecordingFile { moments, seconds, .. } = recording;
     let recorded = Recorded { file: args.file.display().to_string(), moments, seconds };
     if done.is_err() {
         note(format_args!("{} is complete up to {seconds:.1} s, {moments} moments", recorded.file));
     }
     done.and(held)?;
-    session.output.show(&recorded)
+    session.printer.print(&recorded)
 }
 
 /// Lets the arm go, if a hand is to lead it.
-fn limp(arm: &mut Arm, args: &RecordArgs) -> Result<(), Failure> {
+fn set_motors(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
     let state = if args.driven { motor_state::SERVO } else { motor_state::FORCELESS };
     motors_obey(arm.write_checked(MOTOR_STATE.address, &[state]))
 }
 
 /// Makes the arm hold the pose it was left in. A driven arm goes on with its move, but not after Ctrl-C.
-fn leave(arm: &mut Arm, args: &RecordArgs, interrupt: Interrupt) -> Result<(), Failure> {
+fn hold_at_end(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
     if args.driven {
-        if interrupt.has_come() {
-            say_how_it_stands(&hold(arm)?);
+        if Interrupt::is_requested() {
+            report_hold(&hold(arm)?);
         }
         return Ok(());
     }
@@ -132,28 +133,27 @@ fn leave(arm: &mut Arm, args: &RecordArgs, interrupt: Interrupt) -> Result<(), F
 }
 
 /// Takes reports until it is enough.
-fn roll(
+fn record_reports(
     arm: &mut Arm,
     args: &RecordArgs,
     baud: u32,
-    tape: &mut Tape,
-    interrupt: Interrupt,
-) -> Result<(), Failure> {
+    recording: &mut RecordingFile,
+) -> Result<(), CommandError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
-    let mut pendant = Pendant::new(arm.targets()?, vacuum, args.driven);
-    let mut stamps = Stamps::new(args.hz, baud);
+    let mut pendant = TeachPendant::new(arm.targets()?, vacuum, args.driven);
+    let mut clock = ReportClock::new(args.hz, baud);
     let limit = args.seconds.map(|seconds| Duration::from_secs(seconds.into()));
-    let mut heard = Instant::now();
-    while !interrupt.has_come() && !pendant.attend(arm)? {
-        if let Some(report) = arm.next_report(LOOK_EVERY)? {
-            heard = report.received;
-            let time = stamps.stamp(report.received);
+    let mut last_report = Instant::now();
+    while !Interrupt::is_requested() && !pendant.poll_keys(arm)? {
+        if let Some(report) = arm.next_report(POLL_PERIOD)? {
+            last_report = report.received;
+            let time = clock.time_of(report.received);
             if limit.is_some_and(|limit| time > limit) {
                 break;
             }
-            tape.add(&Moment { time, pose: report.positions, vacuum: pendant.vacuum() })?;
-            pendant.show(tape.moments, time);
-        } else if heard.elapsed() > SILENCE {
+            recording.add(&Moment { time, pose: report.positions, vacuum: pendant.vacuum() })?;
+            pendant.show(recording.moments, time);
+        } else if last_report.elapsed() > REPORT_TIMEOUT {
             return Err(silent(arm));
         }
     }
@@ -161,30 +161,30 @@ fn roll(
 }
 
 /// Why no report comes any more.
-fn silent(arm: &mut Arm) -> Failure {
+fn silent(arm: &mut Arm) -> CommandError {
     match arm.read_span(Span::of(&FEEDBACK_FREQUENCY)) {
         Err(error) => error.into(),
-        Ok(_) => Failure::Arm(
+        Ok(_) => CommandError::Arm(
             "the arm has stopped to report its positions: was it switched off and on again?".to_owned(),
         ),
     }
 }
 
 /// The file, and how much is in it.
-struct Tape {
-    file: Growing,
+struct RecordingFile {
+    file: LineFile,
     moments: u64,
     seconds: f64,
 }
 
-impl Tape {
-    fn create(path: &Path) -> Result<Self, Failure> {
-        let mut file = Growing::create(path)?;
+impl RecordingFile {
+    fn create(path: &Path) -> Result<Self, CommandError> {
+        let mut file = LineFile::create(path)?;
         file.add(&recording::head())?;
         Ok(Self { file, moments: 0, seconds: 0.0 })
     }
 
-    fn add(&mut self, moment: &Moment) -> Result<(), Failure> {
+    fn add(&mut self, moment: &Moment) -> Result<(), CommandError> {
         self.file.add(&format!("{moment}\n"))?;
         self.moments += 1;
         self.seconds = moment.time.as_secs_f64();

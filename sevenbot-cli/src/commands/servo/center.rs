@@ -4,14 +4,14 @@ use std::io::{self, Write};
 
 use clap::{Args, value_parser};
 use serde::Serialize;
-use sevenbot::servo_bench::center::{CenterError, Limits, MIDDLE, center};
-use sevenbot::servo_bench::{Reading, ServoBus};
+use sevenbot::servo_bench::center::{CenterError, CenterOptions, MIDDLE, center};
+use sevenbot::servo_bench::{BusMaster, Reading};
 
-use super::port::{Rate, failure, id, open};
+use super::port::{Rate, exchange_error, id, open};
+use crate::command_error::CommandError;
 use crate::confirm::confirm;
-use crate::failure::Failure;
 use crate::interrupt::Interrupt;
-use crate::output::{Facts, note};
+use crate::printer::{Printable, note};
 use crate::progress::Progress;
 use crate::session::Session;
 
@@ -50,37 +50,37 @@ struct Centered {
     position_counts: u16,
 }
 
-impl Facts for Centered {
+impl Printable for Centered {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "servo {} holds at {} counts", self.id, self.position_counts)
     }
 }
 
-pub(super) fn run(session: &mut Session, args: &CenterArgs) -> Result<(), Failure> {
+pub(super) fn run(session: &mut Session, args: &CenterArgs) -> Result<(), CommandError> {
     let id = args.id;
     let mut bus = open(session, args.rate.rate)?;
     // Before the question, so that it is asked about a servo that is there.
     if let Err(error) = bus.read(id, 0, 1) {
-        return Err(failure(session, bus, error));
+        return Err(exchange_error(session, bus, error));
     }
     confirm(
         &format!("Servo {id} turns to {MIDDLE} counts. Is nothing in its way, and the arm supported?"),
         args.yes,
     )?;
     match drive(&mut bus, args) {
-        Ok(position_counts) => session.output.show(&Centered { id, position_counts }),
+        Ok(position_counts) => session.printer.print(&Centered { id, position_counts }),
         Err(CenterError::Interrupted) => {
             note("the servo stopped, and its torque is off");
-            Err(Failure::Interrupted)
+            Err(CommandError::Interrupted)
         }
-        Err(CenterError::Bus(error)) => Err(failure(session, bus, error)),
-        Err(error) => Err(Failure::Advised { message: error.to_string(), advice: advice(&error) }),
+        Err(CenterError::Bus(error)) => Err(exchange_error(session, bus, error)),
+        Err(error) => Err(CommandError::WithAdvice { message: error.to_string(), advice: advice(&error) }),
     }
 }
 
-fn drive(bus: &mut ServoBus, args: &CenterArgs) -> Result<u16, CenterError> {
-    let limits = Limits { speed: args.speed, load: args.load * 10, ..Limits::default() };
-    let interrupt = Interrupt::catch();
+fn drive(bus: &mut BusMaster, args: &CenterArgs) -> Result<u16, CenterError> {
+    let limits = CenterOptions { speed: args.speed, load: args.load * 10, ..CenterOptions::default() };
+    Interrupt::catch();
     let mut progress: Option<(Progress, u16)> = None;
     center(bus, args.id, &limits, |reading| {
         let distance = |reading: &Reading| reading.position_counts.abs_diff(MIDDLE);
@@ -88,7 +88,7 @@ fn drive(bus: &mut ServoBus, args: &CenterArgs) -> Result<u16, CenterError> {
             .get_or_insert_with(|| (Progress::new(distance(reading).into(), "counts"), distance(reading)));
         bar.set(total.saturating_sub(distance(reading)).into());
         bar.say(&format!("load {:.1} %", f64::from(reading.load) / 10.0));
-        !interrupt.has_come()
+        !Interrupt::is_requested()
     })
 }
 
@@ -97,14 +97,14 @@ const fn advice(error: &CenterError) -> &'static [&'static str] {
         CenterError::OutOfReach { .. } | CenterError::Unmeasured => {
             &["nothing was moved; see `sevenbot servo info`"]
         }
-        CenterError::Unfit { .. } => {
+        CenterError::ReportsErrors { .. } => {
             &["nothing was moved; an overload ends when the servo's power goes off and on"]
         }
         CenterError::Overload { .. } | CenterError::Stalled { .. } => &[
             "the servo's torque is off",
             "is something in its way, or its horn at a stop? Is its supply strong enough?",
         ],
-        CenterError::StillOn(_) => &["switch the servos' supply off"],
+        CenterError::TorqueStillOn(_) => &["switch the servos' supply off"],
         CenterError::Bus(_) | CenterError::Interrupted => &[],
     }
 }

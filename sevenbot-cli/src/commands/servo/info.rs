@@ -4,11 +4,11 @@ use std::io::{self, Write};
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot::servo_bench::facts::{Facts as Registers, error_words};
+use sevenbot::servo_bench::servo_info::{ServoInfo, error_words};
 
-use super::port::{Rate, failure, id, open};
-use crate::failure::Failure;
-use crate::output::Facts;
+use super::port::{Rate, exchange_error, id, open};
+use crate::command_error::CommandError;
+use crate::printer::Printable;
 use crate::session::Session;
 use crate::style::{BAD, BOLD, GOOD};
 
@@ -25,7 +25,7 @@ Exit status 1 when the servo reports an error.
 Examples:
   sevenbot servo info 0
   sevenbot servo info 1 --rate 115200 --json")]
-pub(super) struct InfoArgs {
+pub(super) struct ServoInfoArgs {
     /// The servo's id.
     #[arg(value_parser = id())]
     id: u8,
@@ -33,36 +33,36 @@ pub(super) struct InfoArgs {
     rate: Rate,
 }
 
-pub(super) fn run(session: &mut Session, args: &InfoArgs) -> Result<(), Failure> {
+pub(super) fn run(session: &mut Session, args: &ServoInfoArgs) -> Result<(), CommandError> {
     let mut bus = open(session, args.rate.rate)?;
-    match Registers::read(&mut bus, args.id) {
-        Ok(registers) => {
-            session.output.show(&Info::from(&registers))?;
-            healthy(&registers)
+    match ServoInfo::read(&mut bus, args.id) {
+        Ok(servo) => {
+            session.printer.print(&ServoSummary::from(&servo))?;
+            healthy(&servo)
         }
-        Err(error) => Err(failure(session, bus, error)),
+        Err(error) => Err(exchange_error(session, bus, error)),
     }
 }
 
-fn healthy(registers: &Registers) -> Result<(), Failure> {
-    match registers.errors {
+fn healthy(servo: &ServoInfo) -> Result<(), CommandError> {
+    match servo.errors {
         0 => Ok(()),
-        errors => Err(Failure::Arm(format!("servo {} reports: {}", registers.id, error_words(errors)))),
+        errors => Err(CommandError::Arm(format!("servo {} reports: {}", servo.id, error_words(errors)))),
     }
 }
 
 #[derive(Serialize)]
-struct Info {
+struct ServoSummary {
     id: u8,
     joint: Option<u8>,
     /// None where the servo gives no position that can be believed.
-    measured: Option<Measured>,
+    measured: Option<ServoMeasurements>,
     moving: bool,
     errors: String,
     error_bits: u8,
     torque_switch: u8,
     goal_counts: u16,
-    limits: Limits,
+    limits: ServoLimits,
     baud: Option<u32>,
     eeprom_locked: bool,
     acknowledges_writes: bool,
@@ -72,7 +72,7 @@ struct Info {
 }
 
 #[derive(Serialize)]
-struct Measured {
+struct ServoMeasurements {
     position_counts: u16,
     position_degrees: Option<f64>,
     speed_counts_per_second: i16,
@@ -82,7 +82,7 @@ struct Measured {
 }
 
 #[derive(Serialize)]
-struct Limits {
+struct ServoLimits {
     min_position_counts: u16,
     max_position_counts: u16,
     min_supply_volts: f64,
@@ -100,33 +100,33 @@ fn version((major, minor): (u8, u8)) -> String {
     format!("{major}.{minor}")
 }
 
-impl From<&Registers> for Info {
-    fn from(registers: &Registers) -> Self {
+impl From<&ServoInfo> for ServoSummary {
+    fn from(servo: &ServoInfo) -> Self {
         Self {
-            id: registers.id,
-            joint: registers.joint().map(sevenbot::Joint::number),
-            measured: measured(registers),
-            moving: registers.is_moving,
-            errors: error_words(registers.errors),
-            error_bits: registers.errors,
-            torque_switch: registers.torque_switch,
-            goal_counts: registers.goal_position,
-            limits: Limits::from(registers),
-            baud: registers.baud,
-            eeprom_locked: !registers.is_unlocked,
-            acknowledges_writes: registers.acknowledges_writes,
-            firmware_version: version(registers.firmware_version),
-            servo_version: version(registers.servo_version),
-            byte_order: registers.byte_order,
+            id: servo.id,
+            joint: servo.joint().map(sevenbot::Joint::number),
+            measured: measured(servo),
+            moving: servo.is_moving,
+            errors: error_words(servo.errors),
+            error_bits: servo.errors,
+            torque_switch: servo.torque_switch,
+            goal_counts: servo.goal_position,
+            limits: ServoLimits::from(servo),
+            baud: servo.baud,
+            eeprom_locked: !servo.is_unlocked,
+            acknowledges_writes: servo.acknowledges_writes,
+            firmware_version: version(servo.firmware_version),
+            servo_version: version(servo.servo_version),
+            byte_order: servo.byte_order,
         }
     }
 }
 
-fn measured(registers: &Registers) -> Option<Measured> {
-    let reading = registers.reading?;
-    Some(Measured {
+fn measured(servo: &ServoInfo) -> Option<ServoMeasurements> {
+    let reading = servo.reading?;
+    Some(ServoMeasurements {
         position_counts: reading.position_counts,
-        position_degrees: registers.degrees().map(|degrees| (degrees * 10.0).round() / 10.0),
+        position_degrees: servo.degrees().map(|degrees| (degrees * 10.0).round() / 10.0),
         speed_counts_per_second: reading.speed,
         load_percent: tenths(reading.load),
         supply_volts: tenths(reading.voltage_decivolts),
@@ -134,23 +134,23 @@ fn measured(registers: &Registers) -> Option<Measured> {
     })
 }
 
-impl From<&Registers> for Limits {
-    fn from(registers: &Registers) -> Self {
-        let (min_position_counts, max_position_counts) = registers.position_limits;
-        let (min_supply, max_supply) = registers.voltage_limits;
+impl From<&ServoInfo> for ServoLimits {
+    fn from(servo: &ServoInfo) -> Self {
+        let (min_position_counts, max_position_counts) = servo.position_limits;
+        let (min_supply, max_supply) = servo.voltage_limits;
         Self {
             min_position_counts,
             max_position_counts,
             min_supply_volts: tenths(min_supply),
             max_supply_volts: tenths(max_supply),
-            max_temperature_celsius: registers.max_temperature,
-            max_torque_percent: tenths(registers.max_torque),
-            torque_off_at: error_words(registers.unload_conditions),
+            max_temperature_celsius: servo.max_temperature,
+            max_torque_percent: tenths(servo.max_torque),
+            torque_off_at: error_words(servo.unload_conditions),
         }
     }
 }
 
-impl Facts for Info {
+impl Printable for ServoSummary {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         let joint = self.joint.map_or_else(|| "no joint's id".to_owned(), |joint| format!("joint {joint}"));
         writeln!(out, "{BOLD}Servo {}{BOLD:#}, {joint}", self.id)?;
@@ -177,7 +177,7 @@ const fn torque_word(code: u8) -> &'static str {
     }
 }
 
-impl Info {
+impl ServoSummary {
     fn write_settings(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{BOLD}Settings{BOLD:#}")?;
         let baud = self.baud.map_or_else(|| "unknown code".to_owned(), |baud| format!("{baud} baud"));
@@ -195,7 +195,7 @@ impl Info {
     }
 }
 
-impl Measured {
+impl ServoMeasurements {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         let degrees = self.position_degrees.map(|degrees| format!(", {degrees:.1}° without offset"));
         let position = format!("{} counts{}", self.position_counts, degrees.unwrap_or_default());
@@ -207,9 +207,9 @@ impl Measured {
     }
 }
 
-impl Limits {
+impl ServoLimits {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "{BOLD}Limits{BOLD:#}")?;
+        writeln!(out, "{BOLD}ServoLimits{BOLD:#}")?;
         let (lowest, highest) = (self.min_position_counts, self.max_position_counts);
         let endless = if (lowest, highest) == (0, 0) { ": the motor turns on and on" } else { "" };
         line(out, "position", &format!("{lowest} to {highest} counts{endless}"))?;

@@ -11,7 +11,7 @@ mod torque_codes;
 
 use clap::{Args, Subcommand};
 
-use crate::failure::Failure;
+use crate::command_error::CommandError;
 use crate::session::Session;
 
 /// Scan, show and set up single servos through an adapter on the servo bus.
@@ -36,24 +36,24 @@ Examples:
 A simulated bus: `host-sim --servos-only --link ./bus`, then --port ./bus")]
 pub(crate) struct ServoArgs {
     #[command(subcommand)]
-    command: ServoCommand,
+    command: ServoSubcommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum ServoCommand {
+enum ServoSubcommand {
     Scan(scan::ScanArgs),
-    Info(info::InfoArgs),
+    Info(info::ServoInfoArgs),
     SetId(set_id::SetIdArgs),
     Center(center::CenterArgs),
     TorqueCodes(torque_codes::TorqueCodesArgs),
 }
 
-pub(crate) fn run(session: &mut Session, args: &ServoArgs) -> Result<(), Failure> {
+pub(crate) fn run(session: &mut Session, args: &ServoArgs) -> Result<(), CommandError> {
     match &args.command {
-        ServoCommand::Scan(args) => scan::run(session, args),
-        ServoCommand::Info(args) => info::run(session, args),
-        ServoCommand::SetId(args) => set_id::run(session, args),
-        ServoCommand::Center(args) => center::run(session, args),
-        ServoCommand::TorqueCodes(args) => torque_codes::run(session, args),
+        ServoSubcommand::Scan(args) => scan::run(session, args),
+        ServoSubcommand::Info(args) => info::run(session, args),
+        ServoSubcommand::SetId(args) => set_id::run(session, args),
+        ServoSubcommand::Center(args) => center::run(session, args),
+        ServoSubcommand::TorqueCodes(args) => torque_codes::run(session, args),
     }
 }

@@ -1,10 +1,10 @@
 //! The adapter's port and the arguments that all subcommands share, and what a failed exchange may mean.
 
 use clap::{Args, builder::RangedI64ValueParser, value_parser};
-use sevenbot::servo_bench::{BAUD_RATES, BusOptions, MAX_ID, ServoBus, ServoError};
-use sevenbot::{Arm, Heard, Options, ports};
+use sevenbot::servo_bench::{BAUD_RATES, BusMaster, BusOptions, MAX_ID, ServoError};
+use sevenbot::{Arm, ArmOptions, ReceiveCounts, ports};
 
-use crate::failure::Failure;
+use crate::command_error::CommandError;
 use crate::session::Session;
 
 /// The baud rate of the bus, where only one is wanted.
@@ -27,34 +27,36 @@ pub(super) fn id() -> RangedI64ValueParser<u8> {
 }
 
 /// The adapter's port. It cannot be guessed: asking every port would send to whatever is there.
-pub(super) fn port(session: &Session) -> Result<String, Failure> {
+pub(super) fn port(session: &Session) -> Result<String, CommandError> {
     let how = "`sevenbot servo` needs the adapter's port: use --port PORT or set SEVENBOT_PORT";
-    session.port.clone().ok_or_else(|| Failure::Usage(how.to_owned()))
+    session.port.clone().ok_or_else(|| CommandError::Usage(how.to_owned()))
 }
 
 /// Opens the bus.
-pub(super) fn open(session: &Session, baud: u32) -> Result<ServoBus, Failure> {
+pub(super) fn open(session: &Session, baud: u32) -> Result<BusMaster, CommandError> {
     let port = port(session)?;
     let options = BusOptions { reply_timeout: session.options.reply_timeout, ..BusOptions::default() };
-    ServoBus::open(&port, baud, options).map_err(|error| Failure::Open { port, error })
+    BusMaster::open(&port, baud, options).map_err(|error| CommandError::Open { port, error })
 }
 
 /// The failure for an exchange that went wrong. Where no servo was heard, an arm is looked for: its host link is the
 /// port that is most often taken for an adapter.
-pub(super) fn failure(session: &Session, bus: ServoBus, error: ServoError) -> Failure {
-    let is_silent =
-        matches!(error, ServoError::NoAnswer { heard: Heard { other_frames: 0, damaged_frames: 0, .. }, .. });
+pub(super) fn exchange_error(session: &Session, bus: BusMaster, error: ServoError) -> CommandError {
+    let is_silent = matches!(
+        error,
+        ServoError::NoAnswer { received: ReceiveCounts { other_frames: 0, damaged_frames: 0, .. }, .. }
+    );
     match port(session) {
         Err(failure) => failure,
-        Ok(port) if is_silent && leads_to_arm(session, bus, &port) => Failure::HostLink { port },
-        Ok(port) => Failure::Servo { port, error },
+        Ok(port) if is_silent && leads_to_arm(session, bus, &port) => CommandError::HostLink { port },
+        Ok(port) => CommandError::Servo { port, error },
     }
 }
 
 /// Does the controller of an arm answer on this port, at any of its rates?
-pub(super) fn leads_to_arm(session: &Session, bus: ServoBus, port: &str) -> bool {
+pub(super) fn leads_to_arm(session: &Session, bus: BusMaster, port: &str) -> bool {
     // The port can be opened only once.
     drop(bus);
-    let patient = Options { attempts: 1, ..session.options };
+    let patient = ArmOptions { attempts: 1, ..session.options };
     Arm::open_with(port, patient).is_ok() || ports::find_baud(port, |_| ()).is_ok()
 }

@@ -7,15 +7,15 @@ use std::time::Duration;
 use clap::{Args, value_parser};
 use serde::Serialize;
 use sevenbot::Joint;
-use sevenbot::servo_bench::scan::{Answers, Found, Plan, Scan, scan};
+use sevenbot::servo_bench::scan::{AnswerQuality, FoundServo, ScanPlan, ScanResult, scan};
 use sevenbot::servo_bench::{BAUD_RATES, MAX_ID};
 
 use super::port::{leads_to_arm, open, port, rate};
-use crate::failure::Failure;
-use crate::output::{Facts, warn};
+use crate::command_error::CommandError;
+use crate::printer::{Printable, warn};
 use crate::progress::Progress;
 use crate::session::Session;
-use crate::style::DOUBTFUL;
+use crate::style::WARNING;
 
 /// Find the servos on the bus, at all eight baud rates.
 ///
@@ -53,16 +53,16 @@ fn ids(text: &str) -> Result<RangeInclusive<u8>, String> {
 }
 
 #[derive(Serialize)]
-struct Servos {
+struct FoundServos {
     port: String,
     /// Does the adapter echo what is sent?
     echo: bool,
-    servos: Vec<Servo>,
+    servos: Vec<ServoRow>,
     rates_not_tried: Vec<u32>,
 }
 
 #[derive(Serialize)]
-struct Servo {
+struct ServoRow {
     id: u8,
     baud: u32,
     /// None for an id that no joint of the arm has.
@@ -70,30 +70,30 @@ struct Servo {
     answers: &'static str,
 }
 
-impl From<&Found> for Servo {
-    fn from(found: &Found) -> Self {
+impl From<&FoundServo> for ServoRow {
+    fn from(found: &FoundServo) -> Self {
         let joint = Joint::from_index(found.id).map(Joint::number);
         Self { id: found.id, baud: found.baud, joint, answers: word(found.answers) }
     }
 }
 
-const fn word(answers: Answers) -> &'static str {
+const fn word(answers: AnswerQuality) -> &'static str {
     match answers {
-        Answers::Good => "good",
-        Answers::Several => "several servos",
-        Answers::Damaged => "damaged answers",
+        AnswerQuality::Good => "good",
+        AnswerQuality::Several => "several servos",
+        AnswerQuality::Damaged => "damaged answers",
     }
 }
 
-impl Facts for Servos {
+impl Printable for FoundServos {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
-        for Servo { id, baud, joint, answers } in &self.servos {
+        for ServoRow { id, baud, joint, answers } in &self.servos {
             let joint = joint.map_or_else(|| "no joint's id".to_owned(), |joint| format!("joint {joint}"));
             write!(out, "id {id:<3}  {baud:>7} baud  ")?;
-            if *answers == word(Answers::Good) {
+            if *answers == word(AnswerQuality::Good) {
                 writeln!(out, "{joint}")?;
             } else {
-                writeln!(out, "{joint:<13}  {DOUBTFUL}{answers}{DOUBTFUL:#}")?;
+                writeln!(out, "{joint:<13}  {WARNING}{answers}{WARNING:#}")?;
             }
         }
         writeln!(
@@ -104,35 +104,35 @@ impl Facts for Servos {
     }
 }
 
-pub(super) fn run(session: &mut Session, args: &ScanArgs) -> Result<(), Failure> {
+pub(super) fn run(session: &mut Session, args: &ScanArgs) -> Result<(), CommandError> {
     let port = port(session)?;
     let rates = if args.rates.is_empty() { BAUD_RATES.to_vec() } else { args.rates.clone() };
     let wait = args.wait.map(|millis| Duration::from_millis(millis.into()));
-    let plan = Plan { ids: args.ids.clone(), wait, rates };
+    let plan = ScanPlan { ids: args.ids.clone(), wait, rates };
     let mut bus = open(session, plan.rates.first().copied().unwrap_or(1_000_000))?;
     let scan = with_progress(&plan, |tell| scan(&mut bus, &plan, tell));
-    let Scan { found, unknown_rates, has_echo } =
-        scan.map_err(|error| Failure::Servo { port: port.clone(), error })?;
+    let ScanResult { found, unknown_rates, has_echo } =
+        scan.map_err(|error| CommandError::Servo { port: port.clone(), error })?;
     for rate in &unknown_rates {
         warn(format_args!("this adapter does not know {rate} baud: servos at that rate were not looked for"));
     }
     if found.is_empty() {
         let is_host_link = leads_to_arm(session, bus, &port);
         return Err(if is_host_link {
-            Failure::HostLink { port }
+            CommandError::HostLink { port }
         } else {
-            Failure::NoServo { port, has_echo }
+            CommandError::NoServo { port, has_echo }
         });
     }
-    let servos = found.iter().map(Servo::from).collect();
-    session.output.show(&Servos { port, echo: has_echo, servos, rates_not_tried: unknown_rates })?;
+    let servos = found.iter().map(ServoRow::from).collect();
+    session.printer.print(&FoundServos { port, echo: has_echo, servos, rates_not_tried: unknown_rates })?;
     all_good(&found)
 }
 
 /// Runs a scan with a bar for its questions.
 pub(super) fn with_progress<T>(
-    plan: &Plan,
-    scan: impl FnOnce(&mut dyn FnMut(sevenbot::servo_bench::scan::Step)) -> T,
+    plan: &ScanPlan,
+    scan: impl FnOnce(&mut dyn FnMut(sevenbot::servo_bench::scan::ScanProgress)) -> T,
 ) -> T {
     let total = u64::try_from(plan.questions()).unwrap_or(u64::MAX);
     let progress = Progress::new(total, "questions");
@@ -142,11 +142,11 @@ pub(super) fn with_progress<T>(
     })
 }
 
-fn all_good(found: &[Found]) -> Result<(), Failure> {
+fn all_good(found: &[FoundServo]) -> Result<(), CommandError> {
     let bad: Vec<String> = found
         .iter()
-        .filter(|found| found.answers != Answers::Good)
+        .filter(|found| found.answers != AnswerQuality::Good)
         .map(|found| format!("id {} at {} baud: {}", found.id, found.baud, word(found.answers)))
         .collect();
-    if bad.is_empty() { Ok(()) } else { Err(Failure::Arm(bad.join("\n       "))) }
+    if bad.is_empty() { Ok(()) } else { Err(CommandError::Arm(bad.join("\n       "))) }
 }

@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use clap::{Args, value_parser};
 use serde::Serialize;
-use sevenbot::servo_bench::id::{IdError, everything_at, set_id};
+use sevenbot::servo_bench::set_id::{SetIdError, all_ids, set_id};
 
-use super::port::{Rate, failure, id, open};
+use super::port::{Rate, exchange_error, id, open};
 use super::scan::with_progress;
 use crate::advice::servo;
-use crate::failure::Failure;
-use crate::output::Facts;
+use crate::command_error::CommandError;
+use crate::printer::Printable;
 use crate::session::Session;
 
 /// Give the only servo on the bus another id.
@@ -45,42 +45,42 @@ struct Changed {
     id: u8,
 }
 
-impl Facts for Changed {
+impl Printable for Changed {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "the servo has id {} now; nothing answers to {} any more", self.id, self.old_id)
     }
 }
 
-pub(super) fn run(session: &mut Session, args: &SetIdArgs) -> Result<(), Failure> {
+pub(super) fn run(session: &mut Session, args: &SetIdArgs) -> Result<(), CommandError> {
     let &SetIdArgs { old, new, rate: Rate { rate }, wait } = args;
     if old == new {
-        return Err(Failure::Usage(format!("the old id and the new one are both {old}")));
+        return Err(CommandError::Usage(format!("the old id and the new one are both {old}")));
     }
     let mut bus = open(session, rate)?;
-    let plan = everything_at(rate, wait.map(|millis| Duration::from_millis(millis.into())));
+    let plan = all_ids(rate, wait.map(|millis| Duration::from_millis(millis.into())));
     match with_progress(&plan, |tell| set_id(&mut bus, &plan, old, new, tell)) {
-        Ok(()) => session.output.show(&Changed { old_id: old, id: new }),
-        Err(IdError::Bus(error)) => Err(failure(session, bus, error)),
-        Err(error) => Err(Failure::Advised { message: error.to_string(), advice: advice(&error) }),
+        Ok(()) => session.printer.print(&Changed { old_id: old, id: new }),
+        Err(SetIdError::Bus(error)) => Err(exchange_error(session, bus, error)),
+        Err(error) => Err(CommandError::WithAdvice { message: error.to_string(), advice: advice(&error) }),
     }
 }
 
 /// What a user should do now.
-fn advice(error: &IdError) -> &'static [&'static str] {
+fn advice(error: &SetIdError) -> &'static [&'static str] {
     match error {
-        IdError::NotAlone { answering } if answering.is_empty() => {
+        SetIdError::NotAlone { answering } if answering.is_empty() => {
             &["`sevenbot servo scan` tries all baud rates", "do the servos have their own power?"]
         }
-        IdError::NotAlone { .. } => &["unplug the other servos; nothing was written"],
-        IdError::StaysLocked(_) | IdError::Unchanged => {
+        SetIdError::NotAlone { .. } => &["unplug the other servos; nothing was written"],
+        SetIdError::StaysLocked(_) | SetIdError::Unchanged => {
             &["switch the servo's power off and on, and try again: it still has its old id"]
         }
-        IdError::Lost | IdError::HalfWay(_) => &[
+        SetIdError::Lost | SetIdError::IdUncertain(_) => &[
             "switch the servo's power off and on, then look with `sevenbot servo scan`",
             "the servo has either its old id or its new one; then try again",
         ],
-        IdError::AnswersToBoth => &["unplug all servos but one, then look with `sevenbot servo scan`"],
-        IdError::StaysOpen(_) => &["switch the servo's power off and on: that locks it"],
-        IdError::Bus(error) => servo(error),
+        SetIdError::AnswersToBoth => &["unplug all servos but one, then look with `sevenbot servo scan`"],
+        SetIdError::StaysOpen(_) => &["switch the servo's power off and on: that locks it"],
+        SetIdError::Bus(error) => servo(error),
     }
 }

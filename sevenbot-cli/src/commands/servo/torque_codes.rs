@@ -8,12 +8,12 @@ use std::io::{self, IsTerminal, Write};
 use clap::Args;
 use serde::Serialize;
 use sevenbot::servo_bench::register::TORQUE_SWITCH;
-use sevenbot::servo_bench::{ServoBus, ServoError, TorqueCodes};
+use sevenbot::servo_bench::{BusMaster, ServoError, TorqueCodes};
 
-use super::port::{Rate, failure, id, open};
+use super::port::{Rate, exchange_error, id, open};
+use crate::command_error::CommandError;
 use crate::confirm::confirm;
-use crate::failure::Failure;
-use crate::output::Facts;
+use crate::printer::Printable;
 use crate::session::Session;
 
 /// Find out with your hand what codes 0 and 2 of the torque switch (register 40) mean.
@@ -43,7 +43,7 @@ pub(super) struct TorqueCodesArgs {
 }
 
 #[derive(Serialize)]
-struct Verdict {
+struct TorqueCodeResult {
     id: u8,
     lighter_code: u8,
     /// As `host-sim --torque-codes` calls it.
@@ -52,8 +52,8 @@ struct Verdict {
     torque_codes: &'static str,
 }
 
-impl Verdict {
-    const fn new(id: u8, lighter: Code) -> Self {
+impl TorqueCodeResult {
+    const fn new(id: u8, lighter: TorqueOffCode) -> Self {
         let (table, torque_codes) = match lighter.table() {
             TorqueCodes::DampingOnFree => ("older", "DampingOnFree"),
             TorqueCodes::FreeOnDamping => ("current", "FreeOnDamping"),
@@ -62,7 +62,7 @@ impl Verdict {
     }
 }
 
-impl Facts for Verdict {
+impl Printable for TorqueCodeResult {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         let &Self { lighter_code, table, torque_codes, .. } = self;
         writeln!(out, "{table} table: code {lighter_code} is free, code {} is damping", 2 - lighter_code)?;
@@ -74,12 +74,12 @@ impl Facts for Verdict {
 
 /// The two codes that give no torque.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Code {
+enum TorqueOffCode {
     Zero,
     Two,
 }
 
-impl Code {
+impl TorqueOffCode {
     const fn number(self) -> u8 {
         match self {
             Self::Zero => 0,
@@ -105,19 +105,19 @@ impl Code {
 
 /// What may be typed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Answer {
+enum TorqueCodeInput {
     Switch,
-    Lighter(Code),
+    Lighter(TorqueOffCode),
     Same,
     Quit,
 }
 
-impl Answer {
+impl TorqueCodeInput {
     fn parse(line: &str) -> Option<Self> {
         Some(match line.trim() {
             "" => Self::Switch,
-            "0" => Self::Lighter(Code::Zero),
-            "2" => Self::Lighter(Code::Two),
+            "0" => Self::Lighter(TorqueOffCode::Zero),
+            "2" => Self::Lighter(TorqueOffCode::Two),
             "s" | "S" => Self::Same,
             "q" | "Q" => Self::Quit,
             _ => return None,
@@ -125,58 +125,60 @@ impl Answer {
     }
 }
 
-pub(super) fn run(session: &mut Session, args: &TorqueCodesArgs) -> Result<(), Failure> {
+pub(super) fn run(session: &mut Session, args: &TorqueCodesArgs) -> Result<(), CommandError> {
     if !io::stdin().is_terminal() {
         let why = "torque-codes asks what a person feels: run it in a terminal";
-        return Err(Failure::Usage(why.to_owned()));
+        return Err(CommandError::Usage(why.to_owned()));
     }
     let id = args.id;
     let mut bus = open(session, args.rate.rate)?;
     if let Err(error) = bus.read(id, TORQUE_SWITCH, 1) {
-        return Err(failure(session, bus, error));
+        return Err(exchange_error(session, bus, error));
     }
     confirm(
         &format!("The torque of servo {id} goes off. Is the arm supported, and your hand on the joint?"),
         false,
     )?;
-    let felt = ask_which_is_lighter(&mut bus, id);
+    let lighter = ask_lighter_code(&mut bus, id);
     // Also after a failure, which is then the one to tell.
-    let ended = switch(&mut bus, id, Code::Zero);
-    match felt? {
-        Err(error) => Err(failure(session, bus, error)),
+    let ended = switch(&mut bus, id, TorqueOffCode::Zero);
+    match lighter? {
+        Err(error) => Err(exchange_error(session, bus, error)),
         Ok(lighter) => match ended {
-            Err(error) => Err(failure(session, bus, error)),
-            Ok(()) => session.output.show(&Verdict::new(id, lighter)),
+            Err(error) => Err(exchange_error(session, bus, error)),
+            Ok(()) => session.printer.print(&TorqueCodeResult::new(id, lighter)),
         },
     }
 }
 
 /// The code with which the joint turns lighter. The outer failure is the person's, the inner one the bus's.
-fn ask_which_is_lighter(bus: &mut ServoBus, id: u8) -> Result<Result<Code, ServoError>, Failure> {
-    let (mut code, mut has_felt_both) = (Code::Zero, false);
+fn ask_lighter_code(bus: &mut BusMaster, id: u8) -> Result<Result<TorqueOffCode, ServoError>, CommandError> {
+    let (mut code, mut has_tried_both) = (TorqueOffCode::Zero, false);
     if let Err(error) = switch(bus, id, code) {
         return Ok(Err(error));
     }
     loop {
         match ask(code)? {
-            Some(Answer::Switch) => {
+            Some(TorqueCodeInput::Switch) => {
                 code = code.other();
-                has_felt_both = true;
+                has_tried_both = true;
                 if let Err(error) = switch(bus, id, code) {
                     return Ok(Err(error));
                 }
             }
-            Some(Answer::Quit) => return Err(Failure::Arm("ended without a result".to_owned())),
-            Some(_) if !has_felt_both => say("feel the other code too first: press Enter")?,
-            Some(Answer::Lighter(code)) => return Ok(Ok(code)),
-            Some(Answer::Same) => return Err(same()),
+            Some(TorqueCodeInput::Quit) => {
+                return Err(CommandError::Arm("ended without a result".to_owned()));
+            }
+            Some(_) if !has_tried_both => say("feel the other code too first: press Enter")?,
+            Some(TorqueCodeInput::Lighter(code)) => return Ok(Ok(code)),
+            Some(TorqueCodeInput::Same) => return Err(no_difference()),
             None => say("type Enter, 0, 2, s or q")?,
         }
     }
 }
 
-fn same() -> Failure {
-    Failure::Advised {
+fn no_difference() -> CommandError {
+    CommandError::WithAdvice {
         message: "both codes feel the same, so this joint does not tell which table it is".to_owned(),
         advice: &[
             "turn the joint faster: damping grows with speed",
@@ -186,7 +188,7 @@ fn same() -> Failure {
     }
 }
 
-fn switch(bus: &mut ServoBus, id: u8, code: Code) -> Result<(), ServoError> {
+fn switch(bus: &mut BusMaster, id: u8, code: TorqueOffCode) -> Result<(), ServoError> {
     bus.write(id, TORQUE_SWITCH, &[code.number()])
 }
 
@@ -194,7 +196,7 @@ fn say(message: &str) -> io::Result<()> {
     writeln!(anstream::stderr(), "{message}")
 }
 
-fn ask(code: Code) -> Result<Option<Answer>, Failure> {
+fn ask(code: TorqueOffCode) -> Result<Option<TorqueCodeInput>, CommandError> {
     let mut err = anstream::stderr();
     write!(
         err,
@@ -204,9 +206,9 @@ fn ask(code: Code) -> Result<Option<Answer>, Failure> {
     err.flush()?;
     let mut line = String::new();
     if io::stdin().read_line(&mut line)? == 0 {
-        return Ok(Some(Answer::Quit));
+        return Ok(Some(TorqueCodeInput::Quit));
     }
-    Ok(Answer::parse(&line))
+    Ok(TorqueCodeInput::parse(&line))
 }
 
 #[cfg(test)]
@@ -215,18 +217,18 @@ mod tests {
 
     #[test]
     fn the_lighter_code_names_the_table() {
-        let verdict = |code| {
-            let verdict = Verdict::new(0, code);
-            (verdict.lighter_code, verdict.table, verdict.torque_codes)
+        let result = |code| {
+            let result = TorqueCodeResult::new(0, code);
+            (result.lighter_code, result.table, result.torque_codes)
         };
-        assert_eq!(verdict(Code::Two), (2, "older", "DampingOnFree"));
-        assert_eq!(verdict(Code::Zero), (0, "current", "FreeOnDamping"));
+        assert_eq!(result(TorqueOffCode::Two), (2, "older", "DampingOnFree"));
+        assert_eq!(result(TorqueOffCode::Zero), (0, "current", "FreeOnDamping"));
     }
 
     #[test]
     fn the_table_agrees_with_the_controller() {
         use sevenbot::servo_bench::Torque;
-        for code in [Code::Zero, Code::Two] {
+        for code in [TorqueOffCode::Zero, TorqueOffCode::Two] {
             assert_eq!(code.table().code(Torque::Free), code.number());
             assert_eq!(code.table().code(Torque::Damping), code.other().number());
         }
@@ -234,8 +236,8 @@ mod tests {
 
     #[test]
     fn answers_are_short() {
-        assert_eq!(Answer::parse("\n"), Some(Answer::Switch));
-        assert_eq!(Answer::parse("2\n"), Some(Answer::Lighter(Code::Two)));
-        assert_eq!(Answer::parse("1\n"), None);
+        assert_eq!(TorqueCodeInput::parse("\n"), Some(TorqueCodeInput::Switch));
+        assert_eq!(TorqueCodeInput::parse("2\n"), Some(TorqueCodeInput::Lighter(TorqueOffCode::Two)));
+        assert_eq!(TorqueCodeInput::parse("1\n"), None);
     }
 }

@@ -6,7 +6,7 @@ use protocol_core::request::Reply;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
 use sevenbot::map::find;
-use sevenbot::{Snapshot, names, words};
+use sevenbot::{Snapshot, names, register_text};
 
 /// Bytes in pieces of this size, and a text.
 #[derive(Arbitrary, Debug)]
@@ -92,13 +92,13 @@ fn check(snapshot: &Snapshot) {
     let mut again = FrameBuffer::new();
     Reply { address: snapshot.address, values: &snapshot.values }.encode(&mut again);
     assert_eq!(snapshots(&again, again.len()), std::slice::from_ref(snapshot), "parse after encode");
-    assert_eq!(words::raw_entries(snapshot).len(), snapshot.values.len());
+    assert_eq!(register_text::raw_entries(snapshot).len(), snapshot.values.len());
     check_names(snapshot);
 }
 
 /// Every register of the snapshot has an entry, alone or for its whole row. The library parses the entry's name.
 fn check_names(snapshot: &Snapshot) {
-    let mut entries = words::entries(snapshot).into_iter().peekable();
+    let mut entries = register_text::entries(snapshot).into_iter().peekable();
     let mut row = None;
     for address in snapshot.span().addresses() {
         if let Some(entry) = entries.next_if(|entry| entry.address == address) {

@@ -1,4 +1,4 @@
-//! Frames over a serial port: requests out, replies in, and what was heard in between.
+//! Frames over a serial port: requests out, replies in, and what was received in between.
 //!
 //! Knows neither which reply answers which request, nor what a register means.
 
@@ -10,28 +10,28 @@ use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
 use tracing::{debug, trace};
 
-use crate::error::{Heard, PortError};
-use crate::serial::Serial;
+use crate::error::{PortError, ReceiveCounts};
+use crate::open_port::OpenPort;
 use crate::snapshot::Snapshot;
 use crate::traffic::Traffic;
 
 /// A serial port that speaks in frames.
-pub(crate) struct Link {
-    port: Serial,
+pub(crate) struct FramePort {
+    port: OpenPort,
     deframer: Deframer<ToHost>,
     /// What the port brought and the deframer has not taken yet.
     waiting: Vec<u8>,
-    heard: Heard,
+    received: ReceiveCounts,
     start: Instant,
 }
 
-impl Link {
-    pub(crate) fn new(port: Serial, baud: u32) -> Self {
+impl FramePort {
+    pub(crate) fn new(port: OpenPort, baud: u32) -> Self {
         Self {
             port,
             deframer: Deframer::new(gap(baud)),
             waiting: Vec::new(),
-            heard: Heard::default(),
+            received: ReceiveCounts::default(),
             start: Instant::now(),
         }
     }
@@ -75,23 +75,23 @@ impl Link {
         }
     }
 
-    /// What was heard since this was last asked.
-    pub(crate) fn take_heard(&mut self) -> Heard {
-        std::mem::take(&mut self.heard)
+    /// What was received since this was last asked.
+    pub(crate) fn take_received(&mut self) -> ReceiveCounts {
+        std::mem::take(&mut self.received)
     }
 
     fn pull(&mut self) -> Option<Snapshot> {
         while let Some(found) = self.deframer.pull() {
             match found.map(Reply::from_frame) {
                 Ok(Some(reply)) => {
-                    self.heard.other_frames += 1;
+                    self.received.other_frames += 1;
                     let reply = Snapshot { address: reply.address, values: reply.values.to_vec() };
                     trace!("<- {}", Traffic::from(&reply));
                     return Some(reply);
                 }
-                Ok(None) => self.heard.other_frames += 1,
+                Ok(None) => self.received.other_frames += 1,
                 Err(defect) => {
-                    self.heard.damaged_frames += 1;
+                    self.received.damaged_frames += 1;
                     debug!("<- a damaged frame: {defect:?}");
                 }
             }
@@ -110,12 +110,12 @@ impl Link {
         taken > 0
     }
 
-    /// Takes what comes within `patience`. If nothing does, returns `false` and tells the deframer of the silence.
-    fn read(&mut self, patience: Duration) -> Result<bool, PortError> {
+    /// Takes what comes within `timeout`. If nothing does, returns `false` and tells the deframer of the silence.
+    fn read(&mut self, timeout: Duration) -> Result<bool, PortError> {
         // Not the time after the wait: a process that was suspended meanwhile may find bytes in the port.
-        let end = self.time_at(Instant::now() + patience);
-        let bytes = self.port.receive(patience)?;
-        self.heard.bytes += bytes.len();
+        let end = self.time_at(Instant::now() + timeout);
+        let bytes = self.port.receive(timeout)?;
+        self.received.bytes += bytes.len();
         if bytes.is_empty() {
             self.deframer.push(end, &[]);
         }

@@ -13,22 +13,22 @@ use std::io::{self, IsTerminal, Write};
 
 use serde::Serialize;
 
-use crate::failure::Failure;
-use crate::style::{BOLD, DOUBTFUL};
+use crate::command_error::CommandError;
+use crate::style::{BOLD, WARNING};
 
 /// Something found out: its fields as serde names them, or lines for a reader.
-pub(crate) trait Facts: Serialize {
+pub(crate) trait Printable: Serialize {
     /// Writes the lines.
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()>;
 }
 
 /// Where facts are shown.
-pub(crate) struct Output {
+pub(crate) struct Printer {
     json: bool,
     stream: Box<dyn Write>,
 }
 
-impl Output {
+impl Printer {
     pub(crate) fn stdout(json: bool) -> Self {
         Self { json, stream: Box::new(anstream::stdout()) }
     }
@@ -39,12 +39,12 @@ impl Output {
     }
 
     /// Will a person see it in a terminal?
-    pub(crate) fn is_for_the_screen(&self) -> bool {
+    pub(crate) fn is_terminal(&self) -> bool {
         !self.json && io::stdout().is_terminal()
     }
 
     /// Shows facts.
-    pub(crate) fn show(&mut self, facts: &impl Facts) -> Result<(), Failure> {
+    pub(crate) fn print(&mut self, facts: &impl Printable) -> Result<(), CommandError> {
         if self.json {
             let line = serde_json::to_string(facts).map_err(io::Error::from)?;
             writeln!(self.stream, "{line}")?;
@@ -55,7 +55,7 @@ impl Output {
     }
 
     /// Shows text as it is, whether JSON is wanted or not: a generated file.
-    pub(crate) fn raw(&mut self, text: &[u8]) -> Result<(), Failure> {
+    pub(crate) fn print_raw(&mut self, text: &[u8]) -> Result<(), CommandError> {
         self.stream.write_all(text)?;
         Ok(self.stream.flush()?)
     }
@@ -68,5 +68,5 @@ pub(crate) fn note(message: impl Display) {
 
 /// Something that may not be what the user expects.
 pub(crate) fn warn(message: impl Display) {
-    let _ = writeln!(anstream::stderr(), "{DOUBTFUL}warning:{DOUBTFUL:#} {message}");
+    let _ = writeln!(anstream::stderr(), "{WARNING}warning:{WARNING:#} {message}");
 }

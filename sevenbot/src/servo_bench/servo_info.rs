@@ -5,7 +5,7 @@ use motion_core::servo_bus::Reading;
 use motion_core::servo_bus::frame::{BAUD_RATES, error, register};
 use protocol_core::registers::Joint;
 
-use super::bus::ServoBus;
+use super::bus_master::BusMaster;
 use super::error::ServoError;
 
 /// Registers of the EEPROM that are read: up to the conditions that make the LED blink.
@@ -17,7 +17,7 @@ const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;
 
 /// What a servo's registers say. Fields that stand for one register bear its name in Feetech's memory table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Facts {
+pub struct ServoInfo {
     /// The servo.
     pub id: u8,
     /// Major and minor version of its firmware: 0.0 where the servo's table does not define it.
@@ -54,12 +54,12 @@ pub struct Facts {
     pub is_moving: bool,
 }
 
-impl Facts {
+impl ServoInfo {
     /// Reads them, in three questions.
     ///
     /// # Errors
     /// The servo does not answer, or the port is gone.
-    pub fn read(bus: &mut ServoBus, id: u8) -> Result<Self, ServoError> {
+    pub fn read(bus: &mut BusMaster, id: u8) -> Result<Self, ServoError> {
         let settings = Block::read(bus, id, 0, SETTINGS)?;
         let orders = Block::read(bus, id, register::TORQUE_SWITCH, ORDERS)?;
         let measured = Block::read(bus, id, register::PRESENT_POSITION, MEASURED)?;
@@ -125,7 +125,7 @@ struct Block {
 }
 
 impl Block {
-    fn read(bus: &mut ServoBus, id: u8, first: u8, count: u8) -> Result<Self, ServoError> {
+    fn read(bus: &mut BusMaster, id: u8, first: u8, count: u8) -> Result<Self, ServoError> {
         let answer = bus.read(id, first, count)?;
         Ok(Self { first, errors: answer.errors, values: answer.values })
     }

@@ -9,13 +9,13 @@ use ratatui::crossterm::terminal::{disable_raw_mode, enable_raw_mode};
 use sevenbot::map::{TARGET_POSITION, VACUUM_PUMP};
 use sevenbot::{Angle, Arm, Joint};
 
-use crate::commands::{all_taken, motors_obey};
-use crate::failure::Failure;
+use crate::command_error::CommandError;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
+use crate::write_result::{all_taken, motors_obey};
 
 /// What is in the teacher's hands.
-pub(crate) struct Pendant {
+pub(crate) struct TeachPendant {
     has_keys: bool,
     targets: [Angle; 7],
     vacuum: bool,
@@ -26,7 +26,7 @@ pub(crate) struct Pendant {
 
 /// What a key asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Wish {
+enum KeyCommand {
     End,
     /// And hold the arm.
     Stop,
@@ -36,7 +36,7 @@ enum Wish {
     Nudge(i16),
 }
 
-impl Pendant {
+impl TeachPendant {
     /// Takes the keys, where there are any.
     pub(crate) fn new(targets: [Angle; 7], vacuum: bool, is_driven: bool) -> Self {
         let has_keys = io::stdin().is_terminal() && io::stderr().is_terminal() && enable_raw_mode().is_ok();
@@ -63,30 +63,30 @@ impl Pendant {
     }
 
     /// Does what the keys ask for; `true` when that is to end.
-    pub(crate) fn attend(&mut self, arm: &mut Arm) -> Result<bool, Failure> {
+    pub(crate) fn poll_keys(&mut self, arm: &mut Arm) -> Result<bool, CommandError> {
         while self.has_keys && event::poll(Duration::ZERO)? {
             let Event::Key(key) = event::read()? else { continue };
-            match wish(key, self.selected) {
-                Some(Wish::End) => return Ok(true),
-                Some(Wish::Stop) => {
-                    Interrupt::wish();
+            match command(key, self.selected) {
+                Some(KeyCommand::End) => return Ok(true),
+                Some(KeyCommand::Stop) => {
+                    Interrupt::request();
                     return Ok(true);
                 }
-                Some(Wish::SwitchPump) => self.switch_pump(arm)?,
-                Some(Wish::Select(joint)) => self.selected = joint,
-                Some(Wish::Nudge(degrees)) if self.is_driven => self.nudge(arm, degrees)?,
+                Some(KeyCommand::SwitchPump) => self.switch_pump(arm)?,
+                Some(KeyCommand::Select(joint)) => self.selected = joint,
+                Some(KeyCommand::Nudge(degrees)) if self.is_driven => self.nudge(arm, degrees)?,
                 _ => {}
             }
         }
         Ok(false)
     }
 
-    fn switch_pump(&mut self, arm: &mut Arm) -> Result<(), Failure> {
+    fn switch_pump(&mut self, arm: &mut Arm) -> Result<(), CommandError> {
         self.vacuum = !self.vacuum;
         all_taken(&arm.write_checked(VACUUM_PUMP.address, &[u8::from(self.vacuum)])?)
     }
 
-    fn nudge(&mut self, arm: &mut Arm, degrees: i16) -> Result<(), Failure> {
+    fn nudge(&mut self, arm: &mut Arm, degrees: i16) -> Result<(), CommandError> {
         let targets = self.targets.iter_mut().zip(Joint::ALL);
         for (target, joint) in targets.filter(|(_, joint)| *joint == self.selected) {
             let wanted = i16::from(target.degrees()) + degrees;
@@ -98,7 +98,7 @@ impl Pendant {
     }
 }
 
-impl Drop for Pendant {
+impl Drop for TeachPendant {
     fn drop(&mut self) {
         if self.has_keys {
             let _ = disable_raw_mode();
@@ -106,23 +106,23 @@ impl Drop for Pendant {
     }
 }
 
-fn wish(key: KeyEvent, selected: Joint) -> Option<Wish> {
+fn command(key: KeyEvent, selected: Joint) -> Option<KeyCommand> {
     // Some terminals report releases too.
     if key.kind == KeyEventKind::Release {
         return None;
     }
     let degrees = if key.modifiers.contains(KeyModifiers::SHIFT) { 10 } else { 1 };
     let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
-    let select = |number: u8| Joint::new(number).map(Wish::Select);
+    let select = |number: u8| Joint::new(number).map(KeyCommand::Select);
     match key.code {
-        KeyCode::Char('c') if is_control => Some(Wish::Stop),
-        KeyCode::Char('q') | KeyCode::Esc | KeyCode::Enter => Some(Wish::End),
-        KeyCode::Char(' ') => Some(Wish::SwitchPump),
+        KeyCode::Char('c') if is_control => Some(KeyCommand::Stop),
+        KeyCode::Char('q') | KeyCode::Esc | KeyCode::Enter => Some(KeyCommand::End),
+        KeyCode::Char(' ') => Some(KeyCommand::SwitchPump),
         KeyCode::Char(digit) => select(u8::try_from(digit.to_digit(10)?).ok()?),
         KeyCode::Up => select(selected.number().saturating_sub(1)),
         KeyCode::Down => select(selected.number().saturating_add(1)),
-        KeyCode::Left => Some(Wish::Nudge(-degrees)),
-        KeyCode::Right => Some(Wish::Nudge(degrees)),
+        KeyCode::Left => Some(KeyCommand::Nudge(-degrees)),
+        KeyCode::Right => Some(KeyCommand::Nudge(degrees)),
         _ => None,
     }
 }
@@ -134,16 +134,16 @@ mod tests {
     #[test]
     fn keys_ask_for_what_the_line_says() {
         let first = Joint::ALL[0];
-        let plain = |code| wish(KeyEvent::from(code), first);
-        assert_eq!(plain(KeyCode::Char(' ')), Some(Wish::SwitchPump));
-        assert_eq!(plain(KeyCode::Char('q')), Some(Wish::End));
-        assert_eq!(plain(KeyCode::Char('7')), Some(Wish::Select(Joint::ALL[6])));
+        let plain = |code| command(KeyEvent::from(code), first);
+        assert_eq!(plain(KeyCode::Char(' ')), Some(KeyCommand::SwitchPump));
+        assert_eq!(plain(KeyCode::Char('q')), Some(KeyCommand::End));
+        assert_eq!(plain(KeyCode::Char('7')), Some(KeyCommand::Select(Joint::ALL[6])));
         assert_eq!(plain(KeyCode::Char('8')), None);
         assert_eq!(plain(KeyCode::Up), None, "there is nothing above the first");
-        assert_eq!(plain(KeyCode::Left), Some(Wish::Nudge(-1)));
+        assert_eq!(plain(KeyCode::Left), Some(KeyCommand::Nudge(-1)));
         let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
-        assert_eq!(wish(ctrl_c, first), Some(Wish::Stop));
+        assert_eq!(command(ctrl_c, first), Some(KeyCommand::Stop));
         let shifted = KeyEvent::new(KeyCode::Right, KeyModifiers::SHIFT);
-        assert_eq!(wish(shifted, first), Some(Wish::Nudge(10)));
+        assert_eq!(command(shifted, first), Some(KeyCommand::Nudge(10)));
     }
 }

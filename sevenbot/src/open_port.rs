@@ -20,18 +20,18 @@ const UNLOCK_TIMEOUT: Duration = Duration::from_secs(1);
 const TRY_AGAIN: Duration = Duration::from_millis(20);
 
 /// An open serial port.
-pub struct Serial {
+pub struct OpenPort {
     port: Box<dyn SerialPort>,
     opened: Instant,
 }
 
-impl fmt::Debug for Serial {
+impl fmt::Debug for OpenPort {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.debug_struct("Serial").field("name", &self.port.name()).finish_non_exhaustive()
+        out.debug_struct("OpenPort").field("name", &self.port.name()).finish_non_exhaustive()
     }
 }
 
-impl Serial {
+impl OpenPort {
     /// Opens a port, whatever is behind it. No other program can open it meanwhile.
     ///
     /// # Errors
@@ -58,15 +58,15 @@ impl Serial {
         })
     }
 
-    /// The bytes that are here, or the first that come within `patience`. Empty when none came.
+    /// The bytes that are here, or the first that come within `timeout`. Empty when none came.
     ///
     /// # Errors
     /// The port is gone.
-    pub fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, PortError> {
-        if patience.is_zero() && self.port.bytes_to_read().map_err(lost)? == 0 {
+    pub fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
+        if timeout.is_zero() && self.port.bytes_to_read().map_err(lost)? == 0 {
             return Ok(Vec::new());
         }
-        self.port.set_timeout(patience.max(SHORTEST_WAIT)).map_err(lost)?;
+        self.port.set_timeout(timeout.max(SHORTEST_WAIT)).map_err(lost)?;
         let mut chunk = [0; 4096];
         loop {
             match self.port.read(&mut chunk) {

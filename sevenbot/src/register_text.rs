@@ -17,12 +17,12 @@ use crate::units::Speed;
 /// ```
 /// use sevenbot::Snapshot;
 ///
-/// let shown = sevenbot::words::entries(&Snapshot { address: 29, values: vec![1] });
+/// let shown = sevenbot::register_text::entries(&Snapshot { address: 29, values: vec![1] });
 /// assert_eq!(shown[0].name, "motor-state");
 /// assert_eq!(shown[0].meaning, "servo");
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
+pub struct RegisterEntry {
     /// Its first register.
     pub address: u8,
     /// Its name.
@@ -38,7 +38,7 @@ pub struct Entry {
 /// What a snapshot holds, value by value. A value of several registers is one entry where all of them are
 /// there, and bytes where they are not.
 #[must_use]
-pub fn entries(snapshot: &Snapshot) -> Vec<Entry> {
+pub fn entries(snapshot: &Snapshot) -> Vec<RegisterEntry> {
     let mut entries = Vec::new();
     let mut addresses = snapshot.span().addresses().peekable();
     while let Some(address) = addresses.next() {
@@ -56,10 +56,13 @@ pub fn entries(snapshot: &Snapshot) -> Vec<Entry> {
 
 /// What a snapshot holds, byte by byte, without any interpretation.
 #[must_use]
-pub fn raw_entries(snapshot: &Snapshot) -> Vec<Entry> {
+pub fn raw_entries(snapshot: &Snapshot) -> Vec<RegisterEntry> {
     let pairs = snapshot.span().addresses().zip(&snapshot.values);
-    let raw = |(address, byte): (u8, &u8)| Entry { value: format!("0x{byte:02X}"), ..entry(address, *byte) };
-    pairs.map(raw).map(|entry| Entry { meaning: String::new(), ..entry }).collect()
+    let raw = |(address, byte): (u8, &u8)| RegisterEntry {
+        value: format!("0x{byte:02X}"),
+        ..entry(address, *byte)
+    };
+    pairs.map(raw).map(|entry| RegisterEntry { meaning: String::new(), ..entry }).collect()
 }
 
 /// Does a value of several registers begin here, all of them in the snapshot?
@@ -69,7 +72,7 @@ fn is_whole(row: &Register, address: u8, snapshot: &Snapshot) -> bool {
     runs && address == row.address && snapshot.span().addresses().any(|held| held == last)
 }
 
-fn long_entry(row: &Register, snapshot: &Snapshot) -> Entry {
+fn long_entry(row: &Register, snapshot: &Snapshot) -> RegisterEntry {
     let held = snapshot.span().addresses().filter(|&address| row.holds(address));
     let bytes: Vec<u8> = held.map(|address| snapshot.at(address)).collect();
     let value = if *row == CHIP_ID {
@@ -77,14 +80,14 @@ fn long_entry(row: &Register, snapshot: &Snapshot) -> Entry {
     } else {
         snapshot.counter(row).to_string()
     };
-    Entry { address: row.address, name: name_of(row), bytes, value, meaning: String::new() }
+    RegisterEntry { address: row.address, name: name_of(row), bytes, value, meaning: String::new() }
 }
 
-fn entry(address: u8, byte: u8) -> Entry {
+fn entry(address: u8, byte: u8) -> RegisterEntry {
     let row = find(address);
     let value = row.map_or(i16::from(byte), |row| row.range.decode(byte)).to_string();
     let meaning = row.map(|row| meaning(row, byte)).unwrap_or_default();
-    Entry { address, name: name_of_register(address), bytes: vec![byte], value, meaning }
+    RegisterEntry { address, name: name_of_register(address), bytes: vec![byte], value, meaning }
 }
 
 /// What a byte means in a row of the table; empty where the number says all.
@@ -93,12 +96,12 @@ pub fn meaning(row: &Register, byte: u8) -> String {
     match *row {
         BAUD_RATE => format!("{} baud", baud_rate(byte)),
         EEPROM_LOCK => (if byte == 0 { "open" } else { "locked" }).to_owned(),
-        MOTOR_STATE => motor_state_word(byte).to_owned(),
+        MOTOR_STATE => motor_state_name(byte).to_owned(),
         EFFECTOR_TYPE => (if byte == 0 { "suction cup" } else { "gripper" }).to_owned(),
         VACUUM_PUMP => (if byte == 0 { "release" } else { "suck" }).to_owned(),
         FAULTS => faults(byte),
         MISSING_SERVOS | MOVING_JOINTS => joints(byte),
-        LAST_REFUSAL => refusal_word(byte).to_owned(),
+        LAST_REFUSAL => refusal_reason(byte).to_owned(),
         // No frame is ever refused because of the device code, which is at 0.
         LAST_REFUSED_REGISTER if byte == 0 => "none".to_owned(),
         LAST_REFUSED_REGISTER => name_of_register(byte),
@@ -122,7 +125,7 @@ fn in_unit(unit: Unit, byte: u8) -> String {
 
 /// A state of the motors in a word.
 #[must_use]
-pub const fn motor_state_word(state: u8) -> &'static str {
+pub const fn motor_state_name(state: u8) -> &'static str {
     match state {
         motor_state::DAMPING => "damping protection",
         motor_state::SERVO => "servo",
@@ -133,7 +136,7 @@ pub const fn motor_state_word(state: u8) -> &'static str {
 
 /// Why the last refused frame was refused.
 #[must_use]
-pub const fn refusal_word(reason: u8) -> &'static str {
+pub const fn refusal_reason(reason: u8) -> &'static str {
     match reason {
         refusal::NONE => "none",
         refusal::MALFORMED_RANGE => "it reached past register 255",

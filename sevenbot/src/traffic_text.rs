@@ -13,15 +13,15 @@ use protocol_core::registers::Register;
 use protocol_core::registers::map::find;
 
 use crate::names::name_of;
+use crate::register_text::entries;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 use crate::traffic::Traffic;
-use crate::words::entries;
 
 /// A read of more rows than this is named by its ends.
-const ROWS_NAMED: usize = 3;
-/// Of a long stretch of noise so many bytes are shown.
-const NOISE_SHOWN: usize = 32;
+const MAX_ROWS_NAMED: usize = 3;
+/// Of a long run of noise so many bytes are shown.
+const MAX_NOISE_SHOWN: usize = 32;
 
 impl fmt::Display for Traffic {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -45,33 +45,33 @@ fn noise(bytes: &[u8], out: &mut fmt::Formatter<'_>) -> fmt::Result {
         [_] => write!(out, "1 byte that is no frame:")?,
         _ => write!(out, "{} bytes that are no frame:", bytes.len())?,
     }
-    for byte in bytes.iter().take(NOISE_SHOWN) {
+    for byte in bytes.iter().take(MAX_NOISE_SHOWN) {
         write!(out, " {byte:02X}")?;
     }
-    if bytes.len() > NOISE_SHOWN { out.write_str(" ..") } else { Ok(()) }
+    if bytes.len() > MAX_NOISE_SHOWN { out.write_str(" ..") } else { Ok(()) }
 }
 
-/// A stretch of registers inside one row of the table, or inside one of its holes.
+/// Registers inside one row of the table, or inside one of its holes.
 #[derive(Clone, Copy)]
-struct Stretch {
+struct RowSpan {
     row: Option<&'static Register>,
     first: u8,
     last: u8,
 }
 
-fn stretches(span: Span) -> Vec<Stretch> {
-    let mut stretches: Vec<Stretch> = Vec::new();
+fn row_spans(span: Span) -> Vec<RowSpan> {
+    let mut row_spans: Vec<RowSpan> = Vec::new();
     for address in span.addresses() {
         let row = find(address);
-        match stretches.last_mut() {
-            Some(stretch) if stretch.row == row => stretch.last = address,
-            _ => stretches.push(Stretch { row, first: address, last: address }),
+        match row_spans.last_mut() {
+            Some(row_span) if row_span.row == row => row_span.last = address,
+            _ => row_spans.push(RowSpan { row, first: address, last: address }),
         }
     }
-    stretches
+    row_spans
 }
 
-impl Stretch {
+impl RowSpan {
     /// `target-position 1..7`, `device-id`, `no register 61..63`: joints by their numbers, the rest by address.
     fn name(self) -> String {
         let Some(row) = self.row else { return format!("no register {}", range(self.first, self.last)) };
@@ -94,7 +94,7 @@ impl Stretch {
         let numbers: Vec<&str> = entries.iter().map(|entry| entry.value.as_str()).collect();
         let comment = match (self.row, entries.as_slice()) {
             (Some(row), [only]) => comment(row, &only.meaning),
-            (Some(row), _) => behind(row.unit.symbol()),
+            (Some(row), _) => suffix(row.unit.symbol()),
             (None, _) => String::new(),
         };
         format!("{} = {}{comment}", self.name(), numbers.join(" "))
@@ -103,10 +103,10 @@ impl Stretch {
 
 /// What a single value means: a unit as it is, a word in brackets.
 fn comment(row: &Register, words: &str) -> String {
-    if words == row.unit.symbol() || words.is_empty() { behind(words) } else { format!(" ({words})") }
+    if words == row.unit.symbol() || words.is_empty() { suffix(words) } else { format!(" ({words})") }
 }
 
-fn behind(unit: &str) -> String {
+fn suffix(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
@@ -115,23 +115,23 @@ fn range(first: u8, last: u8) -> String {
 }
 
 fn names(span: Span) -> String {
-    let stretches = stretches(span);
-    match stretches.as_slice() {
+    let row_spans = row_spans(span);
+    match row_spans.as_slice() {
         [] => span.to_string(),
-        [first, .., last] if stretches.len() > ROWS_NAMED => {
+        [first, .., last] if row_spans.len() > MAX_ROWS_NAMED => {
             format!("{} to {} ({span})", first.name(), last.name())
         }
-        _ => stretches.iter().map(|stretch| stretch.name()).collect::<Vec<_>>().join(", "),
+        _ => row_spans.iter().map(|row_span| row_span.name()).collect::<Vec<_>>().join(", "),
     }
 }
 
 fn assignments(address: u8, values: &[u8]) -> String {
     let values = Snapshot { address, values: values.to_vec() };
-    let stretches = stretches(values.span());
-    if stretches.is_empty() {
+    let row_spans = row_spans(values.span());
+    if row_spans.is_empty() {
         return values.span().to_string();
     }
-    stretches.iter().map(|stretch| stretch.assignment(&values)).collect::<Vec<_>>().join(", ")
+    row_spans.iter().map(|row_span| row_span.assignment(&values)).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

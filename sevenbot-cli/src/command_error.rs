@@ -22,7 +22,7 @@ const SAFETY: [&str; 3] = [
 
 /// Why the program does not end well.
 #[derive(Debug)]
-pub(crate) enum Failure {
+pub(crate) enum CommandError {
     /// The arm did not do, or is not, what was asked for.
     Arm(String),
     /// It is not known that the arm did what it was told to do with its motors, for this reason.
@@ -38,7 +38,7 @@ pub(crate) enum Failure {
     /// The port opens, but no arm answers there at any rate.
     NoRate { port: String },
     /// The arm went away.
-    Wire(Error),
+    Exchange(Error),
     /// An exchange with a servo failed.
     Servo { port: String, error: ServoError },
     /// No servo answers at any of the rates and ids that were tried.
@@ -46,7 +46,7 @@ pub(crate) enum Failure {
     /// The port of a servo adapter was wanted, but this one leads to an arm's controller.
     HostLink { port: String },
     /// Something did not do what was asked for, and there is advice about it.
-    Advised { message: String, advice: &'static [&'static str] },
+    WithAdvice { message: String, advice: &'static [&'static str] },
     /// A file cannot be read or written, or does not hold what it should.
     File { path: PathBuf, reason: String },
     /// What was found out cannot be shown.
@@ -55,27 +55,27 @@ pub(crate) enum Failure {
     Interrupted,
 }
 
-impl From<Error> for Failure {
+impl From<Error> for CommandError {
     fn from(error: Error) -> Self {
-        Self::Wire(error)
+        Self::Exchange(error)
     }
 }
 
-impl From<io::Error> for Failure {
+impl From<io::Error> for CommandError {
     fn from(error: io::Error) -> Self {
         Self::Output(error)
     }
 }
 
-impl Failure {
+impl CommandError {
     /// A failure with a file, for whatever reason.
     pub(crate) fn file(path: &Path, reason: impl ToString) -> Self {
         Self::File { path: path.to_owned(), reason: reason.to_string() }
     }
 
     /// Did the connection fail, so that the arm cannot be told anything more?
-    pub(crate) const fn is_of_the_wire(&self) -> bool {
-        matches!(self, Self::Wire(_) | Self::MayMove(_))
+    pub(crate) const fn is_connection_lost(&self) -> bool {
+        matches!(self, Self::Exchange(_) | Self::MayMove(_))
     }
 
     /// The exit status; `sevenbot --help` lists them.
@@ -86,8 +86,8 @@ impl Failure {
             Self::Arm(_) | Self::MayMove(_) | Self::File { .. } | Self::Output(_) => 1,
             Self::Usage(_) => 2,
             Self::NoArm { .. } | Self::SeveralArms { .. } => 3,
-            Self::Open { .. } | Self::NoRate { .. } | Self::Wire(_) => 3,
-            Self::Servo { error: ServoError::NotTaken { .. }, .. } | Self::Advised { .. } => 1,
+            Self::Open { .. } | Self::NoRate { .. } | Self::Exchange(_) => 3,
+            Self::Servo { error: ServoError::NotTaken { .. }, .. } | Self::WithAdvice { .. } => 1,
             Self::Servo { .. } | Self::NoServo { .. } | Self::HostLink { .. } => 3,
             Self::Interrupted => INTERRUPTED,
         })
@@ -122,13 +122,13 @@ impl Failure {
             Self::NoRate { port } => {
                 Some(format!("{port}: no arm answers, at any of the rates an arm knows"))
             }
-            Self::Wire(error) => Some(error.to_string()),
+            Self::Exchange(error) => Some(error.to_string()),
             Self::Servo { port, error } => Some(format!("{port}: {error}")),
             Self::NoServo { port, .. } => Some(format!("{port}: no servo answers")),
             Self::HostLink { port } => Some(format!(
                 "{port}: this is the arm's host link: its controller answers here, not its servos"
             )),
-            Self::Advised { message, .. } => Some(message.clone()),
+            Self::WithAdvice { message, .. } => Some(message.clone()),
             Self::File { path, reason } => Some(format!("{}: {reason}", path.display())),
             Self::Interrupted => Some("interrupted".to_owned()),
         }
@@ -150,9 +150,9 @@ impl Failure {
             }
             Self::MayMove(_) => SAFETY.map(str::to_owned).to_vec(),
             Self::Open { error, .. } => advice::opening(error),
-            Self::Wire(error) => owned(advice::exchange(error)),
+            Self::Exchange(error) => owned(advice::exchange(error)),
             Self::Servo { error, .. } => owned(advice::servo(error)),
-            Self::Advised { advice, .. } => owned(advice),
+            Self::WithAdvice { advice, .. } => owned(advice),
             Self::HostLink { .. } => {
                 owned(&["use an adapter on the servo bus, and take the arm's controller off that bus"])
             }

@@ -6,24 +6,24 @@ use std::fs::File;
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use crate::failure::Failure;
+use crate::command_error::CommandError;
 
 /// A file to which lines are added.
-pub(crate) struct Growing {
+pub(crate) struct LineFile {
     path: PathBuf,
     file: File,
 }
 
-impl Growing {
+impl LineFile {
     /// An empty file; what was in it is gone.
-    pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
-        let file = File::create(path).map_err(|error| Failure::file(path, error))?;
+    pub(crate) fn create(path: &Path) -> Result<Self, CommandError> {
+        let file = File::create(path).map_err(|error| CommandError::file(path, error))?;
         Ok(Self { path: path.to_owned(), file })
     }
 
     /// Adds whole lines, or nothing.
-    pub(crate) fn add(&mut self, lines: &str) -> Result<(), Failure> {
-        self.write(lines).map_err(|error| Failure::file(&self.path, error))
+    pub(crate) fn add(&mut self, lines: &str) -> Result<(), CommandError> {
+        self.write(lines).map_err(|error| CommandError::file(&self.path, error))
     }
 
     fn write(&mut self, lines: &str) -> io::Result<()> {

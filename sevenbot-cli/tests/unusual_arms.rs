@@ -11,12 +11,12 @@ use std::process::{Command, Output, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
-use fake::{IDENTITY, arm_of, arm_that, makers_arm, reply};
+use fake::{IDENTITY, answering_arm, makers_arm, reply, scripted_arm};
 use protocol_core::request::Request;
 use sevenbot::ports::find_baud;
 
 /// Patience with a busy machine. It costs nothing while all is well.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 fn command(port: &str, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sevenbot"));
@@ -53,7 +53,7 @@ fn the_makers_firmware_works_as_far_as_it_goes() {
 
 #[test]
 fn another_device_is_named_by_its_code() {
-    let (port, _held) = arm_of(|_, _, _| reply(0, &[9, 30, 0, 0, 0, 0, 0, 0]));
+    let (port, _held) = answering_arm(|_, _, _| reply(0, &[9, 30, 0, 0, 0, 0, 0, 0]));
     let text = run(&port, &["info"], 3);
     assert!(text.contains("not a 7Bot V2: its device code is 9, not 7"), "{text}");
     assert!(text.contains("sevenbot ports"), "{text}");
@@ -62,7 +62,7 @@ fn another_device_is_named_by_its_code() {
 #[test]
 fn silence_and_nonsense_suggest_to_look_for_the_rate() {
     for answer in [&b""[..], b"\x00\xF8\x80"] {
-        let (port, _held) = arm_of(|_, _, _| answer.to_vec());
+        let (port, _held) = answering_arm(|_, _, _| answer.to_vec());
         let text = run(&port, &["info"], 3);
         assert!(text.contains("no answer to a read of 0..7") && text.contains("baud --find"), "{text}");
     }
@@ -75,7 +75,7 @@ fn a_forgotten_rate_is_found() {
     use serialport::SerialPort;
 
     let listens_at = |rate: u32| {
-        arm_that(move |line, request| match *request {
+        scripted_arm(move |line, request| match *request {
             Request::Read { address, count } if line.baud_rate().unwrap() == rate => {
                 let registers = [IDENTITY.as_slice(), &[0; 248]].concat();
                 let first = usize::from(address);
@@ -109,7 +109,7 @@ fn a_forgotten_rate_is_found() {
 fn a_second_ctrl_c_waits_for_nobody() {
     let (moving, is_moving) = mpsc::channel();
     let mut is_sent = false;
-    let (port, _held) = arm_that(move |_, request| match *request {
+    let (port, _held) = scripted_arm(move |_, request| match *request {
         Request::Read { .. } if is_sent => {
             let _ = moving.send(());
             Vec::new()
@@ -128,7 +128,7 @@ fn a_second_ctrl_c_waits_for_nobody() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    is_moving.recv_timeout(PATIENCE).unwrap();
+    is_moving.recv_timeout(TIMEOUT).unwrap();
     // Alone, the first one would end in three more reads without an answer, and status 3. Two that come before the
     // first is taken are one, so there may have to be more.
     let id = waiting.id().to_string();

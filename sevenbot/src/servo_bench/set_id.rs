@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use motion_core::servo_bus::frame::register;
 
-use super::bus::ServoBus;
+use super::bus_master::BusMaster;
 use super::error::ServoError;
-use super::scan::{Answers, Found, Plan, Step, scan};
+use super::scan::{AnswerQuality, FoundServo, ScanPlan, ScanProgress, scan};
 
 /// Register 48, the lock of the EEPROM.
 const OPEN: [u8; 1] = [0];
@@ -17,11 +17,11 @@ const LOCKED: [u8; 1] = [1];
 
 /// Why a servo does not have its new id.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum IdError {
+pub enum SetIdError {
     /// Other servos answer, or none, or several with one id. Nothing was written.
     NotAlone {
         /// Whatever answers.
-        answering: Vec<Found>,
+        answering: Vec<FoundServo>,
     },
     /// The servo does not open its EEPROM. Nothing else was written.
     StaysLocked(ServoError),
@@ -34,18 +34,18 @@ pub enum IdError {
     /// The servo has its new id, but its EEPROM is still unlocked.
     StaysOpen(ServoError),
     /// The port failed after the EEPROM was unlocked.
-    HalfWay(ServoError),
+    IdUncertain(ServoError),
     /// The exchange failed before anything was written.
     Bus(ServoError),
 }
 
-impl From<ServoError> for IdError {
+impl From<ServoError> for SetIdError {
     fn from(error: ServoError) -> Self {
         Self::Bus(error)
     }
 }
 
-impl fmt::Display for IdError {
+impl fmt::Display for SetIdError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotAlone { answering } if answering.is_empty() => {
@@ -68,70 +68,70 @@ impl fmt::Display for IdError {
             Self::StaysOpen(error) => {
                 write!(out, "the servo has its new id, but its EEPROM was not locked again: {error}")
             }
-            Self::HalfWay(error) => write!(out, "{error}; the servo may have its old id or its new one"),
+            Self::IdUncertain(error) => write!(out, "{error}; the servo may have its old id or its new one"),
             Self::Bus(error) => error.fmt(out),
         }
     }
 }
 
-fn word(found: &Found) -> String {
+fn word(found: &FoundServo) -> String {
     match found.answers {
-        Answers::Good => found.id.to_string(),
-        Answers::Several => format!("{} (several servos)", found.id),
-        Answers::Damaged => format!("{} (damaged answers)", found.id),
+        AnswerQuality::Good => found.id.to_string(),
+        AnswerQuality::Several => format!("{} (several servos)", found.id),
+        AnswerQuality::Damaged => format!("{} (damaged answers)", found.id),
     }
 }
 
-impl std::error::Error for IdError {}
+impl std::error::Error for SetIdError {}
 
 /// Changes the id of the only servo on the bus from `old` to `new`, and makes sure of it.
 ///
 /// # Errors
-/// See [`IdError`]; each says what state the servo is in.
+/// See [`SetIdError`]; each says what state the servo is in.
 pub fn set_id(
-    bus: &mut ServoBus,
-    plan: &Plan,
+    bus: &mut BusMaster,
+    plan: &ScanPlan,
     old: u8,
     new: u8,
-    tell: impl FnMut(Step),
-) -> Result<(), IdError> {
-    let answering = scan(bus, plan, tell)?.found;
-    if !matches!(answering.as_slice(), [Found { id, answers: Answers::Good, .. }] if *id == old) {
-        return Err(IdError::NotAlone { answering });
+    on_progress: impl FnMut(ScanProgress),
+) -> Result<(), SetIdError> {
+    let answering = scan(bus, plan, on_progress)?.found;
+    if !matches!(answering.as_slice(), [FoundServo { id, answers: AnswerQuality::Good, .. }] if *id == old) {
+        return Err(SetIdError::NotAlone { answering });
     }
-    bus.write(old, register::LOCK, &OPEN).map_err(IdError::StaysLocked)?;
+    bus.write(old, register::LOCK, &OPEN).map_err(SetIdError::StaysLocked)?;
     let changed = change(bus, old, new);
     // Whatever came of it, no servo is left open.
     let holder = if changed.is_ok() { new } else { old };
     let locked = bus.write(holder, register::LOCK, &LOCKED);
     changed?;
-    locked.map_err(IdError::StaysOpen)
+    locked.map_err(SetIdError::StaysOpen)
 }
 
 /// Writes the id until the servo answers to it. Its acknowledgement may carry either id, so it counts for nothing.
-fn change(bus: &mut ServoBus, old: u8, new: u8) -> Result<(), IdError> {
+fn change(bus: &mut BusMaster, old: u8, new: u8) -> Result<(), SetIdError> {
     for _ in 0..bus.options().attempts.max(1) {
-        bus.send_write(old, register::ID, &[new]).map_err(IdError::HalfWay)?;
+        bus.send_write(old, register::ID, &[new]).map_err(SetIdError::IdUncertain)?;
         match (is_there(bus, new)?, is_there(bus, old)?) {
             (true, false) => return Ok(()),
-            (true, true) => return Err(IdError::AnswersToBoth),
+            (true, true) => return Err(SetIdError::AnswersToBoth),
             (false, _) => {}
         }
     }
-    Err(if is_there(bus, old)? { IdError::Unchanged } else { IdError::Lost })
+    Err(if is_there(bus, old)? { SetIdError::Unchanged } else { SetIdError::Lost })
 }
 
 /// Does a servo answer to this id?
-fn is_there(bus: &mut ServoBus, id: u8) -> Result<bool, IdError> {
+fn is_there(bus: &mut BusMaster, id: u8) -> Result<bool, SetIdError> {
     match bus.read(id, register::ID, 1) {
         Ok(answer) => Ok(answer.values == [id]),
         Err(ServoError::NoAnswer { .. }) => Ok(false),
-        Err(error) => Err(IdError::HalfWay(error)),
+        Err(error) => Err(SetIdError::IdUncertain(error)),
     }
 }
 
 /// A plan for [`set_id`]: every id at one rate.
 #[must_use]
-pub fn everything_at(baud: u32, wait: Option<Duration>) -> Plan {
-    Plan { rates: vec![baud], ids: 0..=super::MAX_ID, wait }
+pub fn all_ids(baud: u32, wait: Option<Duration>) -> ScanPlan {
+    ScanPlan { rates: vec![baud], ids: 0..=super::MAX_ID, wait }
 }

@@ -11,21 +11,21 @@ use protocol_core::registers::{Access, Region, Register};
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::names::name_of_register;
+use crate::register_text;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
-use crate::status::Status;
-use crate::words;
+use crate::status_block::StatusBlock;
 
 /// A register that does not hold what was written to it.
 ///
 /// ```
-/// use sevenbot::change::{Cause, Unchanged};
+/// use sevenbot::checked_write::{MismatchCause, WriteMismatch};
 ///
-/// let refused = Unchanged { address: 11, wanted: 42, found: 0, cause: Cause::Locked };
+/// let refused = WriteMismatch { address: 11, wanted: 42, found: 0, cause: MismatchCause::Locked };
 /// assert_eq!(refused.to_string(), "device-id is 0, not 42: it is protected by the EEPROM lock");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unchanged {
+pub struct WriteMismatch {
     /// The register.
     pub address: u8,
     /// The byte that was written.
@@ -33,18 +33,18 @@ pub struct Unchanged {
     /// The byte that was read back.
     pub found: u8,
     /// Why.
-    pub cause: Cause,
+    pub cause: MismatchCause,
 }
 
 /// Why a register does not hold what was written to it.
 ///
 /// ```
-/// use sevenbot::change::Cause;
+/// use sevenbot::checked_write::MismatchCause;
 ///
-/// assert_eq!(Cause::Locked.to_string(), "it is protected by the EEPROM lock");
+/// assert_eq!(MismatchCause::Locked.to_string(), "it is protected by the EEPROM lock");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cause {
+pub enum MismatchCause {
     /// The table has no register there.
     NoRegister,
     /// It can only be read.
@@ -66,10 +66,10 @@ pub enum Cause {
     Unknown,
 }
 
-impl Cause {
+impl MismatchCause {
     /// Could the same frame have an effect when it is sent again?
     #[must_use]
-    pub const fn may_pass(self) -> bool {
+    pub const fn is_transient(self) -> bool {
         matches!(self, Self::Damaged | Self::Unknown)
     }
 }
@@ -93,7 +93,7 @@ impl Arm {
     ///
     /// # Errors
     /// As [`Arm::read`] and [`Arm::write`]. The arm may have taken the values nevertheless.
-    pub fn write_checked(&mut self, address: u8, values: &[u8]) -> Result<Vec<Unchanged>, Error> {
+    pub fn write_checked(&mut self, address: u8, values: &[u8]) -> Result<Vec<WriteMismatch>, Error> {
         self.write_all_checked(&[(address, values.to_vec())])
     }
 
@@ -101,11 +101,11 @@ impl Arm {
     ///
     /// # Errors
     /// As [`Arm::read`] and [`Arm::write`]. The arm may have taken some of the values nevertheless.
-    pub fn write_all_checked(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<Unchanged>, Error> {
-        self.patiently(|arm| arm.write_until_taken(writes))
+    pub fn write_all_checked(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<WriteMismatch>, Error> {
+        self.with_min_attempts(|arm| arm.write_until_taken(writes))
     }
 
-    fn write_until_taken(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<Unchanged>, Error> {
+    fn write_until_taken(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<WriteMismatch>, Error> {
         let locked = self.read_span(Span::of(&EEPROM_LOCK))?.byte(&EEPROM_LOCK) != 0;
         let mut before = self.status()?;
         let (mut unchanged, mut sending) = (Vec::new(), writes.iter().collect::<Vec<_>>());
@@ -113,15 +113,16 @@ impl Arm {
             let found = self.write_and_read_back(&sending)?;
             let after = self.status()?;
             let cause = |address, wanted| {
-                rule(address, locked).unwrap_or_else(|| match (&before, &after) {
-                    (Some(before), Some(after)) => verdict(before, after),
-                    _ => guess(address, wanted),
+                cause_from_access(address, locked).unwrap_or_else(|| match (&before, &after) {
+                    (Some(before), Some(after)) => cause_from_counters(before, after),
+                    _ => cause_from_range(address, wanted),
                 })
             };
             let mut lost = Vec::new();
             for (found, write) in found.iter().zip(sending) {
                 let differing = compare(found, &write.1, cause);
-                if attempt < WRITE_ATTEMPTS && differing.iter().any(|register| register.cause.may_pass()) {
+                if attempt < WRITE_ATTEMPTS && differing.iter().any(|register| register.cause.is_transient())
+                {
                     lost.push(write);
                 } else {
                     unchanged.extend(differing);
@@ -147,13 +148,13 @@ impl Arm {
     }
 }
 
-fn compare(found: &Snapshot, wanted: &[u8], cause: impl Fn(u8, u8) -> Cause) -> Vec<Unchanged> {
+fn compare(found: &Snapshot, wanted: &[u8], cause: impl Fn(u8, u8) -> MismatchCause) -> Vec<WriteMismatch> {
     let pairs = found.span().addresses().zip(wanted).zip(&found.values);
     pairs
         .filter(|&((address, &wanted), &found)| number(address, wanted) != number(address, found))
         .map(|((address, &wanted), &found)| {
             let cause = cause(address, wanted);
-            Unchanged { address, wanted, found, cause }
+            WriteMismatch { address, wanted, found, cause }
         })
         .collect()
 }
@@ -164,43 +165,43 @@ fn number(address: u8, byte: u8) -> i16 {
 }
 
 /// The rule of the table by which a register keeps its value; `None` where it could have taken another.
-fn rule(address: u8, locked: bool) -> Option<Cause> {
+fn cause_from_access(address: u8, locked: bool) -> Option<MismatchCause> {
     match find(address) {
-        None => Some(Cause::NoRegister),
-        Some(Register { access: Access::ReadOnly, .. }) => Some(Cause::ReadOnly),
-        Some(Register { access: Access::Reserved, .. }) => Some(Cause::Reserved),
-        Some(Register { region: Region::Eeprom, .. }) if locked => Some(Cause::Locked),
+        None => Some(MismatchCause::NoRegister),
+        Some(Register { access: Access::ReadOnly, .. }) => Some(MismatchCause::ReadOnly),
+        Some(Register { access: Access::Reserved, .. }) => Some(MismatchCause::Reserved),
+        Some(Register { region: Region::Eeprom, .. }) if locked => Some(MismatchCause::Locked),
         Some(_) => None,
     }
 }
 
 /// What the arm's counters say of a frame that went out between the two looks at them.
-pub(crate) fn verdict(before: &Status, after: &Status) -> Cause {
+pub(crate) fn cause_from_counters(before: &StatusBlock, after: &StatusBlock) -> MismatchCause {
     let refused = before.frames_refused() != after.frames_refused();
     match after.last_refusal() {
-        Some((refusal::OUT_OF_RANGE, address)) if refused => Cause::OutOfRange { address },
-        Some((refusal::STORAGE_FULL, _)) if refused => Cause::StorageFull,
-        _ if before.frames_corrupted() != after.frames_corrupted() => Cause::Damaged,
-        _ => Cause::Unknown,
+        Some((refusal::OUT_OF_RANGE, address)) if refused => MismatchCause::OutOfRange { address },
+        Some((refusal::STORAGE_FULL, _)) if refused => MismatchCause::StorageFull,
+        _ if before.frames_corrupted() != after.frames_corrupted() => MismatchCause::Damaged,
+        _ => MismatchCause::Unknown,
     }
 }
 
 /// Without a status block only the table is left to ask.
-fn guess(address: u8, wanted: u8) -> Cause {
+fn cause_from_range(address: u8, wanted: u8) -> MismatchCause {
     match find(address) {
-        Some(row) if !row.range.contains(wanted) => Cause::OutOfRange { address },
-        _ => Cause::Unknown,
+        Some(row) if !row.range.contains(wanted) => MismatchCause::OutOfRange { address },
+        _ => MismatchCause::Unknown,
     }
 }
 
-impl fmt::Display for Unchanged {
+impl fmt::Display for WriteMismatch {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (found, wanted) = (number(self.address, self.found), number(self.address, self.wanted));
         write!(out, "{} is {found}, not {wanted}: {}", name_of_register(self.address), self.cause)
     }
 }
 
-impl fmt::Display for Cause {
+impl fmt::Display for MismatchCause {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::NoRegister => out.write_str("the table has no register there"),
@@ -209,7 +210,7 @@ impl fmt::Display for Cause {
             Self::Locked => out.write_str("it is protected by the EEPROM lock"),
             Self::OutOfRange { address } => {
                 let name = name_of_register(address);
-                write!(out, "the frame had no effect, {name} takes {}", words::range(address))
+                write!(out, "the frame had no effect, {name} takes {}", register_text::range(address))
             }
             Self::StorageFull => {
                 out.write_str("the settings storage takes no more before a restart of the arm")
@@ -228,47 +229,51 @@ mod tests {
         STATUS_VERSION, TARGET_POSITION,
     };
 
-    fn status(refused: u8, why: u8, register: u8) -> Status {
+    fn status(refused: u8, why: u8, register: u8) -> StatusBlock {
         let mut status = Snapshot { address: STATUS_VERSION.address, values: vec![0; 16] };
         for (row, value) in
             [(LAST_REFUSAL, why), (LAST_REFUSED_REGISTER, register), (FRAMES_REFUSED, refused)]
         {
             status.values[usize::from(row.address - STATUS_VERSION.address)] = value;
         }
-        Status::from(status)
+        StatusBlock::from(status)
     }
 
     #[test]
     fn the_table_explains_what_no_write_can_change() {
-        assert_eq!(rule(61, false), Some(Cause::NoRegister));
-        assert_eq!(rule(PRESENT_POSITION.address, false), Some(Cause::ReadOnly));
-        assert_eq!(rule(RESERVED_8.address, false), Some(Cause::Reserved));
-        assert_eq!(rule(DEVICE_ID.address, true), Some(Cause::Locked));
-        assert_eq!(rule(DEVICE_ID.address, false), None);
-        assert_eq!(rule(TARGET_POSITION.address, true), None);
+        assert_eq!(cause_from_access(61, false), Some(MismatchCause::NoRegister));
+        assert_eq!(cause_from_access(PRESENT_POSITION.address, false), Some(MismatchCause::ReadOnly));
+        assert_eq!(cause_from_access(RESERVED_8.address, false), Some(MismatchCause::Reserved));
+        assert_eq!(cause_from_access(DEVICE_ID.address, true), Some(MismatchCause::Locked));
+        assert_eq!(cause_from_access(DEVICE_ID.address, false), None);
+        assert_eq!(cause_from_access(TARGET_POSITION.address, true), None);
     }
 
     #[test]
     fn the_status_block_explains_a_refusal_that_was_counted() {
         let before = status(4, refusal::OUT_OF_RANGE, 46);
         let stale = status(4, refusal::OUT_OF_RANGE, 46);
-        assert_eq!(verdict(&before, &stale), Cause::Unknown, "an older refusal explains nothing");
+        assert_eq!(
+            cause_from_counters(&before, &stale),
+            MismatchCause::Unknown,
+            "an older refusal explains nothing"
+        );
         let after = status(5, refusal::OUT_OF_RANGE, 47);
-        assert_eq!(verdict(&before, &after), Cause::OutOfRange { address: 47 });
+        assert_eq!(cause_from_counters(&before, &after), MismatchCause::OutOfRange { address: 47 });
         let full = status(5, refusal::STORAGE_FULL, 11);
-        assert_eq!(verdict(&before, &full), Cause::StorageFull);
+        assert_eq!(cause_from_counters(&before, &full), MismatchCause::StorageFull);
     }
 
     #[test]
     fn without_a_status_block_the_table_is_asked() {
-        assert_eq!(guess(46, 200), Cause::OutOfRange { address: 46 });
-        assert_eq!(guess(46, 90), Cause::Unknown);
+        assert_eq!(cause_from_range(46, 200), MismatchCause::OutOfRange { address: 46 });
+        assert_eq!(cause_from_range(46, 90), MismatchCause::Unknown);
     }
 
     #[test]
     fn minus_zero_took_where_zero_is_read_back() {
         let found = Snapshot { address: OFFSET.address, values: vec![0, 0] };
-        let unchanged = compare(&found, &[0x80, 0x85], |_, _| Cause::Unknown);
+        let unchanged = compare(&found, &[0x80, 0x85], |_, _| MismatchCause::Unknown);
         let [only] = unchanged.as_slice() else { panic!("{unchanged:?}") };
         assert_eq!(only.to_string(), "offset.2 is 0, not -5: the arm gives no reason; try again");
     }

@@ -5,78 +5,81 @@
 
 use std::time::{Duration, Instant};
 
-use sevenbot::joints::{JointSnapshot, NoBase, frames_for};
+use sevenbot::joints::{JointSnapshot, StepBaseError, frames_for};
 use sevenbot::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
+use sevenbot::register_text::{joints, motor_state_name};
 use sevenbot::units::move_duration;
-use sevenbot::words::{joints, motor_state_word};
 use sevenbot::{Arm, Joint, MoveTime, Snapshot, Span, Speed};
 
-use crate::commands::motors_obey;
-use crate::failure::Failure;
+use crate::command_error::CommandError;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
+use crate::write_result::motors_obey;
 
 /// Time between two looks at a moving arm.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
+const POLL_PERIOD: Duration = Duration::from_millis(50);
 /// What a move may take beyond twice its duration.
 const MARGIN: Duration = Duration::from_secs(5);
 /// A joint whose measured position has not changed for so long has settled.
-const AT_REST: Duration = Duration::from_millis(300);
+const STILL_TIME: Duration = Duration::from_millis(300);
 /// How long joints may take to settle: one that trembles never does.
-const SETTLE: Duration = Duration::from_secs(2);
+const SETTLE_TIMEOUT: Duration = Duration::from_secs(2);
 /// A joint this near to its target has arrived: registers are whole degrees.
 const ARRIVED_DEGREES: u8 = 1;
 /// A joint that came to rest this near to its target is where it was sent: servos have some play.
-const NEAR_DEGREES: u8 = 2;
+const TOLERANCE_DEGREES: u8 = 2;
 
 /// Where joints should go, in degrees, joint 1 first; `None` leaves one alone.
 pub(crate) type Targets = [Option<u8>; 7];
 
 /// Where a joint goes by a step from where it is sent already, in degrees. It may be out of range.
-pub(crate) fn stepped(joints: &JointSnapshot, joint: Joint, degrees: i16) -> Result<i16, Failure> {
+pub(crate) fn step_target(joints: &JointSnapshot, joint: Joint, degrees: i16) -> Result<i16, CommandError> {
     let base = joints.step_base(joint).map_err(|reason| {
         let advice = match reason {
-            NoBase::Silent => "",
-            NoBase::PowerUpTarget { .. } => "; `sevenbot stop` makes its position its target",
+            StepBaseError::Silent => "",
+            StepBaseError::PowerUpTarget { .. } => "; `sevenbot stop` makes its position its target",
         };
-        Failure::Arm(format!("joint {} takes no step: {reason}{advice}; nothing was moved", joint.number()))
+        CommandError::Arm(format!(
+            "joint {} takes no step: {reason}{advice}; nothing was moved",
+            joint.number()
+        ))
     })?;
     Ok(i16::from(base).saturating_add(degrees))
 }
 
 /// The joints, as soon as the arm has come up. Fails unless the motors drive them.
-pub(crate) fn driven(arm: &mut Arm) -> Result<JointSnapshot, Failure> {
+pub(crate) fn driven_joints(arm: &mut Arm) -> Result<JointSnapshot, CommandError> {
     let joints = arm.wait_until_settled()?;
     if joints.is_driven() {
         return Ok(joints);
     }
     let state = joints.motor_state();
-    let word = motor_state_word(state);
-    Err(Failure::Arm(format!(
+    let word = motor_state_name(state);
+    Err(CommandError::Arm(format!(
         "the arm's motors are in state {state}, {word}: `sevenbot state servo` makes it hold where it is, \
          and then it can move"
     )))
 }
 
 /// A move that was sent to the arm.
-pub(crate) struct Move {
+pub(crate) struct JointMove {
     targets: Targets,
     /// Speeds, times and positions before it.
     plan: Snapshot,
     start: Instant,
 }
 
-impl Move {
+impl JointMove {
     /// Sends joints to their targets, all at once.
-    pub(crate) fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, Failure> {
+    pub(crate) fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, CommandError> {
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         motors_obey(arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets)))?;
         Ok(Self { targets, plan, start: Instant::now() })
     }
 
     /// Waits until all joints are there; says where they are.
-    pub(crate) fn finish(&self, arm: &mut Arm, interrupt: Interrupt) -> Result<[u8; 7], Failure> {
-        let progress = Progress::new(self.way_to_go(&self.plan.joints(&PRESENT_POSITION)), "degrees");
+    pub(crate) fn finish(&self, arm: &mut Arm, interrupt: Interrupt) -> Result<[u8; 7], CommandError> {
+        let progress = Progress::new(self.degrees_left(&self.plan.joints(&PRESENT_POSITION)), "degrees");
         self.wait_until_still(arm, interrupt, &progress)?;
         progress.say("settling");
         self.settle(arm, interrupt, &progress)
@@ -97,66 +100,71 @@ impl Move {
         arm: &mut Arm,
         interrupt: Interrupt,
         progress: &Progress,
-    ) -> Result<(), Failure> {
-        let patience = self.duration() * 2 + MARGIN;
+    ) -> Result<(), CommandError> {
+        let timeout = self.duration() * 2 + MARGIN;
         loop {
             let moving = self.moving(arm)?;
             if moving == 0 {
                 return Ok(());
             }
-            if self.start.elapsed() >= patience {
-                let seconds = patience.as_secs();
-                return Err(Failure::Arm(format!("still moving after {seconds} s: {}", joints(moving))));
+            if self.start.elapsed() >= timeout {
+                let seconds = timeout.as_secs();
+                return Err(CommandError::Arm(format!("still moving after {seconds} s: {}", joints(moving))));
             }
-            progress.set(self.way_done(&positions(arm)?));
-            interrupt.sleep(LOOK_EVERY)?;
+            progress.set(self.degrees_done(&positions(arm)?));
+            interrupt.sleep(POLL_PERIOD)?;
         }
     }
 
     /// The joints of this move that are on their way, but for those whose servo does not answer.
-    fn moving(&self, arm: &mut Arm) -> Result<u8, Failure> {
+    fn moving(&self, arm: &mut Arm) -> Result<u8, CommandError> {
         let ours = self.goals().fold(0, |bits, (joint, _)| bits | joint.bit());
         if let Some(status) = arm.status()? {
             return Ok(status.moving() & !status.missing() & ours);
         }
         // The maker's firmware does not say: those that are not there yet, while they may be on their way.
-        let far = self.far(&positions(arm)?, ARRIVED_DEGREES);
+        let away = self.away(&positions(arm)?, ARRIVED_DEGREES);
         let is_due = self.start.elapsed() >= self.duration();
-        Ok(if is_due { 0 } else { far.iter().fold(0, |bits, (joint, ..)| bits | joint.bit()) })
+        Ok(if is_due { 0 } else { away.iter().fold(0, |bits, (joint, ..)| bits | joint.bit()) })
     }
 
     /// Waits until the joints have followed their set-points; fails with those that have not.
-    fn settle(&self, arm: &mut Arm, interrupt: Interrupt, progress: &Progress) -> Result<[u8; 7], Failure> {
+    fn settle(
+        &self,
+        arm: &mut Arm,
+        interrupt: Interrupt,
+        progress: &Progress,
+    ) -> Result<[u8; 7], CommandError> {
         let mut last = positions(arm)?;
         let start = Instant::now();
         let mut changed = start;
-        while !self.far(&last, ARRIVED_DEGREES).is_empty()
-            && changed.elapsed() < AT_REST
-            && start.elapsed() < SETTLE
+        while !self.away(&last, ARRIVED_DEGREES).is_empty()
+            && changed.elapsed() < STILL_TIME
+            && start.elapsed() < SETTLE_TIMEOUT
         {
-            interrupt.sleep(LOOK_EVERY)?;
+            interrupt.sleep(POLL_PERIOD)?;
             let present = positions(arm)?;
             if present != last {
                 changed = Instant::now();
             }
             last = present;
-            progress.set(self.way_done(&last));
+            progress.set(self.degrees_done(&last));
         }
-        match self.far(&last, NEAR_DEGREES).as_slice() {
+        match self.away(&last, TOLERANCE_DEGREES).as_slice() {
             [] => Ok(last),
-            far => Err(self.not_reached(arm, far)?),
+            away => Err(self.not_reached(arm, away)?),
         }
     }
 
-    fn not_reached(&self, arm: &mut Arm, far: &[(Joint, u8, u8)]) -> Result<Failure, Failure> {
-        driven(arm)?;
-        let words: Vec<String> = far
+    fn not_reached(&self, arm: &mut Arm, away: &[(Joint, u8, u8)]) -> Result<CommandError, CommandError> {
+        driven_joints(arm)?;
+        let words: Vec<String> = away
             .iter()
             .map(|(joint, is, goal)| format!("joint {} is at {is}°, not {goal}°", joint.number()))
             .collect();
         let missing = arm.status()?.map_or(0, |status| status.missing());
         let cause = if missing == 0 { String::new() } else { format!("; {} not answering", joints(missing)) };
-        Ok(Failure::Arm(format!("the arm did not reach the pose: {}{cause}", words.join(", "))))
+        Ok(CommandError::Arm(format!("the arm did not reach the pose: {}{cause}", words.join(", "))))
     }
 
     fn goals(&self) -> impl Iterator<Item = (Joint, u8)> {
@@ -164,23 +172,23 @@ impl Move {
     }
 
     /// The joints further than `degrees` from where they should be: where they are, and should be.
-    fn far(&self, present: &[u8; 7], degrees: u8) -> Vec<(Joint, u8, u8)> {
+    fn away(&self, present: &[u8; 7], degrees: u8) -> Vec<(Joint, u8, u8)> {
         let pairs = Joint::ALL.into_iter().zip(present).zip(self.targets);
-        let far = pairs.filter_map(|((joint, &is), goal)| Some((joint, is, goal?)));
-        far.filter(|(_, is, goal)| is.abs_diff(*goal) > degrees).collect()
+        let away = pairs.filter_map(|((joint, &is), goal)| Some((joint, is, goal?)));
+        away.filter(|(_, is, goal)| is.abs_diff(*goal) > degrees).collect()
     }
 
     /// Degrees left, of all joints together.
-    fn way_to_go(&self, present: &[u8; 7]) -> u64 {
-        self.far(present, 0).iter().map(|(_, is, goal)| u64::from(is.abs_diff(*goal))).sum()
+    fn degrees_left(&self, present: &[u8; 7]) -> u64 {
+        self.away(present, 0).iter().map(|(_, is, goal)| u64::from(is.abs_diff(*goal))).sum()
     }
 
-    fn way_done(&self, present: &[u8; 7]) -> u64 {
-        let total = self.way_to_go(&self.plan.joints(&PRESENT_POSITION));
-        total.saturating_sub(self.way_to_go(present))
+    fn degrees_done(&self, present: &[u8; 7]) -> u64 {
+        let total = self.degrees_left(&self.plan.joints(&PRESENT_POSITION));
+        total.saturating_sub(self.degrees_left(present))
     }
 }
 
-fn positions(arm: &mut Arm) -> Result<[u8; 7], Failure> {
+fn positions(arm: &mut Arm) -> Result<[u8; 7], CommandError> {
     Ok(arm.read_span(Span::of(&PRESENT_POSITION))?.joints(&PRESENT_POSITION))
 }

@@ -1,25 +1,25 @@
-//! The bytes of the servo bus, and the time: what a [`ServoBus`](super::ServoBus) needs of the world.
+//! The bytes of the servo bus, and the time: what a [`BusMaster`](super::BusMaster) needs of the world.
 
 use std::thread::sleep;
 use std::time::Duration;
 
 use super::error::ServoError;
 use crate::error::PortError;
-use crate::serial::Serial;
+use crate::open_port::OpenPort;
 
 /// A line to the servos, such as a serial port with a half-duplex adapter behind it.
-pub trait Line {
+pub trait ServoLine {
     /// Sends bytes.
     ///
     /// # Errors
     /// The line is gone, or takes no more bytes.
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortError>;
 
-    /// The bytes that are here, or the first that come within `patience`. Empty when none came.
+    /// The bytes that are here, or the first that come within `timeout`. Empty when none came.
     ///
     /// # Errors
     /// The line is gone.
-    fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, PortError>;
+    fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError>;
 
     /// Sends and receives at another baud rate from now on.
     ///
@@ -35,14 +35,14 @@ pub trait Line {
 /// takes longer anyway; a UART that drives the bus itself may not.
 const GUARD_TIME: Duration = Duration::from_micros(100);
 
-impl Line for Serial {
+impl ServoLine for OpenPort {
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         sleep(GUARD_TIME);
         self.send(bytes)
     }
 
-    fn receive(&mut self, patience: Duration) -> Result<Vec<u8>, PortError> {
-        self.receive(patience)
+    fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
+        self.receive(timeout)
     }
 
     fn set_baud(&mut self, baud: u32) -> Result<(), ServoError> {

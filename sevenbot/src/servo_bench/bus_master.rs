@@ -11,12 +11,12 @@ use motion_core::servo_bus::frame::{self, Decoder, Frame, FrameBuffer, Instructi
 use tracing::trace;
 
 use super::error::ServoError;
-use super::line::Line;
-use crate::error::{Heard, OpenError};
-use crate::serial::Serial;
+use super::servo_line::ServoLine;
+use crate::error::{OpenError, ReceiveCounts};
+use crate::open_port::OpenPort;
 
 /// The line is at rest once nothing came for so long: longer than the latency timer of an FTDI chip, 16 ms.
-const AT_REST: Duration = Duration::from_millis(25);
+const IDLE_TIME: Duration = Duration::from_millis(25);
 
 /// How to talk to servos.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +35,7 @@ impl Default for BusOptions {
 
 /// What a servo answered.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Answer {
+pub struct ServoReply {
     /// Its error bits: [`motion_core::servo_bus::frame::error`].
     pub errors: u8,
     /// The values of the registers that were read.
@@ -43,48 +43,48 @@ pub struct Answer {
 }
 
 /// The servo bus, of which this is the only master.
-pub struct ServoBus {
-    line: Box<dyn Line>,
+pub struct BusMaster {
+    line: Box<dyn ServoLine>,
     options: BusOptions,
     decoder: Decoder,
     /// What came and the decoder has not taken yet.
     waiting: Vec<u8>,
     has_echo: bool,
-    heard: Heard,
+    received: ReceiveCounts,
     /// Servos whose answers came when another one was asked.
     late: Vec<u8>,
 }
 
-impl fmt::Debug for ServoBus {
+impl fmt::Debug for BusMaster {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.debug_struct("ServoBus").field("options", &self.options).finish_non_exhaustive()
+        out.debug_struct("BusMaster").field("options", &self.options).finish_non_exhaustive()
     }
 }
 
-impl ServoBus {
+impl BusMaster {
     /// Opens the port of an adapter. Nothing is sent yet.
     ///
     /// # Errors
     /// It cannot be opened.
     pub fn open(path: &str, baud: u32, options: BusOptions) -> Result<Self, OpenError> {
-        Ok(Self::over(Box::new(Serial::open(path, baud)?), options))
+        Ok(Self::with_line(Box::new(OpenPort::open(path, baud)?), options))
     }
 
     /// The bus behind any line.
     #[must_use]
-    pub fn over(line: Box<dyn Line>, options: BusOptions) -> Self {
+    pub fn with_line(line: Box<dyn ServoLine>, options: BusOptions) -> Self {
         Self {
             line,
             options,
             decoder: Decoder::new(),
             waiting: Vec::new(),
             has_echo: false,
-            heard: Heard::default(),
+            received: ReceiveCounts::default(),
             late: Vec::new(),
         }
     }
 
-    /// Was an echo of a question heard? An adapter that joins TX and RX gives one to every question.
+    /// Was an echo of a question received? An adapter that joins TX and RX gives one to every question.
     #[must_use]
     pub const fn has_echo(&self) -> bool {
         self.has_echo
@@ -108,7 +108,7 @@ impl ServoBus {
     /// The adapter does not know the rate.
     pub fn set_baud(&mut self, baud: u32) -> Result<(), ServoError> {
         self.line.set_baud(baud)?;
-        self.rest(Duration::ZERO)?;
+        self.wait_for_silence(Duration::ZERO)?;
         self.late.clear();
         Ok(())
     }
@@ -117,17 +117,18 @@ impl ServoBus {
     ///
     /// # Errors
     /// The servo does not answer, or the port is gone.
-    pub fn read(&mut self, id: u8, register: u8, count: u8) -> Result<Answer, ServoError> {
-        self.heard = Heard::default();
+    pub fn read(&mut self, id: u8, register: u8, count: u8) -> Result<ServoReply, ServoError> {
+        self.received = ReceiveCounts::default();
         for _ in 0..self.options.attempts.max(1) {
-            if let Some(answer) = self.ask(id, register, count, self.options.reply_timeout)? {
+            if let Some(answer) = self.try_read(id, register, count, self.options.reply_timeout)? {
                 return Ok(answer);
             }
         }
         let BusOptions { attempts, reply_timeout: waited } = self.options;
-        let no_answer = ServoError::NoAnswer { id, attempts: attempts.max(1), waited, heard: self.heard };
+        let no_answer =
+            ServoError::NoAnswer { id, attempts: attempts.max(1), waited, received: self.received };
         // A late answer must not be taken for that to the next question.
-        self.rest(AT_REST)?;
+        self.wait_for_silence(IDLE_TIME)?;
         Err(no_answer)
     }
 
@@ -155,33 +156,33 @@ impl ServoBus {
         let mut request = FrameBuffer::new();
         frame::write(&mut request, id, register, values);
         // An acknowledgement ends the wait; where a servo gives none, this is the time it needs to take the values.
-        self.exchange(&request, AT_REST, |answer| answer.id == id && answer.params.is_empty()).map(drop)
+        self.exchange(&request, IDLE_TIME, |answer| answer.id == id && answer.params.is_empty()).map(drop)
     }
 
     /// Asks once. `None`: no answer in time.
-    pub(crate) fn ask(
+    pub(crate) fn try_read(
         &mut self,
         id: u8,
         register: u8,
         count: u8,
-        patience: Duration,
-    ) -> Result<Option<Answer>, ServoError> {
+        timeout: Duration,
+    ) -> Result<Option<ServoReply>, ServoError> {
         // The question for two registers has the length of its answer, so three are read.
         let asked = if count == 2 { 3 } else { count };
         let mut request = FrameBuffer::new();
         frame::read(&mut request, id, register, asked);
         let is_answer = |frame: &Frame<'_>| frame.id == id && frame.params.len() == usize::from(asked);
-        let answer = self.exchange(&request, patience, is_answer)?;
+        let answer = self.exchange(&request, timeout, is_answer)?;
         Ok(answer.map(|mut answer| {
             answer.values.truncate(usize::from(count));
             answer
         }))
     }
 
-    /// How many more answers with this id come within `patience`: more than none means several servos with one id.
-    pub(crate) fn further_answers(&mut self, id: u8, patience: Duration) -> Result<usize, ServoError> {
+    /// How many more answers with this id come within `timeout`: more than none means several servos with one id.
+    pub(crate) fn extra_answers(&mut self, id: u8, timeout: Duration) -> Result<usize, ServoError> {
         self.late.clear();
-        self.rest(patience)?;
+        self.wait_for_silence(timeout)?;
         Ok(self.late.iter().filter(|&&late| late == id).count())
     }
 
@@ -190,15 +191,15 @@ impl ServoBus {
         std::mem::take(&mut self.late)
     }
 
-    /// How many damaged frames were heard since this was last asked.
+    /// How many damaged frames were received since this was last asked.
     pub(crate) fn take_damaged(&mut self) -> usize {
-        std::mem::take(&mut self.heard.damaged_frames)
+        std::mem::take(&mut self.received.damaged_frames)
     }
 
     /// Waits until nothing came for `silence`. Frames that came meanwhile are late answers.
-    pub(crate) fn rest(&mut self, silence: Duration) -> Result<(), ServoError> {
+    pub(crate) fn wait_for_silence(&mut self, silence: Duration) -> Result<(), ServoError> {
         loop {
-            self.look_for(&[], |_| false);
+            self.find_answer(&[], |_| false);
             if !self.receive(silence)? {
                 self.decoder.clear();
                 return Ok(());
@@ -210,48 +211,48 @@ impl ServoBus {
     fn exchange(
         &mut self,
         request: &[u8],
-        patience: Duration,
+        timeout: Duration,
         is_answer: impl Fn(&Frame<'_>) -> bool,
-    ) -> Result<Option<Answer>, ServoError> {
-        self.rest(Duration::ZERO)?;
+    ) -> Result<Option<ServoReply>, ServoError> {
+        self.wait_for_silence(Duration::ZERO)?;
         trace!("-> {request:02x?}");
         self.line.send(request)?;
-        let deadline = self.line.now() + patience;
+        let deadline = self.line.now() + timeout;
         loop {
             let has_more = self.receive(deadline.saturating_sub(self.line.now()))?;
-            let answer = self.look_for(request, &is_answer);
+            let answer = self.find_answer(request, &is_answer);
             if answer.is_some() || (!has_more && self.line.now() >= deadline) {
                 return Ok(answer);
             }
         }
     }
 
-    /// Takes what comes within `patience`; `false` if nothing did.
-    fn receive(&mut self, patience: Duration) -> Result<bool, ServoError> {
-        let bytes = self.line.receive(patience)?;
+    /// Takes what comes within `timeout`; `false` if nothing did.
+    fn receive(&mut self, timeout: Duration) -> Result<bool, ServoError> {
+        let bytes = self.line.receive(timeout)?;
         if !bytes.is_empty() {
             trace!("<- {bytes:02x?}");
         }
-        self.heard.bytes += bytes.len();
+        self.received.bytes += bytes.len();
         self.waiting.extend(&bytes);
         Ok(!bytes.is_empty())
     }
 
     /// Looks for the answer among the bytes that are here. What stands behind it is kept.
-    fn look_for(&mut self, request: &[u8], is_answer: impl Fn(&Frame<'_>) -> bool) -> Option<Answer> {
+    fn find_answer(&mut self, request: &[u8], is_answer: impl Fn(&Frame<'_>) -> bool) -> Option<ServoReply> {
         loop {
             while let Some(found) = self.decoder.pull() {
                 match found {
-                    Err(_) => self.heard.damaged_frames += 1,
+                    Err(_) => self.received.damaged_frames += 1,
                     Ok(frame) if is_echo(&frame, request) => {
                         self.has_echo = true;
-                        self.heard.echoes += 1;
+                        self.received.echoes += 1;
                     }
                     Ok(frame) if is_answer(&frame) => {
-                        return Some(Answer { errors: frame.code, values: frame.params.to_vec() });
+                        return Some(ServoReply { errors: frame.code, values: frame.params.to_vec() });
                     }
                     Ok(frame) => {
-                        self.heard.other_frames += 1;
+                        self.received.other_frames += 1;
                         self.late.push(frame.id);
                     }
                 }

@@ -20,38 +20,38 @@ use crate::snapshot::Snapshot;
 /// let mut arm = sevenbot::Arm::open("/dev/ttyUSB0", 115_200)?;
 /// match arm.status()? {
 ///     Some(status) if status.is_healthy() => println!("all is well"),
-///     Some(status) => println!("faults: {}", sevenbot::words::faults(status.faults())),
+///     Some(status) => println!("faults: {}", sevenbot::register_text::faults(status.faults())),
 ///     None => println!("the maker's firmware does not say"),
 /// }
 /// # Ok(())
 /// # }
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Status(Snapshot);
+pub struct StatusBlock(Snapshot);
 
 impl Arm {
     /// How the arm says it is; `None` from firmware that has no status block, as the maker's.
     ///
     /// # Errors
     /// As [`Arm::read`].
-    pub fn status(&mut self) -> Result<Option<Status>, Error> {
+    pub fn status(&mut self) -> Result<Option<StatusBlock>, Error> {
         if !self.identity().has_status_block() {
             return Ok(None);
         }
         let snapshot = self.read_span(STATUS)?;
         let is_there = snapshot.byte(&STATUS_VERSION) != 0;
-        Ok(is_there.then(|| Status::from(snapshot)))
+        Ok(is_there.then(|| StatusBlock::from(snapshot)))
     }
 }
 
-impl From<Snapshot> for Status {
+impl From<Snapshot> for StatusBlock {
     /// What a read of [`STATUS`] brought.
     fn from(registers: Snapshot) -> Self {
         Self(registers)
     }
 }
 
-impl Status {
+impl StatusBlock {
     /// The registers themselves.
     #[must_use]
     pub const fn registers(&self) -> &Snapshot {

@@ -1,0 +1,70 @@
+//! When a report was measured, which is not when it arrived.
+//!
+//! The arm reports without drift (D14), but USB adapters and a busy host deliver late, and several at once.
+//! So a report belongs to the next tick of the arm's clock, unless so much time has passed that reports must
+//! have been lost.
+
+use std::time::{Duration, Instant};
+
+/// Bits on the line for a report at most this often: half of it, 14 bytes of ten bits each (D14).
+const BITS_PER_REPORT: u32 = 2 * 14 * 10;
+
+/// The ticks of the arm's clock.
+pub(crate) struct ReportClock {
+    period: Duration,
+    /// When the first report came, and the number of the last one's tick.
+    last: Option<(Instant, u32)>,
+}
+
+impl ReportClock {
+    /// Ticks `hz` times a second, or as often as `baud` allows.
+    pub(crate) fn new(hz: u8, baud: u32) -> Self {
+        let rate = u32::from(hz).min(baud / BITS_PER_REPORT).max(1);
+        Self { period: Duration::from_secs(1) / rate, last: None }
+    }
+
+    /// When a report was measured that came at this time: since the first one.
+    pub(crate) fn time_of(&mut self, received: Instant) -> Duration {
+        let (first, tick) = match self.last {
+            None => (received, 0),
+            Some((first, tick)) => (first, self.nearest(received - first).max(tick.saturating_add(1))),
+        };
+        self.last = Some((first, tick));
+        self.period.saturating_mul(tick)
+    }
+
+    /// The number of the tick nearest to a time.
+    fn nearest(&self, time: Duration) -> u32 {
+        let ticks = (time + self.period / 2).as_micros() / self.period.as_micros().max(1);
+        u32::try_from(ticks).unwrap_or(u32::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(received_ms: &[u64]) -> Vec<u128> {
+        let start = Instant::now();
+        let mut clock = ReportClock::new(50, 115_200);
+        let time = |ms: &u64| clock.time_of(start + Duration::from_millis(*ms)).as_millis();
+        received_ms.iter().map(time).collect()
+    }
+
+    #[test]
+    fn late_reports_are_put_where_they_belong() {
+        assert_eq!(times(&[0, 23, 38, 69, 80]), [0, 20, 40, 60, 80], "a little late each");
+        assert_eq!(times(&[7, 27, 47]), [0, 20, 40], "time begins with the first");
+        assert_eq!(times(&[0, 46, 46, 60]), [0, 40, 60, 80], "two at once never share a time");
+    }
+
+    #[test]
+    fn lost_reports_leave_a_gap() {
+        assert_eq!(times(&[0, 20, 101, 120]), [0, 20, 100, 120]);
+    }
+
+    #[test]
+    fn the_line_bounds_the_rate_as_it_does_in_the_arm() {
+        assert_eq!(ReportClock::new(50, 9600).period, Duration::from_secs(1) / 34);
+    }
+}
