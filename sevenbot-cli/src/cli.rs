@@ -6,8 +6,8 @@ use clap::{Args, CommandFactory, Parser, Subcommand, value_parser};
 
 use crate::command_error::CommandError;
 use crate::commands::{
-    backup, baud, calibrate, effector, get, info, monitor, play, ports, pose, record, registers, servo, set,
-    shell, sniff, state, stop,
+    backup, baud, calibrate, effector, get, info, monitor, move_to, play, ports, pose, position, record,
+    registers, servo, set, shell, sniff, state, stop,
 };
 use crate::session::Session;
 
@@ -16,6 +16,7 @@ Examples:
   sevenbot --port /dev/ttyUSB0 info
   export SEVENBOT_PORT=/dev/ttyUSB0
   sevenbot pose 120 90 65 90 90 90 80 --speed 30 --wait
+  sevenbot move-to 0 185 50 --wait
   sevenbot get present-position --json
   sevenbot monitor
 
@@ -69,6 +70,8 @@ pub(crate) enum Command {
     Set(set::SetArgs),
     Pose(pose::PoseArgs),
     Home(pose::HomeArgs),
+    Where(position::WhereArgs),
+    MoveTo(move_to::MoveToArgs),
     Stop(stop::StopArgs),
     State(state::StateArgs),
     Vacuum(effector::VacuumArgs),
@@ -96,6 +99,8 @@ impl Command {
             Self::Set(args) => set::run(session, &args),
             Self::Pose(args) => pose::run(session, &args),
             Self::Home(args) => pose::home(session, &args),
+            Self::Where(_) => position::run(session),
+            Self::MoveTo(args) => move_to::run(session, &args),
             Self::Stop(_) => stop::run(session),
             Self::State(args) => state::run(session, &args),
             Self::Vacuum(args) => effector::vacuum(session, &args),

@@ -28,6 +28,7 @@
 #![forbid(unsafe_code)]
 
 pub mod arm;
+pub mod cartesian;
 pub mod checked_write;
 pub mod error;
 mod frame_port;

@@ -12,7 +12,7 @@ use crate::units::{Angle, MoveTime, Speed};
 
 /// The longest piece of an even movement that is sent at once. Speeds have steps of 1.9 degrees/s, so a long
 /// piece would end early.
-const MAX_SEGMENT: Duration = Duration::from_millis(50);
+pub(crate) const MAX_SEGMENT: Duration = Duration::from_millis(50);
 /// Joints move so much faster than they need to: a host that was held up for a moment sends late, and what it
 /// lost has to be made up for.
 const SPEED_RESERVE: f64 = 1.2;

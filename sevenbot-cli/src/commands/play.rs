@@ -80,21 +80,20 @@ pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), CommandE
     let recording = load(args)?;
     let mut arm = session.connect()?;
     driven_joints(&mut arm)?;
-    let before = arm.read_span(Span::between(&SPEED, &TIME))?;
     let mut player = Player::new(&recording, args.speed);
-    let times = args.times.unwrap_or(1);
-    let done = with_reports(&mut arm, FEEDBACK_HZ, |arm| {
-        hold_on_interrupt(arm, |arm, interrupt| player.play(arm, interrupt, times))
-    });
-    // An arm that went away cannot be told anything.
-    let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
-    let restored = if is_gone { Ok(()) } else { restore_pace(&mut arm, &before) };
+    let done = player.play_and_restore(&mut arm, args.times.unwrap_or(1));
     if let Some(path) = &args.plot {
         fs::write(path, player.plot(args)).map_err(|error| CommandError::file(path, error))?;
     }
-    done.and(restored)?;
+    done?;
     let Player { played, seconds, .. } = player;
     session.printer.print(&Played { times: played, seconds })
+}
+
+/// Makes an arm follow a planned movement once. Restores the speeds and times that it had before.
+pub(super) fn follow(arm: &mut Arm, recording: &Recording) -> Result<(), CommandError> {
+    driven_joints(arm)?;
+    Player::new(recording, 1.0).play_and_restore(arm, 1)
 }
 
 /// The recording, if an arm can follow it.
@@ -132,6 +131,18 @@ impl Player {
         let seconds = recording.duration().as_secs_f64() / factor;
         let (moments, steps) = (recording.moments().collect(), playback::steps(recording, factor));
         Self { moments, steps, measured: Vec::new(), last_report: Instant::now(), played: 0, seconds }
+    }
+
+    /// Plays so many times, and restores the speeds and times that the arm had before.
+    fn play_and_restore(&mut self, arm: &mut Arm, times: u32) -> Result<(), CommandError> {
+        let before = arm.read_span(Span::between(&SPEED, &TIME))?;
+        let done = with_reports(arm, FEEDBACK_HZ, |arm| {
+            hold_on_interrupt(arm, |arm, interrupt| self.play(arm, interrupt, times))
+        });
+        // An arm that went away cannot be told anything.
+        let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
+        let restored = if is_gone { Ok(()) } else { restore_pace(arm, &before) };
+        done.and(restored)
     }
 
     /// Plays so many times; 0 is until somebody has seen enough.

@@ -92,6 +92,11 @@ impl Recording {
         if moments.is_empty() { Err(RecordingError::Empty) } else { Ok(Self { moments }) }
     }
 
+    /// The recording of a planned movement: at least one moment, in rising order of time.
+    pub(crate) fn from_moments(moments: impl Iterator<Item = Moment>) -> Self {
+        Self { moments: (1..).zip(moments).collect() }
+    }
+
     /// The moments, in rising order of time.
     pub fn moments(&self) -> impl Iterator<Item = Moment> {
         self.moments.iter().map(|&(_, moment)| moment)

@@ -1,0 +1,140 @@
+//! The arguments of `move-to`, and whether the point is within reach.
+
+use clap::Args;
+use sevenbot::cartesian::{DOWN, TipTarget, Unreachable, Vector};
+
+use crate::command_error::CommandError;
+
+/// Move the tip to a point, in millimetres.
+///
+/// Nothing moves before the whole move was checked. A point out of reach is refused, with the nearest point within
+/// reach.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot move-to 0 185 50                       with the tool straight down
+  sevenbot move-to -50 185 50 --wait              to the left of it; waits and shows where the tip is
+  sevenbot move-to 0 300 150 --tool 0 1 0         with the tool forward
+  sevenbot move-to 0 300 150 --tool 0 1 -1        with the tool forward and down by 45 degrees
+  sevenbot move-to 20 250 219 --keep-tool         with the tool as it points now
+  sevenbot move-to 0 500 50 --dry-run             is it within reach? Needs no arm
+  sevenbot move-to 60 200 50 --straight --speed 20    on a straight line, at 20 mm/s
+
+Positions are millimetres from the point where the axis of the base meets the top plate: x to the right, y
+forward, z up. The tip is the middle of the disc that joint 6 turns; add the length of a suction cup or claw.
+`sevenbot where` shows where the tip is.
+
+The arm takes whole degrees, so the tip misses the point by about a millimetre; the miss is shown. The joints
+move at their speeds (`sevenbot get speed`), and without --straight the tip takes no straight way. Joints 6
+and 7 keep their angles.
+
+With --straight the whole line is checked before anything moves: reach, limits, singular positions and the
+speed of each joint. It begins where the joints are sent now. The tool turns evenly on the way. The arm gets
+a target each 50 ms; the largest distance from the line that whole degrees cause is shown.
+
+Ctrl-C leaves the arm holding where it is.
+
+Exit status 1 when the point is out of reach, when the arm did not take the move, or with --wait did not
+reach it.")]
+pub(crate) struct MoveToArgs {
+    /// Millimetres to the right of the base axis; negative to the left.
+    #[arg(allow_negative_numbers = true, value_parser = millimetres)]
+    x: f64,
+    /// Millimetres in front of the base axis.
+    #[arg(allow_negative_numbers = true, value_parser = millimetres)]
+    y: f64,
+    /// Millimetres above the top plate.
+    #[arg(allow_negative_numbers = true, value_parser = millimetres)]
+    z: f64,
+    /// Direction from the wrist to the tip, of any length. Straight down (0 0 -1) if not given.
+    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, allow_negative_numbers = true,
+          value_parser = millimetres, conflicts_with = "keep_tool")]
+    tool: Option<Vec<f64>>,
+    /// Keep the direction that the tool has now.
+    #[arg(long)]
+    keep_tool: bool,
+    /// Move the tip on a straight line from where the joints are sent now; waits for the end.
+    #[arg(long)]
+    pub(super) straight: bool,
+    /// Speed of the tip on the straight line in millimetres per second, 1 to 500.
+    #[arg(long, value_name = "MM_S", default_value_t = 50.0, requires = "straight", value_parser = speed)]
+    pub(super) speed: f64,
+    /// Wait until the joints are there, and show where the tip is.
+    #[arg(long)]
+    pub(super) wait: bool,
+    /// Check and show the move, and move nothing.
+    #[arg(long)]
+    pub(super) dry_run: bool,
+}
+
+fn millimetres(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+    number.ok_or_else(|| "a number, such as 185 or -50.5".to_owned())
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    let speed = text.parse().ok().filter(|speed| (1.0..=500.0).contains(speed));
+    speed.ok_or_else(|| "a number from 1 to 500".to_owned())
+}
+
+impl MoveToArgs {
+    pub(super) const fn tip(&self) -> Vector {
+        Vector::new(self.x, self.y, self.z)
+    }
+
+    /// The direction of the tool that was asked for, unless it is the present one.
+    pub(super) fn tool(&self) -> Option<Vector> {
+        match self.tool.as_deref() {
+            Some(&[x, y, z]) => Some(Vector::new(x, y, z)),
+            _ if self.keep_tool => None,
+            _ => Some(DOWN),
+        }
+    }
+}
+
+/// The targets of the joints, or why there are none.
+pub(super) fn target(tip: Vector, tool: Vector) -> Result<TipTarget, CommandError> {
+    TipTarget::of(tip, tool).map_err(|reason| unreachable(&reason))
+}
+
+/// A point out of reach, with advice if another direction of the tool reaches it.
+fn unreachable(reason: &Unreachable) -> CommandError {
+    let other = reason.other_tool.map(|tool| {
+        let Vector { x, y, z } = tool;
+        format!(". With --tool {x} {y} {z} the tip reaches the point")
+    });
+    CommandError::Arm(format!("{reason}{}; nothing was moved", other.unwrap_or_default()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct CommandLine {
+        #[command(flatten)]
+        args: MoveToArgs,
+    }
+
+    fn parsed(words: &[&str]) -> Result<MoveToArgs, clap::Error> {
+        CommandLine::try_parse_from([&["move-to"], words].concat()).map(|line| line.args)
+    }
+
+    #[test]
+    fn negative_numbers_are_no_options() {
+        let args = parsed(&["-50", "-0.5", "-1e1", "--tool", "-1", "0", "-1"]).expect("a point");
+        assert_eq!(
+            (args.tip(), args.tool()),
+            (Vector::new(-50.0, -0.5, -10.0), Some(Vector::new(-1.0, 0.0, -1.0)))
+        );
+    }
+
+    #[test]
+    fn the_tool_points_down_unless_something_else_is_asked_for() {
+        assert_eq!(parsed(&["0", "185", "50"]).expect("a point").tool(), Some(DOWN));
+        assert_eq!(parsed(&["0", "185", "50", "--keep-tool"]).expect("a point").tool(), None);
+        assert!(parsed(&["0", "185", "50", "--keep-tool", "--tool", "0", "1", "0"]).is_err());
+        assert!(parsed(&["0", "185", "nan"]).is_err());
+    }
+}

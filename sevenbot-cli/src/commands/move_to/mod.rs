@@ -1,0 +1,72 @@
+//! `move-to`: the tip to a point in millimetres.
+//!
+//! ```text
+//!   x y z, tool ──▶ TipTarget, or why it is out of reach ──▶ Move, as of `pose`
+//!              └──▶ StraightLine, or where it breaks and why ──▶ played, as recordings are
+//! ```
+
+use sevenbot::cartesian::{TipPose, TipTarget, Vector};
+use sevenbot::{Angle, Arm};
+
+use crate::command_error::CommandError;
+use crate::interrupt::hold_on_interrupt;
+use crate::joint_move::{JointMove, Targets, driven_joints};
+use crate::session::Session;
+
+mod args;
+mod facts;
+mod straight;
+
+pub(crate) use args::MoveToArgs;
+use args::target;
+use facts::TipMove;
+
+pub(crate) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), CommandError> {
+    if args.straight {
+        return straight::run(session, args);
+    }
+    let Some(tool) = args.tool() else {
+        let mut arm = session.connect()?;
+        let tool = present_tool(&mut arm)?;
+        let target = target(args.tip(), tool)?;
+        return take(session, Some(arm), args, &target, tool);
+    };
+    // What needs no arm is checked before there is one.
+    let target = target(args.tip(), tool)?;
+    let arm = if args.dry_run { None } else { Some(session.connect()?) };
+    take(session, arm, args, &target, tool)
+}
+
+/// Shows the move, and makes it unless that is not wanted.
+fn take(
+    session: &mut Session,
+    arm: Option<Arm>,
+    args: &MoveToArgs,
+    target: &TipTarget,
+    tool: Vector,
+) -> Result<(), CommandError> {
+    let arrival = TipMove::planned(args.tip(), target, tool);
+    let measured = match arm {
+        Some(mut arm) if !args.dry_run => move_to(&mut arm, target, args.wait)?,
+        _ => None,
+    };
+    session.printer.print(&arrival.with_measured(measured))
+}
+
+/// The direction in which the tool points now.
+fn present_tool(arm: &mut Arm) -> Result<Vector, CommandError> {
+    let positions = arm.wait_until_settled()?.positions();
+    Ok(TipPose::of(positions.map(Angle::from_register)).tool)
+}
+
+/// Moves joints 1 to 5, and waits if wanted. Returns the measured angles then.
+fn move_to(arm: &mut Arm, target: &TipTarget, wait: bool) -> Result<Option<[u8; 7]>, CommandError> {
+    let [t1, t2, t3, t4, t5] = target.degrees.map(Some);
+    let targets: Targets = [t1, t2, t3, t4, t5, None, None];
+    hold_on_interrupt(arm, |arm, interrupt| {
+        driven_joints(arm)?;
+        interrupt.check()?;
+        let begun = JointMove::begin(arm, targets)?;
+        wait.then(|| begun.finish(arm, interrupt)).transpose()
+    })
+}

@@ -1,0 +1,116 @@
+//! `move-to --straight`: a straight line, planned and checked whole, then played as a recording is.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use sevenbot::cartesian::{
+    DirectionText, PERIOD, PointText, StraightLine, StraightLineRequest, TipPose, Vector,
+};
+use sevenbot::joints::JointSnapshot;
+use sevenbot::map::VACUUM_PUMP;
+use sevenbot::{Angle, Joint, Span};
+
+use super::super::play::follow;
+use super::super::position::components;
+use super::args::{MoveToArgs, target};
+use super::facts::{MeasuredTip, rounded};
+use crate::command_error::CommandError;
+use crate::joint_move::driven_joints;
+use crate::printer::Printable;
+use crate::session::Session;
+
+/// Moves the tip on a straight line from where the arm is sent now.
+pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), CommandError> {
+    let mut arm = session.connect()?;
+    let joints = if args.dry_run { arm.wait_until_settled()? } else { driven_joints(&mut arm)? };
+    let start = start(&joints)?;
+    let tool = args.tool().unwrap_or_else(|| TipPose::of(start).tool);
+    // Of the end, the nearest point and other directions of the tool are told.
+    target(args.tip(), tool)?;
+    let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
+    let request = StraightLineRequest { start, vacuum, tip: args.tip(), tool, speed: args.speed };
+    let line = StraightLine::plan(&request)
+        .map_err(|reason| CommandError::Arm(format!("{reason}; nothing was moved")))?;
+    let course = StraightMove::of(&line, &request);
+    if args.dry_run {
+        return session.printer.print(&course);
+    }
+    follow(&mut arm, &line.recording)?;
+    let positions = arm.positions()?.map(Angle::degrees);
+    session.printer.print(&StraightMove { measured: Some(MeasuredTip::of(positions, args.tip())), ..course })
+}
+
+/// The targets at which the line begins. The arm is there, or on its way there.
+fn start(joints: &JointSnapshot) -> Result<[Angle; 7], CommandError> {
+    let mut start = [Angle::from_register(0); 7];
+    for (angle, joint) in start.iter_mut().zip(Joint::ALL) {
+        let base = joints.step_base(joint).map_err(|reason| {
+            let number = joint.number();
+            CommandError::Arm(format!(
+                "the start of the line is not known: joint {number}: {reason}; nothing was moved"
+            ))
+        })?;
+        *angle = Angle::from_register(base);
+    }
+    Ok(start)
+}
+
+/// A straight line: planned, and measured at its end.
+#[derive(Debug, Serialize)]
+struct StraightMove {
+    start_mm: [f64; 3],
+    asked_mm: [f64; 3],
+    /// The direction of the tool at the end.
+    tool: [f64; 3],
+    length_mm: f64,
+    seconds: f64,
+    targets: usize,
+    period_ms: u64,
+    /// How far whole degrees take the tip from the line.
+    deviation_mm: f64,
+    tilt_degrees: f64,
+    /// Where joint 4 turns before the line begins.
+    first_turn_degrees: Option<u8>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measured: Option<MeasuredTip>,
+    #[serde(skip)]
+    direction: Vector,
+}
+
+impl StraightMove {
+    fn of(line: &StraightLine, request: &StraightLineRequest) -> Self {
+        Self {
+            start_mm: components(line.start.tip, 100.0),
+            asked_mm: components(request.tip, 100.0),
+            tool: components(request.tool.unit().unwrap_or(request.tool), 10_000.0),
+            length_mm: rounded(line.length_mm),
+            seconds: rounded(line.duration.as_secs_f64()),
+            targets: line.targets().count(),
+            period_ms: u64::try_from(PERIOD.as_millis()).unwrap_or(u64::MAX),
+            deviation_mm: rounded(line.deviation_mm),
+            tilt_degrees: rounded(line.tilt_degrees),
+            first_turn_degrees: line.first_turn.map(Angle::degrees),
+            measured: None,
+            direction: request.tool,
+        }
+    }
+}
+
+impl Printable for StraightMove {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        let Self { length_mm, seconds, targets, period_ms, deviation_mm, tilt_degrees, .. } = self;
+        let [from, to] = [self.start_mm, self.asked_mm].map(|[x, y, z]| PointText(Vector::new(x, y, z)));
+        writeln!(out, "line     from {from} to {to} mm: {length_mm:.0} mm in {seconds:.1} s")?;
+        writeln!(out, "tool     {} at the end", DirectionText(self.direction))?;
+        writeln!(out, "targets  {targets}, one each {period_ms} ms")?;
+        writeln!(
+            out,
+            "off      whole degrees take the tip up to {deviation_mm:.1} mm from the line and tilt the tool by up \
+             to {tilt_degrees:.1}°"
+        )?;
+        if let Some(degrees) = self.first_turn_degrees {
+            writeln!(out, "first    joint 4 turns to {degrees}°, which moves neither tip nor tool")?;
+        }
+        self.measured.as_ref().map_or(Ok(()), |measured| measured.write_text(out))
+    }
+}

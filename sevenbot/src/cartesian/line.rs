@@ -1,0 +1,293 @@
+//! A straight line of the tip, as moments for playback: planned exactly, checked whole, and rounded to degrees.
+//!
+//! ```text
+//!   start, end, speed ──▶ TipPath: tip and tool at any share of the way
+//!       each 5 ms, at most 0.5 mm ──▶ angles of the same branch ──▶ reach, jumps and speeds checked
+//!       each 50 ms ──▶ whole degrees ──▶ Moment, and how far it is from the line
+//! ```
+
+use std::time::Duration;
+
+use kinematics::limits::check_arm;
+use kinematics::{NoSolution, ik6_all};
+
+use super::target::TipTarget;
+use super::{TipPose, Unreachable, Vector, angle_between};
+use crate::playback::MAX_SEGMENT;
+use crate::recording::{Moment, Recording};
+use crate::units::{Angle, Speed};
+
+mod fault;
+mod path;
+
+pub use fault::{StraightLineError, StraightLineFault};
+use path::TipPath;
+
+/// Time between two targets.
+pub const PERIOD: Duration = MAX_SEGMENT;
+/// The tool turns no faster, in degrees/s.
+const TURN_SPEED: f64 = 60.0;
+/// The fewest checks in a period.
+const LEAST_CHECKS: f64 = 10.0;
+/// The longest way between two checks, in millimetres.
+const CHECK_EVERY: f64 = 0.5;
+/// A joint that turns further between two checks does not follow the line, in degrees: it changes the branch.
+const JUMP: f64 = 5.0;
+/// Joint 5 at this angle points the tool along the forearm. Joint 4 then turns neither tip nor tool.
+const IN_LINE: f64 = 90.0;
+
+/// Angles of joints 1 to 5, in degrees.
+type Angles = [f64; 5];
+
+/// A straight line of the tip that the arm can follow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StraightLine {
+    /// Where it begins.
+    pub start: TipPose,
+    /// Its length, in millimetres.
+    pub length_mm: f64,
+    /// How long it takes.
+    pub duration: Duration,
+    /// What the joints do.
+    pub recording: Recording,
+    /// The largest distance of the tip from the line that whole degrees cause, in millimetres.
+    pub deviation_mm: f64,
+    /// The largest tilt of the tool that whole degrees cause, in degrees.
+    pub tilt_degrees: f64,
+    /// The angle to which joint 4 turns before the line begins: tip and tool stay where they are. `None` if it stays.
+    pub first_turn: Option<Angle>,
+}
+
+/// What a line is planned from.
+#[derive(Clone, Copy, Debug)]
+pub struct StraightLineRequest {
+    /// The targets of the arm at rest, joint 1 first.
+    pub start: [Angle; 7],
+    /// Does the pump suck?
+    pub vacuum: bool,
+    /// The end of the line, in millimetres.
+    pub tip: Vector,
+    /// The direction of the tool at the end, of any length. It turns evenly on the way.
+    pub tool: Vector,
+    /// Millimetres per second. A tool that turns far makes the line slower.
+    pub speed: f64,
+}
+
+impl StraightLine {
+    /// Plans a line. The angles of joints 6 and 7 do not change.
+    ///
+    /// # Errors
+    /// Where the arm cannot follow it, and why.
+    pub fn plan(request: &StraightLineRequest) -> Result<Self, StraightLineError> {
+        let start = TipPose::of(request.start);
+        let end = request.tool.unit().ok_or_else(|| {
+            StraightLineError::at_start(NoSolution::NoToolDirection, request.tip, request.tool)
+        })?;
+        if !request.tip.is_finite() {
+            return Err(StraightLineError::at_start(NoSolution::NotFinite, request.tip, request.tool));
+        }
+        let path = TipPath::new(start, request.tip, end);
+        let pace = LineTiming::of(&path, request.speed);
+        let angles = start_angles(request, &path, &pace);
+        let poses = pace.follow(&path, angles, request.speed)?;
+        let last = request.start.get(3).copied();
+        let turned = poses.first().and_then(|pose| Angle::from_degrees(pose.degrees[3]));
+        Ok(Self {
+            start,
+            length_mm: path.length,
+            duration: pace.duration,
+            deviation_mm: poses.iter().map(|pose| pose.deviation_mm).fold(0.0, f64::max),
+            tilt_degrees: poses.iter().map(|pose| pose.tilt_degrees).fold(0.0, f64::max),
+            first_turn: turned.filter(|_| turned != last),
+            recording: recording(request, &pace, &poses),
+        })
+    }
+
+    /// The targets, joint 1 first, each [`PERIOD`] or a little less after the one before.
+    pub fn targets(&self) -> impl Iterator<Item = [Angle; 7]> {
+        self.recording.moments().map(|moment| moment.pose)
+    }
+}
+
+/// How a line is divided in time.
+struct LineTiming {
+    duration: Duration,
+    /// Targets after the first.
+    periods: u32,
+    /// Checks in a period.
+    checks: u32,
+}
+
+impl LineTiming {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "saturates, and is not negative"
+    )]
+    fn of(path: &TipPath, speed: f64) -> Self {
+        let seconds = (path.length / speed).max(path.turn_degrees / TURN_SPEED);
+        let periods = (seconds / PERIOD.as_secs_f64()).ceil().max(1.0);
+        let checks = (path.length / periods / CHECK_EVERY).ceil().max(LEAST_CHECKS);
+        let duration = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX).max(PERIOD);
+        Self { duration, periods: periods as u32, checks: checks as u32 }
+    }
+
+    /// The share of the way at a check.
+    fn share(&self, check: u32) -> f64 {
+        f64::from(check) / (f64::from(self.periods) * f64::from(self.checks))
+    }
+
+    /// Seconds between two checks.
+    fn interval(&self) -> f64 {
+        self.duration.as_secs_f64() * self.share(1)
+    }
+
+    /// Checks the whole path. Returns a pose for each period.
+    fn follow(&self, path: &TipPath, start: Angles, speed: f64) -> Result<Vec<WholePose>, StraightLineError> {
+        let mut angles = start;
+        let mut fastest = JointTurn::default();
+        let mut poses = vec![WholePose::of(nearest_degrees(start, path, 0.0), path, 0.0)];
+        let end = self.periods.saturating_mul(self.checks);
+        for check in 1..=end {
+            let share = self.share(check);
+            let next = solved(path, share, angles)?;
+            let turn = JointTurn::between(angles, next, share);
+            if turn.degrees > JUMP {
+                let JointTurn { joint, degrees, .. } = turn;
+                return Err(StraightLineError::new(
+                    path,
+                    share,
+                    StraightLineFault::Singular { joint, degrees },
+                ));
+            }
+            fastest = if turn.degrees > fastest.degrees { turn } else { fastest };
+            angles = next;
+            if check == end {
+                poses.push(WholePose::of(best_degrees(angles, path, share), path, share));
+            } else if check % self.checks == 0 {
+                poses.push(WholePose::of(nearest_degrees(angles, path, share), path, share));
+            }
+        }
+        self.check_speed(path, fastest, speed).map(|()| poses)
+    }
+
+    /// Can the joint that turns fastest follow?
+    fn check_speed(&self, path: &TipPath, fastest: JointTurn, speed: f64) -> Result<(), StraightLineError> {
+        // Above it the registers know only the motors' maximum.
+        let limit = Speed::from_steps(100).map_or(0.0, Speed::degrees_per_second);
+        let degrees_per_second = fastest.degrees / self.interval();
+        if degrees_per_second <= limit {
+            return Ok(());
+        }
+        let slower_mm_per_second = (speed * limit / degrees_per_second).floor();
+        let fault =
+            StraightLineFault::TooFast { joint: fastest.joint, degrees_per_second, slower_mm_per_second };
+        Err(StraightLineError::new(path, fastest.share, fault))
+    }
+}
+
+/// The joint that turns furthest between two checks.
+#[derive(Clone, Copy, Debug, Default)]
+struct JointTurn {
+    joint: u8,
+    degrees: f64,
+    /// The share of the way.
+    share: f64,
+}
+
+impl JointTurn {
+    fn between(from: Angles, to: Angles, share: f64) -> Self {
+        let turns = (1..).zip(from.iter().zip(to)).map(|(joint, (from, to))| (joint, (to - from).abs()));
+        let (joint, degrees) = turns.fold((0, 0.0), |most, turn| if turn.1 > most.1 { turn } else { most });
+        Self { joint, degrees, share }
+    }
+}
+
+/// A pose in whole degrees, and how far it is from the line.
+struct WholePose {
+    degrees: [u8; 5],
+    deviation_mm: f64,
+    tilt_degrees: f64,
+}
+
+impl WholePose {
+    fn of(degrees: [u8; 5], path: &TipPath, share: f64) -> Self {
+        let [t1, t2, t3, t4, t5] = degrees.map(f64::from);
+        let TipPose { tip, tool, .. } = TipPose::at([t1, t2, t3, t4, t5, 90.0]);
+        let tilt_degrees = angle_between(tool, path.at(share).1);
+        Self { degrees, deviation_mm: path.distance(tip), tilt_degrees }
+    }
+}
+
+/// The solution at a share of the way that is nearest to the angles before it.
+fn solved(path: &TipPath, share: f64, before: Angles) -> Result<Angles, StraightLineError> {
+    let (tip, tool) = path.at(share);
+    let all = ik6_all(tip, tool);
+    let all = all.map_err(|why| {
+        StraightLineError::new(
+            path,
+            share,
+            StraightLineFault::Unreachable(Box::new(Unreachable::because(why, tip, tool))),
+        )
+    })?;
+    let furthest = |angles: &Angles| {
+        angles.iter().zip(before).map(|(angle, before)| (angle - before).abs()).fold(0.0, f64::max)
+    };
+    let free = |mut angles: Angles| {
+        // In line with the forearm, the roll is free: joint 4 stays.
+        if let ([_, _, _, t4, t5], [_, _, _, before, _]) = (&mut angles, before)
+            && (*t5 - IN_LINE).abs() < 1e-6
+        {
+            *t4 = before;
+        }
+        angles
+    };
+    let nearest = all
+        .into_iter()
+        .flatten()
+        .map(free)
+        .reduce(|nearest, angles| if furthest(&angles) < furthest(&nearest) { angles } else { nearest });
+    Ok(nearest.unwrap_or(before))
+}
+
+/// The angles at which the line begins. Where the tool is in line with the forearm, joint 4 turns first to where the
+/// line needs it next.
+fn start_angles(request: &StraightLineRequest, path: &TipPath, pace: &LineTiming) -> Angles {
+    let [t1, t2, t3, t4, t5, ..] = request.start.map(|angle| f64::from(angle.degrees()));
+    let angles = [t1, t2, t3, t4, t5];
+    if t5 != IN_LINE {
+        return angles;
+    }
+    let next = solved(path, pace.share(1), angles);
+    next.map_or(angles, |[_, _, _, roll, _]| [t1, t2, t3, roll.round(), t5])
+}
+
+/// Whole degrees that the arm can take: the nearest, or beside them at a limit.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 180 degrees")]
+fn nearest_degrees(angles: Angles, path: &TipPath, share: f64) -> [u8; 5] {
+    let whole = angles.map(f64::round);
+    let [t1, t2, t3, t4, t5] = whole;
+    if check_arm([t1, t2, t3, t4, t5, 90.0]).is_ok() {
+        return whole.map(|degrees| degrees as u8);
+    }
+    best_degrees(angles, path, share)
+}
+
+/// Whole degrees that the arm can take and that miss the path by the least.
+fn best_degrees(angles: Angles, path: &TipPath, share: f64) -> [u8; 5] {
+    let (tip, tool) = path.at(share);
+    TipTarget::near(angles, tip, tool).degrees
+}
+
+fn recording(request: &StraightLineRequest, pace: &LineTiming, poses: &[WholePose]) -> Recording {
+    let [.., sixth, seventh] = request.start;
+    let moments = (0..).zip(poses).map(|(period, pose): (u32, _)| {
+        let [t1, t2, t3, t4, t5] = pose.degrees.map(Angle::from_register);
+        let time = pace.duration.mul_f64(f64::from(period) / f64::from(pace.periods));
+        Moment { time, pose: [t1, t2, t3, t4, t5, sixth, seventh], vacuum: request.vacuum }
+    });
+    Recording::from_moments(moments)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,92 @@
+//! Why the arm cannot follow a straight line, in words of a reader who sees the arm.
+
+use std::fmt;
+
+use kinematics::NoSolution;
+
+use super::super::{PointText, Unreachable, Vector};
+use super::path::TipPath;
+
+/// Where the arm cannot follow a line, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StraightLineError {
+    /// Where, in millimetres from the start.
+    pub at_mm: f64,
+    /// The length of the line, in millimetres.
+    pub length_mm: f64,
+    /// The tip there.
+    pub tip: Vector,
+    /// Why.
+    pub fault: StraightLineFault,
+}
+
+/// Why the arm cannot follow a line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StraightLineFault {
+    /// A point of it is out of reach.
+    Unreachable(Box<Unreachable>),
+    /// A joint would have to turn at once: the line goes through or past a singular position.
+    Singular {
+        /// Its number.
+        joint: u8,
+        /// How far it would have to turn.
+        degrees: f64,
+    },
+    /// A joint would have to turn faster than its speed register can tell.
+    TooFast {
+        /// Its number.
+        joint: u8,
+        /// How fast it would have to turn.
+        degrees_per_second: f64,
+        /// The speed of the tip at which this joint could follow here, in whole mm/s.
+        slower_mm_per_second: f64,
+    },
+}
+
+impl StraightLineError {
+    pub(super) fn new(path: &TipPath, share: f64, fault: StraightLineFault) -> Self {
+        Self { at_mm: path.length * share, length_mm: path.length, tip: path.at(share).0, fault }
+    }
+
+    /// For an end of the line that is no position at all.
+    pub(super) fn at_start(why: NoSolution, tip: Vector, tool: Vector) -> Self {
+        let fault = StraightLineFault::Unreachable(Box::new(Unreachable::because(why, tip, tool)));
+        Self { at_mm: 0.0, length_mm: 0.0, tip, fault }
+    }
+}
+
+impl fmt::Display for StraightLineError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { at_mm, length_mm, tip, .. } = self;
+        let tip = PointText(*tip);
+        write!(out, "the straight line breaks {at_mm:.0} mm from its start, of {length_mm:.0} mm: ")?;
+        match &self.fault {
+            StraightLineFault::Unreachable(why) => why.fmt(out),
+            StraightLineFault::Singular { joint, degrees } => write!(
+                out,
+                "at {tip} mm joint {joint} would have to turn by {degrees:.0}° at once. The position is \
+                 singular ({}). Another tool direction or a detour avoids it",
+                singularity(*joint)
+            ),
+            StraightLineFault::TooFast { joint, degrees_per_second, slower_mm_per_second } => {
+                write!(out, "at {tip} mm joint {joint} would have to turn at {degrees_per_second:.0} °/s")?;
+                if *slower_mm_per_second >= 1.0 {
+                    write!(out, "; it could follow at {slower_mm_per_second} mm/s")
+                } else {
+                    write!(out, ": the position is nearly singular ({})", singularity(*joint))
+                }
+            }
+        }
+    }
+}
+
+/// What a position has in common in which this joint turns at once.
+fn singularity(joint: u8) -> &'static str {
+    match joint {
+        1 => "the wrist passes the axis of the base",
+        4 | 5 => "the tool passes the line of the forearm, or joint 4 is at an end",
+        _ => "the arm is at the end of its reach",
+    }
+}
+
+impl std::error::Error for StraightLineError {}

@@ -1,0 +1,168 @@
+//! Positions of the tip in millimetres: computed from the joints, and turned into targets of the joints.
+//!
+//! ```text
+//!   angles of the joints ──▶ TipPose: tip, tool, wrist
+//!
+//!   tip, tool ──▶ TipTarget: whole degrees of joints 1 to 5     or Unreachable: why, and the nearest point
+//!   tip, tool, speed ──▶ Line: a straight line as moments    or StraightLineError: where it breaks, and why
+//! ```
+//!
+//! Origin: where the base axis meets the top plate. x is to the right, y forward, z up. The tip is where the axis of
+//! joint 6 meets the outer face of its disc. The tool direction points from the wrist to the tip.
+//!
+//! Pure arithmetic: knows no arm. The geometry is that of [`kinematics`].
+
+use std::fmt;
+
+use kinematics::{Frames, forward};
+
+use crate::units::Angle;
+
+mod line;
+mod nearest;
+mod target;
+
+pub use kinematics::NoSolution;
+pub use line::{PERIOD, StraightLine, StraightLineError, StraightLineFault, StraightLineRequest};
+pub use target::{TipTarget, Unreachable};
+
+/// A point in millimetres, or a direction.
+pub type Vector = kinematics::Vector<f64>;
+
+/// The tool straight down.
+pub const DOWN: Vector = Vector::new(0.0, 0.0, -1.0);
+
+/// Half of the step of the registers of positions, in degrees.
+const ROUNDING_DEGREES: f64 = 0.5;
+
+/// The position of the tip, and the direction of the tool.
+///
+/// ```
+/// use sevenbot::Angle;
+/// use sevenbot::cartesian::TipPose;
+///
+/// let pose = TipPose::of([90, 90, 65, 90, 90, 90, 80].map(Angle::from_register));
+/// assert_eq!((pose.tip.y, pose.tip.z), (250.31, 219.5));
+/// assert_eq!(pose.tool.y, 1.0);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipPose {
+    /// The tip, in millimetres.
+    pub tip: Vector,
+    /// The direction of the tool, of length 1.
+    pub tool: Vector,
+    /// Where the axes of joints 4, 5 and 6 meet, in millimetres.
+    pub wrist: Vector,
+}
+
+impl TipPose {
+    /// With the joints at these angles, joint 1 first.
+    #[must_use]
+    pub fn of([t1, t2, t3, t4, t5, t6, _]: [Angle; 7]) -> Self {
+        Self::at([t1, t2, t3, t4, t5, t6].map(|angle| f64::from(angle.degrees())))
+    }
+
+    /// With joints 1 to 6 at these angles, in degrees.
+    #[must_use]
+    pub fn at(angles: [f64; 6]) -> Self {
+        let Frames { arm, hand } = forward(angles);
+        Self { tip: hand.tip, tool: hand.tool, wrist: arm.wrist }
+    }
+
+    /// How far the tip may be from a position that was computed from whole degrees, in millimetres: each joint may be
+    /// half a degree away from its register.
+    #[must_use]
+    pub fn rounding_mm([t1, t2, t3, t4, t5, t6, _]: [Angle; 7]) -> f64 {
+        let angles = [t1, t2, t3, t4, t5, t6].map(|angle| f64::from(angle.degrees()));
+        let tip = Self::at(angles).tip;
+        (0..angles.len())
+            .map(|joint| {
+                let mut turned = angles;
+                if let Some(angle) = turned.get_mut(joint) {
+                    *angle += ROUNDING_DEGREES;
+                }
+                (Self::at(turned).tip - tip).length()
+            })
+            .sum()
+    }
+}
+
+/// The angle between two directions of length 1, in degrees.
+pub(crate) fn angle_between(one: Vector, other: Vector) -> f64 {
+    one.cross(other).length().atan2(one.dot(other)).to_degrees()
+}
+
+/// A point as people write it: `0 185 50`.
+///
+/// ```
+/// use sevenbot::cartesian::{PointText, Vector};
+///
+/// assert_eq!(PointText(Vector::new(-0.04, 185.0, 49.96)).to_string(), "0 185 50");
+/// assert_eq!(PointText(Vector::new(0.5, -0.5, 12.34)).to_string(), "0.5 -0.5 12.3");
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct PointText(pub Vector);
+
+impl fmt::Display for PointText {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = [self.0.x, self.0.y, self.0.z].map(|number| rounded(number, 10.0));
+        write!(out, "{x} {y} {z}")
+    }
+}
+
+/// A direction in words where it has some: `straight down`, or `0 0.71 -0.71`.
+///
+/// ```
+/// use sevenbot::cartesian::{DOWN, DirectionText, Vector};
+///
+/// assert_eq!(DirectionText(DOWN).to_string(), "straight down (0 0 -1)");
+/// assert_eq!(DirectionText(Vector::new(0.0, 1.0, -1.0)).to_string(), "in the direction 0 0.71 -0.71");
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct DirectionText(pub Vector);
+
+/// Directions with a name.
+const NAMED: [(&str, [f64; 3]); 6] = [
+    ("straight down", [0.0, 0.0, -1.0]),
+    ("straight up", [0.0, 0.0, 1.0]),
+    ("forward", [0.0, 1.0, 0.0]),
+    ("backward", [0.0, -1.0, 0.0]),
+    ("to the right", [1.0, 0.0, 0.0]),
+    ("to the left", [-1.0, 0.0, 0.0]),
+];
+
+impl fmt::Display for DirectionText {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit = self.0.unit().unwrap_or(self.0);
+        let [x, y, z] = [unit.x, unit.y, unit.z].map(|number| rounded(number, 100.0));
+        match NAMED.into_iter().find(|(_, named)| *named == [x, y, z]) {
+            Some((words, _)) => write!(out, "{words} ({x} {y} {z})"),
+            None => write!(out, "in the direction {x} {y} {z}"),
+        }
+    }
+}
+
+/// The nearest multiple of 1 / `steps`, without the sign of -0.
+fn rounded(number: f64, steps: f64) -> f64 {
+    (number * steps).round() / steps + 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_degrees_leave_some_millimetres_open() {
+        let pose = [90, 90, 65, 90, 90, 90, 80].map(Angle::from_register);
+        // Half a degree of joint 1 at 250 mm, joint 2 at 120 mm, joint 3 at 222 mm, and the hand.
+        let open = TipPose::rounding_mm(pose);
+        let expected = 0.5_f64.to_radians() * (250.31 + 120.0 + 220.96_f64.hypot(25.0) + 22.46);
+        assert!((open - expected).abs() < 0.05, "{open} {expected}");
+    }
+
+    #[test]
+    fn the_angle_between_directions_is_exact_at_its_ends() {
+        let (x, y) = (Vector::new(1.0, 0.0, 0.0), Vector::new(0.0, 1.0, 0.0));
+        assert_eq!([angle_between(x, x), angle_between(x, y), angle_between(x, -x)], [0.0, 90.0, 180.0]);
+    }
+}
