@@ -33,6 +33,14 @@ fn decoded(pieces: &[&[u8]]) -> Vec<Said> {
 }
 
 #[test]
+fn every_instruction_has_its_code() {
+    for instruction in [Instruction::Ping, Instruction::Read, Instruction::Write, Instruction::SyncWrite] {
+        assert_eq!(Instruction::from_code(instruction as u8), Some(instruction));
+    }
+    assert_eq!(Instruction::from_code(0), None);
+}
+
+#[test]
 fn golden_ping() {
     //                id    len   inst  checksum
     let bytes = [0xFF, 0xFF, 0x00, 0x02, 0x01, 0xFC];

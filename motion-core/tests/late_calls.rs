@@ -1,0 +1,48 @@
+//! Late answers of the servos, as behind a USB adapter, and a controller that is called late.
+
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // In tests.
+
+mod rig;
+
+use arm_sim::servo::ServoFault;
+use protocol_core::registers::Joint;
+use protocol_core::time::Duration;
+use rig::{Rig, STANDARD_POSE};
+
+/// Longer than the timeout of a servo.
+const LATE: Duration = Duration::from_millis(8);
+
+/// An arm whose servos answer late, a second after its start.
+fn late_arm(answer_delay: Duration) -> Rig {
+    let mut rig = Rig::new();
+    Joint::ALL.into_iter().for_each(|joint| rig.plant.set_fault(joint, Some(ServoFault::Late(LATE))));
+    rig.controller.set_answer_delay(answer_delay);
+    rig.run_ms(1_000);
+    rig
+}
+
+#[test]
+fn late_answers_count_only_with_an_answer_delay() {
+    let mut without = late_arm(Duration::ZERO);
+    assert_eq!((without.get(242), without.present()), (0x7F, vec![0; 7]));
+    let mut with = late_arm(Duration::from_millis(20));
+    assert_eq!((with.get(242), with.present()), (0, STANDARD_POSE.to_vec()));
+}
+
+#[test]
+fn the_longest_answer_time_of_each_servo_is_reported_once() {
+    let mut rig = late_arm(Duration::from_millis(20));
+    let longest = rig.controller.take_longest_answers();
+    assert!(longest.iter().all(|micros| (8_000..9_000).contains(micros)), "{longest:?}");
+    assert_eq!(rig.controller.take_longest_answers(), [0; 7]);
+}
+
+#[test]
+fn engaged_joints_stay_engaged_after_a_late_call() {
+    let mut rig = Rig::started();
+    rig.now_us += 300_000;
+    rig.run_ms(30);
+    let all = rig.goals().filter(|(_, goals)| goals.len() == 7).count();
+    assert!(all > 0 && all == rig.goals().count(), "{:?}", rig.to_servos);
+    assert!(rig.torques().all(|torques| torques == [Some(1); 7]), "{:?}", rig.to_servos);
+}
