@@ -27,6 +27,7 @@ const GROUPS: [Group; 3] = [
             "host-sim",
             "sevenbot",
             "sevenbot-cli",
+            "sevenbot-serve",
         ],
     ),
     ("proof", &["flash-model", "system-tests", "torture", "xtask"]),

@@ -1,0 +1,104 @@
+//! A client that speaks frames, as on the arm's own line: requests from its bytes, replies and reports to bytes.
+//!
+//! A client that does not read loses reports first. Its replies wait, its reads wait for room, and finally its bytes wait
+//! where it sent them from; its writes are carried out as long as they do not stand behind a read that waits (D5).
+
+use protocol_core::request::{Reply, Request};
+use protocol_core::time::Instant;
+use protocol_core::wire::deframer::gap;
+use protocol_core::wire::{Deframer, FrameBuffer, MAX_LENGTH, ToArm};
+
+use crate::hub::{ClientId, Event, Hub};
+
+/// Bytes for the client beyond which reports are dropped: a second of reports at the highest frequency.
+const MOST_REPORT_BYTES: usize = 1_024;
+/// Bytes for the client beyond which its reads wait.
+const MOST_BYTES: usize = 4_096;
+
+/// A client that speaks frames.
+#[derive(Debug)]
+pub struct FrameClient {
+    id: ClientId,
+    deframer: Deframer<ToArm>,
+    output: Vec<u8>,
+}
+
+impl FrameClient {
+    /// A new client of `hub`. `baud` is the rate of the arm's line: gaps between bytes are measured in its characters
+    /// (D4).
+    pub fn connect(hub: &mut Hub, baud: u32) -> Self {
+        let id = hub.connect();
+        hub.set_can_receive(id, true);
+        Self { id, deframer: Deframer::new(gap(baud)), output: Vec::new() }
+    }
+
+    /// Leaves the hub.
+    pub fn disconnect(self, hub: &mut Hub, now: Instant) {
+        hub.disconnect(now, self.id);
+    }
+
+    /// Takes bytes of the client, and returns how many. Offer the rest again when requests were sent to the arm. An
+    /// empty slice states that the client is silent at `now`.
+    pub fn push(&mut self, hub: &mut Hub, now: Instant, bytes: &[u8]) -> usize {
+        let mut rest = bytes;
+        loop {
+            self.pull_all(hub);
+            if !hub.has_room(self.id) {
+                break;
+            }
+            let count = self.deframer.push(now, rest);
+            rest = rest.get(count..).unwrap_or(&[]);
+            if count == 0 {
+                self.pull_all(hub);
+                break;
+            }
+        }
+        bytes.len() - rest.len()
+    }
+
+    /// Queues the requests in the bytes taken so far.
+    fn pull_all(&mut self, hub: &mut Hub) {
+        while hub.has_room(self.id) {
+            match self.deframer.pull() {
+                Some(Ok(frame)) => {
+                    hub.request(self.id, Request::from_frame(frame).into());
+                }
+                Some(Err(_)) => {}
+                None => return,
+            }
+        }
+    }
+
+    /// Collects replies and reports from the hub. Call it after [`Hub::poll`] and [`Hub::arm_bytes`].
+    pub fn collect(&mut self, hub: &mut Hub) {
+        let mut frame = FrameBuffer::new();
+        while let Some(event) = hub.take_event(self.id) {
+            match &event {
+                Event::Reply { address, values } => Reply { address: *address, values }.encode(&mut frame),
+                Event::Report { stream, values } if self.output.len() < MOST_REPORT_BYTES => {
+                    Reply { address: stream.registers().address, values }.encode(&mut frame);
+                }
+                Event::Report { .. } | Event::NoReply { .. } => continue,
+            }
+            self.output.extend_from_slice(&frame);
+        }
+        hub.set_can_receive(self.id, self.output.len() + MAX_LENGTH <= MOST_BYTES);
+    }
+
+    /// Bytes for the client.
+    #[must_use]
+    pub fn output(&self) -> &[u8] {
+        &self.output
+    }
+
+    /// Removes bytes that the client took.
+    pub fn consume(&mut self, count: usize) {
+        self.output.drain(..count.min(self.output.len()));
+    }
+
+    /// When silence of the client has an effect: [`FrameClient::push`] has to be called without bytes.
+    #[must_use]
+    pub fn deadline(&self) -> Instant {
+        self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE)
+    }
+}

@@ -1,0 +1,178 @@
+//! The line to the arm: frames out, replies in, each matched to the read that it answers.
+//!
+//! The arm answers in the order of the requests (D5). A reply belongs to the first read with its address and count; the
+//! reads before it have lost theirs. The line is filled at its baud rate and not further, so that no queue grows in the
+//! kernel, where a later frame could not pass an earlier one.
+
+use std::collections::VecDeque;
+
+use protocol_core::request::{Reply, Request};
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::deframer::gap;
+use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
+
+use super::ClientId;
+use super::client::Event;
+use super::request::reply_bytes;
+use super::sampler::Stream;
+
+/// How long a reply may take beside its time on the line. USB adapters take 16 ms each way; a busy computer takes more.
+const REPLY_TIMEOUT: Duration = Duration::from_millis(300);
+/// How long replies that come late are dropped after a timeout.
+const LATE_REPLIES: Duration = Duration::from_millis(50);
+/// The line may be filled this far ahead, so that it is not idle while the program wakes up.
+const AHEAD: Duration = Duration::from_millis(1);
+/// Bytes of replies that may be on their way. One read is always allowed.
+const WINDOW: usize = 96;
+
+/// Who wants a reply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Owner {
+    /// A client.
+    Client(ClientId),
+    /// The sampler.
+    Sample(Stream),
+    /// The hub, to find out whether a 7Bot V2 is there.
+    Identity,
+}
+
+/// A read without a reply.
+#[derive(Clone, Copy, Debug)]
+struct Unanswered {
+    owner: Owner,
+    address: u8,
+    count: u8,
+    /// When its reply counts as lost.
+    deadline: Instant,
+}
+
+/// The line.
+#[derive(Debug)]
+pub(crate) struct Line {
+    deframer: Deframer<ToHost>,
+    output: Vec<u8>,
+    unanswered: VecDeque<Unanswered>,
+    /// Reads before the last matched one, whose replies are lost.
+    lost: VecDeque<Unanswered>,
+    /// Bits per second.
+    baud: u32,
+    /// When the bytes sent so far have left.
+    busy_until: Instant,
+}
+
+impl Line {
+    pub(crate) fn new(baud: u32) -> Self {
+        Self {
+            deframer: Deframer::new(gap(baud)),
+            output: Vec::new(),
+            unanswered: VecDeque::new(),
+            lost: VecDeque::new(),
+            baud,
+            busy_until: Instant::ZERO,
+        }
+    }
+
+    /// Forgets all bytes: the port was opened or closed.
+    pub(crate) fn reset(&mut self) {
+        *self = Self { busy_until: self.busy_until, ..Self::new(self.baud) };
+    }
+
+    /// Takes bytes of the arm, and returns how many.
+    pub(crate) fn push(&mut self, now: Instant, bytes: &[u8]) -> usize {
+        self.deframer.push(now, bytes)
+    }
+
+    /// The next reply and who wants it. Frames that nobody wants are dropped.
+    pub(crate) fn next_reply(&mut self) -> Option<(Owner, Event)> {
+        loop {
+            if let Some(Unanswered { owner, address, count, .. }) = self.lost.pop_front() {
+                return Some((owner, Event::NoReply { address, count }));
+            }
+            let Ok(frame) = self.deframer.pull()? else { continue };
+            let Some(Reply { address, values }) = Reply::from_frame(frame) else { continue };
+            let is_reply =
+                |read: &Unanswered| read.address == address && usize::from(read.count) == values.len();
+            let Some(place) = self.unanswered.iter().position(is_reply) else { continue };
+            let values = values.to_vec();
+            self.lost.extend(self.unanswered.drain(..place));
+            if let Some(read) = self.unanswered.pop_front() {
+                return Some((read.owner, Event::Reply { address, values }));
+            }
+        }
+    }
+
+    /// Is the line free for another frame?
+    pub(crate) fn is_free(&self, now: Instant) -> bool {
+        self.free_at(now) <= now
+    }
+
+    /// When the line is free for another frame.
+    pub(crate) fn free_at(&self, now: Instant) -> Instant {
+        if self.busy_until <= now + AHEAD {
+            now
+        } else {
+            Instant::from_micros(self.busy_until.as_micros() - AHEAD.as_micros())
+        }
+    }
+
+    /// May another read be sent whose reply has `count` registers?
+    pub(crate) fn has_window(&self, count: u8) -> bool {
+        let on_their_way: usize = self.unanswered.iter().map(|read| reply_bytes(read.count)).sum();
+        on_their_way == 0 || on_their_way + reply_bytes(count) <= WINDOW
+    }
+
+    pub(crate) fn send_read(&mut self, now: Instant, owner: Owner, address: u8, count: u8) {
+        self.send(now, &Request::Read { address, count });
+        let line_time = self.time_of(reply_bytes(count) + WINDOW);
+        let deadline = self.busy_until.max(now) + line_time + REPLY_TIMEOUT;
+        self.unanswered.push_back(Unanswered { owner, address, count, deadline });
+    }
+
+    pub(crate) fn send_write(&mut self, now: Instant, address: u8, values: &[u8]) {
+        self.send(now, &Request::Write { address, values });
+    }
+
+    fn send(&mut self, now: Instant, request: &Request<'_>) {
+        let mut frame = FrameBuffer::new();
+        request.encode(&mut frame);
+        self.output.extend_from_slice(&frame);
+        self.busy_until = self.busy_until.max(now) + self.time_of(frame.len());
+    }
+
+    /// Time that bytes take on the line, each with start and stop bit.
+    fn time_of(&self, bytes: usize) -> Duration {
+        let bits = u64::try_from(bytes).unwrap_or(u64::MAX).saturating_mul(10_000_000);
+        Duration::from_micros(bits.checked_div(self.baud.into()).unwrap_or(0))
+    }
+
+    /// Bytes for the arm.
+    pub(crate) fn output(&self) -> &[u8] {
+        &self.output
+    }
+
+    /// Removes bytes that were sent.
+    pub(crate) fn consume(&mut self, count: usize) {
+        self.output.drain(..count.min(self.output.len()));
+    }
+
+    /// Has the reply to the oldest read not come in time?
+    pub(crate) fn has_timed_out(&self, now: Instant) -> bool {
+        self.unanswered.front().is_some_and(|read| read.deadline <= now)
+    }
+
+    /// The reads without a reply, which are forgotten.
+    pub(crate) fn take_unanswered(&mut self) -> Vec<(Owner, u8, u8)> {
+        self.unanswered.drain(..).map(|read| (read.owner, read.address, read.count)).collect()
+    }
+
+    /// Sends nothing for a while, so that a late reply is not taken for the reply to a later read.
+    pub(crate) fn discard_late_replies(&mut self, now: Instant) {
+        self.busy_until = self.busy_until.max(now + LATE_REPLIES);
+    }
+
+    /// When a reply counts as lost, or silence of the arm's line has an effect.
+    pub(crate) fn deadline(&self) -> Instant {
+        let reply = self.unanswered.front().map_or(Instant::FAR_FUTURE, |read| read.deadline);
+        reply.min(self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE))
+    }
+}

@@ -1,0 +1,300 @@
+//! The hub: whole requests of many clients in, frames to one arm out, and each reply back to its client.
+//!
+//! ```text
+//!   Client ─┐                      ┌─▶ Line ──▶ arm
+//!   Client ─┼─▶ Hub::poll: the ────┤
+//!   Sampler ┘   client that used   └─◀ Line ◀── arm
+//!               the line least
+//! ```
+//!
+//! * A client has at most one read without a reply; its later requests wait behind it, so their order is kept.
+//! * The report registers belong to each client ([`own_registers`]). The arm sends no reports: the sampler reads the
+//!   arm once, at the highest frequency that any client wants, and all clients share the values.
+//! * Without an arm requests are dropped. A request that waited could move an arm that a person just plugged in.
+
+mod client;
+mod line;
+mod own_registers;
+mod request;
+mod sampler;
+mod shares;
+
+use std::collections::BTreeMap;
+
+use protocol_core::registers::map::{DEVICE_CODE, FEEDBACK_FREQUENCY};
+use protocol_core::time::{Duration, Instant};
+
+use self::client::Client;
+use self::line::{Line, Owner};
+use self::sampler::Sampler;
+use self::shares::Shares;
+
+pub use self::client::Event;
+pub use self::request::WholeRequest;
+pub use self::sampler::Stream;
+
+/// Requests of one client that may wait. The maker's arm has the same limit for its WebSocket.
+pub const MOST_WAITING: usize = 20;
+/// Time between two questions to a port behind which no arm has answered yet.
+const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
+
+/// A client of the hub.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ClientId(u32);
+
+/// Does an arm answer?
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum ArmState {
+    /// The port is closed.
+    Absent,
+    /// The port is open. The next question is due at this time.
+    Identifying(Instant),
+    /// A 7Bot V2 answered.
+    Present,
+}
+
+/// The clients of one arm, and the line to it.
+#[derive(Debug)]
+pub struct Hub {
+    clients: BTreeMap<ClientId, Client>,
+    next_id: u32,
+    arm: ArmState,
+    line: Line,
+    sampler: Sampler,
+    shares: Shares,
+    is_read_only: bool,
+}
+
+impl Hub {
+    /// A hub without clients, whose port is closed. `baud` is the rate of the arm's line, in bits per second.
+    /// `is_read_only`: writes do not reach the arm; each client can still choose its own reports.
+    #[must_use]
+    pub fn new(baud: u32, is_read_only: bool) -> Self {
+        Self {
+            clients: BTreeMap::new(),
+            next_id: 0,
+            arm: ArmState::Absent,
+            line: Line::new(baud),
+            sampler: Sampler::new(baud),
+            shares: Shares::default(),
+            is_read_only,
+        }
+    }
+
+    /// Adds a client.
+    pub fn connect(&mut self) -> ClientId {
+        let id = ClientId(self.next_id);
+        self.next_id = self.next_id.wrapping_add(1);
+        self.clients.insert(id, Client::default());
+        id
+    }
+
+    /// Removes a client with its requests and its streams of reports. A reply that comes for it is dropped.
+    pub fn disconnect(&mut self, now: Instant, id: ClientId) {
+        self.clients.remove(&id);
+        self.sampler.set_frequencies(now, self.clients.values());
+    }
+
+    /// Can the client make another request?
+    #[must_use]
+    pub fn has_room(&self, id: ClientId) -> bool {
+        self.clients.get(&id).is_some_and(|client| client.waiting.len() < MOST_WAITING)
+    }
+
+    /// Queues a request. Returns false, and drops it, if [`Hub::has_room`] is false.
+    pub fn request(&mut self, id: ClientId, request: WholeRequest) -> bool {
+        if !self.has_room(id) {
+            return false;
+        }
+        let Some(client) = self.clients.get_mut(&id) else { return false };
+        if client.waiting.is_empty() {
+            self.shares.join(&mut client.share);
+        }
+        client.waiting.push_back(request);
+        true
+    }
+
+    /// States whether the client has room for the longest reply. While it has none, its reads wait.
+    pub fn set_can_receive(&mut self, id: ClientId, can_receive: bool) {
+        if let Some(client) = self.clients.get_mut(&id) {
+            client.can_receive = can_receive;
+        }
+    }
+
+    /// The next event for a client.
+    pub fn take_event(&mut self, id: ClientId) -> Option<Event> {
+        self.clients.get_mut(&id)?.events.pop_front()
+    }
+
+    /// The port to the arm is open. Requests pass once a 7Bot V2 has answered.
+    pub fn open_arm(&mut self, now: Instant) {
+        self.line.reset();
+        self.arm = ArmState::Identifying(now);
+    }
+
+    /// The port to the arm is closed.
+    pub fn close_arm(&mut self) {
+        self.arm = ArmState::Absent;
+        self.drop_unanswered();
+        self.line.reset();
+    }
+
+    /// Does a 7Bot V2 answer?
+    #[must_use]
+    pub fn has_arm(&self) -> bool {
+        self.arm == ArmState::Present
+    }
+
+    /// Takes bytes of the arm. An empty slice states that its line is silent at `now`.
+    pub fn arm_bytes(&mut self, now: Instant, bytes: &[u8]) {
+        let mut rest = bytes;
+        loop {
+            let taken = self.line.push(now, rest);
+            while let Some((owner, event)) = self.line.next_reply() {
+                self.deliver(now, owner, event);
+            }
+            rest = rest.get(taken..).unwrap_or(&[]);
+            if rest.is_empty() {
+                return;
+            }
+        }
+    }
+
+    /// Moves requests to the line, as far as the line is free. The caller sends [`Hub::to_arm`] afterwards.
+    pub fn poll(&mut self, now: Instant) {
+        if self.line.has_timed_out(now) {
+            self.drop_unanswered();
+            self.line.discard_late_replies(now);
+        }
+        match self.arm {
+            ArmState::Absent => self.drop_waiting(),
+            ArmState::Identifying(due) => {
+                self.drop_waiting();
+                if due <= now && self.line.is_free(now) {
+                    self.line.send_read(now, Owner::Identity, DEVICE_CODE.address, DEVICE_CODE.count);
+                    self.arm = ArmState::Identifying(now + IDENTIFY_PERIOD);
+                }
+            }
+            ArmState::Present => while self.line.is_free(now) && self.send_next(now) {},
+        }
+    }
+
+    /// Bytes for the arm.
+    #[must_use]
+    pub fn to_arm(&self) -> &[u8] {
+        self.line.output()
+    }
+
+    /// Removes bytes that were sent to the arm.
+    pub fn sent_to_arm(&mut self, count: usize) {
+        self.line.consume(count);
+    }
+
+    /// When to call [`Hub::poll`] and [`Hub::arm_bytes`] again, without other events.
+    #[must_use]
+    pub fn deadline(&self, now: Instant) -> Instant {
+        let line = self.line.deadline();
+        match self.arm {
+            ArmState::Absent => Instant::FAR_FUTURE,
+            ArmState::Identifying(due) => line.min(due),
+            ArmState::Present if self.clients.values().any(|client| self.is_sendable(client)) => {
+                line.min(self.line.free_at(now))
+            }
+            ArmState::Present => line.min(self.sampler.due().max(self.line.free_at(now))),
+        }
+    }
+
+    /// Sends the next request or sample. Returns false if there is none.
+    fn send_next(&mut self, now: Instant) -> bool {
+        let sendable = self.clients.iter().filter(|(_, client)| self.is_sendable(client));
+        let sampler = self.sampler.next_due(now).map(|stream| (self.sampler.share, None, Some(stream)));
+        let clients = sendable.map(|(&id, client)| (client.share, Some(id), None));
+        let next = clients.chain(sampler).min_by_key(|&(share, ..)| self.shares.order(share));
+        match next {
+            Some((_, Some(id), _)) => self.send_request(now, id),
+            Some((_, _, Some(stream))) => self.send_sample(now, stream),
+            _ => return false,
+        }
+        true
+    }
+
+    fn is_sendable(&self, client: &Client) -> bool {
+        match client.waiting.front() {
+            Some(WholeRequest::Read { count, .. }) => {
+                client.can_receive && !client.has_read && self.line.has_window(*count)
+            }
+            Some(WholeRequest::Write { .. }) => !client.has_read,
+            None => false,
+        }
+    }
+
+    fn send_request(&mut self, now: Instant, id: ClientId) {
+        let Some(client) = self.clients.get_mut(&id) else { return };
+        let Some(request) = client.waiting.pop_front() else { return };
+        self.shares.charge(&mut client.share, request.line_bytes());
+        match request {
+            WholeRequest::Read { address, count } => {
+                client.has_read = true;
+                self.line.send_read(now, Owner::Client(id), address, count);
+            }
+            WholeRequest::Write { address, mut values } => {
+                if client.own.write(address, &mut values) {
+                    client.schedule.set(now, &client.own);
+                    self.sampler.set_frequencies(now, self.clients.values());
+                }
+                if !self.is_read_only {
+                    self.line.send_write(now, address, &values);
+                }
+            }
+        }
+    }
+
+    fn send_sample(&mut self, now: Instant, stream: Stream) {
+        let row = stream.registers();
+        self.shares.charge(&mut self.sampler.share, request::read_bytes(row.count));
+        self.sampler.note_sent(now, stream);
+        self.line.send_read(now, Owner::Sample(stream), row.address, row.count);
+    }
+
+    fn deliver(&mut self, now: Instant, owner: Owner, event: Event) {
+        match (owner, event) {
+            (Owner::Client(id), mut event) => {
+                let Some(client) = self.clients.get_mut(&id) else { return };
+                if let Event::Reply { address, values } = &mut event {
+                    client.own.overlay(*address, values);
+                }
+                client.has_read = false;
+                client.events.push_back(event);
+            }
+            (Owner::Sample(stream), Event::Reply { values, .. }) => {
+                for client in self.clients.values_mut() {
+                    client.report(now, stream, &values);
+                }
+            }
+            (Owner::Identity, Event::Reply { values, .. }) => self.identify(now, &values),
+            (Owner::Sample(_) | Owner::Identity, _) => {}
+        }
+    }
+
+    /// An unknown device answered, or a 7Bot V2. A stream that an earlier program left running ends.
+    fn identify(&mut self, now: Instant, values: &[u8]) {
+        if values == [DEVICE_CODE.default_at(DEVICE_CODE.address)] && self.arm != ArmState::Present {
+            self.arm = ArmState::Present;
+            self.line.send_write(now, FEEDBACK_FREQUENCY.address, &[0]);
+        }
+    }
+
+    /// No reply comes any more for the reads that were sent.
+    fn drop_unanswered(&mut self) {
+        for (owner, address, count) in self.line.take_unanswered() {
+            self.deliver(Instant::ZERO, owner, Event::NoReply { address, count });
+        }
+    }
+
+    /// Drops the requests that wait, because there is no arm.
+    fn drop_waiting(&mut self) {
+        for client in self.clients.values_mut() {
+            client.drop_waiting();
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Fair use of the line: start-time fair queueing, counted in bytes.
+//!
+//! Each client has a tag: the bytes up to which it has used the line. The client with the lowest tag is next. A client
+//! that was idle starts at the tag of the request that was sent last. So it waits for one frame, and however many frames
+//! others have queued does not matter.
+
+/// The tag of a client, and when it was served last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Share {
+    tag: u64,
+    turn: u64,
+}
+
+impl Share {
+    /// Of a client that has sent nothing.
+    pub(crate) const IDLE: Self = Self { tag: 0, turn: 0 };
+}
+
+/// The state that all clients share.
+#[derive(Debug, Default)]
+pub(crate) struct Shares {
+    /// The tag of the request that was sent last.
+    current: u64,
+    /// Number of requests sent.
+    turns: u64,
+}
+
+impl Shares {
+    /// A client that was idle has a request again.
+    pub(crate) fn join(&self, share: &mut Share) {
+        share.tag = share.tag.max(self.current);
+    }
+
+    /// The client with the least order is next; with equal tags the one that has waited longest.
+    pub(crate) fn order(&self, share: Share) -> (u64, u64) {
+        (share.tag.max(self.current), share.turn)
+    }
+
+    /// A request of this many bytes was sent.
+    pub(crate) fn charge(&mut self, share: &mut Share, bytes: usize) {
+        self.current = self.current.max(share.tag);
+        self.turns += 1;
+        share.turn = self.turns;
+        share.tag = self.current + u64::try_from(bytes).unwrap_or(u64::MAX);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Serves clients that always have a request of this many bytes, and counts the bytes of each.
+    fn serve<const COUNT: usize>(lengths: [usize; COUNT], rounds: usize) -> [usize; COUNT] {
+        let mut shares = Shares::default();
+        let mut clients = [Share::default(); COUNT];
+        let mut served = [0; COUNT];
+        for _ in 0..rounds {
+            let next = (0..COUNT).min_by_key(|&client| shares.order(clients[client])).unwrap();
+            shares.charge(&mut clients[next], lengths[next]);
+            served[next] += lengths[next];
+        }
+        served
+    }
+
+    #[test]
+    fn clients_get_equal_bytes_whatever_the_length_of_their_requests() {
+        let served = serve([262, 14, 14], 10_000);
+        let (least, most) = (served.iter().min().unwrap(), served.iter().max().unwrap());
+        assert!(most - least <= 262, "{served:?}");
+    }
+
+    #[test]
+    fn a_client_that_was_idle_is_next_but_does_not_catch_up() {
+        let mut shares = Shares::default();
+        let mut busy = [Share::default(); 9];
+        let mut idle = Share::default();
+        for turn in 0..900 {
+            shares.charge(&mut busy[turn % 9], 262);
+        }
+        shares.join(&mut idle);
+        assert!(busy.iter().all(|&share| shares.order(idle) < shares.order(share)));
+        (0..20).for_each(|_| shares.charge(&mut idle, 14));
+        assert!(
+            busy.iter().any(|&share| shares.order(share) < shares.order(idle)),
+            "a frame's length, not 100"
+        );
+    }
+}

@@ -1,0 +1,170 @@
+//! Clients, a hub and a simulated arm on a line of 115 200 baud, in virtual time.
+
+#![allow(dead_code)] // Each test file uses a part of the rig.
+
+use arm_sim::flash::Flash;
+use arm_sim::plant::Plant;
+use arm_sim::simulation::{ArmConfig, Simulation};
+use motion_core::servo_bus::TorqueCodes;
+use protocol_core::request::{Reply, Request};
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
+use sevenbot_serve::{FrameClient, Hub};
+
+pub const BAUD: u32 = 115_200;
+
+/// A frame that a client received: address and values.
+pub type Received = (u8, Vec<u8>);
+
+/// A program: the bytes that it still has to send, and what it received.
+pub struct Program {
+    client: FrameClient,
+    to_send: Vec<u8>,
+    deframer: Deframer<ToHost>,
+    pub received: Vec<(Instant, Received)>,
+    /// It takes the bytes for it.
+    pub reads: bool,
+}
+
+pub struct World {
+    pub now: Instant,
+    pub hub: Hub,
+    pub arm: Simulation<Flash>,
+    pub is_plugged: bool,
+    pub programs: Vec<Program>,
+}
+
+pub fn read(address: u8, count: u8) -> Vec<u8> {
+    encode(&Request::Read { address, count })
+}
+
+pub fn write(address: u8, values: &[u8]) -> Vec<u8> {
+    encode(&Request::Write { address, values })
+}
+
+fn encode(request: &Request<'_>) -> Vec<u8> {
+    let mut frame = FrameBuffer::new();
+    request.encode(&mut frame);
+    frame.to_vec()
+}
+
+impl World {
+    /// An arm that has started up, and programs that have sent nothing.
+    pub fn new(programs: usize) -> Self {
+        Self::with_access(programs, false)
+    }
+
+    pub fn with_access(programs: usize, is_read_only: bool) -> Self {
+        let config =
+            ArmConfig { chip_id: *b"SIM\0\0\x01", is_paced: true, torque_codes: TorqueCodes::default() };
+        let plant = Plant::new(Instant::ZERO);
+        let arm = Simulation::new(Instant::ZERO, config, Flash::in_memory(), plant);
+        let hub = Hub::new(BAUD, is_read_only);
+        let mut world = Self { now: Instant::ZERO, hub, arm, is_plugged: false, programs: Vec::new() };
+        world.plug();
+        (0..programs).for_each(|_| world.join());
+        world.run(1_000);
+        assert!(world.hub.has_arm());
+        world
+    }
+
+    pub fn join(&mut self) {
+        let client = FrameClient::connect(&mut self.hub, BAUD);
+        let deframer = Deframer::new(Duration::from_millis(2));
+        let program = Program { client, to_send: Vec::new(), deframer, received: Vec::new(), reads: true };
+        self.programs.push(program);
+    }
+
+    pub fn leave(&mut self, number: usize) {
+        self.programs.remove(number).client.disconnect(&mut self.hub, self.now);
+    }
+
+    pub fn plug(&mut self) {
+        self.is_plugged = true;
+        self.hub.open_arm(self.now);
+    }
+
+    pub fn unplug(&mut self) {
+        self.is_plugged = false;
+        self.arm.host_disconnect();
+        self.hub.close_arm();
+    }
+
+    pub fn send(&mut self, program: usize, bytes: &[u8]) {
+        self.programs[program].to_send.extend(bytes);
+    }
+
+    /// Runs for some milliseconds, in steps of 0.1 ms.
+    pub fn run(&mut self, millis: u64) {
+        for _ in 0..millis * 10 {
+            self.now = self.now + Duration::from_micros(100);
+            self.step();
+        }
+    }
+
+    fn step(&mut self) {
+        for program in &mut self.programs {
+            let taken = program.client.push(&mut self.hub, self.now, &program.to_send);
+            program.to_send.drain(..taken);
+        }
+        self.hub.poll(self.now);
+        if self.is_plugged {
+            let room = self.arm.host_room().min(self.hub.to_arm().len());
+            let sent = self.arm.host_send(self.now, &self.hub.to_arm()[..room]);
+            self.hub.sent_to_arm(sent);
+            self.arm.advance(self.now, true);
+            let received = self.arm.host_received().to_vec();
+            self.arm.host_take(received.len());
+            self.hub.arm_bytes(self.now, &received);
+        }
+        for program in &mut self.programs {
+            program.client.collect(&mut self.hub);
+            if program.reads {
+                program.take(self.now);
+            }
+        }
+    }
+
+    /// What a program received since the last call.
+    pub fn take(&mut self, program: usize) -> Vec<Received> {
+        self.programs[program].received.drain(..).map(|(_, received)| received).collect()
+    }
+
+    /// Sends a request of a program and returns the time until its reply.
+    pub fn round_trip(&mut self, program: usize, request: &[u8]) -> Duration {
+        self.programs[program].received.clear();
+        self.send(program, request);
+        let start = self.now;
+        while self.programs[program].received.is_empty() {
+            self.run(1);
+            assert!(self.now - start < Duration::from_millis(5_000), "no reply");
+        }
+        self.programs[program].received[0].0 - start
+    }
+}
+
+impl Program {
+    pub fn is_waiting(&self) -> bool {
+        !self.to_send.is_empty()
+    }
+
+    pub fn to_send_bytes(&self) -> usize {
+        self.to_send.len()
+    }
+
+    fn take(&mut self, now: Instant) {
+        let bytes = self.client.output().to_vec();
+        self.client.consume(bytes.len());
+        let mut rest = bytes.as_slice();
+        loop {
+            rest = &rest[self.deframer.push(now, rest)..];
+            while let Some(frame) = self.deframer.pull() {
+                let reply = Reply::from_frame(frame.expect("whole frames")).expect("a reply");
+                self.received.push((now, (reply.address, reply.values.to_vec())));
+            }
+            if rest.is_empty() {
+                return;
+            }
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! Several programs share an arm: each gets its own replies and reports, and none disturbs the others.
+
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
+
+mod rig;
+
+use protocol_core::registers::map::{
+    CHIP_ID, DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED, TARGET_POSITION,
+};
+use protocol_core::time::Duration;
+use rig::{World, read, write};
+
+const POSITIONS: (u8, u8) = (PRESENT_POSITION.address, PRESENT_POSITION.count);
+
+/// The program sets the frequency of its reports.
+fn set_frequency(world: &mut World, program: usize, hertz: u8) {
+    world.send(program, &write(FEEDBACK_FREQUENCY.address, &[hertz]));
+}
+
+#[test]
+fn each_program_gets_the_replies_to_its_own_requests_in_their_order() {
+    let mut world = World::new(3);
+    for (program, address) in [SPEED.address, CHIP_ID.address, DEVICE_CODE.address].into_iter().enumerate() {
+        (0..50_u8).for_each(|number| world.send(program, &read(address, 1 + number % 3)));
+    }
+    world.run(2_000);
+    for (program, address) in [SPEED.address, CHIP_ID.address, DEVICE_CODE.address].into_iter().enumerate() {
+        let shapes: Vec<_> = world.take(program).iter().map(|(a, values)| (*a, values.len())).collect();
+        let expected: Vec<_> = (0..50).map(|number| (address, 1 + number % 3)).collect();
+        assert_eq!(shapes, expected);
+    }
+}
+
+#[test]
+fn a_program_reads_what_it_wrote_directly_before() {
+    let mut world = World::new(4);
+    for value in 1..=40 {
+        for program in 0..4_u8 {
+            let own = SPEED.address + program;
+            world.send(program.into(), &[write(own, &[value]), read(own, 1)].concat());
+        }
+    }
+    world.run(3_000);
+    for program in 0..4_u8 {
+        let values: Vec<_> = world.take(program.into()).into_iter().map(|(_, values)| values[0]).collect();
+        assert_eq!(values, (1..=40).collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn each_program_has_its_own_frequency_of_reports() {
+    let mut world = World::new(4);
+    for (program, hertz) in [50, 20, 7, 0].into_iter().enumerate() {
+        set_frequency(&mut world, program, hertz);
+    }
+    world.run(10_000);
+    for (program, hertz) in [50, 20, 7, 0].into_iter().enumerate() {
+        let reports = world.take(program);
+        assert!(reports.iter().all(|(address, values)| (*address, values.len()) == (POSITIONS.0, 7)));
+        assert!(reports.len().abs_diff(10 * hertz) <= 2, "{} reports at {hertz} Hz", reports.len());
+        world.send(program, &read(FEEDBACK_FREQUENCY.address, 1));
+    }
+    (0..3).for_each(|program| set_frequency(&mut world, program, 0));
+    world.run(100);
+    for (program, hertz) in [50_u8, 20, 7, 0].into_iter().enumerate() {
+        assert!(world.take(program).contains(&(FEEDBACK_FREQUENCY.address, vec![hertz])), "its own value");
+    }
+    assert_eq!(world.arm.registers().get(FEEDBACK_FREQUENCY.address), 0, "the arm sends no reports");
+    world.run(100);
+    assert!((0..4).all(|program| world.take(program).is_empty()), "all streams have ended");
+}
+
+#[test]
+fn reports_end_with_their_program() {
+    let mut world = World::new(2);
+    set_frequency(&mut world, 0, 50);
+    world.run(100);
+    world.leave(0);
+    world.run(50);
+    let before = world.arm.registers().read(246, 2).to_vec();
+    world.run(1_000);
+    assert_eq!(world.arm.registers().read(246, 2), before, "nobody reads the arm any more");
+}
+
+#[test]
+fn a_flood_of_one_program_costs_the_others_less_than_10_ms() {
+    let floods = [
+        read(POSITIONS.0, POSITIONS.1),
+        write(TARGET_POSITION.address, &[90, 90, 65, 90, 90, 90, 80]),
+        vec![0xAA; 14],
+        b"\xAA\x77\x06\x00\xFF".to_vec(),
+    ];
+    for flood in floods {
+        let mut world = World::new(2);
+        let alone = (0..50).map(|_| world.round_trip(0, &read(POSITIONS.0, POSITIONS.1))).max().unwrap();
+        let mut worst = Duration::ZERO;
+        for turn in 0..200 {
+            while world.programs[1].to_send_bytes() < 4_000 {
+                world.send(1, &flood);
+            }
+            world.run(turn % 7);
+            worst = worst.max(world.round_trip(0, &read(POSITIONS.0, POSITIONS.1)));
+        }
+        let cost = worst.as_micros().saturating_sub(alone.as_micros());
+        assert!(
+            cost < 10_000,
+            "{cost} us more than {} us, during a flood of {flood:02x?}",
+            alone.as_micros()
+        );
+    }
+}
+
+#[test]
+fn a_program_that_never_reads_loses_reports_but_no_reply() {
+    let mut world = World::new(2);
+    set_frequency(&mut world, 0, 50);
+    set_frequency(&mut world, 1, 50);
+    world.programs[0].reads = false;
+    (0..1_000).for_each(|_| world.send(0, &read(SPEED.address, 7)));
+    world.run(20_000);
+    assert!(world.take(1).len().abs_diff(1_000) <= 3, "the other one has all its reports");
+    assert!(world.programs[0].is_waiting(), "its requests wait where it sent them from");
+    world.programs[0].reads = true;
+    world.run(10_000);
+    let received = world.take(0);
+    assert_eq!(received.iter().filter(|(address, _)| *address == SPEED.address).count(), 1_000);
+}
+
+#[test]
+fn half_a_frame_of_one_program_disturbs_no_other() {
+    let mut world = World::new(2);
+    world.send(0, &write(TARGET_POSITION.address, &[1, 2, 3, 4, 5, 6, 7])[..8]);
+    world.send(1, &read(CHIP_ID.address, 6));
+    world.run(20);
+    assert_eq!(world.take(1), [(CHIP_ID.address, b"SIM\0\0\x01".to_vec())]);
+    world.send(0, &read(DEVICE_CODE.address, 1));
+    world.run(20);
+    assert_eq!(world.take(0), [(DEVICE_CODE.address, vec![7])]);
+    assert_eq!(world.arm.registers().get(TARGET_POSITION.address), 90);
+}
+
+#[test]
+fn without_an_arm_requests_are_dropped_and_later_ones_pass() {
+    let mut world = World::new(2);
+    set_frequency(&mut world, 1, 50);
+    world.send(0, &read(CHIP_ID.address, 6));
+    world.run(1);
+    world.unplug();
+    world.send(0, &[read(DEVICE_CODE.address, 1), write(TARGET_POSITION.address, &[10])].concat());
+    world.run(1_000);
+    assert_eq!(world.take(0), [], "silence, as on a cable");
+    world.take(1);
+    world.plug();
+    world.run(1_000);
+    assert_eq!(world.take(0), []);
+    assert_eq!(world.arm.registers().get(TARGET_POSITION.address), 90, "an old target does not move the arm");
+    assert!(world.take(1).len() > 30, "reports continue");
+    world.send(0, &read(CHIP_ID.address, 6));
+    world.run(20);
+    assert_eq!(world.take(0), [(CHIP_ID.address, b"SIM\0\0\x01".to_vec())]);
+}
+
+#[test]
+fn an_arm_that_stops_answering_loses_replies_but_never_crosses_them() {
+    let mut world = World::new(2);
+    world.arm.halt_controller(world.now);
+    (0..2).for_each(|program| world.send(program, &read(POSITIONS.0, POSITIONS.1)));
+    world.run(1_000);
+    world.arm.restart_controller(world.now);
+    world.run(1_000);
+    (0..2).for_each(|program| assert_eq!(world.take(program), []));
+    world.send(0, &read(CHIP_ID.address, 1));
+    world.send(1, &read(DEVICE_CODE.address, 1));
+    world.run(50);
+    assert_eq!(world.take(0), [(CHIP_ID.address, vec![b'S'])]);
+    assert_eq!(world.take(1), [(DEVICE_CODE.address, vec![7])]);
+}
+
+#[test]
+fn with_read_only_access_nothing_is_written_but_reports_can_be_chosen() {
+    let mut world = World::with_access(1, true);
+    world.send(0, &write(SPEED.address, &[7]));
+    set_frequency(&mut world, 0, 10);
+    world.run(1_000);
+    assert!(world.take(0).len() >= 9);
+    assert_eq!(world.arm.registers().get(SPEED.address), 60);
+}
