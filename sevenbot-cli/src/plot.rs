@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_at_all_can_be_drawn() {
+    fn an_empty_plot_has_finite_numbers() {
         let drawing = svg("nothing", &Default::default());
         assert!(!drawing.contains("NaN") && !drawing.contains("inf"), "{drawing}");
     }

@@ -72,7 +72,7 @@ mod tests {
     use sevenbot::ports::PortInfo;
 
     #[test]
-    fn ports_that_lead_nowhere_are_named_with_their_reasons() {
+    fn ports_without_an_arm_are_listed_with_reasons() {
         let port = PortInfo { name: "COM1".to_owned(), description: String::new() };
         let found = the_only(vec![ProbeResult { port, answer: Err(OpenError::Busy) }]);
         let Err(CommandError::NoArm { tried }) = found else { panic!("no arm: {found:?}") };

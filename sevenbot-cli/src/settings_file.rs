@@ -124,7 +124,7 @@ fn byte(row: &Register, address: u8, value: &Value) -> Result<u8, String> {
     let number = value.as_integer();
     if *row == BAUD_RATE {
         let code = BAUD_RATES.iter().zip(0..).find(|&(&rate, _)| number == Some(i64::from(rate)));
-        return code.map(|(_, code)| code).ok_or_else(|| format!("the arm does not know {value} baud"));
+        return code.map(|(_, code)| code).ok_or_else(|| format!("the arm does not support {value} baud"));
     }
     let byte =
         number.and_then(|number| i16::try_from(number).ok()).and_then(|number| row.range.encode(number));
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_stand_in_the_file_in_their_units() {
+    fn settings_are_stored_in_their_units() {
         let settings = settings().map(|row| (name_of(row), value(row, &registers()))).collect::<Table>();
         let text = toml::to_string(&settings).expect("TOML");
         assert_eq!(text, "baud-rate = 1000000\ndevice-id = 42\noffset = [0, -5, 0, 0, 0, 0, 16]\n");
@@ -167,13 +167,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_stays_as_it_is() {
+    fn settings_missing_in_the_file_keep_their_value() {
         let wanted = file("device-id = 7").applied_to(Path::new("x"), &registers()).expect("a setting");
         assert_eq!(wanted.values, [7, 3, 0, 0x85, 0, 0, 0, 0, 16]);
     }
 
     #[test]
-    fn what_is_no_setting_or_out_of_range_is_refused() {
+    fn unknown_names_and_values_out_of_range_are_refused() {
         assert_eq!(refused("speed = 5"), "speed is no setting");
         assert_eq!(
             refused("offset = [0, 17, 0, 0, 0, 0, 0]"),
@@ -182,7 +182,7 @@ mod tests {
         assert_eq!(refused("offset = [1]"), "offset has 1 values, not 7");
         assert_eq!(refused("device-id = 300"), "300 is out of range: device-id takes 0 to 255");
         assert_eq!(refused("device-id = 'x'").split(':').count(), 2);
-        assert_eq!(refused("baud-rate = 5"), "the arm does not know 5 baud");
+        assert_eq!(refused("baud-rate = 5"), "the arm does not support 5 baud");
         assert_eq!(span(), Span::between(&DEVICE_ID, &OFFSET));
     }
 }

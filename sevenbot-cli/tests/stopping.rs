@@ -32,7 +32,7 @@ fn may_be_moving(output: &Output) {
 }
 
 #[test]
-fn commands_that_the_arm_does_not_take_say_that_it_may_be_moving() {
+fn lost_commands_report_that_the_arm_may_be_moving() {
     for arguments in [["stop"].as_slice(), &["home"], &["home", "--wait"], &["state", "damping", "--yes"]] {
         let (port, _held, _told) = arm_that_loses_writes_after(0);
         may_be_moving(&command(&port, arguments).output().unwrap());
@@ -40,7 +40,7 @@ fn commands_that_the_arm_does_not_take_say_that_it_may_be_moving() {
 }
 
 #[test]
-fn ctrl_c_that_cannot_stop_the_arm_says_so() {
+fn ctrl_c_without_effect_reports_that_the_arm_may_be_moving() {
     let (port, _held, writes) = arm_that_loses_writes_after(1);
     let tool = command(&port, &["pose", "10", "_", "_", "_", "_", "_", "_", "--wait"]).spawn().unwrap();
     writes.recv_timeout(Duration::from_secs(60)).expect("the pose is written");
@@ -73,7 +73,7 @@ fn ctrl_c_stops_a_pose_and_says_that_the_arm_holds() {
 }
 
 #[test]
-fn a_stop_of_an_arm_that_is_not_driven_writes_nothing() {
+fn a_stop_of_an_undriven_arm_writes_nothing() {
     let registers = moving_registers();
     registers.lock().unwrap()[29] = 2;
     let shown = Arc::clone(&registers);

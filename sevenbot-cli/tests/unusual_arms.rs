@@ -35,7 +35,7 @@ fn said(output: &Output, status: i32) -> String {
 }
 
 #[test]
-fn the_makers_firmware_works_as_far_as_it_goes() {
+fn the_makers_firmware_is_supported_with_a_warning() {
     let (port, _held) = makers_arm();
     let info = run(&port, &["info"], 0);
     assert!(
@@ -60,7 +60,7 @@ fn another_device_is_named_by_its_code() {
 }
 
 #[test]
-fn silence_and_nonsense_suggest_to_look_for_the_rate() {
+fn without_an_answer_baud_find_is_suggested() {
     for answer in [&b""[..], b"\x00\xF8\x80"] {
         let (port, _held) = answering_arm(|_, _, _| answer.to_vec());
         let text = run(&port, &["info"], 3);
@@ -71,7 +71,7 @@ fn silence_and_nonsense_suggest_to_look_for_the_rate() {
 /// Only where the master's end tells the rate that was chosen at the other one.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_forgotten_rate_is_found() {
+fn an_unknown_rate_is_found() {
     use serialport::SerialPort;
 
     let listens_at = |rate: u32| {
@@ -106,7 +106,7 @@ fn a_forgotten_rate_is_found() {
 }
 
 #[test]
-fn a_second_ctrl_c_waits_for_nobody() {
+fn a_second_ctrl_c_ends_the_program_at_once() {
     let (moving, is_moving) = mpsc::channel();
     let mut is_sent = false;
     let (port, _held) = scripted_arm(move |_, request| match *request {

@@ -1,6 +1,6 @@
-//! An open arm: registers read and written, typed values on top, and the reports it sends unasked.
+//! An open arm: reads and writes registers, also as typed values, and keeps the reports.
 //!
-//! Knows the register table, not the port: that is the link's.
+//! Knows the register table. [`FramePort`] knows the serial port.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -21,16 +21,16 @@ use crate::snapshot::Snapshot;
 use crate::span::Span;
 use crate::units::{Angle, MoveTime, Speed};
 
-/// The status block, which is where the table ends.
+/// The status block: the last registers of the table.
 pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
 
-/// Reports kept for whoever asks later: 20 s of them at the highest rate (D14). The oldest go first.
+/// Reports kept until the caller takes them: 20 s at the highest rate (D14). The oldest are dropped first.
 const REPORTS_KEPT: usize = 1_000;
 
-/// How often to ask, at least, after something was written.
+/// At least so many attempts for a read after a write.
 const MIN_ATTEMPTS: u32 = 3;
 
-/// How to talk to an arm.
+/// Baud rate, timeout and attempts.
 ///
 /// ```
 /// use sevenbot::ArmOptions;
@@ -41,11 +41,11 @@ const MIN_ATTEMPTS: u32 = 3;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ArmOptions {
-    /// In bits per second. The arm starts with the rate in its register 12.
+    /// Baud rate of the port. The arm starts with the rate in its register 12.
     pub baud: u32,
-    /// How long to wait for one answer.
+    /// The timeout of one attempt.
     pub reply_timeout: Duration,
-    /// How often to ask before giving up, at least once. Reads change nothing, so asking again is safe.
+    /// Attempts for a read, at least one. A read changes nothing, so repeating it is safe.
     pub attempts: u32,
 }
 
@@ -55,7 +55,7 @@ impl Default for ArmOptions {
     }
 }
 
-/// The present positions, as the arm sent them without being asked (D14).
+/// The present positions. The arm sends them without a request (D14).
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -71,9 +71,9 @@ impl Default for ArmOptions {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Report {
-    /// When it was taken from the port.
+    /// When it was read from the port.
     pub received: Instant,
-    /// Joint 1 first.
+    /// The positions, joint 1 first.
     pub positions: [Angle; 7],
 }
 
@@ -108,18 +108,18 @@ impl fmt::Debug for Arm {
 }
 
 impl Arm {
-    /// Opens a port and makes sure that a 7Bot V2 answers there.
+    /// Opens a port and checks that a 7Bot V2 answers.
     ///
     /// # Errors
-    /// The port cannot be opened, nothing answers, or something else does.
+    /// The port cannot be opened, no device answers, or another device answers.
     pub fn open(path: &str, baud: u32) -> Result<Self, OpenError> {
         Self::open_with(path, ArmOptions { baud, ..ArmOptions::default() })
     }
 
-    /// As [`Arm::open`], with time-outs of one's own.
+    /// As [`Arm::open`], with other timeouts.
     ///
     /// # Errors
-    /// The port cannot be opened, nothing answers, or something else does.
+    /// The port cannot be opened, no device answers, or another device answers.
     pub fn open_with(path: &str, options: ArmOptions) -> Result<Self, OpenError> {
         let port = OpenPort::open(path, options.baud)?;
         let link = FramePort::new(port, options.baud);
@@ -134,38 +134,38 @@ impl Arm {
         }
     }
 
-    /// What the arm said it is when it was opened.
+    /// Registers 0 to 7, read when the arm was opened.
     #[must_use]
     pub const fn identity(&self) -> &Identity {
         &self.identity
     }
 
-    /// The name of its port.
+    /// The name of the port.
     #[must_use]
     pub fn port(&self) -> &str {
         &self.path
     }
 
-    /// How it is talked to.
+    /// Baud rate, timeout and attempts.
     #[must_use]
     pub const fn options(&self) -> ArmOptions {
         self.options
     }
 
-    /// The values of `count` registers from `address` on, all of one instant.
+    /// The values of `count` registers from `address` on, read at one instant.
     ///
     /// # Errors
-    /// The registers reach past 255; no answer, however often asked; or the port is gone.
+    /// The registers reach past 255, no attempt is answered, or the port failed.
     pub fn read(&mut self, address: u8, count: u8) -> Result<Vec<u8>, Error> {
         let outside = Error::OutsideMap { address, count: count.into() };
         let span = Span::new(address, count).ok_or(outside)?;
         self.read_span(span).map(|snapshot| snapshot.values)
     }
 
-    /// As [`Arm::read`], for registers of the table.
+    /// As [`Arm::read`], for a checked span.
     ///
     /// # Errors
-    /// No answer, however often asked; or the port is gone.
+    /// No attempt is answered, or the port failed.
     pub fn read_span(&mut self, span: Span) -> Result<Snapshot, Error> {
         self.take_waiting_replies()?;
         self.link.take_received();
@@ -181,7 +181,7 @@ impl Arm {
         Err(self.no_answer(span))
     }
 
-    /// Does work that asks at least three times for each answer, however the arm was opened.
+    /// Runs `work` with at least three attempts for each read.
     pub(crate) fn with_min_attempts<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> T {
         let attempts = self.options.attempts;
         self.options.attempts = attempts.max(MIN_ATTEMPTS);
@@ -190,17 +190,17 @@ impl Arm {
         done
     }
 
-    /// Gives new values to the registers from `address` on, in one frame: all of them or none (D16, D17).
-    /// The arm does not answer a write; [`crate::checked_write`] finds out what became of it.
+    /// Writes the registers from `address` on in one frame: all of them or none (D16, D17).
+    /// The arm does not answer a write. [`Arm::write_checked`] reads the registers back.
     ///
     /// # Errors
-    /// The registers reach past 255, and nothing was sent; or the port is gone, or takes no more bytes.
+    /// The registers reach past 255 (then nothing is sent), or the port failed.
     pub fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Error> {
         Span::of_values(address, values).ok_or(Error::OutsideMap { address, count: values.len() })?;
         Ok(self.link.send(&Request::Write { address, values })?)
     }
 
-    /// Where the joints are, joint 1 first.
+    /// The present positions, joint 1 first.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -209,7 +209,7 @@ impl Arm {
         Ok(snapshot.joints(&PRESENT_POSITION).map(Angle::from_register))
     }
 
-    /// Where the joints should be, joint 1 first.
+    /// The target positions, joint 1 first.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -218,7 +218,7 @@ impl Arm {
         Ok(snapshot.joints(&TARGET_POSITION).map(Angle::from_register))
     }
 
-    /// Sends one joint to an angle.
+    /// Sets the target of one joint.
     ///
     /// # Errors
     /// As [`Arm::write`].
@@ -226,7 +226,7 @@ impl Arm {
         self.write(TARGET_POSITION.of(joint), &[angle.degrees()])
     }
 
-    /// Sends all joints to a pose, joint 1 first. They start together.
+    /// Sets the targets of all joints, joint 1 first. They start together.
     ///
     /// # Errors
     /// As [`Arm::write`].
@@ -234,7 +234,7 @@ impl Arm {
         self.write(TARGET_POSITION.address, &pose.map(Angle::degrees))
     }
 
-    /// Sets the speed of all joints, at once and for moves to come.
+    /// Sets the speeds of all joints, joint 1 first, for present and later moves.
     ///
     /// # Errors
     /// As [`Arm::write`].
@@ -242,7 +242,7 @@ impl Arm {
         self.write(SPEED.address, &speeds.map(Speed::steps))
     }
 
-    /// Sets the duration of all joints' moves to come; it counts where the speed is the maximum (D11).
+    /// Sets the durations of all joints' later moves. A duration applies where the speed is 0, the maximum (D11).
     ///
     /// # Errors
     /// As [`Arm::write`].
@@ -250,15 +250,15 @@ impl Arm {
         self.write(TIME.address, &times.map(MoveTime::steps))
     }
 
-    /// The reports that came since this was last asked, oldest first.
+    /// Takes the reports received so far, oldest first.
     pub fn reports(&mut self) -> impl Iterator<Item = Report> {
         self.reports.drain(..)
     }
 
-    /// The next report, kept or still to come; `None` when none came for `timeout`.
+    /// The oldest report. Waits for one if there is none; `None` after `timeout`.
     ///
     /// # Errors
-    /// The port is gone.
+    /// The port failed.
     pub fn next_report(&mut self, timeout: Duration) -> Result<Option<Report>, Error> {
         let deadline = Instant::now() + timeout;
         while self.reports.is_empty() {
@@ -270,7 +270,7 @@ impl Arm {
         Ok(self.reports.pop_front())
     }
 
-    /// Waits for a reply to one of these reads. Other replies are late ones or reports.
+    /// Waits for a reply to one of these reads. Other replies are late, or reports.
     fn answer(&mut self, asked: &[Span]) -> Result<Option<Snapshot>, Error> {
         let deadline = Instant::now() + self.options.reply_timeout;
         while let Some(reply) = self.link.receive(deadline)? {
@@ -289,7 +289,7 @@ impl Arm {
         Error::NoAnswer { span, attempts: attempts.max(1), waited: reply_timeout, received }
     }
 
-    /// Takes what has come since the last read: reports, and late replies.
+    /// Takes the replies received since the last read: reports, and late replies.
     fn take_waiting_replies(&mut self) -> Result<(), Error> {
         while let Some(reply) = self.link.receive_waiting()? {
             self.pending.replied(reply.span());

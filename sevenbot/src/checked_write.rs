@@ -1,7 +1,7 @@
-//! Writes that are checked: what took, what did not, and why.
+//! Writes that are verified: which registers did not take the value, and why.
 //!
-//! The arm does not answer a write (D6). What became of it shows in the registers, in the table that both
-//! ends share, and in the status block. Knows nothing of what a register is for.
+//! The arm does not answer a write (D6). So the registers are read back. The register table and the status block
+//! give the reason for a difference.
 
 use std::fmt;
 
@@ -32,7 +32,7 @@ pub struct WriteMismatch {
     pub wanted: u8,
     /// The byte that was read back.
     pub found: u8,
-    /// Why.
+    /// The reason.
     pub cause: MismatchCause,
 }
 
@@ -47,39 +47,39 @@ pub struct WriteMismatch {
 pub enum MismatchCause {
     /// The table has no register there.
     NoRegister,
-    /// It can only be read.
+    /// The register is read only.
     ReadOnly,
-    /// The maker keeps it free.
+    /// The maker reserves the register.
     Reserved,
-    /// It is a setting, and the EEPROM lock protects it (D15).
+    /// The register is a setting, and the EEPROM lock protects it (D15).
     Locked,
-    /// A byte of the frame was out of its register's range, so none of it had an effect (D16).
+    /// A value in the frame was out of range, so the arm ignored the whole frame (D16).
     OutOfRange {
-        /// The register it was meant for.
+        /// The register with the value that was out of range.
         address: u8,
     },
-    /// The settings storage takes no more before the next restart (D19).
+    /// The settings storage is full until the next restart (D19).
     StorageFull,
-    /// The frame reached the arm damaged.
+    /// The arm received the frame damaged.
     Damaged,
-    /// The arm gives no reason: the frame was lost, or the register was changed again since.
+    /// The arm gives no reason: the frame was lost, or the register has changed since.
     Unknown,
 }
 
 impl MismatchCause {
-    /// Could the same frame have an effect when it is sent again?
+    /// Can the same frame succeed when it is sent again?
     #[must_use]
     pub const fn is_transient(self) -> bool {
         matches!(self, Self::Damaged | Self::Unknown)
     }
 }
 
-/// How often a frame is sent before its loss counts as a failure.
+/// A frame is sent so many times before its loss is an error.
 const WRITE_ATTEMPTS: u32 = 5;
 
 impl Arm {
-    /// Writes, reads back, and says which registers do not hold what was written: none, if all went well. A frame
-    /// that seems to be lost is sent again, a few times.
+    /// Writes registers, reads them back, and returns those that differ. A frame that seems to be lost is sent again, up
+    /// to four times.
     ///
     /// ```no_run
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -92,15 +92,15 @@ impl Arm {
     /// ```
     ///
     /// # Errors
-    /// As [`Arm::read`] and [`Arm::write`]. The arm may have taken the values nevertheless.
+    /// As [`Arm::read`] and [`Arm::write`]. The arm may have taken the values.
     pub fn write_checked(&mut self, address: u8, values: &[u8]) -> Result<Vec<WriteMismatch>, Error> {
         self.write_all_checked(&[(address, values.to_vec())])
     }
 
-    /// As [`Arm::write_checked`], for several frames, which go out together: first registers and values.
+    /// As [`Arm::write_checked`], for several frames, sent one after the other. Each is a first address and its values.
     ///
     /// # Errors
-    /// As [`Arm::read`] and [`Arm::write`]. The arm may have taken some of the values nevertheless.
+    /// As [`Arm::read`] and [`Arm::write`]. The arm may have taken some of the values.
     pub fn write_all_checked(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<WriteMismatch>, Error> {
         self.with_min_attempts(|arm| arm.write_until_taken(writes))
     }
@@ -159,12 +159,12 @@ fn compare(found: &Snapshot, wanted: &[u8], cause: impl Fn(u8, u8) -> MismatchCa
         .collect()
 }
 
-/// The number a byte stands for: minus zero is zero (D9).
+/// The number that a byte encodes. Minus zero is zero (D9).
 fn number(address: u8, byte: u8) -> i16 {
     find(address).map_or(i16::from(byte), |row| row.range.decode(byte))
 }
 
-/// The rule of the table by which a register keeps its value; `None` where it could have taken another.
+/// The table's reason why no write can change a register; `None` if a write can.
 fn cause_from_access(address: u8, locked: bool) -> Option<MismatchCause> {
     match find(address) {
         None => Some(MismatchCause::NoRegister),
@@ -175,7 +175,7 @@ fn cause_from_access(address: u8, locked: bool) -> Option<MismatchCause> {
     }
 }
 
-/// What the arm's counters say of a frame that went out between the two looks at them.
+/// The reason according to the arm's counters before and after the write.
 pub(crate) fn cause_from_counters(before: &StatusBlock, after: &StatusBlock) -> MismatchCause {
     let refused = before.frames_refused() != after.frames_refused();
     match after.last_refusal() {
@@ -186,7 +186,7 @@ pub(crate) fn cause_from_counters(before: &StatusBlock, after: &StatusBlock) -> 
     }
 }
 
-/// Without a status block only the table is left to ask.
+/// The reason if the arm has no status block.
 fn cause_from_range(address: u8, wanted: u8) -> MismatchCause {
     match find(address) {
         Some(row) if !row.range.contains(wanted) => MismatchCause::OutOfRange { address },
@@ -210,12 +210,10 @@ impl fmt::Display for MismatchCause {
             Self::Locked => out.write_str("it is protected by the EEPROM lock"),
             Self::OutOfRange { address } => {
                 let name = name_of_register(address);
-                write!(out, "the frame had no effect, {name} takes {}", register_text::range(address))
+                write!(out, "the arm ignored the frame: {name} takes {}", register_text::range(address))
             }
-            Self::StorageFull => {
-                out.write_str("the settings storage takes no more before a restart of the arm")
-            }
-            Self::Damaged => out.write_str("the request was damaged on its way to the arm; try again"),
+            Self::StorageFull => out.write_str("the settings storage is full until the arm restarts"),
+            Self::Damaged => out.write_str("the arm received the request damaged; try again"),
             Self::Unknown => out.write_str("the arm gives no reason; try again"),
         }
     }
@@ -240,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_explains_what_no_write_can_change() {
+    fn the_table_gives_the_cause_of_an_impossible_write() {
         assert_eq!(cause_from_access(61, false), Some(MismatchCause::NoRegister));
         assert_eq!(cause_from_access(PRESENT_POSITION.address, false), Some(MismatchCause::ReadOnly));
         assert_eq!(cause_from_access(RESERVED_8.address, false), Some(MismatchCause::Reserved));
@@ -250,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn the_status_block_explains_a_refusal_that_was_counted() {
+    fn a_new_refusal_gives_the_cause() {
         let before = status(4, refusal::OUT_OF_RANGE, 46);
         let stale = status(4, refusal::OUT_OF_RANGE, 46);
         assert_eq!(
@@ -265,13 +263,13 @@ mod tests {
     }
 
     #[test]
-    fn without_a_status_block_the_table_is_asked() {
+    fn without_a_status_block_the_range_gives_the_cause() {
         assert_eq!(cause_from_range(46, 200), MismatchCause::OutOfRange { address: 46 });
         assert_eq!(cause_from_range(46, 90), MismatchCause::Unknown);
     }
 
     #[test]
-    fn minus_zero_took_where_zero_is_read_back() {
+    fn minus_zero_equals_zero() {
         let found = Snapshot { address: OFFSET.address, values: vec![0, 0] };
         let unchanged = compare(&found, &[0x80, 0x85], |_, _| MismatchCause::Unknown);
         let [only] = unchanged.as_slice() else { panic!("{unchanged:?}") };

@@ -1,6 +1,4 @@
-//! What can go wrong between a host and its arm, said so that its reader knows what to check.
-//!
-//! Knows what happened on the wire, not what somebody wanted to do with it.
+//! Failures of ports and of exchanges with an arm.
 
 use std::fmt;
 use std::io;
@@ -9,7 +7,7 @@ use std::time::Duration;
 use crate::permission;
 use crate::span::Span;
 
-/// Why a port does not lead to an arm.
+/// Why a port cannot be opened, or has no arm.
 ///
 /// ```no_run
 /// use sevenbot::{Arm, OpenError};
@@ -26,18 +24,18 @@ pub enum OpenError {
     NotFound,
     /// This user may not open the port.
     PermissionDenied {
-        /// The group that may, where the system says so.
+        /// The group that may open it, if the system tells.
         group: Option<String>,
     },
     /// Another program has the port open.
     Busy,
-    /// It cannot be used as a serial port; the system's own words say why.
+    /// The port cannot be used as a serial port, with the reason of the system.
     Unusable(serialport::Error),
     /// The port opened, but no arm answered.
     Silent(Error),
-    /// Something answered, but it is not a 7Bot V2: its device code is not 7.
+    /// The device is not a 7Bot V2: its device code is not 7.
     WrongDevice {
-        /// The device code it gave.
+        /// The device code.
         code: u8,
     },
 }
@@ -49,7 +47,7 @@ impl From<Error> for OpenError {
 }
 
 impl OpenError {
-    /// Why the port at `path` did not open.
+    /// The reason why the port at `path` did not open.
     pub(crate) fn of(path: &str, error: serialport::Error) -> Self {
         use io::ErrorKind;
         match error.kind() {
@@ -57,7 +55,7 @@ impl OpenError {
             serialport::ErrorKind::Io(ErrorKind::PermissionDenied) => {
                 Self::PermissionDenied { group: permission::group_of(path) }
             }
-            // The serialport crate gives this kind to a port that is locked; on Windows to a missing one too.
+            // The serialport crate reports a locked port like this. On Windows a missing port is reported like this too.
             serialport::ErrorKind::NoDevice if !cfg!(windows) => Self::Busy,
             _ => Self::Unusable(error),
         }
@@ -98,20 +96,20 @@ impl std::error::Error for OpenError {}
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// The frame would reach past register 255, or be longer than a frame can be. Nothing was sent.
+    /// The registers reach past 255, or there are more than one frame holds. Nothing was sent.
     OutsideMap {
         /// The first register.
         address: u8,
-        /// How many registers from there on.
+        /// The number of registers.
         count: usize,
     },
-    /// No answer to a read, though it was asked for several times.
+    /// A read was not answered in any attempt.
     NoAnswer {
-        /// The registers that were asked for.
+        /// The registers of the read.
         span: Span,
-        /// How often they were.
+        /// The number of attempts.
         attempts: u32,
-        /// How long each attempt waited.
+        /// The timeout of each attempt.
         waited: Duration,
         /// What was received instead.
         received: ReceiveCounts,
@@ -130,9 +128,9 @@ pub enum Error {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PortError {
-    /// The port takes no more bytes: nothing reads at its other end.
+    /// The port takes no more bytes: no program reads at its other end.
     Stalled,
-    /// The port is gone: a cable was pulled, or a simulator ended.
+    /// The port failed: the cable was pulled, or the simulator ended.
     Lost(io::ErrorKind),
 }
 
@@ -148,7 +146,7 @@ impl From<PortError> for OpenError {
     }
 }
 
-/// What was received on the line while an answer was missing.
+/// Counts of the bytes and frames received instead of an answer.
 ///
 /// ```
 /// let received = sevenbot::ReceiveCounts { bytes: 12, ..Default::default() };
@@ -156,13 +154,13 @@ impl From<PortError> for OpenError {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReceiveCounts {
-    /// Bytes of any kind, echoes among them.
+    /// All bytes, with echoes.
     pub bytes: usize,
-    /// Echoes of what was sent. Only the bus of the servos can have them.
+    /// Echoes of sent frames. Only an adapter of the servo bus returns them.
     pub echoes: usize,
-    /// Whole frames, but neither the answer nor an echo.
+    /// Good frames that are neither the answer nor an echo.
     pub other_frames: usize,
-    /// Frames whose checksum was wrong.
+    /// Frames with a wrong checksum.
     pub damaged_frames: usize,
 }
 
@@ -172,7 +170,7 @@ impl fmt::Display for Error {
             Self::OutsideMap { address, count } => {
                 write!(
                     out,
-                    "{count} registers from {address} on: the last register is 255, and one frame takes 255 values"
+                    "{count} registers from {address} on: the last register is 255, and one frame holds 255 values"
                 )
             }
             Self::NoAnswer { span, attempts, waited, received } => {
@@ -219,7 +217,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_missing_answer_says_what_was_heard_instead() {
+    fn a_missing_answer_reports_the_received_bytes() {
         let said = |received| {
             let span = Span::new(54, 7).expect("a span");
             Error::NoAnswer { span, attempts: 3, waited: Duration::from_millis(500), received }.to_string()

@@ -1,6 +1,6 @@
-//! Frames over a serial port: requests out, replies in, and what was received in between.
+//! Frames over a serial port: sends requests, receives replies, counts everything else.
 //!
-//! Knows neither which reply answers which request, nor what a register means.
+//! Does not match replies to requests; `pending.rs` does.
 
 use std::time::{Duration, Instant};
 
@@ -15,11 +15,11 @@ use crate::open_port::OpenPort;
 use crate::snapshot::Snapshot;
 use crate::traffic::Traffic;
 
-/// A serial port that speaks in frames.
+/// A serial port with a deframer.
 pub(crate) struct FramePort {
     port: OpenPort,
     deframer: Deframer<ToHost>,
-    /// What the port brought and the deframer has not taken yet.
+    /// Bytes from the port that the deframer had no room for.
     waiting: Vec<u8>,
     received: ReceiveCounts,
     start: Instant,
@@ -43,7 +43,7 @@ impl FramePort {
         self.port.send(&frame)
     }
 
-    /// The next reply, asked for or not; `None` when none came before `deadline`.
+    /// The next reply or report; `None` if none arrives before `deadline`.
     pub(crate) fn receive(&mut self, deadline: Instant) -> Result<Option<Snapshot>, PortError> {
         loop {
             if let Some(reply) = self.pull() {
@@ -60,7 +60,7 @@ impl FramePort {
         }
     }
 
-    /// The next reply among the bytes that are already here.
+    /// The next reply or report that has already arrived.
     pub(crate) fn receive_waiting(&mut self) -> Result<Option<Snapshot>, PortError> {
         loop {
             if let Some(reply) = self.pull() {
@@ -75,7 +75,7 @@ impl FramePort {
         }
     }
 
-    /// What was received since this was last asked.
+    /// The counts since the last call.
     pub(crate) fn take_received(&mut self) -> ReceiveCounts {
         std::mem::take(&mut self.received)
     }
@@ -99,7 +99,7 @@ impl FramePort {
         None
     }
 
-    /// Hands waiting bytes to the deframer, as many as it takes; `false` when there are none.
+    /// Moves bytes to the deframer, as many as it takes. `false` if there are none.
     fn feed(&mut self) -> bool {
         if self.waiting.is_empty() {
             return false;
@@ -110,9 +110,9 @@ impl FramePort {
         taken > 0
     }
 
-    /// Takes what comes within `timeout`. If nothing does, returns `false` and tells the deframer of the silence.
+    /// Reads from the port. Without bytes within `timeout` it reports an empty line to the deframer and returns `false`.
     fn read(&mut self, timeout: Duration) -> Result<bool, PortError> {
-        // Not the time after the wait: a process that was suspended meanwhile may find bytes in the port.
+        // Use the planned end of the wait. After a suspension the actual end is later, with bytes still in the port.
         let end = self.time_at(Instant::now() + timeout);
         let bytes = self.port.receive(timeout)?;
         self.received.bytes += bytes.len();
@@ -123,7 +123,7 @@ impl FramePort {
         Ok(!bytes.is_empty())
     }
 
-    /// The deadline, or an earlier point where silence would tell the deframer something.
+    /// The deadline, or the earlier time when the deframer expects to hear of an empty line.
     fn wake_up(&self, deadline: Instant) -> Instant {
         let silence = self.deframer.deadline();
         let silence = silence.map(|at| self.start + Duration::from_micros(at.as_micros()));

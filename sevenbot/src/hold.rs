@@ -1,10 +1,10 @@
-//! A stop that is verified: the targets that hold the arm are written, read back, and written again where they differ.
+//! A verified stop: writes targets that hold the arm, reads them back, and writes those again that differ.
 //!
 //! ```text
-//!   look at the joints ──▶ targets that hold them ──▶ write ──▶ look again, until nothing is left to write
+//!   read the joints ──▶ targets that hold them ──▶ write ──▶ read again, until no target differs
 //! ```
 //!
-//! Knows what to write; what the registers say of a joint is in [`crate::joints`].
+//! [`crate::joints`] interprets the registers of each joint.
 
 use std::fmt;
 use std::thread::sleep;
@@ -18,10 +18,10 @@ use crate::checked_write::{MismatchCause, WriteMismatch, cause_from_counters};
 use crate::error::Error;
 use crate::joints::{JointSnapshot, POLL_PERIOD, START_UP_TIME, frames_for};
 
-/// How often targets are written before their loss counts as a failure.
+/// Targets are written so many times before their loss is an error.
 const HOLD_ATTEMPTS: u32 = 5;
 
-/// Why it is not known that the arm holds.
+/// Why the arm may not hold.
 ///
 /// ```
 /// use sevenbot::hold::HoldError;
@@ -31,9 +31,9 @@ const HOLD_ATTEMPTS: u32 = 5;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HoldError {
-    /// The arm could not be asked.
+    /// An exchange with the arm failed.
     Exchange(Error),
-    /// The targets do not hold what was written, however often it was.
+    /// These targets differ from what was written several times.
     NotTaken(Vec<WriteMismatch>),
 }
 
@@ -57,24 +57,23 @@ impl fmt::Display for HoldError {
 
 impl std::error::Error for HoldError {}
 
-/// A target that a stop has written.
+/// A target that was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct SentTarget {
     degrees: u8,
-    /// It was 0, and may not have been measured.
+    /// The target is 0, and the joint was possibly not measured.
     may_be_unmeasured: bool,
 }
 
 const NOTHING_SENT: [Option<SentTarget>; 7] = [None; 7];
 
 impl Arm {
-    /// Makes every joint hold where it is, and makes sure that it took: the targets are written, read back, and written
-    /// again where they differ. Returns the joints as they were read back.
+    /// Makes every joint hold its present position, and verifies the targets. Returns the joints as read back.
     ///
-    /// Where the motors do not drive the joints (state 0 or 2) there is nothing to write. A joint whose servo is silent
-    /// gets the position that was measured last as its target, for the time when it answers again; one that was never
-    /// measured is left alone. A joint that may not be measured yet, because the arm was just switched on, is waited
-    /// for, up to 0.7 s; the others are held before.
+    /// - If the motors do not drive the joints (state 0 or 2), writes nothing.
+    /// - A joint whose servo does not answer gets its last measured position as its target, and none if it was never
+    ///   measured.
+    /// - After power-up waits up to 0.7 s for the joints that are not measured yet. The other joints hold at once.
     ///
     /// # Errors
     /// No answer, or the arm does not take the targets: it may be moving.
@@ -118,7 +117,7 @@ impl Arm {
 }
 
 impl JointSnapshot {
-    /// The targets to write now, so that the joints hold where they are, after `sent` was written.
+    /// The targets to write now so that the joints hold, after `sent` was written.
     fn targets_to_write(&self, sent: &[Option<SentTarget>; 7], is_past_start_up: bool) -> [Option<u8>; 7] {
         let mut targets = [None; 7];
         for ((target, sent), joint) in targets.iter_mut().zip(sent).zip(Joint::ALL) {
@@ -131,17 +130,17 @@ impl JointSnapshot {
         targets
     }
 
-    /// Where the joint is to be held; `None` while that is not known.
+    /// The position at which the joint has to hold; `None` if it is unknown.
     fn hold_target(&self, joint: Joint, is_past_start_up: bool) -> Option<u8> {
         let present = self.present(joint);
         let is_unknown = present == 0 && self.is_missing(joint);
-        // A doubtful joint on its way has left 0 degrees just now, or another host sent it somewhere during start-up.
-        // It cannot wait, and in start-up it is not driven before it was measured, which the next look shows.
+        // A joint that moves at position 0 cannot wait: it has just left 0 degrees, or start-up is not over. In start-up the
+        // arm does not drive a joint before it is measured, and the next read shows that.
         let can_wait = self.may_be_unmeasured(joint, is_past_start_up) && !self.is_moving(joint);
         (!is_unknown && !can_wait).then_some(present)
     }
 
-    /// The targets that do not hold what was sent.
+    /// The targets that differ from what was sent.
     fn lost_targets(&self, sent: &[Option<SentTarget>; 7], before: &Self) -> Vec<WriteMismatch> {
         let cause = match (&before.status, &self.status) {
             (Some(before), Some(after)) => cause_from_counters(before, after),
@@ -174,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_written_again_only_where_it_did_not_take() {
+    fn only_targets_that_differ_are_written_again() {
         let sent = POSE.map(|degrees| Some(SentTarget { degrees, may_be_unmeasured: false }));
         assert_eq!(joint_snapshot(POSE, POSE, 0, 0).targets_to_write(&sent, false), [None; 7]);
         let lost = joint_snapshot([170, 90, 65, 90, 90, 90, 80], [125, 90, 65, 90, 90, 90, 80], 0, 1);
@@ -183,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_that_leaves_zero_degrees_is_stopped_at_once() {
+    fn a_joint_moving_from_0_degrees_is_stopped_at_once() {
         let joints = joint_snapshot([170, 90, 65, 90, 90, 90, 80], [0, 90, 65, 90, 90, 90, 80], 0, 1);
         assert_eq!(joints.targets_to_write(&NOTHING_SENT, false)[0], Some(0));
         assert!(joints.may_be_unmeasured(Joint::ALL[0], false), "it may be start-up: look again");
@@ -212,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_joint_is_held_where_it_was_measured_last_and_never_at_zero() {
+    fn a_missing_joint_is_held_at_its_last_measured_position() {
         let joints = joint_snapshot([170, 90, 170, 90, 90, 90, 80], [120, 90, 0, 90, 90, 90, 80], 0b101, 0);
         let held = joints.targets_to_write(&NOTHING_SENT, true);
         assert_eq!((held[0], held[2]), (Some(120), None));

@@ -1,10 +1,10 @@
-//! Who answered: what kind of device, which chip, whose firmware.
+//! The identity of an arm: device code, firmware version, chip id.
 
 use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, FIRMWARE_VERSION};
 
 use crate::snapshot::Snapshot;
 
-/// What an arm says it is (registers 0 to 7).
+/// Registers 0 to 7 of an arm.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -16,7 +16,7 @@ use crate::snapshot::Snapshot;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity(Snapshot);
 
-/// Whose firmware an arm runs: register 1 tells (D7).
+/// Which firmware an arm runs, by its version in register 1 (D7).
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -29,11 +29,11 @@ pub struct Identity(Snapshot);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Firmware {
-    /// This project's, 3.0 and later: everything here works with it.
+    /// This project's, 3.0 or later: all functions work.
     Ours,
-    /// The maker's, 1.0 to 2.4: it has no status block, checks no ranges, and never says what it refused.
+    /// The maker's, 1.0 to 2.4. It has no status block, checks no ranges and reports no refusal.
     Makers,
-    /// A version nobody is known to have given out.
+    /// Any other version.
     Unknown,
 }
 
@@ -44,19 +44,19 @@ impl From<Snapshot> for Identity {
 }
 
 impl Identity {
-    /// What kind of device it is.
+    /// Register 0: 7 for a 7Bot V2.
     pub(crate) fn device_code(&self) -> u8 {
         self.0.byte(&DEVICE_CODE)
     }
 
-    /// The firmware's version, as `3.0`.
+    /// The firmware version, such as `3.0`.
     #[must_use]
     pub fn version(&self) -> String {
         let tenths = self.0.byte(&FIRMWARE_VERSION);
         format!("{}.{}", tenths / 10, tenths % 10)
     }
 
-    /// Whose firmware it is.
+    /// Which firmware the arm runs.
     #[must_use]
     pub fn firmware(&self) -> Firmware {
         match self.0.byte(&FIRMWARE_VERSION) {
@@ -66,19 +66,19 @@ impl Identity {
         }
     }
 
-    /// Are registers 240 to 255 the status block of docs/protocol.md, section 6?
+    /// Are registers 240 to 255 the status block (docs/protocol.md, section 6)?
     #[must_use]
     pub fn has_status_block(&self) -> bool {
         self.firmware() == Firmware::Ours
     }
 
-    /// The chip's own number, most significant byte first (D8).
+    /// The chip's unique number, most significant byte first (D8).
     #[must_use]
     pub fn chip_id(&self) -> [u8; 6] {
         [0, 1, 2, 3, 4, 5].map(|offset| self.0.at(CHIP_ID.address + offset))
     }
 
-    /// The chip's number as twelve hexadecimal digits.
+    /// The chip id as twelve hexadecimal digits.
     #[must_use]
     pub fn chip_name(&self) -> String {
         self.chip_id().map(|byte| format!("{byte:02X}")).concat()
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_version_tells_whose_firmware_it_is() {
+    fn the_version_selects_the_firmware() {
         let firmware = |version| Identity(Snapshot { address: 0, values: vec![7, version] }).firmware();
         for makers in [10, 21, 22, 24] {
             assert_eq!(firmware(makers), Firmware::Makers, "{makers}");

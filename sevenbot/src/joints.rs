@@ -1,13 +1,16 @@
-//! The joints at one instant, and what follows from it: which positions are measured, and where a relative step begins.
+//! The joints at one instant: which positions are measured, and from where a relative step starts.
 //!
 //! ```text
-//!   motor state, targets, positions, silent and moving joints ──▶ JointSnapshot ──▶ the base of a relative step
-//!                                                                              └──▶ targets that hold the arm (hold.rs)
+//!   motor state, targets, positions, missing and moving joints ──▶ JointSnapshot ──▶ base of a relative step
+//!                                                                              └──▶ targets that hold the arm
 //! ```
 //!
-//! A position of 0 is 0 degrees or, in the first half second after power-up, a joint that was not measured yet. No
-//! register tells start-up from operation, but these facts do: a silent joint (242) is told only after start-up; a
-//! joint at rest whose target is not the power-up value was measured; 700 ms after the first look start-up is over.
+//! Position 0 is either 0 degrees or, in the first half second after power-up, a joint that is not measured yet. No
+//! register tells the two apart, but a joint is measured if one of these holds:
+//!
+//! - Register 242 lists a missing servo, because the arm lists one only after start-up.
+//! - The joint is at rest with target 0, which is no default.
+//! - 700 ms have passed since the first read.
 
 use std::fmt;
 use std::thread::sleep;
@@ -22,14 +25,14 @@ use crate::snapshot::Snapshot;
 use crate::span::Span;
 use crate::status_block::StatusBlock;
 
-/// After power-up an arm measures its joints, or calls them silent, within 500 ms (D12). The rest is for the answer.
+/// After power-up the arm measures each joint or finds it missing within 500 ms (D12). The rest is for the reply.
 pub(crate) const START_UP_TIME: Duration = Duration::from_millis(700);
-/// Time between two looks at an arm that starts.
+/// Time between two reads during start-up.
 pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(20);
-/// A joint this near to its target stands there: a loaded servo stops a few degrees short.
+/// A joint this near to its target has arrived: a loaded servo stops a few degrees short.
 const AT_TARGET_DEGREES: u8 = 5;
 
-/// Why a relative step of a joint has no known start.
+/// Why the base of a relative step is unknown.
 ///
 /// ```
 /// assert_eq!(sevenbot::joints::StepBaseError::Silent.to_string(), "its servo does not answer");
@@ -38,11 +41,11 @@ const AT_TARGET_DEGREES: u8 = 5;
 pub enum StepBaseError {
     /// Its servo does not answer.
     Silent,
-    /// Its target is still the value of power-up, and it stands elsewhere.
+    /// Its target is the default of power-up, and the joint is elsewhere.
     PowerUpTarget {
-        /// In degrees.
+        /// The target in degrees.
         target: u8,
-        /// In degrees.
+        /// The present position in degrees.
         present: u8,
     },
 }
@@ -51,10 +54,9 @@ impl fmt::Display for StepBaseError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Silent => out.write_str("its servo does not answer"),
-            Self::PowerUpTarget { target, present } => write!(
-                out,
-                "it stands at {present}°, and its target of {target}° may be the value of power-up"
-            ),
+            Self::PowerUpTarget { target, present } => {
+                write!(out, "it is at {present}°, and its target of {target}° may be the default of power-up")
+            }
         }
     }
 }
@@ -70,8 +72,8 @@ impl Arm {
         Ok(JointSnapshot { registers, status })
     }
 
-    /// Waits until each joint has a target of its own rather than that of power-up, which after the arm's start takes
-    /// up to half a second (D12); no longer than 0.7 s. Returns the joints as they are then.
+    /// Waits up to 0.7 s until no joint has the default target of power-up. The arm replaces these targets within half a
+    /// second (D12). Returns the joints at that time.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -88,7 +90,7 @@ impl Arm {
     }
 }
 
-/// All joints of an arm, of one instant but for the time between two reads.
+/// All joints of an arm, from two reads.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -106,7 +108,7 @@ pub struct JointSnapshot {
 }
 
 impl JointSnapshot {
-    /// Register 29.
+    /// Register 29, see [`motor_state`].
     #[must_use]
     pub fn motor_state(&self) -> u8 {
         self.registers.byte(&MOTOR_STATE)
@@ -118,31 +120,31 @@ impl JointSnapshot {
         self.motor_state() == motor_state::SERVO
     }
 
-    /// Where the joint should be, in degrees.
+    /// The target position in degrees.
     #[must_use]
     pub fn target(&self, joint: Joint) -> u8 {
         self.registers.at(TARGET_POSITION.of(joint))
     }
 
-    /// Where the joint is, in degrees; 0 as well where that was never measured.
+    /// The present position in degrees; also 0 if the joint was never measured.
     #[must_use]
     pub fn present(&self, joint: Joint) -> u8 {
         self.registers.at(PRESENT_POSITION.of(joint))
     }
 
-    /// Where the joints should be, joint 1 first, in degrees.
+    /// The target positions in degrees, joint 1 first.
     #[must_use]
     pub fn targets(&self) -> [u8; 7] {
         self.registers.joints(&TARGET_POSITION)
     }
 
-    /// Where the joints are, joint 1 first, in degrees.
+    /// The present positions in degrees, joint 1 first.
     #[must_use]
     pub fn positions(&self) -> [u8; 7] {
         self.registers.joints(&PRESENT_POSITION)
     }
 
-    /// The joints whose servo does not answer, by their [`Joint::bit`]s.
+    /// The joints whose servo does not answer, as [`Joint::bit`]s.
     #[must_use]
     pub fn missing(&self) -> u8 {
         self.status.as_ref().map_or(0, StatusBlock::missing)
@@ -156,10 +158,10 @@ impl JointSnapshot {
         self.status.as_ref().is_some_and(|status| status.is_moving(joint))
     }
 
-    /// Where a relative step of this joint begins: its target, in degrees.
+    /// The base of a relative step of this joint: its target, in degrees.
     ///
     /// # Errors
-    /// It is not known where the joint is, or whether the target was ever its own.
+    /// The joint's position or its target is unknown.
     pub fn step_base(&self, joint: Joint) -> Result<u8, StepBaseError> {
         let (target, present) = (self.target(joint), self.present(joint));
         match () {
@@ -169,10 +171,10 @@ impl JointSnapshot {
         }
     }
 
-    /// May the target be the one of power-up, with the joint elsewhere?
+    /// Is the target possibly the default of power-up, with the joint elsewhere?
     fn has_power_up_target(&self, joint: Joint) -> bool {
         let (target, present) = (self.target(joint), self.present(joint));
-        // The maker's firmware may start with other targets; 0 is the likeliest.
+        // The maker's firmware may start with other targets, probably 0.
         let is_default = target == TARGET_POSITION.default_at(TARGET_POSITION.of(joint))
             || (self.status.is_none() && target == 0);
         is_default
@@ -182,17 +184,16 @@ impl JointSnapshot {
             && target.abs_diff(present) > AT_TARGET_DEGREES
     }
 
-    /// May the position of 0 mean that the joint is not measured yet? `is_past_start_up`: the arm has been up for long enough.
+    /// Is position 0 possibly a joint that is not measured yet?
     pub(crate) fn may_be_unmeasured(&self, joint: Joint, is_past_start_up: bool) -> bool {
         let is_start_up_over = is_past_start_up || self.missing() != 0;
-        // Power-up targets are not 0, and a target that the host wrote in start-up counts as on its way.
+        // The default target is not 0, and a joint with a target from the host moves during start-up.
         let was_measured = self.target(joint) == 0 && !self.is_moving(joint);
         self.present(joint) == 0 && !is_start_up_over && !was_measured
     }
 }
 
-/// The writes that give new values to some of a row's joints, joint 1 first, and leave the others alone: one
-/// frame for each run of neighbours.
+/// One write for each run of neighbouring joints with a value, joint 1 first: address and values.
 #[must_use]
 pub fn frames_for(row: &Register, values: &[Option<u8>; 7]) -> Vec<(u8, Vec<u8>)> {
     let pairs: Vec<_> = Joint::ALL.into_iter().zip(values).collect();
@@ -233,7 +234,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_step_does_not_begin_at_a_target_of_power_up() {
+    fn the_default_target_is_no_base_of_a_step() {
         let base = |joints: &JointSnapshot| joints.step_base(Joint::ALL[0]);
         assert_eq!(
             base(&power_up(POSE, 0, 0)),
@@ -255,7 +256,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn joints_that_are_left_out_are_not_written_to() {
+    fn joints_without_a_value_are_not_written() {
         let frames = |left_out: &[u8]| {
             let value = |joint: Joint| (!left_out.contains(&joint.number())).then_some(joint.number());
             frames_for(&TARGET_POSITION, &Joint::ALL.map(value))

@@ -1,15 +1,14 @@
-//! Talks to a 7Bot V2 arm over its serial port: the other end of the wire.
+//! Connects to a 7Bot V2 arm over its serial port.
 //!
 //! ```text
 //!   Arm ── read, write, typed values ──▶ FramePort ──▶ serial port ──▶ arm, simulator, or emulated firmware
-//!    ▲                                    │
-//!    ├── answers ◀── matched by range ────┤
-//!    └── reports ◀── sent unasked (D14) ──┘
+//!    ▲                                        │
+//!    ├── replies ◀── matched by range ────────┤
+//!    └── reports ◀── sent by the arm (D14) ───┘
 //! ```
 //!
-//! Everything blocks, with time-outs. Frames and the register table are those of `protocol-core`, which the
-//! arm itself runs, so the two ends cannot drift apart; `D1` to `D20` are decisions in `docs/protocol.md`.
-//! Knows nothing of motion: what a target does is the arm's business.
+//! All calls block, with timeouts. Frames and the register table come from `protocol-core`, which the arm uses too.
+//! `D1` to `D20` are rules in `docs/protocol.md`. The library sends targets; the arm plans the motion.
 //!
 //! ```no_run
 //! use sevenbot::{Angle, Arm, Joint};

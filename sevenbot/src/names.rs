@@ -1,6 +1,4 @@
-//! Registers by the names people write: `target-position.3`, `SPEED`, `12`, `54..60`.
-//!
-//! The names are those of the table; none stands here.
+//! Parses register names: `target-position.3`, `SPEED`, `12`, `54..60`. The names come from the register table.
 
 use std::fmt;
 
@@ -9,7 +7,7 @@ use protocol_core::registers::{Joint, MAP, Register};
 
 use crate::span::Span;
 
-/// Why a text names no registers.
+/// Why a text is not the name of registers.
 ///
 /// ```
 /// use sevenbot::names::{NameError, parse};
@@ -19,17 +17,17 @@ use crate::span::Span;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NameError {
-    /// No name of the table begins so, and it is no number either.
+    /// No register name starts with the text, and it is not a number.
     Unknown,
-    /// Several names of the table begin so: these rows.
+    /// Several register names start with the text.
     Ambiguous(Vec<&'static Register>),
-    /// What stands behind the dot is no joint: 1 to 7.
+    /// The text after the dot is not a joint, 1 to 7.
     NoJoint,
-    /// The register of this name is not one of seven.
+    /// The row has no register for each joint.
     NotPerJoint(&'static Register),
-    /// Addresses are 0 to 255.
+    /// The number is not an address, 0 to 255.
     NoAddress,
-    /// The range ends before it begins.
+    /// The range ends before it starts.
     EmptyRange,
 }
 
@@ -51,13 +49,13 @@ impl fmt::Display for NameError {
 
 impl std::error::Error for NameError {}
 
-/// The name of a row as people write it: `target-position`.
+/// The name of a row as users write it: `target-position`.
 #[must_use]
 pub fn name_of(row: &Register) -> String {
     row.name.to_ascii_lowercase().replace('_', "-")
 }
 
-/// The name of one register: `target-position.3`, `chip-id+2`, or its number where the table is silent.
+/// The name of one register: `target-position.3` or `chip-id+2`; `register 61` if the table has none.
 #[must_use]
 pub fn name_of_register(address: u8) -> String {
     let Some(row) = find(address) else { return format!("register {address}") };
@@ -68,17 +66,17 @@ pub fn name_of_register(address: u8) -> String {
     }
 }
 
-/// The registers that a text names: a number (`12`), a range (`54..60`, the last one included), or a name
-/// of the table in any case, with `-` or `_`, as short as it is still the only one, with a joint (`.3`)
-/// where there is one register per joint.
+/// Parses a number (`12`), a range with both ends (`54..60`), or a name.
+///
+/// A name may be in any case, with `-` or `_`, and shortened while it is unique. `.3` selects joint 3.
 ///
 /// # Errors
-/// The text names none.
+/// The text is not the name of registers.
 pub fn parse(text: &str) -> Result<Span, NameError> {
     if let Some((first, last)) = text.split_once("..") {
         let (first, last) = (address(first)?, address(last)?);
         let distance = last.checked_sub(first).ok_or(NameError::EmptyRange)?;
-        // All 256 at once are more than one frame can ask for.
+        // One frame cannot read all 256 registers.
         let span = distance.checked_add(1).and_then(|count| Span::new(first, count));
         return span.ok_or(NameError::NoAddress);
     }
@@ -141,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn what_names_nothing_says_why() {
+    fn invalid_names_give_the_reason() {
         assert_eq!(parse("nonsense"), Err(NameError::Unknown));
         assert_eq!(parse(""), Err(NameError::Unknown));
         assert_eq!(parse("speed.8"), Err(NameError::NoJoint));
@@ -155,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_register_in_the_middle_of_a_row_has_a_name_too() {
+    fn each_register_of_a_row_has_a_name() {
         assert_eq!(name_of_register(48), "target-position.3");
         assert_eq!(name_of_register(2), "chip-id");
         assert_eq!(name_of_register(4), "chip-id+2");

@@ -1,4 +1,4 @@
-//! A serial port: bytes with timeouts, and why it fails. Knows no frame.
+//! A serial port: bytes with timeouts, and the reasons why it fails. Knows no frames.
 
 use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
@@ -9,14 +9,14 @@ use serialport::SerialPort;
 
 use crate::error::{OpenError, PortError};
 
-/// The shortest timeout that every platform takes for what it is.
+/// The shortest timeout that works on every platform.
 const SHORTEST_WAIT: Duration = Duration::from_millis(1);
-/// How long the port may refuse to take more bytes.
+/// After this time a port that takes no bytes has failed.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
-/// A lock may outlive its owner: a process that was started meanwhile holds it too until it has become another
-/// program, and on a busy machine that takes a while.
+/// A forked process holds a copy of the lock until it executes its program. So a port may stay locked for a short
+/// time after its owner closed it.
 const UNLOCK_TIMEOUT: Duration = Duration::from_secs(1);
-/// How long to wait before a locked port is tried again.
+/// Time between two attempts to open a locked port.
 const TRY_AGAIN: Duration = Duration::from_millis(20);
 
 /// An open serial port.
@@ -32,10 +32,10 @@ impl fmt::Debug for OpenPort {
 }
 
 impl OpenPort {
-    /// Opens a port, whatever is behind it. No other program can open it meanwhile.
+    /// Opens a port and locks it: no other program can open it.
     ///
     /// # Errors
-    /// It cannot be opened.
+    /// The port cannot be opened.
     pub fn open(name: &str, baud: u32) -> Result<Self, OpenError> {
         let deadline = Instant::now() + UNLOCK_TIMEOUT;
         loop {
@@ -49,7 +49,7 @@ impl OpenPort {
     /// Sends bytes.
     ///
     /// # Errors
-    /// The port is gone, or takes no more bytes.
+    /// The port failed, or takes no more bytes.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.port.set_timeout(WRITE_TIMEOUT).map_err(lost)?;
         self.port.write_all(bytes).map_err(|error| match error.kind() {
@@ -58,10 +58,10 @@ impl OpenPort {
         })
     }
 
-    /// The bytes that are here, or the first that come within `timeout`. Empty when none came.
+    /// The bytes already received, or the first ones within `timeout`. Empty if none arrive.
     ///
     /// # Errors
-    /// The port is gone.
+    /// The port failed.
     pub fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
         if timeout.is_zero() && self.port.bytes_to_read().map_err(lost)? == 0 {
             return Ok(Vec::new());
@@ -79,12 +79,12 @@ impl OpenPort {
         }
     }
 
-    /// Sends and receives at another baud rate from now on; `false` where the port does not know the rate.
+    /// Changes the baud rate; `false` if the port does not support it.
     pub(crate) fn set_baud(&mut self, baud: u32) -> bool {
         self.port.set_baud_rate(baud).is_ok()
     }
 
-    /// The time since it was opened.
+    /// The time since the port was opened.
     pub(crate) fn now(&self) -> Duration {
         self.opened.elapsed()
     }
@@ -93,7 +93,7 @@ impl OpenPort {
 fn open_once(name: &str, baud: u32) -> serialport::Result<Box<dyn SerialPort>> {
     let open = |baud| serialport::new(name, baud).open();
     open(baud).or_else(|error| {
-        // A pseudo-terminal on macOS takes no baud rate; the serialport crate asks for 0 there.
+        // On macOS a pseudo-terminal has no baud rate. The serialport crate then needs rate 0.
         if cfg!(target_os = "macos") && error.kind() == serialport::ErrorKind::Unknown {
             open(0)
         } else {

@@ -1,8 +1,8 @@
-//! Which reads still wait for their replies, so that a late reply is not taken for another read's.
+//! Reads without a reply, so that a late reply is not taken for the reply to another read.
 //!
-//! A reply carries nothing but its range, and the arm replies in the order of the requests (D5). So no two reads wait
-//! for the same range: a read whose range is waited for already asks for a few registers more. The same keeps a read
-//! of the present positions apart from the reports (D14). This file knows no bytes and no time.
+//! A reply is identified by its range only, and the arm replies in the order of the requests (D5). So no two pending
+//! reads have the same range: the second asks for a few registers more. This also keeps a read of the present
+//! positions apart from the reports (D14).
 
 use std::collections::VecDeque;
 
@@ -10,7 +10,7 @@ use protocol_core::registers::map::PRESENT_POSITION;
 
 use crate::span::Span;
 
-/// So many unanswered reads are remembered. A reply that is later than this many reads is not expected.
+/// At most so many pending reads are remembered. No reply is later than this many reads.
 const REMEMBERED: usize = 16;
 
 /// The registers of a report (D14).
@@ -21,8 +21,8 @@ pub(crate) const REPORT: Span = Span::of(&PRESENT_POSITION);
 pub(crate) struct PendingReads(VecDeque<Span>);
 
 impl PendingReads {
-    /// Adds a read of these registers. Returns the registers to ask for: these, and a few more where the reply could
-    /// be taken for another one. A span of more than 239 registers may have no room for that.
+    /// Adds a read of `wanted`. Returns the span to request: wider where `wanted` is pending already. A span of more than
+    /// 239 registers may have no room to be widened.
     pub(crate) fn add(&mut self, wanted: Span) -> Span {
         let is_free = |span: &Span| *span != REPORT && !self.0.contains(span);
         let asked = (0..=u8::MAX).map_while(|by| wanted.widened(by)).find(is_free).unwrap_or(wanted);
@@ -33,7 +33,7 @@ impl PendingReads {
         asked
     }
 
-    /// A reply came: the read it belongs to waits no more, nor do those before it, whose replies are lost.
+    /// Removes the read with this reply, and those before it: their replies are lost.
     pub(crate) fn replied(&mut self, span: Span) {
         if let Some(index) = self.0.iter().position(|&pending| pending == span) {
             self.0.drain(..=index);
@@ -50,7 +50,7 @@ mod tests {
     }
 
     #[test]
-    fn a_read_that_is_asked_again_asks_for_another_range() {
+    fn a_repeated_read_requests_another_span() {
         let mut pending = PendingReads::default();
         assert_eq!(pending.add(span(29, 3)), span(29, 3));
         assert_eq!(pending.add(span(29, 3)), span(29, 4));
@@ -61,12 +61,12 @@ mod tests {
     }
 
     #[test]
-    fn a_read_of_the_positions_is_no_report() {
+    fn a_read_of_the_positions_differs_from_a_report() {
         assert_eq!(PendingReads::default().add(REPORT), span(54, 8));
     }
 
     #[test]
-    fn what_never_comes_is_forgotten() {
+    fn the_number_of_pending_reads_is_bounded() {
         let mut pending = PendingReads::default();
         for _ in 0..1_000 {
             let asked = pending.add(span(240, 16));

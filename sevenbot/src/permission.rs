@@ -1,12 +1,10 @@
-//! Who may open a port: a group, where ports are files and groups have names.
-//!
-//! Only asked once opening has failed.
+//! The group that may open a port, where ports are files.
 
-/// A group's share of a file's mode: reading and writing.
+/// The group may read and write.
 #[cfg(unix)]
 const GROUP_READS_AND_WRITES: u32 = 0o060;
 
-/// The name of the group that may open a port; `None` where there is none, or the system does not say.
+/// The name of the group that may open a port; `None` if there is none, or the system does not tell.
 #[cfg(unix)]
 pub(crate) fn group_of(path: &str) -> Option<String> {
     use std::os::unix::fs::MetadataExt;
@@ -15,13 +13,13 @@ pub(crate) fn group_of(path: &str) -> Option<String> {
     may_open.then(|| name_in(&std::fs::read_to_string("/etc/group").ok()?, file.gid()))?
 }
 
-/// The name of the group that may open a port; `None` where the system does not say.
+/// `None`: ports are not files here.
 #[cfg(not(unix))]
 pub(crate) fn group_of(_: &str) -> Option<String> {
     None
 }
 
-/// The name of a group in a file like /etc/group: `name:password:number:members`.
+/// The name of a group, from a file like /etc/group: `name:password:number:members`.
 #[cfg(unix)]
 fn name_in(groups: &str, number: u32) -> Option<String> {
     groups.lines().find_map(|line| {

@@ -1,8 +1,8 @@
-//! Recordings turned into what is sent to an arm, and when: pure arithmetic, without an arm or a clock.
+//! The frames that play a recording, and when to send each: arithmetic without an arm or a clock.
 //!
 //! ```text
-//!   recording ──▶ cut into pieces of 50 ms at most ──▶ a target for the end of each piece, and the speed
-//!                                                      that brings the joint there by then
+//!   recording ──▶ segments of at most 50 ms ──▶ for each segment: a target, and the speed that brings
+//!                                                the joint there in time
 //! ```
 
 use std::time::Duration;
@@ -10,20 +10,19 @@ use std::time::Duration;
 use crate::recording::{Moment, Recording};
 use crate::units::{Angle, MoveTime, Speed};
 
-/// The longest piece of an even movement that is sent at once. Speeds have steps of 1.9 degrees/s, so a long
-/// piece would end early.
+/// The longest segment of an even movement. A speed has steps of 1.9 degrees/s, so in a longer segment the joint would
+/// arrive early.
 pub(crate) const MAX_SEGMENT: Duration = Duration::from_millis(50);
-/// Joints move so much faster than they need to: a host that was held up for a moment sends late, and what it
-/// lost has to be made up for.
+/// Joints move faster than necessary by this factor, so that they catch up after a late frame.
 const SPEED_RESERVE: f64 = 1.2;
-/// A single degree that is followed by rest is spread over no more than this.
+/// A joint that moves by one degree and then rests spends at most this time on the degree.
 const MAX_DEGREE_DURATION: Duration = Duration::from_millis(250);
-/// The fastest joint's speed on the way to where a recording begins, in degrees/s.
+/// Speed of the fastest joint during the approach to the first pose, in degrees/s.
 const APPROACH_DEGREES_PER_SECOND: f64 = 30.0;
-/// What even the shortest way there takes.
+/// The shortest duration of the approach.
 const MIN_APPROACH: Duration = Duration::from_millis(500);
 
-/// What is sent to the arm at one time: one frame, carried out as one.
+/// One write frame of a playback.
 ///
 /// ```
 /// use sevenbot::{playback, recording::Recording};
@@ -38,31 +37,31 @@ const MIN_APPROACH: Duration = Duration::from_millis(500);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// When, since the beginning.
+    /// When to send it, since the start.
     pub time: Duration,
     /// Does the pump suck?
     pub vacuum: bool,
-    /// Speeds of the joints, joint 1 first.
+    /// Speeds, joint 1 first.
     pub speeds: [Speed; 7],
-    /// Where the joints go, joint 1 first.
+    /// Targets, joint 1 first.
     pub targets: [Angle; 7],
 }
 
 impl Step {
-    /// The registers from the vacuum pump's to the last target's, all of them: one write frame.
+    /// The values of all registers from the vacuum pump to the last target: one write frame.
     #[must_use]
     pub fn registers(&self) -> Vec<u8> {
         let mut bytes = vec![u8::from(self.vacuum)];
         bytes.extend(self.speeds.map(Speed::steps));
-        // A time would count where the speed is the maximum (D11).
+        // At the maximum speed a duration would apply (D11).
         bytes.extend([MoveTime::NONE.steps(); 7]);
         bytes.extend(self.targets.map(Angle::degrees));
         bytes
     }
 }
 
-/// The steps that make an arm, which stands in the recording's first pose, follow the recording `factor`
-/// times as fast as it was made. The last step's time is that of its sending: the arm arrives a piece later.
+/// The steps that play a recording `factor` times as fast, from its first pose. The arm arrives at the last target one
+/// segment after the last step.
 #[must_use]
 pub fn steps(recording: &Recording, factor: f64) -> Vec<Step> {
     let points = segments(recording, factor);
@@ -77,7 +76,7 @@ pub fn steps(recording: &Recording, factor: f64) -> Vec<Step> {
             Step { time: from.time, vacuum: from.vacuum, speeds, targets: to.pose }
         })
         .collect();
-    // Nothing moves any more, but the pump may end otherwise than it was.
+    // The last step can still switch the pump.
     steps.extend(points.last().map(|end| Step {
         time: end.time,
         vacuum: end.vacuum,
@@ -87,7 +86,7 @@ pub fn steps(recording: &Recording, factor: f64) -> Vec<Step> {
     steps
 }
 
-/// One step that brings an arm slowly from where it is to a pose, all joints arriving together.
+/// One step that moves an arm slowly to a pose. All joints arrive together.
 #[must_use]
 pub fn approach(from: [Angle; 7], to: Moment) -> Step {
     let degrees = |joint| distance(&from, &to.pose, joint);
@@ -100,7 +99,7 @@ pub fn approach(from: [Angle; 7], to: Moment) -> Step {
     Step { time: Duration::ZERO, vacuum: to.vacuum, speeds, targets: to.pose }
 }
 
-/// The moments, with more of them between where they are far apart; times from 0, changed by the factor.
+/// The moments with interpolated ones between them. Times start at 0 and are scaled by the factor.
 fn segments(recording: &Recording, factor: f64) -> Vec<Moment> {
     let mut points: Vec<Moment> = Vec::new();
     let mut start = None;
@@ -115,7 +114,7 @@ fn segments(recording: &Recording, factor: f64) -> Vec<Moment> {
     points
 }
 
-/// What lies between two moments, evenly, no two further apart than a piece may be.
+/// Evenly spaced moments between two, at most a segment apart.
 fn interpolated(from: Moment, to: Moment) -> impl Iterator<Item = Moment> {
     let span = to.time - from.time;
     let count = span.as_millis().div_ceil(MAX_SEGMENT.as_millis());
@@ -130,14 +129,14 @@ fn interpolated(from: Moment, to: Moment) -> impl Iterator<Item = Moment> {
     })
 }
 
-/// The angle at a share, 0 to 1, of the way between two others.
+/// The angle at `share` (0 to 1) between two angles.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two angles")]
 fn interpolate(from: Angle, to: Angle, share: f64) -> Angle {
     let (from, to) = (f64::from(from.degrees()), f64::from(to.degrees()));
     Angle::from_register((from + (to - from) * share).round() as u8)
 }
 
-/// The slowest speed at which a joint surely covers so many degrees in this time; the maximum where none is enough.
+/// The slowest speed that covers the degrees in this time; the maximum if none does.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -154,13 +153,13 @@ fn distance(from: &[Angle; 7], to: &[Angle; 7], joint: usize) -> f64 {
     f64::from(degrees(from).abs_diff(degrees(to)))
 }
 
-/// The ways the joints go from point to point.
+/// Points that the joints pass, in order of time.
 struct Waypoints<'a> {
     points: &'a [Moment],
 }
 
 impl Waypoints<'_> {
-    /// How far a joint goes from one point to the next.
+    /// Degrees between a point and the next one.
     fn degrees(&self, index: usize, joint: usize) -> f64 {
         let pair = self.points.get(index).zip(self.points.get(index + 1));
         pair.map_or(0.0, |(from, to)| distance(&from.pose, &to.pose, joint))
@@ -170,20 +169,19 @@ impl Waypoints<'_> {
         self.points.get(index).or(self.points.last()).map_or(Duration::ZERO, |point| point.time)
     }
 
-    /// The speed of a joint's way from one point to the next; `None` where it rests: it may still be on the
-    /// way to the last degree, at the speed that was chosen for it.
+    /// Speed of a joint from a point to the next one. `None` if it rests: the speed of its last degree then remains.
     fn speed(&self, index: usize, joint: usize) -> Option<Speed> {
         let degrees = self.degrees(index, joint);
         let until = match degrees {
             0.0 => return None,
-            // A slow movement is a degree now and then. Each is spread over the time to the next one.
+            // A slow movement has single degrees with rests between them. Each degree fills the time to the next one.
             1.0 => self.next_move(index, joint).min(self.time(index) + MAX_DEGREE_DURATION),
             _ => self.time(index + 1),
         };
         Some(speed_for(degrees, until.saturating_sub(self.time(index))))
     }
 
-    /// When a joint that moves now moves again; the end, if it does not.
+    /// When a joint that moves now moves again, or the time of the last point.
     fn next_move(&self, index: usize, joint: usize) -> Duration {
         let mut later = index + 1..self.points.len();
         let next = later.find(|&later| self.degrees(later, joint) > 0.0);
@@ -207,19 +205,19 @@ mod tests {
     }
 
     #[test]
-    fn a_long_way_is_cut_into_pieces_that_end_on_time() {
+    fn a_long_movement_is_cut_into_segments() {
         let steps = steps(&recording(&[("5", 90), ("6", 110)]), 1.0);
         assert_eq!(steps.len(), 21, "20 pieces and the end");
         assert_eq!(steps[0].time, Duration::ZERO, "however late the recording begins");
         assert_eq!(steps[10].time, Duration::from_millis(500));
         assert_eq!(steps[9].targets[0].degrees(), 100, "to be reached at 500 ms");
-        // 1 degree in 50 ms is 20 °/s; with haste 24, of which 24.7 is the next step up.
+        // 1 degree in 50 ms is 20 °/s. With the reserve it is 24, and the next step up is 24.7.
         assert!((steps[0].speeds[0].degrees_per_second() - 24.7).abs() < 1e-9);
         assert_eq!(steps[20].targets[0].degrees(), 110);
     }
 
     #[test]
-    fn the_factor_makes_it_faster_or_slower() {
+    fn the_factor_scales_times_and_speeds() {
         let moments = [("0", 90), ("0.05", 95)];
         assert!((base_speeds(&moments, 1.0)[0] - 1.9 * 64.0).abs() < 1e-9, "100 °/s, and haste");
         let slow = steps(&recording(&moments), 0.5);
@@ -228,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_movement_is_even_and_not_a_jump_now_and_then() {
+    fn a_slow_movement_has_an_even_speed() {
         // A degree in 200 ms, recorded every 50 ms.
         let moments = [("0", 90), ("0.05", 91), ("0.1", 91), ("0.15", 91), ("0.2", 91), ("0.25", 92)];
         let speeds = base_speeds(&moments, 1.0);

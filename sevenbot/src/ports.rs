@@ -1,6 +1,4 @@
 //! The serial ports of this machine, and which of them lead to an arm.
-//!
-//! Knows how to ask a stranger who it is, quickly; what to make of the answer is the caller's.
 
 use std::thread;
 use std::time::Duration;
@@ -13,10 +11,9 @@ use crate::error::OpenError;
 use crate::identity::Identity;
 use crate::span::Span;
 
-/// How long an arm may take to say who it is: eight registers take 2 ms at 115 200 baud and 25 ms at 9600,
-/// USB adapters add up to 16 ms each way, and an arm's own work little.
+/// Eight registers take 2 ms at 115,200 baud and 25 ms at 9,600 baud. USB adapters add up to 16 ms in each direction.
 const PROBE_TIMEOUT: Duration = Duration::from_millis(200);
-/// A port that just opened may bring rubbish first.
+/// A port that was just opened may first deliver garbage.
 const PROBE_ATTEMPTS: u32 = 2;
 
 /// A serial port of this machine.
@@ -28,13 +25,13 @@ const PROBE_ATTEMPTS: u32 = 2;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PortInfo {
-    /// What to open it by.
+    /// The name to open it by.
     pub name: String,
-    /// What it is plugged into, in the system's words; empty where those are none.
+    /// The system's description of the device; may be empty.
     pub description: String,
 }
 
-/// What was found behind a port.
+/// The result of asking one port.
 ///
 /// ```no_run
 /// let found = sevenbot::ports::probe(sevenbot::ports::available(), 115_200);
@@ -45,17 +42,17 @@ pub struct PortInfo {
 pub struct ProbeResult {
     /// The port.
     pub port: PortInfo,
-    /// Who answered there, with the number its user gave it; or why nobody did.
+    /// The arm's identity and device id (register 11), or why there is none.
     pub answer: Result<(Identity, u8), OpenError>,
 }
 
-/// The serial ports the system knows of. Pseudo-terminals, such as a simulator's, are not among them.
+/// The serial ports that the system lists. Pseudo-terminals, such as a simulator's, are not listed.
 #[must_use]
 pub fn available() -> Vec<PortInfo> {
     let mut ports: Vec<PortInfo> =
         serialport::available_ports().unwrap_or_default().into_iter().map(port).collect();
     ports.sort_by(|one, other| one.name.cmp(&other.name));
-    // macOS has each port twice: tty waits for a carrier that no arm raises, cu does not.
+    // macOS lists each port twice. The tty one waits for a carrier signal, which an arm does not give.
     if cfg!(target_os = "macos") {
         ports.retain(|port| !port.name.starts_with("/dev/tty."));
     }
@@ -75,7 +72,7 @@ fn port(info: serialport::SerialPortInfo) -> PortInfo {
     PortInfo { name: info.port_name, description }
 }
 
-/// Asks all these ports at once who is there.
+/// Asks all these ports at the same time for an arm.
 ///
 /// ```no_run
 /// for found in sevenbot::ports::probe(sevenbot::ports::available(), 115_200) {
@@ -102,19 +99,19 @@ fn open_quickly(name: &str, baud: u32) -> Result<Arm, OpenError> {
     Arm::open_with(name, ArmOptions { baud, reply_timeout: PROBE_TIMEOUT, attempts: PROBE_ATTEMPTS })
 }
 
-/// Finds the baud rate an arm listens at, by trying all eight of them (register 12).
+/// Finds the arm's baud rate by trying all eight (register 12).
 ///
-/// `tell` is told each rate before it is tried.
+/// Calls `on_rate` with each rate before trying it.
 ///
 /// # Errors
-/// None of them is answered: what the last one brought. A port that does not open at all ends the search.
-pub fn find_baud(name: &str, mut tell: impl FnMut(u32)) -> Result<Arm, OpenError> {
+/// No rate is answered: the error of the last one. Or the port cannot be opened.
+pub fn find_baud(name: &str, mut on_rate: impl FnMut(u32)) -> Result<Arm, OpenError> {
     let mut last = OpenError::NotFound;
     for baud in BAUD_RATES {
-        tell(baud);
+        on_rate(baud);
         match open_quickly(name, baud) {
             Ok(arm) => return Ok(arm),
-            // An adapter may not know a rate; the next one may do.
+            // An adapter may not support a rate.
             Err(error @ (OpenError::Silent(_) | OpenError::Unusable(_))) => last = error,
             Err(error) => return Err(error),
         }

@@ -1,6 +1,4 @@
-//! Register values in words, by the table: `-5 °`, `servo`, `joints 2 and 3`.
-//!
-//! Knows how a value reads, not where it is shown.
+//! Register values as text, from the register table: `-5 °`, `servo`, `joints 2 and 3`.
 
 use protocol_core::registers::map::{
     BAUD_RATE, CHIP_ID, EEPROM_LOCK, EFFECTOR_TYPE, FAULTS, LAST_REFUSAL, LAST_REFUSED_REGISTER,
@@ -12,7 +10,7 @@ use crate::names::{name_of, name_of_register};
 use crate::snapshot::Snapshot;
 use crate::units::Speed;
 
-/// One value of the table as it is shown.
+/// The text of one value: one register, or several that form one number.
 ///
 /// ```
 /// use sevenbot::Snapshot;
@@ -23,20 +21,19 @@ use crate::units::Speed;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RegisterEntry {
-    /// Its first register.
+    /// The first register.
     pub address: u8,
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// Its bytes.
+    /// The bytes.
     pub bytes: Vec<u8>,
-    /// The number, in the table's units: what a write takes.
+    /// The number in the table's unit, as `sevenbot set` takes it.
     pub value: String,
-    /// What the number means; empty where it says all itself.
+    /// The meaning of the number; may be empty.
     pub meaning: String,
 }
 
-/// What a snapshot holds, value by value. A value of several registers is one entry where all of them are
-/// there, and bytes where they are not.
+/// The values of a snapshot as text. A value of several registers is one entry if the snapshot has all of them.
 #[must_use]
 pub fn entries(snapshot: &Snapshot) -> Vec<RegisterEntry> {
     let mut entries = Vec::new();
@@ -54,7 +51,7 @@ pub fn entries(snapshot: &Snapshot) -> Vec<RegisterEntry> {
     entries
 }
 
-/// What a snapshot holds, byte by byte, without any interpretation.
+/// The bytes of a snapshot as hexadecimal numbers, one entry each.
 #[must_use]
 pub fn raw_entries(snapshot: &Snapshot) -> Vec<RegisterEntry> {
     let pairs = snapshot.span().addresses().zip(&snapshot.values);
@@ -65,7 +62,7 @@ pub fn raw_entries(snapshot: &Snapshot) -> Vec<RegisterEntry> {
     pairs.map(raw).map(|entry| RegisterEntry { meaning: String::new(), ..entry }).collect()
 }
 
-/// Does a value of several registers begin here, all of them in the snapshot?
+/// Does a value of several registers start here, with all of them in the snapshot?
 fn is_whole(row: &Register, address: u8, snapshot: &Snapshot) -> bool {
     let last = row.address.saturating_add(row.count.saturating_sub(1));
     let runs = row.count > 1 && !row.per_joint && row.access != protocol_core::registers::Access::Reserved;
@@ -90,7 +87,7 @@ fn entry(address: u8, byte: u8) -> RegisterEntry {
     RegisterEntry { address, name: name_of_register(address), bytes: vec![byte], value, meaning }
 }
 
-/// What a byte means in a row of the table; empty where the number says all.
+/// The meaning of a byte in a row; empty if the number is enough.
 #[must_use]
 pub fn meaning(row: &Register, byte: u8) -> String {
     match *row {
@@ -102,7 +99,7 @@ pub fn meaning(row: &Register, byte: u8) -> String {
         FAULTS => faults(byte),
         MISSING_SERVOS | MOVING_JOINTS => joints(byte),
         LAST_REFUSAL => refusal_reason(byte).to_owned(),
-        // No frame is ever refused because of the device code, which is at 0.
+        // No refusal concerns register 0, the device code, so 0 means none.
         LAST_REFUSED_REGISTER if byte == 0 => "none".to_owned(),
         LAST_REFUSED_REGISTER => name_of_register(byte),
         _ => in_unit(row.unit, byte),
@@ -123,7 +120,7 @@ fn in_unit(unit: Unit, byte: u8) -> String {
     }
 }
 
-/// A state of the motors in a word.
+/// The name of a motor state.
 #[must_use]
 pub const fn motor_state_name(state: u8) -> &'static str {
     match state {
@@ -134,7 +131,7 @@ pub const fn motor_state_name(state: u8) -> &'static str {
     }
 }
 
-/// Why the last refused frame was refused.
+/// The reason of the last refusal.
 #[must_use]
 pub const fn refusal_reason(reason: u8) -> &'static str {
     match reason {
@@ -146,7 +143,7 @@ pub const fn refusal_reason(reason: u8) -> &'static str {
     }
 }
 
-/// The faults whose bits are set.
+/// The faults in these bits.
 #[must_use]
 pub fn faults(bits: u8) -> String {
     const WORDS: [(u8, &str); 6] = [
@@ -161,7 +158,7 @@ pub fn faults(bits: u8) -> String {
     list(set.collect()).unwrap_or_else(|| "none".to_owned())
 }
 
-/// The joints whose bits are set.
+/// The joints in these bits.
 #[must_use]
 pub fn joints(bits: u8) -> String {
     let set = Joint::ALL.iter().filter(|joint| bits & joint.bit() != 0);
@@ -175,7 +172,7 @@ fn list(mut words: Vec<String>) -> Option<String> {
     Some(if words.is_empty() { last } else { format!("{} and {last}", words.join(", ")) })
 }
 
-/// The values that the register at `address` takes.
+/// The range of the register at `address`, such as `0 to 180`.
 #[must_use]
 pub fn range(address: u8) -> String {
     find(address).map_or_else(String::new, |row| {
@@ -190,7 +187,7 @@ mod tests {
     use protocol_core::registers::map::{FRAMES_ACCEPTED, OFFSET, SPEED};
 
     #[test]
-    fn bits_become_lists() {
+    fn bits_are_shown_as_lists() {
         assert_eq!(joints(0), "none");
         assert_eq!(joints(0b100), "joint 3");
         assert_eq!(joints(0b110), "joints 2 and 3");
@@ -199,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn values_of_several_registers_are_one_entry_when_they_are_all_there() {
+    fn complete_values_of_several_registers_are_one_entry() {
         let whole = Snapshot { address: 0, values: vec![7, 30, 0xAB, 0x46, 0xDB, 0xA5, 0x94, 0x95] };
         let shown = entries(&whole);
         assert_eq!(shown.len(), 3);
@@ -214,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn values_read_in_the_units_of_the_table() {
+    fn values_have_the_units_of_the_table() {
         assert_eq!(entry(OFFSET.address, 0x85).value, "-5");
         assert_eq!(entry(OFFSET.address, 0x85).meaning, "°");
         assert_eq!(meaning(&SPEED, 60), "114.0 °/s");

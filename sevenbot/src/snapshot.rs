@@ -1,12 +1,10 @@
-//! Registers as they were at one instant: what a single read brought.
-//!
-//! Knows which registers it holds, not what they mean.
+//! The values of consecutive registers at one instant, from one read.
 
 use protocol_core::registers::{Joint, Register};
 
 use crate::span::Span;
 
-/// The values one read brought, all of one instant.
+/// The values of consecutive registers at one instant.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -22,20 +20,20 @@ use crate::span::Span;
 pub struct Snapshot {
     /// The first register.
     pub address: u8,
-    /// The values from there on.
+    /// One value for each register.
     pub values: Vec<u8>,
 }
 
 impl Snapshot {
-    /// The value of the register at `address`; 0 where the read did not reach, as the arm answers where
-    /// its table is silent.
+    /// The value of the register at `address`; 0 if the read did not include it. The arm also answers 0 where the table
+    /// has no register.
     #[must_use]
     pub fn at(&self, address: u8) -> u8 {
         let offset = address.checked_sub(self.address).map(usize::from);
         offset.and_then(|offset| self.values.get(offset)).copied().unwrap_or(0)
     }
 
-    /// The value of a row with one register.
+    /// The value of a row that has one register.
     #[must_use]
     pub fn byte(&self, row: &Register) -> u8 {
         self.at(row.address)
@@ -53,13 +51,13 @@ impl Snapshot {
         Joint::ALL.map(|joint| self.at(row.of(joint)))
     }
 
-    /// The registers it holds; none of them where it claims to hold some past register 255.
+    /// The registers; none if they would reach past 255.
     #[must_use]
     pub fn span(&self) -> Span {
         Span::of_values(self.address, &self.values).unwrap_or(Span::NONE)
     }
 
-    /// These registers of it alone.
+    /// Only these registers.
     pub(crate) fn part(&self, span: Span) -> Self {
         Self { address: span.address(), values: span.addresses().map(|address| self.at(address)).collect() }
     }

@@ -1,4 +1,4 @@
-//! A run of registers, checked when it is made: it never reaches past the last one, 255 (D2).
+//! A range of registers that is checked when it is made: it never reaches past 255 (D2).
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use protocol_core::registers::Register;
 /// The number of addresses.
 const ADDRESSES: usize = 256;
 
-/// A run of registers: so many of them from an address on.
+/// Consecutive registers.
 ///
 /// ```
 /// use sevenbot::{Span, map};
@@ -23,7 +23,7 @@ pub struct Span {
 }
 
 impl Span {
-    /// `count` registers from `address` on; `None` where that reaches past register 255.
+    /// `count` registers from `address` on; `None` if they reach past 255.
     #[must_use]
     pub const fn new(address: u8, count: u8) -> Option<Self> {
         // Lossless.
@@ -39,8 +39,7 @@ impl Span {
         Self { address, count: 1 }
     }
 
-    /// The registers that take these values, one byte each; `None` where some are past register 255, or where they
-    /// are more than one frame takes.
+    /// The registers for these values, one byte each; `None` if they reach past 255 or exceed one frame.
     #[must_use]
     pub fn of_values(address: u8, values: &[u8]) -> Option<Self> {
         Self::new(address, u8::try_from(values.len()).ok()?)
@@ -52,7 +51,7 @@ impl Span {
         Self { address: row.address, count: row.count }
     }
 
-    /// Everything from one row of the table to another one behind it.
+    /// All registers from one row of the table to a later one.
     #[must_use]
     pub const fn between(first: &Register, last: &Register) -> Self {
         let distance = last.address.saturating_sub(first.address);
@@ -65,7 +64,7 @@ impl Span {
         self.address
     }
 
-    /// How many registers.
+    /// The number of registers.
     #[must_use]
     pub const fn count(self) -> u8 {
         self.count
@@ -76,14 +75,14 @@ impl Span {
         (self.address..=u8::MAX).take(usize::from(self.count))
     }
 
-    /// This span and `by` registers more: behind it, or before it at the end of the map.
+    /// This span with `by` registers more: after it, or before it at the end of the map.
     pub(crate) fn widened(self, by: u8) -> Option<Self> {
         let count = self.count.checked_add(by)?;
         Self::new(self.address, count).or_else(|| Self::new(self.address.checked_sub(by)?, count))
     }
 }
 
-/// As the documentation writes it: `54..60`, the last one included.
+/// As in the documentation: `54..60`, with the last one included.
 impl fmt::Display for Span {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.addresses().last() {
@@ -100,7 +99,7 @@ mod tests {
     use protocol_core::registers::map::{FRAMES_ACCEPTED, MAP, OFFSET, STATUS_VERSION};
 
     #[test]
-    fn a_span_reads_as_the_documentation_writes_it() {
+    fn a_span_is_shown_as_in_the_documentation() {
         assert_eq!(Span::of(&OFFSET).to_string(), "13..19");
         assert_eq!(Span::one(12).to_string(), "register 12");
         assert_eq!(Span::one(255).to_string(), "register 255");

@@ -1,6 +1,4 @@
-//! The status block: how the arm says it is (docs/protocol.md, section 6).
-//!
-//! Knows which register says what, not how it is told to a user.
+//! The status block, registers 240 to 255 (docs/protocol.md, section 6).
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{
@@ -13,7 +11,7 @@ use crate::arm::{Arm, STATUS};
 use crate::error::Error;
 use crate::snapshot::Snapshot;
 
-/// The status block, all of one instant.
+/// The status block at one instant.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -30,7 +28,7 @@ use crate::snapshot::Snapshot;
 pub struct StatusBlock(Snapshot);
 
 impl Arm {
-    /// How the arm says it is; `None` from firmware that has no status block, as the maker's.
+    /// Reads the status block; `None` if the firmware has none, as the maker's.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -45,20 +43,20 @@ impl Arm {
 }
 
 impl From<Snapshot> for StatusBlock {
-    /// What a read of [`STATUS`] brought.
+    /// From a read of [`STATUS`].
     fn from(registers: Snapshot) -> Self {
         Self(registers)
     }
 }
 
 impl StatusBlock {
-    /// The registers themselves.
+    /// The registers.
     #[must_use]
     pub const fn registers(&self) -> &Snapshot {
         &self.0
     }
 
-    /// No fault, and every servo answers.
+    /// Is there no fault, and does every servo answer?
     #[must_use]
     pub fn is_healthy(&self) -> bool {
         self.faults() == 0 && self.missing() == 0
@@ -70,7 +68,7 @@ impl StatusBlock {
         self.0.byte(&FAULTS)
     }
 
-    /// The joints whose servo does not answer, by their [`Joint::bit`]s.
+    /// The joints whose servo does not answer, as [`Joint::bit`]s.
     #[must_use]
     pub fn missing(&self) -> u8 {
         self.0.byte(&MISSING_SERVOS)
@@ -82,57 +80,57 @@ impl StatusBlock {
         self.missing() & joint.bit() != 0
     }
 
-    /// The joints whose set-point is on its way, by their [`Joint::bit`]s.
+    /// The joints whose set-point moves, as [`Joint::bit`]s.
     #[must_use]
     pub fn moving(&self) -> u8 {
         self.0.byte(&MOVING_JOINTS)
     }
 
-    /// Is this joint's set-point on its way?
+    /// Does this joint's set-point move?
     #[must_use]
     pub fn is_moving(&self, joint: Joint) -> bool {
         self.moving() & joint.bit() != 0
     }
 
-    /// Why the last refused frame was refused (see [`crate::map::refusal`]), and the register that made it so.
+    /// The reason of the last refusal (see [`crate::map::refusal`]), and the register concerned.
     #[must_use]
     pub fn last_refusal(&self) -> Option<(u8, u8)> {
         let reason = self.0.byte(&LAST_REFUSAL);
         (reason != refusal::NONE).then(|| (reason, self.0.byte(&LAST_REFUSED_REGISTER)))
     }
 
-    /// Frames the arm accepted; wraps.
+    /// Number of accepted frames; wraps.
     #[must_use]
     pub fn frames_accepted(&self) -> u16 {
         self.0.counter(&FRAMES_ACCEPTED)
     }
 
-    /// Frames that reached the arm with a wrong CRC; wraps.
+    /// Number of frames with a wrong CRC; wraps.
     #[must_use]
     pub fn frames_corrupted(&self) -> u16 {
         self.0.counter(&FRAMES_CORRUPTED)
     }
 
-    /// Frames the arm refused; wraps.
+    /// Number of refused frames; wraps.
     #[must_use]
     pub fn frames_refused(&self) -> u16 {
         self.0.counter(&FRAMES_REFUSED)
     }
 
-    /// Questions on the servo bus without an answer that could be trusted; wraps.
+    /// Number of questions on the servo bus without an accepted answer; wraps.
     #[must_use]
     pub fn servo_bus_errors(&self) -> u16 {
         self.0.counter(&SERVO_BUS_ERRORS)
     }
 
-    /// Supply of the servos in volts, where it is known.
+    /// Supply voltage of the servos; `None` if unknown.
     #[must_use]
     pub fn supply_volts(&self) -> Option<f64> {
         let tenths = self.0.byte(&SUPPLY_VOLTAGE);
         (tenths != 0).then(|| f64::from(tenths) / 10.0)
     }
 
-    /// Temperature of the hottest servo in degrees Celsius, where it is known.
+    /// Temperature of the hottest servo in degrees Celsius; `None` if unknown.
     #[must_use]
     pub fn hottest_celsius(&self) -> Option<u8> {
         let degrees = self.0.byte(&SERVO_TEMPERATURE);

@@ -1,4 +1,4 @@
-//! The register table in words, as a document and for other languages, written from the table the arm is built from.
+//! The register table as text: Markdown, C, Python.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use protocol_core::registers::{Access, JOINTS, MAP, Range, Region, Register};
 
 use crate::span::Span;
 
-/// The rows that are settings: kept over power cuts, and writable.
+/// The rows that are settings: writable, and kept without power.
 pub fn settings() -> impl Iterator<Item = &'static Register> {
     MAP.iter().filter(|row| row.region == Region::Eeprom && row.access == Access::ReadWrite)
 }
@@ -72,7 +72,7 @@ fn push_line(text: &mut String, line: &str) {
     let _ = writeln!(text, "{line}");
 }
 
-/// Address, name, region, access, range, default, unit.
+/// Address, name, region, access, range, default and unit of a row.
 #[must_use]
 pub fn cells(row: &Register) -> [String; 7] {
     [
@@ -86,7 +86,7 @@ pub fn cells(row: &Register) -> [String; 7] {
     ]
 }
 
-/// What a program wants to know of a row: the end of the constant's name, and its value.
+/// The constants of a row: suffix of the name, and value.
 fn constants(row: &Register) -> Vec<(&'static str, i16)> {
     let mut constants = vec![("", i16::from(row.address))];
     if row.count > 1 {
@@ -102,7 +102,7 @@ fn addresses(row: &Register) -> String {
     if row.count == 1 { row.address.to_string() } else { Span::of(row).to_string() }
 }
 
-/// A region in a word.
+/// The name of a region.
 #[must_use]
 pub const fn region(region: Region) -> &'static str {
     match region {
@@ -112,7 +112,7 @@ pub const fn region(region: Region) -> &'static str {
     }
 }
 
-/// An access in a word.
+/// The name of an access.
 #[must_use]
 pub const fn access(access: Access) -> &'static str {
     match access {
@@ -122,7 +122,7 @@ pub const fn access(access: Access) -> &'static str {
     }
 }
 
-/// The constants of a row, where they are fewer than a byte has, or may be written.
+/// The range of a row; `None` if a read-only row takes any byte.
 #[must_use]
 pub fn range(row: &Register) -> Option<(i16, i16)> {
     let is_any_byte = row.range == Range::UpTo(u8::MAX) && row.access != Access::ReadWrite;
@@ -137,7 +137,7 @@ fn default(row: &Register) -> String {
     }
 }
 
-/// What a row is for.
+/// The description of a row.
 #[must_use]
 pub fn description(row: &Register) -> String {
     row.doc.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")

@@ -1,12 +1,11 @@
-//! Traffic of both directions, as a parser on the line hears it: frames, and what is none.
+//! Parses both directions of the host link at once, as on a line that only listens.
 //!
 //! ```text
 //!   .. 01 02 AA 77 03 36 07 81 CE AA 77 03 36 07 5A 5A .. 43 81 ..
 //!      ╰ noise ╯╰ read 54..60  ─╯ ╰ answer ────────────────╯
 //! ```
 //!
-//! A read and its answer begin alike. The checksum tells them apart: only one of the two readings has a right
-//! one. Knows no register, and no clock: whoever hears silence says so.
+//! A read and its answer start with the same bytes. Both directions are tried; only one has a valid checksum.
 
 use protocol_core::request::Request;
 use protocol_core::wire::frame::{self, Defect, Direction, Frame, MAX_LENGTH, ParseOutcome};
@@ -14,7 +13,7 @@ use protocol_core::wire::{Function, ToArm, ToHost};
 
 use crate::snapshot::Snapshot;
 
-/// One thing heard on the line.
+/// A frame or noise on the line.
 ///
 /// ```
 /// use sevenbot::traffic::Traffic;
@@ -28,36 +27,36 @@ pub enum Traffic {
     Read {
         /// The first register.
         address: u8,
-        /// How many.
+        /// The number of registers.
         count: u8,
     },
     /// The answer to a read, or a report.
     Answer {
         /// The first register.
         address: u8,
-        /// One byte a register.
+        /// One byte for each register.
         values: Vec<u8>,
     },
     /// A request to write.
     Write {
         /// The first register.
         address: u8,
-        /// One byte a register.
+        /// One byte for each register.
         values: Vec<u8>,
     },
-    /// A frame with a right checksum that reaches past register 255 (D2).
+    /// A frame with a valid checksum that reaches past register 255 (D2).
     TooFar {
         /// The first register.
         address: u8,
-        /// How many.
+        /// The number of registers.
         count: u8,
     },
-    /// Bytes that are no frame.
+    /// Bytes that do not form a frame.
     Noise(Vec<u8>),
 }
 
 impl Traffic {
-    /// A frame that goes in direction `D`.
+    /// From a frame of direction `D`.
     #[must_use]
     pub fn from_frame<D: Direction>(frame: &Frame<'_>) -> Self {
         let (address, count, values) = (frame.address, frame.count, frame.data.to_vec());
@@ -84,7 +83,7 @@ impl From<&Snapshot> for Traffic {
     }
 }
 
-/// Hears bytes, and says what they are.
+/// Splits the bytes of a line into frames and noise.
 ///
 /// ```
 /// use sevenbot::traffic::{Traffic, TrafficParser};
@@ -98,11 +97,11 @@ impl From<&Snapshot> for Traffic {
 #[derive(Clone, Debug, Default)]
 pub struct TrafficParser {
     waiting: Vec<u8>,
-    /// So many of the waiting bytes are no frame, or no beginning of one.
+    /// So many of the waiting bytes are noise.
     noise: usize,
 }
 
-/// What the beginning of some bytes is.
+/// The result for the first of the waiting bytes.
 enum LeadingBytes {
     Frame(Traffic, usize),
     Unfinished,
@@ -110,18 +109,18 @@ enum LeadingBytes {
 }
 
 impl TrafficParser {
-    /// Bytes came.
+    /// Adds received bytes.
     pub fn push(&mut self, bytes: &[u8]) {
         self.waiting.extend(bytes);
     }
 
-    /// The next item; `None` while that depends on bytes to come.
+    /// The next frame or noise; `None` if more bytes are needed.
     #[expect(clippy::should_implement_trait, reason = "none now does not mean none later")]
     pub fn next(&mut self) -> Option<Traffic> {
         self.advance(false)
     }
 
-    /// The next item, now that nothing more belongs to it: the line is silent, or at its end.
+    /// As [`Self::next`], at a gap or at the end of the input: an unfinished frame is noise.
     pub fn next_at_gap(&mut self) -> Option<Traffic> {
         self.advance(true)
     }
@@ -137,7 +136,7 @@ impl TrafficParser {
                 LeadingBytes::Unfinished if !is_gap => return None,
                 LeadingBytes::Unfinished | LeadingBytes::NoFrame => self.noise += 1,
             }
-            // Noise without an end is told in pieces.
+            // Return long noise in parts.
             if self.noise >= MAX_LENGTH {
                 return Some(self.take_noise());
             }
@@ -158,7 +157,7 @@ fn parse_leading(bytes: &[u8]) -> LeadingBytes {
     }
 }
 
-/// What the bytes are if they go in direction `D`. A malformed range still has a length; other damage is no frame.
+/// The result in direction `D`. A frame with a malformed range has a known length; other damage is no frame.
 fn parse_direction<D: Direction>(bytes: &[u8]) -> LeadingBytes {
     match (frame::parse::<D>(bytes), bytes) {
         (ParseOutcome::Complete(found, length), _) => {
@@ -204,13 +203,13 @@ mod tests {
     }
 
     #[test]
-    fn both_directions_are_told_apart() {
+    fn both_directions_are_distinguished() {
         let (bytes, item) = conversation();
         assert_eq!(parse_all(&bytes), item);
     }
 
     #[test]
-    fn any_cutting_gives_the_same() {
+    fn chunks_of_any_size_give_the_same_traffic() {
         let (bytes, item) = conversation();
         for size in 1..bytes.len() {
             let mut parser = TrafficParser::default();
@@ -225,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_noise_and_the_frame_behind_it_is_heard() {
+    fn a_frame_after_a_damaged_one_is_found() {
         let mut damaged = ANSWER.to_vec();
         damaged[6] ^= 1;
         let item = parse_all(&[&damaged, READ].concat());
@@ -234,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unfinished_frame_is_waited_for_until_silence() {
+    fn an_unfinished_frame_becomes_noise_at_a_gap() {
         let mut parser = TrafficParser::default();
         let header = b"\xaa\x77\x06\x00\xff";
         parser.push(&[header, READ].concat());
@@ -244,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_range_beyond_the_last_register_is_a_frame_that_reaches_too_far() {
+    fn a_range_past_register_255_is_a_frame() {
         let mut frame = FrameBuffer::new();
         Request::Read { address: 250, count: 7 }.encode(&mut frame);
         assert_eq!(parse_all(&frame), [Traffic::TooFar { address: 250, count: 7 }]);
@@ -253,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_without_an_end_does_not_pile_up() {
+    fn endless_noise_needs_bounded_memory() {
         let mut parser = TrafficParser::default();
         for _ in 0..100 {
             parser.push(&[0x55; 100]);

@@ -1,4 +1,4 @@
-//! Traffic in words, by the names of the register table.
+//! Traffic as text, with the names of the register table.
 //!
 //! ```text
 //!   read present-position 1..7
@@ -18,9 +18,9 @@ use crate::snapshot::Snapshot;
 use crate::span::Span;
 use crate::traffic::Traffic;
 
-/// A read of more rows than this is named by its ends.
+/// A read of more rows shows only the first and the last.
 const MAX_ROWS_NAMED: usize = 3;
-/// Of a long run of noise so many bytes are shown.
+/// Noise shows at most so many bytes.
 const MAX_NOISE_SHOWN: usize = 32;
 
 impl fmt::Display for Traffic {
@@ -32,7 +32,7 @@ impl fmt::Display for Traffic {
             Self::Answer { address, values } => write!(out, "answer {}", assignments(*address, values)),
             Self::Write { address, values } => write!(out, "write {}", assignments(*address, values)),
             Self::TooFar { address, count } => {
-                write!(out, "{count} registers from {address} on, which is past the last one, 255")
+                write!(out, "{count} registers from {address} on, but the last register is 255")
             }
             Self::Noise(bytes) => noise(bytes, out),
         }
@@ -51,7 +51,7 @@ fn noise(bytes: &[u8], out: &mut fmt::Formatter<'_>) -> fmt::Result {
     if bytes.len() > MAX_NOISE_SHOWN { out.write_str(" ..") } else { Ok(()) }
 }
 
-/// Registers inside one row of the table, or inside one of its holes.
+/// Registers of one row, or of one hole in the table.
 #[derive(Clone, Copy)]
 struct RowSpan {
     row: Option<&'static Register>,
@@ -72,7 +72,7 @@ fn row_spans(span: Span) -> Vec<RowSpan> {
 }
 
 impl RowSpan {
-    /// `target-position 1..7`, `device-id`, `no register 61..63`: joints by their numbers, the rest by address.
+    /// `target-position 1..7`, `device-id`, `no register 61..63`.
     fn name(self) -> String {
         let Some(row) = self.row else { return format!("no register {}", range(self.first, self.last)) };
         match (row.joint_at(self.first), row.joint_at(self.last)) {
@@ -101,7 +101,7 @@ impl RowSpan {
     }
 }
 
-/// What a single value means: a unit as it is, a word in brackets.
+/// The meaning of a single value: a unit as it is, other text in brackets.
 fn comment(row: &Register, words: &str) -> String {
     if words == row.unit.symbol() || words.is_empty() { suffix(words) } else { format!(" ({words})") }
 }
@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn requests_and_answers_read_by_the_table() {
+    fn frames_are_shown_with_register_names() {
         let read = |address, count| Traffic::Read { address, count }.to_string();
         assert_eq!(read(54, 7), "read present-position 1..7");
         assert_eq!(read(60, 3), "read present-position 7, no register 61..62");
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn values_have_their_meaning_behind_them() {
+    fn values_are_followed_by_their_meaning() {
         let write = |address, values: &[u8]| Traffic::Write { address, values: values.to_vec() }.to_string();
         assert_eq!(write(28, &[0, 1]), "write eeprom-lock = 0 (open), motor-state = 1 (servo)");
         assert_eq!(write(13, &[0x85, 3]), "write offset 1..2 = -5 3 °");
@@ -163,13 +163,13 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_shown_as_such() {
+    fn noise_is_shown_in_hexadecimal() {
         assert_eq!(Traffic::Noise(vec![1]).to_string(), "1 byte that is no frame: 01");
         assert_eq!(Traffic::Noise(vec![1, 0xAB]).to_string(), "2 bytes that are no frame: 01 AB");
         let damaged = Traffic::Noise(vec![0xAA, 0x77, 3, 1]).to_string();
         assert_eq!(damaged, "a damaged frame or a part of one, 4 bytes: AA 77 03 01");
         assert!(Traffic::Noise(vec![0; 40]).to_string().ends_with("00 .."));
         let far = Traffic::TooFar { address: 250, count: 7 }.to_string();
-        assert_eq!(far, "7 registers from 250 on, which is past the last one, 255");
+        assert_eq!(far, "7 registers from 250 on, but the last register is 255");
     }
 }

@@ -1,11 +1,9 @@
-//! Quantities of the arm with their units in the type.
-//!
-//! Knows the registers' steps (docs/protocol.md, D10, D11, D18), not the registers.
+//! Angle, speed and duration with their units in the type, in the registers' steps (docs/protocol.md, D10, D11, D18).
 
 use std::fmt;
 use std::time::Duration;
 
-/// Angle of a joint, in whole degrees from 0 to 180, as the arm's registers hold it (D18).
+/// Angle of a joint in whole degrees, 0 to 180, as in the registers (D18).
 ///
 /// ```
 /// use sevenbot::Angle;
@@ -20,19 +18,19 @@ impl Angle {
     /// The largest angle, in degrees.
     pub const MAX_DEGREES: u8 = 180;
 
-    /// `None` where a joint cannot be asked for so many degrees.
+    /// `None` above 180 degrees.
     #[must_use]
     pub const fn from_degrees(degrees: u8) -> Option<Self> {
         if degrees <= Self::MAX_DEGREES { Some(Self(degrees)) } else { None }
     }
 
-    /// What a register holds. A byte past 180, which no arm should send, counts as 180.
+    /// From a register. A value above 180 counts as 180.
     #[must_use]
     pub const fn from_register(byte: u8) -> Self {
         if byte <= Self::MAX_DEGREES { Self(byte) } else { Self(Self::MAX_DEGREES) }
     }
 
-    /// In degrees.
+    /// The angle in degrees.
     #[must_use]
     pub const fn degrees(self) -> u8 {
         self.0
@@ -57,26 +55,26 @@ impl fmt::Display for Angle {
 pub struct Speed(u8);
 
 impl Speed {
-    /// The motor's maximum, 62 rpm; it leaves the choice to [`MoveTime`] where that is set (D11).
+    /// The motor's maximum, 62 rpm. With it [`MoveTime`] applies (D11).
     pub const MAXIMUM: Self = Self(0);
     /// 62 rpm in degrees/s.
     const MAXIMUM_DEGREES_PER_SECOND: f64 = 372.0;
-    /// Degrees/s of one step.
+    /// One step in degrees/s.
     const STEP_DEGREES_PER_SECOND: f64 = 1.9;
 
-    /// `steps` of 1.9 degrees/s, 1 to 100; 0 is the maximum. `None` for more than 100.
+    /// `steps` of 1.9 degrees/s, 1 to 100; 0 is the maximum. `None` above 100.
     #[must_use]
     pub const fn from_steps(steps: u8) -> Option<Self> {
         if steps <= 100 { Some(Self(steps)) } else { None }
     }
 
-    /// What the register holds.
+    /// The register's value.
     #[must_use]
     pub const fn steps(self) -> u8 {
         self.0
     }
 
-    /// In degrees/s.
+    /// The speed in degrees/s.
     #[must_use]
     pub fn degrees_per_second(self) -> f64 {
         match self.0 {
@@ -86,7 +84,7 @@ impl Speed {
     }
 }
 
-/// How long a joint's moves take, in the register's steps of 100 ms; counts where the speed is 0 (D11).
+/// Duration of a joint's moves, in the register's steps of 100 ms. It applies where the speed is 0 (D11).
 ///
 /// ```
 /// use sevenbot::MoveTime;
@@ -98,30 +96,30 @@ impl Speed {
 pub struct MoveTime(u8);
 
 impl MoveTime {
-    /// No duration is asked for.
+    /// No duration: the motor moves at its maximum.
     pub const NONE: Self = Self(0);
 
-    /// `steps` of 100 ms, 0 to 100. `None` for more.
+    /// `steps` of 100 ms, 0 to 100. `None` above 100.
     #[must_use]
     pub const fn from_steps(steps: u8) -> Option<Self> {
         if steps <= 100 { Some(Self(steps)) } else { None }
     }
 
-    /// What the register holds.
+    /// The register's value.
     #[must_use]
     pub const fn steps(self) -> u8 {
         self.0
     }
 
-    /// As a length of time.
+    /// The duration.
     #[must_use]
     pub const fn duration(self) -> Duration {
-        // `as` widens here: `From` is not const.
+        // Lossless; `From` is not const.
         Duration::from_millis(self.0 as u64 * 100)
     }
 }
 
-/// How long a joint takes over `degrees` with this speed and time (D11).
+/// How long a joint needs for `degrees` with this speed and duration (D11).
 #[must_use]
 pub fn move_duration(degrees: u8, speed: Speed, time: MoveTime) -> Duration {
     let at_speed = Duration::from_secs_f64(f64::from(degrees) / speed.degrees_per_second());
@@ -133,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn speed_goes_before_time_and_zero_is_the_maximum() {
+    fn a_duration_applies_only_at_speed_0() {
         let (Some(slow), Some(long)) = (Speed::from_steps(10), MoveTime::from_steps(50)) else {
             panic!("both are in range");
         };
@@ -143,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn quantities_end_where_their_registers_do() {
+    fn quantities_have_the_range_of_their_registers() {
         assert_eq!(Angle::from_degrees(180).map(Angle::degrees), Some(180));
         assert_eq!(Angle::from_degrees(181), None);
         assert_eq!(Angle::from_register(200).degrees(), 180);

@@ -1,5 +1,4 @@
-//! The library against an arm that misbehaves on purpose, through a real pseudo-terminal: what a healthy
-//! arm, or a healthy simulator, never does.
+//! The library with an arm that misbehaves, on a real pseudo-terminal.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
@@ -14,13 +13,13 @@ use fake::{IDENTITY, answering_arm, reply};
 use serialport::{SerialPort, TTYPort};
 use sevenbot::{Arm, ArmOptions, Error, OpenError, ReceiveCounts};
 
-/// Patient: a busy machine may take long to answer, and only tests of silence wait to the end.
+/// A long timeout for a busy machine. Only tests of a silent arm wait that long.
 fn options() -> ArmOptions {
     ArmOptions { reply_timeout: Duration::from_secs(2), ..ArmOptions::default() }
 }
 
 #[test]
-fn a_read_that_got_lost_is_asked_again() {
+fn a_lost_read_is_repeated() {
     let (name, _port) = answering_arm(|read, _, _| if read < 2 { vec![] } else { reply(0, &IDENTITY) });
     let arm = Arm::open_with(&name, options()).expect("the third try is answered");
     assert_eq!(arm.identity().version(), "3.0");
@@ -28,7 +27,7 @@ fn a_read_that_got_lost_is_asked_again() {
 }
 
 #[test]
-fn a_silent_port_is_told_from_garbage() {
+fn a_silent_port_differs_from_garbage() {
     let received = |bytes: &'static [u8]| {
         let (name, _port) = answering_arm(move |_, _, _| bytes.to_vec());
         match Arm::open_with(&name, options()) {
@@ -50,18 +49,18 @@ fn another_device_is_refused_by_its_code() {
 
 #[test]
 fn an_echo_of_the_request_is_no_answer() {
-    // A one-wire adapter sends back what it was told to send: seen from here, a reply cut short.
+    // A one-wire adapter echoes the request. The library sees a reply that is cut short.
     let echo = [0xAA, 0x77, 0x03, 0x00, 0x08, 0x50, 0x27];
     let (name, _port) = answering_arm(move |_, _, _| [echo.as_slice(), &reply(0, &IDENTITY)].concat());
     assert!(Arm::open_with(&name, options()).is_ok());
 }
 
 #[test]
-fn reports_in_between_are_neither_answers_nor_lost() {
+fn reports_between_replies_are_kept() {
     let positions = |first: u8| reply(54, &[first, 20, 30, 40, 50, 60, 70]);
     let (name, _port) = answering_arm(move |read, address, count| match read {
         0 => reply(0, &IDENTITY),
-        // Two reports and an answer nobody asked for, then the one that was asked for.
+        // Two reports and a late reply arrive before the reply.
         1 => [positions(1), positions(2), reply(12, &[9]), reply(address, &vec![3; count.into()])].concat(),
         _ => [reply(address, &vec![4; count.into()]), positions(5)].concat(),
     });
@@ -76,10 +75,10 @@ fn reports_in_between_are_neither_answers_nor_lost() {
 }
 
 #[test]
-fn a_late_answer_is_not_taken_for_the_next_one() {
+fn a_late_answer_is_not_taken_for_the_next() {
     let (name, _port) = answering_arm(|read, address, _| match read {
         0 => reply(0, &IDENTITY),
-        // The second answer is as good as the first, but comes too late to be wanted.
+        // The second reply to the same read arrives too late.
         1 => [reply(address, &[1]), reply(address, &[99])].concat(),
         _ => reply(address, &[2]),
     });
@@ -90,7 +89,7 @@ fn a_late_answer_is_not_taken_for_the_next_one() {
 }
 
 #[test]
-fn a_port_that_is_not_there_says_so() {
+fn ports_that_cannot_be_opened_give_the_reason() {
     assert!(matches!(Arm::open("/dev/no-such-port", 115_200), Err(OpenError::NotFound)));
     assert!(matches!(Arm::open("/dev/null", 115_200), Err(OpenError::Unusable(_))));
     let (name, _port) = answering_arm(|_, _, _| reply(0, &IDENTITY));
@@ -99,7 +98,7 @@ fn a_port_that_is_not_there_says_so() {
 }
 
 #[test]
-fn a_pulled_cable_is_an_error_not_a_time_out() {
+fn a_pulled_cable_is_an_error_and_no_timeout() {
     let (mut master, slave) = TTYPort::pair().unwrap();
     let name = slave.name().unwrap();
     let answering = thread::spawn(move || {

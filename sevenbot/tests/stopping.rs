@@ -1,4 +1,4 @@
-//! Stopping an arm over a line that loses, damages or delays one frame, whichever it is.
+//! Verified stops and writes on a line that loses, damages or delays one frame.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
@@ -15,12 +15,12 @@ use protocol_core::request::Request;
 use sevenbot::hold::HoldError;
 use sevenbot::{Arm, ArmOptions, Error};
 
-/// Frames wait this long; the many attempts give a busy machine ten seconds.
+/// Each lost frame costs one timeout. The many attempts allow a busy machine ten seconds.
 const OPTIONS: ArmOptions =
     ArmOptions { baud: 115_200, reply_timeout: Duration::from_millis(200), attempts: 50 };
 
 #[test]
-fn a_stop_survives_the_loss_of_any_frame() {
+fn a_stop_succeeds_despite_one_lost_frame() {
     for fault in [LineFault::Lost, LineFault::Garbled, LineFault::Late] {
         for faulty_frame in 0..14 {
             let registers = moving_registers();
@@ -34,7 +34,7 @@ fn a_stop_survives_the_loss_of_any_frame() {
 }
 
 #[test]
-fn a_checked_write_survives_the_loss_of_any_frame() {
+fn a_checked_write_succeeds_despite_one_lost_frame() {
     for fault in [LineFault::Lost, LineFault::Garbled, LineFault::Late] {
         for faulty_frame in 0..14 {
             let registers = moving_registers();
@@ -57,7 +57,7 @@ fn a_late_reply_is_not_the_reply_to_the_next_read_of_the_same_registers() {
             1 => reply(0, &IDENTITY),
             // The first attempt gets no reply in time.
             2 => Vec::new(),
-            // It comes with the second attempt, whose own reply comes with the next read.
+            // The reply to the first attempt arrives during the second, and that of the second during the next read.
             3 => reply(10, &[1; 4]),
             4 => [reply(10, &[2; 5]), values(3)].concat(),
             _ => panic!("a read too many"),

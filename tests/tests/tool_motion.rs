@@ -157,7 +157,7 @@ fn a_file_with_an_error_moves_nothing() {
             failed(&arm.sevenbot(&[&["play", text(&recording)], options].concat()), 1)
         };
         let text = refused(arm, "hello\n", &[]);
-        assert!(text.contains("wrong.txt") && text.contains("no recording"), "{text}");
+        assert!(text.contains("wrong.txt") && text.contains("not a recording"), "{text}");
         let text = refused(arm, &format!("{WAVE}1.5 90 90 181 90 90 90 80 0\n"), &[]);
         assert!(text.contains("line 6: joint 3 cannot go to `181`"), "{text}");
         let text = refused(arm, WAVE, &["--speed", "9"]);

@@ -50,7 +50,7 @@ answer present-position 1..7 = 90 90 65 90 90 90 80 °
 3 bytes that are no frame: 01 02 03
 write eeprom-lock = 0 (open), motor-state = 1 (servo)
 a damaged frame or a part of one, 14 bytes: AA 77 03 36 07 5A 5A 41 5B 5A 5A 50 43 81
-7 registers from 250 on, which is past the last one, 255
+7 registers from 250 on, but the last register is 255
 a damaged frame or a part of one, 4 bytes: AA 77 03 00
 ";
     let folder = tempfile::tempdir().expect("a folder");

@@ -59,7 +59,8 @@ pub(crate) fn run(session: &mut Session, args: &BaudArgs) -> Result<(), CommandE
     let baud = arm.options().baud;
     if let Some(rate) = args.rate {
         let code = BAUD_RATES.iter().zip(0..).find_map(|(&known, code)| (known == rate).then_some(code));
-        let code = code.ok_or_else(|| CommandError::Usage(format!("the arm does not know {rate} baud")))?;
+        let code =
+            code.ok_or_else(|| CommandError::Usage(format!("the arm does not support {rate} baud")))?;
         all_taken(&unlocked(&mut arm, |arm| arm.write_checked(BAUD_RATE.address, &[code]))?)?;
     }
     let baud_after_restart = baud_rate(arm.read_span(Span::of(&BAUD_RATE))?.byte(&BAUD_RATE));

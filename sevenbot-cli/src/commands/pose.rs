@@ -160,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn goals_are_absolute_relative_or_none() {
+    fn pose_arguments_are_absolute_relative_or_empty() {
         assert_eq!("120".parse(), Ok(PoseArg::At(120)));
         assert_eq!("+10".parse(), Ok(PoseArg::By(10)));
         assert_eq!("-10".parse(), Ok(PoseArg::By(-10)));

@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_become_bytes_by_the_table() {
+    fn numbers_are_encoded_by_the_table() {
         let joint_2 = Span::one(OFFSET.address + 1);
         assert_eq!(bytes(joint_2, &[-5], false).ok(), Some(vec![0x85]));
         assert_eq!(bytes(Span::of(&OFFSET), &[3], false).ok(), Some(vec![3; 7]));
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_before_it_is_sent() {
+    fn values_out_of_range_are_not_sent() {
         let target = Span::one(TARGET_POSITION.address);
         let Err(CommandError::Arm(said)) = bytes(target, &[181], false) else { panic!("out of range") };
         assert!(said.contains("target-position.1 takes 0 to 180"), "{said}");

@@ -1,4 +1,4 @@
-//! One line of a recording: a moment, as text and back.
+//! One line of a recording: formatting and parsing of a moment.
 
 use std::fmt;
 use std::time::Duration;
@@ -9,10 +9,10 @@ use crate::units::{Angle, Speed};
 
 /// Time, seven angles, vacuum.
 const FIELDS: usize = 9;
-/// A recording ends within a day, so that no arithmetic on its times can overflow.
+/// Longer times are refused, so the arithmetic cannot overflow.
 const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
 
-/// Where the arm was at one time.
+/// Pose and pump at one time.
 ///
 /// ```
 /// use sevenbot::Angle;
@@ -25,15 +25,15 @@ const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moment {
-    /// Since the beginning of the recording.
+    /// Since the start of the recording.
     pub time: Duration,
-    /// Joint 1 first.
+    /// The angles, joint 1 first.
     pub pose: [Angle; 7],
     /// Does the pump suck?
     pub vacuum: bool,
 }
 
-/// What is wrong with a line of a recording.
+/// Why a line of a recording is refused.
 ///
 /// ```
 /// use sevenbot::recording::{LineError, Recording, RecordingError};
@@ -43,34 +43,34 @@ pub struct Moment {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum LineError {
-    /// A moment has nine fields.
+    /// The line has so many fields instead of nine.
     Fields(usize),
-    /// This is no time in seconds.
+    /// The text is not a time in seconds, up to a day.
     Time(String),
-    /// It is not later than the moment before it.
+    /// The time is not later than that of the moment before.
     NotLater,
-    /// This is no angle in whole degrees from 0 to 180.
+    /// The text is not an angle in whole degrees from 0 to 180.
     Angle {
-        /// The joint it was meant for.
+        /// The joint of this field.
         joint: Joint,
-        /// What stands there.
+        /// The text of the field.
         text: String,
     },
-    /// This is neither 0 nor 1.
+    /// The text is neither 0 nor 1.
     Vacuum(String),
-    /// No joint can move so fast.
+    /// The joint would have to move faster than its motor.
     TooFast {
-        /// The joint that would have to.
+        /// The joint.
         joint: Joint,
-        /// How fast it would have to move, in degrees/s.
+        /// The necessary speed in degrees/s.
         degrees_per_second: f64,
     },
 }
 
-// Speeds come from finite numbers, never from NaN.
+// A speed is never NaN: it is a quotient of finite numbers.
 impl Eq for LineError {}
 
-/// The moment that a line holds.
+/// Parses a line.
 pub(super) fn parse(line: &str) -> Result<Moment, LineError> {
     let fields: Vec<&str> = line.split_whitespace().collect();
     let [time, pose @ .., vacuum] = fields.as_slice() else { return Err(LineError::Fields(fields.len())) };
@@ -114,13 +114,13 @@ impl fmt::Display for LineError {
             Self::Fields(found) => {
                 write!(out, "{found} fields instead of {FIELDS}: seconds, seven angles, vacuum")
             }
-            Self::Time(text) => write!(out, "`{text}` is no time in seconds, or more than a day"),
+            Self::Time(text) => write!(out, "`{text}` is not a time in seconds, up to a day"),
             Self::NotLater => out.write_str("the time is not later than the one before"),
             Self::Angle { joint, text } => {
                 let number = joint.number();
                 write!(out, "joint {number} cannot go to `{text}`: whole degrees from 0 to 180")
             }
-            Self::Vacuum(text) => write!(out, "`{text}` is no vacuum: 1 to suck, 0 to release"),
+            Self::Vacuum(text) => write!(out, "`{text}` is not a pump state: 1 sucks, 0 releases"),
             Self::TooFast { joint, degrees_per_second } => {
                 let (number, limit) = (joint.number(), Speed::MAXIMUM.degrees_per_second());
                 write!(out, "joint {number} would have to turn at {degrees_per_second:.0} °/s; ")?;

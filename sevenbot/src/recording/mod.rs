@@ -1,14 +1,14 @@
-//! Recordings of a movement: text that people can read, write and change.
+//! Recordings of movements: a text format for programs and people.
 //!
 //! ```text
-//!   7bot-recording 1                               what it is, and the version of the format
-//!   # seconds  joints 1 to 7 in degrees  vacuum    a comment, anywhere
-//!   0.000   90  90  65  90  90  90  80   0         one moment a line: vacuum is 1 to suck, 0 to release
+//!   7bot-recording 1                               the format and its version
+//!   # seconds  joints 1 to 7 in degrees  vacuum    a comment
+//!   0.000   90  90  65  90  90  90  80   0         one moment per line; vacuum: 1 sucks, 0 releases
 //!   0.033   91  90  65  90  90  90  80   0
 //! ```
 //!
-//! Between two moments the joints move evenly, so a movement written by hand needs a line only where its
-//! direction or speed changes. Knows no arm.
+//! The joints move evenly between two moments. So a movement written by hand needs a line only where its direction or
+//! speed changes.
 
 use std::fmt;
 use std::time::Duration;
@@ -25,10 +25,10 @@ pub use line::{LineError, Moment};
 const FORMAT: &str = "7bot-recording";
 /// The version of the format, the second word.
 const VERSION: &str = "1";
-/// Angles are rounded to whole degrees, so two of them may seem one degree further apart than they were.
+/// Rounding to whole degrees can add one degree to a distance.
 const ROUNDING_DEGREES: f64 = 1.0;
 
-/// A movement: moments in rising order of time, at least one.
+/// A movement: at least one moment, in ascending order of time.
 ///
 /// ```
 /// use sevenbot::recording::Recording;
@@ -43,11 +43,11 @@ const ROUNDING_DEGREES: f64 = 1.0;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recording {
-    /// Each with the number of its line.
+    /// Each moment with its line number.
     moments: Vec<(usize, Moment)>,
 }
 
-/// Why a text is no recording, or none that an arm could follow.
+/// Why a text is not a recording, or cannot be played.
 ///
 /// ```
 /// use sevenbot::recording::{Recording, RecordingError};
@@ -57,28 +57,28 @@ pub struct Recording {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RecordingError {
-    /// It does not begin as recordings do.
+    /// The first line is not the header of a recording.
     NotARecording,
-    /// It is of another version of the format.
+    /// The version of the format is not 1.
     OtherVersion(String),
-    /// There is no moment in it.
+    /// There are no moments.
     Empty,
-    /// A line cannot be right.
+    /// A line is refused.
     Line {
-        /// Its number; the first is 1.
+        /// The line number, from 1.
         number: usize,
-        /// What is wrong.
+        /// The reason.
         cause: LineError,
     },
 }
 
 impl Recording {
-    /// The recording that a text holds.
+    /// Parses a recording.
     ///
     /// # Errors
-    /// The text is no recording; the first line that is wrong is named.
+    /// The first line that is refused.
     pub fn parse(text: &str) -> Result<Self, RecordingError> {
-        let mut lines = (1..).zip(text.lines()).filter(|(_, line)| says_something(line));
+        let mut lines = (1..).zip(text.lines()).filter(|(_, line)| has_content(line));
         header(lines.next().map(|(_, line)| line))?;
         let mut moments: Vec<(usize, Moment)> = Vec::new();
         for (number, line) in lines {
@@ -92,17 +92,17 @@ impl Recording {
         if moments.is_empty() { Err(RecordingError::Empty) } else { Ok(Self { moments }) }
     }
 
-    /// The recording of a planned movement: at least one moment, in rising order of time.
+    /// The recording of a planned movement: at least one moment, in ascending order of time.
     pub(crate) fn from_moments(moments: impl Iterator<Item = Moment>) -> Self {
         Self { moments: (1..).zip(moments).collect() }
     }
 
-    /// The moments, in rising order of time.
+    /// The moments in ascending order of time.
     pub fn moments(&self) -> impl Iterator<Item = Moment> {
         self.moments.iter().map(|&(_, moment)| moment)
     }
 
-    /// From the first moment to the last.
+    /// The time from the first moment to the last.
     #[must_use]
     pub fn duration(&self) -> Duration {
         match self.moments.as_slice() {
@@ -111,7 +111,7 @@ impl Recording {
         }
     }
 
-    /// Can every joint follow, when the recording is played `factor` times as fast?
+    /// Checks that every joint can follow at `factor` times the recorded speed.
     ///
     /// # Errors
     /// The first moment that a joint cannot reach in time.
@@ -126,14 +126,14 @@ impl Recording {
     }
 }
 
-/// Is a line more than a comment?
-fn says_something(line: &str) -> bool {
+/// Is the line neither empty nor a comment?
+fn has_content(line: &str) -> bool {
     let line = line.trim();
     !line.is_empty() && !line.starts_with('#')
 }
 
 fn header(line: Option<&str>) -> Result<(), RecordingError> {
-    // Some editors begin a file with a byte order mark.
+    // Some editors write a byte order mark at the start.
     let mut words = line.unwrap_or_default().trim_start_matches('\u{feff}').split_whitespace();
     match (words.next(), words.next(), words.next()) {
         (Some(FORMAT), Some(VERSION), None) => Ok(()),
@@ -154,7 +154,7 @@ fn too_fast(from: &Moment, to: &Moment, factor: f64) -> Option<LineError> {
         .map(|(joint, degrees)| LineError::TooFast { joint, degrees_per_second: degrees / seconds })
 }
 
-/// What every recording begins with, as whole lines. A line for each moment follows, as it displays itself.
+/// The lines at the start of every recording. A line for each moment follows ([`Moment`] implements `Display`).
 #[must_use]
 pub fn head() -> String {
     format!("{FORMAT} {VERSION}\n# seconds  joints 1 to 7 in degrees  vacuum (1: suck)\n")
@@ -164,12 +164,12 @@ impl fmt::Display for RecordingError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotARecording => {
-                write!(out, "this is no recording of a movement: it does not begin with `{FORMAT} {VERSION}`")
+                write!(out, "this is not a recording: it does not start with `{FORMAT} {VERSION}`")
             }
             Self::OtherVersion(version) => {
-                write!(out, "this recording is of version `{version}`, and only version {VERSION} is known")
+                write!(out, "the recording has version `{version}`; this program reads version {VERSION}")
             }
-            Self::Empty => out.write_str("there is no movement in this recording"),
+            Self::Empty => out.write_str("the recording contains no movement"),
             Self::Line { number, cause } => write!(out, "line {number}: {cause}"),
         }
     }
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_again() {
+    fn a_formatted_recording_parses_to_the_same() {
         let recording = Recording::parse(WAVE).expect("a recording");
         let lines = recording.moments().map(|moment| format!("{moment}\n"));
         let text: String = std::iter::once(head()).chain(lines).collect();
@@ -200,31 +200,31 @@ mod tests {
     }
 
     #[test]
-    fn a_windows_editor_does_no_harm() {
+    fn byte_order_mark_and_crlf_are_accepted() {
         let text = format!("\u{feff}{}", WAVE.replace('\n', "\r\n"));
         assert_eq!(Recording::parse(&text), Recording::parse(WAVE));
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
-        assert!(refused("").contains("no recording"));
-        assert!(refused("seconds,joint\n").contains("no recording"));
+    fn errors_name_their_line() {
+        assert!(refused("").contains("not a recording"));
+        assert!(refused("seconds,joint\n").contains("not a recording"));
         assert!(refused("7bot-recording 2\n").contains("version `2`"));
         assert!(refused("# no\n7bot-recording 1\n").contains("no movement"));
         let line = |line: &str| refused(&format!("{WAVE}{line}\n"));
         assert_eq!(line("2 90 90"), "line 6: 3 fields instead of 9: seconds, seven angles, vacuum");
-        assert_eq!(line("x 90 90 65 90 90 90 80 0"), "line 6: `x` is no time in seconds, or more than a day");
-        assert!(line("-1 90 90 65 90 90 90 80 0").contains("`-1` is no time"));
-        assert!(line("NaN 90 90 65 90 90 90 80 0").contains("`NaN` is no time"));
+        assert_eq!(line("x 90 90 65 90 90 90 80 0"), "line 6: `x` is not a time in seconds, up to a day");
+        assert!(line("-1 90 90 65 90 90 90 80 0").contains("`-1` is not a time"));
+        assert!(line("NaN 90 90 65 90 90 90 80 0").contains("`NaN` is not a time"));
         assert!(line("1.5 90 90 65 90 90 90 80 0").contains("not later"));
         let angle = line("2 90 90 181 90 90 90 80 0");
         assert_eq!(angle, "line 6: joint 3 cannot go to `181`: whole degrees from 0 to 180");
         assert!(line("2 90 90 65.5 90 90 90 80 0").contains("whole degrees"));
-        assert!(line("2 90 90 65 90 90 90 80 on").contains("`on` is no vacuum"));
+        assert!(line("2 90 90 65 90 90 90 80 on").contains("`on` is not a pump state"));
     }
 
     #[test]
-    fn a_movement_that_no_motor_can_follow_is_found() {
+    fn a_movement_too_fast_for_the_motors_is_refused() {
         let recording = Recording::parse(WAVE).expect("a recording");
         assert_eq!(recording.check_speeds(1.0), Ok(()));
         let text = recording.check_speeds(20.0).expect_err("30 degrees in 75 ms").to_string();
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn full_speed_that_was_rounded_to_degrees_is_not_too_fast() {
+    fn rounding_at_full_speed_is_not_too_fast() {
         // 372 °/s at 30 Hz is 12.4 degrees a line: 12 or 13 when rounded.
         let text = "7bot-recording 1\n0 10 0 0 0 0 0 0 0\n0.033 23 0 0 0 0 0 0 0\n";
         assert_eq!(Recording::parse(text).expect("a recording").check_speeds(1.0), Ok(()));

@@ -1,7 +1,7 @@
-//! One question at a time to the servos, with retries, and without echoes and late answers.
+//! Exchanges with one servo at a time: retries, echoes and late answers.
 //!
-//! Every question is a read, also where others send a ping: the echo of a ping has the same bytes as the answer of a
-//! servo that reports a wrong voltage, and the echo of a read never has the length of its answer.
+//! Every question is a read, never a ping. The echo of a ping has the bytes of an answer with a voltage error. The echo
+//! of a read never has the length of its answer.
 
 use std::fmt;
 use std::time::Duration;
@@ -15,15 +15,15 @@ use super::servo_line::ServoLine;
 use crate::error::{OpenError, ReceiveCounts};
 use crate::open_port::OpenPort;
 
-/// The line is at rest once nothing came for so long: longer than the latency timer of an FTDI chip, 16 ms.
+/// The line is idle after this time without bytes: more than the latency timer of an FTDI chip, 16 ms.
 const IDLE_TIME: Duration = Duration::from_millis(25);
 
-/// How to talk to servos.
+/// Timeout and attempts.
 #[derive(Clone, Copy, Debug)]
 pub struct BusOptions {
-    /// How long to wait for one answer.
+    /// The timeout of one attempt.
     pub reply_timeout: Duration,
-    /// How often to ask before giving up, at least once.
+    /// The number of attempts, at least one.
     pub attempts: u32,
 }
 
@@ -33,25 +33,25 @@ impl Default for BusOptions {
     }
 }
 
-/// What a servo answered.
+/// The answer of a servo.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServoReply {
-    /// Its error bits: [`motion_core::servo_bus::frame::error`].
+    /// The error bits: [`motion_core::servo_bus::frame::error`].
     pub errors: u8,
     /// The values of the registers that were read.
     pub values: Vec<u8>,
 }
 
-/// The servo bus, of which this is the only master.
+/// The only master of a servo bus.
 pub struct BusMaster {
     line: Box<dyn ServoLine>,
     options: BusOptions,
     decoder: Decoder,
-    /// What came and the decoder has not taken yet.
+    /// Received bytes that the decoder had no room for.
     waiting: Vec<u8>,
     has_echo: bool,
     received: ReceiveCounts,
-    /// Servos whose answers came when another one was asked.
+    /// The ids of answers that came after their timeout.
     late: Vec<u8>,
 }
 
@@ -62,15 +62,15 @@ impl fmt::Debug for BusMaster {
 }
 
 impl BusMaster {
-    /// Opens the port of an adapter. Nothing is sent yet.
+    /// Opens the port of an adapter. Sends nothing.
     ///
     /// # Errors
-    /// It cannot be opened.
+    /// The port cannot be opened.
     pub fn open(path: &str, baud: u32, options: BusOptions) -> Result<Self, OpenError> {
         Ok(Self::with_line(Box::new(OpenPort::open(path, baud)?), options))
     }
 
-    /// The bus behind any line.
+    /// A master on any line.
     #[must_use]
     pub fn with_line(line: Box<dyn ServoLine>, options: BusOptions) -> Self {
         Self {
@@ -84,28 +84,28 @@ impl BusMaster {
         }
     }
 
-    /// Was an echo of a question received? An adapter that joins TX and RX gives one to every question.
+    /// Was an echo received? An adapter that connects TX to RX echoes every frame.
     #[must_use]
     pub const fn has_echo(&self) -> bool {
         self.has_echo
     }
 
-    /// How it talks to servos.
+    /// Timeout and attempts.
     #[must_use]
     pub const fn options(&self) -> BusOptions {
         self.options
     }
 
-    /// The time since some instant in the past.
+    /// The time since a fixed instant.
     #[must_use]
     pub fn now(&self) -> Duration {
         self.line.now()
     }
 
-    /// Talks at another baud rate from now on. What is still on its way is dropped.
+    /// Changes the baud rate. Drops bytes that have not been read.
     ///
     /// # Errors
-    /// The adapter does not know the rate.
+    /// The adapter does not support the rate, or the port failed.
     pub fn set_baud(&mut self, baud: u32) -> Result<(), ServoError> {
         self.line.set_baud(baud)?;
         self.wait_for_silence(Duration::ZERO)?;
@@ -113,10 +113,10 @@ impl BusMaster {
         Ok(())
     }
 
-    /// The values of `count` registers of a servo, all of one instant.
+    /// The values of `count` registers of a servo at one instant.
     ///
     /// # Errors
-    /// The servo does not answer, or the port is gone.
+    /// The servo does not answer, or the port failed.
     pub fn read(&mut self, id: u8, register: u8, count: u8) -> Result<ServoReply, ServoError> {
         self.received = ReceiveCounts::default();
         for _ in 0..self.options.attempts.max(1) {
@@ -127,16 +127,16 @@ impl BusMaster {
         let BusOptions { attempts, reply_timeout: waited } = self.options;
         let no_answer =
             ServoError::NoAnswer { id, attempts: attempts.max(1), waited, received: self.received };
-        // A late answer must not be taken for that to the next question.
+        // A late answer must not be taken for the answer to the next question.
         self.wait_for_silence(IDLE_TIME)?;
         Err(no_answer)
     }
 
-    /// Writes registers and reads them back, several times if need be. An acknowledgement proves nothing and a servo
-    /// may be set to give none (its register 8), so only the reading counts.
+    /// Writes registers and reads them back, with retries. Only the read counts: a servo may be set to acknowledge nothing
+    /// (its register 8).
     ///
     /// # Errors
-    /// The servo does not answer or does not hold the values, or the port is gone.
+    /// The servo does not answer, does not hold the values, or the port failed.
     pub fn write(&mut self, id: u8, register: u8, values: &[u8]) -> Result<(), ServoError> {
         let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
         for _ in 0..self.options.attempts.max(1) {
@@ -148,18 +148,18 @@ impl BusMaster {
         Err(ServoError::NotTaken { id, register })
     }
 
-    /// Writes registers and does not look whether that worked.
+    /// Writes registers once, without reading them back.
     ///
     /// # Errors
-    /// The port is gone.
+    /// The port failed.
     pub fn send_write(&mut self, id: u8, register: u8, values: &[u8]) -> Result<(), ServoError> {
         let mut request = FrameBuffer::new();
         frame::write(&mut request, id, register, values);
-        // An acknowledgement ends the wait; where a servo gives none, this is the time it needs to take the values.
+        // Wait for the acknowledgement, or as long as a servo needs to take the values.
         self.exchange(&request, IDLE_TIME, |answer| answer.id == id && answer.params.is_empty()).map(drop)
     }
 
-    /// Asks once. `None`: no answer in time.
+    /// Reads once. `None` if no answer arrives in time.
     pub(crate) fn try_read(
         &mut self,
         id: u8,
@@ -167,7 +167,7 @@ impl BusMaster {
         count: u8,
         timeout: Duration,
     ) -> Result<Option<ServoReply>, ServoError> {
-        // The question for two registers has the length of its answer, so three are read.
+        // The question for two registers is as long as its answer, so read three.
         let asked = if count == 2 { 3 } else { count };
         let mut request = FrameBuffer::new();
         frame::read(&mut request, id, register, asked);
@@ -179,24 +179,24 @@ impl BusMaster {
         }))
     }
 
-    /// How many more answers with this id come within `timeout`: more than none means several servos with one id.
+    /// Counts further answers of this id within `timeout`. One or more means that several servos have the id.
     pub(crate) fn extra_answers(&mut self, id: u8, timeout: Duration) -> Result<usize, ServoError> {
         self.late.clear();
         self.wait_for_silence(timeout)?;
         Ok(self.late.iter().filter(|&&late| late == id).count())
     }
 
-    /// The servos whose answers came too late, since this was last asked.
+    /// The ids of late answers since the last call.
     pub(crate) fn take_late(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.late)
     }
 
-    /// How many damaged frames were received since this was last asked.
+    /// The number of damaged frames since the last call.
     pub(crate) fn take_damaged(&mut self) -> usize {
         std::mem::take(&mut self.received.damaged_frames)
     }
 
-    /// Waits until nothing came for `silence`. Frames that came meanwhile are late answers.
+    /// Waits until no byte arrives for `silence`. Frames that arrive meanwhile are late answers.
     pub(crate) fn wait_for_silence(&mut self, silence: Duration) -> Result<(), ServoError> {
         loop {
             self.find_answer(&[], |_| false);
@@ -207,7 +207,7 @@ impl BusMaster {
         }
     }
 
-    /// Sends a frame, and waits for the answer to it.
+    /// Sends a frame and waits for its answer.
     fn exchange(
         &mut self,
         request: &[u8],
@@ -227,7 +227,7 @@ impl BusMaster {
         }
     }
 
-    /// Takes what comes within `timeout`; `false` if nothing did.
+    /// Reads from the line; `false` if no byte arrives within `timeout`.
     fn receive(&mut self, timeout: Duration) -> Result<bool, ServoError> {
         let bytes = self.line.receive(timeout)?;
         if !bytes.is_empty() {
@@ -238,7 +238,7 @@ impl BusMaster {
         Ok(!bytes.is_empty())
     }
 
-    /// Looks for the answer among the bytes that are here. What stands behind it is kept.
+    /// Searches the received bytes for the answer. Keeps the bytes after it.
     fn find_answer(&mut self, request: &[u8], is_answer: impl Fn(&Frame<'_>) -> bool) -> Option<ServoReply> {
         loop {
             while let Some(found) = self.decoder.pull() {
@@ -260,15 +260,14 @@ impl BusMaster {
             if self.waiting.is_empty() {
                 return None;
             }
-            // As much as the decoder has room for besides what it holds.
+            // The decoder has room for one longest frame.
             let piece: Vec<u8> = self.waiting.drain(..self.waiting.len().min(frame::MAX_FRAME)).collect();
             self.decoder.push(&piece);
         }
     }
 }
 
-/// Is this frame an echo: the one that was sent, or an earlier question that comes late? No answer is expected that
-/// has two values.
+/// Is this frame an echo of the request or of an earlier question? No answer with two values is expected.
 fn is_echo(frame: &Frame<'_>, request: &[u8]) -> bool {
     if let [_, _, id, _, code, params @ .., _] = request
         && (frame.id, frame.code, frame.params) == (*id, *code, params)

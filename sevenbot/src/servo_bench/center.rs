@@ -1,6 +1,6 @@
-//! Brings a servo to the middle of its range, slowly, and stops when something is in the way.
+//! Moves a servo slowly to the middle of its range, and stops at an obstacle.
 //!
-//! The servo first gets its present position as its goal and only then torque, so it starts without a jump.
+//! The goal becomes the present position before the torque goes on, so the servo does not jump.
 
 use std::fmt;
 use std::time::Duration;
@@ -14,27 +14,27 @@ use super::servo_info::{ServoInfo, error_words};
 
 /// The middle of the range of 0 to 1023 counts.
 pub const MIDDLE: u16 = 511;
-/// A servo that is so close to its goal has arrived: its dead zone is 2 counts on either side.
+/// A servo this near to its goal has arrived: its dead zone is 2 counts on either side.
 const ARRIVED_COUNTS: u16 = 4;
-/// The torque switch: on has this code in both of Feetech's tables.
+/// The torque switch: code 1 is on in both of Feetech's tables.
 const TORQUE_ON: [u8; 1] = [1];
-/// Damping in the older table, free in the current one: no torque in either.
+/// Damping in the older table, free in the current one. Neither gives torque.
 const TORQUE_OFF: [u8; 1] = [0];
 /// Registers from the present position to the moving flag.
 const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;
-/// A load over the limit in so many readings in a row ends the move. One reading may be a start from rest.
+/// So many consecutive readings above the load limit end the move. One reading may be the start of the motion.
 const OVERLOAD_READINGS: u32 = 5;
 
-/// How a servo is moved.
+/// Speed and limits of the move.
 #[derive(Clone, Copy, Debug)]
 pub struct CenterOptions {
-    /// In counts per second.
+    /// Speed in counts per second.
     pub speed: u16,
     /// The load that ends the move, in 0.1 % of the stall torque.
     pub load: u16,
-    /// How often to look at the servo.
+    /// Time between two readings.
     pub poll_period: Duration,
-    /// A servo that comes no closer for so long has met something.
+    /// After this time without progress the servo is blocked.
     pub stall: Duration,
 }
 
@@ -44,38 +44,38 @@ impl Default for CenterOptions {
     }
 }
 
-/// Why a servo is not in the middle. Whatever it was, its torque was switched off if that was possible.
+/// Why a servo is not in the middle. A move that ends early switches the torque off.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CenterError {
-    /// Its limits leave the middle out, or it has none. Nothing was written.
+    /// The position limits exclude the middle, or the servo has none. Nothing was written.
     OutOfReach {
         /// Lowest and highest position, in counts.
         limits: (u16, u16),
     },
-    /// It reports errors before it moves. Nothing was written.
+    /// The servo reports errors. Nothing was written.
     ReportsErrors {
-        /// The bits.
+        /// The error bits.
         errors: u8,
     },
-    /// It gives no position that can be believed.
+    /// The servo reports a position outside 0 to 1023 counts.
     Unmeasured,
-    /// It pushed too hard, or reported an error.
+    /// The load was above the limit, or the servo reported an error.
     Overload {
-        /// Where it was, in counts.
+        /// The position in counts.
         position: u16,
-        /// How hard it pushed, in 0.1 %.
+        /// The load in 0.1 % of the stall torque.
         load: i16,
-        /// Its error bits.
+        /// The error bits.
         errors: u8,
     },
-    /// It does not come closer.
+    /// The servo makes no progress.
     Stalled {
-        /// Where it is, in counts.
+        /// The position in counts.
         position: u16,
     },
-    /// The user wanted it to stop.
+    /// The user interrupted the move.
     Interrupted,
-    /// The exchange failed.
+    /// An exchange with the servo failed.
     Bus(ServoError),
     /// The torque could not be switched off. The servo may still be moving.
     TorqueStillOn(Box<CenterError>),
@@ -91,7 +91,7 @@ impl fmt::Display for CenterError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::OutOfReach { limits: (0, 0) } => {
-                out.write_str("this servo has no range (both limits are 0): its motor would turn on and on")
+                out.write_str("this servo has no range (both limits are 0): its motor would turn without end")
             }
             Self::OutOfReach { limits: (lowest, highest) } => {
                 write!(
@@ -100,7 +100,7 @@ impl fmt::Display for CenterError {
                 )
             }
             Self::ReportsErrors { errors } => write!(out, "the servo reports: {}", error_words(*errors)),
-            Self::Unmeasured => out.write_str("the servo gives no position between 0 and 1023 counts"),
+            Self::Unmeasured => out.write_str("the servo reports no position between 0 and 1023 counts"),
             Self::Overload { position, load, errors } => {
                 let percent = f64::from(*load) / 10.0;
                 write!(
@@ -110,12 +110,12 @@ impl fmt::Display for CenterError {
                 )
             }
             Self::Stalled { position } => {
-                write!(out, "stopped at {position} counts: the servo does not come closer")
+                write!(out, "stopped at {position} counts: the servo makes no progress")
             }
             Self::Interrupted => out.write_str("interrupted"),
             Self::Bus(error) => error.fmt(out),
             Self::TorqueStillOn(cause) => {
-                write!(out, "the servo may still be moving, its torque could not be switched off: {cause}")
+                write!(out, "the servo may still be moving: its torque could not be switched off ({cause})")
             }
         }
     }
@@ -123,9 +123,9 @@ impl fmt::Display for CenterError {
 
 impl std::error::Error for CenterError {}
 
-/// Brings a servo to the middle, and gives where it stands then, in counts. It holds there, with torque.
+/// Moves a servo to the middle and returns its position in counts. The servo holds there with torque on.
 ///
-/// `on_reading` is told of each reading. It answers whether to go on.
+/// Calls `on_reading` with each reading; `false` ends the move.
 ///
 /// # Errors
 /// See [`CenterError`].
@@ -143,7 +143,7 @@ pub fn center(
     })
 }
 
-/// Where the servo stands, if it is fit to be moved to its middle.
+/// The present position, if the servo can move to the middle.
 fn check(facts: &ServoInfo) -> Result<u16, CenterError> {
     let (lowest, highest) = facts.position_limits;
     if facts.errors != 0 {
@@ -174,14 +174,14 @@ fn drive(
         }
         check.update(&reading, errors, bus.now(), options)?;
         let is_close = reading.position_counts.abs_diff(MIDDLE) <= ARRIVED_COUNTS;
-        // A servo that hunts around its goal says for ever that it moves.
+        // A servo that oscillates around its goal always reports that it moves.
         if is_close && (!is_moving || check.is_stalled(bus.now(), options)) {
             return Ok(reading.position_counts);
         }
     }
 }
 
-/// Position, time and speed, as registers 42 to 47 hold them.
+/// Position, time and speed as in registers 42 to 47.
 fn goal(position: u16, speed: u16) -> [u8; 6] {
     let ([p1, p0], [s1, s0]) = (position.to_be_bytes(), speed.to_be_bytes());
     [p1, p0, 0, 0, s1, s0]
@@ -194,13 +194,13 @@ fn measure(bus: &mut BusMaster, id: u8) -> Result<(Reading, u8, bool), CenterErr
     Ok((reading.ok_or(CenterError::Unmeasured)?, answer.errors, is_moving))
 }
 
-/// What was seen of the move so far.
+/// Progress and load of the move so far.
 struct MoveCheck {
     /// The smallest distance to the middle, in counts.
     closest: u16,
-    /// When that was.
+    /// When the servo was that close first.
     since: Duration,
-    /// Readings in a row with too much load.
+    /// Consecutive readings above the load limit.
     overloaded: u32,
 }
 

@@ -1,4 +1,4 @@
-//! What can go wrong between a computer and servos.
+//! Failures of an exchange with a servo.
 
 use std::fmt;
 use std::time::Duration;
@@ -8,27 +8,27 @@ use crate::error::{PortError, ReceiveCounts};
 /// Why an exchange with a servo failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ServoError {
-    /// No answer that can be believed, though the servo was asked several times.
+    /// No attempt brought an accepted answer.
     NoAnswer {
-        /// The servo.
+        /// The id of the servo.
         id: u8,
-        /// How often it was asked.
+        /// The number of attempts.
         attempts: u32,
-        /// How long each attempt waited.
+        /// The timeout of each attempt.
         waited: Duration,
         /// What was received instead.
         received: ReceiveCounts,
     },
-    /// The servo answers, but the register does not hold what was written.
+    /// The servo answers, but its register does not hold the written value.
     NotTaken {
-        /// The servo.
+        /// The id of the servo.
         id: u8,
         /// The first register that was written.
         register: u8,
     },
-    /// The adapter does not know this baud rate.
+    /// The adapter does not support this baud rate.
     NoSuchRate {
-        /// The rate.
+        /// The rate in bits per second.
         baud: u32,
     },
     /// The port failed.
@@ -51,7 +51,7 @@ impl fmt::Display for ServoError {
             Self::NotTaken { id, register } => {
                 write!(out, "servo {id} answers, but its register {register} does not hold what was written")
             }
-            Self::NoSuchRate { baud } => write!(out, "this adapter does not know {baud} baud"),
+            Self::NoSuchRate { baud } => write!(out, "this adapter does not support {baud} baud"),
             Self::Port(error) => error.fmt(out),
         }
     }

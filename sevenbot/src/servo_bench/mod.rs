@@ -1,13 +1,13 @@
-//! The servo bus without an arm's controller: for who builds or repairs an arm.
+//! Single servos without the arm's controller, for building and repairing an arm.
 //!
 //! ```text
-//!   scan, facts, id, center ──▶ BusMaster ──▶ ServoLine ──▶ half-duplex adapter ──▶ servos
-//!                                  │
-//!                                  └── frames of motion-core, which the arm's controller uses too
+//!   scan, servo_info, set_id, center ──▶ BusMaster ──▶ ServoLine ──▶ half-duplex adapter ──▶ servos
+//!                                            │
+//!                                            └── frames of motion-core, as in the arm's controller
 //! ```
 //!
-//! Talks to SCS servos directly, through a half-duplex TTL adapter. Two masters must never share one bus: the arm's
-//! controller has to be off the bus, or off. Everything blocks, with timeouts.
+//! Talks to SCS servos through a half-duplex TTL adapter. Disconnect the arm's controller from the bus first: two
+//! masters must not share one bus. All calls block, with timeouts.
 //!
 //! ```no_run
 //! use sevenbot::servo_bench::{BusOptions, BusMaster, servo_info::ServoInfo};

@@ -1,12 +1,11 @@
-//! Which servos are on the bus, at which baud rates.
+//! Finds the servos on the bus, and their baud rates.
 //!
 //! ```text
-//!   each rate ──▶ each id: a question with a short wait ──▶ candidates ──▶ each of those: patient questions
+//!   each rate ──▶ each id: a question with a short timeout ──▶ candidates ──▶ each: questions with the full timeout
 //! ```
 //!
-//! The short wait is over before a slow USB adapter has handed over the answer. The answer then comes while another id
-//! is asked, and makes its sender a candidate. So the first pass takes 5 ms for an id at 1 Mbaud, not the latency of
-//! the adapter.
+//! The first pass takes 5 ms for an id at 1 Mbaud. A slow USB adapter delivers an answer after that, while another id is
+//! asked. The late answer then makes its sender a candidate.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -16,70 +15,88 @@ use motion_core::servo_bus::frame::register;
 use super::bus_master::BusMaster;
 use super::error::ServoError;
 
-/// Bytes of the question and its answer, and as many again for a byte time each between them.
+/// Bytes of a question and its answer, and a pause of one byte after each byte.
 const EXCHANGE_BYTES: u32 = 30;
-/// What a servo may take besides: its return delay is 0.5 ms at most.
+/// Time that a servo may need in addition. Its return delay is at most 0.5 ms.
 const RETURN_DELAY: Duration = Duration::from_millis(4);
-/// How long to listen for late answers at the end of each rate.
+/// After the first pass of a rate, wait this long for late answers.
 const LATE_ANSWERS: Duration = Duration::from_millis(200);
 
-/// What to look for.
+/// Baud rates and ids to scan.
 #[derive(Clone, Debug)]
 pub struct ScanPlan {
-    /// Baud rates, in the order they are tried.
+    /// Baud rates in the order of the scan.
     pub rates: Vec<u32>,
     /// Ids.
     pub ids: RangeInclusive<u8>,
-    /// How long to wait for an id in the first pass; `None`: as long as a servo needs at that rate.
+    /// Timeout for each id in the first pass; `None`: what a servo needs at that rate.
     pub wait: Option<Duration>,
 }
 
-/// How far a scan is.
+/// Progress of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanProgress {
-    /// The rate that is being tried.
+    /// The present baud rate.
     pub baud: u32,
-    /// How many questions of the first pass are done, over all rates.
+    /// Questions of the first pass so far, over all rates.
     pub asked: usize,
-    /// How many servos were found.
+    /// Servos found so far.
     pub found: usize,
 }
 
-/// An id that something answers to.
+/// An id with answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FoundServo {
     /// The baud rate.
     pub baud: u32,
     /// The id.
     pub id: u8,
-    /// What the answers were like.
+    /// The kind of answers.
     pub answers: AnswerQuality,
 }
 
-/// What the answers of an id were like.
+/// The kind of answers from one id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnswerQuality {
     /// One servo answers.
     Good,
-    /// Several answers came to one question: several servos have this id.
+    /// A question had several answers: several servos have this id.
     Several,
-    /// Every answer was damaged: several servos with this id, or a bad wire.
+    /// All answers were damaged: several servos have this id, or the wiring is bad.
     Damaged,
 }
 
-/// What a scan brought.
+impl AnswerQuality {
+    /// `good`, `several servos` or `damaged answers`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Several => "several servos",
+            Self::Damaged => "damaged answers",
+        }
+    }
+}
+
+/// The result of a scan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScanResult {
-    /// By rate as planned, then by id.
+    /// In the order of the rates, then of the ids.
     pub found: Vec<FoundServo>,
-    /// Rates that the adapter does not know.
+    /// Rates that the adapter does not support.
     pub unknown_rates: Vec<u32>,
-    /// Was an echo of the questions received?
+    /// Did the adapter echo the questions?
     pub has_echo: bool,
 }
 
 impl ScanPlan {
-    /// How many questions the first pass takes.
+    /// All ids at one rate.
+    #[must_use]
+    pub fn all_ids(baud: u32, wait: Option<Duration>) -> Self {
+        Self { rates: vec![baud], ids: 0..=super::MAX_ID, wait }
+    }
+
+    /// The number of questions in the first pass.
     #[must_use]
     pub fn questions(&self) -> usize {
         self.rates.len() * self.ids.len()
@@ -90,10 +107,10 @@ impl ScanPlan {
     }
 }
 
-/// Looks for servos. `on_progress` is told how far it is.
+/// Scans the bus. Calls `on_progress` after each question.
 ///
 /// # Errors
-/// The port is gone.
+/// The port failed.
 pub fn scan(
     bus: &mut BusMaster,
     plan: &ScanPlan,
@@ -123,7 +140,7 @@ pub fn scan(
     Ok(ScanResult { found, unknown_rates, has_echo: bus.has_echo() })
 }
 
-/// The ids of this rate that something came from in answer to a short question, in ascending order.
+/// The ids with any answer to a short question at this rate, in ascending order.
 fn candidates(
     bus: &mut BusMaster,
     plan: &ScanPlan,
@@ -139,7 +156,7 @@ fn candidates(
         if is_answered || is_damaged {
             candidates.push(id);
         }
-        // A damaged answer that comes late may be the one to the question before.
+        // A late damaged answer may belong to the question before.
         candidates.extend(damaged_before.filter(|_| is_damaged));
         damaged_before = Some(id);
         done += 1;
@@ -155,12 +172,12 @@ fn candidates(
     Ok(candidates)
 }
 
-/// Asks one id patiently. `None`: nothing answers to it.
+/// Asks one id with the full timeout. `None` if nothing answers.
 fn verify(bus: &mut BusMaster, id: u8, wait: Duration) -> Result<Option<AnswerQuality>, ServoError> {
     bus.take_damaged();
     let options = bus.options();
     for _ in 0..options.attempts.max(1) {
-        // Answers of two servos with one id differ in what they measure, and damage each other.
+        // Several servos with one id measure different values, so their answers damage each other.
         if bus.try_read(id, register::PRESENT_POSITION, 8, options.reply_timeout)?.is_some() {
             let several = bus.extra_answers(id, wait)? > 0;
             return Ok(Some(if several { AnswerQuality::Several } else { AnswerQuality::Good }));

@@ -1,4 +1,4 @@
-//! What a servo says of itself: its settings, what it was told, and what it measures.
+//! The registers of one servo: settings, commands, measurements.
 
 use motion_core::calibration::angle_from_counts;
 use motion_core::servo_bus::Reading;
@@ -8,57 +8,57 @@ use protocol_core::registers::Joint;
 use super::bus_master::BusMaster;
 use super::error::ServoError;
 
-/// Registers of the EEPROM that are read: up to the conditions that make the LED blink.
+/// Registers of the EEPROM, up to the LED conditions.
 const SETTINGS: u8 = register::LED_CONDITIONS + 1;
 /// Registers from the torque switch to the lock.
 const ORDERS: u8 = register::LOCK - register::TORQUE_SWITCH + 1;
 /// Registers from the present position to the moving flag.
 const MEASURED: u8 = register::MOVING - register::PRESENT_POSITION + 1;
 
-/// What a servo's registers say. Fields that stand for one register bear its name in Feetech's memory table.
+/// The registers of one servo. Fields of a single register are named as in Feetech's memory table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServoInfo {
-    /// The servo.
+    /// The id.
     pub id: u8,
-    /// Major and minor version of its firmware: 0.0 where the servo's table does not define it.
+    /// Major and minor version of the firmware: 0.0 if the servo's table does not define it.
     pub firmware_version: (u8, u8),
-    /// Major and minor version of the servo itself.
+    /// Major and minor version of the servo.
     pub servo_version: (u8, u8),
-    /// Register 2: 1 is high byte first, as SCS servos have it.
+    /// Register 2: 1 means high byte first, as in SCS servos.
     pub byte_order: u8,
-    /// Its baud rate; `None` for a code that no table has.
+    /// The baud rate; `None` for an undefined code.
     pub baud: Option<u32>,
-    /// Does it acknowledge writes?
+    /// Does the servo acknowledge writes?
     pub acknowledges_writes: bool,
-    /// Lowest and highest goal position, in counts. Both 0: the motor turns on and on.
+    /// Lowest and highest goal position in counts. If both are 0 the motor turns without end.
     pub position_limits: (u16, u16),
-    /// In degrees Celsius.
+    /// The temperature limit in degrees Celsius.
     pub max_temperature: u8,
-    /// Lowest and highest supply, in 0.1 V.
+    /// Lowest and highest supply voltage in 0.1 V.
     pub voltage_limits: (u8, u8),
-    /// In 0.1 % of the stall torque.
+    /// The torque limit in 0.1 % of the stall torque.
     pub max_torque: u16,
     /// Error bits that switch the torque off.
     pub unload_conditions: u8,
-    /// The code in the torque switch.
+    /// The code in the torque switch, register 40.
     pub torque_switch: u8,
-    /// Where it was told to go, in counts.
+    /// The goal position in counts.
     pub goal_position: u16,
-    /// Can its EEPROM be written?
+    /// Is the EEPROM unlocked?
     pub is_unlocked: bool,
-    /// What it measures; `None` where the position is none.
+    /// The measurements; `None` if the position is outside 0 to 1023 counts.
     pub reading: Option<Reading>,
-    /// Its error bits.
+    /// The error bits.
     pub errors: u8,
-    /// Does it move?
+    /// Does the servo move?
     pub is_moving: bool,
 }
 
 impl ServoInfo {
-    /// Reads them, in three questions.
+    /// Reads the registers with three questions.
     ///
     /// # Errors
-    /// The servo does not answer, or the port is gone.
+    /// The servo does not answer, or the port failed.
     pub fn read(bus: &mut BusMaster, id: u8) -> Result<Self, ServoError> {
         let settings = Block::read(bus, id, 0, SETTINGS)?;
         let orders = Block::read(bus, id, register::TORQUE_SWITCH, ORDERS)?;
@@ -85,27 +85,27 @@ impl ServoInfo {
         })
     }
 
-    /// The joint that a servo with this id belongs to; `None` for ids that no joint of the arm has.
+    /// The joint with this id; `None` if the arm has none.
     #[must_use]
     pub const fn joint(&self) -> Option<Joint> {
         Joint::from_index(self.id)
     }
 
-    /// The angle of its joint in degrees, without the joint's offset: that is stored in the arm's controller.
+    /// The joint's angle in degrees, without the offset that the arm's controller stores.
     #[must_use]
     pub fn degrees(&self) -> Option<f64> {
         let counts = self.reading?.position_counts;
         Some(f64::from(angle_from_counts(self.joint()?, counts, 0).0) / 1e6)
     }
 
-    /// Does the motor turn on and on, without a position?
+    /// Does the motor turn without end, without a position?
     #[must_use]
     pub const fn turns_endlessly(&self) -> bool {
         matches!(self.position_limits, (0, 0))
     }
 }
 
-/// Error bits in words: `voltage, overload`; `none` where no bit is set.
+/// The names of error bits: `voltage, overload`; `none` if no bit is set.
 #[must_use]
 pub fn error_words(errors: u8) -> String {
     const NAMES: [(u8, &str); 3] =
@@ -117,7 +117,7 @@ pub fn error_words(errors: u8) -> String {
     if words.is_empty() { "none".to_owned() } else { words.join(", ") }
 }
 
-/// Registers that were read together.
+/// Consecutive registers from one answer.
 struct Block {
     first: u8,
     errors: u8,
@@ -130,7 +130,7 @@ impl Block {
         Ok(Self { first, errors: answer.errors, values: answer.values })
     }
 
-    /// 0 for a register that is not among them.
+    /// The value of a register; 0 if the block does not include it.
     fn byte(&self, register: u8) -> u8 {
         let place = usize::from(register.saturating_sub(self.first));
         self.values.get(place).copied().unwrap_or(0)

@@ -1,4 +1,4 @@
-//! The bytes of the servo bus, and the time: what a [`BusMaster`](super::BusMaster) needs of the world.
+//! The line between a [`BusMaster`](super::BusMaster) and the servos, with its clock.
 
 use std::thread::sleep;
 use std::time::Duration;
@@ -12,27 +12,27 @@ pub trait ServoLine {
     /// Sends bytes.
     ///
     /// # Errors
-    /// The line is gone, or takes no more bytes.
+    /// The line failed, or takes no more bytes.
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortError>;
 
-    /// The bytes that are here, or the first that come within `timeout`. Empty when none came.
+    /// The bytes already received, or the first ones within `timeout`. Empty if none arrive.
     ///
     /// # Errors
-    /// The line is gone.
+    /// The line failed.
     fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError>;
 
-    /// Sends and receives at another baud rate from now on.
+    /// Changes the baud rate.
     ///
     /// # Errors
-    /// [`ServoError::NoSuchRate`] when the adapter does not know the rate.
+    /// [`ServoError::NoSuchRate`] if the adapter does not support the rate.
     fn set_baud(&mut self, baud: u32) -> Result<(), ServoError>;
 
-    /// The time since some instant in the past.
+    /// The time since a fixed instant.
     fn now(&self) -> Duration;
 }
 
-/// A servo releases the line some microseconds after its last stop bit, so each frame waits for so long. A USB adapter
-/// takes longer anyway; a UART that drives the bus itself may not.
+/// Pause before each frame: a servo releases the line some microseconds after its last stop bit. A USB adapter pauses
+/// longer anyway, but a UART on the bus may not.
 const GUARD_TIME: Duration = Duration::from_micros(100);
 
 impl ServoLine for OpenPort {

@@ -1,9 +1,8 @@
 //! Gives the only servo on the bus another id.
 //!
-//! Two servos with one id cannot be told apart any more, so nothing is written unless exactly one servo answers.
+//! Two servos with the same id cannot be told apart. So nothing is written unless exactly one servo answers.
 
 use std::fmt;
-use std::time::Duration;
 
 use motion_core::servo_bus::frame::register;
 
@@ -18,24 +17,24 @@ const LOCKED: [u8; 1] = [1];
 /// Why a servo does not have its new id.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SetIdError {
-    /// Other servos answer, or none, or several with one id. Nothing was written.
+    /// None or several servos answer. Nothing was written.
     NotAlone {
-        /// Whatever answers.
+        /// The ids that answer.
         answering: Vec<FoundServo>,
     },
-    /// The servo does not open its EEPROM. Nothing else was written.
+    /// The EEPROM cannot be unlocked. Nothing else was written.
     StaysLocked(ServoError),
-    /// The servo did not take the new id: it still answers to the old one.
+    /// The servo still answers to the old id.
     Unchanged,
     /// The servo answers to neither id.
     Lost,
     /// Something answers to the old id and to the new one.
     AnswersToBoth,
-    /// The servo has its new id, but its EEPROM is still unlocked.
+    /// The servo has its new id, but its EEPROM cannot be locked again.
     StaysOpen(ServoError),
-    /// The port failed after the EEPROM was unlocked.
+    /// The port failed after the EEPROM was unlocked: the id may be the old or the new one.
     IdUncertain(ServoError),
-    /// The exchange failed before anything was written.
+    /// An exchange failed before anything was written.
     Bus(ServoError),
 }
 
@@ -52,7 +51,7 @@ impl fmt::Display for SetIdError {
                 out.write_str("no servo answers at this baud rate")
             }
             Self::NotAlone { answering } => {
-                let ids: Vec<String> = answering.iter().map(word).collect();
+                let ids: Vec<String> = answering.iter().map(id_text).collect();
                 write!(
                     out,
                     "the servo has to be the only one on the bus, but these ids answer: {}",
@@ -74,20 +73,19 @@ impl fmt::Display for SetIdError {
     }
 }
 
-fn word(found: &FoundServo) -> String {
+fn id_text(found: &FoundServo) -> String {
     match found.answers {
         AnswerQuality::Good => found.id.to_string(),
-        AnswerQuality::Several => format!("{} (several servos)", found.id),
-        AnswerQuality::Damaged => format!("{} (damaged answers)", found.id),
+        answers => format!("{} ({})", found.id, answers.name()),
     }
 }
 
 impl std::error::Error for SetIdError {}
 
-/// Changes the id of the only servo on the bus from `old` to `new`, and makes sure of it.
+/// Changes the id of the only servo on the bus from `old` to `new`, and verifies it.
 ///
 /// # Errors
-/// See [`SetIdError`]; each says what state the servo is in.
+/// Each variant of [`SetIdError`] tells the state of the servo.
 pub fn set_id(
     bus: &mut BusMaster,
     plan: &ScanPlan,
@@ -101,14 +99,14 @@ pub fn set_id(
     }
     bus.write(old, register::LOCK, &OPEN).map_err(SetIdError::StaysLocked)?;
     let changed = change(bus, old, new);
-    // Whatever came of it, no servo is left open.
+    // Lock the EEPROM again after a failure too.
     let holder = if changed.is_ok() { new } else { old };
     let locked = bus.write(holder, register::LOCK, &LOCKED);
     changed?;
     locked.map_err(SetIdError::StaysOpen)
 }
 
-/// Writes the id until the servo answers to it. Its acknowledgement may carry either id, so it counts for nothing.
+/// Writes the id until the servo answers to it. Ignores the acknowledgement, which may carry either id.
 fn change(bus: &mut BusMaster, old: u8, new: u8) -> Result<(), SetIdError> {
     for _ in 0..bus.options().attempts.max(1) {
         bus.send_write(old, register::ID, &[new]).map_err(SetIdError::IdUncertain)?;
@@ -128,10 +126,4 @@ fn is_there(bus: &mut BusMaster, id: u8) -> Result<bool, SetIdError> {
         Err(ServoError::NoAnswer { .. }) => Ok(false),
         Err(error) => Err(SetIdError::IdUncertain(error)),
     }
-}
-
-/// A plan for [`set_id`]: every id at one rate.
-#[must_use]
-pub fn all_ids(baud: u32, wait: Option<Duration>) -> ScanPlan {
-    ScanPlan { rates: vec![baud], ids: 0..=super::MAX_ID, wait }
 }

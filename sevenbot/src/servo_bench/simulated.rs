@@ -1,4 +1,4 @@
-//! A [`ServoLine`] to simulated servos, for tests, in virtual time.
+//! A [`ServoLine`] to simulated servos in virtual time, for tests.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -17,15 +17,15 @@ use crate::error::PortError;
 
 /// The supply voltage in 0.1 V.
 const SUPPLY: u8 = 74;
-/// A step of a servo.
+/// Time of one simulation step.
 const STEP: Duration = Duration::from_millis(1);
 
-/// A servo, and the faults that a servo on an arm does not have.
+/// A servo with more faults than the simulated arm has.
 pub(super) struct SimulatedServo {
     pub(super) servo: Servo,
-    /// Its answers carry these error bits besides its own.
+    /// Error bits added to each answer.
     pub(super) errors: u8,
-    /// It loses its power at this time.
+    /// When the servo loses its power.
     pub(super) fails_at: Duration,
 }
 
@@ -33,7 +33,7 @@ impl SimulatedServo {
     pub(super) fn new(id: u8) -> Self {
         let mut servo = Servo::new(Joint::ALL[0], ServoConfig::default(), 300, Instant::ZERO);
         servo.set_id(id);
-        // The registers hold measurements from the first step on.
+        // The first step fills the measurement registers.
         servo.step(Instant::ZERO, SUPPLY);
         Self { servo, errors: 0, fails_at: Duration::MAX }
     }
@@ -63,24 +63,24 @@ impl SimulatedServo {
     }
 }
 
-/// What is at the other end of the line.
+/// The other end of the line.
 #[derive(Default)]
 pub(super) struct SimulatedWire {
     pub(super) servos: Vec<SimulatedServo>,
     pub(super) has_echo: bool,
     /// The delay of an echo.
     pub(super) echo_delay: Duration,
-    /// The port is lost after so many frames.
+    /// After so many frames the port fails.
     pub(super) frames_until_lost: Option<usize>,
-    /// The rates of the adapter; empty: all.
+    /// The rates of the adapter; empty means all.
     pub(super) rates: Vec<u32>,
     baud: u32,
     now: Duration,
     /// The servos are simulated up to this time.
     simulated: Duration,
-    /// When each piece arrives, in this order.
+    /// Bytes and their time of arrival, in this order.
     in_transit: VecDeque<(Duration, Vec<u8>)>,
-    /// Every frame that was sent.
+    /// All frames sent.
     pub(super) sent: Vec<Vec<u8>>,
 }
 

@@ -1,4 +1,4 @@
-//! The bench against servos without a wire, in virtual time.
+//! Scan, set-id, center and info with simulated servos in virtual time.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use super::center::{CenterError, CenterOptions, center};
 use super::error::ServoError;
 use super::scan::{AnswerQuality, FoundServo, ScanPlan, ScanResult, scan};
 use super::servo_info::{ServoInfo, error_words};
-use super::set_id::{SetIdError, all_ids, set_id};
+use super::set_id::{SetIdError, set_id};
 use super::simulated::{SimulatedServo, bus};
 use super::{BAUD_RATES, MAX_ID};
 
@@ -59,19 +59,19 @@ fn a_scan_finds_every_servo_at_every_rate() {
 }
 
 #[test]
-fn a_scan_of_one_rate_takes_two_seconds_at_most_and_tells_how_far_it_is() {
+fn a_scan_of_one_rate_takes_at_most_two_seconds() {
     let (mut bus, _) = bus(vec![SimulatedServo::new(3)]);
     let start = bus.now();
     let mut last = None;
     scan(&mut bus, &plan(&[FAST]), |step| last = Some(step)).unwrap();
     let step = last.unwrap();
     assert_eq!((step.baud, step.asked, step.found), (FAST, 254, 1));
-    // Virtual time: the sum of the waits.
+    // In virtual time: the sum of all waits.
     assert!(bus.now() - start < Duration::from_secs(2), "{:?}", bus.now() - start);
 }
 
 #[test]
-fn an_echo_is_no_answer_and_does_not_hide_one() {
+fn an_answer_after_an_echo_is_found() {
     let (mut bus, wire) = bus([1, 5].map(SimulatedServo::new).into());
     wire.borrow_mut().has_echo = true;
     assert_eq!(
@@ -86,38 +86,38 @@ fn an_echo_is_no_answer_and_does_not_hide_one() {
 }
 
 #[test]
-fn an_echo_does_not_hide_a_servo_that_reports_a_wrong_voltage() {
+fn a_servo_with_a_voltage_error_is_found_despite_echoes() {
     let servo = SimulatedServo { errors: error::VOLTAGE, ..SimulatedServo::new(4) };
     let (mut bus, wire) = bus(vec![servo]);
     for has_echo in [false, true] {
         wire.borrow_mut().has_echo = has_echo;
         assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 4, AnswerQuality::Good)]);
     }
-    // Two values have the length of a question, and 2 is the code of a question.
+    // An answer with two values is as long as a question, and error bits 2 equal the code of a read.
     wire.borrow_mut().servos[0].errors = 2;
     let answer = bus.read(4, register::ID, 2).unwrap();
     assert_eq!((answer.errors, answer.values), (2, vec![4, 0]));
 }
 
 #[test]
-fn a_slow_adapter_hides_no_servo() {
+fn a_scan_with_a_slow_adapter_finds_every_servo() {
     let slow = |id| SimulatedServo::with(id, late(60_000));
     let (mut bus, _) = bus([0, 3, 253].map(slow).into());
     assert_eq!(found(&mut bus, &plan(&[FAST])), [0, 3, 253].map(|id| (FAST, id, AnswerQuality::Good)));
 }
 
 #[test]
-fn late_echoes_are_no_late_answers() {
+fn late_echoes_are_not_late_answers() {
     let (mut bus, wire) = bus(vec![SimulatedServo::new(3)]);
     (wire.borrow_mut().has_echo, wire.borrow_mut().echo_delay) = (true, Duration::from_millis(60));
     assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 3, AnswerQuality::Good)]);
     assert!(bus.has_echo());
-    // Virtual time: 254 short waits, and patient questions to one id only.
+    // In virtual time: 254 short timeouts, and full timeouts for one id only.
     assert!(bus.now() < Duration::from_secs(3), "{:?}", bus.now());
 }
 
 #[test]
-fn damaged_answers_and_servos_with_one_id_are_told() {
+fn damaged_answers_and_duplicate_ids_are_reported() {
     let garbled = SimulatedServo::with(2, ServoFault::Garbled(1));
     let (mut bus, _) = bus(vec![garbled, SimulatedServo::new(9), SimulatedServo::with(9, late(350))]);
     assert_eq!(
@@ -127,7 +127,7 @@ fn damaged_answers_and_servos_with_one_id_are_told() {
 }
 
 #[test]
-fn rates_that_the_adapter_does_not_know_are_told() {
+fn unsupported_rates_are_reported() {
     let (mut bus, wire) = bus(vec![SimulatedServo::new(0)]);
     wire.borrow_mut().rates = vec![500_000, FAST];
     let scan = scan(&mut bus, &plan(&BAUD_RATES), |_| ()).unwrap();
@@ -136,7 +136,7 @@ fn rates_that_the_adapter_does_not_know_are_told() {
 }
 
 #[test]
-fn a_late_answer_is_not_taken_for_the_next_one() {
+fn a_late_answer_is_not_taken_for_the_next() {
     let (mut bus, wire) = bus(vec![SimulatedServo::with(0, late(610_000))]);
     assert!(matches!(bus.read(0, register::ID, 1), Err(ServoError::NoAnswer { attempts: 3, .. })));
     wire.borrow_mut().servos[0].set_fault(None);
@@ -144,7 +144,7 @@ fn a_late_answer_is_not_taken_for_the_next_one() {
 }
 
 #[test]
-fn facts_are_read_high_byte_first() {
+fn registers_are_read_high_byte_first() {
     let mut servo = SimulatedServo::new(1);
     set(&mut servo, register::MIN_POSITION, &[0, 20, 3, 0xEB]);
     let (mut bus, _) = bus(vec![servo]);
@@ -153,7 +153,7 @@ fn facts_are_read_high_byte_first() {
     assert_eq!((facts.max_torque, facts.max_temperature, facts.voltage_limits), (1_000, 80, (50, 250)));
     assert_eq!((facts.baud, facts.is_unlocked, facts.acknowledges_writes), (Some(FAST), false, true));
     assert_eq!(facts.reading.unwrap().position_counts, 300);
-    // Joint 2: reversed, 20 counts at 180 degrees, 850/180 counts a degree.
+    // Joint 2 is reversed: 20 counts at 180 degrees, 850/180 counts per degree.
     assert!((facts.degrees().unwrap() - (180.0 - 280.0 * 180.0 / 850.0)).abs() < 0.001);
     assert_eq!(error_words(facts.unload_conditions), "voltage, overheated, overload");
     assert_eq!(error_words(0x42), "unknown bits 0x42");
@@ -164,13 +164,13 @@ fn an_id_is_changed_and_locked_again() {
     for has_echo in [false, true] {
         let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
         wire.borrow_mut().has_echo = has_echo;
-        set_id(&mut bus, &all_ids(FAST, None), 1, 6, |_| ()).unwrap();
+        set_id(&mut bus, &ScanPlan::all_ids(FAST, None), 1, 6, |_| ()).unwrap();
         let servo = &mut wire.borrow_mut().servos[0].servo;
         servo.power_cycle(Instant::ZERO);
         assert_eq!(servo.id(), 6);
     }
     let (mut bus, _) = bus(vec![SimulatedServo::new(1)]);
-    set_id(&mut bus, &all_ids(FAST, None), 1, 6, |_| ()).unwrap();
+    set_id(&mut bus, &ScanPlan::all_ids(FAST, None), 1, 6, |_| ()).unwrap();
     assert_eq!(bus.read(6, register::LOCK, 1).unwrap().values, [1]);
 }
 
@@ -179,12 +179,12 @@ fn an_id_is_changed_on_a_servo_that_acknowledges_nothing() {
     let mut servo = SimulatedServo::new(1);
     set(&mut servo, register::RESPONSE_LEVEL, &[0]);
     let (mut bus, wire) = bus(vec![servo]);
-    set_id(&mut bus, &all_ids(FAST, None), 1, 6, |_| ()).unwrap();
+    set_id(&mut bus, &ScanPlan::all_ids(FAST, None), 1, 6, |_| ()).unwrap();
     assert_eq!(wire.borrow().servos[0].servo.id(), 6);
 }
 
 #[test]
-fn nothing_is_written_unless_the_servo_is_alone() {
+fn a_new_id_needs_exactly_one_servo() {
     let garbled = SimulatedServo::with(4, ServoFault::Garbled(1));
     for (servos, says) in [
         (vec![SimulatedServo::new(1), SimulatedServo::new(200)], "these ids answer: 1, 200"),
@@ -194,7 +194,7 @@ fn nothing_is_written_unless_the_servo_is_alone() {
         (vec![], "no servo answers"),
     ] {
         let (mut bus, wire) = bus(servos);
-        let error = set_id(&mut bus, &all_ids(FAST, None), 1, 6, |_| ()).unwrap_err();
+        let error = set_id(&mut bus, &ScanPlan::all_ids(FAST, None), 1, 6, |_| ()).unwrap_err();
         assert!(matches!(error, SetIdError::NotAlone { .. }));
         assert!(error.to_string().contains(says), "{error}");
         assert!(wire.borrow().sent.iter().all(|frame| frame[4] == 2), "only reads");
@@ -202,20 +202,20 @@ fn nothing_is_written_unless_the_servo_is_alone() {
 }
 
 #[test]
-fn a_servo_that_falls_silent_half_way_is_told() {
-    let plan = all_ids(FAST, None);
+fn a_servo_lost_while_unlocking_is_an_error() {
+    let plan = ScanPlan::all_ids(FAST, None);
     let (mut first, _) = bus(vec![SimulatedServo::new(1)]);
     scan(&mut first, &plan, |_| ()).unwrap();
     let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
-    // Just after the scan, while the EEPROM is being opened.
+    // Just after the scan, while the EEPROM is being unlocked.
     wire.borrow_mut().servos[0].fails_at = first.now() + Duration::from_micros(100);
     let error = set_id(&mut bus, &plan, 1, 6, |_| ()).unwrap_err();
     assert!(matches!(error, SetIdError::StaysLocked(_)), "{error:?}");
 }
 
 #[test]
-fn wherever_the_port_is_lost_the_user_learns_what_state_the_servo_may_be_in() {
-    let plan = all_ids(FAST, None);
+fn each_error_after_a_lost_port_gives_the_servos_state() {
+    let plan = ScanPlan::all_ids(FAST, None);
     let (mut bus_to_count, counted) = bus(vec![SimulatedServo::new(1)]);
     set_id(&mut bus_to_count, &plan, 1, 6, |_| ()).unwrap();
     let frames = counted.borrow().sent.clone();
@@ -235,7 +235,7 @@ fn wherever_the_port_is_lost_the_user_learns_what_state_the_servo_may_be_in() {
 }
 
 #[test]
-fn a_servo_goes_to_its_middle_and_starts_where_it_stands() {
+fn a_servo_moves_to_its_middle_without_a_jump() {
     let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
     assert_eq!(center(&mut bus, 1, &CenterOptions::default(), |_| true), Ok(511));
     let goals: Vec<Vec<u8>> = wire
@@ -262,7 +262,7 @@ fn a_blocked_servo_loses_its_torque() {
 }
 
 #[test]
-fn an_interrupted_servo_loses_its_torque() {
+fn an_interrupted_move_ends_without_torque() {
     let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
     let error =
         center(&mut bus, 1, &CenterOptions::default(), |reading| reading.position_counts < 320).unwrap_err();
@@ -271,8 +271,8 @@ fn an_interrupted_servo_loses_its_torque() {
 }
 
 #[test]
-fn a_servo_that_cannot_reach_its_middle_is_left_alone() {
-    for (limits, says) in [([0, 0, 0, 0], "turn on and on"), ([2, 88, 3, 255], "600 to 1023")] {
+fn a_servo_that_cannot_reach_its_middle_gets_no_torque() {
+    for (limits, says) in [([0, 0, 0, 0], "turn without end"), ([2, 88, 3, 255], "600 to 1023")] {
         let mut servo = SimulatedServo::new(1);
         set(&mut servo, register::MIN_POSITION, &limits);
         let (mut bus, wire) = bus(vec![servo]);
@@ -283,7 +283,7 @@ fn a_servo_that_cannot_reach_its_middle_is_left_alone() {
 }
 
 #[test]
-fn a_servo_that_falls_silent_may_still_be_moving() {
+fn a_servo_lost_during_its_move_may_still_be_moving() {
     let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
     let silence = Duration::from_millis(500);
     wire.borrow_mut().servos[0].fails_at = silence;

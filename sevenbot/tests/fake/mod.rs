@@ -1,6 +1,6 @@
-//! Arms that are not ours, on real pseudo-terminals: each does what its test tells it to.
+//! Scripted arms on real pseudo-terminals.
 
-// Not every test asks for everything.
+// No test uses all of it.
 #![allow(dead_code)]
 
 use std::io::{ErrorKind, Read, Write};
@@ -12,10 +12,10 @@ use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
 use serialport::{SerialPort, TTYPort};
 
-/// Registers 0 to 7 of an arm like ours.
+/// Registers 0 to 7 of an arm with this project's firmware.
 pub(crate) const IDENTITY: [u8; 8] = [7, 30, 1, 2, 3, 4, 5, 6];
 
-/// Where the arm of [`moving_registers`] is.
+/// The present position of the arm of [`moving_registers`].
 pub(crate) const POSE: [u8; 7] = [120, 90, 65, 90, 90, 90, 0];
 
 /// The frame of a reply.
@@ -25,8 +25,7 @@ pub(crate) fn reply(address: u8, values: &[u8]) -> Vec<u8> {
     frame.to_vec()
 }
 
-/// An arm that answers the n-th read (the first is number 0) with whatever bytes the script says, on a port
-/// of this name.
+/// Starts an arm that answers each read with the bytes from `script`: number of the read (from 0), address, count.
 pub(crate) fn answering_arm(
     mut script: impl FnMut(usize, u8, u8) -> Vec<u8> + Send + 'static,
 ) -> (String, TTYPort) {
@@ -40,8 +39,7 @@ pub(crate) fn answering_arm(
     })
 }
 
-/// An arm that does with each request what the script says, given its own end of the line too, on a port of
-/// this name. It ends when nobody has the port open any more.
+/// Starts an arm that answers each request with the bytes from `script`. It ends when its port is closed.
 pub(crate) fn scripted_arm(
     mut script: impl FnMut(&TTYPort, &Request<'_>) -> Vec<u8> + Send + 'static,
 ) -> (String, TTYPort) {
@@ -56,7 +54,7 @@ pub(crate) fn scripted_arm(
                 Err(error) if error.kind() == ErrorKind::TimedOut => continue,
                 Err(_) => return,
             };
-            // No test sends more than the deframer holds at once.
+            // No test sends more than the deframer holds.
             assert_eq!(deframer.push(Instant::ZERO, &chunk[..length]), length);
             while let Some(found) = deframer.pull() {
                 if let Ok(request) = found.map(Request::from_frame) {
@@ -66,12 +64,11 @@ pub(crate) fn scripted_arm(
             }
         }
     });
-    // Whoever holds the other end keeps the port alive between two openings.
+    // While the caller holds this end, the port stays open.
     (name, slave)
 }
 
-/// An arm with the maker's firmware 2.2: registers without rules, no status block, servos that are where
-/// they are sent at once.
+/// An arm with the maker's firmware 2.2: no ranges, no status block, and its servos are at their targets at once.
 pub(crate) fn makers_arm() -> (String, TTYPort) {
     let mut registers = [0; 256];
     registers[..8].copy_from_slice(&[7, 22, 1, 2, 3, 4, 5, 6]);
@@ -93,16 +90,16 @@ pub(crate) fn makers_arm() -> (String, TTYPort) {
     })
 }
 
-/// What a line does to a frame.
+/// The fault of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LineFault {
     Lost,
     Garbled,
-    /// A reply comes together with the next one; a request is lost.
+    /// A reply arrives together with the next one. A request is lost.
     Late,
 }
 
-/// The registers of an arm in the servo state whose joints 1 and 7 are on their way, the last from 0 degrees.
+/// Registers of an arm in the servo state. Joints 1 and 7 are moving; joint 7 is at 0 degrees.
 pub(crate) fn moving_registers() -> Arc<Mutex<[u8; 256]>> {
     let mut registers = [0; 256];
     registers[..8].copy_from_slice(&IDENTITY);
@@ -114,7 +111,7 @@ pub(crate) fn moving_registers() -> Arc<Mutex<[u8; 256]>> {
     Arc::new(Mutex::new(registers))
 }
 
-/// Does what a request says; returns the reply.
+/// Carries out a request and returns the reply.
 pub(crate) fn execute(registers: &mut [u8; 256], request: &Request<'_>) -> Vec<u8> {
     match *request {
         Request::Read { address, count } => {
@@ -130,7 +127,7 @@ pub(crate) fn execute(registers: &mut [u8; 256], request: &Request<'_>) -> Vec<u
     }
 }
 
-/// An arm with these registers, on a line that harms its frame number `faulty_frame`, requests and replies counted together.
+/// An arm with these registers. The line damages frame number `faulty_frame`, counted over requests and replies.
 pub(crate) fn arm_on_faulty_line(
     registers: &Arc<Mutex<[u8; 256]>>,
     faulty_frame: usize,
@@ -161,7 +158,7 @@ pub(crate) fn arm_on_faulty_line(
     })
 }
 
-/// An arm that takes so many writes, and then loses them all. It tells of each write.
+/// An arm that loses all writes after the first `takes`. It reports each write.
 pub(crate) fn arm_that_loses_writes_after(takes: usize) -> (String, TTYPort, mpsc::Receiver<()>) {
     let registers = moving_registers();
     let (report_write, writes) = mpsc::channel();
@@ -176,7 +173,7 @@ pub(crate) fn arm_that_loses_writes_after(takes: usize) -> (String, TTYPort, mps
             }
         }
         let reply = execute(&mut registers, request);
-        // A move never ends here.
+        // The joints never arrive.
         registers[243] = 0b100_0001;
         reply
     });

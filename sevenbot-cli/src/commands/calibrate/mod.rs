@@ -233,7 +233,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn answers_are_nudges_angles_or_words() {
+    fn input_is_a_nudge_an_angle_or_a_letter() {
         assert_eq!(CalibrationInput::parse("\n"), Some(CalibrationInput::Keep));
         assert_eq!(CalibrationInput::parse(" +5 \n"), Some(CalibrationInput::Nudge(5)));
         assert_eq!(CalibrationInput::parse("-2\r\n"), Some(CalibrationInput::Nudge(-2)));

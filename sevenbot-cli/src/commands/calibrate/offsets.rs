@@ -138,13 +138,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn grades_are_the_makers() {
+    fn grades_follow_the_makers_table() {
         let words: Vec<&str> = [0, 10, -10, 11, -16, 17, -300].map(|offset| Grade::of(offset).word()).into();
         assert_eq!(words, ["good", "good", "good", "acceptable", "acceptable", "bad", "bad"]);
     }
 
     #[test]
-    fn an_offset_counts_on_the_servos_side() {
+    fn a_reversed_joint_subtracts_the_error() {
         assert_eq!(corrected(Joint::ALL[0], 2, 90, 95), 7);
         assert_eq!(corrected(Joint::ALL[1], 2, 90, 95), -3, "reversed");
         assert_eq!(corrected(Joint::ALL[6], 0, 80, 79), -1);

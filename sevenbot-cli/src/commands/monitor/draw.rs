@@ -276,12 +276,12 @@ mod tests {
     }
 
     #[test]
-    fn an_arm_that_moves() {
+    fn a_moving_arm() {
         insta::assert_snapshot!(screen(&watching(), 80, 24));
     }
 
     #[test]
-    fn an_arm_that_went_away() {
+    fn a_lost_arm() {
         let mut view = watching();
         view.update(ArmEvent::Lost("the connection is gone: broken pipe".to_owned()));
         insta::assert_snapshot!(screen(&view, 80, 24));
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn no_size_is_too_small() {
+    fn every_screen_size_can_be_drawn() {
         let mut view = watching();
         view.dialog = Some(Dialog::ChooseState);
         for (width, height) in [(1, 1), (10, 3), (49, 12), (300, 100)] {
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn on_a_low_screen_all_joints_are_seen() {
+    fn a_low_screen_shows_all_joints() {
         let low = screen(&watching(), 80, 12).to_string();
         for seen in [" ▸   1", "     7", "faults none", "round trip", "q quit"] {
             assert!(low.contains(seen), "{low}");

@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn letting_the_arm_fall_takes_two_keys_and_holding_it_one() {
+    fn only_a_state_without_torque_is_confirmed() {
         let mut view = watching();
         let let_go = [KeyCode::Char('s'), KeyCode::Char('f'), KeyCode::Char('y')];
         let outcomes = pressed(&mut view, &let_go);
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn without_an_arm_keys_ask_for_nothing() {
+    fn without_an_arm_keys_send_nothing() {
         let mut view = View::new("COM3");
         let keys = [KeyCode::Left, KeyCode::Char('+'), KeyCode::Char(']')];
         assert_eq!(pressed(&mut view, &keys), [KeyAction::Redraw; 3]);

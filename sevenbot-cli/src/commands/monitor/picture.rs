@@ -145,7 +145,7 @@ mod tests {
     use crate::commands::monitor::view::tests::watching;
 
     #[test]
-    fn what_the_screen_shows_is_in_the_picture() {
+    fn the_svg_contains_the_screen() {
         let picture = picture(&watching());
         assert!(picture.contains(">firmware<") && picture.contains(">moving<"), "{picture}");
         assert!(picture.matches("<circle").count() > 100, "the plot");
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn dots_are_where_unicode_has_them() {
+    fn braille_dots_follow_unicode() {
         assert_eq!(dots('⠁'), Some(vec![(0.0, 0.0)]));
         assert_eq!(dots('⢀'), Some(vec![(1.0, 3.0)]));
         assert_eq!(dots('a'), None);

@@ -264,14 +264,14 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_past_ends_after_twenty_seconds() {
+    fn the_plot_spans_twenty_seconds() {
         let mut view = watching();
         view.update(ArmEvent::Sample(sample(25_000, 120)));
         assert_eq!(view.past.front().map(|past| past.0), Some(Duration::from_secs(5)));
     }
 
     #[test]
-    fn frozen_it_goes_on_counting_answers_but_shows_none() {
+    fn a_frozen_view_counts_answers_only() {
         let mut view = watching();
         view.is_frozen = true;
         view.tick(Duration::from_secs(60));
@@ -281,7 +281,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn an_arm_that_is_away_cannot_be_asked_for_anything() {
+    fn a_lost_arm_takes_no_commands() {
         let mut view = watching();
         assert!(view.arm().is_some());
         view.update(ArmEvent::Lost("gone".to_owned()));
@@ -301,7 +301,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_note_goes_after_a_while() {
+    fn a_note_disappears_after_six_seconds() {
         let mut view = watching();
         view.show_note("no");
         assert_eq!(view.note(), Some("no"));

@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn late_reports_are_put_where_they_belong() {
+    fn late_reports_get_their_own_tick() {
         assert_eq!(times(&[0, 23, 38, 69, 80]), [0, 20, 40, 60, 80], "a little late each");
         assert_eq!(times(&[7, 27, 47]), [0, 20, 40], "time begins with the first");
         assert_eq!(times(&[0, 46, 46, 60]), [0, 40, 60, 80], "two at once never share a time");
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn the_line_bounds_the_rate_as_it_does_in_the_arm() {
+    fn the_baud_rate_limits_the_report_rate() {
         assert_eq!(ReportClock::new(50, 9600).period, Duration::from_secs(1) / 34);
     }
 }

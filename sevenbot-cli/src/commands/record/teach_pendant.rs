@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_ask_for_what_the_line_says() {
+    fn keys_give_the_commands_in_the_help_line() {
         let first = Joint::ALL[0];
         let plain = |code| command(KeyEvent::from(code), first);
         assert_eq!(plain(KeyCode::Char(' ')), Some(KeyCommand::SwitchPump));

@@ -211,7 +211,7 @@ impl ServoLimits {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{BOLD}ServoLimits{BOLD:#}")?;
         let (lowest, highest) = (self.min_position_counts, self.max_position_counts);
-        let endless = if (lowest, highest) == (0, 0) { ": the motor turns on and on" } else { "" };
+        let endless = if (lowest, highest) == (0, 0) { ": the motor turns without end" } else { "" };
         line(out, "position", &format!("{lowest} to {highest} counts{endless}"))?;
         line(out, "supply", &format!("{:.1} to {:.1} V", self.min_supply_volts, self.max_supply_volts))?;
         line(out, "temperature", &format!("{} °C", self.max_temperature_celsius))?;

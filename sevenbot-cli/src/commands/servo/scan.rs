@@ -73,15 +73,7 @@ struct ServoRow {
 impl From<&FoundServo> for ServoRow {
     fn from(found: &FoundServo) -> Self {
         let joint = Joint::from_index(found.id).map(Joint::number);
-        Self { id: found.id, baud: found.baud, joint, answers: word(found.answers) }
-    }
-}
-
-const fn word(answers: AnswerQuality) -> &'static str {
-    match answers {
-        AnswerQuality::Good => "good",
-        AnswerQuality::Several => "several servos",
-        AnswerQuality::Damaged => "damaged answers",
+        Self { id: found.id, baud: found.baud, joint, answers: found.answers.name() }
     }
 }
 
@@ -90,7 +82,7 @@ impl Printable for FoundServos {
         for ServoRow { id, baud, joint, answers } in &self.servos {
             let joint = joint.map_or_else(|| "no joint's id".to_owned(), |joint| format!("joint {joint}"));
             write!(out, "id {id:<3}  {baud:>7} baud  ")?;
-            if *answers == word(AnswerQuality::Good) {
+            if *answers == AnswerQuality::Good.name() {
                 writeln!(out, "{joint}")?;
             } else {
                 writeln!(out, "{joint:<13}  {WARNING}{answers}{WARNING:#}")?;
@@ -114,7 +106,7 @@ pub(super) fn run(session: &mut Session, args: &ScanArgs) -> Result<(), CommandE
     let ScanResult { found, unknown_rates, has_echo } =
         scan.map_err(|error| CommandError::Servo { port: port.clone(), error })?;
     for rate in &unknown_rates {
-        warn(format_args!("this adapter does not know {rate} baud: servos at that rate were not looked for"));
+        warn(format_args!("this adapter does not support {rate} baud: that rate was not scanned"));
     }
     if found.is_empty() {
         let is_host_link = leads_to_arm(session, bus, &port);
@@ -146,7 +138,7 @@ fn all_good(found: &[FoundServo]) -> Result<(), CommandError> {
     let bad: Vec<String> = found
         .iter()
         .filter(|found| found.answers != AnswerQuality::Good)
-        .map(|found| format!("id {} at {} baud: {}", found.id, found.baud, word(found.answers)))
+        .map(|found| format!("id {} at {} baud: {}", found.id, found.baud, found.answers.name()))
         .collect();
     if bad.is_empty() { Ok(()) } else { Err(CommandError::Arm(bad.join("\n       "))) }
 }

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use clap::{Args, value_parser};
 use serde::Serialize;
-use sevenbot::servo_bench::set_id::{SetIdError, all_ids, set_id};
+use sevenbot::servo_bench::scan::ScanPlan;
+use sevenbot::servo_bench::set_id::{SetIdError, set_id};
 
 use super::port::{Rate, exchange_error, id, open};
 use super::scan::with_progress;
@@ -57,7 +58,7 @@ pub(super) fn run(session: &mut Session, args: &SetIdArgs) -> Result<(), Command
         return Err(CommandError::Usage(format!("the old id and the new one are both {old}")));
     }
     let mut bus = open(session, rate)?;
-    let plan = all_ids(rate, wait.map(|millis| Duration::from_millis(millis.into())));
+    let plan = ScanPlan::all_ids(rate, wait.map(|millis| Duration::from_millis(millis.into())));
     match with_progress(&plan, |tell| set_id(&mut bus, &plan, old, new, tell)) {
         Ok(()) => session.printer.print(&Changed { old_id: old, id: new }),
         Err(SetIdError::Bus(error)) => Err(exchange_error(session, bus, error)),

@@ -216,7 +216,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_lighter_code_names_the_table() {
+    fn the_lighter_code_selects_the_table() {
         let result = |code| {
             let result = TorqueCodeResult::new(0, code);
             (result.lighter_code, result.table, result.torque_codes)
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn answers_are_short() {
+    fn input_is_a_code_or_a_letter() {
         assert_eq!(TorqueCodeInput::parse("\n"), Some(TorqueCodeInput::Switch));
         assert_eq!(TorqueCodeInput::parse("2\n"), Some(TorqueCodeInput::Lighter(TorqueOffCode::Two)));
         assert_eq!(TorqueCodeInput::parse("1\n"), None);
