@@ -1,17 +1,17 @@
-//! What a user should check after a failure, most likely first. Empty where the message says it all.
+//! Advice to the user after a failure, the most likely cause first. May be empty.
 
 use sevenbot::servo_bench::ServoError;
 use sevenbot::{Error, OpenError, ReceiveCounts};
 
-/// After a port or an arm did not open.
+/// Advice after a port or an arm could not be opened.
 pub(crate) fn opening(error: &OpenError) -> Vec<String> {
     let lines: &[&str] = match error {
         OpenError::PermissionDenied { group } => return vec![join(group.as_deref())],
         OpenError::Silent(error) => exchange(error),
         OpenError::NotFound => &[
             "is the arm plugged in, or the simulator started?",
-            "the name may have changed: unplugging and plugging in again gives ports new numbers",
-            "`sevenbot ports` lists what is there",
+            "a port may have a new name after it was plugged in again",
+            "`sevenbot ports` lists the ports",
         ],
         OpenError::Busy => &[
             "close the other program: a terminal, a browser page, a second sevenbot",
@@ -29,20 +29,22 @@ pub(crate) fn opening(error: &OpenError) -> Vec<String> {
 
 fn join(group: Option<&str>) -> String {
     match group {
-        Some("root") => "only root may open it: a udev rule, or another kernel driver, made it so".to_owned(),
+        Some("root") => "only root may open it, because of a udev rule or another kernel driver".to_owned(),
         Some(group) => {
-            format!("join the group that may: `sudo usermod -aG {group} $USER`, then log out and in again")
+            format!(
+                "join the group that may open it: `sudo usermod -aG {group} $USER`, then log out and in again"
+            )
         }
         None if cfg!(unix) => {
-            "`ls -lL` of the port shows who may open it: only its owner, or a group too (often dialout or uucp), \
-             which you can join; then log in again"
+            "`ls -lL PORT` shows the owner and the group that may open it (often dialout or uucp); \
+             join the group and log in again"
                 .to_owned()
         }
         None => "is another program using it, or does it need an administrator?".to_owned(),
     }
 }
 
-/// After an exchange with an arm failed.
+/// Advice after an exchange with an arm failed.
 pub(crate) const fn exchange(error: &Error) -> &'static [&'static str] {
     match error {
         Error::OutsideMap { .. } => &[],
@@ -52,15 +54,15 @@ pub(crate) const fn exchange(error: &Error) -> &'static [&'static str] {
             "is the baud rate right (--baud)? `sevenbot --port PORT baud --find` tries all of them",
         ],
         Error::NoAnswer { .. } => &[
-            "something sends, but it does not make sense: most often the baud rate is wrong (--baud); \
-             `sevenbot --port PORT baud --find` tries all of them",
+            "bytes arrive, but no frames: probably the baud rate is wrong (--baud); \
+             `sevenbot --port PORT baud --find` tries all rates",
             "is this the right port, and no other program reading from it?",
         ],
         Error::Port(_) => &["was the cable pulled, or the simulator ended?"],
     }
 }
 
-/// After an exchange with a servo failed.
+/// Advice after an exchange with a servo failed.
 pub(crate) const fn servo(error: &ServoError) -> &'static [&'static str] {
     match error {
         ServoError::NoAnswer { received: ReceiveCounts { damaged_frames: 1.., .. }, .. } => &[

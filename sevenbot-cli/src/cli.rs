@@ -1,6 +1,4 @@
-//! The command line: what can be said, and the help that teaches it.
-//!
-//! Knows no arm, and of the commands only what they are called: their arguments stand with them.
+//! The command line: global options, commands and help. The arguments of a command are in the command's own file.
 
 use clap::{Args, CommandFactory, Parser, Subcommand, value_parser};
 
@@ -24,13 +22,12 @@ Without --port and SEVENBOT_PORT the only port that leads to an arm is used.
 
 Exit status:
   0    done
-  1    the arm did not take or do what was asked, `info` found a fault, or a file cannot be used
-  2    the command line makes no sense, or a question had nobody to answer it
-  3    no connection: the port cannot be opened, nobody answers, no 7Bot V2 does, or it went away
-  130  ended by Ctrl-C; a moving arm is left holding where it is. A second Ctrl-C ends at once";
+  1    the arm refused or failed, `info` found a fault, or a file cannot be used
+  2    the arguments are invalid, or a question needs a terminal or --yes
+  3    no connection: the port cannot be opened, no 7Bot V2 answers, or the connection was lost
+  130  interrupted by Ctrl-C; a moving arm then holds its position. A second Ctrl-C ends at once";
 
-/// Talks to a 7Bot V2 robot arm over its serial port: a real one, a simulated one, or the firmware in an
-/// emulator.
+/// Controls a 7Bot V2 robot arm over its serial port. The arm may be real, simulated, or the firmware in an emulator.
 #[derive(Debug, Parser)]
 #[command(name = "sevenbot", version, after_help = EXAMPLES)]
 pub(crate) struct Cli {
@@ -40,24 +37,24 @@ pub(crate) struct Cli {
     pub(crate) command: Command,
 }
 
-/// What every command understands.
+/// Options of every command.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Options of every command")]
 pub(crate) struct Global {
-    /// The serial port the arm is on, such as /dev/ttyUSB0, COM3, or the link of the simulator.
+    /// Serial port of the arm, such as /dev/ttyUSB0, COM3, or the link of the simulator.
     #[arg(long, global = true, env = "SEVENBOT_PORT", hide_env_values = true)]
     pub(crate) port: Option<String>,
-    /// Baud rate of the port. The arm starts with the one in its register 12.
+    /// Baud rate of the port. The arm starts with the rate in its register 12.
     #[arg(long, global = true, default_value_t = 115_200, value_parser = value_parser!(u32).range(1..))]
     pub(crate) baud: u32,
-    /// How long to wait for an answer before asking again, in milliseconds; each question is asked three times.
+    /// Timeout for an answer in milliseconds; each question is asked three times.
     #[arg(long, global = true, value_name = "MS", env = "SEVENBOT_TIMEOUT", hide_env_values = true,
           default_value_t = 500, value_parser = value_parser!(u16).range(1..))]
     pub(crate) timeout: u16,
-    /// Show facts as JSON, one value a line.
+    /// Print results as JSON, one value per line.
     #[arg(long, global = true)]
     pub(crate) json: bool,
-    /// Show every frame, in words, on standard error.
+    /// Print every frame as text on standard error.
     #[arg(short, long, global = true)]
     pub(crate) verbose: bool,
 }

@@ -1,4 +1,4 @@
-//! How a command can fail: what is said, and the exit status that scripts see.
+//! Why a command fails: message, advice and exit status.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -10,48 +10,48 @@ use sevenbot::{Error, OpenError};
 use crate::advice::{self, owned};
 use crate::style::BAD;
 
-/// The exit status after Ctrl-C, as shells have it: 128 and the number of SIGINT.
+/// The exit status after Ctrl-C: 128 plus the number of SIGINT, as in shells.
 pub(crate) const INTERRUPTED: u8 = 130;
 
-/// What to do about an arm that may be moving.
+/// Advice if the arm may be moving.
 const SAFETY: [&str; 3] = [
-    "if anybody or anything is in its way, switch the supply of the servos off; the arm then falls",
+    "if a person or an object is in its way, switch off the supply of the servos; the arm then falls",
     "is the cable plugged in at both ends, and the baud rate right (--baud)?",
     "then `sevenbot stop` again",
 ];
 
-/// Why the program does not end well.
+/// Why a command fails.
 #[derive(Debug)]
 pub(crate) enum CommandError {
-    /// The arm did not do, or is not, what was asked for.
+    /// The arm did not do what was asked.
     Arm(String),
-    /// It is not known that the arm did what it was told to do with its motors, for this reason.
+    /// The arm may be moving, for this reason.
     MayMove(String),
-    /// The command line makes no sense for this register, or lacks an answer.
+    /// The arguments do not fit the register, or an answer from the user is missing.
     Usage(String),
-    /// Nobody said which port, and none leads to an arm: those that were tried, and what came of it.
+    /// No port was given, and none leads to an arm. The ports tried, with the reasons.
     NoArm { tried: Vec<(String, OpenError)> },
-    /// Nobody said which port, and several lead to an arm.
+    /// No port was given, and several lead to an arm.
     SeveralArms { ports: Vec<String> },
     /// The port does not lead to an arm.
     Open { port: String, error: OpenError },
-    /// The port opens, but no arm answers there at any rate.
+    /// The port opens, but no arm answers at any baud rate.
     NoRate { port: String },
-    /// The arm went away.
+    /// An exchange with the arm failed.
     Exchange(Error),
     /// An exchange with a servo failed.
     Servo { port: String, error: ServoError },
-    /// No servo answers at any of the rates and ids that were tried.
+    /// No servo answers at the rates and ids of the scan.
     NoServo { port: String, has_echo: bool },
-    /// The port of a servo adapter was wanted, but this one leads to an arm's controller.
+    /// The port leads to an arm's controller, not to servos.
     HostLink { port: String },
-    /// Something did not do what was asked for, and there is advice about it.
+    /// A failure with advice of its own.
     WithAdvice { message: String, advice: &'static [&'static str] },
-    /// A file cannot be read or written, or does not hold what it should.
+    /// A file cannot be read or written, or has the wrong content.
     File { path: PathBuf, reason: String },
-    /// What was found out cannot be shown.
+    /// The output cannot be written.
     Output(io::Error),
-    /// The user wanted it to end.
+    /// The user interrupted the command.
     Interrupted,
 }
 
@@ -68,12 +68,12 @@ impl From<io::Error> for CommandError {
 }
 
 impl CommandError {
-    /// A failure with a file, for whatever reason.
+    /// A failure with a file.
     pub(crate) fn file(path: &Path, reason: impl ToString) -> Self {
         Self::File { path: path.to_owned(), reason: reason.to_string() }
     }
 
-    /// Did the connection fail, so that the arm cannot be told anything more?
+    /// Did the connection fail? Then the arm can take no more commands.
     pub(crate) const fn is_connection_lost(&self) -> bool {
         matches!(self, Self::Exchange(_) | Self::MayMove(_))
     }
@@ -81,7 +81,7 @@ impl CommandError {
     /// The exit status; `sevenbot --help` lists them.
     pub(crate) fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
-            // Somebody piped into `head`: it has all it wants.
+            // The reader of the pipe, such as `head`, has ended.
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             Self::Arm(_) | Self::MayMove(_) | Self::File { .. } | Self::Output(_) => 1,
             Self::Usage(_) => 2,
@@ -93,7 +93,7 @@ impl CommandError {
         })
     }
 
-    /// Tells the user. Where even that fails, the exit status is all that is left.
+    /// Prints message and advice. If that fails, the exit status remains.
     pub(crate) fn report(&self, err: &mut impl Write) {
         let Some(message) = self.message() else { return };
         let _ = writeln!(err, "{BAD}error:{BAD:#} {message}");
@@ -102,7 +102,7 @@ impl CommandError {
         }
     }
 
-    /// What is wrong; `None` where nobody needs to know.
+    /// The message; `None` if there is none to print.
     pub(crate) fn message(&self) -> Option<String> {
         match self {
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => None,
@@ -119,9 +119,7 @@ impl CommandError {
                 Some(format!("no port was given, and several lead to an arm: {}", ports.join(", ")))
             }
             Self::Open { port, error } => Some(format!("{port}: {error}")),
-            Self::NoRate { port } => {
-                Some(format!("{port}: no arm answers, at any of the rates an arm knows"))
-            }
+            Self::NoRate { port } => Some(format!("{port}: no arm answers at any baud rate")),
             Self::Exchange(error) => Some(error.to_string()),
             Self::Servo { port, error } => Some(format!("{port}: {error}")),
             Self::NoServo { port, .. } => Some(format!("{port}: no servo answers")),
@@ -162,13 +160,13 @@ impl CommandError {
     }
 }
 
-/// What to check when no servo answers.
+/// Advice if no servo answers.
 fn no_servo(has_echo: bool) -> Vec<String> {
     let echo: &[&str] = if has_echo { &["the adapter works: it echoes what is sent"] } else { &[] };
     let checks = [
         "do the servos have their own power? The adapter does not supply them",
         "is the signal wire on the adapter's servo side, and the ground common to both?",
-        "without --rates and --ids all eight rates and all ids are tried",
+        "without --rates and --ids a scan tries all rates and ids",
         "is the arm's controller off the bus? Two masters disturb each other",
     ];
     owned(&[echo, &checks].concat())

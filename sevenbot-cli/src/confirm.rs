@@ -1,17 +1,19 @@
-//! A question before something that cannot be taken back.
+//! A question to the user before an action that cannot be undone.
 
 use std::io::{self, IsTerminal, Write};
 
 use crate::command_error::CommandError;
 
-/// Asks; goes on only after a yes. `yes` says that the user has answered already, with `--yes`. Where nobody
-/// can answer, because standard input is no terminal, the question is the failure.
+/// Asks the question and fails unless the answer is yes. `yes` means that `--yes` was given, so it does not ask. Fails if
+/// standard input is not a terminal.
 pub(crate) fn confirm(question: &str, yes: bool) -> Result<(), CommandError> {
     if yes {
         return Ok(());
     }
     if !io::stdin().is_terminal() {
-        return Err(CommandError::Usage(format!("{question} Nobody is there to answer: --yes says yes")));
+        return Err(CommandError::Usage(format!(
+            "{question} Standard input is no terminal: use --yes to confirm"
+        )));
     }
     let mut err = anstream::stderr();
     write!(err, "{question} [y/N] ")?;

@@ -1,7 +1,6 @@
-//! Ctrl-C while the arm moves: the first one leaves it holding where it is, the second one ends at once.
+//! Ctrl-C while the arm moves: the first makes the arm hold its position, the second ends the program.
 //!
-//! A command that moves nothing does not catch it, and ends as any program does; so does a question between two
-//! moves.
+//! Without a move, or while a question waits for its answer, Ctrl-C ends the program.
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -15,21 +14,20 @@ use sevenbot::register_text::{self, motor_state_name};
 use crate::command_error::{CommandError, INTERRUPTED};
 use crate::printer::{note, warn};
 
-/// How often Ctrl-C was pressed, or another wish to end came.
+/// Number of requests to end: Ctrl-C or a signal.
 static REQUESTS: AtomicU32 = AtomicU32::new(0);
-/// Does the arm move, so that it would have to be stopped?
+/// May the arm be moving, so that it has to be stopped?
 static MOVING: AtomicBool = AtomicBool::new(false);
 static HANDLER: Once = Once::new();
-/// A wait looks this often whether it should end.
+/// Time between two checks during a wait.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
 
-/// The user's wish to end, from now on.
+/// Ctrl-C is caught.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Interrupt(());
 
 impl Interrupt {
-    /// Catches Ctrl-C, and the signals that ask a program to end, from now on. Where that is not possible
-    /// they end the program, as without.
+    /// Catches Ctrl-C and the other signals that end a program. If that is not possible they end the program.
     pub(crate) fn catch() -> Self {
         MOVING.store(true, Ordering::SeqCst);
         HANDLER.call_once(|| {
@@ -42,27 +40,27 @@ impl Interrupt {
         Self(())
     }
 
-    /// The arm does not move any more: from now on the wish ends the program at once.
+    /// The arm does not move: Ctrl-C ends the program again.
     fn release() {
         MOVING.store(false, Ordering::SeqCst);
     }
 
-    /// The user pressed Ctrl-C where that is a key and no signal. The signal ends the program from now on.
+    /// Requests the end, where Ctrl-C arrives as a key. A later signal ends the program at once.
     pub(crate) fn request() {
         REQUESTS.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Did the user want a command to end, in whatever thread it runs?
+    /// Has the user requested the end?
     pub(crate) fn is_requested() -> bool {
         REQUESTS.load(Ordering::SeqCst) > 0
     }
 
-    /// Fails if the user wants it to end.
+    /// Fails if the user has requested the end.
     pub(crate) fn check(self) -> Result<(), CommandError> {
         if Self::is_requested() { Err(CommandError::Interrupted) } else { Ok(()) }
     }
 
-    /// Sleeps; less if the user wants it to end, which is then a failure.
+    /// Sleeps. Fails early if the user requests the end.
     pub(crate) fn sleep(self, duration: Duration) -> Result<(), CommandError> {
         let end = Instant::now() + duration;
         loop {
@@ -76,7 +74,7 @@ impl Interrupt {
     }
 }
 
-/// Does work that may move the arm. Interrupted at any time, it leaves the arm holding where it is.
+/// Runs `work`, which may move the arm. After an interrupt the arm holds its position.
 pub(crate) fn hold_on_interrupt<T>(
     arm: &mut Arm,
     work: impl FnOnce(&mut Arm, Interrupt) -> Result<T, CommandError>,
@@ -95,12 +93,12 @@ pub(crate) fn hold_on_interrupt<T>(
     done
 }
 
-/// Makes the arm hold where it is, and makes sure of it.
+/// Makes the arm hold its position, and verifies it.
 pub(crate) fn hold(arm: &mut Arm) -> Result<JointSnapshot, CommandError> {
     arm.hold().map_err(|reason| CommandError::MayMove(reason.to_string()))
 }
 
-/// Says what an arm does that was made to hold.
+/// Tells the user how the arm holds.
 pub(crate) fn report_hold(joints: &JointSnapshot) {
     if joints.is_driven() {
         note("the arm holds where it is");
@@ -108,7 +106,7 @@ pub(crate) fn report_hold(joints: &JointSnapshot) {
     warn_about_unheld_joints(joints);
 }
 
-/// Warns of joints that a stop does not reach.
+/// Warns about joints that a stop does not affect.
 pub(crate) fn warn_about_unheld_joints(joints: &JointSnapshot) {
     if !joints.is_driven() {
         let (state, word) = (joints.motor_state(), motor_state_name(joints.motor_state()));
@@ -116,8 +114,8 @@ pub(crate) fn warn_about_unheld_joints(joints: &JointSnapshot) {
     } else if joints.missing() != 0 {
         let silent = register_text::joints(joints.missing());
         warn(format_args!(
-            "no answer from the servos of {silent}: where they are is not known. Switch the supply of the servos \
-             off before you reach into the arm"
+            "no answer from the servos of {silent}: their positions are unknown. Switch off the supply of the servos \
+             before you reach into the arm"
         ));
     }
 }

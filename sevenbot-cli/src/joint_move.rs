@@ -1,7 +1,7 @@
-//! Sending joints somewhere, and waiting until they are there.
+//! Moves joints to targets and waits until they arrive.
 //!
-//! The arm's moving bits speak of set-points; a servo arrives a little later, or never. So waiting has two
-//! parts: until no set-point is on its way, and until the measured positions have followed.
+//! The arm's moving bits describe set-points, and a servo arrives later or never. So the wait has two parts: until no
+//! set-point moves, and until the measured positions have settled.
 
 use std::time::{Duration, Instant};
 
@@ -16,38 +16,38 @@ use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::write_result::motors_obey;
 
-/// Time between two looks at a moving arm.
+/// Time between two reads of a moving arm.
 const POLL_PERIOD: Duration = Duration::from_millis(50);
-/// What a move may take beyond twice its duration.
+/// A move may take twice its duration, plus this.
 const MARGIN: Duration = Duration::from_secs(5);
-/// A joint whose measured position has not changed for so long has settled.
+/// A joint has settled if its position has not changed for this time.
 const STILL_TIME: Duration = Duration::from_millis(300);
-/// How long joints may take to settle: one that trembles never does.
+/// Joints have this time to settle. A joint that oscillates never does.
 const SETTLE_TIMEOUT: Duration = Duration::from_secs(2);
-/// A joint this near to its target has arrived: registers are whole degrees.
+/// A joint this near to its target has arrived: positions are whole degrees.
 const ARRIVED_DEGREES: u8 = 1;
-/// A joint that came to rest this near to its target is where it was sent: servos have some play.
+/// A joint that settled this near to its target has reached it: servos have play.
 const TOLERANCE_DEGREES: u8 = 2;
 
-/// Where joints should go, in degrees, joint 1 first; `None` leaves one alone.
+/// Targets in degrees, joint 1 first; `None` for joints that stay.
 pub(crate) type Targets = [Option<u8>; 7];
 
-/// Where a joint goes by a step from where it is sent already, in degrees. It may be out of range.
+/// The target after a relative step, in degrees. It may be out of range.
 pub(crate) fn step_target(joints: &JointSnapshot, joint: Joint, degrees: i16) -> Result<i16, CommandError> {
     let base = joints.step_base(joint).map_err(|reason| {
         let advice = match reason {
             StepBaseError::Silent => "",
-            StepBaseError::PowerUpTarget { .. } => "; `sevenbot stop` makes its position its target",
+            StepBaseError::PowerUpTarget { .. } => "; `sevenbot stop` sets its target to its position",
         };
         CommandError::Arm(format!(
-            "joint {} takes no step: {reason}{advice}; nothing was moved",
+            "joint {} cannot make a step: {reason}{advice}; nothing was moved",
             joint.number()
         ))
     })?;
     Ok(i16::from(base).saturating_add(degrees))
 }
 
-/// The joints, as soon as the arm has come up. Fails unless the motors drive them.
+/// The joints after start-up. Fails if the motors do not drive them.
 pub(crate) fn driven_joints(arm: &mut Arm) -> Result<JointSnapshot, CommandError> {
     let joints = arm.wait_until_settled()?;
     if joints.is_driven() {
@@ -56,28 +56,27 @@ pub(crate) fn driven_joints(arm: &mut Arm) -> Result<JointSnapshot, CommandError
     let state = joints.motor_state();
     let word = motor_state_name(state);
     Err(CommandError::Arm(format!(
-        "the arm's motors are in state {state}, {word}: `sevenbot state servo` makes it hold where it is, \
-         and then it can move"
+        "the arm's motors are in state {state}, {word}: use `sevenbot state servo` first"
     )))
 }
 
 /// A move that was sent to the arm.
 pub(crate) struct JointMove {
     targets: Targets,
-    /// Speeds, times and positions before it.
+    /// Speeds, durations and positions before the move.
     plan: Snapshot,
     start: Instant,
 }
 
 impl JointMove {
-    /// Sends joints to their targets, all at once.
+    /// Sends the targets to all joints at the same time.
     pub(crate) fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, CommandError> {
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         motors_obey(arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets)))?;
         Ok(Self { targets, plan, start: Instant::now() })
     }
 
-    /// Waits until all joints are there; says where they are.
+    /// Waits until all joints have arrived. Returns their positions.
     pub(crate) fn finish(&self, arm: &mut Arm, interrupt: Interrupt) -> Result<[u8; 7], CommandError> {
         let progress = Progress::new(self.degrees_left(&self.plan.joints(&PRESENT_POSITION)), "degrees");
         self.wait_until_still(arm, interrupt, &progress)?;
@@ -85,7 +84,7 @@ impl JointMove {
         self.settle(arm, interrupt, &progress)
     }
 
-    /// What the slowest joint takes.
+    /// The duration of the slowest joint.
     fn duration(&self) -> Duration {
         let durations = self.goals().map(|(joint, goal)| {
             let speed = Speed::from_steps(self.plan.at(SPEED.of(joint))).unwrap_or(Speed::MAXIMUM);
@@ -116,19 +115,19 @@ impl JointMove {
         }
     }
 
-    /// The joints of this move that are on their way, but for those whose servo does not answer.
+    /// The joints of this move whose set-point moves, without those whose servo does not answer.
     fn moving(&self, arm: &mut Arm) -> Result<u8, CommandError> {
         let ours = self.goals().fold(0, |bits, (joint, _)| bits | joint.bit());
         if let Some(status) = arm.status()? {
             return Ok(status.moving() & !status.missing() & ours);
         }
-        // The maker's firmware does not say: those that are not there yet, while they may be on their way.
+        // The maker's firmware has no moving bits: take the joints away from their targets, for the duration of the move.
         let away = self.away(&positions(arm)?, ARRIVED_DEGREES);
         let is_due = self.start.elapsed() >= self.duration();
         Ok(if is_due { 0 } else { away.iter().fold(0, |bits, (joint, ..)| bits | joint.bit()) })
     }
 
-    /// Waits until the joints have followed their set-points; fails with those that have not.
+    /// Waits until the joints have settled. Fails if one has not reached its target.
     fn settle(
         &self,
         arm: &mut Arm,
@@ -171,14 +170,14 @@ impl JointMove {
         Joint::ALL.into_iter().zip(self.targets).filter_map(|(joint, goal)| Some((joint, goal?)))
     }
 
-    /// The joints further than `degrees` from where they should be: where they are, and should be.
+    /// The joints more than `degrees` from their targets: joint, position, target.
     fn away(&self, present: &[u8; 7], degrees: u8) -> Vec<(Joint, u8, u8)> {
         let pairs = Joint::ALL.into_iter().zip(present).zip(self.targets);
         let away = pairs.filter_map(|((joint, &is), goal)| Some((joint, is, goal?)));
         away.filter(|(_, is, goal)| is.abs_diff(*goal) > degrees).collect()
     }
 
-    /// Degrees left, of all joints together.
+    /// The degrees left, summed over all joints.
     fn degrees_left(&self, present: &[u8; 7]) -> u64 {
         self.away(present, 0).iter().map(|(_, is, goal)| u64::from(is.abs_diff(*goal))).sum()
     }

@@ -3,11 +3,10 @@
 //! ```text
 //!   cli ──▶ Session ──▶ commands ──▶ sevenbot (the library) ──▶ arm
 //!                          │
-//!                          └──▶ Printer (facts, as text or JSON), or a CommandError (words and exit status)
+//!                          └──▶ Printer (results as text or JSON), or a CommandError (message and exit status)
 //! ```
 //!
-//! Parses, runs one command, and says how it ended. What the commands do is theirs; how the arm is spoken
-//! to is the library's.
+//! Parses the arguments, runs one command, and reports its result.
 
 #![forbid(unsafe_code)]
 
@@ -47,7 +46,7 @@ fn main() -> ExitCode {
         show_frames();
     }
     let printer = Printer::stdout(global.json);
-    // A variable that was emptied is as good as one that was unset.
+    // An empty SEVENBOT_PORT is the same as none.
     let port = global.port.filter(|port| !port.is_empty());
     let reply_timeout = Duration::from_millis(global.timeout.into());
     let options = ArmOptions { baud: global.baud, reply_timeout, ..ArmOptions::default() };
@@ -61,7 +60,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What the library has to say of every frame goes to standard error from now on.
+/// Prints the library's log, with every frame, on standard error.
 fn show_frames() {
     tracing_subscriber::fmt()
         .with_max_level(LevelFilter::TRACE)

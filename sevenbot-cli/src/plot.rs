@@ -1,24 +1,24 @@
-//! A drawing of a movement as SVG: for each joint where it should have been and where it was, over time.
+//! An SVG plot of a movement: target and measured position of each joint over time.
 //!
 //! ```text
-//!   joint 1   120 ┤   ╭──╮          one panel a joint, all on the same axis of time
-//!              90 ┤───╯  ╰───       the target a broad pale line, the measurement a thin dark one on it
+//!   joint 1   120 ┤   ╭──╮          one panel per joint, with a common time axis
+//!              90 ┤───╯  ╰───       target: broad pale line; measured position: thin dark line
 //!                 └──┬──┬──┬─
 //! ```
 //!
-//! Knows neither arm nor recording: times, angles, and where ink goes.
+//! Knows times and angles, not the arm or the recording.
 
 use std::fmt::Write;
 
-/// Seconds, and degrees.
+/// Seconds and degrees.
 pub(crate) type Point = (f64, f64);
 
-/// What one joint did.
+/// The curves of one joint.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Track {
-    /// Where it should have been.
+    /// The target over time.
     pub(crate) target: Vec<Point>,
-    /// Where it was.
+    /// The measured position over time.
     pub(crate) measured: Vec<Point>,
 }
 
@@ -29,10 +29,10 @@ const RIGHT: f64 = 16.0;
 const TOP: f64 = 56.0;
 const BOTTOM: f64 = 40.0;
 const PANEL: f64 = 78.0;
-/// Between two panels.
+/// Distance between two panels.
 const GAP: f64 = 14.0;
 
-/// No panel shows less than this, or a joint at rest would look restless, in degrees.
+/// The shortest degree axis, so that a joint at rest looks at rest.
 const MIN_DEGREES_SHOWN: f64 = 20.0;
 
 const STYLE: &str = "\
@@ -41,7 +41,7 @@ text { font: 12px sans-serif; fill: #444 } .title { font-size: 15px; fill: #111 
 .middle { text-anchor: middle } polyline { fill: none; stroke-linejoin: round }
 .target { stroke: #f2b56b; stroke-width: 5 } .measured { stroke: #1b5e9e; stroke-width: 1.5 }";
 
-/// The drawing of seven joints' tracks.
+/// The plot of seven joints.
 pub(crate) fn svg(title: &str, tracks: &[Track; 7]) -> String {
     let seconds = AxisScale::of_time(tracks);
     let height = TOP + 7.0 * (PANEL + GAP) - GAP + BOTTOM;
@@ -106,18 +106,18 @@ fn line(out: &mut String, class: &str, points: &[Point]) {
     let _ = writeln!(out, "<polyline class=\"{class}\" points=\"{}\"/>", points.join(" "));
 }
 
-/// A text as it may stand in SVG.
+/// Escapes text for SVG.
 pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// From a quantity to a place on the drawing.
+/// Converts a value to a coordinate.
 struct AxisScale {
     low: f64,
     high: f64,
-    /// Where `low` is drawn.
+    /// The coordinate of `low`.
     from: f64,
-    /// Where `high` is drawn.
+    /// The coordinate of `high`.
     to: f64,
 }
 
@@ -128,7 +128,7 @@ impl AxisScale {
         Self { low: 0.0, high, from: LEFT, to: WIDTH - RIGHT }
     }
 
-    /// Wide enough for the track, and some padding.
+    /// An axis for the track, with padding.
     fn of_degrees(track: &Track, top: f64) -> Self {
         let all = || track.target.iter().chain(&track.measured).map(|point| point.1);
         let (low, high) = (all().fold(180.0, f64::min), all().fold(0.0, f64::max));
@@ -141,7 +141,7 @@ impl AxisScale {
         self.from + (value - self.low) / (self.high - self.low) * (self.to - self.from)
     }
 
-    /// Round values, about `count` of them.
+    /// About `count` round values.
     fn ticks(&self, count: f64) -> impl Iterator<Item = f64> {
         let rough = (self.high - self.low) / count;
         let magnitude = 10_f64.powf(rough.log10().floor());
@@ -149,7 +149,7 @@ impl AxisScale {
         let step = round.into_iter().find(|step| *step >= rough).unwrap_or(10.0 * magnitude);
         let first = (self.low / step).ceil();
         let high = self.high;
-        // Rounded, or 0.1 would be drawn as 0.30000000000000004 now and then.
+        // Rounding avoids labels such as 0.30000000000000004.
         let value = move |index: u32| ((first + f64::from(index)) * step * 1e6).round() / 1e6;
         (0..).map(value).take_while(move |tick| *tick <= high)
     }

@@ -1,12 +1,11 @@
-//! What commands show: facts as text or as JSON on standard output, everything else on standard error.
+//! The output of commands: results as text or JSON on standard output, notes and warnings on standard error.
 //!
 //! ```text
 //!   sevenbot get speed.1           32  speed.1   60  114.0 °/s
 //!   sevenbot get speed.1 --json    {"registers":[{"address":32,"name":"speed.1",...}]}
 //! ```
 //!
-//! One JSON value a line. Colours go to terminals only: anstream takes them out of anything else, and where
-//! NO_COLOR is set.
+//! JSON has one value per line. anstream removes the colours if the output is not a terminal, or NO_COLOR is set.
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
@@ -16,13 +15,13 @@ use serde::Serialize;
 use crate::command_error::CommandError;
 use crate::style::{BOLD, WARNING};
 
-/// Something found out: its fields as serde names them, or lines for a reader.
+/// The result of a command, as JSON (by serde) or as text.
 pub(crate) trait Printable: Serialize {
-    /// Writes the lines.
+    /// Writes the text.
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()>;
 }
 
-/// Where facts are shown.
+/// Prints results.
 pub(crate) struct Printer {
     json: bool,
     stream: Box<dyn Write>,
@@ -33,17 +32,17 @@ impl Printer {
         Self { json, stream: Box::new(anstream::stdout()) }
     }
 
-    /// Is JSON wanted?
+    /// Is the output JSON?
     pub(crate) const fn is_json(&self) -> bool {
         self.json
     }
 
-    /// Will a person see it in a terminal?
+    /// Is the output text on a terminal?
     pub(crate) fn is_terminal(&self) -> bool {
         !self.json && io::stdout().is_terminal()
     }
 
-    /// Shows facts.
+    /// Prints a result.
     pub(crate) fn print(&mut self, facts: &impl Printable) -> Result<(), CommandError> {
         if self.json {
             let line = serde_json::to_string(facts).map_err(io::Error::from)?;
@@ -54,19 +53,19 @@ impl Printer {
         Ok(self.stream.flush()?)
     }
 
-    /// Shows text as it is, whether JSON is wanted or not: a generated file.
+    /// Prints text unchanged, also with `--json`.
     pub(crate) fn print_raw(&mut self, text: &[u8]) -> Result<(), CommandError> {
         self.stream.write_all(text)?;
         Ok(self.stream.flush()?)
     }
 }
 
-/// Something the user should know besides the facts. Where even standard error is closed, nobody reads it.
+/// Prints a note. Ignores a closed standard error.
 pub(crate) fn note(message: impl Display) {
     let _ = writeln!(anstream::stderr(), "{BOLD}note:{BOLD:#} {message}");
 }
 
-/// Something that may not be what the user expects.
+/// Prints a warning.
 pub(crate) fn warn(message: impl Display) {
     let _ = writeln!(anstream::stderr(), "{WARNING}warning:{WARNING:#} {message}");
 }

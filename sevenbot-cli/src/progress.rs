@@ -1,12 +1,12 @@
-//! How far something has come, as a bar on standard error; nothing at all where that is no terminal.
+//! A progress bar on standard error; nothing if that is not a terminal.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// A bar. It disappears when it is dropped.
+/// A progress bar. Dropping it removes it from the screen.
 pub(crate) struct Progress(ProgressBar);
 
 impl Progress {
-    /// A bar for `total` steps of `unit`, none of them done.
+    /// A bar of `total` steps, counted in `unit`.
     pub(crate) fn new(total: u64, unit: &str) -> Self {
         // indicatif draws on terminals only.
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
@@ -17,7 +17,7 @@ impl Progress {
         Self(bar)
     }
 
-    /// A count of `unit`, for what has no end of its own.
+    /// A counter without an end, counted in `unit`.
     pub(crate) fn endless(unit: &str) -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
         let template = format!("{{spinner}} {{pos}} {unit}  {{msg}}");
@@ -27,12 +27,12 @@ impl Progress {
         Self(bar)
     }
 
-    /// So much is done.
+    /// Sets the number of completed steps.
     pub(crate) fn set(&self, done: u64) {
         self.0.set_position(done);
     }
 
-    /// What goes on at present.
+    /// Sets the message behind the bar.
     pub(crate) fn say(&self, what: &str) {
         self.0.set_message(what.to_owned());
     }

@@ -1,4 +1,4 @@
-//! Reports for the time of some work; the frequency is afterwards what it was before (register 53).
+//! Position reports during a task. Afterwards register 53 has its old value again.
 
 use sevenbot::map::FEEDBACK_FREQUENCY;
 use sevenbot::{Arm, Span};
@@ -6,7 +6,7 @@ use sevenbot::{Arm, Span};
 use crate::command_error::CommandError;
 use crate::write_result::all_taken;
 
-/// Does work while the arm reports its positions so many times a second.
+/// Runs `work` while the arm reports its positions `hz` times a second.
 pub(crate) fn with_reports<T>(
     arm: &mut Arm,
     hz: u8,
@@ -15,7 +15,7 @@ pub(crate) fn with_reports<T>(
     let before = arm.read_span(Span::of(&FEEDBACK_FREQUENCY))?.byte(&FEEDBACK_FREQUENCY);
     all_taken(&arm.write_checked(FEEDBACK_FREQUENCY.address, &[hz])?)?;
     let done = work(arm);
-    // An arm that went away cannot be told anything.
+    // Without a connection the frequency cannot be restored.
     if done.as_ref().is_err_and(CommandError::is_connection_lost) {
         return done;
     }
@@ -23,4 +23,9 @@ pub(crate) fn with_reports<T>(
     let done = done?;
     all_taken(&restored?)?;
     Ok(done)
+}
+
+/// The failure of an arm that has stopped reporting, although the connection works.
+pub(crate) fn reports_stopped() -> CommandError {
+    CommandError::Arm("the arm has stopped reporting its positions: was it switched off and on?".to_owned())
 }

@@ -1,6 +1,4 @@
-//! What every command is given: the way to the arm, and the place to show what it found.
-//!
-//! Knows how a port is chosen; what is said through it is the command's.
+//! What every command needs: the arm and the printer. Chooses the port.
 
 use sevenbot::ports::{self, ProbeResult};
 use sevenbot::{Arm, ArmOptions, Firmware, OpenError};
@@ -10,16 +8,16 @@ use crate::printer::{Printer, note, warn};
 
 /// One run of the program.
 pub(crate) struct Session {
-    /// The port asked for; none: the only one that leads to an arm.
+    /// The port from the command line; `None`: the only one that leads to an arm.
     pub(crate) port: Option<String>,
-    /// How to talk to the arm.
+    /// Baud rate, timeout and attempts.
     pub(crate) options: ArmOptions,
-    /// Where facts are shown.
+    /// Prints results.
     pub(crate) printer: Printer,
 }
 
 impl Session {
-    /// Opens the arm, and says what its firmware cannot do.
+    /// Opens the arm. Warns if its firmware has limits.
     pub(crate) fn connect(&self) -> Result<Arm, CommandError> {
         let port = self.port_name()?;
         let arm = Arm::open_with(&port, self.options).map_err(|error| CommandError::Open { port, error })?;
@@ -28,18 +26,16 @@ impl Session {
             Firmware::Ours => {}
             Firmware::Makers => warn(format_args!(
                 "this arm runs the maker's firmware {version}: it has no status block, so faults, missing \
-                 servos and moving joints are not known; it takes values out of range, and never says what it \
-                 refused"
+                 servos and moving joints are unknown. It takes values out of range and reports no refusal"
             )),
             Firmware::Unknown => warn(format_args!(
-                "this arm runs a firmware {version} that nobody is known to have given out; its status block, \
-                 if it has one, is not used"
+                "this arm runs an unknown firmware, {version}; its status block is not used"
             )),
         }
         Ok(arm)
     }
 
-    /// The port asked for, or else the only one that leads to an arm.
+    /// The port from the command line, or the only one that leads to an arm.
     pub(crate) fn port_name(&self) -> Result<String, CommandError> {
         match &self.port {
             Some(port) => Ok(port.clone()),
@@ -61,7 +57,7 @@ fn the_only(probed: Vec<ProbeResult>) -> Result<String, CommandError> {
     }
 }
 
-/// A port that was tried, and why it is none of ours.
+/// A port without an arm, and the reason.
 fn reason(found: ProbeResult) -> Option<(String, OpenError)> {
     Some((found.port.name, found.answer.err()?))
 }

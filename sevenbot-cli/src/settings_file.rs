@@ -1,4 +1,4 @@
-//! Settings in a file that people can read and change: TOML, the table's names, numbers in its units.
+//! A TOML file with the settings of an arm: names and units of the register table.
 //!
 //! ```toml
 //! format = 1
@@ -11,7 +11,7 @@
 //! offset = [0, -5, 0, 0, 0, 0, 0]
 //! ```
 //!
-//! Settings are what the arm keeps over power cuts and lets be written; the table says which these are.
+//! Settings are the writable registers that keep their value without power.
 
 use std::fs;
 use std::path::Path;
@@ -25,15 +25,15 @@ use toml::{Table, Value};
 
 use crate::command_error::CommandError;
 
-/// The format of the file. Another one is refused: it would be misunderstood.
+/// The version of the file format. Other versions are refused.
 const FORMAT: u32 = 1;
 
-/// What such a file holds.
+/// The content of the file.
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct SettingsFile {
     format: u32,
-    /// Whose they were, as [`sevenbot::Identity::chip_name`] says it.
+    /// The chip id of the arm, see [`sevenbot::Identity::chip_name`].
     pub(crate) chip_id: String,
     firmware: String,
     settings: Table,
@@ -54,14 +54,14 @@ impl SettingsFile {
         Self { format: FORMAT, chip_id: arm.chip_name(), firmware: arm.version(), settings }
     }
 
-    /// As it stands in the file.
+    /// The text of the file.
     pub(crate) fn text(&self) -> Result<String, CommandError> {
         let body = toml::to_string(self);
         let body =
             body.map_err(|error| CommandError::Arm(format!("these settings cannot be written: {error}")))?;
         Ok(format!(
-            "# Settings of a 7Bot V2. `sevenbot restore FILE` writes them back; what is left out stays as it \
-             is.\n{body}"
+            "# Settings of a 7Bot V2. `sevenbot restore FILE` writes them back; missing settings keep their \
+             value.\n{body}"
         ))
     }
 
@@ -74,17 +74,17 @@ impl SettingsFile {
         } else {
             Err(CommandError::file(
                 path,
-                format!("its format is {}; this program knows {FORMAT}", file.format),
+                format!("its format is {}; this program reads format {FORMAT}", file.format),
             ))
         }
     }
 
-    /// The registers with what stands in the file, over what they hold now.
+    /// The registers `now`, changed by the settings of the file.
     pub(crate) fn applied_to(&self, path: &Path, now: &Snapshot) -> Result<Snapshot, CommandError> {
         let mut wanted = now.clone();
         for (name, value) in &self.settings {
             let row = settings().find(|row| name_of(row) == *name);
-            let row = row.ok_or_else(|| CommandError::file(path, format!("{name} is no setting")))?;
+            let row = row.ok_or_else(|| CommandError::file(path, format!("{name} is not a setting")))?;
             let bytes = bytes(row, value).map_err(|reason| CommandError::file(path, reason))?;
             let places = (row.address..).zip(bytes);
             places.for_each(|(address, byte)| put(&mut wanted, address, byte));
@@ -100,7 +100,7 @@ fn put(registers: &mut Snapshot, address: u8, byte: u8) {
     }
 }
 
-/// How a setting stands in the file.
+/// The value of a setting in the file.
 fn value(row: &Register, registers: &Snapshot) -> Value {
     let number = |address| Value::from(i64::from(row.range.decode(registers.at(address))));
     match *row {
@@ -110,7 +110,7 @@ fn value(row: &Register, registers: &Snapshot) -> Value {
     }
 }
 
-/// The bytes for what stands in the file.
+/// The bytes of a setting from the file.
 fn bytes(row: &Register, value: &Value) -> Result<Vec<u8>, String> {
     let values = value.as_array().map_or(std::slice::from_ref(value), Vec::as_slice);
     if values.len() != usize::from(row.count) {
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn unknown_names_and_values_out_of_range_are_refused() {
-        assert_eq!(refused("speed = 5"), "speed is no setting");
+        assert_eq!(refused("speed = 5"), "speed is not a setting");
         assert_eq!(
             refused("offset = [0, 17, 0, 0, 0, 0, 0]"),
             "17 is out of range: offset.2 takes -16 to 16"

@@ -1,12 +1,12 @@
-//! The colours of the text: the same meaning has the same one everywhere.
+//! The colours of the text output.
 
 use anstyle::{AnsiColor, Style};
 
-/// For headings.
+/// Headings.
 pub(crate) const BOLD: Style = Style::new().bold();
-/// For what is well.
+/// Good states.
 pub(crate) const GOOD: Style = AnsiColor::Green.on_default();
-/// For what is not.
+/// Faults and errors.
 pub(crate) const BAD: Style = AnsiColor::Red.on_default().bold();
-/// For what deserves a look.
+/// Warnings.
 pub(crate) const WARNING: Style = AnsiColor::Yellow.on_default().bold();

@@ -6,13 +6,12 @@ use sevenbot::names::name_of_register;
 
 use crate::command_error::CommandError;
 
-/// A command that wanted these registers changed fails with the reasons of those that are not.
+/// Fails with the reasons if any register did not take its value.
 pub(crate) fn all_taken(unchanged: &[WriteMismatch]) -> Result<(), CommandError> {
     if unchanged.is_empty() { Ok(()) } else { Err(CommandError::Arm(reasons(unchanged))) }
 }
 
-/// As [`all_taken`], for registers that move the arm or change its motors' state: where it is not known what the arm
-/// has taken, it may be moving.
+/// As [`all_taken`], for registers that move the arm. If the result of the write is unknown the arm may be moving.
 pub(crate) fn motors_obey(written: Result<Vec<WriteMismatch>, Error>) -> Result<(), CommandError> {
     match written {
         Ok(unchanged) if unchanged.iter().any(|register| register.cause.is_transient()) => {

@@ -1,4 +1,4 @@
-//! The commands that stop the arm, against arms that lose what is written to them.
+//! Commands that stop the arm, with arms that lose writes.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
@@ -27,7 +27,7 @@ fn may_be_moving(output: &Output) {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("the arm may still be moving"), "{said}");
-    assert!(said.contains("switch the supply of the servos off"), "{said}");
+    assert!(said.contains("switch off the supply of the servos"), "{said}");
     assert!(!said.contains("the arm holds"), "{said}");
 }
 
@@ -83,4 +83,27 @@ fn a_stop_of_an_undriven_arm_writes_nothing() {
     assert_eq!(output.status.code(), Some(0), "{said}");
     assert!(said.contains("state 2, forceless"), "{said}");
     assert_eq!(shown.lock().unwrap()[46], 170);
+}
+
+#[test]
+fn ctrl_c_during_a_change_of_the_baud_rate_closes_the_eeprom_lock() {
+    let registers = moving_registers();
+    let shown = Arc::clone(&registers);
+    let (report_write, writes) = mpsc::channel();
+    let (resume, is_interrupted) = mpsc::channel();
+    let (port, _held) = scripted_arm(move |_, request| {
+        let mut registers = registers.lock().unwrap();
+        if matches!(request, Request::Write { address: 28, values: [0] }) {
+            report_write.send(()).unwrap();
+            is_interrupted.recv().unwrap();
+        }
+        execute(&mut registers, request)
+    });
+    let tool = command(&port, &["baud", "57600"]).spawn().unwrap();
+    writes.recv_timeout(Duration::from_secs(60)).expect("the lock is opened");
+    assert!(Command::new("kill").args(["-INT", &tool.id().to_string()]).status().unwrap().success());
+    resume.send(()).unwrap();
+    let output = tool.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    assert_eq!(shown.lock().unwrap()[28], 1, "locked");
 }

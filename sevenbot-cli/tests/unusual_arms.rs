@@ -1,5 +1,4 @@
-//! The command line against arms that are not ours: the maker's firmware, another device, a rate nobody
-//! remembers, an arm that stops answering.
+//! Commands with unusual arms: the maker's firmware, another device, an unknown baud rate, missing answers.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
@@ -15,7 +14,7 @@ use fake::{IDENTITY, answering_arm, makers_arm, reply, scripted_arm};
 use protocol_core::request::Request;
 use sevenbot::ports::find_baud;
 
-/// Patience with a busy machine. It costs nothing while all is well.
+/// A long timeout for a busy machine.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
 fn command(port: &str, arguments: &[&str]) -> Command {
@@ -68,7 +67,7 @@ fn without_an_answer_baud_find_is_suggested() {
     }
 }
 
-/// Only where the master's end tells the rate that was chosen at the other one.
+/// Needs a pseudo-terminal whose master reports the baud rate of the slave.
 #[cfg(target_os = "linux")]
 #[test]
 fn an_unknown_rate_is_found() {
@@ -84,17 +83,17 @@ fn an_unknown_rate_is_found() {
             _ => b"\x00\xF8".to_vec(),
         })
     };
-    // It asks twice, and waits 200 ms each time: a busy machine may take longer, but not always.
+    // Two attempts of 200 ms may be too short on a busy machine, so repeat.
     let found = |port: &str| {
         let tries = std::iter::repeat_with(|| command(port, &["baud", "--find"]).output().unwrap());
         said(&tries.take(50).find(|output| output.status.success()).unwrap(), 0)
     };
     let (port, _held) = listens_at(57_600);
     let text = found(&port);
-    assert!(text.contains("now            57600 baud") && text.contains("say --baud 57600"), "{text}");
+    assert!(text.contains("now            57600 baud") && text.contains("use --baud 57600"), "{text}");
     let (port, _held) = listens_at(4_800);
     let text = run(&port, &["baud", "--find"], 3);
-    assert!(text.contains("trying 9600 baud") && text.contains("no arm answers, at any"), "{text}");
+    assert!(text.contains("trying 9600 baud") && text.contains("no arm answers at any"), "{text}");
     let (port, _held) = listens_at(9_600);
     let mut tried = 0;
     let arm = std::iter::repeat_with(|| {
@@ -115,7 +114,7 @@ fn a_second_ctrl_c_ends_the_program_at_once() {
             Vec::new()
         }
         Request::Read { address: 0, .. } => reply(0, &IDENTITY),
-        // In the servo state, and all is well.
+        // All registers are 1: the servo state, no fault.
         Request::Read { address, count } => reply(address, &vec![1; count.into()]),
         Request::Write { .. } => {
             is_sent = true;
@@ -129,8 +128,8 @@ fn a_second_ctrl_c_ends_the_program_at_once() {
         .spawn()
         .unwrap();
     is_moving.recv_timeout(TIMEOUT).unwrap();
-    // Alone, the first one would end in three more reads without an answer, and status 3. Two that come before the
-    // first is taken are one, so there may have to be more.
+    // After the first Ctrl-C alone the program would end with status 3, after three more timeouts. Two signals may merge
+    // into one, so repeat.
     let id = waiting.id().to_string();
     while waiting.try_wait().unwrap().is_none() {
         assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());

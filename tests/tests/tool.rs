@@ -113,7 +113,7 @@ fn set_reports_a_full_storage() {
             arm.write(DEVICE_ID, &[id]);
         }
         let text = failed(&arm.sevenbot(&["set", "--unlock", "device-id", "7"]), 1);
-        assert!(text.contains("storage takes no more"), "{text}");
+        assert!(text.contains("storage is full"), "{text}");
     });
 }
 

@@ -55,7 +55,7 @@ fn calibration_shows_and_resets_offsets_and_needs_answers() {
         assert_eq!(words(&text, "1 "), ["1", "-5°", "good"]);
         assert_eq!(words(&text, "2 "), ["2", "12°", "acceptable"]);
         let text = failed(&arm.sevenbot(&["calibrate", "--reset"]), 2);
-        assert!(text.contains("nobody is there"), "{text}");
+        assert!(text.contains("standard input is no terminal"), "{text}");
         let text = failed(&with_input(arm, &["calibrate", "--yes"], "\n95\n"), 2);
         assert!(text.contains("the input has ended"), "{text}");
         assert_eq!(arm.read(OFFSET, 7), [0x85, 12, 0, 0, 0, 0, 0], "nothing was written");
@@ -87,7 +87,7 @@ fn offsets_are_verified_after_a_restart() {
     terminal.wait_for("switch the arm off and on");
     arm.power_cycle();
     terminal.keys("\r");
-    let screen = terminal.wait_for("the offsets are still there");
+    let screen = terminal.wait_for("the arm kept the offsets");
     assert!(!screen.contains("not switched off"), "{screen}");
     assert!(terminal.wait().success(), "{}", terminal.contents());
 

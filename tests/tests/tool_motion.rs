@@ -116,7 +116,10 @@ fn an_arm_moved_by_hand_holds_its_position_after_the_recording() {
     with_arm(TestSetup::any().supported(), |arm| {
         let (_folder, recording) = file("hand.txt", "");
         let text_of = failed(&arm.sevenbot(&["record", text(&recording)]), 2);
-        assert!(text_of.contains("goes limp") && text_of.contains("--yes"), "{text_of}");
+        assert!(
+            text_of.contains("the arm falls unless you hold it") && text_of.contains("--yes"),
+            "{text_of}"
+        );
         assert!(!recording.exists(), "no recording was started");
         let tool = arm.spawn_sevenbot(&["record", text(&recording), "--yes"]);
         wait_for_moments(&recording, 5);
@@ -133,7 +136,7 @@ fn an_arm_moved_by_hand_holds_its_position_after_the_recording() {
             "the targets are the positions"
         );
         let again = failed(&arm.sevenbot(&["record", text(&recording), "--driven"]), 2);
-        assert!(again.contains("is there already"), "{again}");
+        assert!(again.contains("exists. Replace it?"), "{again}");
     });
 }
 

@@ -191,7 +191,7 @@ fn set_id_refuses_unless_one_servo_replies() {
 fn center_turns_a_servo_to_its_middle_position() {
     let bus = SimulatedAdapter::start(&[], 6);
     let text = failed(&bus.servo(&["center", "6"]), 2);
-    assert!(text.contains("--yes says yes"), "{text}");
+    assert!(text.contains("use --yes"), "{text}");
     let text = succeeded(bus.servo(&["center", "6", "--yes", "--speed", "500"]));
     assert!(text.contains("servo 6 holds at 51"), "{text}");
     let text = succeeded(bus.servo(&["info", "6"]));
@@ -229,11 +229,11 @@ fn torque_codes_prompts_and_names_the_table() {
         let mut terminal = bus.terminal(&["torque-codes"]);
         terminal.wait_for("[y/N]");
         terminal.keys("y\n");
-        terminal.wait_for("code 0 is on");
+        terminal.wait_for("code 0 is active");
         terminal.keys(&format!("{answer}\n"));
-        terminal.wait_for("feel the other code too");
+        terminal.wait_for("try the other code first");
         terminal.keys("\n");
-        terminal.wait_for("code 2 is on");
+        terminal.wait_for("code 2 is active");
         terminal.keys(&format!("{answer}\n"));
         terminal.wait_for(table);
         assert!(terminal.wait().success());

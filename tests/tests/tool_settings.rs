@@ -20,7 +20,7 @@ fn settings_are_saved_to_a_file_and_restored() {
         assert!(text.contains("device-id = 42\n") && text.contains("baud-rate = 1000000\n"), "{text}");
         assert!(text.contains("offset = [0, -5, 0, 0, 0, 0, 16]\n"), "{text}");
         let again = failed(&arm.sevenbot(&["backup", file]), 1);
-        assert!(again.contains("there already") && again.contains("--force"), "{again}");
+        assert!(again.contains("the file exists") && again.contains("--force"), "{again}");
         assert_eq!(succeeded(arm.sevenbot(&["backup", "-"])), text);
 
         arm.write_setting(DEVICE_ID, &[0, 0, 0, 0, 0, 0, 0, 0, 16]);
@@ -48,8 +48,8 @@ fn a_file_with_an_error_changes_nothing() {
         let head = "format = 1\nchip-id = \"\"\nfirmware = \"3.0\"\n[settings]\n";
         for (text, expected) in [
             (format!("{head}device-id = 9\noffset = [0, 0, 17, 0, 0, 0, 0]\n"), "offset.3 takes -16 to 16"),
-            (format!("{head}device-id = 9\nspeed = 3\n"), "speed is no setting"),
-            (head.replace("format = 1", "format = 2"), "this program knows 1"),
+            (format!("{head}device-id = 9\nspeed = 3\n"), "speed is not a setting"),
+            (head.replace("format = 1", "format = 2"), "this program reads format 1"),
             (format!("{head}device-id = \n"), "arm.toml"),
         ] {
             fs::write(&path, text).expect("a file");
@@ -60,7 +60,7 @@ fn a_file_with_an_error_changes_nothing() {
         // A file of another arm is restored with a warning.
         fs::write(&path, format!("{head}device-id = 9\n")).expect("a file");
         let output = arm.sevenbot(&["restore", "--yes", &file]);
-        assert!(String::from_utf8_lossy(&output.stderr).contains("this one has"), "{output:?}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("this arm has chip"), "{output:?}");
         assert_eq!(arm.register(DEVICE_ID), 9);
         let error = failed(&arm.sevenbot(&["restore", "--yes", "no-such-file"]), 1);
         assert!(error.contains("no-such-file"), "{error}");

@@ -137,10 +137,12 @@ fn completions_and_manual_pages_are_printed() {
     assert_accepted_by("bash", &["-n"], &succeeded(run_without_arm(&["completions", "bash"])));
     assert!(succeeded(run_without_arm(&["man"])).contains(".TH sevenbot 1"));
     assert!(succeeded(run_without_arm(&["man", "pose"])).contains(".TH sevenbot-pose 1"));
-    assert!(failed(&run_without_arm(&["man", "dance"]), 2).contains("no command dance"));
+    assert!(succeeded(run_without_arm(&["man", "servo", "scan"])).contains(".TH sevenbot-servo-scan 1"));
+    assert!(failed(&run_without_arm(&["man", "servo", "dance"]), 2).contains("no command dance"));
     let folder = tempfile::tempdir().expect("a folder");
     succeeded(run_without_arm(&["man", "--dir", folder.path().to_str().expect("UTF-8")]));
-    for page in ["sevenbot.1", "sevenbot-pose.1", "sevenbot-man.1"] {
+    for page in ["sevenbot.1", "sevenbot-pose.1", "sevenbot-servo.1", "sevenbot-servo-set-id.1"] {
         assert!(folder.path().join(page).exists(), "{page}");
     }
+    assert!(!folder.path().join("sevenbot-servo-help.1").exists());
 }

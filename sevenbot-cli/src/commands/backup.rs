@@ -1,4 +1,4 @@
-//! `backup`, `restore`: the settings of an arm, to a file and back.
+//! `backup`, `restore`: copy the settings of an arm to a file, and back.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -23,7 +23,7 @@ use crate::write_result::all_taken;
 /// Write the settings of the arm to a file.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Settings are what the arm keeps over power cuts: device id, baud rate, offsets. The file is TOML.
+Settings keep their value without power: device id, baud rate, offsets. The file is TOML.
 
 Examples:
   sevenbot backup arm-42.toml
@@ -31,7 +31,7 @@ Examples:
 pub(crate) struct BackupArgs {
     /// The file; - is standard output.
     file: PathBuf,
-    /// Replace the file if it is there.
+    /// Replace an existing file.
     #[arg(long)]
     force: bool,
 }
@@ -39,7 +39,7 @@ pub(crate) struct BackupArgs {
 /// Write settings from a file to the arm, and verify them.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Shows what would change and asks first. What the file leaves out stays as it is.
+Shows the changes and asks first. Settings missing in the file keep their value.
 
 Examples:
   sevenbot restore arm-42.toml
@@ -60,11 +60,11 @@ pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), Com
         return session.printer.print_raw(text.as_bytes());
     }
     write_whole(&args.file, &text, args.force)?;
-    note(format_args!("settings are in {}", args.file.display()));
+    note(format_args!("settings written to {}", args.file.display()));
     Ok(())
 }
 
-/// Writes a file that is there as a whole or not at all; into what is no plain file it just writes.
+/// Writes the whole file or leaves the old one. Other things than files, such as pipes, are written to directly.
 fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), CommandError> {
     let is_special = fs::symlink_metadata(path).is_ok_and(|there| !there.is_file());
     if may_replace && is_special {
@@ -78,7 +78,7 @@ fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), Command
     }
     let written = File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
     written.map_err(|error| match error.kind() {
-        io::ErrorKind::AlreadyExists => CommandError::file(path, "it is there already; --force replaces it"),
+        io::ErrorKind::AlreadyExists => CommandError::file(path, "the file exists; --force replaces it"),
         _ => CommandError::file(path, error),
     })
 }
@@ -96,20 +96,20 @@ pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), C
     let chip = arm.identity().chip_name();
     if file.chip_id != chip {
         warn(format_args!(
-            "these are the settings of the arm with chip {}, this one has {chip}",
+            "the file is from the arm with chip {}, but this arm has chip {chip}",
             file.chip_id
         ));
     }
     confirm("Write these settings?", args.yes)?;
     write(&mut arm, &wanted)?;
-    note("written, read back, and right");
+    note("written and verified");
     if changes.iter().any(|change| BAUD_RATE.holds(change.address)) {
-        note("the new baud rate is in force after the next restart of the arm");
+        note("the new baud rate applies after the next restart of the arm");
     }
     Ok(())
 }
 
-/// All settings in one frame: a power cut leaves all the old ones or all the new ones (D19).
+/// Writes all settings in one frame: after a power cut all are old or all are new (D19).
 fn write(arm: &mut Arm, wanted: &Snapshot) -> Result<(), CommandError> {
     // New offsets move the arm a little.
     let write = |arm: &mut Arm| arm.write_checked(wanted.address, &wanted.values);

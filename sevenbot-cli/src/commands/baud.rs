@@ -1,14 +1,15 @@
-//! `baud`: the rate an arm starts with, and the way back to one whose rate nobody remembers.
+//! `baud`: shows, changes or finds the baud rate of an arm.
 
 use std::io::{self, Write};
 
 use clap::Args;
 use serde::Serialize;
 use sevenbot::map::{BAUD_RATE, BAUD_RATES, baud_rate};
-use sevenbot::{OpenError, Span, ports};
+use sevenbot::{Arm, OpenError, Span, ports};
 
 use super::set::unlocked;
 use crate::command_error::CommandError;
+use crate::interrupt::hold_on_interrupt;
 use crate::printer::{Printable, note};
 use crate::session::Session;
 use crate::write_result::all_taken;
@@ -16,17 +17,17 @@ use crate::write_result::all_taken;
 /// Show, change or find the baud rate of the arm.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The arm takes a new rate with its next restart; until then it listens at the old one.
+A new rate applies after the next restart of the arm.
 
 Examples:
   sevenbot baud                                the rate in use, and the one after a restart
   sevenbot baud 1000000
   sevenbot --port /dev/ttyUSB0 baud --find     tries all eight rates")]
 pub(crate) struct BaudArgs {
-    /// The rate the arm shall start with.
+    /// The rate after the next restart.
     #[arg(value_parser = rate)]
     rate: Option<u32>,
-    /// Find the rate the arm listens at.
+    /// Find the present rate of the arm.
     #[arg(long, conflicts_with = "rate")]
     find: bool,
 }
@@ -36,7 +37,7 @@ fn rate(text: &str) -> Result<u32, String> {
     known.ok_or_else(|| {
         let mut rates = BAUD_RATES;
         rates.sort_unstable();
-        format!("the arm knows {}", rates.map(|rate| rate.to_string()).join(", "))
+        format!("the arm supports {}", rates.map(|rate| rate.to_string()).join(", "))
     })
 }
 
@@ -61,22 +62,23 @@ pub(crate) fn run(session: &mut Session, args: &BaudArgs) -> Result<(), CommandE
         let code = BAUD_RATES.iter().zip(0..).find_map(|(&known, code)| (known == rate).then_some(code));
         let code =
             code.ok_or_else(|| CommandError::Usage(format!("the arm does not support {rate} baud")))?;
-        all_taken(&unlocked(&mut arm, |arm| arm.write_checked(BAUD_RATE.address, &[code]))?)?;
+        let write = |arm: &mut Arm| arm.write_checked(BAUD_RATE.address, &[code]);
+        // Ctrl-C must not leave the EEPROM lock open.
+        all_taken(&hold_on_interrupt(&mut arm, |arm, _| unlocked(arm, write))?)?;
     }
     let baud_after_restart = baud_rate(arm.read_span(Span::of(&BAUD_RATE))?.byte(&BAUD_RATE));
     session.printer.print(&BaudRates { baud, baud_after_restart })?;
     if args.rate.is_some() && baud != baud_after_restart {
         note(format_args!(
-            "switch the arm off and on, and then say --baud {baud_after_restart}; until then it listens at \
-             {baud} baud"
+            "switch the arm off and on, then use --baud {baud_after_restart}; until then use --baud {baud}"
         ));
     } else if args.find {
-        note(format_args!("say --baud {baud} from now on"));
+        note(format_args!("use --baud {baud} from now on"));
     }
     Ok(())
 }
 
-fn find(session: &Session) -> Result<sevenbot::Arm, CommandError> {
+fn find(session: &Session) -> Result<Arm, CommandError> {
     let port = session.port.clone().ok_or_else(|| {
         CommandError::Usage("--find needs --port: it would send to every device of this machine".to_owned())
     })?;

@@ -1,4 +1,4 @@
-//! `vacuum`, `effector`: what is at the end of the arm, and its pump.
+//! `vacuum`, `effector`: the pump, and the type of tool.
 
 use clap::{Args, ValueEnum};
 use sevenbot::map::{EFFECTOR_TYPE, VACUUM_PUMP};
@@ -13,7 +13,7 @@ use crate::write_result::all_taken;
 /// Show or switch the vacuum pump.
 #[derive(Debug, Args)]
 pub(crate) struct VacuumArgs {
-    /// What the pump should do.
+    /// The state of the pump.
     vacuum: Option<PumpState>,
 }
 
@@ -27,10 +27,10 @@ enum PumpState {
     Off,
 }
 
-/// Show or say what is at the end of the arm.
+/// Show or set the type of tool.
 #[derive(Debug, Args)]
 pub(crate) struct EffectorArgs {
-    /// What it is.
+    /// The type of tool.
     effector: Option<Effector>,
 }
 

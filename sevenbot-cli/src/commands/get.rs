@@ -1,4 +1,4 @@
-//! `get`: registers as a list of address, name, value and meaning.
+//! `get`: shows registers with address, name, value and meaning.
 
 use std::io::{self, Write};
 
@@ -13,10 +13,10 @@ use crate::command_error::CommandError;
 use crate::printer::Printable;
 use crate::session::Session;
 
-/// How registers are named, for the help of every command that takes such names.
+/// Help text about register names.
 pub(crate) const NAMES: &str = "\
-Registers are named as in docs/registers.md, in any case, with - or _, as short as the name is still
-the only one; .3 is the third joint's. A number is an address, A..B all from A to B.";
+Register names are those of docs/registers.md, in any case, with - or _, and may be shortened while they
+are unique. .3 selects joint 3. A number is an address, A..B a range.";
 
 /// Show registers.
 #[derive(Debug, Args)]
@@ -46,7 +46,7 @@ pub(crate) fn run(session: &mut Session, args: &GetArgs) -> Result<(), CommandEr
     session.printer.print(&RegisterList::from(shown))
 }
 
-/// Registers as they are shown.
+/// Registers for printing.
 #[derive(Debug, Serialize)]
 pub(crate) struct RegisterList {
     registers: Vec<RegisterLine>,
@@ -72,7 +72,7 @@ impl From<Vec<RegisterEntry>> for RegisterList {
 impl From<RegisterEntry> for RegisterLine {
     fn from(entry: RegisterEntry) -> Self {
         let RegisterEntry { address, name, bytes, value: text, meaning } = entry;
-        // Not every value is a number: the chip id is a name, and raw bytes are shown with 0x.
+        // A chip id and a raw byte (0x..) do not parse as a decimal number.
         let value = match (text.parse::<i32>(), bytes.as_slice()) {
             (Ok(number), _) => Value::from(number),
             (Err(_), [byte]) => Value::from(*byte),
@@ -82,7 +82,7 @@ impl From<RegisterEntry> for RegisterLine {
     }
 }
 
-/// One line an entry, in columns.
+/// One line per entry, in columns.
 impl Printable for RegisterList {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         for RegisterLine { address, name, text, meaning, .. } in &self.registers {

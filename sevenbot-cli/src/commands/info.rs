@@ -1,4 +1,4 @@
-//! `info`: who the arm is, its settings, and how it is, in words.
+//! `info`: identity, settings and health of the arm.
 
 use std::io::{self, Write};
 
@@ -17,7 +17,7 @@ use crate::printer::Printable;
 use crate::session::Session;
 use crate::style::{BAD, BOLD, GOOD};
 
-/// Show who the arm is, its settings, and how it is.
+/// Show identity, settings and health of the arm.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Exit status 1 when the arm reports a fault or a servo does not answer.")]
@@ -40,7 +40,7 @@ struct ArmInfo {
     #[serde(flatten)]
     identity: ArmIdentity,
     settings: ArmSettings,
-    /// None from the maker's firmware.
+    /// None for the maker's firmware.
     health: Option<Health>,
 }
 
@@ -169,7 +169,7 @@ impl Printable for ArmSettings {
     }
 }
 
-/// The bits of a set of joints, as the joints' numbers.
+/// Serializes joint bits as joint numbers.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's own way of calling")]
 fn joint_numbers<S: Serializer>(bits: &u8, serializer: S) -> Result<S::Ok, S::Error> {
     serializer

@@ -1,4 +1,4 @@
-//! One file a command: its arguments, and what it does in a session.
+//! The commands, one file each: arguments and execution.
 
 pub(crate) mod backup;
 pub(crate) mod baud;

@@ -1,8 +1,8 @@
-//! `play`: moves the arm as a recording says, and draws how well it followed.
+//! `play`: moves the arm along a recording, and plots the result.
 //!
 //! ```text
-//!   file ──▶ checked, before anything moves ──▶ approach, slowly ──▶ step by step ──▶ there
-//!                                                                      └── reports ──▶ drawing
+//!   file ──▶ check ──▶ slow approach to the first pose ──▶ one frame per step ──▶ last pose
+//!                                                                  └── reports ──▶ plot
 //! ```
 
 use std::fs;
@@ -23,45 +23,45 @@ use crate::joint_move::{JointMove, driven_joints};
 use crate::plot::{self, Track};
 use crate::printer::Printable;
 use crate::progress::Progress;
-use crate::reports::with_reports;
+use crate::reports::{reports_stopped, with_reports};
 use crate::session::Session;
 use crate::write_result::all_taken;
 
 /// Play a recorded movement.
 ///
-/// Nothing moves before the whole file was checked. The arm goes slowly from wherever it is to where the
-/// recording begins. Ctrl-C leaves it holding where it is.
+/// The whole file is checked before the arm moves. The arm moves slowly to the first pose. Ctrl-C makes it hold its
+/// position.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   sevenbot play wave.txt
   sevenbot play wave.txt --speed 0.5 --loop=3
-  sevenbot play wave.txt --plot wave.svg       draws where each joint should have been, and where it was")]
+  sevenbot play wave.txt --plot wave.svg       plots targets and measured positions")]
 pub(crate) struct PlayArgs {
     /// A recording of `sevenbot record`, or one written by hand.
     file: PathBuf,
-    /// How many times as fast as it was recorded, 0.1 to 10.
+    /// Speed factor, 0.1 to 10.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
     speed: f64,
-    /// Again and again; with a number, so many times in all.
+    /// Repeat without end, or N times in all.
     #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0",
           value_parser = value_parser!(u32))]
     times: Option<u32>,
-    /// Draw the targets and the measured positions of the first time through, as SVG.
+    /// Write an SVG plot of the targets and the measured positions of the first run.
     #[arg(long, value_name = "SVG")]
     plot: Option<PathBuf>,
 }
 
-/// How often the arm reports while it plays, in Hz.
+/// Frequency of the reports while playing, in Hz.
 const FEEDBACK_HZ: u8 = 30;
-/// No report for so long, and something is wrong.
+/// Without a report for this time, the arm has stopped reporting.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
-/// How long Ctrl-C may wait.
+/// The longest reaction time to Ctrl-C.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
-/// How long the drawing goes on behind the end: servos lag.
+/// The plot continues for this time after the end, because servos lag.
 const PLOT_TAIL: Duration = Duration::from_millis(300);
 
-/// What was played.
+/// The result of `play`.
 #[derive(Debug, Serialize)]
 struct Played {
     times: u32,
@@ -96,7 +96,7 @@ pub(super) fn follow(arm: &mut Arm, recording: &Recording) -> Result<(), Command
     Player::new(recording, 1.0).play_and_restore(arm, 1)
 }
 
-/// The recording, if an arm can follow it.
+/// Reads the recording, and checks that an arm can follow it.
 fn load(args: &PlayArgs) -> Result<Recording, CommandError> {
     let text = fs::read_to_string(&args.file).map_err(|error| CommandError::file(&args.file, error))?;
     let recording = Recording::parse(&text);
@@ -109,18 +109,18 @@ fn factor(text: &str) -> Result<f64, String> {
     factor.ok_or_else(|| "a number from 0.1 to 10".to_owned())
 }
 
-/// Restores the speeds and times that the arm had before.
+/// Restores the speeds and durations from before.
 fn restore_pace(arm: &mut Arm, before: &Snapshot) -> Result<(), CommandError> {
     all_taken(&arm.write_checked(before.address, &before.values)?)
 }
 
-/// A recording on its way through an arm.
+/// Plays a recording, and keeps the measured positions.
 struct Player {
     moments: Vec<Moment>,
     steps: Vec<Step>,
-    /// Where the joints were the first time through, since its beginning.
+    /// Positions during the first run, and their times since its start.
     measured: Vec<(Duration, [Angle; 7])>,
-    /// When a report last came.
+    /// When the last report arrived.
     last_report: Instant,
     played: u32,
     seconds: f64,
@@ -139,13 +139,13 @@ impl Player {
         let done = with_reports(arm, FEEDBACK_HZ, |arm| {
             hold_on_interrupt(arm, |arm, interrupt| self.play(arm, interrupt, times))
         });
-        // An arm that went away cannot be told anything.
+        // Without a connection the speeds cannot be restored.
         let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
         let restored = if is_gone { Ok(()) } else { restore_pace(arm, &before) };
         done.and(restored)
     }
 
-    /// Plays so many times; 0 is until somebody has seen enough.
+    /// Plays the recording so many times; 0 means until interrupted.
     fn play(&mut self, arm: &mut Arm, interrupt: Interrupt, times: u32) -> Result<(), CommandError> {
         while times == 0 || self.played < times {
             self.approach(arm, interrupt)?;
@@ -155,7 +155,7 @@ impl Player {
         Ok(())
     }
 
-    /// Goes slowly to where it begins.
+    /// Moves slowly to the first pose.
     fn approach(&self, arm: &mut Arm, interrupt: Interrupt) -> Result<(), CommandError> {
         let Some(first) = self.moments.first() else { return Ok(()) };
         let step = playback::approach(arm.positions()?, *first);
@@ -165,7 +165,7 @@ impl Player {
         move_to(arm, interrupt, step.targets)
     }
 
-    /// Goes from the first step to the last.
+    /// Plays all steps once.
     fn play_once(&mut self, arm: &mut Arm, interrupt: Interrupt) -> Result<(), CommandError> {
         let steps = std::mem::take(&mut self.steps);
         let done = self.send(&steps, arm, interrupt);
@@ -189,7 +189,7 @@ impl Player {
         self.take_reports_until(start, end + PLOT_TAIL, arm, interrupt)
     }
 
-    /// Waits, and takes reports meanwhile.
+    /// Takes reports until `time` after `start`.
     fn take_reports_until(
         &mut self,
         start: Instant,
@@ -242,12 +242,10 @@ fn move_to(arm: &mut Arm, interrupt: Interrupt, targets: [Angle; 7]) -> Result<(
     there.finish(arm, interrupt).map(drop)
 }
 
-/// Why no report comes any more.
+/// Why reports are missing.
 fn silent(arm: &mut Arm) -> CommandError {
     match driven_joints(arm) {
         Err(failure) => failure,
-        Ok(_) => CommandError::Arm(
-            "the arm has stopped to report its positions: was it switched off and on again?".to_owned(),
-        ),
+        Ok(_) => reports_stopped(),
     }
 }

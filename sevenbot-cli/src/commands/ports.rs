@@ -1,4 +1,4 @@
-//! `ports`: the serial ports of this machine, and which of them lead to an arm.
+//! `ports`: lists the serial ports of this machine, and the arms behind them.
 
 use std::io::{self, Write};
 
@@ -11,16 +11,16 @@ use crate::printer::Printable;
 use crate::session::Session;
 use crate::style::GOOD;
 
-/// List serial ports, and which of them lead to an arm.
+/// List serial ports, and the arms behind them.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Each port is opened and asked for its device code, all at once; what is no arm is told 14 bytes.
+Opens all ports at the same time and asks each for its device code. Other devices receive 14 bytes.
 
 Examples:
   sevenbot ports
-  sevenbot ports /dev/ttyUSB0 ./7bot     these, known to the system or not")]
+  sevenbot ports /dev/ttyUSB0 ./7bot     only these, also unlisted ones")]
 pub(crate) struct PortsArgs {
-    /// Ask these instead of all.
+    /// Ask only these ports.
     #[arg(value_name = "PORT")]
     ports: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! `pose`, `home`: joints to where they should be, at a pace, and waiting until they are there.
+//! `pose`, `home`: move joints to targets, with a speed or duration, and optionally wait.
 
 use std::io::{self, Write};
 use std::str::FromStr;
@@ -16,7 +16,7 @@ use crate::printer::Printable;
 use crate::session::Session;
 use crate::write_result::all_taken;
 
-/// Send joints to a pose.
+/// Move joints to a pose.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -25,13 +25,12 @@ Examples:
   sevenbot pose +10 _ -5 _ _ _ _ --wait            joint 1 up, joint 3 down, the others as they are
   sevenbot pose 60 90 65 90 90 90 80 --time 20 --wait
 
-Ctrl-C leaves the arm holding where it is.
+After Ctrl-C the arm holds its position.
 
-Exit status 1 when the arm did not take the pose, or with --wait did not reach it. Where it is not known
-whether it took the pose, the message says that the arm may be moving.")]
+Exit status 1 if the arm did not take the pose, or with --wait did not reach it. If that is unknown, the
+message says that the arm may be moving.")]
 pub(crate) struct PoseArgs {
-    /// Joint 1 to 7: degrees from 0 to 180; +N or -N from where the joint is sent already; _ or . leaves it
-    /// alone.
+    /// Joints 1 to 7: degrees from 0 to 180; +N or -N for a step from the present target; _ or . for no change.
     #[arg(value_names = ["A1", "A2", "A3", "A4", "A5", "A6", "A7"], num_args = 7, required = true,
           action = ArgAction::Set, allow_negative_numbers = true)]
     angles: Vec<PoseArg>,
@@ -39,7 +38,7 @@ pub(crate) struct PoseArgs {
     pace: PaceArgs,
 }
 
-/// Send all joints to the standard pose.
+/// Move all joints to the standard pose.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -54,15 +53,15 @@ struct PaceArgs {
     /// Speed of these joints in steps of 1.9 degrees per second, 1 to 100; 0 is the motors' maximum.
     #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=100))]
     speed: Option<u8>,
-    /// Duration of the move in steps of 100 ms, 0 to 100; sets the speeds to 0, or it would not count.
+    /// Duration of the move in steps of 100 ms, 0 to 100. Sets the speeds to 0, so that it applies.
     #[arg(long, value_name = "N", conflicts_with = "speed", value_parser = value_parser!(u8).range(0..=100))]
     time: Option<u8>,
-    /// Wait until the joints are there.
+    /// Wait until the joints have arrived.
     #[arg(long)]
     wait: bool,
 }
 
-/// Where one joint should go.
+/// The argument for one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum PoseArg {
     At(u8),
@@ -74,8 +73,7 @@ impl FromStr for PoseArg {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong =
-            || "use degrees from 0 to 180, +N or -N for a step, _ or . for a joint to leave".to_owned();
+        let wrong = || "use degrees from 0 to 180, +N or -N for a step, _ or . for no change".to_owned();
         match text.as_bytes() {
             [b'_' | b'.'] => Ok(Self::Leave),
             [b'+' | b'-', ..] => text.parse().map(Self::By).map_err(|_| wrong()),
@@ -89,7 +87,7 @@ impl FromStr for PoseArg {
 }
 
 impl PoseArg {
-    /// In degrees, for a joint that stands and is sent where these joints are.
+    /// The target in degrees.
     fn degrees(self, joint: Joint, joints: &JointSnapshot) -> Result<Option<u8>, CommandError> {
         let Self::By(step) = self else {
             return Ok(if let Self::At(degrees) = self { Some(degrees) } else { None });
@@ -133,7 +131,7 @@ fn targets(goals: &[PoseArg], joints: &JointSnapshot) -> Result<Targets, Command
     Ok(targets)
 }
 
-/// Paces the joints that are to move, and only those.
+/// Sets speed and duration of the joints with a target.
 fn set_speed_and_time(arm: &mut Arm, targets: &Targets, pace: &PaceArgs) -> Result<(), CommandError> {
     let for_targets = |steps: u8| targets.map(|target| target.map(|_| steps));
     let speed = pace.speed.or(pace.time.map(|_| Speed::MAXIMUM.steps()));
@@ -143,7 +141,7 @@ fn set_speed_and_time(arm: &mut Arm, targets: &Targets, pace: &PaceArgs) -> Resu
     if frames.is_empty() { Ok(()) } else { all_taken(&arm.write_all_checked(&frames)?) }
 }
 
-/// Where the arm is.
+/// Positions of the joints.
 #[derive(Serialize)]
 pub(crate) struct Positions {
     pub(crate) positions_degrees: [u8; 7],

@@ -1,4 +1,4 @@
-//! `registers`: the table that both ends of the wire are built from, for readers and for other languages.
+//! `registers`: prints the register table for readers and for other languages.
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use sevenbot::{Range, Register, table};
 use crate::command_error::CommandError;
 use crate::session::Session;
 
-/// Print the register table: it needs no arm.
+/// Print the register table. Needs no arm.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -16,22 +16,22 @@ Examples:
   sevenbot registers --format c > sevenbot_registers.h
   sevenbot registers --format python > sevenbot_registers.py")]
 pub(crate) struct RegistersArgs {
-    /// What to write it as.
+    /// Format of the output.
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Format {
-    /// Columns.
+    /// Columns of text.
     Text,
-    /// The table of docs/registers.md.
+    /// Markdown, as docs/registers.md.
     Markdown,
-    /// One array; also --json.
+    /// A JSON array, as with --json.
     Json,
     /// A header for C and C++.
     C,
-    /// A module.
+    /// A Python module.
     Python,
 }
 
@@ -47,7 +47,7 @@ pub(crate) fn run(session: &mut Session, args: &RegistersArgs) -> Result<(), Com
     session.printer.print_raw(text.as_bytes())
 }
 
-/// Columns for a terminal.
+/// Columns of text.
 fn text() -> String {
     let head = ["address", "name", "region", "access", "range", "default", "unit"].map(str::to_owned);
     let rows: Vec<_> = std::iter::once(head).chain(MAP.iter().map(table::cells)).collect();
@@ -65,7 +65,7 @@ fn text() -> String {
     text
 }
 
-/// One array with an object for each row, in one line.
+/// An array in one line, with an object per row.
 fn json() -> String {
     let rows: Vec<Value> = MAP.iter().map(object).collect();
     let text = serde_json::to_string(&rows).unwrap_or_default();

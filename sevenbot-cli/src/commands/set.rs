@@ -1,4 +1,4 @@
-//! `set`: writes registers in one frame, reads them back, and says what did not take and why.
+//! `set`: writes registers in one frame, reads them back, and reports those that differ.
 
 use clap::Args;
 use sevenbot::checked_write::{MismatchCause, WriteMismatch};
@@ -14,7 +14,7 @@ use crate::printer::note;
 use crate::session::Session;
 use crate::write_result::all_taken;
 
-/// Write registers, read them back, and say what did not take and why.
+/// Write registers, read them back, and report those that differ.
 #[derive(Debug, Args)]
 #[command(after_help = format!("{NAMES}
 
@@ -22,7 +22,7 @@ Examples:
   sevenbot set speed 30                 all seven joints
   sevenbot set target-position.3 70
   sevenbot set feedback-frequency 30
-  sevenbot set --unlock offset.2 -5     settings are kept over power cuts, and locked
+  sevenbot set --unlock offset.2 -5     settings are locked, and kept without power
 
 Exit status 1 when a register did not take its value."))]
 pub(crate) struct SetArgs {
@@ -32,15 +32,15 @@ pub(crate) struct SetArgs {
     /// One value per register, or one for all of them, in the units of the table.
     #[arg(required = true, value_name = "VALUE", allow_negative_numbers = true, value_parser = number)]
     pub(crate) values: Vec<i32>,
-    /// The values are bytes as they go on the wire (0 to 255, or 0x00 to 0xFF), sent unchecked.
+    /// The values are the bytes of the frame, 0 to 255 or 0x00 to 0xFF, and not checked.
     #[arg(long)]
     raw: bool,
-    /// Open the EEPROM lock (register 28) before and close it after.
+    /// Open the EEPROM lock (register 28) before the write, and close it afterwards.
     #[arg(long)]
     unlock: bool,
 }
 
-/// A number in decimal or, after 0x, in hexadecimal digits.
+/// Parses a decimal number, or a hexadecimal one after 0x.
 fn number(text: &str) -> Result<i32, String> {
     let hexadecimal = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
     let parsed = match hexadecimal {
@@ -64,7 +64,7 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandEr
     all_taken(&unchanged)
 }
 
-/// Does `work` with the EEPROM lock open, and closes it again whatever became of the work.
+/// Runs `work` with the EEPROM lock open. Closes the lock afterwards, also after a failure.
 pub(crate) fn unlocked<T>(
     arm: &mut Arm,
     work: impl FnOnce(&mut Arm) -> Result<T, Error>,
@@ -81,7 +81,7 @@ fn note_causes(span: Span, args: &SetArgs, unchanged: &[WriteMismatch]) {
     if unchanged.iter().any(|register| register.cause == MismatchCause::Locked) && !args.unlock {
         note("settings are protected by the EEPROM lock, register 28: --unlock opens it for this write");
     } else if unchanged.is_empty() && span.addresses().any(|address| BAUD_RATE.holds(address)) {
-        note("the new baud rate is in force after the next restart of the arm");
+        note("the new baud rate applies after the next restart of the arm");
     }
 }
 
@@ -103,11 +103,10 @@ fn bytes(span: Span, values: &[i32], raw: bool) -> Result<Vec<u8>, CommandError>
 }
 
 fn raw_byte(value: i32) -> Result<u8, CommandError> {
-    u8::try_from(value).map_err(|_| CommandError::Usage(format!("{value} is no byte: 0 to 255")))
+    u8::try_from(value).map_err(|_| CommandError::Usage(format!("{value} is not a byte, 0 to 255")))
 }
 
-/// The byte for a number in the table's units. One out of range is not even sent: the maker's firmware
-/// would take it.
+/// The byte for a number in the table's unit. Refuses a number out of range, because the maker's firmware takes it.
 fn byte(address: u8, value: i32) -> Result<u8, CommandError> {
     let Some(row) = find(address) else { return raw_byte(value) };
     i16::try_from(value).ok().and_then(|value| row.range.encode(value)).ok_or_else(|| {

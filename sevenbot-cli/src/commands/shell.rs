@@ -1,4 +1,4 @@
-//! `completions`, `man`: what shells and manual readers want of the command line, written from itself.
+//! `completions`, `man`: shell completions and manual pages, generated from the command line.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ Examples:
   sevenbot completions fish > ~/.config/fish/completions/sevenbot.fish
   sevenbot completions powershell >> $PROFILE")]
 pub(crate) struct CompletionsArgs {
-    /// Which shell.
+    /// The shell.
     shell: Shell,
 }
 
@@ -28,12 +28,12 @@ pub(crate) struct CompletionsArgs {
 #[command(after_help = "\
 Examples:
   sevenbot man | man -l -                             this program
-  sevenbot man pose | man -l -                        one command
+  sevenbot man servo scan | man -l -                  one command
   sevenbot man --dir ~/.local/share/man/man1          all of them, into files")]
 pub(crate) struct ManArgs {
-    /// The command; none: the program.
-    command: Option<String>,
-    /// Write the pages of the program and of all its commands into this folder.
+    /// The command, such as `pose` or `servo scan`; none: the program.
+    command: Vec<String>,
+    /// Write the pages of the program and of all commands to this folder.
     #[arg(long, value_name = "FOLDER", conflicts_with = "command")]
     dir: Option<PathBuf>,
 }
@@ -50,18 +50,18 @@ pub(crate) fn completions(
 
 pub(crate) fn man(session: &mut Session, args: &ManArgs, program: Command) -> Result<(), CommandError> {
     let mut program = program.disable_help_subcommand(true);
-    // Gives every command what it inherits: the global options, and its full name.
+    // Adds the global options and the full name to each command.
     program.build();
-    match (&args.dir, &args.command) {
-        (Some(folder), _) => write_all(&program, folder),
-        (None, Some(name)) => {
-            let command = program.find_subcommand(name);
-            let command =
-                command.ok_or_else(|| CommandError::Usage(format!("there is no command {name}")))?;
-            session.printer.print_raw(&page(command.clone())?)
-        }
-        (None, None) => session.printer.print_raw(&page(program)?),
+    if let Some(folder) = &args.dir {
+        fs::create_dir_all(folder).map_err(|error| CommandError::file(folder, error))?;
+        return write_pages(&program, folder);
     }
+    let mut command = &program;
+    for name in &args.command {
+        let found = command.find_subcommand(name);
+        command = found.ok_or_else(|| CommandError::Usage(format!("there is no command {name}")))?;
+    }
+    session.printer.print_raw(&page(command.clone())?)
 }
 
 fn page(command: Command) -> Result<Vec<u8>, CommandError> {
@@ -76,11 +76,9 @@ fn title(command: &Command) -> String {
     command.get_display_name().unwrap_or_else(|| command.get_name()).to_owned()
 }
 
-fn write_all(program: &Command, folder: &Path) -> Result<(), CommandError> {
-    fs::create_dir_all(folder).map_err(|error| CommandError::file(folder, error))?;
-    for command in std::iter::once(program).chain(program.get_subcommands()) {
-        let path = folder.join(format!("{}.1", title(command)));
-        fs::write(&path, page(command.clone())?).map_err(|error| CommandError::file(&path, error))?;
-    }
-    Ok(())
+/// Writes the pages of a command and of all its subcommands.
+fn write_pages(command: &Command, folder: &Path) -> Result<(), CommandError> {
+    let path = folder.join(format!("{}.1", title(command)));
+    fs::write(&path, page(command.clone())?).map_err(|error| CommandError::file(&path, error))?;
+    command.get_subcommands().try_for_each(|subcommand| write_pages(subcommand, folder))
 }

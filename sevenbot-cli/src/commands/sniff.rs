@@ -1,4 +1,4 @@
-//! `sniff`: what goes over a line, in words.
+//! `sniff`: shows the traffic of a line as text.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
@@ -15,23 +15,23 @@ use crate::printer::{Printable, Printer};
 use crate::session::Session;
 use crate::style::WARNING;
 
-/// Show what goes over a line, frame by frame, in words.
+/// Show the traffic of a line as text, frame by frame.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The port is only listened to: an adapter whose receiving pin is connected to the line of interest. The
-arm's own port brings only what the arm sends unasked.
+The port is only read. Connect the receiving pin of an adapter to the line. On the arm's own port only
+reports appear.
 
 Examples:
   sevenbot --port /dev/ttyUSB1 sniff
   sevenbot sniff capture.bin
   some-program | sevenbot sniff -")]
 pub(crate) struct SniffArgs {
-    /// A file with the bytes of a line; - is standard input. None: the port.
+    /// File with the bytes of a line; - is standard input. Without it, the port.
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
 }
 
-/// Silence that no frame goes on after (D4).
+/// An empty line for this time ends an unfinished frame (D4).
 const GAP: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(session: &mut Session, args: &SniffArgs) -> Result<(), CommandError> {
@@ -67,9 +67,7 @@ fn file(printer: &mut Printer, path: &Path, source: &mut dyn Read) -> Result<(),
 
 fn port(session: &mut Session) -> Result<(), CommandError> {
     let name = session.port.clone().ok_or_else(|| {
-        CommandError::Usage(
-            "what to listen to? use --port PORT, or name a file; - is standard input".to_owned(),
-        )
+        CommandError::Usage("no input: use --port PORT, or give a file; - is standard input".to_owned())
     })?;
     let opened = OpenPort::open(&name, session.options.baud);
     let mut port = opened.map_err(|error| CommandError::Open { port: name, error })?;
@@ -87,7 +85,7 @@ fn port(session: &mut Session) -> Result<(), CommandError> {
 
 #[derive(Serialize)]
 struct TrafficLine {
-    /// Since listening began; none in a file.
+    /// Since the start; none for a file.
     seconds: Option<f64>,
     kind: &'static str,
     address: Option<u8>,

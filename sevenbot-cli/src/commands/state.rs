@@ -1,4 +1,4 @@
-//! `state`: whether the motors drive the joints, and a warning before an arm falls.
+//! `state`: shows or changes the motor state. Asks before the arm may fall.
 
 use clap::{Args, ValueEnum};
 use sevenbot::map::{MOTOR_STATE, motor_state};
@@ -12,30 +12,30 @@ use crate::interrupt::hold_on_interrupt;
 use crate::session::Session;
 use crate::write_result::motors_obey;
 
-/// Show or change the state of the motors.
+/// Show or change the motor state.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sevenbot state                     what it is
-  sevenbot state servo               the arm holds where it is found, and can be moved
-  sevenbot state forceless --yes     the arm can be moved by hand; without a hand it falls
+  sevenbot state                     show the state
+  sevenbot state servo               the arm holds its position, and takes targets
+  sevenbot state forceless --yes     the arm can be moved by hand; it falls unless held
 
-Exit status 1 when it is not known that the arm took the state: it may be moving then.")]
+Exit status 1 if the arm may not have taken the state: it may be moving.")]
 pub(crate) struct StateArgs {
-    /// The state wanted.
+    /// The new state.
     state: Option<MotorStateArg>,
-    /// The arm is held, or may fall: do not ask.
+    /// Do not ask whether the arm is held.
     #[arg(long)]
     yes: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum MotorStateArg {
-    /// The joints are driven.
+    /// The motors drive the joints.
     Servo,
-    /// The joints are not driven, but braked.
+    /// The motors brake the joints.
     Damping,
-    /// The joints move freely.
+    /// The joints turn freely.
     Forceless,
 }
 
@@ -61,7 +61,7 @@ fn change(arm: &mut Arm, wanted: MotorStateArg, yes: bool) -> Result<(), Command
     let present = arm.read_span(Span::of(&MOTOR_STATE))?.byte(&MOTOR_STATE);
     if present == motor_state::SERVO && wanted.code() != motor_state::SERVO {
         let how = if matches!(wanted, MotorStateArg::Damping) { "sink" } else { "fall" };
-        confirm(&format!("The arm will {how} unless somebody holds it. Go on?"), yes)?;
+        confirm(&format!("The arm will {how} unless you hold it. Go on?"), yes)?;
     }
     hold_on_interrupt(arm, |arm, _| motors_obey(arm.write_checked(MOTOR_STATE.address, &[wanted.code()])))
 }

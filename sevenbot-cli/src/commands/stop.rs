@@ -1,4 +1,4 @@
-//! `stop`: every joint holds where it is.
+//! `stop`: makes every joint hold its position.
 
 use super::pose::Positions;
 use crate::command_error::CommandError;
@@ -6,19 +6,19 @@ use crate::interrupt::{hold, warn_about_unheld_joints};
 use crate::printer::warn;
 use crate::session::Session;
 
-/// Stop: every joint holds where it is.
+/// Stop: make every joint hold its position.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Targets become the measured positions; they are read back, and written again where they did not take.
-Where the motors are off (state 0 or 2) nothing is written.
+Sets the targets to the measured positions, reads them back, and repeats the write if necessary. Writes
+nothing if the motors are off (state 0 or 2).
 
-Exit status 1 when it is not known that the arm holds: it may still be moving then.")]
+Exit status 1 if the arm may not hold: it may still be moving.")]
 pub(crate) struct StopArgs {}
 
 pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
     let connected = session.connect();
     let mut arm = connected.inspect_err(|_| {
-        warn("the arm was not told to stop and may be moving; the switch of the servos' supply stops it");
+        warn("the arm received no stop and may be moving; switch off the supply of the servos to stop it");
     })?;
     let joints = hold(&mut arm)?;
     warn_about_unheld_joints(&joints);

@@ -1,11 +1,11 @@
-//! `calibrate`: finds the offsets of the joints together with the user, and stores them.
+//! `calibrate`: finds the offsets of the joints with the user's help, and stores them.
 //!
 //! ```text
-//!   joint by joint: nudge it onto a mark ──▶ what does the mark say? ──▶ offset, and how good it is
-//!   then: all seven ──▶ write them? ──▶ lock open, written, read back, lock closed ──▶ still there after a restart?
+//!   each joint: nudge it to a mark ──▶ enter the mark's angle ──▶ offset and grade
+//!   then: question ──▶ lock open, write, read back, lock closed ──▶ restart ──▶ read again
 //! ```
 //!
-//! Nothing is written before the last question.
+//! Nothing is written before the question.
 
 mod offsets;
 
@@ -29,29 +29,28 @@ use crate::write_result::all_taken;
 
 /// Find the offsets of the joints, and store them.
 ///
-/// Goes through the joints. At each one, bring the joint to a mark whose angle you know, by typing +N or -N
-/// degrees, or by hand after `sevenbot state forceless`; then type the mark's angle. The offsets are written
-/// at the end, after a question.
+/// For each joint, bring it to a mark of known angle and enter that angle. Move the joint with +N or -N degrees, or by hand
+/// after `sevenbot state forceless`. At the end a question comes before the offsets are written.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 At each joint:
   +5, -2     move the joint by so many degrees
-  90         the joint really stands at 90 degrees: the offset follows
+  90         the true angle of the joint: computes the offset
   Enter      keep the offset, go on to the next joint
   q          end, and write nothing
 
-Up to 10 degrees an offset is good, up to 16 acceptable. A larger one is bad and cannot be stored: take the
-joint apart and put it together a tooth further.
+Up to 10 degrees an offset is good, up to 16 acceptable. A larger one is bad and cannot be stored: assemble the
+joint again, one tooth further.
 
 Examples:
   sevenbot calibrate
   sevenbot calibrate --show
   sevenbot calibrate --reset                   all offsets 0, as they left the factory")]
 pub(crate) struct CalibrateArgs {
-    /// Show the offsets and how good they are, and change nothing.
+    /// Show the offsets and their grades, and change nothing.
     #[arg(long, conflicts_with = "reset")]
     show: bool,
-    /// Make all offsets 0.
+    /// Set all offsets to 0.
     #[arg(long)]
     reset: bool,
     /// Write without a question.
@@ -59,7 +58,7 @@ pub(crate) struct CalibrateArgs {
     yes: bool,
 }
 
-/// How long an arm may take to come back from a restart.
+/// The arm has this time to restart.
 const RESTART_TIMEOUT: Duration = Duration::from_secs(20);
 const POLL_PERIOD: Duration = Duration::from_millis(500);
 
@@ -70,10 +69,8 @@ pub(crate) fn run(session: &mut Session, args: &CalibrateArgs) -> Result<(), Com
         return session.printer.print(&OffsetTable::new(before, before));
     }
     if !args.yes && !io::stdin().is_terminal() {
-        let how = "--yes says yes; --show only shows them";
-        return Err(CommandError::Usage(format!(
-            "nobody is there to say whether offsets may be written: {how}"
-        )));
+        let how = "use --yes to write without a question, or --show";
+        return Err(CommandError::Usage(format!("standard input is no terminal: {how}")));
     }
     let wanted = if args.reset { Offsets([0; 7]) } else { ask_offsets(&mut arm, before)? };
     store(session, arm, args, before, wanted)
@@ -83,7 +80,7 @@ fn read(arm: &mut Arm) -> Result<Offsets, CommandError> {
     Ok(arm.read_span(Span::of(&OFFSET))?.into())
 }
 
-/// Writes the offsets, if they are wanted, and shows them as the arm has them then.
+/// Writes the offsets if they differ, and prints them.
 fn store(
     session: &mut Session,
     mut arm: Arm,
@@ -94,7 +91,7 @@ fn store(
     if wanted != before {
         let mut err = anstream::stderr();
         OffsetTable::new(before, wanted).write_text(&mut err)?;
-        confirm("Write these offsets? The arm moves a little by them.", args.yes)?;
+        confirm("Write these offsets? The arm moves a little.", args.yes)?;
         let write = |arm: &mut Arm| arm.write_checked(OFFSET.address, &wanted.bytes());
         all_taken(&hold_on_interrupt(&mut arm, |arm, _| unlocked(arm, write))?)?;
         if !args.yes {
@@ -104,20 +101,18 @@ fn store(
     session.printer.print(&OffsetTable::new(before, wanted))
 }
 
-/// Goes through the joints; gives the offsets that were found.
+/// Asks for the offsets of all joints.
 fn ask_offsets(arm: &mut Arm, before: Offsets) -> Result<Offsets, CommandError> {
     let mut wanted = before;
     arm.wait_until_settled()?;
-    say(
-        "Type +N or -N to move a joint, the angle it really stands at, or Enter to keep its offset; q ends.",
-    )?;
+    say("Type +N or -N to move a joint, or its true angle. Enter keeps the offset, q ends.")?;
     for joint in Joint::ALL {
         wanted = wanted.with(joint, ask_offset(arm, joint, before.of(joint))?);
     }
     Ok(wanted)
 }
 
-/// What may be typed at a joint.
+/// The user's input for a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum CalibrationInput {
     Keep,
@@ -139,7 +134,7 @@ impl CalibrationInput {
     }
 }
 
-/// The offset of one joint.
+/// Asks for the offset of one joint.
 fn ask_offset(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, CommandError> {
     loop {
         let measured = arm.read_span(Span::of(&PRESENT_POSITION))?.at(PRESENT_POSITION.of(joint));
@@ -159,14 +154,16 @@ fn ask_offset(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, CommandEr
                 if grade != Grade::Bad {
                     return Ok(found);
                 }
-                warn("the register holds 16° at most: put the joint together a tooth further, or keep it");
+                warn(
+                    "the register holds at most 16°: assemble the joint one tooth further, or keep the old offset",
+                );
             }
             None => warn("+N or -N moves it, 0 to 180 is its true angle, Enter keeps the offset, q ends"),
         }
     }
 }
 
-/// Moves one joint. What keeps it from moving is told, and does not end the walk.
+/// Moves one joint. A refusal is only a warning.
 fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> {
     let moved = hold_on_interrupt(arm, |arm, interrupt| {
         let wanted = step_target(&driven_joints(arm)?, joint, degrees)?.max(0);
@@ -182,22 +179,22 @@ fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> 
     Ok(())
 }
 
-/// Has the arm switched off and on, and looks whether it has forgotten anything.
+/// Asks the user to restart the arm, then checks the offsets.
 fn restart(session: &Session, mut arm: Arm, wanted: Offsets) -> Result<(), CommandError> {
     let accepted =
         |arm: &mut Arm| Ok::<_, CommandError>(arm.status()?.map(|status| status.frames_accepted()));
     let before = accepted(&mut arm)?;
-    // Without its supply the port may go, and come back as another one.
+    // The port may disappear with the supply.
     drop(arm);
-    ask("The offsets are written. To see that they stay, switch the arm off and on; then press Enter. > ")?;
+    ask("The offsets are written. To verify them, switch the arm off and on, then press Enter. > ")?;
     let mut arm = reconnect(session)?;
     if before.is_some() && accepted(&mut arm)? > before {
-        warn("the arm was not switched off: its counters go on");
+        warn("the arm was not switched off: its counters continue");
     }
     if read(&mut arm)? != wanted {
-        return Err(CommandError::Arm("the arm has forgotten its offsets over the restart".to_owned()));
+        return Err(CommandError::Arm("the arm lost its offsets in the restart".to_owned()));
     }
-    note("the offsets are still there");
+    note("the arm kept the offsets");
     Ok(())
 }
 
@@ -215,7 +212,7 @@ fn say(line: &str) -> Result<(), CommandError> {
     Ok(writeln!(anstream::stderr(), "{line}")?)
 }
 
-/// A line from the user.
+/// Reads a line from the user.
 fn ask(question: &str) -> Result<String, CommandError> {
     let mut err = anstream::stderr();
     write!(err, "{question}")?;
@@ -223,7 +220,7 @@ fn ask(question: &str) -> Result<String, CommandError> {
     let mut line = String::new();
     if io::stdin().read_line(&mut line)? == 0 {
         writeln!(err)?;
-        return Err(CommandError::Usage("the input has ended, and there were questions left".to_owned()));
+        return Err(CommandError::Usage("the input has ended before the last question".to_owned()));
     }
     Ok(line)
 }

@@ -1,6 +1,4 @@
-//! Offsets of the joints: how good they are, and which one makes a joint's angle right (docs/protocol.md, D9).
-//!
-//! Knows the arithmetic, neither arm nor user.
+//! Grades and arithmetic of the joints' offsets (docs/protocol.md, D9).
 
 use std::io::{self, Write};
 
@@ -12,18 +10,18 @@ use sevenbot::{Joint, Snapshot};
 use crate::printer::Printable;
 use crate::style::{BAD, BOLD, GOOD, WARNING};
 
-/// Offsets up to this show a good assembly, says the maker's table.
+/// The largest good offset, from the maker's table.
 const GOOD_UP_TO: i16 = 10;
 
-/// How good an offset is.
+/// The grade of an offset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Grade {
-    /// The joint was put together well.
+    /// The joint is well assembled.
     Good,
-    /// It will do.
+    /// The joint can be used.
     Acceptable,
-    /// The register does not hold it: the joint has to be put together anew.
+    /// The register cannot hold the offset. The joint has to be assembled again.
     Bad,
 }
 
@@ -53,14 +51,14 @@ impl Grade {
     }
 }
 
-/// The offset with which a joint that reads `measured` degrees would read `actual`.
+/// The offset that changes the reading from `measured` to `actual` degrees.
 pub(super) fn corrected(joint: Joint, offset: i16, measured: u8, actual: u8) -> i16 {
     let error = i16::from(actual) - i16::from(measured);
-    // Where the servo is mounted the other way round, the offset counts on the servo's side.
+    // A reversed joint subtracts its offset.
     if is_reversed(joint) { offset - error } else { offset + error }
 }
 
-/// Is the joint's servo mounted the other way round (D9)?
+/// Is the joint's servo mounted in reverse (D9)?
 fn is_reversed(joint: Joint) -> bool {
     (2..=6).contains(&joint.number())
 }
@@ -76,7 +74,7 @@ impl From<Snapshot> for Offsets {
 }
 
 impl Offsets {
-    /// The registers' bytes. An offset that does not fit counts as none.
+    /// The register values. An offset out of range becomes 0.
     pub(super) fn bytes(self) -> [u8; 7] {
         self.0.map(|offset| OFFSET.range.encode(offset).unwrap_or(0))
     }
@@ -93,7 +91,7 @@ impl Offsets {
     }
 }
 
-/// The offsets, as they are told.
+/// The offsets for printing.
 #[derive(Debug, Serialize)]
 pub(super) struct OffsetTable {
     joints: Vec<OffsetRow>,
@@ -104,13 +102,13 @@ struct OffsetRow {
     joint: u8,
     offset_degrees: i16,
     grade: Grade,
-    /// What it was, where it was another.
+    /// The old offset, if it differs.
     #[serde(skip_serializing_if = "Option::is_none")]
     before: Option<i16>,
 }
 
 impl OffsetTable {
-    /// What they are, and what they were.
+    /// Old and new offsets.
     pub(super) fn new(before: Offsets, now: Offsets) -> Self {
         let row = |joint: Joint| {
             let (was, is) = (before.of(joint), now.of(joint));

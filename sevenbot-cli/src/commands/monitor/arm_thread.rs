@@ -1,8 +1,6 @@
-//! Who talks to the arm while the screen is drawn: takes samples, fulfils commands, and finds the arm again when
-//! it went away.
+//! The thread that owns the arm: takes samples, executes commands, and reconnects after the arm was lost.
 //!
-//! Runs in a thread of its own: a port that does not answer holds up neither keys nor picture. Ends when
-//! nobody commands any more.
+//! It is a thread so that a silent port blocks neither keys nor drawing. It ends when the command channel closes.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
@@ -18,32 +16,32 @@ use crate::interrupt::{Interrupt, hold};
 use crate::joint_move::step_target;
 use crate::write_result::{all_taken, motors_obey};
 
-/// How long to wait before looking for an arm again.
+/// Time between two attempts to connect.
 const RECONNECT_PERIOD: Duration = Duration::from_millis(500);
-/// After so many lost answers in a row the arm counts as gone.
+/// The arm is lost after so many consecutive unanswered samples.
 const MAX_UNANSWERED: u32 = 3;
 
-/// The one who watches.
+/// State of the thread.
 pub(crate) struct ArmThread {
-    /// The port asked for; none: whichever leads to an arm.
+    /// The port from the command line; `None`: any that leads to an arm.
     pub(crate) port: Option<String>,
-    /// The port that was used last.
+    /// The port used last.
     pub(crate) last_port: String,
-    /// How to talk to it.
+    /// Baud rate, timeout and attempts.
     pub(crate) options: ArmOptions,
-    /// Between two samples.
+    /// Time between two samples.
     pub(crate) period: Duration,
     pub(crate) start: Instant,
     pub(crate) events: Sender<ArmEvent>,
     pub(crate) commands: Receiver<UiCommand>,
-    /// The arm that was watched at the end.
+    /// The arm at the end of the thread.
     pub(crate) arm: Option<Arm>,
 }
 
-/// Nobody listens any more.
+/// The screen has closed its channel.
 struct ChannelClosed;
 
-/// Why watching one arm came to an end.
+/// Why sampling of one arm ended.
 enum WatchEnd {
     Quit,
     Lost(Error),
@@ -56,15 +54,14 @@ impl From<Error> for WatchEnd {
 }
 
 impl ArmThread {
-    /// Watches, until nobody commands any more.
-    /// After Ctrl-C the arm is made to hold: returns what became of that, or `None` if there was no arm.
+    /// Runs until the command channel closes. After Ctrl-C makes the arm hold, and returns the result; `None` without an arm.
     pub(crate) fn run(mut self) -> Option<Result<JointSnapshot, CommandError>> {
         while self.look().is_ok() {}
         let arm = self.arm.take();
         if Interrupt::is_requested() { arm.map(|mut arm| hold(&mut arm)) } else { None }
     }
 
-    /// Finds the arm and watches it for as long as it is there; then waits a little.
+    /// Connects to the arm and samples it until it is lost, then pauses.
     fn look(&mut self) -> Result<(), ChannelClosed> {
         match self.open() {
             Ok(mut arm) => {
@@ -83,16 +80,16 @@ impl ArmThread {
         self.pause(RECONNECT_PERIOD)
     }
 
-    /// Opens the port that was asked for or used last, or else another one that leads to an arm.
+    /// Opens the port of the command line or the last one, or else another one that leads to an arm.
     fn open(&mut self) -> Result<Arm, String> {
-        // An answer that is missing is events, and the next sample asks again.
+        // One attempt: the screen counts each missing answer, and the next sample asks again.
         let options = ArmOptions { attempts: 1, ..self.options };
         let error = match Arm::open_with(&self.last_port, options) {
             Ok(arm) => return Ok(arm),
             Err(error) => error.to_string(),
         };
         if self.port.is_none() {
-            // Unplugged and plugged in again, it may have another name.
+            // A port may have another name after it was plugged in again.
             let found = ports::probe(ports::available(), options.baud);
             if let Some(found) = found.into_iter().find(|found| found.answer.is_ok()) {
                 self.last_port = found.port.name;
@@ -102,7 +99,7 @@ impl ArmThread {
         Err(error)
     }
 
-    /// Watches one arm.
+    /// Samples one arm.
     fn watch(&self, arm: &mut Arm) -> WatchEnd {
         let mut unanswered = 0;
         let mut due = Instant::now();
@@ -127,11 +124,11 @@ impl ArmThread {
         }
     }
 
-    /// Does what is wished, until it is time for the next sample.
+    /// Executes commands until the next sample is due.
     fn execute_until(&self, arm: &mut Arm, due: Instant) -> Result<(), WatchEnd> {
         loop {
             match self.commands.recv_timeout(due.saturating_duration_since(Instant::now())) {
-                // A stop does not wait for the commands before it.
+                // A stop goes before pending commands.
                 Ok(_) if Interrupt::is_requested() => return Err(WatchEnd::Quit),
                 Ok(command) => self.execute(arm, command)?,
                 Err(RecvTimeoutError::Timeout) => return Ok(()),
@@ -140,7 +137,7 @@ impl ArmThread {
         }
     }
 
-    /// Does what is wished, and tells what did not take.
+    /// Executes a command, and reports a refusal to the screen.
     fn execute(&self, arm: &mut Arm, command: UiCommand) -> Result<(), WatchEnd> {
         let (refusal, lost) = match try_execute(arm, command) {
             Ok(()) => return Ok(()),
@@ -159,7 +156,7 @@ impl ArmThread {
         self.events.send(event).map_err(|_| ChannelClosed)
     }
 
-    /// Waits; what is wished meanwhile has nobody to fulfil it.
+    /// Waits. Refuses commands meanwhile, because there is no arm.
     fn pause(&self, duration: Duration) -> Result<(), ChannelClosed> {
         let end = Instant::now() + duration;
         loop {
@@ -172,7 +169,7 @@ impl ArmThread {
     }
 }
 
-/// Does what is wished, and makes sure of it.
+/// Executes a command and verifies it.
 fn try_execute(arm: &mut Arm, command: UiCommand) -> Result<(), CommandError> {
     match command {
         UiCommand::Nudge { joint, degrees } => nudge(arm, joint, degrees),
@@ -181,13 +178,13 @@ fn try_execute(arm: &mut Arm, command: UiCommand) -> Result<(), CommandError> {
             let steps = joints.first().copied().unwrap_or(0);
             all_taken(&arm.write_checked(SPEED.address, &[change.after(steps); 7])?)
         }
-        // In the servo state already, the same state again would stop nothing.
+        // Writing state 1 again does not stop an arm in state 1.
         UiCommand::State(motor_state::SERVO) if arm.joints()?.is_driven() => hold(arm).map(drop),
         UiCommand::State(state) => motors_obey(arm.write_checked(MOTOR_STATE.address, &[state])),
     }
 }
 
-/// Moves a joint's target from where it is now. What the screen shows of it may be older than the last command.
+/// Changes a joint's target by some degrees. Reads the target first: the one on the screen may be old.
 fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> {
     let wanted = step_target(&arm.wait_until_settled()?, joint, degrees)?.max(0);
     let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);

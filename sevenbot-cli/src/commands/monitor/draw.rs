@@ -1,4 +1,4 @@
-//! The view on a screen of any size: the table of joints, the plot of the last 20 s, health, link, keys.
+//! Draws the view on a screen of any size: table of joints, plot of 20 s, health, link, keys.
 //!
 //! ```text
 //!   7Bot V2  /dev/ttyUSB0  firmware 3.0                       servo      title
@@ -8,7 +8,7 @@
 //!   faults none   supply 7.4 V   hottest servo 31 °C                     foot
 //! ```
 //!
-//! Knows nothing but the view.
+//! Knows only the view.
 
 use std::time::Duration;
 
@@ -26,24 +26,24 @@ use super::keys::HELP;
 use super::sample::Sample;
 use super::view::{Connection, Dialog, PLOT_SPAN, PastPose, View};
 
-/// One colour a joint, in the table and in the plot: those that terminals can be told to change.
+/// One colour per joint. Users can change these in their terminal.
 const COLOURS: [Color; 7] =
     [Color::Red, Color::Yellow, Color::Green, Color::Cyan, Color::Blue, Color::Magenta, Color::Gray];
 const FAINT: Style = Style::new().fg(Color::DarkGray);
 const BAD: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
 const GOOD: Style = Style::new().fg(Color::Green);
 const BOLD: Style = Style::new().add_modifier(Modifier::BOLD);
-/// Points further apart in time are not joined: nobody saw what was between them.
+/// A longer gap between two samples interrupts the curve.
 const LONGEST_GAP: Duration = Duration::from_millis(1500);
-/// Columns of the table before its bars.
+/// Width of the table without its bars, in columns.
 const TABLE_WIDTH: usize = 49;
 
-/// Rows of the table of joints: its head, and seven.
+/// Height of the table: a header and seven joints.
 const JOINT_ROWS: u16 = 8;
-/// From so many rows on there is room for more than the joints.
+/// From this height on there are empty lines around the plot.
 const ROOMY: u16 = 18;
 
-/// Draws all of it.
+/// Draws the view.
 pub(crate) fn draw(frame: &mut Frame<'_>, view: &View) {
     let heights = heights(frame.area().height);
     let [title, table, _, plot, _, foot, keys] = Layout::vertical(heights).areas(frame.area());
@@ -51,7 +51,7 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &View) {
     frame.render_widget(Paragraph::new(title_right(view)).alignment(Alignment::Right), title);
     frame.render_widget(Paragraph::new(table_lines(view, table.width)), table);
     draw_plot(frame, view, plot);
-    // What was known of an arm that went away is old.
+    // Values of a lost arm are old.
     let age = if view.arm().is_some() { Style::new() } else { FAINT };
     frame.render_widget(Paragraph::new(vec![health(view), link(view)]).style(age), foot);
     frame.render_widget(Paragraph::new(last_line(view)), keys);
@@ -60,7 +60,7 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &View) {
     }
 }
 
-/// Of title, table, gap, plot, gap, foot and keys. On a low screen the plot goes first, and the joints last.
+/// Heights of title, table, gap, plot, gap, foot and keys. A low screen loses the plot first and the table last.
 fn heights(screen: u16) -> [Constraint; 7] {
     let (gap, joints) = match screen {
         ROOMY.. => (1, Constraint::Length(JOINT_ROWS)),
@@ -139,7 +139,7 @@ fn row(view: &View, sample: &Sample, joint: Joint, bar: usize) -> Line<'static> 
     Line::from(spans)
 }
 
-/// From 0 to 180 degrees: where the joint is, and where it should be.
+/// A bar from 0 to 180 degrees with the present position and the target.
 fn bar_spans(width: usize, target: u8, present: u8, colour: Style) -> Vec<Span<'static>> {
     let last = width.saturating_sub(1);
     let column = |degrees: u8| usize::from(degrees.min(Angle::MAX_DEGREES)) * last / 180;
@@ -152,7 +152,7 @@ fn bar_spans(width: usize, target: u8, present: u8, colour: Style) -> Vec<Span<'
 }
 
 fn draw_plot(frame: &mut Frame<'_>, view: &View, area: Rect) {
-    // The selected joint last, so that it lies above the others.
+    // Draw the selected joint last, above the others.
     let mut order = Joint::ALL.to_vec();
     order.sort_by_key(|&joint| joint == view.selected);
     let curves: Vec<(Joint, Vec<(f64, f64)>)> =
@@ -167,7 +167,7 @@ fn draw_plot(frame: &mut Frame<'_>, view: &View, area: Rect) {
     frame.render_widget(Chart::new(datasets.collect()).x_axis(seconds).y_axis(degrees), area);
 }
 
-/// A joint's past as lines: seconds before now, and degrees. A new line begins behind every gap.
+/// The curves of one joint, in seconds before now and degrees. A gap starts a new curve.
 fn curve_segments(view: &View, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
     let index = usize::from(joint.number()).wrapping_sub(1);
     let point = |(time, pose): &PastPose| {
@@ -182,7 +182,7 @@ fn curve_segments(view: &View, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
 fn health(view: &View) -> Line<'static> {
     let Some(sample) = &view.sample else { return Line::default() };
     let Some(status) = &sample.status else {
-        return Line::styled(" the maker's firmware does not say how it is", FAINT);
+        return Line::styled(" the maker's firmware reports no health", FAINT);
     };
     let style = if status.is_healthy() { GOOD } else { BAD };
     let mut spans = vec![Span::raw(" faults "), Span::styled(faults(status.faults()), style)];
@@ -214,7 +214,7 @@ fn link(view: &View) -> Line<'static> {
     ])
 }
 
-/// What there is to say, or else the keys one needs most.
+/// The error or the note, or else the most important keys.
 fn last_line(view: &View) -> Line<'_> {
     match (&view.connection, view.note()) {
         (Connection::Looking(reason), _) => Line::styled(format!(" {reason}"), BAD),

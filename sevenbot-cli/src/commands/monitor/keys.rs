@@ -1,4 +1,4 @@
-//! What the monitor's keys do. Knows the view and what can be asked of an arm, not the arm.
+//! The keys of the monitor: each changes the view or sends a command.
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use sevenbot::Joint;
@@ -6,36 +6,36 @@ use sevenbot::map::motor_state;
 
 use super::view::{Dialog, SpeedChange, UiCommand, View};
 
-/// Degrees of a nudge, and of one with Shift.
+/// Degrees of a nudge, without and with Shift.
 const NUDGE: i16 = 1;
 const BIG_NUDGE: i16 = 10;
-/// What the help shows: keys, and what they do.
+/// The help: keys and their effect.
 pub(crate) const HELP: [(&str, &str); 9] = [
     ("1..7, ↑ ↓", "select a joint"),
     ("← →", "nudge it by 1°"),
     ("Shift ← →, [ ]", "nudge it by 10°"),
     ("+ -", "speed of all joints"),
     ("s", "motor state: hold, damping, forceless"),
-    ("space", "freeze the picture; the arm goes on"),
+    ("space", "freeze the screen; the arm continues"),
     ("?", "this help"),
-    ("q", "quit; the arm goes where it was sent"),
+    ("q", "quit; the arm finishes its move"),
     ("Ctrl-C", "stop the arm where it is, and quit"),
 ];
 
-/// What a key leads to.
+/// The effect of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum KeyAction {
-    /// The view has changed, or nothing has.
+    /// Draw the view again.
     Redraw,
-    /// The arm is to do this.
+    /// Send a command to the arm.
     Send(UiCommand),
-    /// The monitor ends.
+    /// End the monitor.
     Quit,
-    /// The arm is to hold where it is, and the monitor ends.
+    /// Make the arm hold its position, and end the monitor.
     Stop,
 }
 
-/// A key was pressed.
+/// Handles a key.
 pub(crate) fn press(view: &mut View, key: KeyEvent) -> KeyAction {
     let is_ctrl_c = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
     if is_ctrl_c {
@@ -62,7 +62,7 @@ fn press_in_view(view: &mut View, key: KeyEvent) -> KeyAction {
         KeyCode::Down => select(view, i16::from(view.selected.number()) + 1),
         KeyCode::Left => return nudge(view, -degrees),
         KeyCode::Right => return nudge(view, degrees),
-        // Not every terminal tells Shift and an arrow from the arrow alone.
+        // Some terminals do not report Shift with an arrow key.
         KeyCode::Char('[') => return nudge(view, -BIG_NUDGE),
         KeyCode::Char(']') => return nudge(view, BIG_NUDGE),
         KeyCode::Char('+' | '=') => return change(view, SpeedChange::Faster),
@@ -85,7 +85,7 @@ fn press_in_dialog(view: &mut View, dialog: Dialog, key: KeyCode) -> KeyAction {
     }
 }
 
-/// Asks first where the arm would fall.
+/// Asks for confirmation, because the arm may fall.
 fn release(view: &mut View, state: u8) -> KeyAction {
     view.dialog = Some(Dialog::ConfirmState(state));
     KeyAction::Redraw

@@ -1,6 +1,4 @@
-//! The monitor without a screen: one line a sample, as columns, CSV or JSON.
-//!
-//! Ends with the connection: whoever reads lines wants to be told, not to wait.
+//! The monitor without a screen: one line per sample, as columns, CSV or JSON.
 
 use std::io::{self, Write};
 
@@ -10,12 +8,12 @@ use sevenbot::{Joint, StatusBlock};
 use super::sample::Sample;
 use crate::printer::Printable;
 
-/// How a sample becomes a line of text.
+/// Text format of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LineFormat {
-    /// Seconds, seven targets, seven positions, and which joints move: for eyes, and for `cut`.
+    /// Seconds, seven targets, seven positions, and the moving joints.
     Columns,
-    /// All there is, for spreadsheets.
+    /// All values, separated by commas.
     Csv,
 }
 
@@ -114,7 +112,7 @@ impl From<&Sample> for SampleJson {
     }
 }
 
-/// More digits say nothing, and make lines long.
+/// Rounds to three decimals.
 fn thousandths(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }

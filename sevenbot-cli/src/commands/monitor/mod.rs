@@ -1,10 +1,9 @@
-//! `monitor`: the arm as it moves, on the whole screen of a terminal; as lines into anything else.
+//! `monitor`: shows the arm live on a terminal's screen, or as lines in a pipe or file.
 //!
 //! ```text
 //!              ┌─ screen: draws, takes keys ──┐
-//!   terminal ──┤     │ commands      ▲ events     ├── View ── draw ── picture (SVG)
-//!              └─ watch: owns the arm, a ─────┘
-//!                 thread of its own
+//!   terminal ──┤     │ commands    ▲ events   ├── View ── draw ── picture (SVG)
+//!              └─ arm_thread: owns the arm ───┘
 //!   otherwise ── lines: columns, CSV, JSON
 //! ```
 
@@ -32,10 +31,10 @@ use crate::command_error::CommandError;
 use crate::line_file::LineFile;
 use crate::session::Session;
 
-/// Watch the arm: targets, positions, movement, health, and how well it is understood.
+/// Watch the arm: targets, positions, movement, health and link quality.
 ///
-/// On a terminal it fills the screen; ? explains its keys, which can move the arm too. When the arm goes away
-/// it waits until it is back. Into a pipe or a file goes one line a sample, and the arm going away is an error.
+/// On a terminal it fills the screen; ? lists the keys, which can also move the arm. If the arm is lost the monitor
+/// reconnects. In a pipe or file it prints one line per sample, and a lost arm is an error.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -44,16 +43,16 @@ Examples:
   sevenbot monitor --json --hz 2 | jq .positions
   sevenbot monitor --hz 20 --samples 100 > move.txt")]
 pub(crate) struct MonitorArgs {
-    /// Samples a second.
+    /// Samples per second.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = value_parser!(u8).range(1..=50))]
     hz: u8,
-    /// End after so many samples; shows lines, even on a terminal.
+    /// End after N samples. Prints lines, even on a terminal.
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..))]
     samples: Option<u64>,
-    /// Write lines with commas to FILE, everything there is, instead of showing anything.
+    /// Write all values to FILE, separated by commas.
     #[arg(long, value_name = "FILE", conflicts_with = "json")]
     csv: Option<PathBuf>,
-    /// Write the last picture of the screen to FILE, as SVG.
+    /// Write the last screen to FILE, as SVG.
     #[arg(long, value_name = "FILE", hide = true, conflicts_with_all = ["csv", "json"])]
     picture: Option<PathBuf>,
 }
@@ -81,7 +80,7 @@ pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), Comma
     }
 }
 
-/// Takes samples at their times, until there are enough.
+/// Takes `count` samples, one per period.
 fn each_sample(
     arm: &mut Arm,
     args: &MonitorArgs,
@@ -92,7 +91,7 @@ fn each_sample(
     let mut due = start;
     for _ in 0..count {
         sleep(due.saturating_duration_since(Instant::now()));
-        // A sample that could not be taken in time is left out, not made up for.
+        // A late sample is not made up for.
         due = (due + args.period()).max(Instant::now());
         take(Sample::take(arm, start)?)?;
     }
@@ -124,7 +123,7 @@ fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), C
     })
 }
 
-/// A view without a screen: of as many samples as asked for, or as a plot holds.
+/// A view without a screen, after the requested number of samples, or enough for a full plot.
 fn view_without_screen(session: &Session, args: &MonitorArgs) -> Result<View, CommandError> {
     let mut arm = session.connect()?;
     let mut view = View::new(arm.port());

@@ -1,7 +1,5 @@
-//! The screen as an SVG picture, for documents: drawn cell by cell from what a terminal would be given.
-//!
-//! Lines and dots are drawn as such, so that they meet whatever font a reader has; all else is text, stretched
-//! to its cells. Knows characters and colours, not what they mean.
+//! An SVG picture of the screen, for documents. Lines and Braille dots are drawn, so they join in every font. Text is
+//! stretched to its cells.
 
 use std::fmt::Write;
 
@@ -14,20 +12,20 @@ use super::draw::draw;
 use super::view::View;
 use crate::plot::escaped;
 
-/// The size of the screen, in cells.
+/// Size of the screen in cells.
 const SCREEN: (u16, u16) = (100, 32);
-/// The size of a cell, in pixels.
+/// Size of a cell in pixels.
 const CELL: (u16, u16) = (9, 18);
-/// Around the screen, in pixels.
+/// Margin around the screen in pixels.
 const MARGIN: u16 = 12;
 const BACKGROUND: &str = "#14181f";
 const FOREGROUND: &str = "#d7dce2";
-/// Unicode's Braille patterns begin here; the low byte is the dots.
+/// The first Braille pattern of Unicode. The low byte selects the dots.
 const BRAILLE: u32 = 0x2800;
 
-/// The view on a screen of a hundred columns.
+/// The view as an SVG picture.
 pub(crate) fn picture(view: &View) -> String {
-    // Memory takes whatever is drawn.
+    // Drawing to memory cannot fail.
     let Ok(mut terminal) = Terminal::new(TestBackend::new(SCREEN.0, SCREEN.1));
     let Ok(_) = terminal.draw(|frame| draw(frame, view));
     svg(terminal.backend().buffer())
@@ -70,7 +68,7 @@ fn is_drawn(cell: &Cell) -> bool {
     cell.symbol().chars().next().is_some_and(|symbol| dots(symbol).is_some() || path(symbol).is_some())
 }
 
-/// Word by word: what becomes of spaces is up to the reader of an SVG.
+/// Draws word by word, because SVG viewers treat spaces differently.
 fn text(out: &mut String, x: u16, y: u16, symbols: &str, style: &Cell) {
     let weight = if style.modifier.contains(Modifier::BOLD) { " font-weight=\"bold\"" } else { "" };
     let colour = hexadecimal(style.fg);
@@ -102,7 +100,7 @@ fn shapes(out: &mut String, x: u16, y: u16, cell: &Cell) {
     }
 }
 
-/// The dots of a Braille pattern: column and row, as Unicode numbers its bits.
+/// The dots of a Braille pattern as columns and rows, in the order of Unicode's bits.
 fn dots(symbol: char) -> Option<Vec<(f64, f64)>> {
     const PLACES: [(f64, f64); 8] =
         [(0.0, 0.0), (0.0, 1.0), (0.0, 2.0), (1.0, 0.0), (1.0, 1.0), (1.0, 2.0), (0.0, 3.0), (1.0, 3.0)];
@@ -111,7 +109,7 @@ fn dots(symbol: char) -> Option<Vec<(f64, f64)>> {
     Some(PLACES.into_iter().enumerate().filter(is_set).map(|(_, place)| place).collect())
 }
 
-/// How a line character is drawn, from the corner of its cell.
+/// The SVG path of a line character, relative to the corner of its cell.
 const fn path(symbol: char) -> Option<&'static str> {
     Some(match symbol {
         '─' => "m0 9h9",
@@ -124,7 +122,7 @@ const fn path(symbol: char) -> Option<&'static str> {
     })
 }
 
-/// The sixteen colours that a terminal has a choice of, as this picture chooses.
+/// The colour of a terminal colour in the picture.
 const fn hexadecimal(colour: Color) -> &'static str {
     match colour {
         Color::Red => "#f2777a",

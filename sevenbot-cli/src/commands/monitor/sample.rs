@@ -1,27 +1,25 @@
-//! The arm at one moment: two reads, and how long the first one took.
-//!
-//! Knows what to read, not how it is shown.
+//! A sample of the arm: two reads, and the round-trip time of the first.
 
 use std::time::{Duration, Instant};
 
 use sevenbot::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION};
 use sevenbot::{Arm, Error, Joint, Snapshot, Span, Speed, StatusBlock};
 
-/// Everything that is shown of an arm.
+/// The state of an arm at one time.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
-    /// Since the monitor began.
+    /// Since the start of the monitor.
     pub(crate) time: Duration,
     /// From the motor state to the present positions.
     pub(crate) registers: Snapshot,
-    /// Firmware without a status block has none.
+    /// `None` if the firmware has no status block.
     pub(crate) status: Option<StatusBlock>,
-    /// From a question to its answer.
+    /// From a request to its reply.
     pub(crate) round_trip: Duration,
 }
 
 impl Sample {
-    /// Takes one from an arm.
+    /// Reads a sample from the arm.
     pub(crate) fn take(arm: &mut Arm, start: Instant) -> Result<Self, Error> {
         let asked = Instant::now();
         let registers = arm.read_span(Span::between(&MOTOR_STATE, &PRESENT_POSITION))?;
@@ -29,17 +27,17 @@ impl Sample {
         Ok(Self { time: start.elapsed(), registers, status: arm.status()?, round_trip })
     }
 
-    /// Where the joint should be, in degrees.
+    /// The target position in degrees.
     pub(crate) fn target(&self, joint: Joint) -> u8 {
         self.registers.at(TARGET_POSITION.of(joint))
     }
 
-    /// Where the joint is, in degrees.
+    /// The present position in degrees.
     pub(crate) fn present(&self, joint: Joint) -> u8 {
         self.registers.at(PRESENT_POSITION.of(joint))
     }
 
-    /// How fast the joint moves when it does.
+    /// The speed of the joint's moves.
     pub(crate) fn speed(&self, joint: Joint) -> Speed {
         Speed::from_steps(self.registers.at(SPEED.of(joint))).unwrap_or(Speed::MAXIMUM)
     }
@@ -49,7 +47,7 @@ impl Sample {
         self.registers.byte(&MOTOR_STATE)
     }
 
-    /// Is the joint on its way? Without a status block nobody knows.
+    /// Does the joint's set-point move? `false` without a status block.
     pub(crate) fn is_moving(&self, joint: Joint) -> bool {
         self.status.as_ref().is_some_and(|status| status.is_moving(joint))
     }

@@ -1,4 +1,4 @@
-//! The monitor on a terminal: draws the view, listens to keys, and leaves the terminal as it was.
+//! The monitor on a terminal: draws the view, reads keys, and restores the terminal.
 
 use std::io::{self, IsTerminal};
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -17,12 +17,12 @@ use crate::interrupt::{Interrupt, report_hold};
 use crate::printer::warn;
 use crate::session::Session;
 
-/// How long a key may wait for the picture, and the picture for events.
+/// Time between two frames on the screen, and the longest reaction time to a key.
 const FRAME: Duration = Duration::from_millis(40);
 
-/// Shows the arm until the user has seen enough; gives the last view back.
+/// Shows the arm until the user quits. Returns the last view.
 pub(crate) fn run(session: &Session, period: Duration) -> Result<View, CommandError> {
-    // A port that cannot be chosen is a failure; one that does not answer yet is waited for.
+    // Without a port there is an error. A port without an answer is tried again.
     let port = session.port_name()?;
     let start = Instant::now();
     let mut view = View::new(&port);
@@ -34,19 +34,19 @@ pub(crate) fn run(session: &Session, period: Duration) -> Result<View, CommandEr
         ArmThread { port: asked, last_port: port, options, period, start, events, commands, arm: None };
     let watching = thread::spawn(|| watcher.run());
     let shown = on_terminal(|terminal| show(terminal, &mut view, start, &hear, &command));
-    // Without a command to come the watcher ends, after those that it has already.
+    // Closing the channel ends the thread after the pending commands.
     drop(command);
     let held = watching.join().ok().flatten();
     shown?;
     match held {
         Some(held) => report_hold(&held?),
-        None if Interrupt::is_requested() => warn("there is no arm that could be made to hold"),
+        None if Interrupt::is_requested() => warn("the arm is lost: it could not be made to hold"),
         None => {}
     }
     Ok(view)
 }
 
-/// Does something on the whole screen, and gives it back as it was, even after a failure.
+/// Runs `work` on the whole screen, and restores the terminal, also after a failure.
 fn on_terminal(work: impl FnOnce(&mut DefaultTerminal) -> io::Result<()>) -> Result<(), CommandError> {
     let mut terminal = ratatui::try_init()?;
     let done = work(&mut terminal);
@@ -61,7 +61,7 @@ fn show(
     events: &Receiver<ArmEvent>,
     commands: &Sender<UiCommand>,
 ) -> io::Result<()> {
-    // In raw mode Ctrl-C is a key; other signals to end still come.
+    // In raw mode Ctrl-C arrives as a key. Other signals still arrive.
     Interrupt::catch();
     let reads_stdin = io::stdin().is_terminal();
     while !Interrupt::is_requested() {
@@ -78,7 +78,7 @@ fn show(
     Ok(())
 }
 
-/// Waits until there may be an event. Returns false if the terminal is gone: crossterm would read its end for ever.
+/// Waits for input. `false` if the terminal is gone: crossterm would read its end without end.
 #[cfg(unix)]
 fn wait_for_input(timeout: Duration, reads_stdin: bool) -> io::Result<bool> {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -101,13 +101,13 @@ fn wait_for_input(timeout: Duration, _reads_stdin: bool) -> io::Result<bool> {
     event::poll(timeout).map(|_| true)
 }
 
-/// Does what an event asks for; `false` when that is to end.
+/// Reacts to an event; `false` ends the monitor.
 fn react(view: &mut View, event: &Event, commands: &Sender<UiCommand>) -> bool {
     match event {
-        // Some terminals report releases too.
+        // Some terminals also report releases.
         Event::Key(key) if key.kind != KeyEventKind::Release => match press(view, *key) {
             KeyAction::Redraw => true,
-            // The watcher only ends after this end of the channel does.
+            // The thread ends only after this channel, so sending succeeds.
             KeyAction::Send(command) => commands.send(command).is_ok(),
             KeyAction::Quit => false,
             KeyAction::Stop => {

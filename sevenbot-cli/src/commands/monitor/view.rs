@@ -1,8 +1,8 @@
-//! What the monitor shows, as data: no terminal, no arm, no clock.
+//! The content of the monitor's screen as data, without terminal, arm and clock.
 //!
 //! ```text
 //!   events from the arm ──▶ ┌──────┐
-//!                         │ View │ ──▶ draw: the same picture for a terminal, a test, an SVG
+//!                         │ View │ ──▶ draw: for a terminal, a test, or an SVG
 //!   keys ─── keys.rs ───▶ └──────┘
 //!               └──▶ commands to the arm
 //! ```
@@ -14,40 +14,40 @@ use sevenbot::{Joint, StatusBlock};
 
 use super::sample::Sample;
 
-/// How much of the past is plotted.
+/// Time span of the plot.
 pub(crate) const PLOT_SPAN: Duration = Duration::from_secs(20);
-/// How long a note stays.
+/// A note disappears after this time.
 const NOTE_DURATION: Duration = Duration::from_secs(6);
-/// The weight of a new round trip in the mean.
+/// Weight of a new round trip in the running mean.
 const MEAN_WEIGHT: f64 = 0.1;
 
-/// What there is to tell about an arm.
+/// An event from the arm's thread.
 #[derive(Clone, Debug)]
 pub(crate) enum ArmEvent {
-    /// It answers: this is its port, and its firmware's version.
+    /// Connected: port and firmware version.
     Found { port: String, firmware: String },
-    /// It does not, for this reason.
+    /// Not connected, for this reason.
     Lost(String),
-    /// How it is.
+    /// A new sample.
     Sample(Sample),
-    /// A question was not answered, but so many damaged frames were heard.
+    /// A question without an answer, and the number of damaged frames received.
     Unanswered { damaged: usize },
-    /// A command was not fulfilled.
+    /// A command failed.
     Refused(String),
 }
 
-/// What the arm is asked to do.
+/// A command from the user to the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum UiCommand {
-    /// Move a joint's target by so many degrees.
+    /// Change a joint's target by some degrees.
     Nudge { joint: Joint, degrees: i16 },
-    /// All joints faster or slower than this one is now.
+    /// Change the speed of all joints, starting from that of this joint.
     SpeedChange { joint: Joint, change: SpeedChange },
-    /// This motor state.
+    /// Change the motor state.
     State(u8),
 }
 
-/// A change of speed.
+/// Direction of a change of speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SpeedChange {
     Faster,
@@ -55,12 +55,12 @@ pub(crate) enum SpeedChange {
 }
 
 impl SpeedChange {
-    /// A change, in the register's steps.
+    /// Size of a change, in steps of the register.
     const CHANGE: u8 = 5;
-    /// The highest speed below the maximum, which is 0 (D10).
+    /// The highest speed; 0 is the maximum (D10).
     const HIGHEST: u8 = 100;
 
-    /// The register's next speed after this one.
+    /// The next speed of the register.
     pub(crate) const fn after(self, steps: u8) -> u8 {
         match (self, steps) {
             (Self::Faster, 0 | Self::HIGHEST) => 0,
@@ -73,36 +73,36 @@ impl SpeedChange {
     }
 }
 
-/// Is there an arm?
+/// State of the connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Connection {
-    /// Not yet, or not any more, for this reason.
+    /// Not connected, for this reason.
     Looking(String),
-    /// One with firmware of this version.
+    /// Connected to an arm with this firmware version.
     Open { firmware: String },
 }
 
-/// What stands in front of all else.
+/// A dialog above the view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Dialog {
-    /// What the keys do.
+    /// The help.
     Help,
-    /// Which motor state?
+    /// The choice of a motor state.
     ChooseState,
-    /// This state lets the arm fall: really?
+    /// The confirmation of a motor state without torque.
     ConfirmState(u8),
 }
 
-/// How well host and arm understand each other.
+/// Statistics of the host link.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LinkQuality {
     pub(crate) answers: u64,
     pub(crate) unanswered: u64,
-    /// Frames that came damaged while an answer was missing.
+    /// Damaged frames received instead of an answer.
     pub(crate) damaged: usize,
-    /// The arm's counter of frames that reached it damaged: when it was first seen, and now.
+    /// The arm's counter of damaged frames: at the first sample, and now.
     corrupted: Option<(u16, u16)>,
-    /// In milliseconds, the mean of the last ten or so.
+    /// Mean round-trip time of about the last ten samples, in milliseconds.
     pub(crate) round_trip_ms: f64,
 }
 
@@ -117,25 +117,25 @@ impl LinkQuality {
         }
     }
 
-    /// Frames that reached the arm damaged since it was found.
+    /// Damaged frames that the arm counted since the connection.
     pub(crate) fn damaged_at_arm(&self) -> u16 {
         self.corrupted.map_or(0, |(first, now)| now.wrapping_sub(first))
     }
 }
 
-/// The positions of all joints, joint 1 first, and when they were those.
+/// A time and the positions of all joints, joint 1 first.
 pub(crate) type PastPose = (Duration, [u8; 7]);
 
-/// All that is shown.
+/// The content of the screen.
 #[derive(Clone, Debug)]
 pub(crate) struct View {
     pub(crate) port: String,
     pub(crate) connection: Connection,
-    /// The last sample, or the one that is frozen.
+    /// The last sample, or the frozen one.
     pub(crate) sample: Option<Sample>,
-    /// Of the last [`PLOT_SPAN`], oldest first.
+    /// Positions of the last [`PLOT_SPAN`], oldest first.
     pub(crate) past: VecDeque<PastPose>,
-    /// The right end of the plot.
+    /// The time at the right end of the plot.
     pub(crate) now: Duration,
     pub(crate) link: LinkQuality,
     pub(crate) selected: Joint,
@@ -162,7 +162,7 @@ impl View {
         }
     }
 
-    /// It is so late now, since the monitor began.
+    /// Sets the time since the start of the monitor.
     pub(crate) fn tick(&mut self, clock: Duration) {
         self.clock = clock;
         if !self.is_frozen {
@@ -170,13 +170,13 @@ impl View {
         }
     }
 
-    /// Takes events in.
+    /// Applies an event.
     pub(crate) fn update(&mut self, event: ArmEvent) {
         match event {
             ArmEvent::Found { port, firmware } => {
                 self.port = port;
                 self.connection = Connection::Open { firmware };
-                // Its counters may have begun anew.
+                // The arm may have restarted, with new counters.
                 self.link.corrupted = None;
             }
             ArmEvent::Lost(reason) => self.connection = Connection::Looking(reason),
@@ -201,18 +201,18 @@ impl View {
         self.sample = Some(sample);
     }
 
-    /// Shows a note for a while.
+    /// Shows a note for some seconds.
     pub(crate) fn show_note(&mut self, note: impl Into<String>) {
         self.note = Some((self.clock, note.into()));
     }
 
-    /// The note, while it is fresh.
+    /// The note, if it is not old.
     pub(crate) fn note(&self) -> Option<&str> {
         let (since, note) = self.note.as_ref()?;
         (self.clock < *since + NOTE_DURATION).then_some(note)
     }
 
-    /// Is there an arm, and is it known how it is?
+    /// The last sample, while the arm is connected.
     pub(crate) fn arm(&self) -> Option<&Sample> {
         self.sample.as_ref().filter(|_| matches!(self.connection, Connection::Open { .. }))
     }
@@ -234,7 +234,7 @@ pub(crate) mod tests {
         Snapshot { address: span.address(), values: vec![0; span.count().into()] }
     }
 
-    /// An arm whose joint 2 is on its way from 90 to 120 degrees.
+    /// A sample with joint 2 moving from 90 to 120 degrees.
     pub(crate) fn sample(millis: u64, position: u8) -> Sample {
         let mut registers = zeros(Span::between(&MOTOR_STATE, &PRESENT_POSITION));
         set(&mut registers, MOTOR_STATE.address, &[1]);
@@ -252,7 +252,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// A view of that arm, after 10 s.
+    /// A view after 10 s of such samples.
     pub(crate) fn watching() -> View {
         let mut view = View::new("/dev/ttyUSB0");
         view.update(ArmEvent::Found { port: "/dev/ttyUSB0".to_owned(), firmware: "3.0".to_owned() });

@@ -1,11 +1,11 @@
-//! `record`: what a hand shows the arm, or what the arm does, to a file.
+//! `record`: writes the positions of a guided or moving arm to a file.
 //!
 //! ```text
-//!   arm ── reports, sent unasked ──▶ ReportClock (when each was measured) ──▶ one line each ──▶ file
-//!                                     TeachPendant (keys: pump, nudges, end) ──┘
+//!   arm ── reports ──▶ ReportClock (time of measurement) ──▶ one line each ──▶ file
+//!                       TeachPendant (keys: pump, nudges, end) ──┘
 //! ```
 //!
-//! However it ends, the file is whole up to there, and an arm that is still there holds where it is.
+//! After any end the file has whole lines, and an arm that is still connected holds its position.
 
 mod report_clock;
 mod teach_pendant;
@@ -28,48 +28,47 @@ use crate::interrupt::{Interrupt, hold, report_hold};
 use crate::joint_move::driven_joints;
 use crate::line_file::LineFile;
 use crate::printer::{Printable, note};
-use crate::reports::with_reports;
+use crate::reports::{reports_stopped, with_reports};
 use crate::session::Session;
 use crate::write_result::motors_obey;
 
-/// Record a movement: guide the arm by hand, or watch it move.
+/// Record a movement: guide the arm by hand, or let it move.
 ///
-/// The arm goes limp, so that a hand can lead it, and its positions go to a file as they come. Ctrl-C ends it:
-/// the arm then holds the pose that it was left in,
-/// with --driven too. On a terminal the space bar switches the vacuum pump.
+/// The motors go off so that you can guide the arm, and its positions go to FILE. Ctrl-C ends the recording, and the arm
+/// holds its pose, also with --driven. On a terminal the space bar switches the vacuum pump.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sevenbot record wave.txt                     hold the arm, answer y, lead it; Ctrl-C ends
+  sevenbot record wave.txt                     hold the arm, answer y, guide it; Ctrl-C ends
   sevenbot record wave.txt --driven            the motors stay on, the arrow keys move the arm
   sevenbot pose 150 60 90 90 90 90 80 --speed 10
-  sevenbot record move.txt --driven --seconds 5    a move that is under way
+  sevenbot record move.txt --driven --seconds 5    records a move
 
-The file is text, a line a moment: seconds, seven angles in degrees, vacuum. `sevenbot play` moves the arm
-by it, and so it does by a file that was written by hand.")]
+The file is text, one line per moment: seconds, seven angles in degrees, vacuum. `sevenbot play` plays it,
+and also a file written by hand.")]
 pub(crate) struct RecordArgs {
-    /// Where the recording goes.
+    /// The file for the recording.
     file: PathBuf,
-    /// End after so many seconds.
+    /// End after N seconds.
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=86_400))]
     seconds: Option<u32>,
-    /// Moments a second.
+    /// Moments per second.
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = value_parser!(u8).range(1..=50))]
     hz: u8,
-    /// Leave the motors on: record a move that is under way, or one made by keys.
+    /// Leave the motors on, to record a move of the arm or one made with keys.
     #[arg(long)]
     driven: bool,
-    /// The arm is held, and FILE may be replaced: do not ask.
+    /// Do not ask whether the arm is held and FILE may be replaced.
     #[arg(long)]
     yes: bool,
 }
 
-/// No report for so long, and something is wrong. The slowest rate is one a second.
+/// Without a report for this time, the arm has stopped reporting. The lowest rate is 1 Hz.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(3);
-/// How long a key, or Ctrl-C, may wait.
+/// The longest reaction time to a key or Ctrl-C.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
 
-/// What was recorded.
+/// The result of `record`.
 #[derive(Debug, Serialize)]
 struct Recorded {
     file: String,
@@ -87,12 +86,12 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     let mut arm = session.connect()?;
     let replaced = args.file.exists();
     if replaced {
-        confirm(&format!("{} is there already. Replace it?", args.file.display()), args.yes)?;
+        confirm(&format!("{} exists. Replace it?", args.file.display()), args.yes)?;
     }
     if args.driven {
         driven_joints(&mut arm)?;
     } else {
-        confirm("The arm goes limp, and falls unless somebody holds it. Go on?", args.yes)?;
+        confirm("The motors go off, and the arm falls unless you hold it. Go on?", args.yes)?;
     }
     let mut recording = RecordingFile::create(&args.file)?;
     Interrupt::catch();
@@ -100,7 +99,7 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     let done = set_motors(&mut arm, args).and_then(|()| {
         with_reports(&mut arm, args.hz, |arm| record_reports(arm, args, baud, &mut recording))
     });
-    // An arm that went away cannot be told to hold; it was left as it is.
+    // Without a connection the arm cannot be made to hold.
     let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
     let held = if is_gone && !Interrupt::is_requested() { Ok(()) } else { hold_at_end(&mut arm, args) };
     let RecordingFile { moments, seconds, .. } = recording;
@@ -112,13 +111,13 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     session.printer.print(&recorded)
 }
 
-/// Lets the arm go, if a hand is to lead it.
+/// Switches the motors off if the user guides the arm.
 fn set_motors(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
     let state = if args.driven { motor_state::SERVO } else { motor_state::FORCELESS };
     motors_obey(arm.write_checked(MOTOR_STATE.address, &[state]))
 }
 
-/// Makes the arm hold the pose it was left in. A driven arm goes on with its move, but not after Ctrl-C.
+/// Makes a guided arm hold its pose. A driven arm finishes its move, but holds after Ctrl-C.
 fn hold_at_end(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
     if args.driven {
         if Interrupt::is_requested() {
@@ -126,13 +125,13 @@ fn hold_at_end(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
         }
         return Ok(());
     }
-    // Coming from forceless, the targets become what was measured (D13).
+    // The targets become the measured positions (D13).
     motors_obey(arm.write_checked(MOTOR_STATE.address, &[motor_state::SERVO]))?;
     note("the arm holds where it is");
     Ok(())
 }
 
-/// Takes reports until it is enough.
+/// Records reports until the end is requested.
 fn record_reports(
     arm: &mut Arm,
     args: &RecordArgs,
@@ -160,17 +159,15 @@ fn record_reports(
     Ok(())
 }
 
-/// Why no report comes any more.
+/// Why reports are missing.
 fn silent(arm: &mut Arm) -> CommandError {
     match arm.read_span(Span::of(&FEEDBACK_FREQUENCY)) {
         Err(error) => error.into(),
-        Ok(_) => CommandError::Arm(
-            "the arm has stopped to report its positions: was it switched off and on again?".to_owned(),
-        ),
+        Ok(_) => reports_stopped(),
     }
 }
 
-/// The file, and how much is in it.
+/// The file, and the length of the recording so far.
 struct RecordingFile {
     file: LineFile,
     moments: u64,

@@ -1,18 +1,17 @@
-//! When a report was measured, which is not when it arrived.
+//! The time at which the arm measured a report, from the time at which it arrived.
 //!
-//! The arm reports without drift (D14), but USB adapters and a busy host deliver late, and several at once.
-//! So a report belongs to the next tick of the arm's clock, unless so much time has passed that reports must
-//! have been lost.
+//! The arm reports without drift (D14), but USB adapters and a busy host deliver late, and several reports at once. So a
+//! report belongs to the next tick of the arm's clock. Only a longer delay means that reports were lost.
 
 use std::time::{Duration, Instant};
 
-/// Bits on the line for a report at most this often: half of it, 14 bytes of ten bits each (D14).
+/// A report has 14 bytes of ten bits, and reports fill at most half of the line (D14).
 const BITS_PER_REPORT: u32 = 2 * 14 * 10;
 
-/// The ticks of the arm's clock.
+/// The ticks of the arm's report timer.
 pub(crate) struct ReportClock {
     period: Duration,
-    /// When the first report came, and the number of the last one's tick.
+    /// When the first report arrived, and the tick of the last one.
     last: Option<(Instant, u32)>,
 }
 
@@ -23,7 +22,7 @@ impl ReportClock {
         Self { period: Duration::from_secs(1) / rate, last: None }
     }
 
-    /// When a report was measured that came at this time: since the first one.
+    /// The time of measurement of a report, since the first report.
     pub(crate) fn time_of(&mut self, received: Instant) -> Duration {
         let (first, tick) = match self.last {
             None => (received, 0),
@@ -33,7 +32,7 @@ impl ReportClock {
         self.period.saturating_mul(tick)
     }
 
-    /// The number of the tick nearest to a time.
+    /// The nearest tick to a time.
     fn nearest(&self, time: Duration) -> u32 {
         let ticks = (time + self.period / 2).as_micros() / self.period.as_micros().max(1);
         u32::try_from(ticks).unwrap_or(u32::MAX)

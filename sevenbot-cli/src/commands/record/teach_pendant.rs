@@ -1,5 +1,5 @@
-//! The keys of whoever teaches the arm: the pump, the end, and while the motors are on, nudges. And the line
-//! that says how far it is. Both only on a terminal; elsewhere nothing is asked and nothing shown.
+//! The keys during a recording: pump, end, and nudges while the motors are on. Also shows the progress. Works only on a
+//! terminal.
 
 use std::io::{self, IsTerminal};
 use std::time::Duration;
@@ -14,7 +14,7 @@ use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::write_result::{all_taken, motors_obey};
 
-/// What is in the teacher's hands.
+/// Keys and progress line of a recording.
 pub(crate) struct TeachPendant {
     has_keys: bool,
     targets: [Angle; 7],
@@ -24,11 +24,11 @@ pub(crate) struct TeachPendant {
     progress: Progress,
 }
 
-/// What a key asks for.
+/// A command from a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum KeyCommand {
     End,
-    /// And hold the arm.
+    /// End, and make the arm hold its position.
     Stop,
     SwitchPump,
     Select(Joint),
@@ -37,19 +37,19 @@ enum KeyCommand {
 }
 
 impl TeachPendant {
-    /// Takes the keys, where there are any.
+    /// Switches the terminal to raw mode, if there is one.
     pub(crate) fn new(targets: [Angle; 7], vacuum: bool, is_driven: bool) -> Self {
         let has_keys = io::stdin().is_terminal() && io::stderr().is_terminal() && enable_raw_mode().is_ok();
         let progress = Progress::endless("moments");
         Self { has_keys, targets, vacuum, is_driven, selected: Joint::ALL[0], progress }
     }
 
-    /// Does the pump suck?
+    /// Is the pump on?
     pub(crate) const fn vacuum(&self) -> bool {
         self.vacuum
     }
 
-    /// Says how far it is.
+    /// Shows the progress.
     pub(crate) fn show(&self, moments: u64, time: Duration) {
         self.progress.set(moments);
         let seconds = time.as_secs_f64();
@@ -62,7 +62,7 @@ impl TeachPendant {
         self.progress.say(&format!("{seconds:.1} s  pump {pump}{keys}"));
     }
 
-    /// Does what the keys ask for; `true` when that is to end.
+    /// Executes the commands of all pressed keys; `true` ends the recording.
     pub(crate) fn poll_keys(&mut self, arm: &mut Arm) -> Result<bool, CommandError> {
         while self.has_keys && event::poll(Duration::ZERO)? {
             let Event::Key(key) = event::read()? else { continue };
@@ -107,7 +107,7 @@ impl Drop for TeachPendant {
 }
 
 fn command(key: KeyEvent, selected: Joint) -> Option<KeyCommand> {
-    // Some terminals report releases too.
+    // Some terminals also report releases.
     if key.kind == KeyEventKind::Release {
         return None;
     }

@@ -1,4 +1,4 @@
-//! `servo center`: turns a servo to the middle of its range.
+//! `servo center`: moves a servo to the middle of its range.
 
 use std::io::{self, Write};
 
@@ -15,14 +15,14 @@ use crate::printer::{Printable, note};
 use crate::progress::Progress;
 use crate::session::Session;
 
-/// Turn a servo to the middle of its range, 511 counts, slowly.
+/// Move a servo slowly to the middle of its range, 511 counts.
 ///
-/// The servo gets its present position as its goal, then torque, then the middle as its goal. It stops and loses its
-/// torque when it pushes harder than --load, when it comes no closer for 3 s, and at Ctrl-C. At the end it holds the
-/// middle with torque on, so that a horn or a gear can be fitted.
+/// The goal becomes the present position, the torque goes on, then the goal becomes the middle. The torque goes off if the
+/// load exceeds --load, if the servo makes no progress for 3 s, and at Ctrl-C. At the end the servo holds the middle with
+/// torque on, so that a horn or a gear can be fitted.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Best done with the servo alone on the bench. In an arm, support the arm: at a stop the servo lets go.
+Best with a single servo on the bench. In an arm, support the arm: a stopped servo has no torque.
 
 Examples:
   sevenbot servo center 3
@@ -59,12 +59,12 @@ impl Printable for Centered {
 pub(super) fn run(session: &mut Session, args: &CenterArgs) -> Result<(), CommandError> {
     let id = args.id;
     let mut bus = open(session, args.rate.rate)?;
-    // Before the question, so that it is asked about a servo that is there.
+    // Check that the servo answers before asking the user.
     if let Err(error) = bus.read(id, 0, 1) {
         return Err(exchange_error(session, bus, error));
     }
     confirm(
-        &format!("Servo {id} turns to {MIDDLE} counts. Is nothing in its way, and the arm supported?"),
+        &format!("Servo {id} moves to {MIDDLE} counts. Is its way free, and the arm supported?"),
         args.yes,
     )?;
     match drive(&mut bus, args) {

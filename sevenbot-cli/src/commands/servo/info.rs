@@ -1,4 +1,4 @@
-//! `servo info`: what one servo says of itself.
+//! `servo info`: shows the registers of one servo.
 
 use std::io::{self, Write};
 
@@ -12,9 +12,9 @@ use crate::printer::Printable;
 use crate::session::Session;
 use crate::style::{BAD, BOLD, GOOD};
 
-/// Show what one servo measures, what it was told, and its limits.
+/// Show measurements, goal and limits of one servo.
 ///
-/// Only asks: the servo does not move, and nothing is written.
+/// Only reads: the servo does not move.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The degrees are those of the joint that an id from 0 to 6 belongs to, without the joint's offset: offsets are stored
@@ -55,7 +55,7 @@ fn healthy(servo: &ServoInfo) -> Result<(), CommandError> {
 struct ServoSummary {
     id: u8,
     joint: Option<u8>,
-    /// None where the servo gives no position that can be believed.
+    /// None if the position is outside 0 to 1023 counts.
     measured: Option<ServoMeasurements>,
     moving: bool,
     errors: String,
@@ -168,7 +168,7 @@ impl Printable for ServoSummary {
     }
 }
 
-/// Codes 0 and 2 are damping or free, by the table that the servo has.
+/// Codes 0 and 2 mean damping or free, depending on the servo's table.
 const fn torque_word(code: u8) -> &'static str {
     match code {
         0 | 2 => " (no torque; `sevenbot servo torque-codes` finds out which kind)",
@@ -209,7 +209,7 @@ impl ServoMeasurements {
 
 impl ServoLimits {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "{BOLD}ServoLimits{BOLD:#}")?;
+        writeln!(out, "{BOLD}Limits{BOLD:#}")?;
         let (lowest, highest) = (self.min_position_counts, self.max_position_counts);
         let endless = if (lowest, highest) == (0, 0) { ": the motor turns without end" } else { "" };
         line(out, "position", &format!("{lowest} to {highest} counts{endless}"))?;

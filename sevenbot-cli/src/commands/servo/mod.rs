@@ -1,6 +1,4 @@
-//! `servo`: single servos through an adapter on the servo bus, without the arm's controller.
-//!
-//! What is done with the servos is in one file a subcommand.
+//! `servo`: single servos through an adapter on the servo bus, without the arm's controller. One file per subcommand.
 
 mod center;
 mod info;
@@ -16,20 +14,20 @@ use crate::session::Session;
 
 /// Scan, show and set up single servos through an adapter on the servo bus.
 ///
-/// For building and repairing an arm. The port is a half-duplex TTL adapter for bus servos, such as Feetech's FE-URT-1
-/// or Waveshare's Bus Servo Adapter, with the servos on it and their power on. It is not the arm's host link: take the
-/// arm's controller off the bus first, because two masters disturb each other.
+/// For building and repairing an arm. The port is a half-duplex TTL adapter for bus servos, such as Feetech's FE-URT-1 or
+/// Waveshare's Bus Servo Adapter. The servos need their own power. The port is not the arm's host link. Disconnect the
+/// arm's controller from the bus first, because two masters disturb each other.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The rate of the servo bus is --rate, or --rates of a scan; --baud is that of an arm's host link.
 
-Each joint's servo has its own id: joint 1 has id 0, joint 7 has id 6. A new servo has another one, mostly 1 or 0.
+Each joint's servo has its own id: joint 1 has id 0, joint 7 has id 6. A new servo usually has id 1 or 0.
 
 Examples:
   export SEVENBOT_PORT=/dev/ttyUSB0            the adapter
   sevenbot servo scan                          which servos are there, and at which baud rate?
   sevenbot servo info 3                        the servo of joint 4: position, supply, limits
-  sevenbot servo set-id 1 3                    makes a new servo that of joint 4, alone on the bus
+  sevenbot servo set-id 1 3                    gives a new servo, alone on the bus, the id of joint 4
   sevenbot servo center 3                      turns it to its middle, before its horn goes on
   sevenbot servo torque-codes                  which of the two tables of register 40 do they have?
 

@@ -1,4 +1,4 @@
-//! The adapter's port and the arguments that all subcommands share, and what a failed exchange may mean.
+//! The adapter's port, arguments of all subcommands, and the error of a failed exchange.
 
 use clap::{Args, builder::RangedI64ValueParser, value_parser};
 use sevenbot::servo_bench::{BAUD_RATES, BusMaster, BusOptions, MAX_ID, ServoError};
@@ -7,7 +7,7 @@ use sevenbot::{Arm, ArmOptions, ReceiveCounts, ports};
 use crate::command_error::CommandError;
 use crate::session::Session;
 
-/// The baud rate of the bus, where only one is wanted.
+/// The baud rate of the bus.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct Rate {
     /// Baud rate of the servo bus.
@@ -18,7 +18,7 @@ pub(super) struct Rate {
 /// One of the eight rates of an SCS servo.
 pub(super) fn rate(text: &str) -> Result<u32, String> {
     let known = text.parse().ok().filter(|rate| BAUD_RATES.contains(rate));
-    known.ok_or_else(|| format!("servos know {}", BAUD_RATES.map(|rate| rate.to_string()).join(", ")))
+    known.ok_or_else(|| format!("servos support {}", BAUD_RATES.map(|rate| rate.to_string()).join(", ")))
 }
 
 /// An id that a servo can have.
@@ -26,7 +26,7 @@ pub(super) fn id() -> RangedI64ValueParser<u8> {
     value_parser!(u8).range(..=i64::from(MAX_ID))
 }
 
-/// The adapter's port. It cannot be guessed: asking every port would send to whatever is there.
+/// The adapter's port. It must be given: a search would send bytes to other devices.
 pub(super) fn port(session: &Session) -> Result<String, CommandError> {
     let how = "`sevenbot servo` needs the adapter's port: use --port PORT or set SEVENBOT_PORT";
     session.port.clone().ok_or_else(|| CommandError::Usage(how.to_owned()))
@@ -39,8 +39,7 @@ pub(super) fn open(session: &Session, baud: u32) -> Result<BusMaster, CommandErr
     BusMaster::open(&port, baud, options).map_err(|error| CommandError::Open { port, error })
 }
 
-/// The failure for an exchange that went wrong. Where no servo was heard, an arm is looked for: its host link is the
-/// port that is most often taken for an adapter.
+/// The error of a failed exchange. If no servo answered, checks whether the port is an arm's host link.
 pub(super) fn exchange_error(session: &Session, bus: BusMaster, error: ServoError) -> CommandError {
     let is_silent = matches!(
         error,
@@ -53,7 +52,7 @@ pub(super) fn exchange_error(session: &Session, bus: BusMaster, error: ServoErro
     }
 }
 
-/// Does the controller of an arm answer on this port, at any of its rates?
+/// Does the controller of an arm answer on this port, at any baud rate?
 pub(super) fn leads_to_arm(session: &Session, bus: BusMaster, port: &str) -> bool {
     // The port can be opened only once.
     drop(bus);

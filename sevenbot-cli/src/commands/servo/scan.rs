@@ -1,4 +1,4 @@
-//! `servo scan`: which servos are on the bus, at which baud rates.
+//! `servo scan`: finds the servos on the bus, and their baud rates.
 
 use std::io::{self, Write};
 use std::ops::RangeInclusive;
@@ -19,11 +19,12 @@ use crate::style::WARNING;
 
 /// Find the servos on the bus, at all eight baud rates.
 ///
-/// Only asks: no servo moves, and nothing is written.
+/// Only reads: no servo moves.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Each id gets a short question; what answered is then asked patiently. All 254 ids take about 1.4 s at 1000000 baud
-and 17 s at all eight rates. \"several servos\" or \"damaged answers\" at one id mostly means that two servos have it.
+The first pass asks each id with a short timeout, the second each found id with the full one. All 254 ids take
+about 1.4 s at 1000000 baud and 17 s at all eight rates. \"several servos\" or \"damaged answers\" usually means
+that two servos have the same id.
 
 Exit status 1 when an id does not answer as one servo does, 3 when no servo answers.
 
@@ -35,10 +36,10 @@ pub(super) struct ScanArgs {
     /// Try only these baud rates.
     #[arg(long, value_name = "RATE,..", value_delimiter = ',', value_parser = rate)]
     rates: Vec<u32>,
-    /// Ask only these ids, as 5 or 0-6.
+    /// Ask only these ids, such as 5 or 0-6.
     #[arg(long, value_name = "ID-ID", default_value = "0-253", value_parser = ids)]
     ids: RangeInclusive<u8>,
-    /// Wait so long for each id, in milliseconds, instead of as long as a servo needs.
+    /// Timeout for each id in milliseconds, instead of the time that a servo needs.
     #[arg(long, value_name = "MS", value_parser = value_parser!(u16).range(1..))]
     wait: Option<u16>,
 }
@@ -55,7 +56,7 @@ fn ids(text: &str) -> Result<RangeInclusive<u8>, String> {
 #[derive(Serialize)]
 struct FoundServos {
     port: String,
-    /// Does the adapter echo what is sent?
+    /// Does the adapter echo sent bytes?
     echo: bool,
     servos: Vec<ServoRow>,
     rates_not_tried: Vec<u32>,
@@ -65,7 +66,7 @@ struct FoundServos {
 struct ServoRow {
     id: u8,
     baud: u32,
-    /// None for an id that no joint of the arm has.
+    /// None if no joint of the arm has this id.
     joint: Option<u8>,
     answers: &'static str,
 }
@@ -121,7 +122,7 @@ pub(super) fn run(session: &mut Session, args: &ScanArgs) -> Result<(), CommandE
     all_good(&found)
 }
 
-/// Runs a scan with a bar for its questions.
+/// Runs a scan with a progress bar.
 pub(super) fn with_progress<T>(
     plan: &ScanPlan,
     scan: impl FnOnce(&mut dyn FnMut(sevenbot::servo_bench::scan::ScanProgress)) -> T,

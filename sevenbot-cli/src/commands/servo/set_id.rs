@@ -17,8 +17,8 @@ use crate::session::Session;
 
 /// Give the only servo on the bus another id.
 ///
-/// All ids are asked first. Unless exactly one servo answers, and to OLD, nothing is written. Then the servo's EEPROM is
-/// unlocked, the id written, the EEPROM locked again, and made sure that the servo answers to NEW and no more to OLD.
+/// Asks all ids first. Writes nothing unless exactly one servo answers, with id OLD. Then unlocks the servo's EEPROM, writes
+/// the id, locks the EEPROM, and checks that the servo answers to NEW only.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Joint 1 has id 0, joint 7 has id 6.
@@ -27,15 +27,15 @@ Examples:
   sevenbot servo set-id 1 3                    a new servo with id 1 becomes that of joint 4
   sevenbot servo set-id 1 3 --rate 500000")]
 pub(super) struct SetIdArgs {
-    /// The id it has.
+    /// The present id.
     #[arg(value_parser = id())]
     old: u8,
-    /// The id it shall have.
+    /// The new id.
     #[arg(value_parser = id())]
     new: u8,
     #[command(flatten)]
     rate: Rate,
-    /// Wait so long for each id while looking for other servos, in milliseconds.
+    /// Timeout for each id during the scan for other servos, in milliseconds.
     #[arg(long, value_name = "MS", value_parser = value_parser!(u16).range(1..))]
     wait: Option<u16>,
 }
@@ -66,7 +66,7 @@ pub(super) fn run(session: &mut Session, args: &SetIdArgs) -> Result<(), Command
     }
 }
 
-/// What a user should do now.
+/// Advice to the user.
 fn advice(error: &SetIdError) -> &'static [&'static str] {
     match error {
         SetIdError::NotAlone { answering } if answering.is_empty() => {

@@ -1,7 +1,6 @@
-//! `servo torque-codes`: which of the two published meanings of register 40 a servo has.
+//! `servo torque-codes`: finds which of two published tables describes register 40 of a servo.
 //!
-//! A person turns the joint by hand with code 0 and with code 2. Code 1, torque on, is the same in both tables and is
-//! never written: the servo is never driven.
+//! The user turns the joint by hand with codes 0 and 2. Code 1, torque on, is never written.
 
 use std::io::{self, IsTerminal, Write};
 
@@ -16,11 +15,11 @@ use crate::confirm::confirm;
 use crate::printer::Printable;
 use crate::session::Session;
 
-/// Find out with your hand what codes 0 and 2 of the torque switch (register 40) mean.
+/// Find out by hand what codes 0 and 2 of the torque switch (register 40) mean.
 ///
-/// There are two tables: in the older one 0 is damping and 2 is free, in Feetech's current one it is the other way
-/// round. Code 1 is torque on in both; it is not tried, so the servo is never driven. You turn joint 1, which carries no
-/// weight, and say with which code it turns lighter.
+/// There are two tables. In the older one 0 is damping and 2 is free; in Feetech's current one 0 is free and 2 is damping.
+/// Code 1 is torque on in both. It is not written, so the motor never drives the servo. Turn joint 1, which carries no
+/// weight, and enter the code with which it turns more easily.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 With a hand on the joint:
@@ -46,9 +45,9 @@ pub(super) struct TorqueCodesArgs {
 struct TorqueCodeResult {
     id: u8,
     lighter_code: u8,
-    /// As `host-sim --torque-codes` calls it.
+    /// The value for `host-sim --torque-codes`.
     table: &'static str,
-    /// The constant of the firmware.
+    /// The constant for the firmware.
     torque_codes: &'static str,
 }
 
@@ -72,7 +71,7 @@ impl Printable for TorqueCodeResult {
     }
 }
 
-/// The two codes that give no torque.
+/// The two codes without torque.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum TorqueOffCode {
     Zero,
@@ -103,7 +102,7 @@ impl TorqueOffCode {
     }
 }
 
-/// What may be typed.
+/// The user's input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum TorqueCodeInput {
     Switch,
@@ -127,7 +126,7 @@ impl TorqueCodeInput {
 
 pub(super) fn run(session: &mut Session, args: &TorqueCodesArgs) -> Result<(), CommandError> {
     if !io::stdin().is_terminal() {
-        let why = "torque-codes asks what a person feels: run it in a terminal";
+        let why = "torque-codes needs your answers: run it in a terminal";
         return Err(CommandError::Usage(why.to_owned()));
     }
     let id = args.id;
@@ -140,7 +139,7 @@ pub(super) fn run(session: &mut Session, args: &TorqueCodesArgs) -> Result<(), C
         false,
     )?;
     let lighter = ask_lighter_code(&mut bus, id);
-    // Also after a failure, which is then the one to tell.
+    // Also after a failure. The first failure is then reported.
     let ended = switch(&mut bus, id, TorqueOffCode::Zero);
     match lighter? {
         Err(error) => Err(exchange_error(session, bus, error)),
@@ -151,7 +150,7 @@ pub(super) fn run(session: &mut Session, args: &TorqueCodesArgs) -> Result<(), C
     }
 }
 
-/// The code with which the joint turns lighter. The outer failure is the person's, the inner one the bus's.
+/// Asks for the code with which the joint turns more easily. The outer error is of the input, the inner one of the bus.
 fn ask_lighter_code(bus: &mut BusMaster, id: u8) -> Result<Result<TorqueOffCode, ServoError>, CommandError> {
     let (mut code, mut has_tried_both) = (TorqueOffCode::Zero, false);
     if let Err(error) = switch(bus, id, code) {
@@ -169,7 +168,7 @@ fn ask_lighter_code(bus: &mut BusMaster, id: u8) -> Result<Result<TorqueOffCode,
             Some(TorqueCodeInput::Quit) => {
                 return Err(CommandError::Arm("ended without a result".to_owned()));
             }
-            Some(_) if !has_tried_both => say("feel the other code too first: press Enter")?,
+            Some(_) if !has_tried_both => say("try the other code first: press Enter")?,
             Some(TorqueCodeInput::Lighter(code)) => return Ok(Ok(code)),
             Some(TorqueCodeInput::Same) => return Err(no_difference()),
             None => say("type Enter, 0, 2, s or q")?,
@@ -179,10 +178,10 @@ fn ask_lighter_code(bus: &mut BusMaster, id: u8) -> Result<Result<TorqueOffCode,
 
 fn no_difference() -> CommandError {
     CommandError::WithAdvice {
-        message: "both codes feel the same, so this joint does not tell which table it is".to_owned(),
+        message: "both codes feel the same: the table remains unknown".to_owned(),
         advice: &[
             "turn the joint faster: damping grows with speed",
-            "compare with the servos' power off, which feels as free does",
+            "compare with the servos' power off, which feels like free",
             "keep the default, the older table: with the wrong one an arm drops where it should sink",
         ],
     }
@@ -200,7 +199,7 @@ fn ask(code: TorqueOffCode) -> Result<Option<TorqueCodeInput>, CommandError> {
     let mut err = anstream::stderr();
     write!(
         err,
-        "code {} is on: turn the joint. Enter for the other, 0 or 2 for the lighter, s, q > ",
+        "code {} is active: turn the joint. Enter: other code, 0 or 2: lighter code, s: same, q: quit > ",
         code.number()
     )?;
     err.flush()?;
