@@ -4,8 +4,8 @@ use clap::{Args, CommandFactory, Parser, Subcommand, value_parser};
 
 use crate::command_error::CommandError;
 use crate::commands::{
-    backup, baud, calibrate, effector, get, info, monitor, move_to, play, ports, pose, position, record,
-    registers, servo, set, shell, sniff, state, stop,
+    backup, baud, calibrate, effector, get, info, model, monitor, move_to, play, ports, pose, position,
+    record, registers, servo, set, shell, sniff, state, stop,
 };
 use crate::session::Session;
 
@@ -83,6 +83,7 @@ pub(crate) enum Command {
     Sniff(sniff::SniffArgs),
     Servo(servo::ServoArgs),
     Registers(registers::RegistersArgs),
+    Model(model::ModelArgs),
     Completions(shell::CompletionsArgs),
     Man(shell::ManArgs),
 }
@@ -112,6 +113,7 @@ impl Command {
             Self::Sniff(args) => sniff::run(session, &args),
             Self::Servo(args) => servo::run(session, &args),
             Self::Registers(args) => registers::run(session, &args),
+            Self::Model(args) => model::run(&args),
             Self::Completions(args) => shell::completions(session, &args, Cli::command()),
             Self::Man(args) => shell::man(session, &args, Cli::command()),
         }

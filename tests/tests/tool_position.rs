@@ -136,7 +136,7 @@ fn a_line_that_breaks_moves_nothing() {
         let text = failed(&arm.sevenbot(&["move-to", "-50", "480", "50", "--straight"]), 1);
         assert!(text.contains("nearest point within reach"), "{text}");
         // Both ends are within reach, and the base is between them.
-        let text = failed(&arm.sevenbot(&["move-to", "-120", "-0", "50", "--straight", "--dry-run"]), 1);
+        let text = failed(&arm.sevenbot(&["move-to", "200", "10", "50", "--straight", "--dry-run"]), 1);
         assert!(text.contains("the straight line breaks"), "{text}");
         let text = failed(&arm.sevenbot(&["move-to", "60", "130", "60", "--straight", "--speed", "500"]), 1);
         assert!(text.contains("it could follow at"), "{text}");
@@ -159,4 +159,21 @@ fn ctrl_c_holds_an_arm_on_a_straight_line() {
         assert!(arm.read(TARGET_POSITION, 1)[0] > 70, "not at the end of the line");
         arm.drive_to(&STANDARD_POSE);
     });
+}
+
+#[test]
+fn models_are_written_without_an_arm() {
+    let model = |format: &str| run_without_arm(&["model", "--format", format]);
+    let urdf = succeeded(model("urdf"));
+    assert!(urdf.starts_with("<robot name=\"7bot_v2\">") && urdf.ends_with("</robot>\n"), "{urdf}");
+    let mjcf = succeeded(model("mjcf"));
+    assert!(mjcf.starts_with("<mujoco") && mjcf.ends_with("</mujoco>\n"), "{mjcf}");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("7bot.glb");
+    let out = ["model", "--format", "glb", "--out", file.to_str().expect("UTF-8")];
+    succeeded(run_without_arm(&out));
+    let written = std::fs::read(file).expect("a file");
+    assert_eq!(written, model("glb").stdout, "binary as it is, also through a pipe");
+    assert_eq!(written.get(8..12), Some(&u32::try_from(written.len()).expect("a length").to_le_bytes()[..]));
+    failed(&model("stl"), 2);
 }

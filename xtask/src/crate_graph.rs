@@ -22,6 +22,7 @@ const GROUPS: [Group; 3] = [
             "protocol-core",
             "motion-core",
             "kinematics",
+            "arm-model",
             "arm-sim",
             "firmware-stm32",
             "host-sim",

@@ -20,6 +20,7 @@ mod generated;
 mod install;
 mod jump_table;
 mod modules;
+mod mujoco;
 mod no_panic;
 mod registers_md;
 mod run;
@@ -68,6 +69,8 @@ enum Task {
     Deny,
     /// Fail if files of a crate depend on each other in a cycle
     Modules,
+    /// Install MuJoCo from PyPI, and compare its forward kinematics of the arm's model with ours (needs Python)
+    Mujoco,
     /// Link the cores for the chip and fail if a panic is reachable
     NoPanic,
     /// Print the size of the cores and the image on the chip, and compare it with the budgets
@@ -135,6 +138,7 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Torture(options) => torture::run(options),
         Task::Fuzz(options) => fuzz::check(options),
         Task::Deny => deny::check(),
+        Task::Mujoco => mujoco::check(),
         Task::NoPanic => no_panic::check(),
         Task::Size { by_file: true, .. } => size::print(),
         Task::Size { accept, .. } => footprint::check(accept.accept),

@@ -7,8 +7,8 @@ use clap::Args;
 use crate::run::{CHIP, HOST, TaskResult, build_for_browser, cargo, run};
 use crate::steps::{TestScope, TestStep, long, quick, whole};
 use crate::{
-    count, crate_graph, decisions, deny, drawings, footprint, fuzz, install, modules, no_panic, registers_md,
-    start_up, steps, system_tests, torture, trials,
+    count, crate_graph, decisions, deny, drawings, footprint, fuzz, install, modules, mujoco, no_panic,
+    registers_md, start_up, steps, system_tests, torture, trials,
 };
 
 /// The scope of the run.
@@ -17,7 +17,7 @@ pub(crate) struct TestArgs {
     /// Run the quick steps only: format, lints, unit and property tests, and the system tests on the simulator
     #[arg(long)]
     quick: bool,
-    /// Run the long steps too: more torture and fuzzing, and the long form of the settings' tests
+    /// Run the long steps too: more torture and fuzzing, the long form of the settings' tests, and the model in MuJoCo
     #[arg(long, conflicts_with = "quick")]
     long: bool,
 }
@@ -75,6 +75,7 @@ const STEPS: &[TestStep] = &[
         torture::journal(1, &mut trials)?;
         trials.finish(1)
     }),
+    long("the arm's model in MuJoCo", mujoco::check),
     long("more fuzzing", || {
         fuzz::check(&fuzz::FuzzArgs { seconds: LONG_FUZZ_SECONDS, seed: None, fixed: false })
     }),

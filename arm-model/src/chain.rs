@@ -1,0 +1,167 @@
+//! The links and joints of the arm as a tree, for formats that know no closed loop.
+//!
+//! ```text
+//!   base_link ─joint_1─▶ turret ─joint_2─▶ rear_arm ─elbow─▶ elbow_link ─joint_3─▶ forearm
+//!     ─joint_4─▶ wrist ─joint_5─▶ hand ─joint_6─▶ disc ─▶ tip, disc_edge
+//! ```
+//!
+//! The parallelogram makes joint 3 turn the forearm from the horizontal, whatever joint 2 does. In the tree, the joint
+//! `elbow` turns back what joint 2 turned, so the angle of joint 3 is that of the arm.
+
+use std::f64::consts::FRAC_PI_2;
+
+use kinematics::geometry::{
+    DISC_RADIUS, ELBOW_OFFSET, FOREARM, JOINT_MAX, LEVEL_FOREARM, REAR_ARM, SHOULDER_FORWARD,
+    SHOULDER_HEIGHT, TOOL,
+};
+
+use crate::TIP;
+
+/// A point or a direction: x forward, y to the left, z up.
+pub(crate) type Axes = [f64; 3];
+
+/// From millimetres to metres.
+pub(crate) const fn m(millimetres: f64) -> f64 {
+    millimetres / 1000.0
+}
+
+/// The speed of a joint without load, in rad/s: 62 rpm.
+pub(crate) const MAX_SPEED: f64 = 6.49;
+
+/// A cylinder that shows a part.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Solid {
+    pub(crate) from: Axes,
+    pub(crate) to: Axes,
+    pub(crate) radius: f64,
+}
+
+const fn solid(from: Axes, to: Axes, radius: f64) -> Solid {
+    let [x, y, z] = from;
+    let [u, v, w] = to;
+    Solid { from: [m(x), m(y), m(z)], to: [m(u), m(v), m(w)], radius: m(radius) }
+}
+
+/// A link, its shape, and the joint that carries it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Link {
+    pub(crate) name: &'static str,
+    pub(crate) solids: &'static [Solid],
+    /// `None` for the base.
+    pub(crate) joint: Option<Joint>,
+}
+
+/// A joint between a link and the one before it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Joint {
+    pub(crate) name: &'static str,
+    /// The link that carries it.
+    pub(crate) parent: &'static str,
+    /// Where it is, in that link.
+    pub(crate) origin: Axes,
+    pub(crate) motion: Motion,
+}
+
+/// How a joint moves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Motion {
+    Fixed,
+    /// Turns about an axis, between two angles in radians.
+    Turn {
+        axis: Axes,
+        low: f64,
+        high: f64,
+    },
+    /// Turns about an axis by the negative angle of another joint, which has the same range.
+    TurnBack {
+        axis: Axes,
+        of: &'static str,
+    },
+}
+
+pub(crate) const UP: Axes = [0.0, 0.0, 1.0];
+pub(crate) const LEFT: Axes = [0.0, 1.0, 0.0];
+pub(crate) const RIGHT: Axes = [0.0, -1.0, 0.0];
+pub(crate) const BACK: Axes = [-1.0, 0.0, 0.0];
+
+const fn joint(name: &'static str, parent: &'static str, origin: Axes, motion: Motion) -> Option<Joint> {
+    let [x, y, z] = origin;
+    Some(Joint { name, parent, origin: [m(x), m(y), m(z)], motion })
+}
+
+const fn quarter_turns(axis: Axes) -> Motion {
+    Motion::Turn { axis, low: -FRAC_PI_2, high: FRAC_PI_2 }
+}
+
+/// The range of joint 3 in radians.
+pub(crate) const JOINT_3_LOW: f64 = -LEVEL_FOREARM.to_radians();
+pub(crate) const JOINT_3_HIGH: f64 = (JOINT_MAX - LEVEL_FOREARM).to_radians();
+
+const ORIGIN: Axes = [0.0; 3];
+const SHOULDER: Axes = [SHOULDER_FORWARD, 0.0, SHOULDER_HEIGHT];
+const ELBOW: Axes = [0.0, 0.0, REAR_ARM];
+const WRIST: Axes = [FOREARM, 0.0, ELBOW_OFFSET];
+const DISC: Axes = [TOOL, 0.0, 0.0];
+
+// Radii and what has no dimension in the kinematics are guesses for the eye.
+pub(crate) const BASE_SOLIDS: &[Solid] = &[solid([0.0, 0.0, -60.0], [0.0, 0.0, 0.0], 65.0)];
+pub(crate) const TURRET_SOLIDS: &[Solid] = &[
+    solid(ORIGIN, [0.0, 0.0, SHOULDER_HEIGHT - 15.0], 45.0),
+    solid([SHOULDER_FORWARD, -35.0, SHOULDER_HEIGHT], [SHOULDER_FORWARD, 35.0, SHOULDER_HEIGHT], 20.0),
+];
+pub(crate) const REAR_ARM_SOLIDS: &[Solid] = &[solid(ORIGIN, ELBOW, 14.0)];
+pub(crate) const FOREARM_SOLIDS: &[Solid] = &[
+    solid([0.0, -20.0, 0.0], [0.0, 20.0, 0.0], 16.0),
+    solid(ORIGIN, [0.0, 0.0, ELBOW_OFFSET], 14.0),
+    solid([0.0, 0.0, ELBOW_OFFSET], WRIST, 14.0),
+];
+pub(crate) const WRIST_SOLIDS: &[Solid] = &[solid([0.0, -16.0, 0.0], [0.0, 16.0, 0.0], 12.0)];
+pub(crate) const HAND_SOLIDS: &[Solid] = &[solid(ORIGIN, [TOOL - 5.0, 0.0, 0.0], 10.0)];
+/// The disc, and a pin at its edge that shows its direction at 90 degrees of joint 6.
+pub(crate) const DISC_SOLIDS: &[Solid] = &[
+    solid([-5.0, 0.0, 0.0], ORIGIN, DISC_RADIUS),
+    solid([-5.0, DISC_RADIUS - 2.0, 0.0], [2.0, DISC_RADIUS - 2.0, 0.0], 2.0),
+];
+
+/// All links, each after the one that carries it.
+pub(crate) const LINKS: [Link; 10] = [
+    Link { name: "base_link", solids: BASE_SOLIDS, joint: None },
+    Link {
+        name: "turret",
+        solids: TURRET_SOLIDS,
+        joint: joint("joint_1", "base_link", ORIGIN, quarter_turns(UP)),
+    },
+    Link {
+        name: "rear_arm",
+        solids: REAR_ARM_SOLIDS,
+        joint: joint("joint_2", "turret", SHOULDER, quarter_turns(RIGHT)),
+    },
+    Link {
+        name: "elbow_link",
+        solids: &[],
+        joint: joint("elbow", "rear_arm", ELBOW, Motion::TurnBack { axis: RIGHT, of: "joint_2" }),
+    },
+    Link {
+        name: "forearm",
+        solids: FOREARM_SOLIDS,
+        joint: joint(
+            "joint_3",
+            "elbow_link",
+            ORIGIN,
+            Motion::Turn { axis: LEFT, low: JOINT_3_LOW, high: JOINT_3_HIGH },
+        ),
+    },
+    Link {
+        name: "wrist",
+        solids: WRIST_SOLIDS,
+        joint: joint("joint_4", "forearm", WRIST, quarter_turns(BACK)),
+    },
+    Link { name: "hand", solids: HAND_SOLIDS, joint: joint("joint_5", "wrist", ORIGIN, quarter_turns(LEFT)) },
+    Link { name: "disc", solids: DISC_SOLIDS, joint: joint("joint_6", "hand", DISC, quarter_turns(BACK)) },
+    Link { name: TIP, solids: &[], joint: joint("tip_joint", "disc", ORIGIN, Motion::Fixed) },
+    Link {
+        name: "disc_edge",
+        solids: &[],
+        joint: joint("disc_edge_joint", "disc", [0.0, DISC_RADIUS, 0.0], Motion::Fixed),
+    },
+];

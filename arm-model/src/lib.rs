@@ -1,0 +1,59 @@
+//! The model of a 7Bot V2 arm for robotics programs, from the geometry of [`kinematics`].
+//!
+//! ```text
+//!   kinematics::geometry ──▶ chain: links and joints ──▶ urdf: a tree, the elbow by a mimic joint
+//!                                   │                └──▶ glb: nodes with meshes, in the standard pose
+//!                                   └── the same ────▶ mjcf: the parallelogram closed by an equality constraint
+//! ```
+//!
+//! Lengths are metres and angles radians, axes as in REP-103: x forward, y to the left, z up. All angles of the joints
+//! are 0 in the straight pose: the arm forward, the rear arm upright, forearm and hand level. There all links have the
+//! axes of the base. [`joint_angles`] converts the degrees of the registers.
+//!
+//! Shapes are cylinders along the axes of the parts. They show the arm; their radii are not measured. Joint 7, the claw,
+//! moves no point, and the model has none.
+
+#![forbid(unsafe_code)]
+
+mod chain;
+mod glb;
+mod mesh;
+mod mjcf;
+mod urdf;
+mod xml;
+
+pub use glb::glb;
+pub use mjcf::mjcf;
+pub use urdf::urdf;
+
+/// The angles of joints 1 to 6 in degrees, as the registers have them, at which all joints of the model are 0.
+pub const ZERO_DEGREES: [f64; 6] = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0];
+
+/// The names of joints 1 to 6 in all formats.
+pub const JOINT_NAMES: [&str; 6] = ["joint_1", "joint_2", "joint_3", "joint_4", "joint_5", "joint_6"];
+
+/// The name of the link at the tip: x points along the tool.
+pub const TIP: &str = "tip";
+
+/// The angles of the model's joints 1 to 6 in radians, from those of the registers in degrees.
+///
+/// ```
+/// let angles = arm_model::joint_angles([180.0, 90.0, 65.0, 90.0, 90.0, 90.0]);
+/// assert_eq!(angles, [std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// ```
+#[must_use]
+pub fn joint_angles(degrees: [f64; 6]) -> [f64; 6] {
+    let mut angles = degrees;
+    for (angle, zero) in angles.iter_mut().zip(ZERO_DEGREES) {
+        *angle = (*angle - zero).to_radians();
+    }
+    angles
+}
+
+/// What every format says of itself.
+const ABOUT: [&str; 4] = [
+    "7Bot V2 arm, written by `sevenbot model`. Metres and radians; x forward, y to the left, z up (REP-103).",
+    "A joint's angle is (register - zero) degrees in radians. Zeros of joints 1 to 6: 90 90 65 90 90 90.",
+    "Dimensions are those of the maker's kinematics. Shapes are symbolic, and masses are not measured.",
+    "Joint 7, the claw, moves no point and is left out.",
+];
