@@ -26,10 +26,10 @@ use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::FrameBuffer;
 use tempfile::TempDir;
-use torture::dice::Dice;
 use torture::sag::{
     DISTURBANCE_TIME, FOREARM, NOISE_BYTES, POSE, SETTLE_TIME, Sag, SagCause, SagTable, WATCHDOG_TIME,
 };
+use torture::seeded_rng::SeededRng;
 
 use crate::emulate::monitor::{self, Monitor};
 use crate::emulate::{HOST_LINK_CONTROL, RECEIVER_ON, need_qemu, servo_socket, start_machine};
@@ -148,12 +148,12 @@ impl EmulatedArm {
     }
 
     fn noise(&mut self) -> TaskResult {
-        let mut dice = Dice::new(1);
+        let mut rng = SeededRng::new(1);
         self.set_all_faults(Some(ServoFault::Garbled(1)));
         let mut now = self.clock.now();
         let until = now + DISTURBANCE_TIME;
         while now < until {
-            self.plant.bytes(now, &[(); NOISE_BYTES].map(|()| dice.byte()));
+            self.plant.bytes(now, &[(); NOISE_BYTES].map(|()| rng.byte()));
             now = self.run(NOISE_PERIOD)?;
         }
         self.set_all_faults(None);

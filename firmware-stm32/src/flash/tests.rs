@@ -1,9 +1,9 @@
-//! Tests of the flash driver against the rules of the chip (RM0090, section 3). The model panics where the manual leaves
-//! the result undefined.
+//! Tests of the flash driver against the rules of the chip (RM0090, section 3).
 
-use std::cell::{Cell, RefCell};
+mod chip_model;
 
-use flash_model::{Cache, Comparator, Supply};
+use chip_model::*;
+use flash_model::Supply;
 use protocol_core::journal::{Journal, Opened};
 use protocol_core::registers::Image;
 
@@ -17,209 +17,8 @@ const SECOND: u32 = 16 * 1024;
 const END: u32 = 2 * SECOND;
 const WRITE_PROTECTED: u32 = 1 << 4;
 
-/// The data cache of the chip: 8 lines of 128 bits (RM0090, section 3.5.2).
-type DataCache = Cache<16, 8>;
-/// The lowest supply at which a word can be programmed (RM0090, table 13).
-const LEAST_MILLIVOLTS: u32 = 2_700;
-
-/// A model of the chip as the driver sees it.
-struct Model {
-    cells: RefCell<flash_model::Flash<SECTOR, WORD>>,
-    cache: RefCell<DataCache>,
-    control: u32,
-    errors: u32,
-    keys: Vec<u32>,
-    micros: Cell<u32>,
-    busy_until: u32,
-    /// Time to program a word.
-    word_micros: u32,
-    /// Time to erase a sector.
-    sector_micros: u32,
-    brown_out_level_3: bool,
-    supply: Supply,
-    monitor: RefCell<Option<Comparator>>,
-    /// The time from which the monitor is valid.
-    monitor_settled: u32,
-    /// The model refuses writes.
-    protected: bool,
-    erased: Vec<usize>,
-    fed_at: Vec<u32>,
-}
-
-/// Start value of the microsecond counter, close to its wrap.
-const START: u32 = u32::MAX - 1_000;
-
-impl Model {
-    fn new() -> Self {
-        Self::with(flash_model::Flash::holding(&[0; JOURNAL]))
-    }
-
-    /// A flash that accepts writes and erases and changes nothing, as in the emulator.
-    fn inert() -> Self {
-        Self::with(flash_model::Flash::inert(&[0; JOURNAL]))
-    }
-
-    fn with(cells: flash_model::Flash<SECTOR, WORD>) -> Self {
-        Self {
-            cells: RefCell::new(cells),
-            cache: RefCell::new(DataCache::new()),
-            control: control::LOCK,
-            errors: 0,
-            keys: Vec::new(),
-            micros: Cell::new(START),
-            busy_until: START,
-            word_micros: 16,
-            sector_micros: 250_000,
-            brown_out_level_3: true,
-            supply: Supply::steady(3_300),
-            monitor: RefCell::new(None),
-            monitor_settled: 0,
-            protected: false,
-            erased: Vec::new(),
-            fed_at: Vec::new(),
-        }
-    }
-
-    fn supplied(supply: Supply) -> Self {
-        Self { supply, ..Self::new() }
-    }
-
-    /// The contents of a cell, past the cache.
-    fn cell(&self, offset: usize) -> [u8; WORD] {
-        *self.cells.borrow().bytes()[offset..].first_chunk().unwrap()
-    }
-
-    fn is_busy(&self) -> bool {
-        self.micros.get().wrapping_sub(self.busy_until) > u32::MAX / 2
-    }
-
-    fn is_locked(&self) -> bool {
-        self.control & control::LOCK != 0
-    }
-
-    /// The present supply, in millivolts. Its time starts with the model.
-    fn millivolts(&self) -> u32 {
-        self.supply.at(self.micros.get().wrapping_sub(START))
-    }
-
-    fn start(&mut self, micros: u32) {
-        assert!(!self.is_busy(), "an operation while another runs");
-        assert!(self.millivolts() >= LEAST_MILLIVOLTS, "an operation at {} mV", self.millivolts());
-        self.busy_until = self.micros.get().wrapping_add(micros);
-    }
-
-    fn erase(&mut self) {
-        let sector = (self.control >> control::SECTOR_NUMBER & 0xF) as usize;
-        assert!((FIRST_SECTOR..FIRST_SECTOR + 2).contains(&sector), "sector {sector} is not in the journal");
-        assert_ne!(self.control & control::BY_WORDS, 0, "an erase needs PSIZE too");
-        assert_eq!(self.control & control::PROGRAM, 0, "erase and program bits both set");
-        self.erased.push(sector);
-        self.start(self.sector_micros);
-        let start = u32::try_from((sector - FIRST_SECTOR) * SECTOR).unwrap();
-        self.cells.get_mut().erase(start, start + SECOND).unwrap();
-    }
-}
-
-impl FlashRegisters for Model {
-    fn status(&self) -> u32 {
-        self.micros.set(self.micros.get().wrapping_add(1));
-        if self.is_busy() { status::BUSY } else { self.errors }
-    }
-
-    fn clear_status(&mut self, bits: u32) {
-        self.errors &= !bits;
-    }
-
-    fn control(&self) -> u32 {
-        self.control
-    }
-
-    fn set_control(&mut self, bits: u32) {
-        assert!(!self.is_locked(), "wrote {bits:#x} to the locked register");
-        assert!(!self.is_busy(), "wrote {bits:#x} during an operation, which stops the core");
-        self.control = bits;
-        self.keys.clear();
-        if bits & control::START != 0 {
-            assert_ne!(bits & control::SECTOR_ERASE, 0);
-            assert!(!self.is_locked(), "LOCK and STRT both set");
-            self.erase();
-            self.control &= !control::START;
-        }
-    }
-
-    fn enter_key(&mut self, key: u32) {
-        assert!(self.is_locked(), "a key to an open register locks it until the next reset");
-        self.keys.push(key);
-        assert!(KEYS.starts_with(&self.keys), "a wrong key locks the register until the next reset");
-        if self.keys == KEYS {
-            self.control = 0;
-        }
-    }
-
-    fn load(&self, offset: usize) -> u32 {
-        let cells = self.cells.borrow();
-        u32::from_le_bytes(self.cache.borrow_mut().read(offset, cells.bytes()))
-    }
-
-    fn store(&mut self, offset: usize, word: u32) {
-        assert!(!self.is_locked());
-        assert_eq!(self.control, control::PROGRAM | control::BY_WORDS, "wrote to a cell");
-        self.start(self.word_micros);
-        self.cache.get_mut().write(offset, &word.to_le_bytes());
-        if self.protected {
-            self.errors |= WRITE_PROTECTED;
-        } else {
-            let at = u32::try_from(offset).unwrap();
-            self.cells.get_mut().write(at, &word.to_le_bytes()).unwrap();
-        }
-    }
-
-    fn sector_number(&self, offset: usize) -> u8 {
-        u8::try_from(FIRST_SECTOR + offset / SECTOR).unwrap()
-    }
-
-    fn flush_data_cache(&mut self) {
-        self.cache.get_mut().flush();
-    }
-
-    fn resets_when_supply_sags(&self) -> bool {
-        self.brown_out_level_3
-    }
-
-    /// Worst case of each level: the lowest falling and the highest rising threshold (DS8626, embedded reset and power
-    /// control block).
-    fn watch_supply(&mut self, level: u8) {
-        let comparator = match level {
-            6 => Comparator::new(2_850, 3_100),
-            7 => Comparator::new(2_950, 3_210),
-            _ => panic!("level {level} may be below what a word needs"),
-        };
-        *self.monitor.get_mut() = Some(comparator);
-        self.monitor_settled = self.micros.get().wrapping_add(MONITOR_SETTLES_MICROS);
-    }
-
-    fn supply_is_low(&self) -> bool {
-        let settled = self.micros.get().wrapping_sub(self.monitor_settled) <= u32::MAX / 2;
-        let millivolts = self.millivolts();
-        // Until then it reports a good supply.
-        settled && self.monitor.borrow_mut().as_mut().is_some_and(|monitor| monitor.is_low(millivolts))
-    }
-
-    fn feed_watchdog(&mut self) {
-        self.fed_at.push(self.micros.get());
-    }
-
-    fn micros(&self) -> u32 {
-        self.micros.set(self.micros.get().wrapping_add(1));
-        self.micros.get()
-    }
-}
-
-/// Start-up time of the model's supply monitor.
-const MONITOR_SETTLES_MICROS: u32 = 20;
-
-fn blank() -> Flash<Model> {
-    let mut flash = Flash::new(Model::new());
+fn blank() -> Flash<ChipModel> {
+    let mut flash = Flash::new(ChipModel::new());
     flash.erase(0, END).unwrap();
     flash
 }
@@ -254,7 +53,7 @@ fn an_erase_changes_only_its_sector() {
 
 #[test]
 fn the_watchdog_is_fed_between_sectors() {
-    let mut flash = Flash::new(Model::new());
+    let mut flash = Flash::new(ChipModel::new());
     flash.0.sector_micros = 800_000;
     let start = flash.0.micros();
     flash.erase(0, END).unwrap();
@@ -279,7 +78,7 @@ fn nothing_is_changed_without_brown_out_level_3() {
 
 #[test]
 fn the_first_operation_already_refuses_a_low_supply() {
-    let mut flash = Flash::new(Model::supplied(Supply::steady(2_750)));
+    let mut flash = Flash::new(ChipModel::supplied(Supply::steady(2_750)));
     assert_eq!(flash.erase(0, END), Err(Error::Supply));
     assert_eq!(flash.write(0, b"word"), Err(Error::Supply));
     assert!(flash.0.erased.is_empty() && flash.0.is_locked());
@@ -288,7 +87,7 @@ fn the_first_operation_already_refuses_a_low_supply() {
 #[test]
 fn a_supply_of_3v3_less_5_percent_is_good() {
     let lowest = 3_300 - 3_300 * 5 / 100;
-    let mut flash = Flash::new(Model::supplied(Supply::steady(lowest)));
+    let mut flash = Flash::new(ChipModel::supplied(Supply::steady(lowest)));
     assert_eq!(flash.erase(0, END), Ok(()));
 }
 
@@ -297,7 +96,7 @@ fn a_sag_stops_a_write_before_the_supply_is_too_low_for_a_word() {
     // The erase of both sectors takes 0.5 s. Then the supply falls by 1 mV per 10 us, stays at 2.5 V for 1 ms, and rises.
     let sag = Supply::steady(3_300).then(600_000, 3_300).then(608_000, 2_500);
     let sag = sag.then(609_000, 2_500).then(617_000, 3_300);
-    let mut flash = Flash::new(Model::supplied(sag));
+    let mut flash = Flash::new(ChipModel::supplied(sag));
     flash.erase(0, END).unwrap();
     while flash.0.millivolts() == 3_300 {
         flash.0.micros();
@@ -325,7 +124,7 @@ fn a_cell_that_does_not_take_its_bit_is_found_despite_the_cache() {
 
 #[test]
 fn a_flash_that_changes_nothing_is_an_error() {
-    let mut flash = Flash::new(Model::inert());
+    let mut flash = Flash::new(ChipModel::inert());
     assert_eq!(flash.erase(0, END), Ok(()), "the driver does not check that a sector is blank");
     assert_eq!(flash.write(0, b"word"), Err(Error::Unchanged));
 }
@@ -365,7 +164,7 @@ fn a_range_outside_the_journal_or_unaligned_is_refused() {
 
 #[test]
 fn the_journal_finds_its_settings_again() {
-    let (mut journal, opened) = Journal::open(Flash::new(Model::new()));
+    let (mut journal, opened) = Journal::open(Flash::new(ChipModel::new()));
     assert_eq!(opened, Opened::Damaged, "all zeros are neither blank nor a journal");
     journal.save(&Image([7; Image::LENGTH])).unwrap();
     let (_, opened) = Journal::open(journal.release());
@@ -374,7 +173,7 @@ fn the_journal_finds_its_settings_again() {
 
 #[test]
 fn the_journal_reports_a_flash_that_changes_nothing() {
-    let (journal, opened) = Journal::open(Flash::new(Model::inert()));
+    let (journal, opened) = Journal::open(Flash::new(ChipModel::inert()));
     assert_eq!(opened, Opened::Broken(None));
     assert_eq!(journal.room(), 0);
 }

@@ -19,7 +19,7 @@ use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::FrameBuffer;
 
-use crate::dice::Dice;
+use crate::seeded_rng::SeededRng;
 
 /// Targets in degrees: the rear arm leans to the front, the forearm points down by 35 degrees.
 pub const POSE: [u8; JOINTS] = [90, 60, 100, 90, 90, 90, 80];
@@ -183,7 +183,7 @@ impl PosedArm {
     }
 
     fn noise(&mut self) {
-        let mut rng = Dice::new(1);
+        let mut rng = SeededRng::new(1);
         self.set_all_faults(Some(ServoFault::Garbled(1)));
         let until = self.now + DISTURBANCE_TIME;
         while self.now < until {

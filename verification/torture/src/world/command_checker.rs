@@ -15,33 +15,17 @@ use protocol_core::registers::{Joint, RegisterFile};
 use protocol_core::time::{Duration, Instant};
 
 use super::disturbed_bus::DisturbedBus;
+use super::reachable_range::ReachableRange;
 use super::register_model::RegisterModel;
 use crate::per_joint::PerJoint;
 use crate::violation::{Check, Violation, ensure};
 
-/// One count in the unit of the arithmetic here, 1e-9 counts.
-const NANOCOUNTS: i64 = 1_000_000_000;
-/// A late shell catches up one control cycle, and the present cycle may be incomplete.
-const SLACK: Duration = Duration::from_millis(20);
-/// Rounding to whole counts at both ends of a move.
-const ROUNDING: i64 = NANOCOUNTS + NANOCOUNTS / 100;
 /// Start-up ends after this time at the latest (D12).
 const MAX_START_UP: Duration = Duration::from_millis(500);
 /// Start-up ends earlier if each servo has sent this many replies.
 const START_UP_REPLIES: u8 = 2;
 /// The number of reads without a reply after which a servo is silent: three have failed (D12), one may be in progress.
 const MAX_UNANSWERED: u8 = 4;
-
-/// The range of goals that a joint can reach.
-#[derive(Clone, Copy, Debug)]
-struct ReachableRange {
-    /// Bounds in 1e-9 counts. They move outwards at the allowed speed, and each goal limits them again.
-    upper: i64,
-    lower: i64,
-    last_goal: u16,
-    speed: i64,
-    at: Instant,
-}
 
 /// Counts of one control cycle at 372 degrees/s. A set-point may be ahead of the last goal by one cycle, and by one more
 /// for each cycle in which a read delays the goals.
@@ -136,17 +120,14 @@ impl CommandChecker {
     pub(super) fn speed_written(&mut self, model: &RegisterModel) {
         for (joint, range) in Joint::ALL.into_iter().zip(&mut self.ranges.0) {
             if let Some(range) = range {
-                range.speed = range.speed.max(limit(joint, model.get(SPEED.of(joint))));
+                range.allow_speed(joint, model.get(SPEED.of(joint)));
             }
         }
     }
 
     /// Offsets changed: the controller computes its set-points again, from whole counts.
     pub(super) fn offsets_changed(&mut self) {
-        for range in self.ranges.0.iter_mut().flatten() {
-            range.upper += NANOCOUNTS;
-            range.lower -= NANOCOUNTS;
-        }
+        self.ranges.0.iter_mut().flatten().for_each(ReachableRange::widen);
         self.kept_goals.0.iter_mut().flatten().for_each(|(_, tolerance)| *tolerance += 1);
     }
 
@@ -264,52 +245,25 @@ impl CommandChecker {
     }
 
     fn check_goal(&mut self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
-        let speed = limit(joint, context.registers.get(SPEED.of(joint)));
-        let position = i64::from(goal) * NANOCOUNTS;
+        let speed = context.registers.get(SPEED.of(joint));
         let Some(before) = self.ranges[joint] else {
             self.check_position(joint, goal, "is driven", context)?;
-            let range =
-                ReachableRange { upper: position, lower: position, last_goal: goal, speed, at: context.now };
-            self.ranges[joint] = Some(range);
+            self.ranges[joint] = Some(ReachableRange::at(joint, goal, speed, context.now));
             return Ok(());
         };
-        let fastest = speed.max(before.speed);
-        let moved = fastest * micros(context.now - before.at);
-        let tolerance = fastest * micros(SLACK) + ROUNDING;
-        let (upper, lower) = (before.upper + moved, before.lower - moved);
-        ensure(position <= upper + tolerance && position >= lower - tolerance, || {
-            let (number, register) = (joint.number(), context.registers.get(SPEED.of(joint)));
-            format!(
-                "joint {number} gets the goal {goal} after {}, out of reach with speed {register}",
-                before.last_goal
-            )
+        let range = before.after(joint, goal, speed, context.now).ok_or_else(|| {
+            let (number, last) = (joint.number(), before.last_goal);
+            Violation(format!(
+                "joint {number} gets the goal {goal} after {last}, out of reach with speed {speed}"
+            ))
         })?;
-        // The range of a higher speed does not apply to a lower one.
-        let is_slower = speed < before.speed;
-        let (upper, lower) =
-            if is_slower { (position, position) } else { (upper.min(position), lower.max(position)) };
-        self.ranges[joint] = Some(ReachableRange { upper, lower, last_goal: goal, speed, at: context.now });
+        self.ranges[joint] = Some(range);
         check_arrival(joint, goal, context)
     }
 }
 
 fn invalid_frame(bytes: &[u8]) -> Violation {
     Violation(format!("not a command to servos: {bytes:02x?}"))
-}
-
-fn micros(time: Duration) -> i64 {
-    i64::try_from(time.as_micros()).unwrap_or(i64::MAX).min(10_000_000)
-}
-
-/// The speed limit in 1e-9 counts per microsecond, rounded up. A unit of the speed register is 1.9 degrees/s. The value
-/// 0 means 372 degrees/s.
-fn limit(joint: Joint, speed: u8) -> i64 {
-    let tenths = if speed == 0 { 3_720 } else { i64::from(speed) * 19 };
-    tenths * counts_per_half_turn(joint) * 100 / 180 + 1
-}
-
-fn counts_per_half_turn(joint: Joint) -> i64 {
-    if joint.number() < 5 { 850 } else { 625 }
 }
 
 /// Counts of a degree, with the rounding of a reading.

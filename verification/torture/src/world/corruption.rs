@@ -1,12 +1,12 @@
 //! Corruption of bytes on a line.
 
-use crate::dice::Dice;
+use crate::seeded_rng::SeededRng;
 
 /// Bytes of headers on either line.
 const LIKELY: [u8; 8] = [0xAA, 0x77, 0xAA, 0x77, 0x06, 0x03, 0xFF, 0xFF];
 
 /// The bytes after one random kind of corruption, and sometimes a second.
-pub(super) fn corrupt(bytes: &[u8], rng: &mut Dice) -> Vec<u8> {
+pub(super) fn corrupt(bytes: &[u8], rng: &mut SeededRng) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     corrupt_once(&mut bytes, rng);
     if rng.one_in(4) {
@@ -15,7 +15,7 @@ pub(super) fn corrupt(bytes: &[u8], rng: &mut Dice) -> Vec<u8> {
     bytes
 }
 
-fn corrupt_once(bytes: &mut Vec<u8>, rng: &mut Dice) {
+fn corrupt_once(bytes: &mut Vec<u8>, rng: &mut SeededRng) {
     let index = rng.below(bytes.len());
     match rng.below(7) {
         0 => bytes.get_mut(index).into_iter().for_each(|byte| *byte ^= 1 << rng.below(8)),
@@ -33,7 +33,7 @@ fn corrupt_once(bytes: &mut Vec<u8>, rng: &mut Dice) {
 }
 
 /// 1 to `most` random bytes, half of them from headers.
-pub(super) fn noise(most: usize, rng: &mut Dice) -> Vec<u8> {
+pub(super) fn noise(most: usize, rng: &mut SeededRng) -> Vec<u8> {
     let count = 1 + rng.below(most);
     (0..count).map(|_| if rng.one_in(2) { rng.one_of(&LIKELY, 0) } else { rng.byte() }).collect()
 }

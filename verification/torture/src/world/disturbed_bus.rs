@@ -16,8 +16,8 @@ use protocol_core::time::{Duration, Instant};
 use super::corruption::corrupt;
 use super::motion_checker::{Exemption, MotionChecker};
 use super::status_reply::{StatusFields, status_replies, whole_status};
-use crate::dice::Dice;
 use crate::per_joint::PerJoint;
+use crate::seeded_rng::SeededRng;
 use crate::violation::Check;
 
 /// A servo does not respond for this long after it is switched on.
@@ -118,7 +118,7 @@ impl DisturbedBus {
     }
 
     /// Transmits a frame of the controller.
-    pub(super) fn send(&mut self, now: Instant, bytes: &[u8], rng: &mut Dice) {
+    pub(super) fn send(&mut self, now: Instant, bytes: &[u8], rng: &mut SeededRng) {
         if self.disturbance.corrupted > 0 && rng.in_a_million(self.disturbance.corrupted) {
             self.disturb(now);
             self.deliver(now, bytes, &corrupt(bytes, rng));
@@ -166,7 +166,7 @@ impl DisturbedBus {
     }
 
     /// Returns the bytes that reach the controller now.
-    pub(super) fn receive(&mut self, now: Instant, rng: &mut Dice) -> Vec<u8> {
+    pub(super) fn receive(&mut self, now: Instant, rng: &mut SeededRng) -> Vec<u8> {
         let mut bytes = self.plant.poll(now);
         if !bytes.is_empty() {
             self.record_status(&bytes);
@@ -194,7 +194,7 @@ impl DisturbedBus {
     }
 
     /// Delays or corrupts a reply.
-    fn disturb_reply(&mut self, now: Instant, bytes: Vec<u8>, rng: &mut Dice) -> Vec<u8> {
+    fn disturb_reply(&mut self, now: Instant, bytes: Vec<u8>, rng: &mut SeededRng) -> Vec<u8> {
         if rng.in_a_million(self.disturbance.delayed) {
             self.disturb(now);
             let at = now + rng.any_scale(Duration::from_micros(20), MAX_DELAY);

@@ -20,6 +20,7 @@ mod host_request;
 mod motion_checker;
 mod parameters;
 mod power;
+mod reachable_range;
 mod register_model;
 mod request_generator;
 mod settings_storage;
@@ -29,8 +30,8 @@ mod status_reply;
 
 use protocol_core::time::{Duration, Instant};
 
-use crate::dice::Dice;
 use crate::scenario::Scenario;
+use crate::seeded_rng::SeededRng;
 use crate::violation::{Check, Violation};
 use crate::world_counts::WorldCounts;
 use disturbed_bus::DisturbedBus;
@@ -65,7 +66,7 @@ impl TortureWorld {
     /// The world of a seed.
     #[must_use]
     pub fn new(seed: u64, scenario: &'static Scenario) -> Self {
-        let mut rng = Dice::new(seed);
+        let mut rng = SeededRng::new(seed);
         let now = Instant::ZERO;
         let parameters = WorldParameters::draw(&mut rng);
         Self {

@@ -5,7 +5,7 @@ use motion_core::TorqueCodes;
 use protocol_core::time::Duration;
 
 use super::settings_storage::{BOARD_SECTOR, FlashSettings, SettingsStorage};
-use crate::dice::Dice;
+use crate::seeded_rng::SeededRng;
 
 /// The parameters of a world.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +23,7 @@ pub(super) struct WorldParameters {
 }
 
 impl WorldParameters {
-    pub(super) fn draw(rng: &mut Dice) -> Self {
+    pub(super) fn draw(rng: &mut SeededRng) -> Self {
         let jitters_us = [0, 0, 20, 200, 1_000, 5_000];
         Self {
             sector: rng.one_of(&[512, 2_048, BOARD_SECTOR], BOARD_SECTOR),

@@ -13,7 +13,7 @@ use super::register_model::RegisterModel;
 use super::settings_storage::{PowerOutcome, StoredSettings};
 use super::state::{PowerState, PoweredArm, TortureWorld};
 use super::status_checker::StatusChecker;
-use crate::dice::Dice;
+use crate::seeded_rng::SeededRng;
 use crate::violation::{Check, ensure};
 
 /// The chip id of every simulated arm.
@@ -22,7 +22,7 @@ const CHIP_ID: [u8; 6] = [1, 2, 3, 4, 5, 6];
 const GUARD_TIME: Duration = Duration::from_micros(100);
 
 /// A random power cut at one of the next `operations` of the flash.
-pub(super) fn random_cut(operations: usize, rng: &mut Dice) -> Cut {
+pub(super) fn random_cut(operations: usize, rng: &mut SeededRng) -> Cut {
     Cut {
         after: rng.below(operations),
         program: rng.one_of(&ProgramTear::ALL, ProgramTear::All),

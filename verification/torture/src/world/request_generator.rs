@@ -8,7 +8,7 @@ use protocol_core::time::{Duration, Instant};
 
 use super::corruption::{corrupt, noise};
 use super::host_request::{HostRequest, SentStream};
-use crate::dice::Dice;
+use crate::seeded_rng::SeededRng;
 
 /// A pause inside a frame. From 100 ms on the arm drops the frame.
 const MAX_PAUSE: Duration = Duration::from_millis(90);
@@ -58,7 +58,7 @@ impl RequestGenerator {
     }
 
     /// The next transmissions. Sets `next_at` to the time of the next call.
-    pub(super) fn next_transmissions(&mut self, now: Instant, rng: &mut Dice) -> Vec<Transmission> {
+    pub(super) fn next_transmissions(&mut self, now: Instant, rng: &mut SeededRng) -> Vec<Transmission> {
         if now >= self.rate_until {
             self.rate = rng.one_of(
                 &[RequestRate::Idle, RequestRate::Steady, RequestRate::Steady, RequestRate::Bursts],
@@ -86,7 +86,7 @@ impl RequestGenerator {
         }
     }
 
-    fn transmission(&self, rng: &mut Dice) -> Transmission {
+    fn transmission(&self, rng: &mut SeededRng) -> Transmission {
         let request = self.any_request(rng);
         if self.corrupted_per_million > 0 && rng.in_a_million(self.corrupted_per_million) {
             let bytes = if rng.one_in(4) { noise(40, rng) } else { corrupt(&request.bytes(), rng) };
@@ -95,11 +95,11 @@ impl RequestGenerator {
         Transmission { parts: split(request.bytes(), rng), request: Some(request) }
     }
 
-    fn any_request(&self, rng: &mut Dice) -> HostRequest {
+    fn any_request(&self, rng: &mut SeededRng) -> HostRequest {
         if rng.one_in(2) { self.read(rng) } else { self.write(rng) }
     }
 
-    fn read(&self, rng: &mut Dice) -> HostRequest {
+    fn read(&self, rng: &mut SeededRng) -> HostRequest {
         let (address, count) = match rng.below(6) {
             0 => (STATUS_VERSION.address, 16),
             1 => (PRESENT_POSITION.address, 7),
@@ -111,7 +111,7 @@ impl RequestGenerator {
         HostRequest::Read { address, count }
     }
 
-    fn write(&self, rng: &mut Dice) -> HostRequest {
+    fn write(&self, rng: &mut SeededRng) -> HostRequest {
         let (address, values) = if rng.in_a_million(self.settings_per_mille * 1_000) {
             settings(rng)
         } else {
@@ -138,12 +138,12 @@ impl Transmission {
 }
 
 /// Any motor state: servo twice as often as the others.
-fn state(rng: &mut Dice) -> u8 {
+fn state(rng: &mut SeededRng) -> u8 {
     let states = [motor_state::DAMPING, motor_state::SERVO, motor_state::SERVO, motor_state::FORCELESS];
     rng.one_of(&states, motor_state::SERVO)
 }
 
-fn targets(rng: &mut Dice) -> (u8, Vec<u8>) {
+fn targets(rng: &mut SeededRng) -> (u8, Vec<u8>) {
     if rng.one_in(2) {
         return (TARGET_POSITION.of(rng.joint()), vec![rng.up_to(180)]);
     }
@@ -151,13 +151,13 @@ fn targets(rng: &mut Dice) -> (u8, Vec<u8>) {
 }
 
 /// A value for one joint or for all.
-fn per_joint(address: u8, most: u8, rng: &mut Dice) -> (u8, Vec<u8>) {
+fn per_joint(address: u8, most: u8, rng: &mut SeededRng) -> (u8, Vec<u8>) {
     let value = if rng.one_in(4) { 0 } else { rng.up_to(most) };
     if rng.one_in(2) { (address + rng.joint().index(), vec![value]) } else { (address, vec![value; 7]) }
 }
 
 /// All registers from the motor state to the targets in one frame.
-fn pose(rng: &mut Dice) -> (u8, Vec<u8>) {
+fn pose(rng: &mut SeededRng) -> (u8, Vec<u8>) {
     let head = [state(rng), rng.up_to(1), rng.up_to(1)];
     let speeds = [rng.up_to(100); 7];
     let times = [rng.up_to(100); 7];
@@ -167,7 +167,7 @@ fn pose(rng: &mut Dice) -> (u8, Vec<u8>) {
 }
 
 /// Settings or the lock. One write in a few is out of range.
-fn settings(rng: &mut Dice) -> (u8, Vec<u8>) {
+fn settings(rng: &mut SeededRng) -> (u8, Vec<u8>) {
     match rng.below(6) {
         0 | 1 => (EEPROM_LOCK.address, vec![u8::from(rng.one_in(6))]),
         2 => (DEVICE_ID.address, vec![rng.byte()]),
@@ -177,12 +177,12 @@ fn settings(rng: &mut Dice) -> (u8, Vec<u8>) {
     }
 }
 
-fn offset(rng: &mut Dice) -> u8 {
+fn offset(rng: &mut SeededRng) -> u8 {
     let most = if rng.one_in(40) { 127 } else { 16 };
     rng.up_to(most) | rng.one_of(&[0, 0x80], 0)
 }
 
-fn any_pause(rng: &mut Dice) -> Duration {
+fn any_pause(rng: &mut SeededRng) -> Duration {
     if rng.one_in(3) {
         rng.any_scale(Duration::from_micros(10), Duration::from_millis(300))
     } else {
@@ -191,7 +191,7 @@ fn any_pause(rng: &mut Dice) -> Duration {
 }
 
 /// Splits a frame at random, with pauses inside it that the protocol permits.
-fn split(bytes: Vec<u8>, rng: &mut Dice) -> Vec<(Duration, Vec<u8>)> {
+fn split(bytes: Vec<u8>, rng: &mut SeededRng) -> Vec<(Duration, Vec<u8>)> {
     let mut parts = Vec::new();
     let mut rest = bytes;
     let mut pause = any_pause(rng);

@@ -16,8 +16,8 @@ use super::register_model::RegisterModel;
 use super::request_generator::RequestGenerator;
 use super::settings_storage::SettingsStorage;
 use super::status_checker::{StatusChecker, StatusContext};
-use crate::dice::Dice;
 use crate::scenario::Scenario;
+use crate::seeded_rng::SeededRng;
 use crate::world_counts::WorldCounts;
 
 /// One arm with its servos, its flash and its host.
@@ -26,7 +26,7 @@ pub struct TortureWorld {
     pub(super) seed: u64,
     pub(super) scenario: &'static Scenario,
     pub(super) now: Instant,
-    pub(super) rng: Dice,
+    pub(super) rng: SeededRng,
     pub(super) parameters: WorldParameters,
     pub(super) bus: DisturbedBus,
     pub(super) storage: Box<dyn SettingsStorage>,
