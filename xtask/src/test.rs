@@ -50,7 +50,7 @@ const STEPS: &[TestStep] = &[
     quick("every decision of docs/protocol.md has tests", decisions::check),
     quick("the crates in docs/design.md are up to date", crate_graph::check),
     quick("no cycle between files of a crate", modules::check),
-    quick("the drawings in docs/circuits are up to date", drawings::check),
+    quick("the drawings in docs are up to date", drawings::check),
     quick("licences, versions and sources of dependencies", deny::rules),
     whole("documentation", || {
         run("cargo", &format!("doc {HOST} --no-deps"), &[("RUSTDOCFLAGS", "-D warnings")])

@@ -1,9 +1,12 @@
-//! `cargo xtask docs`: the circuit drawings in docs/circuits, one SVG for each table of parts in [`circuits`].
+//! `cargo xtask docs`: the circuit drawings in docs/circuits, one SVG for each table of parts in [`circuits`], and
+//! docs/kinematics.svg.
 //!
 //! ```text
 //!   circuits.rs ──▶ drawing.rs ──▶ part.rs ──▶ sheet.rs ──▶ docs/circuits/*.svg
 //!   (which parts,   (name, size)   (terminals,  (lines and
 //!    and where)                     shape)       text as SVG)
+//!
+//!   kinematics ──▶ arm.rs ──▶ docs/kinematics.svg
 //! ```
 
 use std::fs;
@@ -11,6 +14,7 @@ use std::path::PathBuf;
 
 use crate::run::{TaskResult, root};
 
+mod arm;
 mod circuits;
 mod drawing;
 mod part;
@@ -24,24 +28,29 @@ fn path(drawing: &Drawing) -> PathBuf {
     folder().join(drawing.name).with_extension("svg")
 }
 
+/// Every drawing, with its path.
+fn all() -> impl Iterator<Item = (PathBuf, String)> {
+    let circuits = circuits::all().into_iter().map(|drawing| (path(&drawing), drawing.svg()));
+    circuits.chain([(root().join("docs/kinematics.svg"), arm::svg())])
+}
+
 /// Writes every drawing.
 pub(crate) fn write() -> TaskResult {
     fs::create_dir_all(folder())?;
-    for drawing in circuits::all() {
-        fs::write(path(&drawing), drawing.svg())?;
+    for (path, svg) in all() {
+        fs::write(path, svg)?;
     }
     Ok(())
 }
 
 /// Fails if a drawing differs from the one that [`write()`] writes.
 pub(crate) fn check() -> TaskResult {
-    for drawing in circuits::all() {
-        let path = path(&drawing);
-        if fs::read_to_string(&path).unwrap_or_default() != drawing.svg() {
+    for (path, svg) in all() {
+        if fs::read_to_string(&path).unwrap_or_default() != svg {
             return Err(format!("{} is out of date: run `cargo xtask docs`", path.display()).into());
         }
     }
-    println!("docs/circuits is up to date");
+    println!("docs/circuits and docs/kinematics.svg are up to date");
     Ok(())
 }
 

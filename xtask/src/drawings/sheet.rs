@@ -11,7 +11,7 @@ const GRID: i32 = 10;
 const LINE: i32 = 17;
 
 /// The reader's colour scheme selects dark lines on white or light lines on black.
-const STYLE: &str = "\
+pub(super) const STYLE: &str = "\
   <style>
     .ground { fill: #ffffff }
     .line { fill: none; stroke: #1f2328; stroke-width: 2; stroke-linecap: round; stroke-linejoin: round }
