@@ -13,10 +13,10 @@ use rustix::event::epoll::{self, CreateFlags, Event, EventData, EventFlags};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
-use crate::clients::Clients;
 use crate::clock::{Clock, sleep_until};
 use crate::pty_arm::PtyArm;
 use crate::signals::{SignalAction, Signals};
+use tty_ports::clients::Clients;
 
 /// Events per call; the other events follow in the next call.
 const EVENTS: usize = 64;
@@ -196,7 +196,7 @@ mod tests {
     use tracing::Span;
 
     use super::*;
-    use crate::pty::Pty;
+    use tty_ports::pty::Pty;
 
     fn arm(pty: Pty) -> PtyArm<Flash> {
         let config = ArmConfig { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };
@@ -208,7 +208,7 @@ mod tests {
     fn an_arm_whose_port_fails_ends_and_the_others_continue() {
         let good = Pty::open(None).unwrap();
         let mut client = File::options().write(true).open(good.path()).unwrap();
-        let mut event_loop = EventLoop::new(vec![arm(Pty::broken()), arm(good)], None).unwrap();
+        let mut event_loop = EventLoop::new(vec![arm(Pty::broken().unwrap()), arm(good)], None).unwrap();
         let now = Instant::ZERO + Duration::from_millis(1_000);
         event_loop.poll_arm(0, now).unwrap();
         assert!(event_loop.arms[0].has_failed);
@@ -224,7 +224,8 @@ mod tests {
 
     #[test]
     fn the_loop_fails_when_the_last_arm_has_failed() {
-        let mut event_loop = EventLoop::new(vec![arm(Pty::broken()), arm(Pty::broken())], None).unwrap();
+        let mut event_loop =
+            EventLoop::new(vec![arm(Pty::broken().unwrap()), arm(Pty::broken().unwrap())], None).unwrap();
         event_loop.poll_arm(1, Instant::ZERO).unwrap();
         assert!(event_loop.poll_arm(0, Instant::ZERO).is_err());
     }

@@ -13,25 +13,25 @@ use arm_sim::simulation::{ArmConfig, Simulation};
 use clap::Parser;
 use host_sim::bus_line::BusLine;
 use host_sim::cli::{Options, in_one_line};
-use host_sim::clients::Clients;
 use host_sim::clock::Clock;
 use host_sim::eeprom::{Eeprom, ImageError};
 use host_sim::event_loop::EventLoop;
 use host_sim::per_arm;
-use host_sim::pty::Pty;
 use host_sim::pty_arm::PtyArm;
 use host_sim::real_servos::{self, RealServos};
-use host_sim::serial::{Serial, SerialError};
 use host_sim::servo_socket::{ServoSocket, SocketError};
 use host_sim::servos_only::{self, ServosOnly, ServosOnlyError};
 use host_sim::signals::Signals;
-use host_sim::symlink::{Symlink, SymlinkError};
 use host_sim::trace::Trace;
 use protocol_core::time::Duration;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tracing::{Span, error_span};
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
+use tty_ports::clients::Clients;
+use tty_ports::pty::Pty;
+use tty_ports::serial::{Serial, SerialError};
+use tty_ports::symlink::{Symlink, SymlinkError};
 
 /// The log target of frames. `--trace` shows it at any log level.
 const FRAMES: &str = "frames";
@@ -41,9 +41,9 @@ const FRAMES: &str = "frames";
 enum Failure {
     #[error(transparent)]
     Image(#[from] ImageError),
-    #[error(transparent)]
+    #[error("--link {0}")]
     Symlink(#[from] SymlinkError),
-    #[error(transparent)]
+    #[error("--servos {0}")]
     Serial(#[from] SerialError),
     #[error(transparent)]
     Socket(#[from] SocketError),

@@ -13,8 +13,8 @@ use rustix::event::PollFlags;
 use rustix::event::epoll::EventFlags;
 use tracing::{Span, error, info};
 
-use crate::clients::Clients;
-use crate::pty::Pty;
+use tty_ports::clients::Clients;
+use tty_ports::pty::Pty;
 
 /// An arm on a pseudo-terminal.
 #[derive(Debug)]

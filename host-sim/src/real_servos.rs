@@ -24,11 +24,11 @@ use tracing::{info, warn};
 
 use crate::bus_line::BusLine;
 use crate::bus_statistics::{BusStatistics, Figures};
-use crate::clients::Clients;
 use crate::clock::{Clock, sleep_until};
 use crate::pty_arm::PtyArm;
-use crate::serial::Serial;
 use crate::signals::{SignalAction, Signals};
+use tty_ports::clients::Clients;
+use tty_ports::serial::Serial;
 
 /// Bytes per read from the servo bus.
 const PIECE: usize = 4_096;

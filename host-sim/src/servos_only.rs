@@ -17,13 +17,13 @@ use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 use tracing::{debug, info};
 
-use crate::clients::Clients;
 use crate::clock::{Clock, sleep_until};
-use crate::pty::Pty;
 use crate::signals::{SignalAction, Signals};
-use crate::symlink::{Symlink, SymlinkError};
 use arm_sim::plant::Plant;
 use arm_sim::usb_adapter::{Latency, UsbAdapter};
+use tty_ports::clients::Clients;
+use tty_ports::pty::Pty;
+use tty_ports::symlink::{Symlink, SymlinkError};
 
 /// Bytes per read from the client.
 const PIECE: usize = 4_096;

@@ -3,6 +3,8 @@
 use clap::{Args, CommandFactory, Parser, Subcommand, value_parser};
 
 use crate::command_error::CommandError;
+#[cfg(target_os = "linux")]
+use crate::commands::serve;
 use crate::commands::{
     backup, baud, calibrate, effector, get, info, model, monitor, move_to, play, ports, pose, position,
     record, registers, servo, set, shell, sniff, state, stop,
@@ -81,6 +83,8 @@ pub(crate) enum Command {
     Backup(backup::BackupArgs),
     Restore(backup::RestoreArgs),
     Sniff(sniff::SniffArgs),
+    #[cfg(target_os = "linux")]
+    Serve(serve::ServeArgs),
     Servo(servo::ServoArgs),
     Registers(registers::RegistersArgs),
     Model(model::ModelArgs),
@@ -111,6 +115,8 @@ impl Command {
             Self::Backup(args) => backup::backup(session, &args),
             Self::Restore(args) => backup::restore(session, &args),
             Self::Sniff(args) => sniff::run(session, &args),
+            #[cfg(target_os = "linux")]
+            Self::Serve(args) => serve::run(session, &args),
             Self::Servo(args) => servo::run(session, &args),
             Self::Registers(args) => registers::run(session, &args),
             Self::Model(args) => model::run(&args),

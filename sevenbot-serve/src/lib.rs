@@ -5,12 +5,17 @@
 //!   bytes ◀── FrameClient ◀── Hub ◀── Line ◀── bytes of the arm
 //! ```
 //!
-//! The hub and the clients in this crate read no clock and open no port: time and bytes are arguments.
+//! The hub and the clients read no clock and open no port: time and bytes are arguments. [`server`] connects them to a
+//! serial port, pseudo-terminals and sockets.
 
 #![forbid(unsafe_code)]
 
 pub mod frame_client;
 pub mod hub;
+#[cfg(target_os = "linux")]
+pub mod server;
+#[cfg(target_os = "linux")]
+mod token;
 
 pub use frame_client::FrameClient;
 pub use hub::{ClientId, Event, Hub, WholeRequest};

@@ -25,6 +25,7 @@ const GROUPS: [Group; 3] = [
             "arm-model",
             "arm-sim",
             "firmware-stm32",
+            "tty-ports",
             "host-sim",
             "sevenbot",
             "sevenbot-cli",

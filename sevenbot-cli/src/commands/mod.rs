@@ -15,6 +15,8 @@ pub(crate) mod pose;
 pub(crate) mod position;
 pub(crate) mod record;
 pub(crate) mod registers;
+#[cfg(target_os = "linux")]
+pub(crate) mod serve;
 pub(crate) mod servo;
 pub(crate) mod set;
 pub(crate) mod shell;

@@ -6,8 +6,9 @@ use protocol_core::time::Instant;
 
 use super::own_registers::OwnRegisters;
 use super::request::WholeRequest;
-use super::sampler::{Schedule, Stream};
+use super::schedule::Schedule;
 use super::shares::Share;
+use super::stream::Stream;
 
 /// Reports that wait for a client to take them. More are dropped.
 const MOST_REPORTS: usize = 4;

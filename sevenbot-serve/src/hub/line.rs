@@ -11,10 +11,10 @@ use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
 
-use super::ClientId;
 use super::client::Event;
+use super::client_id::ClientId;
 use super::request::reply_bytes;
-use super::sampler::Stream;
+use super::stream::Stream;
 
 /// How long a reply may take beside its time on the line. USB adapters take 16 ms each way; a busy computer takes more.
 const REPLY_TIMEOUT: Duration = Duration::from_millis(300);

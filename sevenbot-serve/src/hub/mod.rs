@@ -13,11 +13,14 @@
 //! * Without an arm requests are dropped. A request that waited could move an arm that a person just plugged in.
 
 mod client;
+mod client_id;
 mod line;
 mod own_registers;
 mod request;
 mod sampler;
+mod schedule;
 mod shares;
+mod stream;
 
 use std::collections::BTreeMap;
 
@@ -30,17 +33,14 @@ use self::sampler::Sampler;
 use self::shares::Shares;
 
 pub use self::client::Event;
+pub use self::client_id::ClientId;
 pub use self::request::WholeRequest;
-pub use self::sampler::Stream;
+pub use self::stream::Stream;
 
 /// Requests of one client that may wait. The maker's arm has the same limit for its WebSocket.
 pub const MOST_WAITING: usize = 20;
 /// Time between two questions to a port behind which no arm has answered yet.
 const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
-
-/// A client of the hub.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct ClientId(u32);
 
 /// Does an arm answer?
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +57,7 @@ enum ArmState {
 #[derive(Debug)]
 pub struct Hub {
     clients: BTreeMap<ClientId, Client>,
-    next_id: u32,
+    next_id: ClientId,
     arm: ArmState,
     line: Line,
     sampler: Sampler,
@@ -72,7 +72,7 @@ impl Hub {
     pub fn new(baud: u32, is_read_only: bool) -> Self {
         Self {
             clients: BTreeMap::new(),
-            next_id: 0,
+            next_id: ClientId::default(),
             arm: ArmState::Absent,
             line: Line::new(baud),
             sampler: Sampler::new(baud),
@@ -83,8 +83,8 @@ impl Hub {
 
     /// Adds a client.
     pub fn connect(&mut self) -> ClientId {
-        let id = ClientId(self.next_id);
-        self.next_id = self.next_id.wrapping_add(1);
+        let id = self.next_id;
+        self.next_id = id.next();
         self.clients.insert(id, Client::default());
         id
     }
@@ -92,7 +92,7 @@ impl Hub {
     /// Removes a client with its requests and its streams of reports. A reply that comes for it is dropped.
     pub fn disconnect(&mut self, now: Instant, id: ClientId) {
         self.clients.remove(&id);
-        self.sampler.set_frequencies(now, self.clients.values());
+        self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
     }
 
     /// Can the client make another request?
@@ -240,7 +240,7 @@ impl Hub {
             WholeRequest::Write { address, mut values } => {
                 if client.own.write(address, &mut values) {
                     client.schedule.set(now, &client.own);
-                    self.sampler.set_frequencies(now, self.clients.values());
+                    self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
                 }
                 if !self.is_read_only {
                     self.line.send_write(now, address, &values);

@@ -6,7 +6,7 @@
 use protocol_core::registers::map::{FEEDBACK_FREQUENCY, find};
 use protocol_core::registers::{Access, Region, Register};
 
-use super::sampler::Stream;
+use super::stream::Stream;
 
 /// The values of a client's own registers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -17,8 +17,8 @@ use std::process::{Command, Stdio};
 
 use clap::Args;
 use host_sim::signals::{SignalAction, Signals};
-use host_sim::symlink::Symlink;
 use tempfile::TempDir;
+use tty_ports::symlink::Symlink;
 
 use crate::run::{self, ChildProcess, ChipProgram, TaskResult, cargo, root};
 

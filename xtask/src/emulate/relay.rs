@@ -5,11 +5,11 @@ use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 
-use host_sim::clients::Clients;
-use host_sim::pty::Pty;
 use host_sim::signals::Signals;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
+use tty_ports::clients::Clients;
+use tty_ports::pty::Pty;
 
 use crate::run::TaskResult;
 

@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
 
-/// Does a file descriptor besides the simulator's own refer to `terminal`? True if the system does not show open files.
+/// Does a file descriptor besides the program's own refer to `terminal`? True if the system does not show open files.
 pub(crate) fn has_other_holder(terminal: &Path) -> bool {
     let Ok(processes) = fs::read_dir("/proc") else { return true };
     // "self" is a link to one of the other entries.

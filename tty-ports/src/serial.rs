@@ -1,4 +1,4 @@
-//! The serial port of a USB adapter with real servos behind it.
+//! A serial port, most often of a USB adapter.
 //!
 //! The port is opened for this process only, in raw mode, at any baud rate. If the adapter has a latency timer, it is set
 //! to its minimum.
@@ -22,13 +22,13 @@ const SHORTEST_LATENCY_MS: u32 = 1;
 #[derive(Debug, thiserror::Error)]
 pub enum SerialError {
     /// The path does not exist.
-    #[error("--servos {}: there is no such port: plug the adapter in; ports that are there: {}", path.display(), ports())]
+    #[error("{}: there is no such port: plug the adapter in; ports that are there: {}", path.display(), ports())]
     Absent {
         /// The port.
         path: PathBuf,
     },
     /// This user has no permission to open it.
-    #[error("--servos {}: you may not open it: join the group that owns it (number {group}, most often dialout: sudo usermod -aG dialout $USER) and log in again", path.display())]
+    #[error("{}: you may not open it: join the group that owns it (number {group}, most often dialout: sudo usermod -aG dialout $USER) and log in again", path.display())]
     Forbidden {
         /// The port.
         path: PathBuf,
@@ -36,13 +36,13 @@ pub enum SerialError {
         group: u32,
     },
     /// Another program has it.
-    #[error("--servos {}: another program uses the port: end that one; 'fuser {}' tells its number", .0.display(), .0.display())]
+    #[error("{}: another program uses the port: end that one; 'fuser {}' tells its number", .0.display(), .0.display())]
     InUse(PathBuf),
     /// It is not a serial port.
-    #[error("--servos {}: that is no serial port: ports that are there: {}", .0.display(), ports())]
+    #[error("{}: that is no serial port: ports that are there: {}", .0.display(), ports())]
     NoPort(PathBuf),
     /// The adapter does not support the baud rate.
-    #[error("--servos {}: the adapter refuses {baud} baud ({cause}): choose another --servo-baud, or an adapter that can", path.display())]
+    #[error("{}: the adapter refuses {baud} baud ({cause}): choose another baud rate, or an adapter that can", path.display())]
     Baud {
         /// The port.
         path: PathBuf,
@@ -52,7 +52,7 @@ pub enum SerialError {
         cause: io::Error,
     },
     /// The operating system refused.
-    #[error("--servos {}: {cause}: unplug the adapter, plug it in again, and look what 'dmesg' says of it", path.display())]
+    #[error("{}: {cause}: unplug the adapter, plug it in again, and look what 'dmesg' says of it", path.display())]
     Refused {
         /// The port.
         path: PathBuf,

@@ -1,4 +1,4 @@
-//! A stable name for the port: a symbolic link that exists while the simulator runs.
+//! A stable name for the port: a symbolic link that exists while the program runs.
 
 use std::fs;
 use std::io;
@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum SymlinkError {
     /// The path exists and is not a symbolic link.
-    #[error("--link {}: that is no symbolic link, so it is not replaced: remove it, or choose another path", .0.display())]
+    #[error("{}: that is no symbolic link, so it is not replaced: remove it, or choose another path", .0.display())]
     Taken(PathBuf),
     /// The operating system refused.
-    #[error("--link {}: {cause}: choose a path in a directory that exists and that you can write to", path.display())]
+    #[error("{}: {cause}: choose a path in a directory that exists and that you can write to", path.display())]
     Refused {
         /// The path.
         path: PathBuf,
@@ -20,7 +20,7 @@ pub enum SymlinkError {
     },
 }
 
-/// A symbolic link. Dropping it removes the link, unless another simulator has replaced it.
+/// A symbolic link. Dropping it removes the link, unless another program has replaced it.
 #[derive(Debug)]
 pub struct Symlink {
     path: PathBuf,
@@ -28,7 +28,7 @@ pub struct Symlink {
 }
 
 impl Symlink {
-    /// Creates a link at `path` to `port`. Replaces a symbolic link that an earlier simulator may have left.
+    /// Creates a link at `path` to `port`. Replaces a symbolic link that an earlier program may have left.
     ///
     /// # Errors
     /// See [`SymlinkError`].
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn a_link_that_another_simulator_took_over_stays() {
+    fn a_link_that_another_program_took_over_stays() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("7bot");
         let first = Symlink::new(&path, Path::new("/dev/pts/5")).unwrap();

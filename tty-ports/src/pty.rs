@@ -1,11 +1,11 @@
 //! The port: a pseudo-terminal that any serial client can open.
 //!
 //! ```text
-//!   simulator ◀──▶ master ═══ kernel ═══ terminal (/dev/pts/N) ◀──▶ client, and the one after it
+//!   program ◀──▶ master ═══ kernel ═══ terminal (/dev/pts/N) ◀──▶ client, and the one after it
 //! ```
 //!
-//! The simulator also keeps the terminal open. So the port and its raw mode stay without a client. Before the next client
-//! comes, the simulator resets what a client left: an exclusive lock, another terminal mode, unread bytes. There are no
+//! The program also keeps the terminal open. So the port and its raw mode stay without a client. Before the next client
+//! comes, the program resets what a client left: an exclusive lock, another terminal mode, unread bytes. There are no
 //! frames and no time here.
 
 use std::ffi::OsStr;
@@ -57,12 +57,15 @@ impl Pty {
     }
 
     /// A port whose every read and write fails.
-    #[cfg(test)]
-    pub(crate) fn broken() -> Self {
-        let mut port = Self::open(None).unwrap();
+    ///
+    /// # Errors
+    /// See [`Pty::open`].
+    #[cfg(feature = "test-support")]
+    pub fn broken() -> io::Result<Self> {
+        let mut port = Self::open(None)?;
         // The end of a pipe that cannot be read.
-        port.master = io::pipe().unwrap().1.into();
-        port
+        port.master = io::pipe()?.1.into();
+        Ok(port)
     }
 
     /// Warns that clients are not reported, and of the consequence.

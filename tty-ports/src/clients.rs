@@ -1,6 +1,6 @@
 //! Counts the clients of ports: who has a terminal open, by inotify.
 //!
-//! The simulator itself keeps its ports open, so the kernel does not report that the last client has closed a port.
+//! The program itself keeps its ports open, so the kernel does not report that the last client has closed a port.
 //! inotify reports each open and each close. But it merges equal reports that follow each other unread: two opens in a
 //! row would count as one. The directory of the terminals is watched too, which puts a report of the directory between
 //! any two of a terminal, so that none are merged.
@@ -70,7 +70,7 @@ impl Clients {
         Ok(Self { inotify, ports: HashMap::new(), has_changed: false })
     }
 
-    /// Counts the clients of a terminal from now on. Only the simulator may have it open before.
+    /// Counts the clients of a terminal from now on. Only this program may have it open before.
     ///
     /// # Errors
     /// inotify refuses.

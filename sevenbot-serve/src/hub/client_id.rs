@@ -1,0 +1,12 @@
+//! The name of a client.
+
+/// A client of the hub.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ClientId(u32);
+
+impl ClientId {
+    /// The id of the client after this one.
+    pub(crate) const fn next(self) -> Self {
+        Self(self.0.wrapping_add(1))
+    }
+}

@@ -1,0 +1,67 @@
+//! When reports are due.
+
+use protocol_core::time::{Duration, Instant};
+
+use super::own_registers::OwnRegisters;
+use super::stream::{STREAMS, Stream};
+
+/// How early a report may come: a quarter of the shortest period of 20 ms.
+const EARLY: Duration = Duration::from_millis(5);
+
+/// When a stream is due next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timer {
+    /// Zero: off.
+    period: Duration,
+    pub(crate) due: Instant,
+}
+
+impl Timer {
+    /// Switched off.
+    pub(crate) const OFF: Self = Self { period: Duration::ZERO, due: Instant::FAR_FUTURE };
+
+    /// A frequency of 0 Hz switches off. The same frequency as before keeps the time.
+    pub(crate) fn set(&mut self, now: Instant, frequency: u32) {
+        let period = Duration::from_micros(1_000_000_u32.checked_div(frequency).unwrap_or(0).into());
+        if period == Duration::ZERO {
+            *self = Self::OFF;
+        } else if period != self.period {
+            *self = Self { period, due: now + period };
+        }
+    }
+
+    /// A due time that is a whole period late is skipped, and does not make a burst.
+    pub(crate) fn advance(&mut self, now: Instant) {
+        let due = self.due + self.period;
+        self.due = if due + self.period < now { now + self.period } else { due };
+    }
+}
+
+/// When the reports of one client are due.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Schedule([Timer; STREAMS]);
+
+impl Default for Schedule {
+    fn default() -> Self {
+        Self([Timer::OFF; STREAMS])
+    }
+}
+
+impl Schedule {
+    /// Sets the frequencies that the client's own registers hold.
+    pub(crate) fn set(&mut self, now: Instant, own: &OwnRegisters) {
+        for (timer, stream) in self.0.iter_mut().zip(Stream::ALL) {
+            timer.set(now, own.frequency(stream).into());
+        }
+    }
+
+    /// Is a report of the stream due? A report may be half a sample early, so that the mean frequency is kept.
+    pub(crate) fn take_due(&mut self, now: Instant, stream: Stream) -> bool {
+        let Some(timer) = self.0.get_mut(stream.index()) else { return false };
+        let is_due = timer.period != Duration::ZERO && timer.due <= now + EARLY;
+        if is_due {
+            timer.advance(now);
+        }
+        is_due
+    }
+}

@@ -1,0 +1,129 @@
+//! The serial port of the arm: opened again and again while it is not there.
+
+use std::io;
+use std::path::PathBuf;
+
+use protocol_core::time::{Duration, Instant};
+use rustix::event::{PollFd, PollFlags};
+use tty_ports::serial::Serial;
+
+use super::notice::Notice;
+use crate::hub::Hub;
+
+/// Time between two attempts to open the port.
+const RETRY_PERIOD: Duration = Duration::from_millis(500);
+/// Time after which an open port without an arm is opened anew: the device behind the path may be another one.
+const IDENTIFY_TIMEOUT: Duration = Duration::from_millis(3_000);
+
+/// The serial port of the arm.
+#[derive(Debug)]
+pub(crate) struct ArmPort {
+    path: PathBuf,
+    baud: u32,
+    state: State,
+    /// What the last notice said, so that it is not repeated.
+    last_notice: Option<Notice>,
+}
+
+#[derive(Debug)]
+enum State {
+    /// Tried again at this time.
+    Closed(Instant),
+    /// Opened at this time.
+    Open(Serial, Instant),
+}
+
+impl ArmPort {
+    pub(crate) const fn new(path: PathBuf, baud: u32) -> Self {
+        Self { path, baud, state: State::Closed(Instant::ZERO), last_notice: None }
+    }
+
+    /// Opens the port if it is time to, and passes bytes of the arm to the hub.
+    pub(crate) fn receive(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
+        match &self.state {
+            State::Closed(due) if *due <= now => self.open(hub, now, notify),
+            State::Closed(_) => {}
+            State::Open(port, opened) => {
+                let had_arm = hub.has_arm();
+                match read_all(port, hub, now) {
+                    Err(error) => self.close(hub, now, notify, &error.to_string()),
+                    Ok(()) if hub.has_arm() && !had_arm => {
+                        self.notify(Notice::ArmFound(self.path.clone()), notify);
+                    }
+                    Ok(()) if !hub.has_arm() && *opened + IDENTIFY_TIMEOUT <= now => {
+                        self.notify(Notice::ArmSilent(self.path.clone()), notify);
+                        hub.close_arm();
+                        self.state = State::Closed(now + RETRY_PERIOD);
+                    }
+                    Ok(()) => {}
+                }
+            }
+        }
+    }
+
+    /// Sends the hub's bytes.
+    pub(crate) fn send(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
+        let State::Open(port, _) = &self.state else { return };
+        if hub.to_arm().is_empty() {
+            return;
+        }
+        match port.write(hub.to_arm()) {
+            Ok(count) => hub.sent_to_arm(count),
+            Err(error) => self.close(hub, now, notify, &error.to_string()),
+        }
+    }
+
+    /// When to call [`ArmPort::receive`] without other events.
+    pub(crate) fn deadline(&self) -> Instant {
+        match &self.state {
+            State::Closed(due) => *due,
+            // Only while it is not known what is behind the port does the time matter, but then it is short.
+            State::Open(_, opened) if self.last_notice != Some(Notice::ArmFound(self.path.clone())) => {
+                *opened + IDENTIFY_TIMEOUT
+            }
+            State::Open(..) => Instant::FAR_FUTURE,
+        }
+    }
+
+    /// What poll(2) has to wait for.
+    pub(crate) fn interest(&self, hub: &Hub) -> Option<PollFd<'_>> {
+        let State::Open(port, _) = &self.state else { return None };
+        let output = if hub.to_arm().is_empty() { PollFlags::empty() } else { PollFlags::OUT };
+        Some(PollFd::new(port, PollFlags::IN | output))
+    }
+
+    fn open(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
+        match Serial::open(&self.path, self.baud) {
+            Ok(port) => {
+                self.state = State::Open(port, now);
+                hub.open_arm(now);
+            }
+            Err(error) => self.close(hub, now, notify, &error.to_string()),
+        }
+    }
+
+    fn close(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice), reason: &str) {
+        hub.close_arm();
+        self.state = State::Closed(now + RETRY_PERIOD);
+        self.notify(Notice::ArmLost { port: self.path.clone(), reason: reason.to_owned() }, notify);
+    }
+
+    fn notify(&mut self, notice: Notice, notify: &mut dyn FnMut(Notice)) {
+        if self.last_notice.as_ref() != Some(&notice) {
+            notify(notice.clone());
+            self.last_notice = Some(notice);
+        }
+    }
+}
+
+/// Passes all bytes that have arrived. The read without bytes at the end states that the line is silent.
+fn read_all(port: &Serial, hub: &mut Hub, now: Instant) -> io::Result<()> {
+    let mut bytes = [0; 4_096];
+    loop {
+        let count = port.read(&mut bytes)?;
+        hub.arm_bytes(now, bytes.get(..count).unwrap_or(&[]));
+        if count < bytes.len() {
+            return Ok(());
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! `sevenbot serve`: one simulated arm, many programs at once.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use system_tests::frames::reply;
+use system_tests::process::{self, Signal, send_signal, wait_for_exit};
+use system_tests::programs::{host_sim, tool};
+use system_tests::registers::{CHIP_ID, DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED};
+use system_tests::wait::wait_until;
+use system_tests::{ArmClient, read_request, write_request};
+use tempfile::TempDir;
+
+/// A simulator and a server, in a folder with their links.
+struct Served {
+    simulator: Child,
+    server: Child,
+    ports: Vec<PathBuf>,
+    folder: TempDir,
+}
+
+impl Served {
+    /// Starts a server with the pseudo-terminals `a`, `b`, ... and a TCP port.
+    fn start(ptys: usize, options: &[&str]) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let simulator = simulator(folder.path());
+        let mut command = tool();
+        command.current_dir(&folder).args(["--port", "./arm", "serve", "--tcp", "0"]).args(options);
+        for name in names(ptys) {
+            command.args(["--pty", name]);
+        }
+        let (server, ports) = process::start(&mut command, ptys + 1).expect("the server is ready");
+        let served = Self { simulator, server, ports, folder };
+        if ptys > 0 {
+            served.wait_for_arm(&mut served.open("a"));
+        }
+        served
+    }
+
+    fn open(&self, name: &str) -> ArmClient {
+        ArmClient::open(&self.folder.path().join(name), 115_200)
+    }
+
+    fn connect(&self) -> TcpStream {
+        let port = self.ports.last().and_then(|port| port.to_str()).expect("a TCP port");
+        let stream =
+            TcpStream::connect(port.strip_prefix("socket://").expect("an address")).expect("a connection");
+        stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
+        stream
+    }
+
+    fn wait_for_arm(&self, client: &mut ArmClient) {
+        wait_until("the arm answers", || {
+            client.send(&read_request(DEVICE_CODE, 1));
+            client.reply_within(Duration::from_millis(500)).is_some()
+        });
+        client.drain();
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        process::kill(&mut self.server);
+        process::kill(&mut self.simulator);
+    }
+}
+
+fn names(count: usize) -> impl Iterator<Item = &'static str> {
+    ["a", "b", "c", "d"].into_iter().take(count)
+}
+
+fn simulator(folder: &Path) -> Child {
+    let mut command = Command::new(host_sim());
+    command.args(["--quiet", "--eeprom", "none", "--link"]).arg(folder.join("arm"));
+    process::start(&mut command, 1).expect("the simulator is ready").0
+}
+
+/// Sends a request and checks the reply.
+#[track_caller]
+fn exchange(stream: &mut TcpStream, request: &[u8], expected: &[u8]) {
+    stream.write_all(request).expect("the server takes bytes");
+    let mut received = vec![0; expected.len()];
+    stream.read_exact(&mut received).expect("a reply");
+    assert_eq!(received, expected);
+}
+
+#[test]
+fn programs_on_terminals_and_tcp_get_their_own_replies() {
+    let served = Served::start(3, &[]);
+    thread::scope(|scope| {
+        for (name, own) in names(3).zip(SPEED..) {
+            let mut arm = served.open(name);
+            scope.spawn(move || {
+                (1..=100)
+                    .for_each(|value| assert_eq!(arm.write_and_read((own, &[value]), (own, 1)), [value]));
+            });
+        }
+        for own in SPEED + 3..SPEED + 7 {
+            let mut stream = served.connect();
+            scope.spawn(move || {
+                for value in 1..=100 {
+                    let request = [write_request(own, &[value]), read_request(own, 1)].concat();
+                    exchange(&mut stream, &request, &reply(own, &[value]));
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn each_program_has_its_own_reports_and_the_next_one_on_its_terminal_has_none() {
+    let served = Served::start(2, &[]);
+    let (mut with, mut without) = (served.open("a"), served.open("b"));
+    with.write(FEEDBACK_FREQUENCY, &[50]);
+    for _ in 0..50 {
+        let report = with.reply();
+        assert_eq!((report.address, report.values.len()), (PRESENT_POSITION, 7));
+    }
+    assert_eq!(without.register(FEEDBACK_FREQUENCY), 0);
+    without.expect_nothing_more();
+    assert_eq!(with.register(FEEDBACK_FREQUENCY), 50);
+    drop(with);
+    let mut next = served.open("a");
+    next.drain();
+    assert_eq!(next.register(FEEDBACK_FREQUENCY), 0);
+    thread::sleep(Duration::from_millis(200));
+    next.expect_nothing_more();
+}
+
+#[test]
+fn an_arm_that_was_unplugged_is_found_again() {
+    let mut served = Served::start(1, &[]);
+    let mut arm = served.open("a");
+    let mut stream = served.connect();
+    arm.write(SPEED, &[7]);
+    assert_eq!(arm.register(SPEED), 7);
+    process::kill(&mut served.simulator);
+    arm.send(&read_request(SPEED, 1));
+    assert_eq!(arm.reply_within(Duration::from_millis(1_000)), None, "silence, as on a cable");
+    served.simulator = simulator(served.folder.path());
+    served.wait_for_arm(&mut arm);
+    assert_eq!(arm.register(SPEED), 60, "another arm");
+    exchange(&mut stream, &read_request(DEVICE_CODE, 1), &reply(DEVICE_CODE, &[7]));
+}
+
+#[test]
+fn bad_clients_disturb_no_other() {
+    let served = Served::start(1, &[]);
+    let mut arm = served.open("a");
+    let mut half = served.connect();
+    half.write_all(&write_request(SPEED, &[1, 2, 3])[..6]).expect("half a frame");
+    let mut deaf = served.connect();
+    deaf.write_all(&write_request(FEEDBACK_FREQUENCY, &[50])).expect("a request");
+    deaf.set_nonblocking(true).expect("a mode");
+    let flood = served.connect();
+    let ended = flood.try_clone().expect("a second handle");
+    let flooding =
+        thread::spawn(move || while (&flood).write_all(&write_request(SPEED + 1, &[9])).is_ok() {});
+    let request = read_request(PRESENT_POSITION, 7).repeat(100);
+    let mut slowest = Duration::ZERO;
+    for _ in 0..200 {
+        while deaf.write(&request).is_ok_and(|count| count > 0) {}
+        let start = Instant::now();
+        assert_eq!(arm.read(CHIP_ID, 6).len(), 6);
+        slowest = slowest.max(start.elapsed());
+    }
+    ended.shutdown(std::net::Shutdown::Both).expect("the flood ends");
+    flooding.join().expect("the flood has ended");
+    println!("slowest reply: {slowest:?}");
+    assert!(slowest < Duration::from_secs(2), "{slowest:?}");
+    assert_eq!(arm.register(SPEED), 60, "half a frame writes nothing");
+}
+
+#[test]
+fn a_token_keeps_others_out() {
+    let served = Served::start(1, &["--token", "correct-horse"]);
+    for wrong in ["battery-staple\n", "correct-hors\n", "\n"] {
+        let mut stream = served.connect();
+        stream.write_all(&[wrong.as_bytes(), &read_request(DEVICE_CODE, 1)].concat()).expect("bytes");
+        let end = stream.read(&mut [0; 16]);
+        assert!(matches!(&end, Ok(0)) || end.as_ref().is_err_and(|e| e.kind() == ErrorKind::ConnectionReset));
+    }
+    let request = [b"correct-horse\r\n".as_slice(), &read_request(DEVICE_CODE, 1)].concat();
+    exchange(&mut served.connect(), &request, &reply(DEVICE_CODE, &[7]));
+}
+
+#[test]
+fn with_read_only_programs_look_and_move_nothing() {
+    let served = Served::start(1, &["--read-only"]);
+    let mut arm = served.open("a");
+    assert_eq!(arm.write_and_read((SPEED, &[7]), (SPEED, 1)), [60]);
+}
+
+#[test]
+fn the_program_itself_works_through_the_server_and_ctrl_c_removes_the_links() {
+    let mut served = Served::start(2, &[]);
+    let path = served.folder.path().join("b");
+    let output = tool().arg("--port").arg(&path).args(["info", "--json"]).output().expect("the tool runs");
+    assert!(output.status.success(), "{output:?}");
+    send_signal(&served.server, Signal::INT);
+    assert!(wait_for_exit(&mut served.server).success());
+    assert!(!path.exists() && !path.is_symlink());
+}
+
+#[test]
+fn what_cannot_be_served_is_an_error_that_says_what_to_do() {
+    let served = Served::start(1, &[]);
+    let taken = served.ports[1].to_str().expect("text").rsplit(':').next().expect("a port").to_owned();
+    let cases: [(&[&str], &str); 4] = [
+        (&[], "nothing to serve"),
+        (&["--tcp", &taken], "another program listens there"),
+        (&["--tcp", "0", "--listen", "0.0.0.0"], "--token"),
+        (&["--pty", "/nowhere/a"], "/nowhere/a"),
+    ];
+    for (arguments, expected) in cases {
+        let output =
+            tool().args(["--port", "./none", "serve"]).args(arguments).output().expect("the tool runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && said.contains(expected), "{arguments:?}: {said}");
+    }
+}
