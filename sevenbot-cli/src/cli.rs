@@ -6,7 +6,7 @@ use crate::command_error::CommandError;
 #[cfg(target_os = "linux")]
 use crate::commands::serve;
 use crate::commands::{
-    backup, baud, calibrate, effector, get, info, model, monitor, move_to, play, ports, pose, position,
+    backup, baud, calibrate, effector, get, info, model, monitor, move_to, play, plot, ports, pose, position,
     record, registers, servo, set, shell, sniff, state, stop,
 };
 use crate::session::Session;
@@ -78,6 +78,7 @@ pub(crate) enum Command {
     Monitor(monitor::MonitorArgs),
     Record(record::RecordArgs),
     Play(play::PlayArgs),
+    Plot(plot::PlotArgs),
     Calibrate(calibrate::CalibrateArgs),
     Baud(baud::BaudArgs),
     Backup(backup::BackupArgs),
@@ -110,6 +111,7 @@ impl Command {
             Self::Monitor(args) => monitor::run(session, &args),
             Self::Record(args) => record::run(session, &args),
             Self::Play(args) => play::run(session, &args),
+            Self::Plot(args) => plot::run(session, &args),
             Self::Calibrate(args) => calibrate::run(session, &args),
             Self::Baud(args) => baud::run(session, &args),
             Self::Backup(args) => backup::backup(session, &args),

@@ -24,6 +24,7 @@ mod progress;
 mod reports;
 mod session;
 mod settings_file;
+mod space_plot;
 mod style;
 mod write_result;
 

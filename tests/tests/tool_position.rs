@@ -177,3 +177,15 @@ fn models_are_written_without_an_arm() {
     assert_eq!(written.get(8..12), Some(&u32::try_from(written.len()).expect("a length").to_le_bytes()[..]));
     failed(&model("stl"), 2);
 }
+
+#[test]
+fn the_way_of_a_recording_is_plotted_without_an_arm() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("wave.txt");
+    std::fs::write(&file, "7bot-recording 1\n0 90 90 65 90 90 90 80 0\n1 120 80 65 90 90 90 80 1\n")
+        .expect("a file");
+    let svg = succeeded(run_without_arm(&["plot", file.to_str().expect("UTF-8")]));
+    assert!(svg.starts_with("<svg") && svg.contains("wave.txt") && svg.contains("class=\"way\""), "{svg}");
+    let missing = folder.path().join("none.txt");
+    failed(&run_without_arm(&["plot", missing.to_str().expect("UTF-8")]), 1);
+}

@@ -10,6 +10,7 @@ pub(crate) mod model;
 pub(crate) mod monitor;
 pub(crate) mod move_to;
 pub(crate) mod play;
+pub(crate) mod plot;
 pub(crate) mod ports;
 pub(crate) mod pose;
 pub(crate) mod position;
