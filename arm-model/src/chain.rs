@@ -57,7 +57,7 @@ pub(crate) struct Joint {
     pub(crate) name: &'static str,
     /// The link that carries it.
     pub(crate) parent: &'static str,
-    /// Where it is, in that link.
+    /// Its position in that link.
     pub(crate) origin: Axes,
     pub(crate) motion: Motion,
 }
@@ -103,7 +103,7 @@ const ELBOW: Axes = [0.0, 0.0, REAR_ARM];
 const WRIST: Axes = [FOREARM, 0.0, ELBOW_OFFSET];
 const DISC: Axes = [TOOL, 0.0, 0.0];
 
-// Radii and what has no dimension in the kinematics are guesses for the eye.
+// Radii, and lengths that the kinematics does not need, are estimates.
 pub(crate) const BASE_SOLIDS: &[Solid] = &[solid([0.0, 0.0, -60.0], [0.0, 0.0, 0.0], 65.0)];
 pub(crate) const TURRET_SOLIDS: &[Solid] = &[
     solid(ORIGIN, [0.0, 0.0, SHOULDER_HEIGHT - 15.0], 45.0),

@@ -22,8 +22,8 @@ const FROM_Z_UP: UnitQuaternion = UnitQuaternion([-0.5, -0.5, -0.5, 0.5]);
 /// Bytes of three numbers.
 const VECTOR_BYTES: usize = 12;
 
-/// The arm as binary glTF (GLB), in the straight pose. The nodes are the links; those of a joint turn about the axis that
-/// the URDF names.
+/// The arm as binary glTF (GLB), in the straight pose. The nodes are the links; those of a joint turn about the axis
+/// that the URDF names.
 ///
 /// # Errors
 /// None in practice: the bytes are written to memory.

@@ -10,8 +10,8 @@
 //! are 0 in the straight pose: the arm forward, the rear arm upright, forearm and hand level. There all links have the
 //! axes of the base. [`joint_angles`] converts the degrees of the registers.
 //!
-//! Shapes are cylinders along the axes of the parts. They show the arm; their radii are not measured. Joint 7, the claw,
-//! moves no point, and the model has none.
+//! Shapes are cylinders along the axes of the parts. They show the arm; their radii are not measured. Joint 7, the
+//! claw, moves no point, and the model has none.
 
 #![forbid(unsafe_code)]
 
@@ -50,7 +50,7 @@ pub fn joint_angles(degrees: [f64; 6]) -> [f64; 6] {
     angles
 }
 
-/// What every format says of itself.
+/// The description in every format.
 const ABOUT: [&str; 4] = [
     "7Bot V2 arm, written by `sevenbot model`. Metres and radians; x forward, y to the left, z up (REP-103).",
     "A joint's angle is (register - zero) degrees in radians. Zeros of joints 1 to 6: 90 90 65 90 90 90.",

@@ -26,7 +26,7 @@ use crate::{JOINT_NAMES, TIP};
 
 const QUARTER: [f64; 2] = [-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2];
 const ORIGIN: Axes = [0.0; 3];
-/// The end of the lever, from the shoulder; the end of the rod behind the elbow has the same distance.
+/// The end of the lever, relative to the shoulder. The rod ends at the same distance behind the elbow.
 const LEVER_END: Axes = [m(-LEVER), 0.0, 0.0];
 const RADIUS: f64 = m(4.0);
 

@@ -16,7 +16,7 @@ use protocol_core::wire::MAX_LENGTH;
 pub const CAPACITY: usize = 2 * MAX_LENGTH;
 /// Start bit, eight data bits, stop bit.
 const BITS_PER_BYTE: u64 = 10;
-/// The deadline covers the bytes of so many microseconds: a wake-up for each byte costs more than the byte, and serial
+/// The deadline covers the bytes of this many microseconds: a wake-up for each byte costs more than the byte, and serial
 /// adapters are no finer.
 const BATCH_MICROS: u64 = 1_000;
 

@@ -31,7 +31,7 @@ use temperature::Temperature;
 
 /// A load above this, in 0.1 %, is an overload.
 const OVERLOAD: u16 = 800;
-/// After so many steps of overload a servo turns its motor off, until torque is switched off and on.
+/// After this many steps of overload a servo turns its motor off, until torque is switched off and on.
 const OVERLOAD_STEPS: u32 = 1_000;
 
 /// An answer of a servo.

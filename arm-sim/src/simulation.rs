@@ -35,7 +35,7 @@ const GUARD_TIME: Duration = Duration::from_micros(100);
 /// A deadline that stays in the past is checked again after this. Wake-ups without bytes on the host line are at
 /// multiples of it, so that many arms wake up together.
 const TICK: Duration = Duration::from_millis(1);
-/// Without a client the next wake-up may be this much later: nobody can observe the difference.
+/// Without a client the next wake-up may be this much later, because no client sees the difference.
 const TICK_WITHOUT_CLIENT: Duration = Duration::from_millis(50);
 
 /// What differs from one simulated arm to another.

@@ -14,7 +14,7 @@ use protocol_core::time::{Duration, Instant};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// An FTDI chip sends a block at once when it has so many bytes: a packet of 64 without two bytes of status.
+/// An FTDI chip sends a block at once when it has this many bytes: a packet of 64 without two bytes of status.
 const BLOCK: usize = 62;
 /// The longest possible setting, in milliseconds.
 const LONGEST_MS: u64 = 1_000;

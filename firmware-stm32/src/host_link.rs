@@ -10,7 +10,7 @@ use crate::uart::{Setup, SharedUart, UartPort};
 
 /// Room for a burst of requests while replies of 262 bytes are sent.
 const RECEIVE: usize = 2048;
-/// Room for three such replies.
+/// Room for three replies of 262 bytes.
 const TRANSMIT: usize = 1024;
 
 /// The host link as the main loop uses it.

@@ -38,7 +38,7 @@ const FIRST_REPORT: Duration = Duration::from_millis(2_000);
 const REPORT_PERIOD: Duration = Duration::from_millis(10_000);
 /// The period of attempts to open the port after the adapter was unplugged.
 const SEARCH_PERIOD: Duration = Duration::from_millis(500);
-/// The frame that damps the servos is sent so many times, as after a fault of the controller.
+/// The frame that damps the servos is sent this many times, as after a fault of the controller.
 const REPEATS: usize = 3;
 /// The pause before each of them: longer than a servo needs to answer.
 const PAUSE: std::time::Duration = std::time::Duration::from_millis(5);

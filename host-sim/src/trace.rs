@@ -16,7 +16,7 @@ use protocol_core::wire::{
 };
 use sevenbot::traffic::Traffic;
 
-/// After so many bytes without a frame, the bytes are noise.
+/// After this many bytes without a frame, the bytes are noise.
 const MAX_PENDING: usize = 2 * MAX_LENGTH;
 
 /// Both directions of the host link as text.

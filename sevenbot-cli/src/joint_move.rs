@@ -121,7 +121,8 @@ impl JointMove {
         if let Some(status) = arm.status()? {
             return Ok(status.moving() & !status.missing() & ours);
         }
-        // The maker's firmware has no moving bits: take the joints away from their targets, for the duration of the move.
+        // The maker's firmware has no moving bits: take the joints away from their targets, for the duration of the
+        // move.
         let away = self.away(&positions(arm)?, ARRIVED_DEGREES);
         let is_due = self.start.elapsed() >= self.duration();
         Ok(if is_due { 0 } else { away.iter().fold(0, |bits, (joint, ..)| bits | joint.bit()) })

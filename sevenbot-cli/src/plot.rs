@@ -32,7 +32,7 @@ const PANEL: f64 = 78.0;
 /// Distance between two panels.
 const GAP: f64 = 14.0;
 
-/// The shortest degree axis, so that a joint at rest looks at rest.
+/// The smallest range of the degree axis. It keeps small movements small in the plot.
 const MIN_DEGREES_SHOWN: f64 = 20.0;
 
 const STYLE: &str = "\

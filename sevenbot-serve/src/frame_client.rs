@@ -1,7 +1,7 @@
-//! A client that speaks frames, as on the arm's own line: requests from its bytes, replies and reports to bytes.
+//! A client with frames as on the arm's line: parses its requests, and encodes its replies and reports.
 //!
-//! A client that does not read loses reports first. Its replies wait, its reads wait for room, and finally its bytes wait
-//! where it sent them from; its writes are carried out as long as they do not stand behind a read that waits (D5).
+//! A client that does not read loses reports first. Its replies wait, its reads wait for room, and finally its bytes
+//! wait where it sent them from; its writes are carried out as long as they do not stand behind a read that waits (D5).
 
 use protocol_core::request::{Reply, Request};
 use protocol_core::time::Instant;
@@ -15,7 +15,7 @@ const MOST_REPORT_BYTES: usize = 1_024;
 /// Bytes for the client beyond which its reads wait.
 const MOST_BYTES: usize = 4_096;
 
-/// A client that speaks frames.
+/// A client with frames.
 #[derive(Debug)]
 pub struct FrameClient {
     id: ClientId,

@@ -27,7 +27,7 @@ pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
 /// Reports kept until the caller takes them: 20 s at the highest rate (D14). The oldest are dropped first.
 const REPORTS_KEPT: usize = 1_000;
 
-/// At least so many attempts for a read after a write.
+/// At least this many attempts for a read after a write.
 const MIN_ATTEMPTS: u32 = 3;
 
 /// Baud rate, timeout and attempts.

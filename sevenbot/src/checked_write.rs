@@ -74,12 +74,12 @@ impl MismatchCause {
     }
 }
 
-/// A frame is sent so many times before its loss is an error.
+/// A frame is sent this many times before its loss is an error.
 const WRITE_ATTEMPTS: u32 = 5;
 
 impl Arm {
-    /// Writes registers, reads them back, and returns those that differ. A frame that seems to be lost is sent again, up
-    /// to four times.
+    /// Writes registers, reads them back, and returns those that differ. A frame that seems to be lost is sent again,
+    /// up to four times.
     ///
     /// ```no_run
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -55,7 +55,8 @@ impl OpenError {
             serialport::ErrorKind::Io(ErrorKind::PermissionDenied) => {
                 Self::PermissionDenied { group: permission::group_of(path) }
             }
-            // The serialport crate reports a locked port like this. On Windows a missing port is reported like this too.
+            // The serialport crate reports a locked port like this. On Windows a missing port is reported like this
+            // too.
             serialport::ErrorKind::NoDevice if !cfg!(windows) => Self::Busy,
             _ => Self::Unusable(error),
         }

@@ -110,7 +110,8 @@ impl FramePort {
         taken > 0
     }
 
-    /// Reads from the port. Without bytes within `timeout` it reports an empty line to the deframer and returns `false`.
+    /// Reads from the port. Without bytes within `timeout` it reports an empty line to the deframer and returns
+    /// `false`.
     fn read(&mut self, timeout: Duration) -> Result<bool, PortError> {
         // Use the planned end of the wait. After a suspension the actual end is later, with bytes still in the port.
         let end = self.time_at(Instant::now() + timeout);

@@ -18,7 +18,7 @@ use crate::checked_write::{MismatchCause, WriteMismatch, cause_from_counters};
 use crate::error::Error;
 use crate::joints::{JointSnapshot, POLL_PERIOD, START_UP_TIME, frames_for};
 
-/// Targets are written so many times before their loss is an error.
+/// Targets are written this many times before their loss is an error.
 const HOLD_ATTEMPTS: u32 = 5;
 
 /// Why the arm may not hold.
@@ -134,8 +134,8 @@ impl JointSnapshot {
     fn hold_target(&self, joint: Joint, is_past_start_up: bool) -> Option<u8> {
         let present = self.present(joint);
         let is_unknown = present == 0 && self.is_missing(joint);
-        // A joint that moves at position 0 cannot wait: it has just left 0 degrees, or start-up is not over. In start-up the
-        // arm does not drive a joint before it is measured, and the next read shows that.
+        // A joint that moves at position 0 cannot wait: it has just left 0 degrees, or start-up is not over. In
+        // start-up the arm does not drive a joint before it is measured, and the next read shows that.
         let can_wait = self.may_be_unmeasured(joint, is_past_start_up) && !self.is_moving(joint);
         (!is_unknown && !can_wait).then_some(present)
     }

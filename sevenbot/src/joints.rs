@@ -72,8 +72,8 @@ impl Arm {
         Ok(JointSnapshot { registers, status })
     }
 
-    /// Waits up to 0.7 s until no joint has the default target of power-up. The arm replaces these targets within half a
-    /// second (D12). Returns the joints at that time.
+    /// Waits up to 0.7 s until no joint has the default target of power-up. The arm replaces these targets within half
+    /// a second (D12). Returns the joints at that time.
     ///
     /// # Errors
     /// As [`Arm::read`].

@@ -10,7 +10,7 @@ use protocol_core::registers::map::PRESENT_POSITION;
 
 use crate::span::Span;
 
-/// At most so many pending reads are remembered. No reply is later than this many reads.
+/// At most this many pending reads are remembered. No reply is later than this many reads.
 const REMEMBERED: usize = 16;
 
 /// The registers of a report (D14).
@@ -21,8 +21,8 @@ pub(crate) const REPORT: Span = Span::of(&PRESENT_POSITION);
 pub(crate) struct PendingReads(VecDeque<Span>);
 
 impl PendingReads {
-    /// Adds a read of `wanted`. Returns the span to request: wider where `wanted` is pending already. A span of more than
-    /// 239 registers may have no room to be widened.
+    /// Adds a read of `wanted`. Returns the span to request: wider where `wanted` is pending already. A span of more
+    /// than 239 registers may have no room to be widened.
     pub(crate) fn add(&mut self, wanted: Span) -> Span {
         let is_free = |span: &Span| *span != REPORT && !self.0.contains(span);
         let asked = (0..=u8::MAX).map_while(|by| wanted.widened(by)).find(is_free).unwrap_or(wanted);

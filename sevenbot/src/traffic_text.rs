@@ -20,7 +20,7 @@ use crate::traffic::Traffic;
 
 /// A read of more rows shows only the first and the last.
 const MAX_ROWS_NAMED: usize = 3;
-/// Noise shows at most so many bytes.
+/// Noise shows at most this many bytes.
 const MAX_NOISE_SHOWN: usize = 32;
 
 impl fmt::Display for Traffic {

@@ -5,7 +5,7 @@ use protocol_core::registers::Joint;
 
 use crate::servo::units::COUNT;
 
-/// For either kind of servo, the angle of so many counts is a whole number of thousandths of a degree.
+/// For either kind of servo, the angle of this many counts is a whole number of thousandths of a degree.
 const SPAN: u16 = 850;
 
 /// The angle of a joint in thousandths of a degree, at a servo position in millionths of a count.

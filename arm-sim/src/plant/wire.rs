@@ -51,7 +51,7 @@ impl Wire {
         }
     }
 
-    /// Reserves the wire for so many bytes of the master, at `now` or after its earlier bytes. Returns start and end.
+    /// Reserves the wire for this many bytes of the master, at `now` or after its earlier bytes. Returns start and end.
     pub(crate) fn reserve(&mut self, now: Instant, count: usize) -> (Instant, Instant) {
         let start = self.master_done_at.max(now);
         self.master_done_at = start + time_of(count);

@@ -104,7 +104,7 @@ const STEP_MICROS: i64 = STEP.as_micros().cast_signed();
 mod tests {
     use super::*;
 
-    /// The speed of joint 3 in degrees per second, after so many milliseconds at this torque from rest.
+    /// The speed of joint 3 in degrees per second, after this many milliseconds at this torque from rest.
     fn degrees_per_second(torque: i64, drag: Drag, millis: u32) -> i64 {
         let gear = Gear::of(Joint::ALL[2]);
         let speed = (0..millis).fold(0, |speed, _| gear.speed_after(speed, torque, drag));

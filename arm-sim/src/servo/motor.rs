@@ -205,7 +205,7 @@ impl Motor {
 
 /// The longest distance of a step, from the number of degrees in a count.
 fn max_distance(joint: Joint) -> i64 {
-    /// For either kind of servo, the angle of so many counts is a whole number of thousandths of a degree.
+    /// For either kind of servo, the angle of this many counts is a whole number of thousandths of a degree.
     const SPAN: u16 = 850;
     let angle = angle_from_counts(joint, SPAN, 0).0 - angle_from_counts(joint, 0, 0).0;
     MAX_SPEED * i64::from(SPAN) * COUNT_PER_SECOND / i64::from(angle).abs().max(1)

@@ -4,7 +4,7 @@
 const AMBIENT: u32 = 25_000;
 /// The final rise in temperature for each 0.1 % of load, in thousandths of a degree.
 const RISE_PER_LOAD: u32 = 40;
-/// The temperature is updated once in so many steps: once a second.
+/// The temperature is updated once in this many steps: once a second.
 const UPDATE_STEPS: u32 = 1_000;
 /// The time constant of the temperature, in updates.
 const TIME_CONSTANT: u32 = 300;

@@ -113,7 +113,7 @@ impl Rig {
         Joint::ALL.map(|joint| self.plant.angle(joint))
     }
 
-    /// The distance of each joint in so many milliseconds, in thousandths of a degree.
+    /// The distance of each joint in this many milliseconds, in thousandths of a degree.
     pub fn turn_in(&mut self, millis: u64) -> [i32; JOINTS] {
         let before = self.pose();
         self.pass(millis);

@@ -253,7 +253,7 @@ impl Bus {
         tcsetattr(&self.0, OptionalActions::Now, &mode).unwrap();
     }
 
-    /// Everything that comes until it has been quiet for so long.
+    /// Everything that comes until it has been quiet for this long.
     fn receive(&mut self, quiet: Duration) -> Vec<u8> {
         let mut received = Vec::new();
         let quiet = Timespec { tv_sec: 0, tv_nsec: quiet.as_nanos().try_into().unwrap() };
@@ -278,7 +278,7 @@ impl Bus {
         }
     }
 
-    /// Pings a servo once, and takes everything that comes until it has been quiet for so long.
+    /// Pings a servo once, and takes everything that comes until it has been quiet for this long.
     pub(crate) fn ping(&mut self, id: u8, quiet: Duration) -> Vec<u8> {
         self.0.write_all(&[0xFF, 0xFF, id, 2, 1, !(id + 3)]).unwrap();
         self.receive(quiet)

@@ -133,7 +133,7 @@ impl Player {
         Self { moments, steps, measured: Vec::new(), last_report: Instant::now(), played: 0, seconds }
     }
 
-    /// Plays so many times, and restores the speeds and times that the arm had before.
+    /// Plays this many times, and restores the speeds and times that the arm had before.
     fn play_and_restore(&mut self, arm: &mut Arm, times: u32) -> Result<(), CommandError> {
         let before = arm.read_span(Span::between(&SPEED, &TIME))?;
         let done = with_reports(arm, FEEDBACK_HZ, |arm| {
@@ -145,7 +145,7 @@ impl Player {
         done.and(restored)
     }
 
-    /// Plays the recording so many times; 0 means until interrupted.
+    /// Plays the recording this many times; 0 means until interrupted.
     fn play(&mut self, arm: &mut Arm, interrupt: Interrupt, times: u32) -> Result<(), CommandError> {
         while times == 0 || self.played < times {
             self.approach(arm, interrupt)?;

@@ -13,7 +13,7 @@ use crate::command_error::CommandError;
 use crate::printer::{Printable, warn};
 use crate::session::Session;
 
-/// Show where the tip is, in millimetres.
+/// Show the position of the tip in millimetres.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -35,7 +35,7 @@ pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
     session.printer.print(&TipPosition::of(joints.positions()))
 }
 
-/// Warns of joints whose position is not known.
+/// Warns about joints with an unknown position.
 fn warn_of_silent(snapshot: &JointSnapshot) {
     let moves_tip = |joint: &Joint| joint.number() <= 6;
     let moving = Joint::ALL.iter().filter(|joint| moves_tip(joint)).fold(0, |bits, joint| bits | joint.bit());
@@ -61,7 +61,7 @@ pub(crate) struct TipPosition {
 }
 
 impl TipPosition {
-    /// With the joints at these angles, joint 1 first, in degrees.
+    /// From the joint angles in degrees, joint 1 first.
     pub(crate) fn of(positions_degrees: [u8; 7]) -> Self {
         let angles = positions_degrees.map(Angle::from_register);
         let pose = TipPose::of(angles);

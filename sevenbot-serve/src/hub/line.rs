@@ -1,7 +1,7 @@
 //! The line to the arm: frames out, replies in, each matched to the read that it answers.
 //!
 //! The arm answers in the order of the requests (D5). A reply belongs to the first read with its address and count; the
-//! reads before it have lost theirs. The line is filled at its baud rate and not further, so that no queue grows in the
+//! reads before it have lost theirs. Frames are written at the baud rate, so that no queue grows in the
 //! kernel, where a later frame could not pass an earlier one.
 
 use std::collections::VecDeque;
@@ -16,16 +16,17 @@ use super::client_id::ClientId;
 use super::request::reply_bytes;
 use super::stream::Stream;
 
-/// How long a reply may take beside its time on the line. USB adapters take 16 ms each way; a busy computer takes more.
+/// The time for a reply, in addition to its time on the line. USB adapters take 16 ms each way; a busy computer takes
+/// more.
 const REPLY_TIMEOUT: Duration = Duration::from_millis(300);
-/// How long replies that come late are dropped after a timeout.
+/// After a timeout, replies are dropped for this time.
 const LATE_REPLIES: Duration = Duration::from_millis(50);
 /// The line may be filled this far ahead, so that it is not idle while the program wakes up.
 const AHEAD: Duration = Duration::from_millis(1);
 /// Bytes of replies that may be on their way. One read is always allowed.
 const WINDOW: usize = 96;
 
-/// Who wants a reply.
+/// The owner of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Owner {
     /// A client.
@@ -82,7 +83,7 @@ impl Line {
         self.deframer.push(now, bytes)
     }
 
-    /// The next reply and who wants it. Frames that nobody wants are dropped.
+    /// The next reply and its owner. Drops frames without an owner.
     pub(crate) fn next_reply(&mut self) -> Option<(Owner, Event)> {
         loop {
             if let Some(Unanswered { owner, address, count, .. }) = self.lost.pop_front() {
@@ -170,7 +171,7 @@ impl Line {
         self.busy_until = self.busy_until.max(now + LATE_REPLIES);
     }
 
-    /// When a reply counts as lost, or silence of the arm's line has an effect.
+    /// The next timeout: of a reply, or of an empty line for the deframer.
     pub(crate) fn deadline(&self) -> Instant {
         let reply = self.unanswered.front().map_or(Instant::FAR_FUTURE, |read| read.deadline);
         reply.min(self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE))

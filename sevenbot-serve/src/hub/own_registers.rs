@@ -23,8 +23,8 @@ impl OwnRegisters {
         }
     }
 
-    /// Applies a write and sets the own registers in `values` to 0, as the arm has them. Returns whether a frequency may
-    /// have changed. A frame that the arm will refuse (D16) has no effect here, and passes as it is.
+    /// Applies a write and sets the own registers in `values` to 0, as the arm has them. Returns whether a frequency
+    /// may have changed. A frame that the arm will refuse (D16) has no effect here, and passes as it is.
     pub(crate) fn write(&mut self, address: u8, values: &mut [u8]) -> bool {
         if is_refused(address, values) {
             return false;

@@ -1,8 +1,8 @@
 //! Fair use of the line: start-time fair queueing, counted in bytes.
 //!
 //! Each client has a tag: the bytes up to which it has used the line. The client with the lowest tag is next. A client
-//! that was idle starts at the tag of the request that was sent last. So it waits for one frame, and however many frames
-//! others have queued does not matter.
+//! that was idle starts at the tag of the request that was sent last. So it waits for one frame, and however many
+//! frames others have queued does not matter.
 
 /// The tag of a client, and when it was served last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -12,7 +12,7 @@ pub(crate) struct Share {
 }
 
 impl Share {
-    /// Of a client that has sent nothing.
+    /// The share of a client that has sent nothing.
     pub(crate) const IDLE: Self = Self { tag: 0, turn: 0 };
 }
 
@@ -31,7 +31,7 @@ impl Shares {
         share.tag = share.tag.max(self.current);
     }
 
-    /// The client with the least order is next; with equal tags the one that has waited longest.
+    /// The client with the smallest order is next. Between equal tags it is the one that has waited longest.
     pub(crate) fn order(&self, share: Share) -> (u64, u64) {
         (share.tag.max(self.current), share.turn)
     }

@@ -1,9 +1,9 @@
-//! A straight line of the tip, as moments for playback: planned exactly, checked whole, and rounded to degrees.
+//! Plans a straight line of the tip, checks all of it, and rounds it to whole degrees for playback.
 //!
 //! ```text
-//!   start, end, speed ──▶ TipPath: tip and tool at any share of the way
+//!   start, end, speed ──▶ TipPath: tip and tool at any fraction of the line
 //!       each 5 ms, at most 0.5 mm ──▶ angles of the same branch ──▶ reach, jumps and speeds checked
-//!       each 50 ms ──▶ whole degrees ──▶ Moment, and how far it is from the line
+//!       each 50 ms ──▶ whole degrees ──▶ Moment, and its distance from the line
 //! ```
 
 use std::time::Duration;
@@ -25,13 +25,13 @@ use path::TipPath;
 
 /// Time between two targets.
 pub const PERIOD: Duration = MAX_SEGMENT;
-/// The tool turns no faster, in degrees/s.
+/// The largest turning speed of the tool, in degrees/s.
 const TURN_SPEED: f64 = 60.0;
-/// The fewest checks in a period.
+/// The smallest number of checks in a period.
 const LEAST_CHECKS: f64 = 10.0;
-/// The longest way between two checks, in millimetres.
+/// The largest distance between two checks, in millimetres.
 const CHECK_EVERY: f64 = 0.5;
-/// A joint that turns further between two checks does not follow the line, in degrees: it changes the branch.
+/// The largest turn of a joint between two checks, in degrees. A larger turn means another branch of the solution.
 const JUMP: f64 = 5.0;
 /// Joint 5 at this angle points the tool along the forearm. Joint 4 then turns neither tip nor tool.
 const IN_LINE: f64 = 90.0;
@@ -42,23 +42,23 @@ type Angles = [f64; 5];
 /// A straight line of the tip that the arm can follow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StraightLine {
-    /// Where it begins.
+    /// The pose at the start.
     pub start: TipPose,
     /// Its length, in millimetres.
     pub length_mm: f64,
-    /// How long it takes.
+    /// The duration.
     pub duration: Duration,
-    /// What the joints do.
+    /// The movement of the joints.
     pub recording: Recording,
     /// The largest distance of the tip from the line that whole degrees cause, in millimetres.
     pub deviation_mm: f64,
     /// The largest tilt of the tool that whole degrees cause, in degrees.
     pub tilt_degrees: f64,
-    /// The angle to which joint 4 turns before the line begins: tip and tool stay where they are. `None` if it stays.
+    /// The angle to which joint 4 turns before the line starts, without moving tip or tool. `None` if it stays.
     pub first_turn: Option<Angle>,
 }
 
-/// What a line is planned from.
+/// The request for a line.
 #[derive(Clone, Copy, Debug)]
 pub struct StraightLineRequest {
     /// The targets of the arm at rest, joint 1 first.
@@ -69,7 +69,7 @@ pub struct StraightLineRequest {
     pub tip: Vector,
     /// The direction of the tool at the end, of any length. It turns evenly on the way.
     pub tool: Vector,
-    /// Millimetres per second. A tool that turns far makes the line slower.
+    /// Speed of the tip in mm/s. A large turn of the tool makes the line slower.
     pub speed: f64,
 }
 
@@ -77,7 +77,7 @@ impl StraightLine {
     /// Plans a line. The angles of joints 6 and 7 do not change.
     ///
     /// # Errors
-    /// Where the arm cannot follow it, and why.
+    /// The point where the arm cannot follow the line, and the reason.
     pub fn plan(request: &StraightLineRequest) -> Result<Self, StraightLineError> {
         let start = TipPose::of(request.start);
         let end = request.tool.unit().ok_or_else(|| {
@@ -109,7 +109,7 @@ impl StraightLine {
     }
 }
 
-/// How a line is divided in time.
+/// The division of a line in time.
 struct LineTiming {
     duration: Duration,
     /// Targets after the first.
@@ -132,7 +132,7 @@ impl LineTiming {
         Self { duration, periods: periods as u32, checks: checks as u32 }
     }
 
-    /// The share of the way at a check.
+    /// The fraction of the line at a check, 0 to 1.
     fn share(&self, check: u32) -> f64 {
         f64::from(check) / (f64::from(self.periods) * f64::from(self.checks))
     }
@@ -171,9 +171,9 @@ impl LineTiming {
         self.check_speed(path, fastest, speed).map(|()| poses)
     }
 
-    /// Can the joint that turns fastest follow?
+    /// Checks the speed of the joint that turns fastest.
     fn check_speed(&self, path: &TipPath, fastest: JointTurn, speed: f64) -> Result<(), StraightLineError> {
-        // Above it the registers know only the motors' maximum.
+        // The speed register has no value between this and the maximum.
         let limit = Speed::from_steps(100).map_or(0.0, Speed::degrees_per_second);
         let degrees_per_second = fastest.degrees / self.interval();
         if degrees_per_second <= limit {
@@ -191,7 +191,7 @@ impl LineTiming {
 struct JointTurn {
     joint: u8,
     degrees: f64,
-    /// The share of the way.
+    /// The fraction of the line, 0 to 1.
     share: f64,
 }
 
@@ -203,7 +203,7 @@ impl JointTurn {
     }
 }
 
-/// A pose in whole degrees, and how far it is from the line.
+/// A pose in whole degrees, and its distance from the line.
 struct WholePose {
     degrees: [u8; 5],
     deviation_mm: f64,
@@ -219,7 +219,7 @@ impl WholePose {
     }
 }
 
-/// The solution at a share of the way that is nearest to the angles before it.
+/// The solution at this fraction of the line that is nearest to the angles before.
 fn solved(path: &TipPath, share: f64, before: Angles) -> Result<Angles, StraightLineError> {
     let (tip, tool) = path.at(share);
     let all = ik6_all(tip, tool);
@@ -250,7 +250,7 @@ fn solved(path: &TipPath, share: f64, before: Angles) -> Result<Angles, Straight
     Ok(nearest.unwrap_or(before))
 }
 
-/// The angles at which the line begins. Where the tool is in line with the forearm, joint 4 turns first to where the
+/// The angles at the start of the line. If the tool is in line with the forearm, joint 4 first turns to where the
 /// line needs it next.
 fn start_angles(request: &StraightLineRequest, path: &TipPath, pace: &LineTiming) -> Angles {
     let [t1, t2, t3, t4, t5, ..] = request.start.map(|angle| f64::from(angle.degrees()));
@@ -262,7 +262,7 @@ fn start_angles(request: &StraightLineRequest, path: &TipPath, pace: &LineTiming
     next.map_or(angles, |[_, _, _, roll, _]| [t1, t2, t3, roll.round(), t5])
 }
 
-/// Whole degrees that the arm can take: the nearest, or beside them at a limit.
+/// The nearest whole degrees within the limits of the arm.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 180 degrees")]
 fn nearest_degrees(angles: Angles, path: &TipPath, share: f64) -> [u8; 5] {
     let whole = angles.map(f64::round);
@@ -273,7 +273,7 @@ fn nearest_degrees(angles: Angles, path: &TipPath, share: f64) -> [u8; 5] {
     best_degrees(angles, path, share)
 }
 
-/// Whole degrees that the arm can take and that miss the path by the least.
+/// The whole degrees within the limits that are nearest to the path.
 fn best_degrees(angles: Angles, path: &TipPath, share: f64) -> [u8; 5] {
     let (tip, tool) = path.at(share);
     TipTarget::near(angles, tip, tool).degrees

@@ -1,16 +1,16 @@
-//! Positions of the tip in millimetres: computed from the joints, and turned into targets of the joints.
+//! Converts between joint angles and positions of the tip in millimetres.
 //!
 //! ```text
 //!   angles of the joints ──▶ TipPose: tip, tool, wrist
 //!
-//!   tip, tool ──▶ TipTarget: whole degrees of joints 1 to 5     or Unreachable: why, and the nearest point
-//!   tip, tool, speed ──▶ Line: a straight line as moments    or StraightLineError: where it breaks, and why
+//!   tip, tool ──▶ TipTarget: whole degrees of joints 1 to 5     or Unreachable: reason and nearest point
+//!   tip, tool, speed ──▶ Line: a straight line as moments    or StraightLineError: place and reason
 //! ```
 //!
-//! Origin: where the base axis meets the top plate. x is to the right, y forward, z up. The tip is where the axis of
-//! joint 6 meets the outer face of its disc. The tool direction points from the wrist to the tip.
+//! Origin: the base axis at the height of the top plate. x is to the right, y forward, z up. The tip is the point where
+//! the axis of joint 6 meets the outer face of its disc. The tool direction points from the wrist to the tip.
 //!
-//! Pure arithmetic: knows no arm. The geometry is that of [`kinematics`].
+//! The geometry comes from [`kinematics`]. This module does not know the arm.
 
 use std::fmt;
 
@@ -51,25 +51,25 @@ pub struct TipPose {
     pub tip: Vector,
     /// The direction of the tool, of length 1.
     pub tool: Vector,
-    /// Where the axes of joints 4, 5 and 6 meet, in millimetres.
+    /// The common point of the axes of joints 4, 5 and 6, in millimetres.
     pub wrist: Vector,
 }
 
 impl TipPose {
-    /// With the joints at these angles, joint 1 first.
+    /// From the joint angles, joint 1 first.
     #[must_use]
     pub fn of([t1, t2, t3, t4, t5, t6, _]: [Angle; 7]) -> Self {
         Self::at([t1, t2, t3, t4, t5, t6].map(|angle| f64::from(angle.degrees())))
     }
 
-    /// With joints 1 to 6 at these angles, in degrees.
+    /// From the angles of joints 1 to 6, in degrees.
     #[must_use]
     pub fn at(angles: [f64; 6]) -> Self {
         let Frames { arm, hand } = forward(angles);
         Self { tip: hand.tip, tool: hand.tool, wrist: arm.wrist }
     }
 
-    /// How far the tip may be from a position that was computed from whole degrees, in millimetres: each joint may be
+    /// The largest error of a position computed from whole degrees, in millimetres: each joint may be
     /// half a degree away from its register.
     #[must_use]
     pub fn rounding_mm([t1, t2, t3, t4, t5, t6, _]: [Angle; 7]) -> f64 {
@@ -92,7 +92,7 @@ pub(crate) fn angle_between(one: Vector, other: Vector) -> f64 {
     one.cross(other).length().atan2(one.dot(other)).to_degrees()
 }
 
-/// A point as people write it: `0 185 50`.
+/// A point as text: `0 185 50`.
 ///
 /// ```
 /// use sevenbot::cartesian::{PointText, Vector};
@@ -110,7 +110,7 @@ impl fmt::Display for PointText {
     }
 }
 
-/// A direction in words where it has some: `straight down`, or `0 0.71 -0.71`.
+/// A direction as text: a name such as `straight down`, or `0 0.71 -0.71`.
 ///
 /// ```
 /// use sevenbot::cartesian::{DOWN, DirectionText, Vector};

@@ -1,7 +1,8 @@
-//! The nearest point within reach, as a person can type it: in tenths of a millimetre, and still within reach.
+//! The nearest point within reach, rounded to tenths of a millimetre so that the rounded point is within reach too.
 //!
-//! Where the wrist limits the reach, [`nearest_tip`] gives the point. Where the bend of the hand does, the set of
-//! points has no simple shape, and a search on grids finds one: coarse over the whole reach, then finer round the best.
+//! If the wrist limits the reach, [`nearest_tip`] gives the point. If the bend of the hand limits it, the set of
+//! points has no simple shape. Then a grid search finds a point: coarse over the whole reach, then finer around the
+//! best.
 
 use kinematics::ik6;
 use kinematics::nearest::nearest_tip;
@@ -40,7 +41,7 @@ fn searched(tip: Vector, tool: Vector) -> Option<Vector> {
     let mut step = COARSE / 2.0;
     while step > FINE {
         let next = best(round(nearest, step, 2), tip, tool).unwrap_or(nearest);
-        // A better point may have a better neighbour at the same distance.
+        // A better point may itself have a better neighbour.
         if (next - tip).length() < (nearest - tip).length() {
             nearest = next;
         } else {

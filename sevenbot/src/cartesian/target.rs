@@ -1,4 +1,4 @@
-//! A position of the tip as targets of the joints in whole degrees, or why there are none.
+//! Computes targets in whole degrees for a position of the tip.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ use kinematics::{NoSolution, ik6};
 use super::nearest::nearest;
 use super::{DirectionText, PointText, TipPose, Vector, angle_between};
 
-/// A tilt of the tool counts as the way of a point this far from its axis, in millimetres: the edge of the disc.
+/// Radius in millimetres that converts a tilt of the tool to a distance: the edge of the disc.
 const TILT_RADIUS: f64 = kinematics::geometry::DISC_RADIUS;
 
 /// Targets of joints 1 to 5 that bring the tip to a position.
@@ -27,11 +27,11 @@ pub struct TipTarget {
     pub angles: [f64; 5],
     /// Angles in whole degrees that the registers can hold and the arm can take.
     pub degrees: [u8; 5],
-    /// Where these bring the tip.
+    /// The pose of the tip at these degrees.
     pub reached: TipPose,
-    /// How far that is from the position asked for, in millimetres.
+    /// The distance to the requested position, in millimetres.
     pub miss_mm: f64,
-    /// How far the tool is from the direction asked for, in degrees.
+    /// The angle to the requested direction of the tool, in degrees.
     pub tilt_degrees: f64,
 }
 
@@ -39,7 +39,7 @@ impl TipTarget {
     /// The targets for a tip in millimetres, with the tool in a direction of any length.
     ///
     /// # Errors
-    /// Why the arm does not reach it, and the nearest point that it reaches.
+    /// The position is out of reach: the reason, and the nearest point within reach.
     pub fn of(tip: Vector, tool: Vector) -> Result<Self, Unreachable> {
         let angles = ik6(tip, tool).map_err(|why| Unreachable::because(why, tip, tool))?;
         Ok(Self::near(angles, tip, tool.unit().unwrap_or(tool)))
@@ -57,7 +57,7 @@ impl TipTarget {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 180 degrees")]
     fn with(angles: [f64; 5], whole: [f64; 5], tip: Vector, tool: Vector) -> Self {
         let [t1, t2, t3, t4, t5] = whole;
-        // The tip and the tool are the same for any angle of joint 6.
+        // Joint 6 moves neither tip nor tool.
         let reached = TipPose::at([t1, t2, t3, t4, t5, 90.0]);
         Self {
             angles,
@@ -91,16 +91,16 @@ fn beside(angles: [f64; 5], choice: u8) -> [f64; 5] {
 /// Why the arm does not reach a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unreachable {
-    /// What does not allow it.
+    /// The reason.
     pub why: NoSolution,
-    /// The tip asked for, in millimetres.
+    /// The requested tip, in millimetres.
     pub tip: Vector,
-    /// The direction of the tool asked for.
+    /// The requested direction of the tool.
     pub tool: Vector,
     /// The nearest point that the tip reaches with this direction of the tool, to a tenth of a millimetre. `None` if
     /// there is none within reach or the numbers are no position.
     pub nearest: Option<Vector>,
-    /// A direction of the tool with which the tip reaches the point asked for. `None` if none of the usual ones does.
+    /// A usual direction of the tool with which the tip reaches the requested point; `None` if there is none.
     pub other_tool: Option<Vector>,
 }
 
@@ -109,7 +109,7 @@ impl Unreachable {
         Self { why, tip, tool, nearest: nearest(tip, tool), other_tool: other_tool(tip) }
     }
 
-    /// From the point asked for to the nearest point within reach, in millimetres.
+    /// The distance from the requested point to the nearest point within reach, in millimetres.
     #[must_use]
     pub fn distance_mm(&self) -> Option<f64> {
         self.nearest.map(|nearest| (nearest - self.tip).length())
@@ -143,7 +143,7 @@ impl fmt::Display for Unreachable {
     }
 }
 
-/// What does not allow a position, for a reader who sees the arm.
+/// The reason as text, with the parts that a user sees.
 fn reason(why: NoSolution) -> &'static str {
     match why {
         NoSolution::TooFar => "it is too far from the shoulder",

@@ -43,7 +43,7 @@ pub struct Moment {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum LineError {
-    /// The line has so many fields instead of nine.
+    /// The line has this many fields instead of nine.
     Fields(usize),
     /// The text is not a time in seconds, up to a day.
     Time(String),

@@ -132,8 +132,8 @@ impl BusMaster {
         Err(no_answer)
     }
 
-    /// Writes registers and reads them back, with retries. Only the read counts: a servo may be set to acknowledge nothing
-    /// (its register 8).
+    /// Writes registers and reads them back, with retries. Only the read counts: a servo may be set to acknowledge
+    /// nothing (its register 8).
     ///
     /// # Errors
     /// The servo does not answer, does not hold the values, or the port failed.

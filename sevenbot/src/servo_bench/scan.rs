@@ -4,8 +4,8 @@
 //!   each rate ──▶ each id: a question with a short timeout ──▶ candidates ──▶ each: questions with the full timeout
 //! ```
 //!
-//! The first pass takes 5 ms for an id at 1 Mbaud. A slow USB adapter delivers an answer after that, while another id is
-//! asked. The late answer then makes its sender a candidate.
+//! The first pass takes 5 ms for an id at 1 Mbaud. A slow USB adapter delivers an answer after that, while another id
+//! is asked. The late answer then makes its sender a candidate.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;

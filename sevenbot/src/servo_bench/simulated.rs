@@ -70,7 +70,7 @@ pub(super) struct SimulatedWire {
     pub(super) has_echo: bool,
     /// The delay of an echo.
     pub(super) echo_delay: Duration,
-    /// After so many frames the port fails.
+    /// After this many frames the port fails.
     pub(super) frames_until_lost: Option<usize>,
     /// The rates of the adapter; empty means all.
     pub(super) rates: Vec<u32>,

@@ -13,7 +13,7 @@ use tty_ports::pty::Pty;
 
 use crate::run::TaskResult;
 
-/// The most bytes that wait for the emulator. With so many, the port is not read.
+/// The most bytes that wait for the emulator. With this many, the port is not read.
 const CAPACITY: usize = 4_096;
 /// The period of other tasks.
 const POLL_PERIOD: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };

@@ -29,8 +29,8 @@ use crate::write_result::all_taken;
 
 /// Find the offsets of the joints, and store them.
 ///
-/// For each joint, bring it to a mark of known angle and enter that angle. Move the joint with +N or -N degrees, or by hand
-/// after `sevenbot state forceless`. At the end a question comes before the offsets are written.
+/// For each joint, bring it to a mark of known angle and enter that angle. Move the joint with +N or -N degrees, or by
+/// hand after `sevenbot state forceless`. At the end a question comes before the offsets are written.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 At each joint:

@@ -18,7 +18,7 @@ use crate::write_result::{all_taken, motors_obey};
 
 /// Time between two attempts to connect.
 const RECONNECT_PERIOD: Duration = Duration::from_millis(500);
-/// The arm is lost after so many consecutive unanswered samples.
+/// The arm is lost after this many consecutive unanswered samples.
 const MAX_UNANSWERED: u32 = 3;
 
 /// State of the thread.
@@ -54,7 +54,8 @@ impl From<Error> for WatchEnd {
 }
 
 impl ArmThread {
-    /// Runs until the command channel closes. After Ctrl-C makes the arm hold, and returns the result; `None` without an arm.
+    /// Runs until the command channel closes. After Ctrl-C makes the arm hold, and returns the result; `None` without
+    /// an arm.
     pub(crate) fn run(mut self) -> Option<Result<JointSnapshot, CommandError>> {
         while self.look().is_ok() {}
         let arm = self.arm.take();

@@ -78,7 +78,7 @@ fn show(
     Ok(())
 }
 
-/// Waits for input. `false` if the terminal is gone: crossterm would read its end without end.
+/// Waits for input. Returns false if the terminal is gone, because crossterm would then read end-of-file in a loop.
 #[cfg(unix)]
 fn wait_for_input(timeout: Duration, reads_stdin: bool) -> io::Result<bool> {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};

@@ -1,4 +1,4 @@
-//! The arguments of `move-to`, and whether the point is within reach.
+//! The arguments of `move-to`, and the check of the point.
 
 use clap::Args;
 use sevenbot::cartesian::{DOWN, TipTarget, Unreachable, Vector};
@@ -7,8 +7,8 @@ use crate::command_error::CommandError;
 
 /// Move the tip to a point, in millimetres.
 ///
-/// Nothing moves before the whole move was checked. A point out of reach is refused, with the nearest point within
-/// reach.
+/// The whole move is checked before the arm moves. If the point is out of reach, the error gives the nearest point
+/// within reach.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -50,19 +50,19 @@ pub(crate) struct MoveToArgs {
     #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, allow_negative_numbers = true,
           value_parser = millimetres, conflicts_with = "keep_tool")]
     tool: Option<Vec<f64>>,
-    /// Keep the direction that the tool has now.
+    /// Keep the present direction of the tool.
     #[arg(long)]
     keep_tool: bool,
-    /// Move the tip on a straight line from where the joints are sent now; waits for the end.
+    /// Move the tip on a straight line from the present targets, and wait for the end.
     #[arg(long)]
     pub(super) straight: bool,
     /// Speed of the tip on the straight line in millimetres per second, 1 to 500.
     #[arg(long, value_name = "MM_S", default_value_t = 50.0, requires = "straight", value_parser = speed)]
     pub(super) speed: f64,
-    /// Wait until the joints are there, and show where the tip is.
+    /// Wait until the joints have arrived, and show the position of the tip.
     #[arg(long)]
     pub(super) wait: bool,
-    /// Check and show the move, and move nothing.
+    /// Check and show the move, but do not move.
     #[arg(long)]
     pub(super) dry_run: bool,
 }
@@ -82,7 +82,7 @@ impl MoveToArgs {
         Vector::new(self.x, self.y, self.z)
     }
 
-    /// The direction of the tool that was asked for, unless it is the present one.
+    /// The requested direction of the tool; `None` for the present one.
     pub(super) fn tool(&self) -> Option<Vector> {
         match self.tool.as_deref() {
             Some(&[x, y, z]) => Some(Vector::new(x, y, z)),
@@ -92,7 +92,7 @@ impl MoveToArgs {
     }
 }
 
-/// The targets of the joints, or why there are none.
+/// The targets of the joints. Fails if the point is out of reach.
 pub(super) fn target(tip: Vector, tool: Vector) -> Result<TipTarget, CommandError> {
     TipTarget::of(tip, tool).map_err(|reason| unreachable(&reason))
 }

@@ -1,4 +1,4 @@
-//! What `move-to` shows.
+//! The output of `move-to`.
 
 use std::io::{self, Write};
 
@@ -9,11 +9,11 @@ use sevenbot::cartesian::{DirectionText, PointText, TipPose, TipTarget, Vector};
 use super::super::position::components;
 use crate::printer::Printable;
 
-/// A move to a point: planned, and measured if it was waited for.
+/// A move to a point: the plan, and with --wait the measured result.
 #[derive(Debug, Serialize)]
 pub(super) struct TipMove {
     asked_mm: [f64; 3],
-    /// The direction of the tool that was used.
+    /// The direction of the tool.
     tool: [f64; 3],
     /// Joints 1 to 5.
     targets_degrees: [u8; 5],
@@ -35,7 +35,7 @@ pub(super) struct MeasuredTip {
 }
 
 impl TipMove {
-    /// A move that is about to begin.
+    /// A planned move.
     pub(super) fn planned(tip: Vector, target: &TipTarget, direction: Vector) -> Self {
         Self {
             asked_mm: components(tip, 100.0),
@@ -49,7 +49,7 @@ impl TipMove {
         }
     }
 
-    /// The same with the angles that were measured at its end.
+    /// Adds the angles measured at the end.
     pub(super) fn with_measured(self, positions: Option<[u8; 7]>) -> Self {
         let [x, y, z] = self.asked_mm;
         let measured = positions.map(|positions| MeasuredTip::of(positions, Vector::new(x, y, z)));
@@ -58,7 +58,7 @@ impl TipMove {
 }
 
 impl MeasuredTip {
-    /// With the joints at these angles, joint 1 first, in degrees, and this tip asked for.
+    /// From the joint angles in degrees, joint 1 first, and the requested tip.
     pub(super) fn of(positions_degrees: [u8; 7], asked: Vector) -> Self {
         let tip = TipPose::of(positions_degrees.map(Angle::from_register)).tip;
         Self { positions_degrees, tip_mm: components(tip, 100.0), miss_mm: rounded((tip - asked).length()) }
@@ -69,7 +69,7 @@ impl MeasuredTip {
     }
 }
 
-/// A figure to hundredths.
+/// Rounds to hundredths.
 pub(super) fn rounded(number: f64) -> f64 {
     (number * 100.0).round() / 100.0
 }

@@ -1,8 +1,8 @@
-//! `move-to`: the tip to a point in millimetres.
+//! `move-to`: moves the tip to a point in millimetres.
 //!
 //! ```text
-//!   x y z, tool ──▶ TipTarget, or why it is out of reach ──▶ Move, as of `pose`
-//!              └──▶ StraightLine, or where it breaks and why ──▶ played, as recordings are
+//!   x y z, tool ──▶ TipTarget, or Unreachable ──▶ JointMove, as for `pose`
+//!              └──▶ StraightLine, or StraightLineError ──▶ played like a recording
 //! ```
 
 use sevenbot::cartesian::{TipPose, TipTarget, Vector};
@@ -31,13 +31,13 @@ pub(crate) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
         let target = target(args.tip(), tool)?;
         return take(session, Some(arm), args, &target, tool);
     };
-    // What needs no arm is checked before there is one.
+    // Check the point before opening the arm.
     let target = target(args.tip(), tool)?;
     let arm = if args.dry_run { None } else { Some(session.connect()?) };
     take(session, arm, args, &target, tool)
 }
 
-/// Shows the move, and makes it unless that is not wanted.
+/// Shows the move and, without --dry-run, makes it.
 fn take(
     session: &mut Session,
     arm: Option<Arm>,
@@ -53,13 +53,13 @@ fn take(
     session.printer.print(&arrival.with_measured(measured))
 }
 
-/// The direction in which the tool points now.
+/// The present direction of the tool.
 fn present_tool(arm: &mut Arm) -> Result<Vector, CommandError> {
     let positions = arm.wait_until_settled()?.positions();
     Ok(TipPose::of(positions.map(Angle::from_register)).tool)
 }
 
-/// Moves joints 1 to 5, and waits if wanted. Returns the measured angles then.
+/// Moves joints 1 to 5. If `wait` is set, waits and returns the measured angles.
 fn move_to(arm: &mut Arm, target: &TipTarget, wait: bool) -> Result<Option<[u8; 7]>, CommandError> {
     let [t1, t2, t3, t4, t5] = target.degrees.map(Some);
     let targets: Targets = [t1, t2, t3, t4, t5, None, None];

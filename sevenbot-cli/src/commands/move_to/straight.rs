@@ -1,4 +1,4 @@
-//! `move-to --straight`: a straight line, planned and checked whole, then played as a recording is.
+//! `move-to --straight`: plans a straight line, checks all of it, and plays it like a recording.
 
 use std::io::{self, Write};
 
@@ -19,13 +19,13 @@ use crate::joint_move::driven_joints;
 use crate::printer::Printable;
 use crate::session::Session;
 
-/// Moves the tip on a straight line from where the arm is sent now.
+/// Moves the tip on a straight line, starting at the present targets.
 pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let joints = if args.dry_run { arm.wait_until_settled()? } else { driven_joints(&mut arm)? };
     let start = start(&joints)?;
     let tool = args.tool().unwrap_or_else(|| TipPose::of(start).tool);
-    // Of the end, the nearest point and other directions of the tool are told.
+    // Only this check gives the nearest point and another direction of the tool.
     target(args.tip(), tool)?;
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let request = StraightLineRequest { start, vacuum, tip: args.tip(), tool, speed: args.speed };
@@ -40,7 +40,7 @@ pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
     session.printer.print(&StraightMove { measured: Some(MeasuredTip::of(positions, args.tip())), ..course })
 }
 
-/// The targets at which the line begins. The arm is there, or on its way there.
+/// The targets at the start of the line. The arm is there or moves there.
 fn start(joints: &JointSnapshot) -> Result<[Angle; 7], CommandError> {
     let mut start = [Angle::from_register(0); 7];
     for (angle, joint) in start.iter_mut().zip(Joint::ALL) {
@@ -55,7 +55,7 @@ fn start(joints: &JointSnapshot) -> Result<[Angle; 7], CommandError> {
     Ok(start)
 }
 
-/// A straight line: planned, and measured at its end.
+/// A straight line: the plan, and the measured end.
 #[derive(Debug, Serialize)]
 struct StraightMove {
     start_mm: [f64; 3],
@@ -66,10 +66,10 @@ struct StraightMove {
     seconds: f64,
     targets: usize,
     period_ms: u64,
-    /// How far whole degrees take the tip from the line.
+    /// The largest distance from the line, due to whole degrees.
     deviation_mm: f64,
     tilt_degrees: f64,
-    /// Where joint 4 turns before the line begins.
+    /// The angle of joint 4 at the start of the line.
     first_turn_degrees: Option<u8>,
     #[serde(skip_serializing_if = "Option::is_none")]
     measured: Option<MeasuredTip>,

@@ -34,8 +34,8 @@ use crate::write_result::motors_obey;
 
 /// Record a movement: guide the arm by hand, or let it move.
 ///
-/// The motors go off so that you can guide the arm, and its positions go to FILE. Ctrl-C ends the recording, and the arm
-/// holds its pose, also with --driven. On a terminal the space bar switches the vacuum pump.
+/// The motors go off so that you can guide the arm, and its positions go to FILE. Ctrl-C ends the recording, and the
+/// arm holds its pose, also with --driven. On a terminal the space bar switches the vacuum pump.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -1,7 +1,7 @@
 //! The time at which the arm measured a report, from the time at which it arrived.
 //!
-//! The arm reports without drift (D14), but USB adapters and a busy host deliver late, and several reports at once. So a
-//! report belongs to the next tick of the arm's clock. Only a longer delay means that reports were lost.
+//! The arm reports without drift (D14), but USB adapters and a busy host deliver late, and several reports at once. So
+//! a report belongs to the next tick of the arm's clock. Only a longer delay means that reports were lost.
 
 use std::time::{Duration, Instant};
 

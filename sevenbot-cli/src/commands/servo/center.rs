@@ -17,9 +17,9 @@ use crate::session::Session;
 
 /// Move a servo slowly to the middle of its range, 511 counts.
 ///
-/// The goal becomes the present position, the torque goes on, then the goal becomes the middle. The torque goes off if the
-/// load exceeds --load, if the servo makes no progress for 3 s, and at Ctrl-C. At the end the servo holds the middle with
-/// torque on, so that a horn or a gear can be fitted.
+/// The goal becomes the present position, the torque goes on, then the goal becomes the middle. The torque goes off if
+/// the load exceeds --load, if the servo makes no progress for 3 s, and at Ctrl-C. At the end the servo holds the
+/// middle with torque on, so that a horn or a gear can be fitted.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Best with a single servo on the bench. In an arm, support the arm: a stopped servo has no torque.

@@ -14,9 +14,9 @@ use crate::session::Session;
 
 /// Scan, show and set up single servos through an adapter on the servo bus.
 ///
-/// For building and repairing an arm. The port is a half-duplex TTL adapter for bus servos, such as Feetech's FE-URT-1 or
-/// Waveshare's Bus Servo Adapter. The servos need their own power. The port is not the arm's host link. Disconnect the
-/// arm's controller from the bus first, because two masters disturb each other.
+/// For building and repairing an arm. The port is a half-duplex TTL adapter for bus servos, such as Feetech's FE-URT-1
+/// or Waveshare's Bus Servo Adapter. The servos need their own power. The port is not the arm's host link. Disconnect
+/// the arm's controller from the bus first, because two masters disturb each other.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The rate of the servo bus is --rate, or --rates of a scan; --baud is that of an arm's host link.

@@ -17,8 +17,8 @@ use crate::session::Session;
 
 /// Give the only servo on the bus another id.
 ///
-/// Asks all ids first. Writes nothing unless exactly one servo answers, with id OLD. Then unlocks the servo's EEPROM, writes
-/// the id, locks the EEPROM, and checks that the servo answers to NEW only.
+/// Asks all ids first. Writes nothing unless exactly one servo answers, with id OLD. Then unlocks the servo's EEPROM,
+/// writes the id, locks the EEPROM, and checks that the servo answers to NEW only.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Joint 1 has id 0, joint 7 has id 6.

@@ -17,9 +17,9 @@ use crate::session::Session;
 
 /// Find out by hand what codes 0 and 2 of the torque switch (register 40) mean.
 ///
-/// There are two tables. In the older one 0 is damping and 2 is free; in Feetech's current one 0 is free and 2 is damping.
-/// Code 1 is torque on in both. It is not written, so the motor never drives the servo. Turn joint 1, which carries no
-/// weight, and enter the code with which it turns more easily.
+/// There are two tables. In the older one 0 is damping and 2 is free; in Feetech's current one 0 is free and 2 is
+/// damping. Code 1 is torque on in both. It is not written, so the motor never drives the servo. Turn joint 1, which
+/// carries no weight, and enter the code with which it turns more easily.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 With a hand on the joint:

@@ -1,4 +1,4 @@
-//! Why the arm cannot follow a straight line, in words of a reader who sees the arm.
+//! Why the arm cannot follow a straight line, as text for users.
 
 use std::fmt;
 
@@ -7,36 +7,36 @@ use kinematics::NoSolution;
 use super::super::{PointText, Unreachable, Vector};
 use super::path::TipPath;
 
-/// Where the arm cannot follow a line, and why.
+/// The point where the arm cannot follow a line, and the reason.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StraightLineError {
-    /// Where, in millimetres from the start.
+    /// Distance of the point from the start, in millimetres.
     pub at_mm: f64,
     /// The length of the line, in millimetres.
     pub length_mm: f64,
-    /// The tip there.
+    /// The tip at the point.
     pub tip: Vector,
-    /// Why.
+    /// The reason.
     pub fault: StraightLineFault,
 }
 
 /// Why the arm cannot follow a line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StraightLineFault {
-    /// A point of it is out of reach.
+    /// A point of the line is out of reach.
     Unreachable(Box<Unreachable>),
-    /// A joint would have to turn at once: the line goes through or past a singular position.
+    /// A joint would have to jump, because the line passes a singular position.
     Singular {
         /// Its number.
         joint: u8,
-        /// How far it would have to turn.
+        /// The necessary turn in degrees.
         degrees: f64,
     },
-    /// A joint would have to turn faster than its speed register can tell.
+    /// A joint would have to turn faster than its speed register allows.
     TooFast {
         /// Its number.
         joint: u8,
-        /// How fast it would have to turn.
+        /// The necessary speed in degrees/s.
         degrees_per_second: f64,
         /// The speed of the tip at which this joint could follow here, in whole mm/s.
         slower_mm_per_second: f64,
@@ -48,7 +48,7 @@ impl StraightLineError {
         Self { at_mm: path.length * share, length_mm: path.length, tip: path.at(share).0, fault }
     }
 
-    /// For an end of the line that is no position at all.
+    /// The error for an end that is not a valid position.
     pub(super) fn at_start(why: NoSolution, tip: Vector, tool: Vector) -> Self {
         let fault = StraightLineFault::Unreachable(Box::new(Unreachable::because(why, tip, tool)));
         Self { at_mm: 0.0, length_mm: 0.0, tip, fault }
@@ -80,7 +80,7 @@ impl fmt::Display for StraightLineError {
     }
 }
 
-/// What a position has in common in which this joint turns at once.
+/// The kind of position at which this joint jumps.
 fn singularity(joint: u8) -> &'static str {
     match joint {
         1 => "the wrist passes the axis of the base",

@@ -1,14 +1,14 @@
-//! The way of the tip and of the tool on a straight line: the tip moves evenly, the tool turns evenly.
+//! Tip and tool along a straight line. The tip moves and the tool turns at constant speed.
 
 use super::super::{TipPose, Vector, angle_between};
 
-/// From one pose of the tip to another.
+/// A line from one pose of the tip to another.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TipPath {
     start: TipPose,
     /// From the start to the end.
     way: Vector,
-    /// At right angles to the tool at the start: where it turns to.
+    /// The direction of the turn, at right angles to the tool at the start.
     towards: Vector,
     /// In millimetres.
     pub(super) length: f64,
@@ -16,12 +16,12 @@ pub(super) struct TipPath {
 }
 
 impl TipPath {
-    /// To a tip with the tool in a direction of length 1.
+    /// The path to `tip`. `tool` has length 1.
     pub(super) fn new(start: TipPose, tip: Vector, tool: Vector) -> Self {
         let way = tip - start.tip;
         let turn_degrees = angle_between(start.tool, tool);
         let beside = tool - start.tool * start.tool.dot(tool);
-        // Half a turn has no direction of its own: the tool then turns through the vertical, or forward.
+        // For half a turn every direction is possible. The tool turns through the vertical, or forward.
         let other =
             if start.tool.z.abs() < 0.9 { Vector::new(0.0, 0.0, 1.0) } else { Vector::new(0.0, 1.0, 0.0) };
         let other = other - start.tool * start.tool.dot(other);
@@ -30,7 +30,7 @@ impl TipPath {
         Self { start, way, towards, length: way.length(), turn_degrees }
     }
 
-    /// Tip and tool at a share of the way, 0 to 1.
+    /// Tip and tool at this fraction of the line, 0 to 1.
     pub(super) fn at(&self, share: f64) -> (Vector, Vector) {
         let (sine, cosine) = (self.turn_degrees * share).to_radians().sin_cos();
         (self.start.tip + self.way * share, self.start.tool * cosine + self.towards * sine)

@@ -22,7 +22,7 @@ fn a_line_over_the_table_stays_on_it_but_for_whole_degrees() {
     assert!(line.deviation_mm > 0.1 && line.deviation_mm < 3.5, "{}", line.deviation_mm);
     assert!(line.tilt_degrees < 2.5, "{}", line.tilt_degrees);
     assert_eq!(line.first_turn, None);
-    // What is told is what the targets do.
+    // The reported deviation is that of the targets.
     let end = Vector::new(60.0, 200.0, 50.0);
     let way = (end - line.start.tip).unit().expect("a way");
     let mut worst: f64 = 0.0;
@@ -92,7 +92,7 @@ fn a_joint_that_cannot_follow_says_which_speed_it_could() {
 
 #[test]
 fn a_singular_position_on_the_way_is_told() {
-    // The tip passes beside the axis of the base, high above it: joint 1 would have to turn by half a turn at once.
+    // The tip passes beside the axis of the base, high above it: joint 1 would have to jump by half a turn.
     let [from, to] =
         [0, 180].map(|base| TipPose::of([base, 150, 30, 90, 90, 90, 80].map(Angle::from_register)));
     let end = [to.tip.x, 0.5, to.tip.z];
