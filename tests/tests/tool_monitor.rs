@@ -5,7 +5,7 @@ mod tool_output;
 use std::fs;
 use std::path::Path;
 use system_tests::programs::sevenbot;
-use system_tests::registers::{MOTOR_STATE, TARGET_POSITION};
+use system_tests::registers::{MOTOR_STATE, STANDARD_POSE, TARGET_POSITION};
 use system_tests::started_arm::{ArmKind, StartedArm};
 use system_tests::terminal::Terminal;
 use system_tests::wait::wait_until;
@@ -102,6 +102,32 @@ fn keys_move_a_joint_and_change_speeds() {
         assert!(near(arm.read(TARGET_POSITION, 7)[2], expected));
         arm.write(TARGET_POSITION, &before);
         arm.wait_for_pose(&before);
+    });
+}
+
+#[test]
+fn keys_move_the_tip() {
+    with_arm(TestSetup::any(), |arm| {
+        arm.drive_to(&[90, 91, 110, 90, 135, 90, 80]);
+        let port = arm.lend_port();
+        let mut terminal = monitor(&port, &[]);
+        terminal.wait_for("114.0 °/s");
+        terminal.keys("j");
+        terminal.wait_for("base axes");
+        // 20 mm to the right at 185 mm: the base turns by 6 degrees.
+        for _ in 0..4 {
+            terminal.keys(RIGHT);
+        }
+        terminal.wait_until("the base has its target", |screen| {
+            let target = row(screen, 1).get(1).and_then(|word| word.trim_end_matches('°').parse::<u8>().ok());
+            target.is_some_and(|target| target.abs_diff(84) <= 1)
+        });
+        terminal.keys("j");
+        terminal.wait_for("tool axes");
+        terminal.keys("q");
+        assert!(terminal.wait().success());
+        arm.reopen(115_200);
+        arm.drive_to(&STANDARD_POSE);
     });
 }
 

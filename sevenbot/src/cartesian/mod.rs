@@ -5,6 +5,7 @@
 //!
 //!   tip, tool ──▶ TipTarget: whole degrees of joints 1 to 5     or Unreachable: reason and nearest point
 //!   tip, tool, speed ──▶ Line: a straight line as moments    or StraightLineError: place and reason
+//!   step along axes ──▶ Jog: the same, from the position of the step before
 //! ```
 //!
 //! Origin: the base axis at the height of the top plate. x is to the right, y forward, z up. The tip is the point where
@@ -18,10 +19,12 @@ use kinematics::{Frames, forward};
 
 use crate::units::Angle;
 
+mod jog;
 mod line;
 mod nearest;
 mod target;
 
+pub use jog::{Jog, JogAxes};
 pub use kinematics::NoSolution;
 pub use line::{PERIOD, StraightLine, StraightLineError, StraightLineFault, StraightLineRequest};
 pub use target::{TipTarget, Unreachable};

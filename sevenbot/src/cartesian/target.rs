@@ -133,7 +133,7 @@ impl fmt::Display for Unreachable {
             _ => {}
         }
         let (tip, tool) = (PointText(self.tip), DirectionText(self.tool));
-        write!(out, "{tip} mm with the tool {tool} is out of reach: {}", reason(self.why))?;
+        write!(out, "{tip} mm with the tool {tool} is out of reach: {}", self.reason())?;
         match (self.nearest, self.distance_mm()) {
             (Some(nearest), Some(mm)) => {
                 write!(out, "; the nearest point within reach is {} mm, {mm:.1} mm away", PointText(nearest))
@@ -143,17 +143,22 @@ impl fmt::Display for Unreachable {
     }
 }
 
-/// The reason as text, with the parts that a user sees.
-fn reason(why: NoSolution) -> &'static str {
-    match why {
-        NoSolution::TooFar => "it is too far from the shoulder",
-        NoSolution::TooNear => "it is too near to the shoulder",
-        NoSolution::Joint(1) => "it is behind the arm, and the base (joint 1) turns by 180° only",
-        NoSolution::Joint(2) => "the rear arm (joint 2) does not lean so far",
-        NoSolution::Joint(_) => "the forearm (joint 3) does not tilt so far",
-        NoSolution::ToolDirection => "the hand (joint 5) does not bend so far back",
-        NoSolution::NoHeading => "the wrist would be on the axis of the base, where joint 1 has no angle",
-        NoSolution::NoToolDirection | NoSolution::NoDiscDirection | NoSolution::NotFinite => "no position",
+impl Unreachable {
+    /// The reason as text, with the parts that a user sees.
+    #[must_use]
+    pub const fn reason(&self) -> &'static str {
+        match self.why {
+            NoSolution::TooFar => "it is too far from the shoulder",
+            NoSolution::TooNear => "it is too near to the shoulder",
+            NoSolution::Joint(1) => "it is behind the arm, and the base (joint 1) turns by 180° only",
+            NoSolution::Joint(2) => "the rear arm (joint 2) does not lean so far",
+            NoSolution::Joint(_) => "the forearm (joint 3) does not tilt so far",
+            NoSolution::ToolDirection => "the hand (joint 5) does not bend so far back",
+            NoSolution::NoHeading => "the wrist would be on the axis of the base, where joint 1 has no angle",
+            NoSolution::NoToolDirection | NoSolution::NoDiscDirection | NoSolution::NotFinite => {
+                "no position"
+            }
+        }
     }
 }
 

@@ -5,6 +5,7 @@
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
+use sevenbot::cartesian::{Jog, JogAxes, Vector};
 use sevenbot::joints::JointSnapshot;
 use sevenbot::map::{MOTOR_STATE, SPEED, TARGET_POSITION, motor_state};
 use sevenbot::{Angle, Arm, ArmOptions, Error, Joint, ports};
@@ -36,6 +37,8 @@ pub(crate) struct ArmThread {
     pub(crate) commands: Receiver<UiCommand>,
     /// The arm at the end of the thread.
     pub(crate) arm: Option<Arm>,
+    /// Where steps of the tip have brought it.
+    pub(crate) jog: Option<Jog>,
 }
 
 /// The screen has closed its channel.
@@ -101,7 +104,7 @@ impl ArmThread {
     }
 
     /// Samples one arm.
-    fn watch(&self, arm: &mut Arm) -> WatchEnd {
+    fn watch(&mut self, arm: &mut Arm) -> WatchEnd {
         let mut unanswered = 0;
         let mut due = Instant::now();
         loop {
@@ -126,7 +129,7 @@ impl ArmThread {
     }
 
     /// Executes commands until the next sample is due.
-    fn execute_until(&self, arm: &mut Arm, due: Instant) -> Result<(), WatchEnd> {
+    fn execute_until(&mut self, arm: &mut Arm, due: Instant) -> Result<(), WatchEnd> {
         loop {
             match self.commands.recv_timeout(due.saturating_duration_since(Instant::now())) {
                 // A stop goes before pending commands.
@@ -139,8 +142,8 @@ impl ArmThread {
     }
 
     /// Executes a command, and reports a refusal to the screen.
-    fn execute(&self, arm: &mut Arm, command: UiCommand) -> Result<(), WatchEnd> {
-        let (refusal, lost) = match try_execute(arm, command) {
+    fn execute(&mut self, arm: &mut Arm, command: UiCommand) -> Result<(), WatchEnd> {
+        let (refusal, lost) = match try_execute(arm, &mut self.jog, command) {
             Ok(()) => return Ok(()),
             Err(CommandError::Exchange(error)) => (CommandError::MayMove(error.to_string()), Some(error)),
             Err(failure) => (failure, None),
@@ -171,9 +174,10 @@ impl ArmThread {
 }
 
 /// Executes a command and verifies it.
-fn try_execute(arm: &mut Arm, command: UiCommand) -> Result<(), CommandError> {
+fn try_execute(arm: &mut Arm, jog: &mut Option<Jog>, command: UiCommand) -> Result<(), CommandError> {
     match command {
         UiCommand::Nudge { joint, degrees } => nudge(arm, joint, degrees),
+        UiCommand::Jog { axes, millimetres } => jog_tip(arm, jog, axes, millimetres),
         UiCommand::SpeedChange { joint, change } => {
             let joints = arm.read(SPEED.of(joint), 1)?;
             let steps = joints.first().copied().unwrap_or(0);
@@ -190,4 +194,25 @@ fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> 
     let wanted = step_target(&arm.wait_until_settled()?, joint, degrees)?.max(0);
     let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
     motors_obey(arm.write_checked(TARGET_POSITION.of(joint), &[wanted]))
+}
+
+/// Moves the tip by some millimetres. Reads the targets first: those on the screen may be old.
+fn jog_tip(
+    arm: &mut Arm,
+    jog: &mut Option<Jog>,
+    axes: JogAxes,
+    millimetres: [i16; 3],
+) -> Result<(), CommandError> {
+    let joints = arm.wait_until_settled()?;
+    for joint in Joint::ALL {
+        // Fails where it is not known where a joint is.
+        step_target(&joints, joint, 0)?;
+    }
+    let targets = joints.targets().map(Angle::from_register);
+    let [x, y, z] = millimetres.map(f64::from);
+    let next = Jog::step(*jog, targets, axes, Vector::new(x, y, z));
+    let next = next.map_err(|reason| CommandError::Arm(format!("no step: {}", reason.reason())))?;
+    motors_obey(arm.write_checked(TARGET_POSITION.address, &next.targets.map(Angle::degrees)))?;
+    *jog = Some(next);
+    Ok(())
 }

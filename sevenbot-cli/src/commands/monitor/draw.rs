@@ -18,6 +18,7 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Clear, Dataset, GraphType, Paragraph};
+use sevenbot::cartesian::JogAxes;
 use sevenbot::map::motor_state;
 use sevenbot::register_text::{faults, joints, motor_state_name};
 use sevenbot::{Angle, Joint};
@@ -219,6 +220,7 @@ fn last_line(view: &View) -> Line<'_> {
     match (&view.connection, view.note()) {
         (Connection::Looking(reason), _) => Line::styled(format!(" {reason}"), BAD),
         (_, Some(note)) => Line::styled(format!(" {note}"), BOLD),
+        _ if view.jog.is_some() => Line::styled(jog_keys(view.jog), BOLD),
         _ => Line::styled(
             " ↑↓ joint  ←→ nudge  Shift 10°  +- speed  s state  space freeze  ? help  q quit",
             FAINT,
@@ -226,9 +228,19 @@ fn last_line(view: &View) -> Line<'_> {
     }
 }
 
+/// The keys that move the tip.
+const fn jog_keys(axes: Option<JogAxes>) -> &'static str {
+    match axes {
+        Some(JogAxes::Tool) => {
+            " tip, tool axes: ←→ x  ↑↓ y  PgUp PgDn z, along the tool  Shift 20 mm  j: axes"
+        }
+        _ => " tip, base axes: ←→ x  ↑↓ y  PgUp PgDn z, up and down  Shift 20 mm  j: axes",
+    }
+}
+
 fn draw_dialog(frame: &mut Frame<'_>, dialog: Dialog) {
     let (title, lines) = match dialog {
-        Dialog::Help => (" keys ", HELP.map(|(keys, what)| format!(" {keys:<16}{what}")).to_vec()),
+        Dialog::Help => (" keys ", HELP.map(|(keys, what)| format!(" {keys:<18}{what}")).to_vec()),
         Dialog::ChooseState => (" motor state ", CHOICES.map(str::to_owned).to_vec()),
         Dialog::ConfirmState(state) => (" motor state ", question(state)),
     };

@@ -2,6 +2,7 @@
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use sevenbot::Joint;
+use sevenbot::cartesian::JogAxes;
 use sevenbot::map::motor_state;
 
 use super::view::{Dialog, SpeedChange, UiCommand, View};
@@ -9,11 +10,16 @@ use super::view::{Dialog, SpeedChange, UiCommand, View};
 /// Degrees of a nudge, without and with Shift.
 const NUDGE: i16 = 1;
 const BIG_NUDGE: i16 = 10;
+/// Millimetres of a step of the tip, without and with Shift. A degree moves the tip by up to 6 mm.
+const JOG: i16 = 5;
+const BIG_JOG: i16 = 20;
 /// The help: keys and their effect.
-pub(crate) const HELP: [(&str, &str); 9] = [
+pub(crate) const HELP: [(&str, &str); 11] = [
     ("1..7, ↑ ↓", "select a joint"),
     ("← →", "nudge it by 1°"),
     ("Shift ← →, [ ]", "nudge it by 10°"),
+    ("j", "arrows move the tip: base axes, tool axes, off"),
+    ("← → ↑ ↓ PgUp/Dn", "then x, y and z by 5 mm, with Shift by 20"),
     ("+ -", "speed of all joints"),
     ("s", "motor state: hold, damping, forceless"),
     ("space", "freeze the screen; the arm continues"),
@@ -50,10 +56,15 @@ pub(crate) fn press(view: &mut View, key: KeyEvent) -> KeyAction {
 fn press_in_view(view: &mut View, key: KeyEvent) -> KeyAction {
     let is_shifted = key.modifiers.contains(KeyModifiers::SHIFT);
     let degrees = if is_shifted { BIG_NUDGE } else { NUDGE };
+    let millimetres = if is_shifted { BIG_JOG } else { JOG };
+    if let Some((axes, millimetres)) = view.jog.zip(jog_step(key.code, millimetres)) {
+        return drive(view, UiCommand::Jog { axes, millimetres });
+    }
     match key.code {
         KeyCode::Char('q') | KeyCode::Esc => return KeyAction::Quit,
         KeyCode::Char('?' | 'h') | KeyCode::F(1) => view.dialog = Some(Dialog::Help),
         KeyCode::Char(' ') => view.is_frozen = !view.is_frozen,
+        KeyCode::Char('j') => view.jog = next_axes(view.jog),
         KeyCode::Char('s') => view.dialog = Some(Dialog::ChooseState),
         KeyCode::Char(digit @ '1'..='7') => {
             select(view, i16::from(u8::try_from(digit).unwrap_or(b'1') - b'0'))
@@ -97,9 +108,35 @@ fn select(view: &mut View, number: i16) {
     }
 }
 
+/// The step of the tip for a key: x, y and z in millimetres.
+const fn jog_step(key: KeyCode, millimetres: i16) -> Option<[i16; 3]> {
+    match key {
+        KeyCode::Left => Some([-millimetres, 0, 0]),
+        KeyCode::Right => Some([millimetres, 0, 0]),
+        KeyCode::Up => Some([0, millimetres, 0]),
+        KeyCode::Down => Some([0, -millimetres, 0]),
+        KeyCode::PageUp => Some([0, 0, millimetres]),
+        KeyCode::PageDown => Some([0, 0, -millimetres]),
+        _ => None,
+    }
+}
+
+const fn next_axes(axes: Option<JogAxes>) -> Option<JogAxes> {
+    match axes {
+        None => Some(JogAxes::Base),
+        Some(JogAxes::Base) => Some(JogAxes::Tool),
+        Some(JogAxes::Tool) => None,
+    }
+}
+
 fn nudge(view: &mut View, degrees: i16) -> KeyAction {
+    drive(view, UiCommand::Nudge { joint: view.selected, degrees })
+}
+
+/// Sends a command that moves the arm, if the motors drive it.
+fn drive(view: &mut View, command: UiCommand) -> KeyAction {
     match view.arm().map(|arm| arm.motor_state()) {
-        Some(motor_state::SERVO) => KeyAction::Send(UiCommand::Nudge { joint: view.selected, degrees }),
+        Some(motor_state::SERVO) => KeyAction::Send(command),
         Some(_) => {
             view.show_note("the motors are off: s, then h, makes the arm hold where it is");
             KeyAction::Redraw
@@ -137,6 +174,21 @@ mod tests {
     }
 
     #[test]
+    fn arrows_move_the_tip_in_base_and_tool_axes() {
+        let mut view = watching();
+        let keys = [KeyCode::Char('j'), KeyCode::Left, KeyCode::PageUp, KeyCode::Char('j'), KeyCode::Up];
+        let actions = pressed(&mut view, &keys);
+        let jog = |axes, millimetres| KeyAction::Send(UiCommand::Jog { axes, millimetres });
+        assert_eq!(actions[1], jog(JogAxes::Base, [-5, 0, 0]));
+        assert_eq!(actions[2], jog(JogAxes::Base, [0, 0, 5]));
+        assert_eq!(actions[4], jog(JogAxes::Tool, [0, 5, 0]));
+        let shifted = KeyEvent::new(KeyCode::PageDown, KeyModifiers::SHIFT);
+        assert_eq!(press(&mut view, shifted), jog(JogAxes::Tool, [0, 0, -20]));
+        pressed(&mut view, &[KeyCode::Char('j'), KeyCode::Down]);
+        assert_eq!((view.jog, view.selected), (None, Joint::ALL[1]), "the arrows select joints again");
+    }
+
+    #[test]
     fn only_a_state_without_torque_is_confirmed() {
         let mut view = watching();
         let let_go = [KeyCode::Char('s'), KeyCode::Char('f'), KeyCode::Char('y')];
@@ -161,7 +213,7 @@ mod tests {
     #[test]
     fn without_an_arm_keys_send_nothing() {
         let mut view = View::new("COM3");
-        let keys = [KeyCode::Left, KeyCode::Char('+'), KeyCode::Char(']')];
-        assert_eq!(pressed(&mut view, &keys), [KeyAction::Redraw; 3]);
+        let keys = [KeyCode::Left, KeyCode::Char('+'), KeyCode::Char(']'), KeyCode::Char('j'), KeyCode::Up];
+        assert_eq!(pressed(&mut view, &keys), [KeyAction::Redraw; 5]);
     }
 }

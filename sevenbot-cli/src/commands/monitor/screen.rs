@@ -30,8 +30,17 @@ pub(crate) fn run(session: &Session, period: Duration) -> Result<View, CommandEr
     let (command, commands) = mpsc::channel();
     let asked = session.port.clone();
     let options = session.options;
-    let watcher =
-        ArmThread { port: asked, last_port: port, options, period, start, events, commands, arm: None };
+    let watcher = ArmThread {
+        port: asked,
+        last_port: port,
+        options,
+        period,
+        start,
+        events,
+        commands,
+        arm: None,
+        jog: None,
+    };
     let watching = thread::spawn(|| watcher.run());
     let shown = on_terminal(|terminal| show(terminal, &mut view, start, &hear, &command));
     // Closing the channel ends the thread after the pending commands.

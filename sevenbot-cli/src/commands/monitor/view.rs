@@ -10,6 +10,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use sevenbot::cartesian::JogAxes;
 use sevenbot::{Joint, StatusBlock};
 
 use super::sample::Sample;
@@ -41,6 +42,8 @@ pub(crate) enum ArmEvent {
 pub(crate) enum UiCommand {
     /// Change a joint's target by some degrees.
     Nudge { joint: Joint, degrees: i16 },
+    /// Move the tip by x, y and z along these axes.
+    Jog { axes: JogAxes, millimetres: [i16; 3] },
     /// Change the speed of all joints, starting from that of this joint.
     SpeedChange { joint: Joint, change: SpeedChange },
     /// Change the motor state.
@@ -139,6 +142,8 @@ pub(crate) struct View {
     pub(crate) now: Duration,
     pub(crate) link: LinkQuality,
     pub(crate) selected: Joint,
+    /// The axes along which the arrow keys move the tip; `None`: they select and nudge joints.
+    pub(crate) jog: Option<JogAxes>,
     pub(crate) is_frozen: bool,
     pub(crate) dialog: Option<Dialog>,
     note: Option<(Duration, String)>,
@@ -155,6 +160,7 @@ impl View {
             now: Duration::ZERO,
             link: LinkQuality::default(),
             selected: Joint::ALL[0],
+            jog: None,
             is_frozen: false,
             dialog: None,
             note: None,

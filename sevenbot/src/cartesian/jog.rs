@@ -1,0 +1,120 @@
+//! Small steps of the tip along axes, with the direction of the tool kept: jogging.
+//!
+//! Whole degrees are millimetres apart. So the exact position is kept from step to step, and steps do not add up errors.
+
+use kinematics::{Frames, forward};
+
+use super::{TipTarget, Unreachable, Vector};
+use crate::units::Angle;
+
+/// The axes of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JogAxes {
+    /// Those of the base: x to the right, y forward, z up.
+    Base,
+    /// Those of the tool: x in the direction of the disc, z along the tool away from the wrist.
+    Tool,
+}
+
+/// Where jogging has brought the tip.
+///
+/// ```
+/// use sevenbot::Angle;
+/// use sevenbot::cartesian::{Jog, JogAxes, Vector};
+///
+/// let targets = [90, 91, 110, 90, 135, 90, 80].map(Angle::from_register);
+/// let jog = Jog::step(None, targets, JogAxes::Base, Vector::new(5.0, 0.0, 0.0))?;
+/// assert_eq!(jog.targets[0].degrees(), 89);
+/// # Ok::<(), sevenbot::cartesian::Unreachable>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jog {
+    /// The exact position of the tip, in millimetres.
+    pub tip: Vector,
+    /// The direction of the tool, of length 1.
+    pub tool: Vector,
+    /// The targets in whole degrees, joint 1 first. Joints 6 and 7 keep theirs.
+    pub targets: [Angle; 7],
+}
+
+impl Jog {
+    /// A step of so many millimetres. It goes on from the jog `before` if the arm's targets are still those of that jog,
+    /// else from the position of the targets.
+    ///
+    /// # Errors
+    /// Why the arm does not reach the new position.
+    pub fn step(
+        before: Option<Self>,
+        targets: [Angle; 7],
+        axes: JogAxes,
+        millimetres: Vector,
+    ) -> Result<Self, Unreachable> {
+        let [t1, t2, t3, t4, t5, sixth, seventh] = targets;
+        let angles = [t1, t2, t3, t4, t5, sixth].map(|angle| f64::from(angle.degrees()));
+        let Frames { hand, .. } = forward(angles);
+        let here = before.filter(|jog| jog.targets == targets);
+        let (tip, tool) = here.map_or((hand.tip, hand.tool), |jog| (jog.tip, jog.tool));
+        let way = match axes {
+            JogAxes::Base => millimetres,
+            JogAxes::Tool => {
+                hand.disc * millimetres.x + tool.cross(hand.disc) * millimetres.y + tool * millimetres.z
+            }
+        };
+        let tip = tip + way;
+        let [t1, t2, t3, t4, t5] = TipTarget::of(tip, tool)?.degrees.map(Angle::from_register);
+        Ok(Self { tip, tool, targets: [t1, t2, t3, t4, t5, sixth, seventh] })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::TipPose;
+    use super::*;
+
+    const AT_WORK: [u8; 7] = [90, 91, 110, 90, 135, 90, 80];
+
+    fn jogged(count: usize, axes: JogAxes, step: [f64; 3]) -> (TipPose, Jog) {
+        let start = AT_WORK.map(Angle::from_register);
+        let [x, y, z] = step;
+        let mut jog: Option<Jog> = None;
+        for _ in 0..count {
+            let targets = jog.map_or(start, |jog| jog.targets);
+            jog = Some(Jog::step(jog, targets, axes, Vector::new(x, y, z)).expect("within reach"));
+        }
+        (TipPose::of(start), jog.expect("a step"))
+    }
+
+    #[test]
+    fn many_small_steps_add_up_exactly() {
+        let (start, jog) = jogged(60, JogAxes::Base, [1.0, 0.0, 0.5]);
+        assert!((jog.tip - start.tip - Vector::new(60.0, 0.0, 30.0)).length() < 1e-9);
+        assert!((TipPose::of(jog.targets).tip - jog.tip).length() < 2.5, "whole degrees");
+        assert_eq!([jog.targets[5].degrees(), jog.targets[6].degrees()], [90, 80]);
+        let (start, jog) = jogged(60, JogAxes::Base, [-1.0, 0.0, 0.0]);
+        assert!((TipPose::of(jog.targets).tip - start.tip).x < -57.0);
+    }
+
+    #[test]
+    fn the_axes_of_the_tool_are_those_of_the_hand() {
+        let (start, jog) = jogged(4, JogAxes::Tool, [0.0, 0.0, -5.0]);
+        assert!((jog.tip - start.tip + start.tool * 20.0).length() < 1e-9, "back from the table");
+        let (start, jog) = jogged(1, JogAxes::Tool, [7.0, 0.0, 0.0]);
+        let moved = jog.tip - start.tip;
+        assert!((moved.length() - 7.0).abs() < 1e-9 && moved.dot(start.tool).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_arm_that_was_sent_elsewhere_jogs_from_there() {
+        let (_, jog) = jogged(3, JogAxes::Base, [1.0, 0.0, 0.0]);
+        let elsewhere = [80, 91, 110, 90, 135, 90, 80].map(Angle::from_register);
+        let next = Jog::step(Some(jog), elsewhere, JogAxes::Base, Vector::new(0.0, 0.0, 5.0));
+        let moved = next.expect("within reach").tip - TipPose::of(elsewhere).tip;
+        assert!((moved - Vector::new(0.0, 0.0, 5.0)).length() < 1e-9);
+    }
+
+    #[test]
+    fn a_step_out_of_reach_is_refused() {
+        let start = AT_WORK.map(Angle::from_register);
+        assert!(Jog::step(None, start, JogAxes::Base, Vector::new(0.0, 500.0, 0.0)).is_err());
+    }
+}
