@@ -1,7 +1,7 @@
 //! When the watchdog may be fed: after the control cycle and the host link have both run since the last feed. If one of
 //! them hangs or starves the other, the watchdog restarts the chip.
 
-/// Which of the two has run since the last feed.
+/// True for each task that has run since the last feed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WatchdogGate {
     control_cycle: bool,

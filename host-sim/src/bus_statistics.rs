@@ -22,7 +22,7 @@ pub struct BusStatistics {
     asked: Option<(u8, Instant)>,
     questions: u64,
     goals: u64,
-    /// Bytes that arrived, in answers or not.
+    /// Received bytes, also those outside answers.
     bytes: u64,
     answers: u64,
     round_trips: Vec<u32>,
@@ -41,7 +41,7 @@ pub struct Figures {
     pub p99: Duration,
     /// Number of answers.
     pub answers: u64,
-    /// Bytes that arrived, in answers or not.
+    /// Received bytes, also those outside answers.
     pub bytes: u64,
 }
 

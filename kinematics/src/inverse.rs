@@ -105,7 +105,8 @@ impl<F: Float> Reach<F> {
     }
 }
 
-/// Solves joints 1 to 3 for a wrist with the arm towards it, or else away from it, and then the `rest`.
+/// Solves joints 1 to 3 for a wrist, then calls `rest`. Tries a base that points towards the wrist first, then one that
+/// points away from it.
 fn with_either_heading<F: Float, T>(
     wrist: Vector<F>,
     rest: impl Fn([F; 3]) -> Result<T, NoSolution>,

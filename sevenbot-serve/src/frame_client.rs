@@ -15,7 +15,7 @@ const MOST_REPORT_BYTES: usize = 1_024;
 /// Bytes for the client beyond which its reads wait.
 const MOST_BYTES: usize = 4_096;
 
-/// A client with frames.
+/// A client that sends and receives frames.
 #[derive(Debug)]
 pub struct FrameClient {
     id: ClientId,

@@ -48,7 +48,7 @@ impl FrameConnection {
         Ok(count)
     }
 
-    /// Bytes that were read otherwise.
+    /// Adds bytes that the caller has read.
     pub(crate) fn put(&mut self, bytes: &[u8]) {
         self.input.extend_from_slice(bytes);
     }

@@ -4,9 +4,9 @@
 //!   ArmPort ◀──▶ Hub ◀──▶ FrameConnection ◀──▶ pseudo-terminal, or TCP stream
 //! ```
 //!
-//! One thread waits in poll(2) for all of them, and for the time of the hub. The arm's line carries at most some thousand
-//! frames a second, which one thread passes in a small part of its time; so there are no locks, and the order of
-//! events is the order in this file.
+//! One thread waits in poll(2) for all file descriptors and for the deadline of the hub. The arm's line carries at most
+//! some thousand frames a second, which is little work for one thread. So there are no locks, and events are handled
+//! in the order of this file.
 
 mod arm_port;
 mod connection;

@@ -141,7 +141,7 @@ impl MotionChecker {
         self.exempt_all(now, Exemption::PowerLoss);
     }
 
-    /// Applies the commands in `received`, which are the bytes of the frame `sent` when they reach the servos.
+    /// Applies the commands in `received`: the frame `sent`, as the servos receive it after disturbances.
     pub(super) fn frame_sent(&mut self, now: Instant, sent: &[u8], received: &[u8]) {
         if self.sent.len() == MAX_SENT_FRAMES {
             self.sent.pop_front();
