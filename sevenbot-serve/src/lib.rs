@@ -12,6 +12,7 @@
 
 pub mod frame_client;
 pub mod hub;
+pub mod maker;
 #[cfg(target_os = "linux")]
 pub mod server;
 #[cfg(target_os = "linux")]
@@ -19,3 +20,4 @@ mod token;
 
 pub use frame_client::FrameClient;
 pub use hub::{ClientId, Event, Hub, WholeRequest};
+pub use maker::MakerClient;

@@ -1,92 +1,18 @@
 //! `sevenbot serve`: one simulated arm, many programs at once.
 
+mod served;
+
 use std::io::{ErrorKind, Read, Write};
-use std::net::TcpStream;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use system_tests::frames::reply;
 use system_tests::process::{self, Signal, send_signal, wait_for_exit};
-use system_tests::programs::{host_sim, tool};
+use system_tests::programs::tool;
 use system_tests::registers::{CHIP_ID, DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED};
-use system_tests::wait::wait_until;
-use system_tests::{ArmClient, read_request, write_request};
-use tempfile::TempDir;
+use system_tests::{read_request, write_request};
 
-/// A simulator and a server, in a folder with their links.
-struct Served {
-    simulator: Child,
-    server: Child,
-    ports: Vec<PathBuf>,
-    folder: TempDir,
-}
-
-impl Served {
-    /// Starts a server with the pseudo-terminals `a`, `b`, ... and a TCP port.
-    fn start(ptys: usize, options: &[&str]) -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let simulator = simulator(folder.path());
-        let mut command = tool();
-        command.current_dir(&folder).args(["--port", "./arm", "serve", "--tcp", "0"]).args(options);
-        for name in names(ptys) {
-            command.args(["--pty", name]);
-        }
-        let (server, ports) = process::start(&mut command, ptys + 1).expect("the server is ready");
-        let served = Self { simulator, server, ports, folder };
-        if ptys > 0 {
-            served.wait_for_arm(&mut served.open("a"));
-        }
-        served
-    }
-
-    fn open(&self, name: &str) -> ArmClient {
-        ArmClient::open(&self.folder.path().join(name), 115_200)
-    }
-
-    fn connect(&self) -> TcpStream {
-        let port = self.ports.last().and_then(|port| port.to_str()).expect("a TCP port");
-        let stream =
-            TcpStream::connect(port.strip_prefix("socket://").expect("an address")).expect("a connection");
-        stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
-        stream
-    }
-
-    fn wait_for_arm(&self, client: &mut ArmClient) {
-        wait_until("the arm answers", || {
-            client.send(&read_request(DEVICE_CODE, 1));
-            client.reply_within(Duration::from_millis(500)).is_some()
-        });
-        client.drain();
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        process::kill(&mut self.server);
-        process::kill(&mut self.simulator);
-    }
-}
-
-fn names(count: usize) -> impl Iterator<Item = &'static str> {
-    ["a", "b", "c", "d"].into_iter().take(count)
-}
-
-fn simulator(folder: &Path) -> Child {
-    let mut command = Command::new(host_sim());
-    command.args(["--quiet", "--eeprom", "none", "--link"]).arg(folder.join("arm"));
-    process::start(&mut command, 1).expect("the simulator is ready").0
-}
-
-/// Sends a request and checks the reply.
-#[track_caller]
-fn exchange(stream: &mut TcpStream, request: &[u8], expected: &[u8]) {
-    stream.write_all(request).expect("the server takes bytes");
-    let mut received = vec![0; expected.len()];
-    stream.read_exact(&mut received).expect("a reply");
-    assert_eq!(received, expected);
-}
+use served::{Served, exchange, names, simulator};
 
 #[test]
 fn programs_on_terminals_and_tcp_get_their_own_replies() {

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot_serve::server::{Notice, Server, ServerConfig};
+use sevenbot_serve::server::{Access, Notice, Server, ServerConfig};
 
 use crate::command_error::CommandError;
 use crate::printer::{Printable, note, warn};
@@ -21,10 +21,12 @@ use crate::session::Session;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Pseudo-terminals (--pty) work with every program that opens a serial port. TCP (--tcp) carries the same frames, for
-example to pyserial's `socket://127.0.0.1:7777`.
+example to pyserial's `socket://127.0.0.1:7777`. The maker's WebSocket (--ws) works with the maker's Python client; its
+web pages need --maker-pages as well.
 
-Only programs of this computer can connect. --listen opens the TCP port to others, and then they have to send the
-token and a line feed before their first frame. The token passes the network unencrypted.
+Only programs of this computer can connect. --listen opens the TCP port and the WebSocket to others. Then they need the
+token: over TCP as a first line, with a line feed; over the WebSocket in its address, ws://ADDRESS:8080/ws?token=TOKEN.
+The token passes the network unencrypted.
 
 Two programs that write targets at the same time both move the arm: the last target counts. --read-only is for programs
 that only watch.
@@ -34,6 +36,7 @@ Examples:
   sevenbot --port ./a monitor                     in a second terminal
   python my_program.py ./b                        in a third
   sevenbot --port /dev/ttyUSB0 serve --tcp 7777
+  sevenbot --port /dev/ttyUSB0 serve --ws --maker-pages
   sevenbot --port /dev/ttyUSB0 serve --tcp 7777 --listen 0.0.0.0 --token \"$(openssl rand -hex 16)\"")]
 pub(crate) struct ServeArgs {
     /// Offer a pseudo-terminal behind this link. Repeat it for more programs.
@@ -42,6 +45,13 @@ pub(crate) struct ServeArgs {
     /// Offer the frames on this TCP port; 0: a free one.
     #[arg(long, value_name = "PORT")]
     tcp: Option<u16>,
+    /// Offer the maker's WebSocket on this port, at /ws.
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8080")]
+    ws: Option<u16>,
+    /// Accept web pages from anywhere, such as the maker's: each web site that is open in a browser on this computer can
+    /// then move the arm. Without it only pages that this computer serves can connect.
+    #[arg(long, requires = "ws")]
+    maker_pages: bool,
     /// Listen on this address of this computer, for other computers; needs --token.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), requires = "token")]
     listen: IpAddr,
@@ -66,7 +76,7 @@ impl Printable for Ready {
 }
 
 pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), CommandError> {
-    if args.pty.is_empty() && args.tcp.is_none() {
+    if args.pty.is_empty() && args.tcp.is_none() && args.ws.is_none() {
         return Err(CommandError::Usage(
             "nothing to serve: use --pty LINK for programs that open a serial port, --tcp PORT for others"
                 .to_owned(),
@@ -82,7 +92,8 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
         baud: session.options.baud,
         ptys: args.pty.clone(),
         tcp: args.tcp.map(|port| SocketAddr::new(args.listen, port)),
-        token: args.token.clone(),
+        web_socket: args.ws.map(|port| SocketAddr::new(args.listen, port)),
+        access: Access { token: args.token.clone(), allows_any_page: args.maker_pages },
         is_read_only: args.read_only,
     };
     // Before the links are created: Ctrl-C has to remove them.
@@ -93,6 +104,9 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
     }
     if let Some(address) = server.tcp_address() {
         session.printer.print(&Ready { ready: format!("socket://{address}") })?;
+    }
+    if let Some(address) = server.web_socket_address() {
+        session.printer.print(&Ready { ready: format!("ws://{address}/ws") })?;
     }
     let ended = server.run(&stop, &mut |notice| report(&notice));
     ended.map_err(|error| CommandError::Arm(format!("the operating system failed: {error}")))

@@ -1,7 +1,8 @@
 //! The server: the hub between the arm's serial port and the connections of its clients. Linux only.
 //!
 //! ```text
-//!   ArmPort ◀──▶ Hub ◀──▶ FrameConnection ◀──▶ pseudo-terminal, or TCP stream
+//!   ArmPort ◀──▶ Hub ◀─┬─▶ FrameConnection ◀──▶ pseudo-terminal, or TCP stream
+//!                      └─▶ WebConnection   ◀──▶ WebSocket
 //! ```
 //!
 //! One thread waits in poll(2) for all file descriptors and for the deadline of the hub. The arm's line carries at most
@@ -10,11 +11,13 @@
 
 mod arm_port;
 mod connection;
+mod handshake;
 mod listener;
 mod notice;
 mod pty_connection;
 mod start_error;
 mod tcp_connection;
+mod web_connection;
 
 use std::io;
 use std::net::SocketAddr;
@@ -30,8 +33,10 @@ use self::arm_port::ArmPort;
 use self::listener::Listener;
 use self::pty_connection::PtyConnection;
 use self::tcp_connection::TcpConnection;
+use self::web_connection::WebConnection;
 use crate::hub::Hub;
 
+pub use self::handshake::Access;
 pub use self::notice::Notice;
 pub use self::start_error::StartError;
 
@@ -49,8 +54,10 @@ pub struct ServerConfig {
     pub ptys: Vec<PathBuf>,
     /// Address for clients that speak frames over TCP.
     pub tcp: Option<SocketAddr>,
-    /// What TCP clients have to send first, with a line feed.
-    pub token: Option<String>,
+    /// Address for clients of the maker's WebSocket.
+    pub web_socket: Option<SocketAddr>,
+    /// Who may connect over the network.
+    pub access: Access,
     /// Writes do not reach the arm.
     pub is_read_only: bool,
 }
@@ -64,6 +71,8 @@ pub struct Server {
     pty_clients: Option<Clients>,
     tcp: Option<Listener>,
     streams: Vec<TcpConnection>,
+    web_socket: Option<Listener>,
+    web_clients: Vec<WebConnection>,
     config: ServerConfig,
     start: std::time::Instant,
 }
@@ -81,15 +90,23 @@ impl Server {
             ptys.push(PtyConnection::open(&mut hub, pty_clients.as_mut(), link, config.baud)?);
         }
         let tcp = config.tcp.map(Listener::open).transpose()?;
+        let web_socket = config.web_socket.map(Listener::open).transpose()?;
         let arm = ArmPort::new(config.arm.clone(), config.baud);
         let start = std::time::Instant::now();
-        Ok(Self { hub, arm, ptys, pty_clients, tcp, streams: Vec::new(), config, start })
+        let (streams, web_clients) = (Vec::new(), Vec::new());
+        Ok(Self { hub, arm, ptys, pty_clients, tcp, streams, web_socket, web_clients, config, start })
     }
 
     /// The address for TCP clients, with the port that the system chose for port 0.
     #[must_use]
     pub fn tcp_address(&self) -> Option<SocketAddr> {
         self.tcp.as_ref().map(Listener::address)
+    }
+
+    /// The address for WebSocket clients, likewise.
+    #[must_use]
+    pub fn web_socket_address(&self) -> Option<SocketAddr> {
+        self.web_socket.as_ref().map(Listener::address)
     }
 
     /// Serves until `stop` is readable.
@@ -109,7 +126,7 @@ impl Server {
     fn advance(&mut self, notify: &mut dyn FnMut(Notice)) -> io::Result<Instant> {
         let now = self.now();
         self.arm.receive(&mut self.hub, now, notify);
-        self.accept();
+        self.accept(now);
         if let Some(clients) = &mut self.pty_clients {
             clients.update()?;
         }
@@ -119,6 +136,9 @@ impl Server {
         for stream in &mut self.streams {
             stream.receive(&mut self.hub, now);
         }
+        for client in &mut self.web_clients {
+            client.receive(&mut self.hub, now);
+        }
         self.hub.poll(now);
         self.arm.send(&mut self.hub, now, notify);
         for pty in &mut self.ptys {
@@ -127,7 +147,13 @@ impl Server {
         for stream in &mut self.streams {
             stream.send(&mut self.hub);
         }
+        for client in &mut self.web_clients {
+            client.send(&mut self.hub, now);
+        }
         for closed in self.streams.extract_if(.., |stream| stream.is_closed(now)) {
+            closed.disconnect(&mut self.hub, now);
+        }
+        for closed in self.web_clients.extract_if(.., |client| client.is_closed(now)) {
             closed.disconnect(&mut self.hub, now);
         }
         Ok(self.deadline(now))
@@ -136,19 +162,29 @@ impl Server {
     fn deadline(&self, now: Instant) -> Instant {
         let ptys = self.ptys.iter().map(PtyConnection::deadline);
         let streams = self.streams.iter().map(TcpConnection::deadline);
+        let web_clients = self.web_clients.iter().map(WebConnection::deadline);
         let own = [self.hub.deadline(now), self.arm.deadline()];
-        ptys.chain(streams).chain(own).min().unwrap_or(Instant::FAR_FUTURE)
+        ptys.chain(streams).chain(web_clients).chain(own).min().unwrap_or(Instant::FAR_FUTURE)
     }
 
-    fn accept(&mut self) {
-        let Some(listener) = &self.tcp else { return };
-        let now = self.now();
-        while let Some(stream) = listener.accept() {
-            if self.streams.len() < MOST_NETWORK_CLIENTS {
-                let (token, baud) = (self.config.token.clone(), self.config.baud);
+    /// Accepts clients. Those beyond the limit are closed at once.
+    fn accept(&mut self, now: Instant) {
+        while let Some(stream) = self.tcp.as_ref().and_then(Listener::accept) {
+            if !self.is_full() {
+                let (token, baud) = (self.config.access.token.clone(), self.config.baud);
                 self.streams.push(TcpConnection::new(&mut self.hub, stream, token, baud, now));
             }
         }
+        while let Some(stream) = self.web_socket.as_ref().and_then(Listener::accept) {
+            if !self.is_full() {
+                let access = self.config.access.clone();
+                self.web_clients.extend(WebConnection::new(stream, access, &mut self.hub, now));
+            }
+        }
+    }
+
+    fn is_full(&self) -> bool {
+        self.streams.len() + self.web_clients.len() >= MOST_NETWORK_CLIENTS
     }
 
     /// Sleeps until an event or the deadline. Returns whether `stop` is readable.
@@ -159,6 +195,8 @@ impl Server {
         events.extend(self.ptys.iter().map(PtyConnection::interest));
         events.extend(self.tcp.as_ref().map(|listener| PollFd::new(listener, PollFlags::IN)));
         events.extend(self.streams.iter().map(TcpConnection::interest));
+        events.extend(self.web_socket.as_ref().map(|listener| PollFd::new(listener, PollFlags::IN)));
+        events.extend(self.web_clients.iter().map(WebConnection::interest));
         match poll(&mut events, timeout(deadline - self.now()).as_ref()) {
             Ok(_) | Err(Errno::INTR) => {}
             Err(error) => return Err(error.into()),

@@ -1,0 +1,123 @@
+//! A client of the maker's WebSocket: its commands one after the other, and the answers in their order.
+//!
+//! A read is always answered. All other commands are answered only to a browser: the maker's Python client does not wait
+//! for their answers, and takes the next message for the answer to its next read.
+
+use std::collections::VecDeque;
+
+use protocol_core::registers::map::{PRESENT_POSITION, TARGET_POSITION};
+use protocol_core::time::Instant;
+use serde_json::{Value, json};
+
+use super::command::{Command, CommandError};
+use crate::hub::{ClientId, Event, Hub, MOST_WAITING, WholeRequest};
+
+/// Answers that may wait for a client to take them. Its commands wait meanwhile.
+const MOST_ANSWERS: usize = 8;
+
+/// A client of the maker's WebSocket.
+#[derive(Debug)]
+pub struct MakerClient {
+    id: ClientId,
+    is_browser: bool,
+    waiting: VecDeque<Result<Command, CommandError>>,
+    /// The command whose read has no reply yet.
+    current: Option<Command>,
+    answers: VecDeque<String>,
+}
+
+impl MakerClient {
+    /// A new client of `hub`. `is_browser`: its handshake carried an `Origin`.
+    pub fn connect(hub: &mut Hub, is_browser: bool) -> Self {
+        let id = hub.connect();
+        hub.set_can_receive(id, true);
+        Self { id, is_browser, waiting: VecDeque::new(), current: None, answers: VecDeque::new() }
+    }
+
+    /// Leaves the hub.
+    pub fn disconnect(self, hub: &mut Hub, now: Instant) {
+        hub.disconnect(now, self.id);
+    }
+
+    /// Can the client send another message?
+    #[must_use]
+    pub fn has_room(&self) -> bool {
+        self.waiting.len() < MOST_WAITING
+    }
+
+    /// Takes a message. Call it only if [`MakerClient::has_room`].
+    pub fn message(&mut self, text: &str) {
+        self.waiting.push_back(Command::parse(text));
+    }
+
+    /// Carries out commands, as far as possible. Call it after messages, after [`Hub::poll`] and [`Hub::arm_bytes`].
+    pub fn advance(&mut self, hub: &mut Hub, now: Instant) {
+        while let Some(event) = hub.take_event(self.id) {
+            self.finish_read(hub, event);
+        }
+        while self.current.is_none() && self.answers.len() < MOST_ANSWERS && hub.has_room(self.id) {
+            let Some(command) = self.waiting.pop_front() else { return };
+            self.start(hub, now, command);
+        }
+    }
+
+    /// The next answer.
+    pub fn take_answer(&mut self) -> Option<String> {
+        self.answers.pop_front()
+    }
+
+    fn start(&mut self, hub: &mut Hub, now: Instant, command: Result<Command, CommandError>) {
+        match command {
+            Err(CommandError { message, is_read }) => self.answer(is_read, &error(&message)),
+            Ok(Command::Ping) => {
+                self.answer(false, &json!({"status": "pong", "timestamp": now.as_micros() / 1_000}));
+            }
+            Ok(Command::Write { address, values, done }) => {
+                hub.request(self.id, WholeRequest::Write { address, values });
+                self.answer(false, &message(done));
+            }
+            Ok(Command::Read { address, count }) => {
+                hub.request(self.id, WholeRequest::Read { address, count });
+                self.current = Some(Command::Read { address, count });
+            }
+            Ok(Command::Stop) => {
+                let (address, count) = (PRESENT_POSITION.address, PRESENT_POSITION.count);
+                hub.request(self.id, WholeRequest::Read { address, count });
+                self.current = Some(Command::Stop);
+            }
+        }
+    }
+
+    fn finish_read(&mut self, hub: &mut Hub, event: Event) {
+        match (self.current.take(), event) {
+            (Some(Command::Stop), Event::Reply { values, .. }) => {
+                hub.request(self.id, WholeRequest::Write { address: TARGET_POSITION.address, values });
+                self.answer(false, &message("Stopped"));
+            }
+            (Some(_), Event::Reply { values, .. }) => {
+                self.answer(true, &json!({"status": "ok", "data": values}))
+            }
+            (Some(command), Event::NoReply { .. }) => {
+                let is_read = matches!(command, Command::Read { .. });
+                self.answer(is_read, &error("The arm does not answer"));
+            }
+            // Nothing is pushed: the programs of the maker take any message for an answer.
+            (current, _) => self.current = current,
+        }
+    }
+
+    /// Sends an answer, if the client expects one.
+    fn answer(&mut self, is_read: bool, answer: &Value) {
+        if is_read || self.is_browser {
+            self.answers.push_back(answer.to_string());
+        }
+    }
+}
+
+fn message(text: &str) -> Value {
+    json!({"status": "ok", "message": text})
+}
+
+fn error(text: &str) -> Value {
+    json!({"status": "error", "message": text})
+}

@@ -1,0 +1,12 @@
+//! The maker's WebSocket: JSON messages in place of frames (maker's firmware 2.1.4).
+//!
+//! ```text
+//!   text ──▶ Command ──▶ MakerClient ──▶ Hub
+//!   text ◀── answer  ◀── MakerClient ◀── Hub
+//! ```
+
+pub mod client;
+pub mod command;
+
+pub use client::MakerClient;
+pub use command::Command;

@@ -1,0 +1,144 @@
+//! The maker's WebSocket of `sevenbot serve`, and ten clients of all kinds at once.
+
+mod served;
+
+use std::thread;
+use std::time::{Duration, Instant};
+
+use system_tests::frames::reply;
+use system_tests::registers::{DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED, TARGET_POSITION};
+use system_tests::wait::wait_until;
+use system_tests::{read_request, write_request};
+
+use served::{Served, WebClient, exchange, names};
+
+const LOCAL_PAGE: (&str, &str) = ("origin", "http://localhost:3000");
+
+#[test]
+fn the_next_message_to_a_program_is_the_answer_to_its_read() {
+    let served = Served::start(1, &[]);
+    let mut client = WebClient::connect(&served, &[]).expect("accepted");
+    for value in 1..=50 {
+        client.send(&format!(r#"{{"cmd":"speed","speed":{value}}}"#));
+        client.send(r#"{"cmd":"ping"}"#);
+        client.send("no JSON");
+        assert_eq!(client.read(SPEED, 7), [value; 7]);
+    }
+}
+
+#[test]
+fn a_page_gets_every_answer_in_order() {
+    let served = Served::start(1, &[]);
+    let mut page = WebClient::connect(&served, &[LOCAL_PAGE]).expect("accepted");
+    let requests = [
+        r#"{"cmd":"ping"}"#,
+        r#"{"cmd":"angles","angles":[90,90,65,90,90,90,70.6]}"#,
+        r#"{"cmd":"read","id":46,"num":7}"#,
+        r#"{"cmd":"jump"}"#,
+        r#"{"cmd":"write","id":32,"num":2,"value":[7,8]}"#,
+        r#"{"cmd":"read","id":32,"num":2}"#,
+        "{",
+    ];
+    requests.iter().for_each(|request| page.send(request));
+    let mut next = || page.receive().expect("an answer");
+    assert_eq!(next()["status"], "pong");
+    assert_eq!(next()["message"], "Angles set");
+    assert_eq!(next()["data"].to_string(), "[90,90,65,90,90,90,71]");
+    assert_eq!(next()["message"], "Unknown command");
+    assert_eq!(next()["status"], "ok");
+    assert_eq!(next()["data"].to_string(), "[7,8]");
+    assert_eq!(next()["message"], "Invalid JSON format");
+}
+
+#[test]
+fn stop_holds_every_joint() {
+    let served = Served::start(1, &[]);
+    let mut page = WebClient::connect(&served, &[LOCAL_PAGE]).expect("accepted");
+    page.send(r#"{"cmd":"speed","speed":5}"#);
+    page.send(r#"{"cmd":"angle","id":0,"angle":170}"#);
+    (0..2).for_each(|_| assert_eq!(page.receive().expect("an answer")["status"], "ok"));
+    wait_until("the joint is on its way", || page.read(PRESENT_POSITION, 1)[0] > 95);
+    page.send(r#"{"cmd":"stop"}"#);
+    assert_eq!(page.receive().expect("an answer")["message"], "Stopped");
+    let target = page.read(TARGET_POSITION, 1)[0];
+    assert!((95..160).contains(&target), "{target}");
+}
+
+#[test]
+fn pages_of_other_sites_and_other_names_are_refused() {
+    let served = Served::start(1, &[]);
+    for (headers, status) in [
+        ([("origin", "https://evil.example")], 403),
+        ([("origin", "null")], 403),
+        ([("host", "evil.example")], 403),
+    ] {
+        assert_eq!(WebClient::connect(&served, &headers).err(), Some(status), "{headers:?}");
+    }
+    let served = Served::start(1, &["--maker-pages", "--token", "correct-horse"]);
+    let page = ("origin", "null");
+    assert_eq!(WebClient::connect(&served, &[page]).err(), Some(401));
+    let token = ("authorization", "Bearer correct-horse");
+    assert!(WebClient::connect(&served, &[page, token]).is_ok());
+}
+
+#[test]
+fn a_message_that_is_too_long_ends_its_own_connection_only() {
+    let served = Served::start(1, &[]);
+    let mut good = WebClient::connect(&served, &[]).expect("accepted");
+    let mut bad = WebClient::connect(&served, &[]).expect("accepted");
+    bad.send(&"x".repeat(2_049));
+    assert_eq!(bad.receive(), None);
+    assert_eq!(good.read(DEVICE_CODE, 1), [7]);
+}
+
+/// `SERVE_LOAD_SECONDS` sets the length.
+#[test]
+fn ten_clients_of_three_kinds_lose_nothing_and_cross_nothing() {
+    let seconds = std::env::var("SERVE_LOAD_SECONDS").map_or(5, |text| text.parse().expect("a number"));
+    let served = Served::start(4, &[]);
+    let end = Instant::now() + Duration::from_secs(seconds);
+    let values = || (1..=100).cycle().take_while(|_| Instant::now() < end);
+    let totals: Vec<(&str, usize)> = thread::scope(|scope| {
+        let mut clients = Vec::new();
+        for (name, own) in names(3).zip(SPEED..) {
+            let mut arm = served.open(name);
+            clients.push(scope.spawn(move || {
+                arm.write(FEEDBACK_FREQUENCY, &[0]);
+                let check = |value| assert_eq!(arm.write_and_read((own, &[value]), (own, 1)), [value]);
+                ("frames on a terminal", values().map(check).count())
+            }));
+        }
+        for own in SPEED + 3..SPEED + 5 {
+            let mut stream = served.connect();
+            let check = move |value| {
+                let request = [write_request(own, &[value]), read_request(own, 1)].concat();
+                exchange(&mut stream, &request, &reply(own, &[value]));
+            };
+            clients.push(scope.spawn(move || ("frames over TCP", values().map(check).count())));
+        }
+        for own in SPEED + 5..SPEED + 7 {
+            let mut client = WebClient::connect(&served, &[]).expect("accepted");
+            let check = move |value| {
+                client.send(&format!(r#"{{"cmd":"write","id":{own},"num":1,"value":[{value}]}}"#));
+                assert_eq!(client.read(own, 1), [value]);
+            };
+            clients.push(scope.spawn(move || ("WebSocket", values().map(check).count())));
+        }
+        let mut reports = served.open("d");
+        clients.push(scope.spawn(move || {
+            reports.write(FEEDBACK_FREQUENCY, &[50]);
+            let is_report = |_: &u8| reports.reply().address == PRESENT_POSITION;
+            ("reports", values().filter(is_report).count())
+        }));
+        let mut deaf = served.connect();
+        exchange(&mut deaf, &write_request(FEEDBACK_FREQUENCY, &[50]), &[]);
+        let mut page = WebClient::connect(&served, &[LOCAL_PAGE]).expect("accepted");
+        page.send("half of it: {");
+        clients.into_iter().map(|client| client.join().expect("no client fails")).collect()
+    });
+    println!("{seconds} s: {totals:?}");
+    assert!(
+        totals.iter().all(|&(_, count)| count > usize::try_from(seconds).expect("a count") * 5),
+        "{totals:?}"
+    );
+}
