@@ -2,13 +2,14 @@
 
 mod tool_output;
 
-use std::process::Output;
+use std::io::Read;
+use std::process::{Child, Output};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use system_tests::process::{Signal, send_signal};
 use system_tests::registers::{SPEED, STANDARD_POSE, TARGET_POSITION, VACUUM_PUMP};
-use system_tests::{TestSetup, with_arm};
+use system_tests::{TestArm, TestSetup, with_arm};
 use tool_output::{all_output, failed, run_without_arm, succeeded};
 
 /// The numbers of the line that begins with `first`.
@@ -22,6 +23,21 @@ fn numbers(text: &str, first: &str) -> Vec<f64> {
 /// The distance between two points.
 fn distance(one: &[f64], other: [f64; 3]) -> f64 {
     one.iter().zip(other).map(|(one, other)| (one - other).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Starts a move, and waits until the arm got the first frame of it.
+fn start_to_move(arm: &mut TestArm, arguments: &[&str], first_frame: &str) -> Child {
+    let mut tool = arm.spawn_sevenbot(&[arguments, &["--verbose"]].concat());
+    let mut frames = tool.stderr.take().expect("a pipe");
+    let mut received = Vec::new();
+    while !String::from_utf8_lossy(&received).contains(first_frame) {
+        let mut chunk = [0; 256];
+        let length = frames.read(&mut chunk).expect("text");
+        assert_ne!(length, 0, "ended before the arm moved:\n{}", String::from_utf8_lossy(&received));
+        received.extend(&chunk[..length]);
+    }
+    tool.stderr = Some(frames);
+    tool
 }
 
 #[test]
@@ -92,8 +108,8 @@ fn ctrl_c_holds_an_arm_on_its_way_to_a_point() {
         arm.drive_to(&STANDARD_POSE);
         arm.write(SPEED, &[3; 7]);
         let begin = Instant::now();
-        let tool = arm.spawn_sevenbot(&["move-to", "200", "100", "60", "--wait"]);
-        sleep(Duration::from_millis(2500));
+        let tool = start_to_move(arm, &["move-to", "200", "100", "60", "--wait"], "-> write target-position");
+        sleep(Duration::from_millis(500));
         send_signal(&tool, Signal::INT);
         let output = tool.wait_with_output().expect("the tool ends");
         assert_eq!(output.status.code(), Some(130), "{}", all_output(&output));
@@ -149,8 +165,9 @@ fn a_line_that_breaks_moves_nothing() {
 fn ctrl_c_holds_an_arm_on_a_straight_line() {
     with_arm(TestSetup::any(), |arm| {
         arm.drive_to(&[105, 88, 110, 90, 135, 90, 80]);
-        let tool = arm.spawn_sevenbot(&["move-to", "100", "200", "50", "--straight", "--speed", "10"]);
-        sleep(Duration::from_millis(5000));
+        let line = ["move-to", "100", "200", "50", "--straight", "--speed", "10"];
+        let tool = start_to_move(arm, &line, "-> write vacuum-pump");
+        sleep(Duration::from_millis(2000));
         send_signal(&tool, Signal::INT);
         let output = tool.wait_with_output().expect("the tool ends");
         assert_eq!(output.status.code(), Some(130), "{}", all_output(&output));
