@@ -1,6 +1,6 @@
 //! An open arm: reads and writes registers, also as typed values, and keeps the reports.
 //!
-//! Knows the register table. [`FramePort`] knows the serial port.
+//! Knows the register table. `FramePort` knows the serial port.
 
 use std::collections::VecDeque;
 use std::fmt;
