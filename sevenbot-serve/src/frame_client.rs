@@ -3,12 +3,12 @@
 //! A client that does not read loses reports first. Its replies wait, its reads wait for room, and finally its bytes
 //! wait where it sent them from; its writes are carried out as long as they do not stand behind a read that waits (D5).
 
-use protocol_core::request::{Reply, Request};
+use protocol_core::request::Reply;
 use protocol_core::time::Instant;
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, MAX_LENGTH, ToArm};
 
-use crate::hub::{ClientId, Event, Hub};
+use crate::hub::{ClientId, Event, Hub, WholeRequest};
 
 /// Bytes for the client beyond which reports are dropped: a second of reports at the highest frequency.
 const MOST_REPORT_BYTES: usize = 1_024;
@@ -61,7 +61,7 @@ impl FrameClient {
         while hub.has_room(self.id) {
             match self.deframer.pull() {
                 Some(Ok(frame)) => {
-                    hub.request(self.id, Request::from_frame(frame).into());
+                    hub.request(self.id, WholeRequest::from_frame(frame));
                 }
                 Some(Err(_)) => {}
                 None => return,

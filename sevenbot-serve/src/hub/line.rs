@@ -6,10 +6,11 @@
 
 use std::collections::VecDeque;
 
-use protocol_core::request::{Reply, Request};
+use protocol_core::request::Reply;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer::gap;
-use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
+use protocol_core::wire::frame::encode;
+use protocol_core::wire::{Deframer, FrameBuffer, Function, ToHost};
 
 use super::client::Event;
 use super::client_id::ClientId;
@@ -123,19 +124,20 @@ impl Line {
     }
 
     pub(crate) fn send_read(&mut self, now: Instant, owner: Owner, address: u8, count: u8) {
-        self.send(now, &Request::Read { address, count });
+        self.send(now, Function::Read, address, count, &[]);
         let line_time = self.time_of(reply_bytes(count) + WINDOW);
         let deadline = self.busy_until.max(now) + line_time + REPLY_TIMEOUT;
         self.unanswered.push_back(Unanswered { owner, address, count, deadline });
     }
 
-    pub(crate) fn send_write(&mut self, now: Instant, address: u8, values: &[u8]) {
-        self.send(now, &Request::Write { address, values });
+    pub(crate) fn send_write(&mut self, now: Instant, function: Function, address: u8, values: &[u8]) {
+        let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
+        self.send(now, function, address, count, values);
     }
 
-    fn send(&mut self, now: Instant, request: &Request<'_>) {
+    fn send(&mut self, now: Instant, function: Function, address: u8, count: u8, values: &[u8]) {
         let mut frame = FrameBuffer::new();
-        request.encode(&mut frame);
+        encode(&mut frame, function, address, count, values);
         self.output.extend_from_slice(&frame);
         self.busy_until = self.busy_until.max(now) + self.time_of(frame.len());
     }

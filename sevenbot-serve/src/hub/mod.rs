@@ -26,6 +26,7 @@ use std::collections::BTreeMap;
 
 use protocol_core::registers::map::{DEVICE_CODE, FEEDBACK_FREQUENCY};
 use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::Function;
 
 use self::client::Client;
 use self::line::{Line, Owner};
@@ -237,13 +238,13 @@ impl Hub {
                 client.has_read = true;
                 self.line.send_read(now, Owner::Client(id), address, count);
             }
-            WholeRequest::Write { address, mut values } => {
-                if client.own.write(address, &mut values) {
+            WholeRequest::Write { function, address, mut values } => {
+                if client.own.write(function, address, &mut values) {
                     client.schedule.set(now, &client.own);
                     self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
                 }
                 if !self.is_read_only {
-                    self.line.send_write(now, address, &values);
+                    self.line.send_write(now, function, address, &values);
                 }
             }
         }
@@ -280,7 +281,7 @@ impl Hub {
     fn identify(&mut self, now: Instant, values: &[u8]) {
         if values == [DEVICE_CODE.default_at(DEVICE_CODE.address)] && self.arm != ArmState::Present {
             self.arm = ArmState::Present;
-            self.line.send_write(now, FEEDBACK_FREQUENCY.address, &[0]);
+            self.line.send_write(now, Function::Write, FEEDBACK_FREQUENCY.address, &[0]);
         }
     }
 

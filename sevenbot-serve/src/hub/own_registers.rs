@@ -5,6 +5,7 @@
 
 use protocol_core::registers::map::{FEEDBACK_FREQUENCY, find};
 use protocol_core::registers::{Access, Region, Register};
+use protocol_core::wire::Function;
 
 use super::stream::Stream;
 
@@ -25,8 +26,8 @@ impl OwnRegisters {
 
     /// Applies a write and sets the own registers in `values` to 0, as the arm has them. Returns whether a frequency
     /// may have changed. A frame that the arm will refuse (D16) has no effect here, and passes as it is.
-    pub(crate) fn write(&mut self, address: u8, values: &mut [u8]) -> bool {
-        if is_refused(address, values) {
+    pub(crate) fn write(&mut self, function: Function, address: u8, values: &mut [u8]) -> bool {
+        if function != Function::Write || is_refused(address, values) {
             return false;
         }
         match byte_at(address, values, &FEEDBACK_FREQUENCY) {
@@ -67,13 +68,13 @@ mod tests {
     fn a_write_keeps_its_own_byte_and_passes_the_others() {
         let mut own = OwnRegisters::default();
         let mut values = [90, 90, 65, 90, 90, 90, 80, 30];
-        assert!(own.write(46, &mut values));
+        assert!(own.write(Function::Write, 46, &mut values));
         assert_eq!((own.frequency(Stream::Positions), values), (30, [90, 90, 65, 90, 90, 90, 80, 0]));
         let mut reply = [1, 2, 3];
         own.overlay(52, &mut reply);
         assert_eq!(reply, [1, 30, 3]);
-        assert!(!own.write(54, &mut [1]));
-        assert!(!own.write(46, &mut [90]));
+        assert!(!own.write(Function::Write, 54, &mut [1]));
+        assert!(!own.write(Function::Write, 46, &mut [90]));
     }
 
     #[test]
@@ -81,7 +82,7 @@ mod tests {
         let mut own = OwnRegisters::default();
         for mut values in [[90, 51], [181, 30]] {
             let before = values;
-            assert!(!own.write(52, &mut values));
+            assert!(!own.write(Function::Write, 52, &mut values));
             assert_eq!((own, values), (OwnRegisters::default(), before));
         }
     }

@@ -1,7 +1,6 @@
 //! A whole request of a client, with its values.
 
-use protocol_core::request::Request;
-use protocol_core::wire::MIN_LENGTH;
+use protocol_core::wire::{Frame, Function, MIN_LENGTH};
 
 /// A request that owns its values.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,6 +14,8 @@ pub enum WholeRequest {
     },
     /// Writes registers from `address` on.
     Write {
+        /// The function code of the frame. It passes unchanged.
+        function: Function,
         /// The first register.
         address: u8,
         /// One byte per register, at most 255.
@@ -23,6 +24,16 @@ pub enum WholeRequest {
 }
 
 impl WholeRequest {
+    /// The request in a frame of a client.
+    #[must_use]
+    pub fn from_frame(frame: Frame<'_>) -> Self {
+        let (function, address, count) = (frame.function, frame.address, frame.count);
+        match function {
+            Function::Read => Self::Read { address, count },
+            _ => Self::Write { function, address, values: frame.data.to_vec() },
+        }
+    }
+
     /// Bytes that the request and its reply take on the line.
     pub(crate) fn line_bytes(&self) -> usize {
         match self {
@@ -40,13 +51,4 @@ pub(crate) fn read_bytes(count: u8) -> usize {
 /// Bytes of the reply with `count` registers.
 pub(crate) fn reply_bytes(count: u8) -> usize {
     MIN_LENGTH + usize::from(count)
-}
-
-impl From<Request<'_>> for WholeRequest {
-    fn from(request: Request<'_>) -> Self {
-        match request {
-            Request::Read { address, count } => Self::Read { address, count },
-            Request::Write { address, values } => Self::Write { address, values: values.to_vec() },
-        }
-    }
 }

@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 
 use protocol_core::registers::map::{PRESENT_POSITION, TARGET_POSITION};
 use protocol_core::time::Instant;
+use protocol_core::wire::Function;
 use serde_json::{Value, json};
 
 use super::command::{Command, CommandError};
@@ -73,7 +74,7 @@ impl MakerClient {
                 self.answer(false, &json!({"status": "pong", "timestamp": now.as_micros() / 1_000}));
             }
             Ok(Command::Write { address, values, done }) => {
-                hub.request(self.id, WholeRequest::Write { address, values });
+                hub.request(self.id, write(address, values));
                 self.answer(false, &message(done));
             }
             Ok(Command::Read { address, count }) => {
@@ -91,7 +92,7 @@ impl MakerClient {
     fn finish_read(&mut self, hub: &mut Hub, event: Event) {
         match (self.current.take(), event) {
             (Some(Command::Stop), Event::Reply { values, .. }) => {
-                hub.request(self.id, WholeRequest::Write { address: TARGET_POSITION.address, values });
+                hub.request(self.id, write(TARGET_POSITION.address, values));
                 self.answer(false, &message("Stopped"));
             }
             (Some(_), Event::Reply { values, .. }) => {
@@ -112,6 +113,10 @@ impl MakerClient {
             self.answers.push_back(answer.to_string());
         }
     }
+}
+
+fn write(address: u8, values: Vec<u8>) -> WholeRequest {
+    WholeRequest::Write { function: Function::Write, address, values }
 }
 
 fn message(text: &str) -> Value {
