@@ -177,6 +177,22 @@ fn an_arm_that_stops_answering_loses_replies_but_never_crosses_them() {
 }
 
 #[test]
+fn a_damaged_reply_is_lost_to_its_own_program_only() {
+    let mut world = World::new(3);
+    world.damages_next_byte = true;
+    world.send(0, &read(SPEED.address, 3));
+    world.send(1, &read(CHIP_ID.address, 6));
+    world.send(2, &read(DEVICE_CODE.address, 1));
+    world.run(100);
+    assert_eq!(world.take(0), []);
+    assert_eq!(world.take(1), [(CHIP_ID.address, b"SIM\0\0\x01".to_vec())]);
+    assert_eq!(world.take(2), [(DEVICE_CODE.address, vec![7])]);
+    world.send(0, &read(SPEED.address, 1));
+    world.run(20);
+    assert_eq!(world.take(0), [(SPEED.address, vec![60])]);
+}
+
+#[test]
 fn with_read_only_access_nothing_is_written_but_reports_can_be_chosen() {
     let mut world = World::with_access(1, true);
     world.send(0, &write(SPEED.address, &[7]));

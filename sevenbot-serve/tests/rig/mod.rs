@@ -31,6 +31,8 @@ pub struct World {
     pub hub: Hub,
     pub arm: Simulation<Flash>,
     pub is_plugged: bool,
+    /// The next byte of the arm is damaged on the line.
+    pub damages_next_byte: bool,
     pub programs: Vec<Program>,
 }
 
@@ -60,7 +62,14 @@ impl World {
         let plant = Plant::new(Instant::ZERO);
         let arm = Simulation::new(Instant::ZERO, config, Flash::in_memory(), plant);
         let hub = Hub::new(BAUD, is_read_only);
-        let mut world = Self { now: Instant::ZERO, hub, arm, is_plugged: false, programs: Vec::new() };
+        let mut world = Self {
+            now: Instant::ZERO,
+            hub,
+            arm,
+            is_plugged: false,
+            damages_next_byte: false,
+            programs: Vec::new(),
+        };
         world.plug();
         (0..programs).for_each(|_| world.join());
         world.run(1_000);
@@ -113,8 +122,12 @@ impl World {
             let sent = self.arm.host_send(self.now, &self.hub.to_arm()[..room]);
             self.hub.sent_to_arm(sent);
             self.arm.advance(self.now, true);
-            let received = self.arm.host_received().to_vec();
+            let mut received = self.arm.host_received().to_vec();
             self.arm.host_take(received.len());
+            if let Some(byte) = received.first_mut().filter(|_| self.damages_next_byte) {
+                *byte ^= 0xFF;
+                self.damages_next_byte = false;
+            }
             self.hub.arm_bytes(self.now, &received);
         }
         for program in &mut self.programs {
