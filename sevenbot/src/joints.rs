@@ -16,7 +16,7 @@ use std::fmt;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use protocol_core::registers::map::{MOTOR_STATE, PRESENT_POSITION, TARGET_POSITION, motor_state};
+use protocol_core::registers::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION, motor_state};
 use protocol_core::registers::{Joint, Register};
 
 use crate::arm::Arm;
@@ -24,6 +24,7 @@ use crate::error::Error;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 use crate::status_block::StatusBlock;
+use crate::units::Speed;
 
 /// After power-up the arm measures each joint or finds it missing within 500 ms (D12). The rest is for the reply.
 pub(crate) const START_UP_TIME: Duration = Duration::from_millis(700);
@@ -68,8 +69,7 @@ impl Arm {
     /// As [`Arm::read`].
     pub fn joints(&mut self) -> Result<JointSnapshot, Error> {
         let status = self.status()?;
-        let registers = self.read_span(Span::between(&MOTOR_STATE, &PRESENT_POSITION))?;
-        Ok(JointSnapshot { registers, status })
+        Ok(JointSnapshot::new(self.read_span(JointSnapshot::REGISTERS)?, status))
     }
 
     /// Waits up to 0.7 s until no joint has the default target of power-up. The arm replaces these targets within half
@@ -108,6 +108,21 @@ pub struct JointSnapshot {
 }
 
 impl JointSnapshot {
+    /// The registers of a snapshot, from the motor state to the present positions.
+    pub const REGISTERS: Span = Span::between(&MOTOR_STATE, &PRESENT_POSITION);
+
+    /// From a read of [`Self::REGISTERS`], and the status block if the firmware has one.
+    #[must_use]
+    pub const fn new(registers: Snapshot, status: Option<StatusBlock>) -> Self {
+        Self { registers, status }
+    }
+
+    /// The status block; `None` if the firmware has none.
+    #[must_use]
+    pub const fn status(&self) -> Option<&StatusBlock> {
+        self.status.as_ref()
+    }
+
     /// Register 29, see [`motor_state`].
     #[must_use]
     pub fn motor_state(&self) -> u8 {
@@ -150,11 +165,21 @@ impl JointSnapshot {
         self.status.as_ref().map_or(0, StatusBlock::missing)
     }
 
-    pub(crate) fn is_missing(&self, joint: Joint) -> bool {
+    /// The speed of the joint's moves.
+    #[must_use]
+    pub fn speed(&self, joint: Joint) -> Speed {
+        Speed::from_steps(self.registers.at(SPEED.of(joint))).unwrap_or(Speed::MAXIMUM)
+    }
+
+    /// Does the joint's servo not answer? `false` without a status block.
+    #[must_use]
+    pub fn is_missing(&self, joint: Joint) -> bool {
         self.missing() & joint.bit() != 0
     }
 
-    pub(crate) fn is_moving(&self, joint: Joint) -> bool {
+    /// Does the joint's set-point move? `false` without a status block.
+    #[must_use]
+    pub fn is_moving(&self, joint: Joint) -> bool {
         self.status.as_ref().is_some_and(|status| status.is_moving(joint))
     }
 

@@ -91,7 +91,7 @@ fn title_right(view: &View) -> Line<'static> {
         (Connection::Looking(_), _) => Span::styled("no arm, looking again ", BAD),
         (Connection::Open { .. }, None) => Span::styled("connected ", FAINT),
         (Connection::Open { .. }, Some(sample)) => {
-            let state = sample.motor_state();
+            let state = sample.joints.motor_state();
             let style = if state == motor_state::SERVO { GOOD } else { BAD };
             Span::styled(format!("{} ", motor_state_name(state)), style)
         }
@@ -125,14 +125,14 @@ fn colour(joint: Joint) -> Style {
 }
 
 fn row(view: &View, sample: &Sample, joint: Joint, bar: usize) -> Line<'static> {
-    let (target, present) = (sample.target(joint), sample.present(joint));
+    let (target, present) = (sample.joints.target(joint), sample.joints.present(joint));
     let stale = if view.arm().is_some() { Style::new() } else { FAINT };
-    let (word, style) = match (sample.is_missing(joint), sample.is_moving(joint)) {
+    let (word, style) = match (sample.joints.is_missing(joint), sample.joints.is_moving(joint)) {
         (true, _) => ("no answer", BAD),
         (false, true) => ("moving", Style::new().fg(Color::Cyan)),
         (false, false) => ("", Style::new()),
     };
-    let speed = sample.speed(joint).degrees_per_second();
+    let speed = sample.joints.speed(joint).degrees_per_second();
     let numbers = format!("  {target:>5}°  {present:>7}°  {speed:>5.1} °/s  ");
     let mut spans = vec![marker(view, joint), number(joint)];
     spans.extend([Span::styled(numbers, stale), Span::styled(format!("{word:<10}"), style)]);
@@ -182,7 +182,7 @@ fn curve_segments(view: &View, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
 
 fn health(view: &View) -> Line<'static> {
     let Some(sample) = &view.sample else { return Line::default() };
-    let Some(status) = &sample.status else {
+    let Some(status) = sample.joints.status() else {
         return Line::styled(" the maker's firmware reports no health", FAINT);
     };
     let style = if status.is_healthy() { GOOD } else { BAD };

@@ -135,7 +135,7 @@ fn nudge(view: &mut View, degrees: i16) -> KeyAction {
 
 /// Sends a command that moves the arm, if the motors drive it.
 fn drive(view: &mut View, command: UiCommand) -> KeyAction {
-    match view.arm().map(|arm| arm.motor_state()) {
+    match view.arm().map(|arm| arm.joints.motor_state()) {
         Some(motor_state::SERVO) => KeyAction::Send(command),
         Some(_) => {
             view.show_note("the motors are off: s, then h, makes the arm hold where it is");

@@ -45,25 +45,25 @@ impl LineFormat {
 }
 
 fn columns(sample: &Sample) -> String {
-    let targets = Joint::ALL.map(|joint| sample.target(joint).to_string()).join(" ");
-    let present = Joint::ALL.map(|joint| sample.present(joint).to_string()).join(" ");
-    let moving: String = numbers(|joint| sample.is_moving(joint)).iter().map(u8::to_string).collect();
+    let targets = sample.joints.targets().map(|degrees| degrees.to_string()).join(" ");
+    let present = sample.joints.positions().map(|degrees| degrees.to_string()).join(" ");
+    let moving: String = numbers(|joint| sample.joints.is_moving(joint)).iter().map(u8::to_string).collect();
     let moving = if moving.is_empty() { "-" } else { &moving };
     format!("{:.3} {targets} {present} {moving}", sample.time.as_secs_f64())
 }
 
 fn csv(sample: &Sample) -> String {
     let joints = |field: fn(&Sample, Joint) -> String| Joint::ALL.map(|joint| field(sample, joint)).join(",");
-    let status = sample.status.as_ref();
+    let status = sample.joints.status();
     let number = |value: Option<u8>| value.map_or_else(String::new, |value| value.to_string());
     let volts = status.and_then(StatusBlock::supply_volts);
     [
         format!("{:.3}", sample.time.as_secs_f64()),
-        joints(|sample, joint| sample.target(joint).to_string()),
-        joints(|sample, joint| sample.present(joint).to_string()),
-        joints(|sample, joint| format!("{:.1}", sample.speed(joint).degrees_per_second())),
-        joints(|sample, joint| u8::from(sample.is_moving(joint)).to_string()),
-        sample.motor_state().to_string(),
+        joints(|sample, joint| sample.joints.target(joint).to_string()),
+        joints(|sample, joint| sample.joints.present(joint).to_string()),
+        joints(|sample, joint| format!("{:.1}", sample.joints.speed(joint).degrees_per_second())),
+        joints(|sample, joint| u8::from(sample.joints.is_moving(joint)).to_string()),
+        sample.joints.motor_state().to_string(),
         number(status.map(StatusBlock::faults)),
         number(status.map(StatusBlock::missing)),
         volts.map_or_else(String::new, |volts| format!("{volts:.1}")),
@@ -95,15 +95,16 @@ pub(crate) struct SampleJson {
 
 impl From<&Sample> for SampleJson {
     fn from(sample: &Sample) -> Self {
-        let status = sample.status.as_ref();
+        let status = sample.joints.status();
         Self {
             seconds: thousandths(sample.time.as_secs_f64()),
-            targets: Joint::ALL.map(|joint| sample.target(joint)),
-            positions: Joint::ALL.map(|joint| sample.present(joint)),
-            degrees_per_second: Joint::ALL.map(|joint| thousandths(sample.speed(joint).degrees_per_second())),
-            moving: numbers(|joint| sample.is_moving(joint)),
-            missing: numbers(|joint| sample.is_missing(joint)),
-            motor_state: sample.motor_state(),
+            targets: sample.joints.targets(),
+            positions: sample.joints.positions(),
+            degrees_per_second: Joint::ALL
+                .map(|joint| thousandths(sample.joints.speed(joint).degrees_per_second())),
+            moving: numbers(|joint| sample.joints.is_moving(joint)),
+            missing: numbers(|joint| sample.joints.is_missing(joint)),
+            motor_state: sample.joints.motor_state(),
             faults: status.map(StatusBlock::faults),
             supply_volts: status.and_then(StatusBlock::supply_volts),
             hottest_celsius: status.and_then(StatusBlock::hottest_celsius),

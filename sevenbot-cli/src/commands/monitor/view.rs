@@ -115,7 +115,7 @@ impl LinkQuality {
         let mean = if self.answers == 0 { last } else { self.round_trip_ms };
         self.round_trip_ms = mean + (last - mean) * MEAN_WEIGHT;
         self.answers += 1;
-        if let Some(now) = sample.status.as_ref().map(StatusBlock::frames_corrupted) {
+        if let Some(now) = sample.joints.status().map(StatusBlock::frames_corrupted) {
             self.corrupted = Some((self.corrupted.map_or(now, |(first, _)| first), now));
         }
     }
@@ -200,7 +200,7 @@ impl View {
         if self.is_frozen {
             return;
         }
-        self.past.push_back((sample.time, Joint::ALL.map(|joint| sample.present(joint))));
+        self.past.push_back((sample.time, sample.joints.positions()));
         while self.past.front().is_some_and(|(time, _)| *time + PLOT_SPAN < sample.time) {
             self.past.pop_front();
         }
@@ -228,6 +228,7 @@ impl View {
 pub(crate) mod tests {
     use super::*;
     use sevenbot::arm::STATUS;
+    use sevenbot::joints::JointSnapshot;
     use sevenbot::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION};
     use sevenbot::{Snapshot, Span};
 
@@ -242,7 +243,7 @@ pub(crate) mod tests {
 
     /// A sample with joint 2 moving from 90 to 120 degrees.
     pub(crate) fn sample(millis: u64, position: u8) -> Sample {
-        let mut registers = zeros(Span::between(&MOTOR_STATE, &PRESENT_POSITION));
+        let mut registers = zeros(JointSnapshot::REGISTERS);
         set(&mut registers, MOTOR_STATE.address, &[1]);
         set(&mut registers, SPEED.address, &[10; 7]);
         set(&mut registers, TARGET_POSITION.address, &[90, 120, 65, 90, 90, 90, 80]);
@@ -252,8 +253,7 @@ pub(crate) mod tests {
         set(&mut status, 254, &[74, 31]);
         Sample {
             time: Duration::from_millis(millis),
-            registers,
-            status: Some(StatusBlock::from(status)),
+            joints: JointSnapshot::new(registers, Some(StatusBlock::from(status))),
             round_trip: Duration::from_micros(4200),
         }
     }
