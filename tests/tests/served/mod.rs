@@ -104,6 +104,7 @@ impl WebClient {
         let url = served.ports.last().and_then(|port| port.to_str()).expect("a WebSocket");
         let address = url.strip_prefix("ws://").and_then(|url| url.strip_suffix("/ws")).expect("an address");
         let stream = TcpStream::connect(address).expect("a connection");
+        stream.set_nodelay(true).expect("an option");
         stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
         let mut request = url.into_client_request().expect("a request");
         for (name, value) in headers {
