@@ -59,6 +59,12 @@ impl Pacer {
         self.queue.is_empty()
     }
 
+    /// Number of bytes, in transit or arrived.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.queue.len()
+    }
+
     /// Starts to send bytes at `now`. Returns how many were accepted.
     pub fn push(&mut self, now: Instant, bytes: &[u8]) -> usize {
         self.advance(now);

@@ -76,6 +76,8 @@ pub struct Simulation<F, B = Plant> {
     controller_due: Instant,
     /// The controller does nothing until it is restarted.
     is_halted: bool,
+    /// The host has disconnected, and this many of its bytes are still on the line to the arm.
+    leaving: Option<usize>,
 }
 
 impl<F: NorFlash + Clone> Simulation<F> {
@@ -109,6 +111,7 @@ impl<F: NorFlash + Clone, B: ServoBus> Simulation<F, B> {
             now,
             controller_due: now,
             is_halted: false,
+            leaving: None,
         };
         simulation.start_host_line();
         simulation
@@ -141,6 +144,7 @@ impl<F: NorFlash + Clone, B: ServoBus> Simulation<F, B> {
             power_up(now, self.config, self.flash.clone(), faults, self.bus.answer_delay());
         self.controller_due = now;
         self.is_halted = false;
+        self.leaving = None;
         self.start_host_line();
     }
 
@@ -193,9 +197,20 @@ impl<F: NorFlash + Clone, B: ServoBus> Simulation<F, B> {
         self.to_host.take(count);
     }
 
-    /// The host disconnects: the bytes on the line to it are lost.
+    /// The last host disconnects: the bytes on the line to it are lost. The arm executes what the host sent before, and
+    /// sends nothing for it. Then its reports end (M12).
     pub fn host_disconnect(&mut self) {
         self.to_host = self.idle_line();
+        self.leaving = Some(self.to_arm.len());
+        self.end_host();
+    }
+
+    /// Tells the controller that the host has left, once the last bytes of the host are executed.
+    fn end_host(&mut self) {
+        if self.leaving == Some(0) && !self.is_halted {
+            self.controller.host_left(self.now);
+            self.leaving = None;
+        }
     }
 
     /// The registers.
@@ -262,16 +277,21 @@ impl<F: NorFlash + Clone, B: ServoBus> Simulation<F, B> {
         self.poll_controller();
         while !self.to_arm.arrived().is_empty() && self.pass_host_bytes() > 0 {
             self.poll_controller();
+            self.end_host();
         }
     }
 
     /// Passes the bytes that have arrived from the host, possibly none, to the controller. Returns how many it took.
     fn pass_host_bytes(&mut self) -> usize {
-        let taken = self.controller.host_bytes(self.now, self.to_arm.arrived());
-        if let (Some(tap), Some(bytes)) = (&mut self.tap, self.to_arm.arrived().get(..taken)) {
+        let arrived = self.to_arm.arrived();
+        // The bytes of the next host wait until those of the last one are executed.
+        let end = self.leaving.unwrap_or(usize::MAX).min(arrived.len());
+        let taken = self.controller.host_bytes(self.now, arrived.get(..end).unwrap_or(arrived));
+        if let (Some(tap), Some(bytes)) = (&mut self.tap, arrived.get(..taken)) {
             tap.received(self.now, bytes);
         }
         self.to_arm.take(taken);
+        self.leaving = self.leaving.map(|left| left.saturating_sub(taken));
         taken
     }
 
@@ -279,6 +299,7 @@ impl<F: NorFlash + Clone, B: ServoBus> Simulation<F, B> {
     fn poll_controller(&mut self) {
         loop {
             match self.controller.poll(self.now, self.to_host.room()) {
+                Output::ToHost(_) if self.leaving.is_some() => {}
                 Output::ToHost(bytes) => {
                     if let Some(tap) = &mut self.tap {
                         tap.sent(self.now, bytes);

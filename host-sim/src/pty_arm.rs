@@ -64,17 +64,23 @@ impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
         let room = bytes.get_mut(..self.simulation.host_room()).unwrap_or(&mut []);
         let can_read = !room.is_empty();
         let count = if can_read { self.pty.read(room)? } else { 0 };
+        let mut was_emptied = false;
         if let Some(clients) = clients {
             // After the read: the client that sent these bytes has to be counted before its answer is written.
             if count > 0 {
                 clients.update()?;
             }
-            if self.pty.update_clients(clients)? {
-                self.simulation.host_disconnect();
-            }
+            was_emptied = self.pty.update_clients(clients)?;
+        }
+        // Without a client the bytes are those of the last one, and otherwise those of the next one.
+        if was_emptied && self.pty.has_client() {
+            self.simulation.host_disconnect();
         }
         if count > 0 {
             self.simulation.host_send(now, bytes.get(..count).unwrap_or(&[]));
+        }
+        if was_emptied && !self.pty.has_client() {
+            self.simulation.host_disconnect();
         }
         // A read without bytes means that the host has sent nothing up to now.
         let is_idle = can_read && count == 0;

@@ -9,16 +9,20 @@
 //! A write is checked completely, then executed completely (D15 to D17). This file does not know the host's stream.
 
 use protocol_core::registers::map::{
-    FRAMES_ACCEPTED, FRAMES_CORRUPTED, MOTOR_STATE, SERVO_BUS_ERRORS, SUPPLY_VOLTAGE, VACUUM_PUMP, refusal,
+    FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_CORRUPTED, MOTOR_STATE, SERVO_BUS_ERRORS, SUPPLY_VOLTAGE,
+    VACUUM_PUMP, refusal,
 };
+use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, OPTIONS, option};
 use protocol_core::registers::{Accepted, Image, Joint, RegisterFile};
+use protocol_core::request::Alarm;
 use protocol_core::settings::Storage;
 use protocol_core::time::Instant;
 
 use crate::bus_scheduler::BusScheduler;
 use crate::config::Config;
-use crate::joints::{Joints, Measured, offset};
+use crate::joints::{Joints, Measured};
 use crate::motor_state::MotorState;
+use crate::reach;
 use crate::servo_bus::{Outcome, Reading};
 use crate::status::Status;
 use crate::vacuum::VacuumControl;
@@ -33,6 +37,8 @@ pub(crate) struct ArmControl {
     status: Status,
     /// Changed settings that are not saved yet.
     pub(crate) to_save: Option<Image>,
+    /// An alarm that has to be sent.
+    pub(crate) alarm: Option<Alarm>,
 }
 
 impl ArmControl {
@@ -43,7 +49,7 @@ impl ArmControl {
         let status = Status::new(storage, config.faults);
         status.show_faults(&mut registers, &joints);
         let (bus, vacuum) = (BusScheduler::new(now, &config), VacuumControl::default());
-        Self { registers, bus, vacuum, joints, status, to_save: None }
+        Self { registers, bus, vacuum, joints, status, to_save: None, alarm: None }
     }
 
     /// Processes the answers of the servos, and advances all set-points if a control cycle is due.
@@ -93,25 +99,73 @@ impl ArmControl {
         self.bus.prepare_frame(now, &mut self.joints, &self.registers)
     }
 
-    /// Executes a write of the host, or refuses it completely.
+    /// Executes a write of the host in map 2.2, or refuses it completely.
     pub(crate) fn write(&mut self, now: Instant, address: u8, values: &[u8]) {
         let accepted = match self.registers.check(address, values) {
             Ok(accepted) => accepted,
             Err(wrong) => return Status::refuse(&mut self.registers, refusal::OUT_OF_RANGE, wrong.address),
         };
-        let changed_setting = self.registers.first_changed_setting(&accepted);
-        if let (Some(setting), Storage::Full) = (changed_setting, self.status.storage()) {
-            return Status::refuse(&mut self.registers, refusal::STORAGE_FULL, setting);
+        let Some(changes_settings) = self.check_storage(&accepted) else { return };
+        self.execute(now, &accepted, changes_settings);
+        if accepted.value_at(FEEDBACK_FREQUENCY.address).is_some() {
+            self.stop_reports_of_map21();
         }
+    }
+
+    /// Executes a write of the host in map 2.1, or refuses it completely. `has_room` tells whether an alarm can be sent.
+    pub(crate) fn write_map21(&mut self, now: Instant, address: u8, values: &[u8], has_room: bool) {
+        let accepted = match self.registers.check_map21(address, values) {
+            Ok(accepted) => accepted,
+            Err(wrong) => return Status::refuse(&mut self.registers, refusal::OUT_OF_RANGE, wrong.address),
+        };
+        let Some(changes_settings) = self.check_storage(&accepted) else { return };
+        let targets = match reach::targets(&accepted) {
+            Ok(targets) => targets,
+            Err(out_of_reach) => {
+                let is_wanted = self.registers.get(OPTIONS.address) & option::ALARMS != 0;
+                self.alarm = (is_wanted && has_room).then_some(out_of_reach.alarm);
+                return Status::refuse(&mut self.registers, refusal::OUT_OF_REACH, out_of_reach.address);
+            }
+        };
+        self.execute(now, &accepted, changes_settings);
+        self.registers.set(FEEDBACK_FREQUENCY.address, 0);
+        self.joints.reach(&targets, &mut self.registers);
+        Status::show_moving(&mut self.registers, &self.joints);
+    }
+
+    /// Returns whether a write changes settings. Refuses it and returns `None` if the storage is full.
+    fn check_storage(&mut self, accepted: &Accepted<'_>) -> Option<bool> {
+        let changed_setting = self.registers.first_changed_setting(accepted);
+        if let (Some(setting), Storage::Full) = (changed_setting, self.status.storage()) {
+            Status::refuse(&mut self.registers, refusal::STORAGE_FULL, setting);
+            return None;
+        }
+        Some(changed_setting.is_some())
+    }
+
+    /// Executes a checked write.
+    fn execute(&mut self, now: Instant, accepted: &Accepted<'_>, changes_settings: bool) {
         // Before the rest of the frame, so that a target in it replaces the measured position (D13).
-        self.set_motor_state(&accepted);
-        self.apply(&accepted, changed_setting.is_some());
-        self.joints.set_targets(&accepted, &self.registers);
+        self.set_motor_state(accepted);
+        self.apply(accepted, changes_settings);
+        self.joints.set_targets(accepted, &self.registers);
         if let Some(pump) = accepted.value_at(VACUUM_PUMP.address) {
             self.vacuum.set(now, pump != 0);
         }
         self.count_accepted();
         Status::show_moving(&mut self.registers, &self.joints);
+    }
+
+    fn stop_reports_of_map21(&mut self) {
+        self.registers.set(ANGLE_FEEDBACK_FREQUENCY.address, 0);
+        self.registers.set(LOAD_FEEDBACK_FREQUENCY.address, 0);
+    }
+
+    /// Ends all reports, and forgets in which map the last write was (M12).
+    pub(crate) fn forget_host(&mut self) {
+        self.registers.forget_last_write();
+        self.registers.set(FEEDBACK_FREQUENCY.address, 0);
+        self.stop_reports_of_map21();
     }
 
     fn set_motor_state(&mut self, accepted: &Accepted<'_>) {
@@ -123,7 +177,7 @@ impl ArmControl {
     }
 
     fn apply(&mut self, accepted: &Accepted<'_>, changes_settings: bool) {
-        let offsets = Joint::ALL.map(|joint| offset(&self.registers, joint));
+        let offsets = Joint::ALL.map(|joint| self.registers.offset(joint));
         self.registers.apply(accepted);
         if changes_settings {
             self.to_save = Some(self.registers.image());

@@ -25,6 +25,14 @@ impl MicroDegrees {
         Self(degrees as i32 * Self::PER_DEGREE)
     }
 
+    /// The nearest angle to this many degrees, which are at most 2147.
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "the conversion saturates")]
+    pub fn nearest(degrees: f32) -> Self {
+        let scaled = degrees * 1e6;
+        Self((if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i32)
+    }
+
     /// The value of a position register: the nearest degree, 0 to 180 (D18).
     #[must_use]
     pub fn nearest_degree(self) -> u8 {
@@ -107,6 +115,12 @@ pub fn angle_from_counts(joint: Joint, counts: u16, offset_degrees: i8) -> Micro
     let counts = i32::from(counts).min(MAX_COUNTS);
     let seen = mounting.scale.millidegrees(counts - mounting.zero) + i32::from(offset_degrees) * 1_000;
     MicroDegrees(mounting.reverse(seen) * 1_000)
+}
+
+/// The load of a joint, positive towards greater angles. `load` is that of its servo, positive towards more counts.
+#[must_use]
+pub const fn load_from_servo(joint: Joint, load: i16) -> i16 {
+    if Mounting::of(joint).reversed { load.saturating_neg() } else { load }
 }
 
 /// `number` / `DIVISOR`, rounded to the nearest integer. The divisor is a constant, so the division cannot panic.
@@ -194,6 +208,20 @@ mod tests {
                 assert!([0, 1023].contains(&counts_from_angle(joint, MicroDegrees(angle), offset)));
             }
         }
+    }
+
+    #[test]
+    fn fractions_of_degrees_become_the_nearest_angle() {
+        assert_eq!(MicroDegrees::nearest(88.229), MicroDegrees(88_229_000));
+        assert_eq!(MicroDegrees::nearest(0.000_000_6), MicroDegrees(1));
+        assert_eq!(MicroDegrees::nearest(-0.000_000_6), MicroDegrees(-1));
+        assert_eq!(MicroDegrees::nearest(f32::MAX), MicroDegrees(i32::MAX));
+    }
+
+    #[test]
+    fn m09_a_load_is_positive_towards_greater_angles() {
+        let loads = [1, 2, 3, 4, 5, 6, 7].map(|number| load_from_servo(joint(number), 284));
+        assert_eq!(loads, [284, -284, -284, -284, -284, -284, 284]);
     }
 
     #[test]

@@ -11,10 +11,11 @@
 //!   }
 //! ```
 
-use protocol_core::registers::map::{BAUD_RATE, FEEDBACK_FREQUENCY, baud_rate};
-use protocol_core::registers::{Image, JOINTS, RegisterFile};
+use protocol_core::registers::map::{BAUD_RATE, baud_rate};
+use protocol_core::registers::{Image, JOINTS, Map, RegisterFile};
 use protocol_core::settings::Storage;
 use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::MIN_LENGTH;
 
 use crate::arm_control::ArmControl;
 use crate::config::Config;
@@ -79,7 +80,10 @@ impl Controller {
         if self.arm.prepare_servo_frame(now) {
             return Output::ToServos(self.arm.bus.frame());
         }
-        self.execute_requests(now);
+        self.execute_requests(now, host_room);
+        if let Some(alarm) = self.arm.alarm.take() {
+            return Output::ToHost(self.host.alarm(alarm));
+        }
         if let Some(read) = self.host.take_read(host_room) {
             self.arm.count_accepted();
             return Output::ToHost(self.host.reply(read, &self.arm.registers));
@@ -91,21 +95,25 @@ impl Controller {
             return Output::Vacuum(vacuum);
         }
         if let Some(report) = self.host.take_report(now, host_room) {
-            return Output::ToHost(self.host.reply(report, &self.arm.registers));
+            return Output::ToHost(self.host.report(report, &self.arm.registers));
         }
         Output::Wait(self.arm.deadline(now).min(self.host.deadline()))
     }
 
-    /// Executes requests up to the next read, or until settings have to be saved.
-    fn execute_requests(&mut self, now: Instant) {
+    /// Executes requests up to the next read, or until settings have to be saved or an alarm has to be sent. An alarm that
+    /// does not fit `host_room` is skipped.
+    fn execute_requests(&mut self, now: Instant, host_room: usize) {
         while self.arm.to_save.is_none()
+            && self.arm.alarm.is_none()
             && let Some(event) = self.host.next_event()
         {
             match event {
-                HostEvent::Write { address, values } => {
-                    self.arm.write(now, address, values);
-                    let frequency = self.arm.registers.get(FEEDBACK_FREQUENCY.address);
-                    self.host.set_report_frequency(now, frequency);
+                HostEvent::Write { map, address, values } => {
+                    match map {
+                        Map::V22 => self.arm.write(now, address, values),
+                        Map::V21 => self.arm.write_map21(now, address, values, MIN_LENGTH <= host_room),
+                    }
+                    self.host.set_report_frequencies(now, &self.arm.registers);
                 }
                 HostEvent::MalformedRange { address } => self.arm.refuse_range(address),
                 HostEvent::Corrupted => self.arm.count_corrupted(),
@@ -118,6 +126,12 @@ impl Controller {
     #[must_use]
     pub fn host_deadline(&self) -> Instant {
         self.host.deadline()
+    }
+
+    /// The last host has closed the link: ends the reports, and forgets in which map the last write was (M12).
+    pub fn host_left(&mut self, now: Instant) {
+        self.arm.forget_host();
+        self.host.set_report_frequencies(now, &self.arm.registers);
     }
 
     /// Sets the state of the storage. Call it after every [`Output::Save`] and after every change.

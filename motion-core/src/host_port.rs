@@ -5,19 +5,18 @@
 //!                              │
 //!                              ▼
 //!                        waiting read ──▶ take_read, once its reply has room ──▶ reply ──▶ frame
-//!                                             ReportTimer ──▶ take_report ──┘
+//!                                             Reports ──▶ take_report ──▶ report ──┘
 //! ```
 //!
 //! A read waits until its reply fits the room of the link. All requests behind it wait, too. This file only reads
 //! registers.
 
-use protocol_core::registers::RegisterFile;
-use protocol_core::registers::map::PRESENT_POSITION;
-use protocol_core::request::{Reply, Request};
+use protocol_core::registers::{Map, RegisterFile};
+use protocol_core::request::{Alarm, Reply, Report, Request};
 use protocol_core::time::Instant;
 use protocol_core::wire::{Defect, Deframer, FrameBuffer, MIN_LENGTH, ToArm, deframer};
 
-use crate::report_timer::ReportTimer;
+use crate::reports::{ReportKind, Reports};
 
 /// A read of `count` registers from `address` on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,9 +26,6 @@ pub(crate) struct Read {
 }
 
 impl Read {
-    /// The registers in a report.
-    const REPORT: Self = Self { address: PRESENT_POSITION.address, count: PRESENT_POSITION.count };
-
     const fn fits(self, room: usize) -> bool {
         MIN_LENGTH + self.count as usize <= room
     }
@@ -38,8 +34,8 @@ impl Read {
 /// A write or a defect in the bytes from the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum HostEvent<'a> {
-    /// New values for the registers from `address` on.
-    Write { address: u8, values: &'a [u8] },
+    /// New values for the registers of a map from `address` on.
+    Write { map: Map, address: u8, values: &'a [u8] },
     /// A frame whose range ends beyond address 255.
     MalformedRange { address: u8 },
     /// A frame with a wrong CRC.
@@ -52,7 +48,7 @@ pub(crate) struct HostPort {
     deframer: Deframer<ToArm>,
     /// The oldest pending request, if it is a read. The requests behind it wait in the deframer.
     waiting_read: Option<Read>,
-    reports: ReportTimer,
+    reports: Reports,
     /// In bits per second.
     baud: u32,
     frame: FrameBuffer,
@@ -64,7 +60,7 @@ impl HostPort {
         Self {
             deframer: Deframer::new(deframer::gap(baud)),
             waiting_read: None,
-            reports: ReportTimer::OFF,
+            reports: Reports::OFF,
             baud,
             frame: FrameBuffer::new(),
         }
@@ -95,7 +91,10 @@ impl HostPort {
                 self.waiting_read = Some(Read { address, count });
                 return None;
             }
-            Ok(Request::Write { address, values }) => HostEvent::Write { address, values },
+            Ok(Request::Write { address, values }) => HostEvent::Write { map: Map::V22, address, values },
+            Ok(Request::WriteMap21 { address, values }) => {
+                HostEvent::Write { map: Map::V21, address, values }
+            }
             Err(Defect::MalformedRange { address }) => HostEvent::MalformedRange { address },
             Err(Defect::WrongCrc) => HostEvent::Corrupted,
         };
@@ -107,21 +106,42 @@ impl HostPort {
         self.waiting_read.take_if(|read| read.fits(room))
     }
 
-    /// Sets the report frequency in Hz (register 53) from `now` on.
-    pub(crate) fn set_report_frequency(&mut self, now: Instant, frequency: u8) {
-        self.reports.set(now, frequency, self.baud);
+    /// Sets the report frequencies that the registers hold from `now` on.
+    pub(crate) fn set_report_frequencies(&mut self, now: Instant, registers: &RegisterFile) {
+        self.reports.set(now, registers, self.baud);
     }
 
     /// The report that is due. Replies go first, and a report that does not fit `room` is skipped (D14).
-    pub(crate) fn take_report(&mut self, now: Instant, room: usize) -> Option<Read> {
-        let has_room = self.waiting_read.is_none() && Read::REPORT.fits(room);
-        (self.reports.poll_due(now) && has_room).then_some(Read::REPORT)
+    pub(crate) fn take_report(&mut self, now: Instant, room: usize) -> Option<ReportKind> {
+        while let Some(kind) = self.reports.poll_due(now) {
+            if self.waiting_read.is_none() && MIN_LENGTH + usize::from(kind.registers().count) <= room {
+                return Some(kind);
+            }
+        }
+        None
     }
 
     /// Encodes the reply to `read`.
     pub(crate) fn reply(&mut self, read: Read, registers: &RegisterFile) -> &[u8] {
         let values = registers.read(read.address, read.count);
         Reply { address: read.address, values }.encode(&mut self.frame);
+        &self.frame
+    }
+
+    /// Encodes a report.
+    pub(crate) fn report(&mut self, kind: ReportKind, registers: &RegisterFile) -> &[u8] {
+        let row = kind.registers();
+        let (address, values) = (row.address, registers.read(row.address, row.count));
+        match kind.map() {
+            Map::V22 => Reply { address, values }.encode(&mut self.frame),
+            Map::V21 => Report { address, values }.encode(&mut self.frame),
+        }
+        &self.frame
+    }
+
+    /// Encodes an alarm.
+    pub(crate) fn alarm(&mut self, alarm: Alarm) -> &[u8] {
+        alarm.encode(&mut self.frame);
         &self.frame
     }
 
@@ -136,6 +156,7 @@ impl HostPort {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol_core::registers::map::FEEDBACK_FREQUENCY;
     use protocol_core::time::Duration;
 
     const NOW: Instant = Instant::ZERO;
@@ -162,7 +183,7 @@ mod tests {
     #[test]
     fn d05_a_write_waits_only_behind_a_read() {
         let write = Request::Write { address: 46, values: &[90] };
-        let event = Some(HostEvent::Write { address: 46, values: &[90] });
+        let event = Some(HostEvent::Write { map: Map::V22, address: 46, values: &[90] });
         assert_eq!(port_with(&[write]).next_event(), event);
         let mut port = port_with(&[Request::Read { address: 0, count: 1 }, write]);
         assert_eq!(port.next_event(), None);
@@ -175,12 +196,14 @@ mod tests {
     #[test]
     fn d14_a_report_without_room_is_skipped() {
         let mut port = HostPort::new(115_200);
-        port.set_report_frequency(NOW, 10);
+        let mut registers = RegisterFile::new([0; 6], None);
+        registers.set(FEEDBACK_FREQUENCY.address, 10);
+        port.set_report_frequencies(NOW, &registers);
         let at = |number: u64| NOW + Duration::from_millis(100 * number);
         assert_eq!(port.deadline(), at(1));
         assert_eq!(port.take_report(at(1), 13), None);
         assert_eq!(port.take_report(at(1), 14), None, "it was skipped, not delayed");
-        assert_eq!(port.take_report(at(2), 14), Some(Read::REPORT));
+        assert_eq!(port.take_report(at(2), 14), Some(ReportKind::Positions));
     }
 
     #[test]

@@ -8,20 +8,24 @@
 //!
 //! This file does not know the frames or the timing of the bus.
 
-use protocol_core::registers::map::{OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
+use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
+use protocol_core::registers::map21::{PRESENT_ANGLE, PRESENT_LOAD};
 use protocol_core::registers::{Accepted, JOINTS, Joint, RegisterFile};
 use protocol_core::time::Instant;
 
-use crate::calibration::{MicroDegrees, angle_from_counts, counts_from_angle};
+use crate::calibration::{MicroDegrees, angle_from_counts, counts_from_angle, load_from_servo};
 use crate::drive::{Drive, Target};
 use crate::motor_state::MotorState;
 use crate::position_filter::{FilterOutcome, PositionFilter};
+use crate::reach::Targets;
 use crate::servo_bus::{Reading, Torque};
 
 /// The state of one joint.
 #[derive(Clone, Copy, Debug)]
 struct JointState {
     drive: Drive,
+    /// The target, of which the register shows the nearest degree.
+    target: MicroDegrees,
     position: PositionFilter,
     /// The error bits of the servo's last answer.
     alarms: u8,
@@ -56,8 +60,14 @@ impl Joints {
         if state == MotorState::Servo {
             drive.wait();
         }
-        let joint = JointState { drive, position: PositionFilter::UNKNOWN, alarms: 0, temperature: 0 };
-        Self { joints: [joint; JOINTS], state }
+        let joints = Joint::ALL.map(|joint| JointState {
+            drive,
+            target: MicroDegrees::from_degrees(TARGET_POSITION.default_at(TARGET_POSITION.of(joint))),
+            position: PositionFilter::UNKNOWN,
+            alarms: 0,
+            temperature: 0,
+        });
+        Self { joints, state }
     }
 
     fn joint(&self, joint: Joint) -> Option<&JointState> {
@@ -87,14 +97,14 @@ impl Joints {
             return false;
         }
         self.state = state;
-        for (joint, JointState { drive, position, .. }) in self.each_mut() {
+        for (joint, joint_state) in self.each_mut() {
             if state != MotorState::Servo {
-                drive.release();
+                joint_state.drive.release();
                 continue;
             }
-            drive.wait();
-            if position.is_known() {
-                registers.set(TARGET_POSITION.of(joint), registers.get(PRESENT_POSITION.of(joint)));
+            joint_state.drive.wait();
+            if joint_state.position.is_known() {
+                joint_state.show_target(joint, registers.get(PRESENT_POSITION.of(joint)), registers);
             }
         }
         true
@@ -104,7 +114,19 @@ impl Joints {
     pub(crate) fn set_targets(&mut self, accepted: &Accepted<'_>, registers: &RegisterFile) {
         for (joint, state) in self.each_mut() {
             if let Some(degrees) = accepted.value_at(TARGET_POSITION.of(joint)) {
-                state.drive.set_target(MicroDegrees::from_degrees(degrees), registers.get(TIME.of(joint)));
+                state.target = MicroDegrees::from_degrees(degrees);
+                state.drive.set_target(state.target, registers.get(TIME.of(joint)));
+            }
+        }
+    }
+
+    /// Starts the moves to the positions in a write that was applied (M7).
+    pub(crate) fn reach(&mut self, targets: &Targets, registers: &mut RegisterFile) {
+        for ((joint, state), target) in self.each_mut().zip(targets) {
+            if let Some(angle) = *target {
+                registers.set(TARGET_POSITION.of(joint), angle.nearest_degree());
+                state.target = angle;
+                state.drive.set_target(angle, registers.get(TIME.of(joint)));
             }
         }
     }
@@ -113,12 +135,11 @@ impl Joints {
     /// not move. From there the joint moves to its target at its speed.
     pub(crate) fn rebase_offsets(&mut self, before: &[i8; JOINTS], registers: &RegisterFile) {
         for ((joint, state), &before) in self.each_mut().zip(before) {
-            let offset = offset(registers, joint);
+            let offset = registers.offset(joint);
             if offset != before {
                 let counts = counts_from_angle(joint, state.drive.set_point(), before);
-                let target = MicroDegrees::from_degrees(registers.get(TARGET_POSITION.of(joint)));
                 let set_point = angle_from_counts(joint, counts, offset);
-                state.drive.rebase_offset(set_point, target, registers.get(TIME.of(joint)));
+                state.drive.rebase_offset(set_point, state.target, registers.get(TIME.of(joint)));
             }
         }
     }
@@ -132,7 +153,7 @@ impl Joints {
         may_engage: bool,
         registers: &mut RegisterFile,
     ) -> Measured {
-        let offset = offset(registers, joint);
+        let offset = registers.offset(joint);
         let Some(state) = self.joint_mut(joint) else { return Measured::Rejected };
         let counts = match state.position.answered(now, reading.position_counts) {
             FilterOutcome::Accepted(counts) => counts,
@@ -146,12 +167,14 @@ impl Joints {
         state.alarms = alarms;
         state.temperature = reading.temperature_celsius;
         registers.set(PRESENT_POSITION.of(joint), angle.nearest_degree());
+        registers.set(PRESENT_ANGLE.of(joint), angle.nearest_degree());
+        registers.set(PRESENT_LOAD.of(joint), shown_load(load_from_servo(joint, reading.load)));
         let may_engage = may_engage && state.position.is_steady();
         let Some(target) = (if may_engage { state.drive.engage(angle) } else { None }) else {
             return Measured::Accepted;
         };
         if target == Target::Measured {
-            registers.set(TARGET_POSITION.of(joint), angle.nearest_degree());
+            state.show_target(joint, angle.nearest_degree(), registers);
         }
         Measured::Engaged
     }
@@ -191,7 +214,7 @@ impl Joints {
     /// The goals of the driven joints, in servo counts.
     pub(crate) fn goals(&self, registers: &RegisterFile) -> impl Iterator<Item = (Joint, u16)> {
         self.each().filter(|(_, state)| state.drive.is_driven()).map(|(joint, state)| {
-            (joint, counts_from_angle(joint, state.drive.set_point(), offset(registers, joint)))
+            (joint, counts_from_angle(joint, state.drive.set_point(), registers.offset(joint)))
         })
     }
 
@@ -233,6 +256,12 @@ impl Joints {
 }
 
 impl JointState {
+    /// Makes a measured position the target.
+    fn show_target(&mut self, joint: Joint, degrees: u8, registers: &mut RegisterFile) {
+        self.target = MicroDegrees::from_degrees(degrees);
+        registers.set(TARGET_POSITION.of(joint), degrees);
+    }
+
     fn fall_silent(&mut self) {
         self.drive.mark_silent();
         self.temperature = 0;
@@ -240,10 +269,10 @@ impl JointState {
     }
 }
 
-/// A joint's offset in degrees.
-pub(crate) fn offset(registers: &RegisterFile, joint: Joint) -> i8 {
-    let degrees = OFFSET.range.decode(registers.get(OFFSET.of(joint)));
-    i8::try_from(degrees).unwrap_or(0)
+/// The register value of a load in 0.1 %: 128 + load / 8, 3 to 253 (M9).
+fn shown_load(load: i16) -> u8 {
+    let steps = (load / 8).clamp(-125, 125);
+    u8::try_from(128 + steps).unwrap_or(128)
 }
 
 #[cfg(test)]

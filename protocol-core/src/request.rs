@@ -4,6 +4,7 @@
 //!   host                                   arm
 //!   Request::encode ──▶ Frame ──▶ Request::from_frame
 //!   Reply::from_frame ◀── Frame ◀── Reply::encode
+//!   Report, Alarm     ◀── Frame ◀── without a request
 //! ```
 //!
 //! This file does not know the meaning of registers, or streams.
@@ -21,8 +22,15 @@ pub enum Request<'a> {
         /// How many registers; 0 gives a reply without values.
         count: u8,
     },
-    /// Writes the registers from `address` on.
+    /// Writes the registers of map 2.2 from `address` on.
     Write {
+        /// The first register.
+        address: u8,
+        /// One byte per register, at most 255.
+        values: &'a [u8],
+    },
+    /// Writes the registers of map 2.1 from `address` on (M1).
+    WriteMap21 {
         /// The first register.
         address: u8,
         /// One byte per register, at most 255.
@@ -31,12 +39,16 @@ pub enum Request<'a> {
 }
 
 impl<'a> Request<'a> {
-    /// The request in a frame that the arm received.
+    /// The request in a frame in direction [`ToArm`](crate::wire::ToArm). Frames of the functions that only an arm sends
+    /// count as reads.
     #[must_use]
     pub const fn from_frame(frame: Frame<'a>) -> Self {
         match frame.function {
-            Function::Read => Self::Read { address: frame.address, count: frame.count },
             Function::Write => Self::Write { address: frame.address, values: frame.data },
+            Function::WriteMap21 => Self::WriteMap21 { address: frame.address, values: frame.data },
+            Function::Read | Function::Report | Function::Alarm => {
+                Self::Read { address: frame.address, count: frame.count }
+            }
         }
     }
 
@@ -45,11 +57,14 @@ impl<'a> Request<'a> {
         match *self {
             Self::Read { address, count } => frame::encode(buffer, Function::Read, address, count, &[]),
             Self::Write { address, values } => encode_values(buffer, Function::Write, address, values),
+            Self::WriteMap21 { address, values } => {
+                encode_values(buffer, Function::WriteMap21, address, values);
+            }
         }
     }
 }
 
-/// The reply of the arm to a read. A report of the present positions has the same form (D14).
+/// The reply of the arm to a read. A report of register 53 has the same form (D14).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reply<'a> {
@@ -60,18 +75,76 @@ pub struct Reply<'a> {
 }
 
 impl<'a> Reply<'a> {
-    /// The reply in a frame that the host received; `None` for a write, which an arm never sends.
+    /// The reply in a frame that the host received; `None` for any other frame.
     #[must_use]
     pub const fn from_frame(frame: Frame<'a>) -> Option<Self> {
         match frame.function {
             Function::Read => Some(Self { address: frame.address, values: frame.data }),
-            Function::Write => None,
+            _ => None,
         }
     }
 
     /// Encodes the reply into `buffer`, replacing its content. Values are cut to 255.
     pub fn encode(&self, buffer: &mut FrameBuffer) {
         encode_values(buffer, Function::Read, self.address, self.values);
+    }
+}
+
+/// A report in map 2.1, which the arm sends without a request (M4).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Report<'a> {
+    /// The first register.
+    pub address: u8,
+    /// The values, one byte per register, at most 255.
+    pub values: &'a [u8],
+}
+
+impl<'a> Report<'a> {
+    /// The report in a frame that the host received; `None` for any other frame.
+    #[must_use]
+    pub const fn from_frame(frame: Frame<'a>) -> Option<Self> {
+        match frame.function {
+            Function::Report => Some(Self { address: frame.address, values: frame.data }),
+            _ => None,
+        }
+    }
+
+    /// Encodes the report into `buffer`, replacing its content. Values are cut to 255.
+    pub fn encode(&self, buffer: &mut FrameBuffer) {
+        encode_values(buffer, Function::Report, self.address, self.values);
+    }
+}
+
+/// An alarm, which the arm sends without a request, if register 20 allows it (M6, M8).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Alarm {
+    /// 0: message. 1: warning. 2: fatal.
+    pub level: u8,
+    /// 5: IK5 has no solution. 6: IK6. 7: IK7.
+    pub kind: u8,
+}
+
+impl Alarm {
+    /// A position that joint angles do not reach. `kind` is 5, 6 or 7.
+    #[must_use]
+    pub const fn out_of_reach(kind: u8) -> Self {
+        Self { level: 1, kind }
+    }
+
+    /// The alarm in a frame that the host received; `None` for any other frame.
+    #[must_use]
+    pub const fn from_frame(frame: Frame<'_>) -> Option<Self> {
+        match frame.function {
+            Function::Alarm => Some(Self { level: frame.address, kind: frame.count }),
+            _ => None,
+        }
+    }
+
+    /// Encodes the alarm into `buffer`, replacing its content.
+    pub fn encode(&self, buffer: &mut FrameBuffer) {
+        frame::encode(buffer, Function::Alarm, self.level, self.kind, &[]);
     }
 }
 

@@ -15,9 +15,10 @@ const LONG_SILENCE_US: u64 = 100_000;
 /// A stretch of a stream that is likely to hold trouble: whole frames, pieces of frames, headers that
 /// promise too much, ranges past the end, noise rich in header bytes.
 fn stretch() -> impl Strategy<Value = Vec<u8>> {
-    let noise = prop_oneof![Just(0xAA_u8), Just(0x77), Just(0x06), Just(0x03), any::<u8>()];
-    let whole = (any::<bool>(), any::<u8>(), proptest::collection::vec(any::<u8>(), 0..12))
-        .prop_map(|(write, address, data)| frame(if write { 6 } else { 3 }, address, &data));
+    let noise = prop_oneof![Just(0xAA_u8), Just(0x77), Just(0x06), Just(0x04), Just(0x03), any::<u8>()];
+    let function = prop_oneof![Just(3), Just(4), Just(6)];
+    let whole = (function, any::<u8>(), proptest::collection::vec(any::<u8>(), 0..12))
+        .prop_map(|(function, address, data)| frame(function, address, &data));
     prop_oneof![
         4 => whole.clone(),
         2 => (whole.clone(), any::<proptest::sample::Index>()).prop_map(|(bytes, cut)| {
@@ -29,7 +30,8 @@ fn stretch() -> impl Strategy<Value = Vec<u8>> {
             bytes[place] = value;
             bytes
         }),
-        1 => (any::<u8>(), any::<u8>()).prop_map(|(address, count)| vec![0xAA, 0x77, 6, address, count]),
+        1 => (prop_oneof![Just(4), Just(6)], any::<u8>(), any::<u8>())
+            .prop_map(|(function, address, count)| vec![0xAA, 0x77, function, address, count]),
         1 => proptest::collection::vec(noise, 1..20),
         1 => Just(stream::raw_frame(6, 250, 7, &[1; 7])),
         // A frame inside the data of another one.
@@ -115,8 +117,14 @@ fn the_beginning_of_a_frame_is_distinguished_from_other_bytes() {
         let outcome = parse::<ToArm>(&beginning[..length]);
         assert_eq!(outcome, ParseOutcome::Incomplete(7), "{length} bytes");
     }
-    for wrong in [[0xAB].as_slice(), &[0xAA, 0x78], &[0xAA, 0x77, 4], &[0xAA, 0x78, 6], &[0xAB, 0x77, 6, 46]]
-    {
+    for wrong in [
+        [0xAB].as_slice(),
+        &[0xAA, 0x78],
+        &[0xAA, 0x77, 5],
+        &[0xAA, 0x77, 8],
+        &[0xAA, 0x78, 6],
+        &[0xAB, 0x77, 6, 46],
+    ] {
         assert_eq!(parse::<ToArm>(wrong), ParseOutcome::NotAFrame, "{wrong:?}");
     }
 }

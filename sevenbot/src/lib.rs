@@ -34,6 +34,7 @@ mod frame_port;
 pub mod hold;
 pub mod identity;
 pub mod joints;
+mod map21_text;
 pub mod names;
 pub mod open_port;
 mod pending;

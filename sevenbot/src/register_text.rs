@@ -139,6 +139,7 @@ pub const fn refusal_reason(reason: u8) -> &'static str {
         refusal::MALFORMED_RANGE => "it reached past register 255",
         refusal::OUT_OF_RANGE => "a value was out of range",
         refusal::STORAGE_FULL => "the settings storage was full",
+        refusal::OUT_OF_REACH => "no joint angles reach the position",
         _ => "unknown",
     }
 }

@@ -1,9 +1,9 @@
-//! The register table as text: Markdown, C, Python.
+//! The register tables as text: Markdown, C, Python.
 
 use std::fmt::Write as _;
 
 use protocol_core::registers::map::BAUD_RATES;
-use protocol_core::registers::{Access, JOINTS, MAP, Range, Region, Register};
+use protocol_core::registers::{Access, JOINTS, MAP, MAP_21, Map, Range, Region, Register};
 
 use crate::span::Span;
 
@@ -12,15 +12,35 @@ pub fn settings() -> impl Iterator<Item = &'static Register> {
     MAP.iter().filter(|row| row.region == Region::Eeprom && row.access == Access::ReadWrite)
 }
 
-/// The table of `docs/registers.md`.
+/// The rows of both maps, those that mean the same once.
+pub fn rows() -> impl Iterator<Item = &'static Register> {
+    MAP.iter().chain(only_map21())
+}
+
+/// The rows of map 2.1 that map 2.2 does not have.
+pub fn only_map21() -> impl Iterator<Item = &'static Register> {
+    MAP_21.iter().filter(|row| !MAP.contains(row))
+}
+
+/// The versions of the maps that have this row.
+pub fn versions(row: &Register) -> impl Iterator<Item = &'static str> {
+    Map::ALL.into_iter().filter(|map| map.rows().contains(row)).map(Map::version)
+}
+
+/// The tables of `docs/registers.md`.
 #[must_use]
 pub fn markdown() -> String {
+    let table = |map: Map| format!("## Map {}\n\n{}", map.version(), markdown_table(map));
+    Map::ALL.map(table).join("\n")
+}
+
+fn markdown_table(map: Map) -> String {
     let mut page = "\
 | address | name | region | access | range | default | unit | meaning |
 | --- | --- | --- | --- | --- | --- | --- | --- |
 "
     .to_owned();
-    for row in MAP {
+    for row in map.rows() {
         let [address, name, rest @ ..] = cells(row);
         let joints = if row.per_joint { format!("Joint 1..{JOINTS}. ") } else { String::new() };
         let line = format!("| {address} | `{name}` | {} | {joints}{} |", rest.join(" | "), description(row));
@@ -38,10 +58,10 @@ pub fn c_header() -> String {
 #define SEVENBOT_REGISTERS_H
 "
     .to_owned();
-    for row in MAP {
+    for (prefix, row) in prefixed_rows() {
         push_line(&mut header, &format!("\n/* {} */", description(row)));
         for (suffix, number) in constants(row) {
-            push_line(&mut header, &format!("#define SEVENBOT_{}{suffix} {number}", row.name));
+            push_line(&mut header, &format!("#define SEVENBOT_{prefix}{}{suffix} {number}", row.name));
         }
     }
     let rates = BAUD_RATES.map(|rate| format!("{rate}L")).join(", ");
@@ -56,15 +76,20 @@ pub fn c_header() -> String {
 pub fn python() -> String {
     let mut module =
         "\"\"\"Registers of the 7Bot V2. Written by `sevenbot registers --format python`.\"\"\"\n".to_owned();
-    for row in MAP {
+    for (prefix, row) in prefixed_rows() {
         push_line(&mut module, &format!("\n# {}", description(row)));
         for (suffix, number) in constants(row) {
-            push_line(&mut module, &format!("{}{suffix} = {number}", row.name));
+            push_line(&mut module, &format!("{prefix}{}{suffix} = {number}", row.name));
         }
     }
     let rates = BAUD_RATES.map(|rate| rate.to_string()).join(", ");
     push_line(&mut module, &format!("\n# Baud rates by their codes.\nBAUD_RATES = ({rates})"));
     module
+}
+
+/// The rows of both maps, with the prefix of their constants.
+fn prefixed_rows() -> impl Iterator<Item = (&'static str, &'static Register)> {
+    MAP.iter().map(|row| ("", row)).chain(only_map21().map(|row| ("MAP21_", row)))
 }
 
 fn push_line(text: &mut String, line: &str) {
@@ -146,6 +171,7 @@ pub fn description(row: &Register) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol_core::registers::map::TARGET_POSITION;
 
     #[test]
     fn the_markdown_table_is_the_documented_one() {
@@ -159,5 +185,9 @@ mod tests {
             assert!(python().contains(&format!("\n{} = {}\n", row.name, row.address)));
         }
         assert!(c_header().contains("SEVENBOT_OFFSET_MIN -16"));
+        assert!(c_header().contains("#define SEVENBOT_MAP21_PRESENT_LOAD 91\n"));
+        assert!(python().contains("\nMAP21_ANGLE_FEEDBACK_FREQUENCY_MAX = 100\n"));
+        assert!(!c_header().contains("MAP21_SPEED"), "as in map 2.2");
+        assert_eq!((rows().count(), versions(&TARGET_POSITION).count()), (MAP.len() + 13, 2));
     }
 }

@@ -44,6 +44,27 @@ pub enum Traffic {
         /// One byte for each register.
         values: Vec<u8>,
     },
+    /// A request to write in map 2.1 (M1).
+    WriteMap21 {
+        /// The first register.
+        address: u8,
+        /// One byte for each register.
+        values: Vec<u8>,
+    },
+    /// A report in map 2.1 (M4).
+    Report {
+        /// The first register.
+        address: u8,
+        /// One byte for each register.
+        values: Vec<u8>,
+    },
+    /// An alarm (M8).
+    Alarm {
+        /// 0: message. 1: warning. 2: fatal.
+        level: u8,
+        /// 5: IK5 has no solution. 6: IK6. 7: IK7.
+        kind: u8,
+    },
     /// A frame with a valid checksum that reaches past register 255 (D2).
     TooFar {
         /// The first register.
@@ -62,8 +83,11 @@ impl Traffic {
         let (address, count, values) = (frame.address, frame.count, frame.data.to_vec());
         match frame.function {
             Function::Write => Self::Write { address, values },
+            Function::WriteMap21 => Self::WriteMap21 { address, values },
             Function::Read if D::data_length(Function::Read, 1) == 0 => Self::Read { address, count },
             Function::Read => Self::Answer { address, values },
+            Function::Report => Self::Report { address, values },
+            Function::Alarm => Self::Alarm { level: address, kind: count },
         }
     }
 }
@@ -73,6 +97,7 @@ impl From<&Request<'_>> for Traffic {
         match *request {
             Request::Read { address, count } => Self::Read { address, count },
             Request::Write { address, values } => Self::Write { address, values: values.to_vec() },
+            Request::WriteMap21 { address, values } => Self::WriteMap21 { address, values: values.to_vec() },
         }
     }
 }

@@ -4,14 +4,19 @@
 //!   read present-position 1..7
 //!   answer present-position 1..7 = 90 90 65 90 90 90 80 °
 //!   write eeprom-lock = 0 (open), motor-state = 1 (servo)
+//!   write (map 2.1) tip-position = -50 185 50 mm, tool-direction = 0 0 -1
+//!   report present-angle 1..7 = 90 90 65 90 90 90 80 °
+//!   alarm: level 1, IK6 has no solution
 //!   3 bytes that are no frame: 01 02 03
 //! ```
 
 use std::fmt;
 
-use protocol_core::registers::Register;
 use protocol_core::registers::map::find;
+use protocol_core::registers::map21::find_readable;
+use protocol_core::registers::{Map, Register};
 
+use crate::map21_text;
 use crate::names::name_of;
 use crate::register_text::entries;
 use crate::snapshot::Snapshot;
@@ -29,8 +34,21 @@ impl fmt::Display for Traffic {
             Self::Read { address, count } => {
                 write!(out, "read {}", names(Span::new(*address, *count).unwrap_or(Span::NONE)))
             }
-            Self::Answer { address, values } => write!(out, "answer {}", assignments(*address, values)),
-            Self::Write { address, values } => write!(out, "write {}", assignments(*address, values)),
+            Self::Answer { address, values } => {
+                write!(out, "answer {}", assignments(*address, values, find_readable))
+            }
+            Self::Write { address, values } => write!(out, "write {}", assignments(*address, values, find)),
+            Self::WriteMap21 { address, values } => {
+                let row = |address| Map::V21.find(address);
+                write!(out, "write (map 2.1) {}", assignments(*address, values, row))
+            }
+            Self::Report { address, values } => {
+                write!(out, "report {}", assignments(*address, values, find_readable))
+            }
+            Self::Alarm { level, kind: kind @ 5..=7 } => {
+                write!(out, "alarm: level {level}, IK{kind} has no solution")
+            }
+            Self::Alarm { level, kind } => write!(out, "alarm: level {level}, kind {kind}"),
             Self::TooFar { address, count } => {
                 write!(out, "{count} registers from {address} on, but the last register is 255")
             }
@@ -41,7 +59,9 @@ impl fmt::Display for Traffic {
 
 fn noise(bytes: &[u8], out: &mut fmt::Formatter<'_>) -> fmt::Result {
     match bytes {
-        [0xAA, 0x77, 3 | 6, ..] => write!(out, "a damaged frame or a part of one, {} bytes:", bytes.len())?,
+        [0xAA, 0x77, 3 | 4 | 5 | 6 | 8, ..] => {
+            write!(out, "a damaged frame or a part of one, {} bytes:", bytes.len())?
+        }
         [_] => write!(out, "1 byte that is no frame:")?,
         _ => write!(out, "{} bytes that are no frame:", bytes.len())?,
     }
@@ -59,7 +79,7 @@ struct RowSpan {
     last: u8,
 }
 
-fn row_spans(span: Span) -> Vec<RowSpan> {
+fn row_spans(span: Span, find: impl Fn(u8) -> Option<&'static Register>) -> Vec<RowSpan> {
     let mut row_spans: Vec<RowSpan> = Vec::new();
     for address in span.addresses() {
         let row = find(address);
@@ -90,6 +110,9 @@ impl RowSpan {
 
     fn assignment(self, values: &Snapshot) -> String {
         let bytes: Vec<u8> = (self.first..=self.last).map(|address| values.at(address)).collect();
+        if let Some(row) = self.row.filter(|_| self.row != find(self.first)) {
+            return format!("{} = {}", self.name(), map21_text::values(row, &bytes));
+        }
         let entries = entries(&Snapshot { address: self.first, values: bytes });
         let numbers: Vec<&str> = entries.iter().map(|entry| entry.value.as_str()).collect();
         let comment = match (self.row, entries.as_slice()) {
@@ -115,7 +138,7 @@ fn range(first: u8, last: u8) -> String {
 }
 
 fn names(span: Span) -> String {
-    let row_spans = row_spans(span);
+    let row_spans = row_spans(span, find_readable);
     match row_spans.as_slice() {
         [] => span.to_string(),
         [first, .., last] if row_spans.len() > MAX_ROWS_NAMED => {
@@ -125,9 +148,9 @@ fn names(span: Span) -> String {
     }
 }
 
-fn assignments(address: u8, values: &[u8]) -> String {
+fn assignments(address: u8, values: &[u8], find: impl Fn(u8) -> Option<&'static Register>) -> String {
     let values = Snapshot { address, values: values.to_vec() };
-    let row_spans = row_spans(values.span());
+    let row_spans = row_spans(values.span(), find);
     if row_spans.is_empty() {
         return values.span().to_string();
     }
@@ -142,7 +165,8 @@ mod tests {
     fn frames_are_shown_with_register_names() {
         let read = |address, count| Traffic::Read { address, count }.to_string();
         assert_eq!(read(54, 7), "read present-position 1..7");
-        assert_eq!(read(60, 3), "read present-position 7, no register 61..62");
+        assert_eq!(read(60, 3), "read present-position 7, tool-direction (61..62 of it)");
+        assert_eq!(read(98, 2), "read no register 98..99");
         assert_eq!(read(3, 2), "read chip-id (3..4 of it)");
         assert_eq!(read(10, 0), "read no register at 10");
         assert_eq!(read(0, 61), "read device-code to present-position 1..7 (0..60)");
@@ -160,6 +184,31 @@ mod tests {
         assert_eq!(write(46, &[]), "write no register at 46");
         assert_eq!(write(246, &[1, 1]), "write frames-accepted = 257");
         assert_eq!(write(2, b"SIM\0\0\x01"), "write chip-id = 53494D000001");
+    }
+
+    #[test]
+    fn writes_of_map_21_read_by_its_table() {
+        let write =
+            |address, values: &[u8]| Traffic::WriteMap21 { address, values: values.to_vec() }.to_string();
+        assert_eq!(write(13, &[126, 254]), "write (map 2.1) offset 1..2 = -2 -2 °");
+        let ik6 = write(54, &[0x03, 0xCE, 0x04, 0xB9, 0x04, 0x32, 0x80, 0x80, 0x7F]);
+        assert_eq!(ik6, "write (map 2.1) tip-position = -50 185 50 mm, tool-direction = 0 0 -1");
+        assert_eq!(write(68, &[4]), "write (map 2.1) wrist-position (68 of it) = 4");
+        assert_eq!(write(29, &[2]), "write (map 2.1) motor-state = 2 (forceless)");
+        assert_eq!(write(53, &[0]), "write (map 2.1) end-length = 0");
+        assert_eq!(write(82, &[30]), "write (map 2.1) angle-feedback-frequency = 30 Hz");
+        assert_eq!(write(0, &[]), "write (map 2.1) no register at 0");
+    }
+
+    #[test]
+    fn reports_and_alarms_have_words() {
+        let report =
+            |address, values: &[u8]| Traffic::Report { address, values: values.to_vec() }.to_string();
+        let angles = "report present-angle 1..7 = 90 90 65 90 90 90 80 °";
+        assert_eq!(report(83, &[90, 90, 65, 90, 90, 90, 80]), angles);
+        assert_eq!(report(91, &[128, 93]), "report present-load 1..2 = 0 -35");
+        assert_eq!(Traffic::Alarm { level: 1, kind: 6 }.to_string(), "alarm: level 1, IK6 has no solution");
+        assert_eq!(Traffic::Alarm { level: 0, kind: 1 }.to_string(), "alarm: level 0, kind 1");
     }
 
     #[test]

@@ -98,20 +98,31 @@ impl ArmClient {
         (reply.address == address && reply.values.len() == usize::from(count)).then_some(reply.values)
     }
 
-    /// The next frame; `None` if none begins within `timeout`.
+    /// The next reply or report of map 2.2; `None` if none begins within `timeout`.
     #[track_caller]
     pub fn reply_within(&mut self, timeout: Duration) -> Option<ReplyFrame> {
+        let frame = self.frame_within(timeout)?;
+        assert_eq!(frame[2], 0x03, "a byte from the arm outside a reply");
+        let count = usize::from(frame[4]);
+        Some(ReplyFrame { address: frame[3], values: frame[5..5 + count].to_vec() })
+    }
+
+    /// The bytes of the next frame of any function; `None` if none begins within `timeout`.
+    #[track_caller]
+    pub fn frame_within(&mut self, timeout: Duration) -> Option<Vec<u8>> {
         let mut frame = vec![0; 5];
         if !self.begin(&mut frame[..1], timeout) {
             return None;
         }
         self.fill(&mut frame[1..]);
-        assert_eq!(frame[..3], [0xAA, 0x77, 0x03], "a byte from the arm outside a reply");
-        let (address, count) = (frame[3], usize::from(frame[4]));
+        assert_eq!(frame[..2], [0xAA, 0x77], "a byte from the arm outside a frame");
+        assert!(matches!(frame[2], 0x03 | 0x05 | 0x08), "the arm does not send function {}", frame[2]);
+        // An alarm has no count.
+        let count = if frame[2] == 0x08 { 0 } else { usize::from(frame[4]) };
         frame.resize(5 + count + 2, 0);
         self.fill(&mut frame[5..]);
         assert_eq!(frame, with_checksum(&frame[..5 + count]), "an invalid checksum from the arm");
-        Some(ReplyFrame { address, values: frame[5..5 + count].to_vec() })
+        Some(frame)
     }
 
     /// The next frame. Fails if none begins before the timeout.

@@ -40,7 +40,10 @@ fn a_new_arm_has_the_documented_defaults() {
         assert_eq!(arm.read(SPEED, 7), [60; 7]);
         assert_eq!(arm.read(TIME, 7), [0; 7]);
         assert_eq!(arm.read(53, 1), [0]);
-        assert_eq!(arm.read(61, 179), [0; 179], "unused addresses read 0");
+        let unused = [0; 142];
+        assert_eq!(arm.read(61, 22), [&unused[..5], &[1], &unused[..16]].concat(), "66 is 1 (M3)");
+        assert_eq!(arm.register(90), 0);
+        assert_eq!(arm.read(98, 142), unused, "unused addresses read 0");
         let faults = u8::from(!arm.has(Need::Persistence));
         assert_eq!(
             arm.read(STATUS, 3),

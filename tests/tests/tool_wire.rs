@@ -2,7 +2,7 @@
 
 mod tool_output;
 
-use std::fs;
+use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 
@@ -85,8 +85,10 @@ fn through_standard_input(bytes: &[u8]) -> String {
 #[test]
 fn sniff_prints_the_frames_of_a_port() {
     with_arm(TestSetup::any(), |arm| {
-        arm.write(FEEDBACK_FREQUENCY, &[20]);
-        assert_eq!(arm.register(FEEDBACK_FREQUENCY), 20);
+        // A simulated arm ends its reports when the last program closes the port (M12).
+        let port = arm.lend_port();
+        let mut held = File::options().write(true).open(port).expect("the port opens");
+        held.write_all(&write_request(FEEDBACK_FREQUENCY, &[20])).expect("the port takes bytes");
         let mut tool = arm.spawn_sevenbot(&["sniff"]);
         let lines = BufReader::new(tool.stdout.take().expect("a pipe")).lines().map_while(Result::ok);
         let reports = lines.filter(|line| line.contains("  answer present-position 1..7 = 9"));

@@ -1,6 +1,7 @@
-//! The table in docs/protocol.md of the tests for each decision, D1 to D20, generated from the names of the tests.
+//! The table in docs/protocol.md of the tests for each decision, D1 to D20 and M1 to M12, generated from the names of the
+//! tests.
 //!
-//! A test of D3 and D4 has a name like `d03_d04_...`.
+//! A test of D3 and M4 has a name like `d03_m04_...`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -10,8 +11,15 @@ use std::path::{Path, PathBuf};
 use crate::generated::GeneratedSection;
 use crate::run::{TaskResult, root};
 
-/// The numbers of the decisions.
-const DECISIONS: std::ops::RangeInclusive<u8> = 1..=20;
+/// The letter and the number of a decision.
+type Decision = (char, u8);
+
+/// All decisions on the device. M11 is about the host.
+fn all_decisions() -> impl Iterator<Item = Decision> {
+    let of_map22 = (1..=20).map(|number| ('D', number));
+    of_map22.chain((1..=10).chain([12]).map(|number| ('M', number)))
+}
+
 const SECTION: GeneratedSection = GeneratedSection {
     document: "docs/protocol.md",
     begin: "<!-- begin: made by `cargo xtask docs` from the names of the tests -->\n",
@@ -28,7 +36,7 @@ pub(crate) fn check() -> TaskResult {
 }
 
 fn table() -> TaskResult<String> {
-    let mut tests: BTreeMap<u8, Vec<String>> = BTreeMap::new();
+    let mut tests: BTreeMap<Decision, Vec<String>> = BTreeMap::new();
     let mut files = Vec::new();
     find_sources(root(), &mut files)?;
     files.sort();
@@ -40,11 +48,12 @@ fn table() -> TaskResult<String> {
         }
     }
     let mut table = String::from("| decision | held by |\n| --- | --- |\n");
-    for decision in DECISIONS {
+    for decision @ (letter, number) in all_decisions() {
+        let small = letter.to_ascii_lowercase();
         let tests = tests
             .get(&decision)
-            .ok_or_else(|| format!("no test holds D{decision}: name one d{decision:02}_"))?;
-        writeln!(table, "| D{decision} | {} |", tests.join("<br>"))?;
+            .ok_or_else(|| format!("no test holds {letter}{number}: name one {small}{number:02}_"))?;
+        writeln!(table, "| {letter}{number} | {} |", tests.join("<br>"))?;
     }
     Ok(table)
 }
@@ -66,22 +75,25 @@ fn find_sources(folder: &Path, files: &mut Vec<PathBuf>) -> TaskResult {
 /// The name of a test of decisions that is defined in this line.
 fn test_name(line: &str) -> Option<&str> {
     let name = line.trim_start().strip_prefix("fn ")?.split('(').next()?;
-    number(name).map(|_| name)
+    decision(name).map(|_| name)
 }
 
 /// The decisions in the name of a test, each with the rest of the name as text.
-fn decisions(name: &str) -> Vec<(String, u8)> {
-    let mut numbers = Vec::new();
+fn decisions(name: &str) -> Vec<(String, Decision)> {
+    let mut decisions = Vec::new();
     let mut rest = name;
-    while let Some(decision) = number(rest) {
-        numbers.push(decision);
+    while let Some(decision) = decision(rest) {
+        decisions.push(decision);
         rest = rest.get(4..).unwrap_or_default();
     }
-    numbers.into_iter().map(|decision| (rest.replace('_', " "), decision)).collect()
+    decisions.into_iter().map(|decision| (rest.replace('_', " "), decision)).collect()
 }
 
-/// The number of a prefix like `d07`.
-fn number(name: &str) -> Option<u8> {
-    let (digits, _) = name.strip_prefix('d')?.split_once('_')?;
-    (digits.len() == 2).then(|| digits.parse().ok())?
+/// The decision of a prefix like `d07_` or `m07_`.
+fn decision(name: &str) -> Option<Decision> {
+    let (prefix, _) = name.split_once('_')?;
+    let (letter, digits) = prefix.split_at_checked(1)?;
+    let letter = letter.parse().ok().filter(|letter| matches!(letter, 'd' | 'm'))?;
+    let number = (digits.len() == 2).then(|| digits.parse().ok())??;
+    Some((letter.to_ascii_uppercase(), number))
 }

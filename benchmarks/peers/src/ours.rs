@@ -46,6 +46,12 @@ impl OurServer {
                         self.executed += 1;
                     }
                 }
+                Request::WriteMap21 { address, values } => {
+                    if let Ok(accepted) = self.registers.check_map21(address, values) {
+                        self.registers.apply(&accepted);
+                        self.executed += 1;
+                    }
+                }
             }
         }
     }

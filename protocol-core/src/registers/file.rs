@@ -4,19 +4,13 @@
 //! write, which the arm can inspect before [`RegisterFile::apply`]. This file does not know frames or the effect of a
 //! value.
 
-use super::map::{CHIP_ID, EEPROM_LOCK, MAP};
-use super::spec::{Access, Range, Region, Register};
-
-/// Address of the first EEPROM register.
-const EEPROM_START: u8 = eeprom_bounds().0;
-/// Address behind the last EEPROM register.
-const EEPROM_END: u8 = eeprom_bounds().1;
-/// Address behind the last register that a host can write.
-const WRITABLE_END: usize = writable_end();
-
-/// The rules of all addresses that can be written, generated from the table at compile time. The image holds two bytes
-/// per register and none of the table's text.
-static RULES: [Rule; WRITABLE_END] = rules();
+use super::joint::{JOINTS, Joint};
+use super::map::{CHIP_ID, EEPROM_LOCK, OFFSET};
+use super::map21::{self, Map, OPTIONS, option};
+use super::rules::{
+    DEFAULTS, EEPROM_END, EEPROM_START, keeps_bytes_of_21, rule, rule_21, rules_21_from, rules_from,
+};
+use super::spec::Register;
 
 /// The bytes of the EEPROM region, which survive a power cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,17 +35,38 @@ pub struct OutOfRange {
 /// A write that was checked and may be applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Accepted<'a> {
+    map: Map,
     /// The first address of the write that can have an effect: from the EEPROM region on, or from its end while locked.
     start: u8,
     values: &'a [u8],
 }
 
 impl Accepted<'_> {
-    /// The new value of the register at `address`; `None` if the write does not include it or has no effect on it (D15).
+    /// The map that the write is in.
+    #[must_use]
+    pub const fn map(&self) -> Map {
+        self.map
+    }
+
+    /// The new value of the register at `address`, an offset in sign and magnitude; `None` if the write does not include
+    /// it or has no effect on it (D15).
     #[must_use]
     pub fn value_at(&self, address: u8) -> Option<u8> {
-        let value = self.values.get(usize::from(address.checked_sub(self.start)?))?;
-        RULES.get(usize::from(address))?.is_open().then_some(*value)
+        let value = *self.values.get(usize::from(address.checked_sub(self.start)?))?;
+        match self.map {
+            Map::V22 => rule(address).is_open().then_some(value),
+            Map::V21 => rule_21(address).is_open().then(|| from_map21(address, value)),
+        }
+    }
+
+    /// The bytes for `N` registers from `address` on; `None` unless the write has an effect on all of them.
+    #[must_use]
+    pub fn values_at<const N: usize>(&self, address: u8) -> Option<[u8; N]> {
+        let mut values = [0; N];
+        for (value, address) in values.iter_mut().zip(address..=u8::MAX) {
+            *value = self.value_at(address)?;
+        }
+        Some(values)
     }
 }
 
@@ -59,6 +74,8 @@ impl Accepted<'_> {
 #[derive(Clone, Debug)]
 pub struct RegisterFile {
     values: [u8; 256],
+    /// The offsets in sign and magnitude while 13 to 19 show them as 128 + offset (M5).
+    offsets: Option<[u8; JOINTS]>,
 }
 
 impl RegisterFile {
@@ -66,18 +83,57 @@ impl RegisterFile {
     /// stored value that is out of range is replaced by the default (D19).
     #[must_use]
     pub fn new(chip_id: [u8; CHIP_ID.count as usize], stored: Option<&Image>) -> Self {
-        let mut file = Self { values: DEFAULTS };
+        let mut file = Self { values: DEFAULTS, offsets: None };
         for (address, byte) in (CHIP_ID.address..).zip(chip_id) {
             file.set(address, byte);
         }
         let stored = stored.map_or([].as_slice(), |image| image.0.as_slice());
-        let slots = file.values.iter_mut().zip(&RULES).skip(EEPROM_START.into());
-        for ((value, rule), &byte) in slots.zip(stored) {
+        for (address, &byte) in (EEPROM_START..).zip(stored) {
+            // Register 20 has no rule in map 2.2.
+            let rule = if rule(address).is_open() { rule(address) } else { rule_21(address) };
             if rule.is_open() && rule.allows(byte) {
-                *value = byte;
+                file.set(address, byte);
             }
         }
+        file.forget_last_write();
         file
+    }
+
+    /// Shows the offsets as before the first write (M5, M12).
+    pub fn forget_last_write(&mut self) {
+        let is_biased = self.get(OPTIONS.address) & option::BIASED_OFFSETS != 0;
+        self.show_offsets(if is_biased { Map::V21 } else { Map::V22 });
+    }
+
+    /// Shows the offsets in the encoding of a map.
+    fn show_offsets(&mut self, map: Map) {
+        if let Some(offsets) = self.offsets.take() {
+            self.set_offsets(offsets);
+        }
+        if map == Map::V21 {
+            let offsets = Joint::ALL.map(|joint| self.get(OFFSET.of(joint)));
+            self.set_offsets(offsets.map(to_map21));
+            self.offsets = Some(offsets);
+        }
+    }
+
+    fn set_offsets(&mut self, bytes: [u8; JOINTS]) {
+        for (joint, byte) in Joint::ALL.into_iter().zip(bytes) {
+            self.set(OFFSET.of(joint), byte);
+        }
+    }
+
+    /// A joint's offset in degrees, -16 to 16.
+    #[must_use]
+    pub fn offset(&self, joint: Joint) -> i8 {
+        i8::try_from(OFFSET.range.decode(self.setting(OFFSET.of(joint)))).unwrap_or(0)
+    }
+
+    /// The value of the register at `address`, an offset in sign and magnitude.
+    fn setting(&self, address: u8) -> u8 {
+        let offset =
+            |offsets: &[u8; JOINTS]| offsets.get(usize::from(address.wrapping_sub(OFFSET.address))).copied();
+        self.offsets.as_ref().and_then(offset).unwrap_or_else(|| self.get(address))
     }
 
     /// The value of the register at `address`.
@@ -112,24 +168,49 @@ impl RegisterFile {
         self.values.get(start..start + usize::from(count)).unwrap_or(&[])
     }
 
-    /// Checks a write from the host without applying it.
+    /// Checks a write of the host in map 2.2 without applying it.
     ///
     /// # Errors
     /// The first byte that is outside the range of a register that can be written now.
     pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, OutOfRange> {
-        let is_locked = self.get(EEPROM_LOCK.address) != 0;
-        let start = address.max(if is_locked { EEPROM_END } else { EEPROM_START });
-        let values = values.get(usize::from(start - address)..).unwrap_or(&[]);
+        let (start, values) = self.unlocked(address, values);
         for ((rule, &value), address) in rules_from(start).iter().zip(values).zip(start..) {
             if !rule.allows(value) {
                 return Err(OutOfRange { address, value });
             }
         }
-        Ok(Accepted { start, values })
+        Ok(Accepted { map: Map::V22, start, values })
+    }
+
+    /// Checks a write of the host in map 2.1 without applying it.
+    ///
+    /// # Errors
+    /// The first byte that is outside the range of a register that can be written now.
+    pub fn check_map21<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, OutOfRange> {
+        let (start, values) = self.unlocked(address, values);
+        for ((rule, &value), address) in rules_21_from(start).iter().zip(values).zip(start..) {
+            if !rule.allows_21(value) {
+                return Err(OutOfRange { address, value });
+            }
+        }
+        Ok(Accepted { map: Map::V21, start, values })
+    }
+
+    /// The part of a write that can have an effect: from the EEPROM region on, or from its end while locked.
+    fn unlocked<'a>(&self, address: u8, values: &'a [u8]) -> (u8, &'a [u8]) {
+        let is_locked = self.get(EEPROM_LOCK.address) != 0;
+        let start = address.max(if is_locked { EEPROM_END } else { EEPROM_START });
+        (start, values.get(usize::from(start - address)..).unwrap_or(&[]))
     }
 
     /// Applies a checked write.
     pub fn apply(&mut self, accepted: &Accepted<'_>) {
+        if self.offsets.is_some() {
+            self.show_offsets(Map::V22);
+        }
+        if accepted.map == Map::V21 {
+            return self.apply_map21(accepted);
+        }
         let slots = self.values.get_mut(usize::from(accepted.start)..).unwrap_or(&mut []);
         for ((rule, slot), &value) in rules_from(accepted.start).iter().zip(slots).zip(accepted.values) {
             if rule.is_open() {
@@ -138,12 +219,21 @@ impl RegisterFile {
         }
     }
 
+    fn apply_map21(&mut self, accepted: &Accepted<'_>) {
+        for (&value, address) in accepted.values.iter().zip(accepted.start..=u8::MAX) {
+            if rule_21(address).is_open() && keeps_bytes_of_21(address) {
+                self.set(address, from_map21(address, value));
+            }
+        }
+        self.show_offsets(Map::V21);
+    }
+
     /// The present values of the EEPROM region.
     #[must_use]
     pub fn image(&self) -> Image {
         let mut image = Image([0; Image::LENGTH]);
-        for (byte, &value) in image.0.iter_mut().zip(self.values.iter().skip(EEPROM_START.into())) {
-            *byte = value;
+        for (byte, address) in image.0.iter_mut().zip(EEPROM_START..) {
+            *byte = self.setting(address);
         }
         image
     }
@@ -152,111 +242,31 @@ impl RegisterFile {
     #[must_use]
     pub fn first_changed_setting(&self, accepted: &Accepted<'_>) -> Option<u8> {
         let is_change =
-            |address: &u8| accepted.value_at(*address).is_some_and(|new| new != self.get(*address));
+            |address: &u8| accepted.value_at(*address).is_some_and(|new| new != self.setting(*address));
         (accepted.start..EEPROM_END).find(is_change)
     }
 }
 
-fn rules_from(start: u8) -> &'static [Rule] {
-    RULES.get(usize::from(start)..).unwrap_or(&[])
-}
-
-/// The rule for a write to one register.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Rule {
-    /// The bits of the magnitude. If the mask is 0, a write has no effect.
-    mask: u8,
-    max: u8,
-}
-
-impl Rule {
-    const CLOSED: Self = Self { mask: 0, max: 0 };
-
-    const fn of(register: &Register) -> Self {
-        match (register.access, register.range) {
-            (Access::ReadWrite, Range::UpTo(max)) => Self { mask: 0xFF, max },
-            (Access::ReadWrite, Range::SignMagnitude(max)) => Self { mask: 0x7F, max },
-            _ => Self::CLOSED,
-        }
-    }
-
-    const fn is_open(&self) -> bool {
-        self.mask != 0
-    }
-
-    /// Returns whether the value is in range. A register without effect allows any value.
-    const fn allows(&self, value: u8) -> bool {
-        value & self.mask <= self.max
+/// A byte that function 04 writes, with an offset in sign and magnitude.
+fn from_map21(address: u8, byte: u8) -> u8 {
+    if map21::OFFSET.holds(address) {
+        OFFSET.range.encode(map21::OFFSET.range.decode(byte)).unwrap_or(0)
+    } else {
+        byte
     }
 }
 
-// The functions below run at compile time and in a test. An index out of bounds is a build error, not a panic.
-
-const fn writable_end() -> usize {
-    let mut end = 0;
-    let mut rest = MAP;
-    while let [row, tail @ ..] = rest {
-        if matches!(row.access, Access::ReadWrite) {
-            end = row.address as usize + row.count as usize;
-        }
-        rest = tail;
-    }
-    end
-}
-
-const fn eeprom_bounds() -> (u8, u8) {
-    let (mut start, mut end) = (0, 0);
-    let mut rest = MAP;
-    while let [row, tail @ ..] = rest {
-        if matches!(row.region, Region::Eeprom) {
-            if end == 0 {
-                start = row.address;
-            }
-            end = row.address + row.count;
-        }
-        rest = tail;
-    }
-    (start, end)
-}
-
-#[allow(clippy::indexing_slicing)]
-const fn rules() -> [Rule; WRITABLE_END] {
-    let mut rules = [Rule::CLOSED; WRITABLE_END];
-    let mut rest = MAP;
-    while let [row, tail @ ..] = rest {
-        let mut address = row.address as usize;
-        while address < row.address as usize + row.count as usize && address < WRITABLE_END {
-            rules[address] = Rule::of(row);
-            address += 1;
-        }
-        rest = tail;
-    }
-    rules
-}
-
-/// The values of a new arm after power-up.
-static DEFAULTS: [u8; 256] = defaults();
-
-#[allow(clippy::indexing_slicing, clippy::cast_possible_truncation)]
-const fn defaults() -> [u8; 256] {
-    let mut values = [0; 256];
-    let mut rest = MAP;
-    while let [row, tail @ ..] = rest {
-        let mut offset = 0;
-        while offset < row.count as usize {
-            let address = row.address as usize + offset;
-            values[address] = row.default_at(address as u8);
-            offset += 1;
-        }
-        rest = tail;
-    }
-    values
+/// An offset in sign and magnitude as 128 + offset.
+fn to_map21(byte: u8) -> u8 {
+    map21::OFFSET
+        .range
+        .encode(OFFSET.range.decode(byte))
+        .unwrap_or(map21::OFFSET.default_at(map21::OFFSET.address))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::map::{BAUD_RATE, DEVICE_ID, FRAMES_ACCEPTED, OFFSET, SPEED, TARGET_POSITION};
-    use super::super::spec::Joint;
     use super::*;
 
     fn fresh() -> RegisterFile {
@@ -276,20 +286,9 @@ mod tests {
         assert_eq!(file.read(28, 4), [1, 1, 0, 0]);
         assert_eq!(file.read(TARGET_POSITION.address, 7), [90, 90, 65, 90, 90, 90, 80]);
         assert_eq!(file.read(240, 1), [1]);
-        assert_eq!(file.read(61, 179), [0; 179]);
-    }
-
-    /// Runs the compile-time functions at run time, so that coverage and mutation tests see them.
-    #[test]
-    fn the_rules_and_defaults_follow_from_the_table() {
-        assert_eq!((writable_end(), eeprom_bounds()), (54, (8, 28)));
-        let rules = rules();
-        assert_eq!(rules.as_slice(), RULES.as_slice());
-        assert_eq!(defaults(), DEFAULTS);
-        let rule = |mask, max| Rule { mask, max };
-        assert_eq!(rules[..9], [Rule::CLOSED; 9], "ROM and reserved registers");
-        assert_eq!(rules[12..14], [rule(0xFF, 7), rule(0x7F, 16)]);
-        assert_eq!(rules[28..30], [rule(0xFF, 1), rule(0xFF, 2)]);
+        assert_eq!(file.read(61, 22), [0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(file.read(83, 15), [0, 0, 0, 0, 0, 0, 0, 0, 128, 128, 128, 128, 128, 128, 128]);
+        assert_eq!(file.read(98, 142), [0; 142]);
     }
 
     #[test]

@@ -61,7 +61,7 @@ register_map! {
     /// Joints whose set-point has not reached the target yet: bit n-1 is joint n.
     MOVING_JOINTS = ram(243).read_only();
     /// Why the last refused frame was refused: 0 none yet, 1 malformed range, 2 value out of range,
-    /// 3 settings storage full.
+    /// 3 settings storage full, 6 no joint angles reach the position (M7).
     LAST_REFUSAL = ram(244).read_only();
     /// The register that caused the last refusal.
     LAST_REFUSED_REGISTER = ram(245).read_only();
@@ -114,6 +114,8 @@ pub mod refusal {
     pub const OUT_OF_RANGE: u8 = 2;
     /// The settings storage is full until the next restart (D19).
     pub const STORAGE_FULL: u8 = 3;
+    /// No joint angles reach the position in a write of map 2.1 (M7).
+    pub const OUT_OF_REACH: u8 = 6;
 }
 
 /// The states of [`MOTOR_STATE`].

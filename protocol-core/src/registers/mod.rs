@@ -1,21 +1,30 @@
-//! The registers of the arm: 256 registers of one byte (docs/protocol.md, sections 3 and 4).
+//! The registers of the arm: 256 registers of one byte (docs/protocol.md, sections 3, 4 and 8).
 //!
 //! ```text
-//!  spec   the types of a row                       (no addresses)
+//!  joint, range, spec   the types of a row                  (no addresses)
 //!    ▼
-//!  map    THE TABLE: one row per register          (no values)
+//!  map, map21           THE TABLES: one row per register    (no values)
 //!    ▼
-//!  file   the current values, and the rules of     (no wire, no motion)
-//!         a write
+//!  rules                what a write of either map may do
+//!    ▼
+//!  file                 the current values                  (no wire, no motion)
 //! ```
 //!
-//! The register file, the journal's contents, the simulator's trace, the host tools and
-//! `docs/registers.md` all use this one table.
+//! The maker has two maps, 2.2 and 2.1. The function code of a write says in which one it is (M1); reads are one union of
+//! both (M3). The register file, the journal's contents, the simulator's trace, the host tools and `docs/registers.md` all
+//! use these two tables.
 
 pub mod file;
+pub mod joint;
 pub mod map;
+pub mod map21;
+pub mod range;
+mod rules;
 pub mod spec;
 
 pub use file::{Accepted, Image, OutOfRange, RegisterFile};
+pub use joint::{JOINTS, Joint};
 pub use map::MAP;
-pub use spec::{Access, JOINTS, Joint, Range, Region, Register, Unit};
+pub use map21::{MAP_21, Map};
+pub use range::Range;
+pub use spec::{Access, Region, Register, Unit};

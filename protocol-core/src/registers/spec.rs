@@ -1,49 +1,9 @@
 //! The types of the register table, and its checks at compile time.
 //!
-//! This file does not know any address. A later revision of the arm is a second table of the same types.
+//! This file does not know any address. Both tables, map 2.2 and map 2.1, use these types.
 
-/// Number of joints, and of servos on the bus.
-pub const JOINTS: usize = 7;
-
-/// One of the seven joints. Users count from 1 (the base) to 7 (the claw); arrays count from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Joint(u8);
-
-impl Joint {
-    /// All joints, 1 to 7.
-    pub const ALL: [Self; JOINTS] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5), Self(6)];
-
-    /// The joint with the user's number 1 to 7; `None` for any other.
-    #[must_use]
-    pub const fn new(number: u8) -> Option<Self> {
-        if number >= 1 && number <= 7 { Some(Self(number - 1)) } else { None }
-    }
-
-    /// The joint at position 0 to 6 of an array; `None` for any other.
-    #[must_use]
-    pub const fn from_index(index: u8) -> Option<Self> {
-        if index < 7 { Some(Self(index)) } else { None }
-    }
-
-    /// The user's number, 1 to 7.
-    #[must_use]
-    pub const fn number(self) -> u8 {
-        self.0 + 1
-    }
-
-    /// Position in arrays and in register blocks, 0 to 6.
-    #[must_use]
-    pub const fn index(self) -> u8 {
-        self.0
-    }
-
-    /// This joint's bit in the joint sets of the status block: bit n-1 is joint n.
-    #[must_use]
-    pub const fn bit(self) -> u8 {
-        1 << self.0
-    }
-}
+use super::joint::{JOINTS, Joint};
+use super::range::Range;
 
 /// The memory region of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,63 +61,6 @@ impl Unit {
             Self::Decivolt => "× 0.1 V",
             Self::Celsius => "°C",
             Self::VersionTenths => "× 0.1",
-        }
-    }
-}
-
-/// The valid values of a register.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Range {
-    /// Every byte up to and including this one.
-    UpTo(u8),
-    /// Bit 7 is the sign, the rest a magnitude up to and including this one; 0x80 is a zero (D9).
-    SignMagnitude(u8),
-}
-
-/// The sign bit of [`Range::SignMagnitude`].
-const SIGN: u8 = 0x80;
-
-impl Range {
-    /// Is `byte` in this range?
-    #[must_use]
-    pub const fn contains(self, byte: u8) -> bool {
-        match self {
-            Self::UpTo(max) => byte <= max,
-            Self::SignMagnitude(max) => byte & !SIGN <= max,
-        }
-    }
-
-    /// Decodes a byte: 0x85 of a signed range is -5.
-    #[must_use]
-    pub const fn decode(self, byte: u8) -> i16 {
-        // `as` widens here: `From` is not const.
-        match self {
-            Self::SignMagnitude(_) if byte & SIGN != 0 => -((byte & !SIGN) as i16),
-            _ => byte as i16,
-        }
-    }
-
-    /// Encodes a number; `None` if it is outside the range.
-    #[must_use]
-    pub const fn encode(self, number: i16) -> Option<u8> {
-        let magnitude = number.unsigned_abs();
-        if magnitude > 0xFF {
-            return None;
-        }
-        let byte = magnitude.to_le_bytes()[0];
-        match self {
-            Self::UpTo(max) if number >= 0 && byte <= max => Some(byte),
-            Self::SignMagnitude(max) if byte <= max => Some(if number < 0 { byte | SIGN } else { byte }),
-            _ => None,
-        }
-    }
-
-    /// The smallest and the largest number of this range.
-    #[must_use]
-    pub const fn bounds(self) -> (i16, i16) {
-        match self {
-            Self::UpTo(max) => (0, max as i16),
-            Self::SignMagnitude(max) => (-(max as i16), max as i16),
         }
     }
 }
@@ -256,6 +159,12 @@ impl Register {
         self
     }
 
+    /// Sets the range -`max` to `max`, in any of the three encodings of [`Range::Biased`].
+    pub(crate) const fn biased(mut self, max: u8) -> Self {
+        self.range = Range::Biased(max);
+        self
+    }
+
     /// Sets the default.
     pub(crate) const fn default(mut self, value: u8) -> Self {
         self.defaults = [value; JOINTS];
@@ -284,7 +193,7 @@ impl Register {
     /// The address of a joint's register in a per-joint row; the row's first address in any other.
     #[must_use]
     pub const fn of(&self, joint: Joint) -> u8 {
-        if self.per_joint { self.address.wrapping_add(joint.0) } else { self.address }
+        if self.per_joint { self.address.wrapping_add(joint.index()) } else { self.address }
     }
 
     /// Does the run hold `address`?
@@ -343,31 +252,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sign_and_magnitude_reads_and_writes_both_signs() {
-        let range = Range::SignMagnitude(16);
-        assert_eq!(range.decode(0x85), -5);
-        assert_eq!(range.decode(0x80), 0, "minus zero is zero (D9)");
-        assert_eq!(range.encode(-5), Some(0x85));
-        assert_eq!(range.encode(0), Some(0));
-        assert_eq!(range.encode(17), None);
-        assert_eq!(range.encode(-17), None);
-        assert_eq!(range.bounds(), (-16, 16));
-    }
-
-    #[test]
-    fn every_value_of_a_range_survives_decode_and_encode() {
-        for range in [Range::UpTo(0), Range::UpTo(100), Range::UpTo(255), Range::SignMagnitude(16)] {
-            for byte in (0..=255).filter(|&byte| range.contains(byte) && byte != SIGN) {
-                assert_eq!(range.encode(range.decode(byte)), Some(byte), "{range:?}");
-            }
-            let (low, high) = range.bounds();
-            assert_eq!(range.encode(low - 1), None);
-            assert_eq!(range.encode(high + 1), None);
-        }
-        assert_eq!(Range::UpTo(255).encode(256 + 5), None, "no silent truncation");
-    }
-
-    #[test]
     fn a_bad_table_is_refused() {
         assert!(well_formed(&[ram(1), ram(2).run(3), ram(5)]));
         assert!(!well_formed(&[ram(2), ram(1)]), "order");
@@ -378,17 +262,6 @@ mod tests {
         assert!(!well_formed(&[ram(1).run(0)]), "empty");
         assert!(!well_formed(&[ram(1).up_to(3).default(4)]), "default out of range");
         assert!(!well_formed(&[ram(1).each_joint().run(6)]), "a joint is missing");
-    }
-
-    #[test]
-    fn joints_are_numbered_from_one() {
-        assert_eq!(Joint::new(0), None);
-        assert_eq!(Joint::new(8), None);
-        assert_eq!(Joint::new(7).map(Joint::index), Some(6));
-        assert_eq!(Joint::from_index(7), None);
-        let numbers: Vec<u8> = Joint::ALL.iter().map(|joint| joint.number()).collect();
-        assert_eq!(numbers, [1, 2, 3, 4, 5, 6, 7]);
-        assert_eq!(Joint::ALL.iter().fold(0, |bits, joint| bits | joint.bit()), 0x7F);
     }
 
     #[test]

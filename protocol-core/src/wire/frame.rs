@@ -28,24 +28,24 @@ pub type FrameBuffer = heapless::Vec<u8, MAX_LENGTH>;
 pub enum Function {
     /// 03: a read request, or the reply to one.
     Read = 0x03,
-    /// 06: a write request; it has no reply (D6).
+    /// 04: a write request in map 2.1; it has no reply (M1).
+    WriteMap21 = 0x04,
+    /// 05: a report in map 2.1 (M4).
+    Report = 0x05,
+    /// 06: a write request in map 2.2; it has no reply (D6).
     Write = 0x06,
+    /// 08: an alarm (M8). It has a level and a kind in place of address and count, and no data.
+    Alarm = 0x08,
 }
 
-impl Function {
-    const fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0x03 => Some(Self::Read),
-            0x06 => Some(Self::Write),
-            _ => None,
-        }
-    }
-}
-
-/// The direction of a frame. It decides whether a read carries data.
+/// The direction of a frame. It decides which functions there are, and whether a read carries data.
 pub trait Direction {
+    /// The function with this code; `None` if it is unknown in this direction.
+    fn function(code: u8) -> Option<Function>;
     /// Number of data bytes in a frame of this function and count.
     fn data_length(function: Function, count: u8) -> usize;
+    /// Does a frame of this function name a range of registers?
+    fn has_range(function: Function) -> bool;
 }
 
 /// From the host to the arm: a read is a request without data.
@@ -57,17 +57,39 @@ pub enum ToArm {}
 pub enum ToHost {}
 
 impl Direction for ToArm {
-    fn data_length(function: Function, count: u8) -> usize {
-        match function {
-            Function::Read => 0,
-            Function::Write => usize::from(count),
+    fn function(code: u8) -> Option<Function> {
+        match code {
+            0x03 => Some(Function::Read),
+            0x04 => Some(Function::WriteMap21),
+            0x06 => Some(Function::Write),
+            _ => None,
         }
+    }
+
+    fn data_length(function: Function, count: u8) -> usize {
+        if function == Function::Read { 0 } else { usize::from(count) }
+    }
+
+    fn has_range(_: Function) -> bool {
+        true
     }
 }
 
 impl Direction for ToHost {
-    fn data_length(_: Function, count: u8) -> usize {
-        usize::from(count)
+    fn function(code: u8) -> Option<Function> {
+        match code {
+            0x05 => Some(Function::Report),
+            0x08 => Some(Function::Alarm),
+            _ => ToArm::function(code),
+        }
+    }
+
+    fn data_length(function: Function, count: u8) -> usize {
+        if function == Function::Alarm { 0 } else { usize::from(count) }
+    }
+
+    fn has_range(function: Function) -> bool {
+        function != Function::Alarm
     }
 }
 
@@ -75,11 +97,11 @@ impl Direction for ToHost {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Frame<'a> {
-    /// Read or write.
+    /// What the frame is.
     pub function: Function,
-    /// The first register.
+    /// The first register; the level of an alarm.
     pub address: u8,
-    /// How many registers.
+    /// How many registers; the kind of an alarm.
     pub count: u8,
     /// Values of the registers; empty in a read request.
     pub data: &'a [u8],
@@ -116,14 +138,14 @@ type Prefix = (Function, u8, u8);
 
 /// Parses the prefix of a frame.
 #[inline(always)]
-fn prefix(input: &[u8]) -> IResult<&[u8], Prefix, ()> {
+fn prefix<D: Direction>(input: &[u8]) -> IResult<&[u8], Prefix, ()> {
     match input {
         [first, second, code, address, count, rest @ ..] if [*first, *second] == HEADER => {
-            let function = Function::from_code(*code).ok_or(nom::Err::Error(()))?;
+            let function = D::function(*code).ok_or(nom::Err::Error(()))?;
             Ok((rest, (function, *address, *count)))
         }
         [_, _, _, _, _, ..] => Err(nom::Err::Error(())),
-        short if may_begin(short) => Err(nom::Err::Incomplete(Needed::new(PREFIX_LENGTH - short.len()))),
+        short if may_begin::<D>(short) => Err(nom::Err::Incomplete(Needed::new(PREFIX_LENGTH - short.len()))),
         _ => Err(nom::Err::Error(())),
     }
 }
@@ -135,9 +157,9 @@ fn crc_of_prefix((function, address, count): Prefix) -> Crc {
 }
 
 /// Returns whether these bytes, too few for a prefix, can begin a frame.
-fn may_begin(bytes: &[u8]) -> bool {
+fn may_begin<D: Direction>(bytes: &[u8]) -> bool {
     let is_header = bytes.iter().zip(&HEADER).all(|(found, expected)| found == expected);
-    is_header && bytes.get(2).is_none_or(|&code| Function::from_code(code).is_some())
+    is_header && bytes.get(2).is_none_or(|&code| D::function(code).is_some())
 }
 
 /// Parses data and CRC, and checks the frame.
@@ -152,7 +174,7 @@ fn body<'a, D: Direction>(
     let sum = if data.is_empty() { sum } else { sum.bytes(data) };
     let checked = if crc != sum.finish().to_le_bytes() {
         Err(Defect::WrongCrc)
-    } else if usize::from(address) + usize::from(count) > 256 {
+    } else if D::has_range(function) && usize::from(address) + usize::from(count) > 256 {
         Err(Defect::MalformedRange { address })
     } else {
         Ok(Frame { function, address, count, data })
@@ -167,7 +189,7 @@ fn body<'a, D: Direction>(
 #[cfg_attr(not(target_os = "none"), inline(always))]
 #[must_use]
 pub fn parse<D: Direction>(input: &[u8]) -> ParseOutcome<'_> {
-    let (length, parsed) = match prefix(input) {
+    let (length, parsed) = match prefix::<D>(input) {
         Err(error) => (MIN_LENGTH, Err(error)),
         Ok((rest, prefix)) => {
             let length = PREFIX_LENGTH + D::data_length(prefix.0, prefix.2) + CRC_LENGTH;

@@ -10,8 +10,9 @@
 //!                         registers else count
 //! ```
 //!
-//! Function 03 is a read, 06 a write. A reply has the function, address and count of its request. This module does not
-//! know the registers: an address is a number here.
+//! Function 03 is a read, 06 a write in map 2.2, 04 a write in map 2.1. A reply has the function, address and count of its
+//! request. A report has function 03, or 05 in map 2.1. An alarm, 08, has a level and a kind in place of address and
+//! count, and no data. This module does not know the registers: an address is a number here.
 
 pub mod crc;
 pub mod deframer;

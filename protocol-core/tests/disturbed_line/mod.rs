@@ -64,7 +64,7 @@ impl Disturbance {
             DoubledByte => victim.insert(place, victim[place]),
             FalseLongHeader => {
                 let count = u8::try_from(200 + random.index(56)).unwrap();
-                return vec![0xAA, 0x77, 6, random.byte(), count];
+                return vec![0xAA, 0x77, [4, 6][random.index(2)], random.byte(), count];
             }
             Pauses | BackToBack => victim.clear(),
         }
@@ -74,7 +74,7 @@ impl Disturbance {
 
 /// Noise that is rich in headers.
 fn noise(random: &mut Random) -> u8 {
-    let likely = [0xAA, 0x77, 0xAA, 0x77, 0x06, 0x03];
+    let likely = [0xAA, 0x77, 0xAA, 0x77, 0x06, 0x04, 0x03];
     if random.index(2) == 0 { likely[random.index(likely.len())] } else { random.byte() }
 }
 
@@ -83,7 +83,7 @@ fn noise(random: &mut Random) -> u8 {
 fn any_frame(random: &mut Random, victim: bool) -> Vec<u8> {
     let data: Vec<u8> = (0..random.index(20)).map(|_| random.byte()).collect();
     let address = u8::try_from(random.index(110)).unwrap() * 2 + u8::from(victim);
-    frame(if random.index(2) == 0 { 3 } else { 6 }, address, &data)
+    frame([3, 4, 6][random.index(3)], address, &data)
 }
 
 /// What a run came to.

@@ -6,7 +6,7 @@
 use std::collections::HashSet;
 
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::{Defect, Deframer, Direction, Function, MAX_LENGTH};
+use protocol_core::wire::{Defect, Deframer, Direction, MAX_LENGTH};
 
 pub const GAP_US: u64 = 2_000;
 const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
@@ -83,10 +83,7 @@ pub fn drain<D: Direction>(deframer: &mut Deframer<D>, received: &mut Vec<Receiv
 /// The next thing it says.
 pub fn pull<D: Direction>(deframer: &mut Deframer<D>) -> Option<Received> {
     Some(match deframer.pull()? {
-        Ok(frame) => {
-            let function = if frame.function == Function::Read { 3 } else { 6 };
-            Received::Frame(raw_frame(function, frame.address, frame.count, frame.data))
-        }
+        Ok(frame) => Received::Frame(raw_frame(frame.function as u8, frame.address, frame.count, frame.data)),
         Err(Defect::WrongCrc) => Received::WrongCrc,
         Err(Defect::MalformedRange { address }) => Received::MalformedRange(address),
     })
@@ -207,7 +204,7 @@ impl Model {
         let length = match bytes.get(2) {
             None => return Candidate::Unfinished,
             Some(3) => 7,
-            Some(6) => match bytes.get(4) {
+            Some(4 | 6) => match bytes.get(4) {
                 None => return Candidate::Unfinished,
                 Some(&count) => 7 + usize::from(count),
             },

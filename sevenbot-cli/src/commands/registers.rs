@@ -2,7 +2,6 @@
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use sevenbot::map::MAP;
 use sevenbot::{Range, Register, table};
 
 use crate::command_error::CommandError;
@@ -49,8 +48,12 @@ pub(crate) fn run(session: &mut Session, args: &RegistersArgs) -> Result<(), Com
 
 /// Columns of text.
 fn text() -> String {
-    let head = ["address", "name", "region", "access", "range", "default", "unit"].map(str::to_owned);
-    let rows: Vec<_> = std::iter::once(head).chain(MAP.iter().map(table::cells)).collect();
+    let head = ["address", "name", "region", "access", "range", "default", "unit", "map"].map(str::to_owned);
+    let cells = |row| {
+        let [address, name, region, access, range, default, unit] = table::cells(row);
+        [address, name, region, access, range, default, unit, versions(row).join(", ")]
+    };
+    let rows: Vec<_> = std::iter::once(head).chain(table::rows().map(cells)).collect();
     let width =
         |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
     let mut text = String::new();
@@ -65,9 +68,14 @@ fn text() -> String {
     text
 }
 
+/// The maps that have this row.
+fn versions(row: &Register) -> Vec<&'static str> {
+    table::versions(row).collect()
+}
+
 /// An array in one line, with an object per row.
 fn json() -> String {
-    let rows: Vec<Value> = MAP.iter().map(object).collect();
+    let rows: Vec<Value> = table::rows().map(object).collect();
     let text = serde_json::to_string(&rows).unwrap_or_default();
     format!("{text}\n")
 }
@@ -86,6 +94,8 @@ fn object(row: &Register) -> Value {
         "min": low,
         "max": high,
         "sign_magnitude": matches!(row.range, Range::SignMagnitude(_)),
+        "biased": matches!(row.range, Range::Biased(_)),
+        "maps": versions(row),
         "default": if row.per_joint { json!(defaults) } else { json!(default) },
         "unit": row.unit.symbol(),
         "meaning": table::description(row),
@@ -99,10 +109,19 @@ mod tests {
     #[test]
     fn each_form_has_every_row() {
         let json: Vec<Value> = serde_json::from_str(&json()).expect("JSON");
-        assert_eq!(json.len(), MAP.len());
-        for row in MAP {
+        let rows = table::rows().count();
+        assert_eq!(json.len(), rows);
+        for row in table::rows() {
             assert!(text().lines().any(|line| line.split_whitespace().nth(1) == Some(row.name)));
         }
-        assert_eq!(text().lines().count(), MAP.len() + 1);
+        assert_eq!(text().lines().count(), rows + 1);
+        let maps = |address: u8| {
+            json.iter()
+                .filter(|row| row["address"] == address)
+                .map(|row| row["maps"].clone())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(maps(13), [serde_json::json!(["2.2"]), serde_json::json!(["2.1"])]);
+        assert_eq!(maps(46), [serde_json::json!(["2.2", "2.1"])]);
     }
 }

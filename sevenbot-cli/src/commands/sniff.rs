@@ -106,6 +106,13 @@ impl TrafficLine {
             Traffic::Write { address, values } => {
                 ("write", Some(*address), count_of(values), values.as_slice())
             }
+            Traffic::WriteMap21 { address, values } => {
+                ("write-map-2.1", Some(*address), count_of(values), values.as_slice())
+            }
+            Traffic::Report { address, values } => {
+                ("report", Some(*address), count_of(values), values.as_slice())
+            }
+            Traffic::Alarm { .. } => ("alarm", None, None, &[][..]),
             Traffic::TooFar { address, count } => ("too-far", Some(*address), Some(*count), &[][..]),
             Traffic::Noise(bytes) => ("noise", None, None, bytes.as_slice()),
         };

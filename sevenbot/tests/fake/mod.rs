@@ -35,7 +35,7 @@ pub(crate) fn answering_arm(
             reads += 1;
             script(reads - 1, *address, *count)
         }
-        Request::Write { .. } => Vec::new(),
+        Request::Write { .. } | Request::WriteMap21 { .. } => Vec::new(),
     })
 }
 
@@ -81,7 +81,7 @@ pub(crate) fn makers_arm() -> (String, TTYPort) {
             let first = usize::from(address);
             reply(address, &registers[first..first + usize::from(count)])
         }
-        Request::Write { address, values } => {
+        Request::Write { address, values } | Request::WriteMap21 { address, values } => {
             let first = usize::from(address);
             registers[first..first + values.len()].copy_from_slice(values);
             registers.copy_within(46..53, 54);
@@ -118,7 +118,7 @@ pub(crate) fn execute(registers: &mut [u8; 256], request: &Request<'_>) -> Vec<u
             let first = usize::from(address);
             reply(address, &registers[first..first + usize::from(count)])
         }
-        Request::Write { address, values } => {
+        Request::Write { address, values } | Request::WriteMap21 { address, values } => {
             let first = usize::from(address);
             registers[first..first + values.len()].copy_from_slice(values);
             registers[243] = 0;

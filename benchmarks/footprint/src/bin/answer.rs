@@ -5,7 +5,7 @@
 
 use cortex_m_rt::entry;
 use footprint::{any_bytes, any_time, opaque};
-use protocol_core::registers::RegisterFile;
+use protocol_core::registers::{Accepted, OutOfRange, RegisterFile};
 use protocol_core::request::{Reply, Request};
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
@@ -35,11 +35,16 @@ fn execute(request: Request<'_>, registers: &mut RegisterFile, reply: &mut Frame
             Reply { address, values: registers.read(address, count) }.encode(reply);
             opaque(reply.as_slice());
         }
-        Request::Write { address, values } => match registers.check(address, values) {
-            Ok(accepted) => registers.apply(&accepted),
-            Err(refused) => {
-                opaque(refused);
-            }
-        },
+        Request::Write { address, values } => apply(registers.check(address, values), registers),
+        Request::WriteMap21 { address, values } => apply(registers.check_map21(address, values), registers),
+    }
+}
+
+fn apply(checked: Result<Accepted<'_>, OutOfRange>, registers: &mut RegisterFile) {
+    match checked {
+        Ok(accepted) => registers.apply(&accepted),
+        Err(refused) => {
+            opaque(refused);
+        }
     }
 }

@@ -32,7 +32,7 @@ enum StreamStep<'a> {
     },
     /// A frame, perhaps truncated or corrupted.
     Frame {
-        is_write: bool,
+        function: u8,
         address: u8,
         data: &'a [u8],
         missing: u8,
@@ -48,11 +48,11 @@ impl StreamStep<'_> {
         let bytes = match *self {
             Self::Bytes(bytes) => bytes.to_vec(),
             Self::Header { function, count } => vec![0xAA, 0x77, function % 8, 0, count],
-            Self::Frame { is_write, address, data, missing, damage } => {
+            Self::Frame { function, address, data, missing, damage } => {
                 let data = &data[..data.len().min(255)];
-                let (function, count, data) =
-                    if is_write { (6, data.len(), data) } else { (3, data.len(), &[][..]) };
-                let mut bytes = raw_frame(function, address, u8::try_from(count).unwrap(), data);
+                let function = [3, 6, 4][usize::from(function % 3)];
+                let count = u8::try_from(data.len()).unwrap();
+                let mut bytes = raw_frame(function, address, count, if function == 3 { &[] } else { data });
                 bytes.truncate(bytes.len() - usize::from(missing).min(bytes.len()));
                 if let Some((place, change)) = damage
                     && let Some(byte) = bytes.get_mut(usize::from(place))

@@ -1,8 +1,8 @@
-//! The register file against a model with its own table, written from `docs/protocol.md`, section 3, alone.
+//! The register file against a model with its own tables, written from `docs/protocol.md`, sections 3 and 8, alone.
 
 use arbitrary::Arbitrary;
 use protocol_core::registers::map::{FRAMES_ACCEPTED, FRAMES_CORRUPTED};
-use protocol_core::registers::{Image, RegisterFile};
+use protocol_core::registers::{Image, Map, RegisterFile};
 
 /// The input of a run.
 #[derive(Arbitrary, Debug)]
@@ -19,6 +19,11 @@ enum RegisterStep<'a> {
     Read {
         address: u8,
         count: u8,
+    },
+    /// A write in map 2.1.
+    WriteMap21 {
+        address: u8,
+        values: &'a [u8],
     },
     /// The arm sets a measured value.
     Measure {
@@ -45,8 +50,8 @@ pub fn run(input: &Input<'_>) {
     for step in &input.steps {
         arm.step(step);
     }
-    assert_eq!(arm.file.read(0, 255), &arm.model.0[..255]);
-    assert_eq!(arm.file.get(255), arm.model.0[255]);
+    assert_eq!(arm.file.read(0, 255), &arm.model.shown()[..255]);
+    assert_eq!(arm.file.get(255), arm.model.shown()[255]);
 }
 
 /// The register file and its model.
@@ -65,15 +70,21 @@ impl FileAndModel {
 
     fn step(&mut self, step: &RegisterStep<'_>) {
         match *step {
-            RegisterStep::Write { address, values } => self.write(address, &values[..values.len().min(255)]),
+            RegisterStep::Write { address, values } => {
+                self.write(Map::V22, address, &values[..values.len().min(255)])
+            }
+            RegisterStep::WriteMap21 { address, values } => {
+                self.write(Map::V21, address, &values[..values.len().min(255)]);
+            }
             RegisterStep::Read { address, count } => {
                 let start = usize::from(address);
-                let expected = self.model.0.get(start..start + usize::from(count)).unwrap_or(&[]);
+                let shown = self.model.shown();
+                let expected = shown.get(start..start + usize::from(count)).unwrap_or(&[]);
                 assert_eq!(self.file.read(address, count), expected);
             }
             RegisterStep::Measure { joint, degrees } => {
                 self.file.set(54 + joint % 7, degrees);
-                self.model.0[usize::from(54 + joint % 7)] = degrees;
+                self.model.values[usize::from(54 + joint % 7)] = degrees;
             }
             RegisterStep::Count { corrupted, times } => self.count(corrupted, times % 300),
             RegisterStep::Restart { chip_id } => {
@@ -85,9 +96,13 @@ impl FileAndModel {
         }
     }
 
-    fn write(&mut self, address: u8, values: &[u8]) {
-        let expected = self.model.after(address, values);
-        let accepted = match self.file.check(address, values) {
+    fn write(&mut self, map: Map, address: u8, values: &[u8]) {
+        let expected = self.model.after(map, address, values);
+        let checked = match map {
+            Map::V22 => self.file.check(address, values),
+            Map::V21 => self.file.check_map21(address, values),
+        };
+        let accepted = match checked {
             Ok(accepted) => accepted,
             Err(wrong) => {
                 assert_eq!(expected.err(), Some(wrong.address));
@@ -96,12 +111,14 @@ impl FileAndModel {
             }
         };
         let after = expected.expect("the model refuses this write");
-        let changes = (8..=27_u8).find(|&at| after.0[usize::from(at)] != self.model.0[usize::from(at)]);
+        let (now, then) = (&self.model.values, &after.values);
+        let changes = (8..=27_u8).find(|&at| then[usize::from(at)] != now[usize::from(at)]);
         assert_eq!(self.file.first_changed_setting(&accepted), changes);
         let end = usize::from(address) + values.len();
         for at in (address.saturating_sub(1)..=255).take_while(|at| usize::from(*at) <= end) {
             let value = at.checked_sub(address).and_then(|offset| values.get(usize::from(offset))).copied();
-            assert_eq!(accepted.value_at(at), value.filter(|_| self.model.takes_effect(at)), "register {at}");
+            let value = value.filter(|_| self.model.takes_effect(map, at));
+            assert_eq!(accepted.value_at(at), value.map(|value| stored(map, at, value)), "register {at}");
         }
         self.file.apply(&accepted);
         self.model = after;
@@ -110,7 +127,7 @@ impl FileAndModel {
     fn count(&mut self, corrupted: bool, times: u16) {
         let (row, low) = if corrupted { (FRAMES_CORRUPTED, 248) } else { (FRAMES_ACCEPTED, 246) };
         (0..times).for_each(|_| self.file.increment(&row));
-        let counter = &mut self.model.0[low..low + 2];
+        let counter = &mut self.model.values[low..low + 2];
         let count = u16::from_le_bytes([counter[0], counter[1]]).wrapping_add(times);
         counter.copy_from_slice(&count.to_le_bytes());
     }
@@ -118,7 +135,12 @@ impl FileAndModel {
 
 /// The values of all 256 registers.
 #[derive(Clone)]
-struct TableModel([u8; 256]);
+struct TableModel {
+    /// Offsets are in sign and magnitude.
+    values: [u8; 256],
+    /// The map of the last write, or of register 20 before it (M5).
+    offsets_in: Map,
+}
 
 impl TableModel {
     fn new(chip_id: [u8; 6], stored: &[u8; Image::LENGTH]) -> Self {
@@ -126,52 +148,82 @@ impl TableModel {
         values[..2].copy_from_slice(&[7, 30]);
         values[2..8].copy_from_slice(&chip_id);
         for (at, &value) in (8..).zip(stored) {
-            if (11..=19).contains(&at) && is_in_range(at, value) {
+            if (11..=19).contains(&at) && is_in_range(Map::V22, at, value) || at == 20 && value <= 3 {
                 values[usize::from(at)] = value;
             }
         }
         values[28..30].copy_from_slice(&[1, 1]);
         values[32..39].copy_from_slice(&[60; 7]);
         values[46..53].copy_from_slice(&[90, 90, 65, 90, 90, 90, 80]);
+        values[66] = 1;
+        values[91..98].copy_from_slice(&[128; 7]);
         values[240] = 1;
-        Self(values)
+        let offsets_in = if values[20] % 2 == 1 { Map::V21 } else { Map::V22 };
+        Self { values, offsets_in }
     }
 
-    fn takes_effect(&self, address: u8) -> bool {
-        match address {
-            11..=19 => self.0[28] == 0,
-            28..=53 => true,
+    fn takes_effect(&self, map: Map, address: u8) -> bool {
+        match (address, map) {
+            (11..=19, _) | (20, Map::V21) => self.values[28] == 0,
+            (28..=52, _) | (53, Map::V22) | (54..=66 | 68..=73 | 82 | 90, Map::V21) => true,
             _ => false,
         }
     }
 
     /// The values after a write, or the first register that is out of range (D15 to D17).
-    fn after(&self, address: u8, values: &[u8]) -> Result<Self, u8> {
+    fn after(&self, map: Map, address: u8, values: &[u8]) -> Result<Self, u8> {
         let mut after = self.clone();
-        for (at, &value) in (address..=255).zip(values).filter(|(at, _)| self.takes_effect(*at)) {
-            if !is_in_range(at, value) {
+        after.offsets_in = map;
+        for (at, &value) in (address..=255).zip(values).filter(|(at, _)| self.takes_effect(map, *at)) {
+            if !is_in_range(map, at, value) {
                 return Err(at);
             }
-            after.0[usize::from(at)] = value;
+            // The present positions are there.
+            if !(54..=60).contains(&at) {
+                after.values[usize::from(at)] = stored(map, at, value);
+            }
         }
         Ok(after)
     }
 
+    /// What a read gives.
+    fn shown(&self) -> [u8; 256] {
+        let mut shown = self.values;
+        if self.offsets_in == Map::V21 {
+            for offset in &mut shown[13..20] {
+                *offset = if *offset < 128 { 128 + *offset } else { 0u8.wrapping_sub(*offset) };
+            }
+        }
+        shown
+    }
+
     fn settings(&self) -> &[u8] {
-        &self.0[8..=27]
+        &self.values[8..=27]
+    }
+}
+
+/// The byte that a write stores: an offset in sign and magnitude.
+fn stored(map: Map, address: u8, value: u8) -> u8 {
+    match (map, address, value) {
+        (Map::V21, 13..=19, 128..=144) => value - 128,
+        (Map::V21, 13..=19, 112..=127) => 0x80 | (128 - value),
+        (Map::V21, 13..=19, 240..=255) => 0x80 | (255 - value + 1),
+        _ => value,
     }
 }
 
 /// The column "range" of the writable registers.
-fn is_in_range(address: u8, value: u8) -> bool {
-    let max = match address {
-        12 => 7,
-        13..=19 => return value & 0x7F <= 16,
-        28 | 30 | 31 => 1,
-        29 => 2,
-        32..=45 => 100,
-        46..=52 => 180,
-        53 => 50,
+fn is_in_range(map: Map, address: u8, value: u8) -> bool {
+    let max = match (map, address) {
+        (_, 12) => 7,
+        (Map::V22, 13..=19) => return value & 0x7F <= 16,
+        (Map::V21, 13..=19) => return matches!(value, 0..=16 | 112..=144 | 240..=255),
+        (_, 20) => 3,
+        (_, 28 | 30 | 31 | 66) => 1,
+        (_, 29) => 2,
+        (_, 32..=45 | 82 | 90) => 100,
+        (_, 46..=52) => 180,
+        (_, 53) => 50,
         _ => 255,
     };
     value <= max

@@ -42,7 +42,7 @@ impl HostRequest {
             return 0;
         }
         let inside = bytes.windows(3).skip(1);
-        let headers = inside.filter(|bytes| matches!(bytes, [0xAA, 0x77, 3 | 6]));
+        let headers = inside.filter(|bytes| matches!(bytes, [0xAA, 0x77, 3 | 4 | 6]));
         u16::try_from(headers.count()).unwrap_or(u16::MAX)
     }
 }
@@ -67,7 +67,7 @@ pub(super) fn reply(address: u8, values: &[u8]) -> Vec<u8> {
 fn is_frame(bytes: &[u8]) -> bool {
     let length = match bytes {
         [0xAA, 0x77, 3, ..] => 7,
-        [0xAA, 0x77, 6, _, count, ..] => 7 + usize::from(*count),
+        [0xAA, 0x77, 4 | 6, _, count, ..] => 7 + usize::from(*count),
         _ => return false,
     };
     let Some((covered, crc)) = bytes.get(..length).and_then(<[u8]>::split_last_chunk::<2>) else {

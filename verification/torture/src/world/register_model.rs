@@ -6,7 +6,7 @@ use protocol_core::registers::map::{
     BAUD_RATE, EEPROM_LOCK, FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_REFUSED, LAST_REFUSAL,
     LAST_REFUSED_REGISTER, MAP, MOTOR_STATE, PRESENT_POSITION, TARGET_POSITION, motor_state, refusal,
 };
-use protocol_core::registers::{Access, Image, Joint, Region, Register, RegisterFile};
+use protocol_core::registers::{Access, Image, Joint, MAP_21, Region, Register, RegisterFile};
 
 use super::host_request::HostRequest;
 use crate::per_joint::PerJoint;
@@ -39,7 +39,7 @@ pub(super) struct RegisterModel {
 }
 
 /// The first and last addresses of the registers whose values follow from requests alone.
-const MODELLED: &[(u8, u8)] = &[(0, 45), (53, 53), (61, 240), (244, 247), (250, 251)];
+const MODELLED: &[(u8, u8)] = &[(0, 45), (53, 53), (61, 82), (90, 90), (98, 240), (244, 247), (250, 251)];
 
 impl RegisterModel {
     /// The registers after power-up with the stored settings.
@@ -53,7 +53,7 @@ impl RegisterModel {
             refused: 0,
             has_host_target: PerJoint::all(false),
         };
-        for row in MAP {
+        for row in MAP_21.iter().chain(MAP) {
             (row.address..=row.address + (row.count - 1)).for_each(|at| model.set(at, row.default_at(at)));
         }
         (2..).zip(chip_id).for_each(|(at, byte)| model.set(at, byte));

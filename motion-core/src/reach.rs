@@ -1,0 +1,157 @@
+//! The positions in a write of map 2.1, and the joint angles that reach them (M7).
+//!
+//! ```text
+//!   68..73  wrist                        IK5: joints 1 to 3
+//!   54..62  tip, tool direction          IK6: joints 1 to 5
+//!   54..65  tip, tool, disc direction    IK7: joints 1 to 6
+//! ```
+//!
+//! A block counts only if the frame covers the whole of it. This file does not know joints or what they do.
+
+use kinematics::{NoSolution, Vector, ik5, ik6, ik7};
+use protocol_core::registers::map21::{DISC_DIRECTION, TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION};
+use protocol_core::registers::{Accepted, JOINTS};
+use protocol_core::request::Alarm;
+
+use crate::calibration::MicroDegrees;
+
+/// A millimetre of 0 in a position register.
+const POSITION_ZERO: i32 = 1024;
+/// A component of 0 in a direction register.
+const DIRECTION_ZERO: i16 = 128;
+
+/// The targets of the joints that reach the positions in a write; `None` for a joint that keeps its target.
+pub(crate) type Targets = [Option<MicroDegrees>; JOINTS];
+
+/// No joint angles reach a position in a write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct OutOfReach {
+    /// The first register of the block.
+    pub(crate) address: u8,
+    pub(crate) alarm: Alarm,
+}
+
+impl OutOfReach {
+    /// IK`number` has no solution for the block that begins at `address`.
+    fn of(address: u8, number: u8) -> impl Fn(NoSolution) -> Self {
+        move |_| Self { address, alarm: Alarm::out_of_reach(number) }
+    }
+}
+
+/// Solves the blocks of a write: IK5 first, then IK6 or IK7, which replaces its angles.
+pub(crate) fn targets(accepted: &Accepted<'_>) -> Result<Targets, OutOfReach> {
+    let mut targets = [None; JOINTS];
+    if let Some(wrist) = accepted.values_at(WRIST_POSITION.address) {
+        let angles = ik5(position(wrist)).map_err(OutOfReach::of(WRIST_POSITION.address, 5))?;
+        set(&mut targets, &angles);
+    }
+    let (tip, tool) = (accepted.values_at(TIP_POSITION.address), accepted.values_at(TOOL_DIRECTION.address));
+    if let (Some(tip), Some(tool)) = (tip, tool) {
+        let (tip, tool) = (position(tip), direction(tool));
+        if let Some(disc) = accepted.values_at(DISC_DIRECTION.address) {
+            let angles = ik7(tip, tool, direction(disc)).map_err(OutOfReach::of(TIP_POSITION.address, 7))?;
+            set(&mut targets, &angles);
+        } else {
+            let angles = ik6(tip, tool).map_err(OutOfReach::of(TIP_POSITION.address, 6))?;
+            set(&mut targets, &angles);
+        }
+    }
+    Ok(targets)
+}
+
+fn set(targets: &mut Targets, angles: &[f32]) {
+    for (target, &angle) in targets.iter_mut().zip(angles) {
+        *target = Some(MicroDegrees::nearest(angle));
+    }
+}
+
+/// A position in millimetres.
+fn position([x1, x0, y1, y0, z1, z0]: [u8; 6]) -> Vector<f32> {
+    let millimetres = |high, low| float(i32::from(u16::from_be_bytes([high, low])) - POSITION_ZERO);
+    Vector::new(millimetres(x1, x0), millimetres(y1, y0), millimetres(z1, z0))
+}
+
+/// A direction of any length.
+fn direction([x, y, z]: [u8; 3]) -> Vector<f32> {
+    let component = |byte: u8| f32::from(i16::from(byte) - DIRECTION_ZERO);
+    Vector::new(component(x), component(y), component(z))
+}
+
+/// A whole number below 2^24, which `f32` holds exactly.
+#[expect(clippy::cast_precision_loss, reason = "the number has 17 bits")]
+fn float(number: i32) -> f32 {
+    number as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol_core::registers::RegisterFile;
+
+    /// The targets of a write, in degrees.
+    fn solved(address: u8, values: &[u8]) -> Result<Vec<f64>, OutOfReach> {
+        let registers = RegisterFile::new([0; 6], None);
+        let targets = targets(&registers.check_map21(address, values).unwrap())?;
+        Ok(targets.into_iter().flatten().map(|angle| f64::from(angle.0) / 1e6).collect())
+    }
+
+    fn assert_near(found: &[f64], expected: &[f64]) {
+        assert_eq!(found.len(), expected.len());
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 0.001, "{found} {expected}");
+        }
+    }
+
+    const TIP: [u8; 6] = [0x03, 0xCE, 0x04, 0xB9, 0x04, 0x32];
+    const DOWN: [u8; 3] = [128, 128, 127];
+    const FAR_TIP: [u8; 6] = [0x05, 0xF4, 0x04, 0xB9, 0x04, 0x32];
+    const WRIST: [u8; 6] = [0x04, 0x64, 0x04, 0xC8, 0x04, 0x96];
+    const FAR_WRIST: [u8; 6] = [0x05, 0x90, 0x04, 0, 0x04, 0x64];
+
+    #[test]
+    fn m07_whole_blocks_are_solved() {
+        let ik6 = [105.124, 88.229, 109.746, 90.0, 135.254];
+        assert_near(&solved(68, &WRIST).unwrap(), &[63.435, 90.382, 85.029]);
+        assert_near(&solved(54, &[&TIP[..], &DOWN].concat()).unwrap(), &ik6);
+        // 128.006 in the maker's table is for (3, 4, 0).
+        let ik7 = solved(54, &[&TIP[..], &DOWN, &[131, 132, 128]].concat()).unwrap();
+        assert_near(&ik7, &[&ik6[..], &[128.006]].concat());
+    }
+
+    #[test]
+    fn m07_a_part_of_the_last_block_is_an_ik6() {
+        assert_eq!(solved(54, &[&TIP[..], &DOWN, &[131, 132]].concat()).unwrap().len(), 5);
+    }
+
+    #[test]
+    fn m07_a_part_of_a_block_is_not_solved() {
+        assert_eq!(solved(54, &[&TIP[..], &DOWN[..2]].concat()).unwrap(), []);
+        assert_eq!(solved(55, &[&TIP[1..], &DOWN, &DOWN].concat()).unwrap(), []);
+        assert_eq!(solved(68, &WRIST[..5]).unwrap(), []);
+        assert_eq!(solved(69, &WRIST[1..]).unwrap(), []);
+    }
+
+    #[test]
+    fn m07_both_blocks_in_one_frame() {
+        let frame = |tip: [u8; 6], disc: &[u8], wrist: [u8; 6]| {
+            solved(54, &[&tip[..], &DOWN, disc, &[0, 0], &wrist].concat())
+        };
+        let found = frame(TIP, &[129, 128, 128], WRIST).unwrap();
+        assert_near(&found[..5], &[105.124, 88.229, 109.746, 90.0, 135.254]);
+        let out = |address, kind| Err(OutOfReach { address, alarm: Alarm::out_of_reach(kind) });
+        assert_eq!(frame(TIP, &[129, 128, 128], FAR_WRIST), out(68, 5));
+        assert_eq!(frame(FAR_TIP, &[129, 128, 128], WRIST), out(54, 7));
+        assert_eq!(frame(FAR_TIP, &[129, 128, 128], FAR_WRIST), out(68, 5));
+        assert_eq!(solved(54, &[&FAR_TIP[..], &DOWN].concat()), out(54, 6));
+    }
+
+    #[test]
+    fn m07_what_has_no_direction_has_no_solution() {
+        let zero = [128; 3];
+        let out = |kind| Err(OutOfReach { address: 54, alarm: Alarm::out_of_reach(kind) });
+        assert_eq!(solved(54, &[&TIP[..], &zero].concat()), out(6));
+        assert_eq!(solved(54, &[&TIP[..], &DOWN, &zero].concat()), out(7));
+        assert_eq!(solved(54, &[&TIP[..], &DOWN, &[128, 128, 200]].concat()), out(7), "parallel");
+        assert!(solved(68, &[4, 0, 4, 0, 4, 200]).is_err(), "no heading");
+    }
+}
