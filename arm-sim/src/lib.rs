@@ -17,6 +17,7 @@
 
 extern crate alloc;
 
+pub mod controller;
 pub mod faults;
 pub mod flash;
 pub mod pace;
@@ -25,4 +26,5 @@ pub mod servo;
 pub mod servo_bus;
 mod settings_log;
 pub mod simulation;
+pub mod stock_controller;
 pub mod usb_adapter;

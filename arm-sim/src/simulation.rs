@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   host_send ────▶ Pacer ──▶ ┌────────────┐ ──▶ ServoBus: Plant, or real servos
-//!                             │ Controller │ ◀──
+//!                             │ controller │ ◀──
 //!   host_received ◀─ Pacer ◀─ └────────────┘ ──▶ Settings
 //! ```
 //!
@@ -23,6 +23,7 @@ use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer::gap;
 use tracing::info;
 
+use crate::controller::ArmController;
 use crate::pace::Pacer;
 use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
@@ -59,14 +60,14 @@ pub trait Tap: Debug {
     fn sent(&mut self, now: Instant, bytes: &[u8]);
 }
 
-/// An arm with a host line, with settings on the flash `F` and servos on the bus `B`.
+/// An arm with a host line, with settings on the flash `F`, servos on the bus `B` and the controller `C`.
 #[derive(Debug)]
-pub struct Simulation<F, B = Plant> {
+pub struct Simulation<F, B = Plant, C = Controller> {
     config: ArmConfig,
     /// Clones share their cells.
     flash: F,
     settings: Settings<F>,
-    controller: Controller,
+    controller: C,
     bus: B,
     to_arm: Pacer,
     to_host: Pacer,
@@ -80,7 +81,7 @@ pub struct Simulation<F, B = Plant> {
     leaving: Option<usize>,
 }
 
-impl<F: NorFlash + Clone> Simulation<F> {
+impl<F: NorFlash + Clone, C: ArmController> Simulation<F, Plant, C> {
     /// The simulated servos.
     #[must_use]
     pub const fn plant(&self) -> &Plant {
@@ -94,9 +95,23 @@ impl<F: NorFlash + Clone> Simulation<F> {
 }
 
 impl<F: NorFlash + Clone, B: ServoBus> Simulation<F, B> {
-    /// Switches an arm on at `now`, with the settings on `flash`.
+    /// Switches an arm with this project's controller on at `now`, with the settings on `flash`.
     #[must_use]
     pub fn new(now: Instant, config: ArmConfig, flash: F, bus: B) -> Self {
+        Self::power_up(now, config, flash, bus)
+    }
+
+    /// The registers.
+    #[must_use]
+    pub fn registers(&self) -> &RegisterFile {
+        self.controller.registers()
+    }
+}
+
+impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> Simulation<F, B, C> {
+    /// Switches an arm on at `now`, with the settings on `flash`.
+    #[must_use]
+    pub fn power_up(now: Instant, config: ArmConfig, flash: F, bus: B) -> Self {
         let (settings, controller) = power_up(now, config, flash.clone(), 0, bus.answer_delay());
         let (to_arm, to_host) = (Pacer::new(None), Pacer::new(None));
         let mut simulation = Self {
@@ -213,12 +228,6 @@ impl<F: NorFlash + Clone, B: ServoBus> Simulation<F, B> {
         }
     }
 
-    /// The registers.
-    #[must_use]
-    pub fn registers(&self) -> &RegisterFile {
-        self.controller.registers()
-    }
-
     /// Simulates all events up to `now`. `host_is_idle` tells that the host has sent nothing since the last call, apart
     /// from the bytes in [`Simulation::host_send`].
     pub fn advance(&mut self, now: Instant, host_is_idle: bool) {
@@ -327,13 +336,13 @@ fn next_tick(at: Instant) -> Instant {
     micros.map_or(Instant::FAR_FUTURE, Instant::from_micros)
 }
 
-fn power_up<F: NorFlash + Clone>(
+fn power_up<F: NorFlash + Clone, C: ArmController>(
     now: Instant,
     arm: ArmConfig,
     flash: F,
     faults: u8,
     answer_delay: Duration,
-) -> (Settings<F>, Controller) {
+) -> (Settings<F>, C) {
     let settings = Settings::open(flash);
     settings_log::opened(&settings);
     let config = Config {
@@ -343,7 +352,7 @@ fn power_up<F: NorFlash + Clone>(
         guard_time: GUARD_TIME,
         torque_codes: arm.torque_codes,
     };
-    let mut controller = Controller::new(now, config, settings.found(), settings.storage());
+    let mut controller = C::power_up(now, config, settings.found(), settings.storage());
     controller.set_answer_delay(answer_delay);
     (settings, controller)
 }

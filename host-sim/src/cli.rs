@@ -38,6 +38,12 @@ MANY ARMS
   number before the extension: --eeprom arm.bin keeps the settings of arm 2 in arm-2.bin. Chip ids
   are consecutive, starting with --chip-id. Faults and signals apply to all arms.
 
+AN ARM OF THE MAKER
+  host-sim --as-maker 2.1.4 --link ./7bot      an arm as the maker ships it, to test a program against
+  It has the maker's map 2.1, checks no value, says nothing of what it ignores, and has no status
+  block. It sends text between its frames at start and with each alarm. Its settings are stored in
+  7bot/stock.bin.
+
 REAL SERVOS
   host-sim --servos /dev/ttyUSB0 --link ./7bot the controller on this computer, real servos behind an
                                                adapter for bus servos; clients use ./7bot
@@ -82,8 +88,8 @@ pub struct Options {
     #[arg(long, value_name = "PATH")]
     pub link: Option<PathBuf>,
 
-    /// Keep the settings in FILE; 'none' forgets them [default: 7bot/eeprom.bin, or 7bot/servos.bin with
-    /// --servos, in the state directory, $XDG_STATE_HOME or ~/.local/state]
+    /// Keep the settings in FILE; 'none' forgets them [default: 7bot/eeprom.bin, 7bot/servos.bin with
+    /// --servos, or 7bot/stock.bin with --as-maker, in the state directory, $XDG_STATE_HOME or ~/.local/state]
     #[arg(long, value_name = "FILE", value_parser = |text: &str| Ok::<_, String>(Eeprom::from(text)))]
     pub eeprom: Option<Eeprom>,
 
@@ -98,6 +104,11 @@ pub struct Options {
     /// The arm's chip id, 12 hexadecimal digits
     #[arg(long, value_name = "HEX", default_value = DEFAULT_CHIP_ID, value_parser = chip_id)]
     pub chip_id: [u8; 6],
+
+    /// Be an arm as the maker ships it, with the maker's firmware of this version: see AN ARM OF THE MAKER below
+    #[arg(long, value_name = "VERSION", value_parser = ["2.1.4"],
+          conflicts_with_all = ["servos", "servos_only", "servo_socket"])]
+    pub as_maker: Option<String>,
 
     /// Print every frame in words on standard error
     #[arg(long)]
@@ -256,6 +267,8 @@ mod tests {
             ("--servos-only --ids 0,254", "0 to 253"),
             ("--servos-only --ids 0,1,2,3,4,5,6,7", "seven"),
             ("--usb-latency 1", "--servos-only"),
+            ("--as-maker 2.2", "2.1.4"),
+            ("--as-maker 2.1.4 --servos a", "--servos"),
             ("--servos a --arms 2", "--arms"),
             ("--servos a --fault 3=missing", "--fault"),
             ("--servos a --servos-only", "--servos-only"),

@@ -29,6 +29,8 @@ impl Eeprom {
     pub const SIMULATED: Self = Self::UsersOwn("eeprom.bin");
     /// The default of an arm of real servos: its offsets are not those of the simulated arm.
     pub const REAL_SERVOS: Self = Self::UsersOwn("servos.bin");
+    /// The default of an arm of the maker: its values have other encodings.
+    pub const STOCK: Self = Self::UsersOwn("stock.bin");
 }
 
 impl From<&str> for Eeprom {

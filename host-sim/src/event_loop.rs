@@ -7,7 +7,10 @@ use std::io;
 use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, OwnedFd};
 
+use arm_sim::controller::ArmController;
+use arm_sim::plant::Plant;
 use embedded_storage::nor_flash::NorFlash;
+use motion_core::Controller;
 use protocol_core::time::Instant;
 use rustix::event::epoll::{self, CreateFlags, Event, EventData, EventFlags};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -29,8 +32,8 @@ const CLIENTS: u64 = u64::MAX - 1;
 
 /// The arms of a process.
 #[derive(Debug)]
-pub struct EventLoop<F> {
-    arms: Vec<Entry<F>>,
+pub struct EventLoop<F, C = Controller> {
+    arms: Vec<Entry<F, C>>,
     /// `None` if the system does not report clients.
     clients: Option<Clients>,
     epoll: OwnedFd,
@@ -38,8 +41,8 @@ pub struct EventLoop<F> {
 
 /// An arm, and when to poll it.
 #[derive(Debug)]
-struct Entry<F> {
-    arm: PtyArm<F>,
+struct Entry<F, C> {
+    arm: PtyArm<F, Plant, C>,
     due: Instant,
     /// The events of its port that epoll reports.
     interest: EventFlags,
@@ -47,12 +50,12 @@ struct Entry<F> {
     has_failed: bool,
 }
 
-impl<F: NorFlash + Clone> EventLoop<F> {
+impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
     /// A loop for these arms. `clients` counts their clients.
     ///
     /// # Errors
     /// The operating system refuses an epoll instance or an entry in it.
-    pub fn new(arms: Vec<PtyArm<F>>, clients: Option<Clients>) -> io::Result<Self> {
+    pub fn new(arms: Vec<PtyArm<F, Plant, C>>, clients: Option<Clients>) -> io::Result<Self> {
         let epoll = epoll::create(CreateFlags::CLOEXEC)?;
         for (number, arm) in (0..).zip(&arms) {
             epoll::add(&epoll, arm, EventData::new_u64(number), arm.interest())?;
@@ -60,8 +63,12 @@ impl<F: NorFlash + Clone> EventLoop<F> {
         if let Some(clients) = &clients {
             epoll::add(&epoll, clients, EventData::new_u64(CLIENTS), EventFlags::IN)?;
         }
-        let entry =
-            |arm: PtyArm<F>| Entry { interest: arm.interest(), arm, due: Instant::ZERO, has_failed: false };
+        let entry = |arm: PtyArm<F, Plant, C>| Entry {
+            interest: arm.interest(),
+            arm,
+            due: Instant::ZERO,
+            has_failed: false,
+        };
         Ok(Self { arms: arms.into_iter().map(entry).collect(), clients, epoll })
     }
 
@@ -129,7 +136,7 @@ impl<F: NorFlash + Clone> EventLoop<F> {
         false
     }
 
-    fn for_each_arm(&mut self, now: Instant, action: impl Fn(&mut PtyArm<F>, Instant)) {
+    fn for_each_arm(&mut self, now: Instant, action: impl Fn(&mut PtyArm<F, Plant, C>, Instant)) {
         for entry in self.arms.iter_mut().filter(|entry| !entry.has_failed) {
             action(&mut entry.arm, now);
             entry.due = now;
@@ -154,7 +161,7 @@ impl<F: NorFlash + Clone> EventLoop<F> {
     }
 }
 
-impl<F: NorFlash + Clone> Entry<F> {
+impl<F: NorFlash + Clone, C: ArmController> Entry<F, C> {
     fn poll(
         &mut self,
         number: usize,
@@ -186,7 +193,6 @@ mod tests {
     use std::io::Write;
 
     use arm_sim::flash::Flash;
-    use arm_sim::plant::Plant;
     use arm_sim::simulation::{ArmConfig, Simulation};
     use motion_core::TorqueCodes;
     use protocol_core::registers::map::SPEED;

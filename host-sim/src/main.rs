@@ -5,11 +5,13 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use arm_sim::controller::ArmController;
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoConfig;
 use arm_sim::servo_bus::ServoBus;
 use arm_sim::simulation::{ArmConfig, Simulation};
+use arm_sim::stock_controller::StockController;
 use clap::Parser;
 use host_sim::bus_line::BusLine;
 use host_sim::cli::{Options, in_one_line};
@@ -23,6 +25,7 @@ use host_sim::servo_socket::{ServoSocket, SocketError};
 use host_sim::servos_only::{self, ServosOnly, ServosOnlyError};
 use host_sim::signals::Signals;
 use host_sim::trace::Trace;
+use motion_core::Controller;
 use protocol_core::time::Duration;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tracing::{Span, error_span};
@@ -119,7 +122,10 @@ fn run(options: &Options) -> Result<(), Failure> {
         (Some(path), _) => run_servo_socket(options, path, &mut clock, &mut signals),
         (None, Some(port)) => run_real_servos(options, port, &mut clock, &mut signals),
         (None, None) if options.servos_only => run_servos_only(options, &mut clock, &mut signals),
-        (None, None) => run_arms(options, &mut clock, &mut signals),
+        (None, None) if options.as_maker.is_some() => {
+            run_arms::<StockController>(options, &mut clock, &mut signals)
+        }
+        (None, None) => run_arms::<Controller>(options, &mut clock, &mut signals),
     }
 }
 
@@ -174,7 +180,7 @@ fn run_real_servos(
     let path = pty.path().to_owned();
     let _symlink = options.link.as_ref().map(|link| Symlink::new(link, &path)).transpose()?;
     let line = BusLine::new(Duration::from_millis(options.usb_timeout.into()));
-    let arm = arm(options, None, pty, clock, line)?;
+    let arm = arm::<_, Controller>(options, None, pty, clock, line)?;
     let config = real_servos::BusConfig {
         port: port.to_owned(),
         baud: options.servo_baud,
@@ -186,7 +192,11 @@ fn run_real_servos(
     servos.run(clock, signals).map_err(Failure::Running)
 }
 
-fn run_arms(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Result<(), Failure> {
+fn run_arms<C: ArmController>(
+    options: &Options,
+    clock: &mut Clock,
+    signals: &mut Signals,
+) -> Result<(), Failure> {
     let numbers = options.arms.map_or(vec![None], |count| (1..=count).map(Some).collect());
     if numbers.len() > 1 {
         allow_as_many_files_as_possible();
@@ -204,7 +214,7 @@ fn run_arms(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Resu
         }
         ports.push(port);
         let plant = plant(options, clock);
-        arms.push(arm(options, number, pty, clock, plant)?);
+        arms.push(arm::<_, C>(options, number, pty, clock, plant)?);
     }
     let event_loop = EventLoop::new(arms, clients).map_err(Failure::Running)?;
     print_ready(&ports);
@@ -212,21 +222,25 @@ fn run_arms(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Resu
 }
 
 /// Switches an arm on.
-fn arm<B: ServoBus>(
+fn arm<B: ServoBus, C: ArmController>(
     options: &Options,
     number: Option<u16>,
     pty: Pty,
     clock: &mut Clock,
     bus: B,
-) -> Result<PtyArm<Flash, B>, Failure> {
+) -> Result<PtyArm<Flash, B, C>, Failure> {
     // At level error, so that every log level shows it.
     let span = number.map_or_else(Span::none, |number| error_span!("arm", number));
     let inside = span.enter();
-    let default = if options.servos.is_some() { Eeprom::REAL_SERVOS } else { Eeprom::SIMULATED };
+    let default = match (&options.servos, &options.as_maker) {
+        (Some(_), _) => Eeprom::REAL_SERVOS,
+        (None, Some(_)) => Eeprom::STOCK,
+        (None, None) => Eeprom::SIMULATED,
+    };
     let flash = options.eeprom.as_ref().unwrap_or(&default).open(number)?;
     let chip_id = per_arm::chip_id(options.chip_id, number);
     let config = ArmConfig { chip_id, is_paced: !options.unpaced, torque_codes: options.torque_codes };
-    let mut simulation = Simulation::new(clock.now(), config, flash, bus);
+    let mut simulation = Simulation::power_up(clock.now(), config, flash, bus);
     if options.trace {
         simulation.set_tap(Trace::new(Box::new(|line| tracing::info!(target: FRAMES, "{line}"))));
     }

@@ -3,11 +3,13 @@
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
 
+use arm_sim::controller::ArmController;
 use arm_sim::pace;
 use arm_sim::plant::Plant;
 use arm_sim::servo_bus::ServoBus;
 use arm_sim::simulation::Simulation;
 use embedded_storage::nor_flash::NorFlash;
+use motion_core::Controller;
 use protocol_core::time::Instant;
 use rustix::event::PollFlags;
 use rustix::event::epoll::EventFlags;
@@ -18,8 +20,8 @@ use tty_ports::pty::Pty;
 
 /// An arm on a pseudo-terminal.
 #[derive(Debug)]
-pub struct PtyArm<F, B = Plant> {
-    simulation: Simulation<F, B>,
+pub struct PtyArm<F, B = Plant, C = Controller> {
+    simulation: Simulation<F, B, C>,
     pty: Pty,
     /// The client does not read, and the kernel's buffers are full.
     is_blocked: bool,
@@ -28,9 +30,17 @@ pub struct PtyArm<F, B = Plant> {
 }
 
 impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
+    /// The value of a register.
+    #[must_use]
+    pub fn register(&self, address: u8) -> u8 {
+        self.simulation.registers().get(address)
+    }
+}
+
+impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
     /// Connects an arm to a pseudo-terminal. Its log lines are in `span`.
     #[must_use]
-    pub const fn new(simulation: Simulation<F, B>, pty: Pty, span: Span) -> Self {
+    pub const fn new(simulation: Simulation<F, B, C>, pty: Pty, span: Span) -> Self {
         Self { simulation, pty, is_blocked: false, span }
     }
 
@@ -117,12 +127,6 @@ impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
         self.simulation.bus()
     }
 
-    /// The value of a register.
-    #[must_use]
-    pub fn register(&self, address: u8) -> u8 {
-        self.simulation.registers().get(address)
-    }
-
     /// [`PtyArm::interest`] for poll(2).
     #[must_use]
     pub fn poll_interest(&self) -> PollFlags {
@@ -142,7 +146,7 @@ impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
     }
 }
 
-impl<F, B> AsFd for PtyArm<F, B> {
+impl<F, B, C> AsFd for PtyArm<F, B, C> {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.pty.master()
     }

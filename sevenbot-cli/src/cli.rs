@@ -1,6 +1,7 @@
 //! The command line: global options, commands and help. The arguments of a command are in the command's own file.
 
 use clap::{Args, CommandFactory, Parser, Subcommand, value_parser};
+use sevenbot::Map;
 
 use crate::command_error::CommandError;
 #[cfg(target_os = "linux")]
@@ -53,12 +54,20 @@ pub(crate) struct Global {
     #[arg(long, global = true, value_name = "MS", env = "SEVENBOT_TIMEOUT", hide_env_values = true,
           default_value_t = 500, value_parser = value_parser!(u16).range(1..))]
     pub(crate) timeout: u16,
+    /// The register map of the arm: 2.1 or 2.2. Without this option the arm's version decides.
+    #[arg(long, global = true, value_name = "VERSION", value_parser = map)]
+    pub(crate) map: Option<Map>,
     /// Print results as JSON, one value per line.
     #[arg(long, global = true)]
     pub(crate) json: bool,
     /// Print every frame as text on standard error.
     #[arg(short, long, global = true)]
     pub(crate) verbose: bool,
+}
+
+/// Parses the version of a register map.
+fn map(text: &str) -> Result<Map, &'static str> {
+    Map::ALL.into_iter().find(|map| map.version() == text).ok_or("the maps are 2.1 and 2.2")
 }
 
 #[derive(Debug, Subcommand)]

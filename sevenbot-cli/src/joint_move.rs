@@ -94,13 +94,17 @@ impl JointMove {
         durations.max().unwrap_or_default()
     }
 
+    fn timeout(&self) -> Duration {
+        self.duration() * 2 + MARGIN
+    }
+
     fn wait_until_still(
         &self,
         arm: &mut Arm,
         interrupt: Interrupt,
         progress: &Progress,
     ) -> Result<(), CommandError> {
-        let timeout = self.duration() * 2 + MARGIN;
+        let timeout = self.timeout();
         loop {
             let moving = self.moving(arm)?;
             if moving == 0 {
@@ -138,9 +142,11 @@ impl JointMove {
         let mut last = positions(arm)?;
         let start = Instant::now();
         let mut changed = start;
+        // Without moving bits the joints may still be on their way: their duration is only an estimate.
+        let timeout = if arm.identity().has_status_block() { SETTLE_TIMEOUT } else { self.timeout() };
         while !self.away(&last, ARRIVED_DEGREES).is_empty()
             && changed.elapsed() < STILL_TIME
-            && start.elapsed() < SETTLE_TIMEOUT
+            && start.elapsed() < timeout
         {
             interrupt.sleep(POLL_PERIOD)?;
             let present = positions(arm)?;

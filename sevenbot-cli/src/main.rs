@@ -50,7 +50,7 @@ fn main() -> ExitCode {
     // An empty SEVENBOT_PORT is the same as none.
     let port = global.port.filter(|port| !port.is_empty());
     let reply_timeout = Duration::from_millis(global.timeout.into());
-    let options = ArmOptions { baud: global.baud, reply_timeout, ..ArmOptions::default() };
+    let options = ArmOptions { baud: global.baud, reply_timeout, map: global.map, ..ArmOptions::default() };
     let mut session = Session { port, options, printer };
     match command.run(&mut session) {
         Ok(()) => ExitCode::SUCCESS,

@@ -25,8 +25,8 @@ impl Session {
         match arm.identity().firmware() {
             Firmware::Ours => {}
             Firmware::Makers => warn(format_args!(
-                "this arm runs the maker's firmware {version}: it has no status block, so faults, missing \
-                 servos and moving joints are unknown. It takes values out of range and reports no refusal"
+                "this arm runs the maker's firmware {version}, which has no status block: faults, missing servos and \
+                 moving joints are unknown"
             )),
             Firmware::Unknown => warn(format_args!(
                 "this arm runs an unknown firmware, {version}; its status block is not used"

@@ -38,7 +38,7 @@ fn the_makers_firmware_is_supported_with_a_warning() {
     let (port, _held) = makers_arm();
     let info = run(&port, &["info"], 0);
     assert!(
-        info.contains("warning: this arm runs the maker's firmware 2.2: it has no status block"),
+        info.contains("warning: this arm runs the maker's firmware 2.2, which has no status block"),
         "{info}"
     );
     assert!(!info.contains("Health"), "nobody knows: {info}");

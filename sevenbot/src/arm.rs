@@ -8,15 +8,18 @@ use std::time::{Duration, Instant};
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{
-    CHIP_ID, DEVICE_CODE, PRESENT_POSITION, SERVO_TEMPERATURE, SPEED, STATUS_VERSION, TARGET_POSITION, TIME,
+    CHIP_ID, DEVICE_CODE, OFFSET, PRESENT_POSITION, SERVO_TEMPERATURE, SPEED, STATUS_VERSION,
+    TARGET_POSITION, TIME,
 };
+use protocol_core::registers::map21::Map;
 use protocol_core::request::Request;
 
 use crate::error::{Error, OpenError};
-use crate::frame_port::FramePort;
-use crate::identity::Identity;
+use crate::frame_port::{FramePort, Received};
+use crate::identity::{Firmware, Identity};
+use crate::map_view::MapView;
 use crate::open_port::OpenPort;
-use crate::pending::{PendingReads, REPORT};
+use crate::pending::PendingReads;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 use crate::units::{Angle, MoveTime, Speed};
@@ -26,6 +29,9 @@ pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
 
 /// Reports kept until the caller takes them: 20 s at the highest rate (D14). The oldest are dropped first.
 const REPORTS_KEPT: usize = 1_000;
+
+/// A report has 14 bytes of ten bits, and reports fill at most half of the line (D14).
+const BITS_PER_REPORT: u32 = 2 * 14 * 10;
 
 /// At least this many attempts for a read after a write.
 const MIN_ATTEMPTS: u32 = 3;
@@ -47,11 +53,13 @@ pub struct ArmOptions {
     pub reply_timeout: Duration,
     /// Attempts for a read, at least one. A read changes nothing, so repeating it is safe.
     pub attempts: u32,
+    /// The register map to speak; `None`: the one that the arm's version tells.
+    pub map: Option<Map>,
 }
 
 impl Default for ArmOptions {
     fn default() -> Self {
-        Self { baud: 115_200, reply_timeout: Duration::from_millis(500), attempts: 3 }
+        Self { baud: 115_200, reply_timeout: Duration::from_millis(500), attempts: 3, map: None }
     }
 }
 
@@ -97,6 +105,7 @@ pub struct Arm {
     path: String,
     options: ArmOptions,
     identity: Identity,
+    view: MapView,
     pending: PendingReads,
     reports: VecDeque<Report>,
 }
@@ -126,8 +135,11 @@ impl Arm {
         let nobody = Identity::from(Snapshot { address: 0, values: Vec::new() });
         let path = path.to_owned();
         let (pending, reports) = (PendingReads::default(), VecDeque::new());
-        let mut arm = Self { link, path, options, identity: nobody, pending, reports };
+        let view = MapView(Map::V22);
+        let mut arm = Self { link, path, options, identity: nobody, view, pending, reports };
+        // Registers 0 to 7 are the same in both maps.
         arm.identity = Identity::from(arm.read_span(Span::between(&DEVICE_CODE, &CHIP_ID))?);
+        arm.view = MapView(options.map.unwrap_or_else(|| arm.identity.map()));
         match arm.identity.device_code() {
             code if code == DEVICE_CODE.default_at(DEVICE_CODE.address) => Ok(arm),
             code => Err(OpenError::WrongDevice { code }),
@@ -138,6 +150,18 @@ impl Arm {
     #[must_use]
     pub const fn identity(&self) -> &Identity {
         &self.identity
+    }
+
+    /// The register map of the arm's frames. All methods take registers of map 2.2 and translate them.
+    #[must_use]
+    pub const fn map(&self) -> Map {
+        self.view.0
+    }
+
+    /// The time between two reports at a frequency of `hertz`.
+    #[must_use]
+    pub fn report_period(&self, hertz: u8) -> Duration {
+        report_period(self.identity.firmware(), hertz, self.options.baud)
     }
 
     /// The name of the port.
@@ -169,13 +193,14 @@ impl Arm {
     pub fn read_span(&mut self, span: Span) -> Result<Snapshot, Error> {
         self.take_waiting_replies()?;
         self.link.take_received();
+        self.choose_offset_encoding(span)?;
         let mut asked = Vec::new();
         for _ in 0..self.options.attempts.max(1) {
-            let range = self.pending.add(span);
+            let range = self.pending.add(self.view.read_span(span), self.view.report());
             asked.push(range);
             self.link.send(&Request::Read { address: range.address(), count: range.count() })?;
             if let Some(answer) = self.answer(&asked)? {
-                return Ok(answer.part(span));
+                return Ok(self.view.view(&answer, span));
             }
         }
         Err(self.no_answer(span))
@@ -197,7 +222,28 @@ impl Arm {
     /// The registers reach past 255 (then nothing is sent), or the port failed.
     pub fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Error> {
         Span::of_values(address, values).ok_or(Error::OutsideMap { address, count: values.len() })?;
-        Ok(self.link.send(&Request::Write { address, values })?)
+        for (address, values) in &self.view.writes(address, values) {
+            self.send_write(*address, values)?;
+        }
+        Ok(())
+    }
+
+    fn send_write(&mut self, address: u8, values: &[u8]) -> Result<(), Error> {
+        let request = match self.view.0 {
+            Map::V22 => Request::Write { address, values },
+            Map::V21 => Request::WriteMap21 { address, values },
+        };
+        Ok(self.link.send(&request)?)
+    }
+
+    /// Our firmware shows the offsets in the encoding of the map that was written last, maybe by another program (M5). A
+    /// write without registers makes it this one.
+    fn choose_offset_encoding(&mut self, span: Span) -> Result<(), Error> {
+        let has_both = self.identity.firmware() == Firmware::Ours;
+        if has_both && span.addresses().any(|address| OFFSET.holds(address)) {
+            self.send_write(0, &[])?;
+        }
+        Ok(())
     }
 
     /// The present positions, joint 1 first.
@@ -263,7 +309,7 @@ impl Arm {
         let deadline = Instant::now() + timeout;
         while self.reports.is_empty() {
             match self.link.receive(deadline)? {
-                Some(reply) => self.keep_report(&reply),
+                Some(received) => self.keep_report(&received),
                 None => break,
             }
         }
@@ -273,12 +319,14 @@ impl Arm {
     /// Waits for a reply to one of these reads. Other replies are late, or reports.
     fn answer(&mut self, asked: &[Span]) -> Result<Option<Snapshot>, Error> {
         let deadline = Instant::now() + self.options.reply_timeout;
-        while let Some(reply) = self.link.receive(deadline)? {
-            self.pending.replied(reply.span());
-            if asked.contains(&reply.span()) {
-                return Ok(Some(reply));
+        while let Some(received) = self.link.receive(deadline)? {
+            self.keep_report(&received);
+            if let Received::Reply(reply) = received {
+                self.pending.replied(reply.span());
+                if asked.contains(&reply.span()) {
+                    return Ok(Some(reply));
+                }
             }
-            self.keep_report(&reply);
         }
         Ok(None)
     }
@@ -291,21 +339,52 @@ impl Arm {
 
     /// Takes the replies received since the last read: reports, and late replies.
     fn take_waiting_replies(&mut self) -> Result<(), Error> {
-        while let Some(reply) = self.link.receive_waiting()? {
-            self.pending.replied(reply.span());
-            self.keep_report(&reply);
+        while let Some(received) = self.link.receive_waiting()? {
+            self.keep_report(&received);
+            if let Received::Reply(reply) = received {
+                self.pending.replied(reply.span());
+            }
         }
         Ok(())
     }
 
-    fn keep_report(&mut self, reply: &Snapshot) {
-        if reply.span() != REPORT {
+    fn keep_report(&mut self, received: &Received) {
+        let report = match (received, self.view.0) {
+            (Received::Reply(report), Map::V22) | (Received::Report(report), Map::V21) => report,
+            _ => return,
+        };
+        if report.span() != self.view.report() {
             return;
         }
         if self.reports.len() >= REPORTS_KEPT {
             self.reports.pop_front();
         }
-        let positions = reply.joints(&PRESENT_POSITION).map(Angle::from_register);
+        let positions = self.view.view(report, Span::of(&PRESENT_POSITION));
+        let positions = positions.joints(&PRESENT_POSITION).map(Angle::from_register);
         self.reports.push_back(Report { received: Instant::now(), positions });
+    }
+}
+
+fn report_period(firmware: Firmware, hertz: u8, baud: u32) -> Duration {
+    let hertz = u32::from(hertz.max(1));
+    match firmware {
+        // It sends when more than 1000 ms / hertz have passed.
+        Firmware::Makers => Duration::from_millis(u64::from(1_000 / hertz) + 1),
+        Firmware::Ours | Firmware::Unknown => {
+            Duration::from_secs(1) / hertz.min(baud / BITS_PER_REPORT).max(1)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_period_of_reports_depends_on_firmware_and_line() {
+        let second = Duration::from_secs(1);
+        assert_eq!(report_period(Firmware::Ours, 50, 115_200), second / 50);
+        assert_eq!(report_period(Firmware::Ours, 50, 9_600), second / 34);
+        assert_eq!(report_period(Firmware::Makers, 30, 115_200), Duration::from_millis(34));
     }
 }

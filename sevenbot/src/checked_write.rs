@@ -5,11 +5,12 @@
 
 use std::fmt;
 
-use protocol_core::registers::map::{EEPROM_LOCK, find, refusal};
+use protocol_core::registers::map::{EEPROM_LOCK, MOTOR_STATE, find, motor_state, refusal};
 use protocol_core::registers::{Access, Region, Register};
 
 use crate::arm::Arm;
 use crate::error::Error;
+use crate::identity::Firmware;
 use crate::names::name_of_register;
 use crate::register_text;
 use crate::snapshot::Snapshot;
@@ -107,10 +108,11 @@ impl Arm {
 
     fn write_until_taken(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<WriteMismatch>, Error> {
         let locked = self.read_span(Span::of(&EEPROM_LOCK))?.byte(&EEPROM_LOCK) != 0;
+        self.prepare_torque(writes)?;
         let mut before = self.status()?;
         let (mut unchanged, mut sending) = (Vec::new(), writes.iter().collect::<Vec<_>>());
         for attempt in 1..=WRITE_ATTEMPTS {
-            let found = self.write_and_read_back(&sending)?;
+            let found = self.write_and_read_back(&sending, locked)?;
             let after = self.status()?;
             let cause = |address, wanted| {
                 cause_from_access(address, locked).unwrap_or_else(|| match (&before, &after) {
@@ -136,9 +138,31 @@ impl Arm {
         Ok(unchanged)
     }
 
-    fn write_and_read_back(&mut self, writes: &[&(u8, Vec<u8>)]) -> Result<Vec<Snapshot>, Error> {
+    /// Before a write that lets the motors of the maker's firmware drive the joints: makes the present positions the
+    /// targets. Ours does that by itself (D13); the maker's drives each joint to its last target.
+    fn prepare_torque(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<(), Error> {
+        let new_state = |(address, values): &(u8, Vec<u8>)| {
+            values.get(usize::from(MOTOR_STATE.address.checked_sub(*address)?)).copied()
+        };
+        let will_drive = writes.iter().any(|write| new_state(write) == Some(motor_state::SERVO));
+        if self.identity().firmware() == Firmware::Makers && will_drive && !self.joints()?.is_driven() {
+            let positions = self.positions()?;
+            self.set_targets(positions)?;
+        }
+        Ok(())
+    }
+
+    fn write_and_read_back(
+        &mut self,
+        writes: &[&(u8, Vec<u8>)],
+        locked: bool,
+    ) -> Result<Vec<Snapshot>, Error> {
+        // The maker's firmware changes a locked setting until the next restart, and does not store it.
+        let skips_settings = locked && self.identity().firmware() == Firmware::Makers;
         for (address, values) in writes {
-            self.write(*address, values)?;
+            if !(skips_settings && cause_from_access(*address, locked) == Some(MismatchCause::Locked)) {
+                self.write(*address, values)?;
+            }
         }
         let read_back = |(address, values): &&(u8, Vec<u8>)| {
             let count = u8::try_from(values.len()).unwrap_or(u8::MAX);

@@ -4,16 +4,25 @@
 
 use std::time::{Duration, Instant};
 
-use protocol_core::request::{Reply, Request};
+use protocol_core::request::{Reply, Report, Request};
 use protocol_core::time;
 use protocol_core::wire::deframer::gap;
-use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
+use protocol_core::wire::{Deframer, Frame, FrameBuffer, ToHost};
 use tracing::{debug, trace};
 
 use crate::error::{PortError, ReceiveCounts};
 use crate::open_port::OpenPort;
 use crate::snapshot::Snapshot;
 use crate::traffic::Traffic;
+
+/// A frame from the arm.
+#[derive(Debug)]
+pub(crate) enum Received {
+    /// Function 03: a reply, or a report of map 2.2.
+    Reply(Snapshot),
+    /// Function 05: a report of map 2.1.
+    Report(Snapshot),
+}
 
 /// A serial port with a deframer.
 pub(crate) struct FramePort {
@@ -44,7 +53,7 @@ impl FramePort {
     }
 
     /// The next reply or report; `None` if none arrives before `deadline`.
-    pub(crate) fn receive(&mut self, deadline: Instant) -> Result<Option<Snapshot>, PortError> {
+    pub(crate) fn receive(&mut self, deadline: Instant) -> Result<Option<Received>, PortError> {
         loop {
             if let Some(reply) = self.pull() {
                 return Ok(Some(reply));
@@ -61,7 +70,7 @@ impl FramePort {
     }
 
     /// The next reply or report that has already arrived.
-    pub(crate) fn receive_waiting(&mut self) -> Result<Option<Snapshot>, PortError> {
+    pub(crate) fn receive_waiting(&mut self) -> Result<Option<Received>, PortError> {
         loop {
             if let Some(reply) = self.pull() {
                 return Ok(Some(reply));
@@ -80,16 +89,15 @@ impl FramePort {
         std::mem::take(&mut self.received)
     }
 
-    fn pull(&mut self) -> Option<Snapshot> {
+    fn pull(&mut self) -> Option<Received> {
         while let Some(found) = self.deframer.pull() {
-            match found.map(Reply::from_frame) {
-                Ok(Some(reply)) => {
+            match found.map(received) {
+                Ok(received) => {
                     self.received.other_frames += 1;
-                    let reply = Snapshot { address: reply.address, values: reply.values.to_vec() };
-                    trace!("<- {}", Traffic::from(&reply));
-                    return Some(reply);
+                    if received.is_some() {
+                        return received;
+                    }
                 }
-                Ok(None) => self.received.other_frames += 1,
                 Err(defect) => {
                     self.received.damaged_frames += 1;
                     debug!("<- a damaged frame: {defect:?}");
@@ -135,4 +143,14 @@ impl FramePort {
         let micros = at.duration_since(self.start).as_micros();
         time::Instant::from_micros(u64::try_from(micros).unwrap_or(u64::MAX))
     }
+}
+
+/// The content of a frame; `None` for an alarm, and for a request, which may be an echo.
+fn received(frame: Frame<'_>) -> Option<Received> {
+    let snapshot = |address, values: &[u8]| Snapshot { address, values: values.to_vec() };
+    trace!("<- {}", Traffic::from_frame::<ToHost>(&frame));
+    let reply = Reply::from_frame(frame).map(|it| Received::Reply(snapshot(it.address, it.values)));
+    reply.or_else(|| {
+        Some(Received::Report(Report::from_frame(frame).map(|it| snapshot(it.address, it.values))?))
+    })
 }

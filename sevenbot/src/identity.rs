@@ -1,8 +1,12 @@
 //! The identity of an arm: device code, firmware version, chip id.
 
 use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, FIRMWARE_VERSION};
+use protocol_core::registers::map21::Map;
 
 use crate::snapshot::Snapshot;
+
+/// The highest firmware version, in tenths, with map 2.1. The maker's 2.2 has map 2.2.
+const LAST_VERSION_WITH_MAP_21: u8 = 21;
 
 /// Registers 0 to 7 of an arm.
 ///
@@ -66,6 +70,12 @@ impl Identity {
         }
     }
 
+    /// The register map of this firmware. Ours serves map 2.1, too.
+    #[must_use]
+    pub fn map(&self) -> Map {
+        if self.0.byte(&FIRMWARE_VERSION) <= LAST_VERSION_WITH_MAP_21 { Map::V21 } else { Map::V22 }
+    }
+
     /// Are registers 240 to 255 the status block (docs/protocol.md, section 6)?
     #[must_use]
     pub fn has_status_block(&self) -> bool {
@@ -97,5 +107,7 @@ mod tests {
         }
         assert_eq!((firmware(30), firmware(31)), (Firmware::Ours, Firmware::Ours));
         assert_eq!((firmware(0), firmware(25)), (Firmware::Unknown, Firmware::Unknown));
+        let map = |version| Identity(Snapshot { address: 0, values: vec![7, version] }).map();
+        assert_eq!([10, 21, 22, 30].map(map), [Map::V21, Map::V21, Map::V22, Map::V22]);
     }
 }

@@ -6,25 +6,20 @@
 
 use std::collections::VecDeque;
 
-use protocol_core::registers::map::PRESENT_POSITION;
-
 use crate::span::Span;
 
 /// At most this many pending reads are remembered. No reply is later than this many reads.
 const REMEMBERED: usize = 16;
-
-/// The registers of a report (D14).
-pub(crate) const REPORT: Span = Span::of(&PRESENT_POSITION);
 
 /// The reads without a reply, oldest first.
 #[derive(Debug, Default)]
 pub(crate) struct PendingReads(VecDeque<Span>);
 
 impl PendingReads {
-    /// Adds a read of `wanted`. Returns the span to request: wider where `wanted` is pending already. A span of more
-    /// than 239 registers may have no room to be widened.
-    pub(crate) fn add(&mut self, wanted: Span) -> Span {
-        let is_free = |span: &Span| *span != REPORT && !self.0.contains(span);
+    /// Adds a read of `wanted`. Returns the span to request: wider where `wanted` is pending already, or is a `report`. A
+    /// span of more than 239 registers may have no room to be widened.
+    pub(crate) fn add(&mut self, wanted: Span, report: Span) -> Span {
+        let is_free = |span: &Span| *span != report && !self.0.contains(span);
         let asked = (0..=u8::MAX).map_while(|by| wanted.widened(by)).find(is_free).unwrap_or(wanted);
         if self.0.len() >= REMEMBERED {
             self.0.pop_front();
@@ -49,30 +44,32 @@ mod tests {
         Span::new(address, count).expect("a span")
     }
 
+    const REPORT: Span = Span::of(&protocol_core::registers::map::PRESENT_POSITION);
+
     #[test]
     fn a_repeated_read_requests_another_span() {
         let mut pending = PendingReads::default();
-        assert_eq!(pending.add(span(29, 3)), span(29, 3));
-        assert_eq!(pending.add(span(29, 3)), span(29, 4));
-        assert_eq!(pending.add(span(29, 4)), span(29, 5), "taken by the second");
+        assert_eq!(pending.add(span(29, 3), REPORT), span(29, 3));
+        assert_eq!(pending.add(span(29, 3), REPORT), span(29, 4));
+        assert_eq!(pending.add(span(29, 4), REPORT), span(29, 5), "taken by the second");
         pending.replied(span(29, 4));
-        assert_eq!(pending.add(span(29, 3)), span(29, 3), "the first is lost");
-        assert_eq!(pending.add(span(29, 5)), span(29, 6), "the third still waits");
+        assert_eq!(pending.add(span(29, 3), REPORT), span(29, 3), "the first is lost");
+        assert_eq!(pending.add(span(29, 5), REPORT), span(29, 6), "the third still waits");
     }
 
     #[test]
     fn a_read_of_the_positions_differs_from_a_report() {
-        assert_eq!(PendingReads::default().add(REPORT), span(54, 8));
+        assert_eq!(PendingReads::default().add(REPORT, REPORT), span(54, 8));
     }
 
     #[test]
     fn the_number_of_pending_reads_is_bounded() {
         let mut pending = PendingReads::default();
         for _ in 0..1_000 {
-            let asked = pending.add(span(240, 16));
+            let asked = pending.add(span(240, 16), REPORT);
             assert!(usize::from(asked.count()) <= 16 + REMEMBERED);
         }
-        assert_eq!(pending.add(span(0, 255)), span(0, 255));
-        assert_eq!(pending.add(span(0, 255)), span(0, 255), "there is no room for another range");
+        assert_eq!(pending.add(span(0, 255), REPORT), span(0, 255));
+        assert_eq!(pending.add(span(0, 255), REPORT), span(0, 255), "there is no room for another range");
     }
 }

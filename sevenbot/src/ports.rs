@@ -96,7 +96,8 @@ fn ask(name: &str, baud: u32) -> Result<(Identity, u8), OpenError> {
 }
 
 fn open_quickly(name: &str, baud: u32) -> Result<Arm, OpenError> {
-    Arm::open_with(name, ArmOptions { baud, reply_timeout: PROBE_TIMEOUT, attempts: PROBE_ATTEMPTS })
+    let options = ArmOptions { baud, reply_timeout: PROBE_TIMEOUT, attempts: PROBE_ATTEMPTS, map: None };
+    Arm::open_with(name, options)
 }
 
 /// Finds the arm's baud rate by trying all eight (register 12).

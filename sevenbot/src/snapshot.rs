@@ -56,11 +56,6 @@ impl Snapshot {
     pub fn span(&self) -> Span {
         Span::of_values(self.address, &self.values).unwrap_or(Span::NONE)
     }
-
-    /// Only these registers.
-    pub(crate) fn part(&self, span: Span) -> Self {
-        Self { address: span.address(), values: span.addresses().map(|address| self.at(address)).collect() }
-    }
 }
 
 #[cfg(test)]

@@ -71,7 +71,7 @@ impl Span {
     }
 
     /// The addresses, in ascending order.
-    pub fn addresses(self) -> impl Iterator<Item = u8> {
+    pub fn addresses(self) -> impl Iterator<Item = u8> + Clone {
         (self.address..=u8::MAX).take(usize::from(self.count))
     }
 

@@ -17,7 +17,7 @@ use sevenbot::{Arm, ArmOptions, Error};
 
 /// Each lost frame costs one timeout. The many attempts allow a busy machine ten seconds.
 const OPTIONS: ArmOptions =
-    ArmOptions { baud: 115_200, reply_timeout: Duration::from_millis(200), attempts: 50 };
+    ArmOptions { baud: 115_200, reply_timeout: Duration::from_millis(200), attempts: 50, map: None };
 
 #[test]
 fn a_stop_succeeds_despite_one_lost_frame() {

@@ -18,7 +18,7 @@ use crate::interrupt::hold_on_interrupt;
 use crate::printer::{Printable, note, warn};
 use crate::session::Session;
 use crate::settings_file::{SettingsFile, span};
-use crate::write_result::all_taken;
+use crate::write_result::{all_taken, note_restart};
 
 /// Write the settings of the arm to a file.
 #[derive(Debug, Args)]
@@ -103,9 +103,7 @@ pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), C
     confirm("Write these settings?", args.yes)?;
     write(&mut arm, &wanted)?;
     note("written and verified");
-    if changes.iter().any(|change| BAUD_RATE.holds(change.address)) {
-        note("the new baud rate applies after the next restart of the arm");
-    }
+    note_restart(&arm, changes.iter().map(|change| change.address));
     Ok(())
 }
 

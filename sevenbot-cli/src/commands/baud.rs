@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use clap::Args;
 use serde::Serialize;
 use sevenbot::map::{BAUD_RATE, BAUD_RATES, baud_rate};
-use sevenbot::{Arm, OpenError, Span, ports};
+use sevenbot::{Arm, Map, OpenError, Span, ports};
 
 use super::set::unlocked;
 use crate::command_error::CommandError;
@@ -59,14 +59,16 @@ pub(crate) fn run(session: &mut Session, args: &BaudArgs) -> Result<(), CommandE
     let mut arm = if args.find { find(session)? } else { session.connect()? };
     let baud = arm.options().baud;
     if let Some(rate) = args.rate {
-        let code = BAUD_RATES.iter().zip(0..).find_map(|(&known, code)| (known == rate).then_some(code));
-        let code =
-            code.ok_or_else(|| CommandError::Usage(format!("the arm does not support {rate} baud")))?;
+        let code = (0..).zip(BAUD_RATES).find(|&(code, known)| known == rate && has_baud_code(&arm, code));
+        let (code, _) = code.ok_or_else(|| {
+            CommandError::Usage(format!("the maker's firmware supports 115200 and 1000000 baud, not {rate}"))
+        })?;
         let write = |arm: &mut Arm| arm.write_checked(BAUD_RATE.address, &[code]);
         // Ctrl-C must not leave the EEPROM lock open.
         all_taken(&hold_on_interrupt(&mut arm, |arm, _| unlocked(arm, write))?)?;
     }
-    let baud_after_restart = baud_rate(arm.read_span(Span::of(&BAUD_RATE))?.byte(&BAUD_RATE));
+    let code = arm.read_span(Span::of(&BAUD_RATE))?.byte(&BAUD_RATE);
+    let baud_after_restart = baud_rate(if has_baud_code(&arm, code) { code } else { 0 });
     session.printer.print(&BaudRates { baud, baud_after_restart })?;
     if args.rate.is_some() && baud != baud_after_restart {
         note(format_args!(
@@ -76,6 +78,11 @@ pub(crate) fn run(session: &mut Session, args: &BaudArgs) -> Result<(), CommandE
         note(format_args!("use --baud {baud} from now on"));
     }
     Ok(())
+}
+
+/// Does this arm support the rate with this code? The maker's firmware with map 2.1 takes any other code for 0.
+fn has_baud_code(arm: &Arm, code: u8) -> bool {
+    arm.identity().map() == Map::V22 || matches!(baud_rate(code), 115_200 | 1_000_000)
 }
 
 fn find(session: &Session) -> Result<Arm, CommandError> {

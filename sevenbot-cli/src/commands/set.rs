@@ -12,7 +12,7 @@ use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
 use crate::printer::note;
 use crate::session::Session;
-use crate::write_result::all_taken;
+use crate::write_result::{all_taken, note_restart};
 
 /// Write registers, read them back, and report those that differ.
 #[derive(Debug, Args)]
@@ -60,7 +60,7 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandEr
         if args.unlock { unlocked(arm, write) } else { Ok(write(arm)?) }
     })?;
     session.printer.print(&RegisterList::from(entries(&arm.read_span(span)?)))?;
-    note_causes(span, args, &unchanged);
+    note_causes(&arm, span, args, &unchanged);
     all_taken(&unchanged)
 }
 
@@ -77,11 +77,11 @@ pub(crate) fn unlocked<T>(
     Ok(done)
 }
 
-fn note_causes(span: Span, args: &SetArgs, unchanged: &[WriteMismatch]) {
+fn note_causes(arm: &Arm, span: Span, args: &SetArgs, unchanged: &[WriteMismatch]) {
     if unchanged.iter().any(|register| register.cause == MismatchCause::Locked) && !args.unlock {
         note("settings are protected by the EEPROM lock, register 28: --unlock opens it for this write");
-    } else if unchanged.is_empty() && span.addresses().any(|address| BAUD_RATE.holds(address)) {
-        note("the new baud rate applies after the next restart of the arm");
+    } else if unchanged.is_empty() {
+        note_restart(arm, span.addresses());
     }
 }
 

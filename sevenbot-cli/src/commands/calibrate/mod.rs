@@ -25,7 +25,7 @@ use crate::interrupt::hold_on_interrupt;
 use crate::joint_move::{JointMove, driven_joints, step_target};
 use crate::printer::{Printable, note, warn};
 use crate::session::Session;
-use crate::write_result::all_taken;
+use crate::write_result::{all_taken, uses_offsets_after_restart};
 
 /// Find the offsets of the joints, and store them.
 ///
@@ -91,7 +91,10 @@ fn store(
     if wanted != before {
         let mut err = anstream::stderr();
         OffsetTable::new(before, wanted).write_text(&mut err)?;
-        confirm("Write these offsets? The arm moves a little.", args.yes)?;
+        let is_late = uses_offsets_after_restart(&arm);
+        let effect =
+            if is_late { "The arm uses them after its next restart." } else { "The arm moves a little." };
+        confirm(&format!("Write these offsets? {effect}"), args.yes)?;
         let write = |arm: &mut Arm| arm.write_checked(OFFSET.address, &wanted.bytes());
         all_taken(&hold_on_interrupt(&mut arm, |arm, _| unlocked(arm, write))?)?;
         if !args.yes {

@@ -95,10 +95,8 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     }
     let mut recording = RecordingFile::create(&args.file)?;
     Interrupt::catch();
-    let baud = session.options.baud;
-    let done = set_motors(&mut arm, args).and_then(|()| {
-        with_reports(&mut arm, args.hz, |arm| record_reports(arm, args, baud, &mut recording))
-    });
+    let done = set_motors(&mut arm, args)
+        .and_then(|()| with_reports(&mut arm, args.hz, |arm| record_reports(arm, args, &mut recording)));
     // Without a connection the arm cannot be made to hold.
     let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
     let held = if is_gone && !Interrupt::is_requested() { Ok(()) } else { hold_at_end(&mut arm, args) };
@@ -135,12 +133,11 @@ fn hold_at_end(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
 fn record_reports(
     arm: &mut Arm,
     args: &RecordArgs,
-    baud: u32,
     recording: &mut RecordingFile,
 ) -> Result<(), CommandError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut pendant = TeachPendant::new(arm.targets()?, vacuum, args.driven);
-    let mut clock = ReportClock::new(args.hz, baud);
+    let mut clock = ReportClock::new(arm.report_period(args.hz));
     let limit = args.seconds.map(|seconds| Duration::from_secs(seconds.into()));
     let mut last_report = Instant::now();
     while !Interrupt::is_requested() && !pendant.poll_keys(arm)? {

@@ -5,9 +5,6 @@
 
 use std::time::{Duration, Instant};
 
-/// A report has 14 bytes of ten bits, and reports fill at most half of the line (D14).
-const BITS_PER_REPORT: u32 = 2 * 14 * 10;
-
 /// The ticks of the arm's report timer.
 pub(crate) struct ReportClock {
     period: Duration,
@@ -16,10 +13,9 @@ pub(crate) struct ReportClock {
 }
 
 impl ReportClock {
-    /// Ticks `hz` times a second, or as often as `baud` allows.
-    pub(crate) fn new(hz: u8, baud: u32) -> Self {
-        let rate = u32::from(hz).min(baud / BITS_PER_REPORT).max(1);
-        Self { period: Duration::from_secs(1) / rate, last: None }
+    /// Ticks with this period.
+    pub(crate) const fn new(period: Duration) -> Self {
+        Self { period, last: None }
     }
 
     /// The time of measurement of a report, since the first report.
@@ -45,7 +41,7 @@ mod tests {
 
     fn times(received_ms: &[u64]) -> Vec<u128> {
         let start = Instant::now();
-        let mut clock = ReportClock::new(50, 115_200);
+        let mut clock = ReportClock::new(Duration::from_millis(20));
         let time = |ms: &u64| clock.time_of(start + Duration::from_millis(*ms)).as_millis();
         received_ms.iter().map(time).collect()
     }
@@ -60,10 +56,5 @@ mod tests {
     #[test]
     fn lost_reports_leave_a_gap() {
         assert_eq!(times(&[0, 20, 101, 120]), [0, 20, 100, 120]);
-    }
-
-    #[test]
-    fn the_baud_rate_limits_the_report_rate() {
-        assert_eq!(ReportClock::new(50, 9600).period, Duration::from_secs(1) / 34);
     }
 }

@@ -1,0 +1,99 @@
+//! When and with which registers the maker's firmware solves inverse kinematics.
+//!
+//! A solution is exact here; the maker's firmware truncates it to whole degrees, as this file does, and refuses or misses
+//! some poses that this solver reaches.
+
+use kinematics::{Vector, ik5, ik6, ik7};
+use protocol_core::registers::map21::{DISC_DIRECTION, TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION};
+use protocol_core::registers::{JOINTS, Register};
+
+use super::registers::Registers;
+
+/// Bytes of a coordinate, high byte first, are millimetres + 1024.
+const MILLIMETRES_ZERO: f32 = 1_024.0;
+/// A byte of a direction is its component + 128.
+const DIRECTION_ZERO: f32 = 128.0;
+
+/// A solver of the firmware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Solver {
+    Ik5,
+    Ik6,
+    Ik7,
+}
+
+/// The solvers that writes have asked for.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Requested {
+    ik5: bool,
+    ik6: bool,
+    ik7: bool,
+}
+
+impl Requested {
+    /// Notes the registers of a write. One byte of a block is enough.
+    pub(super) fn note(&mut self, is_written: impl Fn(u8) -> bool) {
+        let any = |row: &Register| (0..row.count).any(|index| is_written(row.address + index));
+        self.ik5 |= any(&WRIST_POSITION);
+        self.ik6 |= any(&TIP_POSITION) || any(&TOOL_DIRECTION);
+        self.ik7 |= any(&DISC_DIRECTION);
+    }
+
+    /// The solvers to run after a write. IK7 leaves the request for IK6 to the next write, as the maker's firmware does.
+    pub(super) fn take(&mut self) -> impl Iterator<Item = Solver> + use<> {
+        let ik5 = core::mem::take(&mut self.ik5).then_some(Solver::Ik5);
+        let other = if core::mem::take(&mut self.ik7) {
+            Some(Solver::Ik7)
+        } else {
+            core::mem::take(&mut self.ik6).then_some(Solver::Ik6)
+        };
+        ik5.into_iter().chain(other)
+    }
+}
+
+impl Solver {
+    /// The targets of the joints; `None` without a solution.
+    pub(super) fn solve(self, registers: &Registers) -> Option<[Option<u8>; JOINTS]> {
+        let point = |first: u8| vector([0, 2, 4].map(|offset| millimetres(registers, first + offset)));
+        let direction = |first: u8| {
+            vector([0, 1, 2].map(|offset| f32::from(registers.get(first + offset)) - DIRECTION_ZERO))
+        };
+        let (tip, tool) = (point(TIP_POSITION.address), direction(TOOL_DIRECTION.address));
+        match self {
+            Self::Ik5 => ik5(point(WRIST_POSITION.address)).ok().map(|angles| targets(&angles)),
+            Self::Ik6 => ik6(tip, tool).ok().map(|angles| targets(&angles)),
+            Self::Ik7 => {
+                ik7(tip, tool, direction(DISC_DIRECTION.address)).ok().map(|angles| targets(&angles))
+            }
+        }
+    }
+
+    /// The type of the alarm without a solution. IK5 fails silently.
+    pub(super) const fn alarm(self) -> Option<u8> {
+        match self {
+            Self::Ik5 => None,
+            Self::Ik6 => Some(6),
+            Self::Ik7 => Some(7),
+        }
+    }
+}
+
+fn vector([x, y, z]: [f32; 3]) -> Vector<f32> {
+    Vector::new(x, y, z)
+}
+
+fn millimetres(registers: &Registers, first: u8) -> f32 {
+    f32::from(u16::from_be_bytes([registers.get(first), registers.get(first + 1)])) - MILLIMETRES_ZERO
+}
+
+/// Whole degrees, truncated. The joints that are not solved keep their targets.
+fn targets(angles: &[f32]) -> [Option<u8>; JOINTS] {
+    let mut targets = [None; JOINTS];
+    for (target, &angle) in targets.iter_mut().zip(angles) {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // 0 to 180: `kinematics` keeps the limits.
+        let degrees = angle as u8;
+        *target = Some(degrees);
+    }
+    targets
+}
