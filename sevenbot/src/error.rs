@@ -18,32 +18,32 @@ use crate::span::Span;
 ///     Err(error) => println!("{error}"),
 /// }
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum OpenError {
     /// There is no such port.
+    #[error("there is no such port")]
     NotFound,
     /// This user may not open the port.
+    #[error("no permission to open this port")]
     PermissionDenied {
         /// The group that may open it, if the system tells.
         group: Option<String>,
     },
     /// Another program has the port open.
+    #[error("another program has this port open")]
     Busy,
     /// The port cannot be used as a serial port, with the reason of the system.
+    #[error("this port cannot be used: {0}")]
     Unusable(serialport::Error),
     /// The port opened, but no arm answered.
-    Silent(Error),
+    #[error(transparent)]
+    Silent(#[from] Error),
     /// The device is not a 7Bot V2: its device code is not 7.
+    #[error("the device on this port is not a 7Bot V2: its device code is {code}, not 7")]
     WrongDevice {
         /// The device code.
         code: u8,
     },
-}
-
-impl From<Error> for OpenError {
-    fn from(error: Error) -> Self {
-        Self::Silent(error)
-    }
 }
 
 impl OpenError {
@@ -63,23 +63,6 @@ impl OpenError {
     }
 }
 
-impl fmt::Display for OpenError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotFound => out.write_str("there is no such port"),
-            Self::PermissionDenied { .. } => out.write_str("no permission to open this port"),
-            Self::Busy => out.write_str("another program has this port open"),
-            Self::Unusable(error) => write!(out, "this port cannot be used: {error}"),
-            Self::Silent(error) => error.fmt(out),
-            Self::WrongDevice { code } => {
-                write!(out, "the device on this port is not a 7Bot V2: its device code is {code}, not 7")
-            }
-        }
-    }
-}
-
-impl std::error::Error for OpenError {}
-
 /// Why an exchange with an open arm failed.
 ///
 /// ```no_run
@@ -95,9 +78,10 @@ impl std::error::Error for OpenError {}
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
     /// The registers reach past 255, or there are more than one frame holds. Nothing was sent.
+    #[error("{count} registers from {address} on: the last register is 255, and one frame holds 255 values")]
     OutsideMap {
         /// The first register.
         address: u8,
@@ -105,6 +89,7 @@ pub enum Error {
         count: usize,
     },
     /// A read was not answered in any attempt.
+    #[error("no answer to a read of {span} ({attempts} tries of {} ms): {received}", waited.as_millis())]
     NoAnswer {
         /// The registers of the read.
         span: Span,
@@ -116,7 +101,8 @@ pub enum Error {
         received: ReceiveCounts,
     },
     /// The port failed.
-    Port(PortError),
+    #[error(transparent)]
+    Port(#[from] PortError),
 }
 
 /// Why an open port failed.
@@ -127,18 +113,14 @@ pub enum Error {
 /// let gone = PortError::Lost(std::io::ErrorKind::BrokenPipe);
 /// assert_eq!(gone.to_string(), "the connection is gone: broken pipe");
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PortError {
     /// The port takes no more bytes: no program reads at its other end.
+    #[error("the port takes no more bytes: nothing reads at its other end")]
     Stalled,
     /// The port failed: the cable was pulled, or the simulator ended.
+    #[error("the connection is gone: {0}")]
     Lost(io::ErrorKind),
-}
-
-impl From<PortError> for Error {
-    fn from(error: PortError) -> Self {
-        Self::Port(error)
-    }
 }
 
 impl From<PortError> for OpenError {
@@ -164,37 +146,6 @@ pub struct ReceiveCounts {
     /// Frames with a wrong checksum.
     pub damaged_frames: usize,
 }
-
-impl fmt::Display for Error {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::OutsideMap { address, count } => {
-                write!(
-                    out,
-                    "{count} registers from {address} on: the last register is 255, and one frame holds 255 values"
-                )
-            }
-            Self::NoAnswer { span, attempts, waited, received } => {
-                let millis = waited.as_millis();
-                write!(out, "no answer to a read of {span} ({attempts} tries of {millis} ms): {received}")
-            }
-            Self::Port(error) => error.fmt(out),
-        }
-    }
-}
-
-impl std::error::Error for Error {}
-
-impl fmt::Display for PortError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Stalled => out.write_str("the port takes no more bytes: nothing reads at its other end"),
-            Self::Lost(kind) => write!(out, "the connection is gone: {kind}"),
-        }
-    }
-}
-
-impl std::error::Error for PortError {}
 
 impl fmt::Display for ReceiveCounts {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {

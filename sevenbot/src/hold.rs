@@ -6,7 +6,6 @@
 //!
 //! [`crate::joints`] interprets the registers of each joint.
 
-use std::fmt;
 use std::thread::sleep;
 use std::time::Instant;
 
@@ -29,33 +28,19 @@ const HOLD_ATTEMPTS: u32 = 5;
 /// let reason = HoldError::NotTaken(Vec::new());
 /// assert!(reason.to_string().contains("did not take"));
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HoldError {
     /// An exchange with the arm failed.
-    Exchange(Error),
+    #[error(transparent)]
+    Exchange(#[from] Error),
     /// These targets differ from what was written several times.
+    #[error("the arm did not take the targets that hold it{}", first_of(.0))]
     NotTaken(Vec<WriteMismatch>),
 }
 
-impl From<Error> for HoldError {
-    fn from(error: Error) -> Self {
-        Self::Exchange(error)
-    }
+fn first_of(unchanged: &[WriteMismatch]) -> String {
+    unchanged.first().map_or(String::new(), |first| format!(": {first}"))
 }
-
-impl fmt::Display for HoldError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Exchange(error) => error.fmt(out),
-            Self::NotTaken(unchanged) => {
-                out.write_str("the arm did not take the targets that hold it")?;
-                unchanged.first().map_or(Ok(()), |first| write!(out, ": {first}"))
-            }
-        }
-    }
-}
-
-impl std::error::Error for HoldError {}
 
 /// A target that was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

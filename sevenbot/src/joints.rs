@@ -12,7 +12,6 @@
 //! - The joint is at rest with target 0, which is no default.
 //! - 700 ms have passed since the first read.
 
-use std::fmt;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -38,28 +37,19 @@ const AT_TARGET_DEGREES: u8 = 5;
 /// ```
 /// assert_eq!(sevenbot::joints::StepBaseError::Silent.to_string(), "its servo does not answer");
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StepBaseError {
     /// Its servo does not answer.
+    #[error("its servo does not answer")]
     Silent,
     /// Its target is the default of power-up, and the joint is elsewhere.
+    #[error("it is at {present}°, and its target of {target}° may be the default of power-up")]
     PowerUpTarget {
         /// The target in degrees.
         target: u8,
         /// The present position in degrees.
         present: u8,
     },
-}
-
-impl fmt::Display for StepBaseError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Silent => out.write_str("its servo does not answer"),
-            Self::PowerUpTarget { target, present } => {
-                write!(out, "it is at {present}°, and its target of {target}° may be the default of power-up")
-            }
-        }
-    }
 }
 
 impl Arm {

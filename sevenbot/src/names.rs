@@ -1,7 +1,5 @@
 //! Parses register names: `target-position.3`, `SPEED`, `12`, `54..60`. The names come from the register table.
 
-use std::fmt;
-
 use protocol_core::registers::map::find;
 use protocol_core::registers::{Joint, MAP, Register};
 
@@ -15,39 +13,27 @@ use crate::span::Span;
 /// assert_eq!(parse("nonsense"), Err(NameError::Unknown));
 /// assert_eq!(parse("target.3").map(sevenbot::Span::address), Ok(48));
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NameError {
     /// No register name starts with the text, and it is not a number.
+    #[error("there is no register of this name")]
     Unknown,
     /// Several register names start with the text.
+    #[error("this could be {}", .0.iter().map(|row| name_of(row)).collect::<Vec<_>>().join(" or "))]
     Ambiguous(Vec<&'static Register>),
     /// The text after the dot is not a joint, 1 to 7.
+    #[error("a joint is a number from 1 to 7")]
     NoJoint,
     /// The row has no register for each joint.
+    #[error("{} has no joints", name_of(.0))]
     NotPerJoint(&'static Register),
     /// The number is not an address, 0 to 255.
+    #[error("a register's number is 0 to 255")]
     NoAddress,
     /// The range ends before it starts.
+    #[error("the range ends before it begins")]
     EmptyRange,
 }
-
-impl fmt::Display for NameError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unknown => out.write_str("there is no register of this name"),
-            Self::Ambiguous(rows) => {
-                let names: Vec<String> = rows.iter().map(|row| name_of(row)).collect();
-                write!(out, "this could be {}", names.join(" or "))
-            }
-            Self::NoJoint => out.write_str("a joint is a number from 1 to 7"),
-            Self::NotPerJoint(row) => write!(out, "{} has no joints", name_of(row)),
-            Self::NoAddress => out.write_str("a register's number is 0 to 255"),
-            Self::EmptyRange => out.write_str("the range ends before it begins"),
-        }
-    }
-}
-
-impl std::error::Error for NameError {}
 
 /// The name of a row as users write it: `target-position`.
 #[must_use]

@@ -41,15 +41,19 @@ pub struct Moment {
 /// let refused = Recording::parse("7bot-recording 1\n0 90 90 65\n");
 /// assert_eq!(refused, Err(RecordingError::Line { number: 2, cause: LineError::Fields(4) }));
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LineError {
     /// The line has this many fields instead of nine.
+    #[error("{0} fields instead of {FIELDS}: seconds, seven angles, vacuum")]
     Fields(usize),
     /// The text is not a time in seconds, up to a day.
+    #[error("`{0}` is not a time in seconds, up to a day")]
     Time(String),
     /// The time is not later than that of the moment before.
+    #[error("the time is not later than the one before")]
     NotLater,
     /// The text is not an angle in whole degrees from 0 to 180.
+    #[error("joint {} cannot go to `{text}`: whole degrees from 0 to 180", joint.number())]
     Angle {
         /// The joint of this field.
         joint: Joint,
@@ -57,8 +61,14 @@ pub enum LineError {
         text: String,
     },
     /// The text is neither 0 nor 1.
+    #[error("`{0}` is not a pump state: 1 sucks, 0 releases")]
     Vacuum(String),
     /// The joint would have to move faster than its motor.
+    #[error(
+        "joint {} would have to turn at {degrees_per_second:.0} °/s; the motors reach {:.0}",
+        joint.number(),
+        Speed::MAXIMUM.degrees_per_second()
+    )]
     TooFast {
         /// The joint.
         joint: Joint,
@@ -105,27 +115,5 @@ impl fmt::Display for Moment {
             write!(out, " {:3}", angle.degrees())?;
         }
         write!(out, "   {}", u8::from(self.vacuum))
-    }
-}
-
-impl fmt::Display for LineError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Fields(found) => {
-                write!(out, "{found} fields instead of {FIELDS}: seconds, seven angles, vacuum")
-            }
-            Self::Time(text) => write!(out, "`{text}` is not a time in seconds, up to a day"),
-            Self::NotLater => out.write_str("the time is not later than the one before"),
-            Self::Angle { joint, text } => {
-                let number = joint.number();
-                write!(out, "joint {number} cannot go to `{text}`: whole degrees from 0 to 180")
-            }
-            Self::Vacuum(text) => write!(out, "`{text}` is not a pump state: 1 sucks, 0 releases"),
-            Self::TooFast { joint, degrees_per_second } => {
-                let (number, limit) = (joint.number(), Speed::MAXIMUM.degrees_per_second());
-                write!(out, "joint {number} would have to turn at {degrees_per_second:.0} °/s; ")?;
-                write!(out, "the motors reach {limit:.0}")
-            }
-        }
     }
 }

@@ -10,7 +10,6 @@
 //! The joints move evenly between two moments. So a movement written by hand needs a line only where its direction or
 //! speed changes.
 
-use std::fmt;
 use std::time::Duration;
 
 use protocol_core::registers::Joint;
@@ -55,15 +54,19 @@ pub struct Recording {
 /// assert_eq!(Recording::parse("a shopping list"), Err(RecordingError::NotARecording));
 /// assert_eq!(Recording::parse("7bot-recording 1\n"), Err(RecordingError::Empty));
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RecordingError {
     /// The first line is not the header of a recording.
+    #[error("this is not a recording: it does not start with `{FORMAT} {VERSION}`")]
     NotARecording,
     /// The version of the format is not 1.
+    #[error("the recording has version `{0}`; this program reads version {VERSION}")]
     OtherVersion(String),
     /// There are no moments.
+    #[error("the recording contains no movement")]
     Empty,
     /// A line is refused.
+    #[error("line {number}: {cause}")]
     Line {
         /// The line number, from 1.
         number: usize,
@@ -159,23 +162,6 @@ fn too_fast(from: &Moment, to: &Moment, factor: f64) -> Option<LineError> {
 pub fn head() -> String {
     format!("{FORMAT} {VERSION}\n# seconds  joints 1 to 7 in degrees  vacuum (1: suck)\n")
 }
-
-impl fmt::Display for RecordingError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotARecording => {
-                write!(out, "this is not a recording: it does not start with `{FORMAT} {VERSION}`")
-            }
-            Self::OtherVersion(version) => {
-                write!(out, "the recording has version `{version}`; this program reads version {VERSION}")
-            }
-            Self::Empty => out.write_str("the recording contains no movement"),
-            Self::Line { number, cause } => write!(out, "line {number}: {cause}"),
-        }
-    }
-}
-
-impl std::error::Error for RecordingError {}
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,6 @@
 //!
 //! The goal becomes the present position before the torque goes on, so the servo does not jump.
 
-use std::fmt;
 use std::time::Duration;
 
 use motion_core::servo_bus::Reading;
@@ -45,21 +44,25 @@ impl Default for CenterOptions {
 }
 
 /// Why a servo is not in the middle. A move that ends early switches the torque off.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CenterError {
     /// The position limits exclude the middle, or the servo has none. Nothing was written.
+    #[error("{}", out_of_reach(*limits))]
     OutOfReach {
         /// Lowest and highest position, in counts.
         limits: (u16, u16),
     },
     /// The servo reports errors. Nothing was written.
+    #[error("the servo reports: {}", error_words(*errors))]
     ReportsErrors {
         /// The error bits.
         errors: u8,
     },
     /// The servo reports a position outside 0 to 1023 counts.
+    #[error("the servo reports no position between 0 and 1023 counts")]
     Unmeasured,
     /// The load was above the limit, or the servo reported an error.
+    #[error("stopped at {position} counts: load {} %, errors: {}", f64::from(*load) / 10.0, error_words(*errors))]
     Overload {
         /// The position in counts.
         position: u16,
@@ -69,59 +72,30 @@ pub enum CenterError {
         errors: u8,
     },
     /// The servo makes no progress.
+    #[error("stopped at {position} counts: the servo makes no progress")]
     Stalled {
         /// The position in counts.
         position: u16,
     },
     /// The user interrupted the move.
+    #[error("interrupted")]
     Interrupted,
     /// An exchange with the servo failed.
-    Bus(ServoError),
+    #[error(transparent)]
+    Bus(#[from] ServoError),
     /// The torque could not be switched off. The servo may still be moving.
+    #[error("the servo may still be moving: its torque could not be switched off ({0})")]
     TorqueStillOn(Box<CenterError>),
 }
 
-impl From<ServoError> for CenterError {
-    fn from(error: ServoError) -> Self {
-        Self::Bus(error)
-    }
-}
-
-impl fmt::Display for CenterError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::OutOfReach { limits: (0, 0) } => {
-                out.write_str("this servo has no range (both limits are 0): its motor would turn without end")
-            }
-            Self::OutOfReach { limits: (lowest, highest) } => {
-                write!(
-                    out,
-                    "the servo's limits, {lowest} to {highest} counts, leave out its middle, {MIDDLE}"
-                )
-            }
-            Self::ReportsErrors { errors } => write!(out, "the servo reports: {}", error_words(*errors)),
-            Self::Unmeasured => out.write_str("the servo reports no position between 0 and 1023 counts"),
-            Self::Overload { position, load, errors } => {
-                let percent = f64::from(*load) / 10.0;
-                write!(
-                    out,
-                    "stopped at {position} counts: load {percent} %, errors: {}",
-                    error_words(*errors)
-                )
-            }
-            Self::Stalled { position } => {
-                write!(out, "stopped at {position} counts: the servo makes no progress")
-            }
-            Self::Interrupted => out.write_str("interrupted"),
-            Self::Bus(error) => error.fmt(out),
-            Self::TorqueStillOn(cause) => {
-                write!(out, "the servo may still be moving: its torque could not be switched off ({cause})")
-            }
+fn out_of_reach(limits: (u16, u16)) -> String {
+    match limits {
+        (0, 0) => "this servo has no range (both limits are 0): its motor would turn without end".to_owned(),
+        (lowest, highest) => {
+            format!("the servo's limits, {lowest} to {highest} counts, leave out its middle, {MIDDLE}")
         }
     }
 }
-
-impl std::error::Error for CenterError {}
 
 /// Moves a servo to the middle and returns its position in counts. The servo holds there with torque on.
 ///

@@ -1,14 +1,14 @@
 //! Failures of an exchange with a servo.
 
-use std::fmt;
 use std::time::Duration;
 
 use crate::error::{PortError, ReceiveCounts};
 
 /// Why an exchange with a servo failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ServoError {
     /// No attempt brought an accepted answer.
+    #[error("servo {id} does not answer ({attempts} tries of {} ms): {received}", waited.as_millis())]
     NoAnswer {
         /// The id of the servo.
         id: u8,
@@ -20,6 +20,7 @@ pub enum ServoError {
         received: ReceiveCounts,
     },
     /// The servo answers, but its register does not hold the written value.
+    #[error("servo {id} answers, but its register {register} does not hold what was written")]
     NotTaken {
         /// The id of the servo.
         id: u8,
@@ -27,34 +28,12 @@ pub enum ServoError {
         register: u8,
     },
     /// The adapter does not support this baud rate.
+    #[error("this adapter does not support {baud} baud")]
     NoSuchRate {
         /// The rate in bits per second.
         baud: u32,
     },
     /// The port failed.
-    Port(PortError),
+    #[error(transparent)]
+    Port(#[from] PortError),
 }
-
-impl From<PortError> for ServoError {
-    fn from(error: PortError) -> Self {
-        Self::Port(error)
-    }
-}
-
-impl fmt::Display for ServoError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoAnswer { id, attempts, waited, received } => {
-                let millis = waited.as_millis();
-                write!(out, "servo {id} does not answer ({attempts} tries of {millis} ms): {received}")
-            }
-            Self::NotTaken { id, register } => {
-                write!(out, "servo {id} answers, but its register {register} does not hold what was written")
-            }
-            Self::NoSuchRate { baud } => write!(out, "this adapter does not support {baud} baud"),
-            Self::Port(error) => error.fmt(out),
-        }
-    }
-}
-
-impl std::error::Error for ServoError {}

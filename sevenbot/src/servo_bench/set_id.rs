@@ -2,8 +2,6 @@
 //!
 //! Two servos with the same id cannot be told apart. So nothing is written unless exactly one servo answers.
 
-use std::fmt;
-
 use motion_core::servo_bus::frame::register;
 
 use super::bus_master::BusMaster;
@@ -15,62 +13,43 @@ const OPEN: [u8; 1] = [0];
 const LOCKED: [u8; 1] = [1];
 
 /// Why a servo does not have its new id.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SetIdError {
     /// None or several servos answer. Nothing was written.
+    #[error("{}", not_alone(answering))]
     NotAlone {
         /// The ids that answer.
         answering: Vec<FoundServo>,
     },
     /// The EEPROM cannot be unlocked. Nothing else was written.
+    #[error("the servo's EEPROM stays locked: {0}")]
     StaysLocked(ServoError),
     /// The servo still answers to the old id.
+    #[error("the servo did not take the new id: it still answers to the old one")]
     Unchanged,
     /// The servo answers to neither id.
+    #[error("the servo answers neither to the old id nor to the new one")]
     Lost,
     /// Something answers to the old id and to the new one.
+    #[error("something answers to the old id and to the new one")]
     AnswersToBoth,
     /// The servo has its new id, but its EEPROM cannot be locked again.
+    #[error("the servo has its new id, but its EEPROM was not locked again: {0}")]
     StaysOpen(ServoError),
     /// The port failed after the EEPROM was unlocked: the id may be the old or the new one.
+    #[error("{0}; the servo may have its old id or its new one")]
     IdUncertain(ServoError),
     /// An exchange failed before anything was written.
-    Bus(ServoError),
+    #[error(transparent)]
+    Bus(#[from] ServoError),
 }
 
-impl From<ServoError> for SetIdError {
-    fn from(error: ServoError) -> Self {
-        Self::Bus(error)
+fn not_alone(answering: &[FoundServo]) -> String {
+    if answering.is_empty() {
+        return "no servo answers at this baud rate".to_owned();
     }
-}
-
-impl fmt::Display for SetIdError {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotAlone { answering } if answering.is_empty() => {
-                out.write_str("no servo answers at this baud rate")
-            }
-            Self::NotAlone { answering } => {
-                let ids: Vec<String> = answering.iter().map(id_text).collect();
-                write!(
-                    out,
-                    "the servo has to be the only one on the bus, but these ids answer: {}",
-                    ids.join(", ")
-                )
-            }
-            Self::StaysLocked(error) => write!(out, "the servo's EEPROM stays locked: {error}"),
-            Self::Unchanged => {
-                out.write_str("the servo did not take the new id: it still answers to the old one")
-            }
-            Self::Lost => out.write_str("the servo answers neither to the old id nor to the new one"),
-            Self::AnswersToBoth => out.write_str("something answers to the old id and to the new one"),
-            Self::StaysOpen(error) => {
-                write!(out, "the servo has its new id, but its EEPROM was not locked again: {error}")
-            }
-            Self::IdUncertain(error) => write!(out, "{error}; the servo may have its old id or its new one"),
-            Self::Bus(error) => error.fmt(out),
-        }
-    }
+    let ids: Vec<String> = answering.iter().map(id_text).collect();
+    format!("the servo has to be the only one on the bus, but these ids answer: {}", ids.join(", "))
 }
 
 fn id_text(found: &FoundServo) -> String {
@@ -79,8 +58,6 @@ fn id_text(found: &FoundServo) -> String {
         answers => format!("{} ({})", found.id, answers.name()),
     }
 }
-
-impl std::error::Error for SetIdError {}
 
 /// Changes the id of the only servo on the bus from `old` to `new`, and verifies it.
 ///
