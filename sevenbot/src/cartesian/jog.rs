@@ -24,7 +24,7 @@ pub enum JogAxes {
 ///
 /// let targets = [90, 91, 110, 90, 135, 90, 80].map(Angle::from_register);
 /// let jog = Jog::step(None, targets, JogAxes::Base, Vector::new(5.0, 0.0, 0.0))?;
-/// assert_eq!(jog.targets[0].degrees(), 89);
+/// assert_eq!(jog.targets[0].degrees(), 88);
 /// # Ok::<(), sevenbot::cartesian::Unreachable>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
