@@ -99,38 +99,49 @@ impl ArmControl {
         self.bus.prepare_frame(now, &mut self.joints, &self.registers)
     }
 
-    /// Executes a write of the host in map 2.2, or refuses it completely.
-    pub(crate) fn write(&mut self, now: Instant, address: u8, values: &[u8]) {
+    /// Executes a write of the host in map 2.2, or refuses it completely. Returns whether it may have changed a report
+    /// frequency.
+    pub(crate) fn write(&mut self, now: Instant, address: u8, values: &[u8]) -> bool {
         let accepted = match self.registers.check(address, values) {
             Ok(accepted) => accepted,
-            Err(wrong) => return Status::refuse(&mut self.registers, refusal::OUT_OF_RANGE, wrong.address),
+            Err(wrong) => return self.refuse(refusal::OUT_OF_RANGE, wrong.address),
         };
-        let Some(changes_settings) = self.check_storage(&accepted) else { return };
+        let Some(changes_settings) = self.check_storage(&accepted) else { return false };
         self.execute(now, &accepted, changes_settings);
-        if accepted.value_at(FEEDBACK_FREQUENCY.address).is_some() {
+        let changes_reports = accepted.value_at(FEEDBACK_FREQUENCY.address).is_some();
+        if changes_reports {
             self.stop_reports_of_map21();
         }
+        changes_reports
     }
 
     /// Executes a write of the host in map 2.1, or refuses it completely. `has_room` tells whether an alarm can be sent.
-    pub(crate) fn write_map21(&mut self, now: Instant, address: u8, values: &[u8], has_room: bool) {
+    /// Returns whether it may have changed a report frequency.
+    pub(crate) fn write_map21(&mut self, now: Instant, address: u8, values: &[u8], has_room: bool) -> bool {
         let accepted = match self.registers.check_map21(address, values) {
             Ok(accepted) => accepted,
-            Err(wrong) => return Status::refuse(&mut self.registers, refusal::OUT_OF_RANGE, wrong.address),
+            Err(wrong) => return self.refuse(refusal::OUT_OF_RANGE, wrong.address),
         };
-        let Some(changes_settings) = self.check_storage(&accepted) else { return };
+        let Some(changes_settings) = self.check_storage(&accepted) else { return false };
         let targets = match reach::targets(&accepted) {
             Ok(targets) => targets,
             Err(out_of_reach) => {
                 let is_wanted = self.registers.get(OPTIONS.address) & option::ALARMS != 0;
                 self.alarm = (is_wanted && has_room).then_some(out_of_reach.alarm);
-                return Status::refuse(&mut self.registers, refusal::OUT_OF_REACH, out_of_reach.address);
+                return self.refuse(refusal::OUT_OF_REACH, out_of_reach.address);
             }
         };
         self.execute(now, &accepted, changes_settings);
         self.registers.set(FEEDBACK_FREQUENCY.address, 0);
         self.joints.reach(&targets, &mut self.registers);
         Status::show_moving(&mut self.registers, &self.joints);
+        true
+    }
+
+    /// Refuses a write, which changes no report frequency.
+    fn refuse(&mut self, reason: u8, address: u8) -> bool {
+        Status::refuse(&mut self.registers, reason, address);
+        false
     }
 
     /// Returns whether a write changes settings. Refuses it and returns `None` if the storage is full.
@@ -177,12 +188,13 @@ impl ArmControl {
     }
 
     fn apply(&mut self, accepted: &Accepted<'_>, changes_settings: bool) {
+        if !changes_settings {
+            return self.registers.apply(accepted);
+        }
         let offsets = Joint::ALL.map(|joint| self.registers.offset(joint));
         self.registers.apply(accepted);
-        if changes_settings {
-            self.to_save = Some(self.registers.image());
-            self.joints.rebase_offsets(&offsets, &self.registers);
-        }
+        self.to_save = Some(self.registers.image());
+        self.joints.rebase_offsets(&offsets, &self.registers);
     }
 
     /// Counts an accepted request.

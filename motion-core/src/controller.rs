@@ -109,11 +109,13 @@ impl Controller {
         {
             match event {
                 HostEvent::Write { map, address, values } => {
-                    match map {
+                    let changes_reports = match map {
                         Map::V22 => self.arm.write(now, address, values),
                         Map::V21 => self.arm.write_map21(now, address, values, MIN_LENGTH <= host_room),
+                    };
+                    if changes_reports {
+                        self.host.set_report_frequencies(now, &self.arm.registers);
                     }
-                    self.host.set_report_frequencies(now, &self.arm.registers);
                 }
                 HostEvent::MalformedRange { address } => self.arm.refuse_range(address),
                 HostEvent::Corrupted => self.arm.count_corrupted(),

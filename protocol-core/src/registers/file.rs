@@ -126,7 +126,9 @@ impl RegisterFile {
     /// A joint's offset in degrees, -16 to 16.
     #[must_use]
     pub fn offset(&self, joint: Joint) -> i8 {
-        i8::try_from(OFFSET.range.decode(self.setting(OFFSET.of(joint)))).unwrap_or(0)
+        let shown = self.get(OFFSET.of(joint));
+        let range = if self.offsets.is_some() { map21::OFFSET.range } else { OFFSET.range };
+        i8::try_from(range.decode(shown)).unwrap_or(0)
     }
 
     /// The value of the register at `address`, an offset in sign and magnitude.
