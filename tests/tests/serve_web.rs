@@ -6,7 +6,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use system_tests::frames::reply;
-use system_tests::registers::{DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED, TARGET_POSITION};
+use system_tests::registers::{
+    DEVICE_CODE, FEEDBACK_FREQUENCY, OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION,
+};
 use system_tests::wait::wait_until;
 use system_tests::{read_request, write_request};
 
@@ -48,6 +50,57 @@ fn a_page_gets_every_answer_in_order() {
     assert_eq!(next()["status"], "ok");
     assert_eq!(next()["data"].to_string(), "[7,8]");
     assert_eq!(next()["message"], "Invalid JSON format");
+}
+
+/// M5 and M11: the maker's two forms of offsets. Their bytes are out of range in function 06.
+#[test]
+fn a_write_has_the_forms_of_the_makers_map() {
+    let served = Served::start(1, &[]);
+    let mut client = WebClient::connect(&served, &[]).expect("accepted");
+    client.send(r#"{"cmd":"write","id":28,"num":1,"value":[0]}"#);
+    for offsets in ["[1,-2,0,1,-1,0,16]", "[129,126,128,129,127,128,144]"] {
+        client.send(r#"{"cmd":"write","id":13,"num":7,"value":[0,0,0,0,0,0,0]}"#);
+        assert_eq!(client.read(OFFSET, 7), [128; 7]);
+        client.send(&format!(r#"{{"cmd":"write","id":13,"num":7,"value":{offsets}}}"#));
+        assert_eq!(client.read(OFFSET, 7), [129, 126, 128, 129, 127, 128, 144], "{offsets}");
+    }
+}
+
+/// The angles are those of the contract's section 4.4.
+#[test]
+fn a_page_moves_to_positions_and_learns_which_are_out_of_reach() {
+    let served = Served::start(1, &[]);
+    let mut page = WebClient::connect(&served, &[LOCAL_PAGE]).expect("accepted");
+    let solved = [
+        (r#""IK5","pos":[100,200,150]"#, vec![63, 90, 85]),
+        (r#""IK6","pos":[-50.4,184.6,50],"vec56":[0,0,-0.01]"#, vec![105, 88, 110, 90, 135]),
+        (r#""IK7","pos":[0,250,100],"vec56":[0,0,-1],"vec67":[-1,1,0]"#, vec![90, 74, 92, 90, 153, 45]),
+    ];
+    for (command, angles) in solved {
+        page.send(&format!(r#"{{"cmd":{command}}}"#));
+        assert_eq!(page.receive().expect("an answer")["message"], "IK calculation completed", "{command}");
+        assert_eq!(page.read(TARGET_POSITION, 7)[..angles.len()], angles, "{command}");
+    }
+    let before = page.read(TARGET_POSITION, 7);
+    for (command, message) in [
+        (r#""IK5","pos":[400,0,100]"#, "IK calculation failed"),
+        (r#""IK6","pos":[500,185,50],"vec56":[0,0,-1]"#, "IK calculation failed"),
+        (r#""IK6","pos":[0,250,100],"vec56":[0,0,0]"#, "IK calculation failed"),
+        (r#""IK7","pos":[0,250,-100000],"vec56":[0,0,-1],"vec67":[0,1,0]"#, "IK calculation failed"),
+        (r#""IK6","pos":[0,250,100]"#, "Missing vec56 parameter"),
+    ] {
+        page.send(&format!(r#"{{"cmd":{command}}}"#));
+        let answer = page.receive().expect("an answer");
+        assert_eq!((&answer["status"], &answer["message"]), (&"error".into(), &message.into()), "{command}");
+    }
+    assert_eq!(page.read(TARGET_POSITION, 7), before);
+    let mut program = WebClient::connect(&served, &[]).expect("accepted");
+    program.send(r#"{"cmd":"IK5","pos":[-120,180,60]}"#);
+    assert_eq!(
+        program.read(TARGET_POSITION, 3),
+        [124, 73, 112],
+        "the next message is the answer to the read"
+    );
 }
 
 #[test]

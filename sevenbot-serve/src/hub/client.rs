@@ -47,8 +47,8 @@ pub(crate) struct Client {
     pub(crate) own: OwnRegisters,
     pub(crate) schedule: Schedule,
     pub(crate) share: Share,
-    /// A read was sent and has no reply yet.
-    pub(crate) has_read: bool,
+    /// Reads that were sent and have no reply yet.
+    pub(crate) unanswered: u8,
     /// The client has room for the longest reply.
     pub(crate) can_receive: bool,
 }
@@ -64,9 +64,12 @@ impl Client {
     /// Drops the requests that wait. Their reads get no reply.
     pub(crate) fn drop_waiting(&mut self) {
         for request in self.waiting.drain(..) {
-            if let WholeRequest::Read { address, count } = request {
-                self.events.push_back(Event::NoReply { address, count });
-            }
+            let (reads, (address, count)) = match request {
+                WholeRequest::Read { address, count } => (1, (address, count)),
+                WholeRequest::WriteBetweenReads { read, .. } => (2, read),
+                WholeRequest::Write { .. } => continue,
+            };
+            self.events.extend((0..reads).map(|_| Event::NoReply { address, count }));
         }
     }
 }

@@ -117,10 +117,10 @@ impl Line {
         }
     }
 
-    /// May another read be sent whose reply has `count` registers?
-    pub(crate) fn has_window(&self, count: u8) -> bool {
+    /// May reads be sent whose replies have `bytes` bytes?
+    pub(crate) fn has_window(&self, bytes: usize) -> bool {
         let on_their_way: usize = self.unanswered.iter().map(|read| reply_bytes(read.count)).sum();
-        on_their_way == 0 || on_their_way + reply_bytes(count) <= WINDOW
+        on_their_way == 0 || on_their_way + bytes <= WINDOW
     }
 
     pub(crate) fn send_read(&mut self, now: Instant, owner: Owner, address: u8, count: u8) {

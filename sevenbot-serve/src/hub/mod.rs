@@ -30,6 +30,7 @@ use protocol_core::wire::Function;
 
 use self::client::Client;
 use self::line::{Line, Owner};
+use self::request::reply_bytes;
 use self::sampler::Sampler;
 use self::shares::Shares;
 
@@ -222,9 +223,12 @@ impl Hub {
     fn is_sendable(&self, client: &Client) -> bool {
         match client.waiting.front() {
             Some(WholeRequest::Read { count, .. }) => {
-                client.can_receive && !client.has_read && self.line.has_window(*count)
+                client.can_receive && client.unanswered == 0 && self.line.has_window(reply_bytes(*count))
             }
-            Some(WholeRequest::Write { .. }) => !client.has_read,
+            Some(WholeRequest::WriteBetweenReads { read: (_, count), .. }) => {
+                client.can_receive && client.unanswered == 0 && self.line.has_window(2 * reply_bytes(*count))
+            }
+            Some(WholeRequest::Write { .. }) => client.unanswered == 0,
             None => false,
         }
     }
@@ -234,19 +238,39 @@ impl Hub {
         let Some(request) = client.waiting.pop_front() else { return };
         self.shares.charge(&mut client.share, request.line_bytes());
         match request {
-            WholeRequest::Read { address, count } => {
-                client.has_read = true;
-                self.line.send_read(now, Owner::Client(id), address, count);
+            WholeRequest::Read { address, count } => self.send_read(now, id, address, count),
+            WholeRequest::Write { function, address, values } => {
+                self.send_write(now, id, function, address, values);
             }
-            WholeRequest::Write { function, address, mut values } => {
-                if client.own.write(function, address, &mut values) {
-                    client.schedule.set(now, &client.own);
-                    self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
-                }
-                if !self.is_read_only {
-                    self.line.send_write(now, function, address, &values);
-                }
+            WholeRequest::WriteBetweenReads { function, address, values, read: (first, count) } => {
+                self.send_read(now, id, first, count);
+                self.send_write(now, id, function, address, values);
+                self.send_read(now, id, first, count);
             }
+        }
+    }
+
+    fn send_read(&mut self, now: Instant, id: ClientId, address: u8, count: u8) {
+        let Some(client) = self.clients.get_mut(&id) else { return };
+        client.unanswered += 1;
+        self.line.send_read(now, Owner::Client(id), address, count);
+    }
+
+    fn send_write(
+        &mut self,
+        now: Instant,
+        id: ClientId,
+        function: Function,
+        address: u8,
+        mut values: Vec<u8>,
+    ) {
+        let Some(client) = self.clients.get_mut(&id) else { return };
+        if client.own.write(function, address, &mut values) {
+            client.schedule.set(now, &client.own);
+            self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
+        }
+        if !self.is_read_only {
+            self.line.send_write(now, function, address, &values);
         }
     }
 
@@ -264,7 +288,7 @@ impl Hub {
                 if let Event::Reply { address, values } = &mut event {
                     client.own.overlay(*address, values);
                 }
-                client.has_read = false;
+                client.unanswered = client.unanswered.saturating_sub(1);
                 client.events.push_back(event);
             }
             (Owner::Sample(stream), Event::Reply { values, .. }) => {

@@ -21,6 +21,18 @@ pub enum WholeRequest {
         /// One byte per register, at most 255.
         values: Vec<u8>,
     },
+    /// A write between two reads of the same registers, to find out what it changes. No other client's request comes
+    /// between them. Gives two events.
+    WriteBetweenReads {
+        /// The function code of the write.
+        function: Function,
+        /// The first register of the write.
+        address: u8,
+        /// One byte per register, at most 255.
+        values: Vec<u8>,
+        /// The first register of the reads, and how many.
+        read: (u8, u8),
+    },
 }
 
 impl WholeRequest {
@@ -39,6 +51,9 @@ impl WholeRequest {
         match self {
             Self::Read { count, .. } => read_bytes(*count),
             Self::Write { values, .. } => MIN_LENGTH + values.len(),
+            Self::WriteBetweenReads { values, read: (_, count), .. } => {
+                MIN_LENGTH + values.len() + 2 * read_bytes(*count)
+            }
         }
     }
 }

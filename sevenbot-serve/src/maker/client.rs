@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use protocol_core::registers::map::{PRESENT_POSITION, TARGET_POSITION};
+use protocol_core::registers::map::{FRAMES_REFUSED, PRESENT_POSITION, TARGET_POSITION};
 use protocol_core::time::Instant;
 use protocol_core::wire::Function;
 use serde_json::{Value, json};
@@ -24,6 +24,8 @@ pub struct MakerClient {
     waiting: VecDeque<Result<Command, CommandError>>,
     /// The command whose read has no reply yet.
     current: Option<Command>,
+    /// The first of two events that the command waits for.
+    first: Option<Event>,
     answers: VecDeque<String>,
 }
 
@@ -32,7 +34,14 @@ impl MakerClient {
     pub fn connect(hub: &mut Hub, is_browser: bool) -> Self {
         let id = hub.connect();
         hub.set_can_receive(id, true);
-        Self { id, is_browser, waiting: VecDeque::new(), current: None, answers: VecDeque::new() }
+        Self {
+            id,
+            is_browser,
+            waiting: VecDeque::new(),
+            current: None,
+            first: None,
+            answers: VecDeque::new(),
+        }
     }
 
     /// Leaves the hub.
@@ -81,6 +90,16 @@ impl MakerClient {
                 hub.request(self.id, WholeRequest::Read { address, count });
                 self.current = Some(Command::Read { address, count });
             }
+            Ok(Command::InverseKinematics { address, values }) => {
+                let request = WholeRequest::WriteBetweenReads {
+                    function: Function::WriteMap21,
+                    address,
+                    values: values.clone(),
+                    read: (FRAMES_REFUSED.address, FRAMES_REFUSED.count),
+                };
+                hub.request(self.id, request);
+                self.current = Some(Command::InverseKinematics { address, values });
+            }
             Ok(Command::Stop) => {
                 let (address, count) = (PRESENT_POSITION.address, PRESENT_POSITION.count);
                 hub.request(self.id, WholeRequest::Read { address, count });
@@ -91,6 +110,13 @@ impl MakerClient {
 
     fn finish_read(&mut self, hub: &mut Hub, event: Event) {
         match (self.current.take(), event) {
+            (
+                Some(command @ Command::InverseKinematics { .. }),
+                event @ (Event::Reply { .. } | Event::NoReply { .. }),
+            ) => match self.first.take() {
+                None => (self.first, self.current) = (Some(event), Some(command)),
+                Some(before) => self.answer(false, &solution(&before, &event)),
+            },
             (Some(Command::Stop), Event::Reply { values, .. }) => {
                 hub.request(self.id, write(TARGET_POSITION.address, values));
                 self.answer(false, &message("Stopped"));
@@ -115,8 +141,23 @@ impl MakerClient {
     }
 }
 
+/// Function 04, so that offsets have the forms of the maker's programs (M5, M11).
 fn write(address: u8, values: Vec<u8>) -> WholeRequest {
-    WholeRequest::Write { function: Function::Write, address, values }
+    WholeRequest::Write { function: Function::WriteMap21, address, values }
+}
+
+/// The arm counts a frame that it refuses. No other client's frame is between the two reads of the counter.
+fn solution(before: &Event, after: &Event) -> Value {
+    match (before, after) {
+        (Event::Reply { values: before, .. }, Event::Reply { values: after, .. }) => {
+            if before == after {
+                message("IK calculation completed")
+            } else {
+                error("IK calculation failed")
+            }
+        }
+        _ => error("The arm does not answer"),
+    }
 }
 
 fn message(text: &str) -> Value {

@@ -6,6 +6,8 @@ use protocol_core::registers::map::{MOTOR_STATE, SPEED, TARGET_POSITION, TIME, V
 use protocol_core::registers::{JOINTS, Register};
 use serde_json::Value;
 
+use super::block::Block;
+
 /// What a message asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Command {
@@ -26,6 +28,13 @@ pub enum Command {
         values: Vec<u8>,
         /// The text of the answer.
         done: &'static str,
+    },
+    /// Writes a block of registers for which the arm finds joint angles (M7).
+    InverseKinematics {
+        /// The first register of the block.
+        address: u8,
+        /// One byte per register.
+        values: Vec<u8>,
     },
     /// Holds every joint where it is.
     Stop,
@@ -69,6 +78,9 @@ fn parse_named(name: &str, message: &Value) -> Result<Command, String> {
         "time" => each_joint(&TIME, message, "time", "Invalid time value (0-100, unit: 100ms)", "Time set"),
         "status" => status(message),
         "vacuum" => vacuum(message),
+        "IK5" => inverse_kinematics(Block::Ik5, message),
+        "IK6" => inverse_kinematics(Block::Ik6, message),
+        "IK7" => inverse_kinematics(Block::Ik7, message),
         _ => Err("Unknown command".to_owned()),
     }
 }
@@ -162,6 +174,11 @@ fn vacuum(message: &Value) -> Result<Command, String> {
         _ => return Err(invalid.to_owned()),
     };
     Ok(Command::Write { address: VACUUM_PUMP.address, values: vec![value], done })
+}
+
+fn inverse_kinematics(block: Block, message: &Value) -> Result<Command, String> {
+    let values = block.values(message)?;
+    Ok(Command::InverseKinematics { address: block.address(), values })
 }
 
 /// A parameter that is a whole number.

@@ -5,6 +5,7 @@
 //!   text ◀── answer  ◀── MakerClient ◀── Hub
 //! ```
 
+mod block;
 pub mod client;
 pub mod command;
 
