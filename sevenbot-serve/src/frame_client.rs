@@ -3,12 +3,12 @@
 //! A client that does not read loses reports first. Its replies wait, its reads wait for room, and finally its bytes
 //! wait where it sent them from; its writes are carried out as long as they do not stand behind a read that waits (D5).
 
-use protocol_core::request::Reply;
+use protocol_core::request::{Reply, Report};
 use protocol_core::time::Instant;
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, MAX_LENGTH, ToArm};
 
-use crate::hub::{ClientId, Event, Hub, WholeRequest};
+use crate::hub::{ClientId, Event, Hub, Stream, WholeRequest};
 
 /// Bytes for the client beyond which reports are dropped: a second of reports at the highest frequency.
 const MOST_REPORT_BYTES: usize = 1_024;
@@ -76,7 +76,7 @@ impl FrameClient {
             match &event {
                 Event::Reply { address, values } => Reply { address: *address, values }.encode(&mut frame),
                 Event::Report { stream, values } if self.output.len() < MOST_REPORT_BYTES => {
-                    Reply { address: stream.registers().address, values }.encode(&mut frame);
+                    encode_report(*stream, values, &mut frame);
                 }
                 Event::Report { .. } | Event::NoReply { .. } => continue,
             }
@@ -100,5 +100,14 @@ impl FrameClient {
     #[must_use]
     pub fn deadline(&self) -> Instant {
         self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE)
+    }
+}
+
+/// A report has the form of the register that asked for it (M4).
+fn encode_report(stream: Stream, values: &[u8], frame: &mut FrameBuffer) {
+    let address = stream.registers().address;
+    match stream {
+        Stream::Positions => Reply { address, values }.encode(frame),
+        Stream::Angles | Stream::Loads => Report { address, values }.encode(frame),
     }
 }

@@ -7,8 +7,9 @@ mod rig;
 use protocol_core::registers::map::{
     CHIP_ID, DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED, TARGET_POSITION,
 };
+use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::time::Duration;
-use rig::{World, read, write};
+use rig::{World, read, write, write_map21};
 
 const POSITIONS: (u8, u8) = (PRESENT_POSITION.address, PRESENT_POSITION.count);
 
@@ -68,6 +69,60 @@ fn each_program_has_its_own_frequency_of_reports() {
     assert_eq!(world.arm.registers().get(FEEDBACK_FREQUENCY.address), 0, "the arm sends no reports");
     world.run(100);
     assert!((0..4).all(|program| world.take(program).is_empty()), "all streams have ended");
+}
+
+#[test]
+fn each_program_has_the_reports_of_its_own_map() {
+    let mut world = World::new(3);
+    let (angles, loads) = (ANGLE_FEEDBACK_FREQUENCY.address, LOAD_FEEDBACK_FREQUENCY.address);
+    set_frequency(&mut world, 0, 50);
+    world.send(1, &[write_map21(angles, &[100]), write_map21(loads, &[20])].concat());
+    world.send(2, &write_map21(loads, &[5]));
+    world.run(10_000);
+    let mut count = |program: usize, address: u8| {
+        world.programs[program].reports.extract_if(.., |(first, _)| *first == address + 1).count()
+    };
+    assert!(count(1, angles).abs_diff(1_000) <= 10, "100 Hz");
+    assert!(count(1, loads).abs_diff(200) <= 4, "20 Hz");
+    assert!(count(2, loads).abs_diff(50) <= 2, "5 Hz");
+    assert!(world.programs.iter().all(|program| program.reports.is_empty()), "no other stream");
+    assert!(world.take(0).len().abs_diff(500) <= 5, "50 Hz of map 2.2");
+    assert_eq!((world.take(1), world.take(2)), (vec![], vec![]));
+    let registers = world.arm.registers();
+    assert_eq!([angles, loads].map(|address| registers.get(address)), [0; 2], "the arm sends no reports");
+}
+
+#[test]
+fn the_other_map_stops_the_streams_of_its_own_program_only() {
+    let mut world = World::new(2);
+    let (angles, loads) = (ANGLE_FEEDBACK_FREQUENCY.address, LOAD_FEEDBACK_FREQUENCY.address);
+    set_frequency(&mut world, 0, 50);
+    world.send(1, &[write_map21(angles, &[50]), write_map21(loads, &[50])].concat());
+    world.run(100);
+    world.send(0, &write_map21(0, &[]));
+    world.send(1, &write(FEEDBACK_FREQUENCY.address, &[10]));
+    world.run(50);
+    (0..2).for_each(|program| drop(world.take(program)));
+    world.programs[1].reports.clear();
+    world.run(1_000);
+    assert_eq!(world.take(0), []);
+    assert!(world.take(1).len().abs_diff(10) <= 1);
+    assert_eq!(world.programs[1].reports, []);
+    for (program, values) in [(0, [0, 0, 0]), (1, [10, 0, 0])] {
+        read_frequencies(&mut world, program);
+        let read: Vec<_> = world.take(program).into_iter().filter(|(_, values)| values.len() == 1).collect();
+        let addresses = [FEEDBACK_FREQUENCY.address, angles, loads];
+        let expected: Vec<_> = addresses.into_iter().zip(values.map(|value| vec![value])).collect();
+        assert_eq!(read, expected);
+    }
+}
+
+/// The program reads the frequencies of its reports.
+fn read_frequencies(world: &mut World, program: usize) {
+    for register in [FEEDBACK_FREQUENCY, ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY] {
+        world.send(program, &read(register.address, 1));
+    }
+    world.run(30);
 }
 
 #[test]

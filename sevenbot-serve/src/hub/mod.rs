@@ -25,6 +25,7 @@ mod stream;
 use std::collections::BTreeMap;
 
 use protocol_core::registers::map::{DEVICE_CODE, FEEDBACK_FREQUENCY};
+use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::Function;
 
@@ -305,6 +306,9 @@ impl Hub {
     fn identify(&mut self, now: Instant, values: &[u8]) {
         if values == [DEVICE_CODE.default_at(DEVICE_CODE.address)] && self.arm != ArmState::Present {
             self.arm = ArmState::Present;
+            for register in [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY] {
+                self.line.send_write(now, Function::WriteMap21, register.address, &[0]);
+            }
             self.line.send_write(now, Function::Write, FEEDBACK_FREQUENCY.address, &[0]);
         }
     }

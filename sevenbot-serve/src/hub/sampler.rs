@@ -32,9 +32,13 @@ impl Sampler {
         now: Instant,
         clients: impl Iterator<Item = &'a OwnRegisters> + Clone,
     ) {
-        for (timer, stream) in self.timers.iter_mut().zip(Stream::ALL) {
-            let wanted = clients.clone().map(|own| own.frequency(stream)).max().unwrap_or(0);
-            let most = highest_frequency(self.baud, stream.registers().count);
+        let wanted =
+            Stream::ALL.map(|stream| clients.clone().map(|own| own.frequency(stream)).max().unwrap_or(0));
+        let streams = || Stream::ALL.into_iter().zip(wanted);
+        let active = streams().filter(|&(_, wanted)| wanted > 0);
+        let bytes = active.map(|(stream, _)| reply_bytes(stream.registers().count)).sum();
+        let most = highest_frequency(self.baud, bytes);
+        for (timer, (_, wanted)) in self.timers.iter_mut().zip(streams()) {
             timer.set(now, u32::from(wanted).min(most));
         }
     }
@@ -58,8 +62,8 @@ impl Sampler {
     }
 }
 
-/// At most half of the line is for reports (D14).
-fn highest_frequency(baud: u32, count: u8) -> u32 {
-    let bytes = u32::try_from(reply_bytes(count)).unwrap_or(u32::MAX);
+/// At most half of the line is for reports, of all streams together (D14, M2). `bytes`: of one report of each.
+fn highest_frequency(baud: u32, bytes: usize) -> u32 {
+    let bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
     (baud / 20).checked_div(bytes).unwrap_or(0).max(1)
 }

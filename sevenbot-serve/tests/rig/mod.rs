@@ -6,7 +6,7 @@ use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
 use arm_sim::simulation::{ArmConfig, Simulation};
 use motion_core::servo_bus::TorqueCodes;
-use protocol_core::request::{Reply, Request};
+use protocol_core::request::{Reply, Report, Request};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
 use sevenbot_serve::{FrameClient, Hub};
@@ -22,6 +22,8 @@ pub struct Program {
     to_send: Vec<u8>,
     deframer: Deframer<ToHost>,
     pub received: Vec<(Instant, Received)>,
+    /// Reports of map 2.1.
+    pub reports: Vec<Received>,
     /// It takes the bytes for it.
     pub reads: bool,
 }
@@ -42,6 +44,10 @@ pub fn read(address: u8, count: u8) -> Vec<u8> {
 
 pub fn write(address: u8, values: &[u8]) -> Vec<u8> {
     encode(&Request::Write { address, values })
+}
+
+pub fn write_map21(address: u8, values: &[u8]) -> Vec<u8> {
+    encode(&Request::WriteMap21 { address, values })
 }
 
 fn encode(request: &Request<'_>) -> Vec<u8> {
@@ -80,7 +86,14 @@ impl World {
     pub fn join(&mut self) {
         let client = FrameClient::connect(&mut self.hub, BAUD);
         let deframer = Deframer::new(Duration::from_millis(2));
-        let program = Program { client, to_send: Vec::new(), deframer, received: Vec::new(), reads: true };
+        let program = Program {
+            client,
+            to_send: Vec::new(),
+            deframer,
+            received: Vec::new(),
+            reports: Vec::new(),
+            reads: true,
+        };
         self.programs.push(program);
     }
 
@@ -172,7 +185,12 @@ impl Program {
         loop {
             rest = &rest[self.deframer.push(now, rest)..];
             while let Some(frame) = self.deframer.pull() {
-                let reply = Reply::from_frame(frame.expect("whole frames")).expect("a reply");
+                let frame = frame.expect("whole frames");
+                if let Some(report) = Report::from_frame(frame) {
+                    self.reports.push((report.address, report.values.to_vec()));
+                    continue;
+                }
+                let reply = Reply::from_frame(frame).expect("a reply");
                 self.received.push((now, (reply.address, reply.values.to_vec())));
             }
             if rest.is_empty() {
