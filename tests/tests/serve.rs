@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use system_tests::frames::reply;
+use system_tests::frames::{reply, with_checksum};
 use system_tests::process::{self, Signal, send_signal, wait_for_exit};
 use system_tests::programs::tool;
 use system_tests::registers::{CHIP_ID, DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED};
@@ -55,6 +55,29 @@ fn each_program_has_its_own_reports_and_the_next_one_on_its_terminal_has_none() 
     assert_eq!(next.register(FEEDBACK_FREQUENCY), 0);
     thread::sleep(Duration::from_millis(200));
     next.expect_nothing_more();
+}
+
+/// M4: golden frames of map 2.1 ask for 30 reports of the angles a second, and for 5 of the loads.
+#[test]
+fn programs_of_both_maps_have_their_own_reports() {
+    let served = Served::start(2, &[]);
+    let (mut old, mut new) = (served.open("a"), served.open("b"));
+    old.write(FEEDBACK_FREQUENCY, &[50]);
+    new.send(b"\xAA\x77\x04\x52\x01\x1E\xCD\x63");
+    new.send(b"\xAA\x77\x04\x5A\x01\x05\x0C\xAA");
+    let mut next = || new.frame_within(Duration::from_secs(5)).expect("a report");
+    let reports: Vec<_> = (0..35).map(|_| next()[2..5].to_vec()).collect();
+    let loads = reports.iter().filter(|start| **start == [5, 91, 7]).count();
+    assert!((4..=6).contains(&loads), "{reports:?}");
+    assert!(reports.iter().all(|start| [[5, 83, 7], [5, 91, 7]].contains(&[start[0], start[1], start[2]])));
+    assert!((0..50).all(|_| old.reply().address == PRESENT_POSITION));
+    new.write(FEEDBACK_FREQUENCY, &[0]);
+    new.drain();
+    assert_eq!((new.register(82), new.register(90)), (0, 0), "stopped by a write of map 2.2");
+    assert_eq!(old.reply().address, PRESENT_POSITION, "its reports go on");
+    old.send(&with_checksum(&[0xAA, 0x77, 4, 0, 0]));
+    old.drain();
+    assert_eq!(old.register(FEEDBACK_FREQUENCY), 0, "stopped by a write of map 2.1");
 }
 
 #[test]
