@@ -5,7 +5,7 @@
 mod rig;
 
 use protocol_core::registers::map::{
-    CHIP_ID, DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED, TARGET_POSITION,
+    CHIP_ID, DEVICE_CODE, EEPROM_LOCK, FEEDBACK_FREQUENCY, OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION,
 };
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::time::Duration;
@@ -123,6 +123,21 @@ fn read_frequencies(world: &mut World, program: usize) {
         world.send(program, &read(register.address, 1));
     }
     world.run(30);
+}
+
+#[test]
+fn each_program_reads_offsets_as_it_writes_them() {
+    let mut world = World::new(3);
+    world.send(0, &[write(EEPROM_LOCK.address, &[0]), write(OFFSET.address, &[0x82, 3])].concat());
+    world.run(20);
+    world.send(1, &write_map21(SPEED.address, &[60]));
+    for _ in 0..5 {
+        (0..3).for_each(|program| world.send(program, &read(OFFSET.address, 2)));
+        world.run(20);
+        for (program, form) in [[0x82, 3], [126, 131], [0x82, 3]].into_iter().enumerate() {
+            assert_eq!(world.take(program), [(OFFSET.address, form.to_vec())], "program {program}");
+        }
+    }
 }
 
 #[test]

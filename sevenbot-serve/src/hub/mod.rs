@@ -254,6 +254,10 @@ impl Hub {
     fn send_read(&mut self, now: Instant, id: ClientId, address: u8, count: u8) {
         let Some(client) = self.clients.get_mut(&id) else { return };
         client.unanswered += 1;
+        // A write of 0 registers chooses the form of the offsets (M5).
+        if let Some(function) = client.own.form_of_read(address, count) {
+            self.line.send_write(now, function, 0, &[]);
+        }
         self.line.send_read(now, Owner::Client(id), address, count);
     }
 

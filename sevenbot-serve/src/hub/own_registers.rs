@@ -3,7 +3,7 @@
 //! A write to them is taken out of the frame, and a read of them is overlaid with the client's values. The other
 //! registers of the frame pass unchanged.
 
-use protocol_core::registers::map::FEEDBACK_FREQUENCY;
+use protocol_core::registers::map::{FEEDBACK_FREQUENCY, OFFSET};
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, Map};
 use protocol_core::registers::{Access, Region, Register};
 use protocol_core::wire::Function;
@@ -19,6 +19,8 @@ pub(crate) struct OwnRegisters {
     angles: u8,
     /// Of the reports of present loads of map 2.1, in Hz.
     loads: u8,
+    /// The map of the client's last write. The arm's form of the offsets depends on it (M5).
+    last_map: Option<Map>,
 }
 
 impl OwnRegisters {
@@ -35,20 +37,33 @@ impl OwnRegisters {
     /// may have changed. A frame that the arm will refuse (D16) has no effect here, and passes as it is.
     pub(crate) fn write(&mut self, function: Function, address: u8, values: &mut [u8]) -> bool {
         let before = *self;
-        match function {
-            Function::Write if !is_refused(Map::V22, address, values) => self.write_map22(address, values),
-            Function::WriteMap21 if !is_refused(Map::V21, address, values) => {
-                self.write_map21(address, values);
+        let map = if function == Function::WriteMap21 { Map::V21 } else { Map::V22 };
+        if !is_refused(map, address, values) {
+            self.last_map = Some(map);
+            match map {
+                Map::V22 => self.write_map22(address, values),
+                Map::V21 => self.write_map21(address, values),
             }
-            _ => {}
         }
         *self != before
+    }
+
+    /// The function whose form a read of these registers has: that of the client's last write, or of map 2.2. `None` if
+    /// there are no offsets among them.
+    pub(crate) fn form_of_read(&self, address: u8, count: u8) -> Option<Function> {
+        let (first, end) = (u16::from(address), u16::from(address) + u16::from(count));
+        let offsets = u16::from(OFFSET.address);
+        let has_offsets = first < offsets + u16::from(OFFSET.count) && offsets < end;
+        has_offsets.then_some(match self.last_map {
+            Some(Map::V21) => Function::WriteMap21,
+            Some(Map::V22) | None => Function::Write,
+        })
     }
 
     /// A write of 53 stops the reports of map 2.1 (M4).
     fn write_map22(&mut self, address: u8, values: &mut [u8]) {
         if let Some(byte) = byte_at(address, values, &FEEDBACK_FREQUENCY) {
-            *self = Self { positions: std::mem::take(byte), ..Self::default() };
+            *self = Self { positions: std::mem::take(byte), angles: 0, loads: 0, ..*self };
         }
     }
 
@@ -107,6 +122,7 @@ mod tests {
         own.overlay(52, &mut reply);
         assert_eq!(reply, [1, 30, 3]);
         assert!(!own.write(Function::Write, 54, &mut [1]));
+        assert_eq!(own.form_of_read(0, 60), Some(Function::Write));
         assert!(!own.write(Function::Write, 46, &mut [90]));
     }
 
@@ -123,18 +139,30 @@ mod tests {
         let mut reply = [9; 16];
         own.overlay(80, &mut reply);
         assert_eq!((reply[2], reply[10]), (30, 5));
-        assert!(!own.write(Function::Write, 46, &mut [90]), "another register of map 2.2");
+        assert!(!own.write(Function::WriteMap21, 46, &mut [90]), "another register");
         assert!(own.write(Function::Write, 53, &mut [50]));
         assert_eq!(frequencies(&own), [50, 0, 0]);
         assert!(own.write(Function::WriteMap21, 0, &mut []), "no registers");
         assert_eq!(frequencies(&own), [0; 3]);
         assert!(!own.write(Function::WriteMap21, 53, &mut [50]), "the byte for 53 has no effect");
-        assert!(!own.write(Function::Write, 82, &mut [50]), "not a register of map 2.2");
+        own.write(Function::Write, 82, &mut [50]);
+        assert_eq!(frequencies(&own), [0; 3], "not a register of map 2.2");
         assert!(own.write(Function::WriteMap21, 90, &mut [100]));
         assert!(!own.write(Function::WriteMap21, 81, &mut [0, 101]), "refused");
         assert_eq!(frequencies(&own), [0, 0, 100]);
         assert!(own.write(Function::Write, 53, &mut [0]));
         assert_eq!(frequencies(&own), [0; 3]);
+    }
+
+    #[test]
+    fn the_last_write_decides_the_form_of_the_offsets() {
+        let mut own = OwnRegisters::default();
+        own.write(Function::WriteMap21, 0, &mut []);
+        own.write(Function::Write, 46, &mut [181]);
+        let form = Some(Function::WriteMap21);
+        let reads = [(13, 7), (19, 1), (0, 255), (12, 2), (12, 1), (20, 9), (13, 0)];
+        let forms = reads.map(|(address, count)| own.form_of_read(address, count));
+        assert_eq!(forms, [form, form, form, form, None, None, None]);
     }
 
     #[test]
