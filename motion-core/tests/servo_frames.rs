@@ -41,6 +41,11 @@ fn every_instruction_has_its_code() {
 }
 
 #[test]
+fn golden_error_bits() {
+    assert_eq!([error::VOLTAGE, error::OVERHEAT, error::OVERLOAD], [0x01, 0x04, 0x20]);
+}
+
+#[test]
 fn golden_ping() {
     //                id    len   inst  checksum
     let bytes = [0xFF, 0xFF, 0x00, 0x02, 0x01, 0xFC];
