@@ -48,12 +48,12 @@ pub(crate) struct Link {
     pub(crate) name: &'static str,
     pub(crate) solids: &'static [Solid],
     /// `None` for the base.
-    pub(crate) joint: Option<Joint>,
+    pub(crate) joint: Option<ModelJoint>,
 }
 
 /// A joint between a link and the one before it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Joint {
+pub(crate) struct ModelJoint {
     pub(crate) name: &'static str,
     /// The link that carries it.
     pub(crate) parent: &'static str,
@@ -84,9 +84,9 @@ pub(crate) const LEFT: Axes = [0.0, 1.0, 0.0];
 pub(crate) const RIGHT: Axes = [0.0, -1.0, 0.0];
 pub(crate) const BACK: Axes = [-1.0, 0.0, 0.0];
 
-const fn joint(name: &'static str, parent: &'static str, origin: Axes, motion: Motion) -> Option<Joint> {
+const fn joint(name: &'static str, parent: &'static str, origin: Axes, motion: Motion) -> Option<ModelJoint> {
     let [x, y, z] = origin;
-    Some(Joint { name, parent, origin: [m(x), m(y), m(z)], motion })
+    Some(ModelJoint { name, parent, origin: [m(x), m(y), m(z)], motion })
 }
 
 const fn quarter_turns(axis: Axes) -> Motion {

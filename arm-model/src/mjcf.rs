@@ -21,7 +21,7 @@ use crate::chain::{
     Axes, BACK, BASE_SOLIDS, DISC_SOLIDS, FOREARM_SOLIDS, HAND_SOLIDS, JOINT_3_HIGH, JOINT_3_LOW, LEFT,
     REAR_ARM_SOLIDS, RIGHT, Solid, TURRET_SOLIDS, UP, WRIST_SOLIDS, m,
 };
-use crate::xml::{Document, number, triple};
+use crate::xml::{XmlDocument, number, triple};
 use crate::{JOINT_NAMES, TIP};
 
 const QUARTER: [f64; 2] = [-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2];
@@ -41,7 +41,7 @@ const RADIUS: f64 = m(4.0);
 /// # Ok::<(), std::io::Error>(())
 /// ```
 pub fn mjcf() -> io::Result<String> {
-    let mut out = Document::new();
+    let mut out = XmlDocument::new();
     out.begin("mujoco", &[text("model", "7bot_v2")])?;
     for line in ABOUT {
         out.comment(line)?;
@@ -65,7 +65,7 @@ fn text(name: &'static str, value: &str) -> (&'static str, String) {
 }
 
 /// Parts of the arm do not collide with each other, but with everything else.
-fn defaults(out: &mut Document) -> io::Result<()> {
+fn defaults(out: &mut XmlDocument) -> io::Result<()> {
     out.begin("default", &[])?;
     out.empty("joint", &[text("damping", "0.1"), text("armature", "0.01")])?;
     out.empty("geom", &[text("contype", "1"), text("conaffinity", "0"), text("type", "cylinder")])?;
@@ -73,7 +73,7 @@ fn defaults(out: &mut Document) -> io::Result<()> {
     out.end()
 }
 
-fn base(out: &mut Document) -> io::Result<()> {
+fn base(out: &mut XmlDocument) -> io::Result<()> {
     body(out, "base_link", ORIGIN, BASE_SOLIDS)?;
     body(out, "turret", ORIGIN, TURRET_SOLIDS)?;
     hinge(out, "joint_1", UP, QUARTER)?;
@@ -84,7 +84,7 @@ fn base(out: &mut Document) -> io::Result<()> {
     out.end()
 }
 
-fn rear_arm(out: &mut Document, shoulder: Axes) -> io::Result<()> {
+fn rear_arm(out: &mut XmlDocument, shoulder: Axes) -> io::Result<()> {
     body(out, "rear_arm", shoulder, REAR_ARM_SOLIDS)?;
     hinge(out, "joint_2", RIGHT, QUARTER)?;
     let behind = Solid { from: ORIGIN, to: LEVER_END, radius: RADIUS };
@@ -106,7 +106,7 @@ fn rear_arm(out: &mut Document, shoulder: Axes) -> io::Result<()> {
     Ok(())
 }
 
-fn lever(out: &mut Document, shoulder: Axes) -> io::Result<()> {
+fn lever(out: &mut XmlDocument, shoulder: Axes) -> io::Result<()> {
     body(out, "lever", shoulder, &[Solid { from: ORIGIN, to: LEVER_END, radius: RADIUS }])?;
     hinge(out, "joint_3", LEFT, [JOINT_3_LOW, JOINT_3_HIGH])?;
     let rod = Solid { from: ORIGIN, to: [0.0, 0.0, m(REAR_ARM)], radius: RADIUS };
@@ -117,7 +117,7 @@ fn lever(out: &mut Document, shoulder: Axes) -> io::Result<()> {
 }
 
 /// Begins a body with its shapes.
-fn body(out: &mut Document, name: &str, position: Axes, solids: &[Solid]) -> io::Result<()> {
+fn body(out: &mut XmlDocument, name: &str, position: Axes, solids: &[Solid]) -> io::Result<()> {
     out.begin("body", &[text("name", name), ("pos", triple(position))])?;
     for Solid { from, to, radius } in solids {
         let ends = format!("{} {}", triple(*from), triple(*to));
@@ -126,12 +126,12 @@ fn body(out: &mut Document, name: &str, position: Axes, solids: &[Solid]) -> io:
     Ok(())
 }
 
-fn hinge(out: &mut Document, name: &str, axis: Axes, range: [f64; 2]) -> io::Result<()> {
+fn hinge(out: &mut XmlDocument, name: &str, axis: Axes, range: [f64; 2]) -> io::Result<()> {
     let range = range.map(number).join(" ");
     out.empty("joint", &[text("name", name), text("type", "hinge"), ("axis", triple(axis)), ("range", range)])
 }
 
-fn equality(out: &mut Document) -> io::Result<()> {
+fn equality(out: &mut XmlDocument) -> io::Result<()> {
     out.begin("equality", &[])?;
     let anchor = ("anchor", triple([0.0, 0.0, m(REAR_ARM)]));
     out.empty(
@@ -141,7 +141,7 @@ fn equality(out: &mut Document) -> io::Result<()> {
     out.end()
 }
 
-fn actuators(out: &mut Document) -> io::Result<()> {
+fn actuators(out: &mut XmlDocument) -> io::Result<()> {
     out.begin("actuator", &[])?;
     for name in JOINT_NAMES {
         out.empty("position", &[text("name", name), text("joint", name), text("inheritrange", "1")])?;

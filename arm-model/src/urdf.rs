@@ -3,8 +3,8 @@
 use std::io;
 
 use crate::ABOUT;
-use crate::chain::{Axes, Joint, LINKS, Link, MAX_SPEED, Motion, Solid};
-use crate::xml::{Document, number, triple};
+use crate::chain::{Axes, LINKS, Link, MAX_SPEED, ModelJoint, Motion, Solid};
+use crate::xml::{XmlDocument, number, triple};
 
 /// The torque limit that URDF demands, in Nm; the stall torque of the servos is not measured.
 const EFFORT: f64 = 2.0;
@@ -20,7 +20,7 @@ const EFFORT: f64 = 2.0;
 /// # Ok::<(), std::io::Error>(())
 /// ```
 pub fn urdf() -> io::Result<String> {
-    let mut out = Document::new();
+    let mut out = XmlDocument::new();
     out.begin("robot", &[("name", "7bot_v2".to_owned())])?;
     for line in ABOUT {
         out.comment(line)?;
@@ -41,7 +41,7 @@ pub fn urdf() -> io::Result<String> {
     out.finish()
 }
 
-fn write_link(out: &mut Document, link: &Link) -> io::Result<()> {
+fn write_link(out: &mut XmlDocument, link: &Link) -> io::Result<()> {
     let name = [("name", link.name.to_owned())];
     if link.solids.is_empty() {
         return out.empty("link", &name);
@@ -58,7 +58,7 @@ fn write_link(out: &mut Document, link: &Link) -> io::Result<()> {
 }
 
 /// A cylinder of URDF is along z; a rotation turns it.
-fn write_solid(out: &mut Document, solid: &Solid) -> io::Result<()> {
+fn write_solid(out: &mut XmlDocument, solid: &Solid) -> io::Result<()> {
     let [x, y, z] = between(solid.from, solid.to, |from, to| to - from);
     let middle = between(solid.from, solid.to, |from, to| (from + to) / 2.0);
     let length = x.hypot(y).hypot(z);
@@ -74,7 +74,7 @@ fn between(from: Axes, to: Axes, mix: impl Fn(f64, f64) -> f64) -> Axes {
     [mix(x, u), mix(y, v), mix(z, w)]
 }
 
-fn write_joint(out: &mut Document, joint: &Joint, child: &str) -> io::Result<()> {
+fn write_joint(out: &mut XmlDocument, joint: &ModelJoint, child: &str) -> io::Result<()> {
     let kind = if matches!(joint.motion, Motion::Fixed) { "fixed" } else { "revolute" };
     out.begin("joint", &[("name", joint.name.to_owned()), ("type", kind.to_owned())])?;
     out.empty("parent", &[("link", joint.parent.to_owned())])?;
@@ -95,7 +95,7 @@ fn write_joint(out: &mut Document, joint: &Joint, child: &str) -> io::Result<()>
     out.end()
 }
 
-fn write_turn(out: &mut Document, axis: Axes, [low, high]: [f64; 2]) -> io::Result<()> {
+fn write_turn(out: &mut XmlDocument, axis: Axes, [low, high]: [f64; 2]) -> io::Result<()> {
     out.empty("axis", &[("xyz", triple(axis))])?;
     let limit = [("lower", low), ("upper", high), ("effort", EFFORT), ("velocity", MAX_SPEED)];
     out.empty("limit", &limit.map(|(name, value)| (name, number(value))))

@@ -8,7 +8,7 @@ use quick_xml::events::{BytesEnd, BytesStart, BytesText, Event};
 use crate::chain::Axes;
 
 /// An XML document as it is written.
-pub(crate) struct Document {
+pub(crate) struct XmlDocument {
     writer: Writer<Vec<u8>>,
     open: Vec<&'static str>,
 }
@@ -16,7 +16,7 @@ pub(crate) struct Document {
 /// Names and values.
 pub(crate) type Attributes<'a> = &'a [(&'static str, String)];
 
-impl Document {
+impl XmlDocument {
     pub(crate) fn new() -> Self {
         Self { writer: Writer::new_with_indent(Vec::new(), b' ', 2), open: Vec::new() }
     }
@@ -25,7 +25,7 @@ impl Document {
         self.writer.write_event(Event::Comment(BytesText::from_escaped(format!(" {text} "))))
     }
 
-    /// Begins an element; [`Document::end`] ends it.
+    /// Begins an element; [`XmlDocument::end`] ends it.
     pub(crate) fn begin(&mut self, name: &'static str, attributes: Attributes) -> io::Result<()> {
         self.open.push(name);
         self.writer.write_event(Event::Start(element(name, attributes)))

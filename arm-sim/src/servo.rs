@@ -17,7 +17,7 @@ mod registers;
 mod temperature;
 pub(crate) mod units;
 
-use motion_core::servo_bus::frame::{Frame, FrameBuffer, error};
+use motion_core::servo_bus::frame::{ServoFrame, ServoFrameBuffer, error};
 use motion_core::servo_bus::{Reading, Torque};
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
@@ -40,7 +40,7 @@ pub struct Answer {
     /// The answer is sent this much later than [`ServoConfig::return_delay`] requires.
     pub delay: Duration,
     /// The frame.
-    pub bytes: FrameBuffer,
+    pub bytes: ServoFrameBuffer,
 }
 
 /// A servo.
@@ -146,7 +146,7 @@ impl Servo {
     }
 
     /// Executes a frame that ends at `now`, and returns the answer if there is one.
-    pub fn handle_frame(&mut self, now: Instant, frame: &Frame<'_>) -> Option<Answer> {
+    pub fn handle_frame(&mut self, now: Instant, frame: &ServoFrame<'_>) -> Option<Answer> {
         if !self.has_power(now) {
             return None;
         }
@@ -202,7 +202,7 @@ impl Servo {
         self.fault == Some(ServoFault::Missing)
     }
 
-    fn inject_fault(&mut self, mut bytes: FrameBuffer) -> Answer {
+    fn inject_fault(&mut self, mut bytes: ServoFrameBuffer) -> Answer {
         self.answers = self.answers.wrapping_add(1);
         let mut delay = Duration::ZERO;
         match self.fault {

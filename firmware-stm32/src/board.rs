@@ -13,30 +13,30 @@ use firmware_stm32::clock_rates::ClockSource;
 use motion_core::TorqueCodes;
 use protocol_core::time::Duration;
 
-use crate::gpio::{Active, Pin, Port};
+use crate::gpio::{Active, GpioPort, Pin};
 
 /// The crystal, in Hz: a multiple of the 2 MHz at the input of the PLL.
 pub(crate) const CRYSTAL_HZ: u32 = 8_000_000;
 
 /// Host link, USART1.
-pub(crate) const HOST_TRANSMIT: Pin = Pin::new(Port::A, 9);
+pub(crate) const HOST_TRANSMIT: Pin = Pin::new(GpioPort::A, 9);
 /// Host link, USART1.
-pub(crate) const HOST_RECEIVE: Pin = Pin::new(Port::A, 10);
+pub(crate) const HOST_RECEIVE: Pin = Pin::new(GpioPort::A, 10);
 /// Servo bus, USART2: one wire, open drain. The bus needs an external pull-up to 3.3 V.
-pub(crate) const SERVO_BUS: Pin = Pin::new(Port::A, 2);
+pub(crate) const SERVO_BUS: Pin = Pin::new(GpioPort::A, 2);
 /// Alternate function of the pins above: USART1 and USART2 (DS8626, table 9).
 pub(crate) const USART_FUNCTION: u8 = 7;
 /// The servos' baud rate as delivered.
 pub(crate) const SERVO_BAUD: u32 = 1_000_000;
 
 /// Vacuum pump.
-pub(crate) const PUMP: Pin = Pin::new(Port::C, 6);
+pub(crate) const PUMP: Pin = Pin::new(GpioPort::C, 6);
 /// Valve that lets air into the cup.
-pub(crate) const VALVE: Pin = Pin::new(Port::C, 7);
+pub(crate) const VALVE: Pin = Pin::new(GpioPort::C, 7);
 /// Level that switches pump and valve on.
 pub(crate) const VACUUM_ACTIVE: Active = Active::High;
 /// Status LED: steady on without a fault, blinking while register 241 shows one.
-pub(crate) const LED: Pin = Pin::new(Port::C, 12);
+pub(crate) const LED: Pin = Pin::new(GpioPort::C, 12);
 /// Level that switches the LED on.
 pub(crate) const LED_ACTIVE: Active = Active::Low;
 

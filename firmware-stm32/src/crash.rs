@@ -14,7 +14,7 @@ use firmware_stm32::clock_rates::{self, ClockSource};
 use firmware_stm32::reset_cause::ResetCause;
 use firmware_stm32::wait::wait_for;
 use motion_core::servo_bus::Torque;
-use motion_core::servo_bus::frame::{FrameBuffer, register, sync_write};
+use motion_core::servo_bus::frame::{ServoFrameBuffer, register, sync_write};
 use stm32f4::stm32f405 as pac;
 
 use crate::board;
@@ -69,7 +69,7 @@ fn stop_servos() {
     // SAFETY: interrupts are off, and the code that owns these registers does not run again.
     let (usart, rcc) = unsafe { (pac::USART2::steal(), pac::RCC::steal()) };
     keep_rate(&usart, &rcc);
-    let mut frame = FrameBuffer::new();
+    let mut frame = ServoFrameBuffer::new();
     let code = board::TORQUE_CODES.code(Torque::Damping);
     sync_write(&mut frame, register::TORQUE_SWITCH, (0..board::SERVOS).map(|id| (id, [code])));
     for _ in 0..REPEATS {

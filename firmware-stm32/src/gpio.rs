@@ -13,11 +13,11 @@ pub(crate) fn enable(rcc: &pac::RCC) {
 }
 
 /// The registers of a port.
-type Registers = pac::gpioi::RegisterBlock;
+type GpioRegisters = pac::gpioi::RegisterBlock;
 
 /// Ports of the 64-pin package.
 #[derive(Clone, Copy)]
-pub(crate) enum Port {
+pub(crate) enum GpioPort {
     A,
     #[allow(dead_code, reason = "for other wiring")]
     B,
@@ -27,7 +27,7 @@ pub(crate) enum Port {
 /// A pin of the chip.
 #[derive(Clone, Copy)]
 pub(crate) struct Pin {
-    port: Port,
+    port: GpioPort,
     number: u8,
 }
 
@@ -40,7 +40,7 @@ pub(crate) enum Active {
 
 /// How a peripheral drives its pin.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Drive {
+pub(crate) enum OutputType {
     /// Drives high and low. The chip's weak pull-up is on: it keeps an unconnected input high.
     PushPull,
     /// Drives low only; the pull-up is outside the chip. With its internal pull-up on, a pin would not be 5 V tolerant: at
@@ -48,9 +48,9 @@ pub(crate) enum Drive {
     OpenDrain,
 }
 
-impl Port {
-    fn registers(self) -> &'static Registers {
-        let base: *const Registers = match self {
+impl GpioPort {
+    fn registers(self) -> &'static GpioRegisters {
+        let base: *const GpioRegisters = match self {
             Self::A => pac::GPIOA::ptr().cast(),
             Self::B => pac::GPIOB::ptr().cast(),
             Self::C => pac::GPIOC::ptr().cast(),
@@ -63,13 +63,13 @@ impl Port {
 
 impl Pin {
     /// Pin `number`, 0 to 15, of a port.
-    pub(crate) const fn new(port: Port, number: u8) -> Self {
+    pub(crate) const fn new(port: GpioPort, number: u8) -> Self {
         assert!(number < 16);
         Self { port, number }
     }
 
     /// Connects the pin to a peripheral.
-    pub(crate) fn give_to(self, function: u8, drive: Drive) {
+    pub(crate) fn give_to(self, function: u8, drive: OutputType) {
         let port = self.port.registers();
         let n = self.n();
         if n < 8 {
@@ -78,11 +78,11 @@ impl Pin {
             port.afrh().modify(|_, w| w.afr(n & 7).set(function & 0xF));
         }
         match drive {
-            Drive::PushPull => {
+            OutputType::PushPull => {
                 port.otyper().modify(|_, w| w.ot(n).push_pull());
                 port.pupdr().modify(|_, w| w.pupdr(n).pull_up());
             }
-            Drive::OpenDrain => {
+            OutputType::OpenDrain => {
                 port.otyper().modify(|_, w| w.ot(n).open_drain());
                 port.pupdr().modify(|_, w| w.pupdr(n).floating());
             }

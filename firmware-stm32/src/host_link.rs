@@ -5,7 +5,7 @@ use firmware_stm32::clock_rates::{self, ClockRates};
 use stm32f4::stm32f405::{USART1, interrupt};
 
 use crate::board;
-use crate::gpio::Drive;
+use crate::gpio::OutputType;
 use crate::uart::{Setup, SharedUart, UartPort};
 
 /// Room for a burst of requests while replies of 262 bytes are sent.
@@ -20,8 +20,8 @@ static LINE: SharedUart<USART1, RECEIVE, TRANSMIT> = SharedUart::new();
 
 /// Opens the host link.
 pub(crate) fn open(usart: USART1, rates: ClockRates, baud: u32, nvic: &mut NVIC) -> HostLink {
-    board::HOST_TRANSMIT.give_to(board::USART_FUNCTION, Drive::PushPull);
-    board::HOST_RECEIVE.give_to(board::USART_FUNCTION, Drive::PushPull);
+    board::HOST_TRANSMIT.give_to(board::USART_FUNCTION, OutputType::PushPull);
+    board::HOST_RECEIVE.give_to(board::USART_FUNCTION, OutputType::PushPull);
     let divisor = clock_rates::usart_divisor(rates.apb2, baud);
     LINE.open(usart, &Setup { divisor, one_wire: false, priority: board::HOST_PRIORITY }, nvic)
 }

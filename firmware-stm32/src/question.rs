@@ -1,12 +1,12 @@
 //! The only frames that the self-test image sends to the servos: pings and reads. No constructor of [`Question`] makes a
 //! write, so the image cannot switch torque on or send a goal.
 
-use motion_core::servo_bus::frame::{self, Decoder, FrameBuffer, Reading, register};
+use motion_core::servo_bus::frame::{self, Decoder, Reading, ServoFrameBuffer, register};
 
 /// A ping or a read: a frame that changes nothing in a servo.
 #[derive(Clone, Debug)]
 pub struct Question {
-    frame: FrameBuffer,
+    frame: ServoFrameBuffer,
     id: u8,
     /// Length of the answer's parameters, in bytes.
     length: u8,
@@ -47,8 +47,8 @@ impl Question {
         Self::new(id, count, |frame| frame::read(frame, id, register, count))
     }
 
-    fn new(id: u8, length: u8, encode: impl FnOnce(&mut FrameBuffer)) -> Self {
-        let mut frame = FrameBuffer::new();
+    fn new(id: u8, length: u8, encode: impl FnOnce(&mut ServoFrameBuffer)) -> Self {
+        let mut frame = ServoFrameBuffer::new();
         encode(&mut frame);
         Self { frame, id, length }
     }

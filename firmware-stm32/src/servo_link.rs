@@ -6,7 +6,7 @@ use firmware_stm32::clock_rates::{self, ClockRates};
 use stm32f4::stm32f405::{USART2, interrupt};
 
 use crate::board;
-use crate::gpio::Drive;
+use crate::gpio::OutputType;
 use crate::uart::{Setup, SharedUart, UartPort};
 
 /// Room for the echo of the longest frame and the answer to it.
@@ -21,7 +21,7 @@ static LINE: SharedUart<USART2, RECEIVE, TRANSMIT> = SharedUart::new();
 
 /// Opens the servo bus.
 pub(crate) fn open(usart: USART2, rates: ClockRates, nvic: &mut NVIC) -> ServoLink {
-    board::SERVO_BUS.give_to(board::USART_FUNCTION, Drive::OpenDrain);
+    board::SERVO_BUS.give_to(board::USART_FUNCTION, OutputType::OpenDrain);
     let divisor = clock_rates::usart_divisor(rates.apb1, board::SERVO_BAUD);
     LINE.open(usart, &Setup { divisor, one_wire: true, priority: board::SERVO_PRIORITY }, nvic)
 }

@@ -150,7 +150,7 @@ impl fmt::Display for Figures {
 
 #[cfg(test)]
 mod tests {
-    use motion_core::servo_bus::frame::{FrameBuffer, read, status, sync_write};
+    use motion_core::servo_bus::frame::{ServoFrameBuffer, read, status, sync_write};
 
     use super::*;
 
@@ -162,7 +162,7 @@ mod tests {
     fn questions_goals_and_round_trips_are_counted() {
         let mut statistics = BusStatistics::new(at(0));
         let (mut question, mut answer, mut goals) =
-            (FrameBuffer::new(), FrameBuffer::new(), FrameBuffer::new());
+            (ServoFrameBuffer::new(), ServoFrameBuffer::new(), ServoFrameBuffer::new());
         read(&mut question, 2, register::PRESENT_POSITION, 8);
         status(&mut answer, 2, 0, &[0; 8]);
         sync_write(&mut goals, register::GOAL_POSITION, [(2, [0; 6])].into_iter());

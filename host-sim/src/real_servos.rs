@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::thread::sleep;
 
 use embedded_storage::nor_flash::NorFlash;
-use motion_core::servo_bus::frame::{FrameBuffer, register, sync_write};
+use motion_core::servo_bus::frame::{ServoFrameBuffer, register, sync_write};
 use motion_core::servo_bus::{Torque, TorqueCodes};
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::MISSING_SERVOS;
@@ -206,7 +206,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
         let Some(serial) = &self.serial else {
             return warn!("the adapter is unplugged: the servos could not be damped");
         };
-        let mut frame = FrameBuffer::new();
+        let mut frame = ServoFrameBuffer::new();
         let code = self.config.torque_codes.code(Torque::Damping);
         sync_write(
             &mut frame,

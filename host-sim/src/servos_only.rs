@@ -58,7 +58,7 @@ pub struct ServosOnly {
     config: AdapterConfig,
     plant: Plant,
     adapter: UsbAdapter,
-    port: Option<Port>,
+    port: Option<AdapterPort>,
     /// Bytes from the adapter that were not written to the port.
     to_client: Vec<u8>,
     /// Gets the direction and the bytes on the wire.
@@ -67,14 +67,14 @@ pub struct ServosOnly {
 
 /// The adapter's port while it is plugged in.
 #[derive(Debug)]
-struct Port {
+struct AdapterPort {
     pty: Pty,
     clients: Option<Clients>,
     /// It exists as long as the port.
     _symlink: Option<Symlink>,
 }
 
-impl Port {
+impl AdapterPort {
     fn open(link: Option<&PathBuf>) -> Result<Self, ServosOnlyError> {
         let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
         let pty = Pty::open(clients.as_mut())?;
@@ -90,7 +90,7 @@ impl ServosOnly {
     /// The pseudo-terminal or the link cannot be created.
     pub fn new(config: AdapterConfig, mut plant: Plant) -> Result<Self, ServosOnlyError> {
         plant.ignore_collisions();
-        let port = Some(Port::open(config.link.as_ref())?);
+        let port = Some(AdapterPort::open(config.link.as_ref())?);
         let adapter = UsbAdapter::new(config.latency, config.seed);
         Ok(Self { config, plant, adapter, port, to_client: Vec::new(), trace: None })
     }
@@ -139,7 +139,7 @@ impl ServosOnly {
             info!("adapter unplugged");
             return Ok(());
         }
-        let port = Port::open(self.config.link.as_ref())?;
+        let port = AdapterPort::open(self.config.link.as_ref())?;
         info!("adapter plugged in, on {}", port.pty.path().display());
         self.port = Some(port);
         Ok(())
@@ -157,7 +157,7 @@ impl ServosOnly {
 
     /// Puts the bytes of the client on the wire, if it uses the servos' baud rate.
     fn read_client(&mut self, now: Instant) -> io::Result<()> {
-        let Some(Port { pty, clients, .. }) = &mut self.port else { return Ok(()) };
+        let Some(AdapterPort { pty, clients, .. }) = &mut self.port else { return Ok(()) };
         let mut bytes = [0; PIECE];
         let count = pty.read(&mut bytes)?;
         let baud = pty.baud()?;
@@ -183,7 +183,7 @@ impl ServosOnly {
     /// A bus has no flow control: bytes that the client does not read are lost.
     fn write_client(&mut self) -> io::Result<()> {
         let bytes = std::mem::take(&mut self.to_client);
-        let Some(Port { pty, .. }) = &self.port else { return Ok(()) };
+        let Some(AdapterPort { pty, .. }) = &self.port else { return Ok(()) };
         if pty.has_client() && !bytes.is_empty() && pty.write(&bytes)? < bytes.len() {
             debug!("the client does not read: an answer is lost");
         }

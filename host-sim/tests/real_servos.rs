@@ -34,7 +34,7 @@ struct Rig {
 }
 
 /// A frame on the wire: instruction and parameters.
-type Frame = (u8, Vec<u8>);
+type Question = (u8, Vec<u8>);
 
 impl Rig {
     /// Starts the servos and the controller, each with its options.
@@ -101,7 +101,7 @@ impl Rig {
 }
 
 /// The frames of the controller in a trace.
-fn frames(trace: &str) -> Vec<Frame> {
+fn frames(trace: &str) -> Vec<Question> {
     let pieces = trace.lines().filter_map(|line| line.split_once("-> [")?.1.strip_suffix(']'));
     let bytes = pieces.flat_map(|piece| piece.split(", ").map(|byte| u8::from_str_radix(byte, 16).unwrap()));
     let (mut decoder, mut frames) = (Decoder::new(), Vec::new());

@@ -3,13 +3,13 @@
 //! Golden frames are added to, not edited.
 
 use motion_core::servo_bus::frame::{
-    Decoder, Frame, FrameBuffer, Instruction, MAX_FRAME, Reading, WrongChecksum, error, ping, read, register,
-    status, sync_write, write,
+    Decoder, Instruction, MAX_FRAME, Reading, ServoFrame, ServoFrameBuffer, WrongChecksum, error, ping, read,
+    register, status, sync_write, write,
 };
 use proptest::prelude::*;
 
-fn encoded(encode: impl FnOnce(&mut FrameBuffer)) -> Vec<u8> {
-    let mut buffer = FrameBuffer::new();
+fn encoded(encode: impl FnOnce(&mut ServoFrameBuffer)) -> Vec<u8> {
+    let mut buffer = ServoFrameBuffer::new();
     encode(&mut buffer);
     buffer.to_vec()
 }
@@ -19,7 +19,7 @@ type Said = Result<(u8, u8, Vec<u8>), WrongChecksum>;
 
 fn pull_all(decoder: &mut Decoder, said: &mut Vec<Said>) {
     while let Some(next) = decoder.pull() {
-        said.push(next.map(|Frame { id, code, params }| (id, code, params.to_vec())));
+        said.push(next.map(|ServoFrame { id, code, params }| (id, code, params.to_vec())));
     }
 }
 

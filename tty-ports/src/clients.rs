@@ -29,7 +29,7 @@ const BUFFER_LENGTH: usize = 2_048;
 #[derive(Debug)]
 pub struct Clients {
     inotify: OwnedFd,
-    ports: HashMap<i32, Port>,
+    ports: HashMap<i32, WatchedPort>,
     /// Clients opened or closed a port since the last call of [`Clients::take_has_changed`].
     has_changed: bool,
 }
@@ -40,7 +40,7 @@ pub struct Watch(i32);
 
 /// The clients of one port.
 #[derive(Debug)]
-struct Port {
+struct WatchedPort {
     terminal: PathBuf,
     /// Number of clients. After an overflow, 1 stands for any number.
     count: usize,
@@ -81,8 +81,13 @@ impl Clients {
         }
         let watch = inotify::add_watch(&self.inotify, terminal, events)?;
         let terminal = terminal.to_owned();
-        let presence =
-            Port { terminal, count: 0, has_lost_count: false, is_stale: false, news: PortNews::default() };
+        let presence = WatchedPort {
+            terminal,
+            count: 0,
+            has_lost_count: false,
+            is_stale: false,
+            news: PortNews::default(),
+        };
         self.ports.insert(watch, presence);
         Ok(Watch(watch))
     }
@@ -129,7 +134,7 @@ impl Clients {
             match reader.next() {
                 Ok(event) if event.events().contains(ReadFlags::QUEUE_OVERFLOW) => {
                     warn!("lost count of clients: looking at the open files of all processes instead");
-                    self.ports.values_mut().for_each(Port::lose_count);
+                    self.ports.values_mut().for_each(WatchedPort::lose_count);
                 }
                 Ok(event) => {
                     if let Some(port) = self.ports.get_mut(&event.wd()) {
@@ -145,7 +150,7 @@ impl Clients {
     }
 }
 
-impl Port {
+impl WatchedPort {
     const fn lose_count(&mut self) {
         self.has_lost_count = true;
         self.is_stale = true;

@@ -8,7 +8,7 @@ mod memory;
 use memory::{COUNT, MAX_ID, RAM, factory_settings, is_writable};
 
 use motion_core::servo_bus::frame::{
-    self, BAUD_RATES, BROADCAST, Frame, FrameBuffer, Instruction, Reading, register,
+    self, BAUD_RATES, BROADCAST, Instruction, Reading, ServoFrame, ServoFrameBuffer, register,
 };
 
 /// The registers of one servo.
@@ -65,7 +65,7 @@ impl ServoRegisters {
     /// A write is acknowledged if register 8 is 1. A broadcast, an unknown instruction and a range beyond register 70
     /// have no answer. The acknowledgement of a write that changes the id carries the new id; Feetech's tables do not
     /// say which of the two a real servo sends.
-    pub(super) fn handle_frame(&mut self, frame: &Frame<'_>) -> Option<FrameBuffer> {
+    pub(super) fn handle_frame(&mut self, frame: &ServoFrame<'_>) -> Option<ServoFrameBuffer> {
         let is_addressed = frame.id == self.id();
         if !is_addressed && frame.id != BROADCAST {
             return None;
@@ -75,7 +75,7 @@ impl ServoRegisters {
     }
 
     /// Executes an instruction, and returns the answer if there is one.
-    fn execute(&mut self, frame: &Frame<'_>) -> Option<FrameBuffer> {
+    fn execute(&mut self, frame: &ServoFrame<'_>) -> Option<ServoFrameBuffer> {
         match (Instruction::from_code(frame.code)?, frame.params) {
             (Instruction::Ping, []) => Some(self.answer(&[])),
             (Instruction::Read, &[register, count]) => Some(self.answer(self.read(register, count)?)),
@@ -91,8 +91,8 @@ impl ServoRegisters {
         }
     }
 
-    fn answer(&self, values: &[u8]) -> FrameBuffer {
-        let mut answer = FrameBuffer::new();
+    fn answer(&self, values: &[u8]) -> ServoFrameBuffer {
+        let mut answer = ServoFrameBuffer::new();
         frame::status(&mut answer, self.id(), self.errors(), values);
         answer
     }

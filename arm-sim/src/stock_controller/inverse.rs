@@ -7,7 +7,7 @@ use kinematics::{Vector, ik5, ik6, ik7};
 use protocol_core::registers::map21::{DISC_DIRECTION, TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION};
 use protocol_core::registers::{JOINTS, Register};
 
-use super::registers::Registers;
+use super::registers::StockRegisters;
 
 /// Bytes of a coordinate, high byte first, are millimetres + 1024.
 const MILLIMETRES_ZERO: f32 = 1_024.0;
@@ -53,7 +53,7 @@ impl Requested {
 
 impl Solver {
     /// The targets of the joints; `None` without a solution.
-    pub(super) fn solve(self, registers: &Registers) -> Option<[Option<u8>; JOINTS]> {
+    pub(super) fn solve(self, registers: &StockRegisters) -> Option<[Option<u8>; JOINTS]> {
         let point = |first: u8| vector([0, 2, 4].map(|offset| millimetres(registers, first + offset)));
         let direction = |first: u8| {
             vector([0, 1, 2].map(|offset| f32::from(registers.get(first + offset)) - DIRECTION_ZERO))
@@ -82,7 +82,7 @@ fn vector([x, y, z]: [f32; 3]) -> Vector<f32> {
     Vector::new(x, y, z)
 }
 
-fn millimetres(registers: &Registers, first: u8) -> f32 {
+fn millimetres(registers: &StockRegisters, first: u8) -> f32 {
     f32::from(u16::from_be_bytes([registers.get(first), registers.get(first + 1)])) - MILLIMETRES_ZERO
 }
 

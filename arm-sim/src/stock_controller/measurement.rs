@@ -19,7 +19,7 @@ pub(super) struct Measurement {
 }
 
 impl Measurement {
-    /// The reply to a read. Registers 83 to 89 and 91 to 97 are measured now.
+    /// The reply to a read. StockRegisters 83 to 89 and 91 to 97 are measured now.
     pub(super) fn reply(first: u8, count: u8) -> Self {
         let is_read = |address: u8| address.checked_sub(first).is_some_and(|index| index < count);
         let is_measured =

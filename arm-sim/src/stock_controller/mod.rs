@@ -1,8 +1,8 @@
 //! The controller of an arm as the maker ships it: firmware 2.1.4 on the maker's ESP32 board, with map 2.1 only.
 //!
 //! ```text
-//!   host ──▶ Parser ──▶ Registers ──▶ ServoMaster ──▶ servos
-//!   host ◀── frames ◀── Registers ◀── ServoMaster ◀── servos
+//!   host ──▶ Parser ──▶ StockRegisters ──▶ ServoMaster ──▶ servos
+//!   host ◀── frames ◀── StockRegisters ◀── ServoMaster ◀── servos
 //! ```
 //!
 //! It is there to test host programs against: it checks no range, refuses nothing, has no status block, sends text
@@ -38,9 +38,9 @@ use crate::controller::ArmController;
 use feedback::Feedback;
 use inverse::Requested;
 use measurement::Measurement;
-use parser::{Parser, Request};
-use registers::Registers;
-use servo_master::{Outcome, ServoGoal, ServoMaster};
+use parser::{Parser, StockRequest};
+use registers::StockRegisters;
+use servo_master::{ReadOutcome, ServoGoal, ServoMaster};
 
 /// The arm obeys nothing before this time after power-up. Then it moves to the standard pose.
 const BOOT_TIME: Duration = Duration::from_millis(500);
@@ -65,7 +65,7 @@ const FAST: u8 = 3;
 #[derive(Debug)]
 pub struct StockController {
     config: Config,
-    registers: Registers,
+    registers: StockRegisters,
     stored: Image,
     to_save: Option<Image>,
     parser: Parser,
@@ -77,7 +77,7 @@ pub struct StockController {
     angle_feedback: Feedback,
     load_feedback: Feedback,
     vacuum: VacuumControl,
-    joints: [JointGoal; JOINTS],
+    joints: [LastGoal; JOINTS],
     requested: Requested,
     /// The servos get their first goals at this time.
     wake_up: Option<Instant>,
@@ -88,7 +88,7 @@ pub struct StockController {
 
 /// The last target of a joint, and how fast it moves to the next one.
 #[derive(Clone, Copy, Debug)]
-struct JointGoal {
+struct LastGoal {
     /// In degrees. A target that is equal is not sent again.
     target: u8,
     /// In counts per second.
@@ -98,8 +98,8 @@ struct JointGoal {
 
 impl ArmController for StockController {
     fn power_up(now: Instant, config: Config, stored: Option<&Image>, _storage: Storage) -> Self {
-        let registers = Registers::new(config.chip_id, stored);
-        let joint = |target| JointGoal { target, speed: SPEED_AT_START, time_ms: TIME_AT_START_MS };
+        let registers = StockRegisters::new(config.chip_id, stored);
+        let joint = |target| LastGoal { target, speed: SPEED_AT_START, time_ms: TIME_AT_START_MS };
         let joints = registers.joints(&TARGET_POSITION).map(joint);
         let is_fast = registers.get(BAUD_RATE.address) == FAST;
         Self {
@@ -185,7 +185,7 @@ impl StockController {
             if now >= wake_up {
                 self.wake_up = None;
                 self.servos.set_torque(motor_state::SERVO);
-                let goal = |goal| JointGoal { speed: 0, time_ms: WAKE_UP_MS, ..goal };
+                let goal = |goal| LastGoal { speed: 0, time_ms: WAKE_UP_MS, ..goal };
                 let goals = Joint::ALL.into_iter().zip(self.joints.map(goal)).collect();
                 self.send_goals(goals);
             }
@@ -213,7 +213,7 @@ impl StockController {
         true
     }
 
-    fn next_request(&mut self) -> Option<Request> {
+    fn next_request(&mut self) -> Option<StockRequest> {
         while let Some(byte) = self.from_host.pop_front() {
             if let Some(request) = self.parser.push(byte) {
                 return Some(request);
@@ -222,12 +222,12 @@ impl StockController {
         None
     }
 
-    fn execute(&mut self, now: Instant, request: Request) {
+    fn execute(&mut self, now: Instant, request: StockRequest) {
         match request {
-            Request::Read { address, count } => {
+            StockRequest::Read { address, count } => {
                 self.measurement = Some(Measurement::reply(address, count));
             }
-            Request::Write { address, values } => self.write(now, address, &values),
+            StockRequest::Write { address, values } => self.write(now, address, &values),
         }
     }
 
@@ -238,7 +238,7 @@ impl StockController {
                 self.measurement = Some(measurement);
                 return false;
             };
-            if let Outcome::Measured(reading) = outcome {
+            if let ReadOutcome::Measured(reading) = outcome {
                 self.registers.measured(joint, &reading);
             }
         }
@@ -332,8 +332,8 @@ impl StockController {
         }
     }
 
-    fn send_goals(&mut self, goals: Vec<(Joint, JointGoal)>) {
-        let goals = goals.into_iter().map(|(joint, JointGoal { target, speed, time_ms })| {
+    fn send_goals(&mut self, goals: Vec<(Joint, LastGoal)>) {
+        let goals = goals.into_iter().map(|(joint, LastGoal { target, speed, time_ms })| {
             let angle = MicroDegrees::from_degrees(target);
             let position_counts = counts_from_angle(joint, angle, self.registers.offset(joint));
             (joint, ServoGoal { position_counts, time_ms, speed })

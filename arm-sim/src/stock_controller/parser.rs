@@ -10,7 +10,7 @@ const WRITE: u8 = 4;
 
 /// A well-formed frame from the host.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Request {
+pub(super) enum StockRequest {
     /// Function 03.
     Read { address: u8, count: u8 },
     /// Function 04.
@@ -25,7 +25,7 @@ pub(super) struct Parser {
 
 impl Parser {
     /// Takes a byte. Returns the request that it completes.
-    pub(super) fn push(&mut self, byte: u8) -> Option<Request> {
+    pub(super) fn push(&mut self, byte: u8) -> Option<StockRequest> {
         self.frame.push(byte);
         let is_complete = match self.frame.as_slice() {
             [first] => return self.drop_unless(*first == HEADER[0]),
@@ -48,7 +48,7 @@ impl Parser {
         (checksum(body).to_le_bytes() == *sum).then(|| request(body)).flatten()
     }
 
-    fn drop_unless(&mut self, is_expected: bool) -> Option<Request> {
+    fn drop_unless(&mut self, is_expected: bool) -> Option<StockRequest> {
         if !is_expected {
             self.frame.clear();
         }
@@ -56,11 +56,11 @@ impl Parser {
     }
 }
 
-fn request(body: &[u8]) -> Option<Request> {
+fn request(body: &[u8]) -> Option<StockRequest> {
     match body {
-        [_, _, READ, address, count] => Some(Request::Read { address: *address, count: *count }),
+        [_, _, READ, address, count] => Some(StockRequest::Read { address: *address, count: *count }),
         [_, _, WRITE, address, _, values @ ..] => {
-            Some(Request::Write { address: *address, values: values.to_vec() })
+            Some(StockRequest::Write { address: *address, values: values.to_vec() })
         }
         _ => None,
     }
@@ -70,7 +70,7 @@ fn request(body: &[u8]) -> Option<Request> {
 mod tests {
     use super::*;
 
-    fn requests(bytes: &[u8]) -> Vec<Request> {
+    fn requests(bytes: &[u8]) -> Vec<StockRequest> {
         let mut parser = Parser::default();
         bytes.iter().filter_map(|&byte| parser.push(byte)).collect()
     }
@@ -80,8 +80,8 @@ mod tests {
 
     #[test]
     fn the_frames_of_map_2_1_are_parsed() {
-        assert_eq!(requests(&READ_ANGLES), [Request::Read { address: 83, count: 7 }]);
-        assert_eq!(requests(&ID_5), [Request::Write { address: 11, values: alloc::vec![5] }]);
+        assert_eq!(requests(&READ_ANGLES), [StockRequest::Read { address: 83, count: 7 }]);
+        assert_eq!(requests(&ID_5), [StockRequest::Write { address: 11, values: alloc::vec![5] }]);
     }
 
     #[test]

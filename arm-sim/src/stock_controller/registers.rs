@@ -14,7 +14,7 @@ use protocol_core::registers::map21::{
     ANGLE_FEEDBACK_FREQUENCY, BUTTON_ENABLE, LOAD_FEEDBACK_FREQUENCY, PRESENT_ANGLE, PRESENT_LOAD,
 };
 
-/// Registers 0 to 99.
+/// StockRegisters 0 to 99.
 const COUNT: usize = 100;
 /// The version in tenths: 2.1.
 const VERSION: u8 = 21;
@@ -26,13 +26,13 @@ const IMAGE_START: u8 = CHIP_ID.address + CHIP_ID.count;
 
 /// The values of the registers.
 #[derive(Debug)]
-pub(super) struct Registers {
+pub(super) struct StockRegisters {
     values: [u8; COUNT],
     /// The offsets act from the next start on.
     offsets: [i8; JOINTS],
 }
 
-impl Registers {
+impl StockRegisters {
     /// The registers after power-up. A stored value that was never written is 255.
     pub(super) fn new(chip_id: [u8; 6], stored: Option<&Image>) -> Self {
         let mut registers = Self { values: [0; COUNT], offsets: [0; JOINTS] };
@@ -54,7 +54,7 @@ impl Registers {
         registers
     }
 
-    /// The value of a register. Registers past the table read 0; the maker's firmware returns other memory.
+    /// The value of a register. StockRegisters past the table read 0; the maker's firmware returns other memory.
     pub(super) fn get(&self, address: u8) -> u8 {
         self.values.get(usize::from(address)).copied().unwrap_or(0)
     }
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn a_fresh_arm_has_the_makers_odd_defaults() {
-        let registers = Registers::new(*b"SIM\0\0\x01", None);
+        let registers = StockRegisters::new(*b"SIM\0\0\x01", None);
         assert_eq!(registers.read(0, 3), [7, 21, b'S']);
         assert_eq!(registers.read(11, 9), [0xFF; 9], "never written");
         assert_eq!(registers.read(28, 2), [1, 1]);
@@ -156,12 +156,12 @@ mod tests {
     #[test]
     fn storage_depends_on_the_lock_after_the_frame() {
         let blank = Image([0xFF; Image::LENGTH]);
-        let mut registers = Registers::new([0; 6], None);
+        let mut registers = StockRegisters::new([0; 6], None);
         registers.write(11, &[5]);
         assert_eq!(registers.get(11), 5, "the register changes");
         assert_eq!(registers.image_after(blank, 11, 1), None, "and only the storage is skipped");
         registers.write(28, &[0]);
         let image = registers.image_after(blank, 11, 1).expect("the lock is open");
-        assert_eq!(Registers::new([0; 6], Some(&image)).get(11), 5);
+        assert_eq!(StockRegisters::new([0; 6], Some(&image)).get(11), 5);
     }
 }

@@ -2,7 +2,7 @@
 
 use alloc::collections::VecDeque;
 
-use motion_core::servo_bus::frame::{self, Decoder, FrameBuffer, Reading, register};
+use motion_core::servo_bus::frame::{self, Decoder, Reading, ServoFrameBuffer, register};
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
@@ -20,7 +20,7 @@ pub(super) struct ServoGoal {
 
 /// The result of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Outcome {
+pub(super) enum ReadOutcome {
     Measured(Reading),
     NoAnswer,
 }
@@ -29,8 +29,8 @@ pub(super) enum Outcome {
 #[derive(Debug)]
 pub(super) struct ServoMaster {
     /// Frames to send. True: a servo answers.
-    queue: VecDeque<(FrameBuffer, bool)>,
-    sending: FrameBuffer,
+    queue: VecDeque<(ServoFrameBuffer, bool)>,
+    sending: ServoFrameBuffer,
     decoder: Decoder,
     /// The joint whose answer is outstanding.
     asked: Option<Joint>,
@@ -44,7 +44,7 @@ impl ServoMaster {
     pub(super) fn new(timeout: Duration, guard_time: Duration) -> Self {
         Self {
             queue: VecDeque::new(),
-            sending: FrameBuffer::new(),
+            sending: ServoFrameBuffer::new(),
             decoder: Decoder::new(),
             asked: None,
             busy_until: Instant::ZERO,
@@ -69,14 +69,14 @@ impl ServoMaster {
     }
 
     fn sync_write<const W: usize>(&mut self, first: u8, items: impl Iterator<Item = (u8, [u8; W])>) {
-        let mut frame = FrameBuffer::new();
+        let mut frame = ServoFrameBuffer::new();
         frame::sync_write(&mut frame, first, items);
         self.queue.push_back((frame, false));
     }
 
     /// Reads the measurements of a joint's servo. Call it again only after the outcome.
     pub(super) fn ask(&mut self, joint: Joint) {
-        let mut frame = FrameBuffer::new();
+        let mut frame = ServoFrameBuffer::new();
         frame::read(&mut frame, joint.index(), register::PRESENT_POSITION, Reading::REGISTERS);
         self.queue.push_back((frame, true));
         self.asked = Some(joint);
@@ -113,7 +113,7 @@ impl ServoMaster {
     }
 
     /// The outcome of the read, once.
-    pub(super) fn take_outcome(&mut self, now: Instant) -> Option<Outcome> {
+    pub(super) fn take_outcome(&mut self, now: Instant) -> Option<ReadOutcome> {
         let joint = self.asked?;
         if !self.queue.is_empty() {
             return None;
@@ -121,9 +121,9 @@ impl ServoMaster {
         let outcome = match self.pull_reading(joint) {
             Some(reading) => {
                 self.busy_until = now + self.guard_time;
-                Outcome::Measured(reading)
+                ReadOutcome::Measured(reading)
             }
-            None if now >= self.busy_until => Outcome::NoAnswer,
+            None if now >= self.busy_until => ReadOutcome::NoAnswer,
             None => return None,
         };
         self.asked = None;

@@ -7,7 +7,7 @@ use arm_sim::plant::Plant;
 use arm_sim::servo::ServoConfig;
 use motion_core::TorqueCodes;
 use motion_core::servo_bus::Torque;
-use motion_core::servo_bus::frame::{Decoder, FrameBuffer, Reading, read, register, sync_write, write};
+use motion_core::servo_bus::frame::{Decoder, Reading, ServoFrameBuffer, read, register, sync_write, write};
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::{Duration, Instant};
 
@@ -45,14 +45,14 @@ impl Rig {
         assert_eq!(self.plant.poll(self.now), [], "a servo sends without a question");
     }
 
-    pub fn send(&mut self, encode: impl FnOnce(&mut FrameBuffer)) {
-        let mut buffer = FrameBuffer::new();
+    pub fn send(&mut self, encode: impl FnOnce(&mut ServoFrameBuffer)) {
+        let mut buffer = ServoFrameBuffer::new();
         encode(&mut buffer);
         self.plant.bytes(self.now, &buffer);
     }
 
     /// Sends a frame and waits for all bytes. Returns them, and the microseconds since the start of the frame.
-    pub fn ask(&mut self, encode: impl FnOnce(&mut FrameBuffer)) -> (Vec<u8>, u64) {
+    pub fn ask(&mut self, encode: impl FnOnce(&mut ServoFrameBuffer)) -> (Vec<u8>, u64) {
         let asked_at = self.now;
         self.send(encode);
         let mut bytes = Vec::new();
@@ -67,7 +67,7 @@ impl Rig {
 
     /// A joint's answer to a read of eight bytes, with its error bits.
     pub fn reading(&mut self, joint: Joint) -> Option<(Reading, u8)> {
-        let question = |b: &mut FrameBuffer| read(b, joint.index(), register::PRESENT_POSITION, 8);
+        let question = |b: &mut ServoFrameBuffer| read(b, joint.index(), register::PRESENT_POSITION, 8);
         let (bytes, _) = self.ask(question);
         let mut decoder = Decoder::new();
         decoder.push(&bytes);

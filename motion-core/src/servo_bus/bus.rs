@@ -6,7 +6,7 @@
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::{Duration, Instant};
 
-use super::frame::{self, Decoder, FrameBuffer, Reading, register};
+use super::frame::{self, Decoder, Reading, ServoFrameBuffer, register};
 use super::torque::{Torque, TorqueCodes};
 use crate::CYCLE;
 
@@ -47,7 +47,7 @@ pub struct Bus {
     answer_delay: Duration,
     codes: TorqueCodes,
     decoder: Decoder,
-    frame: FrameBuffer,
+    frame: ServoFrameBuffer,
     /// The joint of the outstanding read.
     awaited: Option<Joint>,
     /// How many additional registers the next read of each servo asks for. The number changes with each read that
@@ -78,7 +78,7 @@ impl Bus {
             answer_delay: Duration::ZERO,
             codes,
             decoder: Decoder::new(),
-            frame: FrameBuffer::new(),
+            frame: ServoFrameBuffer::new(),
             awaited: None,
             read_length_tags: [0; JOINTS],
             longest_answers: [0; JOINTS],

@@ -32,7 +32,7 @@ const UNCOUNTED: usize = 4;
 pub const BROADCAST: u8 = 0xFE;
 
 /// An encoded frame.
-pub type FrameBuffer = heapless::Vec<u8, MAX_FRAME>;
+pub type ServoFrameBuffer = heapless::Vec<u8, MAX_FRAME>;
 
 /// The instruction in a frame to a servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,13 +67,13 @@ impl Instruction {
 pub const BAUD_RATES: [u32; 8] = [1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400];
 
 /// Encodes a ping.
-pub fn ping(buffer: &mut FrameBuffer, id: u8) {
+pub fn ping(buffer: &mut ServoFrameBuffer, id: u8) {
     begin(buffer, id, Instruction::Ping as u8);
     finish(buffer);
 }
 
 /// Encodes a read of `count` registers from `register` on.
-pub fn read(buffer: &mut FrameBuffer, id: u8, register: u8, count: u8) {
+pub fn read(buffer: &mut ServoFrameBuffer, id: u8, register: u8, count: u8) {
     begin(buffer, id, Instruction::Read as u8);
     append(buffer, &[register, count]);
     finish(buffer);
@@ -81,7 +81,7 @@ pub fn read(buffer: &mut FrameBuffer, id: u8, register: u8, count: u8) {
 
 /// Encodes a write to the registers from `register` on, of one servo or with [`BROADCAST`] of all. If there are more
 /// than 57 values, the frame carries none.
-pub fn write(buffer: &mut FrameBuffer, id: u8, register: u8, data: &[u8]) {
+pub fn write(buffer: &mut ServoFrameBuffer, id: u8, register: u8, data: &[u8]) {
     begin(buffer, id, Instruction::Write as u8);
     append(buffer, &[register]);
     append(buffer, data);
@@ -91,7 +91,7 @@ pub fn write(buffer: &mut FrameBuffer, id: u8, register: u8, data: &[u8]) {
 /// Encodes a write of `W` registers from `register` on for each servo in `items`, which holds ids and values. Items that
 /// do not fit the frame are left out.
 pub fn sync_write<const W: usize>(
-    buffer: &mut FrameBuffer,
+    buffer: &mut ServoFrameBuffer,
     register: u8,
     items: impl Iterator<Item = (u8, [u8; W])>,
 ) {
@@ -109,26 +109,26 @@ pub fn sync_write<const W: usize>(
 
 /// Encodes a servo's answer: its error bits and, after a read, the values. If there are more than 58 values, the frame
 /// carries none.
-pub fn status(buffer: &mut FrameBuffer, id: u8, error: u8, data: &[u8]) {
+pub fn status(buffer: &mut ServoFrameBuffer, id: u8, error: u8, data: &[u8]) {
     begin(buffer, id, error);
     append(buffer, data);
     finish(buffer);
 }
 
-fn begin(buffer: &mut FrameBuffer, id: u8, code: u8) {
+fn begin(buffer: &mut ServoFrameBuffer, id: u8, code: u8) {
     buffer.clear();
     // Cannot fail: the buffer is empty.
     let _ = buffer.extend_from_slice(&[0xFF, 0xFF, id, 0, code]);
 }
 
 /// Appends all of `bytes`, or none if that leaves no room for the checksum.
-fn append(buffer: &mut FrameBuffer, bytes: &[u8]) {
+fn append(buffer: &mut ServoFrameBuffer, bytes: &[u8]) {
     if buffer.len() + bytes.len() < MAX_FRAME {
         let _ = buffer.extend_from_slice(bytes);
     }
 }
 
-fn finish(buffer: &mut FrameBuffer) {
+fn finish(buffer: &mut ServoFrameBuffer) {
     let [length, ..] = (buffer.len() + 1 - UNCOUNTED).to_le_bytes();
     if let Some(field) = buffer.get_mut(3) {
         *field = length;
@@ -145,7 +145,7 @@ fn checksum(bytes: &[u8]) -> u8 {
 /// A complete frame with a correct checksum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Frame<'a> {
+pub struct ServoFrame<'a> {
     /// The servo that receives or sends the frame.
     pub id: u8,
     /// To a servo: the code of the instruction. From a servo: the [`error`] bits.

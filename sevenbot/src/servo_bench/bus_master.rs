@@ -6,7 +6,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use motion_core::servo_bus::frame::{self, Decoder, Frame, FrameBuffer, Instruction};
+use motion_core::servo_bus::frame::{self, Decoder, Instruction, ServoFrame, ServoFrameBuffer};
 
 use tracing::trace;
 
@@ -153,7 +153,7 @@ impl BusMaster {
     /// # Errors
     /// The port failed.
     pub fn send_write(&mut self, id: u8, register: u8, values: &[u8]) -> Result<(), ServoError> {
-        let mut request = FrameBuffer::new();
+        let mut request = ServoFrameBuffer::new();
         frame::write(&mut request, id, register, values);
         // Wait for the acknowledgement, or as long as a servo needs to take the values.
         self.exchange(&request, IDLE_TIME, |answer| answer.id == id && answer.params.is_empty()).map(drop)
@@ -169,9 +169,9 @@ impl BusMaster {
     ) -> Result<Option<ServoReply>, ServoError> {
         // The question for two registers is as long as its answer, so read three.
         let asked = if count == 2 { 3 } else { count };
-        let mut request = FrameBuffer::new();
+        let mut request = ServoFrameBuffer::new();
         frame::read(&mut request, id, register, asked);
-        let is_answer = |frame: &Frame<'_>| frame.id == id && frame.params.len() == usize::from(asked);
+        let is_answer = |frame: &ServoFrame<'_>| frame.id == id && frame.params.len() == usize::from(asked);
         let answer = self.exchange(&request, timeout, is_answer)?;
         Ok(answer.map(|mut answer| {
             answer.values.truncate(usize::from(count));
@@ -212,7 +212,7 @@ impl BusMaster {
         &mut self,
         request: &[u8],
         timeout: Duration,
-        is_answer: impl Fn(&Frame<'_>) -> bool,
+        is_answer: impl Fn(&ServoFrame<'_>) -> bool,
     ) -> Result<Option<ServoReply>, ServoError> {
         self.wait_for_silence(Duration::ZERO)?;
         trace!("-> {request:02x?}");
@@ -239,7 +239,11 @@ impl BusMaster {
     }
 
     /// Searches the received bytes for the answer. Keeps the bytes after it.
-    fn find_answer(&mut self, request: &[u8], is_answer: impl Fn(&Frame<'_>) -> bool) -> Option<ServoReply> {
+    fn find_answer(
+        &mut self,
+        request: &[u8],
+        is_answer: impl Fn(&ServoFrame<'_>) -> bool,
+    ) -> Option<ServoReply> {
         loop {
             while let Some(found) = self.decoder.pull() {
                 match found {
@@ -268,7 +272,7 @@ impl BusMaster {
 }
 
 /// Is this frame an echo of the request or of an earlier question? No answer with two values is expected.
-fn is_echo(frame: &Frame<'_>, request: &[u8]) -> bool {
+fn is_echo(frame: &ServoFrame<'_>, request: &[u8]) -> bool {
     if let [_, _, id, _, code, params @ .., _] = request
         && (frame.id, frame.code, frame.params) == (*id, *code, params)
     {

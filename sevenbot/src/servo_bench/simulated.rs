@@ -6,7 +6,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use arm_sim::servo::{Servo, ServoConfig, ServoFault};
-use motion_core::servo_bus::frame::{Decoder, Frame};
+use motion_core::servo_bus::frame::{Decoder, ServoFrame};
 use protocol_core::registers::Joint;
 use protocol_core::time::Instant;
 
@@ -49,7 +49,7 @@ impl SimulatedServo {
     }
 
     /// The answer to a frame, and when it arrives.
-    fn answer(&mut self, now: Duration, frame: &Frame<'_>) -> Option<(Duration, Vec<u8>)> {
+    fn answer(&mut self, now: Duration, frame: &ServoFrame<'_>) -> Option<(Duration, Vec<u8>)> {
         if now >= self.fails_at {
             self.set_fault(Some(ServoFault::Missing));
         }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use arm_sim::servo::ServoFault;
 use motion_core::servo_bus::Torque;
-use motion_core::servo_bus::frame::{FrameBuffer, error, register, write};
+use motion_core::servo_bus::frame::{ServoFrameBuffer, error, register, write};
 use protocol_core::time::{Duration as SimulatedDuration, Instant};
 
 use super::bus_master::BusMaster;
@@ -34,7 +34,7 @@ fn late(micros: u64) -> ServoFault {
 /// Writes a register of the EEPROM.
 fn set(simulated: &mut SimulatedServo, register: u8, values: &[u8]) {
     for (register, values) in [(register::LOCK, [0].as_slice()), (register, values), (register::LOCK, &[1])] {
-        let mut request = FrameBuffer::new();
+        let mut request = ServoFrameBuffer::new();
         write(&mut request, simulated.servo.id(), register, values);
         let mut decoder = motion_core::servo_bus::frame::Decoder::new();
         decoder.push(&request);

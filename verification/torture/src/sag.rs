@@ -12,7 +12,7 @@ use arm_sim::servo::ServoFault;
 use arm_sim::simulation::{ArmConfig, Simulation};
 use motion_core::TorqueCodes;
 use motion_core::servo_bus::Torque;
-use motion_core::servo_bus::frame::{FrameBuffer as ServoFrame, register, sync_write};
+use motion_core::servo_bus::frame::{ServoFrameBuffer, register, sync_write};
 use protocol_core::registers::map::TARGET_POSITION;
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::request::Request;
@@ -166,7 +166,7 @@ impl PosedArm {
     }
 
     fn panic(&mut self) {
-        let mut frame = ServoFrame::new();
+        let mut frame = ServoFrameBuffer::new();
         let damping = [TorqueCodes::default().code(Torque::Damping)];
         sync_write(
             &mut frame,

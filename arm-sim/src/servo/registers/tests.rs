@@ -6,8 +6,8 @@ const READING: Reading =
     Reading { position_counts: 511, speed: -300, load: 45, voltage_decivolts: 74, temperature_celsius: 31 };
 
 /// The answer of the servo to an encoded frame; empty if there is none.
-fn answer(servo: &mut ServoRegisters, encode: impl FnOnce(&mut FrameBuffer)) -> Vec<u8> {
-    let (mut buffer, mut decoder) = (FrameBuffer::new(), frame::Decoder::new());
+fn answer(servo: &mut ServoRegisters, encode: impl FnOnce(&mut ServoFrameBuffer)) -> Vec<u8> {
+    let (mut buffer, mut decoder) = (ServoFrameBuffer::new(), frame::Decoder::new());
     encode(&mut buffer);
     decoder.push(&buffer);
     let heard = decoder.pull().unwrap().unwrap();
@@ -56,7 +56,7 @@ fn a_broadcast_is_executed_and_not_answered() {
 
 #[test]
 fn each_servo_uses_its_own_item_of_a_sync_write() {
-    let goals = |b: &mut FrameBuffer| {
+    let goals = |b: &mut ServoFrameBuffer| {
         let item = |id: u8| (id, [1, id, 0, 10 + id, 2, 20 + id]);
         sync_write(b, register::GOAL_POSITION, [4, 2, 6].map(item).into_iter());
     };
@@ -149,10 +149,10 @@ fn malformed_instructions_are_not_answered() {
     for (code, params) in
         [(1, [].as_slice()), (2, &[56]), (2, &[56, 8, 0]), (3, &[]), (0x83, &[40]), (9, &[])]
     {
-        let is_answered = servo.handle_frame(&Frame { id: 0, code, params }).is_some();
+        let is_answered = servo.handle_frame(&ServoFrame { id: 0, code, params }).is_some();
         assert_eq!(is_answered, code == 1, "instruction {code}, {params:?}");
     }
-    servo.handle_frame(&Frame { id: BROADCAST, code: 0x83, params: &[40, 1, 0] });
-    servo.handle_frame(&Frame { id: BROADCAST, code: 0x83, params: &[40, 255, 0, 1] });
+    servo.handle_frame(&ServoFrame { id: BROADCAST, code: 0x83, params: &[40, 1, 0] });
+    servo.handle_frame(&ServoFrame { id: BROADCAST, code: 0x83, params: &[40, 255, 0, 1] });
     assert_eq!(servo.torque_switch(), 0, "a truncated item is ignored");
 }

@@ -36,7 +36,7 @@ struct CountedController {
     controller: Controller,
     servos: ScriptedServos,
     /// A reply that the controller has not received yet.
-    reply: frame::FrameBuffer,
+    reply: frame::ServoFrameBuffer,
     /// Most instructions of a single call of `poll`.
     longest_call: u32,
 }
@@ -54,7 +54,7 @@ fn main() -> ! {
         meter: Meter::default(),
         controller: opaque(Controller::new(Instant::ZERO, config, None, Storage::Ready)),
         servos: ScriptedServos { positions: [511; 7] },
-        reply: frame::FrameBuffer::new(),
+        reply: frame::ServoFrameBuffer::new(),
         longest_call: 0,
     };
     (0..START_MILLIS).for_each(|millis| _ = rig.step(millis));
@@ -126,7 +126,7 @@ struct ScriptedServos {
 
 impl ScriptedServos {
     /// The reply to a frame of the controller.
-    fn reply_to(&mut self, bytes: &[u8]) -> Option<frame::FrameBuffer> {
+    fn reply_to(&mut self, bytes: &[u8]) -> Option<frame::ServoFrameBuffer> {
         match bytes {
             [0xFF, 0xFF, frame::BROADCAST, _, SYNC_WRITE, register::GOAL_POSITION, 6, items @ .., _] => {
                 for item in items.chunks_exact(7) {
@@ -139,7 +139,7 @@ impl ScriptedServos {
                 let [high, low] = self.positions.get(usize::from(id))?.to_be_bytes();
                 // Position, speed, load, 7.4 V, 30 degrees, and registers that are 0.
                 let values = [high, low, 0, 0, 0, 0, 74, 30, 0, 0, 0];
-                let mut reply = frame::FrameBuffer::new();
+                let mut reply = frame::ServoFrameBuffer::new();
                 frame::status(&mut reply, id, 0, values.get(..usize::from(count))?);
                 Some(reply)
             }

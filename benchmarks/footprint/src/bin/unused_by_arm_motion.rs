@@ -10,7 +10,7 @@ use motion_core::drive::Drive;
 use motion_core::motor_state::MotorState;
 use motion_core::position_filter::PositionFilter;
 use motion_core::report_timer::ReportTimer;
-use motion_core::servo_bus::frame::{self, Decoder, FrameBuffer, Instruction, Reading};
+use motion_core::servo_bus::frame::{self, Decoder, Instruction, Reading, ServoFrameBuffer};
 use motion_core::servo_bus::{Bus, Torque, TorqueCodes};
 use motion_core::trajectory::Trajectory;
 use motion_core::vacuum::VacuumControl;
@@ -68,7 +68,7 @@ fn timers() {
 }
 
 fn servo_frames() {
-    let mut buffer = FrameBuffer::new();
+    let mut buffer = ServoFrameBuffer::new();
     frame::ping(&mut buffer, opaque(0));
     frame::read(&mut buffer, opaque(0), opaque(0), opaque(0));
     frame::write(&mut buffer, opaque(0), opaque(0), any_bytes());

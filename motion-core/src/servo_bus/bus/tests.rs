@@ -17,7 +17,7 @@ fn reading() -> Reading {
 }
 
 fn answer_of(id: u8, error: u8) -> Vec<u8> {
-    let mut buffer = FrameBuffer::new();
+    let mut buffer = ServoFrameBuffer::new();
     status(&mut buffer, id, error, &reading().to_bytes());
     buffer.to_vec()
 }
@@ -115,7 +115,7 @@ fn a_late_answer_of_the_same_servo_is_recognised_by_its_length() {
     assert_eq!(bus.frame()[6], 9, "one more register");
     bus.bytes(at(4_300), &answer_of(2, 0));
     assert_eq!(bus.poll(at(4_300)), None, "the answer to the first read");
-    let mut longer = FrameBuffer::new();
+    let mut longer = ServoFrameBuffer::new();
     status(&mut longer, 2, 0, &[reading().to_bytes().as_slice(), &[0]].concat());
     bus.bytes(at(4_400), &longer);
     assert_eq!(bus.poll(at(4_400)), measured(0));
@@ -125,7 +125,7 @@ fn a_late_answer_of_the_same_servo_is_recognised_by_its_length() {
 fn an_answer_with_an_invalid_position_is_a_failure() {
     let mut bus = bus();
     bus.ask(at(0), J3);
-    let mut buffer = FrameBuffer::new();
+    let mut buffer = ServoFrameBuffer::new();
     status(&mut buffer, 2, 0, &[0xFF; 8]);
     bus.bytes(at(100), &buffer);
     assert_eq!(bus.poll(at(100)), None);

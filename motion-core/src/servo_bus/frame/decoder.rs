@@ -1,6 +1,6 @@
 //! Splits the bytes of the servo bus into frames, and re-synchronises after damage.
 
-use super::{ENVELOPE, Frame, MAX_FRAME, UNCOUNTED, checksum};
+use super::{ENVELOPE, MAX_FRAME, ServoFrame, UNCOUNTED, checksum};
 
 /// A frame of full length has a wrong checksum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,8 +16,8 @@ pub struct Decoder {
 }
 
 /// What [`parse`] finds at the beginning of its input.
-enum ParseOutcome<'a> {
-    Complete(Frame<'a>),
+enum DecodeOutcome<'a> {
+    Complete(ServoFrame<'a>),
     WrongChecksum,
     Incomplete,
     NotAFrame,
@@ -46,16 +46,16 @@ impl Decoder {
 
     /// The next frame or wrong checksum; `None` once more bytes are needed. Call it until then. After a wrong checksum
     /// the search continues with the next byte, so a damaged frame does not cost the next one.
-    pub fn pull(&mut self) -> Option<Result<Frame<'_>, WrongChecksum>> {
+    pub fn pull(&mut self) -> Option<Result<ServoFrame<'_>, WrongChecksum>> {
         loop {
             match parse(self.buffer.get(self.head..)?) {
-                ParseOutcome::Incomplete => return None,
-                ParseOutcome::NotAFrame => self.head += 1,
-                ParseOutcome::WrongChecksum => {
+                DecodeOutcome::Incomplete => return None,
+                DecodeOutcome::NotAFrame => self.head += 1,
+                DecodeOutcome::WrongChecksum => {
                     self.head += 1;
                     return Some(Err(WrongChecksum));
                 }
-                ParseOutcome::Complete(frame) => {
+                DecodeOutcome::Complete(frame) => {
                     self.head += ENVELOPE + frame.params.len();
                     return Some(Ok(frame));
                 }
@@ -78,25 +78,27 @@ impl Decoder {
 }
 
 /// Parses the frame at the beginning of `bytes`. No servo has the id FF, so after FF FF FF the header is one byte on.
-fn parse(bytes: &[u8]) -> ParseOutcome<'_> {
+fn parse(bytes: &[u8]) -> DecodeOutcome<'_> {
     match bytes {
-        [] | [0xFF] | [0xFF, 0xFF] => ParseOutcome::Incomplete,
-        [0xFF, 0xFF, 0xFF, ..] => ParseOutcome::NotAFrame,
+        [] | [0xFF] | [0xFF, 0xFF] => DecodeOutcome::Incomplete,
+        [0xFF, 0xFF, 0xFF, ..] => DecodeOutcome::NotAFrame,
         [0xFF, 0xFF, rest @ ..] => parse_body(rest),
-        _ => ParseOutcome::NotAFrame,
+        _ => DecodeOutcome::NotAFrame,
     }
 }
 
 /// Parses the bytes behind the header.
-fn parse_body(body: &[u8]) -> ParseOutcome<'_> {
-    let Some(&length) = body.get(1) else { return ParseOutcome::Incomplete };
+fn parse_body(body: &[u8]) -> DecodeOutcome<'_> {
+    let Some(&length) = body.get(1) else { return DecodeOutcome::Incomplete };
     let length = usize::from(length);
     if !(2..=MAX_FRAME - UNCOUNTED).contains(&length) {
-        return ParseOutcome::NotAFrame;
+        return DecodeOutcome::NotAFrame;
     }
     match body.get(..2 + length) {
-        Some([covered @ .., sum]) if checksum(covered) != *sum => ParseOutcome::WrongChecksum,
-        Some([id, _, code, params @ .., _]) => ParseOutcome::Complete(Frame { id: *id, code: *code, params }),
-        _ => ParseOutcome::Incomplete,
+        Some([covered @ .., sum]) if checksum(covered) != *sum => DecodeOutcome::WrongChecksum,
+        Some([id, _, code, params @ .., _]) => {
+            DecodeOutcome::Complete(ServoFrame { id: *id, code: *code, params })
+        }
+        _ => DecodeOutcome::Incomplete,
     }
 }

@@ -2,7 +2,7 @@
 
 use arm_sim::servo::ServoFault;
 use motion_core::servo_bus::Torque;
-use motion_core::servo_bus::frame::{FrameBuffer, register, sync_write};
+use motion_core::servo_bus::frame::{ServoFrameBuffer, register, sync_write};
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::MISSING_SERVOS;
 use protocol_core::time::Duration;
@@ -129,7 +129,7 @@ impl TortureWorld {
     /// The controller panics: its panic handler sends damping to all servos three times and restarts.
     fn panic(&mut self, arm: &PoweredArm) {
         self.power_down(arm, false);
-        let mut frame = FrameBuffer::new();
+        let mut frame = ServoFrameBuffer::new();
         let code = self.bus.torque_codes().code(Torque::Damping);
         let items = Joint::ALL.into_iter().map(|joint| (joint.index(), [code]));
         sync_write(&mut frame, register::TORQUE_SWITCH, items);

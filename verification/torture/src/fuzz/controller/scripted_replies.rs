@@ -1,6 +1,6 @@
 //! Scripted replies in place of seven servos: each position is the last goal. There is no time and no motion.
 
-use motion_core::servo_bus::frame::{Decoder, FrameBuffer, Instruction, Reading, register, status};
+use motion_core::servo_bus::frame::{Decoder, Instruction, Reading, ServoFrameBuffer, register, status};
 
 /// A decoded command. Servos count from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ impl ScriptedReplies {
     }
 
     /// Executes a command. Returns the reply.
-    pub fn execute(&mut self, command: &ServoCommand) -> Option<FrameBuffer> {
+    pub fn execute(&mut self, command: &ServoCommand) -> Option<ServoFrameBuffer> {
         match command {
             ServoCommand::Read(id, count) if self.responding >> id & 1 == 1 => Some(self.answer(*id, *count)),
             ServoCommand::Goals(goals) => {
@@ -37,7 +37,7 @@ impl ScriptedReplies {
         }
     }
 
-    fn answer(&mut self, id: u8, count: u8) -> FrameBuffer {
+    fn answer(&mut self, id: u8, count: u8) -> ServoFrameBuffer {
         self.reported_positions[usize::from(id)] = self.counts[usize::from(id)];
         let reading = Reading {
             position_counts: self.counts[usize::from(id)],
@@ -46,7 +46,7 @@ impl ScriptedReplies {
             voltage_decivolts: 74,
             temperature_celsius: 30,
         };
-        let mut frame = FrameBuffer::new();
+        let mut frame = ServoFrameBuffer::new();
         let mut values = reading.to_bytes().to_vec();
         values.resize(count.into(), 0);
         status(&mut frame, id, 0, &values);
