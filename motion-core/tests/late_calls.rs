@@ -46,3 +46,14 @@ fn engaged_joints_stay_engaged_after_a_late_call() {
     assert!(all > 0 && all == rig.goals().count(), "{:?}", rig.to_servos);
     assert!(rig.torques().all(|torques| torques == [Some(1); 7]), "{:?}", rig.to_servos);
 }
+
+#[test]
+fn a_servo_whose_positions_jump_counts_as_missing() {
+    let mut rig = Rig::started();
+    rig.write(29, &[2]);
+    for counts in [200, 800].into_iter().cycle().take(40) {
+        rig.hand(1, counts);
+        rig.run_ms(10);
+    }
+    assert_eq!(rig.get(242), 1);
+}

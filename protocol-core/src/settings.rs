@@ -93,6 +93,7 @@ mod tests {
     fn saved_settings_are_found_at_the_next_start() {
         let mut settings = Settings::open(Flash::<SECTOR>::new(2));
         assert_eq!((settings.found(), settings.storage()), (None, Storage::Ready));
+        assert_eq!(settings.opened(), &Opened::Fresh);
         assert_eq!(settings.save(&IMAGE), Storage::Ready);
         let settings = Settings::open(settings.journal.release());
         assert_eq!((settings.found(), settings.storage()), (Some(&IMAGE), Storage::Ready));
@@ -101,7 +102,7 @@ mod tests {
     #[test]
     fn the_save_that_uses_the_last_slot_reports_a_full_storage() {
         let mut settings = Settings::open(Flash::<SECTOR>::new(2));
-        let room = settings.journal.room();
+        let room = settings.room();
         for save in 1..room {
             assert_eq!(settings.save(&image(save)), Storage::Ready, "save {save} of {room}");
         }

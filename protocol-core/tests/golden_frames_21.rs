@@ -192,3 +192,15 @@ fn an_alarm_is_no_range_of_registers() {
         |deframer| assert_eq!(Alarm::from_frame(deframer.pull().unwrap().unwrap()), Some(alarm)),
     );
 }
+
+#[test]
+fn a_reply_is_neither_a_report_nor_an_alarm() {
+    let reply = Reply { address: 83, values: &[90] };
+    both_ways::<ToHost>(
+        |buffer| reply.encode(buffer),
+        |deframer| {
+            let frame = deframer.pull().unwrap().unwrap();
+            assert_eq!((Report::from_frame(frame), Alarm::from_frame(frame)), (None, None));
+        },
+    );
+}

@@ -132,3 +132,22 @@ pub fn find_readable(address: u8) -> Option<&'static Register> {
     let open = |row: &&Register| row.access != super::Access::Reserved;
     find(address).filter(open).or_else(|| Map::V21.find(address)).or_else(|| find(address))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_has_its_version_and_its_rows() {
+        assert_eq!(Map::ALL.map(Map::version), ["2.2", "2.1"]);
+        assert_eq!(Map::ALL.map(Map::rows), [map::MAP, MAP_21]);
+        assert_eq!(Map::V21.find(90), Some(&LOAD_FEEDBACK_FREQUENCY));
+        assert_eq!(Map::V22.find(90), None);
+    }
+
+    #[test]
+    fn a_builder_sets_the_range_of_the_offsets() {
+        // In the tables it runs at compile time.
+        assert_eq!(eeprom(13).biased(16).range, OFFSET.range);
+    }
+}
