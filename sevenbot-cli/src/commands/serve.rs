@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot_serve::server::{Access, Notice, Server, ServerConfig};
+use sevenbot_serve::server::{AccessPolicy, Notice, Server, ServerConfig};
 
 use crate::command_error::CommandError;
 use crate::printer::{Printable, note, warn};
@@ -93,7 +93,7 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
         ptys: args.pty.clone(),
         tcp: args.tcp.map(|port| SocketAddr::new(args.listen, port)),
         web_socket: args.ws.map(|port| SocketAddr::new(args.listen, port)),
-        access: Access { token: args.token.clone(), allows_any_page: args.maker_pages },
+        access: AccessPolicy { token: args.token.clone(), allows_any_page: args.maker_pages },
         is_read_only: args.read_only,
     };
     // Before the links are created: Ctrl-C has to remove them.

@@ -10,7 +10,7 @@ use protocol_core::time::Instant;
 use protocol_core::wire::Function;
 use serde_json::{Value, json};
 
-use super::command::{Command, CommandError};
+use super::command::{MakerCommand, MakerCommandError};
 use crate::hub::{ClientId, Event, Hub, MOST_WAITING, WholeRequest};
 
 /// Answers that may wait for a client to take them. Its commands wait meanwhile.
@@ -21,9 +21,9 @@ const MOST_ANSWERS: usize = 8;
 pub struct MakerClient {
     id: ClientId,
     is_browser: bool,
-    waiting: VecDeque<Result<Command, CommandError>>,
+    waiting: VecDeque<Result<MakerCommand, MakerCommandError>>,
     /// The command whose read has no reply yet.
-    current: Option<Command>,
+    current: Option<MakerCommand>,
     /// The first of two events that the command waits for.
     first: Option<Event>,
     answers: VecDeque<String>,
@@ -57,7 +57,7 @@ impl MakerClient {
 
     /// Takes a message. Call it only if [`MakerClient::has_room`].
     pub fn message(&mut self, text: &str) {
-        self.waiting.push_back(Command::parse(text));
+        self.waiting.push_back(MakerCommand::parse(text));
     }
 
     /// Carries out commands, as far as possible. Call it after messages, after [`Hub::poll`] and [`Hub::arm_bytes`].
@@ -76,21 +76,21 @@ impl MakerClient {
         self.answers.pop_front()
     }
 
-    fn start(&mut self, hub: &mut Hub, now: Instant, command: Result<Command, CommandError>) {
+    fn start(&mut self, hub: &mut Hub, now: Instant, command: Result<MakerCommand, MakerCommandError>) {
         match command {
-            Err(CommandError { message, is_read }) => self.answer(is_read, &error(&message)),
-            Ok(Command::Ping) => {
+            Err(MakerCommandError { message, is_read }) => self.answer(is_read, &error(&message)),
+            Ok(MakerCommand::Ping) => {
                 self.answer(false, &json!({"status": "pong", "timestamp": now.as_micros() / 1_000}));
             }
-            Ok(Command::Write { address, values, done }) => {
+            Ok(MakerCommand::Write { address, values, done }) => {
                 hub.request(self.id, write(address, values));
                 self.answer(false, &message(done));
             }
-            Ok(Command::Read { address, count }) => {
+            Ok(MakerCommand::Read { address, count }) => {
                 hub.request(self.id, WholeRequest::Read { address, count });
-                self.current = Some(Command::Read { address, count });
+                self.current = Some(MakerCommand::Read { address, count });
             }
-            Ok(Command::InverseKinematics { address, values }) => {
+            Ok(MakerCommand::InverseKinematics { address, values }) => {
                 let request = WholeRequest::WriteBetweenReads {
                     function: Function::WriteMap21,
                     address,
@@ -98,12 +98,12 @@ impl MakerClient {
                     read: (FRAMES_REFUSED.address, FRAMES_REFUSED.count),
                 };
                 hub.request(self.id, request);
-                self.current = Some(Command::InverseKinematics { address, values });
+                self.current = Some(MakerCommand::InverseKinematics { address, values });
             }
-            Ok(Command::Stop) => {
+            Ok(MakerCommand::Stop) => {
                 let (address, count) = (PRESENT_POSITION.address, PRESENT_POSITION.count);
                 hub.request(self.id, WholeRequest::Read { address, count });
-                self.current = Some(Command::Stop);
+                self.current = Some(MakerCommand::Stop);
             }
         }
     }
@@ -111,13 +111,13 @@ impl MakerClient {
     fn finish_read(&mut self, hub: &mut Hub, event: Event) {
         match (self.current.take(), event) {
             (
-                Some(command @ Command::InverseKinematics { .. }),
+                Some(command @ MakerCommand::InverseKinematics { .. }),
                 event @ (Event::Reply { .. } | Event::NoReply { .. }),
             ) => match self.first.take() {
                 None => (self.first, self.current) = (Some(event), Some(command)),
                 Some(before) => self.answer(false, &solution(&before, &event)),
             },
-            (Some(Command::Stop), Event::Reply { values, .. }) => {
+            (Some(MakerCommand::Stop), Event::Reply { values, .. }) => {
                 hub.request(self.id, write(TARGET_POSITION.address, values));
                 self.answer(false, &message("Stopped"));
             }
@@ -125,7 +125,7 @@ impl MakerClient {
                 self.answer(true, &json!({"status": "ok", "data": values}))
             }
             (Some(command), Event::NoReply { .. }) => {
-                let is_read = matches!(command, Command::Read { .. });
+                let is_read = matches!(command, MakerCommand::Read { .. });
                 self.answer(is_read, &error("The arm does not answer"));
             }
             // Nothing is pushed: the programs of the maker take any message for an answer.

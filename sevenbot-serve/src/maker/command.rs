@@ -10,7 +10,7 @@ use super::block::Block;
 
 /// What a message asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Command {
+pub enum MakerCommand {
     /// Whether the server is there.
     Ping,
     /// Reads registers.
@@ -42,20 +42,20 @@ pub enum Command {
 
 /// Why a message is no command.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CommandError {
+pub struct MakerCommandError {
     /// The text for the client.
     pub message: String,
     /// The message wanted a read: its sender waits for an answer.
     pub is_read: bool,
 }
 
-impl Command {
+impl MakerCommand {
     /// Parses a message.
     ///
     /// # Errors
-    /// See [`CommandError`].
-    pub fn parse(text: &str) -> Result<Self, CommandError> {
-        let failed = |is_read| move |message| CommandError { message, is_read };
+    /// See [`MakerCommandError`].
+    pub fn parse(text: &str) -> Result<Self, MakerCommandError> {
+        let failed = |is_read| move |message| MakerCommandError { message, is_read };
         let message: Value =
             serde_json::from_str(text).map_err(|_| failed(false)("Invalid JSON format".to_owned()))?;
         let Some(name) = message.get("cmd") else {
@@ -66,10 +66,10 @@ impl Command {
     }
 }
 
-fn parse_named(name: &str, message: &Value) -> Result<Command, String> {
+fn parse_named(name: &str, message: &Value) -> Result<MakerCommand, String> {
     match name {
-        "ping" => Ok(Command::Ping),
-        "stop" => Ok(Command::Stop),
+        "ping" => Ok(MakerCommand::Ping),
+        "stop" => Ok(MakerCommand::Stop),
         "read" => read(message),
         "write" => write(message),
         "angle" => angle(message),
@@ -85,16 +85,16 @@ fn parse_named(name: &str, message: &Value) -> Result<Command, String> {
     }
 }
 
-fn read(message: &Value) -> Result<Command, String> {
+fn read(message: &Value) -> Result<MakerCommand, String> {
     let missing = "Missing id or num parameters for read command";
     let (first, number) = (whole(message, "id", missing)?, whole(message, "num", missing)?);
     match (u8::try_from(first), u8::try_from(number)) {
-        (Ok(address), Ok(count @ 1..)) if first + number <= 256 => Ok(Command::Read { address, count }),
+        (Ok(address), Ok(count @ 1..)) if first + number <= 256 => Ok(MakerCommand::Read { address, count }),
         _ => Err("Invalid id or num range".to_owned()),
     }
 }
 
-fn write(message: &Value) -> Result<Command, String> {
+fn write(message: &Value) -> Result<MakerCommand, String> {
     let missing = "Missing id, num, or value parameters for write command";
     let (first, number) = (whole(message, "id", missing)?, whole(message, "num", missing)?);
     let values = message.get("value").ok_or(missing)?;
@@ -104,7 +104,7 @@ fn write(message: &Value) -> Result<Command, String> {
     let is_whole = usize::try_from(number) == Ok(bytes.len()) && !bytes.is_empty();
     match u8::try_from(first) {
         Ok(address) if is_whole && first + number <= 256 => {
-            Ok(Command::Write { address, values: bytes, done: "Values written" })
+            Ok(MakerCommand::Write { address, values: bytes, done: "Values written" })
         }
         _ => Err("Invalid id or num range".to_owned()),
     }
@@ -115,13 +115,13 @@ fn byte(value: i64) -> Option<u8> {
     u8::try_from(value).ok().or_else(|| i8::try_from(value).ok().map(i8::cast_unsigned))
 }
 
-fn angle(message: &Value) -> Result<Command, String> {
+fn angle(message: &Value) -> Result<MakerCommand, String> {
     let missing = "Missing id or angle parameters";
     let joint = whole(message, "id", missing)?;
     let angle = message.get("angle").and_then(Value::as_f64).ok_or(missing)?;
     let value = rounded(angle, 180).ok_or("Invalid id or angle value")?;
     match u8::try_from(joint) {
-        Ok(joint) if usize::from(joint) < JOINTS => Ok(Command::Write {
+        Ok(joint) if usize::from(joint) < JOINTS => Ok(MakerCommand::Write {
             address: TARGET_POSITION.address + joint,
             values: vec![value],
             done: "Angle set",
@@ -130,7 +130,7 @@ fn angle(message: &Value) -> Result<Command, String> {
     }
 }
 
-fn angles(message: &Value) -> Result<Command, String> {
+fn angles(message: &Value) -> Result<MakerCommand, String> {
     let angles = message.get("angles").ok_or("Missing angles parameter")?.as_array();
     let angles = angles.filter(|angles| !angles.is_empty()).ok_or("angles array is empty or invalid")?;
     if angles.len() != JOINTS {
@@ -141,7 +141,7 @@ fn angles(message: &Value) -> Result<Command, String> {
         rounded(angle, 180).ok_or_else(|| format!("angles[{index}] = {angle} is out of range [0, 180]"))
     };
     let values = angles.iter().enumerate().map(value).collect::<Result<_, _>>()?;
-    Ok(Command::Write { address: TARGET_POSITION.address, values, done: "Angles set" })
+    Ok(MakerCommand::Write { address: TARGET_POSITION.address, values, done: "Angles set" })
 }
 
 fn each_joint(
@@ -150,35 +150,35 @@ fn each_joint(
     name: &str,
     invalid: &str,
     done: &'static str,
-) -> Result<Command, String> {
+) -> Result<MakerCommand, String> {
     let value = whole(message, name, &format!("Missing {name} parameter"))?;
     let value = u8::try_from(value).ok().filter(|&value| row.range.contains(value)).ok_or(invalid)?;
-    Ok(Command::Write { address: row.address, values: vec![value; JOINTS], done })
+    Ok(MakerCommand::Write { address: row.address, values: vec![value; JOINTS], done })
 }
 
-fn status(message: &Value) -> Result<Command, String> {
+fn status(message: &Value) -> Result<MakerCommand, String> {
     let (value, done) = match whole(message, "status", "Missing status parameter")? {
         0 => (0, "Protection mode enabled"),
         1 => (1, "Servo mode enabled"),
         2 => (2, "Forceless mode enabled"),
         _ => return Err("Invalid status value (0 for protection, 1 for servo, 2 for forceless)".to_owned()),
     };
-    Ok(Command::Write { address: MOTOR_STATE.address, values: vec![value], done })
+    Ok(MakerCommand::Write { address: MOTOR_STATE.address, values: vec![value], done })
 }
 
-fn vacuum(message: &Value) -> Result<Command, String> {
+fn vacuum(message: &Value) -> Result<MakerCommand, String> {
     let invalid = "Invalid vacuum status (0 or 1)";
     let (value, done) = match whole(message, "status", invalid)? {
         0 => (0, "Vacuum off"),
         1 => (1, "Vacuum on"),
         _ => return Err(invalid.to_owned()),
     };
-    Ok(Command::Write { address: VACUUM_PUMP.address, values: vec![value], done })
+    Ok(MakerCommand::Write { address: VACUUM_PUMP.address, values: vec![value], done })
 }
 
-fn inverse_kinematics(block: Block, message: &Value) -> Result<Command, String> {
+fn inverse_kinematics(block: Block, message: &Value) -> Result<MakerCommand, String> {
     let values = block.values(message)?;
-    Ok(Command::InverseKinematics { address: block.address(), values })
+    Ok(MakerCommand::InverseKinematics { address: block.address(), values })
 }
 
 /// A parameter that is a whole number.
@@ -201,17 +201,17 @@ mod tests {
     use super::*;
 
     fn written(text: &str) -> (u8, Vec<u8>) {
-        match Command::parse(text).unwrap() {
-            Command::Write { address, values, .. } => (address, values),
+        match MakerCommand::parse(text).unwrap() {
+            MakerCommand::Write { address, values, .. } => (address, values),
             other => panic!("{other:?}"),
         }
     }
 
     #[test]
     fn messages_of_the_makers_programs_are_commands() {
-        assert_eq!(Command::parse(r#"{"cmd":"ping"}"#), Ok(Command::Ping));
-        let read = Command::parse(r#"{"cmd":"read","id":83,"num":7}"#);
-        assert_eq!(read, Ok(Command::Read { address: 83, count: 7 }));
+        assert_eq!(MakerCommand::parse(r#"{"cmd":"ping"}"#), Ok(MakerCommand::Ping));
+        let read = MakerCommand::parse(r#"{"cmd":"read","id":83,"num":7}"#);
+        assert_eq!(read, Ok(MakerCommand::Read { address: 83, count: 7 }));
         assert_eq!(written(r#"{"cmd":"angle","id":6,"angle":80}"#), (52, vec![80]));
         let angles = r#"{"cmd":"angles","angles":[90,90.4,65,90,90,90,79.6]}"#;
         assert_eq!(written(angles), (46, vec![90, 90, 65, 90, 90, 90, 80]));
@@ -240,7 +240,7 @@ mod tests {
             (r#"{"cmd":"vacuum"}"#, "Invalid vacuum status (0 or 1)"),
         ];
         for (text, message) in cases {
-            let error = Command::parse(text).unwrap_err();
+            let error = MakerCommand::parse(text).unwrap_err();
             assert_eq!((error.message.as_str(), error.is_read), (message, text.contains("read")), "{text}");
         }
     }

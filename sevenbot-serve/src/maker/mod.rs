@@ -1,7 +1,7 @@
 //! The maker's WebSocket: JSON messages in place of frames (maker's firmware 2.1.4).
 //!
 //! ```text
-//!   text ──▶ Command ──▶ MakerClient ──▶ Hub
+//!   text ──▶ MakerCommand ──▶ MakerClient ──▶ Hub
 //!   text ◀── answer  ◀── MakerClient ◀── Hub
 //! ```
 
@@ -10,4 +10,4 @@ pub mod client;
 pub mod command;
 
 pub use client::MakerClient;
-pub use command::Command;
+pub use command::MakerCommand;

@@ -20,13 +20,13 @@ const IDENTIFY_TIMEOUT: Duration = Duration::from_millis(3_000);
 pub(crate) struct ArmPort {
     path: PathBuf,
     baud: u32,
-    state: State,
+    state: ArmPortState,
     /// What the last notice said, so that it is not repeated.
     last_notice: Option<Notice>,
 }
 
 #[derive(Debug)]
-enum State {
+enum ArmPortState {
     /// Tried again at this time.
     Closed(Instant),
     /// Opened at this time.
@@ -35,15 +35,15 @@ enum State {
 
 impl ArmPort {
     pub(crate) const fn new(path: PathBuf, baud: u32) -> Self {
-        Self { path, baud, state: State::Closed(Instant::ZERO), last_notice: None }
+        Self { path, baud, state: ArmPortState::Closed(Instant::ZERO), last_notice: None }
     }
 
     /// Opens the port if it is time to, and passes bytes of the arm to the hub.
     pub(crate) fn receive(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
         match &self.state {
-            State::Closed(due) if *due <= now => self.open(hub, now, notify),
-            State::Closed(_) => {}
-            State::Open(port, opened) => {
+            ArmPortState::Closed(due) if *due <= now => self.open(hub, now, notify),
+            ArmPortState::Closed(_) => {}
+            ArmPortState::Open(port, opened) => {
                 let had_arm = hub.has_arm();
                 match read_all(port, hub, now) {
                     Err(error) => self.close(hub, now, notify, &error.to_string()),
@@ -53,7 +53,7 @@ impl ArmPort {
                     Ok(()) if !hub.has_arm() && *opened + IDENTIFY_TIMEOUT <= now => {
                         self.notify(Notice::ArmSilent(self.path.clone()), notify);
                         hub.close_arm();
-                        self.state = State::Closed(now + RETRY_PERIOD);
+                        self.state = ArmPortState::Closed(now + RETRY_PERIOD);
                     }
                     Ok(()) => {}
                 }
@@ -63,7 +63,7 @@ impl ArmPort {
 
     /// Sends the hub's bytes.
     pub(crate) fn send(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
-        let State::Open(port, _) = &self.state else { return };
+        let ArmPortState::Open(port, _) = &self.state else { return };
         if hub.to_arm().is_empty() {
             return;
         }
@@ -76,18 +76,20 @@ impl ArmPort {
     /// When to call [`ArmPort::receive`] without other events.
     pub(crate) fn deadline(&self) -> Instant {
         match &self.state {
-            State::Closed(due) => *due,
+            ArmPortState::Closed(due) => *due,
             // Only while it is not known what is behind the port does the time matter, but then it is short.
-            State::Open(_, opened) if self.last_notice != Some(Notice::ArmFound(self.path.clone())) => {
+            ArmPortState::Open(_, opened)
+                if self.last_notice != Some(Notice::ArmFound(self.path.clone())) =>
+            {
                 *opened + IDENTIFY_TIMEOUT
             }
-            State::Open(..) => Instant::FAR_FUTURE,
+            ArmPortState::Open(..) => Instant::FAR_FUTURE,
         }
     }
 
     /// What poll(2) has to wait for.
     pub(crate) fn interest(&self, hub: &Hub) -> Option<PollFd<'_>> {
-        let State::Open(port, _) = &self.state else { return None };
+        let ArmPortState::Open(port, _) = &self.state else { return None };
         let output = if hub.to_arm().is_empty() { PollFlags::empty() } else { PollFlags::OUT };
         Some(PollFd::new(port, PollFlags::IN | output))
     }
@@ -95,7 +97,7 @@ impl ArmPort {
     fn open(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
         match Serial::open(&self.path, self.baud) {
             Ok(port) => {
-                self.state = State::Open(port, now);
+                self.state = ArmPortState::Open(port, now);
                 hub.open_arm(now);
             }
             Err(error) => self.close(hub, now, notify, &error.to_string()),
@@ -104,7 +106,7 @@ impl ArmPort {
 
     fn close(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice), reason: &str) {
         hub.close_arm();
-        self.state = State::Closed(now + RETRY_PERIOD);
+        self.state = ArmPortState::Closed(now + RETRY_PERIOD);
         self.notify(Notice::ArmLost { port: self.path.clone(), reason: reason.to_owned() }, notify);
     }
 

@@ -9,7 +9,7 @@ use crate::frame_client::FrameClient;
 use crate::hub::Hub;
 
 /// Carries bytes of a client without blocking.
-pub(crate) trait Wire {
+pub(crate) trait ByteStream {
     /// Reads bytes. 0 means that there are none now.
     fn read(&self, bytes: &mut [u8]) -> io::Result<usize>;
     /// Writes bytes, and returns how many were accepted.
@@ -38,7 +38,7 @@ impl FrameConnection {
     }
 
     /// Reads bytes, unless earlier ones wait. Returns the number of bytes.
-    pub(crate) fn read(&mut self, wire: &impl Wire) -> io::Result<usize> {
+    pub(crate) fn read(&mut self, wire: &impl ByteStream) -> io::Result<usize> {
         if !self.input.is_empty() {
             return Ok(0);
         }
@@ -60,7 +60,7 @@ impl FrameConnection {
     }
 
     /// Takes replies and reports from the hub and writes them; without a `wire` they are dropped.
-    pub(crate) fn send(&mut self, hub: &mut Hub, wire: Option<&impl Wire>) -> io::Result<()> {
+    pub(crate) fn send(&mut self, hub: &mut Hub, wire: Option<&impl ByteStream>) -> io::Result<()> {
         self.client.collect(hub);
         let count = match wire {
             Some(_) if self.client.output().is_empty() => 0,

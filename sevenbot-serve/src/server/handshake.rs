@@ -17,7 +17,7 @@ const PATH: &str = "/ws";
 
 /// What a request needs to be accepted.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Access {
+pub struct AccessPolicy {
     /// The secret, if one is needed.
     pub token: Option<String>,
     /// Pages of other sites, and from files, are accepted.
@@ -27,7 +27,7 @@ pub struct Access {
 /// Why a request is refused: the status and a text.
 type Refusal = (StatusCode, &'static str);
 
-impl Access {
+impl AccessPolicy {
     /// Checks a request. Returns whether it came from a browser.
     fn check(&self, request: &Request) -> Result<bool, Refusal> {
         let header = |name: &str| request.headers().get(name).map(|value| value.to_str().unwrap_or_default());
@@ -81,7 +81,7 @@ fn without_port(authority: &str) -> &str {
 /// Checks one request, and notes whether a browser sent it.
 #[derive(Debug)]
 pub(crate) struct Gate {
-    pub(crate) access: Access,
+    pub(crate) access: AccessPolicy,
     pub(crate) is_browser: Rc<Cell<bool>>,
 }
 
@@ -106,14 +106,14 @@ impl Callback for Gate {
 mod tests {
     use super::*;
 
-    fn check(access: &Access, uri: &str, headers: &[(&str, &str)]) -> Result<bool, StatusCode> {
+    fn check(access: &AccessPolicy, uri: &str, headers: &[(&str, &str)]) -> Result<bool, StatusCode> {
         let request = headers
             .iter()
             .fold(Request::builder().uri(uri), |request, (name, value)| request.header(*name, *value));
         access.check(&request.body(()).unwrap()).map_err(|(status, _)| status)
     }
 
-    const CLOSED: Access = Access { token: None, allows_any_page: false };
+    const CLOSED: AccessPolicy = AccessPolicy { token: None, allows_any_page: false };
 
     #[test]
     fn programs_and_local_pages_are_accepted() {
@@ -135,7 +135,7 @@ mod tests {
         for host in ["evil.example:8080", "localhost.evil.example", "127.0.0.1.evil.example", ""] {
             assert_eq!(check(&CLOSED, "/ws", &[("host", host)]), Err(StatusCode::FORBIDDEN), "{host}");
         }
-        let open = Access { allows_any_page: true, ..CLOSED };
+        let open = AccessPolicy { allows_any_page: true, ..CLOSED };
         for origin in
             ["null", "https://evil.example", "http://localhost.evil.example", "http://10.0.0.1", "file://"]
         {
@@ -148,7 +148,7 @@ mod tests {
 
     #[test]
     fn a_token_is_in_the_address_or_in_a_header() {
-        let access = Access { token: Some("secret12".to_owned()), ..CLOSED };
+        let access = AccessPolicy { token: Some("secret12".to_owned()), ..CLOSED };
         let host = ("host", "localhost");
         assert_eq!(check(&access, "/ws", &[host]), Err(StatusCode::UNAUTHORIZED));
         assert_eq!(check(&access, "/ws?token=secret1", &[host]), Err(StatusCode::UNAUTHORIZED));

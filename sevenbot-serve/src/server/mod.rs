@@ -36,7 +36,7 @@ use self::tcp_connection::TcpConnection;
 use self::web_connection::WebConnection;
 use crate::hub::Hub;
 
-pub use self::handshake::Access;
+pub use self::handshake::AccessPolicy;
 pub use self::notice::Notice;
 pub use self::start_error::StartError;
 
@@ -57,7 +57,7 @@ pub struct ServerConfig {
     /// Address for clients of the maker's WebSocket.
     pub web_socket: Option<SocketAddr>,
     /// Who may connect over the network.
-    pub access: Access,
+    pub access: AccessPolicy,
     /// Writes do not reach the arm.
     pub is_read_only: bool,
 }

@@ -9,7 +9,7 @@ use tty_ports::clients::Clients;
 use tty_ports::pty::Pty;
 use tty_ports::symlink::Symlink;
 
-use super::connection::{FrameConnection, Wire};
+use super::connection::{ByteStream, FrameConnection};
 use super::start_error::StartError;
 use crate::hub::Hub;
 
@@ -22,7 +22,7 @@ pub(crate) struct PtyConnection {
     _link: Symlink,
 }
 
-impl Wire for Pty {
+impl ByteStream for Pty {
     fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
         Self::read(self, bytes)
     }

@@ -6,7 +6,7 @@ use std::net::TcpStream;
 use protocol_core::time::{Duration, Instant};
 use rustix::event::PollFd;
 
-use super::connection::{FrameConnection, Wire};
+use super::connection::{ByteStream, FrameConnection};
 use crate::hub::Hub;
 use crate::token::is_equal;
 
@@ -32,7 +32,7 @@ struct Login {
     deadline: Instant,
 }
 
-impl Wire for TcpStream {
+impl ByteStream for TcpStream {
     fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
         match Read::read(&mut &*self, bytes) {
             Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
@@ -81,7 +81,7 @@ impl TcpConnection {
     fn log_in(&mut self) -> io::Result<()> {
         let Some(login) = &mut self.login else { return Ok(()) };
         let mut bytes = [0; LONGEST_LINE];
-        let count = Wire::read(&self.stream, &mut bytes)?;
+        let count = ByteStream::read(&self.stream, &mut bytes)?;
         login.line.extend_from_slice(bytes.get(..count).unwrap_or(&[]));
         let mut parts = login.line.splitn(2, |&byte| byte == b'\n');
         let (line, rest) = (parts.next().unwrap_or(&[]), parts.next());

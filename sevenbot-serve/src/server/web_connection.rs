@@ -12,7 +12,7 @@ use tungstenite::handshake::{HandshakeError, MidHandshake};
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Error, Message, WebSocket, accept_hdr_with_config};
 
-use super::handshake::{Access, Gate};
+use super::handshake::{AccessPolicy, Gate};
 use crate::hub::Hub;
 use crate::maker::MakerClient;
 
@@ -30,14 +30,14 @@ const MESSAGES_AT_ONCE: usize = 20;
 pub(crate) struct WebConnection {
     /// Another handle of the same connection, for poll(2).
     stream: TcpStream,
-    state: State,
+    state: WebState,
     is_browser: Rc<Cell<bool>>,
     deadline: Instant,
     is_blocked: bool,
 }
 
 #[derive(Debug)]
-enum State {
+enum WebState {
     Handshake(Box<MidHandshake<ServerHandshake<TcpStream, Gate>>>),
     Open(Box<WebSocket<TcpStream>>, MakerClient),
     Closed(Option<MakerClient>),
@@ -45,7 +45,7 @@ enum State {
 
 impl WebConnection {
     /// Begins the handshake. `None` if it failed.
-    pub(crate) fn new(stream: TcpStream, access: Access, hub: &mut Hub, now: Instant) -> Option<Self> {
+    pub(crate) fn new(stream: TcpStream, access: AccessPolicy, hub: &mut Hub, now: Instant) -> Option<Self> {
         let is_browser = Rc::new(Cell::new(false));
         let gate = Gate { access, is_browser: Rc::clone(&is_browser) };
         let config = WebSocketConfig::default()
@@ -63,21 +63,21 @@ impl WebConnection {
 
     /// Goes on with the handshake, or takes messages.
     pub(crate) fn receive(&mut self, hub: &mut Hub, now: Instant) {
-        let state = std::mem::replace(&mut self.state, State::Closed(None));
+        let state = std::mem::replace(&mut self.state, WebState::Closed(None));
         self.state = match state {
-            State::Handshake(handshake) => next_state(handshake.handshake(), hub, &self.is_browser),
-            State::Open(mut socket, mut client) => {
+            WebState::Handshake(handshake) => next_state(handshake.handshake(), hub, &self.is_browser),
+            WebState::Open(mut socket, mut client) => {
                 let is_alive = take_messages(&mut socket, &mut client).is_ok();
                 client.advance(hub, now);
-                if is_alive { State::Open(socket, client) } else { State::Closed(Some(client)) }
+                if is_alive { WebState::Open(socket, client) } else { WebState::Closed(Some(client)) }
             }
-            closed @ State::Closed(_) => closed,
+            closed @ WebState::Closed(_) => closed,
         };
     }
 
     /// Sends the answers that are there.
     pub(crate) fn send(&mut self, hub: &mut Hub, now: Instant) {
-        let State::Open(socket, client) = &mut self.state else { return };
+        let WebState::Open(socket, client) = &mut self.state else { return };
         client.advance(hub, now);
         match send_answers(socket, client) {
             Ok(is_blocked) => self.is_blocked = is_blocked,
@@ -86,45 +86,45 @@ impl WebConnection {
     }
 
     fn close(&mut self) {
-        if let State::Open(_, client) = std::mem::replace(&mut self.state, State::Closed(None)) {
-            self.state = State::Closed(Some(client));
+        if let WebState::Open(_, client) = std::mem::replace(&mut self.state, WebState::Closed(None)) {
+            self.state = WebState::Closed(Some(client));
         }
     }
 
     pub(crate) fn is_closed(&self, now: Instant) -> bool {
         match &self.state {
-            State::Handshake(_) => self.deadline <= now,
-            State::Open(..) => false,
-            State::Closed(_) => true,
+            WebState::Handshake(_) => self.deadline <= now,
+            WebState::Open(..) => false,
+            WebState::Closed(_) => true,
         }
     }
 
     pub(crate) fn disconnect(self, hub: &mut Hub, now: Instant) {
-        if let State::Closed(Some(client)) | State::Open(_, client) = self.state {
+        if let WebState::Closed(Some(client)) | WebState::Open(_, client) = self.state {
             client.disconnect(hub, now);
         }
     }
 
     pub(crate) fn interest(&self) -> PollFd<'_> {
         let mut interest = PollFlags::empty();
-        let has_room = !matches!(&self.state, State::Open(_, client) if !client.has_room());
+        let has_room = !matches!(&self.state, WebState::Open(_, client) if !client.has_room());
         interest.set(PollFlags::IN, has_room);
         interest.set(PollFlags::OUT, self.is_blocked);
         PollFd::new(&self.stream, interest)
     }
 
     pub(crate) fn deadline(&self) -> Instant {
-        if matches!(self.state, State::Handshake(_)) { self.deadline } else { Instant::FAR_FUTURE }
+        if matches!(self.state, WebState::Handshake(_)) { self.deadline } else { Instant::FAR_FUTURE }
     }
 }
 
 type Handshake = Result<WebSocket<TcpStream>, HandshakeError<ServerHandshake<TcpStream, Gate>>>;
 
-fn next_state(outcome: Handshake, hub: &mut Hub, is_browser: &Cell<bool>) -> State {
+fn next_state(outcome: Handshake, hub: &mut Hub, is_browser: &Cell<bool>) -> WebState {
     match outcome {
-        Ok(socket) => State::Open(Box::new(socket), MakerClient::connect(hub, is_browser.get())),
-        Err(HandshakeError::Interrupted(handshake)) => State::Handshake(Box::new(handshake)),
-        Err(HandshakeError::Failure(_)) => State::Closed(None),
+        Ok(socket) => WebState::Open(Box::new(socket), MakerClient::connect(hub, is_browser.get())),
+        Err(HandshakeError::Interrupted(handshake)) => WebState::Handshake(Box::new(handshake)),
+        Err(HandshakeError::Failure(_)) => WebState::Closed(None),
     }
 }
 
