@@ -146,6 +146,11 @@ mod tests {
     }
 
     #[test]
+    fn golden_option_bits() {
+        assert_eq!([option::BIASED_OFFSETS, option::ALARMS], [1, 2]);
+    }
+
+    #[test]
     fn a_builder_sets_the_range_of_the_offsets() {
         // In the tables it runs at compile time.
         assert_eq!(eeprom(13).biased(16).range, OFFSET.range);
