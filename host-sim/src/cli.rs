@@ -106,7 +106,7 @@ pub struct Options {
     pub chip_id: [u8; 6],
 
     /// Be an arm as the maker ships it, with the maker's firmware of this version: see AN ARM OF THE MAKER below
-    #[arg(long, value_name = "VERSION", value_parser = ["2.1.4"],
+    #[arg(long, value_name = "VERSION", value_parser = maker_version,
           conflicts_with_all = ["servos", "servos_only", "servo_socket"])]
     pub as_maker: Option<String>,
 
@@ -199,6 +199,11 @@ fn torque_codes(word: &str) -> Result<TorqueCodes, &'static str> {
         "current" => Ok(TorqueCodes::FreeOnDamping),
         _ => Err("use older (0 damping, 1 on, 2 free) or current (0 free, 1 on, 2 damping)"),
     }
+}
+
+/// Parses the version of the maker's firmware.
+fn maker_version(text: &str) -> Result<String, &'static str> {
+    if text == "2.1.4" { Ok(text.to_owned()) } else { Err("use 2.1.4, the only version that is simulated") }
 }
 
 /// Parses twelve hexadecimal digits, most significant first.
