@@ -25,7 +25,7 @@ mod host_port;
 mod joints;
 pub mod motor_state;
 pub mod position_filter;
-mod reach;
+pub mod reach;
 pub mod report_timer;
 mod reports;
 pub mod servo_bus;

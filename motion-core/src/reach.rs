@@ -9,16 +9,13 @@
 //! A block counts only if the frame covers the whole of it. This file does not know joints or what they do.
 
 use kinematics::{NoSolution, Vector, ik5, ik6, ik7};
-use protocol_core::registers::map21::{DISC_DIRECTION, TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION};
+use protocol_core::registers::map21::{
+    DIRECTION_ZERO, DISC_DIRECTION, POSITION_ZERO, TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION,
+};
 use protocol_core::registers::{Accepted, JOINTS};
 use protocol_core::request::Alarm;
 
 use crate::calibration::MicroDegrees;
-
-/// A millimetre of 0 in a position register.
-const POSITION_ZERO: i32 = 1024;
-/// A component of 0 in a direction register.
-const DIRECTION_ZERO: i16 = 128;
 
 /// The targets of the joints that reach the positions in a write; `None` for a joint that keeps its target.
 pub(crate) type Targets = [Option<MicroDegrees>; JOINTS];
@@ -65,15 +62,18 @@ fn set(targets: &mut Targets, angles: &[f32]) {
     }
 }
 
-/// A position in millimetres.
-fn position([x1, x0, y1, y0, z1, z0]: [u8; 6]) -> Vector<f32> {
-    let millimetres = |high, low| float(i32::from(u16::from_be_bytes([high, low])) - POSITION_ZERO);
+/// The position in millimetres that six registers hold.
+#[must_use]
+pub fn position([x1, x0, y1, y0, z1, z0]: [u8; 6]) -> Vector<f32> {
+    let millimetres =
+        |high, low| float(i32::from(u16::from_be_bytes([high, low])) - i32::from(POSITION_ZERO));
     Vector::new(millimetres(x1, x0), millimetres(y1, y0), millimetres(z1, z0))
 }
 
-/// A direction of any length.
-fn direction([x, y, z]: [u8; 3]) -> Vector<f32> {
-    let component = |byte: u8| f32::from(i16::from(byte) - DIRECTION_ZERO);
+/// The direction that three registers hold, of any length.
+#[must_use]
+pub fn direction([x, y, z]: [u8; 3]) -> Vector<f32> {
+    let component = |byte: u8| f32::from(i16::from(byte) - i16::from(DIRECTION_ZERO));
     Vector::new(component(x), component(y), component(z))
 }
 

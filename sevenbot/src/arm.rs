@@ -2,7 +2,6 @@
 //!
 //! Knows the register table. `FramePort` knows the serial port.
 
-use std::collections::VecDeque;
 use std::fmt;
 use std::time::{Duration, Instant};
 
@@ -20,18 +19,13 @@ use crate::identity::{Firmware, Identity};
 use crate::map_view::MapView;
 use crate::open_port::OpenPort;
 use crate::pending::PendingReads;
+use crate::reports::{Report, ReportQueue, report_period};
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 use crate::units::{Angle, MoveTime, Speed};
 
 /// The status block: the last registers of the table.
 pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
-
-/// Reports kept until the caller takes them: 20 s at the highest rate (D14). The oldest are dropped first.
-const REPORTS_KEPT: usize = 1_000;
-
-/// A report has 14 bytes of ten bits, and reports fill at most half of the line (D14).
-const BITS_PER_REPORT: u32 = 2 * 14 * 10;
 
 /// At least this many attempts for a read after a write.
 const MIN_ATTEMPTS: u32 = 3;
@@ -63,28 +57,6 @@ impl Default for ArmOptions {
     }
 }
 
-/// The present positions. The arm sends them without a request (D14).
-///
-/// ```no_run
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use std::time::Duration;
-///
-/// let mut arm = sevenbot::Arm::open("/dev/ttyUSB0", 115_200)?;
-/// arm.write(sevenbot::map::FEEDBACK_FREQUENCY.address, &[30])?;
-/// while let Some(report) = arm.next_report(Duration::from_secs(1))? {
-///     println!("{:?}: {:?}", report.received, report.positions);
-/// }
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Report {
-    /// When it was read from the port.
-    pub received: Instant,
-    /// The positions, joint 1 first.
-    pub positions: [Angle; 7],
-}
-
 /// A 7Bot V2 at the other end of a serial port.
 ///
 /// ```no_run
@@ -107,7 +79,7 @@ pub struct Arm {
     identity: Identity,
     view: MapView,
     pending: PendingReads,
-    reports: VecDeque<Report>,
+    reports: ReportQueue,
 }
 
 impl fmt::Debug for Arm {
@@ -134,7 +106,7 @@ impl Arm {
         let link = FramePort::new(port, options.baud);
         let nobody = Identity::from(Snapshot { address: 0, values: Vec::new() });
         let path = path.to_owned();
-        let (pending, reports) = (PendingReads::default(), VecDeque::new());
+        let (pending, reports) = (PendingReads::default(), ReportQueue::default());
         let view = MapView(Map::V22);
         let mut arm = Self { link, path, options, identity: nobody, view, pending, reports };
         // Registers 0 to 7 are the same in both maps.
@@ -298,7 +270,7 @@ impl Arm {
 
     /// Takes the reports received so far, oldest first.
     pub fn reports(&mut self) -> impl Iterator<Item = Report> {
-        self.reports.drain(..)
+        self.reports.drain()
     }
 
     /// The oldest report. Waits for one if there is none; `None` after `timeout`.
@@ -307,20 +279,21 @@ impl Arm {
     /// The port failed.
     pub fn next_report(&mut self, timeout: Duration) -> Result<Option<Report>, Error> {
         let deadline = Instant::now() + timeout;
-        while self.reports.is_empty() {
-            match self.link.receive(deadline)? {
-                Some(received) => self.keep_report(&received),
-                None => break,
+        loop {
+            let report = self.reports.pop();
+            if report.is_some() {
+                return Ok(report);
             }
+            let Some(received) = self.link.receive(deadline)? else { return Ok(None) };
+            self.reports.keep(&received, self.view);
         }
-        Ok(self.reports.pop_front())
     }
 
     /// Waits for a reply to one of these reads. Other replies are late, or reports.
     fn answer(&mut self, asked: &[Span]) -> Result<Option<Snapshot>, Error> {
         let deadline = Instant::now() + self.options.reply_timeout;
         while let Some(received) = self.link.receive(deadline)? {
-            self.keep_report(&received);
+            self.reports.keep(&received, self.view);
             if let Received::Reply(reply) = received {
                 self.pending.replied(reply.span());
                 if asked.contains(&reply.span()) {
@@ -340,51 +313,11 @@ impl Arm {
     /// Takes the replies received since the last read: reports, and late replies.
     fn take_waiting_replies(&mut self) -> Result<(), Error> {
         while let Some(received) = self.link.receive_waiting()? {
-            self.keep_report(&received);
+            self.reports.keep(&received, self.view);
             if let Received::Reply(reply) = received {
                 self.pending.replied(reply.span());
             }
         }
         Ok(())
-    }
-
-    fn keep_report(&mut self, received: &Received) {
-        let report = match (received, self.view.0) {
-            (Received::Reply(report), Map::V22) | (Received::Report(report), Map::V21) => report,
-            _ => return,
-        };
-        if report.span() != self.view.report() {
-            return;
-        }
-        if self.reports.len() >= REPORTS_KEPT {
-            self.reports.pop_front();
-        }
-        let positions = self.view.view(report, Span::of(&PRESENT_POSITION));
-        let positions = positions.joints(&PRESENT_POSITION).map(Angle::from_register);
-        self.reports.push_back(Report { received: Instant::now(), positions });
-    }
-}
-
-fn report_period(firmware: Firmware, hertz: u8, baud: u32) -> Duration {
-    let hertz = u32::from(hertz.max(1));
-    match firmware {
-        // It sends when more than 1000 ms / hertz have passed.
-        Firmware::Makers => Duration::from_millis(u64::from(1_000 / hertz) + 1),
-        Firmware::Ours | Firmware::Unknown => {
-            Duration::from_secs(1) / hertz.min(baud / BITS_PER_REPORT).max(1)
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_period_of_reports_depends_on_firmware_and_line() {
-        let second = Duration::from_secs(1);
-        assert_eq!(report_period(Firmware::Ours, 50, 115_200), second / 50);
-        assert_eq!(report_period(Firmware::Ours, 50, 9_600), second / 34);
-        assert_eq!(report_period(Firmware::Makers, 30, 115_200), Duration::from_millis(34));
     }
 }

@@ -3,7 +3,7 @@
 use std::any::type_name;
 use std::env;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::ops::{Deref, DerefMut};
 use std::path::PathBuf;
 use std::process::{Child, Output, Stdio};
@@ -253,6 +253,21 @@ impl TestArm {
         let mut tool = tool();
         tool.arg("--port").arg(self.lend_port()).args(arguments).stdin(Stdio::null());
         tool.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("sevenbot runs")
+    }
+
+    /// Likewise, and waits until the tool prints `text` on standard error: with `--verbose`, a frame for example.
+    pub fn spawn_sevenbot_until(&mut self, arguments: &[&str], text: &str) -> Child {
+        let mut tool = self.spawn_sevenbot(arguments);
+        let mut stderr = tool.stderr.take().expect("a pipe");
+        let mut received = Vec::new();
+        while !String::from_utf8_lossy(&received).contains(text) {
+            let mut chunk = [0; 256];
+            let length = stderr.read(&mut chunk).expect("text");
+            assert_ne!(length, 0, "ended without {text}:\n{}", String::from_utf8_lossy(&received));
+            received.extend(&chunk[..length]);
+        }
+        tool.stderr = Some(stderr);
+        tool
     }
 
     /// Runs the command line tool on the port of this arm.

@@ -3,7 +3,6 @@
 mod tool_output;
 
 use std::fs;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
@@ -55,17 +54,7 @@ fn moments(path: &Path) -> Vec<Vec<f64>> {
 
 /// Plays a recording, and waits until the arm moves.
 fn start_to_play(arm: &mut TestArm, arguments: &[&str]) -> Child {
-    let mut tool = arm.spawn_sevenbot(&[&["play", "--verbose"], arguments].concat());
-    let mut frames = tool.stderr.take().expect("a pipe");
-    let mut received = Vec::new();
-    while !String::from_utf8_lossy(&received).contains("-> write vacuum-pump") {
-        let mut chunk = [0; 256];
-        let length = frames.read(&mut chunk).expect("text");
-        assert_ne!(length, 0, "ended before the arm moved:\n{}", String::from_utf8_lossy(&received));
-        received.extend(&chunk[..length]);
-    }
-    tool.stderr = Some(frames);
-    tool
+    arm.spawn_sevenbot_until(&[&["play", "--verbose"], arguments].concat(), "-> write vacuum-pump")
 }
 
 #[track_caller]

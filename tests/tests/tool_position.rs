@@ -2,7 +2,6 @@
 
 mod tool_output;
 
-use std::io::Read;
 use std::process::{Child, Output};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -27,17 +26,7 @@ fn distance(one: &[f64], other: [f64; 3]) -> f64 {
 
 /// Starts a move, and waits until the arm got the first frame of it.
 fn start_to_move(arm: &mut TestArm, arguments: &[&str], first_frame: &str) -> Child {
-    let mut tool = arm.spawn_sevenbot(&[arguments, &["--verbose"]].concat());
-    let mut frames = tool.stderr.take().expect("a pipe");
-    let mut received = Vec::new();
-    while !String::from_utf8_lossy(&received).contains(first_frame) {
-        let mut chunk = [0; 256];
-        let length = frames.read(&mut chunk).expect("text");
-        assert_ne!(length, 0, "ended before the arm moved:\n{}", String::from_utf8_lossy(&received));
-        received.extend(&chunk[..length]);
-    }
-    tool.stderr = Some(frames);
-    tool
+    arm.spawn_sevenbot_until(&[arguments, &["--verbose"]].concat(), first_frame)
 }
 
 #[test]

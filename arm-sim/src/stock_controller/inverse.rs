@@ -3,16 +3,12 @@
 //! A solution is exact here; the maker's firmware truncates it to whole degrees, as this file does, and refuses or misses
 //! some poses that this solver reaches.
 
-use kinematics::{Vector, ik5, ik6, ik7};
+use kinematics::{ik5, ik6, ik7};
+use motion_core::reach::{direction, position};
 use protocol_core::registers::map21::{DISC_DIRECTION, TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION};
 use protocol_core::registers::{JOINTS, Register};
 
 use super::registers::StockRegisters;
-
-/// Bytes of a coordinate, high byte first, are millimetres + 1024.
-const MILLIMETRES_ZERO: f32 = 1_024.0;
-/// A byte of a direction is its component + 128.
-const DIRECTION_ZERO: f32 = 128.0;
 
 /// A solver of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,17 +50,16 @@ impl Requested {
 impl Solver {
     /// The targets of the joints; `None` without a solution.
     pub(super) fn solve(self, registers: &StockRegisters) -> Option<[Option<u8>; JOINTS]> {
-        let point = |first: u8| vector([0, 2, 4].map(|offset| millimetres(registers, first + offset)));
-        let direction = |first: u8| {
-            vector([0, 1, 2].map(|offset| f32::from(registers.get(first + offset)) - DIRECTION_ZERO))
-        };
-        let (tip, tool) = (point(TIP_POSITION.address), direction(TOOL_DIRECTION.address));
+        let tip = position(registers.bytes(TIP_POSITION.address));
+        let tool = direction(registers.bytes(TOOL_DIRECTION.address));
         match self {
-            Self::Ik5 => ik5(point(WRIST_POSITION.address)).ok().map(|angles| targets(&angles)),
-            Self::Ik6 => ik6(tip, tool).ok().map(|angles| targets(&angles)),
-            Self::Ik7 => {
-                ik7(tip, tool, direction(DISC_DIRECTION.address)).ok().map(|angles| targets(&angles))
+            Self::Ik5 => {
+                ik5(position(registers.bytes(WRIST_POSITION.address))).ok().map(|angles| targets(&angles))
             }
+            Self::Ik6 => ik6(tip, tool).ok().map(|angles| targets(&angles)),
+            Self::Ik7 => ik7(tip, tool, direction(registers.bytes(DISC_DIRECTION.address)))
+                .ok()
+                .map(|angles| targets(&angles)),
         }
     }
 
@@ -76,14 +71,6 @@ impl Solver {
             Self::Ik7 => Some(7),
         }
     }
-}
-
-fn vector([x, y, z]: [f32; 3]) -> Vector<f32> {
-    Vector::new(x, y, z)
-}
-
-fn millimetres(registers: &StockRegisters, first: u8) -> f32 {
-    f32::from(u16::from_be_bytes([registers.get(first), registers.get(first + 1)])) - MILLIMETRES_ZERO
 }
 
 /// Whole degrees, truncated. The joints that are not solved keep their targets.

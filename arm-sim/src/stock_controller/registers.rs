@@ -107,6 +107,15 @@ impl StockRegisters {
         self.offsets.get(usize::from(joint.index())).copied().unwrap_or(0)
     }
 
+    /// The values of `N` registers.
+    pub(super) fn bytes<const N: usize>(&self, first: u8) -> [u8; N] {
+        let mut bytes = [0; N];
+        for (byte, address) in bytes.iter_mut().zip(first..=u8::MAX) {
+            *byte = self.get(address);
+        }
+        bytes
+    }
+
     /// The values of a read.
     pub(super) fn read(&self, first: u8, count: u8) -> Vec<u8> {
         (0..count).map(|index| first.checked_add(index).map_or(0, |address| self.get(address))).collect()

@@ -79,6 +79,11 @@ pub const MAP_21: &[Register] = &[
 const _: () =
     assert!(well_formed(MAP_21), "the register table has an overlap, a wrong order or a bad default");
 
+/// Added to a position in millimetres, for [`TIP_POSITION`] and [`WRIST_POSITION`].
+pub const POSITION_ZERO: u16 = 1024;
+/// Added to a component of a direction, for [`TOOL_DIRECTION`] and [`DISC_DIRECTION`].
+pub const DIRECTION_ZERO: u8 = 128;
+
 /// The bits of [`OPTIONS`].
 pub mod option {
     /// Before the first write, offsets read as 128 + offset (M5).

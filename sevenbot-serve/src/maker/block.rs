@@ -1,12 +1,10 @@
 //! The blocks of registers for inverse kinematics: positions and directions in JSON, encoded as map 2.1 has them (M7).
 
-use protocol_core::registers::map21::{DISC_DIRECTION, TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION};
+use protocol_core::registers::map21::{
+    DIRECTION_ZERO, DISC_DIRECTION, POSITION_ZERO, TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION,
+};
 use serde_json::Value;
 
-/// Added to a position in millimetres.
-const MIDDLE_MM: f64 = 1_024.0;
-/// Added to a component of a direction.
-const MIDDLE_DIRECTION: f64 = 128.0;
 /// Length of a direction in the registers: the greatest component that a byte holds.
 const DIRECTION_LENGTH: f64 = 127.0;
 
@@ -69,8 +67,9 @@ fn three(message: &Value, name: &str) -> Result<[f64; 3], String> {
 /// Whole millimetres plus 1024, high byte first. A position beyond the registers is out of reach at their limit, too.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the type")]
 fn position(millimetres: [f64; 3]) -> [u8; 6] {
-    let [x, y, z] = millimetres
-        .map(|value| ((value.round() + MIDDLE_MM).clamp(0.0, f64::from(u16::MAX)) as u16).to_be_bytes());
+    let [x, y, z] = millimetres.map(|value| {
+        ((value.round() + f64::from(POSITION_ZERO)).clamp(0.0, f64::from(u16::MAX)) as u16).to_be_bytes()
+    });
     [x[0], x[1], y[0], y[1], z[0], z[1]]
 }
 
@@ -80,7 +79,9 @@ fn direction(components: [f64; 3]) -> [u8; 3] {
     let greatest = components.iter().fold(0.0, |greatest: f64, value| greatest.max(value.abs()));
     let unit = components.map(|value| if greatest > 0.0 { value / greatest } else { 0.0 });
     let length = unit.iter().map(|value| value * value).sum::<f64>().sqrt().max(1.0);
-    unit.map(|value| ((value * DIRECTION_LENGTH / length).round() + MIDDLE_DIRECTION).clamp(0.0, 255.0) as u8)
+    unit.map(|value| {
+        ((value * DIRECTION_LENGTH / length).round() + f64::from(DIRECTION_ZERO)).clamp(0.0, 255.0) as u8
+    })
 }
 
 #[cfg(test)]
