@@ -1,20 +1,11 @@
-//! The maker's WebSocket of `sevenbot serve`, and ten clients of all kinds at once.
+//! The maker's WebSocket of `sevenbot serve`.
 
 mod served;
 
-use std::thread;
-use std::time::{Duration, Instant};
-
-use system_tests::frames::reply;
-use system_tests::registers::{
-    DEVICE_CODE, FEEDBACK_FREQUENCY, OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION,
-};
+use system_tests::registers::{DEVICE_CODE, OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION};
 use system_tests::wait::wait_until;
-use system_tests::{read_request, write_request};
 
-use served::{Served, WebClient, exchange, names};
-
-const LOCAL_PAGE: (&str, &str) = ("origin", "http://localhost:3000");
+use served::{LOCAL_PAGE, Served, WebClient};
 
 #[test]
 fn the_next_message_to_a_program_is_the_answer_to_its_read() {
@@ -142,56 +133,4 @@ fn a_message_that_is_too_long_ends_its_own_connection_only() {
     bad.send(&"x".repeat(2_049));
     assert_eq!(bad.receive(), None);
     assert_eq!(good.read(DEVICE_CODE, 1), [7]);
-}
-
-/// `SERVE_LOAD_SECONDS` sets the length.
-#[test]
-fn ten_clients_of_three_kinds_lose_nothing_and_cross_nothing() {
-    let seconds = std::env::var("SERVE_LOAD_SECONDS").map_or(5, |text| text.parse().expect("a number"));
-    let served = Served::start(4, &[]);
-    let end = Instant::now() + Duration::from_secs(seconds);
-    let values = || (1..=100).cycle().take_while(|_| Instant::now() < end);
-    let totals: Vec<(&str, usize)> = thread::scope(|scope| {
-        let mut clients = Vec::new();
-        for (name, own) in names(3).zip(SPEED..) {
-            let mut arm = served.open(name);
-            clients.push(scope.spawn(move || {
-                arm.write(FEEDBACK_FREQUENCY, &[0]);
-                let check = |value| assert_eq!(arm.write_and_read((own, &[value]), (own, 1)), [value]);
-                ("frames on a terminal", values().map(check).count())
-            }));
-        }
-        for own in SPEED + 3..SPEED + 5 {
-            let mut stream = served.connect();
-            let check = move |value| {
-                let request = [write_request(own, &[value]), read_request(own, 1)].concat();
-                exchange(&mut stream, &request, &reply(own, &[value]));
-            };
-            clients.push(scope.spawn(move || ("frames over TCP", values().map(check).count())));
-        }
-        for own in SPEED + 5..SPEED + 7 {
-            let mut client = WebClient::connect(&served, &[]).expect("accepted");
-            let check = move |value| {
-                client.send(&format!(r#"{{"cmd":"write","id":{own},"num":1,"value":[{value}]}}"#));
-                assert_eq!(client.read(own, 1), [value]);
-            };
-            clients.push(scope.spawn(move || ("WebSocket", values().map(check).count())));
-        }
-        let mut reports = served.open("d");
-        clients.push(scope.spawn(move || {
-            reports.write(FEEDBACK_FREQUENCY, &[50]);
-            let is_report = |_: &u8| reports.reply().address == PRESENT_POSITION;
-            ("reports", values().filter(is_report).count())
-        }));
-        let mut deaf = served.connect();
-        exchange(&mut deaf, &write_request(FEEDBACK_FREQUENCY, &[50]), &[]);
-        let mut page = WebClient::connect(&served, &[LOCAL_PAGE]).expect("accepted");
-        page.send("half of it: {");
-        clients.into_iter().map(|client| client.join().expect("no client fails")).collect()
-    });
-    println!("{seconds} s: {totals:?}");
-    assert!(
-        totals.iter().all(|&(_, count)| count > usize::try_from(seconds).expect("a count") * 5),
-        "{totals:?}"
-    );
 }

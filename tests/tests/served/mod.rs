@@ -19,6 +19,9 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
+/// A header of a page that a program of this computer serves.
+pub(crate) const LOCAL_PAGE: (&str, &str) = ("origin", "http://localhost:3000");
+
 /// A simulator and a server, in a folder with their links.
 pub(crate) struct Served {
     pub(crate) simulator: Child,
