@@ -35,6 +35,12 @@ impl OutOfReach {
     }
 }
 
+/// Do joint angles exist for all positions in a write? The arm refuses the write otherwise (M7).
+#[must_use]
+pub fn is_within(accepted: &Accepted<'_>) -> bool {
+    targets(accepted).is_ok()
+}
+
 /// Solves the blocks of a write: IK5 first, then IK6 or IK7, which replaces its angles.
 pub(crate) fn targets(accepted: &Accepted<'_>) -> Result<Targets, OutOfReach> {
     let mut targets = [None; JOINTS];
@@ -91,7 +97,10 @@ mod tests {
     /// The targets of a write, in degrees.
     fn solved(address: u8, values: &[u8]) -> Result<Vec<f64>, OutOfReach> {
         let registers = RegisterFile::new([0; 6], None);
-        let targets = targets(&registers.check_map21(address, values).unwrap())?;
+        let accepted = registers.check_map21(address, values).unwrap();
+        let targets = targets(&accepted);
+        assert_eq!(is_within(&accepted), targets.is_ok());
+        let targets = targets?;
         Ok(targets.into_iter().flatten().map(|angle| f64::from(angle.0) / 1e6).collect())
     }
 

@@ -5,9 +5,12 @@
 mod rig;
 
 use protocol_core::registers::map::{
-    CHIP_ID, DEVICE_CODE, EEPROM_LOCK, FEEDBACK_FREQUENCY, OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION,
+    CHIP_ID, DEVICE_CODE, DEVICE_ID, EEPROM_LOCK, FEEDBACK_FREQUENCY, FRAMES_REFUSED, OFFSET,
+    PRESENT_POSITION, SPEED, TARGET_POSITION,
 };
-use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
+use protocol_core::registers::map21::{
+    ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, OPTIONS, TIP_POSITION,
+};
 use protocol_core::time::Duration;
 use rig::{World, read, write, write_map21};
 
@@ -138,6 +141,76 @@ fn each_program_reads_offsets_as_it_writes_them() {
             assert_eq!(world.take(program), [(OFFSET.address, form.to_vec())], "program {program}");
         }
     }
+}
+
+/// M4: only an accepted write of map 2.1 stops the reports of map 2.2. The arm refuses these.
+#[test]
+fn a_write_that_the_arm_refuses_stops_no_reports() {
+    let far = [0x05, 0xF4, 0x04, 0xB9, 0x04, 0x32, 0x80, 0x80, 0x7F];
+    let refused: [(bool, Vec<u8>); 4] = [
+        (false, write_map21(TARGET_POSITION.address, &[90, 181])),
+        (false, write_map21(TIP_POSITION.address, &far)),
+        (true, write_map21(OFFSET.address, &[20])),
+        (true, write_map21(DEVICE_ID.address, &[5, 8])),
+    ];
+    for (unlocks, request) in refused {
+        let mut world = World::new(1);
+        if unlocks {
+            world.send(0, &write(EEPROM_LOCK.address, &[0]));
+        }
+        set_frequency(&mut world, 0, 50);
+        world.send(0, &request);
+        world.run(20);
+        assert_eq!(world.arm.registers().read(FRAMES_REFUSED.address, 1), [1], "{request:02x?}");
+        world.take(0);
+        world.run(1_000);
+        assert!(world.take(0).len().abs_diff(50) <= 1, "{request:02x?}");
+        world.send(0, &write_map21(0, &[]));
+        world.run(20);
+        world.take(0);
+        world.run(200);
+        assert_eq!(world.take(0), [], "an accepted one stops them");
+    }
+}
+
+/// A write to the locked EEPROM is accepted without effect (D15).
+#[test]
+fn a_write_that_the_lock_makes_harmless_stops_reports() {
+    let mut world = World::new(1);
+    set_frequency(&mut world, 0, 50);
+    world.send(0, &write_map21(OFFSET.address, &[20]));
+    world.run(20);
+    world.take(0);
+    world.run(200);
+    assert_eq!(world.take(0), []);
+    assert_eq!(world.arm.registers().read(FRAMES_REFUSED.address, 1), [0]);
+}
+
+/// M5 and M6: register 20 holds for each program until its own first write, however often others write.
+#[test]
+fn before_its_first_write_a_program_reads_offsets_as_register_20_says() {
+    let mut world = World::new(2);
+    world.send(1, &[write(EEPROM_LOCK.address, &[0]), write(OFFSET.address, &[0x82, 3])].concat());
+    let reads = |world: &mut World, form: [u8; 2]| {
+        for _ in 0..3 {
+            world.send(0, &read(OFFSET.address, 2));
+            world.send(1, &write(SPEED.address, &[60]));
+            world.run(20);
+            assert_eq!(world.take(0), [(OFFSET.address, form.to_vec())]);
+        }
+    };
+    world.run(20);
+    reads(&mut world, [0x82, 3]);
+    world.send(1, &write_map21(OPTIONS.address, &[1]));
+    world.run(20);
+    reads(&mut world, [126, 131]);
+    world.unplug();
+    world.run(100);
+    world.plug();
+    world.run(1_000);
+    reads(&mut world, [126, 131]);
+    world.send(0, &write(SPEED.address, &[60]));
+    reads(&mut world, [0x82, 3]);
 }
 
 #[test]

@@ -6,6 +6,7 @@
 
 use std::collections::VecDeque;
 
+use protocol_core::registers::Map;
 use protocol_core::request::Reply;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer::gap;
@@ -130,7 +131,12 @@ impl Line {
         self.unanswered.push_back(Unanswered { owner, address, count, deadline });
     }
 
-    pub(crate) fn send_write(&mut self, now: Instant, function: Function, address: u8, values: &[u8]) {
+    /// Sends a write with the function code of its map (M1).
+    pub(crate) fn send_write(&mut self, now: Instant, map: Map, address: u8, values: &[u8]) {
+        let function = match map {
+            Map::V22 => Function::Write,
+            Map::V21 => Function::WriteMap21,
+        };
         let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
         self.send(now, function, address, count, values);
     }

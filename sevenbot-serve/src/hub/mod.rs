@@ -14,6 +14,7 @@
 
 mod client;
 mod client_id;
+mod known_registers;
 mod line;
 mod own_registers;
 mod request;
@@ -24,12 +25,13 @@ mod stream;
 
 use std::collections::BTreeMap;
 
-use protocol_core::registers::map::{DEVICE_CODE, FEEDBACK_FREQUENCY};
+use protocol_core::registers::Map;
+use protocol_core::registers::map::{DEVICE_CODE, EEPROM_LOCK, FEEDBACK_FREQUENCY};
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::Function;
 
 use self::client::Client;
+use self::known_registers::KnownRegisters;
 use self::line::{Line, Owner};
 use self::request::reply_bytes;
 use self::sampler::Sampler;
@@ -44,6 +46,8 @@ pub use self::stream::Stream;
 pub const MOST_WAITING: usize = 20;
 /// Time between two questions to a port behind which no arm has answered yet.
 const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
+/// The read that finds an arm: the device code, and up to the lock what [`KnownRegisters`] needs.
+const IDENTITY: (u8, u8) = (DEVICE_CODE.address, EEPROM_LOCK.address + 1);
 
 /// Does an arm answer?
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +66,7 @@ pub struct Hub {
     clients: BTreeMap<ClientId, Client>,
     next_id: ClientId,
     arm: ArmState,
+    known: KnownRegisters,
     line: Line,
     sampler: Sampler,
     shares: Shares,
@@ -77,6 +82,7 @@ impl Hub {
             clients: BTreeMap::new(),
             next_id: ClientId::default(),
             arm: ArmState::Absent,
+            known: KnownRegisters::new(),
             line: Line::new(baud),
             sampler: Sampler::new(baud),
             shares: Shares::default(),
@@ -174,7 +180,7 @@ impl Hub {
             ArmState::Identifying(due) => {
                 self.drop_waiting();
                 if due <= now && self.line.is_free(now) {
-                    self.line.send_read(now, Owner::Identity, DEVICE_CODE.address, DEVICE_CODE.count);
+                    self.line.send_read(now, Owner::Identity, IDENTITY.0, IDENTITY.1);
                     self.arm = ArmState::Identifying(now + IDENTIFY_PERIOD);
                 }
             }
@@ -240,12 +246,12 @@ impl Hub {
         self.shares.charge(&mut client.share, request.line_bytes());
         match request {
             WholeRequest::Read { address, count } => self.send_read(now, id, address, count),
-            WholeRequest::Write { function, address, values } => {
-                self.send_write(now, id, function, address, values);
+            WholeRequest::Write { map, address, values } => {
+                self.send_write(now, id, map, address, values);
             }
-            WholeRequest::WriteBetweenReads { function, address, values, read: (first, count) } => {
+            WholeRequest::WriteBetweenReads { map, address, values, read: (first, count) } => {
                 self.send_read(now, id, first, count);
-                self.send_write(now, id, function, address, values);
+                self.send_write(now, id, map, address, values);
                 self.send_read(now, id, first, count);
             }
         }
@@ -255,27 +261,22 @@ impl Hub {
         let Some(client) = self.clients.get_mut(&id) else { return };
         client.unanswered += 1;
         // A write of 0 registers chooses the form of the offsets (M5).
-        if let Some(function) = client.own.form_of_read(address, count) {
-            self.line.send_write(now, function, 0, &[]);
+        if let Some(map) = client.own.form_of_read(address, count, self.known.form_before_writes()) {
+            self.line.send_write(now, map, 0, &[]);
         }
         self.line.send_read(now, Owner::Client(id), address, count);
     }
 
-    fn send_write(
-        &mut self,
-        now: Instant,
-        id: ClientId,
-        function: Function,
-        address: u8,
-        mut values: Vec<u8>,
-    ) {
+    fn send_write(&mut self, now: Instant, id: ClientId, map: Map, address: u8, mut values: Vec<u8>) {
         let Some(client) = self.clients.get_mut(&id) else { return };
-        if client.own.write(function, address, &mut values) {
+        let is_accepted = self.known.accepts(map, address, &values);
+        if is_accepted && client.own.write(map, address, &mut values) {
             client.schedule.set(now, &client.own);
             self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
         }
         if !self.is_read_only {
-            self.line.send_write(now, function, address, &values);
+            self.known.write(map, address, &values);
+            self.line.send_write(now, map, address, &values);
         }
     }
 
@@ -308,12 +309,15 @@ impl Hub {
 
     /// An unknown device answered, or a 7Bot V2. A stream that an earlier program left running ends.
     fn identify(&mut self, now: Instant, values: &[u8]) {
-        if values == [DEVICE_CODE.default_at(DEVICE_CODE.address)] && self.arm != ArmState::Present {
+        let is_arm = values.first() == Some(&DEVICE_CODE.default_at(DEVICE_CODE.address));
+        if is_arm && self.arm != ArmState::Present {
             self.arm = ArmState::Present;
+            self.known = KnownRegisters::new();
+            self.known.set(IDENTITY.0, values);
             for register in [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY] {
-                self.line.send_write(now, Function::WriteMap21, register.address, &[0]);
+                self.line.send_write(now, Map::V21, register.address, &[0]);
             }
-            self.line.send_write(now, Function::Write, FEEDBACK_FREQUENCY.address, &[0]);
+            self.line.send_write(now, Map::V22, FEEDBACK_FREQUENCY.address, &[0]);
         }
     }
 

@@ -4,9 +4,8 @@
 //! registers of the frame pass unchanged.
 
 use protocol_core::registers::map::{FEEDBACK_FREQUENCY, OFFSET};
-use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, Map};
-use protocol_core::registers::{Access, Region, Register};
-use protocol_core::wire::Function;
+use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
+use protocol_core::registers::{Map, Register};
 
 use super::stream::Stream;
 
@@ -33,31 +32,25 @@ impl OwnRegisters {
         }
     }
 
-    /// Applies a write and sets the own registers in `values` to 0, as the arm has them. Returns whether a frequency
-    /// may have changed. A frame that the arm will refuse (D16) has no effect here, and passes as it is.
-    pub(crate) fn write(&mut self, function: Function, address: u8, values: &mut [u8]) -> bool {
+    /// Applies a write that the arm accepts, and sets the own registers in `values` to 0, as the arm has them. Returns
+    /// whether a frequency may have changed.
+    pub(crate) fn write(&mut self, map: Map, address: u8, values: &mut [u8]) -> bool {
         let before = *self;
-        let map = if function == Function::WriteMap21 { Map::V21 } else { Map::V22 };
-        if !is_refused(map, address, values) {
-            self.last_map = Some(map);
-            match map {
-                Map::V22 => self.write_map22(address, values),
-                Map::V21 => self.write_map21(address, values),
-            }
+        self.last_map = Some(map);
+        match map {
+            Map::V22 => self.write_map22(address, values),
+            Map::V21 => self.write_map21(address, values),
         }
         *self != before
     }
 
-    /// The function whose form a read of these registers has: that of the client's last write, or of map 2.2. `None` if
+    /// The map whose form a read of these registers has: that of the client's last write, or `before_writes`. `None` if
     /// there are no offsets among them.
-    pub(crate) fn form_of_read(&self, address: u8, count: u8) -> Option<Function> {
+    pub(crate) fn form_of_read(&self, address: u8, count: u8, before_writes: Map) -> Option<Map> {
         let (first, end) = (u16::from(address), u16::from(address) + u16::from(count));
         let offsets = u16::from(OFFSET.address);
         let has_offsets = first < offsets + u16::from(OFFSET.count) && offsets < end;
-        has_offsets.then_some(match self.last_map {
-            Some(Map::V21) => Function::WriteMap21,
-            Some(Map::V22) | None => Function::Write,
-        })
+        has_offsets.then_some(self.last_map.unwrap_or(before_writes))
     }
 
     /// A write of 53 stops the reports of map 2.1 (M4).
@@ -98,16 +91,6 @@ fn byte_at<'a>(address: u8, values: &'a mut [u8], register: &Register) -> Option
     values.get_mut(usize::from(register.address.checked_sub(address)?))
 }
 
-/// Does the arm refuse a frame, because a value in RAM is out of range? The EEPROM depends on the lock, which only the
-/// arm knows.
-fn is_refused(map: Map, address: u8, values: &[u8]) -> bool {
-    (address..).zip(values).any(|(address, &value)| {
-        map.find(address).is_some_and(|row| {
-            row.region == Region::Ram && row.access == Access::ReadWrite && !row.range.contains(value)
-        })
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -116,14 +99,13 @@ mod tests {
     fn a_write_keeps_its_own_byte_and_passes_the_others() {
         let mut own = OwnRegisters::default();
         let mut values = [90, 90, 65, 90, 90, 90, 80, 30];
-        assert!(own.write(Function::Write, 46, &mut values));
+        assert!(own.write(Map::V22, 46, &mut values));
         assert_eq!((own.frequency(Stream::Positions), values), (30, [90, 90, 65, 90, 90, 90, 80, 0]));
         let mut reply = [1, 2, 3];
         own.overlay(52, &mut reply);
         assert_eq!(reply, [1, 30, 3]);
-        assert!(!own.write(Function::Write, 54, &mut [1]));
-        assert_eq!(own.form_of_read(0, 60), Some(Function::Write));
-        assert!(!own.write(Function::Write, 46, &mut [90]));
+        assert!(!own.write(Map::V22, 54, &mut [1]));
+        assert!(!own.write(Map::V22, 46, &mut [90]));
     }
 
     fn frequencies(own: &OwnRegisters) -> [u8; 3] {
@@ -134,44 +116,37 @@ mod tests {
     fn the_streams_of_one_map_stop_those_of_the_other() {
         let mut own = OwnRegisters::default();
         let mut values = [30, 1, 2, 3, 4, 5, 6, 7, 5];
-        assert!(own.write(Function::WriteMap21, 82, &mut values));
+        assert!(own.write(Map::V21, 82, &mut values));
         assert_eq!((frequencies(&own), values), ([0, 30, 5], [0, 1, 2, 3, 4, 5, 6, 7, 0]));
         let mut reply = [9; 16];
         own.overlay(80, &mut reply);
         assert_eq!((reply[2], reply[10]), (30, 5));
-        assert!(!own.write(Function::WriteMap21, 46, &mut [90]), "another register");
-        assert!(own.write(Function::Write, 53, &mut [50]));
+        assert!(!own.write(Map::V21, 46, &mut [90]), "another register");
+        assert!(own.write(Map::V22, 53, &mut [50]));
         assert_eq!(frequencies(&own), [50, 0, 0]);
-        assert!(own.write(Function::WriteMap21, 0, &mut []), "no registers");
+        assert!(own.write(Map::V21, 0, &mut []), "no registers");
         assert_eq!(frequencies(&own), [0; 3]);
-        assert!(!own.write(Function::WriteMap21, 53, &mut [50]), "the byte for 53 has no effect");
-        own.write(Function::Write, 82, &mut [50]);
+        assert!(!own.write(Map::V21, 53, &mut [50]), "the byte for 53 has no effect");
+        own.write(Map::V22, 82, &mut [50]);
         assert_eq!(frequencies(&own), [0; 3], "not a register of map 2.2");
-        assert!(own.write(Function::WriteMap21, 90, &mut [100]));
-        assert!(!own.write(Function::WriteMap21, 81, &mut [0, 101]), "refused");
+        assert!(own.write(Map::V21, 90, &mut [100]));
         assert_eq!(frequencies(&own), [0, 0, 100]);
-        assert!(own.write(Function::Write, 53, &mut [0]));
+        assert!(own.write(Map::V22, 53, &mut [0]));
         assert_eq!(frequencies(&own), [0; 3]);
     }
 
     #[test]
     fn the_last_write_decides_the_form_of_the_offsets() {
         let mut own = OwnRegisters::default();
-        own.write(Function::WriteMap21, 0, &mut []);
-        own.write(Function::Write, 46, &mut [181]);
-        let form = Some(Function::WriteMap21);
-        let reads = [(13, 7), (19, 1), (0, 255), (12, 2), (12, 1), (20, 9), (13, 0)];
-        let forms = reads.map(|(address, count)| own.form_of_read(address, count));
-        assert_eq!(forms, [form, form, form, form, None, None, None]);
-    }
-
-    #[test]
-    fn a_frame_that_the_arm_refuses_changes_nothing() {
-        let mut own = OwnRegisters::default();
-        for mut values in [[90, 51], [181, 30]] {
-            let before = values;
-            assert!(!own.write(Function::Write, 52, &mut values));
-            assert_eq!((own, values), (OwnRegisters::default(), before));
+        for before_writes in Map::ALL {
+            assert_eq!(own.form_of_read(13, 7, before_writes), Some(before_writes));
         }
+        own.write(Map::V21, 0, &mut []);
+        let form = Some(Map::V21);
+        let reads = [(13, 7), (19, 1), (0, 255), (12, 2), (12, 1), (20, 9), (13, 0)];
+        let forms = reads.map(|(address, count)| own.form_of_read(address, count, Map::V22));
+        assert_eq!(forms, [form, form, form, form, None, None, None]);
+        own.write(Map::V22, 0, &mut []);
+        assert_eq!(own.form_of_read(0, 60, Map::V21), Some(Map::V22));
     }
 }

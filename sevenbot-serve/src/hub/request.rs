@@ -1,5 +1,6 @@
 //! A whole request of a client, with its values.
 
+use protocol_core::registers::Map;
 use protocol_core::wire::{Frame, Function, MIN_LENGTH};
 
 /// A request that owns its values.
@@ -14,8 +15,8 @@ pub enum WholeRequest {
     },
     /// Writes registers from `address` on.
     Write {
-        /// The function code of the frame. It passes unchanged.
-        function: Function,
+        /// The map that the write is in (M1).
+        map: Map,
         /// The first register.
         address: u8,
         /// One byte per register, at most 255.
@@ -24,8 +25,8 @@ pub enum WholeRequest {
     /// A write between two reads of the same registers, to find out what it changes. No other client's request comes
     /// between them. Gives two events.
     WriteBetweenReads {
-        /// The function code of the write.
-        function: Function,
+        /// The map that the write is in (M1).
+        map: Map,
         /// The first register of the write.
         address: u8,
         /// One byte per register, at most 255.
@@ -39,10 +40,12 @@ impl WholeRequest {
     /// The request in a frame of a client.
     #[must_use]
     pub fn from_frame(frame: Frame<'_>) -> Self {
-        let (function, address, count) = (frame.function, frame.address, frame.count);
-        match function {
+        let (address, count) = (frame.address, frame.count);
+        let write = |map| Self::Write { map, address, values: frame.data.to_vec() };
+        match frame.function {
             Function::Read => Self::Read { address, count },
-            _ => Self::Write { function, address, values: frame.data.to_vec() },
+            Function::WriteMap21 => write(Map::V21),
+            _ => write(Map::V22),
         }
     }
 

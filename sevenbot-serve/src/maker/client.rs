@@ -5,9 +5,9 @@
 
 use std::collections::VecDeque;
 
+use protocol_core::registers::Map;
 use protocol_core::registers::map::{FRAMES_REFUSED, PRESENT_POSITION, TARGET_POSITION};
 use protocol_core::time::Instant;
-use protocol_core::wire::Function;
 use serde_json::{Value, json};
 
 use super::command::{MakerCommand, MakerCommandError};
@@ -92,7 +92,7 @@ impl MakerClient {
             }
             Ok(MakerCommand::InverseKinematics { address, values }) => {
                 let request = WholeRequest::WriteBetweenReads {
-                    function: Function::WriteMap21,
+                    map: Map::V21,
                     address,
                     values: values.clone(),
                     read: (FRAMES_REFUSED.address, FRAMES_REFUSED.count),
@@ -143,7 +143,7 @@ impl MakerClient {
 
 /// Function 04, so that offsets have the forms of the maker's programs (M5, M11).
 fn write(address: u8, values: Vec<u8>) -> WholeRequest {
-    WholeRequest::Write { function: Function::WriteMap21, address, values }
+    WholeRequest::Write { map: Map::V21, address, values }
 }
 
 /// The arm counts a frame that it refuses. No other client's frame is between the two reads of the counter.
