@@ -9,9 +9,10 @@
 //! device-id = 42
 //! baud-rate = 115200
 //! offset = [0, -5, 0, 0, 0, 0, 0]
+//! options = 0
 //! ```
 //!
-//! Settings are the writable registers that keep their value without power.
+//! Settings are the writable registers that keep their value without power. An arm of the maker has no options.
 
 use std::fs;
 use std::path::Path;
@@ -20,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use sevenbot::map::{BAUD_RATE, BAUD_RATES, baud_rate};
 use sevenbot::names::{name_of, name_of_register};
 use sevenbot::table::settings;
-use sevenbot::{Register, Snapshot, Span, register_text};
+use sevenbot::{Arm, Register, Snapshot, Span, register_text};
 use toml::{Table, Value};
 
 use crate::command_error::CommandError;
@@ -48,10 +49,12 @@ pub(crate) fn span() -> Span {
 }
 
 impl SettingsFile {
-    /// The settings of an arm.
-    pub(crate) fn of(arm: &sevenbot::Identity, registers: &Snapshot) -> Self {
-        let settings = settings().map(|row| (name_of(row), value(row, registers))).collect();
-        Self { format: FORMAT, chip_id: arm.chip_name(), firmware: arm.version(), settings }
+    /// The settings of an arm, from its registers.
+    pub(crate) fn of(arm: &Arm, registers: &Snapshot) -> Self {
+        let rows = settings().filter(|row| arm.serves(row.address));
+        let settings = rows.map(|row| (name_of(row), value(row, registers))).collect();
+        let identity = arm.identity();
+        Self { format: FORMAT, chip_id: identity.chip_name(), firmware: identity.version(), settings }
     }
 
     /// The text of the file.
@@ -79,17 +82,27 @@ impl SettingsFile {
         }
     }
 
-    /// The registers `now`, changed by the settings of the file.
-    pub(crate) fn applied_to(&self, path: &Path, now: &Snapshot) -> Result<Snapshot, CommandError> {
-        let mut wanted = now.clone();
+    /// The registers `now`, changed by the settings of the file; and the settings that an arm lacks, which `serves` only
+    /// some registers.
+    pub(crate) fn applied_to(
+        &self,
+        path: &Path,
+        now: &Snapshot,
+        serves: impl Fn(u8) -> bool,
+    ) -> Result<(Snapshot, Vec<&'static Register>), CommandError> {
+        let (mut wanted, mut missing) = (now.clone(), Vec::new());
         for (name, value) in &self.settings {
             let row = settings().find(|row| name_of(row) == *name);
             let row = row.ok_or_else(|| CommandError::file(path, format!("{name} is not a setting")))?;
             let bytes = bytes(row, value).map_err(|reason| CommandError::file(path, reason))?;
-            let places = (row.address..).zip(bytes);
-            places.for_each(|(address, byte)| put(&mut wanted, address, byte));
+            if serves(row.address) {
+                let places = (row.address..).zip(bytes);
+                places.for_each(|(address, byte)| put(&mut wanted, address, byte));
+            } else {
+                missing.push(row);
+            }
         }
-        Ok(wanted)
+        Ok((wanted, missing))
     }
 }
 
@@ -140,10 +153,11 @@ fn byte(row: &Register, address: u8, value: &Value) -> Result<u8, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sevenbot::map::{DEVICE_ID, OFFSET};
+    use sevenbot::map::DEVICE_ID;
+    use sevenbot::map21::OPTIONS;
 
     fn registers() -> Snapshot {
-        Snapshot { address: DEVICE_ID.address, values: vec![42, 3, 0, 0x85, 0, 0, 0, 0, 16] }
+        Snapshot { address: DEVICE_ID.address, values: vec![42, 3, 0, 0x85, 0, 0, 0, 0, 16, 2] }
     }
 
     fn file(settings: &str) -> SettingsFile {
@@ -151,7 +165,7 @@ mod tests {
     }
 
     fn refused(settings: &str) -> String {
-        match file(settings).applied_to(Path::new("x"), &registers()) {
+        match file(settings).applied_to(Path::new("x"), &registers(), |_| true) {
             Err(CommandError::File { reason, .. }) => reason,
             other => panic!("{other:?}"),
         }
@@ -161,15 +175,24 @@ mod tests {
     fn settings_are_stored_in_their_units() {
         let settings = settings().map(|row| (name_of(row), value(row, &registers()))).collect::<Table>();
         let text = toml::to_string(&settings).expect("TOML");
-        assert_eq!(text, "baud-rate = 1000000\ndevice-id = 42\noffset = [0, -5, 0, 0, 0, 0, 16]\n");
-        let back = file(&text).applied_to(Path::new("x"), &Snapshot { values: vec![0; 9], ..registers() });
-        assert_eq!(back.expect("what was written is read"), registers());
+        assert_eq!(
+            text,
+            "baud-rate = 1000000\ndevice-id = 42\noffset = [0, -5, 0, 0, 0, 0, 16]\noptions = 2\n"
+        );
+        let new = Snapshot { values: vec![0; 10], ..registers() };
+        let back = file(&text).applied_to(Path::new("x"), &new, |_| true);
+        assert_eq!(back.expect("what was written is read"), (registers(), vec![]));
+        let has_no_options = |address| address != OPTIONS.address;
+        let (wanted, missing) =
+            file(&text).applied_to(Path::new("x"), &new, has_no_options).expect("settings");
+        assert_eq!((wanted.values, missing), (vec![42, 3, 0, 0x85, 0, 0, 0, 0, 16, 0], vec![&OPTIONS]));
     }
 
     #[test]
     fn settings_missing_in_the_file_keep_their_value() {
-        let wanted = file("device-id = 7").applied_to(Path::new("x"), &registers()).expect("a setting");
-        assert_eq!(wanted.values, [7, 3, 0, 0x85, 0, 0, 0, 0, 16]);
+        let applied = file("device-id = 7").applied_to(Path::new("x"), &registers(), |_| true);
+        let (wanted, _) = applied.expect("a setting");
+        assert_eq!(wanted.values, [7, 3, 0, 0x85, 0, 0, 0, 0, 16, 2]);
     }
 
     #[test]
@@ -183,6 +206,7 @@ mod tests {
         assert_eq!(refused("device-id = 300"), "300 is out of range: device-id takes 0 to 255");
         assert_eq!(refused("device-id = 'x'").split(':').count(), 2);
         assert_eq!(refused("baud-rate = 5"), "the arm does not support 5 baud");
-        assert_eq!(span(), Span::between(&DEVICE_ID, &OFFSET));
+        assert_eq!(refused("options = 4"), "4 is out of range: options takes 0 to 3");
+        assert_eq!(span(), Span::between(&DEVICE_ID, &OPTIONS));
     }
 }

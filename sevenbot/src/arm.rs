@@ -16,7 +16,7 @@ use protocol_core::request::Request;
 use crate::error::{Error, OpenError};
 use crate::frame_port::{FramePort, Received};
 use crate::identity::{Firmware, Identity};
-use crate::map_view::MapView;
+use crate::map_view::{MapView, WriteFrame};
 use crate::open_port::OpenPort;
 use crate::pending::PendingReads;
 use crate::reports::{Report, ReportQueue, report_period};
@@ -77,7 +77,7 @@ pub struct Arm {
     path: String,
     options: ArmOptions,
     identity: Identity,
-    view: MapView,
+    pub(crate) view: MapView,
     pending: PendingReads,
     reports: ReportQueue,
 }
@@ -107,11 +107,12 @@ impl Arm {
         let nobody = Identity::from(Snapshot { address: 0, values: Vec::new() });
         let path = path.to_owned();
         let (pending, reports) = (PendingReads::default(), ReportQueue::default());
-        let view = MapView(Map::V22);
+        let view = MapView { map: Map::V22, firmware: Firmware::Unknown };
         let mut arm = Self { link, path, options, identity: nobody, view, pending, reports };
         // Registers 0 to 7 are the same in both maps.
         arm.identity = Identity::from(arm.read_span(Span::between(&DEVICE_CODE, &CHIP_ID))?);
-        arm.view = MapView(options.map.unwrap_or_else(|| arm.identity.map()));
+        let map = options.map.unwrap_or_else(|| arm.identity.map());
+        arm.view = MapView { map, firmware: arm.identity.firmware() };
         match arm.identity.device_code() {
             code if code == DEVICE_CODE.default_at(DEVICE_CODE.address) => Ok(arm),
             code => Err(OpenError::WrongDevice { code }),
@@ -127,7 +128,14 @@ impl Arm {
     /// The register map of the arm's frames. All methods take registers of map 2.2 and translate them.
     #[must_use]
     pub const fn map(&self) -> Map {
-        self.view.0
+        self.view.map
+    }
+
+    /// Does the arm have this register? Registers that only map 2.1 has are missing in the maker's firmware 2.2, and
+    /// [`OPTIONS`](crate::map21::OPTIONS) is in this project's firmware only.
+    #[must_use]
+    pub fn serves(&self, address: u8) -> bool {
+        self.view.serves(address)
     }
 
     /// The time between two reports at a frequency of `hertz`.
@@ -190,18 +198,25 @@ impl Arm {
     /// Writes the registers from `address` on in one frame: all of them or none (D16, D17).
     /// The arm does not answer a write. [`Arm::write_checked`] reads the registers back.
     ///
+    /// If both maps are necessary, there are several frames. A write to a register that only map 2.1 has ends the reports
+    /// of map 2.2 (M4). [`Arm::write_checked`] starts them again.
+    ///
     /// # Errors
     /// The registers reach past 255 (then nothing is sent), or the port failed.
     pub fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Error> {
         Span::of_values(address, values).ok_or(Error::OutsideMap { address, count: values.len() })?;
-        for (address, values) in &self.view.writes(address, values) {
-            self.send_write(*address, values)?;
+        let frames = self.view.writes(address, values);
+        for WriteFrame { map, address, values } in &frames {
+            self.send_write(*map, *address, values)?;
+        }
+        if frames.last().is_some_and(|last| last.map != self.view.map) {
+            self.claim_offset_encoding()?;
         }
         Ok(())
     }
 
-    fn send_write(&mut self, address: u8, values: &[u8]) -> Result<(), Error> {
-        let request = match self.view.0 {
+    fn send_write(&mut self, map: Map, address: u8, values: &[u8]) -> Result<(), Error> {
+        let request = match map {
             Map::V22 => Request::Write { address, values },
             Map::V21 => Request::WriteMap21 { address, values },
         };
@@ -210,10 +225,14 @@ impl Arm {
 
     /// Our firmware shows the offsets in the encoding of the map that was written last, maybe by another program (M5). A
     /// write without registers makes it this one.
+    fn claim_offset_encoding(&mut self) -> Result<(), Error> {
+        self.send_write(self.view.map, 0, &[])
+    }
+
     fn choose_offset_encoding(&mut self, span: Span) -> Result<(), Error> {
         let has_both = self.identity.firmware() == Firmware::Ours;
         if has_both && span.addresses().any(|address| OFFSET.holds(address)) {
-            self.send_write(0, &[])?;
+            self.claim_offset_encoding()?;
         }
         Ok(())
     }

@@ -5,12 +5,16 @@
 
 use std::fmt;
 
-use protocol_core::registers::map::{EEPROM_LOCK, MOTOR_STATE, find, motor_state, refusal};
+use protocol_core::registers::map::{
+    EEPROM_LOCK, FEEDBACK_FREQUENCY, MOTOR_STATE, PRESENT_POSITION, motor_state, refusal,
+};
+use protocol_core::registers::map21::find_readable;
 use protocol_core::registers::{Access, Region, Register};
 
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::identity::Firmware;
+use crate::map_view::MapView;
 use crate::names::name_of_register;
 use crate::register_text;
 use crate::snapshot::Snapshot;
@@ -52,6 +56,10 @@ pub enum MismatchCause {
     ReadOnly,
     /// The maker reserves the register.
     Reserved,
+    /// The arm's firmware does not have the register.
+    NotServed,
+    /// A write to any part of a position makes the maker's firmware move the arm, so it was not sent.
+    StartsMotion,
     /// The register is a setting, and the EEPROM lock protects it (D15).
     Locked,
     /// A value in the frame was out of range, so the arm ignored the whole frame (D16).
@@ -59,6 +67,8 @@ pub enum MismatchCause {
         /// The register with the value that was out of range.
         address: u8,
     },
+    /// No joint angles reach the position that a write of map 2.1 asks for (M7).
+    OutOfReach,
     /// The settings storage is full until the next restart (D19).
     StorageFull,
     /// The arm received the frame damaged.
@@ -107,18 +117,23 @@ impl Arm {
     }
 
     fn write_until_taken(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<WriteMismatch>, Error> {
-        let locked = self.read_span(Span::of(&EEPROM_LOCK))?.byte(&EEPROM_LOCK) != 0;
+        let now = self.read_span(Span::between(&EEPROM_LOCK, &FEEDBACK_FREQUENCY))?;
+        let locked = now.byte(&EEPROM_LOCK) != 0;
+        let reports = self.report_write(writes, now.byte(&FEEDBACK_FREQUENCY));
         self.prepare_torque(writes)?;
         let mut before = self.status()?;
-        let (mut unchanged, mut sending) = (Vec::new(), writes.iter().collect::<Vec<_>>());
+        let (mut unchanged, mut sending) = (Vec::new(), writes.iter().chain(&reports).collect::<Vec<_>>());
         for attempt in 1..=WRITE_ATTEMPTS {
             let found = self.write_and_read_back(&sending, locked)?;
             let after = self.status()?;
+            let view = self.view;
             let cause = |address, wanted| {
-                cause_from_access(address, locked).unwrap_or_else(|| match (&before, &after) {
-                    (Some(before), Some(after)) => cause_from_counters(before, after),
-                    _ => cause_from_range(address, wanted),
-                })
+                cause_from_arm(view, address).or_else(|| cause_from_access(address, locked)).unwrap_or_else(
+                    || match (&before, &after) {
+                        (Some(before), Some(after)) => cause_from_counters(before, after),
+                        _ => cause_from_range(address, wanted),
+                    },
+                )
             };
             let mut lost = Vec::new();
             for (found, write) in found.iter().zip(sending) {
@@ -136,6 +151,16 @@ impl Arm {
             (before, sending) = (after, lost);
         }
         Ok(unchanged)
+    }
+
+    /// The write that starts the reports of map 2.2 again, if these writes end them.
+    fn report_write(&self, writes: &[(u8, Vec<u8>)], hertz: u8) -> Option<(u8, Vec<u8>)> {
+        let ends = writes.iter().any(|(address, values)| self.view.ends_reports(*address, values));
+        let row = FEEDBACK_FREQUENCY;
+        let is_written = writes.iter().any(|(address, values)| {
+            row.address.checked_sub(*address).is_some_and(|index| usize::from(index) < values.len())
+        });
+        (ends && hertz != 0 && !is_written).then(|| (row.address, vec![hertz]))
     }
 
     /// Before a write that lets the motors of the maker's firmware drive the joints: makes the present positions the
@@ -185,12 +210,23 @@ fn compare(found: &Snapshot, wanted: &[u8], cause: impl Fn(u8, u8) -> MismatchCa
 
 /// The number that a byte encodes. Minus zero is zero (D9).
 fn number(address: u8, byte: u8) -> i16 {
-    find(address).map_or(i16::from(byte), |row| row.range.decode(byte))
+    find_readable(address).map_or(i16::from(byte), |row| row.range.decode(byte))
+}
+
+/// The firmware's reason why no write can change a register; `None` if a write can.
+fn cause_from_arm(view: MapView, address: u8) -> Option<MismatchCause> {
+    match () {
+        () if !view.serves(address) => Some(MismatchCause::NotServed),
+        () if view.starts_inverse(address) && !PRESENT_POSITION.holds(address) => {
+            Some(MismatchCause::StartsMotion)
+        }
+        () => None,
+    }
 }
 
 /// The table's reason why no write can change a register; `None` if a write can.
 fn cause_from_access(address: u8, locked: bool) -> Option<MismatchCause> {
-    match find(address) {
+    match find_readable(address) {
         None => Some(MismatchCause::NoRegister),
         Some(Register { access: Access::ReadOnly, .. }) => Some(MismatchCause::ReadOnly),
         Some(Register { access: Access::Reserved, .. }) => Some(MismatchCause::Reserved),
@@ -205,6 +241,7 @@ pub(crate) fn cause_from_counters(before: &StatusBlock, after: &StatusBlock) -> 
     match after.last_refusal() {
         Some((refusal::OUT_OF_RANGE, address)) if refused => MismatchCause::OutOfRange { address },
         Some((refusal::STORAGE_FULL, _)) if refused => MismatchCause::StorageFull,
+        Some((refusal::OUT_OF_REACH, _)) if refused => MismatchCause::OutOfReach,
         _ if before.frames_corrupted() != after.frames_corrupted() => MismatchCause::Damaged,
         _ => MismatchCause::Unknown,
     }
@@ -212,7 +249,7 @@ pub(crate) fn cause_from_counters(before: &StatusBlock, after: &StatusBlock) -> 
 
 /// The reason if the arm has no status block.
 fn cause_from_range(address: u8, wanted: u8) -> MismatchCause {
-    match find(address) {
+    match find_readable(address) {
         Some(row) if !row.range.contains(wanted) => MismatchCause::OutOfRange { address },
         _ => MismatchCause::Unknown,
     }
@@ -231,11 +268,16 @@ impl fmt::Display for MismatchCause {
             Self::NoRegister => out.write_str("the table has no register there"),
             Self::ReadOnly => out.write_str("it is read only"),
             Self::Reserved => out.write_str("it is reserved by the maker"),
+            Self::NotServed => out.write_str("the arm's firmware does not have it"),
+            Self::StartsMotion => out.write_str(
+                "not written, because any write there moves an arm of the maker; `sevenbot move-to` moves the tip",
+            ),
             Self::Locked => out.write_str("it is protected by the EEPROM lock"),
             Self::OutOfRange { address } => {
                 let name = name_of_register(address);
                 write!(out, "the arm ignored the frame: {name} takes {}", register_text::range(address))
             }
+            Self::OutOfReach => out.write_str("no joint angles reach the position"),
             Self::StorageFull => out.write_str("the settings storage is full until the arm restarts"),
             Self::Damaged => out.write_str("the arm received the request damaged; try again"),
             Self::Unknown => out.write_str("the arm gives no reason; try again"),
@@ -263,7 +305,8 @@ mod tests {
 
     #[test]
     fn the_table_gives_the_cause_of_an_impossible_write() {
-        assert_eq!(cause_from_access(61, false), Some(MismatchCause::NoRegister));
+        assert_eq!(cause_from_access(67, false), Some(MismatchCause::NoRegister));
+        assert_eq!(cause_from_access(61, false), None, "of map 2.1");
         assert_eq!(cause_from_access(PRESENT_POSITION.address, false), Some(MismatchCause::ReadOnly));
         assert_eq!(cause_from_access(RESERVED_8.address, false), Some(MismatchCause::Reserved));
         assert_eq!(cause_from_access(DEVICE_ID.address, true), Some(MismatchCause::Locked));
@@ -282,6 +325,8 @@ mod tests {
         );
         let after = status(5, refusal::OUT_OF_RANGE, 47);
         assert_eq!(cause_from_counters(&before, &after), MismatchCause::OutOfRange { address: 47 });
+        let far = status(5, refusal::OUT_OF_REACH, 68);
+        assert_eq!(cause_from_counters(&before, &far), MismatchCause::OutOfReach);
         let full = status(5, refusal::STORAGE_FULL, 11);
         assert_eq!(cause_from_counters(&before, &full), MismatchCause::StorageFull);
     }

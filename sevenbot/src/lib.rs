@@ -58,7 +58,7 @@ pub use arm::{Arm, ArmOptions};
 pub use error::{Error, OpenError, PortError, ReceiveCounts};
 pub use identity::{Firmware, Identity};
 pub use protocol_core::registers::map21::Map;
-pub use protocol_core::registers::{Joint, Range, Register, map};
+pub use protocol_core::registers::{Joint, Range, Register, map, map21};
 pub use reports::Report;
 pub use snapshot::Snapshot;
 pub use span::Span;

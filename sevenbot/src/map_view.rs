@@ -6,14 +6,17 @@
 //! ```
 //!
 //! In map 2.1 the present positions and their report frequency have other addresses, and the offsets another encoding.
-//! Everything else that map 2.2 names is the same.
+//! Everything else that map 2.2 names is the same. The registers that only map 2.1 has keep their addresses. This
+//! project's firmware serves both maps, so a register that only map 2.1 has is written by its function.
 
-use protocol_core::registers::Register;
-use protocol_core::registers::map::{FEEDBACK_FREQUENCY, OFFSET, PRESENT_POSITION, TIME};
+use protocol_core::registers::map::{FEEDBACK_FREQUENCY, MAP, OFFSET, PRESENT_POSITION, TIME};
 use protocol_core::registers::map21::{
-    ANGLE_FEEDBACK_FREQUENCY, Map, PRESENT_ANGLE, TIP_POSITION, WRIST_POSITION,
+    self, ANGLE_FEEDBACK_FREQUENCY, DISC_DIRECTION, LOAD_FEEDBACK_FREQUENCY, Map, OPTIONS, PRESENT_ANGLE,
+    TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION, find_readable,
 };
+use protocol_core::registers::{Access, Register};
 
+use crate::identity::Firmware;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
 
@@ -23,16 +26,45 @@ const STOCK_TIME_AT_START: u8 = 232;
 const ONE_SECOND: u8 = 10;
 /// In map 2.1 a stored offset of 0 is 128. 0 and 255 mean that there is none.
 const OFFSET_ZERO: u8 = 128;
+/// A byte that is no offset in any encoding of map 2.1.
+const NO_OFFSET: u8 = 64;
 
 /// How an arm sees the registers of map 2.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct MapView(pub(crate) Map);
+pub(crate) struct MapView {
+    /// The map of the arm's frames.
+    pub(crate) map: Map,
+    /// Ours serves both maps.
+    pub(crate) firmware: Firmware,
+}
+
+/// One frame: the map of its function, the first register, and the values.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct WriteFrame {
+    pub(crate) map: Map,
+    pub(crate) address: u8,
+    pub(crate) values: Vec<u8>,
+}
 
 impl MapView {
+    /// Does the arm have this register? Only a register that map 2.2 lacks can be missing.
+    pub(crate) fn serves(self, address: u8) -> bool {
+        let has_map21 = self.firmware == Firmware::Ours || self.map == Map::V21;
+        // Register 20 is this project's addition (M6).
+        let is_ours = OPTIONS.holds(address) && self.firmware != Firmware::Ours;
+        !is_only_map21(address) || has_map21 && !is_ours
+    }
+
+    /// Does a write there make the arm move at once, whatever part of a position it covers? Ours moves only when a frame
+    /// covers a whole position (M7).
+    pub(crate) fn starts_inverse(self, address: u8) -> bool {
+        self.firmware != Firmware::Ours && self.map == Map::V21 && is_inverse(address)
+    }
+
     /// The registers to read for these ones: a range that holds them all.
     pub(crate) fn read_span(self, span: Span) -> Span {
         let addresses = || span.addresses().map(|address| self.address(address));
-        match (self.0, addresses().min(), addresses().max()) {
+        match (self.map, addresses().min(), addresses().max()) {
             (Map::V21, Some(first), Some(last)) => {
                 Span::new(first, (last - first).saturating_add(1)).unwrap_or(span)
             }
@@ -46,29 +78,66 @@ impl MapView {
         Snapshot { address: span.address(), values: span.addresses().map(value).collect() }
     }
 
-    /// The writes that give these values to registers of map 2.2. Registers that map 2.1 uses for something else are left
-    /// out.
-    pub(crate) fn writes(self, address: u8, values: &[u8]) -> Vec<(u8, Vec<u8>)> {
-        if self.0 == Map::V22 || values.is_empty() {
-            return vec![(address, values.to_vec())];
+    /// The frames that give these values to registers. One frame if the arm has a function that writes them all. Registers
+    /// that map 2.1 uses for something else are left out.
+    pub(crate) fn writes(self, address: u8, values: &[u8]) -> Vec<WriteFrame> {
+        if values.is_empty() {
+            return vec![WriteFrame { map: self.map, address, values: Vec::new() }];
         }
-        let mut writes: Vec<(u8, Vec<u8>)> = Vec::new();
-        for (address, &value) in (address..=u8::MAX).zip(values).filter(|(address, _)| !is_inverse(*address))
+        let default = self.default_map(address, values.len());
+        let mut frames: Vec<WriteFrame> = Vec::new();
+        for (address, &value) in (address..=u8::MAX).zip(values).filter(|(address, _)| !self.skips(*address))
         {
-            let (address, value) = (self.address(address), encode(address, value));
-            match writes.last_mut() {
-                Some((first, run)) if usize::from(*first) + run.len() == usize::from(address) => {
-                    run.push(value)
+            let map = if self.writes_by_map21(address) { Map::V21 } else { default };
+            let value = if map == Map::V21 { encode(address, value) } else { value };
+            let address = self.address(address);
+            match frames.last_mut() {
+                Some(last) if last.map == map && last.end() == usize::from(address) => {
+                    last.values.push(value)
                 }
-                _ => writes.push((address, vec![value])),
+                _ => frames.push(WriteFrame { map, address, values: vec![value] }),
             }
         }
-        writes
+        frames
+    }
+
+    /// Does a write to these registers end the reports of [`FEEDBACK_FREQUENCY`], although none of map 2.1 were asked for
+    /// (M4)?
+    pub(crate) fn ends_reports(self, address: u8, values: &[u8]) -> bool {
+        let starts_others = |frame: &WriteFrame| {
+            [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY].iter().any(|row| {
+                let index = row.address.checked_sub(frame.address).map(usize::from);
+                index.and_then(|index| frame.values.get(index)).is_some_and(|&hertz| hertz != 0)
+            })
+        };
+        let frames = self.writes(address, values);
+        let mut of_map21 = frames.iter().filter(|frame| frame.map == Map::V21).peekable();
+        self.map == Map::V22 && of_map21.peek().is_some() && !of_map21.any(starts_others)
+    }
+
+    /// The map for the registers of a write that both maps have: that of the other registers, so that one frame holds all.
+    fn default_map(self, address: u8, count: usize) -> Map {
+        let has = |test: &dyn Fn(u8) -> bool| (address..=u8::MAX).take(count).any(test);
+        let is_only_map22 = |address| FEEDBACK_FREQUENCY.holds(address) || PRESENT_POSITION.holds(address);
+        match self.map {
+            Map::V22 if has(&|address| self.writes_by_map21(address)) && !has(&is_only_map22) => Map::V21,
+            map => map,
+        }
+    }
+
+    /// Does only the function of map 2.1 write this register?
+    fn writes_by_map21(self, address: u8) -> bool {
+        self.map == Map::V21 || self.firmware == Firmware::Ours && is_only_map21(address)
+    }
+
+    /// In map 2.1 the present positions have the addresses of the tip.
+    fn skips(self, address: u8) -> bool {
+        self.map == Map::V21 && (PRESENT_POSITION.holds(address) || self.starts_inverse(address))
     }
 
     /// The registers of a report of the present positions.
     pub(crate) const fn report(self) -> Span {
-        match self.0 {
+        match self.map {
             Map::V22 => Span::of(&PRESENT_POSITION),
             Map::V21 => Span::of(&PRESENT_ANGLE),
         }
@@ -77,14 +146,14 @@ impl MapView {
     /// Where the arm has this register.
     fn address(self, address: u8) -> u8 {
         let moved = [(&FEEDBACK_FREQUENCY, &ANGLE_FEEDBACK_FREQUENCY), (&PRESENT_POSITION, &PRESENT_ANGLE)];
-        let new = moved.into_iter().find(|(old, _)| self.0 == Map::V21 && old.holds(address));
+        let new = moved.into_iter().find(|(old, _)| self.map == Map::V21 && old.holds(address));
         new.map_or(address, |(old, new)| new.address + (address - old.address))
     }
 
     /// The value of a register of map 2.2, from the arm's own encoding.
     fn value(self, address: u8, value: u8) -> u8 {
         match () {
-            () if self.0 == Map::V22 => value,
+            () if self.map == Map::V22 => value,
             () if OFFSET.holds(address) => offset_from_biased(value),
             () if TIME.holds(address) && value == STOCK_TIME_AT_START => ONE_SECOND,
             () => value,
@@ -92,13 +161,22 @@ impl MapView {
     }
 }
 
-/// Does a write there start inverse kinematics in map 2.1?
-fn is_inverse(address: u8) -> bool {
-    (TIP_POSITION.address..end(&WRIST_POSITION)).contains(&address)
+impl WriteFrame {
+    /// The address behind the last register.
+    fn end(&self) -> usize {
+        usize::from(self.address) + self.values.len()
+    }
 }
 
-fn end(row: &Register) -> u8 {
-    row.address.saturating_add(row.count)
+/// Is this a register that a read shows (M3), and that map 2.2 lacks?
+fn is_only_map21(address: u8) -> bool {
+    let is_only = |row: &Register| row.access != Access::Reserved && !MAP.contains(row);
+    find_readable(address).is_some_and(is_only)
+}
+
+/// Is this a part of a position or a direction for inverse kinematics in map 2.1?
+fn is_inverse(address: u8) -> bool {
+    [TIP_POSITION, TOOL_DIRECTION, DISC_DIRECTION, WRIST_POSITION].iter().any(|row| row.holds(address))
 }
 
 /// The value in map 2.1 of a register of map 2.2.
@@ -106,12 +184,7 @@ fn encode(address: u8, value: u8) -> u8 {
     if !OFFSET.holds(address) {
         return value;
     }
-    let magnitude = value & !OFFSET_ZERO;
-    if value & OFFSET_ZERO == 0 {
-        OFFSET_ZERO.wrapping_add(magnitude)
-    } else {
-        OFFSET_ZERO.wrapping_sub(magnitude)
-    }
+    map21::OFFSET.range.encode(OFFSET.range.decode(value)).unwrap_or(NO_OFFSET)
 }
 
 /// Sign and magnitude (D9) of 128 + offset.
@@ -128,7 +201,16 @@ mod tests {
     use super::*;
     use protocol_core::registers::map::{MOTOR_STATE, TARGET_POSITION};
 
-    const MAP_21: MapView = MapView(Map::V21);
+    /// An arm of the maker with map 2.1.
+    const MAP_21: MapView = MapView { map: Map::V21, firmware: Firmware::Makers };
+    /// This project's firmware.
+    const BOTH: MapView = MapView { map: Map::V22, firmware: Firmware::Ours };
+    /// An arm of the maker with map 2.2.
+    const MAP_22: MapView = MapView { map: Map::V22, firmware: Firmware::Makers };
+
+    fn frame(map: Map, address: u8, values: impl IntoIterator<Item = u8>) -> WriteFrame {
+        WriteFrame { map, address, values: values.into_iter().collect() }
+    }
 
     #[test]
     fn one_read_holds_all_joints() {
@@ -140,7 +222,7 @@ mod tests {
         assert_eq!(view.joints(&PRESENT_POSITION), [83, 84, 85, 86, 87, 88, 89]);
         assert_eq!((view.byte(&FEEDBACK_FREQUENCY), view.byte(&MOTOR_STATE)), (82, 29));
         assert_eq!(MAP_21.read_span(Span::of(&TARGET_POSITION)), Span::of(&TARGET_POSITION));
-        assert_eq!(MapView(Map::V22).read_span(joints), joints);
+        assert_eq!(BOTH.read_span(joints), joints);
     }
 
     #[test]
@@ -149,17 +231,63 @@ mod tests {
         let shown = [0, 0, 0, 1, 0x82, 16, 0x90];
         let view = MAP_21.view(&Snapshot { address: 13, values: stored.to_vec() }, Span::of(&OFFSET));
         assert_eq!(view.values, shown);
-        let [(address, written)] = &MAP_21.writes(13, &shown)[..] else { panic!("one write") };
-        assert_eq!((*address, written.as_slice()), (13, &[128, 128, 128, 129, 126, 144, 112][..]));
+        let written = MAP_21.writes(13, &shown);
+        assert_eq!(written, [frame(Map::V21, 13, [128, 128, 128, 129, 126, 144, 112])]);
+        assert_eq!(
+            MAP_21.writes(13, &[127]),
+            [frame(Map::V21, 13, [64])],
+            "127 is no offset, and 64 neither"
+        );
     }
 
     #[test]
-    fn a_write_never_starts_inverse_kinematics() {
+    fn a_write_never_starts_inverse_kinematics_of_the_maker() {
         let values: Vec<u8> = (46..=90).collect();
         let writes = MAP_21.writes(46, &values);
-        assert_eq!(writes[0], (46, (46..=52).collect()));
-        assert_eq!(writes[1], (82, vec![53]), "the frequency of reports");
-        assert!(writes[2..].iter().all(|(first, _)| *first >= 74), "{writes:?}");
-        assert_eq!(MAP_21.writes(0, &[]), [(0, vec![])]);
+        assert_eq!(writes[0], frame(Map::V21, 46, 46..=52));
+        assert_eq!(writes[1], frame(Map::V21, 82, [53]), "the frequency of reports");
+        assert_eq!(writes[2].address, 66, "{writes:?}");
+        assert!(writes[3..].iter().all(|frame| frame.address >= 74), "{writes:?}");
+        assert_eq!(MAP_21.writes(0, &[]), [frame(Map::V21, 0, [])]);
+        let moving: Vec<u8> = (0..=255).filter(|&address| MAP_21.starts_inverse(address)).collect();
+        assert_eq!(moving, (54..=65).chain(68..=73).collect::<Vec<u8>>());
+        assert!((0..=255).all(|address| !BOTH.starts_inverse(address)));
+    }
+
+    #[test]
+    fn a_register_of_map_21_is_written_by_its_function() {
+        for address in (61..=66).chain(68..=73).chain([20, 82, 90]) {
+            assert_eq!(BOTH.writes(address, &[2]), [frame(Map::V21, address, [2])]);
+            assert_eq!(MAP_22.writes(address, &[2]), [frame(Map::V22, address, [2])]);
+        }
+        for address in (11..20).chain(28..=53).chain([21, 67]) {
+            assert_eq!(BOTH.writes(address, &[2]), [frame(Map::V22, address, [2])]);
+        }
+    }
+
+    #[test]
+    fn all_settings_are_in_one_frame() {
+        let settings = [42, 3, 0, 0x85, 0, 0, 0, 0, 16, 2];
+        let frames = BOTH.writes(11, &settings);
+        assert_eq!(frames, [frame(Map::V21, 11, [42, 3, 128, 123, 128, 128, 128, 128, 144, 2])]);
+        assert_eq!(BOTH.writes(11, &settings[..9]), [frame(Map::V22, 11, settings[..9].to_vec())]);
+        let mixed = BOTH.writes(52, &(52..=66).collect::<Vec<u8>>());
+        assert_eq!(mixed, [frame(Map::V22, 52, 52..=60), frame(Map::V21, 61, 61..=66)]);
+    }
+
+    #[test]
+    fn an_arm_serves_the_registers_of_its_firmware() {
+        let missing = |view: MapView| (0..=255).filter(|&address| !view.serves(address)).collect::<Vec<u8>>();
+        assert_eq!(missing(BOTH), []);
+        assert_eq!(missing(MAP_21), [20]);
+        let only_map21 = [20].into_iter().chain(61..=66).chain(68..=73).chain(82..=97);
+        assert_eq!(missing(MAP_22), only_map21.collect::<Vec<u8>>());
+    }
+
+    #[test]
+    fn a_write_of_map_21_ends_the_reports_of_map_22() {
+        assert!(BOTH.ends_reports(20, &[1]) && BOTH.ends_reports(82, &[0]));
+        assert!(!BOTH.ends_reports(82, &[30]) && !BOTH.ends_reports(90, &[1]), "other reports");
+        assert!(!BOTH.ends_reports(46, &[90]) && !MAP_21.ends_reports(66, &[1]));
     }
 }

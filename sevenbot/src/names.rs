@@ -1,6 +1,7 @@
-//! Parses register names: `target-position.3`, `SPEED`, `12`, `54..60`. The names come from the register table.
+//! Parses register names: `target-position.3`, `SPEED`, `12`, `54..60`. The names come from the register tables. Map 2.2
+//! goes before map 2.1, as in a read (M3).
 
-use protocol_core::registers::map::find;
+use protocol_core::registers::map21::{MAP_21, find_readable};
 use protocol_core::registers::{Joint, MAP, Register};
 
 use crate::span::Span;
@@ -41,10 +42,10 @@ pub fn name_of(row: &Register) -> String {
     row.name.to_ascii_lowercase().replace('_', "-")
 }
 
-/// The name of one register: `target-position.3` or `chip-id+2`; `register 61` if the table has none.
+/// The name of one register: `target-position.3` or `chip-id+2`; `register 67` if the tables have none.
 #[must_use]
 pub fn name_of_register(address: u8) -> String {
-    let Some(row) = find(address) else { return format!("register {address}") };
+    let Some(row) = find_readable(address) else { return format!("register {address}") };
     match (row.joint_at(address), address.saturating_sub(row.address)) {
         (Some(joint), _) => format!("{}.{}", name_of(row), joint.number()),
         (None, 0) => name_of(row),
@@ -71,7 +72,7 @@ pub fn parse(text: &str) -> Result<Span, NameError> {
     }
     let (name, joint) = text.split_once('.').map_or((text, None), |(name, joint)| (name, Some(joint)));
     let row = row(name)?;
-    joint.map_or(Ok(Span::of(row)), |joint| one_joint(row, joint))
+    joint.map_or(Ok(shown(row)), |joint| one_joint(row, joint))
 }
 
 fn address(text: &str) -> Result<u8, NameError> {
@@ -83,13 +84,28 @@ fn one_joint(row: &'static Register, joint: &str) -> Result<Span, NameError> {
     if row.per_joint { Ok(Span::one(row.of(joint))) } else { Err(NameError::NotPerJoint(row)) }
 }
 
+/// The registers of a row that a read of the row's addresses shows: of a row that only map 2.1 has, those that map 2.2
+/// does not use.
+fn shown(row: &Register) -> Span {
+    let is_shown = |address: &u8| MAP.contains(row) || find_readable(*address) == Some(row);
+    let addresses = || Span::of(row).addresses().filter(is_shown);
+    let count = u8::try_from(addresses().count()).unwrap_or_default();
+    addresses().next().and_then(|first| Span::new(first, count)).unwrap_or(Span::NONE)
+}
+
+/// The row of this name. Map 2.1 is searched only for a name that is not the beginning of any in map 2.2.
 fn row(name: &str) -> Result<&'static Register, NameError> {
     let wanted = name.to_ascii_uppercase().replace('-', "_");
-    if let Some(row) = MAP.iter().find(|row| row.name == wanted) {
+    let rows =
+        || MAP.iter().chain(MAP_21.iter().filter(|row| !MAP.contains(row) && shown(row) != Span::NONE));
+    if let Some(row) = rows().find(|row| row.name == wanted) {
         return Ok(row);
     }
-    let candidates: Vec<_> =
-        MAP.iter().filter(|row| !wanted.is_empty() && row.name.starts_with(&wanted)).collect();
+    let is_candidate = |row: &&Register| !wanted.is_empty() && row.name.starts_with(&wanted);
+    let mut candidates: Vec<_> = MAP.iter().filter(is_candidate).collect();
+    if candidates.is_empty() {
+        candidates = rows().filter(is_candidate).collect();
+    }
     match candidates.as_slice() {
         [] => Err(NameError::Unknown),
         [only] => Ok(only),
@@ -112,6 +128,18 @@ mod tests {
                 assert_eq!(parse(&name), Ok(Span::of(row)), "{name}");
             }
         }
+    }
+
+    #[test]
+    fn registers_of_map_21_have_their_names() {
+        assert_eq!((parse("options"), parse("opt")), (span(20, 1), span(20, 1)));
+        assert_eq!((parse("wrist-position"), parse("disc")), (span(68, 6), span(63, 3)));
+        assert_eq!(parse("tool-direction"), span(61, 2), "60 is the present position of joint 7");
+        assert_eq!((parse("present-angle.7"), parse("load")), (span(89, 1), span(90, 1)));
+        assert_eq!(parse("present"), span(54, 7), "map 2.2 goes first");
+        assert_eq!((parse("offset"), parse("o")), (span(13, 7), span(13, 7)));
+        assert_eq!(parse("tip-position"), Err(NameError::Unknown), "map 2.2 uses all its addresses");
+        assert_eq!(name_of_register(62), "tool-direction+2");
     }
 
     #[test]
@@ -143,6 +171,6 @@ mod tests {
         assert_eq!(name_of_register(48), "target-position.3");
         assert_eq!(name_of_register(2), "chip-id");
         assert_eq!(name_of_register(4), "chip-id+2");
-        assert_eq!(name_of_register(61), "register 61");
+        assert_eq!(name_of_register(67), "register 67");
     }
 }

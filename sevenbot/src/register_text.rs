@@ -2,10 +2,14 @@
 
 use protocol_core::registers::map::{
     BAUD_RATE, CHIP_ID, EEPROM_LOCK, EFFECTOR_TYPE, FAULTS, LAST_REFUSAL, LAST_REFUSED_REGISTER,
-    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, VACUUM_PUMP, baud_rate, fault, find, motor_state, refusal,
+    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, VACUUM_PUMP, baud_rate, fault, motor_state, refusal,
+};
+use protocol_core::registers::map21::{
+    DISC_DIRECTION, OPTIONS, PRESENT_LOAD, WRIST_POSITION, find_readable, option,
 };
 use protocol_core::registers::{Joint, Register, Unit};
 
+use crate::map21_text;
 use crate::names::{name_of, name_of_register};
 use crate::snapshot::Snapshot;
 use crate::units::Speed;
@@ -39,7 +43,7 @@ pub fn entries(snapshot: &Snapshot) -> Vec<RegisterEntry> {
     let mut entries = Vec::new();
     let mut addresses = snapshot.span().addresses().peekable();
     while let Some(address) = addresses.next() {
-        let whole = find(address).filter(|row| is_whole(row, address, snapshot));
+        let whole = find_readable(address).filter(|row| is_whole(row, address, snapshot));
         match whole {
             Some(row) => {
                 entries.push(long_entry(row, snapshot));
@@ -72,16 +76,19 @@ fn is_whole(row: &Register, address: u8, snapshot: &Snapshot) -> bool {
 fn long_entry(row: &Register, snapshot: &Snapshot) -> RegisterEntry {
     let held = snapshot.span().addresses().filter(|&address| row.holds(address));
     let bytes: Vec<u8> = held.map(|address| snapshot.at(address)).collect();
-    let value = if *row == CHIP_ID {
-        bytes.iter().map(|byte| format!("{byte:02X}")).collect()
-    } else {
-        snapshot.counter(row).to_string()
+    let (value, meaning) = match *row {
+        CHIP_ID => (bytes.iter().map(|byte| format!("{byte:02X}")).collect(), String::new()),
+        DISC_DIRECTION | WRIST_POSITION => {
+            let numbers: Vec<String> = bytes.iter().map(u8::to_string).collect();
+            (numbers.join(" "), map21_text::values(row, &bytes))
+        }
+        _ => (snapshot.counter(row).to_string(), String::new()),
     };
-    RegisterEntry { address: row.address, name: name_of(row), bytes, value, meaning: String::new() }
+    RegisterEntry { address: row.address, name: name_of(row), bytes, value, meaning }
 }
 
 fn entry(address: u8, byte: u8) -> RegisterEntry {
-    let row = find(address);
+    let row = find_readable(address);
     let value = row.map_or(i16::from(byte), |row| row.range.decode(byte)).to_string();
     let meaning = row.map(|row| meaning(row, byte)).unwrap_or_default();
     RegisterEntry { address, name: name_of_register(address), bytes: vec![byte], value, meaning }
@@ -99,6 +106,8 @@ pub fn meaning(row: &Register, byte: u8) -> String {
         FAULTS => faults(byte),
         MISSING_SERVOS | MOVING_JOINTS => joints(byte),
         LAST_REFUSAL => refusal_reason(byte).to_owned(),
+        OPTIONS => options(byte),
+        PRESENT_LOAD => format!("{:.1} %", 0.8 * (f64::from(byte) - 128.0)),
         // No refusal concerns register 0, the device code, so 0 means none.
         LAST_REFUSED_REGISTER if byte == 0 => "none".to_owned(),
         LAST_REFUSED_REGISTER => name_of_register(byte),
@@ -159,6 +168,14 @@ pub fn faults(bits: u8) -> String {
     list(set.collect()).unwrap_or_else(|| "none".to_owned())
 }
 
+/// The options in these bits of register 20 (M6).
+fn options(bits: u8) -> String {
+    let set = |bit, words: &str| (bits & bit != 0).then(|| words.to_owned());
+    let biased = set(option::BIASED_OFFSETS, "offsets read as 128 + offset until the first write");
+    let alarms = set(option::ALARMS, "alarm frames");
+    list(biased.into_iter().chain(alarms).collect()).unwrap_or_else(|| "none".to_owned())
+}
+
 /// The joints in these bits.
 #[must_use]
 pub fn joints(bits: u8) -> String {
@@ -176,7 +193,7 @@ fn list(mut words: Vec<String>) -> Option<String> {
 /// The range of the register at `address`, such as `0 to 180`.
 #[must_use]
 pub fn range(address: u8) -> String {
-    find(address).map_or_else(String::new, |row| {
+    find_readable(address).map_or_else(String::new, |row| {
         let (low, high) = row.range.bounds();
         format!("{low} to {high}")
     })
@@ -209,6 +226,22 @@ mod tests {
         let counter = Snapshot { address: FRAMES_ACCEPTED.address, values: vec![0x34, 0x12, 5] };
         let values: Vec<String> = entries(&counter).into_iter().map(|entry| entry.value).collect();
         assert_eq!(values, ["4660", "5"]);
+    }
+
+    #[test]
+    fn registers_of_map_21_have_a_meaning() {
+        assert_eq!(meaning(&OPTIONS, 0), "none");
+        assert_eq!(meaning(&OPTIONS, 2), "alarm frames");
+        assert_eq!(
+            meaning(&OPTIONS, 3),
+            "offsets read as 128 + offset until the first write and alarm frames"
+        );
+        assert_eq!(meaning(&PRESENT_LOAD, 93), "-28.0 %");
+        let shown =
+            entries(&Snapshot { address: 63, values: vec![128, 129, 127, 0, 0, 4, 100, 4, 200, 4, 150] });
+        let [disc, .., wrist] = shown.as_slice() else { panic!("{shown:?}") };
+        assert_eq!((disc.value.as_str(), disc.meaning.as_str()), ("128 129 127", "0 1 -1"));
+        assert_eq!((wrist.value.as_str(), wrist.meaning.as_str()), ("4 100 4 200 4 150", "100 200 150 mm"));
     }
 
     #[test]

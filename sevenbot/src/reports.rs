@@ -48,7 +48,7 @@ pub(crate) struct ReportQueue(VecDeque<Report>);
 impl ReportQueue {
     /// Keeps a frame if it is a report.
     pub(crate) fn keep(&mut self, received: &Received, view: MapView) {
-        let report = match (received, view.0) {
+        let report = match (received, view.map) {
             (Received::Reply(report), Map::V22) | (Received::Report(report), Map::V21) => report,
             _ => return,
         };

@@ -3,13 +3,15 @@
 use std::fmt::Write as _;
 
 use protocol_core::registers::map::BAUD_RATES;
+use protocol_core::registers::map21::find_readable;
 use protocol_core::registers::{Access, JOINTS, MAP, MAP_21, Map, Range, Region, Register};
 
 use crate::span::Span;
 
-/// The rows that are settings: writable, and kept without power.
+/// The rows that are settings: writable, and kept without power. The offsets are those of map 2.2.
 pub fn settings() -> impl Iterator<Item = &'static Register> {
-    MAP.iter().filter(|row| row.region == Region::Eeprom && row.access == Access::ReadWrite)
+    let is_shown = |row: &&Register| find_readable(row.address) == Some(*row);
+    rows().filter(is_shown).filter(|row| row.region == Region::Eeprom && row.access == Access::ReadWrite)
 }
 
 /// The rows of both maps, those that mean the same once.

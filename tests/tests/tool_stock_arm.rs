@@ -124,6 +124,33 @@ fn settings_are_saved_and_restored() {
     assert!(offsets.contains(" 3 "), "{offsets}");
 }
 
+/// Options are this project's addition (M6), and any write to a position moves an arm of the maker.
+#[test]
+fn registers_that_this_arm_lacks_are_told() {
+    let arm = StockArm::start();
+    let missing = "the arm's firmware 2.1 does not have register 20, options";
+    for command in [["get", "options", "--json"].as_slice(), &["set", "--unlock", "options", "0"]] {
+        let error = failed(&arm.sevenbot(command), 1);
+        assert!(error.contains(missing), "{error}");
+    }
+    let file = arm.path("settings.toml");
+    succeeded(arm.sevenbot(&["backup", &file]));
+    let text = fs::read_to_string(&file).unwrap_or_default();
+    assert!(text.contains("offset = ") && !text.contains("options"), "{text}");
+    fs::write(&file, text.replace("device-id = 255", "device-id = 9") + "options = 2\n").expect("a file");
+    let restored = arm.sevenbot(&["restore", &file, "--yes"]);
+    let warning = String::from_utf8_lossy(&restored.stderr).into_owned();
+    assert!(warning.contains("has no options: this setting is not written"), "{warning}");
+    assert!(succeeded(restored).contains("255  ->  9"));
+    assert!(succeeded(arm.sevenbot(&["get", "device-id"])).contains(" 9"));
+    succeeded(arm.sevenbot(&["set", "button-enable", "0"]));
+    let refused = failed(&arm.sevenbot(&["set", "wrist-position.1", "4"]), 2);
+    assert!(refused.contains("wrist-position has no joints"), "{refused}");
+    let refused = failed(&arm.sevenbot(&["set", "wrist-position", "4", "100", "4", "200", "4", "150"]), 1);
+    assert!(refused.contains("any write there moves an arm of the maker"), "{refused}");
+    assert!(succeeded(arm.sevenbot(&["get", "target-position.1"])).contains("90"));
+}
+
 #[test]
 fn a_movement_is_recorded_by_hand_and_played() {
     let arm = StockArm::start();

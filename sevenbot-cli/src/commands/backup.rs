@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot::map::{BAUD_RATE, find};
-use sevenbot::names::name_of_register;
+use sevenbot::map::BAUD_RATE;
+use sevenbot::map21::{OPTIONS, find_readable};
+use sevenbot::names::{name_of, name_of_register};
 use sevenbot::register_text::meaning;
-use sevenbot::{Arm, Snapshot};
+use sevenbot::{Arm, Register, Snapshot};
 
 use super::set::unlocked;
 use crate::command_error::CommandError;
@@ -23,7 +24,8 @@ use crate::write_result::{all_taken, note_restart};
 /// Write the settings of the arm to a file.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Settings keep their value without power: device id, baud rate, offsets. The file is TOML.
+Settings keep their value without power: device id, baud rate, offsets, options (register 20; an arm with the
+maker's firmware has none). The file is TOML.
 
 Examples:
   sevenbot backup arm-42.toml
@@ -39,7 +41,8 @@ pub(crate) struct BackupArgs {
 /// Write settings from a file to the arm, and verify them.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Shows the changes and asks first. Settings missing in the file keep their value.
+Shows the changes and asks first. Settings missing in the file keep their value. Settings that the arm's firmware
+lacks are not written, with a warning. Reports of feedback-frequency go on.
 
 Examples:
   sevenbot restore arm-42.toml
@@ -55,7 +58,7 @@ pub(crate) struct RestoreArgs {
 pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let registers = arm.read_span(span())?;
-    let text = SettingsFile::of(arm.identity(), &registers).text()?;
+    let text = SettingsFile::of(&arm, &registers).text()?;
     if args.file.as_os_str() == "-" {
         return session.printer.print_raw(text.as_bytes());
     }
@@ -87,7 +90,8 @@ pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), C
     let file = SettingsFile::read(&args.file)?;
     let mut arm = session.connect()?;
     let now = arm.read_span(span())?;
-    let wanted = file.applied_to(&args.file, &now)?;
+    let (wanted, missing) = file.applied_to(&args.file, &now, |address| arm.serves(address))?;
+    warn_of_missing(&arm, &missing);
     let changes = changes(&now, &wanted);
     session.printer.print(&Changes { changes: &changes })?;
     if changes.is_empty() {
@@ -101,13 +105,30 @@ pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), C
         ));
     }
     confirm("Write these settings?", args.yes)?;
-    write(&mut arm, &wanted)?;
+    write(&mut arm, &changed_registers(&changes, &wanted))?;
     note("written and verified");
     note_restart(&arm, changes.iter().map(|change| change.address));
     Ok(())
 }
 
-/// Writes all settings in one frame: after a power cut all are old or all are new (D19).
+fn warn_of_missing(arm: &Arm, settings: &[&Register]) {
+    let version = arm.identity().version();
+    for row in settings {
+        warn(format_args!(
+            "the arm's firmware {version} has no {}: this setting is not written",
+            name_of(row)
+        ));
+    }
+}
+
+/// The registers from the first change to the last.
+fn changed_registers(changes: &[Change], wanted: &Snapshot) -> Snapshot {
+    let (Some(first), Some(last)) = (changes.first(), changes.last()) else { return wanted.clone() };
+    let values = (first.address..=last.address).map(|address| wanted.at(address)).collect();
+    Snapshot { address: first.address, values }
+}
+
+/// Writes all changes in one frame: after a power cut all are old or all are new (D19).
 fn write(arm: &mut Arm, wanted: &Snapshot) -> Result<(), CommandError> {
     // New offsets move the arm a little.
     let write = |arm: &mut Arm| arm.write_checked(wanted.address, &wanted.values);
@@ -152,8 +173,8 @@ fn changes(now: &Snapshot, wanted: &Snapshot) -> Vec<Change> {
 }
 
 fn in_words(address: u8, byte: u8) -> String {
-    match find(address) {
-        Some(row) if *row == BAUD_RATE => meaning(row, byte),
+    match find_readable(address) {
+        Some(row) if [BAUD_RATE, OPTIONS].contains(row) => meaning(row, byte),
         Some(row) => format!("{} {}", row.range.decode(byte), row.unit.symbol()).trim_end().to_owned(),
         None => byte.to_string(),
     }

@@ -5,9 +5,9 @@ use std::io::{self, Write};
 use clap::Args;
 use serde::Serialize;
 use serde_json::Value;
-use sevenbot::Span;
-use sevenbot::names;
+use sevenbot::names::{self, name_of_register};
 use sevenbot::register_text::{RegisterEntry, entries, raw_entries};
+use sevenbot::{Arm, Span};
 
 use crate::command_error::CommandError;
 use crate::printer::Printable;
@@ -16,7 +16,10 @@ use crate::session::Session;
 /// Help text about register names.
 pub(crate) const NAMES: &str = "\
 Register names are those of docs/registers.md, in any case, with - or _, and may be shortened while they
-are unique. .3 selects joint 3. A number is an address, A..B a range.";
+are unique. .3 selects joint 3. A number is an address, A..B a range.
+
+Registers that only map 2.1 has are options (20), 61 to 66, 68 to 73 and 82 to 97. An arm with the maker's
+firmware 2.2 has none of them, and only this project's firmware has options.";
 
 /// Show registers.
 #[derive(Debug, Args)]
@@ -40,10 +43,27 @@ pub(crate) fn run(session: &mut Session, args: &GetArgs) -> Result<(), CommandEr
     let mut arm = session.connect()?;
     let mut shown = Vec::new();
     for &span in &args.registers {
+        if !args.raw {
+            check_served(&arm, span)?;
+        }
         let snapshot = arm.read_span(span)?;
         shown.extend(if args.raw { raw_entries(&snapshot) } else { entries(&snapshot) });
     }
     session.printer.print(&RegisterList::from(shown))
+}
+
+/// Fails if the arm has none of the registers.
+fn check_served(arm: &Arm, span: Span) -> Result<(), CommandError> {
+    if span.addresses().any(|address| arm.serves(address)) || span == Span::NONE {
+        return Ok(());
+    }
+    Err(not_served(arm, span.address()))
+}
+
+/// The error for a register that the arm lacks.
+pub(crate) fn not_served(arm: &Arm, address: u8) -> CommandError {
+    let (version, name) = (arm.identity().version(), name_of_register(address));
+    CommandError::Arm(format!("the arm's firmware {version} does not have register {address}, {name}"))
 }
 
 /// Registers for printing.

@@ -2,12 +2,13 @@
 
 use clap::Args;
 use sevenbot::checked_write::{MismatchCause, WriteMismatch};
-use sevenbot::map::{BAUD_RATE, EEPROM_LOCK, find};
+use sevenbot::map::{BAUD_RATE, EEPROM_LOCK};
+use sevenbot::map21::find_readable;
 use sevenbot::names::{self, name_of_register};
 use sevenbot::register_text::{self, entries};
 use sevenbot::{Arm, Error, Span};
 
-use super::get::{NAMES, RegisterList};
+use super::get::{NAMES, RegisterList, not_served};
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
 use crate::printer::note;
@@ -23,6 +24,11 @@ Examples:
   sevenbot set target-position.3 70
   sevenbot set feedback-frequency 30
   sevenbot set --unlock offset.2 -5     settings are locked, and kept without power
+  sevenbot set --unlock options 2       the arm sends alarm frames of map 2.1
+  sevenbot set wrist-position 4 100 4 200 4 150    a byte for each register: IK5 on the arm
+
+Registers that only map 2.1 has are written by function 04. Reports of feedback-frequency go on, unless
+other reports (82, 90) are switched on. Offsets then read as in map 2.2, as after any write of this program.
 
 Exit status 1 when a register did not take its value."))]
 pub(crate) struct SetArgs {
@@ -54,6 +60,9 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandEr
     let span = args.register;
     let bytes = bytes(span, &args.values, args.raw)?;
     let mut arm = session.connect()?;
+    if let Some(address) = span.addresses().find(|&address| !args.raw && !arm.serves(address)) {
+        return Err(not_served(&arm, address));
+    }
     // Targets, offsets and the motor state move the arm.
     let unchanged = hold_on_interrupt(&mut arm, |arm, _| {
         let write = |arm: &mut Arm| arm.write_checked(span.address(), &bytes);
@@ -108,7 +117,7 @@ fn raw_byte(value: i32) -> Result<u8, CommandError> {
 
 /// The byte for a number in the table's unit. Refuses a number out of range, because the maker's firmware takes it.
 fn byte(address: u8, value: i32) -> Result<u8, CommandError> {
-    let Some(row) = find(address) else { return raw_byte(value) };
+    let Some(row) = find_readable(address) else { return raw_byte(value) };
     i16::try_from(value).ok().and_then(|value| row.range.encode(value)).ok_or_else(|| {
         let (name, range) = (name_of_register(address), register_text::range(address));
         let hint = if *row == BAUD_RATE { "; `sevenbot baud` takes bits per second" } else { "" };
