@@ -204,6 +204,11 @@ impl Hub {
     pub fn deadline(&self, now: Instant) -> Instant {
         let line = self.line.deadline();
         match self.arm {
+            ArmState::Absent | ArmState::Identifying(_)
+                if self.clients.values().any(|client| !client.waiting.is_empty()) =>
+            {
+                now
+            }
             ArmState::Absent => Instant::FAR_FUTURE,
             ArmState::Identifying(due) => line.min(due),
             ArmState::Present if self.clients.values().any(|client| self.is_sendable(client)) => {

@@ -34,6 +34,8 @@ pub(crate) struct WebConnection {
     is_browser: Rc<Cell<bool>>,
     deadline: Instant,
     is_blocked: bool,
+    /// More messages may have been read from the stream, so poll(2) does not tell of them.
+    has_more: bool,
 }
 
 #[derive(Debug)]
@@ -58,7 +60,7 @@ impl WebConnection {
         let outcome = accept_hdr_with_config(stream, gate, Some(config));
         let state = next_state(outcome, hub, &is_browser);
         let deadline = now + HANDSHAKE_TIMEOUT;
-        Some(Self { stream: handle, state, is_browser, deadline, is_blocked: false })
+        Some(Self { stream: handle, state, is_browser, deadline, is_blocked: false, has_more: false })
     }
 
     /// Goes on with the handshake, or takes messages.
@@ -67,9 +69,13 @@ impl WebConnection {
         self.state = match state {
             WebState::Handshake(handshake) => next_state(handshake.handshake(), hub, &self.is_browser),
             WebState::Open(mut socket, mut client) => {
-                let is_alive = take_messages(&mut socket, &mut client).is_ok();
+                let outcome = take_messages(&mut socket, &mut client);
                 client.advance(hub, now);
-                if is_alive { WebState::Open(socket, client) } else { WebState::Closed(Some(client)) }
+                self.has_more = matches!(outcome, Ok(true));
+                match outcome {
+                    Ok(_) => WebState::Open(socket, client),
+                    Err(_) => WebState::Closed(Some(client)),
+                }
             }
             closed @ WebState::Closed(_) => closed,
         };
@@ -78,8 +84,7 @@ impl WebConnection {
     /// Sends the answers that are there.
     pub(crate) fn send(&mut self, hub: &mut Hub, now: Instant) {
         let WebState::Open(socket, client) = &mut self.state else { return };
-        client.advance(hub, now);
-        match send_answers(socket, client) {
+        match send_answers(socket, client, hub, now) {
             Ok(is_blocked) => self.is_blocked = is_blocked,
             Err(_) => self.close(),
         }
@@ -113,8 +118,13 @@ impl WebConnection {
         PollFd::new(&self.stream, interest)
     }
 
+    /// When to call [`WebConnection::receive`] without other events.
     pub(crate) fn deadline(&self) -> Instant {
-        if matches!(self.state, WebState::Handshake(_)) { self.deadline } else { Instant::FAR_FUTURE }
+        match &self.state {
+            WebState::Handshake(_) => self.deadline,
+            WebState::Open(_, client) if self.has_more && client.has_room() => Instant::ZERO,
+            WebState::Open(..) | WebState::Closed(_) => Instant::FAR_FUTURE,
+        }
     }
 }
 
@@ -128,29 +138,36 @@ fn next_state(outcome: Handshake, hub: &mut Hub, is_browser: &Cell<bool>) -> Web
     }
 }
 
-/// Takes messages while there is room for them. An error means that the connection has ended.
-fn take_messages(socket: &mut WebSocket<TcpStream>, client: &mut MakerClient) -> Result<(), Error> {
+/// Takes messages while there is room for them. Returns whether more may have been read from the stream. An error means
+/// that the connection has ended.
+fn take_messages(socket: &mut WebSocket<TcpStream>, client: &mut MakerClient) -> Result<bool, Error> {
     for _ in 0..MESSAGES_AT_ONCE {
         if !client.has_room() {
-            return Ok(());
+            return Ok(true);
         }
         match socket.read() {
             Ok(Message::Text(text)) => client.message(&text),
             Ok(_) => {}
-            Err(error) => return unless_blocked(error),
+            Err(error) => return unless_blocked(error).map(|()| false),
         }
     }
-    Ok(())
+    Ok(true)
 }
 
-/// Sends answers one by one, while the client takes them. Returns whether it takes no more.
-fn send_answers(socket: &mut WebSocket<TcpStream>, client: &mut MakerClient) -> Result<bool, Error> {
+/// Carries out commands and sends answers one by one, while the client takes them. Returns whether it takes no more.
+fn send_answers(
+    socket: &mut WebSocket<TcpStream>,
+    client: &mut MakerClient,
+    hub: &mut Hub,
+    now: Instant,
+) -> Result<bool, Error> {
     loop {
         match socket.flush() {
             Ok(()) => {}
             Err(Error::Io(cause)) if cause.kind() == ErrorKind::WouldBlock => return Ok(true),
             Err(error) => return Err(error),
         }
+        client.advance(hub, now);
         let Some(answer) = client.take_answer() else { return Ok(false) };
         socket.write(Message::text(answer)).or_else(unless_blocked)?;
     }

@@ -63,6 +63,19 @@ impl Served {
         stream
     }
 
+    fn web_url(&self) -> &str {
+        self.ports.last().and_then(|port| port.to_str()).expect("a WebSocket")
+    }
+
+    /// A connection to the WebSocket, before the handshake.
+    pub(crate) fn connect_web(&self) -> TcpStream {
+        let address = self.web_url().strip_prefix("ws://").and_then(|url| url.strip_suffix("/ws"));
+        let stream = TcpStream::connect(address.expect("an address")).expect("a connection");
+        stream.set_nodelay(true).expect("an option");
+        stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
+        stream
+    }
+
     pub(crate) fn wait_for_arm(&self, client: &mut ArmClient) {
         wait_until("the arm answers", || {
             client.send(&read_request(DEVICE_CODE, 1));
@@ -98,18 +111,28 @@ pub(crate) fn exchange(stream: &mut TcpStream, request: &[u8], expected: &[u8]) 
     assert_eq!(received, expected);
 }
 
+/// A frame of a WebSocket client: `start` holds the bit for the last fragment and the kind.
+pub(crate) fn web_frame(start: u8, payload: &[u8]) -> Vec<u8> {
+    let length = u16::try_from(payload.len()).expect("a short frame");
+    let mut frame = vec![start];
+    match u8::try_from(length) {
+        Ok(short @ ..126) => frame.push(0x80 | short),
+        _ => frame.extend([[0x80 | 126].as_slice(), &length.to_be_bytes()].concat()),
+    }
+    // A mask of 0 leaves the payload as it is.
+    frame.extend([0; 4]);
+    frame.extend(payload);
+    frame
+}
+
 /// A client of the maker's WebSocket.
 pub(crate) struct WebClient(WebSocket<TcpStream>);
 
 impl WebClient {
     /// Connects with these headers. The error is the HTTP status.
     pub(crate) fn connect(served: &Served, headers: &[(&'static str, &str)]) -> Result<Self, u16> {
-        let url = served.ports.last().and_then(|port| port.to_str()).expect("a WebSocket");
-        let address = url.strip_prefix("ws://").and_then(|url| url.strip_suffix("/ws")).expect("an address");
-        let stream = TcpStream::connect(address).expect("a connection");
-        stream.set_nodelay(true).expect("an option");
-        stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
-        let mut request = url.into_client_request().expect("a request");
+        let stream = served.connect_web();
+        let mut request = served.web_url().into_client_request().expect("a request");
         for (name, value) in headers {
             request.headers_mut().insert(*name, HeaderValue::from_str(value).expect("a header"));
         }
@@ -125,6 +148,16 @@ impl WebClient {
     /// Sends a message.
     pub(crate) fn send(&mut self, text: &str) {
         self.0.send(Message::text(text)).expect("the server takes messages");
+    }
+
+    /// Sends bytes as they are, which need not be whole messages.
+    pub(crate) fn send_bytes(&mut self, bytes: &[u8]) {
+        self.0.get_mut().write_all(bytes).expect("the server takes bytes");
+    }
+
+    /// A second handle of the connection.
+    pub(crate) fn stream(&self) -> TcpStream {
+        self.0.get_ref().try_clone().expect("a second handle")
     }
 
     /// The next message; `None` if the server has closed the connection.
