@@ -2,7 +2,8 @@
 
 mod served;
 
-use system_tests::registers::{DEVICE_CODE, OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION};
+use system_tests::frames::with_checksum;
+use system_tests::registers::{DEVICE_CODE, EEPROM_LOCK, OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION};
 use system_tests::wait::wait_until;
 
 use served::{LOCAL_PAGE, Served, WebClient};
@@ -55,6 +56,39 @@ fn a_write_has_the_forms_of_the_makers_map() {
         client.send(&format!(r#"{{"cmd":"write","id":13,"num":7,"value":{offsets}}}"#));
         assert_eq!(client.read(OFFSET, 7), [129, 126, 128, 129, 127, 128, 144], "{offsets}");
     }
+}
+
+/// M5 and M6: each program reads offsets in the form of its own last write, and as register 20 says before it.
+#[test]
+fn programs_of_both_maps_read_the_same_offsets_in_their_own_forms() {
+    let served = Served::start(2, &[]);
+    let (signed, biased) = ([0x82, 3], [126, 131]);
+    let (mut old, mut idle) = (served.open("a"), served.open("b"));
+    let (mut web, mut idle_web) = (connect(&served), connect(&served));
+    old.write(EEPROM_LOCK, &[0]);
+    assert_eq!(old.write_and_read((OFFSET, &signed), (OFFSET, 2)), signed);
+    for _ in 0..10 {
+        web.send(r#"{"cmd":"write","id":32,"num":1,"value":[60]}"#);
+        assert_eq!(web.read(OFFSET, 2), biased);
+        assert_eq!(old.read(OFFSET, 2), signed);
+        assert_eq!((idle.read(OFFSET, 2), idle_web.read(OFFSET, 2)), (signed.to_vec(), signed.to_vec()));
+        old.write(SPEED, &[60]);
+        assert_eq!((old.read(OFFSET, 2), web.read(OFFSET, 2)), (signed.to_vec(), biased.to_vec()));
+    }
+    web.send(r#"{"cmd":"write","id":20,"num":1,"value":[1]}"#);
+    assert_eq!(web.read(OFFSET, 2), biased);
+    assert_eq!((idle.read(OFFSET, 2), idle_web.read(OFFSET, 2)), (biased.to_vec(), biased.to_vec()));
+    assert_eq!(connect(&served).read(OFFSET, 2), biased, "a new program");
+    assert_eq!(old.read(OFFSET, 2), signed);
+    // What is read can be written back.
+    let read = old.read(OFFSET, 7);
+    assert_eq!(old.write_and_read((OFFSET, &read), (OFFSET, 2)), signed);
+    idle.send(&with_checksum(&[0xAA, 0x77, 4, 0, 0]));
+    assert_eq!((idle.read(OFFSET, 2), web.read(OFFSET, 2)), (biased.to_vec(), biased.to_vec()));
+}
+
+fn connect(served: &Served) -> WebClient {
+    WebClient::connect(served, &[]).expect("accepted")
 }
 
 /// The angles are those of the contract's section 4.4.
