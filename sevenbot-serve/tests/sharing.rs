@@ -11,7 +11,6 @@ use protocol_core::registers::map::{
 use protocol_core::registers::map21::{
     ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, OPTIONS, TIP_POSITION,
 };
-use protocol_core::time::Duration;
 use rig::{World, read, write, write_map21};
 
 const POSITIONS: (u8, u8) = (PRESENT_POSITION.address, PRESENT_POSITION.count);
@@ -223,34 +222,6 @@ fn reports_end_with_their_program() {
     let before = world.arm.registers().read(246, 2).to_vec();
     world.run(1_000);
     assert_eq!(world.arm.registers().read(246, 2), before, "nobody reads the arm any more");
-}
-
-#[test]
-fn a_flood_of_one_program_costs_the_others_less_than_10_ms() {
-    let floods = [
-        read(POSITIONS.0, POSITIONS.1),
-        write(TARGET_POSITION.address, &[90, 90, 65, 90, 90, 90, 80]),
-        vec![0xAA; 14],
-        b"\xAA\x77\x06\x00\xFF".to_vec(),
-    ];
-    for flood in floods {
-        let mut world = World::new(2);
-        let alone = (0..50).map(|_| world.round_trip(0, &read(POSITIONS.0, POSITIONS.1))).max().unwrap();
-        let mut worst = Duration::ZERO;
-        for turn in 0..200 {
-            while world.programs[1].to_send_bytes() < 4_000 {
-                world.send(1, &flood);
-            }
-            world.run(turn % 7);
-            worst = worst.max(world.round_trip(0, &read(POSITIONS.0, POSITIONS.1)));
-        }
-        let cost = worst.as_micros().saturating_sub(alone.as_micros());
-        assert!(
-            cost < 10_000,
-            "{cost} us more than {} us, during a flood of {flood:02x?}",
-            alone.as_micros()
-        );
-    }
 }
 
 #[test]

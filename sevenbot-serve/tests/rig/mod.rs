@@ -9,7 +9,9 @@ use motion_core::servo_bus::TorqueCodes;
 use protocol_core::request::{Reply, Report, Request};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
-use sevenbot_serve::{FrameClient, Hub};
+use sevenbot_serve::{FrameClient, Hub, MakerClient};
+
+use std::collections::VecDeque;
 
 pub const BAUD: u32 = 115_200;
 
@@ -28,6 +30,14 @@ pub struct Program {
     pub reads: bool,
 }
 
+/// A page at the maker's WebSocket.
+pub struct Page {
+    client: MakerClient,
+    /// Messages that it still has to send.
+    pub to_send: VecDeque<String>,
+    pub answers: Vec<(Instant, String)>,
+}
+
 pub struct World {
     pub now: Instant,
     pub hub: Hub,
@@ -36,6 +46,7 @@ pub struct World {
     /// The next byte of the arm is damaged on the line.
     pub damages_next_byte: bool,
     pub programs: Vec<Program>,
+    pub pages: Vec<Page>,
 }
 
 pub fn read(address: u8, count: u8) -> Vec<u8> {
@@ -75,6 +86,7 @@ impl World {
             is_plugged: false,
             damages_next_byte: false,
             programs: Vec::new(),
+            pages: Vec::new(),
         };
         world.plug();
         (0..programs).for_each(|_| world.join());
@@ -95,6 +107,15 @@ impl World {
             reads: true,
         };
         self.programs.push(program);
+    }
+
+    pub fn join_page(&mut self) {
+        let client = MakerClient::connect(&mut self.hub, true);
+        self.pages.push(Page { client, to_send: VecDeque::new(), answers: Vec::new() });
+    }
+
+    pub fn send_message(&mut self, page: usize, message: &str) {
+        self.pages[page].to_send.push_back(message.to_owned());
     }
 
     pub fn leave(&mut self, number: usize) {
@@ -129,6 +150,9 @@ impl World {
             let taken = program.client.push(&mut self.hub, self.now, &program.to_send);
             program.to_send.drain(..taken);
         }
+        for page in &mut self.pages {
+            page.send(&mut self.hub, self.now);
+        }
         self.hub.poll(self.now);
         if self.is_plugged {
             let room = self.arm.host_room().min(self.hub.to_arm().len());
@@ -149,6 +173,9 @@ impl World {
                 program.take(self.now);
             }
         }
+        for page in &mut self.pages {
+            page.take(&mut self.hub, self.now);
+        }
     }
 
     /// What a program received since the last call.
@@ -166,6 +193,39 @@ impl World {
             assert!(self.now - start < Duration::from_millis(5_000), "no reply");
         }
         self.programs[program].received[0].0 - start
+    }
+}
+
+impl World {
+    /// Sends a message of a page and returns the time until its answer.
+    pub fn page_round_trip(&mut self, page: usize, message: &str) -> Duration {
+        self.pages[page].answers.clear();
+        self.send_message(page, message);
+        let start = self.now;
+        while self.pages[page].answers.is_empty() {
+            self.run(1);
+            assert!(self.now - start < Duration::from_millis(5_000), "no answer");
+        }
+        self.pages[page].answers[0].0 - start
+    }
+}
+
+impl Page {
+    /// As the server: a bounded number of messages at once.
+    fn send(&mut self, hub: &mut Hub, now: Instant) {
+        for _ in 0..20 {
+            let Some(message) = self.to_send.pop_front_if(|_| self.client.has_room()) else { break };
+            self.client.message(&message);
+        }
+        self.client.advance(hub, now);
+    }
+
+    fn take(&mut self, hub: &mut Hub, now: Instant) {
+        loop {
+            self.client.advance(hub, now);
+            let Some(answer) = self.client.take_answer() else { return };
+            self.answers.push((now, answer));
+        }
     }
 }
 
