@@ -7,7 +7,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot_serve::server::{AccessPolicy, Notice, Server, ServerConfig};
+use sevenbot::ports;
+use sevenbot_serve::server::{AccessPolicy, ArmLocation, Notice, Server, ServerConfig};
 
 use crate::command_error::CommandError;
 use crate::printer::{Printable, note, warn};
@@ -18,6 +19,9 @@ use crate::session::Session;
 /// Each program sees an arm of its own: it gets the replies to its own requests, and the reports that it asked for
 /// itself. Requests of all programs take turns on the arm's line. While the arm is unplugged, programs get no replies,
 /// as on a cable; when it is plugged in again, they go on. Ctrl-C ends the server.
+///
+/// With --port the server keeps to this port. Without it, an arm that comes back under another name is found again, by
+/// its chip id.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Pseudo-terminals (--pty) work with every program that opens a serial port. TCP (--tcp) carries the same frames, for
@@ -88,7 +92,7 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
         ));
     }
     let config = ServerConfig {
-        arm: session.port_name()?.into(),
+        arm: location(session)?,
         baud: session.options.baud,
         ptys: args.pty.clone(),
         tcp: args.tcp.map(|port| SocketAddr::new(args.listen, port)),
@@ -110,6 +114,13 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
     }
     let ended = server.run(&stop, &mut |notice| report(&notice));
     ended.map_err(|error| CommandError::Arm(format!("the operating system failed: {error}")))
+}
+
+/// A port from the command line is kept. Otherwise the arm is searched again each time it was unplugged.
+fn location(session: &Session) -> Result<ArmLocation, CommandError> {
+    let first = PathBuf::from(session.port_name()?);
+    let list = || ports::available().into_iter().map(|port| port.name.into()).collect();
+    Ok(if session.port.is_some() { ArmLocation::Port(first) } else { ArmLocation::Search { first, list } })
 }
 
 /// Becomes readable at Ctrl-C, and at signals that ask a program to end.

@@ -5,7 +5,7 @@
 //! unknown here, and so is a restart of the controller, which locks the EEPROM.
 
 use motion_core::reach;
-use protocol_core::registers::map::EEPROM_LOCK;
+use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, EEPROM_LOCK};
 use protocol_core::registers::map21::{OPTIONS, option};
 use protocol_core::registers::{Accepted, Map, RegisterFile};
 
@@ -14,18 +14,29 @@ use protocol_core::registers::{Accepted, Map, RegisterFile};
 pub(crate) struct KnownRegisters(RegisterFile);
 
 impl KnownRegisters {
+    /// The read that finds an arm, from the device code to the lock: the first register, and how many.
+    pub(crate) const IDENTITY: (u8, u8) = (DEVICE_CODE.address, EEPROM_LOCK.address + 1);
+
     /// The registers of an arm that has just started.
     pub(crate) fn new() -> Self {
         Self(RegisterFile::new([0; 6], None))
     }
 
-    /// Takes over the values that were read from the arm.
-    pub(crate) fn set(&mut self, address: u8, values: &[u8]) {
-        for (address, &value) in (address..=u8::MAX).zip(values) {
-            if EEPROM_LOCK.holds(address) || OPTIONS.holds(address) {
-                self.0.set(address, value);
+    /// The registers of the arm that answered a read of [`KnownRegisters::IDENTITY`]; `None` if it is no 7Bot V2.
+    pub(crate) fn of_arm(values: &[u8]) -> Option<Self> {
+        let mut known = Self::new();
+        for (address, &value) in (Self::IDENTITY.0..).zip(values) {
+            if [DEVICE_CODE, CHIP_ID, EEPROM_LOCK, OPTIONS].iter().any(|register| register.holds(address)) {
+                known.0.set(address, value);
             }
         }
+        let has_code = values.first() == Some(&DEVICE_CODE.default_at(DEVICE_CODE.address));
+        has_code.then_some(known)
+    }
+
+    /// The chip id.
+    pub(crate) fn chip_id(&self) -> &[u8] {
+        self.0.read(CHIP_ID.address, CHIP_ID.count)
     }
 
     /// Does the arm accept a write (D16, M7)?
@@ -54,6 +65,7 @@ impl KnownRegisters {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)] // A panic is a failed test.
 mod tests {
     use super::*;
 
@@ -89,7 +101,9 @@ mod tests {
         known.write(Map::V21, 28, &[0]);
         assert!(!known.accepts(Map::V21, 13, &[20]));
         assert!(!known.accepts(Map::V22, 13, &[20]));
-        known.set(0, &[1; 29]);
+        let mut found = [0; 29];
+        (found[0], found[28]) = (7, 1);
+        let known = KnownRegisters::of_arm(&found).unwrap();
         assert!(known.accepts(Map::V21, 13, &[20]));
     }
 
@@ -114,7 +128,10 @@ mod tests {
         assert_eq!(known.form_before_writes(), Map::V21);
         known.write(Map::V21, 20, &[2]);
         assert_eq!(known.form_before_writes(), Map::V22, "alarms only");
-        known.set(20, &[3]);
-        assert_eq!(known.form_before_writes(), Map::V21);
+        let mut found = [0; 29];
+        (found[0], found[2], found[20]) = (7, 0xA5, 3);
+        let known = KnownRegisters::of_arm(&found).unwrap();
+        assert_eq!((known.form_before_writes(), known.chip_id()[0]), (Map::V21, 0xA5));
+        assert!(KnownRegisters::of_arm(&[6; 29]).is_none(), "another device");
     }
 }

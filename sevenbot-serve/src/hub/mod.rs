@@ -26,7 +26,7 @@ mod stream;
 use std::collections::BTreeMap;
 
 use protocol_core::registers::Map;
-use protocol_core::registers::map::{DEVICE_CODE, EEPROM_LOCK, FEEDBACK_FREQUENCY};
+use protocol_core::registers::map::FEEDBACK_FREQUENCY;
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::time::{Duration, Instant};
 
@@ -46,8 +46,6 @@ pub use self::stream::Stream;
 pub const MOST_WAITING: usize = 20;
 /// Time between two questions to a port behind which no arm has answered yet.
 const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
-/// The read that finds an arm: the device code, and up to the lock what [`KnownRegisters`] needs.
-const IDENTITY: (u8, u8) = (DEVICE_CODE.address, EEPROM_LOCK.address + 1);
 
 /// Does an arm answer?
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +65,8 @@ pub struct Hub {
     next_id: ClientId,
     arm: ArmState,
     known: KnownRegisters,
+    /// The chip id that the arm has to have.
+    chip_id: Option<Vec<u8>>,
     line: Line,
     sampler: Sampler,
     shares: Shares,
@@ -83,6 +83,7 @@ impl Hub {
             next_id: ClientId::default(),
             arm: ArmState::Absent,
             known: KnownRegisters::new(),
+            chip_id: None,
             line: Line::new(baud),
             sampler: Sampler::new(baud),
             shares: Shares::default(),
@@ -154,6 +155,11 @@ impl Hub {
         self.arm == ArmState::Present
     }
 
+    /// From now on only this arm counts, by its chip id.
+    pub fn expect_same_arm(&mut self) {
+        self.chip_id = Some(self.known.chip_id().to_vec());
+    }
+
     /// Takes bytes of the arm. An empty slice states that its line is silent at `now`.
     pub fn arm_bytes(&mut self, now: Instant, bytes: &[u8]) {
         let mut rest = bytes;
@@ -180,7 +186,8 @@ impl Hub {
             ArmState::Identifying(due) => {
                 self.drop_waiting();
                 if due <= now && self.line.is_free(now) {
-                    self.line.send_read(now, Owner::Identity, IDENTITY.0, IDENTITY.1);
+                    let (address, count) = KnownRegisters::IDENTITY;
+                    self.line.send_read(now, Owner::Identity, address, count);
                     self.arm = ArmState::Identifying(now + IDENTIFY_PERIOD);
                 }
             }
@@ -204,11 +211,7 @@ impl Hub {
     pub fn deadline(&self, now: Instant) -> Instant {
         let line = self.line.deadline();
         match self.arm {
-            ArmState::Absent | ArmState::Identifying(_)
-                if self.clients.values().any(|client| !client.waiting.is_empty()) =>
-            {
-                now
-            }
+            ArmState::Absent | ArmState::Identifying(_) if self.has_waiting() => now,
             ArmState::Absent => Instant::FAR_FUTURE,
             ArmState::Identifying(due) => line.min(due),
             ArmState::Present if self.clients.values().any(|client| self.is_sendable(client)) => {
@@ -314,11 +317,11 @@ impl Hub {
 
     /// An unknown device answered, or a 7Bot V2. A stream that an earlier program left running ends.
     fn identify(&mut self, now: Instant, values: &[u8]) {
-        let is_arm = values.first() == Some(&DEVICE_CODE.default_at(DEVICE_CODE.address));
-        if is_arm && self.arm != ArmState::Present {
+        let Some(known) = KnownRegisters::of_arm(values) else { return };
+        let is_wanted = self.chip_id.as_deref().is_none_or(|id| known.chip_id() == id);
+        if is_wanted && self.arm != ArmState::Present {
             self.arm = ArmState::Present;
-            self.known = KnownRegisters::new();
-            self.known.set(IDENTITY.0, values);
+            self.known = known;
             for register in [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY] {
                 self.line.send_write(now, Map::V21, register.address, &[0]);
             }
@@ -331,6 +334,10 @@ impl Hub {
         for (owner, address, count) in self.line.take_unanswered() {
             self.deliver(Instant::ZERO, owner, Event::NoReply { address, count });
         }
+    }
+
+    fn has_waiting(&self) -> bool {
+        self.clients.values().any(|client| !client.waiting.is_empty())
     }
 
     /// Drops the requests that wait, because there is no arm.

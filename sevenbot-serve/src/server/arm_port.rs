@@ -7,6 +7,7 @@ use protocol_core::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags};
 use tty_ports::serial::Serial;
 
+use super::arm_location::{ArmLocation, PortSearch};
 use super::notice::Notice;
 use crate::hub::Hub;
 
@@ -14,11 +15,14 @@ use crate::hub::Hub;
 const RETRY_PERIOD: Duration = Duration::from_millis(500);
 /// Time after which an open port without an arm is opened anew: the device behind the path may be another one.
 const IDENTIFY_TIMEOUT: Duration = Duration::from_millis(3_000);
+/// The same while several ports are tried.
+const SEARCH_TIMEOUT: Duration = Duration::from_millis(1_000);
 
 /// The serial port of the arm.
 #[derive(Debug)]
 pub(crate) struct ArmPort {
     path: PathBuf,
+    search: Option<PortSearch>,
     baud: u32,
     state: ArmPortState,
     /// What the last notice said, so that it is not repeated.
@@ -34,8 +38,12 @@ enum ArmPortState {
 }
 
 impl ArmPort {
-    pub(crate) const fn new(path: PathBuf, baud: u32) -> Self {
-        Self { path, baud, state: ArmPortState::Closed(Instant::ZERO), last_notice: None }
+    pub(crate) fn new(location: ArmLocation, baud: u32) -> Self {
+        let (path, search) = match location {
+            ArmLocation::Port(path) => (path, None),
+            ArmLocation::Search { first, list } => (first, Some(PortSearch::new(list))),
+        };
+        Self { path, search, baud, state: ArmPortState::Closed(Instant::ZERO), last_notice: None }
     }
 
     /// Opens the port if it is time to, and passes bytes of the arm to the hub.
@@ -48,9 +56,13 @@ impl ArmPort {
                 match read_all(port, hub, now) {
                     Err(error) => self.close(hub, now, notify, &error.to_string()),
                     Ok(()) if hub.has_arm() && !had_arm => {
+                        if let Some(search) = &mut self.search {
+                            search.found(&self.path);
+                            hub.expect_same_arm();
+                        }
                         self.notify(Notice::ArmFound(self.path.clone()), notify);
                     }
-                    Ok(()) if !hub.has_arm() && *opened + IDENTIFY_TIMEOUT <= now => {
+                    Ok(()) if !hub.has_arm() && *opened + self.identify_timeout() <= now => {
                         self.notify(Notice::ArmSilent(self.path.clone()), notify);
                         hub.close_arm();
                         self.state = ArmPortState::Closed(now + RETRY_PERIOD);
@@ -81,7 +93,7 @@ impl ArmPort {
             ArmPortState::Open(_, opened)
                 if self.last_notice != Some(Notice::ArmFound(self.path.clone())) =>
             {
-                *opened + IDENTIFY_TIMEOUT
+                *opened + self.identify_timeout()
             }
             ArmPortState::Open(..) => Instant::FAR_FUTURE,
         }
@@ -94,7 +106,14 @@ impl ArmPort {
         Some(PollFd::new(port, PollFlags::IN | output))
     }
 
+    const fn identify_timeout(&self) -> Duration {
+        if self.search.is_some() { SEARCH_TIMEOUT } else { IDENTIFY_TIMEOUT }
+    }
+
     fn open(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
+        if let Some(path) = self.search.as_mut().and_then(|search| search.next(&self.path)) {
+            self.path = path;
+        }
         match Serial::open(&self.path, self.baud) {
             Ok(port) => {
                 self.state = ArmPortState::Open(port, now);
@@ -110,8 +129,14 @@ impl ArmPort {
         self.notify(Notice::ArmLost { port: self.path.clone(), reason: reason.to_owned() }, notify);
     }
 
+    /// While ports are searched, only the first notice without an arm is passed.
     fn notify(&mut self, notice: Notice, notify: &mut dyn FnMut(Notice)) {
-        if self.last_notice.as_ref() != Some(&notice) {
+        let is_found = |notice: &Notice| matches!(notice, Notice::ArmFound(_));
+        let is_known = match &self.last_notice {
+            Some(last) if self.search.is_some() && !is_found(last) => !is_found(&notice),
+            last => last.as_ref() == Some(&notice),
+        };
+        if !is_known {
             notify(notice.clone());
             self.last_notice = Some(notice);
         }

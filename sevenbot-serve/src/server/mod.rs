@@ -9,6 +9,7 @@
 //! some thousand frames a second, which is little work for one thread. So there are no locks, and events are handled
 //! in the order of this file.
 
+mod arm_location;
 mod arm_port;
 mod connection;
 mod handshake;
@@ -36,6 +37,7 @@ use self::tcp_connection::TcpConnection;
 use self::web_connection::WebConnection;
 use crate::hub::Hub;
 
+pub use self::arm_location::ArmLocation;
 pub use self::handshake::AccessPolicy;
 pub use self::notice::Notice;
 pub use self::start_error::StartError;
@@ -47,7 +49,7 @@ pub const MOST_NETWORK_CLIENTS: usize = 32;
 #[derive(Clone, Debug)]
 pub struct ServerConfig {
     /// The serial port of the arm.
-    pub arm: PathBuf,
+    pub arm: ArmLocation,
     /// Its rate, in bits per second.
     pub baud: u32,
     /// Links to pseudo-terminals.
