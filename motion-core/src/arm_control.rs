@@ -9,8 +9,9 @@
 //! A write is checked completely, then executed completely (D15 to D17). This file does not know the host's stream.
 
 use protocol_core::registers::map::{
-    FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_CORRUPTED, MOTOR_STATE, SERVO_BUS_ERRORS, SUPPLY_VOLTAGE,
-    VACUUM_PUMP, refusal,
+    FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_CORRUPTED, HOST_WATCHDOG, LIMITS, MOTOR_STATE,
+    REPORT_CONTENT, SERVO_BUS_ERRORS, SUPPLY_VOLTAGE, VACUUM_PUMP, WATCHDOG_ACTION, fault, motor_state,
+    refusal,
 };
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, OPTIONS, option};
 use protocol_core::registers::{Accepted, Image, Joint, RegisterFile};
@@ -20,9 +21,12 @@ use protocol_core::time::Instant;
 
 use crate::bus_scheduler::BusScheduler;
 use crate::config::Config;
-use crate::joints::{Joints, Measured};
+use crate::host_watchdog::HostWatchdog;
+use crate::joint_state::Measured;
+use crate::joints::Joints;
+use crate::limit_check::LimitCheck;
 use crate::motor_state::MotorState;
-use crate::reach;
+use crate::reach::{self, Reached};
 use crate::servo_bus::{Outcome, Reading};
 use crate::status::Status;
 use crate::vacuum::VacuumControl;
@@ -35,6 +39,7 @@ pub(crate) struct ArmControl {
     pub(crate) vacuum: VacuumControl,
     joints: Joints,
     status: Status,
+    watchdog: HostWatchdog,
     /// Changed settings that are not saved yet.
     pub(crate) to_save: Option<Image>,
     /// An alarm that has to be sent.
@@ -49,7 +54,16 @@ impl ArmControl {
         let status = Status::new(storage, config.faults);
         status.show_faults(&mut registers, &joints);
         let (bus, vacuum) = (BusScheduler::new(now, &config), VacuumControl::default());
-        Self { registers, bus, vacuum, joints, status, to_save: None, alarm: None }
+        Self {
+            registers,
+            bus,
+            vacuum,
+            joints,
+            status,
+            watchdog: HostWatchdog::OFF,
+            to_save: None,
+            alarm: None,
+        }
     }
 
     /// Processes the answers of the servos, and advances all set-points if a control cycle is due.
@@ -65,8 +79,8 @@ impl ArmControl {
         if self.bus.end_start_up(now, &self.joints) {
             self.show_servos();
         }
-        if self.bus.begin_cycle(now) {
-            if self.joints.advance(&self.registers) {
+        if let Some(end) = self.bus.begin_cycle(now) {
+            if self.joints.advance(end, &self.registers) {
                 self.bus.goals_changed();
             }
             Status::show_moving(&mut self.registers, &self.joints);
@@ -104,15 +118,21 @@ impl ArmControl {
     pub(crate) fn write(&mut self, now: Instant, address: u8, values: &[u8]) -> bool {
         let accepted = match self.registers.check(address, values) {
             Ok(accepted) => accepted,
-            Err(wrong) => return self.refuse(refusal::OUT_OF_RANGE, wrong.address),
+            Err(refused) => return self.refuse(now, refused.reason, refused.address),
         };
-        let Some(changes_settings) = self.check_storage(&accepted) else { return false };
+        let Some(changes_settings) = self.check_storage(now, &accepted) else { return false };
+        if let Some(address) = self.against_limit(&accepted, &Reached::NONE) {
+            return self.refuse(now, refusal::AGAINST_A_LIMIT, address);
+        }
         self.execute(now, &accepted, changes_settings);
-        let changes_reports = accepted.value_at(FEEDBACK_FREQUENCY.address).is_some();
-        if changes_reports {
+        if accepted.has_words() {
+            self.execute_extended(now, &accepted);
+        }
+        let sets_frequency = accepted.value_at(FEEDBACK_FREQUENCY.address).is_some();
+        if sets_frequency {
             self.stop_reports_of_map21();
         }
-        changes_reports
+        sets_frequency || accepted.value_at(REPORT_CONTENT.address).is_some()
     }
 
     /// Executes a write of the host in map 2.1, or refuses it completely. `has_room` tells whether an alarm can be sent.
@@ -120,35 +140,44 @@ impl ArmControl {
     pub(crate) fn write_map21(&mut self, now: Instant, address: u8, values: &[u8], has_room: bool) -> bool {
         let accepted = match self.registers.check_map21(address, values) {
             Ok(accepted) => accepted,
-            Err(wrong) => return self.refuse(refusal::OUT_OF_RANGE, wrong.address),
+            Err(refused) => return self.refuse(now, refused.reason, refused.address),
         };
-        let Some(changes_settings) = self.check_storage(&accepted) else { return false };
-        let targets = match reach::targets(&accepted) {
-            Ok(targets) => targets,
+        let Some(changes_settings) = self.check_storage(now, &accepted) else { return false };
+        let reached = match reach::targets(&accepted) {
+            Ok(reached) => reached,
             Err(out_of_reach) => {
                 let is_wanted = self.registers.get(OPTIONS.address) & option::ALARMS != 0;
                 self.alarm = (is_wanted && has_room).then_some(out_of_reach.alarm);
-                return self.refuse(refusal::OUT_OF_REACH, out_of_reach.address);
+                return self.refuse(now, refusal::OUT_OF_REACH, out_of_reach.address);
             }
         };
+        if let Some(address) = self.against_limit(&accepted, &reached) {
+            return self.refuse(now, refusal::AGAINST_A_LIMIT, address);
+        }
         self.execute(now, &accepted, changes_settings);
         self.registers.set(FEEDBACK_FREQUENCY.address, 0);
-        self.joints.reach(&targets, &mut self.registers);
+        self.joints.reach(&reached, &mut self.registers);
         Status::show_moving(&mut self.registers, &self.joints);
         true
     }
 
+    fn against_limit(&self, accepted: &Accepted<'_>, reached: &Reached) -> Option<u8> {
+        let limits = self.registers.get(LIMITS.address);
+        self.joints.against_limit(&LimitCheck { accepted, reached, limits })
+    }
+
     /// Refuses a write, which changes no report frequency.
-    fn refuse(&mut self, reason: u8, address: u8) -> bool {
+    fn refuse(&mut self, now: Instant, reason: u8, address: u8) -> bool {
+        self.watchdog.heard(now);
         Status::refuse(&mut self.registers, reason, address);
         false
     }
 
     /// Returns whether a write changes settings. Refuses it and returns `None` if the storage is full.
-    fn check_storage(&mut self, accepted: &Accepted<'_>) -> Option<bool> {
+    fn check_storage(&mut self, now: Instant, accepted: &Accepted<'_>) -> Option<bool> {
         let changed_setting = self.registers.first_changed_setting(accepted);
         if let (Some(setting), Storage::Full) = (changed_setting, self.status.storage()) {
-            Status::refuse(&mut self.registers, refusal::STORAGE_FULL, setting);
+            self.refuse(now, refusal::STORAGE_FULL, setting);
             return None;
         }
         Some(changed_setting.is_some())
@@ -159,12 +188,42 @@ impl ArmControl {
         // Before the rest of the frame, so that a target in it replaces the measured position (D13).
         self.set_motor_state(accepted);
         self.apply(accepted, changes_settings);
-        self.joints.set_targets(accepted, &self.registers);
+        self.joints.set_targets(now, accepted, &mut self.registers);
         if let Some(pump) = accepted.value_at(VACUUM_PUMP.address) {
             self.vacuum.set(now, pump != 0);
         }
-        self.count_accepted();
+        self.count_accepted(now);
         Status::show_moving(&mut self.registers, &self.joints);
+    }
+
+    /// Executes what only the extended block has.
+    fn execute_extended(&mut self, now: Instant, accepted: &Accepted<'_>) {
+        if let Some(value) = accepted.value_at(HOST_WATCHDOG.address) {
+            self.watchdog.set(now, value);
+            self.status.clear_faults(fault::HOST_SILENT);
+            self.status.show_faults(&mut self.registers, &self.joints);
+        }
+    }
+
+    /// Holds or damps the arm if the host was silent for too long (D24). Returns whether it did.
+    pub(crate) fn poll_watchdog(&mut self, now: Instant) -> bool {
+        if !self.watchdog.poll(now) {
+            return false;
+        }
+        if self.registers.get(WATCHDOG_ACTION.address) == 0 {
+            self.joints.hold(&mut self.registers);
+        } else {
+            self.registers.set(MOTOR_STATE.address, motor_state::DAMPING);
+            self.enter_state(MotorState::Damping);
+        }
+        Status::show_moving(&mut self.registers, &self.joints);
+        self.raise_faults(fault::HOST_SILENT);
+        true
+    }
+
+    /// When the watchdog of the host acts unless a frame comes before.
+    pub(crate) const fn watchdog_due(&self) -> Instant {
+        self.watchdog.due()
     }
 
     fn stop_reports_of_map21(&mut self) {
@@ -180,9 +239,13 @@ impl ArmControl {
     }
 
     fn set_motor_state(&mut self, accepted: &Accepted<'_>) {
-        if let Some(value) = accepted.value_at(MOTOR_STATE.address)
-            && self.joints.set_state(MotorState::from_register(value), &mut self.registers)
-        {
+        if let Some(value) = accepted.value_at(MOTOR_STATE.address) {
+            self.enter_state(MotorState::from_register(value));
+        }
+    }
+
+    fn enter_state(&mut self, state: MotorState) {
+        if self.joints.set_state(state, &mut self.registers) {
             self.bus.state_changed();
         }
     }
@@ -197,8 +260,9 @@ impl ArmControl {
         self.joints.rebase_offsets(&offsets, &self.registers);
     }
 
-    /// Counts an accepted request.
-    pub(crate) fn count_accepted(&mut self) {
+    /// Counts an accepted request whose turn has come at `now`.
+    pub(crate) fn count_accepted(&mut self, now: Instant) {
+        self.watchdog.heard(now);
         self.registers.increment(&FRAMES_ACCEPTED);
     }
 
@@ -224,12 +288,17 @@ impl ArmControl {
         self.status.show_faults(&mut self.registers, &self.joints);
     }
 
+    /// Shows the registers of the extended block as they are now.
+    pub(crate) fn show_extended(&mut self) {
+        self.joints.show_extended(&mut self.registers);
+    }
+
     fn show_servos(&mut self) {
         self.status.show_servos(&mut self.registers, &self.joints, self.bus.is_starting());
     }
 
     /// When the next action of the arm is due.
     pub(crate) fn deadline(&self, now: Instant) -> Instant {
-        self.bus.deadline(now).min(self.vacuum.deadline())
+        self.bus.deadline(now).min(self.vacuum.deadline()).min(self.watchdog.due())
     }
 }

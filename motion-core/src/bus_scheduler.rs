@@ -101,17 +101,18 @@ impl BusScheduler {
         self.torque_due = true;
     }
 
-    /// Begins a control cycle if one is due at `now`, and returns whether it did. At most one missed cycle is repeated:
-    /// a late call makes motion late, not fast.
-    pub(crate) fn begin_cycle(&mut self, now: Instant) -> bool {
+    /// Begins a control cycle if one is due at `now`, and returns when it was due. At most one missed cycle is repeated: a
+    /// late call makes motion late, not fast.
+    pub(crate) fn begin_cycle(&mut self, now: Instant) -> Option<Instant> {
         if now < self.next_cycle {
-            return false;
+            return None;
         }
-        self.next_cycle = self.next_cycle.max(earlier(now, CYCLE)) + CYCLE;
+        let due = self.next_cycle.max(earlier(now, CYCLE));
+        self.next_cycle = due + CYCLE;
         self.left_to_read = JOINTS;
         self.torque_refresh_in = self.torque_refresh_in.saturating_sub(1);
         self.torque_due |= self.torque_refresh_in == 0;
-        true
+        Some(due)
     }
 
     /// Schedules goals, because the set-points have advanced.
@@ -206,7 +207,7 @@ mod tests {
     /// The instructions and ids of the frames in one cycle without answers.
     fn cycle(scheduler: &mut BusScheduler, joints: &mut Joints, start: u64) -> Vec<(u8, u8)> {
         let registers = RegisterFile::new([0; 6], None);
-        assert!(scheduler.begin_cycle(at(start)));
+        assert!(scheduler.begin_cycle(at(start)).is_some());
         let mut frames = Vec::new();
         for now in (start..start + 10_000).step_by(100).map(at) {
             let _ = scheduler.outcome(now);
@@ -242,9 +243,9 @@ mod tests {
     #[test]
     fn at_most_one_missed_cycle_is_repeated() {
         let mut scheduler = scheduler();
-        assert!(scheduler.begin_cycle(at(0)));
-        assert!(!scheduler.begin_cycle(at(9_999)));
-        assert!(scheduler.begin_cycle(at(3_000_000)) && scheduler.begin_cycle(at(3_000_000)));
-        assert!(!scheduler.begin_cycle(at(3_009_999)) && scheduler.begin_cycle(at(3_010_000)));
+        assert_eq!(scheduler.begin_cycle(at(0)), Some(at(0)));
+        assert_eq!(scheduler.begin_cycle(at(9_999)), None);
+        let late = [3_000_000, 3_000_000, 3_009_999, 3_010_000].map(|now| scheduler.begin_cycle(at(now)));
+        assert_eq!(late, [Some(at(2_990_000)), Some(at(3_000_000)), None, Some(at(3_010_000))]);
     }
 }

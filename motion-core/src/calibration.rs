@@ -17,6 +17,7 @@ pub struct MicroDegrees(pub i32);
 
 impl MicroDegrees {
     const PER_DEGREE: i32 = 1_000_000;
+    const PER_CENTIDEGREE: i32 = 10_000;
 
     /// This many whole degrees.
     #[must_use]
@@ -39,10 +40,25 @@ impl MicroDegrees {
         let degrees = rounded::<{ Self::PER_DEGREE }>(self.0.clamp(0, 180 * Self::PER_DEGREE));
         u8::try_from(degrees).unwrap_or(180)
     }
+
+    /// This many hundredths of a degree.
+    #[must_use]
+    pub fn from_centidegrees(centidegrees: u16) -> Self {
+        Self(i32::from(centidegrees) * Self::PER_CENTIDEGREE)
+    }
+
+    /// The value of a fine position register: the nearest hundredth of a degree, 0 to 18000 (D21).
+    #[must_use]
+    pub fn nearest_centidegree(self) -> u16 {
+        let limited = self.0.clamp(0, 180 * Self::PER_DEGREE);
+        u16::try_from(rounded::<{ Self::PER_CENTIDEGREE }>(limited)).unwrap_or(18_000)
+    }
 }
 
 /// The highest position of a servo.
 const MAX_COUNTS: i32 = 1023;
+/// Far above the highest velocity of a servo, 1757 counts per second, and in the range of the arithmetic.
+const MAX_VELOCITY: i32 = 10_000;
 /// Thousandths of a degree in half a turn.
 const HALF_TURN: i32 = 180_000;
 
@@ -117,6 +133,16 @@ pub fn angle_from_counts(joint: Joint, counts: u16, offset_degrees: i8) -> Micro
     MicroDegrees(mounting.reverse(seen) * 1_000)
 }
 
+/// The velocity of a joint in tenths of a degree per second, positive towards greater angles. `velocity` is that of its
+/// servo in counts per second.
+#[must_use]
+pub fn velocity_from_servo(joint: Joint, velocity: i16) -> i16 {
+    let mounting = Mounting::of(joint);
+    let counts = i32::from(velocity).clamp(-MAX_VELOCITY, MAX_VELOCITY);
+    let velocity = rounded::<100>(mounting.scale.millidegrees(counts));
+    i16::try_from(if mounting.reversed { -velocity } else { velocity }).unwrap_or(0)
+}
+
 /// The load of a joint, positive towards greater angles. `load` is that of its servo, positive towards more counts.
 #[must_use]
 pub const fn load_from_servo(joint: Joint, load: i16) -> i16 {
@@ -160,6 +186,24 @@ mod tests {
         assert_eq!([counts(1, 90, 10), counts(1, 90, -10)], [464, 558]);
         assert_eq!([counts(2, 90, 10), counts(2, 90, -10)], [398, 492]);
         assert_eq!([counts(7, 40, 10), counts(7, 40, -10)], [834, 904]);
+    }
+
+    #[test]
+    fn d21_golden_velocities() {
+        let velocity = |number, counts| velocity_from_servo(joint(number), counts);
+        assert_eq!([velocity(1, 850), velocity(1, -850), velocity(2, 850)], [1_800, -1_800, -1_800]);
+        assert_eq!([velocity(5, 625), velocity(7, 625), velocity(1, 1)], [-1_800, 1_800, 2]);
+        assert_eq!([velocity(1, i16::MAX), velocity(2, i16::MIN)], [21_176, 21_176], "limited");
+    }
+
+    #[test]
+    fn d21_hundredths_of_a_degree_are_rounded_to_the_nearest() {
+        let shown = [-1, 4_999, 5_000, 123_456_789, 179_995_000, 181_000_000]
+            .map(|angle| MicroDegrees(angle).nearest_centidegree());
+        assert_eq!(shown, [0, 0, 1, 12_346, 18_000, 18_000]);
+        for centidegrees in 0..=18_000 {
+            assert_eq!(MicroDegrees::from_centidegrees(centidegrees).nearest_centidegree(), centidegrees);
+        }
     }
 
     #[test]

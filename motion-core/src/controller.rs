@@ -85,7 +85,10 @@ impl Controller {
             return Output::ToHost(self.host.alarm(alarm));
         }
         if let Some(read) = self.host.take_read(host_room) {
-            self.arm.count_accepted();
+            self.arm.count_accepted(now);
+            if read.is_extended() {
+                self.arm.show_extended();
+            }
             return Output::ToHost(self.host.reply(read, &self.arm.registers));
         }
         if let Some(image) = self.arm.to_save.take() {
@@ -95,7 +98,14 @@ impl Controller {
             return Output::Vacuum(vacuum);
         }
         if let Some(report) = self.host.take_report(now, host_room) {
+            if report.is_extended() {
+                self.arm.show_extended();
+            }
             return Output::ToHost(self.host.report(report, &self.arm.registers));
+        }
+        if self.arm.poll_watchdog(now) {
+            // Its effect on the servos is due now.
+            return Output::Wait(now);
         }
         Output::Wait(self.arm.deadline(now).min(self.host.deadline()))
     }
@@ -127,7 +137,7 @@ impl Controller {
     /// silence that has an effect. Each deadline until then still needs its own call.
     #[must_use]
     pub fn host_deadline(&self) -> Instant {
-        self.host.deadline()
+        self.host.deadline().min(self.arm.watchdog_due())
     }
 
     /// The last host has closed the link: ends the reports, and forgets in which map the last write was (M12).

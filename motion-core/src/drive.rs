@@ -13,6 +13,8 @@
 //! not jump. A silent joint keeps its set-point, because the servo may still execute what it receives. This file does
 //! not know the bus or which joint it drives.
 
+use protocol_core::time::{Duration, Instant};
+
 use crate::calibration::MicroDegrees;
 use crate::trajectory::Trajectory;
 
@@ -43,7 +45,7 @@ pub enum Target {
 }
 
 /// The drive of one joint.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Drive {
     engagement: Engagement,
     trajectory: Trajectory,
@@ -76,15 +78,38 @@ impl Drive {
 
     /// Sets the target that the host wrote. A released joint ignores it.
     pub fn set_target(&mut self, angle: MicroDegrees, time: u8) {
-        if self.engagement == Engagement::Released {
-            return;
+        if let Some(trajectory) = self.take_target() {
+            trajectory.move_to(angle, time);
         }
+    }
+
+    /// Adds the next point of a stream, whose frame came at `now`. A released joint ignores it.
+    pub fn stream_to(&mut self, angle: MicroDegrees, now: Instant, period: Duration) {
+        if let Some(trajectory) = self.take_target() {
+            trajectory.stream_to(angle, now, period);
+        }
+    }
+
+    /// The trajectory for a new target of the host; `None` for a released joint.
+    fn take_target(&mut self) -> Option<&mut Trajectory> {
+        match &mut self.engagement {
+            Engagement::Released => return None,
+            Engagement::Waiting { has_target: is_new } | Engagement::Silent { has_new_target: is_new } => {
+                *is_new = true;
+            }
+            Engagement::TorquePending | Engagement::Engaged => {}
+        }
+        Some(&mut self.trajectory)
+    }
+
+    /// Lets the joint hold at its set-point, and forgets a target that the host wrote before.
+    pub fn hold(&mut self) {
         if let Engagement::Waiting { has_target: is_new } | Engagement::Silent { has_new_target: is_new } =
             &mut self.engagement
         {
-            *is_new = true;
+            *is_new = false;
         }
-        self.trajectory.move_to(angle, time);
+        self.trajectory = Trajectory::holding(self.set_point());
     }
 
     /// Engages a joint that is at rest at `angle`. A waiting joint engages there. A silent joint continues from its
@@ -123,17 +148,28 @@ impl Drive {
 
     /// Replaces the set-point after a change of the joint's offset. `set_point` and `target` use the new offset.
     pub fn rebase_offset(&mut self, set_point: MicroDegrees, target: MicroDegrees, time: u8) {
-        if self.is_driven() || self.is_silent() {
+        if self.has_set_point() {
             self.trajectory = Trajectory::holding(set_point);
             self.trajectory.move_to(target, time);
         }
     }
 
-    /// Advances the set-point by one control cycle at `speed` (the joint's speed register).
-    pub fn advance(&mut self, speed: u8) {
+    /// Advances the set-point by the control cycle that ends at `end`, at `speed` (the joint's speed register).
+    pub fn advance(&mut self, end: Instant, speed: u8) {
         if self.engagement == Engagement::Engaged {
-            self.trajectory.advance(speed);
+            self.trajectory.advance(end, speed);
         }
+    }
+
+    /// See [`Trajectory::hold_back`].
+    pub fn hold_back(&mut self, set_point: MicroDegrees) {
+        self.trajectory.hold_back(set_point);
+    }
+
+    /// Does the joint have a set-point? A silent joint does, because its servo may still hold there.
+    #[must_use]
+    pub fn has_set_point(&self) -> bool {
+        self.is_driven() || self.is_silent()
     }
 
     /// Is the joint engaged, or is its torque pending? Only such a joint is sent goals.
@@ -160,7 +196,7 @@ impl Drive {
         }
     }
 
-    /// The present set-point of a driven joint.
+    /// The present set-point of a joint that has one.
     #[must_use]
     pub const fn set_point(&self) -> MicroDegrees {
         self.trajectory.set_point()
@@ -188,7 +224,7 @@ mod tests {
     fn silent() -> Drive {
         let mut drive = engaged();
         drive.set_target(degrees(80), 0);
-        drive.advance(100);
+        drive.advance(Instant::ZERO, 100);
         drive.mark_silent();
         drive
     }
@@ -200,7 +236,7 @@ mod tests {
         drive.wait();
         assert!(!drive.is_driven());
         assert_eq!(drive.engage(degrees(40)), Some(Target::Measured));
-        drive.advance(100);
+        drive.advance(Instant::ZERO, 100);
         assert!(drive.is_driven() && !drive.is_moving());
         assert_eq!(drive.set_point(), degrees(40));
         assert_eq!(drive.engage(degrees(50)), None, "only once");
@@ -215,10 +251,10 @@ mod tests {
         drive.set_target(degrees(60), 0);
         assert!(drive.is_moving(), "the move is not over");
         assert_eq!(drive.engage(degrees(40)), Some(Target::FromHost));
-        drive.advance(100);
+        drive.advance(Instant::ZERO, 100);
         assert_eq!(drive.set_point(), degrees(40), "the set-point waits for torque");
         drive.torque_is_on();
-        drive.advance(100);
+        drive.advance(Instant::ZERO, 100);
         assert_eq!(drive.set_point(), MicroDegrees(41_900_000), "from the measured position");
     }
 
@@ -226,12 +262,12 @@ mod tests {
     fn d12_a_silent_joint_stops_its_set_point_and_is_driven_on_from_there() {
         for found in [38_900_000, 41_900_000, 44_900_000].map(MicroDegrees) {
             let mut drive = silent();
-            drive.advance(100);
+            drive.advance(Instant::ZERO, 100);
             assert!(!drive.is_driven(), "no goal is sent to it");
             assert_eq!(drive.set_point(), MicroDegrees(41_900_000));
             assert_eq!(drive.engage(found), Some(Target::FromHost));
             drive.torque_is_on();
-            drive.advance(100);
+            drive.advance(Instant::ZERO, 100);
             assert_eq!(drive.set_point(), MicroDegrees(43_800_000), "found at {found:?}");
         }
     }
@@ -252,13 +288,13 @@ mod tests {
         elsewhere.set_target(degrees(30), 0);
         assert_eq!(elsewhere.engage(degrees(60)), Some(Target::FromHost));
         elsewhere.torque_is_on();
-        elsewhere.advance(100);
+        elsewhere.advance(Instant::ZERO, 100);
         assert_eq!(elsewhere.set_point(), MicroDegrees(58_100_000), "from the measured position");
         let mut near = silent();
         near.set_target(degrees(30), 0);
         near.engage(degrees(42));
         near.torque_is_on();
-        near.advance(100);
+        near.advance(Instant::ZERO, 100);
         assert_eq!(near.set_point(), degrees(40), "from its set-point");
     }
 

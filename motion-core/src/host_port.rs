@@ -11,6 +11,7 @@
 //! A read waits until its reply fits the room of the link. All requests behind it wait, too. This file only reads
 //! registers.
 
+use protocol_core::registers::map::{EXTENDED_VERSION, FINE_TARGET};
 use protocol_core::registers::{Map, RegisterFile};
 use protocol_core::request::{Alarm, Reply, Report, Request};
 use protocol_core::time::Instant;
@@ -28,6 +29,13 @@ pub(crate) struct Read {
 impl Read {
     const fn fits(self, room: usize) -> bool {
         MIN_LENGTH + self.count as usize <= room
+    }
+
+    /// Does the range hold registers of the extended block?
+    pub(crate) const fn is_extended(self) -> bool {
+        // `as` widens here: `From` is not const.
+        let end = self.address as usize + self.count as usize;
+        end > FINE_TARGET.address as usize && self.address <= EXTENDED_VERSION.address
     }
 }
 
@@ -114,7 +122,8 @@ impl HostPort {
     /// The report that is due. Replies go first, and a report that does not fit `room` is skipped (D14).
     pub(crate) fn take_report(&mut self, now: Instant, room: usize) -> Option<ReportKind> {
         while let Some(kind) = self.reports.poll_due(now) {
-            if self.waiting_read.is_none() && MIN_LENGTH + usize::from(kind.registers().count) <= room {
+            let (_, count) = kind.registers();
+            if self.waiting_read.is_none() && MIN_LENGTH + usize::from(count) <= room {
                 return Some(kind);
             }
         }
@@ -130,8 +139,8 @@ impl HostPort {
 
     /// Encodes a report.
     pub(crate) fn report(&mut self, kind: ReportKind, registers: &RegisterFile) -> &[u8] {
-        let row = kind.registers();
-        let (address, values) = (row.address, registers.read(row.address, row.count));
+        let (address, count) = kind.registers();
+        let values = registers.read(address, count);
         match kind.map() {
             Map::V22 => Reply { address, values }.encode(&mut self.frame),
             Map::V21 => Report { address, values }.encode(&mut self.frame),

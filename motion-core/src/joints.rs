@@ -8,43 +8,21 @@
 //!
 //! This file does not know the frames or the timing of the bus.
 
-use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
-use protocol_core::registers::map21::{PRESENT_ANGLE, PRESENT_LOAD};
+use protocol_core::registers::map::{
+    FINE_TARGET, LIMITS, MEASURED_JOINTS, MOTOR_STATE, SET_POINT_PERIOD, SPEED, TARGET_POSITION, TIME, limit,
+    motor_state,
+};
 use protocol_core::registers::{Accepted, JOINTS, Joint, RegisterFile};
-use protocol_core::time::Instant;
+use protocol_core::time::{Duration, Instant};
 
-use crate::calibration::{MicroDegrees, angle_from_counts, counts_from_angle, load_from_servo};
-use crate::drive::{Drive, Target};
+use crate::calibration::{MicroDegrees, angle_from_counts, counts_from_angle};
+use crate::drive::Drive;
+use crate::joint_state::{JointState, Measured};
+use crate::limit_check::LimitCheck;
+use crate::limits::linkage_step;
 use crate::motor_state::MotorState;
-use crate::position_filter::{FilterOutcome, PositionFilter};
-use crate::reach::Targets;
+use crate::reach::Reached;
 use crate::servo_bus::{Reading, Torque};
-
-/// The state of one joint.
-#[derive(Clone, Copy, Debug)]
-struct JointState {
-    drive: Drive,
-    /// The target, of which the register shows the nearest degree.
-    target: MicroDegrees,
-    position: PositionFilter,
-    /// The error bits of the servo's last answer.
-    alarms: u8,
-    /// In degrees Celsius; 0 while unknown.
-    temperature: u8,
-}
-
-/// The effect of a reading.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Measured {
-    /// The position filter rejected the reading.
-    Rejected,
-    /// The filter rejected the reading, and the servo counts as silent from now on.
-    FellSilent,
-    /// The filter accepted the reading.
-    Accepted,
-    /// The filter accepted the reading, and the joint engaged: it needs its goal, then torque.
-    Engaged,
-}
 
 /// The seven joints and their motor state.
 #[derive(Debug)]
@@ -60,14 +38,7 @@ impl Joints {
         if state == MotorState::Servo {
             drive.wait();
         }
-        let joints = Joint::ALL.map(|joint| JointState {
-            drive,
-            target: MicroDegrees::from_degrees(TARGET_POSITION.default_at(TARGET_POSITION.of(joint))),
-            position: PositionFilter::UNKNOWN,
-            alarms: 0,
-            temperature: 0,
-        });
-        Self { joints, state }
+        Self { joints: Joint::ALL.map(|joint| JointState::new(joint, drive.clone())), state }
     }
 
     fn joint(&self, joint: Joint) -> Option<&JointState> {
@@ -97,35 +68,55 @@ impl Joints {
             return false;
         }
         self.state = state;
-        for (joint, joint_state) in self.each_mut() {
+        for joint in &mut self.joints {
             if state != MotorState::Servo {
-                joint_state.drive.release();
+                joint.drive.release();
                 continue;
             }
-            joint_state.drive.wait();
-            if joint_state.position.is_known() {
-                joint_state.show_target(joint, registers.get(PRESENT_POSITION.of(joint)), registers);
+            joint.drive.wait();
+            if let Some(angle) = joint.known_angle() {
+                joint.set_target(angle, registers);
             }
         }
         true
     }
 
-    /// Starts the moves to the targets in a write that was applied.
-    pub(crate) fn set_targets(&mut self, accepted: &Accepted<'_>, registers: &RegisterFile) {
+    /// Starts the moves to the targets in a write that was applied, whose frame came at `now`.
+    pub(crate) fn set_targets(
+        &mut self,
+        now: Instant,
+        accepted: &Accepted<'_>,
+        registers: &mut RegisterFile,
+    ) {
         for (joint, state) in self.each_mut() {
             if let Some(degrees) = accepted.value_at(TARGET_POSITION.of(joint)) {
-                state.target = MicroDegrees::from_degrees(degrees);
-                state.drive.set_target(state.target, registers.get(TIME.of(joint)));
+                let angle = MicroDegrees::from_degrees(degrees);
+                state.set_target(angle, registers);
+                state.drive.set_target(angle, registers.get(TIME.of(joint)));
+            }
+        }
+        if accepted.has_words() {
+            self.set_fine_targets(now, accepted, registers);
+        }
+    }
+
+    fn set_fine_targets(&mut self, now: Instant, accepted: &Accepted<'_>, registers: &mut RegisterFile) {
+        for (joint, state) in self.each_mut() {
+            let Some(centidegrees) = accepted.word_at(FINE_TARGET.of(joint)) else { continue };
+            let angle = MicroDegrees::from_centidegrees(centidegrees);
+            state.set_target(angle, registers);
+            match registers.word(SET_POINT_PERIOD.address) {
+                0 => state.drive.set_target(angle, registers.get(TIME.of(joint))),
+                millis => state.drive.stream_to(angle, now, Duration::from_millis(millis.into())),
             }
         }
     }
 
     /// Starts the moves to the positions in a write that was applied (M7).
-    pub(crate) fn reach(&mut self, targets: &Targets, registers: &mut RegisterFile) {
-        for ((joint, state), target) in self.each_mut().zip(targets) {
-            if let Some(angle) = *target {
-                registers.set(TARGET_POSITION.of(joint), angle.nearest_degree());
-                state.target = angle;
+    pub(crate) fn reach(&mut self, reached: &Reached, registers: &mut RegisterFile) {
+        for ((joint, state), target) in self.each_mut().zip(reached.targets) {
+            if let Some(angle) = target {
+                state.set_target(angle, registers);
                 state.drive.set_target(angle, registers.get(TIME.of(joint)));
             }
         }
@@ -139,7 +130,7 @@ impl Joints {
             if offset != before {
                 let counts = counts_from_angle(joint, state.drive.set_point(), before);
                 let set_point = angle_from_counts(joint, counts, offset);
-                state.drive.rebase_offset(set_point, state.target, registers.get(TIME.of(joint)));
+                state.drive.rebase_offset(set_point, state.target(), registers.get(TIME.of(joint)));
             }
         }
     }
@@ -149,34 +140,12 @@ impl Joints {
         &mut self,
         now: Instant,
         joint: Joint,
-        (reading, alarms): (Reading, u8),
+        reading: (Reading, u8),
         may_engage: bool,
         registers: &mut RegisterFile,
     ) -> Measured {
-        let offset = registers.offset(joint);
         let Some(state) = self.joint_mut(joint) else { return Measured::Rejected };
-        let counts = match state.position.answered(now, reading.position_counts) {
-            FilterOutcome::Accepted(counts) => counts,
-            FilterOutcome::Rejected => return Measured::Rejected,
-            FilterOutcome::FellSilent => {
-                state.fall_silent();
-                return Measured::FellSilent;
-            }
-        };
-        let angle = angle_from_counts(joint, counts, offset);
-        state.alarms = alarms;
-        state.temperature = reading.temperature_celsius;
-        registers.set(PRESENT_POSITION.of(joint), angle.nearest_degree());
-        registers.set(PRESENT_ANGLE.of(joint), angle.nearest_degree());
-        registers.set(PRESENT_LOAD.of(joint), shown_load(load_from_servo(joint, reading.load)));
-        let may_engage = may_engage && state.position.is_steady();
-        let Some(target) = (if may_engage { state.drive.engage(angle) } else { None }) else {
-            return Measured::Accepted;
-        };
-        if target == Target::Measured {
-            state.show_target(joint, angle.nearest_degree(), registers);
-        }
-        Measured::Engaged
+        state.read(now, reading, may_engage, registers)
     }
 
     /// Records that a servo did not answer. Returns whether it counts as silent from now on.
@@ -199,16 +168,69 @@ impl Joints {
         }
     }
 
-    /// Advances all set-points by one control cycle. Returns whether any joint is driven.
-    pub(crate) fn advance(&mut self, registers: &RegisterFile) -> bool {
+    /// Advances all set-points by the control cycle that ends at `end`. Returns whether any joint is driven.
+    pub(crate) fn advance(&mut self, end: Instant, registers: &RegisterFile) -> bool {
+        let before = self.linkage_set_points();
         let mut any = false;
         for (joint, state) in self.each_mut() {
             if state.drive.is_driven() {
-                state.drive.advance(registers.get(SPEED.of(joint)));
+                state.drive.advance(end, registers.get(SPEED.of(joint)));
                 any = true;
             }
         }
+        if registers.get(LIMITS.address) & limit::LINKAGE != 0 {
+            self.keep_linkage(before);
+        }
         any
+    }
+
+    /// The set-points of joints 2 and 3, if both have one.
+    fn linkage_set_points(&self) -> Option<[MicroDegrees; 2]> {
+        let [_, two, three, ..] = &self.joints;
+        let both = two.drive.has_set_point() && three.drive.has_set_point();
+        both.then(|| [two.drive.set_point(), three.drive.set_point()])
+    }
+
+    /// Lets joints 2 and 3 wait for each other where their step would break the linkage (D25).
+    fn keep_linkage(&mut self, before: Option<[MicroDegrees; 2]>) {
+        let (Some(before), Some(after)) = (before, self.linkage_set_points()) else { return };
+        let allowed = linkage_step(before, after);
+        let [_, two, three, ..] = &mut self.joints;
+        for (joint, (after, allowed)) in [two, three].into_iter().zip(after.into_iter().zip(allowed)) {
+            if allowed != after {
+                joint.drive.hold_back(allowed);
+            }
+        }
+    }
+
+    /// The first register because of which a write is refused against a limit (D25).
+    pub(crate) fn against_limit(&self, check: &LimitCheck<'_>) -> Option<u8> {
+        if !check.is_needed() {
+            return None;
+        }
+        let enters_servo = self.state != MotorState::Servo
+            && check.accepted.value_at(MOTOR_STATE.address) == Some(motor_state::SERVO);
+        let target = |state: &JointState| {
+            let measured = if enters_servo { state.known_angle() } else { None };
+            Some(measured.unwrap_or(state.target()))
+        };
+        let set_point = |state: &JointState| state.drive.has_set_point().then_some(state.drive.set_point());
+        check.first_refused(&self.joints.each_ref().map(target), &self.joints.each_ref().map(set_point))
+    }
+
+    /// Holds every joint at its set-point (D24).
+    pub(crate) fn hold(&mut self, registers: &mut RegisterFile) {
+        for joint in &mut self.joints {
+            joint.hold(registers);
+        }
+    }
+
+    /// Shows the registers of the extended block that follow from the joints (D21).
+    pub(crate) fn show_extended(&self, registers: &mut RegisterFile) {
+        for joint in &self.joints {
+            joint.show_extended(registers);
+        }
+        registers.set(MEASURED_JOINTS.address, self.set_of(JointState::was_measured));
     }
 
     /// The goals of the driven joints, in servo counts.
@@ -255,29 +277,10 @@ impl Joints {
     }
 }
 
-impl JointState {
-    /// Makes a measured position the target.
-    fn show_target(&mut self, joint: Joint, degrees: u8, registers: &mut RegisterFile) {
-        self.target = MicroDegrees::from_degrees(degrees);
-        registers.set(TARGET_POSITION.of(joint), degrees);
-    }
-
-    fn fall_silent(&mut self) {
-        self.drive.mark_silent();
-        self.temperature = 0;
-        self.alarms = 0;
-    }
-}
-
-/// The register value of a load in 0.1 %: 128 + load / 8, 3 to 253 (M9).
-fn shown_load(load: i16) -> u8 {
-    let steps = (load / 8).clamp(-125, 125);
-    u8::try_from(128 + steps).unwrap_or(128)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol_core::registers::map::PRESENT_POSITION;
 
     const J1: Joint = Joint::ALL[0];
 
@@ -337,7 +340,7 @@ mod tests {
             assert!(!joints.set_state(state, &mut registers), "the state did not change");
             assert_eq!(joints.take_torque(), [Some(torque); JOINTS]);
             assert_eq!(joints.goals(&registers).count(), 0);
-            assert!(!joints.advance(&registers));
+            assert!(!joints.advance(at_ms(0), &registers));
         }
     }
 

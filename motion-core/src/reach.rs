@@ -12,13 +12,36 @@ use kinematics::{NoSolution, Vector, ik5, ik6, ik7};
 use protocol_core::registers::map21::{
     DIRECTION_ZERO, DISC_DIRECTION, POSITION_ZERO, TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION,
 };
-use protocol_core::registers::{Accepted, JOINTS};
+use protocol_core::registers::{Accepted, JOINTS, Joint};
 use protocol_core::request::Alarm;
 
 use crate::calibration::MicroDegrees;
 
-/// The targets of the joints that reach the positions in a write; `None` for a joint that keeps its target.
-pub(crate) type Targets = [Option<MicroDegrees>; JOINTS];
+/// The targets of the joints that reach the positions in a write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Reached {
+    /// `None` for a joint that keeps its target.
+    pub(crate) targets: [Option<MicroDegrees>; JOINTS],
+    /// The first register of a block that sets targets.
+    pub(crate) address: u8,
+}
+
+impl Reached {
+    /// A write without positions.
+    pub(crate) const NONE: Self = Self { targets: [None; JOINTS], address: 0 };
+
+    /// The target of one joint.
+    pub(crate) fn target(&self, joint: Joint) -> Option<MicroDegrees> {
+        self.targets.get(usize::from(joint.index())).copied().flatten()
+    }
+
+    fn set(&mut self, address: u8, angles: &[f32]) {
+        self.address = address;
+        for (target, &angle) in self.targets.iter_mut().zip(angles) {
+            *target = Some(MicroDegrees::nearest(angle));
+        }
+    }
+}
 
 /// No joint angles reach a position in a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,30 +65,24 @@ pub fn is_within(accepted: &Accepted<'_>) -> bool {
 }
 
 /// Solves the blocks of a write: IK5 first, then IK6 or IK7, which replaces its angles.
-pub(crate) fn targets(accepted: &Accepted<'_>) -> Result<Targets, OutOfReach> {
-    let mut targets = [None; JOINTS];
+pub(crate) fn targets(accepted: &Accepted<'_>) -> Result<Reached, OutOfReach> {
+    let mut reached = Reached::NONE;
     if let Some(wrist) = accepted.values_at(WRIST_POSITION.address) {
         let angles = ik5(position(wrist)).map_err(OutOfReach::of(WRIST_POSITION.address, 5))?;
-        set(&mut targets, &angles);
+        reached.set(WRIST_POSITION.address, &angles);
     }
     let (tip, tool) = (accepted.values_at(TIP_POSITION.address), accepted.values_at(TOOL_DIRECTION.address));
     if let (Some(tip), Some(tool)) = (tip, tool) {
         let (tip, tool) = (position(tip), direction(tool));
         if let Some(disc) = accepted.values_at(DISC_DIRECTION.address) {
             let angles = ik7(tip, tool, direction(disc)).map_err(OutOfReach::of(TIP_POSITION.address, 7))?;
-            set(&mut targets, &angles);
+            reached.set(TIP_POSITION.address, &angles);
         } else {
             let angles = ik6(tip, tool).map_err(OutOfReach::of(TIP_POSITION.address, 6))?;
-            set(&mut targets, &angles);
+            reached.set(TIP_POSITION.address, &angles);
         }
     }
-    Ok(targets)
-}
-
-fn set(targets: &mut Targets, angles: &[f32]) {
-    for (target, &angle) in targets.iter_mut().zip(angles) {
-        *target = Some(MicroDegrees::nearest(angle));
-    }
+    Ok(reached)
 }
 
 /// The position in millimetres that six registers hold.
@@ -101,7 +118,7 @@ mod tests {
         let targets = targets(&accepted);
         assert_eq!(is_within(&accepted), targets.is_ok());
         let targets = targets?;
-        Ok(targets.into_iter().flatten().map(|angle| f64::from(angle.0) / 1e6).collect())
+        Ok(targets.targets.into_iter().flatten().map(|angle| f64::from(angle.0) / 1e6).collect())
     }
 
     fn assert_near(found: &[f64], expected: &[f64]) {

@@ -1,15 +1,15 @@
-//! The timer of the reports of present positions (D14). This file does not know the content of a report.
+//! The timer of reports (D14, D26). This file does not know the content of a report.
 
 use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::MIN_LENGTH;
 
-/// Bytes of one report: seven registers, prefix and CRC.
-const REPORT_LENGTH: u32 = 14;
-
-/// The highest report frequency in Hz at which reports use at most half of the line. `baud` is in bits per second; a
-/// byte takes ten bits.
+/// The highest frequency in Hz at which reports of this many registers use at most half of the line. `baud` is in bits per
+/// second; a byte takes ten bits.
 #[must_use]
-pub const fn highest_frequency(baud: u32) -> u32 {
-    baud / 10 / 2 / REPORT_LENGTH
+#[expect(clippy::cast_possible_truncation, reason = "an empty frame has 7 bytes")]
+pub const fn highest_frequency(baud: u32, registers: u8) -> u32 {
+    // `as` widens here: `From` is not const. The length is at least 7, so the division cannot panic.
+    baud / 10 / 2 / (MIN_LENGTH as u32 + registers as u32)
 }
 
 /// A timer that becomes due `frequency` times a second, without drift.
@@ -26,10 +26,10 @@ impl ReportTimer {
     /// The timer without reports.
     pub const OFF: Self = Self { frequency: 0, due: Instant::FAR_FUTURE, remainder: 0 };
 
-    /// Sets the frequency in Hz (register 53, 0 to 50), limited by `baud`. The first report is due one period after
+    /// Sets the frequency in Hz (register 53, 0 to 50), limited to `highest`. The first report is due one period after
     /// `now`. Setting the same frequency again has no effect.
-    pub fn set(&mut self, now: Instant, frequency: u8, baud: u32) {
-        let frequency = u32::from(frequency).min(highest_frequency(baud));
+    pub fn set(&mut self, now: Instant, frequency: u8, highest: u32) {
+        let frequency = u32::from(frequency).min(highest);
         if frequency != self.frequency {
             *self = Self { frequency, due: now, remainder: 0 };
             self.advance();
@@ -82,14 +82,15 @@ mod tests {
 
     fn timer(now: Instant, frequency: u8, baud: u32) -> ReportTimer {
         let mut timer = ReportTimer::OFF;
-        timer.set(now, frequency, baud);
+        timer.set(now, frequency, highest_frequency(baud, 7));
         timer
     }
 
     #[test]
     fn d14_reports_take_at_most_half_the_line() {
-        assert_eq!(highest_frequency(9_600), 34);
-        assert_eq!(highest_frequency(19_200), 68);
+        assert_eq!(highest_frequency(9_600, 7), 34);
+        assert_eq!(highest_frequency(19_200, 7), 68);
+        assert_eq!([14, 42].map(|registers| highest_frequency(9_600, registers)), [22, 9], "(D26)");
         let mut timer = timer(at(0), 50, 9_600);
         let reports = (0..1_000_000).step_by(500).filter(|&now| timer.poll_due(at(now))).count();
         assert_eq!(reports, 33, "34 Hz, the last one at one second");
@@ -121,11 +122,11 @@ mod tests {
     #[test]
     fn d14_setting_the_same_frequency_again_has_no_effect() {
         let mut timer = timer(at(0), 10, 115_200);
-        timer.set(at(99_000), 10, 115_200);
+        timer.set(at(99_000), 10, 411);
         assert_eq!(timer.due(), at(100_000));
-        timer.set(at(99_000), 20, 115_200);
+        timer.set(at(99_000), 20, 411);
         assert_eq!(timer.due(), at(149_000));
-        timer.set(at(149_000), 0, 115_200);
+        timer.set(at(149_000), 0, 411);
         assert_eq!(timer.due(), Instant::FAR_FUTURE);
     }
 

@@ -3,11 +3,13 @@
 //! The streams of both maps never run at the same time. The streams of map 2.1 share the half of the line that D14 allows.
 //! This file does not know the values in a report.
 
-use protocol_core::registers::map::{FEEDBACK_FREQUENCY, PRESENT_POSITION};
+use protocol_core::registers::RegisterFile;
+use protocol_core::registers::map::{
+    FEEDBACK_FREQUENCY, FINE_POSITION, LOAD, PRESENT_POSITION, REPORT_CONTENT, report_content,
+};
 use protocol_core::registers::map21::{
     ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, Map, PRESENT_ANGLE, PRESENT_LOAD,
 };
-use protocol_core::registers::{Register, RegisterFile};
 use protocol_core::time::Instant;
 
 use crate::report_timer::{ReportTimer, highest_frequency};
@@ -17,6 +19,10 @@ use crate::report_timer::{ReportTimer, highest_frequency};
 pub(crate) enum ReportKind {
     /// The present positions of map 2.2.
     Positions,
+    /// The present positions in hundredths of a degree.
+    FinePositions,
+    /// The present positions in hundredths of a degree, velocities and loads.
+    FineState,
     /// The present angles of map 2.1.
     Angles,
     /// The present loads of map 2.1.
@@ -24,29 +30,48 @@ pub(crate) enum ReportKind {
 }
 
 impl ReportKind {
-    /// The registers in the report.
-    pub(crate) const fn registers(self) -> Register {
-        match self {
+    /// The kind for a value of register 189 (D26).
+    const fn from_register(value: u8) -> Self {
+        match value {
+            report_content::FINE_POSITIONS => Self::FinePositions,
+            report_content::FINE_STATE => Self::FineState,
+            _ => Self::Positions,
+        }
+    }
+
+    /// The address of the first register in the report, and how many there are.
+    pub(crate) const fn registers(self) -> (u8, u8) {
+        let row = match self {
             Self::Positions => PRESENT_POSITION,
+            Self::FinePositions => FINE_POSITION,
+            Self::FineState => {
+                return (FINE_POSITION.address, LOAD.address + LOAD.count - FINE_POSITION.address);
+            }
             Self::Angles => PRESENT_ANGLE,
             Self::Loads => PRESENT_LOAD,
-        }
+        };
+        (row.address, row.count)
     }
 
     /// The map whose form the report has.
     pub(crate) const fn map(self) -> Map {
         match self {
-            Self::Positions => Map::V22,
+            Self::Positions | Self::FinePositions | Self::FineState => Map::V22,
             Self::Angles | Self::Loads => Map::V21,
         }
+    }
+
+    /// Does the report hold registers of the extended block?
+    pub(crate) const fn is_extended(self) -> bool {
+        matches!(self, Self::FinePositions | Self::FineState)
     }
 }
 
 /// The streams that run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reports {
-    /// The map of `joints`.
-    map: Map,
+    /// What the reports of `joints` hold.
+    kind: ReportKind,
     /// Positions in map 2.2, angles in map 2.1.
     joints: ReportTimer,
     loads: ReportTimer,
@@ -56,24 +81,31 @@ pub(crate) struct Reports {
 
 impl Reports {
     /// No stream.
-    pub(crate) const OFF: Self =
-        Self { map: Map::V22, joints: ReportTimer::OFF, loads: ReportTimer::OFF, due: Instant::FAR_FUTURE };
+    pub(crate) const OFF: Self = Self {
+        kind: ReportKind::Positions,
+        joints: ReportTimer::OFF,
+        loads: ReportTimer::OFF,
+        due: Instant::FAR_FUTURE,
+    };
 
     /// Sets the frequencies that the registers hold from `now` on. `baud` is in bits per second.
     pub(crate) fn set(&mut self, now: Instant, registers: &RegisterFile, baud: u32) {
         let frequencies =
             [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY].map(|row| registers.get(row.address));
-        let (map, joints, loads) = if frequencies == [0, 0] {
-            (Map::V22, registers.get(FEEDBACK_FREQUENCY.address), 0)
+        let (kind, joints, loads) = if frequencies == [0, 0] {
+            let kind = ReportKind::from_register(registers.get(REPORT_CONTENT.address));
+            (kind, registers.get(FEEDBACK_FREQUENCY.address), 0)
         } else {
-            let [angles, loads] = shares(frequencies, highest_frequency(baud));
-            (Map::V21, angles, loads)
+            let [angles, loads] = shares(frequencies, highest_frequency(baud, PRESENT_ANGLE.count));
+            (ReportKind::Angles, angles, loads)
         };
-        if map != self.map {
-            (self.map, self.joints) = (map, ReportTimer::OFF);
+        if kind.map() != self.kind.map() {
+            self.joints = ReportTimer::OFF;
         }
-        self.joints.set(now, joints, baud);
-        self.loads.set(now, loads, baud);
+        self.kind = kind;
+        let (_, count) = kind.registers();
+        self.joints.set(now, joints, highest_frequency(baud, count));
+        self.loads.set(now, loads, highest_frequency(baud, PRESENT_LOAD.count));
         self.due = self.joints.due().min(self.loads.due());
     }
 
@@ -89,10 +121,8 @@ impl Reports {
         }
         let kind = if !self.joints.poll_due(now) {
             self.loads.poll_due(now).then_some(ReportKind::Loads)
-        } else if self.map == Map::V22 {
-            Some(ReportKind::Positions)
         } else {
-            Some(ReportKind::Angles)
+            Some(self.kind)
         };
         self.due = self.joints.due().min(self.loads.due());
         kind
@@ -115,6 +145,7 @@ fn shares(wanted: [u8; 2], most: u32) -> [u8; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol_core::registers::Register;
 
     fn at(micros: u64) -> Instant {
         Instant::from_micros(micros)
@@ -146,6 +177,21 @@ mod tests {
         assert_eq!(in_a_second(&both, 115_200), [0, 30, 5]);
         let positions = registers([(FEEDBACK_FREQUENCY, 50), (LOAD_FEEDBACK_FREQUENCY, 0)]);
         assert_eq!(in_a_second(&positions, 115_200), [50, 0, 0]);
+    }
+
+    #[test]
+    fn d26_a_report_holds_what_register_189_says() {
+        let kinds = [(0, ReportKind::Positions), (1, ReportKind::FinePositions), (2, ReportKind::FineState)];
+        for (content, kind) in kinds {
+            let mut reports = Reports::OFF;
+            let frequency = (FEEDBACK_FREQUENCY, 50);
+            reports.set(at(0), &registers([frequency, (REPORT_CONTENT, content)]), 9_600);
+            let count = (0..=1_000_000).step_by(500).filter_map(|now| reports.poll_due(at(now)));
+            let most = [34, 22, 9][usize::from(content)];
+            assert_eq!(count.filter(|&found| found == kind).count(), most, "{kind:?}");
+        }
+        assert_eq!(kinds.map(|(_, kind)| kind.registers()), [(54, 7), (142, 14), (142, 42)]);
+        assert_eq!(kinds.map(|(_, kind)| kind.is_extended()), [false, true, true]);
     }
 
     #[test]

@@ -41,6 +41,11 @@ impl Status {
         self.lasting_faults |= bits;
     }
 
+    /// Clears fault bits that were raised.
+    pub(crate) const fn clear_faults(&mut self, bits: u8) {
+        self.lasting_faults &= !bits;
+    }
+
     /// Shows which joints move. A joint whose servo is silent does not count as moving.
     pub(crate) fn show_moving(registers: &mut RegisterFile, joints: &Joints) {
         let silent = registers.get(MISSING_SERVOS.address);

@@ -1,9 +1,12 @@
-//! The set-point of one joint during a move (D10, D11, D18).
+//! The set-point of one joint during a move or in a stream (D10, D11, D18, D23).
 //!
 //! Each control cycle advances the set-point by one step. A late call delays the move; it never makes a step larger.
 //! This file does not know the joint, its measured position or its servo.
 
+use protocol_core::time::{Duration, Instant};
+
 use crate::calibration::MicroDegrees;
+use crate::point_stream::PointStream;
 
 /// Control cycles in one unit of the time registers: 100 ms at 100 Hz.
 const CYCLES_PER_TIME_UNIT: u16 = 10;
@@ -13,19 +16,21 @@ const STEP_PER_SPEED_UNIT: i32 = 19_000;
 const LARGEST_STEP: i32 = 3_720_000;
 
 /// The set-point of one joint and its target.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Trajectory {
     set_point: MicroDegrees,
+    /// In a stream: its newest point.
     target: MicroDegrees,
-    /// Remaining cycles of a timed move; 0 is the motor's maximum speed.
+    /// Remaining cycles of a timed move, at least 1; 0 is the motor's maximum speed.
     cycles_left: u16,
+    stream: PointStream,
 }
 
 impl Trajectory {
     /// A trajectory at rest at `angle`.
     #[must_use]
     pub const fn holding(angle: MicroDegrees) -> Self {
-        Self { set_point: angle, target: angle, cycles_left: 0 }
+        Self { set_point: angle, target: angle, cycles_left: 0, stream: PointStream::NONE }
     }
 
     /// The present set-point.
@@ -40,11 +45,19 @@ impl Trajectory {
         self.set_point != self.target
     }
 
-    /// Starts a move from the present set-point to `target`. `time` is the joint's time register, 0 to 100
+    /// Starts a move from the present set-point to `target`, and ends a stream. `time` is the joint's time register, 0 to 100
     /// times 100 ms; it counts while the joint's speed register is 0.
     pub fn move_to(&mut self, target: MicroDegrees, time: u8) {
         self.target = target;
         self.cycles_left = u16::from(time) * CYCLES_PER_TIME_UNIT;
+        self.stream = PointStream::NONE;
+    }
+
+    /// Adds the next point of a stream, whose frame came at `now`.
+    pub fn stream_to(&mut self, target: MicroDegrees, now: Instant, period: Duration) {
+        self.target = target;
+        self.cycles_left = 0;
+        self.stream.push(now, period, target);
     }
 
     /// Continues from `angle` to the same target.
@@ -52,19 +65,46 @@ impl Trajectory {
         self.set_point = angle;
     }
 
-    /// Advances the set-point by one control cycle. `speed` is the joint's present speed register, 0 to 100 times 1.9
-    /// degrees/s.
-    pub fn advance(&mut self, speed: u8) {
+    /// Advances the set-point by the control cycle that ends at `end`. `speed` is the joint's present speed register, 0 to
+    /// 100 times 1.9 degrees/s.
+    pub fn advance(&mut self, end: Instant, speed: u8) {
+        let most = if speed == 0 { LARGEST_STEP } else { i32::from(speed) * STEP_PER_SPEED_UNIT };
+        if !self.stream.is_empty() {
+            return self.advance_stream(end, most);
+        }
         let distance = self.target.0 - self.set_point.0;
         let step = match (speed, self.cycles_left) {
-            (0, 0) => LARGEST_STEP,
             // The remaining distance divided by the remaining cycles gives a constant speed without drift.
-            (0, cycles) => (distance.abs() / i32::from(cycles)).min(LARGEST_STEP),
-            (speed, _) => i32::from(speed) * STEP_PER_SPEED_UNIT,
+            (0, cycles @ 1..) => (distance.abs() / i32::from(cycles)).min(most),
+            _ => most,
         };
+        self.step(distance, step);
+        if self.cycles_left > 1 {
+            self.cycles_left -= 1;
+        }
+    }
+
+    /// A joint that cannot keep up with its stream goes towards the newest point.
+    fn advance_stream(&mut self, end: Instant, most: i32) {
+        let mut wanted = self.stream.follow(self.set_point, end);
+        if self.set_point.0.abs_diff(wanted.0) > most.unsigned_abs() {
+            wanted = self.stream.skip_to_newest().unwrap_or(self.target);
+        }
+        self.step(wanted.0 - self.set_point.0, most);
+    }
+
+    fn step(&mut self, distance: i32, most: i32) {
         // `clamp` contains a panic path.
-        self.set_point.0 += distance.min(step).max(-step);
-        self.cycles_left = self.cycles_left.saturating_sub(1);
+        self.set_point.0 += distance.min(most).max(-most);
+    }
+
+    /// Takes back the part of the last step beyond `set_point`, because the joint has to wait (D25). The time of a timed
+    /// move does not pass meanwhile.
+    pub fn hold_back(&mut self, set_point: MicroDegrees) {
+        self.set_point = set_point;
+        if self.cycles_left > 0 {
+            self.cycles_left += 1;
+        }
     }
 }
 
@@ -83,7 +123,7 @@ mod tests {
         let (mut cycles, mut largest) = (0, 0);
         while trajectory.is_moving() {
             let before = trajectory.set_point().0;
-            trajectory.advance(speed);
+            trajectory.advance(Instant::ZERO, speed);
             largest = largest.max((trajectory.set_point().0 - before).abs());
             cycles += 1;
             assert!(cycles < 20_000, "the move does not end");
@@ -133,9 +173,9 @@ mod tests {
     fn d11_a_change_of_speed_is_effective_immediately() {
         let mut trajectory = Trajectory::holding(degrees(0));
         trajectory.move_to(degrees(100), 0);
-        trajectory.advance(1);
+        trajectory.advance(Instant::ZERO, 1);
         assert_eq!(trajectory.set_point().0, 19_000);
-        trajectory.advance(100);
+        trajectory.advance(Instant::ZERO, 100);
         assert_eq!(trajectory.set_point().0, 1_919_000);
     }
 
@@ -143,9 +183,9 @@ mod tests {
     fn a_new_target_during_a_move_causes_no_jump() {
         let mut trajectory = Trajectory::holding(degrees(0));
         trajectory.move_to(degrees(100), 0);
-        trajectory.advance(100);
+        trajectory.advance(Instant::ZERO, 100);
         trajectory.move_to(degrees(0), 0);
-        trajectory.advance(50);
+        trajectory.advance(Instant::ZERO, 50);
         assert_eq!(trajectory.set_point().0, 950_000);
     }
 }

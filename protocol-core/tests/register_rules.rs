@@ -23,17 +23,36 @@ fn takes_effect(address: u8, lock: u8) -> bool {
     })
 }
 
-/// The outcome a write should have: all 256 values, or the register that refuses it.
-fn expected(before: &[u8; 256], address: u8, values: &[u8]) -> Result<[u8; 256], u8> {
+/// Reason 2 of register 244.
+const OUT_OF_RANGE: u8 = 2;
+/// Reason 4 of register 244.
+const HALF_A_WORD: u8 = 4;
+
+/// The low byte of the two-byte register that a byte belongs to.
+fn word_of(address: u8) -> Option<u8> {
+    matches!(address, 128..=185).then_some(address & !1)
+}
+
+/// The outcome a write should have: all 256 values, or the reason and the register that refuses it.
+fn expected(before: &[u8; 256], address: u8, values: &[u8]) -> Result<[u8; 256], (u8, u8)> {
     let lock = before[usize::from(LOCK)];
     let mut after = *before;
+    let byte = |at: u8| values.get(usize::from(at.checked_sub(address)?)).copied();
     for (at, &value) in (address..=255).zip(values) {
-        if takes_effect(at, lock) {
-            if !row(at).unwrap().range.contains(value) {
-                return Err(at);
-            }
-            after[usize::from(at)] = value;
+        if !takes_effect(at, lock) {
+            continue;
         }
+        let raw = match word_of(at) {
+            None => value.into(),
+            Some(low) => match (byte(low), byte(low + 1)) {
+                (Some(low), Some(high)) => u16::from_le_bytes([low, high]),
+                _ => return Err((HALF_A_WORD, low)),
+            },
+        };
+        if !row(at).unwrap().range.contains(raw) {
+            return Err((OUT_OF_RANGE, word_of(at).unwrap_or(at)));
+        }
+        after[usize::from(at)] = value;
     }
     Ok(after)
 }
@@ -42,8 +61,8 @@ fn snapshot(file: &RegisterFile) -> [u8; 256] {
     std::array::from_fn(|address| file.get(u8::try_from(address).unwrap()))
 }
 
-fn write(file: &mut RegisterFile, address: u8, values: &[u8]) -> Result<[u8; 256], u8> {
-    let accepted = file.check(address, values).map_err(|wrong| wrong.address)?;
+fn write(file: &mut RegisterFile, address: u8, values: &[u8]) -> Result<[u8; 256], (u8, u8)> {
+    let accepted = file.check(address, values).map_err(|refused| (refused.reason, refused.address))?;
     file.apply(&accepted);
     Ok(snapshot(file))
 }
@@ -62,7 +81,7 @@ fn d15_d16_d17_every_range_of_addresses_in_every_state() {
         let fresh = file(lock, state);
         let before = snapshot(&fresh);
         // All zero and all one are values of every register but a few; the others find each one's limit.
-        for filler in [0, 1, 2, 8, 17, 51, 100, 181, 0x81, 0x91, 255] {
+        for filler in [0, 1, 2, 4, 8, 17, 51, 70, 100, 181, 0x81, 0x91, 255] {
             let values = [filler; 255];
             for address in 0..=255_u8 {
                 for count in 0..=255_usize.min(256 - usize::from(address)) {
@@ -99,13 +118,26 @@ fn d16_every_value_of_every_register() {
 }
 
 #[test]
+fn d22_every_value_of_every_two_byte_register() {
+    let fresh = file(1, 1);
+    let before = snapshot(&fresh);
+    for address in (128..=184).step_by(2) {
+        for value in 0..=u16::MAX {
+            let bytes = value.to_le_bytes();
+            let outcome = write(&mut fresh.clone(), address, &bytes);
+            assert_eq!(outcome, expected(&before, address, &bytes), "{address} = {value}");
+        }
+    }
+}
+
+#[test]
 fn d16_one_bad_value_anywhere_spoils_the_whole_pose() {
     for bad in 0..7 {
         let mut file = file(1, 1);
         let mut pose = [45; 7];
         pose[bad] = 181;
         let before = snapshot(&file);
-        assert_eq!(write(&mut file, 46, &pose), Err(46 + u8::try_from(bad).unwrap()));
+        assert_eq!(write(&mut file, 46, &pose), Err((OUT_OF_RANGE, 46 + u8::try_from(bad).unwrap())));
         assert_eq!(snapshot(&file), before);
     }
 }
@@ -164,8 +196,9 @@ fn codes_are_as_released() {
         fault::BROWN_OUT_RESTART,
         fault::CRYSTAL_FAILED,
         fault::RECEIVE_OVERRUN,
+        fault::HOST_SILENT,
     ];
-    assert_eq!(faults, [1, 2, 4, 8, 16, 32]);
+    assert_eq!(faults, [1, 2, 4, 8, 16, 32, 64]);
     let rates = [115_200, 250_000, 500_000, 1_000_000, 57_600, 38_400, 19_200, 9_600];
     assert_eq!([0, 1, 2, 3, 4, 5, 6, 7].map(baud_rate), rates);
     assert_eq!(baud_rate(8), 115_200, "no stored byte locks a user out (D19)");

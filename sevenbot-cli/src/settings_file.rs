@@ -115,7 +115,7 @@ fn put(registers: &mut Snapshot, address: u8, byte: u8) {
 
 /// The value of a setting in the file.
 fn value(row: &Register, registers: &Snapshot) -> Value {
-    let number = |address| Value::from(i64::from(row.range.decode(registers.at(address))));
+    let number = |address| Value::from(i64::from(row.range.decode_byte(registers.at(address))));
     match *row {
         BAUD_RATE => Value::from(i64::from(baud_rate(registers.byte(row)))),
         _ if row.per_joint => Value::Array(Span::of(row).addresses().map(number).collect()),
@@ -140,7 +140,7 @@ fn byte(row: &Register, address: u8, value: &Value) -> Result<u8, String> {
         return code.map(|(_, code)| code).ok_or_else(|| format!("the arm does not support {value} baud"));
     }
     let byte =
-        number.and_then(|number| i16::try_from(number).ok()).and_then(|number| row.range.encode(number));
+        number.and_then(|number| i16::try_from(number).ok()).and_then(|number| row.range.encode_byte(number));
     byte.ok_or_else(|| {
         format!(
             "{value} is out of range: {} takes {}",

@@ -210,7 +210,7 @@ fn compare(found: &Snapshot, wanted: &[u8], cause: impl Fn(u8, u8) -> MismatchCa
 
 /// The number that a byte encodes. Minus zero is zero (D9).
 fn number(address: u8, byte: u8) -> i16 {
-    find_readable(address).map_or(i16::from(byte), |row| row.range.decode(byte))
+    find_readable(address).map_or(i16::from(byte), |row| row.range.decode_byte(byte))
 }
 
 /// The firmware's reason why no write can change a register; `None` if a write can.
@@ -250,7 +250,7 @@ pub(crate) fn cause_from_counters(before: &StatusBlock, after: &StatusBlock) -> 
 /// The reason if the arm has no status block.
 fn cause_from_range(address: u8, wanted: u8) -> MismatchCause {
     match find_readable(address) {
-        Some(row) if !row.range.contains(wanted) => MismatchCause::OutOfRange { address },
+        Some(row) if !row.range.contains(wanted.into()) => MismatchCause::OutOfRange { address },
         _ => MismatchCause::Unknown,
     }
 }

@@ -245,7 +245,7 @@ pub(crate) mod tests {
     }
 
     pub(crate) fn power_up(positions: [u8; 7], missing: u8, moving: u8) -> JointSnapshot {
-        joint_snapshot(TARGET_POSITION.defaults, positions, missing, moving)
+        joint_snapshot(TARGET_POSITION.default_bytes(), positions, missing, moving)
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub(crate) fn values(row: &Register, bytes: &[u8]) -> String {
         (TOOL_DIRECTION | DISC_DIRECTION | PRESENT_LOAD, _) => {
             bytes.iter().map(|&byte| (i16::from(byte) - 128).to_string()).collect()
         }
-        _ => bytes.iter().map(|&byte| row.range.decode(byte).to_string()).collect(),
+        _ => bytes.iter().map(|&byte| row.range.decode_byte(byte).to_string()).collect(),
     };
     format!("{} {}", numbers.join(" "), row.unit.symbol()).trim_end().to_owned()
 }

@@ -184,7 +184,7 @@ fn encode(address: u8, value: u8) -> u8 {
     if !OFFSET.holds(address) {
         return value;
     }
-    map21::OFFSET.range.encode(OFFSET.range.decode(value)).unwrap_or(NO_OFFSET)
+    map21::OFFSET.range.encode_byte(OFFSET.range.decode_byte(value)).unwrap_or(NO_OFFSET)
 }
 
 /// Sign and magnitude (D9) of 128 + offset.

@@ -42,14 +42,16 @@ pub fn name_of(row: &Register) -> String {
     row.name.to_ascii_lowercase().replace('_', "-")
 }
 
-/// The name of one register: `target-position.3` or `chip-id+2`; `register 67` if the tables have none.
+/// The name of one register: `target-position.3`, or `chip-id+2` and `fine-target.3+1` for a later byte of a longer value;
+/// `register 67` if the tables have none.
 #[must_use]
 pub fn name_of_register(address: u8) -> String {
     let Some(row) = find_readable(address) else { return format!("register {address}") };
-    match (row.joint_at(address), address.saturating_sub(row.address)) {
-        (Some(joint), _) => format!("{}.{}", name_of(row), joint.number()),
-        (None, 0) => name_of(row),
-        (None, offset) => format!("{}+{offset}", name_of(row)),
+    let joint = row.joint_at(address);
+    let name = joint.map_or(name_of(row), |joint| format!("{}.{}", name_of(row), joint.number()));
+    match address.saturating_sub(joint.map_or(row.address, |joint| row.of(joint))) {
+        0 => name,
+        offset => format!("{name}+{offset}"),
     }
 }
 
@@ -81,7 +83,8 @@ fn address(text: &str) -> Result<u8, NameError> {
 
 fn one_joint(row: &'static Register, joint: &str) -> Result<Span, NameError> {
     let joint = joint.parse().ok().and_then(Joint::new).ok_or(NameError::NoJoint)?;
-    if row.per_joint { Ok(Span::one(row.of(joint))) } else { Err(NameError::NotPerJoint(row)) }
+    let span = Span::new(row.of(joint), row.range.width()).filter(|_| row.per_joint);
+    span.ok_or(NameError::NotPerJoint(row))
 }
 
 /// The registers of a row that a read of the row's addresses shows: of a row that only map 2.1 has, those that map 2.2
@@ -172,5 +175,7 @@ mod tests {
         assert_eq!(name_of_register(2), "chip-id");
         assert_eq!(name_of_register(4), "chip-id+2");
         assert_eq!(name_of_register(67), "register 67");
+        assert_eq!([132, 133].map(name_of_register), ["fine-target.3", "fine-target.3+1"]);
+        assert_eq!(parse("fine-target.3"), span(132, 2));
     }
 }

@@ -1,17 +1,20 @@
 //! Register values as text, from the register table: `-5 °`, `servo`, `joints 2 and 3`.
 
 use protocol_core::registers::map::{
-    BAUD_RATE, CHIP_ID, EEPROM_LOCK, EFFECTOR_TYPE, FAULTS, LAST_REFUSAL, LAST_REFUSED_REGISTER,
-    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, VACUUM_PUMP, baud_rate, fault, motor_state, refusal,
+    BAUD_RATE, CHIP_ID, EEPROM_LOCK, EFFECTOR_TYPE, FAULTS, FINE_POSITION, HOST_WATCHDOG, LAST_REFUSAL,
+    LAST_REFUSED_REGISTER, LIMITS, MEASURED_JOINTS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS,
+    REPORT_CONTENT, SET_POINT_PERIOD, VACUUM_PUMP, WATCHDOG_ACTION, baud_rate, fault, limit, motor_state,
+    refusal, report_content,
 };
 use protocol_core::registers::map21::{
     DISC_DIRECTION, OPTIONS, PRESENT_LOAD, WRIST_POSITION, find_readable, option,
 };
-use protocol_core::registers::{Joint, Register, Unit};
+use protocol_core::registers::{Access, Joint, Register, Unit};
 
 use crate::map21_text;
-use crate::names::{name_of, name_of_register};
+use crate::names::name_of_register;
 use crate::snapshot::Snapshot;
+use crate::span::Span;
 use crate::units::Speed;
 
 /// The text of one value: one register, or several that form one number.
@@ -43,14 +46,12 @@ pub fn entries(snapshot: &Snapshot) -> Vec<RegisterEntry> {
     let mut entries = Vec::new();
     let mut addresses = snapshot.span().addresses().peekable();
     while let Some(address) = addresses.next() {
-        let whole = find_readable(address).filter(|row| is_whole(row, address, snapshot));
-        match whole {
-            Some(row) => {
-                entries.push(long_entry(row, snapshot));
-                while addresses.next_if(|&next| row.holds(next)).is_some() {}
-            }
-            None => entries.push(entry(address, snapshot.at(address))),
-        }
+        let Some((row, span)) = long_value(address, snapshot) else {
+            entries.push(entry(address, snapshot.at(address)));
+            continue;
+        };
+        entries.push(long_entry(row, span, snapshot));
+        while addresses.next_if(|&next| span.addresses().any(|held| held == next)).is_some() {}
     }
     entries
 }
@@ -66,30 +67,52 @@ pub fn raw_entries(snapshot: &Snapshot) -> Vec<RegisterEntry> {
     pairs.map(raw).map(|entry| RegisterEntry { meaning: String::new(), ..entry }).collect()
 }
 
-/// Does a value of several registers start here, with all of them in the snapshot?
-fn is_whole(row: &Register, address: u8, snapshot: &Snapshot) -> bool {
-    let last = row.address.saturating_add(row.count.saturating_sub(1));
-    let runs = row.count > 1 && !row.per_joint && row.access != protocol_core::registers::Access::Reserved;
-    runs && address == row.address && snapshot.span().addresses().any(|held| held == last)
+/// The value of several registers that starts here, if the snapshot has all of them.
+fn long_value(address: u8, snapshot: &Snapshot) -> Option<(&'static Register, Span)> {
+    let row = find_readable(address).filter(|row| row.access != Access::Reserved)?;
+    let span = match (row.range.width(), row.per_joint) {
+        (2, _) => Span::new(address, 2).filter(|_| (address - row.address).is_multiple_of(2))?,
+        (_, false) if row.count > 1 && address == row.address => Span::of(row),
+        _ => return None,
+    };
+    let held = snapshot.span().addresses();
+    span.addresses().all(|address| held.clone().any(|held| held == address)).then_some((row, span))
 }
 
-fn long_entry(row: &Register, snapshot: &Snapshot) -> RegisterEntry {
-    let held = snapshot.span().addresses().filter(|&address| row.holds(address));
-    let bytes: Vec<u8> = held.map(|address| snapshot.at(address)).collect();
-    let (value, meaning) = match *row {
-        CHIP_ID => (bytes.iter().map(|byte| format!("{byte:02X}")).collect(), String::new()),
-        DISC_DIRECTION | WRIST_POSITION => {
+fn long_entry(row: &Register, span: Span, snapshot: &Snapshot) -> RegisterEntry {
+    let bytes: Vec<u8> = span.addresses().map(|address| snapshot.at(address)).collect();
+    let (value, meaning) = match (*row, bytes.as_slice()) {
+        (CHIP_ID, _) => (bytes.iter().map(|byte| format!("{byte:02X}")).collect(), String::new()),
+        (_, &[low, high]) if row.range.width() == 2 => {
+            let word = u16::from_le_bytes([low, high]);
+            (row.range.decode(word).to_string(), word_meaning(row, word))
+        }
+        (DISC_DIRECTION | WRIST_POSITION, _) => {
             let numbers: Vec<String> = bytes.iter().map(u8::to_string).collect();
             (numbers.join(" "), map21_text::values(row, &bytes))
         }
         _ => (snapshot.counter(row).to_string(), String::new()),
     };
-    RegisterEntry { address: row.address, name: name_of(row), bytes, value, meaning }
+    RegisterEntry { address: span.address(), name: name_of_register(span.address()), bytes, value, meaning }
+}
+
+/// The meaning of a two-byte value in a row; empty if the number is enough.
+#[must_use]
+pub fn word_meaning(row: &Register, word: u16) -> String {
+    let number = f64::from(row.range.decode(word));
+    match row.unit {
+        Unit::Centidegree if *row == FINE_POSITION && word == u16::MAX => "not measured".to_owned(),
+        Unit::Centidegree => format!("{:.2} °", number / 100.0),
+        Unit::DecidegreePerSecond => format!("{:.1} °/s", number / 10.0),
+        Unit::PermilleOfStall => format!("{:.1} %", number / 10.0),
+        _ if *row == SET_POINT_PERIOD && word == 0 => "no stream".to_owned(),
+        unit => unit.symbol().to_owned(),
+    }
 }
 
 fn entry(address: u8, byte: u8) -> RegisterEntry {
     let row = find_readable(address);
-    let value = row.map_or(i16::from(byte), |row| row.range.decode(byte)).to_string();
+    let value = row.map_or(i16::from(byte), |row| row.range.decode_byte(byte)).to_string();
     let meaning = row.map(|row| meaning(row, byte)).unwrap_or_default();
     RegisterEntry { address, name: name_of_register(address), bytes: vec![byte], value, meaning }
 }
@@ -104,7 +127,11 @@ pub fn meaning(row: &Register, byte: u8) -> String {
         EFFECTOR_TYPE => (if byte == 0 { "suction cup" } else { "gripper" }).to_owned(),
         VACUUM_PUMP => (if byte == 0 { "release" } else { "suck" }).to_owned(),
         FAULTS => faults(byte),
-        MISSING_SERVOS | MOVING_JOINTS => joints(byte),
+        MISSING_SERVOS | MOVING_JOINTS | MEASURED_JOINTS => joints(byte),
+        HOST_WATCHDOG if byte == 0 => "off".to_owned(),
+        WATCHDOG_ACTION => (if byte == 0 { "hold" } else { "damping protection" }).to_owned(),
+        LIMITS => limits(byte),
+        REPORT_CONTENT => report_content_name(byte).to_owned(),
         LAST_REFUSAL => refusal_reason(byte).to_owned(),
         OPTIONS => options(byte),
         PRESENT_LOAD => format!("{:.1} %", 0.8 * (f64::from(byte) - 128.0)),
@@ -121,6 +148,7 @@ fn in_unit(unit: Unit, byte: u8) -> String {
         Unit::SpeedStep if byte == Speed::MAXIMUM.steps() => "maximum, 372 °/s".to_owned(),
         Unit::SpeedStep => Speed::from_steps(byte)
             .map_or_else(String::new, |speed| format!("{:.1} °/s", speed.degrees_per_second())),
+        Unit::Centisecond => format!("{:.2} s", f64::from(byte) / 100.0),
         Unit::Decisecond => format!("{tenths:.1} s"),
         Unit::Decivolt if byte == 0 => "unknown".to_owned(),
         Unit::Decivolt => format!("{tenths:.1} V"),
@@ -148,6 +176,8 @@ pub const fn refusal_reason(reason: u8) -> &'static str {
         refusal::MALFORMED_RANGE => "it reached past register 255",
         refusal::OUT_OF_RANGE => "a value was out of range",
         refusal::STORAGE_FULL => "the settings storage was full",
+        refusal::HALF_A_WORD => "it held half of a two-byte register",
+        refusal::AGAINST_A_LIMIT => "it was against a limit that is switched on",
         refusal::OUT_OF_REACH => "no joint angles reach the position",
         _ => "unknown",
     }
@@ -156,13 +186,14 @@ pub const fn refusal_reason(reason: u8) -> &'static str {
 /// The faults in these bits.
 #[must_use]
 pub fn faults(bits: u8) -> String {
-    const WORDS: [(u8, &str); 6] = [
+    const WORDS: [(u8, &str); 7] = [
         (fault::SETTINGS_STORAGE, "settings storage"),
         (fault::SERVO_BUS, "servo bus"),
         (fault::WATCHDOG_RESTART, "restarted by the watchdog"),
         (fault::BROWN_OUT_RESTART, "restarted after a drop of the supply"),
         (fault::CRYSTAL_FAILED, "crystal failed"),
         (fault::RECEIVE_OVERRUN, "over-run of the receive buffer"),
+        (fault::HOST_SILENT, "host was silent"),
     ];
     let set = WORDS.iter().filter(|(bit, _)| bits & bit != 0).map(|&(_, word)| word.to_owned());
     list(set.collect()).unwrap_or_else(|| "none".to_owned())
@@ -174,6 +205,22 @@ fn options(bits: u8) -> String {
     let biased = set(option::BIASED_OFFSETS, "offsets read as 128 + offset until the first write");
     let alarms = set(option::ALARMS, "alarm frames");
     list(biased.into_iter().chain(alarms).collect()).unwrap_or_else(|| "none".to_owned())
+}
+
+/// The limits in these bits.
+#[must_use]
+pub fn limits(bits: u8) -> String {
+    let set =
+        [(limit::LINKAGE, "linkage"), (limit::CLAW, "claw")].into_iter().filter(|(bit, _)| bits & bit != 0);
+    list(set.map(|(_, word)| word.to_owned()).collect()).unwrap_or_else(|| "none".to_owned())
+}
+
+const fn report_content_name(content: u8) -> &'static str {
+    match content {
+        report_content::FINE_POSITIONS => "positions in 0.01 °",
+        report_content::FINE_STATE => "positions in 0.01 °, velocities and loads",
+        _ => "positions",
+    }
 }
 
 /// The joints in these bits.
@@ -202,7 +249,7 @@ pub fn range(address: u8) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol_core::registers::map::{FRAMES_ACCEPTED, OFFSET, SPEED};
+    use protocol_core::registers::map::{FRAMES_ACCEPTED, OFFSET, SPEED, VELOCITY};
 
     #[test]
     fn bits_are_shown_as_lists() {
@@ -226,6 +273,23 @@ mod tests {
         let counter = Snapshot { address: FRAMES_ACCEPTED.address, values: vec![0x34, 0x12, 5] };
         let values: Vec<String> = entries(&counter).into_iter().map(|entry| entry.value).collect();
         assert_eq!(values, ["4660", "5"]);
+    }
+
+    #[test]
+    fn d22_words_are_one_entry_each() {
+        let snapshot = Snapshot { address: 127, values: vec![0, 0x28, 0x23, 1] };
+        let shown: Vec<_> =
+            entries(&snapshot).into_iter().map(|entry| (entry.name, entry.value, entry.meaning)).collect();
+        let expected = [
+            ("register 127", "0", ""),
+            ("fine-target.1", "9000", "90.00 °"),
+            ("fine-target.2", "1", "× 0.01 °"),
+        ];
+        assert_eq!(shown, expected.map(|(name, value, meaning)| (name.into(), value.into(), meaning.into())));
+        assert_eq!(word_meaning(&FINE_POSITION, 0xFFFF), "not measured");
+        assert_eq!(word_meaning(&VELOCITY, 0xFFFB), "-0.5 °/s");
+        assert_eq!([limits(3), limits(0)], ["linkage and claw", "none"]);
+        assert_eq!(meaning(&HOST_WATCHDOG, 25), "0.25 s");
     }
 
     #[test]

@@ -114,10 +114,10 @@ pub fn cells(row: &Register) -> [String; 7] {
 }
 
 /// The constants of a row: suffix of the name, and value.
-fn constants(row: &Register) -> Vec<(&'static str, i16)> {
-    let mut constants = vec![("", i16::from(row.address))];
+fn constants(row: &Register) -> Vec<(&'static str, i32)> {
+    let mut constants = vec![("", i32::from(row.address))];
     if row.count > 1 {
-        constants.push(("_COUNT", i16::from(row.count)));
+        constants.push(("_COUNT", i32::from(row.count)));
     }
     if let Some((low, high)) = range(row).filter(|_| row.access == Access::ReadWrite) {
         constants.extend([("_MIN", low), ("_MAX", high)]);
@@ -151,7 +151,7 @@ pub const fn access(access: Access) -> &'static str {
 
 /// The range of a row; `None` if a read-only row takes any byte.
 #[must_use]
-pub fn range(row: &Register) -> Option<(i16, i16)> {
+pub fn range(row: &Register) -> Option<(i32, i32)> {
     let is_any_byte = row.range == Range::UpTo(u8::MAX) && row.access != Access::ReadWrite;
     (!is_any_byte).then(|| row.range.bounds())
 }

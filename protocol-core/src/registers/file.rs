@@ -5,10 +5,12 @@
 //! value.
 
 use super::joint::{JOINTS, Joint};
-use super::map::{CHIP_ID, EEPROM_LOCK, OFFSET};
+use super::map::{CHIP_ID, EEPROM_LOCK, OFFSET, refusal};
 use super::map21::{self, Map, OPTIONS, option};
+use super::range::Range;
 use super::rules::{
-    DEFAULTS, EEPROM_END, EEPROM_START, keeps_bytes_of_21, rule, rule_21, rules_21_from, rules_from,
+    DEFAULTS, EEPROM_END, EEPROM_START, WORDS_START, first_refused_word, keeps_bytes_of_21, rule, rule_21,
+    rules_21_from, rules_from,
 };
 use super::spec::Register;
 
@@ -22,14 +24,14 @@ impl Image {
     pub const LENGTH: usize = (EEPROM_END - EEPROM_START) as usize;
 }
 
-/// The reason why a write has no effect: a byte is outside the range of its register (D16).
+/// The reason why a write has no effect (D16, D22).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct OutOfRange {
-    /// The first such register.
+pub struct Refused {
+    /// One of [`refusal`].
+    pub reason: u8,
+    /// The first register that is the reason; of a two-byte register its low byte.
     pub address: u8,
-    /// The byte for that register.
-    pub value: u8,
 }
 
 /// A write that was checked and may be applied.
@@ -57,6 +59,18 @@ impl Accepted<'_> {
             Map::V22 => rule(address).is_open().then_some(value),
             Map::V21 => rule_21(address).is_open().then(|| from_map21(address, value)),
         }
+    }
+
+    /// The new value of the two-byte register at `address`; `None` if the write does not include it.
+    #[must_use]
+    pub fn word_at(&self, address: u8) -> Option<u16> {
+        self.values_at(address).map(u16::from_le_bytes)
+    }
+
+    /// Does the write reach the extended block? No other registers have two bytes.
+    #[must_use]
+    pub fn has_words(&self) -> bool {
+        usize::from(self.start) + self.values.len() > usize::from(WORDS_START)
     }
 
     /// The bytes for `N` registers from `address` on; `None` unless the write has an effect on all of them.
@@ -128,7 +142,7 @@ impl RegisterFile {
     pub fn offset(&self, joint: Joint) -> i8 {
         let shown = self.get(OFFSET.of(joint));
         let range = if self.offsets.is_some() { map21::OFFSET.range } else { OFFSET.range };
-        i8::try_from(range.decode(shown)).unwrap_or(0)
+        i8::try_from(range.decode_byte(shown)).unwrap_or(0)
     }
 
     /// The value of the register at `address`, an offset in sign and magnitude.
@@ -152,6 +166,19 @@ impl RegisterFile {
         }
     }
 
+    /// Sets a two-byte register from the arm's side, without any rule.
+    pub fn set_word(&mut self, address: u8, word: u16) {
+        for (address, byte) in (address..=u8::MAX).zip(word.to_le_bytes()) {
+            self.set(address, byte);
+        }
+    }
+
+    /// The value of the two-byte register at `address`.
+    #[must_use]
+    pub fn word(&self, address: u8) -> u16 {
+        u16::from_le_bytes([self.get(address), self.get(address.wrapping_add(1))])
+    }
+
     /// Increments a counter of two bytes, low byte first. The counter wraps.
     pub fn increment(&mut self, counter: &Register) {
         let low = self.get(counter.address).wrapping_add(1);
@@ -173,26 +200,31 @@ impl RegisterFile {
     /// Checks a write of the host in map 2.2 without applying it.
     ///
     /// # Errors
-    /// The first byte that is outside the range of a register that can be written now.
-    pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, OutOfRange> {
+    /// The first register that can be written now and cannot take its value.
+    pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, Refused> {
         let (start, values) = self.unlocked(address, values);
-        for ((rule, &value), address) in rules_from(start).iter().zip(values).zip(start..) {
-            if !rule.allows(value) {
-                return Err(OutOfRange { address, value });
-            }
+        let accepted = Accepted { map: Map::V22, start, values };
+        let byte = (rules_from(start).iter().zip(values).zip(start..))
+            .find(|((rule, value), _)| !rule.allows(**value))
+            .map(|(_, address)| Refused { reason: refusal::OUT_OF_RANGE, address });
+        let word = if accepted.has_words() { first_refused_word(start, values) } else { None };
+        match (byte, word) {
+            (None, None) => Ok(accepted),
+            (Some(byte), Some((_, address))) if byte.address < address => Err(byte),
+            (_, Some((reason, address))) => Err(Refused { reason, address }),
+            (Some(byte), None) => Err(byte),
         }
-        Ok(Accepted { map: Map::V22, start, values })
     }
 
     /// Checks a write of the host in map 2.1 without applying it.
     ///
     /// # Errors
-    /// The first byte that is outside the range of a register that can be written now.
-    pub fn check_map21<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, OutOfRange> {
+    /// The first register that can be written now and cannot take its value.
+    pub fn check_map21<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, Refused> {
         let (start, values) = self.unlocked(address, values);
         for ((rule, &value), address) in rules_21_from(start).iter().zip(values).zip(start..) {
             if !rule.allows_21(value) {
-                return Err(OutOfRange { address, value });
+                return Err(Refused { reason: refusal::OUT_OF_RANGE, address });
             }
         }
         Ok(Accepted { map: Map::V21, start, values })
@@ -251,19 +283,17 @@ impl RegisterFile {
 
 /// A byte that function 04 writes, with an offset in sign and magnitude.
 fn from_map21(address: u8, byte: u8) -> u8 {
-    if map21::OFFSET.holds(address) {
-        OFFSET.range.encode(map21::OFFSET.range.decode(byte)).unwrap_or(0)
-    } else {
-        byte
-    }
+    if map21::OFFSET.holds(address) { recoded(byte, map21::OFFSET.range, OFFSET.range) } else { byte }
 }
 
 /// An offset in sign and magnitude as 128 + offset.
 fn to_map21(byte: u8) -> u8 {
-    map21::OFFSET
-        .range
-        .encode(OFFSET.range.decode(byte))
-        .unwrap_or(map21::OFFSET.default_at(map21::OFFSET.address))
+    recoded(byte, OFFSET.range, map21::OFFSET.range)
+}
+
+/// A byte in another encoding. Both ranges have the same numbers, so 0 is never used.
+fn recoded(byte: u8, from: Range, to: Range) -> u8 {
+    to.encode_byte(from.decode_byte(byte)).unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -275,7 +305,7 @@ mod tests {
         RegisterFile::new([1, 2, 3, 4, 5, 6], None)
     }
 
-    fn write(file: &mut RegisterFile, address: u8, values: &[u8]) -> Result<(), OutOfRange> {
+    fn write(file: &mut RegisterFile, address: u8, values: &[u8]) -> Result<(), Refused> {
         let accepted = file.check(address, values)?;
         file.apply(&accepted);
         Ok(())
@@ -290,7 +320,11 @@ mod tests {
         assert_eq!(file.read(240, 1), [1]);
         assert_eq!(file.read(61, 22), [0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
         assert_eq!(file.read(83, 15), [0, 0, 0, 0, 0, 0, 0, 0, 128, 128, 128, 128, 128, 128, 128]);
-        assert_eq!(file.read(98, 142), [0; 142]);
+        assert_eq!(file.read(98, 30), [0; 30]);
+        let targets = [9_000_u16, 9_000, 6_500, 9_000, 9_000, 9_000, 8_000].map(u16::to_le_bytes);
+        assert_eq!(file.read(128, 14), targets.as_flattened());
+        assert_eq!((file.read(142, 14), file.read(156, 35)), ([0xFF; 14].as_slice(), [0; 35].as_slice()));
+        assert_eq!((file.read(191, 1), file.read(192, 48)), ([1].as_slice(), [0; 48].as_slice()));
     }
 
     #[test]
@@ -332,6 +366,39 @@ mod tests {
             None,
             "writing unchanged settings causes no flash wear (D19)"
         );
+    }
+
+    #[test]
+    fn d22_a_word_is_written_whole() {
+        let mut file = fresh();
+        let half = |address| Err(Refused { reason: refusal::HALF_A_WORD, address });
+        let wrong = |address| Err(Refused { reason: refusal::OUT_OF_RANGE, address });
+        assert_eq!(write(&mut file, 129, &[1]), half(128));
+        assert_eq!(write(&mut file, 127, &[1, 1]), half(128), "127 has no effect");
+        assert_eq!(write(&mut file, 128, &[1, 1, 1]), half(130));
+        assert_eq!(write(&mut file, 184, &[4, 0]), wrong(184));
+        assert_eq!(write(&mut file, 185, &[0, 0, 2]), half(184), "before 187");
+        assert_eq!(write(&mut file, 184, &[5, 0, 0, 2]), wrong(187));
+        assert_eq!(write(&mut file, 53, &[&[51], [0; 130].as_slice()].concat()), wrong(53), "before 184");
+        assert_eq!(write(&mut file, 128, &[0x51, 0x46]), wrong(128), "18001");
+        assert_eq!(write(&mut file, 141, &[1, 2, 3]), half(140), "142 is read only");
+        assert_eq!(write(&mut file, 143, &[1; 41]), Ok(()), "all of it is read only");
+        let written = [0x50, 0x46, 1, 0];
+        assert_eq!((write(&mut file, 130, &written), file.read(130, 4)), (Ok(()), written.as_slice()));
+        assert_eq!((file.word(130), file.word(132), file.word(255)), (18_000, 1, 0x0700));
+    }
+
+    #[test]
+    fn d22_an_accepted_write_reports_its_words() {
+        let mut file = fresh();
+        let accepted = file.check(128, &[1, 2, 3, 4]).unwrap();
+        assert_eq!(
+            [128, 130, 132].map(|address| accepted.word_at(address)),
+            [Some(0x201), Some(0x403), None]
+        );
+        assert!(accepted.has_words() && !file.check(46, &[0; 82]).unwrap().has_words());
+        file.set_word(142, 0x1234);
+        assert_eq!((file.word(142), file.read(142, 2)), (0x1234, [0x34, 0x12].as_slice()));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //!
 //! No other file holds a register address as a number.
 
+use super::range::Range;
 use super::spec::{Register, Unit, eeprom, ram, rom, well_formed};
 
 /// Turns rows into named constants with their doc comments, and into [`MAP`] in the same order.
@@ -51,17 +52,51 @@ register_map! {
     FEEDBACK_FREQUENCY = ram(53).up_to(50).unit(Unit::Hertz);
     /// Measured position of the joint.
     PRESENT_POSITION = ram(54).each_joint().up_to(180).read_only().unit(Unit::Degree);
+    /// The target of the joint in hundredths of a degree: the same target as in 46 to 52. With a set-point period, each
+    /// write is the next point of a stream (D21, D23).
+    FINE_TARGET = ram(128)
+        .word(Range::WordUpTo(18_000))
+        .each_joint()
+        .default_each([9_000, 9_000, 6_500, 9_000, 9_000, 9_000, 8_000])
+        .unit(Unit::Centidegree);
+    /// Measured position of the joint; 65535 until it was measured (D21).
+    FINE_POSITION = ram(142)
+        .word(Range::WordUpTo(u16::MAX))
+        .each_joint()
+        .read_only()
+        .default(u16::MAX)
+        .unit(Unit::Centidegree);
+    /// Velocity of the joint, as its servo measures it; positive towards greater angles (D21).
+    VELOCITY =
+        ram(156).word(Range::SignedWord).each_joint().read_only().unit(Unit::DecidegreePerSecond);
+    /// Load of the joint, as its servo measures it; positive if the motor pushes towards greater angles (D21).
+    LOAD = ram(170).word(Range::SignedWord).each_joint().read_only().unit(Unit::PermilleOfStall);
+    /// Time between the points of a stream of fine targets, 5 to 1000; 0: fine targets are no stream (D23).
+    SET_POINT_PERIOD = ram(184).word(Range::ZeroOr(5, 1_000)).unit(Unit::Millisecond);
+    /// Longest silence of the host before the watchdog acts; 0: off (D24).
+    HOST_WATCHDOG = ram(186).unit(Unit::Centisecond);
+    /// What the watchdog of the host does. 0: the joints hold. 1: damping protection (D24).
+    WATCHDOG_ACTION = ram(187).up_to(1);
+    /// Bits: 0 the linkage of joints 2 and 3 is protected, 1 the claw is protected (D25).
+    LIMITS = ram(188).up_to(3);
+    /// What a report holds. 0: 54 to 60. 1: 142 to 155. 2: 142 to 183 (D26).
+    REPORT_CONTENT = ram(189).up_to(2);
+    /// Joints that were measured since power-up: bit n-1 is joint n.
+    MEASURED_JOINTS = ram(190).read_only();
+    /// Layout version of the extended block, this project's addition.
+    EXTENDED_VERSION = ram(191).read_only().default(1);
     /// Layout version of the status block, this project's addition.
     STATUS_VERSION = ram(240).read_only().default(1);
     /// Bits: 0 settings storage, 1 servo bus, 2 watchdog restart, 3 brown-out restart, 4 crystal failed,
-    /// 5 over-run of the receive buffer.
+    /// 5 over-run of the receive buffer, 6 the watchdog of the host acted (D24).
     FAULTS = ram(241).read_only();
     /// Servos that do not answer: bit n-1 is joint n.
     MISSING_SERVOS = ram(242).read_only();
     /// Joints whose set-point has not reached the target yet: bit n-1 is joint n.
     MOVING_JOINTS = ram(243).read_only();
     /// Why the last refused frame was refused: 0 none yet, 1 malformed range, 2 value out of range,
-    /// 3 settings storage full, 6 no joint angles reach the position (M7).
+    /// 3 settings storage full, 4 half of a two-byte register (D22), 5 against a limit (D25), 6 no joint angles reach the
+    /// position (M7).
     LAST_REFUSAL = ram(244).read_only();
     /// The register that caused the last refusal.
     LAST_REFUSED_REGISTER = ram(245).read_only();
@@ -102,6 +137,8 @@ pub mod fault {
     pub const CRYSTAL_FAILED: u8 = 1 << 4;
     /// Bytes from the host were lost, because the receive buffer was full.
     pub const RECEIVE_OVERRUN: u8 = 1 << 5;
+    /// The watchdog of the host acted, and register 186 was not written since (D24).
+    pub const HOST_SILENT: u8 = 1 << 6;
 }
 
 /// The reasons of [`LAST_REFUSAL`].
@@ -114,6 +151,10 @@ pub mod refusal {
     pub const OUT_OF_RANGE: u8 = 2;
     /// The settings storage is full until the next restart (D19).
     pub const STORAGE_FULL: u8 = 3;
+    /// The frame would write one byte of a two-byte register (D22).
+    pub const HALF_A_WORD: u8 = 4;
+    /// A target, or a set-point, is against a limit that is switched on (D25).
+    pub const AGAINST_A_LIMIT: u8 = 5;
     /// No joint angles reach the position in a write of map 2.1 (M7).
     pub const OUT_OF_REACH: u8 = 6;
 }
@@ -126,6 +167,24 @@ pub mod motor_state {
     pub const SERVO: u8 = 1;
     /// The joints move freely.
     pub const FORCELESS: u8 = 2;
+}
+
+/// The bits of [`LIMITS`].
+pub mod limit {
+    /// The linkage of joints 2 and 3.
+    pub const LINKAGE: u8 = 1 << 0;
+    /// The claw.
+    pub const CLAW: u8 = 1 << 1;
+}
+
+/// The values of [`REPORT_CONTENT`].
+pub mod report_content {
+    /// The present positions in degrees.
+    pub const POSITIONS: u8 = 0;
+    /// The present positions in hundredths of a degree.
+    pub const FINE_POSITIONS: u8 = 1;
+    /// The present positions in hundredths of a degree, velocities and loads.
+    pub const FINE_STATE: u8 = 2;
 }
 
 /// The baud rates for the codes of [`BAUD_RATE`], in baud.

@@ -22,7 +22,7 @@ pub mod range;
 mod rules;
 pub mod spec;
 
-pub use file::{Accepted, Image, OutOfRange, RegisterFile};
+pub use file::{Accepted, Image, Refused, RegisterFile};
 pub use joint::{JOINTS, Joint};
 pub use map::MAP;
 pub use map21::{MAP_21, Map};

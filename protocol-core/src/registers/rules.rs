@@ -1,7 +1,7 @@
-//! The rules for writes, generated from both tables at compile time. The image holds two bytes per register and map, and
-//! none of the tables' text.
+//! The rules for writes, generated from both tables at compile time. The image holds two bytes per register and map, six
+//! per word, and none of the tables' text. A word is a register of two bytes.
 
-use super::map::{MAP, PRESENT_POSITION};
+use super::map::{MAP, PRESENT_POSITION, refusal};
 use super::map21::MAP_21;
 use super::range::{Range, SIGN};
 use super::spec::{Access, Region, Register};
@@ -16,6 +16,11 @@ const _: () = assert!(EEPROM_END == eeprom_bounds(MAP_21).1, "both maps have the
 static RULES: [Rule; writable_end(MAP)] = rules(MAP);
 /// The rules of all addresses that function 04 can write.
 static RULES_21: [Rule; writable_end(MAP_21)] = rules(MAP_21);
+/// The rules of all words that function 06 can write, in ascending order. Map 2.1 has none.
+static WORDS: [WordRule; writable_words(MAP)] = word_rules(MAP);
+/// Address of the first word that can be written.
+pub(super) const WORDS_START: u8 = first_word(MAP);
+const _: () = assert!(writable_words(MAP_21) == 0, "function 04 writes no words");
 /// The values of a new arm after power-up.
 pub(super) static DEFAULTS: [u8; 256] = defaults();
 
@@ -60,6 +65,8 @@ impl Rule {
             (Access::ReadWrite, Range::UpTo(max)) => Self { mask: 0xFF, max },
             (Access::ReadWrite, Range::SignMagnitude(max)) => Self { mask: !SIGN, max },
             (Access::ReadWrite, Range::Biased(max)) => Self { mask: !SIGN, max: 2 * max },
+            // The two bytes are checked together, by a `WordRule`.
+            (Access::ReadWrite, _) => Self { mask: 0xFF, max: 0xFF },
             _ => Self::CLOSED,
         }
     }
@@ -78,6 +85,48 @@ impl Rule {
         let bias = if self.mask == !SIGN { self.max / 2 } else { 0 };
         value.wrapping_add(bias) & self.mask <= self.max
     }
+}
+
+/// The rule for a write to one word: 0, or a number from `min` to `max`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct WordRule {
+    /// The address of the low byte.
+    address: u8,
+    min: u16,
+    max: u16,
+}
+
+impl WordRule {
+    const fn of(register: &Register, address: u8) -> Self {
+        let (min, max) = match register.range {
+            Range::WordUpTo(max) => (0, max),
+            Range::ZeroOr(min, max) => (min, max),
+            _ => (0, u16::MAX),
+        };
+        Self { address, min, max }
+    }
+
+    const fn allows(self, word: u16) -> bool {
+        word == 0 || (self.min <= word && word <= self.max)
+    }
+
+    /// The reason why a write of `values` from `start` on is refused because of this word, if it is (D22).
+    fn refusal(self, start: u8, values: &[u8]) -> Option<u8> {
+        let byte = |address: u8| values.get(usize::from(address.checked_sub(start)?)).copied();
+        match (byte(self.address), byte(self.address + 1)) {
+            (None, None) => None,
+            (Some(low), Some(high)) => {
+                (!self.allows(u16::from_le_bytes([low, high]))).then_some(refusal::OUT_OF_RANGE)
+            }
+            _ => Some(refusal::HALF_A_WORD),
+        }
+    }
+}
+
+/// The first word because of which a write of `values` from `start` on is refused: the reason and the address of its low
+/// byte (D22).
+pub(super) fn first_refused_word(start: u8, values: &[u8]) -> Option<(u8, u8)> {
+    WORDS.iter().find_map(|word| Some((word.refusal(start, values)?, word.address)))
 }
 
 // The functions below run at compile time and in a test. An index out of bounds is a build error, not a panic.
@@ -107,6 +156,48 @@ const fn eeprom_bounds(map: &[Register]) -> (u8, u8) {
         rest = tail;
     }
     (start, end)
+}
+
+const fn is_writable_word(row: &Register) -> bool {
+    matches!(row.access, Access::ReadWrite) && row.range.width() == 2
+}
+
+const fn writable_words(map: &[Register]) -> usize {
+    let mut words = 0;
+    let mut rest = map;
+    while let [row, tail @ ..] = rest {
+        if is_writable_word(row) {
+            words += row.count as usize / 2;
+        }
+        rest = tail;
+    }
+    words
+}
+
+const fn first_word(map: &[Register]) -> u8 {
+    let mut rest = map;
+    while let [row, tail @ ..] = rest {
+        if is_writable_word(row) {
+            return row.address;
+        }
+        rest = tail;
+    }
+    u8::MAX
+}
+
+#[allow(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+const fn word_rules<const WORDS: usize>(map: &[Register]) -> [WordRule; WORDS] {
+    let mut words = [WordRule { address: 0, min: 0, max: 0 }; WORDS];
+    let (mut rest, mut index) = (map, 0);
+    while let [row, tail @ ..] = rest {
+        let mut offset = 0;
+        while is_writable_word(row) && offset < row.count {
+            words[index] = WordRule::of(row, row.address + offset);
+            (index, offset) = (index + 1, offset + 2);
+        }
+        rest = tail;
+    }
+    words
 }
 
 #[allow(clippy::indexing_slicing)]
@@ -151,8 +242,8 @@ mod tests {
     /// Runs the compile-time functions at run time, so that coverage and mutation tests see them.
     #[test]
     fn the_rules_and_defaults_follow_from_the_table() {
-        assert_eq!((writable_end(MAP), eeprom_bounds(MAP)), (54, (8, 28)));
-        let rules: [Rule; 54] = rules(MAP);
+        assert_eq!((writable_end(MAP), eeprom_bounds(MAP)), (190, (8, 28)));
+        let rules: [Rule; 190] = rules(MAP);
         assert_eq!(rules.as_slice(), RULES.as_slice());
         assert_eq!(defaults(), DEFAULTS);
         let rule = |mask, max| Rule { mask, max };
@@ -173,14 +264,37 @@ mod tests {
     }
 
     #[test]
+    fn d22_the_word_rules_follow_from_the_table() {
+        assert_eq!((writable_words(MAP), writable_words(MAP_21), first_word(MAP)), (8, 0, 128));
+        assert_eq!(first_word(MAP_21), u8::MAX);
+        let words: [WordRule; 8] = word_rules(MAP);
+        assert_eq!(words, WORDS);
+        let addresses = words.map(|word| word.address);
+        assert_eq!(addresses, [128, 130, 132, 134, 136, 138, 140, 184]);
+        for (word, raw) in words.iter().flat_map(|word| (0..=u16::MAX).map(move |raw| (word, raw))) {
+            let row = MAP.iter().find(|row| row.holds(word.address));
+            assert_eq!(Some(word.allows(raw)), row.map(|row| row.range.contains(raw)), "{word:?}: {raw}");
+        }
+        assert_eq!(WordRule::of(&MAP[0], 0), WordRule { address: 0, min: 0, max: u16::MAX });
+    }
+
+    #[test]
     fn a_rule_allows_what_the_range_of_its_row_contains() {
-        for row in MAP.iter().chain(MAP_21).filter(|row| row.access == Access::ReadWrite) {
+        for row in
+            MAP.iter().chain(MAP_21).filter(|row| row.access == Access::ReadWrite && row.range.width() == 1)
+        {
             let is_biased = matches!(row.range, Range::Biased(_));
             let is_signed = matches!(row.range, Range::SignMagnitude(_));
             for value in 0..=255 {
                 let rule = Rule::of(row);
-                assert!(is_biased || rule.allows(value) == row.range.contains(value), "{row:?}: {value}");
-                assert!(is_signed || rule.allows_21(value) == row.range.contains(value), "{row:?}: {value}");
+                assert!(
+                    is_biased || rule.allows(value) == row.range.contains(value.into()),
+                    "{row:?}: {value}"
+                );
+                assert!(
+                    is_signed || rule.allows_21(value) == row.range.contains(value.into()),
+                    "{row:?}: {value}"
+                );
             }
         }
     }

@@ -34,6 +34,16 @@ pub enum Unit {
     None,
     /// Degrees of a joint.
     Degree,
+    /// Hundredths of a degree.
+    Centidegree,
+    /// Tenths of a degree per second.
+    DecidegreePerSecond,
+    /// Tenths of a percent of the stall torque.
+    PermilleOfStall,
+    /// Milliseconds.
+    Millisecond,
+    /// Hundredths of a second.
+    Centisecond,
     /// 1.9 degrees per second (docs/protocol.md, D10).
     SpeedStep,
     /// Tenths of a second.
@@ -55,6 +65,11 @@ impl Unit {
         match self {
             Self::None => "",
             Self::Degree => "°",
+            Self::Centidegree => "× 0.01 °",
+            Self::DecidegreePerSecond => "× 0.1 °/s",
+            Self::PermilleOfStall => "× 0.1 %",
+            Self::Millisecond => "ms",
+            Self::Centisecond => "× 10 ms",
             Self::SpeedStep => "× 1.9 °/s",
             Self::Decisecond => "× 100 ms",
             Self::Hertz => "Hz",
@@ -66,7 +81,7 @@ impl Unit {
 }
 
 /// One row of the table: a register, or a run of registers that mean the same (one per joint, or the
-/// bytes of one longer value).
+/// bytes of one longer value). The range tells whether a value has one byte or two, the low byte first (D22).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
     /// The name of the constant: `TARGET_POSITION`.
@@ -75,9 +90,9 @@ pub struct Register {
     pub doc: &'static [&'static str],
     /// Address of the first register of the run.
     pub address: u8,
-    /// How many registers the run holds, at least 1.
+    /// How many bytes the run holds, at least 1.
     pub count: u8,
-    /// Is the run one register per joint?
+    /// Is the run one value per joint?
     pub per_joint: bool,
     /// The memory region.
     pub region: Region,
@@ -85,8 +100,8 @@ pub struct Register {
     pub access: Access,
     /// The valid values.
     pub range: Range,
-    /// The values after power-up or, in EEPROM, of a new arm. A per-joint row has one for each joint.
-    pub defaults: [u8; JOINTS],
+    /// The raw values after power-up or, in EEPROM, of a new arm. A per-joint row has one for each joint.
+    pub defaults: [u16; JOINTS],
     /// The unit of the value.
     pub unit: Unit,
 }
@@ -122,10 +137,17 @@ pub(crate) const fn ram(address: u8) -> Register {
 }
 
 impl Register {
-    /// Makes the row a run of one register per joint.
+    /// Makes the row a run of one value per joint.
     pub(crate) const fn each_joint(mut self) -> Self {
-        self.count = 7;
+        self.count = 7 * self.range.width();
         self.per_joint = true;
+        self
+    }
+
+    /// Gives the row values of two bytes in this range. It comes before [`Register::each_joint`].
+    pub(crate) const fn word(mut self, range: Range) -> Self {
+        self.count = range.width();
+        self.range = range;
         self
     }
 
@@ -166,13 +188,13 @@ impl Register {
     }
 
     /// Sets the default.
-    pub(crate) const fn default(mut self, value: u8) -> Self {
+    pub(crate) const fn default(mut self, value: u16) -> Self {
         self.defaults = [value; JOINTS];
         self
     }
 
     /// Sets the default of each joint, joint 1 first.
-    pub(crate) const fn default_each(mut self, values: [u8; JOINTS]) -> Self {
+    pub(crate) const fn default_each(mut self, values: [u16; JOINTS]) -> Self {
         self.defaults = values;
         self
     }
@@ -190,10 +212,11 @@ impl Register {
         self
     }
 
-    /// The address of a joint's register in a per-joint row; the row's first address in any other.
+    /// The address of a joint's value in a per-joint row, or of its low byte; the row's first address in any other.
     #[must_use]
     pub const fn of(&self, joint: Joint) -> u8 {
-        if self.per_joint { self.address.wrapping_add(joint.index()) } else { self.address }
+        let distance = joint.index() * self.range.width();
+        if self.per_joint { self.address.wrapping_add(distance) } else { self.address }
     }
 
     /// Does the run hold `address`?
@@ -202,20 +225,39 @@ impl Register {
         address.wrapping_sub(self.address) < self.count
     }
 
-    /// The joint whose register `address` is, in a per-joint row.
+    /// The joint of the value that holds `address`, in a per-joint row.
     #[must_use]
     pub const fn joint_at(&self, address: u8) -> Option<Joint> {
-        if self.per_joint { Joint::from_index(address.wrapping_sub(self.address)) } else { None }
+        let index = address.wrapping_sub(self.address) / self.range.width();
+        if self.per_joint { Joint::from_index(index) } else { None }
     }
 
-    /// The default of the register at `address`, which the run must hold.
+    /// The default of a joint in a per-joint row; of the whole row in any other.
     #[must_use]
-    pub const fn default_at(&self, address: u8) -> u8 {
-        let index = if self.per_joint { address.wrapping_sub(self.address) } else { 0 };
-        match self.defaults.as_slice().split_at_checked(index as usize) {
+    pub const fn default_of(&self, joint: Joint) -> u16 {
+        match self.defaults.as_slice().split_at_checked(joint.index() as usize) {
             Some((_, [value, ..])) => *value,
             _ => 0,
         }
+    }
+
+    /// The defaults of a per-joint row with values of one byte.
+    #[must_use]
+    pub fn default_bytes(&self) -> [u8; JOINTS] {
+        Joint::ALL.map(|joint| self.default_at(self.of(joint)))
+    }
+
+    /// The default of the byte at `address`, which the run must hold.
+    #[must_use]
+    pub const fn default_at(&self, address: u8) -> u8 {
+        let joint = match self.joint_at(address) {
+            Some(joint) => joint,
+            None if self.per_joint => return 0,
+            None => Joint::ALL[0],
+        };
+        let [low, high] = self.default_of(joint).to_le_bytes();
+        let is_high = self.range.width() == 2 && address.wrapping_sub(self.address) % 2 == 1;
+        if is_high { high } else { low }
     }
 }
 
@@ -228,7 +270,9 @@ pub const fn well_formed(map: &[Register]) -> bool {
     let mut region = Region::Rom;
     while let [row, tail @ ..] = rest {
         let end = row.address as usize + row.count as usize;
-        let shape_is_right = row.count > 0 && (!row.per_joint || row.count as usize == JOINTS);
+        let width = row.range.width();
+        let joints_are_right = !row.per_joint || row.count == 7 * width;
+        let shape_is_right = row.count > 0 && row.count % width == 0 && joints_are_right;
         let is_in_order = row.address as usize >= next && row.region as u8 >= region as u8;
         if !is_in_order || end > 256 || !shape_is_right {
             return false;
@@ -262,6 +306,10 @@ mod tests {
         assert!(!well_formed(&[ram(1).run(0)]), "empty");
         assert!(!well_formed(&[ram(1).up_to(3).default(4)]), "default out of range");
         assert!(!well_formed(&[ram(1).each_joint().run(6)]), "a joint is missing");
+        let word = ram(1).word(Range::WordUpTo(300));
+        assert!(well_formed(&[word, ram(3)]) && well_formed(&[word.each_joint(), ram(15)]));
+        assert!(!well_formed(&[word.run(1)]) && !well_formed(&[word.run(3)]), "half a word");
+        assert!(!well_formed(&[word.default(301)]), "default of a word out of range");
     }
 
     #[test]
@@ -273,6 +321,17 @@ mod tests {
         assert_eq!(row.joint_at(45), None);
         assert_eq!(row.default_at(48), 3);
         assert_eq!(ram(46).of(Joint::ALL[6]), 46, "a row without joints has one address");
+    }
+
+    #[test]
+    fn d22_a_row_of_words_holds_both_bytes_of_each() {
+        let row = ram(128).word(Range::WordUpTo(18_000)).each_joint().default_each([1, 9_000, 3, 4, 5, 6, 7]);
+        assert_eq!((row.count, row.of(Joint::ALL[1]), row.of(Joint::ALL[6])), (14, 130, 140));
+        assert_eq!([130, 131].map(|address| row.joint_at(address)), [Joint::new(2); 2]);
+        assert_eq!([130, 131].map(|address| row.default_at(address)), [0x28, 0x23]);
+        assert_eq!(row.joint_at(142), None);
+        let period = ram(184).word(Range::ZeroOr(5, 1_000)).default(0x0102 * 2);
+        assert_eq!([184, 185].map(|address| period.default_at(address)), [4, 2]);
     }
 
     #[test]
@@ -297,5 +356,8 @@ mod tests {
         assert_eq!(symbols, ["", "× 1.9 °/s", "× 100 ms", "Hz"]);
         let symbols = [Unit::Decivolt, Unit::Celsius, Unit::VersionTenths].map(Unit::symbol);
         assert_eq!(symbols, ["× 0.1 V", "°C", "× 0.1"]);
+        let symbols = [Unit::Centidegree, Unit::DecidegreePerSecond, Unit::PermilleOfStall].map(Unit::symbol);
+        assert_eq!(symbols, ["× 0.01 °", "× 0.1 °/s", "× 0.1 %"]);
+        assert_eq!([Unit::Millisecond, Unit::Centisecond].map(Unit::symbol), ["ms", "× 10 ms"]);
     }
 }

@@ -175,7 +175,7 @@ fn changes(now: &Snapshot, wanted: &Snapshot) -> Vec<Change> {
 fn in_words(address: u8, byte: u8) -> String {
     match find_readable(address) {
         Some(row) if [BAUD_RATE, OPTIONS].contains(row) => meaning(row, byte),
-        Some(row) => format!("{} {}", row.range.decode(byte), row.unit.symbol()).trim_end().to_owned(),
+        Some(row) => format!("{} {}", row.range.decode_byte(byte), row.unit.symbol()).trim_end().to_owned(),
         None => byte.to_string(),
     }
 }

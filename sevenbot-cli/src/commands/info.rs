@@ -102,7 +102,7 @@ impl From<&Snapshot> for ArmSettings {
         Self {
             device_id: registers.byte(&DEVICE_ID),
             baud_rate: baud_rate(registers.byte(&BAUD_RATE)),
-            offsets_degrees: registers.joints(&OFFSET).map(|byte| OFFSET.range.decode(byte)),
+            offsets_degrees: registers.joints(&OFFSET).map(|byte| OFFSET.range.decode_byte(byte)),
             eeprom_lock: word(&EEPROM_LOCK),
             motor_state: word(&MOTOR_STATE),
             effector: word(&EFFECTOR_TYPE),

@@ -108,7 +108,7 @@ pub(crate) fn run(session: &mut Session, args: &PoseArgs) -> Result<(), CommandE
 }
 
 pub(crate) fn home(session: &mut Session, args: &HomeArgs) -> Result<(), CommandError> {
-    move_to(session, &TARGET_POSITION.defaults.map(PoseArg::At), &args.pace)
+    move_to(session, &TARGET_POSITION.default_bytes().map(PoseArg::At), &args.pace)
 }
 
 fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<(), CommandError> {

@@ -118,7 +118,7 @@ fn raw_byte(value: i32) -> Result<u8, CommandError> {
 /// The byte for a number in the table's unit. Refuses a number out of range, because the maker's firmware takes it.
 fn byte(address: u8, value: i32) -> Result<u8, CommandError> {
     let Some(row) = find_readable(address) else { return raw_byte(value) };
-    i16::try_from(value).ok().and_then(|value| row.range.encode(value)).ok_or_else(|| {
+    i16::try_from(value).ok().and_then(|value| row.range.encode_byte(value)).ok_or_else(|| {
         let (name, range) = (name_of_register(address), register_text::range(address));
         let hint = if *row == BAUD_RATE { "; `sevenbot baud` takes bits per second" } else { "" };
         CommandError::Arm(format!("{value} is out of range: {name} takes {range}; nothing was written{hint}"))

@@ -152,7 +152,7 @@ fn each_joint(
     done: &'static str,
 ) -> Result<MakerCommand, String> {
     let value = whole(message, name, &format!("Missing {name} parameter"))?;
-    let value = u8::try_from(value).ok().filter(|&value| row.range.contains(value)).ok_or(invalid)?;
+    let value = u8::try_from(value).ok().filter(|&value| row.range.contains(value.into())).ok_or(invalid)?;
     Ok(MakerCommand::Write { address: row.address, values: vec![value; JOINTS], done })
 }
 

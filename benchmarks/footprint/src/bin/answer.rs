@@ -5,7 +5,7 @@
 
 use cortex_m_rt::entry;
 use footprint::{any_bytes, any_time, opaque};
-use protocol_core::registers::{Accepted, OutOfRange, RegisterFile};
+use protocol_core::registers::{Accepted, Refused, RegisterFile};
 use protocol_core::request::{Reply, Request};
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, ToArm};
@@ -40,7 +40,7 @@ fn execute(request: Request<'_>, registers: &mut RegisterFile, reply: &mut Frame
     }
 }
 
-fn apply(checked: Result<Accepted<'_>, OutOfRange>, registers: &mut RegisterFile) {
+fn apply(checked: Result<Accepted<'_>, Refused>, registers: &mut RegisterFile) {
     match checked {
         Ok(accepted) => registers.apply(&accepted),
         Err(refused) => {

@@ -28,7 +28,7 @@ pub(super) enum Grade {
 impl Grade {
     pub(super) fn of(offset: i16) -> Self {
         match offset {
-            _ if OFFSET.range.encode(offset).is_none() => Self::Bad,
+            _ if OFFSET.range.encode_byte(offset).is_none() => Self::Bad,
             _ if offset.abs() <= GOOD_UP_TO => Self::Good,
             _ => Self::Acceptable,
         }
@@ -69,14 +69,14 @@ pub(super) struct Offsets(pub(super) [i16; 7]);
 
 impl From<Snapshot> for Offsets {
     fn from(registers: Snapshot) -> Self {
-        Self(registers.joints(&OFFSET).map(|byte| OFFSET.range.decode(byte)))
+        Self(registers.joints(&OFFSET).map(|byte| OFFSET.range.decode_byte(byte)))
     }
 }
 
 impl Offsets {
     /// The register values. An offset out of range becomes 0.
     pub(super) fn bytes(self) -> [u8; 7] {
-        self.0.map(|offset| OFFSET.range.encode(offset).unwrap_or(0))
+        self.0.map(|offset| OFFSET.range.encode_byte(offset).unwrap_or(0))
     }
 
     pub(super) fn of(self, joint: Joint) -> i16 {

@@ -2,10 +2,10 @@
 //! register.
 
 use arbitrary::Arbitrary;
+use protocol_core::registers::map21::find_readable;
 use protocol_core::request::Reply;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
-use sevenbot::map::find;
 use sevenbot::{Snapshot, names, register_text};
 
 /// Bytes in pieces of this size, and a text.
@@ -102,7 +102,7 @@ fn check_names(snapshot: &Snapshot) {
     let mut row = None;
     for address in snapshot.span().addresses() {
         if let Some(entry) = entries.next_if(|entry| entry.address == address) {
-            row = find(address);
+            row = find_readable(address);
             let named = names::parse(&entry.name).map_or(address, |span| span.address());
             assert_eq!(named, address, "{}", entry.name);
         } else {

@@ -98,7 +98,7 @@ fn check_settings(stored: Option<&Image>) {
         for address in (row.address..).take(row.count.into()) {
             // The region begins at 8.
             let value = settings[usize::from(address - 8)];
-            assert!(row.range.contains(value), "register {address} is {value}");
+            assert!(row.range.contains(value.into()), "register {address} is {value}");
             let most = if OPTIONS.holds(address) { 3 } else { 0 };
             assert!(row.access == Access::ReadWrite || value <= most, "register {address} is {value}");
         }

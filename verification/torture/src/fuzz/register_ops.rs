@@ -104,9 +104,8 @@ impl FileAndModel {
         };
         let accepted = match checked {
             Ok(accepted) => accepted,
-            Err(wrong) => {
-                assert_eq!(expected.err(), Some(wrong.address));
-                assert_eq!(wrong.value, values[usize::from(wrong.address - address)]);
+            Err(refused) => {
+                assert_eq!(expected.err(), Some((refused.reason, refused.address)));
                 return;
             }
         };
@@ -157,6 +156,11 @@ impl TableModel {
         values[46..53].copy_from_slice(&[90, 90, 65, 90, 90, 90, 80]);
         values[66] = 1;
         values[91..98].copy_from_slice(&[128; 7]);
+        for (place, target) in (128..).step_by(2).zip([9_000_u16, 9_000, 6_500, 9_000, 9_000, 9_000, 8_000]) {
+            values[place..place + 2].copy_from_slice(&target.to_le_bytes());
+        }
+        values[142..156].copy_from_slice(&[0xFF; 14]);
+        values[191] = 1;
         values[240] = 1;
         let offsets_in = if values[20] % 2 == 1 { Map::V21 } else { Map::V22 };
         Self { values, offsets_in }
@@ -165,18 +169,28 @@ impl TableModel {
     fn takes_effect(&self, map: Map, address: u8) -> bool {
         match (address, map) {
             (11..=19, _) | (20, Map::V21) => self.values[28] == 0,
-            (28..=52, _) | (53, Map::V22) | (54..=66 | 68..=73 | 82 | 90, Map::V21) => true,
+            (28..=52, _)
+            | (53 | 128..=141 | 184..=189, Map::V22)
+            | (54..=66 | 68..=73 | 82 | 90, Map::V21) => true,
             _ => false,
         }
     }
 
-    /// The values after a write, or the first register that is out of range (D15 to D17).
-    fn after(&self, map: Map, address: u8, values: &[u8]) -> Result<Self, u8> {
+    /// The values after a write, or the reason and the first register of a refusal (D15 to D17, D22).
+    fn after(&self, map: Map, address: u8, values: &[u8]) -> Result<Self, (u8, u8)> {
         let mut after = self.clone();
         after.offsets_in = map;
         for (at, &value) in (address..=255).zip(values).filter(|(at, _)| self.takes_effect(map, *at)) {
-            if !is_in_range(map, at, value) {
-                return Err(at);
+            let byte = |at: u8| values.get(usize::from(at.checked_sub(address)?)).copied();
+            match word_at(at).map(|low| (low, byte(low), byte(low + 1))) {
+                None if !is_in_range(map, at, value) => return Err((2, at)),
+                Some((low, Some(first), Some(second)))
+                    if !is_word(low, u16::from_le_bytes([first, second])) =>
+                {
+                    return Err((2, low));
+                }
+                Some((low, None, _) | (low, _, None)) => return Err((4, low)),
+                _ => {}
             }
             // The present positions are there.
             if !(54..=60).contains(&at) {
@@ -212,6 +226,16 @@ fn stored(map: Map, address: u8, value: u8) -> u8 {
     }
 }
 
+/// The low byte of the two-byte register that a byte belongs to.
+fn word_at(address: u8) -> Option<u8> {
+    matches!(address, 128..=141 | 184..=185).then_some(address & !1)
+}
+
+/// The column "range" of the writable registers of two bytes.
+fn is_word(low: u8, word: u16) -> bool {
+    if low == 184 { word == 0 || (5..=1_000).contains(&word) } else { word <= 18_000 }
+}
+
 /// The column "range" of the writable registers.
 fn is_in_range(map: Map, address: u8, value: u8) -> bool {
     let max = match (map, address) {
@@ -219,8 +243,9 @@ fn is_in_range(map: Map, address: u8, value: u8) -> bool {
         (Map::V22, 13..=19) => return value & 0x7F <= 16,
         (Map::V21, 13..=19) => return matches!(value, 0..=16 | 112..=144 | 240..=255),
         (_, 20) => 3,
-        (_, 28 | 30 | 31 | 66) => 1,
-        (_, 29) => 2,
+        (_, 28 | 30 | 31 | 66 | 187) => 1,
+        (_, 29 | 189) => 2,
+        (_, 188) => 3,
         (_, 32..=45 | 82 | 90) => 100,
         (_, 46..=52) => 180,
         (_, 53) => 50,

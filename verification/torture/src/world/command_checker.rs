@@ -278,7 +278,7 @@ const MAX_FALL: u16 = 12;
 
 /// The servo position of a joint's target register.
 pub(super) fn target_counts(joint: Joint, registers: &RegisterFile) -> u16 {
-    let offset = OFFSET.range.decode(registers.get(OFFSET.of(joint)));
+    let offset = OFFSET.range.decode_byte(registers.get(OFFSET.of(joint)));
     let target = MicroDegrees::from_degrees(registers.get(TARGET_POSITION.of(joint)));
     counts_from_angle(joint, target, i8::try_from(offset).unwrap_or(0))
 }

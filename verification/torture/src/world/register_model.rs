@@ -64,7 +64,10 @@ impl RegisterModel {
     /// Loads stored settings. A value outside its range is replaced by its default (D19), and reserved registers read 0.
     fn load(&mut self, image: &Image) {
         for (at, byte) in (EEPROM.0..EEPROM.1).zip(image.0) {
-            if self.row(at).is_some_and(|row| row.access == Access::ReadWrite && row.range.contains(byte)) {
+            if self
+                .row(at)
+                .is_some_and(|row| row.access == Access::ReadWrite && row.range.contains(byte.into()))
+            {
                 self.set(at, byte);
             }
         }
@@ -148,7 +151,8 @@ impl RegisterModel {
 
     fn write(&mut self, address: u8, values: &[u8]) -> RequestEffect {
         let mut items = self.effective(address, values);
-        let refused = items.find(|(at, value)| self.row(*at).is_some_and(|row| !row.range.contains(*value)));
+        let refused =
+            items.find(|(at, value)| self.row(*at).is_some_and(|row| !row.range.contains((*value).into())));
         if let Some((at, _)) = refused {
             return self.refuse(refusal::OUT_OF_RANGE, at);
         }

@@ -123,7 +123,7 @@ impl StatusChecker {
 
     /// A write with an effect on the report frequency was accepted.
     pub(super) fn frequency_written(&mut self, now: Instant, frequency: u8, baud: u32) {
-        let frequency = u32::from(frequency).min(highest_frequency(baud));
+        let frequency = u32::from(frequency).min(highest_frequency(baud, PRESENT_POSITION.count));
         if frequency == self.reports.frequency {
             return;
         }
@@ -219,7 +219,7 @@ impl StatusChecker {
         if last != position || self.settled_time(context.now, since.max(self.motion_at)) < DETECTION_TIME {
             return Ok(());
         }
-        let offset = OFFSET.range.decode(context.registers.get(OFFSET.of(joint)));
+        let offset = OFFSET.range.decode_byte(context.registers.get(OFFSET.of(joint)));
         let angle = angle_from_counts(joint, position, i8::try_from(offset).unwrap_or(0)).nearest_degree();
         let shown = context.registers.get(PRESENT_POSITION.of(joint));
         ensure(shown.abs_diff(angle) == 0, || {

@@ -1,0 +1,69 @@
+//! The watchdog of the host link: acts once in each silence of the host (D24).
+//!
+//! This file does not know what the watchdog does.
+
+use protocol_core::time::{Duration, Instant};
+
+/// The watchdog of the host link.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HostWatchdog {
+    /// The longest silence; zero is off.
+    timeout: Duration,
+    /// When the watchdog acts unless a frame comes before.
+    due: Instant,
+}
+
+impl HostWatchdog {
+    /// No watchdog.
+    pub(crate) const OFF: Self = Self { timeout: Duration::ZERO, due: Instant::FAR_FUTURE };
+
+    /// Sets the longest silence, 0 to 255 times 10 ms, and begins to count at `now`. 0 switches the watchdog off.
+    pub(crate) fn set(&mut self, now: Instant, value: u8) {
+        self.timeout = Duration::from_millis(u64::from(value) * 10);
+        self.heard(now);
+    }
+
+    /// Ends a silence: a well-formed frame had its turn at `now`.
+    pub(crate) fn heard(&mut self, now: Instant) {
+        self.due = if self.timeout == Duration::ZERO { Instant::FAR_FUTURE } else { now + self.timeout };
+    }
+
+    /// Returns whether the watchdog has to act at `now`, once in each silence.
+    pub(crate) fn poll(&mut self, now: Instant) -> bool {
+        let acts = self.due <= now;
+        if acts {
+            self.due = Instant::FAR_FUTURE;
+        }
+        acts
+    }
+
+    /// When the watchdog acts unless a frame comes before.
+    pub(crate) const fn due(&self) -> Instant {
+        self.due
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at_ms(millis: u64) -> Instant {
+        Instant::from_micros(millis * 1_000)
+    }
+
+    #[test]
+    fn d24_the_watchdog_acts_once_in_each_silence() {
+        let mut watchdog = HostWatchdog::OFF;
+        watchdog.heard(at_ms(1));
+        assert_eq!(watchdog.due(), Instant::FAR_FUTURE);
+        watchdog.set(at_ms(5), 20);
+        assert!(!watchdog.poll(at_ms(204)) && watchdog.due() == at_ms(205));
+        watchdog.heard(at_ms(204));
+        assert!(!watchdog.poll(at_ms(403)) && watchdog.poll(at_ms(404)) && !watchdog.poll(at_ms(10_000)));
+        watchdog.heard(at_ms(10_000));
+        assert!(watchdog.poll(at_ms(10_200)));
+        watchdog.heard(at_ms(20_000));
+        watchdog.set(at_ms(20_000), 0);
+        assert!(!watchdog.poll(at_ms(1_000_000)));
+    }
+}

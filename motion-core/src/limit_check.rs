@@ -1,0 +1,93 @@
+//! Checks a write against the limits of linkage and claw, before it is executed (D25).
+//!
+//! ```text
+//!   write, targets before it ──▶ targets after it ──▶ limits that are on after it ──▶ register that is the reason
+//! ```
+
+use protocol_core::registers::map::{FINE_TARGET, LIMITS, TARGET_POSITION, limit};
+use protocol_core::registers::{Accepted, JOINTS, Joint};
+
+use crate::calibration::MicroDegrees;
+use crate::limits::{claw_allows, linkage_allows};
+use crate::reach::Reached;
+
+/// What the limits concern: an angle of each joint.
+pub(crate) type Angles = [Option<MicroDegrees>; JOINTS];
+
+/// A write that is to be checked.
+#[derive(Clone, Copy)]
+pub(crate) struct LimitCheck<'a> {
+    pub(crate) accepted: &'a Accepted<'a>,
+    /// The targets that the write reaches by a position.
+    pub(crate) reached: &'a Reached,
+    /// The limits that are on before the write: [`LIMITS`].
+    pub(crate) limits: u8,
+}
+
+impl LimitCheck<'_> {
+    /// Can any limit be on after the write?
+    pub(crate) fn is_needed(&self) -> bool {
+        self.limits_after() != 0
+    }
+
+    fn limits_after(&self) -> u8 {
+        self.accepted.value_at(LIMITS.address).unwrap_or(self.limits)
+    }
+
+    /// The first register because of which the write is refused. `targets` holds the targets of a write that writes none,
+    /// `set_points` the set-points of the driven joints.
+    pub(crate) fn first_refused(&self, targets: &Angles, set_points: &Angles) -> Option<u8> {
+        let mut after = *targets;
+        for (target, joint) in after.iter_mut().zip(Joint::ALL) {
+            *target = self.written(joint).or(*target);
+        }
+        let [_, two, three, .., seven] = Joint::ALL;
+        let linkage = self.refused_by(limit::LINKAGE, &[two, three], linkage_is_kept, &after, set_points);
+        let claw = self.refused_by(limit::CLAW, &[seven], claw_is_kept, &after, set_points);
+        linkage.into_iter().chain(claw).min()
+    }
+
+    fn refused_by(
+        &self,
+        limit: u8,
+        joints: &[Joint],
+        is_kept: fn(&Angles) -> bool,
+        targets: &Angles,
+        set_points: &Angles,
+    ) -> Option<u8> {
+        if self.limits_after() & limit == 0 {
+            return None;
+        }
+        if self.limits & limit == 0 {
+            return (!is_kept(targets) || !is_kept(set_points)).then_some(LIMITS.address);
+        }
+        let first_written = joints.iter().filter_map(|&joint| self.written_at(joint)).min();
+        first_written.filter(|_| !is_kept(targets))
+    }
+
+    /// The target of a joint in the write. The last of several counts.
+    fn written(&self, joint: Joint) -> Option<MicroDegrees> {
+        let coarse = || self.accepted.value_at(TARGET_POSITION.of(joint)).map(MicroDegrees::from_degrees);
+        let fine = || self.accepted.word_at(FINE_TARGET.of(joint)).map(MicroDegrees::from_centidegrees);
+        self.reached.target(joint).or_else(fine).or_else(coarse)
+    }
+
+    /// The first register of the write that sets a joint's target.
+    fn written_at(&self, joint: Joint) -> Option<u8> {
+        let coarse = self.accepted.value_at(TARGET_POSITION.of(joint)).map(|_| TARGET_POSITION.of(joint));
+        let fine = || self.accepted.word_at(FINE_TARGET.of(joint)).map(|_| FINE_TARGET.of(joint));
+        let reached = || self.reached.target(joint).map(|_| self.reached.address);
+        coarse.or_else(reached).or_else(fine)
+    }
+}
+
+/// Only angles that are there can break a limit.
+fn linkage_is_kept(angles: &Angles) -> bool {
+    let [_, two, three, ..] = *angles;
+    two.zip(three).is_none_or(|(two, three)| linkage_allows(two, three))
+}
+
+fn claw_is_kept(angles: &Angles) -> bool {
+    let [.., seven] = *angles;
+    seven.is_none_or(claw_allows)
+}

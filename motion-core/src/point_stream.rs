@@ -1,0 +1,115 @@
+//! The schedule of a stream of points for one joint (D23).
+//!
+//! ```text
+//!   frames of the host     │k      │k+1   │k+2        │k+3      each up to half a period early or late
+//!   points are due               │k-1     │k      │k+1     │k+2   an even grid, one and a half periods later
+//! ```
+//!
+//! The points are due on a grid of one period, so the joint moves evenly although the frames do not come evenly. Each
+//! frame shifts the grid a little towards one and a half periods after itself: the grid follows the host's clock. A
+//! point is due two periods after its frame at the latest. This file does not know the joint or its speed.
+
+use heapless::Deque;
+use protocol_core::time::{Duration, Instant};
+
+use crate::CYCLE;
+use crate::calibration::MicroDegrees;
+
+/// A stream needs three points; one more may be due within the present control cycle.
+const CAPACITY: usize = 4;
+/// The part of its error by which a frame shifts the grid: 1/16.
+const SHIFT_DIVISOR: u64 = 16;
+
+/// A point of a stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Point {
+    due: Instant,
+    angle: MicroDegrees,
+}
+
+/// The points of a stream that the joint has not passed yet.
+#[derive(Clone, Debug)]
+pub struct PointStream {
+    points: Deque<Point, CAPACITY>,
+    /// When the newest point is or was due.
+    last_due: Instant,
+}
+
+impl PointStream {
+    /// No stream.
+    pub const NONE: Self = Self { points: Deque::new(), last_due: Instant::ZERO };
+
+    /// Has the joint passed all points?
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Adds the point whose frame came at `now`. Points that are due at the same time or later are passed over, and so is
+    /// the oldest point if there is no room.
+    pub fn push(&mut self, now: Instant, period: Duration, angle: MicroDegrees) {
+        let due = self.due(now, period);
+        while self.points.back().is_some_and(|point| point.due >= due) {
+            self.points.pop_back();
+        }
+        if self.points.is_full() {
+            self.points.pop_front();
+        }
+        // There is room.
+        let _ = self.points.push_back(Point { due, angle });
+        self.last_due = due;
+    }
+
+    /// When the point is due whose frame came at `now`.
+    fn due(&self, now: Instant, period: Duration) -> Instant {
+        let wanted = now + period + half(period);
+        let latest = now + period + period;
+        if now > self.last_due + period {
+            return wanted; // A new stream.
+        }
+        let slot = self.last_due + period;
+        // The joint has passed the point before this one: this frame is late, or the one before it is lost.
+        let slot = if now > self.last_due { slot + period } else { slot };
+        let late = Duration::from_micros((wanted - slot).as_micros() / SHIFT_DIVISOR);
+        let early = Duration::from_micros((slot - wanted).as_micros() / SHIFT_DIVISOR);
+        latest.min(earlier(slot + late, early))
+    }
+
+    /// The point where a joint that was at `from` one control cycle before `end` should be at `end`. Points that are due by
+    /// then are passed.
+    pub fn follow(&mut self, from: MicroDegrees, end: Instant) -> MicroDegrees {
+        let (mut angle, mut time) = (from, earlier(end, CYCLE));
+        while let Some(next) = self.points.front() {
+            if next.due > end {
+                return between(angle, next.angle, end - time, next.due - time);
+            }
+            (angle, time) = (next.angle, time.max(next.due));
+            self.points.pop_front();
+        }
+        angle
+    }
+
+    /// Passes over all points but the newest, and returns that one if the joint has not passed it.
+    pub fn skip_to_newest(&mut self) -> Option<MicroDegrees> {
+        while self.points.len() > 1 {
+            self.points.pop_front();
+        }
+        self.points.back().map(|point| point.angle)
+    }
+}
+
+const fn half(period: Duration) -> Duration {
+    Duration::from_micros(period.as_micros() / 2)
+}
+
+fn earlier(time: Instant, by: Duration) -> Instant {
+    Instant::from_micros(time.as_micros().saturating_sub(by.as_micros()))
+}
+
+/// The angle after `passed` of the `whole` time on the straight line between two angles.
+fn between(from: MicroDegrees, to: MicroDegrees, passed: Duration, whole: Duration) -> MicroDegrees {
+    let micros = |time: Duration| i64::try_from(time.as_micros()).unwrap_or(i64::MAX);
+    let distance = i64::from(to.0) - i64::from(from.0);
+    let part = distance.saturating_mul(micros(passed)).checked_div(micros(whole)).unwrap_or(0);
+    MicroDegrees(from.0.saturating_add(i32::try_from(part).unwrap_or(0)))
+}
