@@ -3,7 +3,9 @@
 mod served;
 
 use system_tests::frames::with_checksum;
-use system_tests::registers::{DEVICE_CODE, EEPROM_LOCK, OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION};
+use system_tests::registers::{
+    DEVICE_CODE, EEPROM_LOCK, MOTOR_STATE, OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION,
+};
 use system_tests::wait::wait_until;
 
 use served::{LOCAL_PAGE, Served, WebClient};
@@ -126,6 +128,28 @@ fn a_page_moves_to_positions_and_learns_which_are_out_of_reach() {
         [124, 73, 112],
         "the next message is the answer to the read"
     );
+}
+
+/// As at the maker's server: a position within reach engages the servos, another one leaves the motor state.
+#[test]
+fn a_position_within_reach_switches_to_the_servo_state() {
+    let served = Served::start(1, &[]);
+    let mut page = WebClient::connect(&served, &[LOCAL_PAGE]).expect("accepted");
+    for (state, command, after) in [
+        (0, r#"{"cmd":"IK5","pos":[100,200,150]}"#, 1),
+        (2, r#"{"cmd":"IK6","pos":[0,250,100],"vec56":[0,0,-1]}"#, 1),
+        (0, r#"{"cmd":"IK5","pos":[400,0,100]}"#, 0),
+        (2, r#"{"cmd":"IK6","pos":[0,250,100],"vec56":[0,0,0]}"#, 2),
+        (0, r#"{"cmd":"angles","angles":[90,90,65,90,90,90,80]}"#, 0),
+    ] {
+        page.send(&format!(r#"{{"cmd":"status","status":{state}}}"#));
+        page.send(command);
+        (0..2).for_each(|_| drop(page.receive().expect("an answer")));
+        assert_eq!(page.read(MOTOR_STATE, 1), [after], "{command}");
+    }
+    page.send(r#"{"cmd":"IK5","pos":[100,200,150]}"#);
+    assert_eq!(page.receive().expect("an answer")["message"], "IK calculation completed");
+    assert_eq!(page.read(TARGET_POSITION, 3), [63, 90, 85], "the targets stay");
 }
 
 #[test]

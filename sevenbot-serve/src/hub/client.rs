@@ -66,7 +66,7 @@ impl Client {
         for request in self.waiting.drain(..) {
             let (reads, (address, count)) = match request {
                 WholeRequest::Read { address, count } => (1, (address, count)),
-                WholeRequest::WriteBetweenReads { read, .. } => (2, read),
+                WholeRequest::WritesBetweenReads { read, .. } => (2, read),
                 WholeRequest::Write { .. } => continue,
             };
             self.events.extend((0..reads).map(|_| Event::NoReply { address, count }));

@@ -240,7 +240,7 @@ impl Hub {
             Some(WholeRequest::Read { count, .. }) => {
                 client.can_receive && client.unanswered == 0 && self.line.has_window(reply_bytes(*count))
             }
-            Some(WholeRequest::WriteBetweenReads { read: (_, count), .. }) => {
+            Some(WholeRequest::WritesBetweenReads { read: (_, count), .. }) => {
                 client.can_receive && client.unanswered == 0 && self.line.has_window(2 * reply_bytes(*count))
             }
             Some(WholeRequest::Write { .. }) => client.unanswered == 0,
@@ -257,9 +257,11 @@ impl Hub {
             WholeRequest::Write { map, address, values } => {
                 self.send_write(now, id, map, address, values);
             }
-            WholeRequest::WriteBetweenReads { map, address, values, read: (first, count) } => {
+            WholeRequest::WritesBetweenReads { map, writes, read: (first, count) } => {
                 self.send_read(now, id, first, count);
-                self.send_write(now, id, map, address, values);
+                writes
+                    .into_iter()
+                    .for_each(|(address, values)| self.send_write(now, id, map, address, values));
                 self.send_read(now, id, first, count);
             }
         }

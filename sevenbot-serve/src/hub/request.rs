@@ -22,15 +22,13 @@ pub enum WholeRequest {
         /// One byte per register, at most 255.
         values: Vec<u8>,
     },
-    /// A write between two reads of the same registers, to find out what it changes. No other client's request comes
+    /// Writes between two reads of the same registers, to find out what they change. No other client's request comes
     /// between them. Gives two events.
-    WriteBetweenReads {
-        /// The map that the write is in (M1).
+    WritesBetweenReads {
+        /// The map that the writes are in (M1).
         map: Map,
-        /// The first register of the write.
-        address: u8,
-        /// One byte per register, at most 255.
-        values: Vec<u8>,
+        /// The first register of each write, and one byte per register, at most 255.
+        writes: Vec<(u8, Vec<u8>)>,
         /// The first register of the reads, and how many.
         read: (u8, u8),
     },
@@ -54,8 +52,9 @@ impl WholeRequest {
         match self {
             Self::Read { count, .. } => read_bytes(*count),
             Self::Write { values, .. } => MIN_LENGTH + values.len(),
-            Self::WriteBetweenReads { values, read: (_, count), .. } => {
-                MIN_LENGTH + values.len() + 2 * read_bytes(*count)
+            Self::WritesBetweenReads { writes, read: (_, count), .. } => {
+                let writes: usize = writes.iter().map(|(_, values)| MIN_LENGTH + values.len()).sum();
+                writes + 2 * read_bytes(*count)
             }
         }
     }

@@ -1,5 +1,7 @@
 //! The blocks of registers for inverse kinematics: positions and directions in JSON, encoded as map 2.1 has them (M7).
 
+use motion_core::reach;
+use protocol_core::registers::RegisterFile;
 use protocol_core::registers::map21::{
     DIRECTION_ZERO, DISC_DIRECTION, POSITION_ZERO, TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION,
 };
@@ -53,6 +55,12 @@ impl Block {
             Self::Ik7 => tip + DISC_DIRECTION.count,
         })
     }
+}
+
+/// Are there joint angles for the block in these registers? It decides as the arm does.
+pub(super) fn has_solution(address: u8, values: &[u8]) -> bool {
+    let registers = RegisterFile::new([0; 6], None);
+    registers.check_map21(address, values).is_ok_and(|accepted| reach::is_within(&accepted))
 }
 
 /// A parameter that is an array of three numbers.

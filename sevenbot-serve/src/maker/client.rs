@@ -6,10 +6,13 @@
 use std::collections::VecDeque;
 
 use protocol_core::registers::Map;
-use protocol_core::registers::map::{FRAMES_REFUSED, PRESENT_POSITION, TARGET_POSITION};
+use protocol_core::registers::map::{
+    FRAMES_REFUSED, MOTOR_STATE, PRESENT_POSITION, TARGET_POSITION, motor_state,
+};
 use protocol_core::time::Instant;
 use serde_json::{Value, json};
 
+use super::block::has_solution;
 use super::command::{MakerCommand, MakerCommandError};
 use crate::hub::{ClientId, Event, Hub, MOST_WAITING, WholeRequest};
 
@@ -91,10 +94,9 @@ impl MakerClient {
                 self.current = Some(MakerCommand::Read { address, count });
             }
             Ok(MakerCommand::InverseKinematics { address, values }) => {
-                let request = WholeRequest::WriteBetweenReads {
+                let request = WholeRequest::WritesBetweenReads {
                     map: Map::V21,
-                    address,
-                    values: values.clone(),
+                    writes: solving_writes(address, &values),
                     read: (FRAMES_REFUSED.address, FRAMES_REFUSED.count),
                 };
                 hub.request(self.id, request);
@@ -144,6 +146,13 @@ impl MakerClient {
 /// Function 04, so that offsets have the forms of the maker's programs (M5, M11).
 fn write(address: u8, values: Vec<u8>) -> WholeRequest {
     WholeRequest::Write { map: Map::V21, address, values }
+}
+
+/// The maker's arm first switches all joints to the servo state, if the position has a solution.
+fn solving_writes(address: u8, values: &[u8]) -> Vec<(u8, Vec<u8>)> {
+    let block = (address, values.to_vec());
+    let engage = has_solution(address, values).then(|| (MOTOR_STATE.address, vec![motor_state::SERVO]));
+    engage.into_iter().chain([block]).collect()
 }
 
 /// The arm counts a frame that it refuses. No other client's frame is between the two reads of the counter.
