@@ -259,9 +259,7 @@ impl Hub {
             }
             WholeRequest::WritesBetweenReads { map, writes, read: (first, count) } => {
                 self.send_read(now, id, first, count);
-                writes
-                    .into_iter()
-                    .for_each(|(address, values)| self.send_write(now, id, map, address, values));
+                writes.into_iter().for_each(|(first, bytes)| self.send_write(now, id, map, first, bytes));
                 self.send_read(now, id, first, count);
             }
         }
