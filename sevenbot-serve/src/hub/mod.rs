@@ -259,7 +259,7 @@ impl Hub {
             }
             WholeRequest::WritesBetweenReads { map, writes, read: (first, count) } => {
                 self.send_read(now, id, first, count);
-                writes.into_iter().for_each(|(first, bytes)| self.send_write(now, id, map, first, bytes));
+                writes.into_iter().for_each(|(start, bytes)| self.send_write(now, id, map, start, bytes));
                 self.send_read(now, id, first, count);
             }
         }
