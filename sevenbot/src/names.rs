@@ -138,8 +138,8 @@ mod tests {
         assert_eq!((parse("options"), parse("opt")), (span(20, 1), span(20, 1)));
         assert_eq!((parse("wrist-position"), parse("disc")), (span(68, 6), span(63, 3)));
         assert_eq!(parse("tool-direction"), span(61, 2), "60 is the present position of joint 7");
-        assert_eq!((parse("present-angle.7"), parse("load")), (span(89, 1), span(90, 1)));
-        assert_eq!(parse("present"), span(54, 7), "map 2.2 goes first");
+        assert_eq!((parse("present-angle.7"), parse("load-f")), (span(89, 1), span(90, 1)));
+        assert_eq!((parse("present"), parse("load")), (span(54, 7), span(170, 14)), "map 2.2 goes first");
         assert_eq!((parse("offset"), parse("o")), (span(13, 7), span(13, 7)));
         assert_eq!(parse("tip-position"), Err(NameError::Unknown), "map 2.2 uses all its addresses");
         assert_eq!(name_of_register(62), "tool-direction+2");
