@@ -75,6 +75,9 @@ const STEPS: &[TestStep] = &[
         torture::journal(1, &mut trials)?;
         trials.finish(1)
     }),
+    long("the linkage between all pairs of whole degrees", || {
+        cargo("test --release -p motion-core --test linkage -- --ignored")
+    }),
     long("the arm's model in MuJoCo", mujoco::check),
     long("more fuzzing", || {
         fuzz::check(&fuzz::FuzzArgs { seconds: LONG_FUZZ_SECONDS, seed: None, fixed: false })
