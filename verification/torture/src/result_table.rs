@@ -60,13 +60,15 @@ impl ResultTable<'_> {
 
     fn total(&self) -> Vec<ResultRow> {
         let (worlds, counts) = self.1.total();
-        let WorldCounts { requests, replies, reports, corrupted_bursts, commands, engagements, .. } = counts;
+        let WorldCounts {
+            requests, replies, reports, alarms, corrupted_bursts, commands, engagements, ..
+        } = counts;
         let WorldCounts { disturbed_servo_frames, undetected_errors, servo_faults, stalls, .. } = counts;
         let WorldCounts { power_cuts, cut_starts, cut_saves, saves, .. } = counts;
         let counts = [
             ("all worlds", amount(worlds, &counts)),
             ("  complete requests", requests.to_string()),
-            ("  checked replies and reports", format!("{replies}, {reports}")),
+            ("  checked replies, reports and alarms", format!("{replies}, {reports}, {alarms}")),
             ("  bursts of requests with corruption", corrupted_bursts.to_string()),
             ("  checked frames to the servos", commands.to_string()),
             ("  joints given torque at their position", engagements.to_string()),

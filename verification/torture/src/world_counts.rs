@@ -25,6 +25,8 @@ counts! {
     replies,
     /// Checked reports.
     reports,
+    /// Checked alarms.
+    alarms,
     /// Bursts of requests with corruption.
     corrupted_bursts,
     /// Checked frames to the servos.

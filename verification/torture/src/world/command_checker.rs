@@ -9,7 +9,7 @@ use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::Decoder;
 use motion_core::{CYCLE, TorqueCodes};
 use protocol_core::registers::map::{
-    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, OFFSET, SPEED, TARGET_POSITION, motor_state,
+    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, SPEED, TARGET_POSITION, motor_state,
 };
 use protocol_core::registers::{Joint, RegisterFile};
 use protocol_core::time::{Duration, Instant};
@@ -277,10 +277,9 @@ const FRESH_FOR: Duration = Duration::from_millis(20);
 const MAX_FALL: u16 = 12;
 
 /// The servo position of a joint's target register.
-pub(super) fn target_counts(joint: Joint, registers: &RegisterFile) -> u16 {
-    let offset = OFFSET.range.decode_byte(registers.get(OFFSET.of(joint)));
-    let target = MicroDegrees::from_degrees(registers.get(TARGET_POSITION.of(joint)));
-    counts_from_angle(joint, target, i8::try_from(offset).unwrap_or(0))
+pub(super) fn target_counts(joint: Joint, registers: &RegisterFile, model: &RegisterModel) -> u16 {
+    let degrees = MicroDegrees::from_degrees(registers.get(TARGET_POSITION.of(joint)));
+    counts_from_angle(joint, model.fine_target(joint).unwrap_or(degrees), model.offset(joint))
 }
 
 /// The goal of a joint that has arrived is its target. A target that the host did not write is the measured position,
@@ -295,7 +294,7 @@ fn check_arrival(joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check
         (false, 0 | 180) => return Ok(()),
         (false, _) => degree(joint) / 2 + 1,
     };
-    let wanted = target_counts(joint, context.registers);
+    let wanted = target_counts(joint, context.registers, context.model);
     ensure(goal.abs_diff(wanted) <= tolerance, || {
         format!(
             "joint {} has arrived at {target} degrees ({wanted} counts), but its goal is {goal}",

@@ -2,17 +2,17 @@
 
 use motion_core::{Output, Vacuum};
 use protocol_core::registers::map::{
-    FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_REFUSED, MOTOR_STATE, OFFSET, PRESENT_POSITION, SPEED,
-    VACUUM_PUMP,
+    FRAMES_ACCEPTED, FRAMES_REFUSED, MOTOR_STATE, OFFSET, SPEED, VACUUM_PUMP,
 };
 use protocol_core::registers::{Image, Joint, Register};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer;
 
 use super::command_checker::CommandContext;
-use super::host_request::{HostRequest, MAX_LENGTH, reply};
+use super::host_request::{HostRequest, MAX_LENGTH, alarm, reply, report};
 use super::power::random_cut;
 use super::register_model::RequestEffect;
+use super::report_checker::ReportStream;
 use super::settings_storage::PowerOutcome;
 use super::state::{PoweredArm, TortureWorld};
 use super::status_checker::{StatusChecker, affects_motion};
@@ -107,7 +107,7 @@ impl TortureWorld {
             let before = arm.executed();
             let output = arm.poll(self.now, room);
             let count = arm.executed().wrapping_sub(before);
-            let effect = self.apply_requests(arm, count)?;
+            let effect = self.apply_requests(arm, count, room)?;
             match output {
                 OwnedOutput::ToServos => self.send_to_servos(arm)?,
                 OwnedOutput::ToHost => self.send_to_host(arm, effect, room)?,
@@ -126,8 +126,14 @@ impl TortureWorld {
         Err(Violation(format!("{MAX_OUTPUTS} outputs without a wait")))
     }
 
-    /// Applies the next `count` requests to the model. Returns the effect of the last one.
-    fn apply_requests(&mut self, arm: &mut PoweredArm, count: u16) -> Check<Option<RequestEffect>> {
+    /// Applies the next `count` requests to the model. `room` is the room of the link, in bytes. Returns the effect of the
+    /// last one.
+    fn apply_requests(
+        &mut self,
+        arm: &mut PoweredArm,
+        count: u16,
+        room: usize,
+    ) -> Check<Option<RequestEffect>> {
         self.record_missing(arm);
         let mut last = None;
         for _ in 0..count {
@@ -138,7 +144,7 @@ impl TortureWorld {
             let has_output = !matches!(last, None | Some(RequestEffect::NoReply { .. }));
             ensure(!has_output, || format!("the output of {last:?} is missing before {request:?}"))?;
             let was_servo = arm.model.is_servo();
-            let effect = arm.model.execute(&request);
+            let effect = arm.model.execute(&request, room);
             if arm.model.is_servo() != was_servo {
                 Joint::ALL.into_iter().for_each(|joint| arm.command_checker.forget(joint));
             }
@@ -173,17 +179,18 @@ impl TortureWorld {
 
     /// Tells the checkers about an accepted write.
     fn record_write(&self, arm: &mut PoweredArm, request: &HostRequest, effect: RequestEffect) {
-        let HostRequest::Write { address, values } = request else { return };
-        if effect == (RequestEffect::NoReply { accepted: false }) {
+        let (HostRequest::Write { address, values } | HostRequest::WriteMap21 { address, values }) = request
+        else {
+            return;
+        };
+        if matches!(effect, RequestEffect::NoReply { accepted: false } | RequestEffect::Alarm { .. }) {
             return;
         }
         let includes =
             |at: u8| at.checked_sub(*address).is_some_and(|offset| usize::from(offset) < values.len());
         let includes_any = |row: &Register| (row.address..row.address + row.count).any(includes);
-        if includes(FEEDBACK_FREQUENCY.address) {
-            let (frequency, baud) = (arm.model.frequency(), arm.controller.baud());
-            arm.status_checker.frequency_written(self.now, frequency, baud);
-        }
+        let (frequencies, baud) = (arm.model.frequencies(), arm.controller.baud());
+        arm.status_checker.reports.frequencies_written(self.now, frequencies, baud);
         if includes(VACUUM_PUMP.address) {
             arm.status_checker.vacuum_written(self.now);
         }
@@ -216,19 +223,25 @@ impl TortureWorld {
         self.log.host(self.now, "arm", bytes);
         ensure(bytes.len() <= room, || format!("{} bytes to the host with room for {room}", bytes.len()))?;
         arm.to_host.push(bytes.len());
-        let (address, count) = match effect {
+        let registers = arm.controller.registers();
+        let expected = match effect {
             Some(RequestEffect::Reply { address, count }) => {
                 self.counts.replies += 1;
-                (address, count)
+                reply(address, registers.read(address, count))
+            }
+            Some(RequestEffect::Alarm { kind }) => {
+                self.counts.alarms += 1;
+                alarm(kind)
             }
             Some(RequestEffect::Save(_)) => return Err(Violation(format!("a reply to {effect:?}"))),
             None | Some(RequestEffect::NoReply { .. }) => {
                 self.counts.reports += 1;
-                arm.status_checker.report_sent(self.now)?;
-                (PRESENT_POSITION.address, PRESENT_POSITION.count)
+                let stream = ReportStream::of(bytes);
+                arm.status_checker.reports.sent(self.now, stream)?;
+                let (function, address, count) = stream.frame();
+                report(function, address, registers.read(address, count))
             }
         };
-        let expected = reply(address, arm.controller.registers().read(address, count));
         ensure(arm.output_bytes == expected, || format!("the frame to the host should be {expected:02x?}"))
     }
 
@@ -256,7 +269,7 @@ impl TortureWorld {
     fn wait(&mut self, arm: &mut PoweredArm, until: Instant, room: usize) -> Check {
         let has_room = room >= MAX_LENGTH;
         if !has_room {
-            arm.status_checker.link_is_full();
+            arm.status_checker.reports.disturb();
         }
         if !arm.to_arm.waiting().is_empty() {
             // The controller has been offered these bytes: they wait for room, and the wait says nothing about them.

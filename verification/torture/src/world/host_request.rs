@@ -13,6 +13,7 @@ pub(super) const MAX_LENGTH: usize = 262;
 pub(super) enum HostRequest {
     Read { address: u8, count: u8 },
     Write { address: u8, values: Vec<u8> },
+    WriteMap21 { address: u8, values: Vec<u8> },
 }
 
 impl HostRequest {
@@ -20,6 +21,7 @@ impl HostRequest {
         match self {
             Self::Read { address, count } => frame(3, *address, *count, &[]),
             Self::Write { address, values } => frame(6, *address, count(values), values),
+            Self::WriteMap21 { address, values } => frame(4, *address, count(values), values),
         }
     }
 
@@ -58,9 +60,21 @@ fn frame(function: u8, address: u8, count: u8, values: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A reply to a read. A report has the same form.
+/// A reply to a read. A report of map 2.2 has the same form.
 pub(super) fn reply(address: u8, values: &[u8]) -> Vec<u8> {
-    frame(3, address, count(values), values)
+    report(3, address, values)
+}
+
+/// A report, with the function code of its map.
+pub(super) fn report(function: u8, address: u8, values: &[u8]) -> Vec<u8> {
+    frame(function, address, count(values), values)
+}
+
+/// The alarm of an inverse kinematics without a solution (M8): `kind` is 5, 6 or 7.
+pub(super) fn alarm(kind: u8) -> Vec<u8> {
+    let mut bytes = vec![0xAA, 0x77, 8, 1, kind];
+    bytes.extend(CRC.checksum(&bytes).to_le_bytes());
+    bytes
 }
 
 /// True if `bytes` begin with a frame that has a valid checksum.
@@ -118,6 +132,9 @@ mod tests {
         assert_eq!(HostRequest::Read { address: 54, count: 7 }.bytes(), [0xAA, 0x77, 3, 0x36, 7, 0x81, 0xCE]);
         let unlock = HostRequest::Write { address: 28, values: vec![0] };
         assert_eq!(unlock.bytes(), [0xAA, 0x77, 6, 0x1C, 1, 0, 0x2C, 0xC4]);
+        let unlock = HostRequest::WriteMap21 { address: 28, values: vec![0] };
+        assert_eq!(unlock.bytes(), [0xAA, 0x77, 4, 0x1C, 1, 0, 0x2D, 0x7C]);
+        assert_eq!(alarm(6), [0xAA, 0x77, 8, 1, 6, 0x27, 0xFC]);
     }
 
     #[test]

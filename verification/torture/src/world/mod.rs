@@ -17,11 +17,14 @@ mod event_log;
 mod fault_injection;
 mod host_link;
 mod host_request;
+mod map21_model;
+mod map21_requests;
 mod motion_checker;
 mod parameters;
 mod power;
 mod reachable_range;
 mod register_model;
+mod report_checker;
 mod request_generator;
 mod settings_storage;
 mod state;
@@ -48,6 +51,11 @@ const MAX_PENDING: usize = 64;
 const MAX_QUEUE_TIME: Duration = Duration::from_millis(200);
 /// A pause of the host.
 const HOST_PAUSE: Duration = Duration::from_millis(100);
+
+/// True if the host of a seed's world uses both maps. The other worlds have map 2.2 only.
+const fn has_both_maps(seed: u64) -> bool {
+    seed / 8 % 2 == 1
+}
 
 /// A world that violated a rule.
 #[derive(Debug)]
@@ -76,7 +84,7 @@ impl TortureWorld {
             bus: DisturbedBus::new(now, parameters.plant(), parameters.reply_time_bounds()),
             storage: parameters.storage(),
             parameters,
-            generator: RequestGenerator::new(now, scenario.settings_per_mille),
+            generator: RequestGenerator::new(now, scenario.settings_per_mille, has_both_maps(seed)),
             power: PowerState::Off { until: now, servos_too: false },
             is_servo: true,
             stalled_until: now,

@@ -2,16 +2,25 @@
 //! missing servos.
 
 use motion_core::Storage;
+use motion_core::calibration::MicroDegrees;
 use protocol_core::registers::map::{
     BAUD_RATE, EEPROM_LOCK, FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_REFUSED, LAST_REFUSAL,
-    LAST_REFUSED_REGISTER, MAP, MOTOR_STATE, PRESENT_POSITION, TARGET_POSITION, motor_state, refusal,
+    LAST_REFUSED_REGISTER, MAP, MOTOR_STATE, OFFSET, PRESENT_POSITION, TARGET_POSITION, motor_state, refusal,
 };
 use protocol_core::registers::{Access, Image, Joint, MAP_21, Region, Register, RegisterFile};
 
 use super::host_request::HostRequest;
+use super::map21_model::{self, OutOfReach};
 use crate::per_joint::PerJoint;
 use crate::violation::{Check, ensure};
 
+/// The options of map 2.1: bit 0 biased offsets, bit 1 alarms (M6).
+const OPTIONS: u8 = 20;
+/// The report frequencies of map 2.1 (M4).
+const ANGLE_FREQUENCY: u8 = 82;
+const LOAD_FREQUENCY: u8 = 90;
+/// The bytes of an alarm.
+const ALARM_LENGTH: usize = 7;
 /// The first address of the EEPROM region, and the first after it.
 const EEPROM: (u8, u8) = (8, 28);
 
@@ -24,6 +33,8 @@ pub(super) enum RequestEffect {
     NoReply { accepted: bool },
     /// A save of these settings.
     Save(Image),
+    /// An alarm of this kind. The request was refused.
+    Alarm { kind: u8 },
 }
 
 /// The modelled registers.
@@ -36,10 +47,16 @@ pub(super) struct RegisterModel {
     refused: u16,
     /// True if the host's last target is in force: no release, loss of the servo or correction by the arm followed it.
     pub(super) has_host_target: PerJoint<bool>,
+    /// Offsets are shown as 128 + offset (M5). `values` has them in sign and magnitude.
+    has_biased_offsets: bool,
+    /// A target from inverse kinematics, with its fraction (M7).
+    fine_targets: PerJoint<Option<MicroDegrees>>,
 }
 
-/// The first and last addresses of the registers whose values follow from requests alone.
-const MODELLED: &[(u8, u8)] = &[(0, 45), (53, 53), (61, 82), (90, 90), (98, 240), (244, 247), (250, 251)];
+/// The first and last addresses of the registers whose values follow from requests alone. The host writes none of the
+/// extended block, 128 to 191.
+const MODELLED: &[(u8, u8)] =
+    &[(0, 45), (53, 53), (61, 82), (90, 90), (98, 127), (192, 240), (244, 247), (250, 251)];
 
 impl RegisterModel {
     /// The registers after power-up with the stored settings.
@@ -52,8 +69,11 @@ impl RegisterModel {
             accepted: 0,
             refused: 0,
             has_host_target: PerJoint::all(false),
+            has_biased_offsets: false,
+            fine_targets: PerJoint::all(None),
         };
-        for row in MAP_21.iter().chain(MAP) {
+        let bytes_of_21 = MAP_21.iter().filter(|row| row.region == Region::Ram);
+        for row in bytes_of_21.chain(MAP) {
             (row.address..=row.address + (row.count - 1)).for_each(|at| model.set(at, row.default_at(at)));
         }
         (2..).zip(chip_id).for_each(|(at, byte)| model.set(at, byte));
@@ -70,7 +90,11 @@ impl RegisterModel {
             {
                 self.set(at, byte);
             }
+            if at == OPTIONS && byte <= 3 {
+                self.set(at, byte);
+            }
         }
+        self.has_biased_offsets = self.get(OPTIONS) & 1 != 0;
     }
 
     fn row(&self, at: u8) -> Option<&'static Register> {
@@ -104,20 +128,31 @@ impl RegisterModel {
         image
     }
 
-    /// Executes a request.
-    pub(super) fn execute(&mut self, request: &HostRequest) -> RequestEffect {
+    /// Executes a request. An alarm needs `room` bytes on the link.
+    pub(super) fn execute(&mut self, request: &HostRequest, room: usize) -> RequestEffect {
         match request {
             HostRequest::Read { address, count } if usize::from(*address) + usize::from(*count) > 256 => {
                 self.refuse(refusal::MALFORMED_RANGE, *address)
             }
-            HostRequest::Write { address, values } if usize::from(*address) + values.len() > 256 => {
+            HostRequest::Write { address, values } | HostRequest::WriteMap21 { address, values }
+                if usize::from(*address) + values.len() > 256 =>
+            {
                 self.refuse(refusal::MALFORMED_RANGE, *address)
             }
             HostRequest::Read { address, count } => {
                 self.accept();
                 RequestEffect::Reply { address: *address, count: *count }
             }
-            HostRequest::Write { address, values } => self.write(*address, values),
+            HostRequest::Write { address, values } => {
+                let items: Vec<_> = self.effective(*address, values).collect();
+                let is_wrong =
+                    |at, value| self.row(at).is_some_and(|row| !row.range.contains(u16::from(value)));
+                match items.iter().find(|(at, value)| is_wrong(*at, *value)) {
+                    Some((at, _)) => self.refuse(refusal::OUT_OF_RANGE, *at),
+                    None => self.write(&items),
+                }
+            }
+            HostRequest::WriteMap21 { address, values } => self.write_map21(*address, values, room),
         }
     }
 
@@ -149,20 +184,22 @@ impl RegisterModel {
         })
     }
 
-    fn write(&mut self, address: u8, values: &[u8]) -> RequestEffect {
-        let mut items = self.effective(address, values);
-        let refused =
-            items.find(|(at, value)| self.row(*at).is_some_and(|row| !row.range.contains((*value).into())));
-        if let Some((at, _)) = refused {
-            return self.refuse(refusal::OUT_OF_RANGE, at);
-        }
+    /// The first setting that a write changes.
+    fn first_changed_setting(&self, items: &[(u8, u8)]) -> Option<u8> {
         let is_setting = |at| (EEPROM.0..EEPROM.1).contains(&at);
-        let mut items = self.effective(address, values);
-        let changed = items.find(|(at, value)| is_setting(*at) && self.get(*at) != *value);
-        if let (Some((at, _)), Storage::Full) = (changed, self.storage) {
+        items.iter().find(|(at, value)| is_setting(*at) && self.get(*at) != *value).map(|(at, _)| *at)
+    }
+
+    fn write(&mut self, items: &[(u8, u8)]) -> RequestEffect {
+        let changed = self.first_changed_setting(items);
+        if let (Some(at), Storage::Full) = (changed, self.storage) {
             return self.refuse(refusal::STORAGE_FULL, at);
         }
-        self.apply(address, values);
+        self.apply(items);
+        self.has_biased_offsets = false;
+        if items.iter().any(|(at, _)| *at == FEEDBACK_FREQUENCY.address) {
+            [ANGLE_FREQUENCY, LOAD_FREQUENCY].into_iter().for_each(|at| self.set(at, 0));
+        }
         self.accept();
         if changed.is_some() {
             RequestEffect::Save(self.image())
@@ -171,30 +208,92 @@ impl RegisterModel {
         }
     }
 
-    fn apply(&mut self, address: u8, values: &[u8]) {
-        let was_servo = self.is_servo();
-        let items: Vec<_> = self.effective(address, values).collect();
-        items.iter().for_each(|(at, value)| self.set(*at, *value));
-        if self.is_servo() != was_servo {
-            self.has_host_target = PerJoint::all(false);
+    /// Executes a write of map 2.1 (M2, M4, M5, M7, M8).
+    fn write_map21(&mut self, address: u8, values: &[u8], room: usize) -> RequestEffect {
+        let is_open = self.get(EEPROM_LOCK.address) == 0;
+        let reach = |at| map21_model::is_writable(at) && (is_open || !(EEPROM.0..EEPROM.1).contains(&at));
+        let items: Vec<_> =
+            (address..=255).zip(values.iter().copied()).filter(|(at, _)| reach(*at)).collect();
+        if let Some((at, _)) = items.iter().find(|(at, value)| !map21_model::is_in_range(*at, *value)) {
+            return self.refuse(refusal::OUT_OF_RANGE, *at);
         }
-        for (at, _) in items {
-            if let Some(joint) = TARGET_POSITION.joint_at(at) {
+        // 54 to 60 go on showing the present positions (M3).
+        let items = items.into_iter().filter(|(at, _)| !PRESENT_POSITION.holds(*at));
+        let items: Vec<_> = items.map(|(at, value)| (at, map21_model::stored(at, value))).collect();
+        if self.storage == Storage::Full
+            && let Some(at) = self.first_changed_setting(&items)
+        {
+            return self.refuse(refusal::STORAGE_FULL, at);
+        }
+        let angles = match map21_model::angles(address, values) {
+            Ok(angles) => angles,
+            Err(OutOfReach { address, kind }) => {
+                let refused = self.refuse(refusal::OUT_OF_REACH, address);
+                let has_alarm = self.get(OPTIONS) & 2 != 0 && room >= ALARM_LENGTH;
+                return if has_alarm { RequestEffect::Alarm { kind } } else { refused };
+            }
+        };
+        let effect = self.write(&items);
+        self.has_biased_offsets = true;
+        self.set(FEEDBACK_FREQUENCY.address, 0);
+        self.aim(&angles);
+        effect
+    }
+
+    /// Sets the targets from inverse kinematics.
+    fn aim(&mut self, angles: &[Option<f32>; 7]) {
+        for (joint, angle) in Joint::ALL.into_iter().zip(angles) {
+            if let Some(angle) = angle {
+                let target = MicroDegrees::nearest(*angle);
+                self.set(TARGET_POSITION.of(joint), target.nearest_degree());
+                self.fine_targets[joint] = Some(target);
                 self.has_host_target[joint] = self.is_servo();
             }
         }
     }
 
-    /// The report frequency in Hz.
-    pub(super) fn frequency(&self) -> u8 {
-        self.get(FEEDBACK_FREQUENCY.address)
+    fn apply(&mut self, items: &[(u8, u8)]) {
+        let was_servo = self.is_servo();
+        items.iter().for_each(|(at, value)| self.set(*at, *value));
+        if self.is_servo() != was_servo {
+            self.has_host_target = PerJoint::all(false);
+        }
+        for (at, _) in items {
+            if let Some(joint) = TARGET_POSITION.joint_at(*at) {
+                self.fine_targets[joint] = None;
+                self.has_host_target[joint] = self.is_servo();
+            }
+        }
+    }
+
+    /// The report frequencies in Hz: registers 53, 82 and 90.
+    pub(super) fn frequencies(&self) -> [u8; 3] {
+        [FEEDBACK_FREQUENCY.address, ANGLE_FREQUENCY, LOAD_FREQUENCY].map(|at| self.get(at))
+    }
+
+    /// A joint's offset in degrees.
+    pub(super) fn offset(&self, joint: Joint) -> i8 {
+        i8::try_from(OFFSET.range.decode_byte(self.get(OFFSET.of(joint)))).unwrap_or(0)
+    }
+
+    /// The target with its fraction, if inverse kinematics set it and it is in force.
+    pub(super) fn fine_target(&self, joint: Joint) -> Option<MicroDegrees> {
+        self.fine_targets[joint].filter(|_| self.has_host_target[joint])
+    }
+
+    /// The values that a read shows.
+    fn shown(&self, first: u8, last: u8) -> Vec<u8> {
+        let shown = |at| match self.has_biased_offsets {
+            true => map21_model::shown(at, self.get(at)),
+            false => self.get(at),
+        };
+        (first..=last).map(shown).collect()
     }
 
     /// Compares the model with the registers of the arm.
     pub(super) fn compare(&self, registers: &RegisterFile) -> Check {
         for (first, last) in MODELLED {
-            let range = usize::from(*first)..=usize::from(*last);
-            let ours = self.values.get(range).unwrap_or(&[]);
+            let ours = self.shown(*first, *last);
             let theirs = registers.read(*first, last - first + 1);
             ensure(ours == theirs, || {
                 let differs = (*first..).zip(ours.iter().zip(theirs)).find(|(_, (a, b))| a != b);
@@ -202,7 +301,10 @@ impl RegisterModel {
                 format!("register {at} holds {found} instead of {wanted}")
             })?;
         }
-        Ok(())
+        let [angles, positions] = [83, 54].map(|first| registers.read(first, 7));
+        ensure(angles == positions, || format!("angles {angles:?} of positions {positions:?}"))?;
+        let loads = registers.read(91, 7);
+        ensure(loads.iter().all(|load| (3..=253).contains(load)), || format!("loads {loads:?}"))
     }
 
     /// A target that differs from the model is the measured position (D12, D13). The model takes it over.
@@ -219,6 +321,7 @@ impl RegisterModel {
                 format!("target {number} is {found}: the host wrote {wanted}, and the joint was at {present}")
             })?;
             self.set(at, found);
+            self.fine_targets[joint] = None;
             self.has_host_target[joint] = false;
         }
         Ok(())

@@ -8,10 +8,14 @@ use protocol_core::time::{Duration, Instant};
 
 use super::corruption::{corrupt, noise};
 use super::host_request::{HostRequest, SentStream};
+use super::map21_requests;
 use crate::seeded_rng::SeededRng;
 
 /// A pause inside a frame. From 100 ms on the arm drops the frame.
 const MAX_PAUSE: Duration = Duration::from_millis(90);
+
+/// The first and last address of the extended block.
+const EXTENDED: (usize, usize) = (128, 191);
 
 /// How often the host sends requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,13 +46,22 @@ pub(super) struct RequestGenerator {
     /// The number of corrupted transmissions in a million.
     pub(super) corrupted_per_million: u64,
     settings_per_mille: u64,
+    /// True if half of the writes are in map 2.1.
+    has_both_maps: bool,
     stream: SentStream,
 }
 
 impl RequestGenerator {
-    pub(super) fn new(now: Instant, settings_per_mille: u64) -> Self {
-        let (rate, stream) = (RequestRate::Steady, SentStream::default());
-        Self { rate, rate_until: now, next_at: now, corrupted_per_million: 0, settings_per_mille, stream }
+    pub(super) fn new(now: Instant, settings_per_mille: u64, has_both_maps: bool) -> Self {
+        Self {
+            rate: RequestRate::Steady,
+            rate_until: now,
+            next_at: now,
+            corrupted_per_million: 0,
+            settings_per_mille,
+            has_both_maps,
+            stream: SentStream::default(),
+        }
     }
 
     /// The arm starts: it has received nothing.
@@ -96,7 +109,15 @@ impl RequestGenerator {
     }
 
     fn any_request(&self, rng: &mut SeededRng) -> HostRequest {
-        if rng.one_in(2) { self.read(rng) } else { self.write(rng) }
+        match () {
+            () if rng.one_in(2) => self.read(rng),
+            () if self.has_both_maps && rng.one_in(2) => self.write_map21(rng),
+            () => {
+                let (address, mut values) = self.write(rng);
+                leave_out_extended(address, &mut values);
+                HostRequest::Write { address, values }
+            }
+        }
     }
 
     fn read(&self, rng: &mut SeededRng) -> HostRequest {
@@ -111,8 +132,16 @@ impl RequestGenerator {
         HostRequest::Read { address, count }
     }
 
-    fn write(&self, rng: &mut SeededRng) -> HostRequest {
-        let (address, values) = if rng.in_a_million(self.settings_per_mille * 1_000) {
+    fn write_map21(&self, rng: &mut SeededRng) -> HostRequest {
+        match () {
+            () if rng.in_a_million(self.settings_per_mille * 1_000) => map21_requests::settings(rng),
+            () if rng.one_in(2) => map21_requests::write(rng),
+            () => map21_requests::of_map22(self.write(rng)),
+        }
+    }
+
+    fn write(&self, rng: &mut SeededRng) -> (u8, Vec<u8>) {
+        if rng.in_a_million(self.settings_per_mille * 1_000) {
             settings(rng)
         } else {
             match rng.below(16) {
@@ -126,14 +155,21 @@ impl RequestGenerator {
                 14 => (rng.byte(), (0..rng.below(12)).map(|_| rng.byte()).collect()),
                 _ => (rng.byte(), vec![rng.up_to(30); rng.below(256)]),
             }
-        };
-        HostRequest::Write { address, values }
+        }
     }
 }
 
 impl Transmission {
     fn bytes(&self) -> Vec<u8> {
         self.parts.iter().flat_map(|(_, bytes)| bytes.iter().copied()).collect()
+    }
+}
+
+/// Shortens a write that reaches the extended block, which the model does not know.
+fn leave_out_extended(address: u8, values: &mut Vec<u8>) {
+    let (first, end) = (usize::from(address), usize::from(address) + values.len());
+    if end <= 256 && first <= EXTENDED.1 && end > EXTENDED.0 {
+        values.truncate(EXTENDED.0.saturating_sub(first));
     }
 }
 

@@ -5,17 +5,18 @@
 
 use motion_core::Vacuum;
 use motion_core::calibration::angle_from_counts;
-use motion_core::report_timer::highest_frequency;
 use protocol_core::registers::map::{
     FAULTS, FRAMES_CORRUPTED, MISSING_SERVOS, MOVING_JOINTS, OFFSET, PRESENT_POSITION, SERVO_BUS_ERRORS,
-    SERVO_TEMPERATURE, SPEED, SUPPLY_VOLTAGE, TARGET_POSITION, TIME, fault,
+    SERVO_TEMPERATURE, SPEED, SUPPLY_VOLTAGE, TIME, fault,
 };
+use protocol_core::registers::map21::WRIST_POSITION;
 use protocol_core::registers::{Joint, Register, RegisterFile};
 use protocol_core::time::{Duration, Instant};
 
 use super::command_checker::{CommandChecker, target_counts};
 use super::disturbed_bus::{Availability, DisturbedBus};
 use super::register_model::RegisterModel;
+use super::report_checker::ReportChecker;
 use crate::per_joint::PerJoint;
 use crate::violation::{Check, ensure};
 
@@ -51,18 +52,8 @@ pub(super) struct StatusChecker {
     pub(super) link_was_disturbed: bool,
     /// Headers in malformed requests. The arm may count each of them as a corrupted frame once.
     pub(super) false_headers: u16,
-    reports: ReportCount,
+    pub(super) reports: ReportChecker,
     valve_open_since: Option<Instant>,
-}
-
-/// The reports since the last change of their frequency.
-#[derive(Clone, Copy, Debug)]
-struct ReportCount {
-    frequency: u32,
-    since: Instant,
-    count: u64,
-    /// True if a stall or a full link held up reports.
-    disturbed: bool,
 }
 
 /// The true state of the arm, and its registers.
@@ -92,7 +83,7 @@ impl StatusChecker {
             bus_errors: 0,
             link_was_disturbed: false,
             false_headers: 0,
-            reports: ReportCount { frequency: 0, since: now, count: 0, disturbed: false },
+            reports: ReportChecker::new(now),
             valve_open_since: None,
         }
     }
@@ -100,14 +91,9 @@ impl StatusChecker {
     /// The shell stalls until `now`, for a time of `by`.
     pub(super) fn shell_was_late(&mut self, now: Instant, by: Duration) {
         self.unsettled_at = now;
-        self.reports.disturbed = true;
+        self.reports.disturb();
         self.settled_by.0.iter_mut().for_each(|at| *at = *at + by + Duration::from_millis(20));
         self.valve_open_since = self.valve_open_since.map(|since| since + by);
-    }
-
-    /// The host link has no room for a report.
-    pub(super) const fn link_is_full(&mut self) {
-        self.reports.disturbed = true;
     }
 
     pub(super) fn vacuum_switched(&mut self, now: Instant, vacuum: Vacuum) -> Check {
@@ -119,22 +105,6 @@ impl StatusChecker {
     /// The pump register was written: a release opens the valve for the full time, even if it is open already.
     pub(super) fn vacuum_written(&mut self, now: Instant) {
         self.valve_open_since = self.valve_open_since.map(|_| now);
-    }
-
-    /// A write with an effect on the report frequency was accepted.
-    pub(super) fn frequency_written(&mut self, now: Instant, frequency: u8, baud: u32) {
-        let frequency = u32::from(frequency).min(highest_frequency(baud, PRESENT_POSITION.count));
-        if frequency == self.reports.frequency {
-            return;
-        }
-        self.reports = ReportCount { frequency, since: now, count: 0, disturbed: false };
-    }
-
-    pub(super) fn report_sent(&mut self, now: Instant) -> Check {
-        self.reports.count += 1;
-        let ReportCount { frequency, since, count, .. } = self.reports;
-        let due = (now - since).as_micros() * u64::from(frequency) / 1_000_000;
-        ensure(count <= due + 1, || format!("{count} reports instead of {due} at {frequency} Hz"))
     }
 
     /// A write can move joints, or a servo was found: computes the time by which each joint has to be at rest.
@@ -170,7 +140,7 @@ impl StatusChecker {
         }
         self.check_faults(context)?;
         self.check_counters(context)?;
-        self.check_reports(context.now)?;
+        self.reports.check(context.now)?;
         let open = self.valve_open_since.map_or(Duration::ZERO, |since| context.now - since);
         ensure(open <= MAX_VALVE_TIME, || format!("the valve has been open for {} us", open.as_micros()))
     }
@@ -219,8 +189,7 @@ impl StatusChecker {
         if last != position || self.settled_time(context.now, since.max(self.motion_at)) < DETECTION_TIME {
             return Ok(());
         }
-        let offset = OFFSET.range.decode_byte(context.registers.get(OFFSET.of(joint)));
-        let angle = angle_from_counts(joint, position, i8::try_from(offset).unwrap_or(0)).nearest_degree();
+        let angle = angle_from_counts(joint, position, context.model.offset(joint)).nearest_degree();
         let shown = context.registers.get(PRESENT_POSITION.of(joint));
         ensure(shown.abs_diff(angle) == 0, || {
             format!("joint {} is at {angle} degrees, and its register holds {shown}", joint.number())
@@ -271,19 +240,11 @@ impl StatusChecker {
         let all_well = Joint::ALL.into_iter().all(|joint| self.is_responding(joint, context));
         ensure(more == 0 || !all_well, || format!("{more} servo bus errors while all servos respond"))
     }
-
-    fn check_reports(&self, now: Instant) -> Check {
-        let ReportCount { frequency, since, count, disturbed } = self.reports;
-        let due = (now - since).as_micros() * u64::from(frequency) / 1_000_000;
-        ensure(disturbed || count + 2 >= due, || {
-            format!("{count} reports instead of {due} at {frequency} Hz")
-        })
-    }
 }
 
 /// The largest distance that a joint may have to move, in counts.
 fn distance(joint: Joint, context: &StatusContext<'_>) -> u16 {
-    let target = target_counts(joint, context.registers);
+    let target = target_counts(joint, context.registers, context.model);
     match context.command_checker.goal(joint) {
         // A set-point may lie beyond the end of the servo's range.
         Some(goal @ 1..1_023) if (1..1_023).contains(&target) => goal.abs_diff(target) + 5,
@@ -309,9 +270,9 @@ const MAX_TIME_UNITS: u8 = {
     most.to_le_bytes()[0]
 };
 
-/// True if a write to these registers can move joints.
+/// True if a write to these registers, in any map, can move joints.
 pub(super) fn affects_motion(first: u8, count: usize) -> bool {
     let last = usize::from(first) + count;
-    let (from, to) = (OFFSET.address, TARGET_POSITION.address + TARGET_POSITION.count);
+    let (from, to) = (OFFSET.address, WRIST_POSITION.address + WRIST_POSITION.count);
     first < to && last > usize::from(from)
 }
