@@ -138,10 +138,10 @@ impl Arm {
         self.view.serves(address)
     }
 
-    /// The time between two reports at a frequency of `hertz`.
+    /// The time between two reports at a frequency of `hertz`, with this content of [`crate::map::report_content`].
     #[must_use]
-    pub fn report_period(&self, hertz: u8) -> Duration {
-        report_period(self.identity.firmware(), hertz, self.options.baud)
+    pub fn report_period(&self, hertz: u8, content: u8) -> Duration {
+        report_period(self.identity.firmware(), hertz, content, self.options.baud)
     }
 
     /// The name of the port.
@@ -176,7 +176,7 @@ impl Arm {
         self.choose_offset_encoding(span)?;
         let mut asked = Vec::new();
         for _ in 0..self.options.attempts.max(1) {
-            let range = self.pending.add(self.view.read_span(span), self.view.report());
+            let range = self.pending.add(self.view.read_span(span), self.view.reports());
             asked.push(range);
             self.link.send(&Request::Read { address: range.address(), count: range.count() })?;
             if let Some(answer) = self.answer(&asked)? {

@@ -5,21 +5,21 @@
 
 use std::fmt;
 
-use protocol_core::registers::map::{
-    EEPROM_LOCK, FEEDBACK_FREQUENCY, MOTOR_STATE, PRESENT_POSITION, motor_state, refusal,
-};
+use protocol_core::registers::map::{EEPROM_LOCK, FEEDBACK_FREQUENCY, MOTOR_STATE, motor_state};
 use protocol_core::registers::map21::find_readable;
-use protocol_core::registers::{Access, Region, Register};
 
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::identity::Firmware;
-use crate::map_view::MapView;
 use crate::names::name_of_register;
-use crate::register_text;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
-use crate::status_block::StatusBlock;
+
+mod cause;
+
+pub use cause::MismatchCause;
+pub(crate) use cause::cause_from_counters;
+use cause::{cause_from_access, cause_from_arm, cause_from_range};
 
 /// A register that does not hold what was written to it.
 ///
@@ -33,56 +33,12 @@ use crate::status_block::StatusBlock;
 pub struct WriteMismatch {
     /// The register.
     pub address: u8,
-    /// The byte that was written.
-    pub wanted: u8,
-    /// The byte that was read back.
-    pub found: u8,
+    /// The raw value that was written: one byte, or two with the low byte first.
+    pub wanted: u16,
+    /// The raw value that was read back.
+    pub found: u16,
     /// The reason.
     pub cause: MismatchCause,
-}
-
-/// Why a register does not hold what was written to it.
-///
-/// ```
-/// use sevenbot::checked_write::MismatchCause;
-///
-/// assert_eq!(MismatchCause::Locked.to_string(), "it is protected by the EEPROM lock");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MismatchCause {
-    /// The table has no register there.
-    NoRegister,
-    /// The register is read only.
-    ReadOnly,
-    /// The maker reserves the register.
-    Reserved,
-    /// The arm's firmware does not have the register.
-    NotServed,
-    /// A write to any part of a position makes the maker's firmware move the arm, so it was not sent.
-    StartsMotion,
-    /// The register is a setting, and the EEPROM lock protects it (D15).
-    Locked,
-    /// A value in the frame was out of range, so the arm ignored the whole frame (D16).
-    OutOfRange {
-        /// The register with the value that was out of range.
-        address: u8,
-    },
-    /// No joint angles reach the position that a write of map 2.1 asks for (M7).
-    OutOfReach,
-    /// The settings storage is full until the next restart (D19).
-    StorageFull,
-    /// The arm received the frame damaged.
-    Damaged,
-    /// The arm gives no reason: the frame was lost, or the register has changed since.
-    Unknown,
-}
-
-impl MismatchCause {
-    /// Can the same frame succeed when it is sent again?
-    #[must_use]
-    pub const fn is_transient(self) -> bool {
-        matches!(self, Self::Damaged | Self::Unknown)
-    }
 }
 
 /// A frame is sent this many times before its loss is an error.
@@ -197,62 +153,35 @@ impl Arm {
     }
 }
 
-fn compare(found: &Snapshot, wanted: &[u8], cause: impl Fn(u8, u8) -> MismatchCause) -> Vec<WriteMismatch> {
-    let pairs = found.span().addresses().zip(wanted).zip(&found.values);
-    pairs
-        .filter(|&((address, &wanted), &found)| number(address, wanted) != number(address, found))
-        .map(|((address, &wanted), &found)| {
+/// The values that differ. Both bytes of a two-byte register are one value (D22).
+fn compare(found: &Snapshot, wanted: &[u8], cause: impl Fn(u8, u16) -> MismatchCause) -> Vec<WriteMismatch> {
+    let written = Snapshot { address: found.address, values: wanted.to_vec() };
+    let values = raw_values(&written).into_iter().zip(raw_values(found));
+    values
+        .filter(|((address, wanted), (_, found))| number(*address, *wanted) != number(*address, *found))
+        .map(|((address, wanted), (_, found))| {
             let cause = cause(address, wanted);
             WriteMismatch { address, wanted, found, cause }
         })
         .collect()
 }
 
-/// The number that a byte encodes. Minus zero is zero (D9).
-fn number(address: u8, byte: u8) -> i16 {
-    find_readable(address).map_or(i16::from(byte), |row| row.range.decode_byte(byte))
+/// The raw values of a snapshot with their addresses: two-byte registers whole, but for halves at its ends.
+fn raw_values(snapshot: &Snapshot) -> Vec<(u8, u16)> {
+    let mut values = Vec::new();
+    let mut addresses = snapshot.span().addresses().peekable();
+    while let Some(address) = addresses.next() {
+        let is_low = find_readable(address)
+            .is_some_and(|row| row.range.width() == 2 && address.wrapping_sub(row.address).is_multiple_of(2));
+        let is_whole = is_low && addresses.next_if(|next| *next == address.wrapping_add(1)).is_some();
+        values.push((address, if is_whole { snapshot.word(address) } else { snapshot.at(address).into() }));
+    }
+    values
 }
 
-/// The firmware's reason why no write can change a register; `None` if a write can.
-fn cause_from_arm(view: MapView, address: u8) -> Option<MismatchCause> {
-    match () {
-        () if !view.serves(address) => Some(MismatchCause::NotServed),
-        () if view.starts_inverse(address) && !PRESENT_POSITION.holds(address) => {
-            Some(MismatchCause::StartsMotion)
-        }
-        () => None,
-    }
-}
-
-/// The table's reason why no write can change a register; `None` if a write can.
-fn cause_from_access(address: u8, locked: bool) -> Option<MismatchCause> {
-    match find_readable(address) {
-        None => Some(MismatchCause::NoRegister),
-        Some(Register { access: Access::ReadOnly, .. }) => Some(MismatchCause::ReadOnly),
-        Some(Register { access: Access::Reserved, .. }) => Some(MismatchCause::Reserved),
-        Some(Register { region: Region::Eeprom, .. }) if locked => Some(MismatchCause::Locked),
-        Some(_) => None,
-    }
-}
-
-/// The reason according to the arm's counters before and after the write.
-pub(crate) fn cause_from_counters(before: &StatusBlock, after: &StatusBlock) -> MismatchCause {
-    let refused = before.frames_refused() != after.frames_refused();
-    match after.last_refusal() {
-        Some((refusal::OUT_OF_RANGE, address)) if refused => MismatchCause::OutOfRange { address },
-        Some((refusal::STORAGE_FULL, _)) if refused => MismatchCause::StorageFull,
-        Some((refusal::OUT_OF_REACH, _)) if refused => MismatchCause::OutOfReach,
-        _ if before.frames_corrupted() != after.frames_corrupted() => MismatchCause::Damaged,
-        _ => MismatchCause::Unknown,
-    }
-}
-
-/// The reason if the arm has no status block.
-fn cause_from_range(address: u8, wanted: u8) -> MismatchCause {
-    match find_readable(address) {
-        Some(row) if !row.range.contains(wanted.into()) => MismatchCause::OutOfRange { address },
-        _ => MismatchCause::Unknown,
-    }
+/// The number that a raw value encodes. Minus zero is zero (D9).
+fn number(address: u8, raw: u16) -> i32 {
+    find_readable(address).map_or(i32::from(raw), |row| row.range.decode(raw))
 }
 
 impl fmt::Display for WriteMismatch {
@@ -262,80 +191,10 @@ impl fmt::Display for WriteMismatch {
     }
 }
 
-impl fmt::Display for MismatchCause {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::NoRegister => out.write_str("the table has no register there"),
-            Self::ReadOnly => out.write_str("it is read only"),
-            Self::Reserved => out.write_str("it is reserved by the maker"),
-            Self::NotServed => out.write_str("the arm's firmware does not have it"),
-            Self::StartsMotion => out.write_str(
-                "not written, because any write there moves an arm of the maker; `sevenbot move-to` moves the tip",
-            ),
-            Self::Locked => out.write_str("it is protected by the EEPROM lock"),
-            Self::OutOfRange { address } => {
-                let name = name_of_register(address);
-                write!(out, "the arm ignored the frame: {name} takes {}", register_text::range(address))
-            }
-            Self::OutOfReach => out.write_str("no joint angles reach the position"),
-            Self::StorageFull => out.write_str("the settings storage is full until the arm restarts"),
-            Self::Damaged => out.write_str("the arm received the request damaged; try again"),
-            Self::Unknown => out.write_str("the arm gives no reason; try again"),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol_core::registers::map::{
-        DEVICE_ID, FRAMES_REFUSED, LAST_REFUSAL, LAST_REFUSED_REGISTER, OFFSET, PRESENT_POSITION, RESERVED_8,
-        STATUS_VERSION, TARGET_POSITION,
-    };
-
-    fn status(refused: u8, why: u8, register: u8) -> StatusBlock {
-        let mut status = Snapshot { address: STATUS_VERSION.address, values: vec![0; 16] };
-        for (row, value) in
-            [(LAST_REFUSAL, why), (LAST_REFUSED_REGISTER, register), (FRAMES_REFUSED, refused)]
-        {
-            status.values[usize::from(row.address - STATUS_VERSION.address)] = value;
-        }
-        StatusBlock::from(status)
-    }
-
-    #[test]
-    fn the_table_gives_the_cause_of_an_impossible_write() {
-        assert_eq!(cause_from_access(67, false), Some(MismatchCause::NoRegister));
-        assert_eq!(cause_from_access(61, false), None, "of map 2.1");
-        assert_eq!(cause_from_access(PRESENT_POSITION.address, false), Some(MismatchCause::ReadOnly));
-        assert_eq!(cause_from_access(RESERVED_8.address, false), Some(MismatchCause::Reserved));
-        assert_eq!(cause_from_access(DEVICE_ID.address, true), Some(MismatchCause::Locked));
-        assert_eq!(cause_from_access(DEVICE_ID.address, false), None);
-        assert_eq!(cause_from_access(TARGET_POSITION.address, true), None);
-    }
-
-    #[test]
-    fn a_new_refusal_gives_the_cause() {
-        let before = status(4, refusal::OUT_OF_RANGE, 46);
-        let stale = status(4, refusal::OUT_OF_RANGE, 46);
-        assert_eq!(
-            cause_from_counters(&before, &stale),
-            MismatchCause::Unknown,
-            "an older refusal explains nothing"
-        );
-        let after = status(5, refusal::OUT_OF_RANGE, 47);
-        assert_eq!(cause_from_counters(&before, &after), MismatchCause::OutOfRange { address: 47 });
-        let far = status(5, refusal::OUT_OF_REACH, 68);
-        assert_eq!(cause_from_counters(&before, &far), MismatchCause::OutOfReach);
-        let full = status(5, refusal::STORAGE_FULL, 11);
-        assert_eq!(cause_from_counters(&before, &full), MismatchCause::StorageFull);
-    }
-
-    #[test]
-    fn without_a_status_block_the_range_gives_the_cause() {
-        assert_eq!(cause_from_range(46, 200), MismatchCause::OutOfRange { address: 46 });
-        assert_eq!(cause_from_range(46, 90), MismatchCause::Unknown);
-    }
+    use protocol_core::registers::map::{FINE_TARGET, OFFSET};
 
     #[test]
     fn minus_zero_equals_zero() {
@@ -343,5 +202,14 @@ mod tests {
         let unchanged = compare(&found, &[0x80, 0x85], |_, _| MismatchCause::Unknown);
         let [only] = unchanged.as_slice() else { panic!("{unchanged:?}") };
         assert_eq!(only.to_string(), "offset.2 is 0, not -5: the arm gives no reason; try again");
+    }
+
+    #[test]
+    fn d22_both_bytes_of_a_word_are_one_value() {
+        let found = Snapshot { address: FINE_TARGET.address, values: vec![0x28, 0x23, 0x28, 0x23, 0x28] };
+        let unchanged = compare(&found, &[0x28, 0x23, 0x29, 0x24, 0x28], |_, _| MismatchCause::Unknown);
+        let [only] = unchanged.as_slice() else { panic!("{unchanged:?}") };
+        assert_eq!((only.address, only.wanted, only.found), (130, 0x2429, 9000));
+        assert_eq!(only.to_string(), "fine-target.2 is 9000, not 9257: the arm gives no reason; try again");
     }
 }

@@ -137,8 +137,8 @@ impl JointSnapshot {
             .filter(|(_, wanted, found)| wanted != found)
             .map(|(joint, wanted, found)| WriteMismatch {
                 address: TARGET_POSITION.of(joint),
-                wanted,
-                found,
+                wanted: wanted.into(),
+                found: found.into(),
                 cause,
             })
             .collect()

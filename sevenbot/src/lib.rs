@@ -8,7 +8,7 @@
 //! ```
 //!
 //! All calls block, with timeouts. Frames and the register table come from `protocol-core`, which the arm uses too.
-//! `D1` to `D20` are rules in `docs/protocol.md`. The library sends targets; the arm plans the motion.
+//! `D1` to `D26` are rules in `docs/protocol.md`. The library sends targets; the arm plans the motion.
 //!
 //! ```no_run
 //! use sevenbot::{Angle, Arm, Joint};
@@ -30,6 +30,9 @@ pub mod arm;
 pub mod cartesian;
 pub mod checked_write;
 pub mod error;
+pub mod fine;
+pub mod fine_angle;
+mod fine_state;
 mod frame_port;
 pub mod hold;
 pub mod identity;
@@ -49,6 +52,7 @@ pub mod servo_bench;
 pub mod snapshot;
 mod span;
 pub mod status_block;
+pub mod stream;
 pub mod table;
 pub mod traffic;
 mod traffic_text;
@@ -56,6 +60,7 @@ pub mod units;
 
 pub use arm::{Arm, ArmOptions};
 pub use error::{Error, OpenError, PortError, ReceiveCounts};
+pub use fine_angle::FineAngle;
 pub use identity::{Firmware, Identity};
 pub use protocol_core::registers::map21::Map;
 pub use protocol_core::registers::{Joint, Range, Register, map, map21};

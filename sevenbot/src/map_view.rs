@@ -9,7 +9,12 @@
 //! Everything else that map 2.2 names is the same. The registers that only map 2.1 has keep their addresses. This
 //! project's firmware serves both maps, so a register that only map 2.1 has is written by its function.
 
-use protocol_core::registers::map::{FEEDBACK_FREQUENCY, MAP, OFFSET, PRESENT_POSITION, TIME};
+use std::ops::RangeInclusive;
+
+use protocol_core::registers::map::{
+    EXTENDED_VERSION, FEEDBACK_FREQUENCY, FINE_POSITION, FINE_TARGET, LOAD, MAP, OFFSET, PRESENT_POSITION,
+    TIME,
+};
 use protocol_core::registers::map21::{
     self, ANGLE_FEEDBACK_FREQUENCY, DISC_DIRECTION, LOAD_FEEDBACK_FREQUENCY, Map, OPTIONS, PRESENT_ANGLE,
     TIP_POSITION, TOOL_DIRECTION, WRIST_POSITION, find_readable,
@@ -29,6 +34,13 @@ const OFFSET_ZERO: u8 = 128;
 /// A byte that is no offset in any encoding of map 2.1.
 const NO_OFFSET: u8 = 64;
 
+/// The registers in the reports of map 2.2, by the value of register 189 (D26).
+pub(crate) const REPORTS: [Span; 3] =
+    [Span::of(&PRESENT_POSITION), Span::of(&FINE_POSITION), Span::between(&FINE_POSITION, &LOAD)];
+
+/// The extended block.
+const EXTENDED_BLOCK: RangeInclusive<u8> = FINE_TARGET.address..=EXTENDED_VERSION.address;
+
 /// How an arm sees the registers of map 2.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct MapView {
@@ -47,12 +59,12 @@ pub(crate) struct WriteFrame {
 }
 
 impl MapView {
-    /// Does the arm have this register? Only a register that map 2.2 lacks can be missing.
+    /// Does the arm have this register? Only a register of map 2.1 or of this project can be missing.
     pub(crate) fn serves(self, address: u8) -> bool {
         let has_map21 = self.firmware == Firmware::Ours || self.map == Map::V21;
-        // Register 20 is this project's addition (M6).
-        let is_ours = OPTIONS.holds(address) && self.firmware != Firmware::Ours;
-        !is_only_map21(address) || has_map21 && !is_ours
+        // Register 20 (M6) and the extended block (D21) are this project's additions.
+        let is_ours = OPTIONS.holds(address) || EXTENDED_BLOCK.contains(&address);
+        (!is_only_map21(address) || has_map21) && (!is_ours || self.firmware == Firmware::Ours)
     }
 
     /// Does a write there make the arm move at once, whatever part of a position it covers? Ours moves only when a frame
@@ -135,11 +147,11 @@ impl MapView {
         self.map == Map::V21 && (PRESENT_POSITION.holds(address) || self.starts_inverse(address))
     }
 
-    /// The registers of a report of the present positions.
-    pub(crate) const fn report(self) -> Span {
+    /// The registers that a report may have.
+    pub(crate) const fn reports(self) -> &'static [Span] {
         match self.map {
-            Map::V22 => Span::of(&PRESENT_POSITION),
-            Map::V21 => Span::of(&PRESENT_ANGLE),
+            Map::V22 => &REPORTS,
+            Map::V21 => const { &[Span::of(&PRESENT_ANGLE)] },
         }
     }
 
@@ -279,8 +291,8 @@ mod tests {
     fn an_arm_serves_the_registers_of_its_firmware() {
         let missing = |view: MapView| (0..=255).filter(|&address| !view.serves(address)).collect::<Vec<u8>>();
         assert_eq!(missing(BOTH), []);
-        assert_eq!(missing(MAP_21), [20]);
-        let only_map21 = [20].into_iter().chain(61..=66).chain(68..=73).chain(82..=97);
+        assert_eq!(missing(MAP_21), [20].into_iter().chain(128..=191).collect::<Vec<u8>>());
+        let only_map21 = [20].into_iter().chain(61..=66).chain(68..=73).chain(82..=97).chain(128..=191);
         assert_eq!(missing(MAP_22), only_map21.collect::<Vec<u8>>());
     }
 

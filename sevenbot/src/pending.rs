@@ -16,10 +16,10 @@ const REMEMBERED: usize = 16;
 pub(crate) struct PendingReads(VecDeque<Span>);
 
 impl PendingReads {
-    /// Adds a read of `wanted`. Returns the span to request: wider where `wanted` is pending already, or is a `report`. A
+    /// Adds a read of `wanted`. Returns the span to request: wider where `wanted` is pending already, or is one of `reports`. A
     /// span of more than 239 registers may have no room to be widened.
-    pub(crate) fn add(&mut self, wanted: Span, report: Span) -> Span {
-        let is_free = |span: &Span| *span != report && !self.0.contains(span);
+    pub(crate) fn add(&mut self, wanted: Span, reports: &[Span]) -> Span {
+        let is_free = |span: &Span| !reports.contains(span) && !self.0.contains(span);
         let asked = (0..=u8::MAX).map_while(|by| wanted.widened(by)).find(is_free).unwrap_or(wanted);
         if self.0.len() >= REMEMBERED {
             self.0.pop_front();
@@ -44,7 +44,7 @@ mod tests {
         Span::new(address, count).expect("a span")
     }
 
-    const REPORT: Span = Span::of(&protocol_core::registers::map::PRESENT_POSITION);
+    const REPORT: &[Span] = &[Span::of(&protocol_core::registers::map::PRESENT_POSITION)];
 
     #[test]
     fn a_repeated_read_requests_another_span() {
@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn a_read_of_the_positions_differs_from_a_report() {
-        assert_eq!(PendingReads::default().add(REPORT, REPORT), span(54, 8));
+        assert_eq!(PendingReads::default().add(REPORT[0], REPORT), span(54, 8));
     }
 
     #[test]

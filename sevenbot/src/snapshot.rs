@@ -51,6 +51,18 @@ impl Snapshot {
         Joint::ALL.map(|joint| self.at(row.of(joint)))
     }
 
+    /// The raw two-byte value whose low byte is at `address`; bytes outside the snapshot are 0.
+    #[must_use]
+    pub fn word(&self, address: u8) -> u16 {
+        u16::from_le_bytes([self.at(address), self.at(address.wrapping_add(1))])
+    }
+
+    /// The raw values of a per-joint row of two-byte registers, joint 1 first.
+    #[must_use]
+    pub fn words(&self, row: &Register) -> [u16; 7] {
+        Joint::ALL.map(|joint| self.word(row.of(joint)))
+    }
+
     /// The registers; none if they would reach past 255.
     #[must_use]
     pub fn span(&self) -> Span {

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, value_parser};
 use serde::Serialize;
-use sevenbot::map::{FEEDBACK_FREQUENCY, MOTOR_STATE, VACUUM_PUMP, motor_state};
+use sevenbot::map::{FEEDBACK_FREQUENCY, MOTOR_STATE, VACUUM_PUMP, motor_state, report_content};
 use sevenbot::recording::{self, Moment};
 use sevenbot::{Arm, Span};
 
@@ -137,7 +137,7 @@ fn record_reports(
 ) -> Result<(), CommandError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut pendant = TeachPendant::new(arm.targets()?, vacuum, args.driven);
-    let mut clock = ReportClock::new(arm.report_period(args.hz));
+    let mut clock = ReportClock::new(arm.report_period(args.hz, report_content::POSITIONS));
     let limit = args.seconds.map(|seconds| Duration::from_secs(seconds.into()));
     let mut last_report = Instant::now();
     while !Interrupt::is_requested() && !pendant.poll_keys(arm)? {

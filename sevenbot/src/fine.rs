@@ -1,0 +1,99 @@
+//! Typed access to the extended block, registers 128 to 191: hundredths of a degree, velocities, loads (D21 to D26).
+
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{EXTENDED_VERSION, FINE_TARGET, SET_POINT_PERIOD};
+use protocol_core::registers::map21::Map;
+
+use crate::arm::Arm;
+use crate::checked_write::WriteMismatch;
+use crate::error::Error;
+use crate::fine_angle::FineAngle;
+pub use crate::fine_state::{FineState, FineTargets};
+use crate::identity::Firmware;
+use crate::span::Span;
+
+/// The layout of the extended block that this library knows.
+const KNOWN_LAYOUT: u8 = 1;
+
+impl Arm {
+    /// Does the arm have the extended block? Only this project's firmware has it, and only in map 2.2.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn has_extended_block(&mut self) -> Result<bool, Error> {
+        if self.identity().firmware() != Firmware::Ours || self.map() != Map::V22 {
+            return Ok(false);
+        }
+        Ok(self.read_span(Span::of(&EXTENDED_VERSION))?.byte(&EXTENDED_VERSION) == KNOWN_LAYOUT)
+    }
+
+    /// Positions, velocities and loads. Only for an arm with the extended block.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn fine_state(&mut self) -> Result<FineState, Error> {
+        Ok(FineState::new(&self.read_span(FineState::REGISTERS)?))
+    }
+
+    /// The targets in hundredths of a degree, joint 1 first. Only for an arm with the extended block.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn fine_targets(&mut self) -> Result<[FineAngle; 7], Error> {
+        let snapshot = self.read_span(Span::of(&FINE_TARGET))?;
+        let limit = FineAngle::MAX_HUNDREDTHS;
+        Ok(snapshot.words(&FINE_TARGET).map(|word| {
+            FineAngle::from_hundredths(word.min(limit))
+                .unwrap_or(FineAngle::from(crate::Angle::from_register(0)))
+        }))
+    }
+
+    /// Sets targets and reads them back. They are approached by speed or time, as whole degrees are: a set-point period
+    /// that another program left is switched off for these frames (D23). Only for an arm with the extended block.
+    ///
+    /// # Errors
+    /// As [`Arm::write_checked`].
+    pub fn set_fine_targets_checked(&mut self, targets: &FineTargets) -> Result<Vec<WriteMismatch>, Error> {
+        let period = self.read_span(Span::of(&SET_POINT_PERIOD))?;
+        let is_streaming = period.word(SET_POINT_PERIOD.address) != 0;
+        if is_streaming {
+            self.write(SET_POINT_PERIOD.address, &[0, 0])?;
+        }
+        let unchanged = self.write_all_checked(&fine_frames(targets))?;
+        if is_streaming {
+            self.write(SET_POINT_PERIOD.address, &period.values)?;
+        }
+        Ok(unchanged)
+    }
+}
+
+/// One write for each run of neighbouring joints with a target, joint 1 first: address and values.
+#[must_use]
+pub fn fine_frames(targets: &FineTargets) -> Vec<(u8, Vec<u8>)> {
+    let mut frames: Vec<(u8, Vec<u8>)> = Vec::new();
+    let pairs = Joint::ALL.into_iter().zip(targets).filter_map(|(joint, target)| Some((joint, (*target)?)));
+    for (joint, target) in pairs {
+        let (address, bytes) = (FINE_TARGET.of(joint), target.hundredths().to_le_bytes());
+        match frames.last_mut() {
+            Some((first, values)) if usize::from(*first) + values.len() == usize::from(address) => {
+                values.extend(bytes);
+            }
+            _ => frames.push((address, bytes.to_vec())),
+        }
+    }
+    frames
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joints_without_a_target_are_not_written() {
+        let angle = FineAngle::from_hundredths(0x0102);
+        assert_eq!(fine_frames(&[None; 7]), []);
+        assert_eq!(fine_frames(&[angle; 7]), [(128, [2, 1].repeat(7))]);
+        let some = [None, angle, angle, None, None, None, angle];
+        assert_eq!(fine_frames(&some), [(130, vec![2, 1, 2, 1]), (140, vec![2, 1])]);
+    }
+}

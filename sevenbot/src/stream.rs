@@ -1,0 +1,215 @@
+//! Streams of set-points in hundredths of a degree, with a watchdog in the arm (D23, D24).
+//!
+//! ```text
+//!   SetPointStream::open ──▶ period and watchdog of this stream ──▶ send, send, ... ──▶ values from before
+//!                                                                      ▲                 (also on drop)
+//!   StreamPace: when the next point is due ────────────────────────────┘
+//! ```
+//!
+//! If the program dies, the watchdog makes the arm hold. A clean end, an error and a panic put the registers back.
+
+use std::time::{Duration, Instant};
+
+use protocol_core::registers::map::{FINE_TARGET, SET_POINT_PERIOD, WATCHDOG_ACTION, fault};
+
+use crate::arm::Arm;
+use crate::checked_write::WriteMismatch;
+use crate::error::Error;
+use crate::fine::fine_frames;
+use crate::fine_state::FineTargets;
+use crate::span::Span;
+
+mod pace;
+
+pub use pace::{PaceCounts, StreamPace};
+
+/// The registers that a stream sets: period, time of the watchdog, action of the watchdog.
+const STREAM_REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &WATCHDOG_ACTION);
+/// No stream, no watchdog.
+const SWITCHED_OFF: [u8; 4] = [0; 4];
+
+/// What the watchdog of the arm does when the host is silent (D24).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WatchdogAction {
+    /// The joints hold.
+    Hold,
+    /// Damping protection: the arm sinks slowly.
+    Damping,
+}
+
+/// Period and watchdog of a stream.
+///
+/// ```
+/// use sevenbot::stream::StreamOptions;
+///
+/// assert_eq!(StreamOptions::new(20).map(|options| options.period().as_millis()), Some(20));
+/// assert_eq!(StreamOptions::new(4), None);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StreamOptions {
+    period_ms: u16,
+    watchdog: (u8, WatchdogAction),
+}
+
+impl StreamOptions {
+    /// The time of the watchdog if nothing else is set, in steps of 10 ms.
+    pub const WATCHDOG_STEPS: u8 = 30;
+
+    /// A stream with this period in milliseconds, 5 to 1000, and a watchdog that makes the arm hold after 300 ms. `None`
+    /// for another period.
+    #[must_use]
+    pub const fn new(period_ms: u16) -> Option<Self> {
+        if period_ms < 5 || period_ms > 1_000 {
+            return None;
+        }
+        Some(Self { period_ms, watchdog: (Self::WATCHDOG_STEPS, WatchdogAction::Hold) })
+    }
+
+    /// With another watchdog: its time in steps of 10 ms, 0 for none, and what it does.
+    #[must_use]
+    pub const fn with_watchdog(self, steps: u8, action: WatchdogAction) -> Self {
+        Self { watchdog: (steps, action), ..self }
+    }
+
+    /// The time between two points.
+    #[must_use]
+    pub const fn period(self) -> Duration {
+        Duration::from_millis(self.period_ms as u64)
+    }
+
+    fn registers(self) -> [u8; 4] {
+        let [low, high] = self.period_ms.to_le_bytes();
+        let (steps, action) = self.watchdog;
+        [low, high, steps, u8::from(action == WatchdogAction::Damping)]
+    }
+
+    /// The host sends something at least this often, or the watchdog acts.
+    fn keep_alive_period(self) -> Duration {
+        Duration::from_millis(u64::from(self.watchdog.0) * 10) / 3
+    }
+}
+
+/// Why a stream does not start.
+///
+/// ```
+/// use sevenbot::stream::StreamError;
+///
+/// assert!(StreamError::NoExtendedBlock.to_string().contains("whole degrees"));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StreamError {
+    /// The arm has no extended block.
+    #[error("the arm's firmware takes no stream of set-points: it has whole degrees only")]
+    NoExtendedBlock,
+    /// These registers did not take their values.
+    #[error("the arm did not take the stream's registers{}", .0.first().map_or(String::new(), |first| format!(": {first}")))]
+    NotTaken(Vec<WriteMismatch>),
+    /// An exchange with the arm failed.
+    #[error(transparent)]
+    Exchange(#[from] Error),
+}
+
+/// An open stream. While it lives, the arm takes fine targets as points of a stream, and its watchdog runs.
+///
+/// ```no_run
+/// use sevenbot::stream::{SetPointStream, StreamOptions, StreamPace};
+/// use sevenbot::{Arm, FineAngle};
+/// use std::{thread::sleep, time::Instant};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut arm = Arm::open("/dev/ttyUSB0", 115_200)?;
+/// let options = StreamOptions::new(20).ok_or("a period")?;
+/// let mut stream = SetPointStream::open(&mut arm, options)?;
+/// let mut pace = StreamPace::new(Instant::now(), options.period());
+/// for hundredths in (9000..9500).step_by(20) {
+///     sleep(pace.due().saturating_duration_since(Instant::now()));
+///     pace.take(Instant::now());
+///     stream.send(&[FineAngle::from_hundredths(hundredths), None, None, None, None, None, None])?;
+/// }
+/// stream.close()?;
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct SetPointStream<'a> {
+    arm: &'a mut Arm,
+    options: StreamOptions,
+    /// The registers of the stream before it; `None` once they are put back.
+    before: Option<Vec<u8>>,
+    last_sent: Instant,
+}
+
+impl<'a> SetPointStream<'a> {
+    /// Sets period and watchdog. The joints stay where they are.
+    ///
+    /// # Errors
+    /// The arm has no extended block, or does not take the values.
+    pub fn open(arm: &'a mut Arm, options: StreamOptions) -> Result<Self, StreamError> {
+        if !arm.has_extended_block()? {
+            return Err(StreamError::NoExtendedBlock);
+        }
+        let before = registers_before(arm)?;
+        let mut stream = Self { arm, options, before: Some(before), last_sent: Instant::now() };
+        let unchanged = stream.arm.write_checked(STREAM_REGISTERS.address(), &options.registers())?;
+        stream.last_sent = Instant::now();
+        if unchanged.is_empty() { Ok(stream) } else { Err(StreamError::NotTaken(unchanged)) }
+    }
+
+    /// Sends a point at once. A joint without an angle gets no point.
+    ///
+    /// # Errors
+    /// The port failed. The arm does not answer, so a refused point is no error: see [`StatusBlock`](crate::StatusBlock).
+    pub fn send(&mut self, point: &FineTargets) -> Result<(), Error> {
+        for (address, values) in fine_frames(point) {
+            self.arm.write(address, &values)?;
+            self.last_sent = Instant::now();
+        }
+        Ok(())
+    }
+
+    /// Sends an empty write if the watchdog would act soon. Call it while no point is due.
+    ///
+    /// # Errors
+    /// The port failed.
+    pub fn keep_alive(&mut self) -> Result<(), Error> {
+        if self.last_sent.elapsed() >= self.options.keep_alive_period() {
+            self.arm.write(FINE_TARGET.address, &[])?;
+            self.last_sent = Instant::now();
+        }
+        Ok(())
+    }
+
+    /// The arm, for other requests during the stream. Each counts as a sign of life.
+    pub fn arm(&mut self) -> &mut Arm {
+        self.last_sent = Instant::now();
+        self.arm
+    }
+
+    /// Puts the registers back, and verifies them.
+    ///
+    /// # Errors
+    /// An exchange failed, or the arm does not take the values.
+    pub fn close(mut self) -> Result<(), StreamError> {
+        let Some(before) = self.before.take() else { return Ok(()) };
+        let unchanged = self.arm.write_checked(STREAM_REGISTERS.address(), &before)?;
+        if unchanged.is_empty() { Ok(()) } else { Err(StreamError::NotTaken(unchanged)) }
+    }
+}
+
+impl Drop for SetPointStream<'_> {
+    fn drop(&mut self) {
+        if let Some(before) = self.before.take() {
+            // After an error: there may be no arm any more.
+            let _ = self.arm.write(STREAM_REGISTERS.address(), &before);
+        }
+    }
+}
+
+/// The registers to put back. If the watchdog acted, the program that set them is gone, and they are switched off.
+fn registers_before(arm: &mut Arm) -> Result<Vec<u8>, Error> {
+    let is_left_behind = arm.status()?.is_some_and(|status| status.faults() & fault::HOST_SILENT != 0);
+    if is_left_behind {
+        return Ok(SWITCHED_OFF.to_vec());
+    }
+    Ok(arm.read_span(STREAM_REGISTERS)?.values)
+}

@@ -1,0 +1,99 @@
+//! Streams of set-points: what the registers hold during a stream and after it, however it ends.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
+
+mod fake;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex};
+
+use fake::{execute, moving_registers, scripted_arm};
+use serialport::TTYPort;
+use sevenbot::checked_write::MismatchCause;
+use sevenbot::stream::{SetPointStream, StreamError, StreamOptions, WatchdogAction};
+use sevenbot::{Arm, FineAngle};
+
+type Registers = Arc<Mutex<[u8; 256]>>;
+
+/// An arm with the extended block, and its registers.
+fn arm_with_block() -> (Arm, Registers, TTYPort) {
+    let registers = moving_registers();
+    registers.lock().unwrap()[191] = 1;
+    let shown = Arc::clone(&registers);
+    let (port, held) = scripted_arm(move |_, request| execute(&mut registers.lock().unwrap(), request));
+    (Arm::open(&port, 115_200).unwrap(), shown, held)
+}
+
+fn options() -> StreamOptions {
+    StreamOptions::new(20).unwrap().with_watchdog(25, WatchdogAction::Damping)
+}
+
+/// The registers from the set-point period to the action of the watchdog, after all writes so far.
+fn stream_registers(arm: &mut Arm, registers: &Registers) -> [u8; 4] {
+    // The reply comes after the writes before it.
+    arm.read(0, 1).unwrap();
+    registers.lock().unwrap()[184..188].try_into().unwrap()
+}
+
+#[test]
+fn d24_a_stream_arms_the_watchdog_and_puts_everything_back() {
+    let (mut arm, registers, _held) = arm_with_block();
+    registers.lock().unwrap()[184..188].copy_from_slice(&[50, 0, 7, 0]);
+    let mut stream = SetPointStream::open(&mut arm, options()).unwrap();
+    assert_eq!(registers.lock().unwrap()[184..188], [20, 0, 25, 1]);
+    let angle = FineAngle::from_hundredths(9_025);
+    stream.send(&[angle, None, angle, None, None, None, None]).unwrap();
+    assert_eq!(stream.arm().read(128, 6).unwrap(), [0x41, 0x23, 0, 0, 0x41, 0x23]);
+    stream.close().unwrap();
+    assert_eq!(registers.lock().unwrap()[184..188], [50, 0, 7, 0]);
+}
+
+#[test]
+fn d24_a_dropped_stream_and_a_panic_put_everything_back() {
+    let (mut arm, registers, _held) = arm_with_block();
+    drop(SetPointStream::open(&mut arm, options()).unwrap());
+    assert_eq!(stream_registers(&mut arm, &registers), [0; 4]);
+    let panicked = catch_unwind(AssertUnwindSafe(|| {
+        let _stream = SetPointStream::open(&mut arm, options()).unwrap();
+        assert_eq!(registers.lock().unwrap()[186], 25);
+        panic!("on purpose");
+    }));
+    assert!(panicked.is_err());
+    assert_eq!(stream_registers(&mut arm, &registers), [0; 4]);
+}
+
+#[test]
+fn d24_what_a_dead_program_left_behind_is_switched_off() {
+    let (mut arm, registers, _held) = arm_with_block();
+    registers.lock().unwrap()[184..188].copy_from_slice(&[20, 0, 30, 0]);
+    registers.lock().unwrap()[241] = 1 << 6;
+    SetPointStream::open(&mut arm, options()).unwrap().close().unwrap();
+    assert_eq!(stream_registers(&mut arm, &registers), [0; 4]);
+}
+
+#[test]
+fn an_arm_without_the_block_takes_no_stream() {
+    let registers = moving_registers();
+    let (port, _held) = scripted_arm(move |_, request| execute(&mut registers.lock().unwrap(), request));
+    let mut arm = Arm::open(&port, 115_200).unwrap();
+    assert!(!arm.has_extended_block().unwrap());
+    assert_eq!(SetPointStream::open(&mut arm, options()).unwrap_err(), StreamError::NoExtendedBlock);
+}
+
+#[test]
+fn d22_registers_that_are_not_taken_are_told_whole() {
+    let registers = moving_registers();
+    registers.lock().unwrap()[191] = 1;
+    let (port, _held) = scripted_arm(move |_, request| {
+        let mut registers = registers.lock().unwrap();
+        let reply = execute(&mut registers, request);
+        registers[184..188].copy_from_slice(&[0x2C, 0x01, 25, 1]);
+        reply
+    });
+    let mut arm = Arm::open(&port, 115_200).unwrap();
+    let error = SetPointStream::open(&mut arm, options()).unwrap_err();
+    let StreamError::NotTaken(unchanged) = error else { panic!("{error}") };
+    let [only] = unchanged.as_slice() else { panic!("{unchanged:?}") };
+    assert_eq!((only.address, only.wanted, only.found, only.cause), (184, 20, 300, MismatchCause::Unknown));
+}
