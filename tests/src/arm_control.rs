@@ -21,6 +21,8 @@ pub enum Need {
     Support,
     /// Its settings storage may be filled.
     ExpendableStorage,
+    /// It notices when the last program closes its port.
+    SeesClosing,
 }
 
 /// An arm under test. A test may call a method only if the arm has the capability.
@@ -64,6 +66,7 @@ impl ArmControl for ExternalArm {
             Need::Persistence => "the arm on ARM_PORT may keep no settings, as in an emulator",
             Need::ServoFaults => "the servos of the arm on ARM_PORT cannot be made to fail",
             Need::Support => "the arm on ARM_PORT falls without torque",
+            Need::SeesClosing => "the arm on ARM_PORT may not notice who has its port open",
             Need::ExpendableStorage => "the tests must not wear out the flash of the arm on ARM_PORT",
         })
     }

@@ -85,6 +85,7 @@ impl ArmKind {
             (Self::Emulator, Need::Persistence | Need::ExpendableStorage) => {
                 Some("the flash of the emulator does not change")
             }
+            (Self::Emulator, Need::SeesClosing) => Some("a chip does not notice who has its port open"),
             (Self::Emulator, Need::Kill) => Some("the emulated arm keeps no settings"),
             (Self::Emulator, Need::ChosenChipId) => Some("the chip id of the emulator cannot be chosen"),
             _ => None,

@@ -5,7 +5,8 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use system_tests::registers::{
-    EEPROM_LOCK, FEEDBACK_FREQUENCY, LAST_REFUSAL, MOTOR_STATE, OFFSET, STANDARD_POSE, TARGET_POSITION,
+    DEVICE_ID, EEPROM_LOCK, FEEDBACK_FREQUENCY, LAST_REFUSAL, MOTOR_STATE, OFFSET, STANDARD_POSE,
+    TARGET_POSITION,
 };
 use system_tests::wait::TIMEOUT;
 use system_tests::{Need, TestArm, TestSetup, near, with_arm};
@@ -24,6 +25,7 @@ const READ_TARGETS: &[u8] = &[0xAA, 0x77, 0x03, 0x2E, 0x07, 0x8B, 0xCE];
 const READ_ANGLE_0: &[u8] = &[0xAA, 0x77, 0x03, 0x53, 0x01, 0x2A, 0x9C];
 const READ_ANGLES: &[u8] = &[0xAA, 0x77, 0x03, 0x53, 0x07, 0xAA, 0x9E];
 const READ_LOADS: &[u8] = &[0xAA, 0x77, 0x03, 0x5B, 0x07, 0xAD, 0x5E];
+const WRITE_NOTHING: &[u8] = &[0xAA, 0x77, 0x04, 0x00, 0x00, 0x66, 0x6D];
 const UNLOCK: &[u8] = &[0xAA, 0x77, 0x04, 0x1C, 0x01, 0x00, 0x2D, 0x7C];
 const LOCK: &[u8] = &[0xAA, 0x77, 0x04, 0x1C, 0x01, 0x01, 0xEC, 0xBC];
 const EEPROM_INIT: &[u8] =
@@ -80,15 +82,16 @@ fn are_loads(values: &[u8]) -> bool {
 /// The Python client sends nothing at first. Then each getter is one read and one answer.
 #[test]
 fn m01_m03_m10_python_getters() {
-    with_arm(TestSetup::any().needs(Need::FreshArm), |arm| {
+    with_arm(TestSetup::any(), |arm| {
         assert!(is_standard_pose(&ask(arm, READ_ANGLES)), "without a write before");
+        arm.write_setting(DEVICE_ID, &[0; 9]);
         arm.send(READ_DEVICE_CODE);
         arm.expect(DEVICE_CODE);
         arm.send(READ_VERSION);
         arm.expect(VERSION);
         assert_eq!(ask(arm, READ_MAC).len(), 6);
         assert_eq!(ask(arm, READ_ID), [0]);
-        assert_eq!(ask(arm, READ_OFFSETS), [0; 7], "no write yet, and register 20 is 0");
+        assert_eq!(ask(arm, READ_OFFSETS), [0; 7], "in the form of the last write");
         assert_eq!((ask(arm, READ_STATUS), ask(arm, READ_VACUUM)), (vec![1], vec![0]));
         assert!(near(ask(arm, READ_ANGLE_0)[0], 90));
         assert!(are_loads(&ask(arm, READ_LOADS)));
@@ -96,10 +99,20 @@ fn m01_m03_m10_python_getters() {
     });
 }
 
+#[test]
+fn m05_m06_before_any_write_offsets_read_as_register_20_says() {
+    with_arm(TestSetup::any().needs(Need::FreshArm), |arm| {
+        assert_eq!((ask(arm, READ_OFFSETS), ask(arm, READ_ID)), (vec![0; 7], vec![0]));
+        arm.send(WRITE_NOTHING);
+        arm.send(READ_OFFSETS);
+        arm.expect(OFFSETS_ZERO);
+    });
+}
+
 /// EEPROMinit: three frames back to back.
 #[test]
 fn m02_m05_python_initialises_the_eeprom() {
-    with_arm(TestSetup::any().needs(Need::FreshArm), |arm| {
+    with_arm(TestSetup::any(), |arm| {
         arm.write_setting(OFFSET, &[3, 0x83]);
         arm.send(&[UNLOCK, EEPROM_INIT, LOCK].concat());
         arm.send(READ_OFFSETS);
@@ -278,7 +291,8 @@ fn m01_m07_blockly_page() {
 /// A script that was killed leaves nothing to the next one.
 #[test]
 fn m12_the_next_program_starts_afresh() {
-    with_arm(TestSetup::any().needs(Need::FreshArm).needs(Need::Kill), |arm| {
+    with_arm(TestSetup::any().needs(Need::SeesClosing), |arm| {
+        arm.write_setting(DEVICE_ID, &[0; 9]);
         arm.send(&[LOAD_REPORTS, ANGLE_REPORTS].concat());
         assert_eq!(arm.frame_within(TIMEOUT).expect("a report")[2], 0x05);
         arm.reopen(115_200);
