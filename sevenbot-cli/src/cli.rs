@@ -8,7 +8,7 @@ use crate::command_error::CommandError;
 use crate::commands::serve;
 use crate::commands::{
     backup, baud, calibrate, effector, get, info, model, monitor, move_to, play, plot, ports, pose, position,
-    record, registers, servo, set, shell, sniff, state, stop,
+    record, registers, servo, set, shell, sniff, state, stop, stream,
 };
 use crate::session::Session;
 
@@ -87,6 +87,7 @@ pub(crate) enum Command {
     Monitor(monitor::MonitorArgs),
     Record(record::RecordArgs),
     Play(play::PlayArgs),
+    Stream(stream::StreamArgs),
     Plot(plot::PlotArgs),
     Calibrate(calibrate::CalibrateArgs),
     Baud(baud::BaudArgs),
@@ -120,6 +121,7 @@ impl Command {
             Self::Monitor(args) => monitor::run(session, &args),
             Self::Record(args) => record::run(session, &args),
             Self::Play(args) => play::run(session, &args),
+            Self::Stream(args) => stream::run(session, &args),
             Self::Plot(args) => plot::run(session, &args),
             Self::Calibrate(args) => calibrate::run(session, &args),
             Self::Baud(args) => baud::run(session, &args),

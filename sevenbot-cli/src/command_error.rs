@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use sevenbot::servo_bench::ServoError;
+use sevenbot::stream::StreamError;
 use sevenbot::{Error, OpenError};
 
 use crate::advice::{self, owned};
@@ -58,6 +59,15 @@ pub(crate) enum CommandError {
 impl From<Error> for CommandError {
     fn from(error: Error) -> Self {
         Self::Exchange(error)
+    }
+}
+
+impl From<StreamError> for CommandError {
+    fn from(error: StreamError) -> Self {
+        match error {
+            StreamError::Exchange(error) => Self::Exchange(error),
+            other => Self::Arm(other.to_string()),
+        }
     }
 }
 

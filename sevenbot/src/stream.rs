@@ -179,9 +179,8 @@ impl<'a> SetPointStream<'a> {
         Ok(())
     }
 
-    /// The arm, for other requests during the stream. Each counts as a sign of life.
+    /// The arm, for other requests and its reports during the stream.
     pub fn arm(&mut self) -> &mut Arm {
-        self.last_sent = Instant::now();
         self.arm
     }
 

@@ -24,3 +24,4 @@ pub(crate) mod shell;
 pub(crate) mod sniff;
 pub(crate) mod state;
 pub(crate) mod stop;
+pub(crate) mod stream;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, value_parser};
 use serde::Serialize;
-use sevenbot::map::{SPEED, TIME, VACUUM_PUMP};
+use sevenbot::map::{SPEED, TIME, VACUUM_PUMP, report_content};
 use sevenbot::playback::{self, Step};
 use sevenbot::recording::{Moment, Recording};
 use sevenbot::{Angle, Arm, Snapshot, Span};
@@ -136,7 +136,7 @@ impl Player {
     /// Plays this many times, and restores the speeds and times that the arm had before.
     fn play_and_restore(&mut self, arm: &mut Arm, times: u32) -> Result<(), CommandError> {
         let before = arm.read_span(Span::between(&SPEED, &TIME))?;
-        let done = with_reports(arm, FEEDBACK_HZ, |arm| {
+        let done = with_reports(arm, FEEDBACK_HZ, report_content::POSITIONS, |arm| {
             hold_on_interrupt(arm, |arm, interrupt| self.play(arm, interrupt, times))
         });
         // Without a connection the speeds cannot be restored.

@@ -62,13 +62,19 @@ impl StreamPace {
         self.start + self.period.saturating_mul(self.next)
     }
 
-    /// Takes the point to send at `now`, as its number: the next one, or a later one if that is due already. The arm would
-    /// pass over the ones before (D23).
-    pub fn take(&mut self, now: Instant) -> u32 {
+    /// The number of the point to send at `now`: the next one, or a later one if that is due already. The arm would pass
+    /// over the ones before (D23).
+    #[must_use]
+    pub fn number_at(&self, now: Instant) -> u32 {
         let lateness = now.saturating_duration_since(self.due());
         let passed = lateness.as_micros() / self.period.as_micros().max(1);
-        let passed = u32::try_from(passed).unwrap_or(u32::MAX);
-        let number = self.next.saturating_add(passed);
+        self.next.saturating_add(u32::try_from(passed).unwrap_or(u32::MAX))
+    }
+
+    /// Takes the point to send at `now`: its number, as [`Self::number_at`] gives it.
+    pub fn take(&mut self, now: Instant) -> u32 {
+        let number = self.number_at(now);
+        let passed = number.saturating_sub(self.next);
         self.next = number;
         self.count(now.saturating_duration_since(self.due()), passed, now);
         self.next = number.saturating_add(1);

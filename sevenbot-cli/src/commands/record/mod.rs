@@ -95,8 +95,11 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     }
     let mut recording = RecordingFile::create(&args.file)?;
     Interrupt::catch();
-    let done = set_motors(&mut arm, args)
-        .and_then(|()| with_reports(&mut arm, args.hz, |arm| record_reports(arm, args, &mut recording)));
+    let done = set_motors(&mut arm, args).and_then(|()| {
+        with_reports(&mut arm, args.hz, report_content::POSITIONS, |arm| {
+            record_reports(arm, args, &mut recording)
+        })
+    });
     // Without a connection the arm cannot be made to hold.
     let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
     let held = if is_gone && !Interrupt::is_requested() { Ok(()) } else { hold_at_end(&mut arm, args) };

@@ -1,0 +1,225 @@
+//! `stream`: sends set-points from standard input to the arm, at an even period.
+//!
+//! ```text
+//!   standard input ──▶ input: TimedPoint ──▶ Feed: the point of each period ──▶ SetPointStream ──▶ arm
+//!                                            StreamPace: when it is due ─┘          reports ──▶ Tracking
+//! ```
+
+mod feed;
+mod input;
+mod summary;
+mod tracking;
+
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::time::{Duration, Instant};
+
+use clap::{Args, value_parser};
+use sevenbot::map::report_content;
+use sevenbot::stream::{PaceCounts, SetPointStream, StreamError, StreamOptions, StreamPace, WatchdogAction};
+use sevenbot::{Arm, StatusBlock};
+
+use self::feed::Feed;
+use self::input::TimedPoint;
+use self::summary::StreamSummary;
+use self::tracking::Tracking;
+use crate::command_error::CommandError;
+use crate::interrupt::{Interrupt, hold_on_interrupt};
+use crate::joint_move::driven_joints;
+use crate::reports::with_reports;
+use crate::session::Session;
+
+/// Stream set-points from standard input, in hundredths of a degree.
+///
+/// The arm goes through the points in straight lines. If this program dies, the watchdog of the arm makes it hold.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  policy.py | sevenbot stream
+  sevenbot stream --period 10 < move.csv
+  printf '0,90,90,65,90,90,90,80\\n2,95.5,90,65,90,90,90,80\\n' | sevenbot stream
+
+One set-point per line, with its time in seconds and the seven joints in degrees, 0 to 180:
+
+  {\"t\": 0.02, \"joints\": [90.25, 88, 65, 90, 90, 90, null]}      as JSON; null: this joint gets no point
+  0.02, 90.25, 88, 65, 90, 90, 90,                             or separated by commas; empty: no point
+
+Times ascend. The first line is due at once. Between two lines the joints move in straight lines. A line that
+comes late delays what follows: nothing is speeded up. The arm lags one and a half periods behind the points.
+No joint goes faster than its speed (`sevenbot get speed`), also on the way to the first point.
+
+A bad line ends the stream with its number. The lines before it are sent, and the arm holds at the last of
+them. Ctrl-C also makes it hold. At the end the registers of the period and of the watchdog have their old
+values again, and the summary shows:
+
+  late      points sent more than a quarter of the period late, points passed over, and pauses of the input
+  gap       the longest time between two points
+  jitter    the standard deviation of the sending times
+  tracking  the distance of the measured positions from the points that were due
+
+Only for arms with this project's firmware: others take whole degrees and no stream.
+
+Exit status 1 after a bad line, or if the arm takes no stream.")]
+pub(crate) struct StreamArgs {
+    /// Time between two points in milliseconds, 5 to 1000.
+    #[arg(long, value_name = "MS", default_value_t = 20, value_parser = value_parser!(u16).range(5..=1_000))]
+    period: u16,
+    /// Time without a sign of this program after which the arm holds, in milliseconds up to 2550; 0: never.
+    #[arg(long, value_name = "MS", default_value_t = 300, value_parser = value_parser!(u16).range(0..=2_550))]
+    watchdog: u16,
+}
+
+/// Frequency of the reports, in Hz.
+const FEEDBACK_HZ: u8 = 50;
+/// The longest reaction time to a line or Ctrl-C.
+const POLL_PERIOD: Duration = Duration::from_millis(2);
+/// After the last point a joint at 1.9 degrees/s may need 95 s.
+const ARRIVAL_TIMEOUT: Duration = Duration::from_secs(100);
+/// One step of the watchdog's time, in milliseconds.
+const WATCHDOG_STEP_MS: u16 = 10;
+
+impl StreamArgs {
+    fn options(&self) -> Result<StreamOptions, CommandError> {
+        let steps = u8::try_from(self.watchdog.div_ceil(WATCHDOG_STEP_MS)).unwrap_or(u8::MAX);
+        let options = StreamOptions::new(self.period);
+        let options = options.ok_or_else(|| CommandError::Usage("a period is 5 to 1000 ms".to_owned()))?;
+        Ok(options.with_watchdog(steps, WatchdogAction::Hold))
+    }
+}
+
+pub(crate) fn run(session: &mut Session, args: &StreamArgs) -> Result<(), CommandError> {
+    let options = args.options()?;
+    let mut arm = session.connect()?;
+    if !arm.has_extended_block()? {
+        return Err(StreamError::NoExtendedBlock.into());
+    }
+    driven_joints(&mut arm)?;
+    let refused_before = refused(arm.status()?);
+    let mut tracking = Tracking::new(arm.fine_targets()?, options.period());
+    let done = with_reports(&mut arm, FEEDBACK_HZ, report_content::FINE_POSITIONS, |arm| {
+        hold_on_interrupt(arm, |arm, interrupt| stream(arm, interrupt, options, &mut tracking))
+    });
+    let (counts, ended) = done?;
+    let refused = refused(arm.status()?).wrapping_sub(refused_before);
+    session.printer.print(&StreamSummary::new(counts, options.period(), refused, tracking.error()))?;
+    ended.map_err(|reason| CommandError::file("standard input".as_ref(), reason))
+}
+
+fn refused(status: Option<StatusBlock>) -> u16 {
+    status.as_ref().map_or(0, StatusBlock::frames_refused)
+}
+
+/// Streams all points, and waits until the arm has arrived. The second result is the reason if the input ended early.
+fn stream(
+    arm: &mut Arm,
+    interrupt: Interrupt,
+    options: StreamOptions,
+    tracking: &mut Tracking,
+) -> Result<(PaceCounts, Result<(), String>), CommandError> {
+    let stream = SetPointStream::open(arm, options)?;
+    let pace = StreamPace::new(Instant::now(), options.period());
+    let source = Source { lines: input::read_in_background(), feed: Feed::default(), end: None };
+    let mut streamer = Streamer { stream, pace, source, tracking, period: options.period() };
+    while streamer.play(interrupt)? {}
+    streamer.wait_until_still(interrupt)?;
+    let Streamer { stream, pace, source, .. } = streamer;
+    stream.close()?;
+    Ok((pace.counts(), source.end.unwrap_or(Ok(()))))
+}
+
+/// The input, and its points that are not sent yet.
+struct Source {
+    lines: Receiver<Result<TimedPoint, String>>,
+    feed: Feed,
+    /// How the input has ended; `None` while there may be more.
+    end: Option<Result<(), String>>,
+}
+
+impl Source {
+    /// Takes the lines that have come.
+    fn poll(&mut self) {
+        while self.end.is_none() {
+            match self.lines.try_recv() {
+                Ok(Ok(point)) => self.feed.push(point),
+                Ok(Err(reason)) => self.end = Some(Err(reason)),
+                Err(TryRecvError::Disconnected) => self.end = Some(Ok(())),
+                Err(TryRecvError::Empty) => return,
+            }
+        }
+    }
+}
+
+/// A stream with its input.
+struct Streamer<'a, 'b> {
+    stream: SetPointStream<'a>,
+    pace: StreamPace,
+    source: Source,
+    tracking: &'b mut Tracking,
+    period: Duration,
+}
+
+impl Streamer<'_, '_> {
+    /// Sends points until the input pauses; `false` at its end.
+    fn play(&mut self, interrupt: Interrupt) -> Result<bool, CommandError> {
+        let Some(start) = self.wait_for_points(interrupt)? else { return Ok(false) };
+        loop {
+            self.take_reports_until(self.pace.due(), interrupt)?;
+            self.source.poll();
+            let now = Instant::now();
+            let time = start + self.period.saturating_mul(self.pace.number_at(now));
+            let Some(point) = self.source.feed.take(time) else { return Ok(true) };
+            self.pace.take(now);
+            self.stream.send(&point)?;
+            self.tracking.add_point(now, &point);
+        }
+    }
+
+    /// Waits for a point, and makes it due now: returns its time in the stream. `None` at the end of the input.
+    fn wait_for_points(&mut self, interrupt: Interrupt) -> Result<Option<Duration>, CommandError> {
+        self.source.poll();
+        while self.source.feed.is_empty() {
+            if self.source.end.is_some() {
+                return Ok(None);
+            }
+            self.take_reports_until(Instant::now() + POLL_PERIOD, interrupt)?;
+            self.stream.keep_alive()?;
+            self.source.poll();
+        }
+        let now = Instant::now();
+        if self.pace.counts().points == 0 {
+            self.pace = StreamPace::new(now, self.period);
+        } else {
+            self.pace.restart(now);
+        }
+        Ok(Some(self.source.feed.resume_time(self.period)))
+    }
+
+    fn take_reports_until(&mut self, end: Instant, interrupt: Interrupt) -> Result<(), CommandError> {
+        loop {
+            interrupt.check()?;
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(());
+            }
+            if let Some(report) = self.stream.arm().next_report(left)?
+                && let Some(fine) = report.fine
+            {
+                self.tracking.add_measured(report.received, &fine.positions);
+            }
+        }
+    }
+
+    /// Waits until no set-point moves.
+    fn wait_until_still(&mut self, interrupt: Interrupt) -> Result<(), CommandError> {
+        let deadline = Instant::now() + ARRIVAL_TIMEOUT;
+        self.take_reports_until(Instant::now() + 2 * self.period, interrupt)?;
+        while Instant::now() < deadline {
+            // Each read is a sign of life.
+            let status = self.stream.arm().status()?;
+            if status.is_none_or(|status| status.moving() & !status.missing() == 0) {
+                break;
+            }
+            self.take_reports_until(Instant::now() + self.period, interrupt)?;
+        }
+        Ok(())
+    }
+}
