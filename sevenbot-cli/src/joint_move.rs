@@ -5,6 +5,7 @@
 
 use std::time::{Duration, Instant};
 
+use sevenbot::fine::FineTargets;
 use sevenbot::joints::{JointSnapshot, StepBaseError, frames_for};
 use sevenbot::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
 use sevenbot::register_text::{joints, motor_state_name};
@@ -13,6 +14,7 @@ use sevenbot::{Arm, Joint, MoveTime, Snapshot, Span, Speed};
 
 use crate::command_error::CommandError;
 use crate::interrupt::Interrupt;
+use crate::printer::note;
 use crate::progress::Progress;
 use crate::write_result::motors_obey;
 
@@ -74,6 +76,21 @@ impl JointMove {
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         motors_obey(arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets)))?;
         Ok(Self { targets, plan, start: Instant::now() })
+    }
+
+    /// As [`Self::begin`], in hundredths of a degree. An arm without the extended block takes the nearest whole degrees.
+    pub(crate) fn begin_fine(arm: &mut Arm, targets: FineTargets) -> Result<Self, CommandError> {
+        let whole = targets.map(|angle| angle.map(|angle| angle.nearest().degrees()));
+        if targets.iter().flatten().all(|angle| angle.is_whole()) {
+            return Self::begin(arm, whole);
+        }
+        if !arm.has_extended_block()? {
+            note("this arm takes whole degrees: each joint goes to the nearest one");
+            return Self::begin(arm, whole);
+        }
+        let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
+        motors_obey(arm.set_fine_targets_checked(&targets))?;
+        Ok(Self { targets: whole, plan, start: Instant::now() })
     }
 
     /// Waits until all joints have arrived. Returns their positions.

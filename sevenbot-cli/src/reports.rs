@@ -1,10 +1,16 @@
 //! Position reports during a task. Afterwards registers 53 and 189 have their old values again.
 
-use sevenbot::map::{FEEDBACK_FREQUENCY, REPORT_CONTENT};
+use sevenbot::map::{FEEDBACK_FREQUENCY, REPORT_CONTENT, report_content};
 use sevenbot::{Arm, Span};
 
 use crate::command_error::CommandError;
 use crate::write_result::all_taken;
+
+/// The most exact positions that this arm reports: a value of register 189.
+pub(crate) fn exact_positions(arm: &mut Arm) -> Result<u8, CommandError> {
+    let has_block = arm.has_extended_block()?;
+    Ok(if has_block { report_content::FINE_POSITIONS } else { report_content::POSITIONS })
+}
 
 /// Runs `work` while the arm reports `hz` times a second what `content` asks for: a value of register 189.
 pub(crate) fn with_reports<T>(

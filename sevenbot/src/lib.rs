@@ -44,6 +44,7 @@ pub mod open_port;
 mod pending;
 mod permission;
 pub mod playback;
+pub mod point_path;
 pub mod ports;
 pub mod recording;
 pub mod register_text;

@@ -7,6 +7,7 @@
 
 use std::time::Duration;
 
+use crate::fine_angle::FineAngle;
 use crate::recording::{Moment, Recording};
 use crate::units::{Angle, MoveTime, Speed};
 
@@ -89,6 +90,7 @@ pub fn steps(recording: &Recording, factor: f64) -> Vec<Step> {
 /// One step that moves an arm slowly to a pose. All joints arrive together.
 #[must_use]
 pub fn approach(from: [Angle; 7], to: Moment) -> Step {
+    let to = WholeMoment::from(to);
     let degrees = |joint| distance(&from, &to.pose, joint);
     let longest = (0..7).map(degrees).fold(0.0, f64::max);
     let duration = Duration::from_secs_f64(longest / APPROACH_DEGREES_PER_SECOND).max(MIN_APPROACH);
@@ -99,13 +101,27 @@ pub fn approach(from: [Angle; 7], to: Moment) -> Step {
     Step { time: Duration::ZERO, vacuum: to.vacuum, speeds, targets: to.pose }
 }
 
+/// A moment in whole degrees.
+#[derive(Clone, Copy, Debug)]
+struct WholeMoment {
+    time: Duration,
+    pose: [Angle; 7],
+    vacuum: bool,
+}
+
+impl From<Moment> for WholeMoment {
+    fn from(Moment { time, pose, vacuum }: Moment) -> Self {
+        Self { time, pose: pose.map(FineAngle::nearest), vacuum }
+    }
+}
+
 /// The moments with interpolated ones between them. Times start at 0 and are scaled by the factor.
-fn segments(recording: &Recording, factor: f64) -> Vec<Moment> {
-    let mut points: Vec<Moment> = Vec::new();
+fn segments(recording: &Recording, factor: f64) -> Vec<WholeMoment> {
+    let mut points: Vec<WholeMoment> = Vec::new();
     let mut start = None;
     for moment in recording.moments() {
         let time = (moment.time - *start.get_or_insert(moment.time)).div_f64(factor);
-        let to = Moment { time, ..moment };
+        let to = WholeMoment { time, ..moment.into() };
         if let Some(&from) = points.last() {
             points.extend(interpolated(from, to));
         }
@@ -115,7 +131,7 @@ fn segments(recording: &Recording, factor: f64) -> Vec<Moment> {
 }
 
 /// Evenly spaced moments between two, at most a segment apart.
-fn interpolated(from: Moment, to: Moment) -> impl Iterator<Item = Moment> {
+fn interpolated(from: WholeMoment, to: WholeMoment) -> impl Iterator<Item = WholeMoment> {
     let span = to.time - from.time;
     let count = span.as_millis().div_ceil(MAX_SEGMENT.as_millis());
     let count = if from.pose == to.pose { 1 } else { u32::try_from(count).unwrap_or(u32::MAX) };
@@ -125,7 +141,7 @@ fn interpolated(from: Moment, to: Moment) -> impl Iterator<Item = Moment> {
         for (angle, end) in pose.iter_mut().zip(to.pose) {
             *angle = interpolate(*angle, end, share);
         }
-        Moment { time: from.time + span.mul_f64(share), pose, vacuum: from.vacuum }
+        WholeMoment { time: from.time + span.mul_f64(share), pose, vacuum: from.vacuum }
     })
 }
 
@@ -155,7 +171,7 @@ fn distance(from: &[Angle; 7], to: &[Angle; 7], joint: usize) -> f64 {
 
 /// Points that the joints pass, in order of time.
 struct Waypoints<'a> {
-    points: &'a [Moment],
+    points: &'a [WholeMoment],
 }
 
 impl Waypoints<'_> {
@@ -240,7 +256,7 @@ mod tests {
         let step = approach(from, to);
         assert!((step.speeds[0].degrees_per_second() - 36.1).abs() < 1e-9, "60 degrees in 2 s, and haste");
         assert_eq!(step.speeds[1].steps(), 1, "nothing to do");
-        assert_eq!(step.targets, to.pose);
+        assert_eq!(step.targets, to.pose.map(FineAngle::nearest));
     }
 
     #[test]

@@ -2,8 +2,10 @@
 //!
 //! ```text
 //!   file ──▶ check ──▶ slow approach to the first pose ──▶ one frame per step ──▶ last pose
-//!                                                                  └── reports ──▶ plot
+//!                                                          or a stream     └── reports ──▶ plot
 //! ```
+//!
+//! An arm with the extended block gets a stream of points in hundredths of a degree, another one whole degrees with speeds.
 
 use std::fs;
 use std::io::{self, Write};
@@ -12,10 +14,13 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, value_parser};
 use serde::Serialize;
-use sevenbot::map::{SPEED, TIME, VACUUM_PUMP, report_content};
+use sevenbot::map::{SPEED, TIME, VACUUM_PUMP};
 use sevenbot::playback::{self, Step};
+use sevenbot::point_path::PointPath;
 use sevenbot::recording::{Moment, Recording};
-use sevenbot::{Angle, Arm, Snapshot, Span};
+use sevenbot::{Arm, FineAngle, Snapshot, Span};
+
+mod stream;
 
 use crate::command_error::CommandError;
 use crate::interrupt::{Interrupt, hold_on_interrupt};
@@ -23,7 +28,7 @@ use crate::joint_move::{JointMove, driven_joints};
 use crate::plot::{self, Track};
 use crate::printer::Printable;
 use crate::progress::Progress;
-use crate::reports::{reports_stopped, with_reports};
+use crate::reports::{exact_positions, reports_stopped, with_reports};
 use crate::session::Session;
 use crate::write_result::all_taken;
 
@@ -36,7 +41,10 @@ use crate::write_result::all_taken;
 Examples:
   sevenbot play wave.txt
   sevenbot play wave.txt --speed 0.5 --loop=3
-  sevenbot play wave.txt --plot wave.svg       plots targets and measured positions")]
+  sevenbot play wave.txt --plot wave.svg       plots targets and measured positions
+
+An arm with this project's firmware gets a point in hundredths of a degree each 20 ms, and its watchdog makes it
+hold if this program dies. Others get whole degrees and speeds each 50 ms.")]
 pub(crate) struct PlayArgs {
     /// A recording of `sevenbot record`, or one written by hand.
     file: PathBuf,
@@ -118,8 +126,9 @@ fn restore_pace(arm: &mut Arm, before: &Snapshot) -> Result<(), CommandError> {
 struct Player {
     moments: Vec<Moment>,
     steps: Vec<Step>,
+    path: PointPath,
     /// Positions during the first run, and their times since its start.
-    measured: Vec<(Duration, [Angle; 7])>,
+    measured: Vec<(Duration, [FineAngle; 7])>,
     /// When the last report arrived.
     last_report: Instant,
     played: u32,
@@ -130,13 +139,15 @@ impl Player {
     fn new(recording: &Recording, factor: f64) -> Self {
         let seconds = recording.duration().as_secs_f64() / factor;
         let (moments, steps) = (recording.moments().collect(), playback::steps(recording, factor));
-        Self { moments, steps, measured: Vec::new(), last_report: Instant::now(), played: 0, seconds }
+        let path = PointPath::new(recording, factor);
+        Self { moments, steps, path, measured: Vec::new(), last_report: Instant::now(), played: 0, seconds }
     }
 
     /// Plays this many times, and restores the speeds and times that the arm had before.
     fn play_and_restore(&mut self, arm: &mut Arm, times: u32) -> Result<(), CommandError> {
         let before = arm.read_span(Span::between(&SPEED, &TIME))?;
-        let done = with_reports(arm, FEEDBACK_HZ, report_content::POSITIONS, |arm| {
+        let content = exact_positions(arm)?;
+        let done = with_reports(arm, FEEDBACK_HZ, content, |arm| {
             hold_on_interrupt(arm, |arm, interrupt| self.play(arm, interrupt, times))
         });
         // Without a connection the speeds cannot be restored.
@@ -162,17 +173,21 @@ impl Player {
         let pace = step.registers();
         let pace = pace.get(..pace.len().saturating_sub(step.targets.len())).unwrap_or_default();
         all_taken(&arm.write_checked(VACUUM_PUMP.address, pace)?)?;
-        move_to(arm, interrupt, step.targets)
+        move_to(arm, interrupt, first.pose)
     }
 
-    /// Plays all steps once.
+    /// Plays the whole recording once.
     fn play_once(&mut self, arm: &mut Arm, interrupt: Interrupt) -> Result<(), CommandError> {
-        let steps = std::mem::take(&mut self.steps);
-        let done = self.send(&steps, arm, interrupt);
-        self.steps = steps;
-        done?;
-        let end = self.steps.last().map(|step| step.targets);
-        end.map_or(Ok(()), |targets| move_to(arm, interrupt, targets))
+        if arm.has_extended_block()? {
+            self.stream(arm, interrupt)?;
+        } else {
+            let steps = std::mem::take(&mut self.steps);
+            let done = self.send(&steps, arm, interrupt);
+            self.steps = steps;
+            done?;
+        }
+        let end = self.moments.last().map(|last| last.pose);
+        end.map_or(Ok(()), |pose| move_to(arm, interrupt, pose))
     }
 
     fn send(&mut self, steps: &[Step], arm: &mut Arm, interrupt: Interrupt) -> Result<(), CommandError> {
@@ -207,8 +222,7 @@ impl Player {
                 Some(report) => {
                     self.last_report = report.received;
                     if self.played == 0 {
-                        self.measured
-                            .push((report.received.saturating_duration_since(start), report.positions));
+                        self.measured.push((report.received.saturating_duration_since(start), report.pose()));
                     }
                 }
                 None if self.last_report.elapsed() > REPORT_TIMEOUT => return Err(silent(arm)),
@@ -223,12 +237,12 @@ impl Player {
         for moment in &self.moments {
             let seconds = (moment.time.saturating_sub(start)).as_secs_f64() / args.speed;
             for (track, angle) in tracks.iter_mut().zip(moment.pose) {
-                track.target.push((seconds, angle.degrees().into()));
+                track.target.push((seconds, angle.degrees()));
             }
         }
         for (time, pose) in &self.measured {
             for (track, angle) in tracks.iter_mut().zip(pose) {
-                track.measured.push((time.as_secs_f64(), angle.degrees().into()));
+                track.measured.push((time.as_secs_f64(), angle.degrees()));
             }
         }
         let name = args.file.file_name().unwrap_or_default().to_string_lossy();
@@ -237,8 +251,8 @@ impl Player {
     }
 }
 
-fn move_to(arm: &mut Arm, interrupt: Interrupt, targets: [Angle; 7]) -> Result<(), CommandError> {
-    let there = JointMove::begin(arm, targets.map(|angle| Some(angle.degrees())))?;
+fn move_to(arm: &mut Arm, interrupt: Interrupt, pose: [FineAngle; 7]) -> Result<(), CommandError> {
+    let there = JointMove::begin_fine(arm, pose.map(Some))?;
     there.finish(arm, interrupt).map(drop)
 }
 

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use clap::Args;
+use sevenbot::FineAngle;
 use sevenbot::cartesian::TipPose;
 use sevenbot::recording::{Moment, Recording};
 
@@ -44,21 +45,26 @@ fn way(recording: &Recording) -> Vec<WayPoint> {
     let moments: Vec<Moment> = recording.moments().collect();
     let pairs = moments.iter().zip(moments.iter().skip(1));
     let between = pairs.flat_map(|(from, to)| points_between(from, to));
-    let last =
-        moments.last().map(|moment| WayPoint { tip: TipPose::of(moment.pose).tip, vacuum: moment.vacuum });
+    let last = moments
+        .last()
+        .map(|moment| WayPoint { tip: TipPose::of_fine(moment.pose).tip, vacuum: moment.vacuum });
     between.chain(last).collect()
 }
 
 /// A point for each degree of the joint that turns most, without the end.
 fn points_between(from: &Moment, to: &Moment) -> impl Iterator<Item = WayPoint> {
-    let turns = from.pose.iter().zip(to.pose).map(|(from, to)| from.degrees().abs_diff(to.degrees()));
+    let turns = from
+        .pose
+        .iter()
+        .zip(to.pose)
+        .map(|(from, to)| from.nearest().degrees().abs_diff(to.nearest().degrees()));
     let steps = turns.max().unwrap_or_default().max(1);
     let ([t1, t2, t3, t4, t5, t6, _], end, vacuum) = (from.pose, to.pose, from.vacuum);
     (0..steps).map(move |step| {
         let share = f64::from(step) / f64::from(steps);
-        let mut angles = [t1, t2, t3, t4, t5, t6].map(|angle| f64::from(angle.degrees()));
+        let mut angles = [t1, t2, t3, t4, t5, t6].map(FineAngle::degrees);
         for (angle, end) in angles.iter_mut().zip(end) {
-            *angle += (f64::from(end.degrees()) - *angle) * share;
+            *angle += (end.degrees() - *angle) * share;
         }
         WayPoint { tip: TipPose::at(angles).tip, vacuum }
     })

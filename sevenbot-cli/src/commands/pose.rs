@@ -5,13 +5,14 @@ use std::str::FromStr;
 
 use clap::{ArgAction, Args, value_parser};
 use serde::Serialize;
+use sevenbot::fine::FineTargets;
 use sevenbot::joints::{JointSnapshot, frames_for};
 use sevenbot::map::{SPEED, TARGET_POSITION, TIME};
-use sevenbot::{Angle, Arm, Joint, Speed};
+use sevenbot::{Angle, Arm, FineAngle, Joint, Speed};
 
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
-use crate::joint_move::{JointMove, Targets, driven_joints, step_target};
+use crate::joint_move::{JointMove, driven_joints, step_target};
 use crate::printer::Printable;
 use crate::session::Session;
 use crate::write_result::all_taken;
@@ -24,13 +25,17 @@ Examples:
   sevenbot pose 120 90 65 90 90 90 80 --speed 30   at 57 degrees per second
   sevenbot pose +10 _ -5 _ _ _ _ --wait            joint 1 up, joint 3 down, the others as they are
   sevenbot pose 60 90 65 90 90 90 80 --time 20 --wait
+  sevenbot pose 90.25 _ _ _ _ _ +0.5               in hundredths of a degree
+
+Angles take up to two decimals. An arm without hundredths, such as one with the maker's firmware, goes to the
+nearest whole degrees, and a note says so.
 
 After Ctrl-C the arm holds its position.
 
 Exit status 1 if the arm did not take the pose, or with --wait did not reach it. If that is unknown, the
 message says that the arm may be moving.")]
 pub(crate) struct PoseArgs {
-    /// Joints 1 to 7: degrees from 0 to 180; +N or -N for a step from the present target; _ or . for no change.
+    /// Joints 1 to 7: degrees from 0 to 180, up to two decimals; +N or -N for a step from the present target; _ or . for no change.
     #[arg(value_names = ["A1", "A2", "A3", "A4", "A5", "A6", "A7"], num_args = 7, required = true,
           action = ArgAction::Set, allow_negative_numbers = true)]
     angles: Vec<PoseArg>,
@@ -64,8 +69,9 @@ struct PaceArgs {
 /// The argument for one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum PoseArg {
-    At(u8),
-    By(i16),
+    At(FineAngle),
+    /// Hundredths of a degree.
+    By(i32),
     Leave,
 }
 
@@ -73,29 +79,40 @@ impl FromStr for PoseArg {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || "use degrees from 0 to 180, +N or -N for a step, _ or . for no change".to_owned();
+        let wrong = || {
+            "use degrees from 0 to 180 with up to two decimals, +N or -N for a step, _ or . for no change"
+                .to_owned()
+        };
+        let angle = |text: &str| text.parse::<FineAngle>().map_err(|_| wrong());
         match text.as_bytes() {
             [b'_' | b'.'] => Ok(Self::Leave),
-            [b'+' | b'-', ..] => text.parse().map(Self::By).map_err(|_| wrong()),
-            _ => text
-                .parse()
-                .ok()
-                .and_then(Angle::from_degrees)
-                .map_or_else(|| Err(wrong()), |angle| Ok(Self::At(angle.degrees()))),
+            // No step is longer than the whole range.
+            [sign @ (b'+' | b'-'), ..] => {
+                let hundredths = i32::from(angle(text.get(1..).unwrap_or_default())?.hundredths());
+                Ok(Self::By(if *sign == b'-' { -hundredths } else { hundredths }))
+            }
+            _ => angle(text).map(Self::At),
         }
     }
 }
 
 impl PoseArg {
-    /// The target in degrees.
-    fn degrees(self, joint: Joint, joints: &JointSnapshot) -> Result<Option<u8>, CommandError> {
+    /// The target. A step starts from the target in `bases`.
+    fn target(
+        self,
+        joint: Joint,
+        joints: &JointSnapshot,
+        base: FineAngle,
+    ) -> Result<Option<FineAngle>, CommandError> {
         let Self::By(step) = self else {
-            return Ok(if let Self::At(degrees) = self { Some(degrees) } else { None });
+            return Ok(if let Self::At(angle) = self { Some(angle) } else { None });
         };
-        let degrees = step_target(joints, joint, step)?;
-        let angle = u8::try_from(degrees).ok().and_then(Angle::from_degrees);
-        angle.map(|angle| Some(angle.degrees())).ok_or_else(|| {
-            let number = joint.number();
+        // The whole degrees tell whether the target is a base for a step at all.
+        step_target(joints, joint, 0)?;
+        let hundredths = i32::from(base.hundredths()).saturating_add(step);
+        let angle = u16::try_from(hundredths).ok().and_then(FineAngle::from_hundredths);
+        angle.map(Some).ok_or_else(|| {
+            let (number, degrees) = (joint.number(), f64::from(hundredths) / 100.0);
             CommandError::Arm(format!(
                 "joint {number} would go to {degrees}°: it takes 0 to 180; nothing was moved"
             ))
@@ -108,31 +125,69 @@ pub(crate) fn run(session: &mut Session, args: &PoseArgs) -> Result<(), CommandE
 }
 
 pub(crate) fn home(session: &mut Session, args: &HomeArgs) -> Result<(), CommandError> {
-    move_to(session, &TARGET_POSITION.default_bytes().map(PoseArg::At), &args.pace)
+    move_to(
+        session,
+        &TARGET_POSITION.default_bytes().map(|degrees| PoseArg::At(Angle::from_register(degrees).into())),
+        &args.pace,
+    )
 }
 
 fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let reached = hold_on_interrupt(&mut arm, |arm, interrupt| {
-        let targets = targets(goals, &driven_joints(arm)?)?;
+        let targets = targets(goals, arm)?;
         set_speed_and_time(arm, &targets, pace)?;
         interrupt.check()?;
-        let begun = JointMove::begin(arm, targets)?;
-        pace.wait.then(|| begun.finish(arm, interrupt)).transpose()
+        let begun = JointMove::begin_fine(arm, targets)?;
+        let reached = pace.wait.then(|| begun.finish(arm, interrupt)).transpose()?;
+        reached.map(|whole| measured(arm, goals, whole)).transpose()
     })?;
-    reached.map_or(Ok(()), |positions_degrees| session.printer.print(&Positions { positions_degrees }))
+    match reached {
+        None => Ok(()),
+        Some(Reached::Degrees(positions_degrees)) => session.printer.print(&Positions { positions_degrees }),
+        Some(Reached::Hundredths(positions)) => session.printer.print(&positions),
+    }
 }
 
-fn targets(goals: &[PoseArg], joints: &JointSnapshot) -> Result<Targets, CommandError> {
+/// Measured positions, in the resolution of the arguments.
+enum Reached {
+    Degrees([u8; 7]),
+    Hundredths(FinePositions),
+}
+
+/// The positions in hundredths if an argument has a fraction, and the arm measures them.
+fn measured(arm: &mut Arm, goals: &[PoseArg], whole: [u8; 7]) -> Result<Reached, CommandError> {
+    let is_whole = goals.iter().all(|goal| match goal {
+        PoseArg::At(angle) => angle.is_whole(),
+        PoseArg::By(hundredths) => hundredths % 100 == 0,
+        PoseArg::Leave => true,
+    });
+    if is_whole || !arm.has_extended_block()? {
+        return Ok(Reached::Degrees(whole));
+    }
+    let mut positions_degrees = whole.map(f64::from);
+    for (degrees, angle) in positions_degrees.iter_mut().zip(arm.fine_state()?.positions) {
+        *degrees = angle.map_or(*degrees, FineAngle::degrees);
+    }
+    Ok(Reached::Hundredths(FinePositions { positions_degrees }))
+}
+
+fn targets(goals: &[PoseArg], arm: &mut Arm) -> Result<FineTargets, CommandError> {
+    let joints = driven_joints(arm)?;
+    let is_step = goals.iter().any(|goal| matches!(goal, PoseArg::By(_)));
+    let bases = match is_step && arm.has_extended_block()? {
+        true => arm.fine_targets()?,
+        false => joints.targets().map(|degrees| Angle::from_register(degrees).into()),
+    };
     let mut targets = [None; 7];
-    for ((target, goal), joint) in targets.iter_mut().zip(goals).zip(Joint::ALL) {
-        *target = goal.degrees(joint, joints)?;
+    for (((target, goal), joint), base) in targets.iter_mut().zip(goals).zip(Joint::ALL).zip(bases) {
+        *target = goal.target(joint, &joints, base)?;
     }
     Ok(targets)
 }
 
 /// Sets speed and duration of the joints with a target.
-fn set_speed_and_time(arm: &mut Arm, targets: &Targets, pace: &PaceArgs) -> Result<(), CommandError> {
+fn set_speed_and_time(arm: &mut Arm, targets: &FineTargets, pace: &PaceArgs) -> Result<(), CommandError> {
     let for_targets = |steps: u8| targets.map(|target| target.map(|_| steps));
     let speed = pace.speed.or(pace.time.map(|_| Speed::MAXIMUM.steps()));
     let speeds = speed.map(|steps| frames_for(&SPEED, &for_targets(steps)));
@@ -153,18 +208,32 @@ impl Printable for Positions {
     }
 }
 
+/// Positions of the joints, in hundredths of a degree.
+#[derive(Serialize)]
+struct FinePositions {
+    positions_degrees: [f64; 7],
+}
+
+impl Printable for FinePositions {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{}", self.positions_degrees.map(|degrees| format!("{degrees:.2}")).join(" "))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn pose_arguments_are_absolute_relative_or_empty() {
-        assert_eq!("120".parse(), Ok(PoseArg::At(120)));
-        assert_eq!("+10".parse(), Ok(PoseArg::By(10)));
-        assert_eq!("-10".parse(), Ok(PoseArg::By(-10)));
+        let at = |hundredths| FineAngle::from_hundredths(hundredths).map(PoseArg::At);
+        assert_eq!("120".parse().ok(), at(12_000));
+        assert_eq!("90.25".parse().ok(), at(9_025));
+        assert_eq!("+10".parse(), Ok(PoseArg::By(1_000)));
+        assert_eq!("-0.5".parse(), Ok(PoseArg::By(-50)));
         assert_eq!("_".parse(), Ok(PoseArg::Leave));
         assert_eq!(".".parse(), Ok(PoseArg::Leave));
-        for text in ["181", "", "+", "_5", "9.5", "--5"] {
+        for text in ["181", "", "+", "_5", "9.555", "--5", "+-5", "9.", "NaN"] {
             assert!(text.parse::<PoseArg>().is_err(), "{text}");
         }
     }

@@ -13,6 +13,7 @@ use kinematics::{NoSolution, ik6_all};
 
 use super::target::TipTarget;
 use super::{TipPose, Unreachable, Vector, angle_between};
+use crate::fine_angle::FineAngle;
 use crate::playback::MAX_SEGMENT;
 use crate::recording::{Moment, Recording};
 use crate::units::{Angle, Speed};
@@ -105,7 +106,7 @@ impl StraightLine {
 
     /// The targets, joint 1 first, each [`PERIOD`] or a little less after the one before.
     pub fn targets(&self) -> impl Iterator<Item = [Angle; 7]> {
-        self.recording.moments().map(|moment| moment.pose)
+        self.recording.moments().map(|moment| moment.pose.map(FineAngle::nearest))
     }
 }
 
@@ -284,7 +285,11 @@ fn recording(request: &StraightLineRequest, pace: &LineTiming, poses: &[WholePos
     let moments = (0..).zip(poses).map(|(period, pose): (u32, _)| {
         let [t1, t2, t3, t4, t5] = pose.degrees.map(Angle::from_register);
         let time = pace.duration.mul_f64(f64::from(period) / f64::from(pace.periods));
-        Moment { time, pose: [t1, t2, t3, t4, t5, sixth, seventh], vacuum: request.vacuum }
+        Moment {
+            time,
+            pose: [t1, t2, t3, t4, t5, sixth, seventh].map(FineAngle::from),
+            vacuum: request.vacuum,
+        }
     });
     Recording::from_moments(moments)
 }

@@ -17,6 +17,7 @@ use std::fmt;
 
 use kinematics::{Frames, forward};
 
+use crate::fine_angle::FineAngle;
 use crate::units::Angle;
 
 mod jog;
@@ -63,6 +64,12 @@ impl TipPose {
     #[must_use]
     pub fn of([t1, t2, t3, t4, t5, t6, _]: [Angle; 7]) -> Self {
         Self::at([t1, t2, t3, t4, t5, t6].map(|angle| f64::from(angle.degrees())))
+    }
+
+    /// From the joint angles in hundredths of a degree, joint 1 first.
+    #[must_use]
+    pub fn of_fine([t1, t2, t3, t4, t5, t6, _]: [FineAngle; 7]) -> Self {
+        Self::at([t1, t2, t3, t4, t5, t6].map(FineAngle::degrees))
     }
 
     /// From the angles of joints 1 to 6, in degrees.

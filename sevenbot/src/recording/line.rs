@@ -1,10 +1,11 @@
 //! One line of a recording: formatting and parsing of a moment.
 
-use std::fmt;
 use std::time::Duration;
 
 use protocol_core::registers::Joint;
 
+use super::version::FileVersion;
+use crate::fine_angle::FineAngle;
 use crate::units::{Angle, Speed};
 
 /// Time, seven angles, vacuum.
@@ -15,20 +16,22 @@ const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
 /// Pose and pump at one time.
 ///
 /// ```
-/// use sevenbot::Angle;
-/// use sevenbot::recording::Moment;
+/// use sevenbot::FineAngle;
+/// use sevenbot::recording::{FileVersion, Moment};
 /// use std::time::Duration;
 ///
-/// let pose = [Angle::from_register(90); 7];
+/// let pose = ["90.25".parse::<FineAngle>()?; 7];
 /// let moment = Moment { time: Duration::from_millis(1500), pose, vacuum: true };
-/// assert_eq!(moment.to_string(), "1.500  90  90  90  90  90  90  90   1");
+/// assert_eq!(moment.line(FileVersion::Degrees), "1.500  90  90  90  90  90  90  90   1");
+/// assert!(moment.line(FileVersion::Hundredths).starts_with("1.500  90.25  90.25"));
+/// # Ok::<(), sevenbot::fine_angle::NoAngle>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moment {
     /// Since the start of the recording.
     pub time: Duration,
     /// The angles, joint 1 first.
-    pub pose: [Angle; 7],
+    pub pose: [FineAngle; 7],
     /// Does the pump suck?
     pub vacuum: bool,
 }
@@ -60,6 +63,14 @@ pub enum LineError {
         /// The text of the field.
         text: String,
     },
+    /// The text is not an angle from 0 to 180 degrees with up to two decimals.
+    #[error("joint {} cannot go to `{text}`: degrees from 0 to 180, with up to two decimals", joint.number())]
+    FineAngle {
+        /// The joint of this field.
+        joint: Joint,
+        /// The text of the field.
+        text: String,
+    },
     /// The text is neither 0 nor 1.
     #[error("`{0}` is not a pump state: 1 sucks, 0 releases")]
     Vacuum(String),
@@ -80,19 +91,30 @@ pub enum LineError {
 // A speed is never NaN: it is a quotient of finite numbers.
 impl Eq for LineError {}
 
-/// Parses a line.
-pub(super) fn parse(line: &str) -> Result<Moment, LineError> {
+/// Parses a line of a file of this version.
+pub(super) fn parse(line: &str, version: FileVersion) -> Result<Moment, LineError> {
     let fields: Vec<&str> = line.split_whitespace().collect();
     let [time, pose @ .., vacuum] = fields.as_slice() else { return Err(LineError::Fields(fields.len())) };
     if fields.len() != FIELDS {
         return Err(LineError::Fields(fields.len()));
     }
-    let mut angles = [Angle::from_register(0); 7];
+    let mut angles = [FineAngle::from(Angle::from_register(0)); 7];
     for ((angle, text), joint) in angles.iter_mut().zip(pose).zip(Joint::ALL) {
-        let parsed = text.parse().ok().and_then(Angle::from_degrees);
-        *angle = parsed.ok_or_else(|| LineError::Angle { joint, text: (*text).to_owned() })?;
+        *angle = parse_angle(text, joint, version)?;
     }
     Ok(Moment { time: seconds(time)?, pose: angles, vacuum: suck(vacuum)? })
+}
+
+fn parse_angle(text: &str, joint: Joint, version: FileVersion) -> Result<FineAngle, LineError> {
+    match version {
+        FileVersion::Degrees => {
+            let angle = text.parse().ok().and_then(Angle::from_degrees).map(FineAngle::from);
+            angle.ok_or_else(|| LineError::Angle { joint, text: text.to_owned() })
+        }
+        FileVersion::Hundredths => {
+            text.parse().map_err(|_| LineError::FineAngle { joint, text: text.to_owned() })
+        }
+    }
 }
 
 fn seconds(text: &str) -> Result<Duration, LineError> {
@@ -108,12 +130,15 @@ fn suck(text: &str) -> Result<bool, LineError> {
     }
 }
 
-impl fmt::Display for Moment {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{:.3}", self.time.as_secs_f64())?;
-        for angle in self.pose {
-            write!(out, " {:3}", angle.degrees())?;
-        }
-        write!(out, "   {}", u8::from(self.vacuum))
+impl Moment {
+    /// The line of this moment in a file of this version.
+    #[must_use]
+    pub fn line(&self, version: FileVersion) -> String {
+        let angle = |angle: FineAngle| match version {
+            FileVersion::Degrees => format!(" {:3}", angle.nearest().degrees()),
+            FileVersion::Hundredths => format!(" {angle:6.2}"),
+        };
+        let angles = self.pose.map(angle).concat();
+        format!("{:.3}{angles}   {}", self.time.as_secs_f64(), u8::from(self.vacuum))
     }
 }

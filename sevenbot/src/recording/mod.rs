@@ -7,6 +7,8 @@
 //!   0.033   91  90  65  90  90  90  80   0
 //! ```
 //!
+//! Version 2 has angles with up to two decimals, for arms with the extended block; version 1 has whole degrees.
+//!
 //! The joints move evenly between two moments. So a movement written by hand needs a line only where its direction or
 //! speed changes.
 
@@ -17,13 +19,13 @@ use protocol_core::registers::Joint;
 use crate::units::Speed;
 
 mod line;
+mod version;
 
 pub use line::{LineError, Moment};
+pub use version::FileVersion;
 
 /// The first word of every recording.
 const FORMAT: &str = "7bot-recording";
-/// The version of the format, the second word.
-const VERSION: &str = "1";
 /// Rounding to whole degrees can add one degree to a distance.
 const ROUNDING_DEGREES: f64 = 1.0;
 
@@ -57,10 +59,10 @@ pub struct Recording {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RecordingError {
     /// The first line is not the header of a recording.
-    #[error("this is not a recording: it does not start with `{FORMAT} {VERSION}`")]
+    #[error("this is not a recording: it does not start with `{FORMAT} 1` or `{FORMAT} 2`")]
     NotARecording,
-    /// The version of the format is not 1.
-    #[error("the recording has version `{0}`; this program reads version {VERSION}")]
+    /// The version of the format is neither 1 nor 2.
+    #[error("the recording has version `{0}`; this program reads versions 1 and 2")]
     OtherVersion(String),
     /// There are no moments.
     #[error("the recording contains no movement")]
@@ -82,11 +84,11 @@ impl Recording {
     /// The first line that is refused.
     pub fn parse(text: &str) -> Result<Self, RecordingError> {
         let mut lines = (1..).zip(text.lines()).filter(|(_, line)| has_content(line));
-        header(lines.next().map(|(_, line)| line))?;
+        let version = header(lines.next().map(|(_, line)| line))?;
         let mut moments: Vec<(usize, Moment)> = Vec::new();
         for (number, line) in lines {
             let at_line = |cause| RecordingError::Line { number, cause };
-            let moment = line::parse(line).map_err(at_line)?;
+            let moment = line::parse(line, version).map_err(at_line)?;
             if moments.last().is_some_and(|(_, before)| moment.time <= before.time) {
                 return Err(at_line(LineError::NotLater));
             }
@@ -135,16 +137,15 @@ fn has_content(line: &str) -> bool {
     !line.is_empty() && !line.starts_with('#')
 }
 
-fn header(line: Option<&str>) -> Result<(), RecordingError> {
+fn header(line: Option<&str>) -> Result<FileVersion, RecordingError> {
     // Some editors write a byte order mark at the start.
     let mut words = line.unwrap_or_default().trim_start_matches('\u{feff}').split_whitespace();
-    match (words.next(), words.next(), words.next()) {
-        (Some(FORMAT), Some(VERSION), None) => Ok(()),
-        (Some(FORMAT), version, _) => {
-            Err(RecordingError::OtherVersion(version.unwrap_or_default().to_owned()))
-        }
-        _ => Err(RecordingError::NotARecording),
+    let (format, word, more) = (words.next(), words.next(), words.next());
+    if format != Some(FORMAT) {
+        return Err(RecordingError::NotARecording);
     }
+    let version = FileVersion::ALL.into_iter().find(|version| Some(version.word()) == word && more.is_none());
+    version.ok_or_else(|| RecordingError::OtherVersion(word.unwrap_or_default().to_owned()))
 }
 
 fn too_fast(from: &Moment, to: &Moment, factor: f64) -> Option<LineError> {
@@ -152,15 +153,15 @@ fn too_fast(from: &Moment, to: &Moment, factor: f64) -> Option<LineError> {
     let reach = Speed::MAXIMUM.degrees_per_second() * seconds + ROUNDING_DEGREES;
     let pairs = from.pose.iter().zip(&to.pose).zip(Joint::ALL);
     pairs
-        .map(|((from, to), joint)| (joint, f64::from(from.degrees().abs_diff(to.degrees()))))
+        .map(|((from, to), joint)| (joint, (from.degrees() - to.degrees()).abs()))
         .find(|&(_, degrees)| degrees > reach)
         .map(|(joint, degrees)| LineError::TooFast { joint, degrees_per_second: degrees / seconds })
 }
 
-/// The lines at the start of every recording. A line for each moment follows ([`Moment`] implements `Display`).
+/// The lines at the start of every recording. A line for each moment follows ([`Moment::line`]).
 #[must_use]
-pub fn head() -> String {
-    format!("{FORMAT} {VERSION}\n# seconds  joints 1 to 7 in degrees  vacuum (1: suck)\n")
+pub fn head(version: FileVersion) -> String {
+    format!("{FORMAT} {}\n# seconds  joints 1 to 7 in degrees  vacuum (1: suck)\n", version.word())
 }
 
 #[cfg(test)]
@@ -177,8 +178,8 @@ mod tests {
     #[test]
     fn a_formatted_recording_parses_to_the_same() {
         let recording = Recording::parse(WAVE).expect("a recording");
-        let lines = recording.moments().map(|moment| format!("{moment}\n"));
-        let text: String = std::iter::once(head()).chain(lines).collect();
+        let lines = recording.moments().map(|moment| moment.line(FileVersion::Degrees) + "\n");
+        let text: String = std::iter::once(head(FileVersion::Degrees)).chain(lines).collect();
         assert!(text.ends_with("1.500 120  90  65  90  90  90  80   1\n"), "{text}");
         let again = Recording::parse(&text).expect("a recording");
         assert!(again.moments().eq(recording.moments()));
@@ -195,7 +196,7 @@ mod tests {
     fn errors_name_their_line() {
         assert!(refused("").contains("not a recording"));
         assert!(refused("seconds,joint\n").contains("not a recording"));
-        assert!(refused("7bot-recording 2\n").contains("version `2`"));
+        assert!(refused("7bot-recording 3\n").contains("version `3`"));
         assert!(refused("# no\n7bot-recording 1\n").contains("no movement"));
         let line = |line: &str| refused(&format!("{WAVE}{line}\n"));
         assert_eq!(line("2 90 90"), "line 6: 3 fields instead of 9: seconds, seven angles, vacuum");
@@ -222,5 +223,24 @@ mod tests {
         // 372 °/s at 30 Hz is 12.4 degrees a line: 12 or 13 when rounded.
         let text = "7bot-recording 1\n0 10 0 0 0 0 0 0 0\n0.033 23 0 0 0 0 0 0 0\n";
         assert_eq!(Recording::parse(text).expect("a recording").check_speeds(1.0), Ok(()));
+    }
+
+    #[test]
+    fn version_2_has_hundredths_of_a_degree() {
+        let text = "7bot-recording 2\n0 90.25 90 65.5 90 90 90 80 0\n1.5 120.01 90 65 90 90 90 180.00 1\n";
+        let recording = Recording::parse(text).expect("a recording");
+        let lines = recording.moments().map(|moment| moment.line(FileVersion::Hundredths) + "\n");
+        let written: String = std::iter::once(head(FileVersion::Hundredths)).chain(lines).collect();
+        assert!(
+            written.contains("\n0.000  90.25  90.00  65.50  90.00  90.00  90.00  80.00   0\n"),
+            "{written}"
+        );
+        let again = Recording::parse(&written).expect("a recording");
+        assert!(again.moments().eq(recording.moments()));
+        let refused = refused("7bot-recording 2\n0 90.255 90 65 90 90 90 80 0\n");
+        assert_eq!(
+            refused,
+            "line 2: joint 1 cannot go to `90.255`: degrees from 0 to 180, with up to two decimals"
+        );
     }
 }

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, value_parser};
 use serde::Serialize;
 use sevenbot::map::{FEEDBACK_FREQUENCY, MOTOR_STATE, VACUUM_PUMP, motor_state, report_content};
-use sevenbot::recording::{self, Moment};
+use sevenbot::recording::{self, FileVersion, Moment};
 use sevenbot::{Arm, Span};
 
 use self::report_clock::ReportClock;
@@ -28,7 +28,7 @@ use crate::interrupt::{Interrupt, hold, report_hold};
 use crate::joint_move::driven_joints;
 use crate::line_file::LineFile;
 use crate::printer::{Printable, note};
-use crate::reports::{reports_stopped, with_reports};
+use crate::reports::{exact_positions, reports_stopped, with_reports};
 use crate::session::Session;
 use crate::write_result::motors_obey;
 
@@ -44,8 +44,8 @@ Examples:
   sevenbot pose 150 60 90 90 90 90 80 --speed 10
   sevenbot record move.txt --driven --seconds 5    records a move
 
-The file is text, one line per moment: seconds, seven angles in degrees, vacuum. `sevenbot play` plays it,
-and also a file written by hand.")]
+The file is text, one line per moment: seconds, seven angles in degrees, vacuum. Angles have two decimals if
+the arm measures them. `sevenbot play` plays it, and also a file written by hand.")]
 pub(crate) struct RecordArgs {
     /// The file for the recording.
     file: PathBuf,
@@ -93,12 +93,15 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     } else {
         confirm("The motors go off, and the arm falls unless you hold it. Go on?", args.yes)?;
     }
-    let mut recording = RecordingFile::create(&args.file)?;
+    let content = exact_positions(&mut arm)?;
+    let version = match content {
+        report_content::POSITIONS => FileVersion::Degrees,
+        _ => FileVersion::Hundredths,
+    };
+    let mut recording = RecordingFile::create(&args.file, version)?;
     Interrupt::catch();
     let done = set_motors(&mut arm, args).and_then(|()| {
-        with_reports(&mut arm, args.hz, report_content::POSITIONS, |arm| {
-            record_reports(arm, args, &mut recording)
-        })
+        with_reports(&mut arm, args.hz, content, |arm| record_reports(arm, args, content, &mut recording))
     });
     // Without a connection the arm cannot be made to hold.
     let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
@@ -136,11 +139,12 @@ fn hold_at_end(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
 fn record_reports(
     arm: &mut Arm,
     args: &RecordArgs,
+    content: u8,
     recording: &mut RecordingFile,
 ) -> Result<(), CommandError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut pendant = TeachPendant::new(arm.targets()?, vacuum, args.driven);
-    let mut clock = ReportClock::new(arm.report_period(args.hz, report_content::POSITIONS));
+    let mut clock = ReportClock::new(arm.report_period(args.hz, content));
     let limit = args.seconds.map(|seconds| Duration::from_secs(seconds.into()));
     let mut last_report = Instant::now();
     while !Interrupt::is_requested() && !pendant.poll_keys(arm)? {
@@ -150,7 +154,7 @@ fn record_reports(
             if limit.is_some_and(|limit| time > limit) {
                 break;
             }
-            recording.add(&Moment { time, pose: report.positions, vacuum: pendant.vacuum() })?;
+            recording.add(&Moment { time, pose: report.pose(), vacuum: pendant.vacuum() })?;
             pendant.show(recording.moments, time);
         } else if last_report.elapsed() > REPORT_TIMEOUT {
             return Err(silent(arm));
@@ -170,19 +174,20 @@ fn silent(arm: &mut Arm) -> CommandError {
 /// The file, and the length of the recording so far.
 struct RecordingFile {
     file: LineFile,
+    version: FileVersion,
     moments: u64,
     seconds: f64,
 }
 
 impl RecordingFile {
-    fn create(path: &Path) -> Result<Self, CommandError> {
+    fn create(path: &Path, version: FileVersion) -> Result<Self, CommandError> {
         let mut file = LineFile::create(path)?;
-        file.add(&recording::head())?;
-        Ok(Self { file, moments: 0, seconds: 0.0 })
+        file.add(&recording::head(version))?;
+        Ok(Self { file, version, moments: 0, seconds: 0.0 })
     }
 
     fn add(&mut self, moment: &Moment) -> Result<(), CommandError> {
-        self.file.add(&format!("{moment}\n"))?;
+        self.file.add(&(moment.line(self.version) + "\n"))?;
         self.moments += 1;
         self.seconds = moment.time.as_secs_f64();
         Ok(())

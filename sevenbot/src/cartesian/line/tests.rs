@@ -36,7 +36,7 @@ fn a_line_over_the_table_stays_on_it_but_for_whole_degrees() {
     }
     assert!((worst - line.deviation_mm).abs() < 0.5, "{worst}");
     let last = line.recording.moments().last().expect("an end");
-    assert!((TipPose::of(last.pose).tip - end).length() < 1.5 && last.vacuum);
+    assert!((TipPose::of_fine(last.pose).tip - end).length() < 1.5 && last.vacuum);
     let times: Vec<_> = line.recording.moments().map(|moment| moment.time).collect();
     assert!(times.windows(2).all(|pair| pair[1] > pair[0] && pair[1] - pair[0] <= PERIOD));
 }
