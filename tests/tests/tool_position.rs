@@ -97,7 +97,7 @@ fn ctrl_c_holds_an_arm_on_its_way_to_a_point() {
         arm.drive_to(&STANDARD_POSE);
         arm.write(SPEED, &[3; 7]);
         let begin = Instant::now();
-        let tool = start_to_move(arm, &["move-to", "200", "100", "60", "--wait"], "-> write target-position");
+        let tool = start_to_move(arm, &["move-to", "200", "100", "60", "--wait"], "-> write fine-target");
         sleep(Duration::from_millis(500));
         send_signal(&tool, Signal::INT);
         let output = tool.wait_with_output().expect("the tool ends");
@@ -120,7 +120,7 @@ fn the_tip_goes_straight_and_the_speeds_are_restored() {
         arm.write(VACUUM_PUMP, &[1]);
         let line = ["move-to", "60", "200", "50", "--straight", "--speed", "60"];
         let text = succeeded(arm.sevenbot(&[&line[..], &["--dry-run"]].concat()));
-        assert!(text.contains("one each 50 ms") && text.contains("mm from the line"), "{text}");
+        assert!(text.contains("one each 20 ms") && text.contains("take the tip up to 0.0"), "{text}");
         assert_eq!(arm.read(TARGET_POSITION, 1), [105], "a dry run moves nothing");
         let text = succeeded(arm.sevenbot(&line));
         assert!(distance(&numbers(&text, "reached")[..3], [60.0, 200.0, 50.0]) < 20.0, "{text}");

@@ -1,9 +1,9 @@
-//! Plans a straight line of the tip, checks all of it, and rounds it to whole degrees for playback.
+//! Plans a straight line of the tip, checks all of it, and rounds it to what the arm takes.
 //!
 //! ```text
 //!   start, end, speed ──▶ TipPath: tip and tool at any fraction of the line
 //!       each 5 ms, at most 0.5 mm ──▶ angles of the same branch ──▶ reach, jumps and speeds checked
-//!       each 50 ms ──▶ whole degrees ──▶ Moment, and its distance from the line
+//!       each period ──▶ whole degrees, or hundredths ──▶ Moment, and its distance from the line
 //! ```
 
 use std::time::Duration;
@@ -24,8 +24,26 @@ mod path;
 pub use fault::{StraightLineError, StraightLineFault};
 use path::TipPath;
 
-/// Time between two targets.
-pub const PERIOD: Duration = MAX_SEGMENT;
+/// The resolution of the targets, and with it the time between them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TargetResolution {
+    /// Whole degrees, for playback with speeds.
+    Degrees,
+    /// Hundredths of a degree, for a stream.
+    Hundredths,
+}
+
+impl TargetResolution {
+    /// Time between two targets.
+    #[must_use]
+    pub const fn period(self) -> Duration {
+        match self {
+            Self::Degrees => MAX_SEGMENT,
+            Self::Hundredths => Duration::from_millis(20),
+        }
+    }
+}
+
 /// The largest turning speed of the tool, in degrees/s.
 const TURN_SPEED: f64 = 60.0;
 /// The smallest number of checks in a period.
@@ -51,19 +69,21 @@ pub struct StraightLine {
     pub duration: Duration,
     /// The movement of the joints.
     pub recording: Recording,
-    /// The largest distance of the tip from the line that whole degrees cause, in millimetres.
+    /// The largest distance of the tip from the line that rounded angles cause, in millimetres.
     pub deviation_mm: f64,
-    /// The largest tilt of the tool that whole degrees cause, in degrees.
+    /// The largest tilt of the tool that rounded angles cause, in degrees.
     pub tilt_degrees: f64,
     /// The angle to which joint 4 turns before the line starts, without moving tip or tool. `None` if it stays.
-    pub first_turn: Option<Angle>,
+    pub first_turn: Option<FineAngle>,
 }
 
 /// The request for a line.
 #[derive(Clone, Copy, Debug)]
 pub struct StraightLineRequest {
     /// The targets of the arm at rest, joint 1 first.
-    pub start: [Angle; 7],
+    pub start: [FineAngle; 7],
+    /// The resolution of the targets on the way.
+    pub resolution: TargetResolution,
     /// Does the pump suck?
     pub vacuum: bool,
     /// The end of the line, in millimetres.
@@ -80,7 +100,7 @@ impl StraightLine {
     /// # Errors
     /// The point where the arm cannot follow the line, and the reason.
     pub fn plan(request: &StraightLineRequest) -> Result<Self, StraightLineError> {
-        let start = TipPose::of(request.start);
+        let start = TipPose::of_fine(request.start);
         let end = request.tool.unit().ok_or_else(|| {
             StraightLineError::at_start(NoSolution::NoToolDirection, request.tip, request.tool)
         })?;
@@ -88,11 +108,11 @@ impl StraightLine {
             return Err(StraightLineError::at_start(NoSolution::NotFinite, request.tip, request.tool));
         }
         let path = TipPath::new(start, request.tip, end);
-        let pace = LineTiming::of(&path, request.speed);
+        let pace = LineTiming::of(&path, request.speed, request.resolution);
         let angles = start_angles(request, &path, &pace);
         let poses = pace.follow(&path, angles, request.speed)?;
         let last = request.start.get(3).copied();
-        let turned = poses.first().and_then(|pose| Angle::from_degrees(pose.degrees[3]));
+        let turned = poses.first().map(|pose| pose.angles[3]);
         Ok(Self {
             start,
             length_mm: path.length,
@@ -104,15 +124,16 @@ impl StraightLine {
         })
     }
 
-    /// The targets, joint 1 first, each [`PERIOD`] or a little less after the one before.
-    pub fn targets(&self) -> impl Iterator<Item = [Angle; 7]> {
-        self.recording.moments().map(|moment| moment.pose.map(FineAngle::nearest))
+    /// The targets, joint 1 first, each a period of the resolution or a little less after the one before.
+    pub fn targets(&self) -> impl Iterator<Item = [FineAngle; 7]> {
+        self.recording.moments().map(|moment| moment.pose)
     }
 }
 
 /// The division of a line in time.
 struct LineTiming {
     duration: Duration,
+    resolution: TargetResolution,
     /// Targets after the first.
     periods: u32,
     /// Checks in a period.
@@ -125,12 +146,13 @@ impl LineTiming {
         clippy::cast_sign_loss,
         reason = "saturates, and is not negative"
     )]
-    fn of(path: &TipPath, speed: f64) -> Self {
+    fn of(path: &TipPath, speed: f64, resolution: TargetResolution) -> Self {
+        let period = resolution.period();
         let seconds = (path.length / speed).max(path.turn_degrees / TURN_SPEED);
-        let periods = (seconds / PERIOD.as_secs_f64()).ceil().max(1.0);
+        let periods = (seconds / period.as_secs_f64()).ceil().max(1.0);
         let checks = (path.length / periods / CHECK_EVERY).ceil().max(LEAST_CHECKS);
-        let duration = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX).max(PERIOD);
-        Self { duration, periods: periods as u32, checks: checks as u32 }
+        let duration = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX).max(period);
+        Self { duration, resolution, periods: periods as u32, checks: checks as u32 }
     }
 
     /// The fraction of the line at a check, 0 to 1.
@@ -144,10 +166,15 @@ impl LineTiming {
     }
 
     /// Checks the whole path. Returns a pose for each period.
-    fn follow(&self, path: &TipPath, start: Angles, speed: f64) -> Result<Vec<WholePose>, StraightLineError> {
+    fn follow(
+        &self,
+        path: &TipPath,
+        start: Angles,
+        speed: f64,
+    ) -> Result<Vec<PlannedPose>, StraightLineError> {
         let mut angles = start;
         let mut fastest = JointTurn::default();
-        let mut poses = vec![WholePose::of(nearest_degrees(start, path, 0.0), path, 0.0)];
+        let mut poses = vec![self.pose(start, path, 0.0)];
         let end = self.periods.saturating_mul(self.checks);
         for check in 1..=end {
             let share = self.share(check);
@@ -163,13 +190,22 @@ impl LineTiming {
             }
             fastest = if turn.degrees > fastest.degrees { turn } else { fastest };
             angles = next;
-            if check == end {
-                poses.push(WholePose::of(best_degrees(angles, path, share), path, share));
-            } else if check % self.checks == 0 {
-                poses.push(WholePose::of(nearest_degrees(angles, path, share), path, share));
+            if check == end && self.resolution == TargetResolution::Degrees {
+                poses.push(PlannedPose::of(best_degrees(angles, path, share), path, share));
+            } else if check == end || check % self.checks == 0 {
+                poses.push(self.pose(angles, path, share));
             }
         }
         self.check_speed(path, fastest, speed).map(|()| poses)
+    }
+
+    /// The targets for exact angles, in the resolution of the line.
+    fn pose(&self, angles: Angles, path: &TipPath, share: f64) -> PlannedPose {
+        let targets = match self.resolution {
+            TargetResolution::Degrees => nearest_degrees(angles, path, share),
+            TargetResolution::Hundredths => nearest_hundredths(angles, path, share),
+        };
+        PlannedPose::of(targets, path, share)
     }
 
     /// Checks the speed of the joint that turns fastest.
@@ -204,19 +240,19 @@ impl JointTurn {
     }
 }
 
-/// A pose in whole degrees, and its distance from the line.
-struct WholePose {
-    degrees: [u8; 5],
+/// The targets of joints 1 to 5, and their distance from the line.
+struct PlannedPose {
+    angles: [FineAngle; 5],
     deviation_mm: f64,
     tilt_degrees: f64,
 }
 
-impl WholePose {
-    fn of(degrees: [u8; 5], path: &TipPath, share: f64) -> Self {
-        let [t1, t2, t3, t4, t5] = degrees.map(f64::from);
+impl PlannedPose {
+    fn of(angles: [FineAngle; 5], path: &TipPath, share: f64) -> Self {
+        let [t1, t2, t3, t4, t5] = angles.map(FineAngle::degrees);
         let TipPose { tip, tool, .. } = TipPose::at([t1, t2, t3, t4, t5, 90.0]);
         let tilt_degrees = angle_between(tool, path.at(share).1);
-        Self { degrees, deviation_mm: path.distance(tip), tilt_degrees }
+        Self { angles, deviation_mm: path.distance(tip), tilt_degrees }
     }
 }
 
@@ -254,9 +290,9 @@ fn solved(path: &TipPath, share: f64, before: Angles) -> Result<Angles, Straight
 /// The angles at the start of the line. If the tool is in line with the forearm, joint 4 first turns to where the
 /// line needs it next.
 fn start_angles(request: &StraightLineRequest, path: &TipPath, pace: &LineTiming) -> Angles {
-    let [t1, t2, t3, t4, t5, ..] = request.start.map(|angle| f64::from(angle.degrees()));
+    let [t1, t2, t3, t4, t5, ..] = request.start.map(FineAngle::degrees);
     let angles = [t1, t2, t3, t4, t5];
-    if t5 != IN_LINE {
+    if (t5 - IN_LINE).abs() > f64::EPSILON {
         return angles;
     }
     let next = solved(path, pace.share(1), angles);
@@ -264,26 +300,37 @@ fn start_angles(request: &StraightLineRequest, path: &TipPath, pace: &LineTiming
 }
 
 /// The nearest whole degrees within the limits of the arm.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 180 degrees")]
-fn nearest_degrees(angles: Angles, path: &TipPath, share: f64) -> [u8; 5] {
+fn nearest_degrees(angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
     let whole = angles.map(f64::round);
     let [t1, t2, t3, t4, t5] = whole;
     if check_arm([t1, t2, t3, t4, t5, 90.0]).is_ok() {
-        return whole.map(|degrees| degrees as u8);
+        return whole.map(in_range);
     }
     best_degrees(angles, path, share)
 }
 
-/// The whole degrees within the limits that are nearest to the path.
-fn best_degrees(angles: Angles, path: &TipPath, share: f64) -> [u8; 5] {
-    let (tip, tool) = path.at(share);
-    TipTarget::near(angles, tip, tool).degrees
+/// The nearest hundredths; whole degrees where those would break a limit of the arm.
+fn nearest_hundredths(angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
+    let fine = angles.map(in_range);
+    let [t1, t2, t3, t4, t5] = fine.map(FineAngle::degrees);
+    if check_arm([t1, t2, t3, t4, t5, 90.0]).is_ok() { fine } else { best_degrees(angles, path, share) }
 }
 
-fn recording(request: &StraightLineRequest, pace: &LineTiming, poses: &[WholePose]) -> Recording {
+/// The whole degrees within the limits that are nearest to the path.
+fn best_degrees(angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
+    let (tip, tool) = path.at(share);
+    TipTarget::near(angles, tip, tool).degrees.map(|degrees| Angle::from_register(degrees).into())
+}
+
+/// The nearest hundredth from 0 to 180 degrees.
+fn in_range(degrees: f64) -> FineAngle {
+    FineAngle::from_degrees(degrees.clamp(0.0, 180.0)).unwrap_or(Angle::from_register(0).into())
+}
+
+fn recording(request: &StraightLineRequest, pace: &LineTiming, poses: &[PlannedPose]) -> Recording {
     let [.., sixth, seventh] = request.start;
     let moments = (0..).zip(poses).map(|(period, pose): (u32, _)| {
-        let [t1, t2, t3, t4, t5] = pose.degrees.map(Angle::from_register);
+        let [t1, t2, t3, t4, t5] = pose.angles;
         let time = pace.duration.mul_f64(f64::from(period) / f64::from(pace.periods));
         Moment {
             time,

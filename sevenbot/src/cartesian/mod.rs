@@ -27,8 +27,8 @@ mod target;
 
 pub use jog::{Jog, JogAxes};
 pub use kinematics::NoSolution;
-pub use line::{PERIOD, StraightLine, StraightLineError, StraightLineFault, StraightLineRequest};
-pub use target::{TipTarget, Unreachable};
+pub use line::{StraightLine, StraightLineError, StraightLineFault, StraightLineRequest, TargetResolution};
+pub use target::{FineTipTarget, TipTarget, Unreachable};
 
 /// A point in millimetres, or a direction.
 pub type Vector = kinematics::Vector<f64>;

@@ -7,6 +7,8 @@ use kinematics::{NoSolution, ik6};
 
 use super::nearest::nearest;
 use super::{DirectionText, PointText, TipPose, Vector, angle_between};
+use crate::fine_angle::FineAngle;
+use crate::units::Angle;
 
 /// Radius in millimetres that converts a tilt of the tool to a distance: the edge of the disc.
 const TILT_RADIUS: f64 = kinematics::geometry::DISC_RADIUS;
@@ -28,6 +30,19 @@ pub struct TipTarget {
     /// Angles in whole degrees that the registers can hold and the arm can take.
     pub degrees: [u8; 5],
     /// The pose of the tip at these degrees.
+    pub reached: TipPose,
+    /// The distance to the requested position, in millimetres.
+    pub miss_mm: f64,
+    /// The angle to the requested direction of the tool, in degrees.
+    pub tilt_degrees: f64,
+}
+
+/// Targets of joints 1 to 5 in hundredths of a degree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FineTipTarget {
+    /// The angles of joints 1 to 5.
+    pub angles: [FineAngle; 5],
+    /// The pose of the tip at these angles.
     pub reached: TipPose,
     /// The distance to the requested position, in millimetres.
     pub miss_mm: f64,
@@ -66,6 +81,22 @@ impl TipTarget {
             miss_mm: (reached.tip - tip).length(),
             tilt_degrees: angle_between(reached.tool, tool),
         }
+    }
+
+    /// The targets in hundredths of a degree, with the tip and the misses there. `None` if rounding breaks a limit of the
+    /// arm: then only the whole degrees are legal.
+    #[must_use]
+    pub fn in_hundredths(&self, tip: Vector, tool: Vector) -> Option<FineTipTarget> {
+        let mut angles = [FineAngle::from(Angle::from_register(0)); 5];
+        for (angle, degrees) in angles.iter_mut().zip(self.angles) {
+            *angle = FineAngle::from_degrees(degrees)?;
+        }
+        let [t1, t2, t3, t4, t5] = angles.map(FineAngle::degrees);
+        let pose = [t1, t2, t3, t4, t5, 90.0];
+        check_arm(pose).ok()?;
+        let reached = TipPose::at(pose);
+        let tilt_degrees = angle_between(reached.tool, tool.unit().unwrap_or(tool));
+        Some(FineTipTarget { angles, reached, miss_mm: (reached.tip - tip).length(), tilt_degrees })
     }
 
     fn pose(&self) -> [f64; 6] {
@@ -181,6 +212,9 @@ mod tests {
         assert!(target.angles.iter().zip(exact).all(|(angle, exact)| (angle - exact).abs() < 0.001));
         assert_eq!(target.degrees, [105, 88, 110, 90, 135]);
         assert!(target.miss_mm < 1.0 && target.tilt_degrees < 1.0, "{target:?}");
+        let fine = target.in_hundredths(v(-50.0, 185.0, 50.0), DOWN).expect("within the limits");
+        assert_eq!(fine.angles[0].hundredths(), 10_512);
+        assert!(fine.miss_mm < 0.05 && fine.tilt_degrees < 0.02, "{fine:?}");
     }
 
     #[test]

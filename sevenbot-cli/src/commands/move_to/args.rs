@@ -24,13 +24,15 @@ Positions are millimetres from the point where the axis of the base meets the to
 forward, z up. The tip is the middle of the disc that joint 6 turns; add the length of a suction cup or claw.
 `sevenbot where` shows where the tip is.
 
-The arm takes whole degrees, so the tip misses the point by about a millimetre; the miss is shown. The joints
+With this project's firmware the joints go to hundredths of a degree, and the tip misses the point by less than
+0.1 mm. Other arms take whole degrees, and it misses by about a millimetre. The miss is shown. The joints
 move at their speeds (`sevenbot get speed`), and without --straight the tip takes no straight way. Joints 6
 and 7 keep their angles.
 
 With --straight the whole line is checked before anything moves: reach, limits, singular positions and the
 speed of each joint. It begins where the joints are sent now. The tool turns evenly on the way. The arm gets
-a target each 50 ms; the largest distance from the line that whole degrees cause is shown.
+a target in hundredths of a degree each 20 ms, others one in whole degrees each 50 ms. The largest distance from
+the line that the rounding causes is shown.
 
 Ctrl-C leaves the arm holding where it is.
 

@@ -3,10 +3,11 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use sevenbot::Angle;
-use sevenbot::cartesian::{DirectionText, PointText, TipPose, TipTarget, Vector};
+use sevenbot::cartesian::{DirectionText, FineTipTarget, PointText, TipPose, TipTarget, Vector};
+use sevenbot::{Angle, Arm, FineAngle};
 
 use super::super::position::components;
+use crate::command_error::CommandError;
 use crate::printer::Printable;
 
 /// A move to a point: the plan, and with --wait the measured result.
@@ -16,7 +17,7 @@ pub(super) struct TipMove {
     /// The direction of the tool.
     tool: [f64; 3],
     /// Joints 1 to 5.
-    targets_degrees: [u8; 5],
+    targets_degrees: TargetDegrees,
     planned_mm: [f64; 3],
     planned_miss_mm: f64,
     planned_tilt_degrees: f64,
@@ -26,10 +27,35 @@ pub(super) struct TipMove {
     direction: Vector,
 }
 
+/// Angles of joints 1 to 5, as the arm takes them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+enum TargetDegrees {
+    Whole([u8; 5]),
+    Hundredths([f64; 5]),
+}
+
+impl TargetDegrees {
+    fn texts(self) -> [String; 5] {
+        match self {
+            Self::Whole(degrees) => degrees.map(|degrees| degrees.to_string()),
+            Self::Hundredths(degrees) => degrees.map(|degrees| format!("{degrees:.2}")),
+        }
+    }
+
+    /// What the targets are rounded to, and the decimals of a miss.
+    const fn rounding(self) -> (&'static str, usize) {
+        match self {
+            Self::Whole(_) => ("whole degrees miss", 1),
+            Self::Hundredths(_) => ("hundredths of a degree miss", 2),
+        }
+    }
+}
+
 /// The arm at the end of a move.
 #[derive(Debug, Serialize)]
 pub(super) struct MeasuredTip {
-    positions_degrees: [u8; 7],
+    positions_degrees: PositionDegrees,
     tip_mm: [f64; 3],
     miss_mm: f64,
 }
@@ -40,7 +66,7 @@ impl TipMove {
         Self {
             asked_mm: components(tip, 100.0),
             tool: components(direction, 10_000.0),
-            targets_degrees: target.degrees,
+            targets_degrees: TargetDegrees::Whole(target.degrees),
             planned_mm: components(target.reached.tip, 100.0),
             planned_miss_mm: rounded(target.miss_mm),
             planned_tilt_degrees: rounded(target.tilt_degrees),
@@ -49,18 +75,66 @@ impl TipMove {
         }
     }
 
+    /// With targets in hundredths of a degree.
+    pub(super) fn in_hundredths(self, target: &FineTipTarget) -> Self {
+        Self {
+            targets_degrees: TargetDegrees::Hundredths(target.angles.map(FineAngle::degrees)),
+            planned_mm: components(target.reached.tip, 100.0),
+            planned_miss_mm: rounded(target.miss_mm),
+            planned_tilt_degrees: rounded(target.tilt_degrees),
+            ..self
+        }
+    }
+
     /// Adds the angles measured at the end.
-    pub(super) fn with_measured(self, positions: Option<[u8; 7]>) -> Self {
+    pub(super) fn with_measured(self, positions: Option<MeasuredPose>) -> Self {
         let [x, y, z] = self.asked_mm;
         let measured = positions.map(|positions| MeasuredTip::of(positions, Vector::new(x, y, z)));
         Self { measured, ..self }
     }
 }
 
+/// Measured angles, joint 1 first.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[serde(untagged)]
+enum PositionDegrees {
+    Whole([u8; 7]),
+    Hundredths([f64; 7]),
+}
+
+/// The measured angles, and the tip there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MeasuredPose {
+    positions_degrees: PositionDegrees,
+    tip: Vector,
+}
+
+impl MeasuredPose {
+    /// From whole degrees.
+    pub(super) fn whole(positions: [u8; 7]) -> Self {
+        let tip = TipPose::of(positions.map(Angle::from_register)).tip;
+        Self { positions_degrees: PositionDegrees::Whole(positions), tip }
+    }
+
+    /// Reads the positions as exactly as the arm measures them.
+    pub(super) fn read(arm: &mut Arm) -> Result<Self, CommandError> {
+        let whole = arm.positions()?;
+        if !arm.has_extended_block()? {
+            return Ok(Self::whole(whole.map(Angle::degrees)));
+        }
+        let mut pose = whole.map(FineAngle::from);
+        for (angle, fine) in pose.iter_mut().zip(arm.fine_state()?.positions) {
+            *angle = fine.unwrap_or(*angle);
+        }
+        let positions_degrees = PositionDegrees::Hundredths(pose.map(FineAngle::degrees));
+        Ok(Self { positions_degrees, tip: TipPose::of_fine(pose).tip })
+    }
+}
+
 impl MeasuredTip {
-    /// From the joint angles in degrees, joint 1 first, and the requested tip.
-    pub(super) fn of(positions_degrees: [u8; 7], asked: Vector) -> Self {
-        let tip = TipPose::of(positions_degrees.map(Angle::from_register)).tip;
+    /// From the measured angles and the requested tip.
+    pub(super) fn of(pose: MeasuredPose, asked: Vector) -> Self {
+        let MeasuredPose { positions_degrees, tip } = pose;
         Self { positions_degrees, tip_mm: components(tip, 100.0), miss_mm: rounded((tip - asked).length()) }
     }
 
@@ -81,13 +155,14 @@ fn point([x, y, z]: [f64; 3]) -> PointText {
 impl Printable for TipMove {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "tool     {}", DirectionText(self.direction))?;
-        let joints = self.targets_degrees.map(|degrees| degrees.to_string()).join(" ");
+        let joints = self.targets_degrees.texts().join(" ");
+        let (misses, decimals) = self.targets_degrees.rounding();
         writeln!(out, "joints   {joints} _ _ degrees")?;
         let Self { planned_miss_mm, planned_tilt_degrees, .. } = self;
         writeln!(
             out,
-            "target   {} mm: whole degrees miss the point by {planned_miss_mm:.1} mm and tilt the tool by \
-             {planned_tilt_degrees:.1}°",
+            "target   {} mm: {misses} the point by {planned_miss_mm:.decimals$} mm and tilt the tool by \
+             {planned_tilt_degrees:.decimals$}°",
             point(self.planned_mm)
         )?;
         self.measured.as_ref().map_or(Ok(()), |measured| measured.write_text(out))
@@ -104,8 +179,8 @@ mod tests {
         let tip = Vector::new(-50.0, 185.0, 50.0);
         let target = TipTarget::of(tip, DOWN).expect("within reach");
         let arrival = TipMove::planned(tip, &target, DOWN);
-        assert_eq!(arrival.targets_degrees, [105, 88, 110, 90, 135]);
-        let arrival = arrival.with_measured(Some([105, 88, 110, 90, 135, 90, 80]));
+        assert_eq!(arrival.targets_degrees, TargetDegrees::Whole([105, 88, 110, 90, 135]));
+        let arrival = arrival.with_measured(Some(MeasuredPose::whole([105, 88, 110, 90, 135, 90, 80])));
         let mut text = Vec::new();
         arrival.write_text(&mut text).expect("memory");
         let text = String::from_utf8(text).expect("text");

@@ -6,11 +6,11 @@
 //! ```
 
 use sevenbot::cartesian::{TipPose, TipTarget, Vector};
-use sevenbot::{Angle, Arm};
+use sevenbot::{Angle, Arm, FineAngle};
 
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
-use crate::joint_move::{JointMove, Targets, driven_joints};
+use crate::joint_move::{JointMove, driven_joints};
 use crate::session::Session;
 
 mod args;
@@ -19,7 +19,7 @@ mod straight;
 
 pub(crate) use args::MoveToArgs;
 use args::target;
-use facts::TipMove;
+use facts::{MeasuredPose, TipMove};
 
 pub(crate) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), CommandError> {
     if args.straight {
@@ -46,10 +46,15 @@ fn take(
     tool: Vector,
 ) -> Result<(), CommandError> {
     let arrival = TipMove::planned(args.tip(), target, tool);
-    let measured = match arm {
-        Some(mut arm) if !args.dry_run => move_to(&mut arm, target, args.wait)?,
-        _ => None,
+    let Some(mut arm) = arm else { return session.printer.print(&arrival) };
+    let fine = match arm.has_extended_block()? {
+        true => target.in_hundredths(args.tip(), tool),
+        false => None,
     };
+    let arrival = fine.iter().fold(arrival, TipMove::in_hundredths);
+    let whole = target.degrees.map(|degrees| Angle::from_register(degrees).into());
+    let angles = fine.map_or(whole, |fine| fine.angles);
+    let measured = if args.dry_run { None } else { move_to(&mut arm, angles, args.wait)? };
     session.printer.print(&arrival.with_measured(measured))
 }
 
@@ -60,13 +65,16 @@ fn present_tool(arm: &mut Arm) -> Result<Vector, CommandError> {
 }
 
 /// Moves joints 1 to 5. If `wait` is set, waits and returns the measured angles.
-fn move_to(arm: &mut Arm, target: &TipTarget, wait: bool) -> Result<Option<[u8; 7]>, CommandError> {
-    let [t1, t2, t3, t4, t5] = target.degrees.map(Some);
-    let targets: Targets = [t1, t2, t3, t4, t5, None, None];
+fn move_to(arm: &mut Arm, angles: [FineAngle; 5], wait: bool) -> Result<Option<MeasuredPose>, CommandError> {
+    let [t1, t2, t3, t4, t5] = angles.map(Some);
     hold_on_interrupt(arm, |arm, interrupt| {
         driven_joints(arm)?;
         interrupt.check()?;
-        let begun = JointMove::begin(arm, targets)?;
-        wait.then(|| begun.finish(arm, interrupt)).transpose()
+        let begun = JointMove::begin_fine(arm, [t1, t2, t3, t4, t5, None, None])?;
+        if !wait {
+            return Ok(None);
+        }
+        begun.finish(arm, interrupt)?;
+        MeasuredPose::read(arm).map(Some)
     })
 }

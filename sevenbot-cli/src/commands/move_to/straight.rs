@@ -4,16 +4,16 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 use sevenbot::cartesian::{
-    DirectionText, PERIOD, PointText, StraightLine, StraightLineRequest, TipPose, Vector,
+    DirectionText, PointText, StraightLine, StraightLineRequest, TargetResolution, TipPose, Vector,
 };
 use sevenbot::joints::JointSnapshot;
 use sevenbot::map::VACUUM_PUMP;
-use sevenbot::{Angle, Joint, Span};
+use sevenbot::{Angle, FineAngle, Joint, Span};
 
 use super::super::play::follow;
 use super::super::position::components;
 use super::args::{MoveToArgs, target};
-use super::facts::{MeasuredTip, rounded};
+use super::facts::{MeasuredPose, MeasuredTip, rounded};
 use crate::command_error::CommandError;
 use crate::joint_move::driven_joints;
 use crate::printer::Printable;
@@ -23,12 +23,16 @@ use crate::session::Session;
 pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let joints = if args.dry_run { arm.wait_until_settled()? } else { driven_joints(&mut arm)? };
-    let start = start(&joints)?;
-    let tool = args.tool().unwrap_or_else(|| TipPose::of(start).tool);
+    let whole = start(&joints)?;
+    let (resolution, start) = match arm.has_extended_block()? {
+        true => (TargetResolution::Hundredths, arm.fine_targets()?),
+        false => (TargetResolution::Degrees, whole.map(FineAngle::from)),
+    };
+    let tool = args.tool().unwrap_or_else(|| TipPose::of_fine(start).tool);
     // Only this check gives the nearest point and another direction of the tool.
     target(args.tip(), tool)?;
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
-    let request = StraightLineRequest { start, vacuum, tip: args.tip(), tool, speed: args.speed };
+    let request = StraightLineRequest { start, resolution, vacuum, tip: args.tip(), tool, speed: args.speed };
     let line = StraightLine::plan(&request)
         .map_err(|reason| CommandError::Arm(format!("{reason}; nothing was moved")))?;
     let course = StraightMove::of(&line, &request);
@@ -36,8 +40,8 @@ pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
         return session.printer.print(&course);
     }
     follow(&mut arm, &line.recording)?;
-    let positions = arm.positions()?.map(Angle::degrees);
-    session.printer.print(&StraightMove { measured: Some(MeasuredTip::of(positions, args.tip())), ..course })
+    let measured = MeasuredTip::of(MeasuredPose::read(&mut arm)?, args.tip());
+    session.printer.print(&StraightMove { measured: Some(measured), ..course })
 }
 
 /// The targets at the start of the line. The arm is there or moves there.
@@ -66,15 +70,17 @@ struct StraightMove {
     seconds: f64,
     targets: usize,
     period_ms: u64,
-    /// The largest distance from the line, due to whole degrees.
+    /// The largest distance from the line, due to rounded angles.
     deviation_mm: f64,
     tilt_degrees: f64,
     /// The angle of joint 4 at the start of the line.
-    first_turn_degrees: Option<u8>,
+    first_turn_degrees: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     measured: Option<MeasuredTip>,
     #[serde(skip)]
     direction: Vector,
+    #[serde(skip)]
+    rounded_to: &'static str,
 }
 
 impl StraightMove {
@@ -86,27 +92,33 @@ impl StraightMove {
             length_mm: rounded(line.length_mm),
             seconds: rounded(line.duration.as_secs_f64()),
             targets: line.targets().count(),
-            period_ms: u64::try_from(PERIOD.as_millis()).unwrap_or(u64::MAX),
+            period_ms: u64::try_from(request.resolution.period().as_millis()).unwrap_or(u64::MAX),
             deviation_mm: rounded(line.deviation_mm),
             tilt_degrees: rounded(line.tilt_degrees),
-            first_turn_degrees: line.first_turn.map(Angle::degrees),
+            first_turn_degrees: line.first_turn.map(FineAngle::degrees),
             measured: None,
             direction: request.tool,
+            rounded_to: match request.resolution {
+                TargetResolution::Degrees => "whole degrees",
+                TargetResolution::Hundredths => "hundredths of a degree",
+            },
         }
     }
 }
 
 impl Printable for StraightMove {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
-        let Self { length_mm, seconds, targets, period_ms, deviation_mm, tilt_degrees, .. } = self;
+        let Self { length_mm, seconds, targets, period_ms, deviation_mm, tilt_degrees, rounded_to, .. } =
+            self;
+        let decimals = if *rounded_to == "whole degrees" { 1 } else { 2 };
         let [from, to] = [self.start_mm, self.asked_mm].map(|[x, y, z]| PointText(Vector::new(x, y, z)));
         writeln!(out, "line     from {from} to {to} mm: {length_mm:.0} mm in {seconds:.1} s")?;
         writeln!(out, "tool     {} at the end", DirectionText(self.direction))?;
         writeln!(out, "targets  {targets}, one each {period_ms} ms")?;
         writeln!(
             out,
-            "off      whole degrees take the tip up to {deviation_mm:.1} mm from the line and tilt the tool by up \
-             to {tilt_degrees:.1}°"
+            "off      {rounded_to} take the tip up to {deviation_mm:.decimals$} mm from the line and tilt the tool by up \
+             to {tilt_degrees:.decimals$}°"
         )?;
         if let Some(degrees) = self.first_turn_degrees {
             writeln!(out, "first    joint 4 turns to {degrees}°, which moves neither tip nor tool")?;
