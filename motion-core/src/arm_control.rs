@@ -40,6 +40,8 @@ pub(crate) struct ArmControl {
     joints: Joints,
     status: Status,
     watchdog: HostWatchdog,
+    /// The watchdog has to be checked, once in each control cycle.
+    pub(crate) watchdog_is_due: bool,
     /// Changed settings that are not saved yet.
     pub(crate) to_save: Option<Image>,
     /// An alarm that has to be sent.
@@ -61,6 +63,7 @@ impl ArmControl {
             joints,
             status,
             watchdog: HostWatchdog::OFF,
+            watchdog_is_due: false,
             to_save: None,
             alarm: None,
         }
@@ -84,6 +87,7 @@ impl ArmControl {
                 self.bus.goals_changed();
             }
             Status::show_moving(&mut self.registers, &self.joints);
+            self.watchdog_is_due = true;
         }
     }
 
@@ -118,11 +122,11 @@ impl ArmControl {
     pub(crate) fn write(&mut self, now: Instant, address: u8, values: &[u8]) -> bool {
         let accepted = match self.registers.check(address, values) {
             Ok(accepted) => accepted,
-            Err(refused) => return self.refuse(now, refused.reason, refused.address),
+            Err(refused) => return self.refuse(refused.reason, refused.address),
         };
-        let Some(changes_settings) = self.check_storage(now, &accepted) else { return false };
+        let Some(changes_settings) = self.check_storage(&accepted) else { return false };
         if let Some(address) = self.against_limit(&accepted, &Reached::NONE) {
-            return self.refuse(now, refusal::AGAINST_A_LIMIT, address);
+            return self.refuse(refusal::AGAINST_A_LIMIT, address);
         }
         self.execute(now, &accepted, changes_settings);
         if accepted.has_words() {
@@ -140,19 +144,19 @@ impl ArmControl {
     pub(crate) fn write_map21(&mut self, now: Instant, address: u8, values: &[u8], has_room: bool) -> bool {
         let accepted = match self.registers.check_map21(address, values) {
             Ok(accepted) => accepted,
-            Err(refused) => return self.refuse(now, refused.reason, refused.address),
+            Err(refused) => return self.refuse(refused.reason, refused.address),
         };
-        let Some(changes_settings) = self.check_storage(now, &accepted) else { return false };
+        let Some(changes_settings) = self.check_storage(&accepted) else { return false };
         let reached = match reach::targets(&accepted) {
             Ok(reached) => reached,
             Err(out_of_reach) => {
                 let is_wanted = self.registers.get(OPTIONS.address) & option::ALARMS != 0;
                 self.alarm = (is_wanted && has_room).then_some(out_of_reach.alarm);
-                return self.refuse(now, refusal::OUT_OF_REACH, out_of_reach.address);
+                return self.refuse(refusal::OUT_OF_REACH, out_of_reach.address);
             }
         };
         if let Some(address) = self.against_limit(&accepted, &reached) {
-            return self.refuse(now, refusal::AGAINST_A_LIMIT, address);
+            return self.refuse(refusal::AGAINST_A_LIMIT, address);
         }
         self.execute(now, &accepted, changes_settings);
         self.registers.set(FEEDBACK_FREQUENCY.address, 0);
@@ -163,21 +167,23 @@ impl ArmControl {
 
     fn against_limit(&self, accepted: &Accepted<'_>, reached: &Reached) -> Option<u8> {
         let limits = self.registers.get(LIMITS.address);
+        if limits == 0 && !accepted.has_words() {
+            return None;
+        }
         self.joints.against_limit(&LimitCheck { accepted, reached, limits })
     }
 
     /// Refuses a write, which changes no report frequency.
-    fn refuse(&mut self, now: Instant, reason: u8, address: u8) -> bool {
-        self.watchdog.heard(now);
+    fn refuse(&mut self, reason: u8, address: u8) -> bool {
         Status::refuse(&mut self.registers, reason, address);
         false
     }
 
     /// Returns whether a write changes settings. Refuses it and returns `None` if the storage is full.
-    fn check_storage(&mut self, now: Instant, accepted: &Accepted<'_>) -> Option<bool> {
+    fn check_storage(&mut self, accepted: &Accepted<'_>) -> Option<bool> {
         let changed_setting = self.registers.first_changed_setting(accepted);
         if let (Some(setting), Storage::Full) = (changed_setting, self.status.storage()) {
-            self.refuse(now, refusal::STORAGE_FULL, setting);
+            self.refuse(refusal::STORAGE_FULL, setting);
             return None;
         }
         Some(changed_setting.is_some())
@@ -192,7 +198,7 @@ impl ArmControl {
         if let Some(pump) = accepted.value_at(VACUUM_PUMP.address) {
             self.vacuum.set(now, pump != 0);
         }
-        self.count_accepted(now);
+        self.count_accepted();
         Status::show_moving(&mut self.registers, &self.joints);
     }
 
@@ -207,6 +213,7 @@ impl ArmControl {
 
     /// Holds or damps the arm if the host was silent for too long (D24). Returns whether it did.
     pub(crate) fn poll_watchdog(&mut self, now: Instant) -> bool {
+        self.watchdog_is_due = false;
         if !self.watchdog.poll(now) {
             return false;
         }
@@ -219,11 +226,6 @@ impl ArmControl {
         Status::show_moving(&mut self.registers, &self.joints);
         self.raise_faults(fault::HOST_SILENT);
         true
-    }
-
-    /// When the watchdog of the host acts unless a frame comes before.
-    pub(crate) const fn watchdog_due(&self) -> Instant {
-        self.watchdog.due()
     }
 
     fn stop_reports_of_map21(&mut self) {
@@ -260,9 +262,13 @@ impl ArmControl {
         self.joints.rebase_offsets(&offsets, &self.registers);
     }
 
-    /// Counts an accepted request whose turn has come at `now`.
-    pub(crate) fn count_accepted(&mut self, now: Instant) {
+    /// Ends a silence of the host: a well-formed frame had its turn at `now`.
+    pub(crate) fn heard_host(&mut self, now: Instant) {
         self.watchdog.heard(now);
+    }
+
+    /// Counts an accepted request.
+    pub(crate) fn count_accepted(&mut self) {
         self.registers.increment(&FRAMES_ACCEPTED);
     }
 
@@ -299,6 +305,6 @@ impl ArmControl {
 
     /// When the next action of the arm is due.
     pub(crate) fn deadline(&self, now: Instant) -> Instant {
-        self.bus.deadline(now).min(self.vacuum.deadline()).min(self.watchdog.due())
+        self.bus.deadline(now).min(self.vacuum.deadline())
     }
 }

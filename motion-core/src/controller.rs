@@ -81,11 +81,16 @@ impl Controller {
             return Output::ToServos(self.arm.bus.frame());
         }
         self.execute_requests(now, host_room);
+        if self.arm.watchdog_is_due && self.arm.poll_watchdog(now) {
+            // Its effect on the servos is due now.
+            return Output::Wait(now);
+        }
         if let Some(alarm) = self.arm.alarm.take() {
             return Output::ToHost(self.host.alarm(alarm));
         }
         if let Some(read) = self.host.take_read(host_room) {
-            self.arm.count_accepted(now);
+            self.arm.heard_host(now);
+            self.arm.count_accepted();
             if read.is_extended() {
                 self.arm.show_extended();
             }
@@ -103,10 +108,6 @@ impl Controller {
             }
             return Output::ToHost(self.host.report(report, &self.arm.registers));
         }
-        if self.arm.poll_watchdog(now) {
-            // Its effect on the servos is due now.
-            return Output::Wait(now);
-        }
         Output::Wait(self.arm.deadline(now).min(self.host.deadline()))
     }
 
@@ -119,6 +120,7 @@ impl Controller {
         {
             match event {
                 HostEvent::Write { map, address, values } => {
+                    self.arm.heard_host(now);
                     let changes_reports = match map {
                         Map::V22 => self.arm.write(now, address, values),
                         Map::V21 => self.arm.write_map21(now, address, values, MIN_LENGTH <= host_room),
@@ -137,7 +139,7 @@ impl Controller {
     /// silence that has an effect. Each deadline until then still needs its own call.
     #[must_use]
     pub fn host_deadline(&self) -> Instant {
-        self.host.deadline().min(self.arm.watchdog_due())
+        self.host.deadline()
     }
 
     /// The last host has closed the link: ends the reports, and forgets in which map the last write was (M12).

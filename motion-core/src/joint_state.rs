@@ -119,6 +119,12 @@ impl JointState {
         self.alarms = 0;
     }
 
+    /// Moves to a target that the register shows already.
+    pub(crate) fn move_to(&mut self, degrees: u8, time: u8) {
+        self.target = MicroDegrees::from_degrees(degrees);
+        self.drive.set_target(self.target, time);
+    }
+
     /// Sets the target, without a move.
     pub(crate) fn set_target(&mut self, target: MicroDegrees, registers: &mut RegisterFile) {
         self.target = target;

@@ -90,9 +90,7 @@ impl Joints {
     ) {
         for (joint, state) in self.each_mut() {
             if let Some(degrees) = accepted.value_at(TARGET_POSITION.of(joint)) {
-                let angle = MicroDegrees::from_degrees(degrees);
-                state.set_target(angle, registers);
-                state.drive.set_target(angle, registers.get(TIME.of(joint)));
+                state.move_to(degrees, registers.get(TIME.of(joint)));
             }
         }
         if accepted.has_words() {
@@ -170,7 +168,8 @@ impl Joints {
 
     /// Advances all set-points by the control cycle that ends at `end`. Returns whether any joint is driven.
     pub(crate) fn advance(&mut self, end: Instant, registers: &RegisterFile) -> bool {
-        let before = self.linkage_set_points();
+        let keeps_linkage = registers.get(LIMITS.address) & limit::LINKAGE != 0;
+        let before = if keeps_linkage { self.linkage_set_points() } else { None };
         let mut any = false;
         for (joint, state) in self.each_mut() {
             if state.drive.is_driven() {
@@ -178,7 +177,7 @@ impl Joints {
                 any = true;
             }
         }
-        if registers.get(LIMITS.address) & limit::LINKAGE != 0 {
+        if let Some(before) = before {
             self.keep_linkage(before);
         }
         any
@@ -192,8 +191,8 @@ impl Joints {
     }
 
     /// Lets joints 2 and 3 wait for each other where their step would break the linkage (D25).
-    fn keep_linkage(&mut self, before: Option<[MicroDegrees; 2]>) {
-        let (Some(before), Some(after)) = (before, self.linkage_set_points()) else { return };
+    fn keep_linkage(&mut self, before: [MicroDegrees; 2]) {
+        let Some(after) = self.linkage_set_points() else { return };
         let allowed = linkage_step(before, after);
         let [_, two, three, ..] = &mut self.joints;
         for (joint, (after, allowed)) in [two, three].into_iter().zip(after.into_iter().zip(allowed)) {
@@ -205,9 +204,6 @@ impl Joints {
 
     /// The first register because of which a write is refused against a limit (D25).
     pub(crate) fn against_limit(&self, check: &LimitCheck<'_>) -> Option<u8> {
-        if !check.is_needed() {
-            return None;
-        }
         let enters_servo = self.state != MotorState::Servo
             && check.accepted.value_at(MOTOR_STATE.address) == Some(motor_state::SERVO);
         let target = |state: &JointState| {

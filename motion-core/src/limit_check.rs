@@ -25,11 +25,6 @@ pub(crate) struct LimitCheck<'a> {
 }
 
 impl LimitCheck<'_> {
-    /// Can any limit be on after the write?
-    pub(crate) fn is_needed(&self) -> bool {
-        self.limits_after() != 0
-    }
-
     fn limits_after(&self) -> u8 {
         self.accepted.value_at(LIMITS.address).unwrap_or(self.limits)
     }
@@ -42,27 +37,25 @@ impl LimitCheck<'_> {
             *target = self.written(joint).or(*target);
         }
         let [_, two, three, .., seven] = Joint::ALL;
-        let linkage = self.refused_by(limit::LINKAGE, &[two, three], linkage_is_kept, &after, set_points);
-        let claw = self.refused_by(limit::CLAW, &[seven], claw_is_kept, &after, set_points);
+        let kept = (linkage_is_kept(&after), linkage_is_kept(set_points));
+        let linkage = self.refused_by(limit::LINKAGE, &[two, three], kept);
+        let kept = (claw_is_kept(&after), claw_is_kept(set_points));
+        let claw = self.refused_by(limit::CLAW, &[seven], kept);
         linkage.into_iter().chain(claw).min()
     }
 
-    fn refused_by(
-        &self,
-        limit: u8,
-        joints: &[Joint],
-        is_kept: fn(&Angles) -> bool,
-        targets: &Angles,
-        set_points: &Angles,
-    ) -> Option<u8> {
+    /// The register because of which a limit refuses the write. `kept` tells whether the targets after the write and the
+    /// set-points keep the limit.
+    fn refused_by(&self, limit: u8, joints: &[Joint], kept: (bool, bool)) -> Option<u8> {
+        let (targets_keep, set_points_keep) = kept;
         if self.limits_after() & limit == 0 {
             return None;
         }
         if self.limits & limit == 0 {
-            return (!is_kept(targets) || !is_kept(set_points)).then_some(LIMITS.address);
+            return (!targets_keep || !set_points_keep).then_some(LIMITS.address);
         }
         let first_written = joints.iter().filter_map(|&joint| self.written_at(joint)).min();
-        first_written.filter(|_| !is_kept(targets))
+        first_written.filter(|_| !targets_keep)
     }
 
     /// The target of a joint in the write. The last of several counts.

@@ -9,7 +9,7 @@
 //! frame shifts the grid a little towards one and a half periods after itself: the grid follows the host's clock. A
 //! point is due two periods after its frame at the latest. This file does not know the joint or its speed.
 
-use heapless::Deque;
+use heapless::Vec;
 use protocol_core::time::{Duration, Instant};
 
 use crate::CYCLE;
@@ -19,6 +19,9 @@ use crate::calibration::MicroDegrees;
 const CAPACITY: usize = 4;
 /// The part of its error by which a frame shifts the grid: 1/16.
 const SHIFT_DIVISOR: u64 = 16;
+
+/// A frame that comes later than this part of a period after the joint passed the point before it follows a lost one: 1/8.
+const LATE_DIVISOR: u64 = 8;
 
 /// A point of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,14 +33,20 @@ struct Point {
 /// The points of a stream that the joint has not passed yet.
 #[derive(Clone, Debug)]
 pub struct PointStream {
-    points: Deque<Point, CAPACITY>,
+    /// The oldest first.
+    points: Vec<Point, CAPACITY>,
     /// When the newest point is or was due.
     last_due: Instant,
 }
 
 impl PointStream {
     /// No stream.
-    pub const NONE: Self = Self { points: Deque::new(), last_due: Instant::ZERO };
+    pub const NONE: Self = Self { points: Vec::new(), last_due: Instant::ZERO };
+
+    /// Forgets the points.
+    pub fn end(&mut self) {
+        self.points.clear();
+    }
 
     /// Has the joint passed all points?
     #[must_use]
@@ -49,29 +58,29 @@ impl PointStream {
     /// the oldest point if there is no room.
     pub fn push(&mut self, now: Instant, period: Duration, angle: MicroDegrees) {
         let due = self.due(now, period);
-        while self.points.back().is_some_and(|point| point.due >= due) {
-            self.points.pop_back();
+        while self.points.last().is_some_and(|point| point.due >= due) {
+            self.points.pop();
         }
         if self.points.is_full() {
-            self.points.pop_front();
+            self.pass(1);
         }
         // There is room.
-        let _ = self.points.push_back(Point { due, angle });
+        let _ = self.points.push(Point { due, angle });
         self.last_due = due;
     }
 
     /// When the point is due whose frame came at `now`.
     fn due(&self, now: Instant, period: Duration) -> Instant {
-        let wanted = now + period + half(period);
+        let wanted = now + period + part(period, 2);
         let latest = now + period + period;
         if now > self.last_due + period {
             return wanted; // A new stream.
         }
         let slot = self.last_due + period;
-        // The joint has passed the point before this one: this frame is late, or the one before it is lost.
-        let slot = if now > self.last_due { slot + period } else { slot };
-        let late = Duration::from_micros((wanted - slot).as_micros() / SHIFT_DIVISOR);
-        let early = Duration::from_micros((slot - wanted).as_micros() / SHIFT_DIVISOR);
+        // The joint has been waiting for longer than a late frame takes: the frame before this one is lost.
+        let slot = if now > self.last_due + part(period, LATE_DIVISOR) { slot + period } else { slot };
+        let late = part(wanted - slot, SHIFT_DIVISOR);
+        let early = part(slot - wanted, SHIFT_DIVISOR);
         latest.min(earlier(slot + late, early))
     }
 
@@ -79,27 +88,31 @@ impl PointStream {
     /// then are passed.
     pub fn follow(&mut self, from: MicroDegrees, end: Instant) -> MicroDegrees {
         let (mut angle, mut time) = (from, earlier(end, CYCLE));
-        while let Some(next) = self.points.front() {
+        while let Some(next) = self.points.first() {
             if next.due > end {
                 return between(angle, next.angle, end - time, next.due - time);
             }
             (angle, time) = (next.angle, time.max(next.due));
-            self.points.pop_front();
+            self.pass(1);
         }
         angle
     }
 
     /// Passes over all points but the newest, and returns that one if the joint has not passed it.
     pub fn skip_to_newest(&mut self) -> Option<MicroDegrees> {
-        while self.points.len() > 1 {
-            self.points.pop_front();
-        }
-        self.points.back().map(|point| point.angle)
+        self.pass(self.points.len().saturating_sub(1));
+        self.points.last().map(|point| point.angle)
+    }
+
+    /// Removes the oldest points.
+    fn pass(&mut self, count: usize) {
+        let left = self.points.get(count..).unwrap_or(&[]);
+        self.points = Vec::from_slice(left).unwrap_or_default();
     }
 }
 
-const fn half(period: Duration) -> Duration {
-    Duration::from_micros(period.as_micros() / 2)
+fn part(time: Duration, divisor: u64) -> Duration {
+    Duration::from_micros(time.as_micros().checked_div(divisor).unwrap_or(0))
 }
 
 fn earlier(time: Instant, by: Duration) -> Instant {

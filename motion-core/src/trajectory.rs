@@ -50,7 +50,7 @@ impl Trajectory {
     pub fn move_to(&mut self, target: MicroDegrees, time: u8) {
         self.target = target;
         self.cycles_left = u16::from(time) * CYCLES_PER_TIME_UNIT;
-        self.stream = PointStream::NONE;
+        self.stream.end();
     }
 
     /// Adds the next point of a stream, whose frame came at `now`.

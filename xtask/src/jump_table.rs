@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!   TBB [PC, r0]              TBH [PC, r0, LSL #1]         ADR   r1, table
-//!   table: bytes              table: halfwords             ADD.W r1, r1, r0, LSL #2
-//!   target: table + 2 * n     target: table + 2 * n        MOV   PC, r1
+//!   table: bytes              table: halfwords             ADD.W r2, r1, r0, LSL #2
+//!   target: table + 2 * n     target: table + 2 * n        MOV   PC, r2
 //!                                                          table: B.W, B.W, ...
 //! ```
 //!
@@ -24,6 +24,8 @@ pub(crate) struct FunctionCode<'a> {
 }
 
 const PC: u8 = 15;
+/// How far before a jump the instructions are searched that calculate its target.
+const MOST_BETWEEN: usize = 8;
 
 impl FunctionCode<'_> {
     /// The targets of the indirect jump at `at`; `None` if it uses no table that can be read.
@@ -64,14 +66,23 @@ impl FunctionCode<'_> {
 
     /// The addresses of the branches from which `MOV PC, rN` selects.
     fn branches(&self, at: u64) -> Option<Vec<u64>> {
-        let index = self.instructions.binary_search(&at).ok()?;
-        let [base, add, jump] = *self.instructions.get(index.checked_sub(2)?..=index)? else { return None };
-        let (register, table) = address_of_table(base, &self.instruction(base)?)?;
-        if index_step(&self.instruction(add)?)? != register || source(&self.instruction(jump)?)? != register {
-            return None;
-        }
+        let register = source(&self.instruction(at)?)?;
+        let add = self.last_write(register, at)?;
+        let base = self.last_write(index_step(&self.instruction(add)?)?, add)?;
+        let table = address_of_table(base, &self.instruction(base)?)?;
         let entries = (0..).map(|number| table + 4 * number);
         Some(entries.take_while(|&entry| self.is_long_branch(entry)).collect())
+    }
+
+    /// The last instruction before `at` that writes `register`: its first operand. Others may stand between.
+    fn last_write(&self, register: u8, at: u64) -> Option<u64> {
+        let end = self.instructions.binary_search(&at).ok()?;
+        let near = self.instructions.get(end.saturating_sub(MOST_BETWEEN)..end)?;
+        near.iter().copied().rev().find(|&at| {
+            self.instruction(at).is_some_and(|instruction| {
+                matches!(instruction.operands.first(), Some(Operand::Reg(to)) if to.number() == register)
+            })
+        })
     }
 
     /// True if the instruction at `at` is an unconditional branch of 4 bytes.
@@ -94,34 +105,30 @@ impl FunctionCode<'_> {
     }
 }
 
-/// `ADR rN, table`: the register and the table's address.
-fn address_of_table(at: u64, instruction: &Instruction) -> Option<(u8, u64)> {
+/// `ADR rN, table`: the table's address.
+fn address_of_table(at: u64, instruction: &Instruction) -> Option<u64> {
     // PC reads as the address of this instruction plus 4, rounded down to a word (A4.2.1).
     let pc = (at + 4) & !3;
     match (instruction.opcode, instruction.operands) {
-        (Opcode::ADR, [Operand::Reg(to), Operand::Imm32(offset), ..]) => {
-            Some((to.number(), pc + u64::from(offset)))
-        }
-        (Opcode::ADD, [Operand::Reg(to), Operand::Reg(base), offset, _]) if base.number() == PC => {
-            match offset {
-                Operand::Imm32(offset) => Some((to.number(), pc + u64::from(offset))),
-                Operand::Imm12(offset) => Some((to.number(), pc + u64::from(offset))),
-                _ => None,
-            }
-        }
+        (Opcode::ADR, [_, Operand::Imm32(offset), ..]) => Some(pc + u64::from(offset)),
+        (Opcode::ADD, [_, Operand::Reg(base), offset, _]) if base.number() == PC => match offset {
+            Operand::Imm32(offset) => Some(pc + u64::from(offset)),
+            Operand::Imm12(offset) => Some(pc + u64::from(offset)),
+            _ => None,
+        },
         _ => None,
     }
 }
 
-/// `ADD.W rN, rN, rM, LSL #2`: the register rN.
+/// `ADD.W rN, rB, rM, LSL #2`: the register rB.
 fn index_step(instruction: &Instruction) -> Option<u8> {
-    let (Opcode::ADD, [Operand::Reg(to), Operand::Reg(base), Operand::RegShift(index), _]) =
+    let (Opcode::ADD, [_, Operand::Reg(base), Operand::RegShift(index), _]) =
         (instruction.opcode, instruction.operands)
     else {
         return None;
     };
     let RegShiftStyle::RegImm(shift) = index.into_shift() else { return None };
-    (to == base && shift.stype() == ShiftStyle::LSL && shift.imm() == 2).then(|| to.number())
+    (shift.stype() == ShiftStyle::LSL && shift.imm() == 2).then(|| base.number())
 }
 
 /// `MOV PC, rN`: the register rN.

@@ -29,6 +29,7 @@ mod size;
 mod stack;
 mod start_up;
 mod steps;
+mod stream;
 mod system_tests;
 mod test;
 mod thumb_decode;
@@ -89,6 +90,8 @@ enum Task {
     Coverage,
     /// Compare the parse-and-reply path with its peers: Modbus, postcard with COBS, MAVLink
     Bench(bench::BenchArgs),
+    /// Print how evenly and how late set-points follow streams of points with jitter, losses and pauses, beside other methods
+    Stream,
     /// Run the image for the arm in an emulator with simulated servos, and print its port.
     ///
     /// SIGHUP (`kill -HUP`) switches the arm off and on, SIGUSR2 restarts the chip alone, Ctrl-C ends it. The emulator keeps no
@@ -147,6 +150,7 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Coverage => coverage::check(),
         Task::Emulate(options) => emulate::run(options),
         Task::Sag => sag::measure(),
+        Task::Stream => stream::measure(),
         Task::Bench(options) => bench::run(options),
     }
 }

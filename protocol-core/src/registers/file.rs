@@ -7,10 +7,9 @@
 use super::joint::{JOINTS, Joint};
 use super::map::{CHIP_ID, EEPROM_LOCK, OFFSET, refusal};
 use super::map21::{self, Map, OPTIONS, option};
-use super::range::Range;
 use super::rules::{
-    DEFAULTS, EEPROM_END, EEPROM_START, WORDS_START, first_refused_word, keeps_bytes_of_21, rule, rule_21,
-    rules_21_from, rules_from,
+    DEFAULTS, EEPROM_END, EEPROM_START, Refused, WORDS_START, first_refused_word, keeps_bytes_of_21, rule,
+    rule_21, rules_21_from, rules_from,
 };
 use super::spec::Register;
 
@@ -22,16 +21,6 @@ pub struct Image(pub [u8; Image::LENGTH]);
 impl Image {
     /// Bytes of the EEPROM region.
     pub const LENGTH: usize = (EEPROM_END - EEPROM_START) as usize;
-}
-
-/// The reason why a write has no effect (D16, D22).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Refused {
-    /// One of [`refusal`].
-    pub reason: u8,
-    /// The first register that is the reason; of a two-byte register its low byte.
-    pub address: u8,
 }
 
 /// A write that was checked and may be applied.
@@ -204,16 +193,14 @@ impl RegisterFile {
     pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, Refused> {
         let (start, values) = self.unlocked(address, values);
         let accepted = Accepted { map: Map::V22, start, values };
-        let byte = (rules_from(start).iter().zip(values).zip(start..))
-            .find(|((rule, value), _)| !rule.allows(**value))
-            .map(|(_, address)| Refused { reason: refusal::OUT_OF_RANGE, address });
         let word = if accepted.has_words() { first_refused_word(start, values) } else { None };
-        match (byte, word) {
-            (None, None) => Ok(accepted),
-            (Some(byte), Some((_, address))) if byte.address < address => Err(byte),
-            (_, Some((reason, address))) => Err(Refused { reason, address }),
-            (Some(byte), None) => Err(byte),
+        for ((rule, &value), address) in rules_from(start).iter().zip(values).zip(start..) {
+            if !rule.allows(value) {
+                let byte = Refused { reason: refusal::OUT_OF_RANGE, address };
+                return Err(word.filter(|word| word.address < address).unwrap_or(byte));
+            }
         }
+        word.map_or(Ok(accepted), Err)
     }
 
     /// Checks a write of the host in map 2.1 without applying it.
@@ -283,17 +270,16 @@ impl RegisterFile {
 
 /// A byte that function 04 writes, with an offset in sign and magnitude.
 fn from_map21(address: u8, byte: u8) -> u8 {
-    if map21::OFFSET.holds(address) { recoded(byte, map21::OFFSET.range, OFFSET.range) } else { byte }
+    if map21::OFFSET.holds(address) {
+        OFFSET.range.encode_byte(map21::OFFSET.range.decode_byte(byte)).unwrap_or(0)
+    } else {
+        byte
+    }
 }
 
 /// An offset in sign and magnitude as 128 + offset.
 fn to_map21(byte: u8) -> u8 {
-    recoded(byte, OFFSET.range, map21::OFFSET.range)
-}
-
-/// A byte in another encoding. Both ranges have the same numbers, so 0 is never used.
-fn recoded(byte: u8, from: Range, to: Range) -> u8 {
-    to.encode_byte(from.decode_byte(byte)).unwrap_or(0)
+    map21::OFFSET.range.encode_byte(OFFSET.range.decode_byte(byte)).unwrap_or(0)
 }
 
 #[cfg(test)]

@@ -22,9 +22,10 @@ pub mod range;
 mod rules;
 pub mod spec;
 
-pub use file::{Accepted, Image, Refused, RegisterFile};
+pub use file::{Accepted, Image, RegisterFile};
 pub use joint::{JOINTS, Joint};
 pub use map::MAP;
 pub use map21::{MAP_21, Map};
 pub use range::Range;
+pub use rules::Refused;
 pub use spec::{Access, Region, Register, Unit};

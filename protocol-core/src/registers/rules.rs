@@ -49,6 +49,16 @@ pub(super) const fn keeps_bytes_of_21(address: u8) -> bool {
     !PRESENT_POSITION.holds(address)
 }
 
+/// The reason why a write has no effect (D16, D22).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Refused {
+    /// One of [`refusal`](super::map::refusal).
+    pub reason: u8,
+    /// The first register that is the reason; of a two-byte register its low byte.
+    pub address: u8,
+}
+
 /// The rule for a write to one register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Rule {
@@ -123,10 +133,13 @@ impl WordRule {
     }
 }
 
-/// The first word because of which a write of `values` from `start` on is refused: the reason and the address of its low
-/// byte (D22).
-pub(super) fn first_refused_word(start: u8, values: &[u8]) -> Option<(u8, u8)> {
-    WORDS.iter().find_map(|word| Some((word.refusal(start, values)?, word.address)))
+/// The first word because of which a write of `values` from `start` on is refused (D22).
+pub(super) fn first_refused_word(start: u8, values: &[u8]) -> Option<Refused> {
+    let refused = |word: &WordRule| {
+        let reason = word.refusal(start, values)?;
+        Some(Refused { reason, address: word.address })
+    };
+    WORDS.iter().find_map(refused)
 }
 
 // The functions below run at compile time and in a test. An index out of bounds is a build error, not a panic.

@@ -40,14 +40,19 @@ fn calibration() {
 fn one_joint() {
     let mut trajectory = opaque(Trajectory::holding(MicroDegrees(opaque(0))));
     trajectory.move_to(MicroDegrees(opaque(0)), opaque(0));
-    trajectory.advance(opaque(0));
+    trajectory.stream_to(MicroDegrees(opaque(0)), any_time(), Duration::from_micros(opaque(0)));
+    trajectory.advance(any_time(), opaque(0));
+    trajectory.hold_back(MicroDegrees(opaque(0)));
     opaque((trajectory.set_point(), trajectory.is_moving()));
     let mut drive = opaque(Drive::RELEASED);
     drive.wait();
     drive.set_target(MicroDegrees(opaque(0)), opaque(0));
     opaque(drive.engage(MicroDegrees(opaque(0))));
     drive.rebase_offset(MicroDegrees(opaque(0)), MicroDegrees(opaque(0)), opaque(0));
-    drive.advance(opaque(0));
+    drive.stream_to(MicroDegrees(opaque(0)), any_time(), Duration::from_micros(opaque(0)));
+    drive.advance(any_time(), opaque(0));
+    drive.hold_back(MicroDegrees(opaque(0)));
+    drive.hold();
     opaque((drive.is_driven(), drive.is_moving(), drive.set_point()));
     drive.mark_silent();
     drive.release();

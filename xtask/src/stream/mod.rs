@@ -1,0 +1,168 @@
+//! Set-points from streams of points (D23): how evenly, how late, with this project's method and with others.
+//!
+//! A joint moves at a constant velocity, and its points come in frames with jitter, losses and a pause. All methods get
+//! the same frames. The seeds are fixed, so the figures are the same on every machine.
+
+mod methods;
+
+use fastrand::Rng;
+
+use crate::run::TaskResult;
+use methods::{CYCLE, METHODS, Method, OURS};
+
+/// Degrees per second. Ten minutes stay below the largest angle of motion-core.
+const VELOCITY: f64 = 3.0;
+/// Runs of each scenario, each with its own seed and phase of the control cycles.
+const RUNS: u64 = 20;
+const PERIODS: [f64; 5] = [0.005, 0.01, 0.02, 0.05, 0.1];
+/// After so many points a method has settled.
+const SETTLING_POINTS: usize = 40;
+
+/// How the frames of a stream come.
+#[derive(Clone, Copy)]
+struct Scenario {
+    name: &'static str,
+    /// A frame comes up to this part of a period early or late.
+    jitter: f64,
+    /// The part of the frames that is lost.
+    loss: f64,
+    /// A pause of five periods in the middle, after which the points go on where they stopped.
+    pause: bool,
+    /// The host's clock runs faster by this part.
+    drift: f64,
+    seconds: f64,
+}
+
+const EVEN: Scenario =
+    Scenario { name: "even", jitter: 0.0, loss: 0.0, pause: false, drift: 0.0, seconds: 20.0 };
+
+const SCENARIOS: [Scenario; 8] = [
+    EVEN,
+    Scenario { name: "jitter 25 %", jitter: 0.25, ..EVEN },
+    Scenario { name: "jitter 40 %", jitter: 0.4, ..EVEN },
+    Scenario { name: "jitter 50 %", jitter: 0.5, ..EVEN },
+    Scenario { name: "1 % lost", loss: 0.01, ..EVEN },
+    Scenario { name: "25 %, 1 % lost", jitter: 0.25, loss: 0.01, ..EVEN },
+    Scenario { name: "a pause of 5 periods", pause: true, ..EVEN },
+    Scenario { name: "25 %, clocks 200 ppm apart", jitter: 0.25, drift: 200e-6, seconds: 600.0, ..EVEN },
+];
+
+/// Of one run, or the worst of several.
+#[derive(Clone, Copy, Default)]
+struct Figures {
+    /// The largest deviation from the velocity of the motion, in percent.
+    ripple: f64,
+    /// The root of the mean square of that deviation, in percent.
+    rms: f64,
+    /// The mean time from when a point was to be sent to when the set-point passes it, in periods.
+    delay: f64,
+    /// How far the set-points go past the last point, in percent of the distance between two points.
+    overshoot: f64,
+    /// Cycles without motion, in percent.
+    stopped: f64,
+}
+
+impl Figures {
+    fn worst(self, other: Self) -> Self {
+        Self {
+            ripple: self.ripple.max(other.ripple),
+            rms: self.rms.max(other.rms),
+            delay: self.delay.max(other.delay),
+            overshoot: self.overshoot.max(other.overshoot),
+            stopped: self.stopped.max(other.stopped),
+        }
+    }
+
+    fn cells(&self) -> String {
+        let Self { ripple, rms, delay, overshoot, stopped } = self;
+        format!("{ripple:.1} | {rms:.1} | {delay:.2} | {stopped:.1} | {overshoot:.0}")
+    }
+}
+
+/// Prints the figures.
+pub(crate) fn measure() -> TaskResult {
+    let columns = "largest ripple % | rms ripple % | delay P | stopped % | overshoot %";
+    println!("Set-points of this firmware; the worst of {RUNS} runs.\n");
+    println!("| frames | P ms | {columns} |\n| --- | --- | --- | --- | --- | --- | --- |");
+    for (scenario, period) in SCENARIOS.iter().flat_map(|scenario| PERIODS.map(|period| (scenario, period))) {
+        println!("| {} | {:.0} | {} |", scenario.name, period * 1e3, worst(&OURS, scenario, period).cells());
+    }
+    println!("\nMethods at P = 20 ms; the worst of {RUNS} runs of the same frames.\n");
+    println!("| frames | method | {columns} |\n| --- | --- | --- | --- | --- | --- | --- |");
+    for (scenario, method) in
+        SCENARIOS.iter().flat_map(|scenario| METHODS.iter().map(move |method| (scenario, method)))
+    {
+        println!("| {} | {} | {} |", scenario.name, method.name, worst(method, scenario, 0.02).cells());
+    }
+    Ok(())
+}
+
+fn worst(method: &Method, scenario: &Scenario, period: f64) -> Figures {
+    (0..RUNS).map(|seed| one_run(method, scenario, period, seed)).fold(Figures::default(), Figures::worst)
+}
+
+/// A frame: when it comes, when it was to be sent, and its angle.
+struct Frame {
+    comes: f64,
+    planned: f64,
+    angle: f64,
+}
+
+fn frames(scenario: &Scenario, period: f64, random: &mut Rng) -> Vec<Frame> {
+    let count = (scenario.seconds / period).min(30_000.0);
+    let mut frames = Vec::new();
+    let mut k = 0.0;
+    while k < count {
+        let pause = if scenario.pause && k > count / 2.0 { 5.0 } else { 0.0 };
+        let planned = 1.0 + (k + pause) * period * (1.0 - scenario.drift);
+        let comes = planned + (random.f64() * 2.0 - 1.0) * scenario.jitter * period;
+        if random.f64() >= scenario.loss {
+            frames.push(Frame { comes, planned, angle: VELOCITY * (k + 1.0) * period });
+        }
+        k += 1.0;
+    }
+    frames
+}
+
+fn one_run(method: &Method, scenario: &Scenario, period: f64, seed: u64) -> Figures {
+    let mut random = Rng::with_seed(seed);
+    let frames = frames(scenario, period, &mut random);
+    let phase = random.f64() * CYCLE;
+    let mut set_points = (method.new)(period);
+    let mut waiting = frames.iter().peekable();
+    let (Some(first), Some(last)) = (frames.get(SETTLING_POINTS), frames.last()) else {
+        return Figures::default();
+    };
+    let mut passed = frames.iter().skip(SETTLING_POINTS).peekable();
+    let (mut velocities, mut delays, mut highest) = (Vec::new(), Vec::new(), 0.0_f64);
+    let (mut now, mut before) = (phase, 0.0);
+    while now < last.comes + 1.0 {
+        while let Some(frame) = waiting.next_if(|frame| frame.comes <= now) {
+            set_points.point(frame.comes, frame.angle, VELOCITY);
+        }
+        let angle = set_points.step(now);
+        while let Some(frame) = passed.next_if(|frame| frame.angle <= angle + 1e-9) {
+            // The set-point passed the point between the last two cycles.
+            let part = ((angle - frame.angle) / (angle - before).max(1e-9)).clamp(0.0, 1.0);
+            delays.push(now - part * CYCLE - frame.planned);
+        }
+        if before >= first.angle && angle < last.angle - VELOCITY * period {
+            velocities.push((angle - before) / CYCLE / VELOCITY);
+        }
+        highest = highest.max(angle);
+        (now, before) = (now + CYCLE, angle);
+    }
+    let mean = |values: &[f64]| {
+        values.iter().sum::<f64>() / f64::from(u32::try_from(values.len()).unwrap_or(u32::MAX)).max(1.0)
+    };
+    let errors: Vec<f64> = velocities.iter().map(|velocity| (velocity - 1.0).abs()).collect();
+    let squares: Vec<f64> = errors.iter().map(|error| error * error).collect();
+    let still: Vec<f64> = velocities.iter().map(|velocity| f64::from(*velocity < 0.05)).collect();
+    Figures {
+        ripple: 100.0 * errors.iter().copied().fold(0.0, f64::max),
+        rms: 100.0 * mean(&squares).sqrt(),
+        delay: mean(&delays) / period,
+        overshoot: 100.0 * (highest - last.angle).max(0.0) / (VELOCITY * period),
+        stopped: 100.0 * mean(&still),
+    }
+}
