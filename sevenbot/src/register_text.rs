@@ -9,7 +9,7 @@ use protocol_core::registers::map::{
 use protocol_core::registers::map21::{
     DISC_DIRECTION, OPTIONS, PRESENT_LOAD, WRIST_POSITION, find_readable, option,
 };
-use protocol_core::registers::{Access, Joint, Register, Unit};
+use protocol_core::registers::{Access, Joint, Range, Register, Unit};
 
 use crate::map21_text;
 use crate::names::name_of_register;
@@ -240,9 +240,9 @@ fn list(mut words: Vec<String>) -> Option<String> {
 /// The range of the register at `address`, such as `0 to 180`.
 #[must_use]
 pub fn range(address: u8) -> String {
-    find_readable(address).map_or_else(String::new, |row| {
-        let (low, high) = row.range.bounds();
-        format!("{low} to {high}")
+    find_readable(address).map_or_else(String::new, |row| match (row.range, row.range.bounds()) {
+        (Range::ZeroOr(low, high), _) => format!("0, or {low} to {high}"),
+        (_, (low, high)) => format!("{low} to {high}"),
     })
 }
 

@@ -119,6 +119,9 @@ fn constants(row: &Register) -> Vec<(&'static str, i32)> {
     if row.count > 1 {
         constants.push(("_COUNT", i32::from(row.count)));
     }
+    if row.range.width() > 1 {
+        constants.push(("_WIDTH", i32::from(row.range.width())));
+    }
     if let Some((low, high)) = range(row).filter(|_| row.access == Access::ReadWrite) {
         constants.extend([("_MIN", low), ("_MAX", high)]);
     }
@@ -189,6 +192,8 @@ mod tests {
         assert!(c_header().contains("SEVENBOT_OFFSET_MIN -16"));
         assert!(c_header().contains("#define SEVENBOT_MAP21_PRESENT_LOAD 91\n"));
         assert!(python().contains("\nMAP21_ANGLE_FEEDBACK_FREQUENCY_MAX = 100\n"));
+        assert!(c_header().contains("#define SEVENBOT_FINE_TARGET_WIDTH 2\n"), "bytes of a value");
+        assert!(python().contains("\nFINE_TARGET_MAX = 18000\n"));
         assert!(!c_header().contains("MAP21_SPEED"), "as in map 2.2");
         assert_eq!((rows().count(), versions(&TARGET_POSITION).count()), (MAP.len() + 13, 2));
     }

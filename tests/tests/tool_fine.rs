@@ -70,6 +70,24 @@ fn d23_a_recording_in_hundredths_is_streamed() {
     });
 }
 
+#[test]
+fn d22_d25_two_byte_registers_and_limits_are_told_in_words() {
+    with_arm(TestSetup::any(), |arm| {
+        let text = succeeded(arm.sevenbot(&["set", "fine-target.1", "9125"]));
+        assert!(text.contains("fine-target.1") && text.contains("91.25 °"), "{text}");
+        assert_eq!(arm.counter(FINE_TARGET), 9_125);
+        let text = failed(&arm.sevenbot(&["set", "129", "5"]), 2);
+        assert!(text.contains("fine-target.1 has two bytes"), "{text}");
+        let text = failed(&arm.sevenbot(&["set", "--raw", "129", "5"]), 1);
+        assert!(text.contains("only one of the two bytes of fine-target.1"), "{text}");
+        succeeded(arm.sevenbot(&["set", "limits", "1"]));
+        let text = failed(&arm.sevenbot(&["pose", "_", "_", "170.5", "_", "_", "_", "_"]), 1);
+        assert!(text.contains("fine-target.3 is against a limit that is switched on"), "{text}");
+        succeeded(arm.sevenbot(&["set", "limits", "0"]));
+        arm.drive_to(&STANDARD_POSE);
+    });
+}
+
 /// Runs commands with an arm of the maker.
 fn with_stock_arm(test: impl FnOnce(&dyn Fn(&[&str]) -> Output, &dyn Fn(&str) -> String)) {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -87,6 +87,7 @@ fn object(row: &Register) -> Value {
     json!({
         "address": row.address,
         "count": row.count,
+        "width": row.range.width(),
         "name": row.name,
         "per_joint": row.per_joint,
         "region": table::region(row.region),
@@ -121,6 +122,9 @@ mod tests {
                 .map(|row| row["maps"].clone())
                 .collect::<Vec<_>>()
         };
+        let width =
+            |address: u8| json.iter().find(|row| row["address"] == address).map(|row| row["width"].clone());
+        assert_eq!([width(46), width(128)], [1, 2].map(|width| Some(width.into())));
         assert_eq!(maps(13), [serde_json::json!(["2.2"]), serde_json::json!(["2.1"])]);
         assert_eq!(maps(46), [serde_json::json!(["2.2", "2.1"])]);
     }

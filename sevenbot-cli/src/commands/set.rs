@@ -23,10 +23,12 @@ Examples:
   sevenbot set speed 30                 all seven joints
   sevenbot set target-position.3 70
   sevenbot set feedback-frequency 30
+  sevenbot set fine-target.3 7025       70.25 degrees: its unit is 0.01 degrees
   sevenbot set --unlock offset.2 -5     settings are locked, and kept without power
   sevenbot set --unlock options 2       the arm sends alarm frames of map 2.1
   sevenbot set wrist-position 4 100 4 200 4 150    a byte for each register: IK5 on the arm
 
+A register of two bytes takes one number. With --raw each byte is given, the low one first.
 Registers that only map 2.1 has are written by function 04. Reports of feedback-frequency go on, unless
 other reports (82, 90) are switched on. Offsets then read as in map 2.2, as after any write of this program.
 
@@ -94,31 +96,61 @@ fn note_causes(arm: &Arm, span: Span, args: &SetArgs, unchanged: &[WriteMismatch
     }
 }
 
-/// The bytes for a span: one value per register, or one for all.
+/// The bytes for a span: one value per register, or one for all. A register of two bytes takes one value.
 fn bytes(span: Span, values: &[i32], raw: bool) -> Result<Vec<u8>, CommandError> {
-    let registers = usize::from(span.count());
+    let registers = if raw { span.addresses().map(Span::one).collect() } else { registers(span)? };
     let values = match values {
-        [only] => vec![*only; registers],
-        all if all.len() == registers => all.to_vec(),
+        [only] => vec![*only; registers.len()],
+        all if all.len() == registers.len() => all.to_vec(),
         all => {
-            let given = all.len();
+            let (given, registers) = (all.len(), registers.len());
             return Err(CommandError::Usage(format!(
                 "{given} values for {registers} registers: one each, or one for all"
             )));
         }
     };
-    let pairs = span.addresses().zip(values);
-    pairs.map(|(address, value)| if raw { raw_byte(value) } else { byte(address, value) }).collect()
+    let mut bytes = Vec::new();
+    for (register, value) in registers.iter().zip(values) {
+        match register.count() {
+            _ if raw => bytes.push(raw_byte(value)?),
+            2 => bytes.extend(encoded(register.address(), value)?.to_le_bytes()),
+            _ => bytes.extend(encoded(register.address(), value)?.to_le_bytes().first()),
+        }
+    }
+    Ok(bytes)
+}
+
+/// The registers of a span: one byte each, or two where the table has two-byte registers. Half of one is refused (D22).
+fn registers(span: Span) -> Result<Vec<Span>, CommandError> {
+    let mut registers = Vec::new();
+    let mut addresses = span.addresses().peekable();
+    while let Some(address) = addresses.next() {
+        let row = find_readable(address).filter(|row| row.range.width() == 2);
+        let Some(row) = row else {
+            registers.push(Span::one(address));
+            continue;
+        };
+        let is_low = address.wrapping_sub(row.address).is_multiple_of(2);
+        let high = addresses.next_if(|next| is_low && *next == address.wrapping_add(1));
+        let (Some(_), Some(word)) = (high, Span::new(address, 2)) else {
+            let name = name_of_register(if is_low { address } else { address.wrapping_sub(1) });
+            return Err(CommandError::Usage(format!(
+                "{name} has two bytes, and {address} is one of them: use the name"
+            )));
+        };
+        registers.push(word);
+    }
+    Ok(registers)
 }
 
 fn raw_byte(value: i32) -> Result<u8, CommandError> {
     u8::try_from(value).map_err(|_| CommandError::Usage(format!("{value} is not a byte, 0 to 255")))
 }
 
-/// The byte for a number in the table's unit. Refuses a number out of range, because the maker's firmware takes it.
-fn byte(address: u8, value: i32) -> Result<u8, CommandError> {
-    let Some(row) = find_readable(address) else { return raw_byte(value) };
-    i16::try_from(value).ok().and_then(|value| row.range.encode_byte(value)).ok_or_else(|| {
+/// The raw value for a number in the table's unit. Refuses a number out of range, because the maker's firmware takes it.
+fn encoded(address: u8, value: i32) -> Result<u16, CommandError> {
+    let Some(row) = find_readable(address) else { return raw_byte(value).map(u16::from) };
+    row.range.encode(value).ok_or_else(|| {
         let (name, range) = (name_of_register(address), register_text::range(address));
         let hint = if *row == BAUD_RATE { "; `sevenbot baud` takes bits per second" } else { "" };
         CommandError::Arm(format!("{value} is out of range: {name} takes {range}; nothing was written{hint}"))
@@ -128,7 +160,7 @@ fn byte(address: u8, value: i32) -> Result<u8, CommandError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sevenbot::map::{OFFSET, TARGET_POSITION};
+    use sevenbot::map::{FINE_TARGET, OFFSET, SET_POINT_PERIOD, TARGET_POSITION};
 
     #[test]
     fn numbers_are_decimal_or_hexadecimal() {
@@ -155,5 +187,23 @@ mod tests {
         assert_eq!(bytes(target, &[181], true).ok(), Some(vec![181]), "--raw sends it");
         assert!(matches!(bytes(target, &[256], true), Err(CommandError::Usage(_))));
         assert!(matches!(bytes(target, &[1, 2], false), Err(CommandError::Usage(_))));
+    }
+
+    #[test]
+    fn d22_a_register_of_two_bytes_takes_one_number() {
+        assert_eq!(bytes(Span::of(&FINE_TARGET), &[9_025], false).ok(), Some([0x41, 0x23].repeat(7)));
+        let period = Span::of(&SET_POINT_PERIOD);
+        assert_eq!(bytes(period, &[300], false).ok(), Some(vec![0x2C, 1]));
+        assert_eq!(bytes(period, &[0x2C, 1], true).ok(), Some(vec![0x2C, 1]), "--raw takes bytes");
+        assert_eq!(bytes(Span::new(184, 3).expect("a span"), &[20, 30], false).ok(), Some(vec![20, 0, 30]));
+        let Err(CommandError::Arm(said)) = bytes(period, &[4], false) else { panic!("out of range") };
+        assert!(said.contains("set-point-period takes 0, or 5 to 1000"), "{said}");
+        for (address, count) in [(184, 1), (185, 1), (129, 3), (128, 3)] {
+            let half = bytes(Span::new(address, count).expect("a span"), &[5], false);
+            assert!(
+                matches!(half, Err(CommandError::Usage(said)) if said.contains("has two bytes")),
+                "{address}"
+            );
+        }
     }
 }
