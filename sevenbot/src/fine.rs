@@ -1,7 +1,7 @@
 //! Typed access to the extended block, registers 128 to 191: hundredths of a degree, velocities, loads (D21 to D26).
 
 use protocol_core::registers::Joint;
-use protocol_core::registers::map::{EXTENDED_VERSION, FINE_TARGET, SET_POINT_PERIOD};
+use protocol_core::registers::map::{EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, SET_POINT_PERIOD};
 use protocol_core::registers::map21::Map;
 
 use crate::arm::Arm;
@@ -33,6 +33,18 @@ impl Arm {
     /// As [`Arm::read`].
     pub fn fine_state(&mut self) -> Result<FineState, Error> {
         Ok(FineState::new(&self.read_span(FineState::REGISTERS)?))
+    }
+
+    /// As [`Arm::fine_state`], from any arm; `None` without the extended block.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn fine_state_if_served(&mut self) -> Result<Option<FineState>, Error> {
+        if self.identity().firmware() != Firmware::Ours || self.map() != Map::V22 {
+            return Ok(None);
+        }
+        let snapshot = self.read_span(Span::between(&FINE_POSITION, &EXTENDED_VERSION))?;
+        Ok((snapshot.byte(&EXTENDED_VERSION) == KNOWN_LAYOUT).then(|| FineState::new(&snapshot)))
     }
 
     /// The targets in hundredths of a degree, joint 1 first. Only for an arm with the extended block.

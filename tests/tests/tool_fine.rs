@@ -41,6 +41,8 @@ fn d21_a_pose_takes_decimals() {
         arm.write(STREAM_REGISTERS, &[0, 0]);
         let text = failed(&arm.sevenbot(&["pose", "+85.1", "_", "_", "_", "_", "_", "_"]), 1);
         assert!(text.contains("joint 1 would go to 180.05°"), "{text}");
+        let text = succeeded(arm.sevenbot(&["monitor", "--json", "--samples", "1"]));
+        assert!(text.contains("\"fine\":{\"positions\":[") && text.contains("\"load_percent\":["), "{text}");
         let text = succeeded(arm.sevenbot(&["home", "--wait"]));
         assert!(!text.contains('.'), "whole degrees were asked for: {text}");
     });
@@ -116,6 +118,7 @@ fn an_arm_of_the_maker_takes_the_nearest_whole_degrees() {
         succeeded(sevenbot(&["record", &path("r.txt"), "--driven", "--seconds", "1"]));
         let recorded = fs::read_to_string(path("r.txt")).expect("a recording");
         assert!(recorded.starts_with("7bot-recording 1\n"), "{recorded}");
+        assert!(!succeeded(sevenbot(&["monitor", "--json", "--samples", "1"])).contains("fine"));
         let refused = failed(&sevenbot(&["get", "fine-position"]), 1);
         assert!(refused.contains("does not have register 142"), "{refused}");
     });

@@ -198,7 +198,7 @@ fn csv_is_complete_up_to_a_lost_connection() {
         let text = fs::read_to_string(&file).expect("a file");
         assert!(text.ends_with('\n'));
         let lines = lines(&text);
-        assert_eq!((lines[0][0], lines[0].last()), ("seconds", Some(&"round_trip_ms")));
+        assert_eq!((lines[0][0], lines[0].last()), ("seconds", Some(&"load_percent.7")));
         assert!(lines.iter().all(|line| line.len() == lines[0].len()), "{text}");
         assert_eq!(lines[1][1..8], ["90", "90", "65", "90", "90", "90", "80"]);
     });

@@ -3,7 +3,8 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use sevenbot::{Joint, StatusBlock};
+use sevenbot::fine::FineState;
+use sevenbot::{FineAngle, Joint, StatusBlock};
 
 use super::sample::Sample;
 use crate::printer::Printable;
@@ -26,11 +27,14 @@ impl LineFormat {
                 format!("seconds {} {} moving", joints("target").join(" "), joints("present").join(" "))
             }
             Self::Csv => format!(
-                "seconds,{},{},{},{},motor_state,faults,missing,supply_volts,hottest_celsius,round_trip_ms",
+                "seconds,{},{},{},{},motor_state,faults,missing,supply_volts,hottest_celsius,round_trip_ms,{},{},{}",
                 joints("target").join(","),
                 joints("present").join(","),
                 joints("degrees_per_second").join(","),
-                joints("moving").join(",")
+                joints("moving").join(","),
+                joints("fine_position").join(","),
+                joints("velocity").join(","),
+                joints("load_percent").join(",")
             ),
         }
     }
@@ -69,8 +73,17 @@ fn csv(sample: &Sample) -> String {
         volts.map_or_else(String::new, |volts| format!("{volts:.1}")),
         number(status.and_then(StatusBlock::hottest_celsius)),
         format!("{:.1}", sample.round_trip.as_secs_f64() * 1e3),
+        optional(sample.fine.map(|fine| fine.positions.map(|angle| angle.map(FineAngle::degrees))), 2),
+        optional(sample.fine.map(|fine| fine.velocities.map(|tenths| Some(f64::from(tenths) / 10.0))), 1),
+        optional(sample.fine.map(|fine| fine.loads.map(|tenths| Some(f64::from(tenths) / 10.0))), 1),
     ]
     .join(",")
+}
+
+/// Seven fields, empty where there is no number.
+fn optional(values: Option<[Option<f64>; 7]>, decimals: usize) -> String {
+    let field = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.decimals$}"));
+    values.unwrap_or_default().map(field).join(",")
 }
 
 fn numbers(is_so: impl Fn(Joint) -> bool) -> Vec<u8> {
@@ -91,6 +104,27 @@ pub(crate) struct SampleJson {
     supply_volts: Option<f64>,
     hottest_celsius: Option<u8>,
     round_trip_ms: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fine: Option<FineJson>,
+}
+
+/// What only the extended block has.
+#[derive(Debug, Serialize)]
+struct FineJson {
+    positions: [Option<f64>; 7],
+    degrees_per_second: [f64; 7],
+    load_percent: [f64; 7],
+}
+
+impl From<FineState> for FineJson {
+    fn from(fine: FineState) -> Self {
+        let tenths = |values: [i16; 7]| values.map(|tenths| f64::from(tenths) / 10.0);
+        Self {
+            positions: fine.positions.map(|angle| angle.map(FineAngle::degrees)),
+            degrees_per_second: tenths(fine.velocities),
+            load_percent: tenths(fine.loads),
+        }
+    }
 }
 
 impl From<&Sample> for SampleJson {
@@ -109,6 +143,7 @@ impl From<&Sample> for SampleJson {
             supply_volts: status.and_then(StatusBlock::supply_volts),
             hottest_celsius: status.and_then(StatusBlock::hottest_celsius),
             round_trip_ms: thousandths(sample.round_trip.as_secs_f64() * 1e3),
+            fine: sample.fine.map(FineJson::from),
         }
     }
 }

@@ -41,7 +41,10 @@ Examples:
   sevenbot monitor
   sevenbot monitor --csv move.csv                  until Ctrl-C, or the arm goes away
   sevenbot monitor --json --hz 2 | jq .positions
-  sevenbot monitor --hz 20 --samples 100 > move.txt")]
+  sevenbot monitor --hz 20 --samples 100 > move.txt
+
+CSV and JSON also have positions in hundredths of a degree, velocities in degrees per second and loads in
+percent of the stall torque, if the arm measures them.")]
 pub(crate) struct MonitorArgs {
     /// Samples per second.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = value_parser!(u8).range(1..=50))]

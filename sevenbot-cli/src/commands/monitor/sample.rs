@@ -1,7 +1,8 @@
-//! A sample of the arm: two reads, and the round-trip time of the first.
+//! A sample of the arm: two or three reads, and the round-trip time of the first.
 
 use std::time::{Duration, Instant};
 
+use sevenbot::fine::FineState;
 use sevenbot::joints::JointSnapshot;
 use sevenbot::{Arm, Error};
 
@@ -11,6 +12,8 @@ pub(crate) struct Sample {
     /// Since the start of the monitor.
     pub(crate) time: Duration,
     pub(crate) joints: JointSnapshot,
+    /// Positions in hundredths, velocities and loads; `None` from an arm without the extended block.
+    pub(crate) fine: Option<FineState>,
     /// From a request to its reply.
     pub(crate) round_trip: Duration,
 }
@@ -22,6 +25,7 @@ impl Sample {
         let registers = arm.read_span(JointSnapshot::REGISTERS)?;
         let round_trip = asked.elapsed();
         let joints = JointSnapshot::new(registers, arm.status()?);
-        Ok(Self { time: start.elapsed(), joints, round_trip })
+        let fine = arm.fine_state_if_served()?;
+        Ok(Self { time: start.elapsed(), joints, fine, round_trip })
     }
 }

@@ -254,6 +254,7 @@ pub(crate) mod tests {
         Sample {
             time: Duration::from_millis(millis),
             joints: JointSnapshot::new(registers, Some(StatusBlock::from(status))),
+            fine: None,
             round_trip: Duration::from_micros(4200),
         }
     }
