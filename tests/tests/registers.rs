@@ -40,10 +40,13 @@ fn a_new_arm_has_the_documented_defaults() {
         assert_eq!(arm.read(SPEED, 7), [60; 7]);
         assert_eq!(arm.read(TIME, 7), [0; 7]);
         assert_eq!(arm.read(53, 1), [0]);
-        let unused = [0; 142];
+        let unused = [0; 48];
         assert_eq!(arm.read(61, 22), [&unused[..5], &[1], &unused[..16]].concat(), "66 is 1 (M3)");
         assert_eq!(arm.register(90), 0);
-        assert_eq!(arm.read(98, 142), unused, "unused addresses read 0");
+        assert_eq!(arm.read(98, 30), unused[..30], "unused addresses read 0");
+        assert_eq!(arm.read(184, 6), [0; 6], "no stream, no watchdog, no limits, reports in degrees");
+        assert_eq!(arm.register(191), 1, "the layout of the extended block");
+        assert_eq!(arm.read(192, 48), unused, "unused addresses read 0");
         let faults = u8::from(!arm.has(Need::Persistence));
         assert_eq!(
             arm.read(STATUS, 3),
