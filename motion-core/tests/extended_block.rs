@@ -5,6 +5,7 @@
 mod rig;
 
 use arm_sim::servo::ServoFault;
+use motion_core::calibration::angle_from_counts;
 use protocol_core::registers::Joint;
 use rig::{Rig, STANDARD_POSE};
 
@@ -270,13 +271,32 @@ fn d25_a_limit_that_is_broken_cannot_be_switched_on() {
 fn d25_a_position_of_map_21_is_a_target_like_any_other() {
     let mut rig = Rig::started();
     rig.write(LIMITS, &[1]);
-    // Near the base the wrist folds the linkage.
-    let wrist: Vec<u8> = [0_i16, 60, 60].iter().flat_map(|mm| (mm + 1024).to_be_bytes()).collect();
-    let before = rig.targets();
+    // The wrist at (0, 185, 50) mm.
+    let wrist: Vec<u8> = [0_i16, 185, 50].iter().flat_map(|mm| (mm + 1024).to_be_bytes()).collect();
     rig.send(&rig::frame(4, 68, 6, &wrist));
-    let told = refusal(&mut rig);
-    assert!(told == (5, 68) || told.0 == 6, "{told:?}");
-    assert_eq!(rig.targets(), before);
+    assert_eq!(refusal(&mut rig).0, 0);
+    let reached = rig.targets();
+    assert!(reached != STANDARD_POSE);
+    rig.send(&rig::frame(4, 47, 2, &[162, 65]));
+    assert_eq!((refusal(&mut rig), rig.targets()), ((5, 47), reached));
+}
+
+#[test]
+fn d25_joints_2_and_3_wait_for_each_other_on_the_way() {
+    let mut rig = Rig::started();
+    rig.write(33, &[100, 10]);
+    rig.write(TARGET + 1, &[40, 180]);
+    rig.run_until_still();
+    rig.write(LIMITS, &[1]);
+    rig.forget();
+    rig.write(TARGET + 1, &[180, 40]);
+    rig.run_until_still();
+    let angle = |joint: usize, counts| angle_from_counts(Joint::ALL[joint], counts, 0).0;
+    let sums: Vec<i32> = rig.goals().map(|(_, goals)| angle(1, goals[1].1) + angle(2, goals[2].1)).collect();
+    // A goal is rounded to a count of 0.212 degrees.
+    assert!(sums.iter().all(|sum| (83_700_000..=226_300_000).contains(sum)), "{:?}", sums.iter().max());
+    assert!(sums.iter().any(|sum| *sum > 225_500_000), "joint 2 goes as far as it may");
+    assert_eq!(rig.targets()[1..3], [180, 40]);
 }
 
 #[test]

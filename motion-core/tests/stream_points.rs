@@ -124,6 +124,19 @@ fn d23_points_that_come_too_fast_are_not_piled_up() {
 }
 
 #[test]
+fn d23_a_shorter_period_counts_from_the_next_point_on() {
+    let mut trajectory = Trajectory::holding(MicroDegrees(0));
+    let at = |millis: u64| Instant::from_micros(millis * 1_000);
+    for (millis, angle, period) in [(1_000, 10_000_000, 1_000), (1_010, 3_000_000, 20)] {
+        trajectory.stream_to(MicroDegrees(angle), at(millis), Duration::from_millis(period));
+    }
+    for millis in (1_010..=1_050).step_by(10) {
+        trajectory.advance(at(millis), FASTEST);
+    }
+    assert_eq!(trajectory.set_point(), MicroDegrees(3_000_000), "two short periods after its frame");
+}
+
+#[test]
 fn d23_one_lost_frame_does_not_move_the_grid() {
     let times: Vec<u64> = (0..40).map(|k| 1_000_000 + k * 20_000).collect();
     let all = ramp(&times, 2_000_000);

@@ -232,15 +232,6 @@ impl Register {
         if self.per_joint { Joint::from_index(index) } else { None }
     }
 
-    /// The default of a joint in a per-joint row; of the whole row in any other.
-    #[must_use]
-    pub const fn default_of(&self, joint: Joint) -> u16 {
-        match self.defaults.as_slice().split_at_checked(joint.index() as usize) {
-            Some((_, [value, ..])) => *value,
-            _ => 0,
-        }
-    }
-
     /// The defaults of a per-joint row with values of one byte.
     #[must_use]
     pub fn default_bytes(&self) -> [u8; JOINTS] {
@@ -250,14 +241,16 @@ impl Register {
     /// The default of the byte at `address`, which the run must hold.
     #[must_use]
     pub const fn default_at(&self, address: u8) -> u8 {
-        let joint = match self.joint_at(address) {
-            Some(joint) => joint,
-            None if self.per_joint => return 0,
-            None => Joint::ALL[0],
+        let distance = address.wrapping_sub(self.address);
+        let index = if self.per_joint { distance / self.range.width() } else { 0 };
+        let (low, high) = match self.defaults.as_slice().split_at_checked(index as usize) {
+            Some((_, [value, ..])) => {
+                let [low, high] = value.to_le_bytes();
+                (low, high)
+            }
+            _ => (0, 0),
         };
-        let [low, high] = self.default_of(joint).to_le_bytes();
-        let is_high = self.range.width() == 2 && address.wrapping_sub(self.address) % 2 == 1;
-        if is_high { high } else { low }
+        if self.range.width() == 2 && distance % 2 == 1 { high } else { low }
     }
 }
 
@@ -319,7 +312,7 @@ mod tests {
         assert_eq!(row.joint_at(48), Joint::new(3));
         assert_eq!(row.joint_at(53), None);
         assert_eq!(row.joint_at(45), None);
-        assert_eq!(row.default_at(48), 3);
+        assert_eq!((row.default_at(48), row.default_bytes()), (3, [1, 2, 3, 4, 5, 6, 7]));
         assert_eq!(ram(46).of(Joint::ALL[6]), 46, "a row without joints has one address");
     }
 

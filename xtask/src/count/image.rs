@@ -5,7 +5,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use protocol_core::registers::JOINTS;
-use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION};
+use protocol_core::registers::map::{FINE_TARGET, PRESENT_POSITION, SPEED, TARGET_POSITION};
 use protocol_core::request::Request;
 
 use super::machine::{Machine, frame};
@@ -45,6 +45,8 @@ const TRANSMITTER_BYTES: u64 = 2;
 
 const READ: Request<'_> = Request::Read { address: PRESENT_POSITION.address, count: PRESENT_POSITION.count };
 const POSE: [u8; JOINTS] = [90, 90, 65, 90, 90, 90, 80];
+/// 90 degrees in hundredths, low byte first.
+const FINE_POSE: [[u8; 2]; JOINTS] = [[0x28, 0x23]; JOINTS];
 
 /// Addresses in the image.
 struct ImageAddresses {
@@ -68,6 +70,8 @@ pub(crate) fn figures() -> TaskResult<Vec<Figure>> {
     let read = addresses.paths(&mut machine, READ, 1, answered)?;
     let read_whole = addresses.paths(&mut machine, READ, 1, asleep)?;
     let write = addresses.paths(&mut machine, write, 1, asleep)?;
+    let fine = Request::Write { address: FINE_TARGET.address, values: FINE_POSE.as_flattened() };
+    let fine = addresses.paths(&mut machine, fine, 1, asleep)?;
     let last_but_one = addresses.paths(&mut machine, READ, 2, asleep)?;
     let first = addresses.paths(&mut machine, READ, 7, asleep)?;
     let delayed = addresses.behind_a_false_header(&mut machine)?;
@@ -77,6 +81,7 @@ pub(crate) fn figures() -> TaskResult<Vec<Figure>> {
         Figure::new("image: read of 7, last byte in to first byte out", read),
         Figure::new("image: read of 7, last byte in to asleep again", read_whole),
         Figure::new("image: write of 7, last byte in to asleep again", write),
+        Figure::new("image: write of 7 fine targets, last byte in to asleep again", fine),
         Figure::new("image: last byte but one of a request, in to asleep again", last_but_one),
         Figure::new("image: byte that needs no pass of the loop, in to asleep again", first),
         Figure::new("image: milliseconds that 34 reads are held up by a false header", delayed),
