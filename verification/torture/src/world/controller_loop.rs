@@ -9,6 +9,7 @@ use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer;
 
 use super::command_checker::CommandContext;
+use super::extended_model;
 use super::host_request::{HostRequest, MAX_LENGTH, alarm, reply, report};
 use super::power::random_cut;
 use super::register_model::RequestEffect;
@@ -190,7 +191,12 @@ impl TortureWorld {
             |at: u8| at.checked_sub(*address).is_some_and(|offset| usize::from(offset) < values.len());
         let includes_any = |row: &Register| (row.address..row.address + row.count).any(includes);
         let (frequencies, baud) = (arm.model.frequencies(), arm.controller.baud());
-        arm.status_checker.reports.frequencies_written(self.now, frequencies, baud);
+        arm.status_checker.reports.frequencies_written(
+            self.now,
+            frequencies,
+            arm.model.report_content(),
+            baud,
+        );
         if includes(VACUUM_PUMP.address) {
             arm.status_checker.vacuum_written(self.now);
         }
@@ -238,10 +244,14 @@ impl TortureWorld {
                 self.counts.reports += 1;
                 let stream = ReportStream::of(bytes);
                 arm.status_checker.reports.sent(self.now, stream)?;
-                let (function, address, count) = stream.frame();
+                let (function, address, count) = stream.frame(arm.model.report_content());
                 report(function, address, registers.read(address, count))
             }
         };
+        if extended_model::shows_block(&expected) {
+            arm.model.compare_fine_targets(arm.controller.registers())?;
+            arm.check_status(self.now, &self.bus, |checker, context| checker.check_fine_positions(context))?;
+        }
         ensure(arm.output_bytes == expected, || format!("the frame to the host should be {expected:02x?}"))
     }
 

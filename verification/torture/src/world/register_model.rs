@@ -1,18 +1,20 @@
 //! A model of the registers, from docs/protocol.md alone. It does not model measured values, such as positions and
 //! missing servos.
 
+mod comparison;
+
 use motion_core::Storage;
 use motion_core::calibration::MicroDegrees;
 use protocol_core::registers::map::{
     BAUD_RATE, EEPROM_LOCK, FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_REFUSED, LAST_REFUSAL,
     LAST_REFUSED_REGISTER, MAP, MOTOR_STATE, OFFSET, PRESENT_POSITION, TARGET_POSITION, motor_state, refusal,
 };
-use protocol_core::registers::{Access, Image, Joint, MAP_21, Region, Register, RegisterFile};
+use protocol_core::registers::{Access, Image, Joint, MAP_21, Region, Register};
 
+use super::extended_model;
 use super::host_request::HostRequest;
 use super::map21_model::{self, OutOfReach};
 use crate::per_joint::PerJoint;
-use crate::violation::{Check, ensure};
 
 /// The options of map 2.1: bit 0 biased offsets, bit 1 alarms (M6).
 const OPTIONS: u8 = 20;
@@ -49,14 +51,10 @@ pub(super) struct RegisterModel {
     pub(super) has_host_target: PerJoint<bool>,
     /// Offsets are shown as 128 + offset (M5). `values` has them in sign and magnitude.
     has_biased_offsets: bool,
-    /// A target from inverse kinematics, with its fraction (M7).
+    /// A target with its fraction, from inverse kinematics (M7) or the extended block (D21).
     fine_targets: PerJoint<Option<MicroDegrees>>,
+    has_streams: bool,
 }
-
-/// The first and last addresses of the registers whose values follow from requests alone. The host writes none of the
-/// extended block, 128 to 191.
-const MODELLED: &[(u8, u8)] =
-    &[(0, 45), (53, 53), (61, 82), (90, 90), (98, 127), (192, 240), (244, 247), (250, 251)];
 
 impl RegisterModel {
     /// The registers after power-up with the stored settings.
@@ -71,6 +69,7 @@ impl RegisterModel {
             has_host_target: PerJoint::all(false),
             has_biased_offsets: false,
             fine_targets: PerJoint::all(None),
+            has_streams: false,
         };
         let bytes_of_21 = MAP_21.iter().filter(|row| row.region == Region::Ram);
         for row in bytes_of_21.chain(MAP) {
@@ -78,6 +77,7 @@ impl RegisterModel {
         }
         (2..).zip(chip_id).for_each(|(at, byte)| model.set(at, byte));
         stored.into_iter().for_each(|image| model.load(image));
+        Joint::ALL.into_iter().for_each(|joint| model.show_coarse_target(joint));
         model
     }
 
@@ -145,10 +145,8 @@ impl RegisterModel {
             }
             HostRequest::Write { address, values } => {
                 let items: Vec<_> = self.effective(*address, values).collect();
-                let is_wrong =
-                    |at, value| self.row(at).is_some_and(|row| !row.range.contains(u16::from(value)));
-                match items.iter().find(|(at, value)| is_wrong(*at, *value)) {
-                    Some((at, _)) => self.refuse(refusal::OUT_OF_RANGE, *at),
+                match self.first_offence(&items) {
+                    Some((reason, at)) => self.refuse(reason, at),
                     None => self.write(&items),
                 }
             }
@@ -181,6 +179,17 @@ impl RegisterModel {
             rows.get(usize::from(*at)).copied().flatten().is_some_and(|row| {
                 row.access == Access::ReadWrite && (row.region != Region::Eeprom || is_open)
             })
+        })
+    }
+
+    /// The reason for which a write is refused, and the register (D16, D22).
+    fn first_offence(&self, items: &[(u8, u8)]) -> Option<(u8, u8)> {
+        items.iter().find_map(|&(at, value)| {
+            let is_wrong = self.row(at).is_some_and(|row| !row.range.contains(u16::from(value)));
+            match extended_model::is_word(at) {
+                true => extended_model::word_offence(items, at),
+                false => is_wrong.then_some((refusal::OUT_OF_RANGE, at)),
+            }
         })
     }
 
@@ -245,11 +254,38 @@ impl RegisterModel {
         for (joint, angle) in Joint::ALL.into_iter().zip(angles) {
             if let Some(angle) = angle {
                 let target = MicroDegrees::nearest(*angle);
-                self.set(TARGET_POSITION.of(joint), target.nearest_degree());
-                self.fine_targets[joint] = Some(target);
-                self.has_host_target[joint] = self.is_servo();
+                self.set_fine_target(joint, target);
             }
         }
+    }
+
+    fn set_fine_target(&mut self, joint: Joint, target: MicroDegrees) {
+        self.set(TARGET_POSITION.of(joint), target.nearest_degree());
+        let hundredths = target.0.saturating_add(5_000) / 10_000;
+        self.show_fine_target(joint, u16::try_from(hundredths).unwrap_or(0));
+        self.fine_targets[joint] = Some(target);
+        self.has_host_target[joint] = self.is_servo();
+    }
+
+    /// A coarse target has no fraction (D21).
+    fn show_coarse_target(&mut self, joint: Joint) {
+        self.show_fine_target(joint, u16::from(self.get(TARGET_POSITION.of(joint))) * 100);
+    }
+
+    fn show_fine_target(&mut self, joint: Joint, hundredths: u16) {
+        (extended_model::fine_target(joint)..)
+            .zip(hundredths.to_le_bytes())
+            .for_each(|(at, byte)| self.set(at, byte));
+    }
+
+    fn shown_fine_target(&self, joint: Joint) -> u16 {
+        let low = extended_model::fine_target(joint);
+        u16::from_le_bytes([self.get(low), self.get(low + 1)])
+    }
+
+    /// True if fine targets were the points of a stream at any time since power-up (D23).
+    pub(super) const fn has_streams(&self) -> bool {
+        self.has_streams
     }
 
     fn apply(&mut self, items: &[(u8, u8)]) {
@@ -261,14 +297,24 @@ impl RegisterModel {
         for (at, _) in items {
             if let Some(joint) = TARGET_POSITION.joint_at(*at) {
                 self.fine_targets[joint] = None;
+                self.show_coarse_target(joint);
                 self.has_host_target[joint] = self.is_servo();
             }
+        }
+        self.has_streams |= items.iter().any(|(at, value)| matches!(at, 184 | 185) && *value != 0);
+        for (joint, hundredths) in extended_model::fine_targets(items) {
+            self.set_fine_target(joint, MicroDegrees(i32::from(hundredths) * 10_000));
         }
     }
 
     /// The report frequencies in Hz: registers 53, 82 and 90.
     pub(super) fn frequencies(&self) -> [u8; 3] {
         [FEEDBACK_FREQUENCY.address, ANGLE_FREQUENCY, LOAD_FREQUENCY].map(|at| self.get(at))
+    }
+
+    /// What the reports of register 53 hold (D26).
+    pub(super) fn report_content(&self) -> u8 {
+        self.get(extended_model::REPORT_CONTENT)
     }
 
     /// A joint's offset in degrees.
@@ -279,51 +325,5 @@ impl RegisterModel {
     /// The target with its fraction, if inverse kinematics set it and it is in force.
     pub(super) fn fine_target(&self, joint: Joint) -> Option<MicroDegrees> {
         self.fine_targets[joint].filter(|_| self.has_host_target[joint])
-    }
-
-    /// The values that a read shows.
-    fn shown(&self, first: u8, last: u8) -> Vec<u8> {
-        let shown = |at| match self.has_biased_offsets {
-            true => map21_model::shown(at, self.get(at)),
-            false => self.get(at),
-        };
-        (first..=last).map(shown).collect()
-    }
-
-    /// Compares the model with the registers of the arm.
-    pub(super) fn compare(&self, registers: &RegisterFile) -> Check {
-        for (first, last) in MODELLED {
-            let ours = self.shown(*first, *last);
-            let theirs = registers.read(*first, last - first + 1);
-            ensure(ours == theirs, || {
-                let differs = (*first..).zip(ours.iter().zip(theirs)).find(|(_, (a, b))| a != b);
-                let (at, (wanted, found)) = differs.unwrap_or((0, (&0, &0)));
-                format!("register {at} holds {found} instead of {wanted}")
-            })?;
-        }
-        let [angles, positions] = [83, 54].map(|first| registers.read(first, 7));
-        ensure(angles == positions, || format!("angles {angles:?} of positions {positions:?}"))?;
-        let loads = registers.read(91, 7);
-        ensure(loads.iter().all(|load| (3..=253).contains(load)), || format!("loads {loads:?}"))
-    }
-
-    /// A target that differs from the model is the measured position (D12, D13). The model takes it over.
-    pub(super) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
-        for joint in Joint::ALL {
-            let (at, found) = (TARGET_POSITION.of(joint), registers.get(TARGET_POSITION.of(joint)));
-            if found == self.get(at) {
-                continue;
-            }
-            let present = registers.get(PRESENT_POSITION.of(joint));
-            ensure(found == present, || {
-                let wanted = self.get(at);
-                let number = joint.number();
-                format!("target {number} is {found}: the host wrote {wanted}, and the joint was at {present}")
-            })?;
-            self.set(at, found);
-            self.fine_targets[joint] = None;
-            self.has_host_target[joint] = false;
-        }
-        Ok(())
     }
 }

@@ -1,0 +1,121 @@
+//! What a write of the extended block means, from docs/protocol.md, section 9.
+
+use motion_core::calibration::angle_from_counts;
+use protocol_core::registers::map::refusal;
+use protocol_core::registers::{Joint, RegisterFile};
+
+use crate::violation::{Check, ensure};
+
+/// The first fine target, and the first address after the fine targets.
+pub(super) const FINE_TARGETS: (u8, u8) = (128, 142);
+/// The first fine present position.
+const FINE_POSITIONS: u8 = 142;
+/// The set-point period, two bytes.
+pub(super) const PERIOD: u8 = 184;
+/// What a report holds (D26).
+pub(super) const REPORT_CONTENT: u8 = 189;
+/// The joints that were measured.
+const MEASURED: u8 = 190;
+/// A fine position before the first reading.
+const UNKNOWN: u16 = 65_535;
+
+/// The address of the low byte if this is a byte of a writable two-byte register.
+const fn low_byte(at: u8) -> Option<u8> {
+    match at {
+        128..=141 | 184 | 185 => Some(at & !1),
+        _ => None,
+    }
+}
+
+/// The reason for which a write is refused because of this byte of a two-byte register, and the address of its low byte
+/// (D22). `None` for the other registers.
+pub(super) fn word_offence(items: &[(u8, u8)], at: u8) -> Option<(u8, u8)> {
+    let low = low_byte(at)?;
+    let Some(value) = word(items, low) else { return Some((refusal::HALF_A_WORD, low)) };
+    let is_in_range = if low == PERIOD { matches!(value, 0 | 5..=1_000) } else { value <= 18_000 };
+    (!is_in_range).then_some((refusal::OUT_OF_RANGE, low))
+}
+
+/// True if this is a byte of a writable two-byte register.
+pub(super) const fn is_word(at: u8) -> bool {
+    low_byte(at).is_some()
+}
+
+/// The two-byte register at `low` in a write that covers both its bytes.
+fn word(items: &[(u8, u8)], low: u8) -> Option<u16> {
+    let byte = |wanted| items.iter().find(|(at, _)| *at == wanted).map(|(_, value)| *value);
+    Some(u16::from_le_bytes([byte(low)?, byte(low + 1)?]))
+}
+
+/// The address of a joint's fine target.
+pub(super) const fn fine_target(joint: Joint) -> u8 {
+    FINE_TARGETS.0 + 2 * joint.index()
+}
+
+/// The fine targets in a write, in hundredths of a degree.
+pub(super) fn fine_targets(items: &[(u8, u8)]) -> impl Iterator<Item = (Joint, u16)> + use<'_> {
+    Joint::ALL.into_iter().filter_map(|joint| Some((joint, word(items, fine_target(joint))?)))
+}
+
+/// The present position of a joint in hundredths of a degree, if it was measured.
+pub(super) fn fine_position(registers: &RegisterFile, joint: Joint) -> Option<u16> {
+    Some(word_of(registers, FINE_POSITIONS + 2 * joint.index())).filter(|position| *position != UNKNOWN)
+}
+
+/// True if a frame to the host holds registers of the extended block. The arm computes them for such a frame only.
+pub(super) fn shows_block(frame: &[u8]) -> bool {
+    matches!(frame, [_, _, 3, first, count, ..] if *first < 192 && usize::from(*first) + usize::from(*count) > 128 && *count > 0)
+}
+
+/// A two-byte register of the arm.
+pub(super) fn word_of(registers: &RegisterFile, low: u8) -> u16 {
+    u16::from_le_bytes([registers.get(low), registers.get(low + 1)])
+}
+
+/// Both views of the present positions agree, and 190 tells which of them were measured (D21).
+pub(super) fn check_positions(registers: &RegisterFile) -> Check {
+    for joint in Joint::ALL {
+        let (number, coarse) = (joint.number(), registers.get(54 + joint.index()));
+        let is_measured = registers.get(MEASURED) & joint.bit() != 0;
+        let fine = fine_position(registers, joint);
+        let agrees = match fine {
+            // A half is rounded before it is shown in hundredths.
+            Some(fine) => is_measured && fine <= 18_000 && fine.abs_diff(u16::from(coarse) * 100) <= 50,
+            None => !is_measured && coarse == 0,
+        };
+        ensure(agrees, || {
+            format!("joint {number} is at {coarse} and {fine:?} hundredths, measured: {is_measured}")
+        })?;
+    }
+    Ok(())
+}
+
+/// The fine position of a joint at rest is its position, `counts` (D21).
+pub(super) fn check_position(joint: Joint, counts: u16, offset: i8, registers: &RegisterFile) -> Check {
+    let angle = angle_from_counts(joint, counts, offset).0.clamp(0, 180_000_000);
+    let fine = fine_position(registers, joint);
+    let is_right = fine.is_some_and(|fine| (i32::from(fine) * 10_000).abs_diff(angle) <= 5_000);
+    ensure(is_right, || {
+        format!("joint {} is at {angle} microdegrees, not {fine:?} hundredths", joint.number())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_byte_registers_are_written_whole() {
+        let of = |first: u8, values: &[u8]| (first..).zip(values.iter().copied()).collect::<Vec<_>>();
+        assert_eq!(word_offence(&of(127, &[0, 1]), 128), Some((refusal::HALF_A_WORD, 128)));
+        assert_eq!(word_offence(&of(129, &[0]), 129), Some((refusal::HALF_A_WORD, 128)));
+        assert_eq!(word_offence(&of(128, &[0x50, 0x46]), 129), None, "18000");
+        assert_eq!(word_offence(&of(140, &[0x51, 0x46]), 140), Some((refusal::OUT_OF_RANGE, 140)));
+        let period = |value: u16| word_offence(&of(184, &value.to_le_bytes()), 185);
+        assert_eq!([0, 5, 1_000].map(period), [None; 3]);
+        assert_eq!([4, 1_001].map(period), [Some((refusal::OUT_OF_RANGE, PERIOD)); 2]);
+        assert_eq!(word_offence(&of(142, &[1]), 142), None, "not writable");
+        let written: Vec<_> = fine_targets(&of(129, &[9, 1, 2])).collect();
+        assert_eq!(written.iter().map(|(_, value)| *value).collect::<Vec<_>>(), [0x201]);
+    }
+}
