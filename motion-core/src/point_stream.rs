@@ -98,10 +98,9 @@ impl PointStream {
         angle
     }
 
-    /// Passes over all points but the newest, and returns that one if the joint has not passed it.
-    pub fn skip_to_newest(&mut self) -> Option<MicroDegrees> {
+    /// Passes over all points but the newest.
+    pub fn skip_to_newest(&mut self) {
         self.pass(self.points.len().saturating_sub(1));
-        self.points.last().map(|point| point.angle)
     }
 
     /// Removes the oldest points.

@@ -88,7 +88,8 @@ impl Trajectory {
     fn advance_stream(&mut self, end: Instant, most: i32) {
         let mut wanted = self.stream.follow(self.set_point, end);
         if self.set_point.0.abs_diff(wanted.0) > most.unsigned_abs() {
-            wanted = self.stream.skip_to_newest().unwrap_or(self.target);
+            self.stream.skip_to_newest();
+            wanted = self.target;
         }
         self.step(wanted.0 - self.set_point.0, most);
     }
