@@ -75,6 +75,7 @@ mod tests {
         assert_eq!(step([100, 126], [103, 125]), [101, 125], "joint 2 goes as far as joint 3 makes room");
         assert_eq!(step([100, 126], [99, 129]), [99, 127], "joint 3 likewise");
         assert_eq!(step([100, 126], [103, 129]), [100, 126], "nobody makes room");
+        assert_eq!(step([100, 125], [102, 127]), [100, 126], "both use the room that there is");
         assert_eq!(step([20, 64], [17, 65]), [19, 65], "the lower limit");
         assert_eq!(step([20, 64], [17, 60]), [20, 64]);
     }

@@ -137,6 +137,16 @@ fn d23_a_shorter_period_counts_from_the_next_point_on() {
 }
 
 #[test]
+fn d23_a_coarse_target_ends_the_stream_at_once() {
+    let mut trajectory = Trajectory::holding(MicroDegrees(0));
+    let at = |millis: u64| Instant::from_micros(millis * 1_000);
+    trajectory.stream_to(MicroDegrees(10_000_000), at(1_000), Duration::from_millis(20));
+    trajectory.move_to(MicroDegrees(0), 0);
+    trajectory.advance(at(1_010), FASTEST);
+    assert_eq!(trajectory.set_point(), MicroDegrees(0), "it does not go to the point first");
+}
+
+#[test]
 fn d23_one_lost_frame_does_not_move_the_grid() {
     let times: Vec<u64> = (0..40).map(|k| 1_000_000 + k * 20_000).collect();
     let all = ramp(&times, 2_000_000);
