@@ -12,6 +12,8 @@ pub(super) const FINE_TARGETS: (u8, u8) = (128, 142);
 const FINE_POSITIONS: u8 = 142;
 /// The set-point period, two bytes.
 pub(super) const PERIOD: u8 = 184;
+/// The limits (D25).
+pub(super) const LIMITS: u8 = 188;
 /// What a report holds (D26).
 pub(super) const REPORT_CONTENT: u8 = 189;
 /// The joints that were measured.

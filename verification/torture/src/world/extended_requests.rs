@@ -2,7 +2,7 @@
 
 use protocol_core::registers::map::TARGET_POSITION;
 
-use super::extended_model::{PERIOD, REPORT_CONTENT, fine_target};
+use super::extended_model::{LIMITS, PERIOD, REPORT_CONTENT, fine_target};
 use crate::seeded_rng::SeededRng;
 
 /// A write of the extended block. A few are out of range, or cover half of a two-byte register.
@@ -13,7 +13,8 @@ pub(super) fn write(rng: &mut SeededRng) -> (u8, Vec<u8>) {
             (fine_target(protocol_core::registers::Joint::ALL[0]), (0..7).flat_map(|_| fine(rng)).collect())
         }
         9 | 10 => (PERIOD, period(rng)),
-        11 | 12 => (REPORT_CONTENT, vec![content(rng)]),
+        11 => (LIMITS, vec![rng.up_to(3)]),
+        12 => (REPORT_CONTENT, vec![content(rng)]),
         // The targets in both views.
         13 => (TARGET_POSITION.address, (0..96).map(|_| rng.up_to(60)).collect()),
         _ => (124 + rng.up_to(68), (0..rng.below(20)).map(|_| rng.up_to(64)).collect()),

@@ -1,7 +1,7 @@
-//! A model of the registers, from docs/protocol.md alone. It does not model measured values, such as positions and
-//! missing servos.
+//! A model of the registers, from docs/protocol.md alone, without measured values such as positions.
 
 mod comparison;
+mod limits;
 
 use motion_core::Storage;
 use motion_core::calibration::MicroDegrees;
@@ -15,6 +15,8 @@ use super::extended_model;
 use super::host_request::HostRequest;
 use super::map21_model::{self, OutOfReach};
 use crate::per_joint::PerJoint;
+pub(in crate::world) use limits::LINKAGE;
+use limits::LimitVerdict;
 
 /// The options of map 2.1: bit 0 biased offsets, bit 1 alarms (M6).
 const OPTIONS: u8 = 20;
@@ -40,7 +42,7 @@ pub(super) enum RequestEffect {
 }
 
 /// The modelled registers.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct RegisterModel {
     values: [u8; 256],
     rows: Vec<Option<&'static Register>>,
@@ -54,6 +56,8 @@ pub(super) struct RegisterModel {
     /// A target with its fraction, from inverse kinematics (M7) or the extended block (D21).
     fine_targets: PerJoint<Option<MicroDegrees>>,
     has_streams: bool,
+    /// The arm refuses the next write whose verdict the model does not know.
+    pub(super) refuses_unknown: bool,
 }
 
 impl RegisterModel {
@@ -70,6 +74,7 @@ impl RegisterModel {
             has_biased_offsets: false,
             fine_targets: PerJoint::all(None),
             has_streams: false,
+            refuses_unknown: false,
         };
         let bytes_of_21 = MAP_21.iter().filter(|row| row.region == Region::Ram);
         for row in bytes_of_21.chain(MAP) {
@@ -84,13 +89,9 @@ impl RegisterModel {
     /// Loads stored settings. A value outside its range is replaced by its default (D19), and reserved registers read 0.
     fn load(&mut self, image: &Image) {
         for (at, byte) in (EEPROM.0..EEPROM.1).zip(image.0) {
-            if self
-                .row(at)
-                .is_some_and(|row| row.access == Access::ReadWrite && row.range.contains(byte.into()))
-            {
-                self.set(at, byte);
-            }
-            if at == OPTIONS && byte <= 3 {
+            let is_stored =
+                |row: &Register| row.access == Access::ReadWrite && row.range.contains(byte.into());
+            if self.row(at).is_some_and(is_stored) || at == OPTIONS && byte <= 3 {
                 self.set(at, byte);
             }
         }
@@ -147,7 +148,7 @@ impl RegisterModel {
                 let items: Vec<_> = self.effective(*address, values).collect();
                 match self.first_offence(&items) {
                     Some((reason, at)) => self.refuse(reason, at),
-                    None => self.write(&items),
+                    None => self.write(&items, &PerJoint::all(None), 0),
                 }
             }
             HostRequest::WriteMap21 { address, values } => self.write_map21(*address, values, room),
@@ -199,10 +200,22 @@ impl RegisterModel {
         items.iter().find(|(at, value)| is_setting(*at) && self.get(*at) != *value).map(|(at, _)| *at)
     }
 
-    fn write(&mut self, items: &[(u8, u8)]) -> RequestEffect {
+    fn write(
+        &mut self,
+        items: &[(u8, u8)],
+        reached: &PerJoint<Option<MicroDegrees>>,
+        block: u8,
+    ) -> RequestEffect {
         let changed = self.first_changed_setting(items);
         if let (Some(at), Storage::Full) = (changed, self.storage) {
             return self.refuse(refusal::STORAGE_FULL, at);
+        }
+        match self.limit_verdict(items, reached, block) {
+            LimitVerdict::Refused(at) => return self.refuse(refusal::AGAINST_A_LIMIT, at),
+            LimitVerdict::Unknown(at) if self.refuses_unknown => {
+                return self.refuse(refusal::AGAINST_A_LIMIT, at);
+            }
+            _ => {}
         }
         self.apply(items);
         self.has_biased_offsets = false;
@@ -242,7 +255,12 @@ impl RegisterModel {
                 return if has_alarm { RequestEffect::Alarm { kind } } else { refused };
             }
         };
-        let effect = self.write(&items);
+        let reached = PerJoint(angles.map(|angle| angle.map(MicroDegrees::nearest)));
+        let block = map21_model::block_of(address, values);
+        let effect = self.write(&items, &reached, block);
+        if effect == (RequestEffect::NoReply { accepted: false }) {
+            return effect;
+        }
         self.has_biased_offsets = true;
         self.set(FEEDBACK_FREQUENCY.address, 0);
         self.aim(&angles);

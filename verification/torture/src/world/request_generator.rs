@@ -16,8 +16,8 @@ const MAX_PAUSE: Duration = Duration::from_millis(90);
 
 /// The first and last address of the extended block.
 const EXTENDED: (usize, usize) = (128, 191);
-/// The watchdog and the limits, which the model does not know.
-const NOT_MODELLED: (usize, usize) = (186, 188);
+/// The watchdog, which the model does not know.
+const NOT_MODELLED: (usize, usize) = (186, 187);
 
 /// The parts of the register map that the host of a world writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
