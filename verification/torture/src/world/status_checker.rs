@@ -7,7 +7,7 @@ use motion_core::Vacuum;
 use motion_core::calibration::angle_from_counts;
 use protocol_core::registers::map::{
     FAULTS, FRAMES_CORRUPTED, MISSING_SERVOS, MOVING_JOINTS, OFFSET, PRESENT_POSITION, SERVO_BUS_ERRORS,
-    SERVO_TEMPERATURE, SPEED, SUPPLY_VOLTAGE, TIME, fault,
+    SERVO_TEMPERATURE, SPEED, SUPPLY_VOLTAGE, TIME, fault, limit,
 };
 use protocol_core::registers::map21::WRIST_POSITION;
 use protocol_core::registers::{Joint, Register, RegisterFile};
@@ -15,7 +15,7 @@ use protocol_core::time::{Duration, Instant};
 
 use super::command_checker::{CommandChecker, target_counts};
 use super::disturbed_bus::{Availability, DisturbedBus};
-use super::extended_model;
+use super::extended_model::{self, LIMITS};
 use super::register_model::RegisterModel;
 use super::report_checker::ReportChecker;
 use crate::per_joint::PerJoint;
@@ -31,6 +31,8 @@ const RELEASE_TIME: Duration = Duration::from_millis(300);
 const MOVE_MARGIN: Duration = Duration::from_millis(1_000);
 /// A point of a stream is reached after two periods and a cycle (D23), of the longest period.
 const MAX_STREAM_MILLIS: u64 = 2_020;
+/// The time of a move over the whole range at the lowest speed, 1.9 degrees/s.
+const LONGEST_MOVE: Duration = Duration::from_millis(125_000);
 /// The longest time that the valve may be open (D20).
 const MAX_VALVE_TIME: Duration = Duration::from_millis(501);
 
@@ -173,6 +175,12 @@ impl StatusChecker {
                 self.check_torque(joint, context)?;
             }
             _ => {}
+        }
+        // A joint of the linkage may wait for the other one (D25), even for one whose servo is missing.
+        let may_wait = context.model.get(LIMITS) & limit::LINKAGE != 0 && matches!(joint.number(), 2 | 3);
+        if may_wait {
+            // It has its full time once the limit is off.
+            self.settled_by[joint] = self.settled_by[joint].max(now + LONGEST_MOVE);
         }
         let is_late = is_moving && now > self.settled_by[joint];
         ensure(!is_late, || format!("joint {number} has been moving for too long"))?;
