@@ -20,7 +20,7 @@ use super::stream::Stream;
 
 /// The time for a reply, in addition to its time on the line. USB adapters take 16 ms each way; a busy computer takes
 /// more.
-const REPLY_TIMEOUT: Duration = Duration::from_millis(300);
+const REPLY_TIMEOUT: Duration = Duration::from_millis(1_000);
 /// After a timeout, replies are dropped for this time.
 const LATE_REPLIES: Duration = Duration::from_millis(50);
 /// The line may be filled this far ahead, so that it is not idle while the program wakes up.
