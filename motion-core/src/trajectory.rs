@@ -181,6 +181,21 @@ mod tests {
     }
 
     #[test]
+    fn d25_the_time_of_a_move_does_not_pass_while_it_waits() {
+        let mut trajectory = Trajectory::holding(degrees(0));
+        trajectory.move_to(degrees(100), 10);
+        for _ in 0..50 {
+            trajectory.advance(Instant::ZERO, 0);
+        }
+        for _ in 0..500 {
+            trajectory.advance(Instant::ZERO, 0);
+            trajectory.hold_back(degrees(50));
+        }
+        trajectory.advance(Instant::ZERO, 0);
+        assert_eq!(trajectory.set_point(), degrees(51), "as fast as before");
+    }
+
+    #[test]
     fn a_new_target_during_a_move_causes_no_jump() {
         let mut trajectory = Trajectory::holding(degrees(0));
         trajectory.move_to(degrees(100), 0);

@@ -161,6 +161,18 @@ fn d23_one_lost_frame_does_not_move_the_grid() {
 }
 
 #[test]
+fn d23_a_joint_that_cannot_keep_up_passes_over_older_points() {
+    let mut trajectory = Trajectory::holding(MicroDegrees(0));
+    let at = |millis: u64| Instant::from_micros(millis * 1_000);
+    trajectory.stream_to(MicroDegrees(100_000_000), at(1_000), Duration::from_millis(20));
+    trajectory.advance(at(1_010), 10);
+    assert_eq!(trajectory.set_point(), MicroDegrees(190_000));
+    trajectory.stream_to(MicroDegrees(0), at(1_020), Duration::from_millis(20));
+    trajectory.advance(at(1_020), 10);
+    assert_eq!(trajectory.set_point(), MicroDegrees(0), "the first point is not due yet");
+}
+
+#[test]
 fn d23_a_joint_that_cannot_keep_up_goes_towards_the_newest_point() {
     // 19 degrees/s, and the points do 100 degrees/s to and fro.
     let times: Vec<u64> = (0..10).map(|k| 1_000_000 + k * 20_000).collect();
