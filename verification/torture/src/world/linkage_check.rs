@@ -5,7 +5,8 @@ use protocol_core::registers::Joint;
 use protocol_core::registers::map::limit;
 
 use super::extended_model::LIMITS;
-use super::register_model::{LINKAGE, RegisterModel};
+use super::limit_verdict::LINKAGE;
+use super::register_model::RegisterModel;
 use crate::violation::{Check, ensure};
 
 /// One count of each of both joints, in microdegrees.

@@ -19,6 +19,7 @@ mod extended_requests;
 mod fault_injection;
 mod host_link;
 mod host_request;
+mod limit_verdict;
 mod linkage_check;
 mod map21_model;
 mod map21_requests;

@@ -13,10 +13,9 @@ use protocol_core::registers::{Access, Image, Joint, MAP_21, Region, Register};
 
 use super::extended_model;
 use super::host_request::HostRequest;
+use super::limit_verdict::LimitVerdict;
 use super::map21_model::{self, OutOfReach};
 use crate::per_joint::PerJoint;
-pub(in crate::world) use limits::LINKAGE;
-use limits::LimitVerdict;
 
 /// The options of map 2.1: bit 0 biased offsets, bit 1 alarms (M6).
 const OPTIONS: u8 = 20;

@@ -22,7 +22,7 @@ impl RegisterModel {
     }
 
     /// Compares the model with the registers of the arm.
-    pub(in crate::world) fn compare(&self, registers: &RegisterFile) -> Check {
+    pub(crate) fn compare(&self, registers: &RegisterFile) -> Check {
         for (first, last) in MODELLED {
             let ours = self.shown(*first, *last);
             let theirs = registers.read(*first, last - first + 1);
@@ -39,7 +39,7 @@ impl RegisterModel {
     }
 
     /// Compares the fine targets that the arm has just shown with the model (D21).
-    pub(in crate::world) fn compare_fine_targets(&self, registers: &RegisterFile) -> Check {
+    pub(crate) fn compare_fine_targets(&self, registers: &RegisterFile) -> Check {
         Joint::ALL.into_iter().try_for_each(|joint| {
             let fine = extended_model::word_of(registers, extended_model::fine_target(joint));
             let wanted = self.shown_fine_target(joint);
@@ -54,7 +54,7 @@ impl RegisterModel {
     }
 
     /// A target that differs from the model is the measured position (D12, D13). The model takes it over.
-    pub(in crate::world) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
+    pub(crate) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
         for joint in Joint::ALL {
             let (at, found) = (TARGET_POSITION.of(joint), registers.get(TARGET_POSITION.of(joint)));
             if found == self.get(at) {

@@ -8,23 +8,9 @@ use protocol_core::registers::{Joint, RegisterFile};
 
 use super::super::extended_model::{self, LIMITS};
 use super::super::host_request::HostRequest;
+use super::super::limit_verdict::{CLAW, LINKAGE, LimitVerdict, combined};
 use super::RegisterModel;
 use crate::per_joint::PerJoint;
-
-/// The smallest and the largest sum of the angles of joints 2 and 3: 19 to 161 degrees, plus 65.
-pub(in crate::world) const LINKAGE: (i32, i32) = (84_000_000, 226_000_000);
-/// The largest angle of joint 7.
-const CLAW: i32 = 84_000_000;
-
-/// What a model can tell about a write.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::world) enum LimitVerdict {
-    Allowed,
-    /// Refused because of this register.
-    Refused(u8),
-    /// It depends on set-points or measured targets. If it is refused, this is the register.
-    Unknown(u8),
-}
 
 impl RegisterModel {
     /// The verdict on a write of these registers. `reached` are the targets of inverse kinematics, from `block` on.
@@ -67,7 +53,7 @@ impl RegisterModel {
 
     /// True if the arm, with these registers, has refused what it must have refused by `requests` if the first of them
     /// with an unknown verdict is refused (`refuses`).
-    pub(in crate::world) fn explains(
+    pub(crate) fn explains(
         &self,
         registers: &RegisterFile,
         requests: &[&HostRequest],
@@ -95,18 +81,6 @@ impl RegisterModel {
             LAST_REFUSED_REGISTER.address,
         ];
         addresses.into_iter().all(|at| self.get(at) == registers.get(at))
-    }
-}
-
-/// Both limits: the lowest register counts.
-fn combined(verdicts: [LimitVerdict; 2]) -> LimitVerdict {
-    use LimitVerdict::{Allowed, Refused, Unknown};
-    match verdicts {
-        [Allowed, other] | [other, Allowed] => other,
-        [Refused(a), Refused(b)] => Refused(a.min(b)),
-        // Switched on together, or of a lower register: the verdict does not depend on what is unknown.
-        [Refused(a), Unknown(b)] | [Unknown(b), Refused(a)] if a <= b => Refused(a),
-        [Unknown(a) | Refused(a), Unknown(b) | Refused(b)] => Unknown(a.min(b)),
     }
 }
 
