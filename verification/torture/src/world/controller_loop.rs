@@ -2,14 +2,13 @@
 
 use motion_core::{Output, Vacuum};
 use protocol_core::registers::map::{
-    FRAMES_ACCEPTED, FRAMES_REFUSED, LAST_REFUSAL, MOTOR_STATE, OFFSET, SPEED, VACUUM_PUMP, refusal,
+    FRAMES_ACCEPTED, FRAMES_REFUSED, MOTOR_STATE, OFFSET, SPEED, VACUUM_PUMP,
 };
 use protocol_core::registers::{Image, Joint, Register};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer;
 
 use super::command_checker::CommandContext;
-use super::extended_model::{self, LIMITS};
 use super::host_request::{HostRequest, MAX_LENGTH, alarm, reply, report};
 use super::power::random_cut;
 use super::register_model::RequestEffect;
@@ -56,20 +55,6 @@ impl PoweredArm {
         let registers = self.controller.registers();
         let count = |at: u8| u16::from_le_bytes([registers.get(at), registers.get(at + 1)]);
         count(FRAMES_ACCEPTED.address).wrapping_add(count(FRAMES_REFUSED.address))
-    }
-
-    /// Tells the model whether the arm refused `request`, where the model cannot know it (D25): both are tried, with the
-    /// `count` requests behind it.
-    fn guess_refusal(&mut self, request: &HostRequest, count: usize, room: usize) {
-        let rest = self.pending.iter().take(count).map(|pending| &pending.request);
-        let requests: Vec<_> = std::iter::once(request).chain(rest).collect();
-        let registers = self.controller.registers();
-        let uses_limits = registers.get(LIMITS) != 0
-            || self.model.get(LIMITS) != 0
-            || registers.get(LAST_REFUSAL.address) == refusal::AGAINST_A_LIMIT;
-        self.model.refuses_unknown = uses_limits
-            && !self.model.explains(registers, &requests, room, false)
-            && self.model.explains(registers, &requests, room, true);
     }
 
     /// Passes the waiting host bytes, perhaps none, to the controller. True if it took any.
@@ -151,7 +136,7 @@ impl TortureWorld {
     ) -> Check<Option<RequestEffect>> {
         self.record_missing(arm);
         let mut last = None;
-        for index in 0..count {
+        for _ in 0..count {
             let has_arrived = arm.pending.front().is_some_and(|first| first.arrived_at <= self.now);
             let request = arm.pending.pop_front().filter(|_| has_arrived).map(|pending| pending.request);
             let request = request
@@ -159,7 +144,6 @@ impl TortureWorld {
             let has_output = !matches!(last, None | Some(RequestEffect::NoReply { .. }));
             ensure(!has_output, || format!("the output of {last:?} is missing before {request:?}"))?;
             let was_servo = arm.model.is_servo();
-            arm.guess_refusal(&request, usize::from(count - index - 1), room);
             let effect = arm.model.execute(&request, room);
             if arm.model.is_servo() != was_servo {
                 Joint::ALL.into_iter().for_each(|joint| arm.command_checker.forget(joint));
@@ -206,12 +190,7 @@ impl TortureWorld {
             |at: u8| at.checked_sub(*address).is_some_and(|offset| usize::from(offset) < values.len());
         let includes_any = |row: &Register| (row.address..row.address + row.count).any(includes);
         let (frequencies, baud) = (arm.model.frequencies(), arm.controller.baud());
-        arm.status_checker.reports.frequencies_written(
-            self.now,
-            frequencies,
-            arm.model.report_content(),
-            baud,
-        );
+        arm.status_checker.reports.frequencies_written(self.now, frequencies, baud);
         if includes(VACUUM_PUMP.address) {
             arm.status_checker.vacuum_written(self.now);
         }
@@ -259,14 +238,10 @@ impl TortureWorld {
                 self.counts.reports += 1;
                 let stream = ReportStream::of(bytes);
                 arm.status_checker.reports.sent(self.now, stream)?;
-                let (function, address, count) = stream.frame(arm.model.report_content());
+                let (function, address, count) = stream.frame();
                 report(function, address, registers.read(address, count))
             }
         };
-        if extended_model::shows_block(&expected) {
-            arm.model.compare_fine_targets(arm.controller.registers())?;
-            arm.check_status(self.now, &self.bus, |checker, context| checker.check_fine_positions(context))?;
-        }
         ensure(arm.output_bytes == expected, || format!("the frame to the host should be {expected:02x?}"))
     }
 

@@ -1,7 +1,5 @@
-//! A model of the registers, from docs/protocol.md alone, without measured values such as positions.
-
-mod comparison;
-mod limits;
+//! A model of the registers, from docs/protocol.md alone. It does not model measured values, such as positions and
+//! missing servos.
 
 use motion_core::Storage;
 use motion_core::calibration::MicroDegrees;
@@ -9,13 +7,12 @@ use protocol_core::registers::map::{
     BAUD_RATE, EEPROM_LOCK, FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_REFUSED, LAST_REFUSAL,
     LAST_REFUSED_REGISTER, MAP, MOTOR_STATE, OFFSET, PRESENT_POSITION, TARGET_POSITION, motor_state, refusal,
 };
-use protocol_core::registers::{Access, Image, Joint, MAP_21, Region, Register};
+use protocol_core::registers::{Access, Image, Joint, MAP_21, Region, Register, RegisterFile};
 
-use super::extended_model;
 use super::host_request::HostRequest;
-use super::limit_verdict::LimitVerdict;
 use super::map21_model::{self, OutOfReach};
 use crate::per_joint::PerJoint;
+use crate::violation::{Check, ensure};
 
 /// The options of map 2.1: bit 0 biased offsets, bit 1 alarms (M6).
 const OPTIONS: u8 = 20;
@@ -41,7 +38,7 @@ pub(super) enum RequestEffect {
 }
 
 /// The modelled registers.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct RegisterModel {
     values: [u8; 256],
     rows: Vec<Option<&'static Register>>,
@@ -52,12 +49,14 @@ pub(super) struct RegisterModel {
     pub(super) has_host_target: PerJoint<bool>,
     /// Offsets are shown as 128 + offset (M5). `values` has them in sign and magnitude.
     has_biased_offsets: bool,
-    /// A target with its fraction, from inverse kinematics (M7) or the extended block (D21).
+    /// A target from inverse kinematics, with its fraction (M7).
     fine_targets: PerJoint<Option<MicroDegrees>>,
-    has_streams: bool,
-    /// The arm refuses the next write whose verdict the model does not know.
-    pub(super) refuses_unknown: bool,
 }
+
+/// The first and last addresses of the registers whose values follow from requests alone. The host writes none of the
+/// extended block, 128 to 191.
+const MODELLED: &[(u8, u8)] =
+    &[(0, 45), (53, 53), (61, 82), (90, 90), (98, 127), (192, 240), (244, 247), (250, 251)];
 
 impl RegisterModel {
     /// The registers after power-up with the stored settings.
@@ -72,8 +71,6 @@ impl RegisterModel {
             has_host_target: PerJoint::all(false),
             has_biased_offsets: false,
             fine_targets: PerJoint::all(None),
-            has_streams: false,
-            refuses_unknown: false,
         };
         let bytes_of_21 = MAP_21.iter().filter(|row| row.region == Region::Ram);
         for row in bytes_of_21.chain(MAP) {
@@ -81,16 +78,19 @@ impl RegisterModel {
         }
         (2..).zip(chip_id).for_each(|(at, byte)| model.set(at, byte));
         stored.into_iter().for_each(|image| model.load(image));
-        Joint::ALL.into_iter().for_each(|joint| model.show_coarse_target(joint));
         model
     }
 
     /// Loads stored settings. A value outside its range is replaced by its default (D19), and reserved registers read 0.
     fn load(&mut self, image: &Image) {
         for (at, byte) in (EEPROM.0..EEPROM.1).zip(image.0) {
-            let is_stored =
-                |row: &Register| row.access == Access::ReadWrite && row.range.contains(byte.into());
-            if self.row(at).is_some_and(is_stored) || at == OPTIONS && byte <= 3 {
+            if self
+                .row(at)
+                .is_some_and(|row| row.access == Access::ReadWrite && row.range.contains(byte.into()))
+            {
+                self.set(at, byte);
+            }
+            if at == OPTIONS && byte <= 3 {
                 self.set(at, byte);
             }
         }
@@ -145,9 +145,11 @@ impl RegisterModel {
             }
             HostRequest::Write { address, values } => {
                 let items: Vec<_> = self.effective(*address, values).collect();
-                match self.first_offence(&items) {
-                    Some((reason, at)) => self.refuse(reason, at),
-                    None => self.write(&items, &PerJoint::all(None), 0),
+                let is_wrong =
+                    |at, value| self.row(at).is_some_and(|row| !row.range.contains(u16::from(value)));
+                match items.iter().find(|(at, value)| is_wrong(*at, *value)) {
+                    Some((at, _)) => self.refuse(refusal::OUT_OF_RANGE, *at),
+                    None => self.write(&items),
                 }
             }
             HostRequest::WriteMap21 { address, values } => self.write_map21(*address, values, room),
@@ -182,39 +184,16 @@ impl RegisterModel {
         })
     }
 
-    /// The reason for which a write is refused, and the register (D16, D22).
-    fn first_offence(&self, items: &[(u8, u8)]) -> Option<(u8, u8)> {
-        items.iter().find_map(|&(at, value)| {
-            let is_wrong = self.row(at).is_some_and(|row| !row.range.contains(u16::from(value)));
-            match extended_model::is_word(at) {
-                true => extended_model::word_offence(items, at),
-                false => is_wrong.then_some((refusal::OUT_OF_RANGE, at)),
-            }
-        })
-    }
-
     /// The first setting that a write changes.
     fn first_changed_setting(&self, items: &[(u8, u8)]) -> Option<u8> {
         let is_setting = |at| (EEPROM.0..EEPROM.1).contains(&at);
         items.iter().find(|(at, value)| is_setting(*at) && self.get(*at) != *value).map(|(at, _)| *at)
     }
 
-    fn write(
-        &mut self,
-        items: &[(u8, u8)],
-        reached: &PerJoint<Option<MicroDegrees>>,
-        block: u8,
-    ) -> RequestEffect {
+    fn write(&mut self, items: &[(u8, u8)]) -> RequestEffect {
         let changed = self.first_changed_setting(items);
         if let (Some(at), Storage::Full) = (changed, self.storage) {
             return self.refuse(refusal::STORAGE_FULL, at);
-        }
-        match self.limit_verdict(items, reached, block) {
-            LimitVerdict::Refused(at) => return self.refuse(refusal::AGAINST_A_LIMIT, at),
-            LimitVerdict::Unknown(at) if self.refuses_unknown => {
-                return self.refuse(refusal::AGAINST_A_LIMIT, at);
-            }
-            _ => {}
         }
         self.apply(items);
         self.has_biased_offsets = false;
@@ -254,12 +233,7 @@ impl RegisterModel {
                 return if has_alarm { RequestEffect::Alarm { kind } } else { refused };
             }
         };
-        let reached = PerJoint(angles.map(|angle| angle.map(MicroDegrees::nearest)));
-        let block = map21_model::block_of(address, values);
-        let effect = self.write(&items, &reached, block);
-        if effect == (RequestEffect::NoReply { accepted: false }) {
-            return effect;
-        }
+        let effect = self.write(&items);
         self.has_biased_offsets = true;
         self.set(FEEDBACK_FREQUENCY.address, 0);
         self.aim(&angles);
@@ -271,38 +245,11 @@ impl RegisterModel {
         for (joint, angle) in Joint::ALL.into_iter().zip(angles) {
             if let Some(angle) = angle {
                 let target = MicroDegrees::nearest(*angle);
-                self.set_fine_target(joint, target);
+                self.set(TARGET_POSITION.of(joint), target.nearest_degree());
+                self.fine_targets[joint] = Some(target);
+                self.has_host_target[joint] = self.is_servo();
             }
         }
-    }
-
-    fn set_fine_target(&mut self, joint: Joint, target: MicroDegrees) {
-        self.set(TARGET_POSITION.of(joint), target.nearest_degree());
-        let hundredths = target.0.saturating_add(5_000) / 10_000;
-        self.show_fine_target(joint, u16::try_from(hundredths).unwrap_or(0));
-        self.fine_targets[joint] = Some(target);
-        self.has_host_target[joint] = self.is_servo();
-    }
-
-    /// A coarse target has no fraction (D21).
-    fn show_coarse_target(&mut self, joint: Joint) {
-        self.show_fine_target(joint, u16::from(self.get(TARGET_POSITION.of(joint))) * 100);
-    }
-
-    fn show_fine_target(&mut self, joint: Joint, hundredths: u16) {
-        (extended_model::fine_target(joint)..)
-            .zip(hundredths.to_le_bytes())
-            .for_each(|(at, byte)| self.set(at, byte));
-    }
-
-    fn shown_fine_target(&self, joint: Joint) -> u16 {
-        let low = extended_model::fine_target(joint);
-        u16::from_le_bytes([self.get(low), self.get(low + 1)])
-    }
-
-    /// True if fine targets were the points of a stream at any time since power-up (D23).
-    pub(super) const fn has_streams(&self) -> bool {
-        self.has_streams
     }
 
     fn apply(&mut self, items: &[(u8, u8)]) {
@@ -314,24 +261,14 @@ impl RegisterModel {
         for (at, _) in items {
             if let Some(joint) = TARGET_POSITION.joint_at(*at) {
                 self.fine_targets[joint] = None;
-                self.show_coarse_target(joint);
                 self.has_host_target[joint] = self.is_servo();
             }
-        }
-        self.has_streams |= items.iter().any(|(at, value)| matches!(at, 184 | 185) && *value != 0);
-        for (joint, hundredths) in extended_model::fine_targets(items) {
-            self.set_fine_target(joint, MicroDegrees(i32::from(hundredths) * 10_000));
         }
     }
 
     /// The report frequencies in Hz: registers 53, 82 and 90.
     pub(super) fn frequencies(&self) -> [u8; 3] {
         [FEEDBACK_FREQUENCY.address, ANGLE_FREQUENCY, LOAD_FREQUENCY].map(|at| self.get(at))
-    }
-
-    /// What the reports of register 53 hold (D26).
-    pub(super) fn report_content(&self) -> u8 {
-        self.get(extended_model::REPORT_CONTENT)
     }
 
     /// A joint's offset in degrees.
@@ -342,5 +279,51 @@ impl RegisterModel {
     /// The target with its fraction, if inverse kinematics set it and it is in force.
     pub(super) fn fine_target(&self, joint: Joint) -> Option<MicroDegrees> {
         self.fine_targets[joint].filter(|_| self.has_host_target[joint])
+    }
+
+    /// The values that a read shows.
+    fn shown(&self, first: u8, last: u8) -> Vec<u8> {
+        let shown = |at| match self.has_biased_offsets {
+            true => map21_model::shown(at, self.get(at)),
+            false => self.get(at),
+        };
+        (first..=last).map(shown).collect()
+    }
+
+    /// Compares the model with the registers of the arm.
+    pub(super) fn compare(&self, registers: &RegisterFile) -> Check {
+        for (first, last) in MODELLED {
+            let ours = self.shown(*first, *last);
+            let theirs = registers.read(*first, last - first + 1);
+            ensure(ours == theirs, || {
+                let differs = (*first..).zip(ours.iter().zip(theirs)).find(|(_, (a, b))| a != b);
+                let (at, (wanted, found)) = differs.unwrap_or((0, (&0, &0)));
+                format!("register {at} holds {found} instead of {wanted}")
+            })?;
+        }
+        let [angles, positions] = [83, 54].map(|first| registers.read(first, 7));
+        ensure(angles == positions, || format!("angles {angles:?} of positions {positions:?}"))?;
+        let loads = registers.read(91, 7);
+        ensure(loads.iter().all(|load| (3..=253).contains(load)), || format!("loads {loads:?}"))
+    }
+
+    /// A target that differs from the model is the measured position (D12, D13). The model takes it over.
+    pub(super) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
+        for joint in Joint::ALL {
+            let (at, found) = (TARGET_POSITION.of(joint), registers.get(TARGET_POSITION.of(joint)));
+            if found == self.get(at) {
+                continue;
+            }
+            let present = registers.get(PRESENT_POSITION.of(joint));
+            ensure(found == present, || {
+                let wanted = self.get(at);
+                let number = joint.number();
+                format!("target {number} is {found}: the host wrote {wanted}, and the joint was at {present}")
+            })?;
+            self.set(at, found);
+            self.fine_targets[joint] = None;
+            self.has_host_target[joint] = false;
+        }
+        Ok(())
     }
 }
