@@ -24,8 +24,9 @@ use sevenbot::register_text::{faults, joints, motor_state_name};
 use sevenbot::{Angle, Joint};
 
 use super::keys::HELP;
+use super::plot_kind::{PastSample, PlotKind};
 use super::sample::Sample;
-use super::view::{Connection, Dialog, PLOT_SPAN, PastPose, View};
+use super::view::{Connection, Dialog, PLOT_SPAN, View};
 
 /// One colour per joint. Users can change these in their terminal.
 const COLOURS: [Color; 7] =
@@ -101,7 +102,10 @@ fn title_right(view: &View) -> Line<'static> {
 }
 
 fn table_lines(view: &View, width: u16) -> Vec<Line<'static>> {
-    let head = "   joint  target  position       speed";
+    let mut head = "   joint  target  position       speed".to_owned();
+    if view.plot != PlotKind::Position {
+        head = format!("{head:<TABLE_WIDTH$}{}", view.plot.name());
+    }
     let mut lines = vec![Line::from(Span::styled(head, BOLD))];
     let bar = usize::from(width).saturating_sub(TABLE_WIDTH + 2);
     lines.extend(Joint::ALL.map(|joint| match &view.sample {
@@ -136,7 +140,11 @@ fn row(view: &View, sample: &Sample, joint: Joint, bar: usize) -> Line<'static> 
     let numbers = format!("  {target:>5}°  {present:>7}°  {speed:>5.1} °/s  ");
     let mut spans = vec![marker(view, joint), number(joint)];
     spans.extend([Span::styled(numbers, stale), Span::styled(format!("{word:<10}"), style)]);
-    spans.extend(bar_spans(bar, target, present, colour(joint)));
+    match (view.plot, PastSample::from(sample).value(view.plot, joint)) {
+        (PlotKind::Position, _) => spans.extend(bar_spans(bar, target, present, colour(joint))),
+        (_, Some(value)) => spans.push(Span::styled(format!("{value:>7.1}"), stale)),
+        (_, None) => spans.push(Span::styled("      –", FAINT)),
+    }
     Line::from(spans)
 }
 
@@ -162,22 +170,22 @@ fn draw_plot(frame: &mut Frame<'_>, view: &View, area: Rect) {
         let line = Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line);
         line.style(colour(*joint)).data(points)
     });
-    let degrees = Axis::default().bounds([0.0, 180.0]).labels(["0°", "90°", "180°"]).style(FAINT);
+    let (bounds, labels) = view.plot.axis();
+    let values = Axis::default().bounds(bounds).labels(labels).style(FAINT);
     let past = PLOT_SPAN.as_secs_f64();
     let seconds = Axis::default().bounds([-past, 0.0]).labels(["-20 s", "-10 s", "now"]).style(FAINT);
-    frame.render_widget(Chart::new(datasets.collect()).x_axis(seconds).y_axis(degrees), area);
+    frame.render_widget(Chart::new(datasets.collect()).x_axis(seconds).y_axis(values), area);
 }
 
-/// The curves of one joint, in seconds before now and degrees. A gap starts a new curve.
+/// The curves of one joint, in seconds before now and the unit of the plot. A gap starts a new curve.
 fn curve_segments(view: &View, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
-    let index = usize::from(joint.number()).wrapping_sub(1);
-    let point = |(time, pose): &PastPose| {
-        let before = view.now.saturating_sub(*time).as_secs_f64();
-        (-before, f64::from(pose.get(index).copied().unwrap_or(0)))
+    let point = |sample: &PastSample| {
+        let before = view.now.saturating_sub(sample.time).as_secs_f64();
+        Some((-before, sample.value(view.plot, joint)?))
     };
-    let past: Vec<PastPose> = view.past.iter().copied().collect();
-    let lines = past.chunk_by(|one, next| next.0.saturating_sub(one.0) <= LONGEST_GAP);
-    lines.map(|line| (joint, line.iter().map(point).collect())).collect()
+    let past: Vec<PastSample> = view.past.iter().copied().collect();
+    let lines = past.chunk_by(|one, next| next.time.saturating_sub(one.time) <= LONGEST_GAP);
+    lines.map(|line| (joint, line.iter().filter_map(point).collect())).collect()
 }
 
 fn health(view: &View) -> Line<'static> {
@@ -277,9 +285,13 @@ fn centred(area: Rect, width: usize, height: usize) -> Rect {
 mod tests {
     use super::*;
     use crate::commands::monitor::view::ArmEvent;
-    use crate::commands::monitor::view::tests::watching;
+    use crate::commands::monitor::view::tests::{sample, watching};
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
+    use sevenbot::Snapshot;
+    use sevenbot::fine::FineState;
+
+    const NOTHING: Snapshot = Snapshot { address: 0, values: Vec::new() };
 
     fn screen(view: &View, width: u16, height: u16) -> TestBackend {
         let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("memory");
@@ -290,6 +302,21 @@ mod tests {
     #[test]
     fn a_moving_arm() {
         insta::assert_snapshot!(screen(&watching(), 80, 24));
+    }
+
+    #[test]
+    fn loads_in_the_place_of_positions() {
+        let mut view = watching();
+        view.plot = PlotKind::Load;
+        let without = screen(&view, 80, 24).to_string();
+        assert!(without.contains("load, %") && without.contains("–"), "an arm that measures none: {without}");
+        for half_seconds in 0..20 {
+            let fine = FineState { loads: [0, -205, 0, 0, 0, 0, 1_000], ..FineState::new(&NOTHING) };
+            let sample = sample(60_000 + half_seconds * 500, 90);
+            view.tick(sample.time);
+            view.update(ArmEvent::Sample(Sample { fine: Some(fine), ..sample }));
+        }
+        insta::assert_snapshot!(screen(&view, 80, 24));
     }
 
     #[test]

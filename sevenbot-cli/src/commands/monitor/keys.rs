@@ -14,7 +14,7 @@ const BIG_NUDGE: i16 = 10;
 const JOG: i16 = 5;
 const BIG_JOG: i16 = 20;
 /// The help: keys and their effect.
-pub(crate) const HELP: [(&str, &str); 11] = [
+pub(crate) const HELP: [(&str, &str); 12] = [
     ("1..7, ↑ ↓", "select a joint"),
     ("← →", "nudge it by 1°"),
     ("Shift ← →, [ ]", "nudge it by 10°"),
@@ -22,6 +22,7 @@ pub(crate) const HELP: [(&str, &str); 11] = [
     ("← → ↑ ↓ PgUp/Dn", "then x, y and z by 5 mm, with Shift by 20"),
     ("+ -", "speed of all joints"),
     ("s", "motor state: hold, damping, forceless"),
+    ("p", "plot positions, velocities or loads"),
     ("space", "freeze the screen; the arm continues"),
     ("?", "this help"),
     ("q", "quit; the arm finishes its move"),
@@ -64,6 +65,7 @@ fn press_in_view(view: &mut View, key: KeyEvent) -> KeyAction {
         KeyCode::Char('q') | KeyCode::Esc => return KeyAction::Quit,
         KeyCode::Char('?' | 'h') | KeyCode::F(1) => view.dialog = Some(Dialog::Help),
         KeyCode::Char(' ') => view.is_frozen = !view.is_frozen,
+        KeyCode::Char('p') => change_plot(view),
         KeyCode::Char('j') => view.jog = next_axes(view.jog),
         KeyCode::Char('s') => view.dialog = Some(Dialog::ChooseState),
         KeyCode::Char(digit @ '1'..='7') => {
@@ -105,6 +107,15 @@ fn release(view: &mut View, state: u8) -> KeyAction {
 fn select(view: &mut View, number: i16) {
     if let Some(joint) = u8::try_from(number).ok().and_then(Joint::new) {
         view.selected = joint;
+    }
+}
+
+/// Shows the next quantity in the plot, if the arm measures it.
+fn change_plot(view: &mut View) {
+    if view.sample.as_ref().is_some_and(|sample| sample.fine.is_none()) {
+        view.show_note("this arm's firmware measures no velocities and loads");
+    } else {
+        view.plot = view.plot.next();
     }
 }
 
@@ -157,6 +168,7 @@ fn change(view: &View, change: SpeedChange) -> KeyAction {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::commands::monitor::plot_kind::PlotKind;
     use crate::commands::monitor::view::tests::watching;
 
     fn pressed(view: &mut View, keys: &[KeyCode]) -> Vec<KeyAction> {
@@ -212,7 +224,7 @@ mod tests {
 
     #[test]
     fn without_an_arm_keys_send_nothing() {
-        let mut view = View::new("COM3");
+        let mut view = View::new("COM3", PlotKind::Position);
         let keys = [KeyCode::Left, KeyCode::Char('+'), KeyCode::Char(']'), KeyCode::Char('j'), KeyCode::Up];
         assert_eq!(pressed(&mut view, &keys), [KeyAction::Redraw; 5]);
     }

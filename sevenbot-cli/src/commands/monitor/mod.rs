@@ -12,6 +12,7 @@ mod draw;
 mod keys;
 mod lines;
 mod picture;
+mod plot_kind;
 mod sample;
 mod screen;
 mod view;
@@ -25,6 +26,7 @@ use clap::{Args, value_parser};
 use sevenbot::Arm;
 
 use self::lines::{LineFormat, SampleJson};
+use self::plot_kind::PlotKind;
 use self::sample::Sample;
 use self::view::{ArmEvent, PLOT_SPAN, View};
 use crate::command_error::CommandError;
@@ -39,6 +41,7 @@ use crate::session::Session;
 #[command(after_help = "\
 Examples:
   sevenbot monitor
+  sevenbot monitor --plot load
   sevenbot monitor --csv move.csv                  until Ctrl-C, or the arm goes away
   sevenbot monitor --json --hz 2 | jq .positions
   sevenbot monitor --hz 20 --samples 100 > move.txt
@@ -55,6 +58,9 @@ pub(crate) struct MonitorArgs {
     /// Write all values to FILE, separated by commas.
     #[arg(long, value_name = "FILE", conflicts_with = "json")]
     csv: Option<PathBuf>,
+    /// What the plot on the screen shows at first; p changes it.
+    #[arg(long, value_enum, default_value_t)]
+    plot: PlotKind,
     /// Write the last screen to FILE, as SVG.
     #[arg(long, value_name = "FILE", hide = true, conflicts_with_all = ["csv", "json"])]
     picture: Option<PathBuf>,
@@ -71,14 +77,14 @@ pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), Comma
     match (&args.picture, &args.csv) {
         (Some(path), _) => {
             let view = if on_screen {
-                screen::run(session, args.period())?
+                screen::run(session, args.period(), args.plot)?
             } else {
                 view_without_screen(session, args)?
             };
             fs::write(path, picture::picture(&view)).map_err(|error| CommandError::file(path, error))
         }
         (None, Some(path)) => write_csv(session, args, path),
-        (None, None) if on_screen => screen::run(session, args.period()).map(drop),
+        (None, None) if on_screen => screen::run(session, args.period(), args.plot).map(drop),
         (None, None) => show_lines(session, args),
     }
 }
@@ -129,7 +135,7 @@ fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), C
 /// A view without a screen, after the requested number of samples, or enough for a full plot.
 fn view_without_screen(session: &Session, args: &MonitorArgs) -> Result<View, CommandError> {
     let mut arm = session.connect()?;
-    let mut view = View::new(arm.port());
+    let mut view = View::new(arm.port(), args.plot);
     view.update(ArmEvent::Found { port: arm.port().to_owned(), firmware: arm.identity().version() });
     let count = args.samples.unwrap_or(PLOT_SPAN.as_secs() * u64::from(args.hz));
     each_sample(&mut arm, args, count, |sample| {

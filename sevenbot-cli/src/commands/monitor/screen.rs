@@ -11,6 +11,7 @@ use ratatui::crossterm::event::{self, Event, KeyEventKind};
 use super::arm_thread::ArmThread;
 use super::draw::draw;
 use super::keys::{KeyAction, press};
+use super::plot_kind::PlotKind;
 use super::view::{ArmEvent, UiCommand, View};
 use crate::command_error::CommandError;
 use crate::interrupt::{Interrupt, report_hold};
@@ -21,11 +22,11 @@ use crate::session::Session;
 const FRAME: Duration = Duration::from_millis(40);
 
 /// Shows the arm until the user quits. Returns the last view.
-pub(crate) fn run(session: &Session, period: Duration) -> Result<View, CommandError> {
+pub(crate) fn run(session: &Session, period: Duration, plot: PlotKind) -> Result<View, CommandError> {
     // Without a port there is an error. A port without an answer is tried again.
     let port = session.port_name()?;
     let start = Instant::now();
-    let mut view = View::new(&port);
+    let mut view = View::new(&port, plot);
     let (events, hear) = mpsc::channel();
     let (command, commands) = mpsc::channel();
     let asked = session.port.clone();

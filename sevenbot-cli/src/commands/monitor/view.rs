@@ -13,6 +13,7 @@ use std::time::Duration;
 use sevenbot::cartesian::JogAxes;
 use sevenbot::{Joint, StatusBlock};
 
+use super::plot_kind::{PastSample, PlotKind};
 use super::sample::Sample;
 
 /// Time span of the plot.
@@ -126,9 +127,6 @@ impl LinkQuality {
     }
 }
 
-/// A time and the positions of all joints, joint 1 first.
-pub(crate) type PastPose = (Duration, [u8; 7]);
-
 /// The content of the screen.
 #[derive(Clone, Debug)]
 pub(crate) struct View {
@@ -136,8 +134,10 @@ pub(crate) struct View {
     pub(crate) connection: Connection,
     /// The last sample, or the frozen one.
     pub(crate) sample: Option<Sample>,
-    /// Positions of the last [`PLOT_SPAN`], oldest first.
-    pub(crate) past: VecDeque<PastPose>,
+    /// The samples of the last [`PLOT_SPAN`], oldest first.
+    pub(crate) past: VecDeque<PastSample>,
+    /// What the plot shows.
+    pub(crate) plot: PlotKind,
     /// The time at the right end of the plot.
     pub(crate) now: Duration,
     pub(crate) link: LinkQuality,
@@ -151,12 +151,13 @@ pub(crate) struct View {
 }
 
 impl View {
-    pub(crate) fn new(port: &str) -> Self {
+    pub(crate) fn new(port: &str, plot: PlotKind) -> Self {
         Self {
             port: port.to_owned(),
             connection: Connection::Looking("opening the port".to_owned()),
             sample: None,
             past: VecDeque::new(),
+            plot,
             now: Duration::ZERO,
             link: LinkQuality::default(),
             selected: Joint::ALL[0],
@@ -200,8 +201,8 @@ impl View {
         if self.is_frozen {
             return;
         }
-        self.past.push_back((sample.time, sample.joints.positions()));
-        while self.past.front().is_some_and(|(time, _)| *time + PLOT_SPAN < sample.time) {
+        self.past.push_back(PastSample::from(&sample));
+        while self.past.front().is_some_and(|past| past.time + PLOT_SPAN < sample.time) {
             self.past.pop_front();
         }
         self.sample = Some(sample);
@@ -261,7 +262,7 @@ pub(crate) mod tests {
 
     /// A view after 10 s of such samples.
     pub(crate) fn watching() -> View {
-        let mut view = View::new("/dev/ttyUSB0");
+        let mut view = View::new("/dev/ttyUSB0", PlotKind::Position);
         view.update(ArmEvent::Found { port: "/dev/ttyUSB0".to_owned(), firmware: "3.0".to_owned() });
         for tenth in 0..100_u8 {
             view.tick(Duration::from_millis(u64::from(tenth) * 100));
@@ -274,7 +275,7 @@ pub(crate) mod tests {
     fn the_plot_spans_twenty_seconds() {
         let mut view = watching();
         view.update(ArmEvent::Sample(sample(25_000, 120)));
-        assert_eq!(view.past.front().map(|past| past.0), Some(Duration::from_secs(5)));
+        assert_eq!(view.past.front().map(|past| past.time), Some(Duration::from_secs(5)));
     }
 
     #[test]
