@@ -19,7 +19,7 @@ use alloc::vec::Vec;
 
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use motion_core::servo_bus::Torque;
-use motion_core::servo_bus::frame::Decoder;
+use motion_core::servo_bus::frame::{Decoder, Instruction};
 use protocol_core::registers::map::TARGET_POSITION;
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::{Duration, Instant};
@@ -49,6 +49,8 @@ pub struct Plant {
     collisions: u64,
     /// The motors are simulated up to this time.
     now: Instant,
+    /// Steps that end by then change nothing but the sums behind the temperatures, unless a call changes a servo.
+    rest_until: Instant,
 }
 
 impl Plant {
@@ -72,6 +74,7 @@ impl Plant {
             has_exact_times: true,
             collisions: 0,
             now,
+            rest_until: now,
         };
         plant.update_weight();
         plant
@@ -100,10 +103,13 @@ impl Plant {
     }
 
     fn handle_frames(&mut self, now: Instant, answer_at: Instant) {
-        let Self { decoder, servos, wire, .. } = self;
+        let Self { decoder, servos, wire, rest_until, .. } = self;
         while let Some(found) = decoder.pull() {
             // A servo does not answer a damaged frame.
             let Ok(frame) = found else { continue };
+            if !matches!(Instruction::from_code(frame.code), Some(Instruction::Ping | Instruction::Read)) {
+                *rest_until = self.now;
+            }
             for answer in servos.iter_mut().filter_map(|servo| servo.handle_frame(now, &frame)) {
                 wire.send(answer_at + answer.delay, &answer.bytes);
             }
@@ -139,22 +145,49 @@ impl Plant {
         let oldest = now.as_micros().saturating_sub(LONGEST_CATCH_UP.as_micros());
         self.now = self.now.max(Instant::from_micros(oldest));
         while self.now + STEP <= now {
-            self.now = self.now + STEP;
-            let supply = self.supply_decivolts();
-            let mut has_turned = false;
-            for servo in &mut self.servos {
-                has_turned |= servo.step(self.now, supply);
-            }
-            if has_turned {
-                self.update_weight();
+            if self.now + STEP <= self.rest_until {
+                self.rest(now.min(self.rest_until));
+            } else {
+                self.step();
             }
         }
+    }
+
+    /// Simulates one step.
+    fn step(&mut self) {
+        self.now = self.now + STEP;
+        let supply = self.supply_decivolts();
+        let mut has_turned = false;
+        for servo in &mut self.servos {
+            has_turned |= servo.step(self.now, supply);
+        }
+        if has_turned {
+            self.update_weight();
+        } else {
+            let supply = self.supply_decivolts();
+            let ends = self.servos.iter().map(|servo| servo.rest_until(self.now, supply));
+            self.rest_until = ends.min().unwrap_or(self.now);
+        }
+    }
+
+    /// Simulates the whole steps until `end`, which is not after `self.rest_until`.
+    fn rest(&mut self, end: Instant) {
+        let steps = (end - self.now).as_micros() / STEP.as_micros();
+        let steps = u32::try_from(steps).unwrap_or(u32::MAX);
+        self.servos.iter_mut().for_each(|servo| servo.rest(steps));
+        self.now = self.now + Duration::from_micros(STEP.as_micros() * u64::from(steps));
+    }
+
+    /// The servos, for a change.
+    const fn servos_mut(&mut self) -> &mut [Servo; JOINTS] {
+        self.rest_until = self.now;
+        &mut self.servos
     }
 
     /// Loads each servo with its share of the arm's weight in this pose.
     fn update_weight(&mut self) {
         let torques = weight::torques(self.pose());
-        for ((servo, joint), torque) in self.servos.iter_mut().zip(Joint::ALL).zip(torques) {
+        for ((servo, joint), torque) in self.servos_mut().iter_mut().zip(Joint::ALL).zip(torques) {
             servo.set_weight(if pose::is_reversed(joint) { -torque } else { torque });
         }
     }
@@ -206,7 +239,8 @@ impl Plant {
     /// Sets whether a goal switches torque on after a servo's own start.
     pub fn set_goal_starts_torque(&mut self, starts_torque: bool) {
         self.config.goal_starts_torque = starts_torque;
-        self.servos.iter_mut().for_each(|servo| servo.set_config(self.config));
+        let config = self.config;
+        self.servos_mut().iter_mut().for_each(|servo| servo.set_config(config));
     }
 
     /// Sets whether the controller receives its own bytes, as on a bus with one wire for both directions.
@@ -234,7 +268,7 @@ impl Plant {
 
     /// Sets whether a stand holds each joint that has no torque.
     pub fn support(&mut self, is_supported: bool) {
-        self.servos.iter_mut().for_each(|servo| servo.support(is_supported));
+        self.servos_mut().iter_mut().for_each(|servo| servo.support(is_supported));
     }
 
     /// Switches power off and on: torque, goals and answers are lost, faults stay. A hand holds each joint until it has
@@ -242,7 +276,7 @@ impl Plant {
     pub fn power_cycle(&mut self, now: Instant) {
         self.advance(now);
         let ready_at = now + self.config.boot_time;
-        for servo in &mut self.servos {
+        for servo in self.servos_mut() {
             servo.power_cycle(ready_at);
             servo.hold_by_hand(true);
         }
@@ -280,7 +314,7 @@ impl Plant {
     }
 
     fn servo_mut(&mut self, joint: Joint) -> Option<&mut Servo> {
-        self.servos.get_mut(usize::from(joint.index()))
+        self.servos_mut().get_mut(usize::from(joint.index()))
     }
 }
 

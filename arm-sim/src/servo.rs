@@ -28,6 +28,7 @@ use gear::Drag;
 use motor::{Motor, MotorMode};
 use registers::ServoRegisters;
 use temperature::Temperature;
+use units::STEP;
 
 /// A load above this, in 0.1 %, is an overload.
 const OVERLOAD: u16 = 800;
@@ -147,7 +148,7 @@ impl Servo {
 
     /// Executes a frame that ends at `now`, and returns the answer if there is one.
     pub fn handle_frame(&mut self, now: Instant, frame: &ServoFrame<'_>) -> Option<Answer> {
-        if !self.has_power(now) {
+        if !self.registers.is_addressed_by(frame) || !self.has_power(now) {
             return None;
         }
         let answer = self.registers.handle_frame(frame);
@@ -221,9 +222,9 @@ impl Servo {
             self.power_cycle(now + self.config.boot_time);
             self.restarts_at = next_restart(now, self.fault);
         }
-        self.temperature.step(self.load());
+        self.temperature.steps(self.load(), 1);
         let mode = self.motor_mode(now);
-        if self.motor.is_at_rest(mode) && self.reported == Some(self.report(supply_decivolts)) {
+        if self.is_at_rest(mode, supply_decivolts) {
             // Most steps change nothing.
             self.overload_steps = 0;
             return false;
@@ -233,6 +234,29 @@ impl Servo {
         self.check_overload();
         self.update_registers(supply_decivolts);
         before != self.motor.position()
+    }
+
+    /// Does a step in this mode, with this supply voltage, change nothing?
+    fn is_at_rest(&self, mode: MotorMode, supply_decivolts: u8) -> bool {
+        self.motor.is_at_rest(mode) && self.reported == Some(self.report(supply_decivolts))
+    }
+
+    /// After the step that ended at `now`: until when steps with this supply voltage change nothing, if no call changes
+    /// the servo. [`Servo::rest`] then replaces them.
+    pub(crate) fn rest_until(&self, now: Instant, supply_decivolts: u8) -> Instant {
+        if !self.is_at_rest(self.motor_mode(now), supply_decivolts) {
+            return now;
+        }
+        let start = if self.ready_at > now { self.ready_at } else { Instant::FAR_FUTURE };
+        let event = start.min(self.restarts_at).as_micros().saturating_sub(1);
+        let heating = now.as_micros() + u64::from(self.temperature.steps_to_update()) * STEP.as_micros();
+        Instant::from_micros(event.min(heating))
+    }
+
+    /// Simulates steps that change nothing.
+    pub(crate) fn rest(&mut self, steps: u32) {
+        self.temperature.steps(self.load(), steps);
+        self.overload_steps = 0;
     }
 
     /// The mode of the motor in the step that ends at `now`.

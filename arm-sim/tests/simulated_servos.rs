@@ -177,3 +177,30 @@ fn the_motion_does_not_depend_on_the_calls() {
     assert_eq!(run(1), run(600));
     assert_eq!(run(7), run(595), "595 is a multiple of 7");
 }
+
+#[test]
+fn a_plant_at_rest_is_the_same_as_one_that_is_simulated_step_by_step() {
+    for fault in [None, Some("restarting=700"), Some("stuck"), Some("missing")] {
+        let mut rigs = [Rig::driven(), Rig::driven()];
+        for rig in &mut rigs {
+            rig.plant.set_fault(Joint::ALL[2], fault.map(|fault| fault.parse().unwrap()));
+        }
+        for second in 0..120 {
+            for (rig, steps) in rigs.iter_mut().zip([1, 1_000]) {
+                if second % 40 == 5 {
+                    rig.all_goals([300 + 2 * second, 445, 684, 511, 512, 512, 1_008]);
+                }
+                for _ in 0..steps {
+                    // A call that may change a servo ends its rest.
+                    rig.plant.support(false);
+                    rig.pass(1_000 / steps);
+                }
+            }
+            let [seldom, often] = &mut rigs;
+            assert_eq!(seldom.pose(), often.pose(), "{fault:?} at {second} s");
+            for joint in Joint::ALL {
+                assert_eq!(seldom.reading(joint), often.reading(joint), "{joint:?} {fault:?} at {second} s");
+            }
+        }
+    }
+}

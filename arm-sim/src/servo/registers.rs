@@ -60,6 +60,11 @@ impl ServoRegisters {
         BAUD_RATES.get(usize::from(code)).copied().unwrap_or(1_000_000)
     }
 
+    /// Is a frame for this servo, or for all servos?
+    pub(super) fn is_addressed_by(&self, frame: &ServoFrame<'_>) -> bool {
+        frame.id == self.id() || frame.id == BROADCAST
+    }
+
     /// Executes a frame that is addressed to this servo, and returns the answer if there is one.
     ///
     /// A write is acknowledged if register 8 is 1. A broadcast, an unknown instruction and a range beyond register 70

@@ -26,10 +26,15 @@ impl Default for Temperature {
 }
 
 impl Temperature {
-    /// Adds a step with this load, in 0.1 %.
-    pub(super) fn step(&mut self, load: u16) {
-        self.loads += u32::from(load);
-        self.steps += 1;
+    /// How many steps the temperature certainly stays the same.
+    pub(super) const fn steps_to_update(self) -> u32 {
+        UPDATE_STEPS.saturating_sub(self.steps + 1)
+    }
+
+    /// Adds steps with this load, in 0.1 %. Several at once must not be more than [`Temperature::steps_to_update`].
+    pub(super) fn steps(&mut self, load: u16, count: u32) {
+        self.loads += u32::from(load) * count;
+        self.steps += count;
         if self.steps < UPDATE_STEPS {
             return;
         }
