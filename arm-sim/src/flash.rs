@@ -4,11 +4,10 @@
 //! sector, and a restart changes nothing. The bytes are in memory, or in other [`Cells`]. The content does not matter
 //! here.
 
-use alloc::rc::Rc;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::cell::RefCell;
 use core::fmt::Debug;
+use core::iter;
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
@@ -36,49 +35,74 @@ pub trait Cells: Debug {
     fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), NorFlashErrorKind>;
 }
 
-impl Cells for Vec<u8> {
+/// Cells in memory. A copy has cells of its own.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Memory {
+    /// The cells behind the last one here are erased.
+    bytes: Vec<u8>,
+}
+
+impl Memory {
+    /// Cells with this content. Those behind its end are erased.
+    #[must_use]
+    pub const fn holding(bytes: Vec<u8>) -> Self {
+        Self { bytes }
+    }
+}
+
+impl Cells for Memory {
     fn read(&self, offset: usize, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
-        let source = self.get(offset..offset + bytes.len()).ok_or(NorFlashErrorKind::OutOfBounds)?;
-        bytes.copy_from_slice(source);
+        let stored = self.bytes.iter().skip(offset).copied().chain(iter::repeat(ERASED));
+        bytes.iter_mut().zip(stored).for_each(|(byte, stored)| *byte = stored);
         Ok(())
     }
 
     fn write(&mut self, offset: usize, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
-        let target = self.get_mut(offset..offset + bytes.len()).ok_or(NorFlashErrorKind::OutOfBounds)?;
+        let end = offset + bytes.len();
+        self.bytes.resize(self.bytes.len().max(end), ERASED);
+        let target = self.bytes.get_mut(offset..end).ok_or(NorFlashErrorKind::OutOfBounds)?;
         target.copy_from_slice(bytes);
+        let used = self.bytes.iter().rposition(|&byte| byte != ERASED).map_or(0, |last| last + 1);
+        self.bytes.truncate(used);
         Ok(())
     }
 }
 
-/// The two sectors. Clones share their cells, because the flash outlives the controller that runs between two
-/// power-ups.
+/// The two sectors.
 #[derive(Clone, Debug)]
-pub struct Flash(Rc<RefCell<dyn Cells>>);
+pub struct Flash<C = Memory>(C);
 
 impl Flash {
     /// Erased sectors in memory.
     #[must_use]
     pub fn in_memory() -> Self {
-        Self::on(vec![ERASED; SIZE])
-    }
-
-    /// Sectors on these cells.
-    #[must_use]
-    pub fn on(cells: impl Cells + 'static) -> Self {
-        Self(Rc::new(RefCell::new(cells)))
+        Self::on(Memory::default())
     }
 }
 
-impl ErrorType for Flash {
+impl<C: Cells> Flash<C> {
+    /// Sectors on these cells.
+    #[must_use]
+    pub const fn on(cells: C) -> Self {
+        Self(cells)
+    }
+
+    /// The cells.
+    pub const fn cells_mut(&mut self) -> &mut C {
+        &mut self.0
+    }
+}
+
+impl<C> ErrorType for Flash<C> {
     type Error = NorFlashErrorKind;
 }
 
-impl ReadNorFlash for Flash {
+impl<C: Cells> ReadNorFlash for Flash<C> {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
         check_read(self, offset, bytes.len())?;
-        self.0.borrow().read(index(offset)?, bytes)
+        self.0.read(index(offset)?, bytes)
     }
 
     fn capacity(&self) -> usize {
@@ -86,25 +110,24 @@ impl ReadNorFlash for Flash {
     }
 }
 
-impl NorFlash for Flash {
+impl<C: Cells> NorFlash for Flash<C> {
     const WRITE_SIZE: usize = 4;
     const ERASE_SIZE: usize = SECTOR_SIZE;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
         check_erase(self, from, to)?;
         let (start, end) = (index(from)?, index(to)?);
-        self.0.borrow_mut().write(start, &vec![ERASED; end - start])
+        self.0.write(start, &vec![ERASED; end - start])
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
         check_write(self, offset, bytes.len())?;
         let start = index(offset)?;
-        let mut cells = self.0.borrow_mut();
         let mut programmed = vec![0; bytes.len()];
-        cells.read(start, &mut programmed)?;
+        self.0.read(start, &mut programmed)?;
         // Programming clears bits and never sets one.
         programmed.iter_mut().zip(bytes).for_each(|(cell, byte)| *cell &= byte);
-        cells.write(start, &programmed)
+        self.0.write(start, &programmed)
     }
 }
 
@@ -149,10 +172,10 @@ mod tests {
     }
 
     #[test]
-    fn clones_share_their_cells() {
+    fn a_copy_has_cells_of_its_own() {
         let mut flash = Flash::in_memory();
-        let clone = flash.clone();
+        let copy = flash.clone();
         flash.write(0, &[0; 4]).unwrap();
-        assert!(!is_blank(clone));
+        assert!(!is_blank(flash) && is_blank(copy));
     }
 }

@@ -1,13 +1,15 @@
 //! A simulated 7Bot V2 arm: the controller of the firmware, and seven simulated servos under the weight of the arm.
 //!
 //! ```text
-//!           Simulation: time is an argument
+//!           SimulatedArm: time is an argument
 //!          ┌───────────────────────────────────────────────────────────┐
 //!   bytes ─▶ Pacer ──▶ motion_core::Controller ──▶ bytes ──▶ Plant:    │
 //!   bytes ◀─ Pacer ◀──     │                   ◀── bytes ◀── 7 × Servo │
 //!          │               └─▶ Settings: the journal on a Flash        │
 //!          └───────────────────────────────────────────────────────────┘
 //! ```
+//!
+//! [`Simulation`] is such an arm with a clock of its own: start there.
 //!
 //! The crate is `no_std`: it has no clock, file or thread, and it runs in a browser. The same calls give the same bytes
 //! on every machine.
@@ -25,6 +27,14 @@ pub mod plant;
 pub mod servo;
 pub mod servo_bus;
 mod settings_log;
+pub mod simulated_arm;
 pub mod simulation;
 pub mod stock_controller;
+pub mod tap;
 pub mod usb_adapter;
+
+pub use protocol_core::registers::Joint;
+pub use protocol_core::request;
+pub use protocol_core::time::{Duration, Instant};
+pub use servo::ServoFault;
+pub use simulation::{Simulation, SimulationConfig};

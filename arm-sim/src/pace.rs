@@ -21,7 +21,7 @@ const BITS_PER_BYTE: u64 = 10;
 const BATCH_MICROS: u64 = 1_000;
 
 /// One direction of a serial line.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Pacer {
     /// In bits per second. `None`: bytes arrive at once.
     baud: Option<u64>,

@@ -1,364 +1,244 @@
-//! An arm in virtual time: host line, controller, servo bus and settings.
+//! An arm with a clock of its own, for programs that have no real time: tests, learning, a browser.
 //!
-//! ```text
-//!   host_send ────▶ Pacer ──▶ ┌────────────┐ ──▶ ServoBus: Plant, or real servos
-//!                             │ controller │ ◀──
-//!   host_received ◀─ Pacer ◀─ └────────────┘ ──▶ Settings
+//! ```
+//! use arm_sim::request::Request;
+//! use arm_sim::{Duration, Joint, Simulation};
+//!
+//! let mut arm = Simulation::default();
+//! arm.advance(Duration::from_millis(1_000));
+//! // Joint 1 to 120 degrees, and a second later the time is still virtual.
+//! arm.send_request(&Request::Write { address: 46, values: &[120] });
+//! arm.advance(Duration::from_millis(3_000));
+//! assert_eq!(arm.plant().angle(Joint::ALL[0]) / 1_000, 120);
+//! assert_eq!(arm.now().as_micros(), 4_000_000);
 //! ```
 //!
-//! The simulation advances from event to event, each at its own time. So the result does not depend on how often
-//! [`Simulation::advance`] is called: a late caller makes neither the arm slower nor its servos late.
+//! A copy is a snapshot:
+//!
+//! ```
+//! use arm_sim::{Duration, Joint, ServoFault, Simulation};
+//!
+//! let mut arm = Simulation::default();
+//! arm.advance(Duration::from_millis(1_000));
+//! let before = arm.clone();
+//! arm.plant_mut().set_fault(Joint::ALL[2], Some(ServoFault::Missing));
+//! arm.advance(Duration::from_millis(1_000));
+//! assert_ne!(arm.registers().get(241), before.registers().get(241), "register 241 holds the faults");
+//! arm = before;
+//! assert_eq!(arm.now().as_micros(), 1_000_000);
+//! ```
 
-use alloc::boxed::Box;
-use core::fmt::Debug;
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
 
-use embedded_storage::nor_flash::NorFlash;
-use motion_core::servo_bus::TorqueCodes;
-use motion_core::vacuum::Vacuum;
-use motion_core::{Config, Controller, Output};
+use motion_core::Controller;
 use protocol_core::registers::RegisterFile;
-use protocol_core::registers::map::fault;
-use protocol_core::settings::Settings;
+use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::deframer::gap;
-use tracing::info;
+use protocol_core::wire::FrameBuffer;
 
 use crate::controller::ArmController;
-use crate::pace::Pacer;
+use crate::flash::{Flash, Memory};
 use crate::plant::Plant;
-use crate::servo_bus::ServoBus;
-use crate::settings_log;
+use crate::servo::ServoConfig;
+use crate::simulated_arm::{ArmConfig, SimulatedArm};
+use crate::tap::Tap;
 
-/// How long the controller waits for a servo's answer.
-const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
-/// The pause of the controller before each frame on the servo bus: that of the reference board.
-const GUARD_TIME: Duration = Duration::from_micros(100);
-/// A deadline that stays in the past is checked again after this. Wake-ups without bytes on the host line are at
-/// multiples of it, so that many arms wake up together.
-const TICK: Duration = Duration::from_millis(1);
-/// Without a client the next wake-up may be this much later, because no client sees the difference.
-const TICK_WITHOUT_CLIENT: Duration = Duration::from_millis(50);
+/// The arm's bytes are taken off its line at least this often, so that the line is never full.
+const TAKE_PERIOD: Duration = Duration::from_millis(10);
 
-/// What differs from one simulated arm to another.
-#[derive(Clone, Copy, Debug)]
-pub struct ArmConfig {
+/// What differs from one simulation to another.
+#[derive(Clone, Debug)]
+pub struct SimulationConfig {
     /// The chip id, most significant byte first (D8).
     pub chip_id: [u8; 6],
     /// Bytes on the host line take the time that the baud rate requires. Otherwise they arrive at once.
     pub is_paced: bool,
-    /// The meaning of the codes in the servos' torque switch.
-    pub torque_codes: TorqueCodes,
+    /// The make of the servos.
+    pub servos: ServoConfig,
+    /// The settings of the arm; by default the factory settings.
+    pub settings: Memory,
 }
 
-/// Gets a copy of the bytes on the host line.
-pub trait Tap: Debug {
-    /// The line starts, or starts again. `gap` is the idle time by which the arm separates frames (D4).
-    fn restart(&mut self, gap: Duration);
-    /// The arm received these bytes from the host. No bytes: the host's line is idle at `now`.
-    fn received(&mut self, now: Instant, bytes: &[u8]);
-    /// The arm sent these bytes to the host.
-    fn sent(&mut self, now: Instant, bytes: &[u8]);
+impl Default for SimulationConfig {
+    fn default() -> Self {
+        Self {
+            chip_id: *b"SIM\0\0\x01",
+            is_paced: true,
+            servos: ServoConfig::default(),
+            settings: Memory::default(),
+        }
+    }
 }
 
-/// An arm with a host line, with settings on the flash `F`, servos on the bus `B` and the controller `C`.
-#[derive(Debug)]
-pub struct Simulation<F, B = Plant, C = Controller> {
-    config: ArmConfig,
-    /// Clones share their cells.
-    flash: F,
-    settings: Settings<F>,
-    controller: C,
-    bus: B,
-    to_arm: Pacer,
-    to_host: Pacer,
-    tap: Option<Box<dyn Tap>>,
+/// An arm in virtual time, with the controller `C`. The same calls give the same bytes on every machine.
+#[derive(Clone, Debug)]
+pub struct Simulation<C = Controller> {
+    arm: SimulatedArm<Flash, Plant, C>,
     now: Instant,
-    /// When the controller has to be polled again.
-    controller_due: Instant,
-    /// The controller does nothing until it is restarted.
-    is_halted: bool,
-    /// The host has disconnected, and this many of its bytes are still on the line to the arm.
-    leaving: Option<usize>,
+    /// Bytes of the host that the line has not accepted yet.
+    to_send: VecDeque<u8>,
+    /// Bytes that have arrived at the host.
+    received: Vec<u8>,
 }
 
-impl<F: NorFlash + Clone, C: ArmController> Simulation<F, Plant, C> {
-    /// The simulated servos.
-    #[must_use]
-    pub const fn plant(&self) -> &Plant {
-        &self.bus
-    }
-
-    /// The simulated servos, for example to set a fault.
-    pub const fn plant_mut(&mut self) -> &mut Plant {
-        &mut self.bus
+impl Default for Simulation {
+    fn default() -> Self {
+        Self::new(SimulationConfig::default())
     }
 }
 
-impl<F: NorFlash + Clone, B: ServoBus> Simulation<F, B> {
-    /// Switches an arm with this project's controller on at `now`, with the settings on `flash`.
+impl Simulation {
+    /// Switches an arm with this project's controller on, at time 0.
     #[must_use]
-    pub fn new(now: Instant, config: ArmConfig, flash: F, bus: B) -> Self {
-        Self::power_up(now, config, flash, bus)
+    pub fn new(config: SimulationConfig) -> Self {
+        Self::power_up(config)
     }
 
     /// The registers.
     #[must_use]
     pub fn registers(&self) -> &RegisterFile {
-        self.controller.registers()
+        self.arm.registers()
     }
 }
 
-impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> Simulation<F, B, C> {
-    /// Switches an arm on at `now`, with the settings on `flash`.
+impl<C: ArmController> Simulation<C> {
+    /// Switches an arm on, at time 0.
     #[must_use]
-    pub fn power_up(now: Instant, config: ArmConfig, flash: F, bus: B) -> Self {
-        let (settings, controller) = power_up(now, config, flash.clone(), 0, bus.answer_delay());
-        let (to_arm, to_host) = (Pacer::new(None), Pacer::new(None));
-        let mut simulation = Self {
-            config,
-            flash,
-            settings,
-            controller,
-            bus,
-            to_arm,
-            to_host,
-            tap: None,
-            now,
-            controller_due: now,
-            is_halted: false,
-            leaving: None,
-        };
-        simulation.start_host_line();
-        simulation
+    pub fn power_up(config: SimulationConfig) -> Self {
+        let SimulationConfig { chip_id, is_paced, servos, settings } = config;
+        let config = ArmConfig { chip_id, is_paced, torque_codes: servos.torque_codes };
+        let plant = Plant::with_config(Instant::ZERO, servos);
+        let arm = SimulatedArm::power_up(Instant::ZERO, config, Flash::on(settings), plant);
+        Self { arm, now: Instant::ZERO, to_send: VecDeque::new(), received: Vec::new() }
     }
 
-    /// Switches the arm off and on at `now`. RAM and the bytes on the host line are lost; the flash stays.
-    pub fn power_cycle(&mut self, now: Instant) {
-        self.advance(now, false);
-        self.bus.power_cycle(now);
-        self.start_controller(now, 0);
-    }
-
-    /// Restarts only the controller at `now`, as its watchdog does. RAM and the bytes on the host line are lost. The
-    /// servos keep power, torque and goals.
-    pub fn restart_controller(&mut self, now: Instant) {
-        self.advance(now, false);
-        self.start_controller(now, fault::WATCHDOG_RESTART);
-    }
-
-    /// Stops the controller at `now`, as a program that hangs. It sends and receives nothing until
-    /// [`Simulation::restart_controller`] or [`Simulation::power_cycle`]. The servos keep their goals.
-    pub fn halt_controller(&mut self, now: Instant) {
-        self.advance(now, false);
-        self.is_halted = true;
-        self.controller_due = Instant::FAR_FUTURE;
-    }
-
-    fn start_controller(&mut self, now: Instant, faults: u8) {
-        (self.settings, self.controller) =
-            power_up(now, self.config, self.flash.clone(), faults, self.bus.answer_delay());
-        self.controller_due = now;
-        self.is_halted = false;
-        self.leaving = None;
-        self.start_host_line();
-    }
-
-    /// The servo bus.
-    pub const fn bus(&mut self) -> &mut B {
-        &mut self.bus
-    }
-
-    fn start_host_line(&mut self) {
-        let baud = self.controller.baud();
-        info!("arm on, host link at {baud} baud");
-        self.to_arm = self.idle_line();
-        self.to_host = self.idle_line();
-        if let Some(tap) = &mut self.tap {
-            tap.restart(gap(baud));
-        }
-    }
-
-    fn idle_line(&self) -> Pacer {
-        Pacer::new(self.config.is_paced.then(|| self.controller.baud()))
-    }
-
-    /// Copies the bytes on the host line to `tap` from now on.
-    pub fn set_tap(&mut self, mut tap: impl Tap + 'static) {
-        tap.restart(gap(self.controller.baud()));
-        self.tap = Some(Box::new(tap));
-    }
-
-    /// Number of bytes that the host can send now.
+    /// The virtual time since power-up.
     #[must_use]
-    pub fn host_room(&self) -> usize {
-        self.to_arm.room()
+    pub const fn now(&self) -> Instant {
+        self.now
     }
 
-    /// The host starts to send bytes at `now`. Returns how many were accepted.
-    pub fn host_send(&mut self, now: Instant, bytes: &[u8]) -> usize {
-        self.advance(now, false);
-        self.to_arm.push(now, bytes)
+    /// The host starts to send these bytes now.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.to_send.extend(bytes);
+        self.pass_bytes();
     }
 
-    /// The first bytes that have arrived at the host, possibly not all of them. They fill the line until
-    /// [`Simulation::host_take`], and the arm holds back answers while the line is full (D5).
-    #[must_use]
-    pub fn host_received(&self) -> &[u8] {
-        self.to_host.arrived()
+    /// The host starts to send this request now.
+    pub fn send_request(&mut self, request: &Request<'_>) {
+        let mut frame = FrameBuffer::new();
+        request.encode(&mut frame);
+        self.send(&frame);
     }
 
-    /// Removes the first `count` of the bytes that have arrived at the host.
-    pub fn host_take(&mut self, count: usize) {
-        self.to_host.take(count);
+    /// Takes the bytes that have arrived at the host since the last call.
+    pub fn take_received(&mut self) -> Vec<u8> {
+        core::mem::take(&mut self.received)
     }
 
-    /// The last host disconnects: the bytes on the line to it are lost. The arm executes what the host sent before, and
-    /// sends nothing for it. Then its reports end (M12).
-    pub fn host_disconnect(&mut self) {
-        self.to_host = self.idle_line();
-        self.leaving = Some(self.to_arm.len());
-        self.end_host();
-    }
-
-    /// Tells the controller that the host has left, once the last bytes of the host are executed.
-    fn end_host(&mut self) {
-        if self.leaving == Some(0) && !self.is_halted {
-            self.controller.host_left(self.now);
-            self.leaving = None;
+    /// Lets time pass.
+    pub fn advance(&mut self, time: Duration) {
+        let end = self.now + time;
+        while self.now < end {
+            self.advance_to(end.min(self.now + TAKE_PERIOD));
         }
     }
 
-    /// Simulates all events up to `now`. `host_is_idle` tells that the host has sent nothing since the last call, apart
-    /// from the bytes in [`Simulation::host_send`].
-    pub fn advance(&mut self, now: Instant, host_is_idle: bool) {
-        // Real servos cannot catch up: an answer that has arrived but was not read has not timed out.
-        while !B::IS_REAL
-            && let Some(event) = self.next_event().filter(|&event| event < now)
-        {
-            self.process(event, host_is_idle);
-        }
-        self.process(now, host_is_idle);
-    }
-
-    /// When to call [`Simulation::advance`] next, unless the host sends bytes. Without a client the call can be later:
-    /// the events keep their times.
-    #[must_use]
-    pub fn deadline(&self, has_client: bool) -> Instant {
-        let line = self.line_deadline().unwrap_or(Instant::FAR_FUTURE).max(self.now);
-        if B::IS_REAL {
-            let later = self.now + TICK;
-            return line.min(if self.controller_due > self.now { self.controller_due } else { later });
-        }
-        let inside = self.bus.deadline().unwrap_or(Instant::FAR_FUTURE).min(self.controller_due);
-        let unobserved = self.now + TICK_WITHOUT_CLIENT;
-        if has_client {
-            let observed = self.controller.host_deadline().max(self.now + TICK);
-            line.min(next_tick(observed.min(inside.max(unobserved))))
-        } else {
-            next_tick(line.min(inside).max(unobserved))
-        }
-    }
-
-    fn line_deadline(&self) -> Option<Instant> {
-        [self.to_arm.deadline(), self.to_host.deadline()].into_iter().flatten().min()
-    }
-
-    /// The next event after `self.now`. A deadline that stays in the past depends on something else, for example on an
-    /// idle line, and is checked again after a tick.
-    fn next_event(&self) -> Option<Instant> {
-        let candidates = [self.line_deadline(), self.bus.deadline(), Some(self.controller_due)];
-        let later = |deadline| if deadline > self.now { deadline } else { self.now + TICK };
-        candidates.into_iter().flatten().map(later).min()
-    }
-
-    fn process(&mut self, now: Instant, host_is_idle: bool) {
-        self.now = now;
-        self.to_arm.advance(now);
-        self.to_host.advance(now);
-        let from_servos = self.bus.poll(now);
-        if self.is_halted {
-            return;
-        }
-        self.controller.servo_bytes(now, &from_servos);
-        if host_is_idle && self.to_arm.is_empty() {
-            self.pass_host_bytes();
-        }
-        self.poll_controller();
-        while !self.to_arm.arrived().is_empty() && self.pass_host_bytes() > 0 {
-            self.poll_controller();
-            self.end_host();
-        }
-    }
-
-    /// Passes the bytes that have arrived from the host, possibly none, to the controller. Returns how many it took.
-    fn pass_host_bytes(&mut self) -> usize {
-        let arrived = self.to_arm.arrived();
-        // The bytes of the next host wait until those of the last one are executed.
-        let end = self.leaving.unwrap_or(usize::MAX).min(arrived.len());
-        let taken = self.controller.host_bytes(self.now, arrived.get(..end).unwrap_or(arrived));
-        if let (Some(tap), Some(bytes)) = (&mut self.tap, arrived.get(..taken)) {
-            tap.received(self.now, bytes);
-        }
-        self.to_arm.take(taken);
-        self.leaving = self.leaving.map(|left| left.saturating_sub(taken));
-        taken
-    }
-
-    /// Executes the outputs of the controller until it waits.
-    fn poll_controller(&mut self) {
+    /// Lets time pass until the condition holds, at most for `timeout`. The condition is checked after each event. Returns
+    /// whether it holds.
+    ///
+    /// ```
+    /// use arm_sim::request::Request;
+    /// use arm_sim::{Duration, Simulation};
+    ///
+    /// let mut arm = Simulation::default();
+    /// arm.send_request(&Request::Read { address: 54, count: 7 });
+    /// let second = Duration::from_millis(1_000);
+    /// assert!(arm.advance_until(second, |arm| arm.received().len() == 14));
+    /// assert!(arm.now().as_micros() < 3_000, "21 bytes at 115200 baud");
+    /// ```
+    pub fn advance_until(&mut self, timeout: Duration, mut condition: impl FnMut(&Self) -> bool) -> bool {
+        let end = self.now + timeout;
         loop {
-            match self.controller.poll(self.now, self.to_host.room()) {
-                Output::ToHost(_) if self.leaving.is_some() => {}
-                Output::ToHost(bytes) => {
-                    if let Some(tap) = &mut self.tap {
-                        tap.sent(self.now, bytes);
-                    }
-                    self.to_host.push(self.now, bytes);
-                }
-                Output::ToServos(bytes) => self.bus.bytes(self.now, bytes),
-                Output::Vacuum(vacuum) => log_vacuum(vacuum),
-                Output::Save(image) => {
-                    self.controller.set_storage(self.settings.save(&image));
-                    settings_log::saved(&self.settings);
-                }
-                Output::Wait(until) => {
-                    self.controller_due = until;
-                    return;
-                }
+            if condition(self) {
+                return true;
             }
+            if self.now >= end {
+                return false;
+            }
+            self.advance_to(end.min(self.arm.next_event()).min(self.now + TAKE_PERIOD));
         }
     }
-}
 
-/// The first multiple of [`TICK`] at or after a time.
-fn next_tick(at: Instant) -> Instant {
-    let micros = at.as_micros().checked_next_multiple_of(TICK.as_micros());
-    micros.map_or(Instant::FAR_FUTURE, Instant::from_micros)
-}
+    /// The bytes that have arrived at the host since [`Simulation::take_received`].
+    #[must_use]
+    pub fn received(&self) -> &[u8] {
+        &self.received
+    }
 
-fn power_up<F: NorFlash + Clone, C: ArmController>(
-    now: Instant,
-    arm: ArmConfig,
-    flash: F,
-    faults: u8,
-    answer_delay: Duration,
-) -> (Settings<F>, C) {
-    let settings = Settings::open(flash);
-    settings_log::opened(&settings);
-    let config = Config {
-        chip_id: arm.chip_id,
-        faults,
-        servo_timeout: SERVO_TIMEOUT,
-        guard_time: GUARD_TIME,
-        torque_codes: arm.torque_codes,
-    };
-    let mut controller = C::power_up(now, config, settings.found(), settings.storage());
-    controller.set_answer_delay(answer_delay);
-    (settings, controller)
-}
+    fn advance_to(&mut self, now: Instant) {
+        self.now = now;
+        self.arm.advance(now, self.to_send.is_empty());
+        self.pass_bytes();
+    }
 
-fn log_vacuum(vacuum: Vacuum) {
-    let pump = if vacuum.pump { "on" } else { "off" };
-    let valve = if vacuum.valve { "open" } else { "closed" };
-    info!("vacuum: pump {pump}, valve {valve}");
+    fn pass_bytes(&mut self) {
+        while !self.to_send.is_empty() {
+            let (piece, _) = self.to_send.as_slices();
+            let sent = self.arm.host_send(self.now, piece);
+            if sent == 0 {
+                break;
+            }
+            self.to_send.drain(..sent);
+        }
+        while !self.arm.host_received().is_empty() {
+            self.received.extend(self.arm.host_received());
+            self.arm.host_take(self.arm.host_received().len());
+        }
+    }
+
+    /// The simulated servos, and the arm that they carry.
+    #[must_use]
+    pub const fn plant(&self) -> &Plant {
+        self.arm.plant()
+    }
+
+    /// The simulated servos, for example to set a fault.
+    pub const fn plant_mut(&mut self) -> &mut Plant {
+        self.arm.plant_mut()
+    }
+
+    /// The cells of the flash with the settings.
+    pub fn settings_mut(&mut self) -> &mut Memory {
+        self.arm.flash_mut().cells_mut()
+    }
+
+    /// Switches the arm off and on. RAM and the bytes on the host line are lost; the settings stay.
+    pub fn power_cycle(&mut self) {
+        self.to_send.clear();
+        self.arm.power_cycle(self.now);
+    }
+
+    /// Restarts the controller, as its watchdog does. The servos keep power, torque and goals.
+    pub fn restart_controller(&mut self) {
+        self.to_send.clear();
+        self.arm.restart_controller(self.now);
+    }
+
+    /// Stops the controller, as a program that hangs, until [`Simulation::restart_controller`] or
+    /// [`Simulation::power_cycle`]. The servos keep their goals.
+    pub fn halt_controller(&mut self) {
+        self.arm.halt_controller(self.now);
+    }
+
+    /// The host closes its port: bytes on the line to it are lost, and reports end (M12).
+    pub fn disconnect(&mut self) {
+        self.arm.host_disconnect();
+    }
+
+    /// Copies the bytes on the host line to `tap` from now on. A copy of the simulation has no tap.
+    pub fn set_tap(&mut self, tap: impl Tap + 'static) {
+        self.arm.set_tap(tap);
+    }
 }

@@ -7,7 +7,7 @@ mod rig;
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
 use arm_sim::servo::{ServoConfig, ServoFault};
-use arm_sim::simulation::{ArmConfig, Simulation};
+use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::TorqueCodes;
 use motion_core::servo_bus::Torque;
 use protocol_core::registers::map::{FAULTS, MISSING_SERVOS, fault};
@@ -224,10 +224,11 @@ fn a_fall_does_not_depend_on_the_calls() {
     assert_eq!(fall(1), fall(600));
 }
 
-fn simulation() -> Simulation<Flash> {
+fn simulation() -> SimulatedArm<Flash> {
     let torque_codes = TorqueCodes::default();
     let setup = ArmConfig { chip_id: *b"SIM\0\0\x01", is_paced: false, torque_codes };
-    let mut simulation = Simulation::new(Instant::ZERO, setup, Flash::in_memory(), Plant::new(Instant::ZERO));
+    let mut simulation =
+        SimulatedArm::new(Instant::ZERO, setup, Flash::in_memory(), Plant::new(Instant::ZERO));
     simulation.advance(Instant::ZERO + Duration::from_millis(2_000), true);
     simulation
 }

@@ -5,14 +5,14 @@
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoFault;
-use arm_sim::simulation::{ArmConfig, Simulation};
+use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use arm_sim::stock_controller::StockController;
 use motion_core::TorqueCodes;
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::crc::checksum;
 
-type StockArm = Simulation<Flash, Plant, StockController>;
+type StockArm = SimulatedArm<Flash, Plant, StockController>;
 
 /// An arm, and the time.
 struct Bench {
@@ -26,7 +26,7 @@ impl Bench {
         let config =
             ArmConfig { chip_id: *b"SIM\0\0\x01", is_paced: false, torque_codes: TorqueCodes::default() };
         let plant = Plant::new(Instant::ZERO);
-        let arm = Simulation::power_up(Instant::ZERO, config, Flash::in_memory(), plant);
+        let arm = SimulatedArm::power_up(Instant::ZERO, config, Flash::in_memory(), plant);
         let mut bench = Self { arm, now: Instant::ZERO };
         bench.receive_text();
         bench

@@ -2,7 +2,7 @@
 
 use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
-use std::os::unix::fs::{DirBuilderExt, FileExt, OpenOptionsExt};
+use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 use arm_sim::flash::{ERASED, Flash, SIZE};
@@ -92,8 +92,8 @@ impl Eeprom {
     ///
     /// # Errors
     /// See [`ImageError`].
-    pub fn open(&self, arm: Option<u16>) -> Result<Flash, ImageError> {
-        let Some(path) = self.path(arm)? else { return Ok(Flash::in_memory()) };
+    pub fn open(&self, arm: Option<u16>) -> Result<Flash<ImageFile>, ImageError> {
+        let Some(path) = self.path(arm)? else { return Ok(Flash::on(ImageFile::in_memory())) };
         let refused = |verb, cause| ImageError::Refused { verb, path: path.clone(), cause };
         if matches!(self, Self::UsersOwn(_))
             && let Some(directory) = path.parent()
@@ -114,12 +114,11 @@ impl Eeprom {
             TryLockError::Error(cause) => refused("lock", cause),
         })?;
         check_size(&file, &path)?;
-        let mut copy = vec![0; SIZE];
-        file.read_exact_at(&mut copy, 0).map_err(|cause| refused("read", cause))?;
+        let image = ImageFile::open(file).map_err(|cause| refused("read", cause))?;
         // Opening a damaged journal erases the flash, so a copy is opened.
-        match Journal::open(Flash::on(copy)) {
+        match Journal::open(Flash::on(image.copy())) {
             (_, Opened::Damaged) => Err(ImageError::Damaged(path)),
-            _ => Ok(Flash::on(ImageFile(file))),
+            _ => Ok(Flash::on(image)),
         }
     }
 }

@@ -193,7 +193,7 @@ mod tests {
     use std::io::Write;
 
     use arm_sim::flash::Flash;
-    use arm_sim::simulation::{ArmConfig, Simulation};
+    use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
     use motion_core::TorqueCodes;
     use protocol_core::registers::map::SPEED;
     use protocol_core::request::Request;
@@ -207,7 +207,7 @@ mod tests {
     fn arm(pty: Pty) -> PtyArm<Flash> {
         let config = ArmConfig { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };
         let plant = Plant::new(Instant::ZERO);
-        PtyArm::new(Simulation::new(Instant::ZERO, config, Flash::in_memory(), plant), pty, Span::none())
+        PtyArm::new(SimulatedArm::new(Instant::ZERO, config, Flash::in_memory(), plant), pty, Span::none())
     }
 
     #[test]

@@ -10,7 +10,7 @@ use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoConfig;
 use arm_sim::servo_bus::ServoBus;
-use arm_sim::simulation::{ArmConfig, Simulation};
+use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use arm_sim::stock_controller::StockController;
 use clap::Parser;
 use host_sim::bus_line::BusLine;
@@ -18,6 +18,7 @@ use host_sim::cli::{Options, in_one_line};
 use host_sim::clock::Clock;
 use host_sim::eeprom::{Eeprom, ImageError};
 use host_sim::event_loop::EventLoop;
+use host_sim::image_file::ImageFile;
 use host_sim::per_arm;
 use host_sim::pty_arm::PtyArm;
 use host_sim::real_servos::{self, RealServos};
@@ -228,7 +229,7 @@ fn arm<B: ServoBus, C: ArmController>(
     pty: Pty,
     clock: &mut Clock,
     bus: B,
-) -> Result<PtyArm<Flash, B, C>, Failure> {
+) -> Result<PtyArm<Flash<ImageFile>, B, C>, Failure> {
     // At level error, so that every log level shows it.
     let span = number.map_or_else(Span::none, |number| error_span!("arm", number));
     let inside = span.enter();
@@ -240,7 +241,7 @@ fn arm<B: ServoBus, C: ArmController>(
     let flash = options.eeprom.as_ref().unwrap_or(&default).open(number)?;
     let chip_id = per_arm::chip_id(options.chip_id, number);
     let config = ArmConfig { chip_id, is_paced: !options.unpaced, torque_codes: options.torque_codes };
-    let mut simulation = Simulation::power_up(clock.now(), config, flash, bus);
+    let mut simulation = SimulatedArm::power_up(clock.now(), config, flash, bus);
     if options.trace {
         simulation.set_tap(Trace::new(Box::new(|line| tracing::info!(target: FRAMES, "{line}"))));
     }

@@ -1,4 +1,4 @@
-//! An arm on a pseudo-terminal: passes bytes between a [`Simulation`] and a [`Pty`].
+//! An arm on a pseudo-terminal: passes bytes between a [`SimulatedArm`] and a [`Pty`].
 
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
@@ -7,7 +7,7 @@ use arm_sim::controller::ArmController;
 use arm_sim::pace;
 use arm_sim::plant::Plant;
 use arm_sim::servo_bus::ServoBus;
-use arm_sim::simulation::Simulation;
+use arm_sim::simulated_arm::SimulatedArm;
 use embedded_storage::nor_flash::NorFlash;
 use motion_core::Controller;
 use protocol_core::time::Instant;
@@ -21,7 +21,7 @@ use tty_ports::pty::Pty;
 /// An arm on a pseudo-terminal.
 #[derive(Debug)]
 pub struct PtyArm<F, B = Plant, C = Controller> {
-    simulation: Simulation<F, B, C>,
+    simulation: SimulatedArm<F, B, C>,
     pty: Pty,
     /// The client does not read, and the kernel's buffers are full.
     is_blocked: bool,
@@ -40,7 +40,7 @@ impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
 impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
     /// Connects an arm to a pseudo-terminal. Its log lines are in `span`.
     #[must_use]
-    pub const fn new(simulation: Simulation<F, B, C>, pty: Pty, span: Span) -> Self {
+    pub const fn new(simulation: SimulatedArm<F, B, C>, pty: Pty, span: Span) -> Self {
         Self { simulation, pty, is_blocked: false, span }
     }
 

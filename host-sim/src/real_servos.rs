@@ -1,7 +1,7 @@
 //! The controller on this computer, with real servos behind a USB adapter.
 //!
 //! ```text
-//!   client ◀──▶ Pty ◀──▶ Simulation: the controller ◀──▶ BusLine ◀──▶ Serial ◀──▶ adapter, servos
+//!   client ◀──▶ Pty ◀──▶ SimulatedArm: the controller ◀──▶ BusLine ◀──▶ Serial ◀──▶ adapter, servos
 //! ```
 //!
 //! This runs in real time: a late caller does not catch up. If the adapter is unplugged, the program waits for it. Only

@@ -9,7 +9,7 @@
 //!
 //! The trace has deframers of its own, so it does not change the traffic. It does not show the effect of a request.
 
-use arm_sim::simulation::Tap;
+use arm_sim::tap::Tap;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{
     Defect, Deframer, Direction, Frame, FrameBuffer, MAX_LENGTH, ToArm, ToHost, frame,
@@ -23,13 +23,13 @@ const MAX_PENDING: usize = 2 * MAX_LENGTH;
 pub struct Trace {
     from_host: LineTrace<ToArm>,
     to_host: LineTrace<ToHost>,
-    sink: Box<dyn FnMut(&str)>,
+    sink: Box<dyn FnMut(&str) + Send>,
 }
 
 impl Trace {
     /// Passes a line for each frame to `sink`.
     #[must_use]
-    pub fn new(sink: Box<dyn FnMut(&str)>) -> Self {
+    pub fn new(sink: Box<dyn FnMut(&str) + Send>) -> Self {
         let gap = Duration::ZERO;
         Self { from_host: LineTrace::new("->", gap), to_host: LineTrace::new("<-", gap), sink }
     }
@@ -122,8 +122,7 @@ const fn defect_text(defect: Defect) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use std::cell::RefCell;
-    use std::rc::Rc;
+    use std::sync::{Arc, Mutex};
 
     use protocol_core::request::{Reply, Request};
     use protocol_core::wire::deframer::{ABANDON_AFTER, gap};
@@ -132,14 +131,14 @@ mod tests {
 
     struct TraceRecorder {
         trace: Trace,
-        lines: Rc<RefCell<Vec<String>>>,
+        lines: Arc<Mutex<Vec<String>>>,
         now: Instant,
     }
 
     fn session() -> TraceRecorder {
-        let lines = Rc::new(RefCell::new(Vec::new()));
-        let heard = Rc::clone(&lines);
-        let sink = Box::new(move |line: &str| heard.borrow_mut().push(line.to_owned()));
+        let lines = Arc::new(Mutex::new(Vec::new()));
+        let heard = Arc::clone(&lines);
+        let sink = Box::new(move |line: &str| heard.lock().unwrap().push(line.to_owned()));
         let mut trace = Trace::new(sink);
         trace.restart(gap(115_200));
         TraceRecorder { trace, lines, now: Instant::ZERO }
@@ -148,7 +147,7 @@ mod tests {
     impl TraceRecorder {
         fn host(&mut self, bytes: &[u8]) -> Vec<String> {
             self.trace.received(self.now, bytes);
-            self.lines.take()
+            std::mem::take(&mut self.lines.lock().unwrap())
         }
 
         fn silence(&mut self) -> Vec<String> {
@@ -156,14 +155,14 @@ mod tests {
                 self.now = self.now + ABANDON_AFTER;
                 self.trace.received(self.now, &[]);
             }
-            self.lines.take()
+            std::mem::take(&mut self.lines.lock().unwrap())
         }
 
         fn arm(&mut self, address: u8, values: &[u8]) -> Vec<String> {
             let mut bytes = FrameBuffer::new();
             Reply { address, values }.encode(&mut bytes);
             self.trace.sent(self.now, &bytes);
-            self.lines.take()
+            std::mem::take(&mut self.lines.lock().unwrap())
         }
     }
 

@@ -32,7 +32,7 @@ use crate::status::Status;
 use crate::vacuum::VacuumControl;
 
 /// Registers, joints, servo bus, status and vacuum of one arm.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct ArmControl {
     pub(crate) registers: RegisterFile,
     pub(crate) bus: BusScheduler,

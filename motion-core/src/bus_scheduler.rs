@@ -22,7 +22,7 @@ const START_UP_TIME: Duration = Duration::from_millis(500);
 const TORQUE_REFRESH_CYCLES: u8 = 25;
 
 /// The servo bus and its schedule.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct BusScheduler {
     bus: Bus,
     /// When start-up ends at the latest; `None` once it is over.

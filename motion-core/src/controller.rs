@@ -40,7 +40,7 @@ pub enum Output<'a> {
 }
 
 /// The controller of one arm.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Controller {
     host: HostPort,
     arm: ArmControl,

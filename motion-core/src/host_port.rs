@@ -51,7 +51,7 @@ pub(crate) enum HostEvent<'a> {
 }
 
 /// The arm's end of the host link.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct HostPort {
     deframer: Deframer<ToArm>,
     /// The oldest pending request, if it is a read. The requests behind it wait in the deframer.

@@ -25,7 +25,7 @@ use crate::reach::Reached;
 use crate::servo_bus::{Reading, Torque};
 
 /// The seven joints and their motor state.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Joints {
     joints: [JointState; JOINTS],
     state: MotorState,

@@ -18,7 +18,7 @@ pub enum Storage {
 }
 
 /// The journal, and the settings that it held at start.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Settings<F> {
     journal: Journal<F>,
     opened: Opened,
@@ -26,14 +26,22 @@ pub struct Settings<F> {
 }
 
 impl<F: NorFlash> Settings<F> {
-    /// Opens the journal. Only this function erases sectors.
+    /// Opens the journal. Only this function and [`Settings::reopen`] erase sectors.
     pub fn open(flash: F) -> Self {
         let (journal, opened) = Journal::open(flash);
-        let storage = match opened {
-            Opened::Broken(_) => Storage::Broken,
-            _ => ready_or_full(&journal),
-        };
+        let storage = storage_after(&journal, &opened);
         Self { journal, opened, storage }
+    }
+
+    /// Opens the journal again, as the next start does.
+    pub fn reopen(&mut self) {
+        self.opened = self.journal.reopen();
+        self.storage = storage_after(&self.journal, &self.opened);
+    }
+
+    /// The flash, for a test or a simulator that changes it.
+    pub const fn flash_mut(&mut self) -> &mut F {
+        self.journal.flash_mut()
     }
 
     /// The result of opening the journal.
@@ -70,6 +78,10 @@ impl<F: NorFlash> Settings<F> {
     }
 }
 
+fn storage_after<F: NorFlash>(journal: &Journal<F>, opened: &Opened) -> Storage {
+    if matches!(opened, Opened::Broken(_)) { Storage::Broken } else { ready_or_full(journal) }
+}
+
 fn ready_or_full<F: NorFlash>(journal: &Journal<F>) -> Storage {
     if journal.room() > 0 { Storage::Ready } else { Storage::Full }
 }
@@ -95,8 +107,9 @@ mod tests {
         assert_eq!((settings.found(), settings.storage()), (None, Storage::Ready));
         assert_eq!(settings.opened(), &Opened::Fresh);
         assert_eq!(settings.save(&IMAGE), Storage::Ready);
-        let settings = Settings::open(settings.journal.release());
+        settings.reopen();
         assert_eq!((settings.found(), settings.storage()), (Some(&IMAGE), Storage::Ready));
+        assert_eq!(Settings::open(settings.flash_mut().clone()).found(), Some(&IMAGE));
     }
 
     #[test]

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
-use arm_sim::simulation::{ArmConfig, Simulation};
+use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::servo_bus::TorqueCodes;
 use protocol_core::time::Instant;
 use sevenbot_serve::server::{AccessPolicy, ArmLocation, Notice, Server, ServerConfig};
@@ -52,7 +52,7 @@ impl Plugged {
         let run = move || {
             let mut arm = chip_id.map(|chip_id| {
                 let config = ArmConfig { chip_id, is_paced: false, torque_codes: TorqueCodes::default() };
-                Simulation::new(now(), config, Flash::in_memory(), Plant::new(now()))
+                SimulatedArm::new(now(), config, Flash::in_memory(), Plant::new(now()))
             });
             while stopped.recv_timeout(Duration::from_millis(1)) == Err(mpsc::RecvTimeoutError::Timeout) {
                 let mut bytes = [0; 64];

@@ -3,7 +3,7 @@
 use protocol_core::time::{Duration, Instant};
 
 /// A stream of feedback frames.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Feedback {
     period: Duration,
     due: Instant,

@@ -6,7 +6,7 @@ use protocol_core::registers::map21::{PRESENT_ANGLE, PRESENT_LOAD};
 use protocol_core::registers::{Joint, Register};
 
 /// Servos that are read one after the other, before a frame is sent.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Measurement {
     /// The frame is a report: the host did not ask for it.
     pub(super) is_report: bool,

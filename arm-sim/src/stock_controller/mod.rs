@@ -62,7 +62,7 @@ const INPUT_BUFFER: usize = 256;
 const FAST: u8 = 3;
 
 /// The maker's controller.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct StockController {
     config: Config,
     registers: StockRegisters,

@@ -18,7 +18,7 @@ pub(super) enum StockRequest {
 }
 
 /// The bytes of the frame so far, header included.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Parser {
     frame: Vec<u8>,
 }

@@ -25,7 +25,7 @@ const TIME_AT_START: u8 = 232;
 const IMAGE_START: u8 = CHIP_ID.address + CHIP_ID.count;
 
 /// The values of the registers.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct StockRegisters {
     values: [u8; COUNT],
     /// The offsets act from the next start on.

@@ -26,7 +26,7 @@ pub(super) enum ReadOutcome {
 }
 
 /// The master of the servo bus.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct ServoMaster {
     /// Frames to send. True: a servo answers.
     queue: VecDeque<(ServoFrameBuffer, bool)>,

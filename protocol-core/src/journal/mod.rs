@@ -118,6 +118,10 @@ struct Tail {
 }
 
 impl Tail {
+    /// Before the first record.
+    const BLANK: Self =
+        Self { next: SlotAddress { sector: 0, slot: 1 }, generation: 1, following: 2, spare: None };
+
     /// Continues in the spare.
     fn change_over(&mut self) -> Result<(), SaveError> {
         let slot = self.spare.take().ok_or(SaveError::Full)?;
@@ -153,16 +157,22 @@ impl<F: NorFlash> Journal<F> {
     /// Saves use the slots below this one.
     const LIMIT: u32 = Self::SLOTS - RESERVE;
 
-    /// Finds the settings and makes room for saves. Only this function erases.
+    /// Finds the settings and makes room for saves. Only this function and [`Journal::reopen`] erase.
     ///
     /// The flash has two sectors of `ERASE_SIZE` (512 bytes to 1 MiB) and words of at most four bytes.
     pub fn open(flash: F) -> (Self, Opened) {
-        let tail =
-            Tail { next: SlotAddress { sector: 0, slot: 1 }, generation: 1, following: 2, spare: None };
-        let mut journal = Self { sectors: Sectors(flash), tail, newest: None, broken: false };
-        let opened = journal.start();
-        journal.broken = matches!(opened, Opened::Broken(_));
+        let mut journal = Self { sectors: Sectors(flash), tail: Tail::BLANK, newest: None, broken: false };
+        let opened = journal.reopen();
         (journal, opened)
+    }
+
+    /// Opens the journal again, as the next start does: [`Journal::open`] on the same flash.
+    pub fn reopen(&mut self) -> Opened {
+        self.tail = Tail::BLANK;
+        self.newest = None;
+        let opened = self.start();
+        self.broken = matches!(opened, Opened::Broken(_));
+        opened
     }
 
     /// Saves the settings. An unchanged image is not saved again. (An image of 20 times 0xFF would read as no settings;
@@ -186,6 +196,11 @@ impl<F: NorFlash> Journal<F> {
     pub fn room(&self) -> usize {
         let free = |slot| Self::LIMIT.saturating_sub(slot) as usize;
         if self.broken { 0 } else { free(self.tail.next.slot) + self.tail.spare.map_or(0, free) }
+    }
+
+    /// The flash.
+    pub const fn flash_mut(&mut self) -> &mut F {
+        &mut self.sectors.0
     }
 
     /// Returns the flash.

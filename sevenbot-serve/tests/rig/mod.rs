@@ -4,7 +4,7 @@
 
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
-use arm_sim::simulation::{ArmConfig, Simulation};
+use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::servo_bus::TorqueCodes;
 use protocol_core::request::{Reply, Report, Request};
 use protocol_core::time::{Duration, Instant};
@@ -41,7 +41,7 @@ pub struct Page {
 pub struct World {
     pub now: Instant,
     pub hub: Hub,
-    pub arm: Simulation<Flash>,
+    pub arm: SimulatedArm<Flash>,
     pub is_plugged: bool,
     /// The next byte of the arm is damaged on the line.
     pub damages_next_byte: bool,
@@ -77,7 +77,7 @@ impl World {
         let config =
             ArmConfig { chip_id: *b"SIM\0\0\x01", is_paced: true, torque_codes: TorqueCodes::default() };
         let plant = Plant::new(Instant::ZERO);
-        let arm = Simulation::new(Instant::ZERO, config, Flash::in_memory(), plant);
+        let arm = SimulatedArm::new(Instant::ZERO, config, Flash::in_memory(), plant);
         let hub = Hub::new(BAUD, is_read_only);
         let mut world = Self {
             now: Instant::ZERO,

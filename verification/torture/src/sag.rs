@@ -9,7 +9,7 @@ use std::fmt::{self, Display};
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoFault;
-use arm_sim::simulation::{ArmConfig, Simulation};
+use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::TorqueCodes;
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{ServoFrameBuffer, register, sync_write};
@@ -107,7 +107,7 @@ impl Sag {
 
 /// An arm that holds [`POSE`].
 struct PosedArm {
-    world: Simulation<Flash>,
+    world: SimulatedArm<Flash>,
     now: Instant,
     rest: [i32; JOINTS],
     sag: Sag,
@@ -117,7 +117,7 @@ impl PosedArm {
     fn new() -> Self {
         let now = Instant::ZERO;
         let setup = ArmConfig { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };
-        let world = Simulation::new(now, setup, Flash::in_memory(), Plant::new(now));
+        let world = SimulatedArm::new(now, setup, Flash::in_memory(), Plant::new(now));
         let mut arm = Self { world, now, rest: [0; JOINTS], sag: Sag::default() };
         arm.run(SETTLE_TIME);
         let mut frame = FrameBuffer::new();

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
 use arm_sim::servo_bus::ServoBus;
-use arm_sim::simulation::{ArmConfig, Simulation};
+use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use fastrand::Rng;
 use motion_core::calibration::angle_from_counts;
 use motion_core::servo_bus::frame::{Decoder, register};
@@ -98,8 +98,8 @@ impl ServoBus for Recorder {
 pub(super) fn record(targets: Targets) -> Recording {
     let config = ArmConfig { chip_id: [0; 6], is_paced: true, torque_codes: Default::default() };
     let recorder = Recorder { plant: Plant::new(Instant::ZERO), goals: Vec::new() };
-    let mut arm: Simulation<Flash, Recorder> =
-        Simulation::power_up(Instant::ZERO, config, Flash::in_memory(), recorder);
+    let mut arm: SimulatedArm<Flash, Recorder> =
+        SimulatedArm::power_up(Instant::ZERO, config, Flash::in_memory(), recorder);
     let mut recording = Recording::default();
     let mut frames = frames(targets, &mut recording.asked).into_iter().peekable();
     let mut time = 0.0;

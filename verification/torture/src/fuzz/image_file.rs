@@ -61,7 +61,7 @@ pub fn run(input: &Input<'_>) {
     }
 }
 
-type FileSettings = Settings<arm_sim::flash::Flash>;
+type FileSettings = Settings<arm_sim::flash::Flash<host_sim::image_file::ImageFile>>;
 
 fn start(path: &Path) -> Result<FileSettings, ImageError> {
     Ok(Settings::open(Eeprom::File(path.to_owned()).open(None)?))

@@ -1,0 +1,353 @@
+//! An arm in virtual time: host line, controller, servo bus and settings.
+//!
+//! ```text
+//!   host_send ────▶ Pacer ──▶ ┌────────────┐ ──▶ ServoBus: Plant, or real servos
+//!                             │ controller │ ◀──
+//!   host_received ◀─ Pacer ◀─ └────────────┘ ──▶ Settings
+//! ```
+//!
+//! The simulation advances from event to event, each at its own time. So the result does not depend on how often
+//! [`SimulatedArm::advance`] is called: a late caller makes neither the arm slower nor its servos late.
+
+use embedded_storage::nor_flash::NorFlash;
+use motion_core::servo_bus::TorqueCodes;
+use motion_core::vacuum::Vacuum;
+use motion_core::{Config, Controller, Output};
+use protocol_core::registers::RegisterFile;
+use protocol_core::registers::map::fault;
+use protocol_core::settings::Settings;
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::deframer::gap;
+use tracing::info;
+
+use crate::controller::ArmController;
+use crate::pace::Pacer;
+use crate::plant::Plant;
+use crate::servo_bus::ServoBus;
+use crate::settings_log;
+use crate::tap::{Tap, TapSlot};
+
+/// How long the controller waits for a servo's answer.
+const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
+/// The pause of the controller before each frame on the servo bus: that of the reference board.
+const GUARD_TIME: Duration = Duration::from_micros(100);
+/// A deadline that stays in the past is checked again after this. Wake-ups without bytes on the host line are at
+/// multiples of it, so that many arms wake up together.
+const TICK: Duration = Duration::from_millis(1);
+/// Without a client the next wake-up may be this much later, because no client sees the difference.
+const TICK_WITHOUT_CLIENT: Duration = Duration::from_millis(50);
+
+/// What differs from one simulated arm to another.
+#[derive(Clone, Copy, Debug)]
+pub struct ArmConfig {
+    /// The chip id, most significant byte first (D8).
+    pub chip_id: [u8; 6],
+    /// Bytes on the host line take the time that the baud rate requires. Otherwise they arrive at once.
+    pub is_paced: bool,
+    /// The meaning of the codes in the servos' torque switch.
+    pub torque_codes: TorqueCodes,
+}
+
+/// An arm with a host line, with settings on the flash `F`, servos on the bus `B` and the controller `C`.
+#[derive(Clone, Debug)]
+pub struct SimulatedArm<F, B = Plant, C = Controller> {
+    config: ArmConfig,
+    settings: Settings<F>,
+    controller: C,
+    bus: B,
+    to_arm: Pacer,
+    to_host: Pacer,
+    tap: TapSlot,
+    now: Instant,
+    /// When the controller has to be polled again.
+    controller_due: Instant,
+    /// The controller does nothing until it is restarted.
+    is_halted: bool,
+    /// The host has disconnected, and this many of its bytes are still on the line to the arm.
+    leaving: Option<usize>,
+}
+
+impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
+    /// The simulated servos.
+    #[must_use]
+    pub const fn plant(&self) -> &Plant {
+        &self.bus
+    }
+
+    /// The simulated servos, for example to set a fault.
+    pub const fn plant_mut(&mut self) -> &mut Plant {
+        &mut self.bus
+    }
+}
+
+impl<F: NorFlash, B: ServoBus> SimulatedArm<F, B> {
+    /// Switches an arm with this project's controller on at `now`, with the settings on `flash`.
+    #[must_use]
+    pub fn new(now: Instant, config: ArmConfig, flash: F, bus: B) -> Self {
+        Self::power_up(now, config, flash, bus)
+    }
+
+    /// The registers.
+    #[must_use]
+    pub fn registers(&self) -> &RegisterFile {
+        self.controller.registers()
+    }
+}
+
+impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
+    /// Switches an arm on at `now`, with the settings on `flash`.
+    #[must_use]
+    pub fn power_up(now: Instant, config: ArmConfig, flash: F, bus: B) -> Self {
+        let settings = Settings::open(flash);
+        let controller = power_up(now, config, &settings, 0, bus.answer_delay());
+        let (to_arm, to_host) = (Pacer::new(None), Pacer::new(None));
+        let mut simulation = Self {
+            config,
+            settings,
+            controller,
+            bus,
+            to_arm,
+            to_host,
+            tap: TapSlot::default(),
+            now,
+            controller_due: now,
+            is_halted: false,
+            leaving: None,
+        };
+        simulation.start_host_line();
+        simulation
+    }
+
+    /// Switches the arm off and on at `now`. RAM and the bytes on the host line are lost; the flash stays.
+    pub fn power_cycle(&mut self, now: Instant) {
+        self.advance(now, false);
+        self.bus.power_cycle(now);
+        self.start_controller(now, 0);
+    }
+
+    /// Restarts only the controller at `now`, as its watchdog does. RAM and the bytes on the host line are lost. The
+    /// servos keep power, torque and goals.
+    pub fn restart_controller(&mut self, now: Instant) {
+        self.advance(now, false);
+        self.start_controller(now, fault::WATCHDOG_RESTART);
+    }
+
+    /// Stops the controller at `now`, as a program that hangs. It sends and receives nothing until
+    /// [`SimulatedArm::restart_controller`] or [`SimulatedArm::power_cycle`]. The servos keep their goals.
+    pub fn halt_controller(&mut self, now: Instant) {
+        self.advance(now, false);
+        self.is_halted = true;
+        self.controller_due = Instant::FAR_FUTURE;
+    }
+
+    fn start_controller(&mut self, now: Instant, faults: u8) {
+        self.settings.reopen();
+        self.controller = power_up(now, self.config, &self.settings, faults, self.bus.answer_delay());
+        self.controller_due = now;
+        self.is_halted = false;
+        self.leaving = None;
+        self.start_host_line();
+    }
+
+    /// The flash with the settings.
+    pub const fn flash_mut(&mut self) -> &mut F {
+        self.settings.flash_mut()
+    }
+
+    /// The servo bus.
+    pub const fn bus(&mut self) -> &mut B {
+        &mut self.bus
+    }
+
+    fn start_host_line(&mut self) {
+        let baud = self.controller.baud();
+        info!("arm on, host link at {baud} baud");
+        self.to_arm = self.idle_line();
+        self.to_host = self.idle_line();
+        if let Some(tap) = self.tap.get() {
+            tap.restart(gap(baud));
+        }
+    }
+
+    fn idle_line(&self) -> Pacer {
+        Pacer::new(self.config.is_paced.then(|| self.controller.baud()))
+    }
+
+    /// Copies the bytes on the host line to `tap` from now on.
+    pub fn set_tap(&mut self, mut tap: impl Tap + 'static) {
+        tap.restart(gap(self.controller.baud()));
+        self.tap = TapSlot::holding(tap);
+    }
+
+    /// Number of bytes that the host can send now.
+    #[must_use]
+    pub fn host_room(&self) -> usize {
+        self.to_arm.room()
+    }
+
+    /// The host starts to send bytes at `now`. Returns how many were accepted.
+    pub fn host_send(&mut self, now: Instant, bytes: &[u8]) -> usize {
+        self.advance(now, false);
+        self.to_arm.push(now, bytes)
+    }
+
+    /// The first bytes that have arrived at the host, possibly not all of them. They fill the line until
+    /// [`SimulatedArm::host_take`], and the arm holds back answers while the line is full (D5).
+    #[must_use]
+    pub fn host_received(&self) -> &[u8] {
+        self.to_host.arrived()
+    }
+
+    /// Removes the first `count` of the bytes that have arrived at the host.
+    pub fn host_take(&mut self, count: usize) {
+        self.to_host.take(count);
+    }
+
+    /// The last host disconnects: the bytes on the line to it are lost. The arm executes what the host sent before, and
+    /// sends nothing for it. Then its reports end (M12).
+    pub fn host_disconnect(&mut self) {
+        self.to_host = self.idle_line();
+        self.leaving = Some(self.to_arm.len());
+        self.end_host();
+    }
+
+    /// Tells the controller that the host has left, once the last bytes of the host are executed.
+    fn end_host(&mut self) {
+        if self.leaving == Some(0) && !self.is_halted {
+            self.controller.host_left(self.now);
+            self.leaving = None;
+        }
+    }
+
+    /// Simulates all events up to `now`. `host_is_idle` tells that the host has sent nothing since the last call, apart
+    /// from the bytes in [`SimulatedArm::host_send`].
+    pub fn advance(&mut self, now: Instant, host_is_idle: bool) {
+        // Real servos cannot catch up: an answer that has arrived but was not read has not timed out.
+        while !B::IS_REAL && self.next_event() < now {
+            self.process(self.next_event(), host_is_idle);
+        }
+        self.process(now, host_is_idle);
+    }
+
+    /// When to call [`SimulatedArm::advance`] next, unless the host sends bytes. Without a client the call can be later:
+    /// the events keep their times.
+    #[must_use]
+    pub fn deadline(&self, has_client: bool) -> Instant {
+        let line = self.line_deadline().unwrap_or(Instant::FAR_FUTURE).max(self.now);
+        if B::IS_REAL {
+            let later = self.now + TICK;
+            return line.min(if self.controller_due > self.now { self.controller_due } else { later });
+        }
+        let inside = self.bus.deadline().unwrap_or(Instant::FAR_FUTURE).min(self.controller_due);
+        let unobserved = self.now + TICK_WITHOUT_CLIENT;
+        if has_client {
+            let observed = self.controller.host_deadline().max(self.now + TICK);
+            line.min(next_tick(observed.min(inside.max(unobserved))))
+        } else {
+            next_tick(line.min(inside).max(unobserved))
+        }
+    }
+
+    fn line_deadline(&self) -> Option<Instant> {
+        [self.to_arm.deadline(), self.to_host.deadline()].into_iter().flatten().min()
+    }
+
+    /// The next event after the last call. A deadline that stays in the past depends on something else, for example on
+    /// an idle line, and is checked again after a tick.
+    #[must_use]
+    pub fn next_event(&self) -> Instant {
+        let candidates = [self.line_deadline(), self.bus.deadline(), Some(self.controller_due)];
+        let later = |deadline| if deadline > self.now { deadline } else { self.now + TICK };
+        candidates.into_iter().flatten().map(later).min().unwrap_or(Instant::FAR_FUTURE)
+    }
+
+    fn process(&mut self, now: Instant, host_is_idle: bool) {
+        self.now = now;
+        self.to_arm.advance(now);
+        self.to_host.advance(now);
+        let from_servos = self.bus.poll(now);
+        if self.is_halted {
+            return;
+        }
+        self.controller.servo_bytes(now, &from_servos);
+        if host_is_idle && self.to_arm.is_empty() {
+            self.pass_host_bytes();
+        }
+        self.poll_controller();
+        while !self.to_arm.arrived().is_empty() && self.pass_host_bytes() > 0 {
+            self.poll_controller();
+            self.end_host();
+        }
+    }
+
+    /// Passes the bytes that have arrived from the host, possibly none, to the controller. Returns how many it took.
+    fn pass_host_bytes(&mut self) -> usize {
+        let arrived = self.to_arm.arrived();
+        // The bytes of the next host wait until those of the last one are executed.
+        let end = self.leaving.unwrap_or(usize::MAX).min(arrived.len());
+        let taken = self.controller.host_bytes(self.now, arrived.get(..end).unwrap_or(arrived));
+        if let (Some(tap), Some(bytes)) = (self.tap.get(), arrived.get(..taken)) {
+            tap.received(self.now, bytes);
+        }
+        self.to_arm.take(taken);
+        self.leaving = self.leaving.map(|left| left.saturating_sub(taken));
+        taken
+    }
+
+    /// Executes the outputs of the controller until it waits.
+    fn poll_controller(&mut self) {
+        loop {
+            match self.controller.poll(self.now, self.to_host.room()) {
+                Output::ToHost(_) if self.leaving.is_some() => {}
+                Output::ToHost(bytes) => {
+                    if let Some(tap) = self.tap.get() {
+                        tap.sent(self.now, bytes);
+                    }
+                    self.to_host.push(self.now, bytes);
+                }
+                Output::ToServos(bytes) => self.bus.bytes(self.now, bytes),
+                Output::Vacuum(vacuum) => log_vacuum(vacuum),
+                Output::Save(image) => {
+                    self.controller.set_storage(self.settings.save(&image));
+                    settings_log::saved(&self.settings);
+                }
+                Output::Wait(until) => {
+                    self.controller_due = until;
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// The first multiple of [`TICK`] at or after a time.
+fn next_tick(at: Instant) -> Instant {
+    let micros = at.as_micros().checked_next_multiple_of(TICK.as_micros());
+    micros.map_or(Instant::FAR_FUTURE, Instant::from_micros)
+}
+
+fn power_up<F: NorFlash, C: ArmController>(
+    now: Instant,
+    arm: ArmConfig,
+    settings: &Settings<F>,
+    faults: u8,
+    answer_delay: Duration,
+) -> C {
+    settings_log::opened(settings);
+    let config = Config {
+        chip_id: arm.chip_id,
+        faults,
+        servo_timeout: SERVO_TIMEOUT,
+        guard_time: GUARD_TIME,
+        torque_codes: arm.torque_codes,
+    };
+    let mut controller = C::power_up(now, config, settings.found(), settings.storage());
+    controller.set_answer_delay(answer_delay);
+    controller
+}
+
+fn log_vacuum(vacuum: Vacuum) {
+    let pump = if vacuum.pump { "on" } else { "off" };
+    let valve = if vacuum.valve { "open" } else { "closed" };
+    info!("vacuum: pump {pump}, valve {valve}");
+}
