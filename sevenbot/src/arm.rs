@@ -1,20 +1,17 @@
 //! An open arm: reads and writes registers, also as typed values, and keeps the reports.
 //!
-//! Knows the register table. `FramePort` knows the serial port.
+//! Knows the register table. `FramePort` knows the line.
 
 use std::fmt;
 use std::time::{Duration, Instant};
 
-use protocol_core::registers::Joint;
-use protocol_core::registers::map::{
-    CHIP_ID, DEVICE_CODE, OFFSET, PRESENT_POSITION, SERVO_TEMPERATURE, SPEED, STATUS_VERSION,
-    TARGET_POSITION, TIME,
-};
+use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, OFFSET, SERVO_TEMPERATURE, STATUS_VERSION};
 use protocol_core::registers::map21::Map;
 use protocol_core::request::Request;
 
 use crate::error::{Error, OpenError};
 use crate::frame_port::{FramePort, Received};
+use crate::host_line::HostLine;
 use crate::identity::{Firmware, Identity};
 use crate::map_view::{MapView, WriteFrame};
 use crate::open_port::OpenPort;
@@ -22,7 +19,6 @@ use crate::pending::PendingReads;
 use crate::reports::{Report, ReportQueue, report_period};
 use crate::snapshot::Snapshot;
 use crate::span::Span;
-use crate::units::{Angle, MoveTime, Speed};
 
 /// The status block: the last registers of the table.
 pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
@@ -102,10 +98,17 @@ impl Arm {
     /// # Errors
     /// The port cannot be opened, no device answers, or another device answers.
     pub fn open_with(path: &str, options: ArmOptions) -> Result<Self, OpenError> {
-        let port = OpenPort::open(path, options.baud)?;
-        let link = FramePort::new(port, options.baud);
+        Self::over(Box::new(OpenPort::open(path, options.baud)?), path, options)
+    }
+
+    /// An arm at the other end of a line. `name` is what [`Arm::port`] returns.
+    ///
+    /// # Errors
+    /// No device answers, or another device answers.
+    pub fn over(line: Box<dyn HostLine>, name: &str, options: ArmOptions) -> Result<Self, OpenError> {
+        let link = FramePort::new(line, options.baud);
         let nobody = Identity::from(Snapshot { address: 0, values: Vec::new() });
-        let path = path.to_owned();
+        let path = name.to_owned();
         let (pending, reports) = (PendingReads::default(), ReportQueue::default());
         let view = MapView { map: Map::V22, firmware: Firmware::Unknown };
         let mut arm = Self { link, path, options, identity: nobody, view, pending, reports };
@@ -237,54 +240,15 @@ impl Arm {
         Ok(())
     }
 
-    /// The present positions, joint 1 first.
-    ///
-    /// # Errors
-    /// As [`Arm::read`].
-    pub fn positions(&mut self) -> Result<[Angle; 7], Error> {
-        let snapshot = self.read_span(Span::of(&PRESENT_POSITION))?;
-        Ok(snapshot.joints(&PRESENT_POSITION).map(Angle::from_register))
+    /// The time now, on the clock of the arm's line.
+    #[must_use]
+    pub fn now(&self) -> Instant {
+        self.link.now()
     }
 
-    /// The target positions, joint 1 first.
-    ///
-    /// # Errors
-    /// As [`Arm::read`].
-    pub fn targets(&mut self) -> Result<[Angle; 7], Error> {
-        let snapshot = self.read_span(Span::of(&TARGET_POSITION))?;
-        Ok(snapshot.joints(&TARGET_POSITION).map(Angle::from_register))
-    }
-
-    /// Sets the target of one joint.
-    ///
-    /// # Errors
-    /// As [`Arm::write`].
-    pub fn set_target(&mut self, joint: Joint, angle: Angle) -> Result<(), Error> {
-        self.write(TARGET_POSITION.of(joint), &[angle.degrees()])
-    }
-
-    /// Sets the targets of all joints, joint 1 first. They start together.
-    ///
-    /// # Errors
-    /// As [`Arm::write`].
-    pub fn set_targets(&mut self, pose: [Angle; 7]) -> Result<(), Error> {
-        self.write(TARGET_POSITION.address, &pose.map(Angle::degrees))
-    }
-
-    /// Sets the speeds of all joints, joint 1 first, for present and later moves.
-    ///
-    /// # Errors
-    /// As [`Arm::write`].
-    pub fn set_speeds(&mut self, speeds: [Speed; 7]) -> Result<(), Error> {
-        self.write(SPEED.address, &speeds.map(Speed::steps))
-    }
-
-    /// Sets the durations of all joints' later moves. A duration applies where the speed is 0, the maximum (D11).
-    ///
-    /// # Errors
-    /// As [`Arm::write`].
-    pub fn set_times(&mut self, times: [MoveTime; 7]) -> Result<(), Error> {
-        self.write(TIME.address, &times.map(MoveTime::steps))
+    /// Waits, on the clock of the arm's line.
+    pub fn sleep(&mut self, duration: Duration) {
+        self.link.sleep(duration);
     }
 
     /// Takes the reports received so far, oldest first.
@@ -297,22 +261,22 @@ impl Arm {
     /// # Errors
     /// The port failed.
     pub fn next_report(&mut self, timeout: Duration) -> Result<Option<Report>, Error> {
-        let deadline = Instant::now() + timeout;
+        let deadline = self.now() + timeout;
         loop {
             let report = self.reports.pop();
             if report.is_some() {
                 return Ok(report);
             }
             let Some(received) = self.link.receive(deadline)? else { return Ok(None) };
-            self.reports.keep(&received, self.view);
+            self.reports.keep(&received, self.view, self.link.now());
         }
     }
 
     /// Waits for a reply to one of these reads. Other replies are late, or reports.
     fn answer(&mut self, asked: &[Span]) -> Result<Option<Snapshot>, Error> {
-        let deadline = Instant::now() + self.options.reply_timeout;
+        let deadline = self.now() + self.options.reply_timeout;
         while let Some(received) = self.link.receive(deadline)? {
-            self.reports.keep(&received, self.view);
+            self.reports.keep(&received, self.view, self.link.now());
             if let Received::Reply(reply) = received {
                 self.pending.replied(reply.span());
                 if asked.contains(&reply.span()) {
@@ -332,7 +296,7 @@ impl Arm {
     /// Takes the replies received since the last read: reports, and late replies.
     fn take_waiting_replies(&mut self) -> Result<(), Error> {
         while let Some(received) = self.link.receive_waiting()? {
-            self.reports.keep(&received, self.view);
+            self.reports.keep(&received, self.view, self.link.now());
             if let Received::Reply(reply) = received {
                 self.pending.replied(reply.span());
             }

@@ -1,4 +1,4 @@
-//! Frames over a serial port: sends requests, receives replies, counts everything else.
+//! Frames over a line: sends requests, receives replies, counts everything else.
 //!
 //! Does not match replies to requests; `pending.rs` does.
 
@@ -11,7 +11,7 @@ use protocol_core::wire::{Deframer, Frame, FrameBuffer, ToHost};
 use tracing::{debug, trace};
 
 use crate::error::{PortError, ReceiveCounts};
-use crate::open_port::OpenPort;
+use crate::host_line::HostLine;
 use crate::snapshot::Snapshot;
 use crate::traffic::Traffic;
 
@@ -24,24 +24,25 @@ pub(crate) enum Received {
     Report(Snapshot),
 }
 
-/// A serial port with a deframer.
+/// A line with a deframer.
 pub(crate) struct FramePort {
-    port: OpenPort,
+    line: Box<dyn HostLine>,
     deframer: Deframer<ToHost>,
-    /// Bytes from the port that the deframer had no room for.
+    /// Bytes from the line that the deframer had no room for.
     waiting: Vec<u8>,
     received: ReceiveCounts,
     start: Instant,
 }
 
 impl FramePort {
-    pub(crate) fn new(port: OpenPort, baud: u32) -> Self {
+    pub(crate) fn new(line: Box<dyn HostLine>, baud: u32) -> Self {
+        let start = line.now();
         Self {
-            port,
+            line,
             deframer: Deframer::new(gap(baud)),
             waiting: Vec::new(),
             received: ReceiveCounts::default(),
-            start: Instant::now(),
+            start,
         }
     }
 
@@ -49,7 +50,7 @@ impl FramePort {
         let mut frame = FrameBuffer::new();
         request.encode(&mut frame);
         trace!("-> {}", Traffic::from(request));
-        self.port.send(&frame)
+        self.line.send(&frame)
     }
 
     /// The next reply or report; `None` if none arrives before `deadline`.
@@ -61,7 +62,7 @@ impl FramePort {
             if self.feed() {
                 continue;
             }
-            let now = Instant::now();
+            let now = self.line.now();
             if now >= deadline {
                 return Ok(None);
             }
@@ -82,6 +83,16 @@ impl FramePort {
                 return Ok(None);
             }
         }
+    }
+
+    /// The clock of the line.
+    pub(crate) fn now(&self) -> Instant {
+        self.line.now()
+    }
+
+    /// Waits on the clock of the line.
+    pub(crate) fn sleep(&mut self, duration: Duration) {
+        self.line.sleep(duration);
     }
 
     /// The counts since the last call.
@@ -112,18 +123,18 @@ impl FramePort {
         if self.waiting.is_empty() {
             return false;
         }
-        let now = self.time_at(Instant::now());
+        let now = self.time_at(self.line.now());
         let taken = self.deframer.push(now, &self.waiting);
         self.waiting.drain(..taken.min(self.waiting.len()));
         taken > 0
     }
 
-    /// Reads from the port. Without bytes within `timeout` it reports an empty line to the deframer and returns
+    /// Reads from the line. Without bytes within `timeout` it reports an empty line to the deframer and returns
     /// `false`.
     fn read(&mut self, timeout: Duration) -> Result<bool, PortError> {
-        // Use the planned end of the wait. After a suspension the actual end is later, with bytes still in the port.
-        let end = self.time_at(Instant::now() + timeout);
-        let bytes = self.port.receive(timeout)?;
+        // Use the planned end of the wait. After a suspension the actual end is later, with bytes still in the line.
+        let end = self.time_at(self.line.now() + timeout);
+        let bytes = self.line.receive(timeout)?;
         self.received.bytes += bytes.len();
         if bytes.is_empty() {
             self.deframer.push(end, &[]);
@@ -136,7 +147,7 @@ impl FramePort {
     fn wake_up(&self, deadline: Instant) -> Instant {
         let silence = self.deframer.deadline();
         let silence = silence.map(|at| self.start + Duration::from_micros(at.as_micros()));
-        silence.map_or(deadline, |at| at.min(deadline)).max(Instant::now())
+        silence.map_or(deadline, |at| at.min(deadline)).max(self.line.now())
     }
 
     fn time_at(&self, at: Instant) -> time::Instant {

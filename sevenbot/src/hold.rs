@@ -6,9 +6,6 @@
 //!
 //! [`crate::joints`] interprets the registers of each joint.
 
-use std::thread::sleep;
-use std::time::Instant;
-
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::TARGET_POSITION;
 
@@ -67,7 +64,7 @@ impl Arm {
     }
 
     fn hold_until_verified(&mut self) -> Result<JointSnapshot, HoldError> {
-        let start = Instant::now();
+        let start = self.now();
         let mut before = None;
         let mut sent = NOTHING_SENT;
         let mut losses = 0;
@@ -76,7 +73,7 @@ impl Arm {
             if !joints.is_driven() {
                 return Ok(joints);
             }
-            let is_past_start_up = start.elapsed() >= START_UP_TIME;
+            let is_past_start_up = self.now() >= start + START_UP_TIME;
             let before: &JointSnapshot = before.get_or_insert_with(|| joints.clone());
             let lost = joints.lost_targets(&sent, before);
             losses += u32::from(!lost.is_empty());
@@ -95,7 +92,7 @@ impl Arm {
                 if !Joint::ALL.into_iter().any(|joint| joints.may_be_unmeasured(joint, is_past_start_up)) {
                     return Ok(joints);
                 }
-                sleep(POLL_PERIOD);
+                self.sleep(POLL_PERIOD);
             }
         }
     }

@@ -12,8 +12,7 @@
 //! - The joint is at rest with target 0, which is no default.
 //! - 700 ms have passed since the first read.
 
-use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use protocol_core::registers::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION, motor_state};
 use protocol_core::registers::{Joint, Register};
@@ -68,14 +67,14 @@ impl Arm {
     /// # Errors
     /// As [`Arm::read`].
     pub fn wait_until_settled(&mut self) -> Result<JointSnapshot, Error> {
-        let deadline = Instant::now() + START_UP_TIME;
+        let deadline = self.now() + START_UP_TIME;
         loop {
             let joints = self.joints()?;
             let is_settled = !Joint::ALL.into_iter().any(|joint| joints.has_power_up_target(joint));
-            if is_settled || Instant::now() >= deadline {
+            if is_settled || self.now() >= deadline {
                 return Ok(joints);
             }
-            sleep(POLL_PERIOD);
+            self.sleep(POLL_PERIOD);
         }
     }
 }

@@ -27,6 +27,7 @@
 #![forbid(unsafe_code)]
 
 pub mod arm;
+mod arm_values;
 pub mod cartesian;
 pub mod checked_write;
 pub mod error;
@@ -35,6 +36,7 @@ pub mod fine_angle;
 mod fine_state;
 mod frame_port;
 pub mod hold;
+pub mod host_line;
 pub mod identity;
 pub mod joints;
 mod map21_text;
@@ -50,6 +52,7 @@ pub mod recording;
 pub mod register_text;
 mod reports;
 pub mod servo_bench;
+pub mod simulated;
 pub mod snapshot;
 mod span;
 pub mod status_block;

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use serialport::SerialPort;
 
 use crate::error::{OpenError, PortError};
+use crate::host_line::HostLine;
 
 /// The shortest timeout that works on every platform.
 const SHORTEST_WAIT: Duration = Duration::from_millis(1);
@@ -87,6 +88,16 @@ impl OpenPort {
     /// The time since the port was opened.
     pub(crate) fn now(&self) -> Duration {
         self.opened.elapsed()
+    }
+}
+
+impl HostLine for OpenPort {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.send(bytes)
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
+        self.receive(timeout)
     }
 }
 

@@ -77,8 +77,8 @@ impl Report {
 pub(crate) struct ReportQueue(VecDeque<Report>);
 
 impl ReportQueue {
-    /// Keeps a frame if it is a report.
-    pub(crate) fn keep(&mut self, received: &Received, view: MapView) {
+    /// Keeps a frame that arrived at `now` if it is a report.
+    pub(crate) fn keep(&mut self, received: &Received, view: MapView, now: Instant) {
         let report = match (received, view.map) {
             (Received::Reply(report), Map::V22) | (Received::Report(report), Map::V21) => report,
             _ => return,
@@ -89,7 +89,7 @@ impl ReportQueue {
         if self.0.len() >= REPORTS_KEPT {
             self.0.pop_front();
         }
-        self.0.push_back(Report::new(report, view, Instant::now()));
+        self.0.push_back(Report::new(report, view, now));
     }
 
     /// Takes the oldest report.

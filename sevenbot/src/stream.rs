@@ -149,9 +149,10 @@ impl<'a> SetPointStream<'a> {
             return Err(StreamError::NoExtendedBlock);
         }
         let before = registers_before(arm)?;
-        let mut stream = Self { arm, options, before: Some(before), last_sent: Instant::now() };
+        let last_sent = arm.now();
+        let mut stream = Self { arm, options, before: Some(before), last_sent };
         let unchanged = stream.arm.write_checked(STREAM_REGISTERS.address(), &options.registers())?;
-        stream.last_sent = Instant::now();
+        stream.last_sent = stream.arm.now();
         if unchanged.is_empty() { Ok(stream) } else { Err(StreamError::NotTaken(unchanged)) }
     }
 
@@ -162,7 +163,7 @@ impl<'a> SetPointStream<'a> {
     pub fn send(&mut self, point: &FineTargets) -> Result<(), Error> {
         for (address, values) in fine_frames(point) {
             self.arm.write(address, &values)?;
-            self.last_sent = Instant::now();
+            self.last_sent = self.arm.now();
         }
         Ok(())
     }
@@ -172,9 +173,9 @@ impl<'a> SetPointStream<'a> {
     /// # Errors
     /// The port failed.
     pub fn keep_alive(&mut self) -> Result<(), Error> {
-        if self.last_sent.elapsed() >= self.options.keep_alive_period() {
+        if self.arm.now() >= self.last_sent + self.options.keep_alive_period() {
             self.arm.write(FINE_TARGET.address, &[])?;
-            self.last_sent = Instant::now();
+            self.last_sent = self.arm.now();
         }
         Ok(())
     }
