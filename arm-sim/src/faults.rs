@@ -1,11 +1,28 @@
-//! The faults of an arm, and their names on a command line: `3=missing`, `5=late=20`, `bus=echo`, `arm=supported`.
+//! The faults of an arm, and their names on a command line: `3=missing`, `5=late=20`, `bus=echo`, `supply=off`.
+//!
+//! | location | faults |
+//! | --- | --- |
+//! | a joint, 1 to 7 | [`ServoFault`] |
+//! | `bus` | `echo` |
+//! | `supply` | [`SupplyFault`] |
+//! | `flash` | [`FlashFault`] |
+//! | `line` | [`LineFault`] |
+//! | `arm` | `supported`, `goal-starts-torque` |
 
+use core::fmt::{self, Display, Formatter};
+use core::mem::discriminant;
 use core::str::FromStr;
 
 use protocol_core::registers::Joint;
+use protocol_core::time::{Duration, Instant};
 
-use crate::plant::Plant;
+use crate::fault_count::FaultCount;
+use crate::faulty_flash::{FlashFault, UnknownFlashFault};
+use crate::host_line::{LineFault, UnknownLineFault};
+use crate::plant::{Plant, SupplyFault, UnknownSupplyFault};
 use crate::servo::{ServoFault, UnknownFault};
+
+pub(crate) mod list;
 
 /// A fault of the simulated arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,21 +31,76 @@ pub enum ArmFault {
     Servo(Joint, ServoFault),
     /// Of the bus: the controller receives its own bytes.
     Echo,
+    /// Of the supply of all servos.
+    Supply(SupplyFault),
+    /// Of the settings storage.
+    Flash(FlashFault),
+    /// Of the host line.
+    Line(LineFault),
     /// No fault: a stand supports the arm, so that it does not fall.
     Supported,
     /// Of all servos: after their own start, a goal switches torque on.
     GoalStartsTorque,
 }
 
+/// Where a fault is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultLocation {
+    /// The servo of a joint.
+    Joint(Joint),
+    /// The servo bus.
+    Bus,
+    /// The supply of the servos.
+    Supply,
+    /// The settings storage.
+    Flash,
+    /// The host line.
+    Line,
+    /// The whole arm.
+    Arm,
+}
+
 /// Why a text names no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownArmFault {
     /// The part before the first `=` is not a possible location.
-    #[error("use JOINT=KIND with a joint from 1 to 7, bus=echo, arm=supported or arm=goal-starts-torque")]
+    #[error(
+        "use JOINT=KIND with a joint from 1 to 7, bus=echo, supply=KIND, flash=KIND, line=KIND, arm=supported or \
+         arm=goal-starts-torque"
+    )]
     Location,
     /// The part after it is no fault of a servo.
     #[error(transparent)]
     Kind(#[from] UnknownFault),
+    /// Likewise, of the supply.
+    #[error(transparent)]
+    Supply(#[from] UnknownSupplyFault),
+    /// Likewise, of the flash.
+    #[error(transparent)]
+    Flash(#[from] UnknownFlashFault),
+    /// Likewise, of the host line.
+    #[error(transparent)]
+    Line(#[from] UnknownLineFault),
+}
+
+/// A text that names no location of a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("use a joint from 1 to 7, bus, supply, flash, line or arm")]
+pub struct UnknownLocation;
+
+impl FromStr for FaultLocation {
+    type Err = UnknownLocation;
+
+    fn from_str(text: &str) -> Result<Self, UnknownLocation> {
+        Ok(match text {
+            "bus" => Self::Bus,
+            "supply" => Self::Supply,
+            "flash" => Self::Flash,
+            "line" => Self::Line,
+            "arm" => Self::Arm,
+            number => Self::Joint(number.parse().ok().and_then(Joint::new).ok_or(UnknownLocation)?),
+        })
+    }
 }
 
 impl FromStr for ArmFault {
@@ -36,43 +108,139 @@ impl FromStr for ArmFault {
 
     fn from_str(text: &str) -> Result<Self, UnknownArmFault> {
         let (location, kind) = text.split_once('=').ok_or(UnknownArmFault::Location)?;
-        match (location, kind) {
-            ("bus", "echo") => return Ok(Self::Echo),
-            ("arm", "supported") => return Ok(Self::Supported),
-            ("arm", "goal-starts-torque") => return Ok(Self::GoalStartsTorque),
-            _ => {}
+        Ok(match (location.parse(), kind) {
+            (Ok(FaultLocation::Bus), "echo") => Self::Echo,
+            (Ok(FaultLocation::Arm), "supported") => Self::Supported,
+            (Ok(FaultLocation::Arm), "goal-starts-torque") => Self::GoalStartsTorque,
+            (Ok(FaultLocation::Joint(joint)), kind) => Self::Servo(joint, kind.parse()?),
+            (Ok(FaultLocation::Supply), kind) => Self::Supply(kind.parse()?),
+            (Ok(FaultLocation::Flash), kind) => Self::Flash(kind.parse()?),
+            (Ok(FaultLocation::Line), kind) => Self::Line(kind.parse()?),
+            _ => return Err(UnknownArmFault::Location),
+        })
+    }
+}
+
+impl Display for ArmFault {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Servo(joint, fault) => write!(out, "{}={fault}", joint.number()),
+            Self::Echo => out.write_str("bus=echo"),
+            Self::Supply(fault) => write!(out, "supply={fault}"),
+            Self::Flash(fault) => write!(out, "flash={fault}"),
+            Self::Line(fault) => write!(out, "line={fault}"),
+            Self::Supported => out.write_str("arm=supported"),
+            Self::GoalStartsTorque => out.write_str("arm=goal-starts-torque"),
         }
-        let joint = location.parse().ok().and_then(Joint::new).ok_or(UnknownArmFault::Location)?;
-        Ok(Self::Servo(joint, kind.parse()?))
     }
 }
 
 impl ArmFault {
+    /// Where it is.
+    #[must_use]
+    pub const fn location(self) -> FaultLocation {
+        match self {
+            Self::Servo(joint, _) => FaultLocation::Joint(joint),
+            Self::Echo => FaultLocation::Bus,
+            Self::Supply(_) => FaultLocation::Supply,
+            Self::Flash(_) => FaultLocation::Flash,
+            Self::Line(_) => FaultLocation::Line,
+            Self::Supported | Self::GoalStartsTorque => FaultLocation::Arm,
+        }
+    }
+
+    /// Is it a fault of the servos, their bus or their supply? [`ArmFault::apply`] ignores the others.
+    #[must_use]
+    pub const fn is_of_plant(self) -> bool {
+        !matches!(self, Self::Flash(_) | Self::Line(_))
+    }
+
+    /// Does it take the place of another one? A servo and the supply have one fault at a time.
+    #[must_use]
+    pub fn replaces(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Flash(new), Self::Flash(old)) => new == old,
+            (Self::Line(new), Self::Line(old)) => discriminant(&new) == discriminant(&old),
+            (new, old) => new.location() == old.location() && discriminant(&new) == discriminant(&old),
+        }
+    }
+
+    /// What its count counts. `None`: its effects are not counted.
+    #[must_use]
+    pub const fn unit(self) -> Option<&'static str> {
+        Some(match self {
+            Self::Servo(_, ServoFault::Missing) => "frames",
+            Self::Servo(_, ServoFault::Late(_) | ServoFault::Garbled(_)) => "answers",
+            Self::Servo(_, ServoFault::Stuck) => "ms",
+            Self::Servo(_, ServoFault::Restarting(_)) => "restarts",
+            Self::Echo | Self::Line(_) => "bytes",
+            Self::Supply(SupplyFault::Dips(_)) => "dips",
+            Self::Supply(_) => "frames",
+            Self::Flash(FlashFault::Fails) => "writes",
+            Self::Flash(FlashFault::Full) | Self::Supported | Self::GoalStartsTorque => return None,
+        })
+    }
+
     /// Applies the fault to a plant.
     pub fn apply(self, plant: &mut Plant) {
         match self {
             Self::Servo(joint, fault) => plant.set_fault(joint, Some(fault)),
             Self::Echo => plant.set_echo(true),
+            Self::Supply(fault) => plant.set_supply_fault(Some(fault)),
             Self::Supported => plant.support(true),
             Self::GoalStartsTorque => plant.set_goal_starts_torque(true),
+            Self::Flash(_) | Self::Line(_) => {}
         }
+    }
+
+    /// Removes the fault from a plant.
+    pub(crate) fn remove(self, plant: &mut Plant) {
+        match self {
+            Self::Servo(joint, _) => plant.set_fault(joint, None),
+            Self::Echo => plant.set_echo(false),
+            Self::Supply(_) => plant.set_supply_fault(None),
+            Self::Supported => plant.support(false),
+            Self::GoalStartsTorque => plant.set_goal_starts_torque(false),
+            Self::Flash(_) | Self::Line(_) => {}
+        }
+    }
+}
+
+/// A fault, and how often it took effect so far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaultReport {
+    /// The fault.
+    pub fault: ArmFault,
+    /// When it ends, unless it is taken back before.
+    pub until: Option<Instant>,
+    /// How often it took effect. `None` if that is not counted.
+    pub count: Option<FaultCount>,
+}
+
+impl FaultReport {
+    /// The time until it ends by itself.
+    #[must_use]
+    pub fn remaining(&self, now: Instant) -> Option<Duration> {
+        self.until.map(|until| until - now)
+    }
+
+    /// Is it known that it never took effect?
+    #[must_use]
+    pub fn had_no_effect(&self) -> bool {
+        self.count.is_some_and(|count| count.effects == 0)
+    }
+}
+
+/// For example `3=garbled=10: 0 of 4 answers: it never took effect`.
+impl Display for FaultReport {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        write!(out, "{}", self.fault)?;
+        if let (Some(FaultCount { effects, occasions }), Some(unit)) = (self.count, self.fault.unit()) {
+            write!(out, ": {effects} of {occasions} {unit}")?;
+        }
+        if self.had_no_effect() { out.write_str(": it never took effect") } else { Ok(()) }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_fault_has_a_location_and_a_kind() {
-        assert_eq!("3=missing".parse(), Ok(ArmFault::Servo(Joint::ALL[2], ServoFault::Missing)));
-        assert!(matches!("7=late=5".parse(), Ok(ArmFault::Servo(_, ServoFault::Late(_)))));
-        assert_eq!("bus=echo".parse(), Ok(ArmFault::Echo));
-        assert_eq!("arm=supported".parse(), Ok(ArmFault::Supported));
-        assert_eq!("arm=goal-starts-torque".parse(), Ok(ArmFault::GoalStartsTorque));
-        for wrong in ["arm=missing", "missing", "0=missing", "8=missing", "x=missing", "bus=missing", ""] {
-            assert_eq!(wrong.parse::<ArmFault>(), Err(UnknownArmFault::Location), "{wrong}");
-        }
-        assert!(matches!("3=echo".parse::<ArmFault>(), Err(UnknownArmFault::Kind(_))));
-    }
-}
+mod tests;

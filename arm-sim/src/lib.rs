@@ -20,8 +20,11 @@
 extern crate alloc;
 
 pub mod controller;
+pub mod fault_count;
 pub mod faults;
+pub mod faulty_flash;
 pub mod flash;
+pub mod host_line;
 pub mod pace;
 pub mod plant;
 pub mod servo;

@@ -116,7 +116,8 @@ impl Pacer {
         Some(self.busy_since + protocol_core::time::Duration::from_micros(micros))
     }
 
-    fn in_transit(&self) -> usize {
+    /// Number of bytes in transit.
+    pub(crate) fn in_transit(&self) -> usize {
         self.queue.len() - self.arrived
     }
 }

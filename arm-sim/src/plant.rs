@@ -10,8 +10,10 @@
 //! has torque. The same calls at the same times give the same bytes on every machine. The plant does not know the
 //! controller.
 
+mod disturbance;
 mod pose;
 mod sine;
+mod supply;
 mod weight;
 mod wire;
 
@@ -24,14 +26,14 @@ use protocol_core::registers::map::TARGET_POSITION;
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::{Duration, Instant};
 
+use crate::fault_count::FaultCount;
 use crate::servo::units::STEP;
 use crate::servo::{Servo, ServoConfig, ServoFault};
+use supply::Supply;
+pub use supply::{SupplyFault, UnknownSupplyFault};
+pub use weight::HEAVIEST_LOAD_G;
 use wire::Wire;
 
-/// The supply voltage without load, in 0.1 V.
-const SUPPLY_DECIVOLTS: u16 = 74;
-/// The voltage drop for each servo with full load, in 0.1 V.
-const DROP_DECIVOLTS: u16 = 3;
 /// If no call comes for longer than this, the arm stands still during the time before.
 const LONGEST_CATCH_UP: Duration = Duration::from_millis(100_000);
 
@@ -42,7 +44,12 @@ pub struct Plant {
     servos: [Servo; JOINTS],
     decoder: Decoder,
     wire: Wire,
+    supply: Supply,
+    /// The weight in the gripper, in grams.
+    load_g: u16,
     has_echo: bool,
+    /// Of the echo, in bytes.
+    echo_count: FaultCount,
     /// The times of the controller's bytes are exact, so that collisions can be simulated.
     has_exact_times: bool,
     /// Number of frames of the controller that were lost by a collision.
@@ -70,7 +77,10 @@ impl Plant {
             servos: Joint::ALL.map(servo),
             decoder: Decoder::new(),
             wire: Wire::new(),
+            supply: Supply::default(),
+            load_g: 0,
             has_echo: false,
+            echo_count: FaultCount::default(),
             has_exact_times: true,
             collisions: 0,
             now,
@@ -90,6 +100,7 @@ impl Plant {
         let (start, end) = self.wire.reserve(now, bytes.len());
         let has_collided = self.has_exact_times && self.wire.collide(start, end);
         if self.has_echo {
+            self.echo_count.count_many(bytes.len() as u64, true);
             self.wire.echo(start, bytes, has_collided);
         }
         if has_collided {
@@ -103,13 +114,14 @@ impl Plant {
     }
 
     fn handle_frames(&mut self, now: Instant, answer_at: Instant) {
-        let Self { decoder, servos, wire, rest_until, .. } = self;
+        let Self { decoder, servos, wire, supply, rest_until, .. } = self;
         while let Some(found) = decoder.pull() {
             // A servo does not answer a damaged frame.
             let Ok(frame) = found else { continue };
             if !matches!(Instruction::from_code(frame.code), Some(Instruction::Ping | Instruction::Read)) {
                 *rest_until = self.now;
             }
+            supply.count_frame();
             for answer in servos.iter_mut().filter_map(|servo| servo.handle_frame(now, &frame)) {
                 wire.send(answer_at + answer.delay, &answer.bytes);
             }
@@ -156,6 +168,7 @@ impl Plant {
     /// Simulates one step.
     fn step(&mut self) {
         self.now = self.now + STEP;
+        self.supply.step(self.now);
         let supply = self.supply_decivolts();
         let mut has_turned = false;
         for servo in &mut self.servos {
@@ -166,7 +179,7 @@ impl Plant {
         } else {
             let supply = self.supply_decivolts();
             let ends = self.servos.iter().map(|servo| servo.rest_until(self.now, supply));
-            self.rest_until = ends.min().unwrap_or(self.now);
+            self.rest_until = ends.min().unwrap_or(self.now).min(self.supply.steady_until(self.now));
         }
     }
 
@@ -186,7 +199,7 @@ impl Plant {
 
     /// Loads each servo with its share of the arm's weight in this pose.
     fn update_weight(&mut self) {
-        let torques = weight::torques(self.pose());
+        let torques = weight::torques(self.pose(), self.load_g.into());
         for ((servo, joint), torque) in self.servos_mut().iter_mut().zip(Joint::ALL).zip(torques) {
             servo.set_weight(if pose::is_reversed(joint) { -torque } else { torque });
         }
@@ -197,18 +210,10 @@ impl Plant {
         Joint::ALL.map(|joint| self.servo(joint).map_or(0, |servo| pose::angle(joint, servo.position())))
     }
 
-    fn supply_decivolts(&self) -> u8 {
-        let load: u16 = self.servos.iter().map(Servo::load).sum();
-        let drop = u32::from(load) * u32::from(DROP_DECIVOLTS) / 1_000;
-        u8::try_from(u32::from(SUPPLY_DECIVOLTS).saturating_sub(drop)).unwrap_or(0)
-    }
-
-    /// Sets or removes the fault of a joint's servo.
-    pub fn set_fault(&mut self, joint: Joint, fault: Option<ServoFault>) {
-        let (now, ready_at) = (self.now, self.now + self.config.boot_time);
-        if let Some(servo) = self.servo_mut(joint) {
-            servo.set_fault(now, fault, ready_at);
-        }
+    /// The supply voltage of the servos at the last call with a time, in 0.1 V. 0 without supply.
+    #[must_use]
+    pub fn supply_decivolts(&self) -> u8 {
+        self.supply.decivolts(self.now, self.servos.iter().map(Servo::load).sum())
     }
 
     /// Leaves only servos with these ids on the bus. An id from 0 to 6 goes to its joint's servo if that has no id yet;
@@ -225,63 +230,6 @@ impl Plant {
             }
         }
         free.into_iter().for_each(|joint| self.set_fault(joint, Some(ServoFault::Missing)));
-    }
-
-    /// Interrupts the power of one servo at `now`: torque and goal are lost, and no hand holds the joint.
-    pub fn restart_servo(&mut self, now: Instant, joint: Joint) {
-        self.advance(now);
-        let ready_at = now + self.config.boot_time;
-        if let Some(servo) = self.servo_mut(joint) {
-            servo.power_cycle(ready_at);
-        }
-    }
-
-    /// Sets whether a goal switches torque on after a servo's own start.
-    pub fn set_goal_starts_torque(&mut self, starts_torque: bool) {
-        self.config.goal_starts_torque = starts_torque;
-        let config = self.config;
-        self.servos_mut().iter_mut().for_each(|servo| servo.set_config(config));
-    }
-
-    /// Sets whether the controller receives its own bytes, as on a bus with one wire for both directions.
-    pub const fn set_echo(&mut self, has_echo: bool) {
-        self.has_echo = has_echo;
-    }
-
-    /// Turns a joint by hand to a position in counts, and holds it there. A joint with torque turns back.
-    pub fn move_by_hand(&mut self, joint: Joint, counts: u16) {
-        if let Some(servo) = self.servo_mut(joint) {
-            servo.move_by_hand(counts);
-        }
-        self.update_weight();
-    }
-
-    /// Lets a hand hold a joint until it has torque. Has no effect on a joint with torque.
-    pub fn hold(&mut self, joint: Joint) {
-        self.servo_mut(joint).into_iter().for_each(|servo| servo.hold_by_hand(true));
-    }
-
-    /// Ends [`Plant::hold`]: without torque, a loaded joint falls.
-    pub fn let_go(&mut self, joint: Joint) {
-        self.servo_mut(joint).into_iter().for_each(|servo| servo.hold_by_hand(false));
-    }
-
-    /// Sets whether a stand holds each joint that has no torque.
-    pub fn support(&mut self, is_supported: bool) {
-        self.servos_mut().iter_mut().for_each(|servo| servo.support(is_supported));
-    }
-
-    /// Switches power off and on: torque, goals and answers are lost, faults stay. A hand holds each joint until it has
-    /// torque.
-    pub fn power_cycle(&mut self, now: Instant) {
-        self.advance(now);
-        let ready_at = now + self.config.boot_time;
-        for servo in self.servos_mut() {
-            servo.power_cycle(ready_at);
-            servo.hold_by_hand(true);
-        }
-        self.decoder.clear();
-        self.wire.clear();
     }
 
     /// The true angle of a joint in thousandths of a degree, without any offset, at the last call with a time.
@@ -301,6 +249,18 @@ impl Plant {
     #[must_use]
     pub fn position_counts(&self, joint: Joint) -> u16 {
         self.servo(joint).map_or(0, Servo::position_counts)
+    }
+
+    /// The load of a joint's motor in 0.1 %. Positive values are towards more counts.
+    #[must_use]
+    pub fn load(&self, joint: Joint) -> i16 {
+        self.servo(joint).map_or(0, Servo::signed_load)
+    }
+
+    /// Does a hand hold a joint until it has torque?
+    #[must_use]
+    pub fn is_held(&self, joint: Joint) -> bool {
+        self.servo(joint).is_some_and(Servo::is_held)
     }
 
     /// Does a joint's servo drive it? Not without torque or power, and not after an overload.

@@ -25,6 +25,11 @@ pub trait ServoBus {
 
     /// Switches the power of the servos off and on, if that is possible.
     fn power_cycle(&mut self, now: Instant);
+
+    /// The simulated servos; `None` for real ones.
+    fn plant_mut(&mut self) -> Option<&mut Plant> {
+        None
+    }
 }
 
 impl ServoBus for Plant {
@@ -48,5 +53,9 @@ impl ServoBus for Plant {
 
     fn power_cycle(&mut self, now: Instant) {
         Self::power_cycle(self, now);
+    }
+
+    fn plant_mut(&mut self) -> Option<&mut Plant> {
+        Some(self)
     }
 }

@@ -14,18 +14,22 @@ use motion_core::servo_bus::TorqueCodes;
 use motion_core::vacuum::Vacuum;
 use motion_core::{Config, Controller, Output};
 use protocol_core::registers::RegisterFile;
-use protocol_core::registers::map::fault;
 use protocol_core::settings::Settings;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer::gap;
 use tracing::info;
 
 use crate::controller::ArmController;
-use crate::pace::Pacer;
+use crate::faults::list::{EndedFaults, FaultList};
+use crate::faulty_flash::FaultyFlash;
+use crate::host_line::LineDirection;
 use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
 use crate::settings_log;
 use crate::tap::{Tap, TapSlot};
+
+mod disturbance;
+mod power;
 
 /// How long the controller waits for a servo's answer.
 const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
@@ -52,17 +56,21 @@ pub struct ArmConfig {
 #[derive(Clone, Debug)]
 pub struct SimulatedArm<F, B = Plant, C = Controller> {
     config: ArmConfig,
-    settings: Settings<F>,
+    settings: Settings<FaultyFlash<F>>,
     controller: C,
     bus: B,
-    to_arm: Pacer,
-    to_host: Pacer,
+    to_arm: LineDirection,
+    to_host: LineDirection,
     tap: TapSlot,
     now: Instant,
     /// When the controller has to be polled again.
     controller_due: Instant,
     /// The controller does nothing until it is restarted.
     is_halted: bool,
+    /// The arm has no power.
+    is_off: bool,
+    faults: FaultList,
+    ended_faults: EndedFaults,
     /// The host has disconnected, and this many of its bytes are still on the line to the arm.
     leaving: Option<usize>,
 }
@@ -98,9 +106,9 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Switches an arm on at `now`, with the settings on `flash`.
     #[must_use]
     pub fn power_up(now: Instant, config: ArmConfig, flash: F, bus: B) -> Self {
-        let settings = Settings::open(flash);
-        let controller = power_up(now, config, &settings, 0, bus.answer_delay());
-        let (to_arm, to_host) = (Pacer::new(None), Pacer::new(None));
+        let settings = Settings::open(FaultyFlash::new(flash));
+        let controller = start(now, config, &settings, 0, bus.answer_delay());
+        let (to_arm, to_host) = LineDirection::pair(1);
         let mut simulation = Self {
             config,
             settings,
@@ -112,46 +120,18 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
             now,
             controller_due: now,
             is_halted: false,
+            is_off: false,
+            faults: FaultList::default(),
+            ended_faults: EndedFaults::default(),
             leaving: None,
         };
         simulation.start_host_line();
         simulation
     }
 
-    /// Switches the arm off and on at `now`. RAM and the bytes on the host line are lost; the flash stays.
-    pub fn power_cycle(&mut self, now: Instant) {
-        self.advance(now, false);
-        self.bus.power_cycle(now);
-        self.start_controller(now, 0);
-    }
-
-    /// Restarts only the controller at `now`, as its watchdog does. RAM and the bytes on the host line are lost. The
-    /// servos keep power, torque and goals.
-    pub fn restart_controller(&mut self, now: Instant) {
-        self.advance(now, false);
-        self.start_controller(now, fault::WATCHDOG_RESTART);
-    }
-
-    /// Stops the controller at `now`, as a program that hangs. It sends and receives nothing until
-    /// [`SimulatedArm::restart_controller`] or [`SimulatedArm::power_cycle`]. The servos keep their goals.
-    pub fn halt_controller(&mut self, now: Instant) {
-        self.advance(now, false);
-        self.is_halted = true;
-        self.controller_due = Instant::FAR_FUTURE;
-    }
-
-    fn start_controller(&mut self, now: Instant, faults: u8) {
-        self.settings.reopen();
-        self.controller = power_up(now, self.config, &self.settings, faults, self.bus.answer_delay());
-        self.controller_due = now;
-        self.is_halted = false;
-        self.leaving = None;
-        self.start_host_line();
-    }
-
     /// The flash with the settings.
     pub const fn flash_mut(&mut self) -> &mut F {
-        self.settings.flash_mut()
+        &mut self.settings.flash_mut().flash
     }
 
     /// The servo bus.
@@ -162,15 +142,21 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     fn start_host_line(&mut self) {
         let baud = self.controller.baud();
         info!("arm on, host link at {baud} baud");
-        self.to_arm = self.idle_line();
-        self.to_host = self.idle_line();
+        self.clear_host_line();
         if let Some(tap) = self.tap.get() {
             tap.restart(gap(baud));
         }
     }
 
-    fn idle_line(&self) -> Pacer {
-        Pacer::new(self.config.is_paced.then(|| self.controller.baud()))
+    /// Drops the bytes on the host line.
+    fn clear_host_line(&mut self) {
+        let baud = self.paced_baud();
+        self.to_arm.clear(baud);
+        self.to_host.clear(baud);
+    }
+
+    fn paced_baud(&self) -> Option<u32> {
+        self.config.is_paced.then(|| self.controller.baud())
     }
 
     /// Copies the bytes on the host line to `tap` from now on.
@@ -188,7 +174,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// The host starts to send bytes at `now`. Returns how many were accepted.
     pub fn host_send(&mut self, now: Instant, bytes: &[u8]) -> usize {
         self.advance(now, false);
-        self.to_arm.push(now, bytes)
+        if self.is_off { bytes.len() } else { self.to_arm.push(now, bytes) }
     }
 
     /// The first bytes that have arrived at the host, possibly not all of them. They fill the line until
@@ -206,7 +192,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// The last host disconnects: the bytes on the line to it are lost. The arm executes what the host sent before, and
     /// sends nothing for it. Then its reports end (M12).
     pub fn host_disconnect(&mut self) {
-        self.to_host = self.idle_line();
+        self.to_host.clear(self.paced_baud());
         self.leaving = Some(self.to_arm.len());
         self.end_host();
     }
@@ -256,7 +242,8 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// an idle line, and is checked again after a tick.
     #[must_use]
     pub fn next_event(&self) -> Instant {
-        let candidates = [self.line_deadline(), self.bus.deadline(), Some(self.controller_due)];
+        let candidates =
+            [self.line_deadline(), self.bus.deadline(), Some(self.controller_due), self.faults.deadline()];
         let later = |deadline| if deadline > self.now { deadline } else { self.now + TICK };
         candidates.into_iter().flatten().map(later).min().unwrap_or(Instant::FAR_FUTURE)
     }
@@ -266,6 +253,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.to_arm.advance(now);
         self.to_host.advance(now);
         let from_servos = self.bus.poll(now);
+        self.end_due_faults();
         if self.is_halted {
             return;
         }
@@ -308,7 +296,8 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
                 Output::ToServos(bytes) => self.bus.bytes(self.now, bytes),
                 Output::Vacuum(vacuum) => log_vacuum(vacuum),
                 Output::Save(image) => {
-                    self.controller.set_storage(self.settings.save(&image));
+                    self.settings.save(&image);
+                    self.controller.set_storage(self.storage());
                     settings_log::saved(&self.settings);
                 }
                 Output::Wait(until) => {
@@ -326,7 +315,8 @@ fn next_tick(at: Instant) -> Instant {
     micros.map_or(Instant::FAR_FUTURE, Instant::from_micros)
 }
 
-fn power_up<F: NorFlash, C: ArmController>(
+/// A controller that starts.
+fn start<F: NorFlash, C: ArmController>(
     now: Instant,
     arm: ArmConfig,
     settings: &Settings<F>,

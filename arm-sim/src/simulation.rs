@@ -38,6 +38,7 @@ use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::FrameBuffer;
 
 use crate::controller::ArmController;
+use crate::faults::{ArmFault, FaultLocation, FaultReport};
 use crate::flash::{Flash, Memory};
 use crate::plant::Plant;
 use crate::servo::ServoConfig;
@@ -235,6 +236,50 @@ impl<C: ArmController> Simulation<C> {
     /// The host closes its port: bytes on the line to it are lost, and reports end (M12).
     pub fn disconnect(&mut self) {
         self.arm.host_disconnect();
+    }
+
+    /// Switches the arm off, until [`Simulation::power_cycle`]. Loaded joints fall.
+    pub fn power_off(&mut self) {
+        self.to_send.clear();
+        self.arm.power_off(self.now);
+    }
+
+    /// Gives the arm a fault, for a time or until [`Simulation::end_faults`]. Returns the report of the fault that it
+    /// replaces.
+    ///
+    /// ```
+    /// use arm_sim::{Duration, Simulation};
+    ///
+    /// let mut arm = Simulation::default();
+    /// let second = Duration::from_millis(1_000);
+    /// arm.set_fault("3=garbled=10".parse()?, Some(second));
+    /// arm.advance(second);
+    /// let [report] = arm.take_ended_faults().try_into().map_err(|_| "one fault")?;
+    /// assert!(!report.had_no_effect(), "{report}");
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    pub fn set_fault(&mut self, fault: ArmFault, duration: Option<Duration>) -> Option<FaultReport> {
+        self.arm.set_fault(self.now, fault, duration)
+    }
+
+    /// Takes the faults at a location back, or all faults. Returns how often they took effect.
+    pub fn end_faults(&mut self, location: Option<FaultLocation>) -> Vec<FaultReport> {
+        self.arm.end_faults(self.now, location)
+    }
+
+    /// The faults of the arm, and how often they took effect so far.
+    pub fn faults(&mut self) -> Vec<FaultReport> {
+        self.arm.faults()
+    }
+
+    /// Takes the reports of the faults whose time was over since the last call, at most the last 16.
+    pub fn take_ended_faults(&mut self) -> Vec<FaultReport> {
+        self.arm.take_ended_faults()
+    }
+
+    /// Draws the faults of the host line from this seed from now on. By default it is 1.
+    pub fn set_seed(&mut self, seed: u64) {
+        self.arm.set_seed(seed);
     }
 
     /// Copies the bytes on the host line to `tap` from now on. A copy of the simulation has no tap.

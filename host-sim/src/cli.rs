@@ -33,6 +33,21 @@ THE ARM HAS WEIGHT
   Without torque, a loaded joint falls, and in state damping it sinks. After power-up a hand holds
   each joint until it has torque. With --fault arm=supported it never falls.
 
+FAULTS
+  3=missing                  the servo of joint 3 has no power
+  3=late, 3=late=MS          its answers are 30 ms late, or MS
+  3=garbled, 3=garbled=N     each answer has a wrong checksum, or each Nth one
+  3=stuck                    something keeps it from turning
+  3=restarting=MS            it restarts each MS, and loses its torque
+  bus=echo                   the controller receives its own bytes
+  supply=volts=V             the supply has V volts instead of 7.4; a servo restarts below 4.5
+  supply=dips=MS             each MS it falls to 3 V for 20 ms
+  supply=off                 the servos have no supply; the controller has its own
+  flash=fails, flash=full    no settings can be stored
+  line=loss=P%, line=corruption=P%, line=delay=MS      of the bytes on the host line
+  arm=supported              no fault: a stand supports the arm, and it does not fall
+  arm=goal-starts-torque     in a servo that restarted, a goal switches torque on
+
 MANY ARMS
   --arms N runs arms 1 to N in one process. If an option names a file, each arm has its own, with its
   number before the extension: --eeprom arm.bin keeps the settings of arm 2 in arm-2.bin. Chip ids
@@ -114,9 +129,7 @@ pub struct Options {
     #[arg(long)]
     pub trace: bool,
 
-    /// Give the arm a fault (repeatable): JOINT from 1 to 7 and missing, stuck, late, late=MILLISECONDS,
-    /// garbled, garbled=EVERY_NTH or restarting=MILLISECONDS (the servo restarts that often); or bus=echo; or
-    /// arm=supported (it does not fall without torque); or arm=goal-starts-torque (in a servo that restarted)
+    /// Give the arm a fault (repeatable): see FAULTS below
     #[arg(long = "fault", value_name = "JOINT=KIND")]
     pub faults: Vec<ArmFault>,
 
@@ -152,8 +165,8 @@ pub struct Options {
     #[arg(long, value_name = "MS", default_value = "0", requires = "servos_only")]
     pub usb_latency: Latency,
 
-    /// With --servos-only: what the adapter's delays are drawn from
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "servos_only")]
+    /// The seed of all random values: line faults, and with --servos-only the delays of the adapter
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with_all = ["servos", "servo_socket"])]
     pub seed: u64,
 
     /// The baud rate of the servo bus

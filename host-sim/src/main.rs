@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use arm_sim::controller::ArmController;
+use arm_sim::faults::ArmFault;
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoConfig;
@@ -51,6 +52,10 @@ enum Failure {
     Serial(#[from] SerialError),
     #[error(transparent)]
     Socket(#[from] SocketError),
+    #[error(
+        "--fault {0}: without a controller there is no host line and no flash: see FAULTS in host-sim --help"
+    )]
+    FaultOfController(ArmFault),
     #[error("no pseudo-terminal: {0}: see that /dev/pts is mounted and has not run out, nor 'ulimit -n'")]
     Port(io::Error),
     #[error("cannot catch signals: {0}")]
@@ -130,6 +135,14 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
+/// The simulated servos without a controller.
+fn plant_alone(options: &Options, clock: &mut Clock) -> Result<Plant, Failure> {
+    match options.faults.iter().find(|fault| !fault.is_of_plant()) {
+        Some(&fault) => Err(Failure::FaultOfController(fault)),
+        None => Ok(plant(options, clock)),
+    }
+}
+
 /// The simulated servos in the standard pose, with the faults of the command line.
 fn plant(options: &Options, clock: &mut Clock) -> Plant {
     let config = ServoConfig { torque_codes: options.torque_codes, ..ServoConfig::default() };
@@ -144,14 +157,14 @@ fn run_servo_socket(
     clock: &mut Clock,
     signals: &mut Signals,
 ) -> Result<(), Failure> {
-    let plant = plant(options, clock);
+    let plant = plant_alone(options, clock)?;
     let socket = ServoSocket::listen(path)?;
     print_ready(&[path.to_owned()]);
     socket.serve(plant, clock, signals).map_err(Failure::Running)
 }
 
 fn run_servos_only(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Result<(), Failure> {
-    let mut plant = plant(options, clock);
+    let mut plant = plant_alone(options, clock)?;
     if let Some(ids) = &options.ids {
         plant.set_ids(ids);
     }
@@ -215,7 +228,10 @@ fn run_arms<C: ArmController>(
         }
         ports.push(port);
         let plant = plant(options, clock);
-        arms.push(arm::<_, C>(options, number, pty, clock, plant)?);
+        let mut arm = arm::<_, C>(options, number, pty, clock, plant)?;
+        arm.set_seed(options.seed.wrapping_add(number.unwrap_or(0).into()));
+        options.faults.iter().for_each(|&fault| arm.set_fault(clock.now(), fault));
+        arms.push(arm);
     }
     let event_loop = EventLoop::new(arms, clients).map_err(Failure::Running)?;
     print_ready(&ports);

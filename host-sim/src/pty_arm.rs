@@ -4,6 +4,7 @@ use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
 
 use arm_sim::controller::ArmController;
+use arm_sim::faults::ArmFault;
 use arm_sim::pace;
 use arm_sim::plant::Plant;
 use arm_sim::servo_bus::ServoBus;
@@ -34,6 +35,18 @@ impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
     #[must_use]
     pub fn register(&self, address: u8) -> u8 {
         self.simulation.registers().get(address)
+    }
+}
+
+impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
+    /// Gives the arm a fault until it is taken back.
+    pub fn set_fault(&mut self, now: Instant, fault: ArmFault) {
+        self.simulation.set_fault(now, fault, None);
+    }
+
+    /// Draws the faults of the host line from this seed.
+    pub fn set_seed(&mut self, seed: u64) {
+        self.simulation.set_seed(seed);
     }
 }
 

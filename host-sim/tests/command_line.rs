@@ -95,6 +95,7 @@ fn a_wrong_command_line_is_refused_in_one_line() {
         (vec!["--eprom", "x"], "--eeprom"),
         (vec!["--chip-id", "xyz"], "12 hexadecimal digits"),
         (vec!["--fault", "8=missing"], "1 to 7"),
+        (vec!["--servos-only", "--fault", "line=loss=1%"], "no host line"),
         (vec!["--eeprom", "none", "--link", "/nowhere/7bot"], "/nowhere/7bot"),
         (vec!["--eeprom", "/nowhere/arm.bin"], "/nowhere/arm.bin"),
         (vec!["--servo-socket", "/nowhere/servos"], "/nowhere/servos"),

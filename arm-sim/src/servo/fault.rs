@@ -2,11 +2,13 @@
 
 use alloc::borrow::ToOwned;
 use alloc::string::String;
+use core::fmt::{self, Display, Formatter};
 use core::str::FromStr;
 
 use protocol_core::time::Duration;
 
-/// A fault of a simulated servo.
+/// A fault of a simulated servo. Its effects are counted in frames to the servo (missing), answers (late, garbled),
+/// milliseconds (stuck) or restarts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ServoFault {
     /// It has no power: it executes no frame, sends no answer and drives nothing. When the fault is removed, it starts.
@@ -60,9 +62,29 @@ fn without_value(word: &str) -> Option<ServoFault> {
     }
 }
 
+impl Display for ServoFault {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing => out.write_str("missing"),
+            Self::Late(by) => write!(out, "late={}", by.as_micros() / 1_000),
+            Self::Garbled(1) => out.write_str("garbled"),
+            Self::Garbled(every) => write!(out, "garbled={every}"),
+            Self::Stuck => out.write_str("stuck"),
+            Self::Restarting(every) => write!(out, "restarting={}", every.as_micros() / 1_000),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_fault_is_printed_as_it_is_read() {
+        for word in ["missing", "late=30", "garbled", "garbled=10", "stuck", "restarting=2000"] {
+            assert_eq!(word.parse::<ServoFault>().unwrap().to_string(), word);
+        }
+    }
 
     #[test]
     fn each_fault_has_a_name() {

@@ -184,12 +184,20 @@ impl Motor {
     pub(crate) fn is_at_rest(&self, mode: MotorMode) -> bool {
         let is_still = match mode {
             MotorMode::Held | MotorMode::Blocked => self.position == self.set_point,
-            MotorMode::Released(_) => {
-                self.position == self.set_point && (self.gear.holds(self.weight) || self.is_at_end())
-            }
+            MotorMode::Released(_) => self.position == self.set_point && self.holds_weight(),
             MotorMode::Driven => self.position == self.equilibrium(),
         };
         is_still && mode == self.mode && self.moved == 0 && self.set_point == self.target
+    }
+
+    /// Is the position the set-point?
+    pub(crate) const fn is_at_set_point(&self) -> bool {
+        self.position == self.set_point
+    }
+
+    /// Do friction or a mechanical end hold the weight, without torque?
+    pub(crate) const fn holds_weight(&self) -> bool {
+        self.gear.holds(self.weight) || self.is_at_end()
     }
 
     /// Does a mechanical end stop the weight?

@@ -1,0 +1,127 @@
+//! What disturbs an arm: faults of its servos, bus and supply, a hand, a weight in the gripper, and the power switch.
+
+use protocol_core::registers::Joint;
+use protocol_core::time::Instant;
+
+use super::Plant;
+use super::supply::SupplyFault;
+use super::weight::HEAVIEST_LOAD_G;
+use crate::fault_count::FaultCount;
+use crate::servo::{Servo, ServoFault};
+
+impl Plant {
+    /// Sets or removes the fault of a joint's servo.
+    pub fn set_fault(&mut self, joint: Joint, fault: Option<ServoFault>) {
+        let (now, ready_at) = (self.now, self.now + self.config.boot_time);
+        if let Some(servo) = self.servo_mut(joint) {
+            servo.set_fault(now, fault, ready_at);
+        }
+    }
+
+    /// How often the fault of a joint's servo took effect since it was set: see [`ServoFault`] for the units.
+    #[must_use]
+    pub fn fault_count(&self, joint: Joint) -> FaultCount {
+        self.servo(joint).map_or_else(FaultCount::default, Servo::fault_count)
+    }
+
+    /// Sets or removes the fault of the supply. A servo restarts below 4.5 V, and reports a wrong voltage below 5 V.
+    pub fn set_supply_fault(&mut self, fault: Option<SupplyFault>) {
+        self.supply.set_fault(self.now, fault);
+        self.rest_until = self.now;
+    }
+
+    /// How often the fault of the supply took effect: frames to the servos, or dips.
+    #[must_use]
+    pub const fn supply_fault_count(&self) -> FaultCount {
+        self.supply.count()
+    }
+
+    /// Puts this weight into the gripper, in grams, at most [`HEAVIEST_LOAD_G`]. 0 takes it away.
+    pub fn set_load(&mut self, grams: u16) {
+        self.load_g = grams.min(HEAVIEST_LOAD_G);
+        self.update_weight();
+    }
+
+    /// The weight in the gripper, in grams.
+    #[must_use]
+    pub const fn load_grams(&self) -> u16 {
+        self.load_g
+    }
+
+    /// Interrupts the power of one servo at `now`: torque and goal are lost, and no hand holds the joint.
+    pub fn restart_servo(&mut self, now: Instant, joint: Joint) {
+        self.advance(now);
+        let ready_at = now + self.config.boot_time;
+        if let Some(servo) = self.servo_mut(joint) {
+            servo.power_cycle(ready_at);
+        }
+    }
+
+    /// Sets whether a goal switches torque on after a servo's own start.
+    pub fn set_goal_starts_torque(&mut self, starts_torque: bool) {
+        self.config.goal_starts_torque = starts_torque;
+        let config = self.config;
+        self.servos_mut().iter_mut().for_each(|servo| servo.set_config(config));
+    }
+
+    /// Sets whether the controller receives its own bytes, as on a bus with one wire for both directions.
+    pub fn set_echo(&mut self, has_echo: bool) {
+        self.has_echo = has_echo;
+        self.echo_count = FaultCount::default();
+    }
+
+    /// Number of bytes that were echoed since [`Plant::set_echo`].
+    #[must_use]
+    pub const fn echo_count(&self) -> FaultCount {
+        self.echo_count
+    }
+
+    /// Turns a joint by hand to a position in counts, and holds it there. A joint with torque turns back.
+    pub fn move_by_hand(&mut self, joint: Joint, counts: u16) {
+        if let Some(servo) = self.servo_mut(joint) {
+            servo.move_by_hand(counts);
+        }
+        self.update_weight();
+    }
+
+    /// Lets a hand hold a joint until it has torque. Has no effect on a joint with torque.
+    pub fn hold(&mut self, joint: Joint) {
+        self.servo_mut(joint).into_iter().for_each(|servo| servo.hold_by_hand(true));
+    }
+
+    /// Ends [`Plant::hold`]: without torque, a loaded joint falls.
+    pub fn let_go(&mut self, joint: Joint) {
+        self.servo_mut(joint).into_iter().for_each(|servo| servo.hold_by_hand(false));
+    }
+
+    /// Sets whether a stand holds each joint that has no torque.
+    pub fn support(&mut self, is_supported: bool) {
+        self.servos_mut().iter_mut().for_each(|servo| servo.support(is_supported));
+    }
+
+    /// Switches power off and on: torque, goals and answers are lost, faults stay. A hand holds each joint until it has
+    /// torque.
+    pub fn power_cycle(&mut self, now: Instant) {
+        self.advance(now);
+        self.supply.switch(true);
+        let ready_at = now + self.config.boot_time;
+        for servo in self.servos_mut() {
+            servo.power_cycle(ready_at);
+            servo.hold_by_hand(true);
+        }
+        self.decoder.clear();
+        self.wire.clear();
+    }
+
+    /// Switches the power of all servos off at `now`, until [`Plant::power_cycle`]. No hand holds a joint.
+    pub fn power_off(&mut self, now: Instant) {
+        self.advance(now);
+        self.supply.switch(false);
+        for servo in self.servos_mut() {
+            servo.power_cycle(Instant::FAR_FUTURE);
+            servo.hold_by_hand(false);
+        }
+        self.decoder.clear();
+        self.wire.clear();
+    }
+}

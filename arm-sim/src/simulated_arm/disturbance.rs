@@ -1,0 +1,130 @@
+//! What disturbs an arm while it runs: faults, each until it is taken back or its time is over, and the power switch.
+
+use alloc::vec::Vec;
+
+use embedded_storage::nor_flash::NorFlash;
+use protocol_core::settings::Storage;
+use protocol_core::time::{Duration, Instant};
+
+use super::SimulatedArm;
+use crate::controller::ArmController;
+use crate::fault_count::FaultCount;
+use crate::faults::list::ListedFault;
+use crate::faults::{ArmFault, FaultLocation, FaultReport};
+use crate::faulty_flash::FlashFault;
+use crate::host_line::LineDirection;
+use crate::plant::Plant;
+use crate::servo_bus::ServoBus;
+
+impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
+    /// Draws the faults of the host line from this seed from now on. By default it is 1.
+    pub fn set_seed(&mut self, seed: u64) {
+        (self.to_arm, self.to_host) = LineDirection::pair(seed);
+        self.start_host_line();
+        for ListedFault { fault, .. } in self.faults.iter() {
+            if let ArmFault::Line(fault) = fault {
+                self.to_arm.set_fault(fault);
+                self.to_host.set_fault(fault);
+            }
+        }
+    }
+
+    /// Gives the arm a fault at `now`, for a time or until [`SimulatedArm::end_faults`]. Returns the report of the fault
+    /// that it replaces.
+    pub fn set_fault(
+        &mut self,
+        now: Instant,
+        fault: ArmFault,
+        duration: Option<Duration>,
+    ) -> Option<FaultReport> {
+        self.advance(now, false);
+        let replaced = self.faults.take_replaced(fault).map(|replaced| self.end(replaced));
+        self.faults.add(fault, duration.map(|duration| now + duration));
+        fault.apply(&mut self.bus);
+        match fault {
+            ArmFault::Flash(FlashFault::Fails) => self.settings.flash_mut().set_fails(true),
+            ArmFault::Flash(FlashFault::Full) => self.controller.set_storage(Storage::Full),
+            ArmFault::Line(fault) => {
+                self.to_arm.set_fault(fault);
+                self.to_host.set_fault(fault);
+            }
+            _ => {}
+        }
+        replaced
+    }
+
+    /// Takes the faults at a location back at `now`, or all faults. Returns how often they took effect.
+    pub fn end_faults(&mut self, now: Instant, location: Option<FaultLocation>) -> Vec<FaultReport> {
+        self.advance(now, false);
+        self.faults.take_at(location).into_iter().map(|listed| self.end(listed)).collect()
+    }
+
+    /// The faults of the arm.
+    pub fn faults(&mut self) -> Vec<FaultReport> {
+        let listed: Vec<ListedFault> = self.faults.iter().collect();
+        listed.into_iter().map(|listed| self.report(listed)).collect()
+    }
+
+    /// Takes the reports of the faults whose time was over since the last call, at most the last 16.
+    pub fn take_ended_faults(&mut self) -> Vec<FaultReport> {
+        self.ended_faults.take()
+    }
+
+    /// Is a byte of the host on the way to the controller, or one of the controller on the way to the host?
+    #[must_use]
+    pub fn is_host_line_busy(&self) -> bool {
+        let waits = !self.is_halted && !self.to_arm.arrived().is_empty() && self.to_host.room() > 0;
+        waits || self.to_arm.is_in_transit() || self.to_host.is_in_transit()
+    }
+}
+
+impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
+    /// Ends the faults whose time is over.
+    pub(super) fn end_due_faults(&mut self) {
+        if self.faults.deadline().is_none_or(|deadline| deadline > self.now) {
+            return;
+        }
+        for listed in self.faults.take_due(self.now) {
+            let report = self.end(listed);
+            self.ended_faults.push(report);
+        }
+    }
+
+    /// The state of the storage, with its fault.
+    pub(super) fn storage(&self) -> Storage {
+        let is_full = self.faults.contains(ArmFault::Flash(FlashFault::Full));
+        if is_full { Storage::Full } else { self.settings.storage() }
+    }
+
+    fn end(&mut self, listed: ListedFault) -> FaultReport {
+        let report = self.report(listed);
+        self.bus.plant_mut().into_iter().for_each(|plant| listed.fault.remove(plant));
+        match listed.fault {
+            ArmFault::Flash(FlashFault::Fails) => self.settings.flash_mut().set_fails(false),
+            ArmFault::Flash(FlashFault::Full) => self.controller.set_storage(self.settings.storage()),
+            ArmFault::Line(fault) => {
+                self.to_arm.end_fault(fault);
+                self.to_host.end_fault(fault);
+            }
+            _ => {}
+        }
+        report
+    }
+
+    fn report(&mut self, ListedFault { fault, until }: ListedFault) -> FaultReport {
+        FaultReport { fault, until, count: self.fault_count(fault) }
+    }
+
+    fn fault_count(&mut self, fault: ArmFault) -> Option<FaultCount> {
+        match fault {
+            ArmFault::Servo(joint, _) => Some(self.bus.plant_mut()?.fault_count(joint)),
+            ArmFault::Echo => Some(self.bus.plant_mut()?.echo_count()),
+            ArmFault::Supply(_) => Some(self.bus.plant_mut()?.supply_fault_count()),
+            ArmFault::Flash(FlashFault::Fails) => Some(self.settings.flash_mut().count()),
+            ArmFault::Line(fault) => {
+                Some(self.to_arm.fault_count(fault).plus(self.to_host.fault_count(fault)))
+            }
+            ArmFault::Flash(FlashFault::Full) | ArmFault::Supported | ArmFault::GoalStartsTorque => None,
+        }
+    }
+}
