@@ -4,6 +4,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use sevenbot::moves::{ConnectionLost, MoveError};
+use sevenbot::register_text::motor_state_name;
 use sevenbot::servo_bench::ServoError;
 use sevenbot::stream::StreamError;
 use sevenbot::{Error, OpenError};
@@ -71,6 +73,28 @@ impl From<StreamError> for CommandError {
     }
 }
 
+impl From<MoveError> for CommandError {
+    fn from(error: MoveError) -> Self {
+        match error {
+            MoveError::Interrupted => Self::Interrupted,
+            MoveError::Exchange(error) => Self::Exchange(error),
+            MoveError::Stream(error) => error.into(),
+            MoveError::MayMove(reason) => Self::MayMove(reason),
+            MoveError::NotDriven { state } => Self::Arm(format!(
+                "the arm's motors are in state {state}, {}: use `sevenbot state servo` first",
+                motor_state_name(state)
+            )),
+            other => Self::Arm(other.to_string()),
+        }
+    }
+}
+
+impl ConnectionLost for CommandError {
+    fn is_connection_lost(&self) -> bool {
+        matches!(self, Self::Exchange(_) | Self::MayMove(_))
+    }
+}
+
 impl From<io::Error> for CommandError {
     fn from(error: io::Error) -> Self {
         Self::Output(error)
@@ -81,11 +105,6 @@ impl CommandError {
     /// A failure with a file.
     pub(crate) fn file(path: &Path, reason: impl ToString) -> Self {
         Self::File { path: path.to_owned(), reason: reason.to_string() }
-    }
-
-    /// Did the connection fail? Then the arm can take no more commands.
-    pub(crate) const fn is_connection_lost(&self) -> bool {
-        matches!(self, Self::Exchange(_) | Self::MayMove(_))
     }
 
     /// The exit status; `sevenbot --help` lists them.

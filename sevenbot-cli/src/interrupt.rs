@@ -4,8 +4,6 @@
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::thread::sleep;
-use std::time::{Duration, Instant};
 
 use sevenbot::Arm;
 use sevenbot::joints::JointSnapshot;
@@ -19,8 +17,6 @@ static REQUESTS: AtomicU32 = AtomicU32::new(0);
 /// May the arm be moving, so that it has to be stopped?
 static MOVING: AtomicBool = AtomicBool::new(false);
 static HANDLER: Once = Once::new();
-/// Time between two checks during a wait.
-const POLL_PERIOD: Duration = Duration::from_millis(20);
 
 /// Ctrl-C is caught.
 #[derive(Clone, Copy, Debug)]
@@ -58,19 +54,6 @@ impl Interrupt {
     /// Fails if the user has requested the end.
     pub(crate) fn check(self) -> Result<(), CommandError> {
         if Self::is_requested() { Err(CommandError::Interrupted) } else { Ok(()) }
-    }
-
-    /// Sleeps. Fails early if the user requests the end.
-    pub(crate) fn sleep(self, duration: Duration) -> Result<(), CommandError> {
-        let end = Instant::now() + duration;
-        loop {
-            self.check()?;
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return Ok(());
-            }
-            sleep(left.min(POLL_PERIOD));
-        }
     }
 }
 

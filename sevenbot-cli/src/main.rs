@@ -16,16 +16,16 @@ mod command_error;
 mod commands;
 mod confirm;
 mod interrupt;
-mod joint_move;
 mod line_file;
 mod plot;
 mod printer;
 mod progress;
-mod reports;
 mod session;
 mod settings_file;
 mod space_plot;
+mod step_target;
 mod style;
+mod watch;
 mod write_result;
 
 use std::io;

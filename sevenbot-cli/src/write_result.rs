@@ -1,8 +1,7 @@
 //! The result of a checked write as the result of a command.
 
-use sevenbot::checked_write::WriteMismatch;
+use sevenbot::checked_write::{WriteMismatch, reasons};
 use sevenbot::map::{BAUD_RATE, OFFSET};
-use sevenbot::names::name_of_register;
 use sevenbot::{Arm, Error, Firmware};
 
 use crate::command_error::CommandError;
@@ -37,21 +36,4 @@ pub(crate) fn note_restart(arm: &Arm, mut changed: impl Iterator<Item = u8> + Cl
 /// Do new offsets act only after a restart? Ours act at once (D9).
 pub(crate) fn uses_offsets_after_restart(arm: &Arm) -> bool {
     arm.identity().firmware() == Firmware::Makers
-}
-
-fn reasons(unchanged: &[WriteMismatch]) -> String {
-    let groups = unchanged.chunk_by(|one, next| one.cause == next.cause);
-    groups.map(reason).collect::<Vec<String>>().join("\n       ")
-}
-
-/// One reason for all registers that share it.
-fn reason(unchanged: &[WriteMismatch]) -> String {
-    match unchanged {
-        [only] => only.to_string(),
-        [first, .., last] => {
-            let (from, to) = (name_of_register(first.address), name_of_register(last.address));
-            format!("{from} to {to} did not change: {}", first.cause)
-        }
-        [] => String::new(),
-    }
 }

@@ -184,6 +184,25 @@ fn number(address: u8, raw: u16) -> i32 {
     find_readable(address).map_or(i32::from(raw), |row| row.range.decode(raw))
 }
 
+/// The reasons, one for all neighbouring registers that share it, each on its own line.
+#[must_use]
+pub fn reasons(unchanged: &[WriteMismatch]) -> String {
+    let groups = unchanged.chunk_by(|one, next| one.cause == next.cause);
+    groups.map(reason).collect::<Vec<String>>().join("\n       ")
+}
+
+/// One reason for all registers that share it.
+fn reason(unchanged: &[WriteMismatch]) -> String {
+    match unchanged {
+        [only] => only.to_string(),
+        [first, .., last] => {
+            let (from, to) = (name_of_register(first.address), name_of_register(last.address));
+            format!("{from} to {to} did not change: {}", first.cause)
+        }
+        [] => String::new(),
+    }
+}
+
 impl fmt::Display for WriteMismatch {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (found, wanted) = (number(self.address, self.found), number(self.address, self.wanted));

@@ -41,6 +41,7 @@ pub mod identity;
 pub mod joints;
 mod map21_text;
 mod map_view;
+pub mod moves;
 pub mod names;
 pub mod open_port;
 mod pending;

@@ -12,10 +12,12 @@ use sevenbot::{Angle, Arm, FineAngle, Joint, Speed};
 
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
-use crate::joint_move::{JointMove, driven_joints, step_target};
 use crate::printer::Printable;
 use crate::session::Session;
+use crate::step_target::step_target;
+use crate::watch::{Watch, note_rounding};
 use crate::write_result::all_taken;
+use sevenbot::moves::JointMove;
 
 /// Move joints to a pose.
 #[derive(Debug, Args)]
@@ -139,7 +141,8 @@ fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<
         set_speed_and_time(arm, &targets, pace)?;
         interrupt.check()?;
         let begun = JointMove::begin_fine(arm, targets)?;
-        let reached = pace.wait.then(|| begun.finish(arm, interrupt)).transpose()?;
+        note_rounding(&begun);
+        let reached = pace.wait.then(|| begun.finish(arm, &mut Watch::new(interrupt))).transpose()?;
         reached.map(|whole| measured(arm, goals, whole)).transpose()
     })?;
     match reached {
@@ -173,7 +176,7 @@ fn measured(arm: &mut Arm, goals: &[PoseArg], whole: [u8; 7]) -> Result<Reached,
 }
 
 fn targets(goals: &[PoseArg], arm: &mut Arm) -> Result<FineTargets, CommandError> {
-    let joints = driven_joints(arm)?;
+    let joints = arm.driven_joints()?;
     let is_step = goals.iter().any(|goal| matches!(goal, PoseArg::By(_)));
     let bases = match is_step && arm.has_extended_block()? {
         true => arm.fine_targets()?,

@@ -22,10 +22,12 @@ use super::set::unlocked;
 use crate::command_error::CommandError;
 use crate::confirm::confirm;
 use crate::interrupt::hold_on_interrupt;
-use crate::joint_move::{JointMove, driven_joints, step_target};
 use crate::printer::{Printable, note, warn};
 use crate::session::Session;
+use crate::step_target::step_target;
+use crate::watch::Watch;
 use crate::write_result::{all_taken, uses_offsets_after_restart};
+use sevenbot::moves::JointMove;
 
 /// Find the offsets of the joints, and store them.
 ///
@@ -169,10 +171,10 @@ fn ask_offset(arm: &mut Arm, joint: Joint, offset: i16) -> Result<i16, CommandEr
 /// Moves one joint. A refusal is only a warning.
 fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> {
     let moved = hold_on_interrupt(arm, |arm, interrupt| {
-        let wanted = step_target(&driven_joints(arm)?, joint, degrees)?.max(0);
+        let wanted = step_target(&arm.driven_joints()?, joint, degrees)?.max(0);
         let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
         let targets = Joint::ALL.map(|other| (other == joint).then_some(wanted));
-        JointMove::begin(arm, targets)?.finish(arm, interrupt)
+        Ok(JointMove::begin(arm, targets)?.finish(arm, &mut Watch::new(interrupt))?)
     });
     match moved {
         Err(CommandError::Arm(reason)) => warn(reason),

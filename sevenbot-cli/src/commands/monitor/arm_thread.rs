@@ -14,7 +14,7 @@ use super::sample::Sample;
 use super::view::{ArmEvent, UiCommand};
 use crate::command_error::CommandError;
 use crate::interrupt::{Interrupt, hold};
-use crate::joint_move::step_target;
+use crate::step_target::step_target;
 use crate::write_result::{all_taken, motors_obey};
 
 /// Time between two attempts to connect.

@@ -10,8 +10,9 @@ use sevenbot::{Angle, Arm, FineAngle};
 
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
-use crate::joint_move::{JointMove, driven_joints};
 use crate::session::Session;
+use crate::watch::{Watch, note_rounding};
+use sevenbot::moves::JointMove;
 
 mod args;
 mod facts;
@@ -68,13 +69,14 @@ fn present_tool(arm: &mut Arm) -> Result<Vector, CommandError> {
 fn move_to(arm: &mut Arm, angles: [FineAngle; 5], wait: bool) -> Result<Option<MeasuredPose>, CommandError> {
     let [t1, t2, t3, t4, t5] = angles.map(Some);
     hold_on_interrupt(arm, |arm, interrupt| {
-        driven_joints(arm)?;
+        arm.driven_joints()?;
         interrupt.check()?;
         let begun = JointMove::begin_fine(arm, [t1, t2, t3, t4, t5, None, None])?;
+        note_rounding(&begun);
         if !wait {
             return Ok(None);
         }
-        begun.finish(arm, interrupt)?;
+        begun.finish(arm, &mut Watch::new(interrupt))?;
         MeasuredPose::read(arm).map(Some)
     })
 }

@@ -15,14 +15,13 @@ use super::super::position::components;
 use super::args::{MoveToArgs, target};
 use super::facts::{MeasuredPose, MeasuredTip, rounded};
 use crate::command_error::CommandError;
-use crate::joint_move::driven_joints;
 use crate::printer::Printable;
 use crate::session::Session;
 
 /// Moves the tip on a straight line, starting at the present targets.
 pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
-    let joints = if args.dry_run { arm.wait_until_settled()? } else { driven_joints(&mut arm)? };
+    let joints = if args.dry_run { arm.wait_until_settled()? } else { arm.driven_joints()? };
     let whole = start(&joints)?;
     let (resolution, start) = match arm.has_extended_block()? {
         true => (TargetResolution::Hundredths, arm.fine_targets()?),

@@ -1,34 +1,31 @@
 //! `record`: writes the positions of a guided or moving arm to a file.
 //!
 //! ```text
-//!   arm ── reports ──▶ ReportClock (time of measurement) ──▶ one line each ──▶ file
+//!   arm ── reports ──▶ Recorder (time of measurement) ──▶ one line each ──▶ file
 //!                       TeachPendant (keys: pump, nudges, end) ──┘
 //! ```
 //!
 //! After any end the file has whole lines, and an arm that is still connected holds its position.
 
-mod report_clock;
 mod teach_pendant;
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::{Args, value_parser};
 use serde::Serialize;
-use sevenbot::map::{FEEDBACK_FREQUENCY, MOTOR_STATE, VACUUM_PUMP, motor_state, report_content};
+use sevenbot::map::{MOTOR_STATE, VACUUM_PUMP, motor_state, report_content};
+use sevenbot::moves::{ConnectionLost, RecordedPose, Recorder};
 use sevenbot::recording::{self, FileVersion, Moment};
 use sevenbot::{Arm, Span};
 
-use self::report_clock::ReportClock;
 use self::teach_pendant::TeachPendant;
 use crate::command_error::CommandError;
 use crate::confirm::confirm;
 use crate::interrupt::{Interrupt, hold, report_hold};
-use crate::joint_move::driven_joints;
 use crate::line_file::LineFile;
 use crate::printer::{Printable, note};
-use crate::reports::{exact_positions, reports_stopped, with_reports};
 use crate::session::Session;
 use crate::write_result::motors_obey;
 
@@ -63,8 +60,6 @@ pub(crate) struct RecordArgs {
     yes: bool,
 }
 
-/// Without a report for this time, the arm has stopped reporting. The lowest rate is 1 Hz.
-const REPORT_TIMEOUT: Duration = Duration::from_secs(3);
 /// The longest reaction time to a key or Ctrl-C.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
 
@@ -89,11 +84,11 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
         confirm(&format!("{} exists. Replace it?", args.file.display()), args.yes)?;
     }
     if args.driven {
-        driven_joints(&mut arm)?;
+        arm.driven_joints()?;
     } else {
         confirm("The motors go off, and the arm falls unless you hold it. Go on?", args.yes)?;
     }
-    let content = exact_positions(&mut arm)?;
+    let content = arm.exact_positions()?;
     let version = match content {
         report_content::POSITIONS => FileVersion::Degrees,
         _ => FileVersion::Hundredths,
@@ -101,7 +96,7 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     let mut recording = RecordingFile::create(&args.file, version)?;
     Interrupt::catch();
     let done = set_motors(&mut arm, args).and_then(|()| {
-        with_reports(&mut arm, args.hz, content, |arm| record_reports(arm, args, content, &mut recording))
+        arm.with_reports(args.hz, content, |arm| record_reports(arm, args, content, &mut recording))
     });
     // Without a connection the arm cannot be made to hold.
     let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
@@ -144,31 +139,17 @@ fn record_reports(
 ) -> Result<(), CommandError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut pendant = TeachPendant::new(arm.targets()?, vacuum, args.driven);
-    let mut clock = ReportClock::new(arm.report_period(args.hz, content));
+    let mut recorder = Recorder::new(arm, args.hz, content);
     let limit = args.seconds.map(|seconds| Duration::from_secs(seconds.into()));
-    let mut last_report = Instant::now();
     while !Interrupt::is_requested() && !pendant.poll_keys(arm)? {
-        if let Some(report) = arm.next_report(POLL_PERIOD)? {
-            last_report = report.received;
-            let time = clock.time_of(report.received);
-            if limit.is_some_and(|limit| time > limit) {
-                break;
-            }
-            recording.add(&Moment { time, pose: report.pose(), vacuum: pendant.vacuum() })?;
-            pendant.show(recording.moments, time);
-        } else if last_report.elapsed() > REPORT_TIMEOUT {
-            return Err(silent(arm));
+        let Some(RecordedPose { time, pose }) = recorder.next(arm, POLL_PERIOD)? else { continue };
+        if limit.is_some_and(|limit| time > limit) {
+            break;
         }
+        recording.add(&Moment { time, pose, vacuum: pendant.vacuum() })?;
+        pendant.show(recording.moments, time);
     }
     Ok(())
-}
-
-/// Why reports are missing.
-fn silent(arm: &mut Arm) -> CommandError {
-    match arm.read_span(Span::of(&FEEDBACK_FREQUENCY)) {
-        Err(error) => error.into(),
-        Ok(_) => reports_stopped(),
-    }
 }
 
 /// The file, and the length of the recording so far.

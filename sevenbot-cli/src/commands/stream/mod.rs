@@ -24,8 +24,6 @@ use self::summary::StreamSummary;
 use self::tracking::Tracking;
 use crate::command_error::CommandError;
 use crate::interrupt::{Interrupt, hold_on_interrupt};
-use crate::joint_move::driven_joints;
-use crate::reports::with_reports;
 use crate::session::Session;
 
 /// Stream set-points from standard input, in hundredths of a degree.
@@ -92,10 +90,10 @@ pub(crate) fn run(session: &mut Session, args: &StreamArgs) -> Result<(), Comman
     if !arm.has_extended_block()? {
         return Err(StreamError::NoExtendedBlock.into());
     }
-    driven_joints(&mut arm)?;
+    arm.driven_joints()?;
     let refused_before = refused(arm.status()?);
     let mut tracking = Tracking::new(arm.fine_targets()?, options.period());
-    let done = with_reports(&mut arm, FEEDBACK_HZ, report_content::FINE_POSITIONS, |arm| {
+    let done = arm.with_reports(FEEDBACK_HZ, report_content::FINE_POSITIONS, |arm| {
         hold_on_interrupt(arm, |arm, interrupt| stream(arm, interrupt, options, &mut tracking))
     });
     let (counts, ended) = done?;

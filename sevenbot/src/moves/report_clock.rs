@@ -6,7 +6,8 @@
 use std::time::{Duration, Instant};
 
 /// The ticks of the arm's report timer.
-pub(crate) struct ReportClock {
+#[derive(Debug)]
+pub(super) struct ReportClock {
     period: Duration,
     /// When the first report arrived, and the tick of the last one.
     last: Option<(Instant, u32)>,
@@ -14,12 +15,12 @@ pub(crate) struct ReportClock {
 
 impl ReportClock {
     /// Ticks with this period.
-    pub(crate) const fn new(period: Duration) -> Self {
+    pub(super) const fn new(period: Duration) -> Self {
         Self { period, last: None }
     }
 
     /// The time of measurement of a report, since the first report.
-    pub(crate) fn time_of(&mut self, received: Instant) -> Duration {
+    pub(super) fn time_of(&mut self, received: Instant) -> Duration {
         let (first, tick) = match self.last {
             None => (received, 0),
             Some((first, tick)) => (first, self.nearest(received - first).max(tick.saturating_add(1))),

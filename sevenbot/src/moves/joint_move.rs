@@ -5,18 +5,18 @@
 
 use std::time::{Duration, Instant};
 
-use sevenbot::fine::FineTargets;
-use sevenbot::joints::{JointSnapshot, StepBaseError, frames_for};
-use sevenbot::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
-use sevenbot::register_text::{joints, motor_state_name};
-use sevenbot::units::move_duration;
-use sevenbot::{Arm, Joint, MoveTime, Snapshot, Span, Speed};
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
 
-use crate::command_error::CommandError;
-use crate::interrupt::Interrupt;
-use crate::printer::note;
-use crate::progress::Progress;
-use crate::write_result::motors_obey;
+use super::error::{MoveError, motors_obey};
+use super::observer::{Observer, Stage};
+use crate::arm::Arm;
+use crate::error::Error;
+use crate::fine_state::FineTargets;
+use crate::joints::{JointSnapshot, frames_for};
+use crate::snapshot::Snapshot;
+use crate::span::Span;
+use crate::units::{MoveTime, Speed, move_duration};
 
 /// Time between two reads of a moving arm.
 const POLL_PERIOD: Duration = Duration::from_millis(50);
@@ -32,39 +32,41 @@ const ARRIVED_DEGREES: u8 = 1;
 const TOLERANCE_DEGREES: u8 = 2;
 
 /// Targets in degrees, joint 1 first; `None` for joints that stay.
-pub(crate) type Targets = [Option<u8>; 7];
+pub type Targets = [Option<u8>; 7];
 
-/// The target after a relative step, in degrees. It may be out of range.
-pub(crate) fn step_target(joints: &JointSnapshot, joint: Joint, degrees: i16) -> Result<i16, CommandError> {
-    let base = joints.step_base(joint).map_err(|reason| {
-        let advice = match reason {
-            StepBaseError::Silent => "",
-            StepBaseError::PowerUpTarget { .. } => "; `sevenbot stop` sets its target to its position",
-        };
-        CommandError::Arm(format!(
-            "joint {} cannot make a step: {reason}{advice}; nothing was moved",
-            joint.number()
-        ))
-    })?;
-    Ok(i16::from(base).saturating_add(degrees))
-}
-
-/// The joints after start-up. Fails if the motors do not drive them.
-pub(crate) fn driven_joints(arm: &mut Arm) -> Result<JointSnapshot, CommandError> {
-    let joints = arm.wait_until_settled()?;
-    if joints.is_driven() {
-        return Ok(joints);
+impl Arm {
+    /// The joints after start-up: [`Arm::wait_until_settled`].
+    ///
+    /// # Errors
+    /// [`MoveError::NotDriven`] if the motors do not drive the joints, and the errors of [`Arm::read`].
+    pub fn driven_joints(&mut self) -> Result<JointSnapshot, MoveError> {
+        let joints = self.wait_until_settled()?;
+        if joints.is_driven() {
+            Ok(joints)
+        } else {
+            Err(MoveError::NotDriven { state: joints.motor_state() })
+        }
     }
-    let state = joints.motor_state();
-    let word = motor_state_name(state);
-    Err(CommandError::Arm(format!(
-        "the arm's motors are in state {state}, {word}: use `sevenbot state servo` first"
-    )))
 }
 
 /// A move that was sent to the arm.
-pub(crate) struct JointMove {
+///
+/// ```
+/// use sevenbot::moves::JointMove;
+/// use sevenbot::simulated::{self, SimulationConfig};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let (mut arm, _) = simulated::arm(SimulationConfig::default())?;
+/// arm.driven_joints()?;
+/// let there = JointMove::begin(&mut arm, [Some(120), None, None, None, None, None, None])?;
+/// assert!(there.finish(&mut arm, &mut ())?[0] >= 119, "within a degree");
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct JointMove {
     targets: Targets,
+    is_rounded: bool,
     /// Speeds, durations and positions before the move.
     plan: Snapshot,
     start: Instant,
@@ -72,33 +74,46 @@ pub(crate) struct JointMove {
 
 impl JointMove {
     /// Sends the targets to all joints at the same time.
-    pub(crate) fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, CommandError> {
+    ///
+    /// # Errors
+    /// The arm does not take the targets, or an exchange failed.
+    pub fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, MoveError> {
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         motors_obey(arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets)))?;
-        Ok(Self { targets, plan, start: Instant::now() })
+        Ok(Self { targets, is_rounded: false, plan, start: arm.now() })
     }
 
     /// As [`Self::begin`], in hundredths of a degree. An arm without the extended block takes the nearest whole degrees.
-    pub(crate) fn begin_fine(arm: &mut Arm, targets: FineTargets) -> Result<Self, CommandError> {
+    ///
+    /// # Errors
+    /// As [`JointMove::begin`].
+    pub fn begin_fine(arm: &mut Arm, targets: FineTargets) -> Result<Self, MoveError> {
         let whole = targets.map(|angle| angle.map(|angle| angle.nearest().degrees()));
         if targets.iter().flatten().all(|angle| angle.is_whole()) {
             return Self::begin(arm, whole);
         }
         if !arm.has_extended_block()? {
-            note("this arm takes whole degrees: each joint goes to the nearest one");
-            return Self::begin(arm, whole);
+            return Ok(Self { is_rounded: true, ..Self::begin(arm, whole)? });
         }
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         motors_obey(arm.set_fine_targets_checked(&targets))?;
-        Ok(Self { targets: whole, plan, start: Instant::now() })
+        Ok(Self { targets: whole, is_rounded: false, plan, start: arm.now() })
     }
 
-    /// Waits until all joints have arrived. Returns their positions.
-    pub(crate) fn finish(&self, arm: &mut Arm, interrupt: Interrupt) -> Result<[u8; 7], CommandError> {
-        let progress = Progress::new(self.degrees_left(&self.plan.joints(&PRESENT_POSITION)), "degrees");
-        self.wait_until_still(arm, interrupt, &progress)?;
-        progress.say("settling");
-        self.settle(arm, interrupt, &progress)
+    /// Did the arm get whole degrees because it has no finer ones?
+    #[must_use]
+    pub const fn is_rounded(&self) -> bool {
+        self.is_rounded
+    }
+
+    /// Waits until all joints have arrived. Returns their positions in degrees.
+    ///
+    /// # Errors
+    /// A joint still moves after twice its duration, or settles away from its target; the observer ends the wait; or an
+    /// exchange failed.
+    pub fn finish(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<[u8; 7], MoveError> {
+        self.wait_until_still(arm, observer)?;
+        self.settle(arm, observer)
     }
 
     /// The duration of the slowest joint.
@@ -115,29 +130,24 @@ impl JointMove {
         self.duration() * 2 + MARGIN
     }
 
-    fn wait_until_still(
-        &self,
-        arm: &mut Arm,
-        interrupt: Interrupt,
-        progress: &Progress,
-    ) -> Result<(), CommandError> {
+    fn wait_until_still(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
         let timeout = self.timeout();
         loop {
             let moving = self.moving(arm)?;
             if moving == 0 {
                 return Ok(());
             }
-            if self.start.elapsed() >= timeout {
-                let seconds = timeout.as_secs();
-                return Err(CommandError::Arm(format!("still moving after {seconds} s: {}", joints(moving))));
+            if self.elapsed(arm) >= timeout {
+                return Err(MoveError::StillMoving { bits: moving, after: timeout });
             }
-            progress.set(self.degrees_done(&positions(arm)?));
-            interrupt.sleep(POLL_PERIOD)?;
+            let present = positions(arm)?;
+            self.report(observer, Stage::Moving, &present);
+            pause(arm, observer)?;
         }
     }
 
     /// The joints of this move whose set-point moves, without those whose servo does not answer.
-    fn moving(&self, arm: &mut Arm) -> Result<u8, CommandError> {
+    fn moving(&self, arm: &mut Arm) -> Result<u8, MoveError> {
         let ours = self.goals().fold(0, |bits, (joint, _)| bits | joint.bit());
         if let Some(status) = arm.status()? {
             return Ok(status.moving() & !status.missing() & ours);
@@ -145,49 +155,37 @@ impl JointMove {
         // The maker's firmware has no moving bits: take the joints away from their targets, for the duration of the
         // move.
         let away = self.away(&positions(arm)?, ARRIVED_DEGREES);
-        let is_due = self.start.elapsed() >= self.duration();
+        let is_due = self.elapsed(arm) >= self.duration();
         Ok(if is_due { 0 } else { away.iter().fold(0, |bits, (joint, ..)| bits | joint.bit()) })
     }
 
     /// Waits until the joints have settled. Fails if one has not reached its target.
-    fn settle(
-        &self,
-        arm: &mut Arm,
-        interrupt: Interrupt,
-        progress: &Progress,
-    ) -> Result<[u8; 7], CommandError> {
+    fn settle(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<[u8; 7], MoveError> {
         let mut last = positions(arm)?;
-        let start = Instant::now();
+        let start = arm.now();
         let mut changed = start;
         // Without moving bits the joints may still be on their way: their duration is only an estimate.
         let timeout = if arm.identity().has_status_block() { SETTLE_TIMEOUT } else { self.timeout() };
         while !self.away(&last, ARRIVED_DEGREES).is_empty()
-            && changed.elapsed() < STILL_TIME
-            && start.elapsed() < timeout
+            && arm.now() < changed + STILL_TIME
+            && arm.now() < start + timeout
         {
-            interrupt.sleep(POLL_PERIOD)?;
+            pause(arm, observer)?;
             let present = positions(arm)?;
             if present != last {
-                changed = Instant::now();
+                changed = arm.now();
             }
             last = present;
-            progress.set(self.degrees_done(&last));
+            self.report(observer, Stage::Settling, &last);
         }
         match self.away(&last, TOLERANCE_DEGREES).as_slice() {
             [] => Ok(last),
-            away => Err(self.not_reached(arm, away)?),
+            away => Err(not_reached(arm, away.to_vec())),
         }
     }
 
-    fn not_reached(&self, arm: &mut Arm, away: &[(Joint, u8, u8)]) -> Result<CommandError, CommandError> {
-        driven_joints(arm)?;
-        let words: Vec<String> = away
-            .iter()
-            .map(|(joint, is, goal)| format!("joint {} is at {is}°, not {goal}°", joint.number()))
-            .collect();
-        let missing = arm.status()?.map_or(0, |status| status.missing());
-        let cause = if missing == 0 { String::new() } else { format!("; {} not answering", joints(missing)) };
-        Ok(CommandError::Arm(format!("the arm did not reach the pose: {}{cause}", words.join(", "))))
+    fn elapsed(&self, arm: &Arm) -> Duration {
+        arm.now().saturating_duration_since(self.start)
     }
 
     fn goals(&self) -> impl Iterator<Item = (Joint, u8)> {
@@ -206,12 +204,30 @@ impl JointMove {
         self.away(present, 0).iter().map(|(_, is, goal)| u64::from(is.abs_diff(*goal))).sum()
     }
 
-    fn degrees_done(&self, present: &[u8; 7]) -> u64 {
+    fn report(&self, observer: &mut dyn Observer, stage: Stage, present: &[u8; 7]) {
         let total = self.degrees_left(&self.plan.joints(&PRESENT_POSITION));
-        total.saturating_sub(self.degrees_left(present))
+        observer.progress(stage, total.saturating_sub(self.degrees_left(present)), total);
     }
 }
 
-fn positions(arm: &mut Arm) -> Result<[u8; 7], CommandError> {
+/// Waits for the time between two reads.
+fn pause(arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
+    if !observer.goes_on() {
+        return Err(MoveError::Interrupted);
+    }
+    arm.sleep(POLL_PERIOD);
+    Ok(())
+}
+
+/// Why the joints settled away from their targets.
+fn not_reached(arm: &mut Arm, away: Vec<(Joint, u8, u8)>) -> MoveError {
+    let missing = arm.driven_joints().and_then(|_| Ok(arm.status()?.map_or(0, |status| status.missing())));
+    match missing {
+        Ok(missing) => MoveError::NotReached { away, missing },
+        Err(error) => error,
+    }
+}
+
+fn positions(arm: &mut Arm) -> Result<[u8; 7], Error> {
     Ok(arm.read_span(Span::of(&PRESENT_POSITION))?.joints(&PRESENT_POSITION))
 }

@@ -1,0 +1,110 @@
+//! Why a move does not start or end.
+
+use std::time::Duration;
+
+use crate::checked_write::{WriteMismatch, reasons};
+use crate::error::Error;
+use crate::hold::HoldError;
+use crate::register_text::{joints, motor_state_name};
+use crate::stream::StreamError;
+use protocol_core::registers::Joint;
+
+/// Why a move does not start or end.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum MoveError {
+    /// [`Observer::goes_on`](super::Observer::goes_on) said no. A player has made the arm hold; after another call it may
+    /// still be moving.
+    #[error("interrupted")]
+    Interrupted,
+    /// The motors do not drive the joints.
+    #[error("the arm's motors are in state {state}, {}", motor_state_name(*state))]
+    NotDriven {
+        /// The value of register 29.
+        state: u8,
+    },
+    /// The arm did not take these values.
+    #[error("{}", reasons(.0))]
+    NotTaken(Vec<WriteMismatch>),
+    /// It is unknown whether the arm took the values, so it may be moving, for this reason.
+    #[error("the arm may still be moving: {0}")]
+    MayMove(String),
+    /// The set-points of these joints still move.
+    #[error("still moving after {} s: {}", after.as_secs(), joints(*bits))]
+    StillMoving {
+        /// Bit 0 is joint 1.
+        bits: u8,
+        /// The time since the start of the move.
+        after: Duration,
+    },
+    /// Joints have settled away from their targets.
+    #[error("the arm did not reach the pose: {}{}", away_text(away), missing_text(*missing))]
+    NotReached {
+        /// Joint, position and target in degrees.
+        away: Vec<(Joint, u8, u8)>,
+        /// The joints whose servo does not answer; bit 0 is joint 1.
+        missing: u8,
+    },
+    /// The arm answers, but its reports have ended.
+    #[error("the arm has stopped reporting its positions: was it switched off and on?")]
+    ReportsStopped,
+    /// A stream of points failed.
+    #[error(transparent)]
+    Stream(StreamError),
+    /// An exchange with the arm failed.
+    #[error(transparent)]
+    Exchange(#[from] Error),
+}
+
+impl From<StreamError> for MoveError {
+    fn from(error: StreamError) -> Self {
+        match error {
+            StreamError::Exchange(error) => Self::Exchange(error),
+            StreamError::NotTaken(unchanged) => Self::NotTaken(unchanged),
+            other @ StreamError::NoExtendedBlock => Self::Stream(other),
+        }
+    }
+}
+
+impl From<HoldError> for MoveError {
+    fn from(error: HoldError) -> Self {
+        Self::MayMove(error.to_string())
+    }
+}
+
+/// A failure that may be the end of the connection.
+pub trait ConnectionLost {
+    /// Can the arm take no more commands?
+    fn is_connection_lost(&self) -> bool;
+}
+
+impl ConnectionLost for MoveError {
+    fn is_connection_lost(&self) -> bool {
+        matches!(self, Self::Exchange(_) | Self::MayMove(_))
+    }
+}
+
+/// Fails if any register did not take its value.
+pub(super) fn all_taken(unchanged: Vec<WriteMismatch>) -> Result<(), MoveError> {
+    if unchanged.is_empty() { Ok(()) } else { Err(MoveError::NotTaken(unchanged)) }
+}
+
+/// As [`all_taken`], for registers that move the arm.
+pub(super) fn motors_obey(written: Result<Vec<WriteMismatch>, Error>) -> Result<(), MoveError> {
+    match written {
+        Ok(unchanged) if unchanged.iter().any(|register| register.cause.is_transient()) => {
+            Err(MoveError::MayMove(reasons(&unchanged)))
+        }
+        Ok(unchanged) => all_taken(unchanged),
+        Err(error) => Err(MoveError::MayMove(error.to_string())),
+    }
+}
+
+fn away_text(away: &[(Joint, u8, u8)]) -> String {
+    let words =
+        away.iter().map(|(joint, is, goal)| format!("joint {} is at {is}°, not {goal}°", joint.number()));
+    words.collect::<Vec<_>>().join(", ")
+}
+
+fn missing_text(missing: u8) -> String {
+    if missing == 0 { String::new() } else { format!("; {} not answering", joints(missing)) }
+}

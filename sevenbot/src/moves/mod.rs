@@ -1,0 +1,23 @@
+//! Moves that take a while: to a pose, along a recording, or guided by hand into a recording.
+//!
+//! ```text
+//!   Arm::driven_joints ──▶ JointMove::begin ──▶ finish ──▶ positions        ┐
+//!   Recording ──▶ Player::play ──▶ approach, points, last pose ──▶ measured ├── Observer: progress, and whether to go on
+//!   Arm::with_reports ──▶ Recorder::next ──▶ moments                        ┘
+//! ```
+//!
+//! All calls block on the clock of the arm's line.
+
+mod error;
+mod joint_move;
+mod observer;
+mod player;
+mod recorder;
+mod report_clock;
+mod report_session;
+
+pub use error::{ConnectionLost, MoveError};
+pub use joint_move::{JointMove, Targets};
+pub use observer::{Observer, Stage};
+pub use player::Player;
+pub use recorder::{RecordedPose, Recorder};

@@ -1,0 +1,53 @@
+//! Who watches a call that takes a while.
+
+/// What a call does at the moment, and in what its progress is counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Joints move to their targets. In degrees, summed over all joints.
+    Moving,
+    /// The joints have nearly arrived. In degrees.
+    Settling,
+    /// A recording is played. In points.
+    Playing,
+}
+
+impl Stage {
+    /// The unit of the progress.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Moving | Self::Settling => "degrees",
+            Self::Playing => "points",
+        }
+    }
+}
+
+/// Who watches a call that takes a while. `()` watches nothing.
+///
+/// ```
+/// use sevenbot::moves::{Observer, Stage};
+///
+/// struct ForAtMost(u32);
+/// impl Observer for ForAtMost {
+///     fn goes_on(&mut self) -> bool {
+///         self.0 = self.0.saturating_sub(1);
+///         self.0 > 0
+///     }
+/// }
+/// let mut watch = ForAtMost(2);
+/// watch.progress(Stage::Moving, 10, 90);
+/// assert!(watch.goes_on() && !watch.goes_on());
+/// ```
+pub trait Observer {
+    /// Does the call go on? Asked at least every 50 ms. `false` ends it with [`MoveError::Interrupted`](super::MoveError).
+    fn goes_on(&mut self) -> bool {
+        true
+    }
+
+    /// `done` of `total` units of this stage are done.
+    fn progress(&mut self, stage: Stage, done: u64, total: u64) {
+        let _ = (stage, done, total);
+    }
+}
+
+impl Observer for () {}

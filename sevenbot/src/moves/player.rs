@@ -1,0 +1,246 @@
+//! Makes an arm follow a recording, and keeps the measured positions.
+//!
+//! ```text
+//!   slow approach to the first pose ──▶ stream of points, or one frame per step ──▶ last pose
+//!                                                          └── reports ──▶ measured
+//! ```
+
+use std::time::{Duration, Instant};
+
+use protocol_core::registers::map::{SPEED, TIME, VACUUM_PUMP};
+
+use super::error::{ConnectionLost, MoveError, all_taken};
+use super::joint_move::JointMove;
+use super::observer::{Observer, Stage};
+use crate::arm::Arm;
+use crate::fine_angle::FineAngle;
+use crate::playback::{self, Step};
+use crate::point_path::PointPath;
+use crate::recording::{Moment, Recording};
+use crate::span::Span;
+use crate::stream::{SetPointStream, StreamError, StreamOptions, StreamPace};
+use crate::units::Speed;
+
+/// Frequency of the reports while playing, in Hz.
+const FEEDBACK_HZ: u8 = 30;
+/// Without a report for this time, the arm has stopped reporting.
+const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
+/// The longest time between two questions to the observer.
+const POLL_PERIOD: Duration = Duration::from_millis(20);
+/// Reports are taken for this time after the end, because servos lag.
+const TAIL: Duration = Duration::from_millis(300);
+/// Time between two points of a stream, in milliseconds.
+const PERIOD_MS: u16 = 20;
+
+/// Plays a recording.
+///
+/// An arm with the extended block gets a stream of points in hundredths of a degree (D23), another one whole degrees with
+/// speeds.
+///
+/// ```
+/// use sevenbot::moves::Player;
+/// use sevenbot::recording::Recording;
+/// use sevenbot::simulated::{self, SimulationConfig};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let (mut arm, _) = simulated::arm(SimulationConfig::default())?;
+/// let text = "7bot-recording 1\n0 90 90 65 90 90 90 80 0\n2 130 90 65 90 90 90 80 0\n";
+/// let recording = Recording::parse(text)?;
+/// recording.check_speeds(1.0)?;
+/// let mut player = Player::new(&recording, 1.0);
+/// player.play(&mut arm, 1, &mut ())?;
+/// assert_eq!(arm.positions()?[0].degrees(), 130);
+/// assert!(player.measured().len() > 50);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Player {
+    moments: Vec<Moment>,
+    steps: Vec<Step>,
+    path: PointPath,
+    measured: Vec<(Duration, [FineAngle; 7])>,
+    played: u32,
+}
+
+impl Player {
+    /// Plays `factor` times as fast. [`Recording::check_speeds`] tells whether the arm can follow.
+    #[must_use]
+    pub fn new(recording: &Recording, factor: f64) -> Self {
+        Self {
+            moments: recording.moments().collect(),
+            steps: playback::steps(recording, factor),
+            path: PointPath::new(recording, factor),
+            measured: Vec::new(),
+            played: 0,
+        }
+    }
+
+    /// How many times the recording was played to its end.
+    #[must_use]
+    pub const fn played(&self) -> u32 {
+        self.played
+    }
+
+    /// The positions measured during the first run, and their times since its start.
+    #[must_use]
+    pub fn measured(&self) -> &[(Duration, [FineAngle; 7])] {
+        &self.measured
+    }
+
+    /// Plays this many times; 0 means until the observer ends it, and the arm then holds. Restores the speeds and times
+    /// that the arm had before. The motors must drive the joints: [`Arm::driven_joints`].
+    ///
+    /// # Errors
+    /// The observer ended it, the arm did not take a value or reach a pose, its reports ended, or an exchange failed.
+    pub fn play(&mut self, arm: &mut Arm, times: u32, observer: &mut dyn Observer) -> Result<(), MoveError> {
+        let before = arm.read_span(Span::between(&SPEED, &TIME))?;
+        let content = arm.exact_positions()?;
+        let done = arm.with_reports(FEEDBACK_HZ, content, |arm| {
+            let done = self.play_times(arm, times, observer);
+            if done == Err(MoveError::Interrupted) {
+                arm.hold()?;
+            }
+            done
+        });
+        // Without a connection the speeds cannot be restored.
+        if done.as_ref().is_err_and(MoveError::is_connection_lost) {
+            return done;
+        }
+        let restored = arm.write_checked(before.address, &before.values);
+        done.and(all_taken(restored?))
+    }
+
+    fn play_times(
+        &mut self,
+        arm: &mut Arm,
+        times: u32,
+        observer: &mut dyn Observer,
+    ) -> Result<(), MoveError> {
+        while times == 0 || self.played < times {
+            self.approach(arm, observer)?;
+            self.play_once(arm, observer)?;
+            self.played = self.played.saturating_add(1);
+        }
+        Ok(())
+    }
+
+    /// Moves slowly to the first pose.
+    fn approach(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
+        let Some(first) = self.moments.first() else { return Ok(()) };
+        let step = playback::approach(arm.positions()?, *first);
+        let pace = step.registers();
+        let pace = pace.get(..pace.len().saturating_sub(step.targets.len())).unwrap_or_default();
+        all_taken(arm.write_checked(VACUUM_PUMP.address, pace)?)?;
+        move_to(arm, first.pose, observer)
+    }
+
+    fn play_once(&mut self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
+        let mut run = Run { measured: Vec::new(), start: arm.now(), last_report: arm.now() };
+        let done = if arm.has_extended_block()? {
+            self.stream(&mut run, arm, observer)
+        } else {
+            self.send_steps(&mut run, arm, observer)
+        };
+        if self.played == 0 {
+            self.measured = run.measured;
+        }
+        done?;
+        self.moments.last().map_or(Ok(()), |last| move_to(arm, last.pose, observer))
+    }
+
+    /// Sends one frame per step.
+    fn send_steps(&self, run: &mut Run, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
+        run.restart(arm);
+        for (number, step) in (1..).zip(&self.steps) {
+            run.take_reports_until(step.time, arm, observer)?;
+            arm.write(VACUUM_PUMP.address, &step.registers())?;
+            observer.progress(Stage::Playing, number, count(self.steps.len()));
+        }
+        let end = self.steps.last().map_or(Duration::ZERO, |step| step.time);
+        run.take_reports_until(end + TAIL, arm, observer)
+    }
+
+    /// Streams all points once, from where the arm is: at the first of them.
+    fn stream(&self, run: &mut Run, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
+        let options = StreamOptions::new(PERIOD_MS).ok_or(StreamError::NoExtendedBlock)?;
+        // The points tell the speed. The recording was checked, and the arm is at its first pose.
+        all_taken(arm.write_checked(SPEED.address, &[Speed::MAXIMUM.steps(); 7])?)?;
+        let mut stream = SetPointStream::open(arm, options)?;
+        let (mut path, period) = (self.path.clone(), options.period());
+        let points = path.duration().as_millis().div_ceil(period.as_millis().max(1));
+        run.restart(stream.arm());
+        let mut pace = StreamPace::new(run.start, period);
+        let mut vacuum = self.moments.first().is_some_and(|first| first.vacuum);
+        let mut time = Duration::ZERO;
+        while pace.counts().points == 0 || time < path.duration() {
+            run.take_reports_until(pace.due().saturating_duration_since(run.start), stream.arm(), observer)?;
+            let number = pace.take(stream.arm().now());
+            time = period.saturating_mul(number);
+            let Some(point) = path.at(time) else { break };
+            if point.vacuum != vacuum {
+                vacuum = point.vacuum;
+                stream.arm().write(VACUUM_PUMP.address, &[u8::from(vacuum)])?;
+            }
+            stream.send(&point.pose.map(Some))?;
+            observer.progress(Stage::Playing, number.into(), u64::try_from(points).unwrap_or(u64::MAX));
+        }
+        run.take_reports_until(time + 2 * period + TAIL, stream.arm(), observer)?;
+        Ok(stream.close()?)
+    }
+}
+
+/// One run through a recording.
+struct Run {
+    measured: Vec<(Duration, [FineAngle; 7])>,
+    start: Instant,
+    last_report: Instant,
+}
+
+impl Run {
+    fn restart(&mut self, arm: &mut Arm) {
+        arm.reports().for_each(drop);
+        self.start = arm.now();
+        self.last_report = self.start;
+    }
+
+    /// Takes reports until `time` after the start.
+    fn take_reports_until(
+        &mut self,
+        time: Duration,
+        arm: &mut Arm,
+        observer: &mut dyn Observer,
+    ) -> Result<(), MoveError> {
+        loop {
+            if !observer.goes_on() {
+                return Err(MoveError::Interrupted);
+            }
+            let left = (self.start + time).saturating_duration_since(arm.now());
+            if left.is_zero() {
+                return Ok(());
+            }
+            match arm.next_report(left.min(POLL_PERIOD))? {
+                Some(report) => {
+                    self.last_report = report.received;
+                    let time = report.received.saturating_duration_since(self.start);
+                    self.measured.push((time, report.pose()));
+                }
+                None if arm.now() > self.last_report + REPORT_TIMEOUT => return Err(silent(arm)),
+                None => {}
+            }
+        }
+    }
+}
+
+fn count(items: usize) -> u64 {
+    u64::try_from(items).unwrap_or(u64::MAX)
+}
+
+fn move_to(arm: &mut Arm, pose: [FineAngle; 7], observer: &mut dyn Observer) -> Result<(), MoveError> {
+    JointMove::begin_fine(arm, pose.map(Some))?.finish(arm, observer).map(drop)
+}
+
+/// Why reports are missing.
+fn silent(arm: &mut Arm) -> MoveError {
+    arm.driven_joints().err().unwrap_or(MoveError::ReportsStopped)
+}

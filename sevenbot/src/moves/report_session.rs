@@ -1,0 +1,57 @@
+//! Position reports during a task. Afterwards registers 53 and 189 have their old values again.
+
+use protocol_core::registers::map::{FEEDBACK_FREQUENCY, REPORT_CONTENT, report_content};
+
+use super::error::{ConnectionLost, MoveError, all_taken};
+use crate::arm::Arm;
+use crate::error::Error;
+use crate::span::Span;
+
+impl Arm {
+    /// The most exact positions that this arm reports: a value of register 189.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn exact_positions(&mut self) -> Result<u8, Error> {
+        let has_block = self.has_extended_block()?;
+        Ok(if has_block { report_content::FINE_POSITIONS } else { report_content::POSITIONS })
+    }
+
+    /// Runs `work` while the arm reports `hz` times a second what `content` asks for: a value of register 189.
+    ///
+    /// # Errors
+    /// Those of `work`, and of [`Arm::write_checked`].
+    pub fn with_reports<T, E: ConnectionLost + From<MoveError>>(
+        &mut self,
+        hz: u8,
+        content: u8,
+        work: impl FnOnce(&mut Self) -> Result<T, E>,
+    ) -> Result<T, E> {
+        let before = self.start_reports(hz, content)?;
+        let done = work(self);
+        // Without a connection the registers cannot be restored.
+        if done.as_ref().is_err_and(E::is_connection_lost) {
+            return done;
+        }
+        let restored = self.write_all_checked(&before);
+        let done = done?;
+        all_taken(restored.map_err(MoveError::from)?)?;
+        Ok(done)
+    }
+
+    /// Starts reports. Returns the registers to restore.
+    fn start_reports(&mut self, hz: u8, content: u8) -> Result<Vec<(u8, Vec<u8>)>, MoveError> {
+        let mut rows = vec![(FEEDBACK_FREQUENCY, hz)];
+        if self.has_extended_block()? {
+            // The content first: no report of another content is sent at this frequency.
+            rows.insert(0, (REPORT_CONTENT, content));
+        }
+        let mut before = Vec::new();
+        for (row, _) in &rows {
+            before.push((row.address, vec![self.read_span(Span::of(row))?.byte(row)]));
+        }
+        let wanted: Vec<_> = rows.iter().map(|(row, value)| (row.address, vec![*value])).collect();
+        all_taken(self.write_all_checked(&wanted)?)?;
+        Ok(before)
+    }
+}
