@@ -3,7 +3,7 @@
 use core::fmt::Debug;
 
 use motion_core::{Config, Controller, Output};
-use protocol_core::registers::Image;
+use protocol_core::registers::{Image, RegisterFile};
 use protocol_core::settings::Storage;
 use protocol_core::time::{Duration, Instant};
 
@@ -35,6 +35,11 @@ pub trait ArmController: Debug {
 
     /// The baud rate of the host link, in bits per second.
     fn baud(&self) -> u32;
+
+    /// The registers; `None` if their layout is another one.
+    fn registers(&self) -> Option<&RegisterFile> {
+        None
+    }
 }
 
 impl ArmController for Controller {
@@ -72,5 +77,9 @@ impl ArmController for Controller {
 
     fn baud(&self) -> u32 {
         Self::baud(self)
+    }
+
+    fn registers(&self) -> Option<&RegisterFile> {
+        Some(Self::registers(self))
     }
 }

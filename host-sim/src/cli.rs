@@ -33,6 +33,11 @@ THE ARM HAS WEIGHT
   Without torque, a loaded joint falls, and in state damping it sinks. After power-up a hand holds
   each joint until it has torque. With --fault arm=supported it never falls.
 
+WHILE IT RUNS
+  sevenbot sim fault 3=missing --for 2s        faults, a hand, a weight, power: see sevenbot sim --help
+  The control socket is for this user only. Standard error shows its path. With --arms each arm has its
+  own socket, with its number before the extension. docs/simulation.md describes the requests.
+
 FAULTS
   3=missing                  the servo of joint 3 has no power
   3=late, 3=late=MS          its answers are 30 ms late, or MS
@@ -119,6 +124,11 @@ pub struct Options {
     /// The arm's chip id, 12 hexadecimal digits
     #[arg(long, value_name = "HEX", default_value = DEFAULT_CHIP_ID, value_parser = chip_id)]
     pub chip_id: [u8; 6],
+
+    /// Listen for `sevenbot sim` on a unix socket at PATH; 'none' for no socket [default: 7bot/control-PID.sock in
+    /// $XDG_RUNTIME_DIR, or in the state directory]
+    #[arg(long, value_name = "PATH", conflicts_with_all = ["servos", "servos_only", "servo_socket"])]
+    pub control: Option<PathBuf>,
 
     /// Be an arm as the maker ships it, with the maker's firmware of this version: see AN ARM OF THE MAKER below
     #[arg(long, value_name = "VERSION", value_parser = maker_version,
@@ -288,6 +298,7 @@ mod tests {
             ("--as-maker 2.2", "2.1.4"),
             ("--as-maker 2.1.4 --servos a", "--servos"),
             ("--servos a --arms 2", "--arms"),
+            ("--servos a --control b", "--control"),
             ("--servos a --fault 3=missing", "--fault"),
             ("--servos a --servos-only", "--servos-only"),
             ("--hold-on-exit", "--servos"),

@@ -17,6 +17,9 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
 use crate::clock::{Clock, sleep_until};
+use crate::control::execute::execute;
+use crate::control::request;
+use crate::control::socket::ControlSocket;
 use crate::pty_arm::PtyArm;
 use crate::signals::{SignalAction, Signals};
 use tty_ports::clients::Clients;
@@ -29,6 +32,8 @@ const NO_WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 0 };
 const SIGNALS: u64 = u64::MAX;
 /// The event data of the clients.
 const CLIENTS: u64 = u64::MAX - 1;
+/// The event data of the control socket of the first arm.
+const CONTROL: u64 = 1 << 32;
 
 /// The arms of a process.
 #[derive(Debug)]
@@ -43,6 +48,7 @@ pub struct EventLoop<F, C = Controller> {
 #[derive(Debug)]
 struct Entry<F, C> {
     arm: PtyArm<F, Plant, C>,
+    control: Option<ControlSocket>,
     due: Instant,
     /// The events of its port that epoll reports.
     interest: EventFlags,
@@ -66,10 +72,23 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         let entry = |arm: PtyArm<F, Plant, C>| Entry {
             interest: arm.interest(),
             arm,
+            control: None,
             due: Instant::ZERO,
             has_failed: false,
         };
         Ok(Self { arms: arms.into_iter().map(entry).collect(), clients, epoll })
+    }
+
+    /// Adds the control sockets of the arms, in their order. `None`: the arm has none.
+    ///
+    /// # Errors
+    /// The operating system refuses an entry in epoll.
+    pub fn add_controls(&mut self, controls: Vec<Option<ControlSocket>>) -> io::Result<()> {
+        for (data, (entry, control)) in (CONTROL..).zip(self.arms.iter_mut().zip(controls)) {
+            control.iter().try_for_each(|control| control.register(&self.epoll, EventData::new_u64(data)))?;
+            entry.control = control;
+        }
+        Ok(())
     }
 
     /// Runs until a signal ends it.
@@ -90,6 +109,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
                 match event.data.u64() {
                     SIGNALS => {}
                     CLIENTS => self.clients.as_mut().map_or(Ok(()), Clients::update)?,
+                    data @ CONTROL.. => self.poll_control(data, now)?,
                     number => self.poll_arm(usize::try_from(number).unwrap_or(usize::MAX), now)?,
                 }
             }
@@ -152,6 +172,21 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         }
     }
 
+    /// Polls the control socket of an arm.
+    fn poll_control(&mut self, data: u64, now: Instant) -> io::Result<()> {
+        let number = usize::try_from(data - CONTROL).unwrap_or(usize::MAX);
+        let Some(entry) = self.arms.get_mut(number).filter(|entry| !entry.has_failed) else { return Ok(()) };
+        let Entry { arm, control: Some(control), due, .. } = entry else { return Ok(()) };
+        let execute = |line: &[u8]| {
+            arm.log_ended_faults();
+            request::line(request::parse(line).and_then(|request| execute(arm, now, request)))
+        };
+        if control.poll(&self.epoll, EventData::new_u64(data), execute)? {
+            *due = now;
+        }
+        Ok(())
+    }
+
     /// Polls an arm. If its port fails, the arm ends; an error means that no arm is left.
     fn poll_arm(&mut self, number: usize, now: Instant) -> io::Result<()> {
         let Some(entry) = self.arms.get_mut(number).filter(|entry| !entry.has_failed) else { return Ok(()) };
@@ -170,6 +205,7 @@ impl<F: NorFlash + Clone, C: ArmController> Entry<F, C> {
         epoll: &OwnedFd,
     ) -> io::Result<()> {
         self.due = self.arm.poll(now, clients)?;
+        self.arm.log_ended_faults();
         if self.interest != self.arm.interest() {
             self.interest = self.arm.interest();
             let number = u64::try_from(number).unwrap_or(u64::MAX);
@@ -180,6 +216,7 @@ impl<F: NorFlash + Clone, C: ArmController> Entry<F, C> {
 
     fn fail(&mut self, failure: &io::Error, epoll: &OwnedFd) {
         self.arm.report_failure(failure);
+        self.control = None;
         // This fails if epoll itself has failed.
         let _ = epoll::delete(epoll, &self.arm);
         self.due = Instant::FAR_FUTURE;

@@ -17,20 +17,22 @@ use clap::Parser;
 use host_sim::bus_line::BusLine;
 use host_sim::cli::{Options, in_one_line};
 use host_sim::clock::Clock;
+use host_sim::control::{self, socket::ControlSocket};
 use host_sim::eeprom::{Eeprom, ImageError};
 use host_sim::event_loop::EventLoop;
 use host_sim::image_file::ImageFile;
 use host_sim::per_arm;
+use host_sim::private_socket::SocketError;
 use host_sim::pty_arm::PtyArm;
 use host_sim::real_servos::{self, RealServos};
-use host_sim::servo_socket::{ServoSocket, SocketError};
+use host_sim::servo_socket::ServoSocket;
 use host_sim::servos_only::{self, ServosOnly, ServosOnlyError};
 use host_sim::signals::Signals;
 use host_sim::trace::Trace;
 use motion_core::Controller;
 use protocol_core::time::Duration;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
-use tracing::{Span, error_span};
+use tracing::{Span, error_span, info, warn};
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
 use tty_ports::clients::Clients;
@@ -220,7 +222,7 @@ fn run_arms<C: ArmController>(
     let mut ports = Vec::with_capacity(numbers.len());
     // They exist as long as the loop runs.
     let mut symlinks = Vec::new();
-    for number in numbers {
+    for &number in &numbers {
         let pty = Pty::open(clients.as_mut()).map_err(Failure::Port)?;
         let port = pty.path().to_owned();
         if let Some(link) = &options.link {
@@ -233,9 +235,33 @@ fn run_arms<C: ArmController>(
         options.faults.iter().for_each(|&fault| arm.set_fault(clock.now(), fault));
         arms.push(arm);
     }
-    let event_loop = EventLoop::new(arms, clients).map_err(Failure::Running)?;
+    let mut event_loop = EventLoop::new(arms, clients).map_err(Failure::Running)?;
+    event_loop.add_controls(control_sockets(options, &numbers)?).map_err(Failure::Running)?;
     print_ready(&ports);
     event_loop.run(clock, signals).map_err(Failure::Running)
+}
+
+/// The control sockets of the arms. If the default one cannot be created, the arm has none.
+fn control_sockets(
+    options: &Options,
+    numbers: &[Option<u16>],
+) -> Result<Vec<Option<ControlSocket>>, Failure> {
+    let listen = |path: &Path, number: Option<u16>| {
+        let socket = ControlSocket::listen(&per_arm::path(path, number))?;
+        info!("control socket {}", socket.path().display());
+        Ok::<_, SocketError>(socket)
+    };
+    match &options.control {
+        Some(path) if path.as_os_str() == "none" => Ok(Vec::new()),
+        Some(path) => numbers.iter().map(|&number| Ok(Some(listen(path, number)?))).collect(),
+        None => {
+            let default = control::path::default();
+            let path = default.inspect_err(|cause| warn!("no control socket: {cause}: see --control")).ok();
+            let warned = |error: &SocketError| warn!("no control socket: {error}");
+            let listen = |number| listen(path.as_ref()?, number).inspect_err(warned).ok();
+            Ok(numbers.iter().map(|&number| listen(number)).collect())
+        }
+    }
 }
 
 /// Switches an arm on.

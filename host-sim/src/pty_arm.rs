@@ -2,9 +2,10 @@
 
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
+use std::path::Path;
 
 use arm_sim::controller::ArmController;
-use arm_sim::faults::ArmFault;
+use arm_sim::faults::{ArmFault, FaultReport};
 use arm_sim::pace;
 use arm_sim::plant::Plant;
 use arm_sim::servo_bus::ServoBus;
@@ -19,6 +20,9 @@ use tracing::{Span, error, info};
 use tty_ports::clients::Clients;
 use tty_ports::pty::Pty;
 
+/// Faults that ended by themselves, of which the reports are kept.
+const ENDED_FAULTS: usize = 16;
+
 /// An arm on a pseudo-terminal.
 #[derive(Debug)]
 pub struct PtyArm<F, B = Plant, C = Controller> {
@@ -28,6 +32,8 @@ pub struct PtyArm<F, B = Plant, C = Controller> {
     is_blocked: bool,
     /// The span of its log lines.
     span: Span,
+    /// The last faults that ended by themselves.
+    ended_faults: Vec<FaultReport>,
 }
 
 impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
@@ -48,13 +54,43 @@ impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
     pub fn set_seed(&mut self, seed: u64) {
         self.simulation.set_seed(seed);
     }
+
+    /// The arm without its port.
+    pub const fn simulation_mut(&mut self) -> &mut SimulatedArm<F, Plant, C> {
+        &mut self.simulation
+    }
+
+    /// Logs the faults that ended by themselves since the last call.
+    pub fn log_ended_faults(&mut self) {
+        let ended = self.simulation.take_ended_faults();
+        if ended.is_empty() {
+            return;
+        }
+        let _inside = self.span.enter();
+        ended.iter().for_each(|report| info!("fault over: {report}"));
+        self.ended_faults.extend(ended);
+        let excess = self.ended_faults.len().saturating_sub(ENDED_FAULTS);
+        self.ended_faults.drain(..excess);
+    }
+
+    /// The last faults that ended by themselves, 16 at most.
+    #[must_use]
+    pub fn ended_faults(&self) -> &[FaultReport] {
+        &self.ended_faults
+    }
+
+    /// The path of the port.
+    #[must_use]
+    pub fn port(&self) -> &Path {
+        self.pty.path()
+    }
 }
 
 impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
     /// Connects an arm to a pseudo-terminal. Its log lines are in `span`.
     #[must_use]
     pub const fn new(simulation: SimulatedArm<F, B, C>, pty: Pty, span: Span) -> Self {
-        Self { simulation, pty, is_blocked: false, span }
+        Self { simulation, pty, is_blocked: false, span, ended_faults: Vec::new() }
     }
 
     /// Switches it off and on.

@@ -6,6 +6,8 @@ use sevenbot::Map;
 use crate::command_error::CommandError;
 #[cfg(target_os = "linux")]
 use crate::commands::serve;
+#[cfg(unix)]
+use crate::commands::sim;
 use crate::commands::{
     backup, baud, calibrate, effector, get, info, model, monitor, move_to, play, plot, ports, pose, position,
     record, registers, servo, set, shell, sniff, state, stop, stream,
@@ -97,6 +99,8 @@ pub(crate) enum Command {
     #[cfg(target_os = "linux")]
     Serve(serve::ServeArgs),
     Servo(servo::ServoArgs),
+    #[cfg(unix)]
+    Sim(sim::SimArgs),
     Registers(registers::RegistersArgs),
     Model(model::ModelArgs),
     Completions(shell::CompletionsArgs),
@@ -131,6 +135,8 @@ impl Command {
             #[cfg(target_os = "linux")]
             Self::Serve(args) => serve::run(session, &args),
             Self::Servo(args) => servo::run(session, &args),
+            #[cfg(unix)]
+            Self::Sim(args) => sim::run(session, &args),
             Self::Registers(args) => registers::run(session, &args),
             Self::Model(args) => model::run(&args),
             Self::Completions(args) => shell::completions(session, &args, Cli::command()),

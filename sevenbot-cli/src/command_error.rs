@@ -50,6 +50,12 @@ pub(crate) enum CommandError {
     HostLink { port: String },
     /// A failure with advice of its own.
     WithAdvice { message: String, advice: &'static [&'static str] },
+    /// No simulator has a control socket for the request.
+    #[cfg(unix)]
+    NoSimulator { message: String, advice: Vec<String> },
+    /// The simulator refused the request.
+    #[cfg(unix)]
+    SimulatorRefused { message: String, hint: String },
     /// A file cannot be read or written, or has the wrong content.
     File { path: PathBuf, reason: String },
     /// The output cannot be written.
@@ -117,6 +123,10 @@ impl CommandError {
             Self::NoArm { .. } | Self::SeveralArms { .. } => 3,
             Self::Open { .. } | Self::NoRate { .. } | Self::Exchange(_) => 3,
             Self::Servo { error: ServoError::NotTaken { .. }, .. } | Self::WithAdvice { .. } => 1,
+            #[cfg(unix)]
+            Self::NoSimulator { .. } => 3,
+            #[cfg(unix)]
+            Self::SimulatorRefused { .. } => 1,
             Self::Servo { .. } | Self::NoServo { .. } | Self::HostLink { .. } => 3,
             Self::Interrupted => INTERRUPTED,
         })
@@ -156,6 +166,10 @@ impl CommandError {
                 "{port}: this is the arm's host link: its controller answers here, not its servos"
             )),
             Self::WithAdvice { message, .. } => Some(message.clone()),
+            #[cfg(unix)]
+            Self::NoSimulator { message, .. } | Self::SimulatorRefused { message, .. } => {
+                Some(message.clone())
+            }
             Self::File { path, reason } => Some(format!("{}: {reason}", path.display())),
             Self::Interrupted => Some("interrupted".to_owned()),
         }
@@ -180,6 +194,10 @@ impl CommandError {
             Self::Exchange(error) => owned(advice::exchange(error)),
             Self::Servo { error, .. } => owned(advice::servo(error)),
             Self::WithAdvice { advice, .. } => owned(advice),
+            #[cfg(unix)]
+            Self::NoSimulator { advice, .. } => advice.clone(),
+            #[cfg(unix)]
+            Self::SimulatorRefused { hint, .. } => vec![hint.clone()],
             Self::HostLink { .. } => {
                 owned(&["use an adapter on the servo bus, and take the arm's controller off that bus"])
             }

@@ -17,6 +17,12 @@ use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
 
 impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
+    /// The controller.
+    #[must_use]
+    pub const fn controller(&self) -> &C {
+        &self.controller
+    }
+
     /// Draws the faults of the host line from this seed from now on. By default it is 1.
     pub fn set_seed(&mut self, seed: u64) {
         (self.to_arm, self.to_host) = LineDirection::pair(seed);

@@ -21,6 +21,8 @@ pub(crate) mod serve;
 pub(crate) mod servo;
 pub(crate) mod set;
 pub(crate) mod shell;
+#[cfg(unix)]
+pub(crate) mod sim;
 pub(crate) mod sniff;
 pub(crate) mod state;
 pub(crate) mod stop;

@@ -1,0 +1,165 @@
+//! The requests of a control socket, and the shape of an answer.
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// A request.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Request {
+    /// Gives the arm a fault, for a time or until it is taken back.
+    Fault {
+        /// The fault, as in `--fault`.
+        fault: String,
+        /// The duration in milliseconds of virtual time.
+        for_ms: Option<u64>,
+    },
+    /// Takes faults back.
+    Clear {
+        /// The location, as `3` or `line`. All faults without it.
+        at: Option<String>,
+    },
+    /// Lists the faults.
+    Faults,
+    /// A hand turns a joint, holds it or lets it go.
+    Hand {
+        /// The joint, 1 to 7.
+        joint: u8,
+        /// The angle or the action.
+        to: HandAction,
+    },
+    /// Puts a weight into the gripper.
+    Weight {
+        /// The weight; 0 takes it away.
+        grams: u16,
+    },
+    /// Switches the power.
+    Power {
+        /// The state of the power.
+        to: Power,
+    },
+    /// Restarts the controller. The servos keep their power.
+    Restart,
+    /// Stops the controller, as a program that hangs.
+    Halt,
+    /// Asks for the state of the arm.
+    State,
+}
+
+/// What a hand does with a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum HandAction {
+    /// Turns it to this angle in degrees, and holds it there.
+    Degrees(f64),
+    /// Holds it, or lets it go.
+    Grip(Grip),
+}
+
+/// Does a hand hold a joint?
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Grip {
+    /// Until the joint has torque.
+    Hold,
+    /// Without torque, a loaded joint falls.
+    LetGo,
+}
+
+/// What the power switch does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Power {
+    /// Off, until it is switched on.
+    Off,
+    /// On, if it is off.
+    On,
+    /// Off and on.
+    Cycle,
+}
+
+/// Why a request was refused.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// What is wrong.
+    pub error: String,
+    /// What to do.
+    pub hint: &'static str,
+}
+
+impl Refusal {
+    /// A refusal with a hint.
+    #[must_use]
+    pub fn new(error: impl ToString, hint: &'static str) -> Self {
+        Self { error: error.to_string(), hint }
+    }
+}
+
+/// Parses a line.
+///
+/// # Errors
+/// It is no request.
+pub fn parse(line: &[u8]) -> Result<Request, Refusal> {
+    serde_json::from_slice(line).map_err(|error| {
+        Refusal::new(
+            error,
+            "a request is one JSON object in a line, as {\"do\":\"state\"}; docs/simulation.md lists them",
+        )
+    })
+}
+
+/// The line of an answer, with its end.
+#[must_use]
+pub fn line(answer: Result<Value, Refusal>) -> String {
+    let value = match answer {
+        Ok(result) => json!({ "ok": result }),
+        Err(Refusal { error, hint }) => json!({ "error": error, "hint": hint }),
+    };
+    format!("{value}\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_are_json_objects() {
+        for (line, request) in [
+            (r#"{"do":"faults"}"#, Request::Faults),
+            (r#"{"do":"clear"}"#, Request::Clear { at: None }),
+            (
+                r#"{"do":"hand","joint":2,"to":120}"#,
+                Request::Hand { joint: 2, to: HandAction::Degrees(120.0) },
+            ),
+            (
+                r#"{"do":"hand","joint":2,"to":"let-go"}"#,
+                Request::Hand { joint: 2, to: HandAction::Grip(Grip::LetGo) },
+            ),
+            (r#"{"do":"power","to":"cycle"}"#, Request::Power { to: Power::Cycle }),
+            (
+                r#" {"do":"fault","fault":"3=missing","for_ms":2000} "#,
+                Request::Fault { fault: "3=missing".to_owned(), for_ms: Some(2_000) },
+            ),
+        ] {
+            assert_eq!(parse(line.as_bytes()), Ok(request));
+        }
+        for wrong in [
+            "",
+            "{",
+            "[]",
+            r#"{"do":"stat"}"#,
+            r#"{"do":"weight","grams":-1}"#,
+            r#"{"do":"weight","gram":1}"#,
+        ] {
+            assert!(parse(wrong.as_bytes()).is_err(), "{wrong}");
+        }
+        assert!(parse(b"\xFF\xFE").is_err());
+    }
+
+    #[test]
+    fn an_answer_is_one_line() {
+        assert_eq!(line(Ok(json!({}))), "{\"ok\":{}}\n");
+        let refused = line(Err(Refusal::new("a\nb", "c")));
+        assert_eq!(refused, "{\"error\":\"a\\nb\",\"hint\":\"c\"}\n");
+    }
+}

@@ -1,0 +1,277 @@
+//! The clients of a control socket: lines in, lines out, with bounded memory.
+//!
+//! A client that sends garbage gets errors. A client that does not read its answers waits until it does. A line that is
+//! too long, or one client too many, ends the connection. The others notice nothing.
+
+use std::io::{self, Read, Write};
+use std::mem;
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+
+use rustix::event::epoll::{self, EventData, EventFlags};
+
+use super::request::{Refusal, line};
+use crate::private_socket::{PrivateSocket, SocketError, is_temporary};
+
+/// The longest line, in bytes.
+const LONGEST_LINE: usize = 4_096;
+/// No request of a client is executed while this many bytes of answers wait for it.
+const LONGEST_BACKLOG: usize = 64 * 1_024;
+/// Clients at the same time.
+const CLIENTS: usize = 16;
+
+/// A control socket and its clients.
+#[derive(Debug)]
+pub struct ControlSocket {
+    socket: PrivateSocket,
+    clients: Vec<Client>,
+}
+
+#[derive(Debug)]
+struct Client {
+    stream: UnixStream,
+    input: Vec<u8>,
+    output: Vec<u8>,
+    /// It sends nothing more, or nothing more is accepted.
+    is_at_end: bool,
+    /// The connection failed.
+    is_gone: bool,
+    interest: EventFlags,
+}
+
+impl ControlSocket {
+    /// Listens at `path`, for this user only.
+    ///
+    /// # Errors
+    /// See [`SocketError`].
+    pub fn listen(path: &Path) -> Result<Self, SocketError> {
+        Ok(Self { socket: PrivateSocket::listen("control", path)?, clients: Vec::new() })
+    }
+
+    /// The path of the socket.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.socket.path()
+    }
+
+    /// Lets `epoll` report with `data` when [`ControlSocket::poll`] has to be called.
+    ///
+    /// # Errors
+    /// The operating system refuses.
+    pub fn register(&self, epoll: &OwnedFd, data: EventData) -> io::Result<()> {
+        Ok(epoll::add(epoll, &self.socket, data, EventFlags::IN)?)
+    }
+
+    /// Accepts clients, executes the requests that have arrived, and sends answers. Returns whether there was a request.
+    ///
+    /// # Errors
+    /// The operating system fails: accept or epoll.
+    pub fn poll(
+        &mut self,
+        epoll: &OwnedFd,
+        data: EventData,
+        mut execute: impl FnMut(&[u8]) -> String,
+    ) -> io::Result<bool> {
+        self.accept(epoll, data)?;
+        let mut has_executed = false;
+        for client in &mut self.clients {
+            client.receive();
+            has_executed |= client.execute(&mut execute);
+            client.send();
+            client.update_interest(epoll, data)?;
+        }
+        // Closing a connection removes it from epoll.
+        self.clients.retain(|client| !client.is_done());
+        Ok(has_executed)
+    }
+
+    fn accept(&mut self, epoll: &OwnedFd, data: EventData) -> io::Result<()> {
+        while let Some(stream) = self.socket.accept()? {
+            let mut client = Client::new(stream);
+            if self.clients.len() >= CLIENTS {
+                client.refuse(&Refusal::new("16 clients are connected", "close one of them"));
+                client.send();
+                continue;
+            }
+            epoll::add(epoll, &client.stream, data, client.interest)?;
+            self.clients.push(client);
+        }
+        Ok(())
+    }
+}
+
+impl Client {
+    const fn new(stream: UnixStream) -> Self {
+        let interest = EventFlags::IN;
+        Self { stream, input: Vec::new(), output: Vec::new(), is_at_end: false, is_gone: false, interest }
+    }
+
+    fn receive(&mut self) {
+        let room = LONGEST_LINE.saturating_sub(self.input.len());
+        let mut bytes = [0; LONGEST_LINE];
+        let Some(space) = bytes.get_mut(..room).filter(|space| !space.is_empty() && !self.is_at_end) else {
+            return;
+        };
+        match self.stream.read(space) {
+            Ok(0) => self.is_at_end = true,
+            Ok(count) => self.input.extend(space.iter().take(count)),
+            Err(error) => self.is_gone |= !is_temporary(&error),
+        }
+    }
+
+    /// Executes the whole lines. Returns whether there was one.
+    fn execute(&mut self, execute: &mut impl FnMut(&[u8]) -> String) -> bool {
+        let mut has_executed = false;
+        while self.output.len() < LONGEST_BACKLOG
+            && let Some(end) = self.input.iter().position(|&byte| byte == b'\n')
+        {
+            let rest = self.input.split_off(end + 1);
+            let request = mem::replace(&mut self.input, rest);
+            if !request.trim_ascii().is_empty() {
+                self.output.extend_from_slice(execute(request.trim_ascii()).as_bytes());
+                has_executed = true;
+            }
+        }
+        if self.input.len() >= LONGEST_LINE && !self.input.contains(&b'\n') {
+            self.input.clear();
+            self.refuse(&Refusal::new(
+                "a line has more than 4096 bytes",
+                "end each request with a line feed",
+            ));
+        }
+        has_executed
+    }
+
+    /// Sends an error, and then closes the connection.
+    fn refuse(&mut self, refusal: &Refusal) {
+        self.output.extend_from_slice(line(Err(refusal.clone())).as_bytes());
+        self.is_at_end = true;
+    }
+
+    fn send(&mut self) {
+        while !self.output.is_empty() && !self.is_gone {
+            match self.stream.write(&self.output) {
+                Ok(count) => drop(self.output.drain(..count)),
+                Err(error) if is_temporary(&error) => return,
+                Err(_) => self.is_gone = true,
+            }
+        }
+    }
+
+    fn is_done(&self) -> bool {
+        let has_request = self.input.contains(&b'\n');
+        self.is_gone || (self.is_at_end && self.output.is_empty() && !has_request)
+    }
+
+    fn update_interest(&mut self, epoll: &OwnedFd, data: EventData) -> io::Result<()> {
+        let mut interest = EventFlags::empty();
+        interest.set(EventFlags::IN, !self.is_at_end && self.input.len() < LONGEST_LINE);
+        interest.set(EventFlags::OUT, !self.output.is_empty());
+        if interest != self.interest && !self.is_done() {
+            self.interest = interest;
+            epoll::modify(epoll, &self.stream, data, interest)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{BufRead, BufReader};
+
+    use rustix::event::epoll::CreateFlags;
+
+    use super::*;
+
+    struct Rig {
+        socket: ControlSocket,
+        epoll: OwnedFd,
+        directory: tempfile::TempDir,
+    }
+
+    impl Rig {
+        fn new() -> Self {
+            let directory = tempfile::tempdir().unwrap();
+            let socket = ControlSocket::listen(&directory.path().join("control")).unwrap();
+            let epoll = epoll::create(CreateFlags::CLOEXEC).unwrap();
+            socket.register(&epoll, EventData::new_u64(0)).unwrap();
+            Self { socket, epoll, directory }
+        }
+
+        fn connect(&self) -> UnixStream {
+            let client = UnixStream::connect(self.directory.path().join("control")).unwrap();
+            client.set_nonblocking(true).unwrap();
+            client
+        }
+
+        /// Polls, with requests that are answered with their own length.
+        fn poll(&mut self) {
+            let answer = |request: &[u8]| format!("{}\n", request.len());
+            self.socket.poll(&self.epoll, EventData::new_u64(0), answer).unwrap();
+        }
+
+        fn lines(&mut self, client: &UnixStream) -> Vec<String> {
+            self.poll();
+            BufReader::new(client).lines().map_while(Result::ok).collect()
+        }
+    }
+
+    #[test]
+    fn each_line_has_an_answer_however_it_arrives() {
+        let mut rig = Rig::new();
+        let mut client = rig.connect();
+        client.write_all(b"abc\n\n  \nab").unwrap();
+        assert_eq!(rig.lines(&client), ["3"], "empty lines have no answer");
+        client.write_all(b"cd\r\n").unwrap();
+        assert_eq!(rig.lines(&client), ["4"]);
+    }
+
+    #[test]
+    fn the_last_requests_are_answered_after_the_client_has_closed_its_direction() {
+        let mut rig = Rig::new();
+        let mut client = rig.connect();
+        client.write_all(b"abc\nhalf a line").unwrap();
+        client.shutdown(std::net::Shutdown::Write).unwrap();
+        rig.poll();
+        assert_eq!(rig.lines(&client), ["3"]);
+        assert!(rig.socket.clients.is_empty());
+    }
+
+    #[test]
+    fn a_line_without_end_ends_the_connection() {
+        let mut rig = Rig::new();
+        let (mut bad, mut good) = (rig.connect(), rig.connect());
+        bad.write_all(&[b'x'; LONGEST_LINE + 1]).unwrap();
+        good.write_all(b"abc\n").unwrap();
+        assert_eq!(rig.lines(&good), ["3"]);
+        assert!(rig.lines(&bad)[0].contains("4096"));
+        assert_eq!(rig.socket.clients.len(), 1);
+    }
+
+    #[test]
+    fn a_client_that_does_not_read_fills_no_memory() {
+        let mut rig = Rig::new();
+        let mut client = rig.connect();
+        let mut sent = 0;
+        for _ in 0..1_000 {
+            sent += client.write(&[b"x\n".as_slice(); 2_000].concat()).unwrap_or(0);
+            rig.socket
+                .poll(&rig.epoll, EventData::new_u64(0), |_| format!("{}\n", "y".repeat(1_000)))
+                .unwrap();
+        }
+        let [client] = rig.socket.clients.as_slice() else { panic!("one client") };
+        assert!(client.output.len() < LONGEST_BACKLOG + 2_000 && client.input.len() <= LONGEST_LINE);
+        assert!(sent < 1_000_000, "{sent} bytes were accepted");
+    }
+
+    #[test]
+    fn a_client_too_many_is_told_so() {
+        let mut rig = Rig::new();
+        let clients: Vec<UnixStream> = (0..=CLIENTS).map(|_| rig.connect()).collect();
+        assert!(rig.lines(&clients[CLIENTS])[0].contains("16 clients"));
+        drop(clients);
+        rig.poll();
+        assert!(rig.socket.clients.is_empty());
+    }
+}

@@ -1,0 +1,265 @@
+//! `sim`: controls a running simulator through its control socket, apart from the arm's port.
+
+mod socket;
+mod text;
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::command_error::CommandError;
+use crate::printer::Printable;
+use crate::session::Session;
+use socket::Connection;
+
+/// Control a running simulator: faults, a hand, a weight, power.
+///
+/// host-sim opens a control socket beside the arm's port. These commands use it, so that another program can drive the
+/// arm at the same time. All durations are virtual time.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  host-sim --link ./7bot                       in another terminal; in the source tree: cargo sim -- --link ./7bot
+  sevenbot sim fault 3=missing --for 2s        joint 3 does not answer for two seconds
+  sevenbot sim fault line=loss=1%              the host line loses a byte in a hundred, until it is cleared
+  sevenbot sim fault list                      the faults, and how often each took effect
+  sevenbot sim hand 2 120                      a hand turns joint 2 to 120 degrees, and holds it there
+  sevenbot sim weight 150g                     a weight in the gripper
+  sevenbot sim power cycle                     off and on
+  sevenbot sim state                           the true angles, whatever the arm says
+
+Without --control the only simulator that is running is used, or the one whose port is --port. host-sim
+prints the path of its socket when it starts.
+
+Exit status: 1 if the simulator refused, 3 if none was found.")]
+pub(crate) struct SimArgs {
+    /// Control socket of the simulator.
+    #[arg(long, global = true, value_name = "PATH", env = "SEVENBOT_CONTROL", hide_env_values = true)]
+    control: Option<PathBuf>,
+    #[command(subcommand)]
+    command: SimCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum SimCommand {
+    Fault(FaultArgs),
+    Hand(HandArgs),
+    Weight(WeightArgs),
+    /// Switch the power of the arm.
+    Power {
+        /// 'off' loses what is in RAM, and loaded joints fall; 'cycle' is off and on.
+        to: PowerState,
+    },
+    /// Restart the controller, as its watchdog does. The servos keep power, torque and goals.
+    Restart,
+    /// Stop the controller, as a program that hangs, until `restart` or `power cycle`.
+    Halt,
+    /// Show the true state of the arm: angles, torque, loads, supply and faults.
+    State,
+}
+
+/// Give the arm a fault, list the faults, or take them back.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Faults:
+  3=missing                  the servo of joint 3 has no power
+  3=late, 3=late=MS          its answers are 30 ms late, or MS
+  3=garbled, 3=garbled=N     each answer has a wrong checksum, or each Nth one
+  3=stuck                    something keeps it from turning
+  3=restarting=MS            it restarts each MS, and loses its torque
+  bus=echo                   the controller receives its own bytes
+  supply=volts=V             the supply has V volts instead of 7.4; a servo restarts below 4.5
+  supply=dips=MS             each MS it falls to 3 V for 20 ms
+  supply=off                 the servos have no supply; the controller has its own
+  flash=fails, flash=full    no settings can be stored
+  line=loss=P%, line=corruption=P%, line=delay=MS      of the bytes on the host line
+  arm=supported              no fault: a stand supports the arm, and it does not fall
+  arm=goal-starts-torque     in a servo that restarted, a goal switches torque on
+
+Examples:
+  sevenbot sim fault 3=garbled=10              until it is cleared
+  sevenbot sim fault supply=off --for 500ms    by itself over after half a second of virtual time
+  sevenbot sim fault list                      active faults, and those that ended by themselves
+  sevenbot sim fault clear 3                   those of joint 3; also line, supply, flash, bus, arm
+  sevenbot sim fault clear                     all
+
+A fault that never took effect is marked: a test with such a fault proves nothing.")]
+struct FaultArgs {
+    /// The fault, 'list' or 'clear'.
+    #[arg(value_name = "FAULT|list|clear")]
+    action: String,
+    /// With 'clear': the joint, or line, supply, flash, bus or arm.
+    at: Option<String>,
+    /// The duration, as 2s or 500ms; without it the fault stays until it is cleared.
+    #[arg(long = "for", value_name = "TIME", value_parser = millis)]
+    for_ms: Option<u64>,
+}
+
+/// Turn a joint by hand, hold it, or let it go.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot sim hand 2 120                      turns joint 2 to 120 degrees, and holds it there
+  sevenbot sim hand 2 hold                     holds it where it is, until it has torque
+  sevenbot sim hand 2 let-go                   without torque, a loaded joint falls
+
+A motor with torque is stronger: it turns the joint back. The fault 2=stuck keeps it from turning.")]
+struct HandArgs {
+    /// The joint, 1 to 7.
+    joint: u8,
+    /// The angle in degrees, 'hold' or 'let-go'.
+    #[arg(value_name = "DEGREES|hold|let-go", value_parser = hand)]
+    to: Value,
+}
+
+/// Put a weight into the gripper; 0 takes it away.
+#[derive(Debug, Args)]
+struct WeightArgs {
+    /// The weight in grams, as 150g or 150, up to 1000.
+    #[arg(value_parser = grams)]
+    weight: u16,
+}
+
+#[derive(Clone, Copy, Debug, Serialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+enum PowerState {
+    On,
+    Off,
+    Cycle,
+}
+
+/// Parses a duration into milliseconds: 250ms, 2s, 1.5s or 3min.
+fn millis(text: &str) -> Result<u64, &'static str> {
+    const WANTED: &str = "use a time of 1 ms or more with its unit, as 250ms, 2s or 3min";
+    let digits = text.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
+    let factor = match text.get(digits.len()..) {
+        Some("ms") => 1.0,
+        Some("s") => 1_000.0,
+        Some("min") => 60_000.0,
+        _ => return Err(WANTED),
+    };
+    let millis = digits.parse::<f64>().map_err(|_| WANTED)? * factor;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the range")]
+    if (1.0..=1e12).contains(&millis) { Ok(millis.round() as u64) } else { Err(WANTED) }
+}
+
+/// Parses a weight in grams.
+fn grams(text: &str) -> Result<u16, &'static str> {
+    text.strip_suffix('g').unwrap_or(text).parse().map_err(|_| "use grams from 0 to 1000, as 150g")
+}
+
+/// Parses what a hand does.
+fn hand(text: &str) -> Result<Value, &'static str> {
+    match text {
+        "hold" | "let-go" => Ok(json!(text)),
+        degrees => degrees
+            .parse::<f64>()
+            .map(|degrees| json!(degrees))
+            .map_err(|_| "use an angle in degrees from 0 to 180, hold or let-go"),
+    }
+}
+
+/// An answer of the simulator.
+struct Answer<'a> {
+    command: &'a SimCommand,
+    value: Value,
+}
+
+impl Serialize for Answer<'_> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.value.serialize(serializer)
+    }
+}
+
+impl Printable for Answer<'_> {
+    fn write_text(&self, out: &mut dyn std::io::Write) -> std::io::Result<()> {
+        match self.command {
+            SimCommand::Fault(args) => text::faults(out, &args.action, &self.value),
+            SimCommand::Hand(args) => text::hand(out, args.joint, &self.value),
+            SimCommand::State => text::state(out, &self.value),
+            SimCommand::Weight(_) | SimCommand::Power { .. } | SimCommand::Restart | SimCommand::Halt => {
+                Ok(())
+            }
+        }
+    }
+}
+
+pub(crate) fn run(session: &mut Session, args: &SimArgs) -> Result<(), CommandError> {
+    let request = request(&args.command)?;
+    let mut connection = Connection::open(args.control.as_deref(), session.port.as_deref())?;
+    let value = connection.ask(&request)?;
+    session.printer.print(&Answer { command: &args.command, value })
+}
+
+/// The request of a command.
+fn request(command: &SimCommand) -> Result<Value, CommandError> {
+    Ok(match command {
+        SimCommand::Fault(args) => return fault_request(args),
+        SimCommand::Hand(HandArgs { joint, to }) => json!({ "do": "hand", "joint": joint, "to": to }),
+        SimCommand::Weight(WeightArgs { weight }) => json!({ "do": "weight", "grams": weight }),
+        SimCommand::Power { to } => json!({ "do": "power", "to": to }),
+        SimCommand::Restart => json!({ "do": "restart" }),
+        SimCommand::Halt => json!({ "do": "halt" }),
+        SimCommand::State => json!({ "do": "state" }),
+    })
+}
+
+fn fault_request(args: &FaultArgs) -> Result<Value, CommandError> {
+    let FaultArgs { action, at, for_ms } = args;
+    match (action.as_str(), at, for_ms) {
+        ("list", None, None) => Ok(json!({ "do": "faults" })),
+        ("clear", at, None) => Ok(json!({ "do": "clear", "at": at })),
+        ("list" | "clear", _, Some(_)) => {
+            Err(CommandError::Usage("--for belongs to a fault, as in `fault 3=missing --for 2s`".to_owned()))
+        }
+        (_, Some(at), _) => {
+            Err(CommandError::Usage(format!("'{at}' is too much: a location follows only 'clear'")))
+        }
+        (fault, None, for_ms) => Ok(json!({ "do": "fault", "fault": fault, "for_ms": for_ms })),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_have_a_unit() {
+        for (text, value) in
+            [("250ms", 250), ("2s", 2_000), ("1.5s", 1_500), ("3min", 180_000), ("0.0014s", 1)]
+        {
+            assert_eq!(millis(text), Ok(value), "{text}");
+        }
+        for wrong in ["250", "0ms", "-1s", "s", "", "2h", "infs", "nans", "1e99s"] {
+            assert!(millis(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn weights_are_grams() {
+        assert_eq!((grams("150g"), grams("0")), (Ok(150), Ok(0)));
+        assert!(grams("1kg").is_err() && grams("-1").is_err());
+    }
+
+    #[test]
+    fn a_location_follows_only_clear() {
+        let args = |action: &str, at: Option<&str>, for_ms| FaultArgs {
+            action: action.to_owned(),
+            at: at.map(str::to_owned),
+            for_ms,
+        };
+        let ok = |args: FaultArgs| fault_request(&args).ok();
+        assert_eq!(ok(args("clear", Some("3"), None)), Some(json!({ "do": "clear", "at": "3" })));
+        assert_eq!(ok(args("clear", None, None)), Some(json!({ "do": "clear", "at": null })));
+        assert_eq!(ok(args("list", None, None)), Some(json!({ "do": "faults" })));
+        let fault = json!({ "do": "fault", "fault": "3=late", "for_ms": 5 });
+        assert_eq!(ok(args("3=late", None, Some(5))), Some(fault));
+        for wrong in
+            [args("list", None, Some(5)), args("list", Some("3"), None), args("3=late", Some("3"), None)]
+        {
+            assert!(matches!(fault_request(&wrong), Err(CommandError::Usage(_))), "{wrong:?}");
+        }
+    }
+}

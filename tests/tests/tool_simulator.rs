@@ -1,0 +1,255 @@
+//! `sevenbot sim`: faults, a hand, a weight and power of a running simulator, and clients that behave badly.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output};
+
+use serde_json::{Value, json};
+use system_tests::process::{self, Signal};
+use system_tests::programs::{host_sim, tool};
+use system_tests::registers::{EFFECTOR_TYPE, MISSING_SERVOS, MOTOR_STATE};
+use system_tests::{ArmClient, wait};
+use tempfile::TempDir;
+
+/// A simulator, and its folder for everything.
+struct Simulator {
+    process: Child,
+    ports: Vec<PathBuf>,
+    folder: TempDir,
+}
+
+impl Simulator {
+    fn start(arguments: &[&str]) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut command = Command::new(host_sim());
+        command.args(["--eeprom", "none"]).args(arguments).env("XDG_RUNTIME_DIR", folder.path());
+        let arms = arguments.iter().position(|&argument| argument == "--arms");
+        let count = arms.map_or(1, |index| arguments[index + 1].parse().expect("a number"));
+        let (process, ports) = process::start(&mut command, count).expect("host-sim starts");
+        Self { process, ports, folder }
+    }
+
+    fn client(&self) -> ArmClient {
+        ArmClient::open(&self.ports[0], 115_200)
+    }
+
+    /// The control sockets, in the order of their names.
+    fn sockets(&self) -> Vec<PathBuf> {
+        let entries = fs::read_dir(self.folder.path().join("7bot")).expect("the folder of the sockets");
+        let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
+        paths.sort();
+        paths
+    }
+
+    fn sim(&self, arguments: &[&str]) -> Output {
+        let mut tool = tool();
+        tool.env("XDG_RUNTIME_DIR", self.folder.path()).env_remove("SEVENBOT_PORT");
+        tool.arg("sim").args(arguments).output().expect("sevenbot runs")
+    }
+
+    /// What a command prints that succeeds.
+    #[track_caller]
+    fn says(&self, arguments: &[&str]) -> String {
+        let output = self.sim(arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).expect("text")
+    }
+
+    /// What a command prints that fails with this exit status.
+    #[track_caller]
+    fn refuses(&self, arguments: &[&str], status: i32) -> String {
+        let output = self.sim(arguments);
+        assert_eq!(output.status.code(), Some(status), "{}", String::from_utf8_lossy(&output.stdout));
+        String::from_utf8(output.stderr).expect("text")
+    }
+
+    fn state(&self) -> Value {
+        serde_json::from_str(&self.says(&["state", "--json"])).expect("JSON")
+    }
+
+    fn joint(&self, number: usize, key: &str) -> Value {
+        self.state()["joints"][number - 1][key].clone()
+    }
+}
+
+impl Drop for Simulator {
+    fn drop(&mut self) {
+        process::kill(&mut self.process);
+    }
+}
+
+/// A client of a control socket.
+struct Control(BufReader<UnixStream>);
+
+impl Control {
+    fn connect(path: &Path) -> Self {
+        Self(BufReader::new(UnixStream::connect(path).expect("a control socket")))
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        self.0.get_mut().write_all(bytes).expect("it accepts bytes");
+    }
+
+    fn answer(&mut self) -> Value {
+        let mut line = String::new();
+        self.0.read_line(&mut line).expect("an answer");
+        serde_json::from_str(&line).expect("JSON")
+    }
+
+    fn ask(&mut self, request: &Value) -> Value {
+        self.send(format!("{request}\n").as_bytes());
+        self.answer()
+    }
+}
+
+#[test]
+fn a_fault_begins_and_ends_while_the_arm_runs_and_tells_its_effects() {
+    let simulator = Simulator::start(&[]);
+    let mut arm = simulator.client();
+    wait::wait_until("all servos answer", || arm.register(MISSING_SERVOS) == 0);
+    assert_eq!(simulator.says(&["fault", "list"]), "no faults\n");
+    simulator.says(&["fault", "3=missing"]);
+    wait::wait_until("joint 3 is missing", || arm.register(MISSING_SERVOS) == 0b100);
+    let list = simulator.says(&["fault", "list"]);
+    assert!(list.starts_with("active    3=missing: ") && list.contains(" frames"), "{list}");
+    assert!(simulator.says(&["fault", "clear", "3"]).starts_with("cleared   3=missing: "));
+    wait::wait_until("joint 3 answers", || arm.register(MISSING_SERVOS) == 0);
+    simulator.says(&["fault", "4=late=20", "--for", "50ms"]);
+    wait::wait_until("the fault is over", || {
+        simulator.says(&["fault", "list"]).starts_with("ended     4=late=20")
+    });
+    simulator.says(&["fault", "5=garbled=1000000"]);
+    let cleared = simulator.says(&["fault", "clear"]);
+    assert!(
+        cleared.contains("5=garbled=1000000: 0 of ") && cleared.contains("never took effect"),
+        "{cleared}"
+    );
+}
+
+#[test]
+fn a_hand_a_weight_and_the_power_switch_act_on_the_arm() {
+    let simulator = Simulator::start(&[]);
+    let mut arm = simulator.client();
+    wait::wait_until("the arm holds", || simulator.joint(3, "torque") == "on");
+    let refusal = simulator.refuses(&["hand", "2", "hold"], 1);
+    assert!(refusal.contains("has torque") && refusal.contains("JOINT=stuck"), "{refusal}");
+    simulator.says(&["weight", "150g"]);
+    wait::wait_until("the forearm carries it", || {
+        simulator.joint(3, "load_percent").as_f64().expect("a load").abs() > 40.0
+    });
+    assert_eq!(simulator.state()["weight_grams"], 150);
+    arm.write(MOTOR_STATE, &[2]);
+    wait::wait_until("the arm is free", || simulator.joint(2, "torque") == "free");
+    assert_eq!(simulator.says(&["hand", "2", "120"]), "joint 2 is at 120.1 degrees\n");
+    assert_eq!(simulator.joint(2, "is_held"), true);
+    simulator.says(&["hand", "2", "let-go"]);
+    arm.write(EFFECTOR_TYPE, &[1]);
+    wait::wait_until("the write is done", || arm.register(EFFECTOR_TYPE) == 1);
+    simulator.says(&["power", "off"]);
+    assert_eq!(
+        (&simulator.state()["controller"], &simulator.state()["supply_volts"]),
+        (&json!("off"), &json!(0.0))
+    );
+    assert!(simulator.refuses(&["halt"], 1).contains("no power"));
+    simulator.says(&["power", "on"]);
+    assert!(simulator.refuses(&["power", "on"], 1).contains("the power is on"));
+    wait::wait_until("the RAM is lost", || arm.register(EFFECTOR_TYPE) == 0);
+    simulator.says(&["halt"]);
+    assert_eq!(simulator.state()["controller"], "halted");
+    simulator.says(&["restart"]);
+    wait::wait_until("it answers again", || arm.register(EFFECTOR_TYPE) == 0);
+}
+
+#[test]
+fn errors_say_what_to_do() {
+    let simulator = Simulator::start(&[]);
+    assert!(simulator.refuses(&["fault", "9=missing"], 1).contains("1 to 7"));
+    assert!(simulator.refuses(&["fault", "line=loss=x"], 1).contains("line=loss=0.5%"));
+    assert!(simulator.refuses(&["fault", "clear", "3"], 1).contains("no such fault"));
+    assert!(simulator.refuses(&["fault", "list", "3"], 2).contains("'clear'"));
+    assert!(simulator.refuses(&["weight", "2000g"], 1).contains("1000 grams"));
+    assert!(simulator.refuses(&["hand", "8", "90"], 1).contains("1 to 7"));
+    assert!(simulator.refuses(&["hand", "2", "200"], 1).contains("180"));
+    assert!(simulator.refuses(&["--control", "/nowhere", "state"], 3).contains("/nowhere"));
+    assert!(simulator.refuses(&["--port", "/dev/null", "state"], 3).contains("/dev/null"));
+    let alone = tool()
+        .env("XDG_RUNTIME_DIR", simulator.folder.path().join("other"))
+        .env_remove("SEVENBOT_PORT")
+        .args(["sim", "state"])
+        .output()
+        .expect("sevenbot runs");
+    let said = String::from_utf8_lossy(&alone.stderr);
+    assert!(alone.status.code() == Some(3) && said.contains("cargo sim"), "{said}");
+}
+
+#[test]
+fn each_arm_has_its_own_socket_and_the_port_chooses_it() {
+    let simulator = Simulator::start(&["--arms", "2"]);
+    let sockets = simulator.sockets();
+    assert_eq!(sockets.len(), 2);
+    for socket in &sockets {
+        assert_eq!(fs::metadata(socket).expect("a socket").permissions().mode() & 0o777, 0o600);
+    }
+    let error = simulator.refuses(&["state"], 3);
+    assert!(error.contains("several") && error.contains(sockets[1].to_str().expect("text")), "{error}");
+    let second = simulator.ports[1].to_str().expect("text");
+    simulator.says(&["--port", second, "weight", "10g"]);
+    let state = simulator.says(&["--port", second, "state"]);
+    assert!(state.contains("weight      10 g") && state.contains(second), "{state}");
+    let first = simulator.says(&["--control", sockets[0].to_str().expect("text"), "state"]);
+    assert!(first.contains("weight      0 g"), "{first}");
+}
+
+#[test]
+fn the_socket_is_removed_at_the_end_and_a_left_one_replaced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("control");
+    let text = path.to_str().expect("text");
+    let mut simulator = Simulator::start(&["--control", text]);
+    process::kill(&mut simulator.process);
+    assert!(path.exists(), "a kill leaves it");
+    let mut simulator = Simulator::start(&["--control", text]);
+    assert!(simulator.says(&["--control", text, "state"]).contains("controller"));
+    process::send_signal(&simulator.process, Signal::TERM);
+    assert!(process::wait_for_exit(&mut simulator.process).success());
+    assert!(!path.exists());
+}
+
+#[test]
+fn clients_that_behave_badly_disturb_neither_the_arm_nor_each_other() {
+    let simulator = Simulator::start(&[]);
+    let path = &simulator.sockets()[0];
+    let mut arm = simulator.client();
+    let mut silent = Control::connect(path);
+    let mut half = Control::connect(path);
+    half.send(br#"{"do":"sta"#);
+    let mut garbage = Control::connect(path);
+    garbage.send(b"\x00\xFF\xFEgarbage\n[]\n{\"do\":\"nothing\"}\n{\"do\":\"state\"}\n");
+    let flood = UnixStream::connect(path).expect("a control socket");
+    flood.set_nonblocking(true).expect("a mode");
+    let mut sent = 0;
+    for _ in 0..1_000 {
+        // It never reads an answer.
+        sent += (&flood).write(&b"{\"do\":\"state\"}\n".repeat(100)).unwrap_or(0);
+        arm.register(EFFECTOR_TYPE);
+    }
+    assert!(sent < 1_000_000, "{sent} bytes");
+    Control::connect(path).send(b"{\"do\":");
+    for _ in 0..3 {
+        let answer = garbage.answer();
+        assert!(answer["error"].is_string() && answer["hint"].is_string(), "{answer}");
+    }
+    assert!(garbage.answer()["ok"]["joints"].is_array());
+    half.send(b"te\"}\n");
+    assert!(half.answer()["ok"]["joints"].is_array());
+    assert_eq!(silent.ask(&json!({ "do": "weight", "grams": 5 })), json!({ "ok": { "grams": 5 } }));
+    let many: Vec<Control> = (0..20).map(|_| Control::connect(path)).collect();
+    arm.register(EFFECTOR_TYPE);
+    drop((many, flood));
+    assert_eq!(silent.ask(&json!({ "do": "faults" }))["ok"]["faults"], json!([]));
+    arm.write(EFFECTOR_TYPE, &[1]);
+    wait::wait_until("the arm obeys", || arm.register(EFFECTOR_TYPE) == 1);
+}
