@@ -103,6 +103,19 @@ impl FromStr for FaultLocation {
     }
 }
 
+impl Display for FaultLocation {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Joint(joint) => write!(out, "{}", joint.number()),
+            Self::Bus => out.write_str("bus"),
+            Self::Supply => out.write_str("supply"),
+            Self::Flash => out.write_str("flash"),
+            Self::Line => out.write_str("line"),
+            Self::Arm => out.write_str("arm"),
+        }
+    }
+}
+
 impl FromStr for ArmFault {
     type Err = UnknownArmFault;
 

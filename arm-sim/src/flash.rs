@@ -48,6 +48,12 @@ impl Memory {
     pub const fn holding(bytes: Vec<u8>) -> Self {
         Self { bytes }
     }
+
+    /// The cells up to the last one that is not erased.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
 }
 
 impl Cells for Memory {

@@ -19,6 +19,7 @@
 
 extern crate alloc;
 
+pub mod action;
 pub mod controller;
 pub mod fault_count;
 pub mod faults;
@@ -27,8 +28,10 @@ pub mod flash;
 pub mod host_line;
 pub mod pace;
 pub mod plant;
+pub mod replay;
 pub mod servo;
 pub mod servo_bus;
+pub mod session;
 mod settings_log;
 pub mod simulated_arm;
 pub mod simulation;
@@ -36,6 +39,7 @@ pub mod stock_controller;
 pub mod tap;
 pub mod usb_adapter;
 
+pub use action::Action;
 pub use protocol_core::registers::Joint;
 pub use protocol_core::request;
 pub use protocol_core::time::{Duration, Instant};

@@ -9,6 +9,8 @@
 //! The simulation advances from event to event, each at its own time. So the result does not depend on how often
 //! [`SimulatedArm::advance`] is called: a late caller makes neither the arm slower nor its servos late.
 
+use alloc::boxed::Box;
+
 use embedded_storage::nor_flash::NorFlash;
 use motion_core::servo_bus::TorqueCodes;
 use motion_core::vacuum::Vacuum;
@@ -25,11 +27,14 @@ use crate::faulty_flash::FaultyFlash;
 use crate::host_line::LineDirection;
 use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
+use crate::session::Recorder;
 use crate::settings_log;
-use crate::tap::{Tap, TapSlot};
+use crate::tap::{Slot, Tap};
 
+mod act;
 mod disturbance;
 mod power;
+mod record;
 
 /// How long the controller waits for a servo's answer.
 const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
@@ -61,7 +66,12 @@ pub struct SimulatedArm<F, B = Plant, C = Controller> {
     bus: B,
     to_arm: LineDirection,
     to_host: LineDirection,
-    tap: TapSlot,
+    tap: Slot<dyn Tap>,
+    recorder: Slot<dyn Recorder>,
+    /// The host was last known to be idle then.
+    idle_until: Instant,
+    /// The host has sent nothing since then.
+    is_host_idle: bool,
     now: Instant,
     /// When the controller has to be polled again.
     controller_due: Instant,
@@ -116,7 +126,10 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
             bus,
             to_arm,
             to_host,
-            tap: TapSlot::default(),
+            tap: Slot::default(),
+            recorder: Slot::default(),
+            idle_until: now,
+            is_host_idle: false,
             now,
             controller_due: now,
             is_halted: false,
@@ -126,6 +139,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
             leaving: None,
         };
         simulation.start_host_line();
+        simulation.process(now, false);
         simulation
     }
 
@@ -162,7 +176,13 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Copies the bytes on the host line to `tap` from now on.
     pub fn set_tap(&mut self, mut tap: impl Tap + 'static) {
         tap.restart(gap(self.controller.baud()));
-        self.tap = TapSlot::holding(tap);
+        self.tap = Slot::holding(Box::new(tap));
+    }
+
+    /// The time of the last call.
+    #[must_use]
+    pub const fn now(&self) -> Instant {
+        self.now
     }
 
     /// Number of bytes that the host can send now.
@@ -173,8 +193,12 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
 
     /// The host starts to send bytes at `now`. Returns how many were accepted.
     pub fn host_send(&mut self, now: Instant, bytes: &[u8]) -> usize {
+        let idle_until = self.idle_until;
         self.advance(now, false);
-        if self.is_off { bytes.len() } else { self.to_arm.push(now, bytes) }
+        let accepted = if self.is_off { bytes.len() } else { self.to_arm.push(now, bytes) };
+        self.record_sent(idle_until, bytes.get(..accepted).unwrap_or(bytes));
+        self.process(now, false);
+        accepted
     }
 
     /// The first bytes that have arrived at the host, possibly not all of them. They fill the line until
@@ -186,7 +210,10 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
 
     /// Removes the first `count` of the bytes that have arrived at the host.
     pub fn host_take(&mut self, count: usize) {
+        self.record_taken(count);
         self.to_host.take(count);
+        // The controller may have waited for room.
+        self.process(self.now, false);
     }
 
     /// The last host disconnects: the bytes on the line to it are lost. The arm executes what the host sent before, and
@@ -213,6 +240,11 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
             self.process(self.next_event(), host_is_idle);
         }
         self.process(now, host_is_idle);
+        if host_is_idle {
+            self.record_idle();
+            self.idle_until = now;
+        }
+        self.is_host_idle = host_is_idle;
     }
 
     /// When to call [`SimulatedArm::advance`] next, unless the host sends bytes. Without a client the call can be later:

@@ -37,11 +37,13 @@ use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::FrameBuffer;
 
+use crate::action::Action;
 use crate::controller::ArmController;
 use crate::faults::{ArmFault, FaultLocation, FaultReport};
 use crate::flash::{Flash, Memory};
 use crate::plant::Plant;
 use crate::servo::ServoConfig;
+use crate::session::Recorder;
 use crate::simulated_arm::{ArmConfig, SimulatedArm};
 use crate::tap::Tap;
 
@@ -280,6 +282,17 @@ impl<C: ArmController> Simulation<C> {
     /// Draws the faults of the host line from this seed from now on. By default it is 1.
     pub fn set_seed(&mut self, seed: u64) {
         self.arm.set_seed(seed);
+    }
+
+    /// Does something to the arm. Returns the reports of the faults that this ended.
+    pub fn act(&mut self, action: Action) -> Vec<FaultReport> {
+        self.arm.act(self.now, action)
+    }
+
+    /// Passes everything that is done to the arm by [`Simulation::send`] and [`Simulation::act`], and every byte that it
+    /// sends, to `recorder` from now on: see [`crate::session`]. A copy of the simulation has no recorder.
+    pub fn set_recorder(&mut self, recorder: impl Recorder + 'static) {
+        self.arm.set_recorder(recorder);
     }
 
     /// Copies the bytes on the host line to `tap` from now on. A copy of the simulation has no tap.

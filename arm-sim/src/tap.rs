@@ -15,21 +15,27 @@ pub trait Tap: Debug + Send {
     fn sent(&mut self, now: Instant, bytes: &[u8]);
 }
 
-/// A place for a tap. A copy of an arm has no tap.
-#[derive(Debug, Default)]
-pub(crate) struct TapSlot(Option<Box<dyn Tap>>);
+/// A place for something that watches an arm. A copy of the arm has none.
+#[derive(Debug)]
+pub(crate) struct Slot<T: ?Sized>(Option<Box<T>>);
 
-impl TapSlot {
-    pub(crate) fn holding(tap: impl Tap + 'static) -> Self {
-        Self(Some(Box::new(tap)))
+impl<T: ?Sized> Slot<T> {
+    pub(crate) const fn holding(watcher: Box<T>) -> Self {
+        Self(Some(watcher))
     }
 
-    pub(crate) fn get(&mut self) -> Option<&mut (dyn Tap + 'static)> {
+    pub(crate) fn get(&mut self) -> Option<&mut T> {
         self.0.as_deref_mut()
     }
 }
 
-impl Clone for TapSlot {
+impl<T: ?Sized> Default for Slot<T> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<T: ?Sized> Clone for Slot<T> {
     fn clone(&self) -> Self {
         Self::default()
     }

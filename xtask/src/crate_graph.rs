@@ -32,7 +32,7 @@ const GROUPS: [Group; 3] = [
             "sevenbot-serve",
         ],
     ),
-    ("proof", &["flash-model", "system-tests", "torture", "xtask"]),
+    ("proof", &["flash-model", "replay", "system-tests", "torture", "xtask"]),
     ("measurement", &["bench", "footprint", "peers"]),
 ];
 

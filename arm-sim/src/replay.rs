@@ -1,0 +1,176 @@
+//! Does to a new arm what was done to the recorded one, and compares what it sends.
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::fmt::{self, Display, Formatter};
+
+use motion_core::Controller;
+use protocol_core::time::Instant;
+
+use crate::controller::ArmController;
+use crate::flash::{Flash, Memory};
+use crate::plant::Plant;
+use crate::servo::ServoConfig;
+use crate::session::{ControllerKind, Entry, HeaderError, Hex, NoEntry, SessionEvent, SessionHeader};
+use crate::simulated_arm::{ArmConfig, SimulatedArm};
+use crate::stock_controller::StockController;
+
+/// The arm sent something else than in the session.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// When the host took the bytes.
+    pub now: Instant,
+    /// The bytes of the session.
+    pub recorded: Vec<u8>,
+    /// The bytes of this arm, at most as many.
+    pub replayed: Vec<u8>,
+}
+
+impl Display for Difference {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        let Self { now, recorded, replayed } = self;
+        let same = recorded.iter().zip(replayed).take_while(|(one, other)| one == other).count();
+        let micros = now.as_micros();
+        let (recorded, replayed) = (Hex(recorded), Hex(replayed));
+        write!(out, "at {}.{:06} s the arm sent '{replayed}', and ", micros / 1_000_000, micros % 1_000_000)?;
+        write!(out, "in the session '{recorded}': byte {} differs", same + 1)
+    }
+}
+
+/// Why a session cannot be replayed, or how it ended.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ReplayError {
+    /// The first two lines are no start of a session.
+    #[error(transparent)]
+    Header(#[from] HeaderError),
+    /// A line is no entry.
+    #[error("line {line}: {reason}")]
+    Line {
+        /// Its number; the first is 1.
+        line: usize,
+        /// What it should be.
+        reason: NoEntry,
+    },
+    /// A line goes back in time.
+    #[error("line {line} is earlier than the one before")]
+    Backwards {
+        /// Its number; the first is 1.
+        line: usize,
+    },
+    /// The arm sent something else.
+    #[error("line {line}: {difference}")]
+    Different {
+        /// The number of the line that differs; the first is 1.
+        line: usize,
+        /// What differs.
+        difference: Difference,
+    },
+}
+
+/// An arm of either controller.
+trait ReplayedArm {
+    fn now(&self) -> Instant;
+    fn advance(&mut self, now: Instant, host_is_idle: bool);
+    fn apply(&mut self, entry: &Entry) -> Result<(), Difference>;
+}
+
+impl<C: ArmController> ReplayedArm for SimulatedArm<Flash, Plant, C> {
+    fn now(&self) -> Instant {
+        self.now()
+    }
+
+    fn advance(&mut self, now: Instant, host_is_idle: bool) {
+        self.advance(now, host_is_idle);
+    }
+
+    fn apply(&mut self, entry: &Entry) -> Result<(), Difference> {
+        match &entry.event {
+            SessionEvent::Idle => {}
+            SessionEvent::Sent(bytes) => {
+                self.host_send(entry.now, bytes);
+            }
+            SessionEvent::Acted(action) => {
+                self.act(entry.now, *action);
+            }
+            SessionEvent::Taken(recorded) => {
+                let mut replayed = Vec::new();
+                while replayed.len() < recorded.len() && !self.host_received().is_empty() {
+                    let missing = recorded.len() - replayed.len();
+                    let piece = self.host_received().get(..missing).unwrap_or(self.host_received()).to_vec();
+                    self.host_take(piece.len());
+                    replayed.extend(piece);
+                }
+                if replayed != *recorded {
+                    return Err(Difference { now: entry.now, recorded: recorded.clone(), replayed });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A session that is replayed line by line.
+pub struct Replay {
+    arm: Box<dyn ReplayedArm>,
+    line: usize,
+}
+
+impl fmt::Debug for Replay {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        out.debug_struct("Replay").field("line", &self.line).finish_non_exhaustive()
+    }
+}
+
+impl Replay {
+    /// Switches the arm of a session on.
+    #[must_use]
+    pub fn new(header: &SessionHeader) -> Self {
+        let arm: Box<dyn ReplayedArm> = match header.controller {
+            ControllerKind::Sevenbot => Box::new(power_up::<Controller>(header)),
+            ControllerKind::Maker => Box::new(power_up::<StockController>(header)),
+        };
+        Self { arm, line: 2 }
+    }
+
+    /// Replays a whole session. Returns the number of its lines.
+    ///
+    /// # Errors
+    /// The text is no session, or the arm sends something else.
+    pub fn run(text: &str) -> Result<usize, ReplayError> {
+        let mut lines = text.lines();
+        let mut head = || lines.next().unwrap_or_default();
+        let mut replay = Self::new(&SessionHeader::parse(head(), head())?);
+        lines.try_for_each(|line| replay.line(line))?;
+        Ok(replay.line)
+    }
+
+    /// Replays the next line after the first two.
+    ///
+    /// # Errors
+    /// It is no entry, or the arm has sent something else.
+    pub fn line(&mut self, text: &str) -> Result<(), ReplayError> {
+        self.line += 1;
+        let line = self.line;
+        let entry: Entry = text.parse().map_err(|reason| ReplayError::Line { line, reason })?;
+        if entry.now < self.arm.now() {
+            return Err(ReplayError::Backwards { line });
+        }
+        if entry.idle_until > self.arm.now() {
+            self.arm.advance(entry.idle_until, true);
+        }
+        if entry.now > self.arm.now() {
+            self.arm.advance(entry.now, false);
+        }
+        self.arm.apply(&entry).map_err(|difference| ReplayError::Different { line, difference })
+    }
+}
+
+fn power_up<C: ArmController>(header: &SessionHeader) -> SimulatedArm<Flash, Plant, C> {
+    let &SessionHeader { chip_id, is_paced, torque_codes, .. } = header;
+    let plant = Plant::with_config(Instant::ZERO, ServoConfig { torque_codes, ..ServoConfig::default() });
+    let flash = Flash::on(Memory::holding(header.settings.clone()));
+    let config = ArmConfig { chip_id, is_paced, torque_codes };
+    let mut arm = SimulatedArm::power_up(Instant::ZERO, config, flash, plant);
+    arm.set_seed(header.seed);
+    arm
+}

@@ -1,0 +1,101 @@
+//! A host and a person that do everything that can be done to an arm, drawn from a seed.
+
+use std::fmt::Write;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use arm_sim::request::Request;
+use arm_sim::session::{Entry, Recorder, SessionHeader};
+use arm_sim::{Action, Duration, Joint, Simulation};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
+/// Times that something is done.
+const ACTS: u32 = 40;
+/// The longest time between two of them, in microseconds.
+const LONGEST_PAUSE: u64 = 100_000;
+/// Actions that are always the same.
+const ACTIONS: [&str; 7] = ["clear", "restart", "power-cycle", "disconnect", "weight 100", "seed 9", "halt"];
+/// Faults of a servo, for a time.
+const SERVO_FAULTS: [&str; 4] = ["late=20", "garbled=3", "stuck", "missing"];
+/// Faults until they are taken back.
+const ARM_FAULTS: [&str; 5] =
+    ["line=loss=5", "line=corruption=5", "line=delay=3", "bus=echo", "supply=dips=100"];
+
+/// Collects the lines of a session.
+#[derive(Clone, Debug, Default)]
+struct Lines(Arc<Mutex<String>>);
+
+impl Lines {
+    fn add(&self, line: &dyn std::fmt::Display) {
+        let mut text = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // A string takes everything.
+        let _ = writeln!(text, "{line}");
+    }
+}
+
+impl Recorder for Lines {
+    fn add(&mut self, entry: &Entry) {
+        Lines::add(self, entry);
+    }
+}
+
+/// A session of about two seconds of virtual time.
+#[must_use]
+pub fn random_session(seed: u64) -> String {
+    let mut random = Random(Xoshiro256PlusPlus::seed_from_u64(seed));
+    let lines = Lines::default();
+    lines.add(&SessionHeader::default());
+    let mut arm = Simulation::default();
+    arm.set_recorder(lines.clone());
+    for _ in 0..ACTS {
+        random.act(&mut arm);
+        arm.advance(Duration::from_micros(random.0.next_u64() % LONGEST_PAUSE));
+    }
+    drop(arm);
+    std::mem::take(&mut lines.0.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+struct Random(Xoshiro256PlusPlus);
+
+impl Random {
+    /// A number from 0 on, below `below`.
+    fn byte(&mut self, below: u8) -> u8 {
+        u8::try_from(self.0.next_u64() % u64::from(below)).unwrap_or(0)
+    }
+
+    fn pick<T: Copy>(&mut self, items: &[T]) -> Option<T> {
+        let index = self.byte(u8::try_from(items.len()).unwrap_or(u8::MAX));
+        items.get(usize::from(index)).copied()
+    }
+
+    fn act(&mut self, arm: &mut Simulation) {
+        match self.byte(12) {
+            0..4 => arm.send_request(&Request::Read { address: self.byte(200), count: 1 + self.byte(50) }),
+            4 => arm.send_request(&Request::Write { address: 46 + self.byte(7), values: &[self.byte(181)] }),
+            5 => arm.send_request(&Request::Write { address: 53, values: &[self.byte(51)] }),
+            6 => arm.send_request(&Request::Write { address: 28 + self.byte(2), values: &[self.byte(4)] }),
+            7 => arm.send(&[self.byte(255), 0xAA, 0x77, self.byte(9), self.byte(255), self.byte(255)]),
+            _ => {
+                if let Some(action) = self.action() {
+                    arm.act(action);
+                }
+            }
+        }
+    }
+
+    fn action(&mut self) -> Option<Action> {
+        let joint = self.pick(&Joint::ALL)?;
+        Some(match self.byte(4) {
+            0 => {
+                let fault = self.pick(&SERVO_FAULTS)?.parse().ok()?;
+                Action::Fault(
+                    arm_sim::faults::ArmFault::Servo(joint, fault),
+                    Some(Duration::from_millis(300)),
+                )
+            }
+            1 => Action::Fault(self.pick(&ARM_FAULTS)?.parse().ok()?, None),
+            2 => Action::Hand(joint, 4 * u16::from(self.byte(255))),
+            _ => self.pick(&ACTIONS)?.parse().ok()?,
+        })
+    }
+}
