@@ -167,7 +167,8 @@ impl ArmControl {
 
     fn against_limit(&self, accepted: &Accepted<'_>, reached: &Reached) -> Option<u8> {
         let limits = self.registers.get(LIMITS.address);
-        if limits == 0 && !accepted.has_words() {
+        let may_change = accepted.has_words() && accepted.value_at(LIMITS.address).is_some();
+        if limits == 0 && !may_change {
             return None;
         }
         self.joints.against_limit(&LimitCheck { accepted, reached, limits })
