@@ -115,6 +115,11 @@ impl<'data> Program<'data> {
         self.instructions.iter().filter(|&(_, &other)| other == effect).map(|(&at, _)| at).collect()
     }
 
+    /// The address of the instruction that precedes the one at `address`.
+    pub(crate) fn instruction_before(&self, address: u64) -> Option<u64> {
+        self.instructions.range(..address).next_back().map(|(&at, _)| at)
+    }
+
     /// The effect of the instruction at each address.
     pub(crate) fn effects(&self) -> HashMap<u64, Effect> {
         self.instructions.iter().map(|(&at, &effect)| (at, effect)).collect()

@@ -91,7 +91,11 @@ enum Task {
     /// Compare the parse-and-reply path with its peers: Modbus, postcard with COBS, MAVLink
     Bench(bench::BenchArgs),
     /// Print how evenly and how late set-points follow streams of points with jitter, losses and pauses, beside other methods
-    Stream,
+    Stream {
+        /// Stream a sine to the image in the emulator instead, and draw it beside the simulated arm (some minutes)
+        #[arg(long)]
+        image: bool,
+    },
     /// Run the image for the arm in an emulator with simulated servos, and print its port.
     ///
     /// SIGHUP (`kill -HUP`) switches the arm off and on, SIGUSR2 restarts the chip alone, Ctrl-C ends it. The emulator keeps no
@@ -150,7 +154,8 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Coverage => coverage::check(),
         Task::Emulate(options) => emulate::run(options),
         Task::Sag => sag::measure(),
-        Task::Stream => stream::measure(),
+        Task::Stream { image: true } => stream::measure_image(),
+        Task::Stream { image: false } => stream::measure(),
         Task::Bench(options) => bench::run(options),
     }
 }

@@ -58,6 +58,16 @@ struct ImageAddresses {
     effects: HashMap<u64, Effect>,
 }
 
+/// Instructions of iterations of the loop.
+struct Passes {
+    /// One that moves seven joints.
+    cycle: u64,
+    /// Of that, from its wake-up to the first byte of the goals.
+    first_goal_byte: u64,
+    /// One with nothing to do.
+    idle: u64,
+}
+
 /// Counts the instructions of the image.
 pub(crate) fn figures() -> TaskResult<Vec<Figure>> {
     let file = IMAGE.read()?;
@@ -86,7 +96,16 @@ pub(crate) fn figures() -> TaskResult<Vec<Figure>> {
         Figure::new("image: byte that needs no pass of the loop, in to asleep again", first),
         Figure::new("image: milliseconds that 34 reads are held up by a false header", delayed),
     ];
-    figures.extend(addresses.passes(&moving)?);
+    let passes = addresses.passes(&moving)?;
+    figures.extend([
+        Figure::new("image: pass of the loop that moves seven joints", passes.cycle),
+        Figure::new("image: pass of the loop with nothing to do", passes.idle),
+        Figure::new("image: control cycle, wake-up to first byte of seven goals", passes.first_goal_byte),
+        Figure::new(
+            "image: 7 fine targets in to first byte of goals out, besides the wait",
+            fine + passes.first_goal_byte,
+        ),
+    ]);
     figures.extend(addresses.interrupts(&moving)?);
     Ok(figures)
 }
@@ -219,26 +238,28 @@ impl ImageAddresses {
     }
 
     /// Iterations of the loop from a wake-up to the sleep, without received bytes.
-    fn passes(&self, events: &[TraceEvent]) -> TaskResult<[Figure; 2]> {
-        let (mut cycles, mut others) = (Vec::new(), Vec::new());
+    fn passes(&self, events: &[TraceEvent]) -> TaskResult<Passes> {
+        let (mut cycles, mut first_bytes, mut others) = (Vec::new(), Vec::new(), Vec::new());
         for pass in trace::between(events, |event| self.is_sleep(event)) {
             let pass = events.get(pass).unwrap_or_default();
             if trace::times(pass, TraceEvent::Read(SERVO_DATA)) > 0 {
                 continue;
             }
             match trace::times(pass, TraceEvent::Wrote(SERVO_DATA)) {
-                GOAL_FRAME_BYTES.. => cycles.push(trace::steps(pass)),
+                GOAL_FRAME_BYTES.. => {
+                    cycles.push(trace::steps(pass));
+                    let first = pass.iter().position(|event| *event == TraceEvent::Wrote(SERVO_DATA));
+                    first_bytes.extend(first.and_then(|first| pass.get(..first)).map(trace::steps));
+                }
                 0 => others.push(trace::steps(pass)),
                 _ => {}
             }
         }
-        Ok([
-            Figure::new(
-                "image: pass of the loop that moves seven joints",
-                median(cycles, "a control cycle")?,
-            ),
-            Figure::new("image: pass of the loop with nothing to do", median(others, "an idle pass")?),
-        ])
+        Ok(Passes {
+            cycle: median(cycles, "a control cycle")?,
+            first_goal_byte: median(first_bytes, "a control cycle")?,
+            idle: median(others, "an idle pass")?,
+        })
     }
 
     /// The interrupts of a line. Both lines have the same code.

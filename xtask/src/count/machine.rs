@@ -122,7 +122,7 @@ impl Machine {
     }
 
     fn command(&mut self, line: &str) -> TaskResult {
-        self.monitor.execute("human-monitor-command", &format!(r#""command-line":"{line}""#))
+        self.monitor.human(line)
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod cores;
 mod image;
+mod load;
 mod machine;
 mod trace;
 
@@ -26,6 +27,7 @@ pub(crate) fn check(accept: bool) -> TaskResult {
     build_image()?;
     cargo("build --quiet --package host-sim")?;
     let mut figures = image::figures()?;
+    figures.push(load::figure()?);
     for &(profile, words) in PROFILES {
         build_footprint(profile)?;
         for &name in OURS {

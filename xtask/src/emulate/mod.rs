@@ -22,6 +22,8 @@ use tty_ports::symlink::Symlink;
 
 use crate::run::{self, ChildProcess, ChipProgram, TaskResult, cargo, root};
 
+mod debugger;
+pub(crate) mod lockstep;
 mod log;
 pub(crate) mod monitor;
 mod relay;

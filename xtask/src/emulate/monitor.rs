@@ -48,6 +48,11 @@ impl Monitor {
         }
     }
 
+    /// Executes a command of the monitor for people.
+    pub(crate) fn human(&mut self, line: &str) -> TaskResult {
+        self.execute("human-monitor-command", &format!(r#""command-line":"{line}""#))
+    }
+
     /// `length` bytes of the chip's memory from `address` on.
     pub(crate) fn memory(&mut self, address: u32, length: u32) -> TaskResult<Vec<u8>> {
         let file = self.scratch.display().to_string();

@@ -10,8 +10,9 @@ use std::fs;
 
 use fastrand::Rng;
 
-use crate::run::TaskResult;
-use sine::Targets;
+use crate::emulate;
+use crate::run::{TaskResult, build_image, root};
+use sine::{Recording, Targets};
 
 use methods::{CYCLE, METHODS, Method, OURS, SetPoints};
 
@@ -20,8 +21,11 @@ const VELOCITY: f64 = 3.0;
 /// Runs of each scenario, each with its own seed and phase of the control cycles.
 const RUNS: u64 = 20;
 const PERIODS: [f64; 5] = [0.005, 0.01, 0.02, 0.05, 0.1];
-/// The drawing of the sine.
+/// The drawings of the sine: on the simulated arm, and on the emulated image.
 const DRAWING: &str = "docs/stream.svg";
+const IMAGE_DRAWING: &str = "docs/stream-image.svg";
+/// The title of the panel of fine targets.
+const FINE_TITLE: &str = "fine targets, period 20 ms";
 /// After so many points a method has settled.
 const SETTLING_POINTS: usize = 40;
 
@@ -107,17 +111,37 @@ pub(crate) fn measure() -> TaskResult {
 /// Prints how the simulated arm follows a sine, and draws it.
 fn measure_sine() -> TaskResult {
     let (fine, whole) = (sine::record(Targets::Fine), sine::record(Targets::WholeDegrees));
-    println!(
-        "\nA sine of 30 degrees at 0.2 Hz, 50 points a second with 25 % jitter; joint 1 of the simulated arm.\n"
-    );
+    print_sine(&[("fine, with a period", &fine), ("whole degrees", &whole)]);
+    let panels = [(FINE_TITLE, &fine), ("whole degrees", &whole)];
+    draw(DRAWING, &sine::svg(&panels))
+}
+
+/// Prints how the emulated image and the simulated arm follow a sine, and draws both.
+pub(crate) fn measure_image() -> TaskResult {
+    emulate::need_qemu()?;
+    build_image()?;
+    let (image, simulated) = (sine::record_image()?, sine::record(Targets::Fine));
+    print_sine(&[("emulated image", &image), ("simulated arm", &simulated)]);
+    let panels = [
+        ("the image in the emulator, period 20 ms", &image),
+        ("the simulated arm, period 20 ms", &simulated),
+    ];
+    draw(IMAGE_DRAWING, &sine::svg(&panels))
+}
+
+fn print_sine(recordings: &[(&str, &Recording)]) {
+    println!("\nA sine of 30 degrees at 0.2 Hz, 50 points a second with 25 % jitter; joint 1.\n");
     println!("| targets | delay ms | rms error degrees | largest change of velocity, degrees/s | rms |");
     println!("| --- | --- | --- | --- | --- |");
-    for (name, recording) in [("fine, with a period", &fine), ("whole degrees", &whole)] {
+    for (name, recording) in recordings {
         let ((delay, error), (largest, rms)) = (sine::tracking(recording), sine::roughness(recording));
         println!("| {name} | {delay:.0} | {error:.3} | {largest:.1} | {rms:.1} |");
     }
-    fs::write(DRAWING, sine::svg(&fine, &whole))?;
-    println!("\ndrawn: {DRAWING}");
+}
+
+fn draw(path: &str, drawing: &str) -> TaskResult {
+    fs::write(root().join(path), drawing)?;
+    println!("\ndrawn: {path}");
     Ok(())
 }
 

@@ -1,4 +1,5 @@
-//! A sine on all joints, streamed to the simulated arm: as fine targets with a period, and in whole degrees.
+//! A sine on all joints, streamed to the simulated arm: as fine targets with a period, and in whole degrees. And the
+//! same fine targets, streamed to the image in the emulator.
 //!
 //! The points come 50 times a second with 25 % jitter, at a speed register of 100. The drawing shows joint 1.
 
@@ -18,6 +19,8 @@ use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
 
 use crate::count::frame;
+use crate::emulate::lockstep::Lockstep;
+use crate::run::TaskResult;
 
 /// Degrees and hertz.
 const AMPLITUDE: f64 = 30.0;
@@ -29,6 +32,8 @@ const JITTER: f64 = 0.25;
 /// Seconds before the sine, and its length.
 const START: f64 = 3.0;
 const LENGTH: f64 = 10.0;
+/// The end of a recording.
+const END: f64 = START + LENGTH + 1.0;
 /// Seconds between two samples of the arm.
 const SAMPLE: f64 = 0.002;
 
@@ -59,6 +64,8 @@ pub(super) enum Targets {
 struct Recorder {
     plant: Plant,
     goals: Curve,
+    /// Where joint 1 was at each poll.
+    measured: Curve,
 }
 
 impl ServoBus for Recorder {
@@ -82,7 +89,9 @@ impl ServoBus for Recorder {
     }
 
     fn poll(&mut self, now: Instant) -> Vec<u8> {
-        self.plant.poll(now)
+        let bytes = self.plant.poll(now);
+        self.measured.push((seconds(now), f64::from(self.plant.angle(Joint::ALL[0])) / 1e3));
+        bytes
     }
 
     fn deadline(&self) -> Option<Instant> {
@@ -94,16 +103,52 @@ impl ServoBus for Recorder {
     }
 }
 
+impl Recorder {
+    fn new() -> Self {
+        Self { plant: Plant::new(Instant::ZERO), goals: Vec::new(), measured: Vec::new() }
+    }
+}
+
+/// Streams the sine to the emulated image, with simulated servos.
+pub(super) fn record_image() -> TaskResult<Recording> {
+    let mut recorder = Recorder::new();
+    recorder.plant.ignore_collisions();
+    let mut image = Lockstep::start(recorder)?;
+    let mut recording = Recording::default();
+    for (at, bytes) in frames(Targets::Fine, &mut recording.asked) {
+        image.advance(instant(at))?;
+        image.host_send(&bytes);
+    }
+    image.advance(instant(END))?;
+    recording.goals = std::mem::take(&mut image.bus.goals);
+    recording.measured = resampled(&image.bus.measured);
+    Ok(recording)
+}
+
+/// The curve at even times, from one whose times are uneven.
+fn resampled(curve: &Curve) -> Curve {
+    let mut even = Curve::new();
+    for pair in curve.windows(2) {
+        let [(from, low), (to, high)] = *pair else { continue };
+        let mut time = SAMPLE * f64::from(u32::try_from(even.len()).unwrap_or(u32::MAX));
+        while time < to {
+            even.push((time, low + (high - low) * (time - from).max(0.0) / (to - from)));
+            time += SAMPLE;
+        }
+    }
+    even
+}
+
 /// Streams the sine to a simulated arm.
 pub(super) fn record(targets: Targets) -> Recording {
     let config = ArmConfig { chip_id: [0; 6], is_paced: true, torque_codes: Default::default() };
-    let recorder = Recorder { plant: Plant::new(Instant::ZERO), goals: Vec::new() };
+    let recorder = Recorder::new();
     let mut arm: SimulatedArm<Flash, Recorder> =
         SimulatedArm::power_up(Instant::ZERO, config, Flash::in_memory(), recorder);
     let mut recording = Recording::default();
     let mut frames = frames(targets, &mut recording.asked).into_iter().peekable();
     let mut time = 0.0;
-    while time < START + LENGTH + 1.0 {
+    while time < END {
         while let Some((at, bytes)) = frames.next_if(|(at, _)| *at <= time) {
             arm.advance(instant(at), false);
             arm.host_send(instant(at), &bytes);
@@ -196,8 +241,8 @@ fn differences(values: &[f64]) -> impl Iterator<Item = f64> {
     values.iter().skip(1).zip(values).map(|(after, before)| after - before)
 }
 
-/// Two panels: fine targets above, whole degrees below, half a second around the steepest part of the sine.
-pub(super) fn svg(fine: &Recording, whole: &Recording) -> String {
+/// Two panels with their titles: half a second around the steepest part of the sine.
+pub(super) fn svg(panels: &[(&str, &Recording); 2]) -> String {
     let mut out = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 860 640\" width=\"860\" height=\"640\">\n\
         <style>text { font: 13px sans-serif; fill: #444 } .title { font-size: 15px; fill: #111 } \
         polyline { fill: none } .asked { stroke: #f2b56b; stroke-width: 5 } \
@@ -206,9 +251,7 @@ pub(super) fn svg(fine: &Recording, whole: &Recording) -> String {
         <text class=\"title\" x=\"20\" y=\"24\">A sine of 30° at 0.2 Hz, streamed at 50 Hz with 25 % jitter: joint 1</text>\n\
         <text x=\"20\" y=\"44\">pale: asked; green: goals of the servo; blue: measured. the panels show 0.5 s of 10 s, and 24°</text>\n"
         .to_owned();
-    for (recording, top, title) in
-        [(fine, 60.0, "fine targets, period 20 ms"), (whole, 350.0, "whole degrees")]
-    {
+    for (top, (title, recording)) in [60.0, 350.0].into_iter().zip(panels) {
         panel(&mut out, recording, top, title);
     }
     out.push_str("</svg>\n");

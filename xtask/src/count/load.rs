@@ -1,0 +1,81 @@
+//! The load of the chip while a program streams points and gets reports: one second of virtual time as one count.
+//!
+//! ```text
+//!   200 frames a second of seven fine targets ──▶ image ──▶ 50 reports a second of content 2
+//!                                                   │▲
+//!                             goals, 700 questions  ▼│ 700 answers a second
+//! ```
+
+use arm_sim::plant::Plant;
+use protocol_core::registers::JOINTS;
+use protocol_core::registers::map::{
+    FEEDBACK_FREQUENCY, FINE_TARGET, REPORT_CONTENT, SET_POINT_PERIOD, SPEED,
+};
+use protocol_core::request::Request;
+use protocol_core::time::{Duration, Instant};
+
+use super::machine::frame;
+use super::trace;
+use crate::budget::Figure;
+use crate::emulate::lockstep::Lockstep;
+use crate::run::TaskResult;
+
+/// The time between two frames of targets, in milliseconds; also the set-point period.
+const FRAME_MILLIS: u16 = 5;
+/// The frequency of the reports, their content, and the bytes of such a report: registers 142 to 183 and 7 more.
+const REPORT_HZ: u8 = 50;
+const CONTENT: u8 = 2;
+const REPORT_BYTES: usize = 49;
+/// When start-up and the first frames are over, and the end of the count, in milliseconds.
+const START_MILLIS: u64 = 1_500;
+const END_MILLIS: u64 = START_MILLIS + 1_000;
+/// 90 degrees in hundredths.
+const MIDDLE: u16 = 9_000;
+/// From one frame to the next, each joint moves by this many hundredths of a degree: 60 degrees a second.
+const STEP: u16 = 30;
+/// Instructions for a byte that the chip sends: its interrupt, and the check whether the loop has to run. The emulator's
+/// transmitter is always empty, so that one interrupt sends up to eight bytes.
+const PER_BYTE_SENT: u64 = 58 + 52;
+
+/// The load as one figure. The part of the sent bytes is computed, the rest is counted.
+pub(super) fn figure() -> TaskResult<Figure> {
+    let mut plant = Plant::new(Instant::ZERO);
+    plant.ignore_collisions();
+    let mut image = Lockstep::start(plant)?;
+    let write = |register: u8, values: &[u8]| frame(Request::Write { address: register, values });
+    image.advance(at(START_MILLIS - 500))?;
+    image.host_send(&write(SPEED.address, &[100; JOINTS]));
+    image.host_send(&write(SET_POINT_PERIOD.address, &FRAME_MILLIS.to_le_bytes()));
+    image.host_send(&write(REPORT_CONTENT.address, &[CONTENT]));
+    image.host_send(&write(FEEDBACK_FREQUENCY.address, &[REPORT_HZ]));
+    let (mut steps, mut reported) = (0, 0);
+    for (number, millis) in (START_MILLIS - 400..END_MILLIS).step_by(FRAME_MILLIS.into()).enumerate() {
+        let angle = [target(number).to_le_bytes(); JOINTS];
+        image.host_send(&write(FINE_TARGET.address, angle.as_flattened()));
+        let until = at(millis) + Duration::from_millis(FRAME_MILLIS.into());
+        if millis < START_MILLIS {
+            image.advance(until)?;
+            image.take_sent()?;
+        } else {
+            steps += trace::steps(&trace::parse(&image.log_until(until)?));
+            let sent = image.take_sent()?;
+            reported += sent.to_host;
+            steps += PER_BYTE_SENT * (sent.to_host + sent.to_servos) as u64;
+        }
+    }
+    // The first and the last report may be cut.
+    if reported / REPORT_BYTES < usize::from(REPORT_HZ) - 1 {
+        Err(format!("the image sent {reported} bytes of reports in a second"))?;
+    }
+    Ok(Figure::new("image: one second of 200 frames of 7 fine targets and 50 long reports", steps))
+}
+
+/// A triangle of 120 steps around the middle.
+fn target(number: usize) -> u16 {
+    let phase = u16::try_from(number % 120).unwrap_or(0);
+    MIDDLE + STEP * phase.min(120 - phase)
+}
+
+fn at(millis: u64) -> Instant {
+    Instant::from_micros(millis * 1_000)
+}

@@ -1,0 +1,183 @@
+//! The image in virtual time, with its servos in this process.
+//!
+//! ```text
+//!   the image is about to sleep ──▶ stop: take what it sent, give it at most one byte per line ──▶ go on
+//! ```
+//!
+//! Virtual time stands still during a stop, so the time of this process does not count. An instruction takes 8 ns. The
+//! image sleeps in real time: a busy computer may end a sleep late, and then a tick is late or lost. A byte arrives only
+//! at a stop, so a frame or an answer is up to one tick, 1 ms, late. Then its bytes follow each other, each with its own
+//! interrupt.
+
+use std::collections::VecDeque;
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::PathBuf;
+
+use arm_sim::servo_bus::ServoBus;
+use protocol_core::time::Instant;
+use tempfile::TempDir;
+
+use super::debugger::Debugger;
+use super::monitor::{self, Monitor};
+use crate::elf::Program;
+use crate::run::{ChildProcess, IMAGE, TaskResult};
+use crate::thumb_decode::Effect;
+
+/// The count of TIM2, the clock of the image, in microseconds.
+const CLOCK: u32 = 0x4000_0024;
+/// The status registers of the USARTs of host link and servo bus (RM0090, section 30.6.1).
+const HOST_STATUS: u32 = 0x4001_1000;
+const SERVO_STATUS: u32 = 0x4000_4400;
+/// A received byte waits in the USART.
+const RXNE: u32 = 1 << 5;
+
+/// The image, its lines and its servos.
+pub(crate) struct Lockstep<B> {
+    /// The servo bus.
+    pub(crate) bus: B,
+    debugger: Debugger,
+    monitor: Monitor,
+    log: PathBuf,
+    host: Line,
+    servos: Line,
+    sent_to_servos: usize,
+    now: Instant,
+    // In this order: the emulator ends before the sockets.
+    _machine: ChildProcess,
+    _folder: TempDir,
+}
+
+/// Numbers of bytes that the image has sent.
+pub(crate) struct Sent {
+    /// On the host link.
+    pub(crate) to_host: usize,
+    /// On the servo bus.
+    pub(crate) to_servos: usize,
+}
+
+/// One serial line of the image.
+struct Line {
+    stream: UnixStream,
+    status: u32,
+    to_image: VecDeque<u8>,
+}
+
+impl<B: ServoBus> Lockstep<B> {
+    /// Starts the image with `bus`, and runs it until it sleeps for the first time.
+    pub(crate) fn start(bus: B) -> TaskResult<Self> {
+        let folder = tempfile::tempdir()?;
+        let listen = |name: &str| UnixListener::bind(folder.path().join(name));
+        let (host, servos) = (listen("host")?, listen("servos")?);
+        let commands = listen("monitor")?;
+        let socket = folder.path().join("debugger");
+        let chardev = format!("socket,id=debugger,path={},server=on,wait=off", socket.display());
+        let log = folder.path().join("log");
+        let log_option = log.display().to_string();
+        let options = ["-S", "-icount", "shift=3,sleep=on", "-singlestep", "-D", &log_option];
+        let options = [&options[..], &["-chardev", &chardev, "-gdb", "chardev:debugger"]].concat();
+        let machine = super::start_machine(&IMAGE, &folder, &super::servo_socket(&folder), &options)?;
+        let line = |listener, status| Line::accept(listener, status);
+        let (host, servos) = (line(&host, HOST_STATUS)?, line(&servos, SERVO_STATUS)?);
+        let monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
+        let mut debugger = Debugger::connect(&socket)?;
+        let file = IMAGE.read()?;
+        let program = Program::read(&file)?;
+        for sleep in program.addresses_of(Effect::WaitForInterrupt) {
+            // The debugger cannot step over a sleep, only over what precedes it.
+            let before = program.instruction_before(sleep).ok_or("nothing precedes a sleep")?;
+            debugger.break_at(before)?;
+        }
+        debugger.run()?;
+        let now = Instant::ZERO;
+        Ok(Self {
+            bus,
+            debugger,
+            monitor,
+            log,
+            host,
+            servos,
+            sent_to_servos: 0,
+            now,
+            _machine: machine,
+            _folder: folder,
+        })
+    }
+
+    /// Sends bytes to the host link of the image, from its next stop on.
+    pub(crate) fn host_send(&mut self, bytes: &[u8]) {
+        self.host.to_image.extend(bytes);
+    }
+
+    /// How many bytes the image has sent since the last call.
+    pub(crate) fn take_sent(&mut self) -> TaskResult<Sent> {
+        let to_host = self.host.received()?.len();
+        Ok(Sent { to_host, to_servos: std::mem::take(&mut self.sent_to_servos) })
+    }
+
+    /// Runs the image until it sleeps at `until` or later, and returns the emulator's log of its instructions.
+    pub(crate) fn log_until(&mut self, until: Instant) -> TaskResult<String> {
+        let before = fs::metadata(&self.log).map_or(0, |log| log.len());
+        self.monitor.human("log exec,nochain")?;
+        let advanced = self.advance(until);
+        self.monitor.human("log none")?;
+        advanced?;
+        let mut file = File::options().read(true).write(true).open(&self.log)?;
+        file.seek(SeekFrom::Start(before))?;
+        let mut text = String::new();
+        file.read_to_string(&mut text)?;
+        // The emulator writes on at its own position, so the file stays large but takes no space.
+        file.set_len(0)?;
+        Ok(text)
+    }
+
+    /// Runs the image until it sleeps at `until` or later.
+    pub(crate) fn advance(&mut self, until: Instant) -> TaskResult {
+        while self.now < until {
+            self.host.give_byte(&mut self.debugger)?;
+            self.servos.give_byte(&mut self.debugger)?;
+            self.debugger.step()?;
+            self.debugger.run()?;
+            self.now = Instant::from_micros(self.debugger.word(CLOCK)?.into());
+            let sent = self.servos.received()?;
+            if !sent.is_empty() {
+                self.sent_to_servos += sent.len();
+                self.bus.bytes(self.now, &sent);
+            }
+            self.servos.to_image.extend(self.bus.poll(self.now));
+        }
+        Ok(())
+    }
+}
+
+impl Line {
+    fn accept(listener: &UnixListener, status: u32) -> TaskResult<Self> {
+        let stream = monitor::accept(listener)?;
+        stream.set_nonblocking(true)?;
+        Ok(Self { stream, status, to_image: VecDeque::new() })
+    }
+
+    /// Gives the image the next byte, and waits until it is in the USART.
+    fn give_byte(&mut self, debugger: &mut Debugger) -> TaskResult {
+        let Some(byte) = self.to_image.pop_front() else { return Ok(()) };
+        self.stream.write_all(&[byte])?;
+        wait_for_bit(debugger, self.status)
+    }
+
+    fn received(&mut self) -> TaskResult<Vec<u8>> {
+        let mut bytes = vec![0; 4_096];
+        match self.stream.read(&mut bytes) {
+            Ok(0) => Err("the emulator has ended")?,
+            Ok(count) => bytes.truncate(count),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => bytes.clear(),
+            Err(error) => Err(error)?,
+        }
+        Ok(bytes)
+    }
+}
+
+fn wait_for_bit(debugger: &mut Debugger, status: u32) -> TaskResult {
+    while debugger.word(status)? & RXNE == 0 {}
+    Ok(())
+}
