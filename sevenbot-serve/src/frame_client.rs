@@ -105,9 +105,11 @@ impl FrameClient {
 
 /// A report has the form of the register that asked for it (M4).
 fn encode_report(stream: Stream, values: &[u8], frame: &mut FrameBuffer) {
-    let address = stream.registers().address;
+    let (address, _) = stream.registers();
     match stream {
-        Stream::Positions => Reply { address, values }.encode(frame),
+        Stream::Positions | Stream::FinePositions | Stream::FineState => {
+            Reply { address, values }.encode(frame)
+        }
         Stream::Angles | Stream::Loads => Report { address, values }.encode(frame),
     }
 }

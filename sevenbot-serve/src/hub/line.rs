@@ -13,9 +13,9 @@ use protocol_core::wire::deframer::gap;
 use protocol_core::wire::frame::encode;
 use protocol_core::wire::{Deframer, FrameBuffer, Function, ToHost};
 
-use super::client::Event;
+use super::client::{Client, Event};
 use super::client_id::ClientId;
-use super::request::reply_bytes;
+use super::request::{WholeRequest, reply_bytes};
 use super::stream::Stream;
 
 /// The time for a reply, in addition to its time on the line. USB adapters take 16 ms each way; a busy computer takes
@@ -118,10 +118,29 @@ impl Line {
         }
     }
 
+    /// When the last byte leaves, or has left.
+    pub(crate) const fn idle_since(&self) -> Instant {
+        self.busy_until
+    }
+
     /// May reads be sent whose replies have `bytes` bytes?
     pub(crate) fn has_window(&self, bytes: usize) -> bool {
         let on_their_way: usize = self.unanswered.iter().map(|read| reply_bytes(read.count)).sum();
         on_their_way == 0 || on_their_way + bytes <= WINDOW
+    }
+
+    /// Can the client's oldest request be sent?
+    pub(crate) fn takes(&self, client: &Client) -> bool {
+        match client.waiting.front() {
+            Some(WholeRequest::Read { count, .. }) => {
+                client.can_receive && client.unanswered == 0 && self.has_window(reply_bytes(*count))
+            }
+            Some(WholeRequest::WritesBetweenReads { read: (_, count), .. }) => {
+                client.can_receive && client.unanswered == 0 && self.has_window(2 * reply_bytes(*count))
+            }
+            Some(WholeRequest::Write { .. }) => client.unanswered == 0,
+            None => false,
+        }
     }
 
     pub(crate) fn send_read(&mut self, now: Instant, owner: Owner, address: u8, count: u8) {

@@ -22,6 +22,7 @@ mod sampler;
 mod schedule;
 mod shares;
 mod stream;
+mod watchdog;
 
 use std::collections::BTreeMap;
 
@@ -33,9 +34,9 @@ use protocol_core::time::{Duration, Instant};
 use self::client::Client;
 use self::known_registers::KnownRegisters;
 use self::line::{Line, Owner};
-use self::request::reply_bytes;
 use self::sampler::Sampler;
 use self::shares::Shares;
+use self::watchdog::ClientWatchdog;
 
 pub use self::client::Event;
 pub use self::client_id::ClientId;
@@ -69,6 +70,7 @@ pub struct Hub {
     chip_id: Option<Vec<u8>>,
     line: Line,
     sampler: Sampler,
+    watchdog: ClientWatchdog,
     shares: Shares,
     is_read_only: bool,
 }
@@ -86,6 +88,7 @@ impl Hub {
             chip_id: None,
             line: Line::new(baud),
             sampler: Sampler::new(baud),
+            watchdog: ClientWatchdog::default(),
             shares: Shares::default(),
             is_read_only,
         }
@@ -191,7 +194,10 @@ impl Hub {
                     self.arm = ArmState::Identifying(now + IDENTIFY_PERIOD);
                 }
             }
-            ArmState::Present => while self.line.is_free(now) && self.send_next(now) {},
+            ArmState::Present => {
+                self.watchdog.poll(now, self.line.idle_since());
+                while self.watchdog.allows(now) && self.line.is_free(now) && self.send_next(now) {}
+            }
         }
     }
 
@@ -214,7 +220,8 @@ impl Hub {
             ArmState::Absent | ArmState::Identifying(_) if self.has_waiting() => now,
             ArmState::Absent => Instant::FAR_FUTURE,
             ArmState::Identifying(due) => line.min(due),
-            ArmState::Present if self.clients.values().any(|client| self.is_sendable(client)) => {
+            ArmState::Present if !self.watchdog.allows(now) => line.min(self.watchdog.quiet_until()),
+            ArmState::Present if self.clients.values().any(|client| self.line.takes(client)) => {
                 line.min(self.line.free_at(now))
             }
             ArmState::Present => line.min(self.sampler.due().max(self.line.free_at(now))),
@@ -223,7 +230,7 @@ impl Hub {
 
     /// Sends the next request or sample. Returns false if there is none.
     fn send_next(&mut self, now: Instant) -> bool {
-        let sendable = self.clients.iter().filter(|(_, client)| self.is_sendable(client));
+        let sendable = self.clients.iter().filter(|(_, client)| self.line.takes(client));
         let sampler = self.sampler.next_due(now).map(|stream| (self.sampler.share, None, Some(stream)));
         let clients = sendable.map(|(&id, client)| (client.share, Some(id), None));
         let next = clients.chain(sampler).min_by_key(|&(share, ..)| self.shares.order(share));
@@ -235,23 +242,11 @@ impl Hub {
         true
     }
 
-    fn is_sendable(&self, client: &Client) -> bool {
-        match client.waiting.front() {
-            Some(WholeRequest::Read { count, .. }) => {
-                client.can_receive && client.unanswered == 0 && self.line.has_window(reply_bytes(*count))
-            }
-            Some(WholeRequest::WritesBetweenReads { read: (_, count), .. }) => {
-                client.can_receive && client.unanswered == 0 && self.line.has_window(2 * reply_bytes(*count))
-            }
-            Some(WholeRequest::Write { .. }) => client.unanswered == 0,
-            None => false,
-        }
-    }
-
     fn send_request(&mut self, now: Instant, id: ClientId) {
         let Some(client) = self.clients.get_mut(&id) else { return };
         let Some(request) = client.waiting.pop_front() else { return };
         self.shares.charge(&mut client.share, request.line_bytes());
+        self.watchdog.sent_request(now, id);
         match request {
             WholeRequest::Read { address, count } => self.send_read(now, id, address, count),
             WholeRequest::Write { map, address, values } => {
@@ -283,16 +278,19 @@ impl Hub {
             self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
         }
         if !self.is_read_only {
+            if is_accepted && map == Map::V22 {
+                self.watchdog.wrote(now, id, address, &values);
+            }
             self.known.write(map, address, &values);
             self.line.send_write(now, map, address, &values);
         }
     }
 
     fn send_sample(&mut self, now: Instant, stream: Stream) {
-        let row = stream.registers();
-        self.shares.charge(&mut self.sampler.share, request::read_bytes(row.count));
+        let (address, count) = stream.registers();
+        self.shares.charge(&mut self.sampler.share, request::read_bytes(count));
         self.sampler.note_sent(now, stream);
-        self.line.send_read(now, Owner::Sample(stream), row.address, row.count);
+        self.line.send_read(now, Owner::Sample(stream), address, count);
     }
 
     fn deliver(&mut self, now: Instant, owner: Owner, event: Event) {
@@ -322,6 +320,7 @@ impl Hub {
         if is_wanted && self.arm != ArmState::Present {
             self.arm = ArmState::Present;
             self.known = known;
+            self.watchdog.forget();
             for register in [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY] {
                 self.line.send_write(now, Map::V21, register.address, &[0]);
             }

@@ -1,9 +1,9 @@
-//! The registers that each client has for itself: the frequencies of its reports.
+//! The registers that each client has for itself: the frequencies of its reports, and what they hold.
 //!
 //! A write to them is taken out of the frame, and a read of them is overlaid with the client's values. The other
 //! registers of the frame pass unchanged.
 
-use protocol_core::registers::map::{FEEDBACK_FREQUENCY, OFFSET};
+use protocol_core::registers::map::{FEEDBACK_FREQUENCY, OFFSET, REPORT_CONTENT};
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::registers::{Map, Register};
 
@@ -14,6 +14,8 @@ use super::stream::Stream;
 pub(crate) struct OwnRegisters {
     /// Of the reports of map 2.2, in Hz.
     positions: u8,
+    /// What these reports hold (D26).
+    content: u8,
     /// Of the reports of present angles of map 2.1, in Hz.
     angles: u8,
     /// Of the reports of present loads of map 2.1, in Hz.
@@ -26,7 +28,9 @@ impl OwnRegisters {
     /// The frequency of a stream, in Hz.
     pub(crate) const fn frequency(&self, stream: Stream) -> u8 {
         match stream {
-            Stream::Positions => self.positions,
+            Stream::Positions | Stream::FinePositions | Stream::FineState => {
+                if Stream::of_content(self.content).index() == stream.index() { self.positions } else { 0 }
+            }
             Stream::Angles => self.angles,
             Stream::Loads => self.loads,
         }
@@ -58,6 +62,9 @@ impl OwnRegisters {
         if let Some(byte) = byte_at(address, values, &FEEDBACK_FREQUENCY) {
             *self = Self { positions: std::mem::take(byte), angles: 0, loads: 0, ..*self };
         }
+        if let Some(byte) = byte_at(address, values, &REPORT_CONTENT) {
+            self.content = std::mem::take(byte);
+        }
     }
 
     /// Every write stops the reports of map 2.2 (M4).
@@ -75,6 +82,7 @@ impl OwnRegisters {
     pub(crate) fn overlay(&self, address: u8, values: &mut [u8]) {
         let own = [
             (FEEDBACK_FREQUENCY, self.positions),
+            (REPORT_CONTENT, self.content),
             (ANGLE_FEEDBACK_FREQUENCY, self.angles),
             (LOAD_FEEDBACK_FREQUENCY, self.loads),
         ];
@@ -109,7 +117,7 @@ mod tests {
     }
 
     fn frequencies(own: &OwnRegisters) -> [u8; 3] {
-        Stream::ALL.map(|stream| own.frequency(stream))
+        [Stream::Positions, Stream::Angles, Stream::Loads].map(|stream| own.frequency(stream))
     }
 
     #[test]

@@ -36,7 +36,7 @@ impl Sampler {
             Stream::ALL.map(|stream| clients.clone().map(|own| own.frequency(stream)).max().unwrap_or(0));
         let streams = || Stream::ALL.into_iter().zip(wanted);
         let active = streams().filter(|&(_, wanted)| wanted > 0);
-        let bytes = active.map(|(stream, _)| reply_bytes(stream.registers().count)).sum();
+        let bytes = active.map(|(stream, _)| reply_bytes(stream.registers().1)).sum();
         let most = highest_frequency(self.baud, bytes);
         for (timer, (_, wanted)) in self.timers.iter_mut().zip(streams()) {
             timer.set(now, u32::from(wanted).min(most));

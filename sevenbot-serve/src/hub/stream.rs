@@ -1,7 +1,6 @@
 //! The streams of reports that a client can have.
 
-use protocol_core::registers::Register;
-use protocol_core::registers::map::PRESENT_POSITION;
+use protocol_core::registers::map::{FINE_POSITION, LOAD, PRESENT_POSITION, report_content};
 use protocol_core::registers::map21::{PRESENT_ANGLE, PRESENT_LOAD};
 
 /// A stream of reports.
@@ -9,6 +8,10 @@ use protocol_core::registers::map21::{PRESENT_ANGLE, PRESENT_LOAD};
 pub enum Stream {
     /// The present positions of map 2.2.
     Positions,
+    /// The present positions in hundredths of a degree (D26).
+    FinePositions,
+    /// The present positions in hundredths of a degree, velocities and loads (D26).
+    FineState,
     /// The present angles of map 2.1.
     Angles,
     /// The present loads of map 2.1.
@@ -16,20 +19,35 @@ pub enum Stream {
 }
 
 /// Number of streams.
-pub(crate) const STREAMS: usize = 3;
+pub(crate) const STREAMS: usize = 5;
 
 impl Stream {
     /// All streams.
-    pub(crate) const ALL: [Self; STREAMS] = [Self::Positions, Self::Angles, Self::Loads];
+    pub(crate) const ALL: [Self; STREAMS] =
+        [Self::Positions, Self::FinePositions, Self::FineState, Self::Angles, Self::Loads];
 
-    /// The registers in a report.
+    /// The stream of register 53 for a value of register 189 (D26).
+    pub(crate) const fn of_content(content: u8) -> Self {
+        match content {
+            report_content::FINE_POSITIONS => Self::FinePositions,
+            report_content::FINE_STATE => Self::FineState,
+            _ => Self::Positions,
+        }
+    }
+
+    /// The address of the first register in a report, and how many there are.
     #[must_use]
-    pub const fn registers(self) -> Register {
-        match self {
+    pub const fn registers(self) -> (u8, u8) {
+        let row = match self {
             Self::Positions => PRESENT_POSITION,
+            Self::FinePositions => FINE_POSITION,
+            Self::FineState => {
+                return (FINE_POSITION.address, LOAD.address + LOAD.count - FINE_POSITION.address);
+            }
             Self::Angles => PRESENT_ANGLE,
             Self::Loads => PRESENT_LOAD,
-        }
+        };
+        (row.address, row.count)
     }
 
     /// Its place in [`Stream::ALL`].

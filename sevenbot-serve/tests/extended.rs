@@ -1,0 +1,87 @@
+//! Programs share an arm whose extended block one of them uses: reports (D26) and the watchdog (D24).
+
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
+
+mod rig;
+
+use protocol_core::registers::map::{
+    FAULTS, FEEDBACK_FREQUENCY, FINE_POSITION, FINE_TARGET, HOST_WATCHDOG, PRESENT_POSITION, REPORT_CONTENT,
+    fault, report_content,
+};
+use protocol_core::time::Duration;
+use rig::{World, read, write};
+
+/// 90 degrees in hundredths, low byte first.
+const POINT: [u8; 2] = [0x28, 0x23];
+/// The watchdog in steps of 10 ms, and in milliseconds.
+const STEPS: u8 = 20;
+const TIMEOUT_MS: u64 = 200;
+
+fn has_acted(world: &World) -> bool {
+    world.arm.registers().get(FAULTS.address) & fault::HOST_SILENT != 0
+}
+
+/// A program that streams with a watchdog, and one that reads and has reports.
+fn streamer_and_reader() -> World {
+    let mut world = World::new(2);
+    world.send(0, &write(HOST_WATCHDOG.address, &[STEPS]));
+    world.send(1, &write(FEEDBACK_FREQUENCY.address, &[50]));
+    for _ in 0..20 {
+        world.send(0, &write(FINE_TARGET.address, &POINT));
+        world.send(1, &read(PRESENT_POSITION.address, 3));
+        world.run(50);
+    }
+    world
+}
+
+#[test]
+fn d24_the_frames_of_others_do_not_keep_the_watchdog_of_a_silent_program_alive() {
+    let mut world = streamer_and_reader();
+    assert!(!has_acted(&world), "the program sends every 50 ms");
+    let slowest = (0..100).map(|_| world.round_trip(1, &read(1, 2))).max();
+    assert!(slowest.is_some_and(|time| time > Duration::from_millis(TIMEOUT_MS)), "the arm hears nothing");
+    assert!(has_acted(&world));
+    let delays = (0..50).map(|_| world.round_trip(1, &read(1, 2)));
+    assert!(delays.max().is_some_and(|time| time < Duration::from_millis(20)), "once in each silence");
+}
+
+#[test]
+fn d24_the_watchdog_of_a_program_that_is_gone_acts() {
+    let mut world = streamer_and_reader();
+    world.leave(0);
+    world.run(2 * TIMEOUT_MS + 100);
+    assert!(has_acted(&world));
+}
+
+#[test]
+fn d24_a_program_that_switches_its_watchdog_off_delays_nobody() {
+    let mut world = streamer_and_reader();
+    world.send(0, &write(HOST_WATCHDOG.address, &[0]));
+    let delays: Vec<_> = (0..100).map(|_| world.round_trip(1, &read(1, 2))).collect();
+    assert!(delays.iter().all(|time| *time < Duration::from_millis(20)));
+    assert!(!has_acted(&world));
+}
+
+#[test]
+fn d26_each_program_chooses_what_its_reports_hold() {
+    let mut world = World::new(3);
+    let contents = [report_content::POSITIONS, report_content::FINE_POSITIONS, report_content::FINE_STATE];
+    for (program, content) in contents.into_iter().enumerate() {
+        world.send(program, &write(REPORT_CONTENT.address, &[content]));
+        world.send(program, &write(FEEDBACK_FREQUENCY.address, &[20]));
+    }
+    world.run(2_000);
+    let expected = [(PRESENT_POSITION.address, 7), (FINE_POSITION.address, 14), (FINE_POSITION.address, 42)];
+    for (program, expected) in expected.into_iter().enumerate() {
+        let reports = world.take(program);
+        assert!(reports.len().abs_diff(40) <= 2, "{} reports at 20 Hz", reports.len());
+        assert!(reports.iter().all(|(address, values)| (*address, values.len()) == expected));
+        world.send(program, &read(REPORT_CONTENT.address, 1));
+        world.send(program, &write(FEEDBACK_FREQUENCY.address, &[0]));
+    }
+    world.run(100);
+    for (program, content) in contents.into_iter().enumerate() {
+        assert!(world.take(program).contains(&(REPORT_CONTENT.address, vec![content])), "its own value");
+    }
+    assert_eq!(world.arm.registers().get(REPORT_CONTENT.address), 0);
+}
