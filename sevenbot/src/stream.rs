@@ -205,10 +205,30 @@ impl Drop for SetPointStream<'_> {
     }
 }
 
+impl Arm {
+    /// Switches off period and watchdog of a stream whose program is gone: the watchdog has acted, and no program has
+    /// written it since. Otherwise it would stop the moves of programs that do not send all the time. Returns whether
+    /// there was such a stream.
+    ///
+    /// # Errors
+    /// As [`Arm::write_checked`].
+    pub fn end_abandoned_stream(&mut self) -> Result<bool, Error> {
+        let is_abandoned = is_left_behind(self)? && self.has_extended_block()?;
+        if is_abandoned {
+            self.write_checked(STREAM_REGISTERS.address(), &SWITCHED_OFF)?;
+        }
+        Ok(is_abandoned)
+    }
+}
+
+/// Has the watchdog acted, and was not written since?
+fn is_left_behind(arm: &mut Arm) -> Result<bool, Error> {
+    Ok(arm.status()?.is_some_and(|status| status.faults() & fault::HOST_SILENT != 0))
+}
+
 /// The registers to put back. If the watchdog acted, the program that set them is gone, and they are switched off.
 fn registers_before(arm: &mut Arm) -> Result<Vec<u8>, Error> {
-    let is_left_behind = arm.status()?.is_some_and(|status| status.faults() & fault::HOST_SILENT != 0);
-    if is_left_behind {
+    if is_left_behind(arm)? {
         return Ok(SWITCHED_OFF.to_vec());
     }
     Ok(arm.read_span(STREAM_REGISTERS)?.values)

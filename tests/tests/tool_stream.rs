@@ -137,6 +137,48 @@ fn d24_a_killed_stream_leaves_an_arm_that_holds_and_takes_the_next_client() {
 }
 
 #[test]
+fn d24_the_watchdog_of_a_killed_stream_does_not_stop_what_comes_after() {
+    with_arm(TestSetup::any(), |arm| {
+        let (mut killed, _lines) = start_slow_stream(arm);
+        send_signal(&killed, Signal::KILL);
+        wait_for_exit(&mut killed);
+        sleep(SILENCE);
+        let set = tool().arg("--port").arg(arm.lend_port()).args(["set", "target-position.1", "80"]).output();
+        succeeded(set.expect("sevenbot runs"));
+        // The joint needs a second or more. Nothing is sent meanwhile.
+        sleep(SILENCE);
+        arm.reopen(115_200);
+        assert_eq!((arm.register(TARGET_POSITION), arm.register(FAULTS) & HOST_SILENT), (80, 0));
+        assert_eq!(arm.read(STREAM_REGISTERS, 4), [0; 4], "what the dead program left is switched off");
+        arm.write(SPEED, &[60]);
+        arm.drive_to(&STANDARD_POSE);
+    });
+}
+
+#[test]
+fn d24_a_killed_stream_can_leave_the_arm_damped() {
+    with_arm(TestSetup::any(), |arm| {
+        let mut killed = start_stream(arm, &["--watchdog-action", "damping"]);
+        arm_is_watched(&mut killed);
+        send_signal(&killed, Signal::KILL);
+        wait_for_exit(&mut killed);
+        sleep(SILENCE);
+        arm.reopen(115_200);
+        assert_eq!((arm.register(MOTOR_STATE), arm.register(FAULTS) & HOST_SILENT), (0, HOST_SILENT));
+        arm.write(STREAM_REGISTERS, &[0; 4]);
+        arm.write(MOTOR_STATE, &[1]);
+        arm.wait_until("the arm is driven", |arm| arm.register(MOTOR_STATE) == 1);
+        arm.drive_to(&STANDARD_POSE);
+    });
+}
+
+/// Sends the point where the arm stands, and waits until the stream must have begun.
+fn arm_is_watched(tool: &mut Child) {
+    tool.stdin.as_mut().expect("a pipe").write_all(b"0,90,90,65,90,90,90,80\n").expect("the tool reads");
+    sleep(SILENCE);
+}
+
+#[test]
 fn d24_ctrl_c_holds_the_arm_and_puts_the_registers_back() {
     with_arm(TestSetup::any(), |arm| {
         let (tool, _lines) = start_slow_stream(arm);

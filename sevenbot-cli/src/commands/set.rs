@@ -2,7 +2,7 @@
 
 use clap::Args;
 use sevenbot::checked_write::{MismatchCause, WriteMismatch};
-use sevenbot::map::{BAUD_RATE, EEPROM_LOCK};
+use sevenbot::map::{BAUD_RATE, EEPROM_LOCK, FINE_TARGET, TARGET_POSITION};
 use sevenbot::map21::find_readable;
 use sevenbot::names::{self, name_of_register};
 use sevenbot::register_text::{self, entries};
@@ -67,6 +67,10 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandEr
     }
     // Targets, offsets and the motor state move the arm.
     let unchanged = hold_on_interrupt(&mut arm, |arm, _| {
+        let is_target = |address| TARGET_POSITION.holds(address) || FINE_TARGET.holds(address);
+        if span.addresses().any(is_target) {
+            arm.end_abandoned_stream()?;
+        }
         let write = |arm: &mut Arm| arm.write_checked(span.address(), &bytes);
         if args.unlock { unlocked(arm, write) } else { Ok(write(arm)?) }
     })?;

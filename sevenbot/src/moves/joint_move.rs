@@ -35,13 +35,15 @@ const TOLERANCE_DEGREES: u8 = 2;
 pub type Targets = [Option<u8>; 7];
 
 impl Arm {
-    /// The joints after start-up: [`Arm::wait_until_settled`].
+    /// The joints after start-up: [`Arm::wait_until_settled`]. Ends a stream whose program is gone:
+    /// [`Arm::end_abandoned_stream`].
     ///
     /// # Errors
     /// [`MoveError::NotDriven`] if the motors do not drive the joints, and the errors of [`Arm::read`].
     pub fn driven_joints(&mut self) -> Result<JointSnapshot, MoveError> {
         let joints = self.wait_until_settled()?;
         if joints.is_driven() {
+            self.end_abandoned_stream()?;
             Ok(joints)
         } else {
             Err(MoveError::NotDriven { state: joints.motor_state() })

@@ -13,7 +13,7 @@ mod tracking;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
-use clap::{Args, value_parser};
+use clap::{Args, ValueEnum, value_parser};
 use sevenbot::map::report_content;
 use sevenbot::stream::{PaceCounts, SetPointStream, StreamError, StreamOptions, StreamPace, WatchdogAction};
 use sevenbot::{Arm, StatusBlock};
@@ -28,7 +28,7 @@ use crate::session::Session;
 
 /// Stream set-points from standard input, in hundredths of a degree.
 ///
-/// The arm goes through the points in straight lines. If this program dies, the watchdog of the arm makes it hold.
+/// The arm goes through the points in straight lines. If this program dies, the watchdog of the arm makes it hold, or sink slowly.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -61,9 +61,30 @@ pub(crate) struct StreamArgs {
     /// Time between two points in milliseconds, 5 to 1000.
     #[arg(long, value_name = "MS", default_value_t = 20, value_parser = value_parser!(u16).range(5..=1_000))]
     period: u16,
-    /// Time without a sign of this program after which the arm holds, in milliseconds up to 2550; 0: never.
+    /// Time without a sign of this program after which the watchdog acts, in milliseconds up to 2550; 0: never.
     #[arg(long, value_name = "MS", default_value_t = 300, value_parser = value_parser!(u16).range(0..=2_550))]
     watchdog: u16,
+    /// What the watchdog of the arm does.
+    #[arg(long, value_name = "ACTION", value_enum, default_value_t = Action::Hold)]
+    watchdog_action: Action,
+}
+
+/// What the arm does if this program is silent.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Action {
+    /// The joints hold.
+    Hold,
+    /// Damping protection: the arm sinks slowly.
+    Damping,
+}
+
+impl From<Action> for WatchdogAction {
+    fn from(action: Action) -> Self {
+        match action {
+            Action::Hold => Self::Hold,
+            Action::Damping => Self::Damping,
+        }
+    }
 }
 
 /// Frequency of the reports, in Hz.
@@ -80,7 +101,7 @@ impl StreamArgs {
         let steps = u8::try_from(self.watchdog.div_ceil(WATCHDOG_STEP_MS)).unwrap_or(u8::MAX);
         let options = StreamOptions::new(self.period);
         let options = options.ok_or_else(|| CommandError::Usage("a period is 5 to 1000 ms".to_owned()))?;
-        Ok(options.with_watchdog(steps, WatchdogAction::Hold))
+        Ok(options.with_watchdog(steps, self.watchdog_action.into()))
     }
 }
 
