@@ -23,6 +23,7 @@ mod modules;
 mod mujoco;
 mod no_panic;
 mod registers_md;
+mod replays;
 mod run;
 mod sag;
 mod size;
@@ -64,6 +65,8 @@ enum Task {
     /// Prints one table: trials, their number, failures and seeds. A seed reproduces its worlds. The time determines their
     /// number.
     Torture(torture::TortureArgs),
+    /// Record random sessions with a simulated arm natively and in a WebAssembly module, compare them, and replay them
+    Replays,
     /// Fuzz six parts of the arm and the library (needs a C++ compiler)
     Fuzz(fuzz::FuzzArgs),
     /// Check licences, versions and sources of all dependencies, and the advisories if they can be downloaded
@@ -143,6 +146,7 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Docs { check: false } => DOCUMENTS.iter().try_for_each(|document| (document.write)()),
         Task::Modules => modules::check(),
         Task::Torture(options) => torture::run(options),
+        Task::Replays => replays::long(),
         Task::Fuzz(options) => fuzz::check(options),
         Task::Deny => deny::check(),
         Task::Mujoco => mujoco::check(),

@@ -13,7 +13,7 @@ pub(crate) type TaskResult<T = ()> = Result<T, Box<dyn Error>>;
 /// The target triple of the chip.
 pub(crate) const CHIP: &str = "thumbv7em-none-eabihf";
 /// The target triple of a browser.
-const BROWSER: &str = "wasm32-unknown-unknown";
+pub(crate) const BROWSER: &str = "wasm32-unknown-unknown";
 
 /// The packages of a build for the host. All commands select the same packages, because another selection may enable other
 /// features and cause a second build.

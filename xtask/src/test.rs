@@ -8,7 +8,7 @@ use crate::run::{CHIP, HOST, TaskResult, build_for_browser, cargo, run};
 use crate::steps::{TestScope, TestStep, long, quick, whole};
 use crate::{
     count, crate_graph, decisions, deny, drawings, footprint, fuzz, install, modules, mujoco, no_panic,
-    registers_md, start_up, steps, system_tests, torture, trials,
+    registers_md, replays, start_up, steps, system_tests, torture, trials,
 };
 
 /// The scope of the run.
@@ -67,8 +67,10 @@ const STEPS: &[TestStep] = &[
     whole("system tests, the controller on this computer with servos behind a USB adapter", || {
         system_tests::run_on(&system_tests::ADAPTER)
     }),
+    whole("recorded sessions, natively and in a WebAssembly module", replays::short),
     whole("worlds with injected faults", torture::short),
     whole("fuzzing", fuzz::fixed),
+    long("more recorded sessions", replays::long),
     long("more worlds with injected faults", torture::long),
     long("the settings' tests in their long form", || {
         let mut trials = trials::Trials::default();

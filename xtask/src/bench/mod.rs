@@ -5,7 +5,7 @@ mod peers;
 mod programs;
 mod simulator;
 
-use crate::run::TaskResult;
+use crate::run::{TaskResult, cargo};
 
 /// Arguments of `cargo xtask bench`.
 #[derive(clap::Args)]
@@ -14,9 +14,16 @@ pub(crate) struct BenchArgs {
     /// arms in one process
     #[arg(long)]
     programs: bool,
+    /// Measure simulated arms in virtual time instead: 1, 10, 100 and 1000 of them, on one and two threads
+    #[arg(long, conflicts_with = "programs")]
+    simulation: bool,
 }
 
 /// Measures and prints.
 pub(crate) fn run(args: &BenchArgs) -> TaskResult {
-    if args.programs { programs::measure() } else { peers::compare() }
+    match args {
+        BenchArgs { programs: true, .. } => programs::measure(),
+        BenchArgs { simulation: true, .. } => cargo("run --quiet --release --package bench --bin simulation"),
+        _ => peers::compare(),
+    }
 }
