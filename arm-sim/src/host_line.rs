@@ -124,6 +124,8 @@ pub(crate) struct LineDirection {
     corruption: RandomFault,
     delay: Duration,
     delay_count: FaultCount,
+    /// Each byte is an event.
+    is_bytewise: bool,
     /// Bytes that the pacer gets at these times.
     delayed: VecDeque<(Instant, u8)>,
 }
@@ -137,6 +139,7 @@ impl LineDirection {
             corruption: RandomFault::new(!seed),
             delay: Duration::ZERO,
             delay_count: FaultCount::default(),
+            is_bytewise: false,
             delayed: VecDeque::new(),
         }
     }
@@ -150,6 +153,15 @@ impl LineDirection {
     pub(crate) fn clear(&mut self, baud: Option<u32>) {
         self.pacer = Pacer::new(baud);
         self.delayed.clear();
+        if self.is_bytewise {
+            self.pacer.set_bytewise();
+        }
+    }
+
+    /// Makes each byte an event.
+    pub(crate) const fn set_bytewise(&mut self) {
+        self.is_bytewise = true;
+        self.pacer.set_bytewise();
     }
 
     /// Begins a fault. Its count begins at 0.

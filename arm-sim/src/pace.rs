@@ -9,7 +9,7 @@
 
 use alloc::collections::VecDeque;
 
-use protocol_core::time::Instant;
+use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::MAX_LENGTH;
 
 /// Bytes that a direction holds: two of the longest frames, so that one can wait while the other is sent.
@@ -32,6 +32,8 @@ pub struct Pacer {
     busy_since: Instant,
     /// Number of bytes that have arrived since then.
     sent: u64,
+    /// The deadline covers the bytes of this many microseconds.
+    batch_micros: u64,
 }
 
 impl Pacer {
@@ -44,7 +46,13 @@ impl Pacer {
             arrived: 0,
             busy_since: Instant::ZERO,
             sent: 0,
+            batch_micros: BATCH_MICROS,
         }
+    }
+
+    /// Makes each byte a deadline. Then the times at which bytes are taken do not depend on the bytes behind them.
+    pub const fn set_bytewise(&mut self) {
+        self.batch_micros = 0;
     }
 
     /// Number of bytes that the line accepts.
@@ -68,7 +76,8 @@ impl Pacer {
     /// Starts to send bytes at `now`. Returns how many were accepted.
     pub fn push(&mut self, now: Instant, bytes: &[u8]) -> usize {
         self.advance(now);
-        if self.in_transit() == 0 {
+        // A byte that starts when the last one ends does not wait for the next microsecond.
+        if self.in_transit() == 0 && self.end_of(self.sent) != Some(now) {
             self.busy_since = now;
             self.sent = 0;
         }
@@ -111,9 +120,14 @@ impl Pacer {
     pub fn deadline(&self) -> Option<Instant> {
         let in_transit = self.in_transit() as u64;
         let baud = self.baud.filter(|_| in_transit > 0)?;
-        let batch = (baud * BATCH_MICROS / (BITS_PER_BYTE * 1_000_000)).clamp(1, in_transit);
-        let micros = ((self.sent + batch) * BITS_PER_BYTE * 1_000_000).div_ceil(baud);
-        Some(self.busy_since + protocol_core::time::Duration::from_micros(micros))
+        let batch = (baud * self.batch_micros / (BITS_PER_BYTE * 1_000_000)).clamp(1, in_transit);
+        self.end_of(self.sent + batch)
+    }
+
+    /// When this many bytes have arrived since the line is busy. `None` if they arrive at once.
+    fn end_of(&self, count: u64) -> Option<Instant> {
+        let micros = count.saturating_mul(BITS_PER_BYTE * 1_000_000).div_ceil(self.baud?);
+        Some(self.busy_since + Duration::from_micros(micros))
     }
 
     /// Number of bytes in transit.
@@ -160,6 +174,26 @@ mod tests {
             }
             let late = now.as_micros() - received * 10_000_000 / u64::from(baud);
             assert!(late <= 1, "{baud} baud: {late} us late after {received} bytes");
+        }
+    }
+
+    #[test]
+    fn bytes_in_one_piece_or_in_two_without_a_pause_arrive_at_the_same_times() {
+        let mut whole = Pacer::new(Some(115_200));
+        let mut parts = Pacer::new(Some(115_200));
+        whole.set_bytewise();
+        parts.set_bytewise();
+        whole.push(micros(0), b"abcdefgh");
+        parts.push(micros(0), b"abc");
+        for byte in 1..=8 {
+            let now = whole.deadline().unwrap();
+            assert_eq!(parts.deadline(), Some(now), "byte {byte}");
+            whole.advance(now);
+            parts.advance(now);
+            if byte == 3 {
+                parts.push(now, b"defgh");
+            }
+            assert_eq!((whole.arrived().len(), parts.arrived().len()), (byte, byte));
         }
     }
 

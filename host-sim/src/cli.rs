@@ -38,6 +38,12 @@ WHILE IT RUNS
   The control socket is for this user only. Standard error shows its path. With --arms each arm has its
   own socket, with its number before the extension. docs/simulation.md describes the requests.
 
+LOCKSTEP
+  host-sim --lockstep 1000 --link ./7bot       for a client that asks and waits for the answer
+  Virtual time goes on only while a byte is on the host line. Then it stands until the client sends its
+  next byte: the same client gets the same bytes in every run, however long it thinks. After MS without a
+  byte, time goes on by 1 ms. A client that sleeps, or that waits for reports, waits for this time-out.
+
 FAULTS
   3=missing                  the servo of joint 3 has no power
   3=late, 3=late=MS          its answers are 30 ms late, or MS
@@ -129,6 +135,11 @@ pub struct Options {
     /// $XDG_RUNTIME_DIR, or in the state directory]
     #[arg(long, value_name = "PATH", conflicts_with_all = ["servos", "servos_only", "servo_socket"])]
     pub control: Option<PathBuf>,
+
+    /// Let virtual time stand while the client thinks: see LOCKSTEP below. MS is a time-out in real time
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..=86_400_000),
+          conflicts_with_all = ["arms", "servos", "servos_only", "servo_socket"])]
+    pub lockstep: Option<u32>,
 
     /// Be an arm as the maker ships it, with the maker's firmware of this version: see AN ARM OF THE MAKER below
     #[arg(long, value_name = "VERSION", value_parser = maker_version,
@@ -299,6 +310,8 @@ mod tests {
             ("--as-maker 2.1.4 --servos a", "--servos"),
             ("--servos a --arms 2", "--arms"),
             ("--servos a --control b", "--control"),
+            ("--lockstep 10 --arms 2", "--arms"),
+            ("--lockstep 0", "--lockstep"),
             ("--servos a --fault 3=missing", "--fault"),
             ("--servos a --servos-only", "--servos-only"),
             ("--hold-on-exit", "--servos"),

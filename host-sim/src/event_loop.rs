@@ -16,12 +16,12 @@ use rustix::event::epoll::{self, CreateFlags, Event, EventData, EventFlags};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
-use crate::clock::{Clock, sleep_until};
-use crate::control::execute::execute;
+use crate::control::execute::{Outcome, execute};
 use crate::control::request;
-use crate::control::socket::ControlSocket;
+use crate::control::socket::{ControlSocket, Reply};
 use crate::pty_arm::PtyArm;
 use crate::signals::{SignalAction, Signals};
+use crate::virtual_clock::VirtualClock;
 use tty_ports::clients::Clients;
 
 /// Events per call; the other events follow in the next call.
@@ -95,12 +95,15 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
     ///
     /// # Errors
     /// The operating system fails: inotify, epoll, or the port of the last arm.
-    pub fn run(mut self, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
+    pub fn run(mut self, clock: &mut VirtualClock, signals: &mut Signals) -> io::Result<()> {
         epoll::add(&self.epoll, signals.as_fd(), EventData::new_u64(SIGNALS), EventFlags::IN)?;
         loop {
             let mut space = [MaybeUninit::uninit(); EVENTS];
-            let events = self.wait(clock, &mut space)?;
-            let now = clock.now();
+            let due = self.arms.iter().map(|entry| entry.due).min().unwrap_or(Instant::FAR_FUTURE);
+            // Only lockstep needs it.
+            let is_busy = clock.is_in_lockstep() && self.is_host_line_busy();
+            let events = self.wait(&clock.sleep(due, is_busy), &mut space)?;
+            let now = clock.tick(due, is_busy);
             // Signals come first: bytes that a client sends after a signal must reach the arm after it.
             if self.apply_signals(signals, now) {
                 return Ok(());
@@ -109,8 +112,8 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
                 match event.data.u64() {
                     SIGNALS => {}
                     CLIENTS => self.clients.as_mut().map_or(Ok(()), Clients::update)?,
-                    data @ CONTROL.. => self.poll_control(data, now)?,
-                    number => self.poll_arm(usize::try_from(number).unwrap_or(usize::MAX), now)?,
+                    data @ CONTROL.. => self.poll_control(index(data - CONTROL), clock)?,
+                    number => self.poll_arm(index(number), now)?,
                 }
             }
             self.wake_arms_with_news(now);
@@ -118,20 +121,25 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
                 if self.arms.get(number).is_some_and(|entry| entry.due <= now) {
                     self.poll_arm(number, now)?;
                 }
+                if self.arms.get(number).is_some_and(|entry| entry.is_control_due(now)) {
+                    self.poll_control(number, clock)?;
+                }
             }
         }
     }
 
-    /// Sleeps until an event or a deadline. poll(2) is slow with many ports, and epoll_wait(2) has no timeouts below a
+    fn is_host_line_busy(&self) -> bool {
+        self.arms.iter().any(|entry| !entry.has_failed && entry.arm.is_host_line_busy())
+    }
+
+    /// Sleeps until an event, at most for this time. poll(2) is slow with many ports, and epoll_wait(2) has no timeouts below a
     /// millisecond before Linux 5.11. So poll(2) waits for the epoll instance.
     fn wait<'space>(
         &self,
-        clock: &mut Clock,
+        time: &Timespec,
         space: &'space mut [MaybeUninit<Event>; EVENTS],
     ) -> io::Result<&'space mut [Event]> {
-        let earliest = self.arms.iter().map(|entry| entry.due).min().unwrap_or(Instant::FAR_FUTURE);
-        let time = sleep_until(clock.now(), earliest);
-        let result = match poll(&mut [PollFd::new(&self.epoll, PollFlags::IN)], Some(&time)) {
+        let result = match poll(&mut [PollFd::new(&self.epoll, PollFlags::IN)], Some(time)) {
             Ok(0) => return Ok(&mut []),
             Ok(_) => epoll::wait(&self.epoll, space, Some(&NO_WAIT)),
             Err(error) => Err(error),
@@ -173,15 +181,21 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
     }
 
     /// Polls the control socket of an arm.
-    fn poll_control(&mut self, data: u64, now: Instant) -> io::Result<()> {
-        let number = usize::try_from(data - CONTROL).unwrap_or(usize::MAX);
+    fn poll_control(&mut self, number: usize, clock: &mut VirtualClock) -> io::Result<()> {
         let Some(entry) = self.arms.get_mut(number).filter(|entry| !entry.has_failed) else { return Ok(()) };
         let Entry { arm, control: Some(control), due, .. } = entry else { return Ok(()) };
+        let now = clock.now();
+        let data = EventData::new_u64(CONTROL + u64::try_from(number).unwrap_or(u64::MAX));
         let execute = |line: &[u8]| {
+            arm.simulation_mut().advance(now, false);
             arm.log_ended_faults();
-            request::line(request::parse(line).and_then(|request| execute(arm, now, request)))
+            match request::parse(line).and_then(|request| execute(arm, clock, request)) {
+                Ok(Outcome::Done(result)) => Reply::Line(request::line(Ok(result))),
+                Ok(Outcome::At(end)) => Reply::At(end),
+                Err(refusal) => Reply::Line(request::line(Err(refusal))),
+            }
         };
-        if control.poll(&self.epoll, EventData::new_u64(data), execute)? {
+        if control.poll(&self.epoll, data, now, execute)? {
             *due = now;
         }
         Ok(())
@@ -214,6 +228,11 @@ impl<F: NorFlash + Clone, C: ArmController> Entry<F, C> {
         Ok(())
     }
 
+    /// Does a client of the control socket wait for this time?
+    fn is_control_due(&self, now: Instant) -> bool {
+        self.control.as_ref().and_then(ControlSocket::due).is_some_and(|due| due <= now)
+    }
+
     fn fail(&mut self, failure: &io::Error, epoll: &OwnedFd) {
         self.arm.report_failure(failure);
         self.control = None;
@@ -222,6 +241,11 @@ impl<F: NorFlash + Clone, C: ArmController> Entry<F, C> {
         self.due = Instant::FAR_FUTURE;
         self.has_failed = true;
     }
+}
+
+/// The number of an arm in event data.
+fn index(data: u64) -> usize {
+    usize::try_from(data).unwrap_or(usize::MAX)
 }
 
 #[cfg(test)]

@@ -32,3 +32,4 @@ pub mod servo_socket;
 pub mod servos_only;
 pub mod signals;
 pub mod trace;
+pub mod virtual_clock;

@@ -29,8 +29,9 @@ use host_sim::servo_socket::ServoSocket;
 use host_sim::servos_only::{self, ServosOnly, ServosOnlyError};
 use host_sim::signals::Signals;
 use host_sim::trace::Trace;
+use host_sim::virtual_clock::VirtualClock;
 use motion_core::Controller;
-use protocol_core::time::Duration;
+use protocol_core::time::{Duration, Instant};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tracing::{Span, error_span, info, warn};
 use tracing_subscriber::filter::Targets;
@@ -42,6 +43,9 @@ use tty_ports::symlink::{Symlink, SymlinkError};
 
 /// The log target of frames. `--trace` shows it at any log level.
 const FRAMES: &str = "frames";
+
+/// With --lockstep the servos have started when the port is ready: no virtual time passes before the first byte.
+const LOCKSTEP_START: Instant = Instant::from_micros(1_000_000);
 
 /// Why the program failed.
 #[derive(Debug, thiserror::Error)]
@@ -130,10 +134,8 @@ fn run(options: &Options) -> Result<(), Failure> {
         (Some(path), _) => run_servo_socket(options, path, &mut clock, &mut signals),
         (None, Some(port)) => run_real_servos(options, port, &mut clock, &mut signals),
         (None, None) if options.servos_only => run_servos_only(options, &mut clock, &mut signals),
-        (None, None) if options.as_maker.is_some() => {
-            run_arms::<StockController>(options, &mut clock, &mut signals)
-        }
-        (None, None) => run_arms::<Controller>(options, &mut clock, &mut signals),
+        (None, None) if options.as_maker.is_some() => run_arms::<StockController>(options, &mut signals),
+        (None, None) => run_arms::<Controller>(options, &mut signals),
     }
 }
 
@@ -141,14 +143,14 @@ fn run(options: &Options) -> Result<(), Failure> {
 fn plant_alone(options: &Options, clock: &mut Clock) -> Result<Plant, Failure> {
     match options.faults.iter().find(|fault| !fault.is_of_plant()) {
         Some(&fault) => Err(Failure::FaultOfController(fault)),
-        None => Ok(plant(options, clock)),
+        None => Ok(plant(options, clock.now())),
     }
 }
 
 /// The simulated servos in the standard pose, with the faults of the command line.
-fn plant(options: &Options, clock: &mut Clock) -> Plant {
+fn plant(options: &Options, now: Instant) -> Plant {
     let config = ServoConfig { torque_codes: options.torque_codes, ..ServoConfig::default() };
-    let mut plant = Plant::with_config(clock.now(), config);
+    let mut plant = Plant::with_config(now, config);
     options.faults.iter().for_each(|fault| fault.apply(&mut plant));
     plant
 }
@@ -196,7 +198,7 @@ fn run_real_servos(
     let path = pty.path().to_owned();
     let _symlink = options.link.as_ref().map(|link| Symlink::new(link, &path)).transpose()?;
     let line = BusLine::new(Duration::from_millis(options.usb_timeout.into()));
-    let arm = arm::<_, Controller>(options, None, pty, clock, line)?;
+    let arm = arm::<_, Controller>(options, None, pty, clock.now(), line)?;
     let config = real_servos::BusConfig {
         port: port.to_owned(),
         baud: options.servo_baud,
@@ -208,11 +210,11 @@ fn run_real_servos(
     servos.run(clock, signals).map_err(Failure::Running)
 }
 
-fn run_arms<C: ArmController>(
-    options: &Options,
-    clock: &mut Clock,
-    signals: &mut Signals,
-) -> Result<(), Failure> {
+fn run_arms<C: ArmController>(options: &Options, signals: &mut Signals) -> Result<(), Failure> {
+    let mut clock = match options.lockstep {
+        None => VirtualClock::default(),
+        Some(millis) => VirtualClock::in_lockstep(LOCKSTEP_START, Duration::from_millis(millis.into())),
+    };
     let numbers = options.arms.map_or(vec![None], |count| (1..=count).map(Some).collect());
     if numbers.len() > 1 {
         allow_as_many_files_as_possible();
@@ -229,16 +231,20 @@ fn run_arms<C: ArmController>(
             symlinks.push(Symlink::new(&per_arm::path(link, number), &port)?);
         }
         ports.push(port);
-        let plant = plant(options, clock);
-        let mut arm = arm::<_, C>(options, number, pty, clock, plant)?;
+        let plant = plant(options, Instant::ZERO);
+        let mut arm = arm::<_, C>(options, number, pty, Instant::ZERO, plant)?;
         arm.set_seed(options.seed.wrapping_add(number.unwrap_or(0).into()));
-        options.faults.iter().for_each(|&fault| arm.set_fault(clock.now(), fault));
+        if clock.is_in_lockstep() {
+            arm.simulation_mut().set_bytewise_line();
+        }
+        options.faults.iter().for_each(|&fault| arm.set_fault(Instant::ZERO, fault));
+        arm.simulation_mut().advance(clock.now(), true);
         arms.push(arm);
     }
     let mut event_loop = EventLoop::new(arms, clients).map_err(Failure::Running)?;
     event_loop.add_controls(control_sockets(options, &numbers)?).map_err(Failure::Running)?;
     print_ready(&ports);
-    event_loop.run(clock, signals).map_err(Failure::Running)
+    event_loop.run(&mut clock, signals).map_err(Failure::Running)
 }
 
 /// The control sockets of the arms. If the default one cannot be created, the arm has none.
@@ -269,7 +275,7 @@ fn arm<B: ServoBus, C: ArmController>(
     options: &Options,
     number: Option<u16>,
     pty: Pty,
-    clock: &mut Clock,
+    now: Instant,
     bus: B,
 ) -> Result<PtyArm<Flash<ImageFile>, B, C>, Failure> {
     // At level error, so that every log level shows it.
@@ -283,7 +289,7 @@ fn arm<B: ServoBus, C: ArmController>(
     let flash = options.eeprom.as_ref().unwrap_or(&default).open(number)?;
     let chip_id = per_arm::chip_id(options.chip_id, number);
     let config = ArmConfig { chip_id, is_paced: !options.unpaced, torque_codes: options.torque_codes };
-    let mut simulation = SimulatedArm::power_up(clock.now(), config, flash, bus);
+    let mut simulation = SimulatedArm::power_up(now, config, flash, bus);
     if options.trace {
         simulation.set_tap(Trace::new(Box::new(|line| tracing::info!(target: FRAMES, "{line}"))));
     }

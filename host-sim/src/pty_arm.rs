@@ -4,6 +4,7 @@ use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::path::Path;
 
+use arm_sim::action::Action;
 use arm_sim::controller::ArmController;
 use arm_sim::faults::{ArmFault, FaultReport};
 use arm_sim::pace;
@@ -55,9 +56,21 @@ impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
         self.simulation.set_seed(seed);
     }
 
+    /// Does something to the arm. Returns the reports of the faults that this ended.
+    pub fn act(&mut self, now: Instant, action: Action) -> Vec<FaultReport> {
+        let _inside = self.span.enter();
+        info!("{action}");
+        self.simulation.act(now, action)
+    }
+
     /// The arm without its port.
     pub const fn simulation_mut(&mut self) -> &mut SimulatedArm<F, Plant, C> {
         &mut self.simulation
+    }
+
+    /// Is a byte on the host line?
+    pub(crate) fn is_host_line_busy(&self) -> bool {
+        self.simulation.is_host_line_busy()
     }
 
     /// Logs the faults that ended by themselves since the last call.

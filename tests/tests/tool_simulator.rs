@@ -6,11 +6,14 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
+use std::time::Duration;
 
 use serde_json::{Value, json};
 use system_tests::process::{self, Signal};
 use system_tests::programs::{host_sim, tool};
-use system_tests::registers::{EFFECTOR_TYPE, MISSING_SERVOS, MOTOR_STATE};
+use system_tests::registers::{
+    EFFECTOR_TYPE, MISSING_SERVOS, MOTOR_STATE, PRESENT_POSITION, TARGET_POSITION,
+};
 use system_tests::{ArmClient, wait};
 use tempfile::TempDir;
 
@@ -201,6 +204,99 @@ fn each_arm_has_its_own_socket_and_the_port_chooses_it() {
     assert!(state.contains("weight      10 g") && state.contains(second), "{state}");
     let first = simulator.says(&["--control", sockets[0].to_str().expect("text"), "state"]);
     assert!(first.contains("weight      0 g"), "{first}");
+}
+
+/// The virtual time of a state, in microseconds.
+fn time(simulator: &Simulator) -> u64 {
+    simulator.state()["time_us"].as_u64().expect("a time")
+}
+
+#[test]
+fn virtual_time_stands_advances_exactly_and_goes_at_full_speed() {
+    let simulator = Simulator::start(&[]);
+    let mut arm = simulator.client();
+    assert_eq!(simulator.state()["speed"], 1.0);
+    simulator.says(&["pause"]);
+    let paused_at = time(&simulator);
+    arm.write(TARGET_POSITION, &[120]);
+    assert!(arm.try_read(EFFECTOR_TYPE, 1, Duration::from_millis(200)).is_none(), "no time, no answer");
+    assert_eq!((time(&simulator), &simulator.state()["speed"]), (paused_at, &json!("paused")));
+    let said = simulator.says(&["advance", "10s"]);
+    assert_eq!(said, format!("time        {:.3} s\n", (paused_at + 10_000_000) as f64 / 1e6));
+    assert_eq!(time(&simulator), paused_at + 10_000_000);
+    let angle = simulator.joint(1, "angle_degrees").as_f64().expect("an angle");
+    assert!((angle - 120.0).abs() < 1.0, "{angle}");
+    simulator.says(&["speed", "max"]);
+    wait::wait_until("ten minutes have passed", || time(&simulator) > 600_000_000);
+    assert_eq!(arm.register(EFFECTOR_TYPE), 0, "the port is served");
+    let said = simulator.says(&["speed", "50"]);
+    assert!(said.ends_with(", speed 50.0\n"), "{said}");
+    assert_eq!(arm.register(EFFECTOR_TYPE), 0);
+    assert!(simulator.refuses(&["speed", "0"], 1).contains("0.001"));
+    assert!(simulator.refuses(&["advance", "10"], 2).contains("250ms"));
+    simulator.says(&["pause"]);
+    simulator.says(&["resume"]);
+    let resumed_at = time(&simulator);
+    wait::wait_until("time passes", || time(&simulator) > resumed_at);
+}
+
+#[test]
+fn requests_after_an_advance_wait_for_its_end() {
+    let simulator = Simulator::start(&[]);
+    let mut control = Control::connect(&simulator.sockets()[0]);
+    control.ask(&json!({ "do": "pause" }));
+    control.send(
+        b"{\"do\":\"advance\",\"ms\":5000}\n{\"do\":\"fault\",\"fault\":\"3=missing\",\"for_ms\":1000}\n",
+    );
+    control.send(b"{\"do\":\"advance\",\"ms\":999}\n{\"do\":\"faults\"}\n{\"do\":\"advance\",\"ms\":1}\n{\"do\":\"faults\"}\n");
+    let first = control.answer()["ok"]["time_us"].as_u64().expect("a time");
+    assert_eq!(control.answer()["ok"]["fault"], "3=missing");
+    assert_eq!(control.answer()["ok"]["time_us"], first + 999_000);
+    assert_eq!(control.answer()["ok"]["faults"][0]["remaining_ms"], 1);
+    control.answer();
+    let faults = control.answer();
+    assert_eq!(faults["ok"]["faults"], json!([]));
+    assert_eq!(faults["ok"]["ended_faults"][0]["had_no_effect"], false, "{faults}");
+}
+
+/// A client that asks and waits for the answer, with pauses in real time: all its answers, and the state at the end.
+fn lockstep_run(pause: Duration) -> (Vec<Vec<u8>>, Value) {
+    let simulator = Simulator::start(&["--lockstep", "60000", "--fault", "3=garbled=7", "--seed", "3"]);
+    let mut arm = simulator.client();
+    let mut answers = Vec::new();
+    for degrees in [120, 60, 100] {
+        arm.write(TARGET_POSITION, &[degrees, 80]);
+        for _ in 0..40 {
+            std::thread::sleep(pause);
+            answers.push(arm.read(PRESENT_POSITION, 7));
+        }
+    }
+    let mut state = simulator.state();
+    state["port"].take();
+    (answers, state)
+}
+
+#[test]
+fn in_lockstep_a_client_gets_the_same_answers_however_long_it_thinks() {
+    let simulator = Simulator::start(&["--lockstep", "60000"]);
+    let start = time(&simulator);
+    assert_eq!((start, simulator.joint(3, "torque")), (1_000_000, json!("on")), "the servos have started");
+    assert!(simulator.refuses(&["speed", "5"], 1).contains("--lockstep"));
+    simulator.says(&["advance", "2s"]);
+    assert_eq!(time(&simulator), start + 2_000_000);
+    drop(simulator);
+    let (answers, state) = lockstep_run(Duration::ZERO);
+    assert_ne!(answers.first(), answers.last(), "the arm moves");
+    assert_eq!(lockstep_run(Duration::from_millis(7)), (answers, state));
+}
+
+#[test]
+fn in_lockstep_time_goes_on_after_a_timeout() {
+    let simulator = Simulator::start(&["--lockstep", "1"]);
+    let _arm = simulator.client();
+    let before = time(&simulator);
+    wait::wait_until("time goes on", || time(&simulator) > before + 10_000);
+    assert_eq!(time(&simulator) % 1_000, 0);
 }
 
 #[test]

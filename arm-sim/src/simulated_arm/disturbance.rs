@@ -26,13 +26,20 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
     /// Draws the faults of the host line from this seed from now on. By default it is 1.
     pub fn set_seed(&mut self, seed: u64) {
         (self.to_arm, self.to_host) = LineDirection::pair(seed);
-        self.start_host_line();
+        self.clear_host_line();
         for ListedFault { fault, .. } in self.faults.iter() {
             if let ArmFault::Line(fault) = fault {
                 self.to_arm.set_fault(fault);
                 self.to_host.set_fault(fault);
             }
         }
+    }
+
+    /// Makes each byte on the host line an event. Then results do not depend on whether the host sends two frames at once,
+    /// or the second one as soon as the first one has arrived. [`SimulatedArm::set_seed`] ends it.
+    pub const fn set_bytewise_line(&mut self) {
+        self.to_arm.set_bytewise();
+        self.to_host.set_bytewise();
     }
 
     /// Gives the arm a fault at `now`, for a time or until [`SimulatedArm::end_faults`]. Returns the report of the fault

@@ -1,5 +1,6 @@
 //! Executes the requests of a control socket on an arm.
 
+use arm_sim::action::Action;
 use arm_sim::controller::ArmController;
 use arm_sim::faults::{ArmFault, FaultLocation};
 use arm_sim::plant::HEAVIEST_LOAD_G;
@@ -10,18 +11,82 @@ use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 use serde_json::{Value, json};
 
-use super::request::{Grip, HandAction, Power, Refusal, Request};
+use super::request::{Grip, HandAction, Power, Refusal, Request, SpeedFactor};
 use super::state;
 use crate::pty_arm::PtyArm;
+use crate::virtual_clock::{Speed, VirtualClock};
 
-/// The longest duration of a fault, in milliseconds: a day.
+/// The longest duration of a fault or of an advance, in milliseconds: a day.
 const LONGEST_MS: u64 = 86_400_000;
 
-/// Executes a request at `now`.
+/// How a request ends.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// With this result.
+    Done(Value),
+    /// At this virtual time.
+    At(Instant),
+}
+
+/// Executes a request.
 ///
 /// # Errors
 /// A value in the request is wrong, or the arm is in the wrong state.
 pub fn execute<F: NorFlash + Clone, C: ArmController>(
+    arm: &mut PtyArm<F, Plant, C>,
+    clock: &mut VirtualClock,
+    request: Request,
+) -> Result<Outcome, Refusal> {
+    const HINT: &str = "without --lockstep, virtual time can be paused and has a speed";
+    let follows = |error| Refusal::new(error, HINT);
+    let done = match request {
+        Request::Pause => clock.pause(true).map(|()| time(clock)).map_err(follows),
+        Request::Resume => clock.pause(false).map(|()| time(clock)).map_err(follows),
+        Request::Speed { factor } => clock.set_speed(speed(factor)?).map(|()| time(clock)).map_err(follows),
+        Request::Advance { ms } if (1..=LONGEST_MS).contains(&ms) => {
+            return Ok(Outcome::At(clock.advance(Duration::from_millis(ms))));
+        }
+        Request::Advance { .. } => Err(Refusal::new(
+            "the time is not from 1 to 86400000 ms",
+            "use several requests for more than a day",
+        )),
+        Request::State => Ok(with_speed(state::of(arm, clock.now()), clock)),
+        request => change(arm, clock.now(), request),
+    };
+    done.map(Outcome::Done)
+}
+
+fn speed(factor: SpeedFactor) -> Result<Speed, Refusal> {
+    let speed = match factor {
+        SpeedFactor::Max(_) => Some(Speed::Max),
+        SpeedFactor::Times(factor) => Speed::times(factor),
+    };
+    speed.ok_or_else(|| {
+        Refusal::new("the speed is not from 0.001 to 1000", "1 is real time, and max is the fastest")
+    })
+}
+
+/// Time and speed.
+fn time(clock: &VirtualClock) -> Value {
+    with_speed(json!({ "time_us": clock.now().as_micros() }), clock)
+}
+
+/// Adds the speed of virtual time.
+fn with_speed(mut value: Value, clock: &VirtualClock) -> Value {
+    let speed = match clock.speed() {
+        _ if clock.is_in_lockstep() => json!("lockstep"),
+        None => json!("paused"),
+        Some(Speed::Max) => json!("max"),
+        Some(Speed::Thousandths(factor)) => json!(f64::from(factor) / 1_000.0),
+    };
+    if let Some(object) = value.as_object_mut() {
+        object.insert("speed".to_owned(), speed);
+    }
+    value
+}
+
+/// Executes a request that changes the arm, or lists its faults, at `now`.
+fn change<F: NorFlash + Clone, C: ArmController>(
     arm: &mut PtyArm<F, Plant, C>,
     now: Instant,
     request: Request,
@@ -29,24 +94,17 @@ pub fn execute<F: NorFlash + Clone, C: ArmController>(
     match request {
         Request::Fault { fault, for_ms } => begin_fault(arm, now, &fault, for_ms),
         Request::Clear { at } => end_faults(arm, now, at.as_deref()),
-        Request::Faults => Ok(json!({
-            "faults": state::reports(&arm.simulation_mut().faults(), now),
-            "ended_faults": state::reports(arm.ended_faults(), now),
-        })),
         Request::Hand { joint, to } => hand(arm, now, joint, to),
         Request::Weight { grams } => weight(arm, now, grams),
         Request::Power { to } => power(arm, now, to),
         Request::Restart => {
-            let running = needs_power(arm)?;
-            running.restart_controller(now);
-            Ok(json!({}))
+            needs_power(arm).map(|arm| arm.act(now, Action::RestartController)).map(|_| json!({}))
         }
-        Request::Halt => {
-            let running = needs_power(arm)?;
-            running.simulation_mut().halt_controller(now);
-            Ok(json!({}))
-        }
-        Request::State => Ok(state::of(arm, now)),
+        Request::Halt => needs_power(arm).map(|arm| arm.act(now, Action::HaltController)).map(|_| json!({})),
+        _ => Ok(json!({
+            "faults": state::reports(&arm.simulation_mut().faults(), now),
+            "ended_faults": state::reports(arm.ended_faults(), now),
+        })),
     }
 }
 
@@ -64,8 +122,8 @@ fn begin_fault<F: NorFlash + Clone, C: ArmController>(
             "a fault without a time stays until it is cleared",
         ));
     }
-    let replaced = arm.simulation_mut().set_fault(now, fault, for_ms.map(Duration::from_millis));
-    Ok(json!({ "fault": fault.to_string(), "replaced": state::reports(replaced.as_slice(), now) }))
+    let replaced = arm.act(now, Action::Fault(fault, for_ms.map(Duration::from_millis)));
+    Ok(json!({ "fault": fault.to_string(), "replaced": state::reports(&replaced, now) }))
 }
 
 fn end_faults<F: NorFlash + Clone, C: ArmController>(
@@ -76,7 +134,7 @@ fn end_faults<F: NorFlash + Clone, C: ArmController>(
     let location: Result<Option<FaultLocation>, _> = at.map(str::parse).transpose();
     let location =
         location.map_err(|error| Refusal::new(error, "{\"do\":\"clear\"} takes all faults back"))?;
-    let ended = arm.simulation_mut().end_faults(now, location);
+    let ended = arm.act(now, Action::Clear(location));
     if ended.is_empty() {
         return Err(Refusal::new("there is no such fault", "{\"do\":\"faults\"} lists the faults"));
     }
@@ -90,21 +148,20 @@ fn hand<F: NorFlash + Clone, C: ArmController>(
     to: HandAction,
 ) -> Result<Value, Refusal> {
     let joint = Joint::new(joint).ok_or_else(|| Refusal::new("no such joint", "joints are 1 to 7"))?;
-    let simulation = arm.simulation_mut();
-    simulation.advance(now, false);
-    let plant = simulation.plant_mut();
-    let has_torque = plant.has_torque(joint);
-    match to {
-        HandAction::Degrees(degrees) => plant.move_by_hand(joint, counts(joint, degrees)?),
-        HandAction::Grip(Grip::LetGo) => plant.let_go(joint),
+    let has_torque = arm.simulation_mut().plant().has_torque(joint);
+    let action = match to {
+        HandAction::Degrees(degrees) => Action::Hand(joint, counts(joint, degrees)?),
+        HandAction::Grip(Grip::LetGo) => Action::LetGo(joint),
         HandAction::Grip(Grip::Hold) if has_torque => {
             return Err(Refusal::new(
                 "the joint has torque, which is stronger than a hand",
                 "switch the motors off (motor state 2), or use the fault JOINT=stuck",
             ));
         }
-        HandAction::Grip(Grip::Hold) => plant.hold(joint),
-    }
+        HandAction::Grip(Grip::Hold) => Action::Hold(joint),
+    };
+    arm.act(now, action);
+    let plant = arm.simulation_mut().plant();
     Ok(json!({ "has_torque": has_torque, "angle_degrees": f64::from(plant.angle(joint)) / 1_000.0 }))
 }
 
@@ -129,9 +186,7 @@ fn weight<F: NorFlash + Clone, C: ArmController>(
     if grams > HEAVIEST_LOAD_G {
         return Err(Refusal::new("the weight is not from 0 to 1000 grams", "0 takes the weight away"));
     }
-    let simulation = arm.simulation_mut();
-    simulation.advance(now, false);
-    simulation.plant_mut().set_load(grams);
+    arm.act(now, Action::Weight(grams));
     Ok(json!({ "grams": grams }))
 }
 
@@ -140,16 +195,17 @@ fn power<F: NorFlash + Clone, C: ArmController>(
     now: Instant,
     to: Power,
 ) -> Result<Value, Refusal> {
-    match (to, arm.simulation_mut().has_power()) {
-        (Power::Off, _) => arm.simulation_mut().power_off(now),
+    let action = match (to, arm.simulation_mut().has_power()) {
+        (Power::Off, _) => Action::PowerOff,
         (Power::On, true) => {
             return Err(Refusal::new(
                 "the power is on",
                 "{\"do\":\"power\",\"to\":\"cycle\"} switches it off and on",
             ));
         }
-        (Power::On, false) | (Power::Cycle, _) => arm.power_cycle(now),
-    }
+        (Power::On, false) | (Power::Cycle, _) => Action::PowerCycle,
+    };
+    arm.act(now, action);
     Ok(json!({}))
 }
 

@@ -30,7 +30,8 @@ pub fn directory(variable: impl Fn(&str) -> Option<PathBuf>) -> Option<PathBuf> 
 pub fn default() -> io::Result<PathBuf> {
     let found = directory(|name| std::env::var_os(name).map(PathBuf::from));
     let directory = found.ok_or_else(|| io::Error::other("neither XDG_RUNTIME_DIR nor HOME is set"))?;
-    DirBuilder::new().recursive(true).mode(0o700).create(&directory)?;
+    let created = DirBuilder::new().recursive(true).mode(0o700).create(&directory);
+    created.map_err(|cause| io::Error::other(format!("{}: {cause}", directory.display())))?;
     remove_left_ones(&directory);
     Ok(directory.join(format!("{PREFIX}{}{SUFFIX}", std::process::id())))
 }

@@ -42,6 +42,20 @@ pub enum Request {
     Restart,
     /// Stops the controller, as a program that hangs.
     Halt,
+    /// Stops virtual time.
+    Pause,
+    /// Lets virtual time go on after a pause.
+    Resume,
+    /// Lets virtual time pass as fast as possible. The answer comes at its end.
+    Advance {
+        /// The time in milliseconds.
+        ms: u64,
+    },
+    /// Sets the speed of virtual time.
+    Speed {
+        /// The factor or `max`.
+        factor: SpeedFactor,
+    },
     /// Asks for the state of the arm.
     State,
 }
@@ -54,6 +68,24 @@ pub enum HandAction {
     Degrees(f64),
     /// Holds it, or lets it go.
     Grip(Grip),
+}
+
+/// The speed of virtual time.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum SpeedFactor {
+    /// Times real time.
+    Times(f64),
+    /// As fast as possible.
+    Max(MaxSpeed),
+}
+
+/// The word `max`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MaxSpeed {
+    /// As fast as possible.
+    Max,
 }
 
 /// Does a hand hold a joint?
@@ -135,6 +167,9 @@ mod tests {
                 r#"{"do":"hand","joint":2,"to":"let-go"}"#,
                 Request::Hand { joint: 2, to: HandAction::Grip(Grip::LetGo) },
             ),
+            (r#"{"do":"advance","ms":250}"#, Request::Advance { ms: 250 }),
+            (r#"{"do":"speed","factor":50}"#, Request::Speed { factor: SpeedFactor::Times(50.0) }),
+            (r#"{"do":"speed","factor":"max"}"#, Request::Speed { factor: SpeedFactor::Max(MaxSpeed::Max) }),
             (r#"{"do":"power","to":"cycle"}"#, Request::Power { to: Power::Cycle }),
             (
                 r#" {"do":"fault","fault":"3=missing","for_ms":2000} "#,

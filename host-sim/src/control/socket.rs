@@ -9,7 +9,9 @@ use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 
+use protocol_core::time::Instant;
 use rustix::event::epoll::{self, EventData, EventFlags};
+use serde_json::json;
 
 use super::request::{Refusal, line};
 use crate::private_socket::{PrivateSocket, SocketError, is_temporary};
@@ -20,6 +22,15 @@ const LONGEST_LINE: usize = 4_096;
 const LONGEST_BACKLOG: usize = 64 * 1_024;
 /// Clients at the same time.
 const CLIENTS: usize = 16;
+
+/// How a request is answered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reply {
+    /// At once, with this line.
+    Line(String),
+    /// At this virtual time, with the time. The client's next requests wait.
+    At(Instant),
+}
 
 /// A control socket and its clients.
 #[derive(Debug)]
@@ -33,6 +44,8 @@ struct Client {
     stream: UnixStream,
     input: Vec<u8>,
     output: Vec<u8>,
+    /// The virtual time of its next answer.
+    waits_until: Option<Instant>,
     /// It sends nothing more, or nothing more is accepted.
     is_at_end: bool,
     /// The connection failed.
@@ -63,7 +76,14 @@ impl ControlSocket {
         Ok(epoll::add(epoll, &self.socket, data, EventFlags::IN)?)
     }
 
-    /// Accepts clients, executes the requests that have arrived, and sends answers. Returns whether there was a request.
+    /// The virtual time for which a client waits.
+    #[must_use]
+    pub fn due(&self) -> Option<Instant> {
+        self.clients.iter().filter_map(|client| client.waits_until).min()
+    }
+
+    /// Accepts clients, executes the requests that have arrived by the virtual time `now`, and sends answers.
+    /// Returns whether there was a request.
     ///
     /// # Errors
     /// The operating system fails: accept or epoll.
@@ -71,12 +91,14 @@ impl ControlSocket {
         &mut self,
         epoll: &OwnedFd,
         data: EventData,
-        mut execute: impl FnMut(&[u8]) -> String,
+        now: Instant,
+        mut execute: impl FnMut(&[u8]) -> Reply,
     ) -> io::Result<bool> {
         self.accept(epoll, data)?;
         let mut has_executed = false;
         for client in &mut self.clients {
             client.receive();
+            client.answer_if_due(now);
             has_executed |= client.execute(&mut execute);
             client.send();
             client.update_interest(epoll, data)?;
@@ -104,7 +126,15 @@ impl ControlSocket {
 impl Client {
     const fn new(stream: UnixStream) -> Self {
         let interest = EventFlags::IN;
-        Self { stream, input: Vec::new(), output: Vec::new(), is_at_end: false, is_gone: false, interest }
+        Self {
+            stream,
+            input: Vec::new(),
+            output: Vec::new(),
+            waits_until: None,
+            is_at_end: false,
+            is_gone: false,
+            interest,
+        }
     }
 
     fn receive(&mut self) {
@@ -121,15 +151,19 @@ impl Client {
     }
 
     /// Executes the whole lines. Returns whether there was one.
-    fn execute(&mut self, execute: &mut impl FnMut(&[u8]) -> String) -> bool {
+    fn execute(&mut self, execute: &mut impl FnMut(&[u8]) -> Reply) -> bool {
         let mut has_executed = false;
         while self.output.len() < LONGEST_BACKLOG
+            && self.waits_until.is_none()
             && let Some(end) = self.input.iter().position(|&byte| byte == b'\n')
         {
             let rest = self.input.split_off(end + 1);
             let request = mem::replace(&mut self.input, rest);
             if !request.trim_ascii().is_empty() {
-                self.output.extend_from_slice(execute(request.trim_ascii()).as_bytes());
+                match execute(request.trim_ascii()) {
+                    Reply::Line(line) => self.output.extend_from_slice(line.as_bytes()),
+                    Reply::At(end) => self.waits_until = Some(end),
+                }
                 has_executed = true;
             }
         }
@@ -141,6 +175,14 @@ impl Client {
             ));
         }
         has_executed
+    }
+
+    /// Answers the request that waits for a virtual time.
+    fn answer_if_due(&mut self, now: Instant) {
+        if self.waits_until.take_if(|end| *end <= now).is_some() {
+            let time = json!({ "time_us": now.as_micros() });
+            self.output.extend_from_slice(line(Ok(time)).as_bytes());
+        }
     }
 
     /// Sends an error, and then closes the connection.
@@ -161,7 +203,8 @@ impl Client {
 
     fn is_done(&self) -> bool {
         let has_request = self.input.contains(&b'\n');
-        self.is_gone || (self.is_at_end && self.output.is_empty() && !has_request)
+        let has_work = has_request || self.waits_until.is_some() || !self.output.is_empty();
+        self.is_gone || (self.is_at_end && !has_work)
     }
 
     fn update_interest(&mut self, epoll: &OwnedFd, data: EventData) -> io::Result<()> {
@@ -207,8 +250,11 @@ mod tests {
 
         /// Polls, with requests that are answered with their own length.
         fn poll(&mut self) {
-            let answer = |request: &[u8]| format!("{}\n", request.len());
-            self.socket.poll(&self.epoll, EventData::new_u64(0), answer).unwrap();
+            self.poll_with(Instant::ZERO, |request| Reply::Line(format!("{}\n", request.len())));
+        }
+
+        fn poll_with(&mut self, now: Instant, answer: impl FnMut(&[u8]) -> Reply) {
+            self.socket.poll(&self.epoll, EventData::new_u64(0), now, answer).unwrap();
         }
 
         fn lines(&mut self, client: &UnixStream) -> Vec<String> {
@@ -256,13 +302,27 @@ mod tests {
         let mut sent = 0;
         for _ in 0..1_000 {
             sent += client.write(&[b"x\n".as_slice(); 2_000].concat()).unwrap_or(0);
-            rig.socket
-                .poll(&rig.epoll, EventData::new_u64(0), |_| format!("{}\n", "y".repeat(1_000)))
-                .unwrap();
+            rig.poll_with(Instant::ZERO, |_| Reply::Line(format!("{}\n", "y".repeat(1_000))));
         }
         let [client] = rig.socket.clients.as_slice() else { panic!("one client") };
         assert!(client.output.len() < LONGEST_BACKLOG + 2_000 && client.input.len() <= LONGEST_LINE);
         assert!(sent < 1_000_000, "{sent} bytes were accepted");
+    }
+
+    #[test]
+    fn a_client_that_waits_for_a_time_gets_its_answers_in_order() {
+        let mut rig = Rig::new();
+        let mut client = rig.connect();
+        let end = Instant::from_micros(500);
+        client.write_all(b"wait\nnext\n").unwrap();
+        client.shutdown(std::net::Shutdown::Write).unwrap();
+        for now in [0, 499] {
+            rig.poll_with(Instant::from_micros(now), |_| Reply::At(end));
+            assert_eq!(rig.socket.due(), Some(end));
+        }
+        rig.poll_with(end, |request| Reply::Line(format!("{}\n", request.len())));
+        assert_eq!(rig.lines(&client), ["{\"ok\":{\"time_us\":500}}", "4"]);
+        assert!(rig.socket.due().is_none() && rig.socket.clients.is_empty());
     }
 
     #[test]

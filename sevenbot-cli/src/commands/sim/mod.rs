@@ -14,7 +14,7 @@ use crate::printer::Printable;
 use crate::session::Session;
 use socket::Connection;
 
-/// Control a running simulator: faults, a hand, a weight, power.
+/// Control a running simulator: faults, a hand, a weight, power, virtual time.
 ///
 /// host-sim opens a control socket beside the arm's port. These commands use it, so that another program can drive the
 /// arm at the same time. All durations are virtual time.
@@ -28,6 +28,7 @@ Examples:
   sevenbot sim hand 2 120                      a hand turns joint 2 to 120 degrees, and holds it there
   sevenbot sim weight 150g                     a weight in the gripper
   sevenbot sim power cycle                     off and on
+  sevenbot sim speed 50                        virtual time; also max, pause, resume, advance 250ms
   sevenbot sim state                           the true angles, whatever the arm says
 
 Without --control the only simulator that is running is used, or the one whose port is --port. host-sim
@@ -56,6 +57,12 @@ enum SimCommand {
     Restart,
     /// Stop the controller, as a program that hangs, until `restart` or `power cycle`.
     Halt,
+    /// Stop virtual time. The port is still served.
+    Pause,
+    /// Let virtual time go on after `pause`.
+    Resume,
+    Advance(AdvanceArgs),
+    Speed(SpeedArgs),
     /// Show the true state of the arm: angles, torque, loads, supply and faults.
     State,
 }
@@ -122,6 +129,34 @@ struct WeightArgs {
     weight: u16,
 }
 
+/// Let virtual time pass as fast as possible, and wait for its end.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  sevenbot sim pause
+  sevenbot sim advance 250ms                   a pause goes on after it")]
+struct AdvanceArgs {
+    /// The virtual time, as 250ms or 2s.
+    #[arg(value_parser = millis)]
+    time: u64,
+}
+
+/// Set the speed of virtual time.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot sim speed 50                        a minute takes 1.2 seconds
+  sevenbot sim speed max                       as fast as the computer can
+  sevenbot sim speed 1                         real time
+
+The baud rate counts in virtual time, but a client thinks in real time: at a high speed much virtual time
+passes between its requests. host-sim --lockstep avoids that.")]
+struct SpeedArgs {
+    /// The factor from 0.001 to 1000, or 'max'.
+    #[arg(value_name = "FACTOR|max", value_parser = factor)]
+    factor: Value,
+}
+
 #[derive(Clone, Copy, Debug, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 enum PowerState {
@@ -148,6 +183,17 @@ fn millis(text: &str) -> Result<u64, &'static str> {
 /// Parses a weight in grams.
 fn grams(text: &str) -> Result<u16, &'static str> {
     text.strip_suffix('g').unwrap_or(text).parse().map_err(|_| "use grams from 0 to 1000, as 150g")
+}
+
+/// Parses a speed.
+fn factor(text: &str) -> Result<Value, &'static str> {
+    match text {
+        "max" => Ok(json!(text)),
+        factor => factor
+            .parse::<f64>()
+            .map(|factor| json!(factor))
+            .map_err(|_| "use a factor, as 50 or 0.5, or max"),
+    }
 }
 
 /// Parses what a hand does.
@@ -179,6 +225,9 @@ impl Printable for Answer<'_> {
             SimCommand::Fault(args) => text::faults(out, &args.action, &self.value),
             SimCommand::Hand(args) => text::hand(out, args.joint, &self.value),
             SimCommand::State => text::state(out, &self.value),
+            SimCommand::Pause | SimCommand::Resume | SimCommand::Advance(_) | SimCommand::Speed(_) => {
+                text::time(out, &self.value)
+            }
             SimCommand::Weight(_) | SimCommand::Power { .. } | SimCommand::Restart | SimCommand::Halt => {
                 Ok(())
             }
@@ -189,6 +238,9 @@ impl Printable for Answer<'_> {
 pub(crate) fn run(session: &mut Session, args: &SimArgs) -> Result<(), CommandError> {
     let request = request(&args.command)?;
     let mut connection = Connection::open(args.control.as_deref(), session.port.as_deref())?;
+    if matches!(args.command, SimCommand::Advance(_)) {
+        connection.wait_forever()?;
+    }
     let value = connection.ask(&request)?;
     session.printer.print(&Answer { command: &args.command, value })
 }
@@ -202,6 +254,10 @@ fn request(command: &SimCommand) -> Result<Value, CommandError> {
         SimCommand::Power { to } => json!({ "do": "power", "to": to }),
         SimCommand::Restart => json!({ "do": "restart" }),
         SimCommand::Halt => json!({ "do": "halt" }),
+        SimCommand::Pause => json!({ "do": "pause" }),
+        SimCommand::Resume => json!({ "do": "resume" }),
+        SimCommand::Advance(AdvanceArgs { time }) => json!({ "do": "advance", "ms": time }),
+        SimCommand::Speed(SpeedArgs { factor }) => json!({ "do": "speed", "factor": factor }),
         SimCommand::State => json!({ "do": "state" }),
     })
 }

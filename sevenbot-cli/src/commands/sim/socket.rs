@@ -77,6 +77,12 @@ impl Connection {
         Some(state.get("port")?.as_str()?.to_owned())
     }
 
+    /// Waits for the next answer without a time limit.
+    pub(super) fn wait_forever(&mut self) -> Result<(), CommandError> {
+        let set = self.stream.get_mut().set_read_timeout(None);
+        set.map_err(|reason| unreachable(&self.path, &reason))
+    }
+
     /// Sends a request and waits for its answer.
     pub(super) fn ask(&mut self, request: &Value) -> Result<Value, CommandError> {
         let line = self.exchange(request).map_err(|reason| unreachable(&self.path, &reason))?;

@@ -57,10 +57,23 @@ pub(super) fn hand(out: &mut dyn Write, joint: u8, value: &Value) -> io::Result<
     writeln!(out)
 }
 
+/// The virtual time, and its speed if the answer has it.
+pub(super) fn time(out: &mut dyn Write, value: &Value) -> io::Result<()> {
+    writeln!(out, "time        {:.3} s{}", number(value, "time_us") / 1e6, speed(value))
+}
+
+fn speed(value: &Value) -> String {
+    match value.get("speed") {
+        Some(Value::String(word)) => format!(", {}", if word == "max" { "speed max" } else { word }),
+        Some(factor) => format!(", speed {factor}"),
+        None => String::new(),
+    }
+}
+
 /// The state of the arm.
 pub(super) fn state(out: &mut dyn Write, value: &Value) -> io::Result<()> {
     writeln!(out, "port        {}", string(value, "port"))?;
-    writeln!(out, "time        {:.3} s", number(value, "time_us") / 1e6)?;
+    time(out, value)?;
     writeln!(out, "controller  {}", string(value, "controller"))?;
     writeln!(out, "supply      {:.1} V", number(value, "supply_volts"))?;
     writeln!(out, "weight      {} g", number(value, "weight_grams"))?;
