@@ -17,6 +17,7 @@ pub mod seeded_rng;
 // Fuzz targets report a violated rule by a panic. Only the fuzzer and tests call them.
 #[allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 pub mod fuzz;
+mod linkage_goals;
 pub mod load;
 pub mod parser_trial;
 pub mod per_joint;

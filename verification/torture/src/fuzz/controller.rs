@@ -1,6 +1,7 @@
 //! The controller with any host bytes, servo replies, delays, host link room and storage results.
 
 mod controller_loop;
+mod extended_block;
 mod invariants;
 mod scripted_replies;
 

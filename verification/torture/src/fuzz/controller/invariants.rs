@@ -1,17 +1,20 @@
-//! The invariants: replies match the registers, goals do not jump, torque is off outside motor state servo, the valve
-//! closes, and the status block is right.
+//! The invariants: replies match the registers, goals do not jump and keep the linkage, torque is off outside motor state
+//! servo, the valve closes, and the status block and the extended block are right.
 
 use motion_core::calibration::{MicroDegrees, angle_from_counts};
 use motion_core::servo_bus::Torque;
 use motion_core::{Config, Storage, Vacuum};
 use protocol_core::registers::map::{
-    EEPROM_LOCK, FAULTS, MISSING_SERVOS, MOTOR_STATE, OFFSET, PRESENT_POSITION, SPEED, fault, motor_state,
+    EEPROM_LOCK, FAULTS, LIMITS, MISSING_SERVOS, MOTOR_STATE, OFFSET, PRESENT_POSITION, SPEED, fault, limit,
+    motor_state,
 };
 use protocol_core::registers::map21::{OPTIONS, option};
 use protocol_core::registers::{Access, Image, Joint, MAP, Register, RegisterFile};
 use protocol_core::wire::frame::{Function, ParseOutcome, ToHost, parse};
 
+use super::extended_block;
 use super::scripted_replies::ServoCommand;
+use crate::linkage_goals::LinkageGoals;
 
 /// Counts of the largest step in a control cycle: per unit of speed (0.019 degrees) and for the motor (3.72 degrees), at
 /// 850 / 180 counts per degree.
@@ -40,6 +43,9 @@ pub struct InvariantChecker {
     released_at: Option<u64>,
     valve_opened_at: Option<u64>,
     vacuum: Vacuum,
+    linkage: LinkageGoals,
+    /// The offsets of joints 2 and 3.
+    offsets: [i8; 2],
 }
 
 impl InvariantChecker {
@@ -54,6 +60,8 @@ impl InvariantChecker {
             released_at: None,
             valve_opened_at: None,
             vacuum: Vacuum::default(),
+            linkage: LinkageGoals::default(),
+            offsets: [0; 2],
         }
     }
 
@@ -70,6 +78,7 @@ impl InvariantChecker {
         assert!(matches!(reply.function, Function::Read | Function::Report));
         assert_eq!(reply.data, registers.read(reply.address, reply.count));
         assert!(registers.image() == self.settings, "a reply before the settings were saved");
+        extended_block::check_reply(reply.address, reply.count, registers);
     }
 
     /// Checks a command to the servos. `positions` are those of their last replies, in counts.
@@ -85,6 +94,7 @@ impl InvariantChecker {
             ServoCommand::Torque(codes) => self.torque_command(codes, registers),
             ServoCommand::Goals(goals) => {
                 assert_eq!(registers.get(MOTOR_STATE.address), motor_state::SERVO, "goals in state 0 or 2");
+                self.linkage_goals(goals, registers, positions);
                 for &(id, counts) in goals {
                     let position = positions.get(usize::from(id)).copied().unwrap_or(u16::MAX);
                     self.goal_command(now_us, id, counts, position, registers);
@@ -106,6 +116,28 @@ impl InvariantChecker {
         if self.is_driven != [false; 7] {
             self.released_at = None;
         }
+    }
+
+    /// The goals of joints 2 and 3 keep the linkage, if it limits them (D25).
+    fn linkage_goals(&mut self, goals: &[(u8, u16)], registers: &RegisterFile, positions: &[u16; 7]) {
+        let [_, two, three, ..] = Joint::ALL;
+        let offsets = [two, three].map(|joint| registers.offset(joint));
+        // A new goal at the joint's position: it engages where a hand left it.
+        let engages = goals.iter().any(|&(id, counts)| {
+            let index = usize::from(id);
+            matches!(id, 1 | 2)
+                && positions[index] == counts
+                && self.joints[index].goal.is_none_or(|(last, ..)| last != counts)
+        });
+        let is_on = registers.get(LIMITS.address) & limit::LINKAGE != 0;
+        if engages || !is_on || offsets != self.offsets {
+            self.linkage.reset();
+        }
+        self.offsets = offsets;
+        let goal =
+            |wanted: Joint| goals.iter().find(|(id, _)| *id == wanted.index()).map(|(_, counts)| *counts);
+        let check = self.linkage.check([goal(two), goal(three)], offsets);
+        assert!(!is_on || check.is_ok(), "{check:?}");
     }
 
     /// A goal is within reach of the last one, or at the joint's position.
