@@ -92,3 +92,15 @@ fn d25_the_linkage_is_kept_between_all_pairs_of_whole_degrees() {
     println!("{} legal pairs", pairs.len());
     every_pair_of(&pairs, 20, 90_210);
 }
+
+#[test]
+fn d25_a_move_without_a_time_goes_on_at_full_speed_after_waiting() {
+    let mut trajectory = Trajectory::holding(MicroDegrees(0));
+    trajectory.move_to(MicroDegrees(7_000_000), 0);
+    for _ in 0..3 {
+        trajectory.advance(Instant::ZERO, 0);
+        trajectory.hold_back(MicroDegrees(0));
+    }
+    trajectory.advance(Instant::ZERO, 0);
+    assert_eq!(trajectory.set_point(), MicroDegrees(3_720_000), "372 degrees/s");
+}
