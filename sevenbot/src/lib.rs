@@ -26,6 +26,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod advice;
 pub mod arm;
 mod arm_values;
 pub mod cartesian;
@@ -51,6 +52,7 @@ pub mod point_path;
 pub mod ports;
 pub mod recording;
 pub mod register_text;
+pub mod register_values;
 mod reports;
 pub mod servo_bench;
 pub mod simulated;

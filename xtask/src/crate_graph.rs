@@ -30,6 +30,7 @@ const GROUPS: [Group; 3] = [
             "sevenbot",
             "sevenbot-cli",
             "sevenbot-serve",
+            "sevenbot-python",
         ],
     ),
     ("proof", &["flash-model", "replay", "system-tests", "torture", "xtask"]),

@@ -8,16 +8,27 @@ use crate::run::{CHIP, TaskResult, run};
 /// A program that Rust does not include.
 struct Tool {
     program: &'static str,
+    /// Arguments with which it succeeds.
+    arguments: &'static [&'static str],
     /// Its package in Debian and Ubuntu.
     package: &'static str,
     /// Its purpose.
     purpose: &'static str,
 }
 
-const TOOLS: [Tool; 3] = [
-    Tool { program: QEMU, package: QEMU, purpose: "runs the image for the arm" },
-    Tool { program: "c++", package: "g++", purpose: "builds the fuzzer" },
-    Tool { program: "python3", package: "python3", purpose: "checks the register table for Python" },
+/// All programs know this.
+const VERSION: &[&str] = &["--version"];
+
+const TOOLS: [Tool; 4] = [
+    Tool { program: QEMU, arguments: VERSION, package: QEMU, purpose: "runs the image for the arm" },
+    Tool { program: "c++", arguments: VERSION, package: "g++", purpose: "builds the fuzzer" },
+    Tool { program: "python3", arguments: VERSION, package: "python3", purpose: "runs the Python package" },
+    Tool {
+        program: "python3",
+        arguments: &["-c", "import ensurepip, venv"],
+        package: "python3-venv",
+        purpose: "makes environments for the Python package",
+    },
 ];
 
 /// Installs the missing tools.
@@ -42,7 +53,7 @@ pub(crate) fn all() -> TaskResult {
 impl Tool {
     fn works(&self) -> bool {
         let mut program = Command::new(self.program);
-        program.arg("--version").stdout(Stdio::null()).stderr(Stdio::null());
+        program.args(self.arguments).stdout(Stdio::null()).stderr(Stdio::null());
         program.status().is_ok_and(|status| status.success())
     }
 }

@@ -22,6 +22,7 @@ mod jump_table;
 mod modules;
 mod mujoco;
 mod no_panic;
+mod python;
 mod registers_md;
 mod replays;
 mod run;
@@ -75,6 +76,8 @@ enum Task {
     Modules,
     /// Install MuJoCo from PyPI, and compare its forward kinematics of the arm's model with ours (needs Python)
     Mujoco,
+    /// Build the Python package and test it with each Python on PATH from 3.10 on (installs packages from PyPI)
+    Python,
     /// Link the cores for the chip and fail if a panic is reachable
     NoPanic,
     /// Print the size of the cores and the image on the chip, and compare it with the budgets
@@ -150,6 +153,7 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Fuzz(options) => fuzz::check(options),
         Task::Deny => deny::check(),
         Task::Mujoco => mujoco::check(),
+        Task::Python => python::check(),
         Task::NoPanic => no_panic::check(),
         Task::Size { by_file: true, .. } => size::print(),
         Task::Size { accept, .. } => footprint::check(accept.accept),

@@ -8,7 +8,7 @@ use crate::run::{CHIP, HOST, TaskResult, build_for_browser, cargo, run};
 use crate::steps::{TestScope, TestStep, long, quick, whole};
 use crate::{
     count, crate_graph, decisions, deny, drawings, footprint, fuzz, install, modules, mujoco, no_panic,
-    registers_md, replays, start_up, steps, system_tests, torture, trials,
+    python, registers_md, replays, start_up, steps, system_tests, torture, trials,
 };
 
 /// The scope of the run.
@@ -67,6 +67,7 @@ const STEPS: &[TestStep] = &[
     whole("system tests, the controller on this computer with servos behind a USB adapter", || {
         system_tests::run_on(&system_tests::ADAPTER)
     }),
+    whole("the Python package", python::check),
     whole("recorded sessions, natively and in a WebAssembly module", replays::short),
     whole("worlds with injected faults", torture::short),
     whole("fuzzing", fuzz::fixed),

@@ -3,9 +3,9 @@
 use clap::Args;
 use sevenbot::checked_write::{MismatchCause, WriteMismatch};
 use sevenbot::map::{BAUD_RATE, EEPROM_LOCK, FINE_TARGET, TARGET_POSITION};
-use sevenbot::map21::find_readable;
-use sevenbot::names::{self, name_of_register};
-use sevenbot::register_text::{self, entries};
+use sevenbot::names;
+use sevenbot::register_text::entries;
+use sevenbot::register_values::{self, ValueError};
 use sevenbot::{Arm, Error, Span};
 
 use super::get::{NAMES, RegisterList, not_served};
@@ -102,62 +102,14 @@ fn note_causes(arm: &Arm, span: Span, args: &SetArgs, unchanged: &[WriteMismatch
 
 /// The bytes for a span: one value per register, or one for all. A register of two bytes takes one value.
 fn bytes(span: Span, values: &[i32], raw: bool) -> Result<Vec<u8>, CommandError> {
-    let registers = if raw { span.addresses().map(Span::one).collect() } else { registers(span)? };
-    let values = match values {
-        [only] => vec![*only; registers.len()],
-        all if all.len() == registers.len() => all.to_vec(),
-        all => {
-            let (given, registers) = (all.len(), registers.len());
-            return Err(CommandError::Usage(format!(
-                "{given} values for {registers} registers: one each, or one for all"
-            )));
+    let encoded =
+        if raw { register_values::raw_bytes(span, values) } else { register_values::bytes(span, values) };
+    encoded.map_err(|error| match error {
+        ValueError::OutOfRange { address, .. } => {
+            let hint = if BAUD_RATE.holds(address) { "; `sevenbot baud` takes bits per second" } else { "" };
+            CommandError::Arm(format!("{error}; nothing was written{hint}"))
         }
-    };
-    let mut bytes = Vec::new();
-    for (register, value) in registers.iter().zip(values) {
-        match register.count() {
-            _ if raw => bytes.push(raw_byte(value)?),
-            2 => bytes.extend(encoded(register.address(), value)?.to_le_bytes()),
-            _ => bytes.extend(encoded(register.address(), value)?.to_le_bytes().first()),
-        }
-    }
-    Ok(bytes)
-}
-
-/// The registers of a span: one byte each, or two where the table has two-byte registers. Half of one is refused (D22).
-fn registers(span: Span) -> Result<Vec<Span>, CommandError> {
-    let mut registers = Vec::new();
-    let mut addresses = span.addresses().peekable();
-    while let Some(address) = addresses.next() {
-        let row = find_readable(address).filter(|row| row.range.width() == 2);
-        let Some(row) = row else {
-            registers.push(Span::one(address));
-            continue;
-        };
-        let is_low = address.wrapping_sub(row.address).is_multiple_of(2);
-        let high = addresses.next_if(|next| is_low && *next == address.wrapping_add(1));
-        let (Some(_), Some(word)) = (high, Span::new(address, 2)) else {
-            let name = name_of_register(if is_low { address } else { address.wrapping_sub(1) });
-            return Err(CommandError::Usage(format!(
-                "{name} has two bytes, and {address} is one of them: use the name"
-            )));
-        };
-        registers.push(word);
-    }
-    Ok(registers)
-}
-
-fn raw_byte(value: i32) -> Result<u8, CommandError> {
-    u8::try_from(value).map_err(|_| CommandError::Usage(format!("{value} is not a byte, 0 to 255")))
-}
-
-/// The raw value for a number in the table's unit. Refuses a number out of range, because the maker's firmware takes it.
-fn encoded(address: u8, value: i32) -> Result<u16, CommandError> {
-    let Some(row) = find_readable(address) else { return raw_byte(value).map(u16::from) };
-    row.range.encode(value).ok_or_else(|| {
-        let (name, range) = (name_of_register(address), register_text::range(address));
-        let hint = if *row == BAUD_RATE { "; `sevenbot baud` takes bits per second" } else { "" };
-        CommandError::Arm(format!("{value} is out of range: {name} takes {range}; nothing was written{hint}"))
+        other => CommandError::Usage(other.to_string()),
     })
 }
 

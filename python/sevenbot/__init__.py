@@ -1,0 +1,60 @@
+"""Talks to a 7Bot V2 robot arm over its serial port, or to a simulated one.
+
+>>> import sevenbot
+>>> with sevenbot.Arm.simulated() as arm:
+...     angles = arm.pose(120, 90, 65, 90, 90, 90, 80)
+>>> round(angles[0])
+120
+
+Angles are degrees, positions millimetres, times seconds.
+"""
+
+from sevenbot._sevenbot import (
+    Arm,
+    BadRecording,
+    Closed,
+    Error,
+    Interrupted,
+    MayMove,
+    NoAnswer,
+    NotDriven,
+    NotReached,
+    NotServed,
+    NotTaken,
+    OutOfReach,
+    PortError,
+    Recording,
+    Registers,
+    Simulation,
+    SimulationSnapshot,
+    Status,
+    Stream,
+    Tip,
+    __version__,
+    ports,
+)
+
+__all__ = [
+    "Arm",
+    "BadRecording",
+    "Closed",
+    "Error",
+    "Interrupted",
+    "MayMove",
+    "NoAnswer",
+    "NotDriven",
+    "NotReached",
+    "NotServed",
+    "NotTaken",
+    "OutOfReach",
+    "PortError",
+    "Recording",
+    "Registers",
+    "Simulation",
+    "SimulationSnapshot",
+    "Status",
+    "Stream",
+    "Tip",
+    "__version__",
+    "ports",
+]

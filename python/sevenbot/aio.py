@@ -1,0 +1,124 @@
+"""An arm for asyncio: the methods of `sevenbot.Arm` as coroutines.
+
+    async with sevenbot.aio.Arm.simulated() as arm:
+        await arm.pose(120, 90, 65, 90, 90, 90, 80)
+
+One thread of each arm waits for its calls, so that they run in order. A cancelled call makes the arm hold.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import sevenbot
+
+__all__ = ["Arm"]
+
+_Result = TypeVar("_Result")
+
+
+class Arm:
+    """As `sevenbot.Arm`. Methods that talk to the arm are coroutines; `arm.sync` is the arm itself."""
+
+    def __init__(self, arm: sevenbot.Arm) -> None:
+        """Wraps an open arm, which no other code may use meanwhile."""
+        self.sync = arm
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="sevenbot")
+
+    @classmethod
+    async def open(cls, port: str | None = None, **options: Any) -> Arm:
+        """Opens a port, as `sevenbot.Arm(port, **options)` does."""
+        return cls(await asyncio.to_thread(lambda: sevenbot.Arm(port, **options)))
+
+    @classmethod
+    def simulated(cls, seed: int = 1, **options: Any) -> Arm:
+        """An arm in virtual time."""
+        return cls(sevenbot.Arm.simulated(seed, **options))
+
+    @property
+    def simulation(self) -> sevenbot.Simulation | None:
+        """The simulation behind this arm; `None` for a real one."""
+        return self.sync.simulation
+
+    async def _call(self, method: Callable[..., _Result], *arguments: Any, **options: Any) -> _Result:
+        call = self._thread.submit(lambda: method(*arguments, **options))
+        future = asyncio.wrap_future(call)
+        # The result of a cancelled call is not used.
+        future.add_done_callback(lambda done: done.cancelled() or done.exception())
+        try:
+            return await asyncio.shield(future)
+        except asyncio.CancelledError:
+            # The arm holds before the cancellation goes on. The call ends with `Interrupted`, or does not begin.
+            call.cancel()
+            await asyncio.to_thread(self.sync.stop)
+            while not call.done():
+                await asyncio.to_thread(self.sync.stop)
+            raise
+
+    async def angles(self) -> tuple[float, float, float, float, float, float, float]:
+        """The measured angles in degrees."""
+        return await self._call(lambda: self.sync.angles)
+
+    def get(self, name: str) -> Awaitable[Any]:
+        """As `sevenbot.Arm.get`."""
+        return self._call(self.sync.get, name)
+
+    def set(self, name: str, values: Any, *, unlock: bool = False) -> Awaitable[None]:
+        """As `sevenbot.Arm.set`."""
+        return self._call(self.sync.set, name, values, unlock=unlock)
+
+    def where(self) -> Awaitable[sevenbot.Tip]:
+        """As `sevenbot.Arm.where`."""
+        return self._call(self.sync.where)
+
+    def pose(self, *angles: Any, **options: Any) -> Awaitable[Any]:
+        """As `sevenbot.Arm.pose`."""
+        return self._call(self.sync.pose, *angles, **options)
+
+    def move_to(self, x: float, y: float, z: float, **options: Any) -> Awaitable[Any]:
+        """As `sevenbot.Arm.move_to`."""
+        return self._call(self.sync.move_to, x, y, z, **options)
+
+    def wait(self) -> Awaitable[Any]:
+        """As `sevenbot.Arm.wait`."""
+        return self._call(self.sync.wait)
+
+    def sleep(self, seconds: float) -> Awaitable[None]:
+        """As `sevenbot.Arm.sleep`: on the clock of the arm."""
+        return self._call(self.sync.sleep, seconds)
+
+    def status(self) -> Awaitable[sevenbot.Status | None]:
+        """As `sevenbot.Arm.status`."""
+        return self._call(self.sync.status)
+
+    def record(self, seconds: float, **options: Any) -> Awaitable[sevenbot.Recording]:
+        """As `sevenbot.Arm.record`."""
+        return self._call(self.sync.record, seconds, **options)
+
+    def play(self, recording: sevenbot.Recording, **options: Any) -> Awaitable[sevenbot.Recording]:
+        """As `sevenbot.Arm.play`."""
+        return self._call(self.sync.play, recording, **options)
+
+    def sample(self, count: int, **options: Any) -> Awaitable[tuple[Any, Any]]:
+        """As `sevenbot.Arm.sample`."""
+        return self._call(self.sync.sample, count, **options)
+
+    async def stop(self) -> list[int]:
+        """As `sevenbot.Arm.stop`: does not wait for the call before it, but interrupts it."""
+        return await asyncio.to_thread(self.sync.stop)
+
+    async def close(self) -> None:
+        """Closes the port. The arm goes on with its move."""
+        await self._call(self.sync.close)
+        self._thread.shutdown(wait=False)
+
+    async def __aenter__(self) -> Arm:
+        return self
+
+    async def __aexit__(self, *exception: Any) -> None:
+        """Stops what moves, and closes the port."""
+        await self._call(self.sync.__exit__, *exception)
+        self._thread.shutdown(wait=False)

@@ -1,0 +1,417 @@
+//! `Arm`: a real arm or a simulated one.
+
+use std::sync::{Arc, Mutex};
+
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyTuple, PyType};
+use sevenbot::cartesian::{DOWN, TipTarget, Vector};
+use sevenbot::fine::FineTargets;
+use sevenbot::moves::JointMove;
+use sevenbot::simulated::{self, SharedSimulation, SimulationConfig};
+use sevenbot::{ArmOptions, FineAngle, Map, MoveTime, Speed};
+
+use crate::errors::{OutOfReach, error, not_opened, raised};
+use crate::motion::{self, Pace, RecordOptions};
+use crate::recording::Recording;
+use crate::registers::{self, Registers, Shown, Values};
+use crate::simulation::{Simulation, duration};
+use crate::status::Status;
+use crate::stream::Stream;
+use crate::tip::Tip;
+use crate::worker::{Worker, lock};
+use crate::{bulk, ports};
+
+/// Seven angles.
+type Angles = (f64, f64, f64, f64, f64, f64, f64);
+
+/// A 7Bot V2 arm.
+///
+/// `Arm("/dev/ttyUSB0")` opens a port, `Arm()` the only port with an arm that answers, and `Arm.simulated()` an arm in
+/// virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the end, and closes the port.
+///
+/// Angles are degrees, 0 to 180, joint 1 first; positions millimetres; times seconds.
+#[pyclass(frozen, module = "sevenbot")]
+pub(crate) struct Arm {
+    worker: Worker,
+    simulation: Option<SharedSimulation>,
+    /// The move that `wait` waits for.
+    sent: Mutex<Option<Arc<JointMove>>>,
+    port: String,
+    firmware: String,
+    chip: String,
+    map: &'static str,
+}
+
+impl Arm {
+    fn of(arm: sevenbot::Arm, simulation: Option<SharedSimulation>) -> Self {
+        let (port, map) = (arm.port().to_owned(), arm.map().version());
+        let (firmware, chip) = (arm.identity().version(), arm.identity().chip_name());
+        Self { worker: Worker::start(arm), simulation, sent: Mutex::new(None), port, firmware, chip, map }
+    }
+
+    pub(crate) const fn worker(&self) -> &Worker {
+        &self.worker
+    }
+
+    /// Starts a move, and waits for it.
+    fn go(&self, py: Python<'_>, targets: FineTargets, pace: Pace, wait: bool) -> PyResult<Option<Angles>> {
+        let sent = self.worker.call(py, move |arm, _| motion::begin(arm, targets, pace))?;
+        *lock(&self.sent) = Some(Arc::new(raised(py, sent)?));
+        if wait { self.wait(py) } else { Ok(None) }
+    }
+}
+
+/// Angles of a pose: a number for each joint, or `None` for a joint that stays.
+#[derive(FromPyObject)]
+pub(crate) struct Goals([Option<f64>; 7]);
+
+impl Goals {
+    /// As the library takes them.
+    pub(crate) fn targets(&self) -> PyResult<FineTargets> {
+        let mut targets = [None; 7];
+        for ((target, goal), number) in targets.iter_mut().zip(self.0).zip(1..) {
+            let Some(degrees) = goal else { continue };
+            let angle = FineAngle::from_degrees(degrees);
+            *target = Some(angle.ok_or_else(|| {
+                PyValueError::new_err(format!(
+                    "joint {number}: {degrees} is out of range: use 0 to 180 degrees"
+                ))
+            })?);
+        }
+        Ok(targets)
+    }
+}
+
+/// Speed in degrees/s, in steps of 1.9; duration in seconds, in steps of 0.1.
+fn pace(speed: Option<f64>, duration: Option<f64>) -> PyResult<Pace> {
+    if speed.is_some() && duration.is_some() {
+        return Err(PyTypeError::new_err("give a speed or a duration, not both"));
+    }
+    let wrong = |text: &str| PyValueError::new_err(text.to_owned());
+    let speed = speed.map(|speed| {
+        let found =
+            (1..=100).filter_map(Speed::from_steps).rfind(|step| step.degrees_per_second() <= speed + 0.05);
+        found.filter(|_| speed <= 190.05).ok_or_else(|| wrong("use a speed of 1.9 to 190 degrees per second"))
+    });
+    let time = duration.map(|duration| {
+        let found = (1..=100)
+            .filter_map(MoveTime::from_steps)
+            .find(|step| step.duration().as_secs_f64() >= duration - 0.001);
+        found.filter(|_| duration > 0.0).ok_or_else(|| wrong("use a duration of 0.1 to 10 seconds"))
+    });
+    Ok(Pace { speed: speed.transpose()?, time: time.transpose()? })
+}
+
+fn options(baud: u32, timeout: f64, attempts: u32, map: Option<&str>) -> PyResult<ArmOptions> {
+    let wanted = |version: &str| {
+        let found = Map::ALL.into_iter().find(|map| map.version() == version);
+        found.ok_or_else(|| PyValueError::new_err(format!("map {version}: use \"2.1\" or \"2.2\"")))
+    };
+    Ok(ArmOptions { baud, reply_timeout: duration(timeout)?, attempts, map: map.map(wanted).transpose()? })
+}
+
+#[pymethods]
+impl Arm {
+    #[new]
+    #[pyo3(signature = (port = None, *, baud = 115_200, timeout = 0.5, attempts = 3, map = None))]
+    fn new(
+        py: Python<'_>,
+        port: Option<String>,
+        baud: u32,
+        timeout: f64,
+        attempts: u32,
+        map: Option<&str>,
+    ) -> PyResult<Self> {
+        let options = options(baud, timeout, attempts, map)?;
+        let port = port.map_or_else(|| ports::only_one(py, baud), Ok)?;
+        let opened = py.detach(|| sevenbot::Arm::open_with(&port, options));
+        let arm = opened.map_err(|why| not_opened(py, &port, &why))?;
+        Ok(Self::of(arm, None))
+    }
+
+    /// An arm in virtual time. The same calls give the same values on every machine.
+    ///
+    /// `seed` determines the random faults of the host line, 0 to 2**64 - 1. `attempts` and `timeout` are as for a port.
+    #[classmethod]
+    #[pyo3(signature = (seed = 1, *, timeout = 0.5, attempts = 3, map = None))]
+    fn simulated(
+        _: &Bound<'_, PyType>,
+        py: Python<'_>,
+        seed: u64,
+        timeout: f64,
+        attempts: u32,
+        map: Option<&str>,
+    ) -> PyResult<Self> {
+        let options = options(115_200, timeout, attempts, map)?;
+        let opened = py.detach(|| simulated::arm_with(SimulationConfig::default(), options));
+        let (arm, simulation) = opened.map_err(|why| not_opened(py, "simulated", &why))?;
+        simulation.with(|simulation| simulation.set_seed(seed));
+        Ok(Self::of(arm, Some(simulation)))
+    }
+
+    /// The simulation behind this arm; `None` for a real one.
+    #[getter]
+    fn simulation(&self) -> Option<Simulation> {
+        self.simulation.clone().map(Simulation::of)
+    }
+
+    /// The name of the port.
+    #[getter]
+    fn port(&self) -> &str {
+        &self.port
+    }
+
+    /// The firmware's version, such as `"3.0"`.
+    #[getter]
+    fn firmware(&self) -> &str {
+        &self.firmware
+    }
+
+    /// The chip's unique number, twelve hexadecimal digits.
+    #[getter]
+    fn chip_id(&self) -> &str {
+        &self.chip
+    }
+
+    /// The register map of the frames, `"2.1"` or `"2.2"`. Names and addresses are those of map 2.2 with both.
+    #[getter]
+    fn map(&self) -> &str {
+        self.map
+    }
+
+    /// The registers as a mapping: `arm.registers["speed.1"] = 10`.
+    #[getter]
+    fn registers(slf: Bound<'_, Self>) -> Registers {
+        Registers::of(slf.unbind())
+    }
+
+    /// The value of a register, or a list if the name has several: `arm.get("offset")`.
+    ///
+    /// Numbers are in the units of docs/registers.md. An unknown name raises `KeyError`.
+    fn get(&self, py: Python<'_>, name: &str) -> PyResult<Shown> {
+        registers::get(py, self, name)
+    }
+
+    /// Writes a register, or several with one number for all or one each, and reads them back.
+    ///
+    /// Raises `ValueError` for a number out of range, and `NotTaken` if the arm does not take it. `unlock=True` opens the
+    /// EEPROM lock (register 28) for this write.
+    #[pyo3(signature = (name, values, *, unlock = false))]
+    fn set(&self, py: Python<'_>, name: &str, values: Values, unlock: bool) -> PyResult<()> {
+        registers::set(py, self, name, &values, unlock)
+    }
+
+    /// The measured angles in degrees, joint 1 first: in steps of 0.01 with this project's firmware, else of 1.
+    #[getter]
+    fn angles(&self, py: Python<'_>) -> PyResult<Angles> {
+        let read = self.worker.call(py, |arm, _| motion::angles(arm))?;
+        Ok(raised(py, read)?.into())
+    }
+
+    /// Where the arm is: tip, tool and wrist in millimetres, and the angles.
+    #[pyo3(name = "where")]
+    fn where_(&self, py: Python<'_>) -> PyResult<Tip> {
+        let read = self.worker.call(py, |arm, _| {
+            arm.wait_until_settled()?;
+            motion::angles(arm)
+        })?;
+        raised(py, read).map(Tip::at)
+    }
+
+    /// Moves joints: `arm.pose(120, 90, 65.25, None, None, None, 80)`, or one list of seven.
+    ///
+    /// Angles are 0 to 180 degrees in steps of 0.01; `None` leaves a joint. `speed` is 1.9 to 190 degrees per second in
+    /// steps of 1.9, rounded down; or `duration` 0.1 to 10 seconds. Both stay set for later moves. Waits until the joints
+    /// have arrived and returns the measured angles; with `wait=False` returns `None` at once.
+    #[pyo3(signature = (*angles, speed = None, duration = None, wait = true))]
+    fn pose(
+        &self,
+        py: Python<'_>,
+        angles: &Bound<'_, PyTuple>,
+        speed: Option<f64>,
+        duration: Option<f64>,
+        wait: bool,
+    ) -> PyResult<Option<Angles>> {
+        let goals: Goals = match angles.len() {
+            1 => angles.get_item(0)?.extract()?,
+            7 => Goals(angles.extract::<[Option<f64>; 7]>()?),
+            other => {
+                return Err(PyTypeError::new_err(format!("{other} angles: use seven, or a list of seven")));
+            }
+        };
+        self.go(py, goals.targets()?, pace(speed, duration)?, wait)
+    }
+
+    /// Moves the tip to x, y, z in millimetres, with the tool in a direction of any length, by default straight down.
+    ///
+    /// `speed` and `duration` are those of `pose`. With `straight` the tip moves on a straight line, from its present
+    /// targets, with `speed` in millimetres per second (default 50). Raises `OutOfReach` with the nearest point within
+    /// reach; then nothing moves.
+    #[pyo3(signature = (x, y, z, *, tool = None, speed = None, duration = None, wait = true, straight = false))]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn move_to(
+        &self,
+        py: Python<'_>,
+        x: f64,
+        y: f64,
+        z: f64,
+        tool: Option<(f64, f64, f64)>,
+        speed: Option<f64>,
+        duration: Option<f64>,
+        wait: bool,
+        straight: bool,
+    ) -> PyResult<Option<Angles>> {
+        let tip = Vector::new(x, y, z);
+        let tool = tool.map_or(DOWN, |(x, y, z)| Vector::new(x, y, z));
+        let target = raised(py, TipTarget::of(tip, tool))?;
+        if straight {
+            return self.move_straight(py, tip, tool, speed.unwrap_or(50.0)).map(Some);
+        }
+        let pace = pace(speed, duration)?;
+        let targets = self.worker.call(py, move |arm, _| motion::tip_targets(arm, &target, tip, tool))?;
+        self.go(py, raised(py, targets)?, pace, wait)
+    }
+
+    /// Waits until the joints of the last move have arrived, and returns the measured angles.
+    ///
+    /// Raises `NotReached` if a joint does not arrive. Ctrl-C makes the arm hold.
+    fn wait(&self, py: Python<'_>) -> PyResult<Option<Angles>> {
+        let Some(sent) = lock(&self.sent).take() else { return Ok(None) };
+        let finished = self.worker.call(py, move |arm, watch| motion::finish(arm, &sent, watch))?;
+        Ok(Some(raised(py, finished)?.into()))
+    }
+
+    /// Waits this many seconds, 0 to 86400, on the clock of the arm: virtual time for a simulated one.
+    fn sleep(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let time = duration(seconds)?;
+        let slept = self.worker.call(py, move |arm, watch| motion::sleep(arm, time, watch))?;
+        raised(py, slept)
+    }
+
+    /// Makes every joint hold its position, and verifies that. Ends a move of another thread.
+    ///
+    /// Returns the targets in degrees. If the motors are off, writes nothing.
+    fn stop(&self, py: Python<'_>) -> PyResult<Vec<u16>> {
+        self.worker.interrupt();
+        lock(&self.sent).take();
+        let held = self.worker.call(py, |arm, _| arm.hold())?;
+        raised(py, held).map(|joints| joints.targets().map(u16::from).to_vec())
+    }
+
+    /// The status block; `None` if the firmware has none, as the maker's.
+    fn status(&self, py: Python<'_>) -> PyResult<Option<Status>> {
+        let read = self.worker.call(py, |arm, _| arm.status())?;
+        Ok(raised(py, read)?.map(Status::from))
+    }
+
+    /// A stream of set-points, one each `period` seconds, 0.005 to 1: a context manager.
+    ///
+    /// If the program sends nothing for `watchdog` seconds, 0.01 to 2.55 or 0 for never, the arm holds; with `damping` it
+    /// sinks slowly. Needs this project's firmware, or raises `NotServed`.
+    #[pyo3(signature = (period = 0.02, *, watchdog = 0.3, damping = false))]
+    fn stream(slf: Bound<'_, Self>, period: f64, watchdog: f64, damping: bool) -> PyResult<Stream> {
+        Stream::new(slf.unbind(), period, watchdog, damping)
+    }
+
+    /// Records the positions for `seconds`, 0 to 86400, or until Ctrl-C, `hz` times a second, 1 to 50.
+    ///
+    /// With `guided` the motors go off, so that you can guide the arm by hand: it falls unless you hold it. At the end it
+    /// holds where it is.
+    #[pyo3(signature = (seconds = None, *, hz = 30, guided = false))]
+    fn record(&self, py: Python<'_>, seconds: Option<f64>, hz: u8, guided: bool) -> PyResult<Recording> {
+        if !(1..=50).contains(&hz) {
+            return Err(PyValueError::new_err("use 1 to 50 moments per second"));
+        }
+        let limit = seconds.map(duration).transpose()?;
+        let options = RecordOptions { limit, hz, is_guided: guided };
+        let work = move |arm: &mut _, watch: &mut _| motion::record(arm, options, watch);
+        let (recorded, signal) = self.worker.call_until_signal(py, work)?;
+        match signal.filter(|_| limit.is_some()) {
+            Some(signal) => Err(signal),
+            None => Recording::parse(py, &raised(py, recorded)?),
+        }
+    }
+
+    /// Plays a recording, `speed` times as fast (0.1 to 10), `times` times, and returns the measured positions of the
+    /// first run.
+    ///
+    /// The whole recording is checked before the arm moves. The arm moves slowly to the first pose. Ctrl-C makes it hold.
+    #[pyo3(signature = (recording, *, speed = 1.0, times = 1))]
+    fn play(&self, py: Python<'_>, recording: &Recording, speed: f64, times: u32) -> PyResult<Recording> {
+        if !(0.1..=10.0).contains(&speed) || times == 0 {
+            return Err(PyValueError::new_err("use a speed of 0.1 to 10, and at least one time"));
+        }
+        raised(py, recording.moments().check_speeds(speed))?;
+        self.play_moments(py, recording.moments().clone(), speed, times)
+    }
+
+    /// Reads all positions `count` times, one read after the other, or one each `period` seconds.
+    ///
+    /// Returns times in seconds and angles in degrees: numpy arrays of shape (n,) and (n, 7) if numpy is installed. Python
+    /// threads run meanwhile, and do not delay the reads.
+    #[pyo3(signature = (count, *, period = 0.0))]
+    fn sample<'py>(
+        &self,
+        py: Python<'py>,
+        count: u32,
+        period: f64,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let period = duration(period)?;
+        let work = move |arm: &mut _, watch: &mut _| motion::sample(arm, count, period, watch);
+        let (times, rows) = raised(py, self.worker.call(py, work)?)?;
+        Ok((bulk::numbers(py, &times)?, bulk::angles(py, &rows)?))
+    }
+
+    /// Closes the port. The arm goes on with its move: `stop()` makes it hold.
+    fn close(&self, py: Python<'_>) {
+        self.worker.close(py);
+    }
+
+    fn __enter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    #[pyo3(signature = (*exception))]
+    fn __exit__(&self, py: Python<'_>, exception: &Bound<'_, PyTuple>) -> PyResult<bool> {
+        if !self.worker.is_open() {
+            return Ok(false);
+        }
+        let held = self.worker.call(py, |arm, _| motion::hold_if_moving(arm));
+        self.worker.close(py);
+        let held = held.and_then(|held| raised(py, held));
+        let failed = exception.get_item(0).is_ok_and(|kind| !kind.is_none());
+        match held {
+            // The first failure is the cause of this one.
+            Err(_) if failed => Ok(false),
+            other => other.map(|()| false),
+        }
+    }
+
+    fn __repr__(&self) -> String {
+        let state = if self.worker.is_open() { "" } else { ", closed" };
+        format!("<Arm at {}, firmware {}, map {}{state}>", self.port, self.firmware, self.map)
+    }
+}
+
+impl Arm {
+    fn move_straight(&self, py: Python<'_>, tip: Vector, tool: Vector, speed: f64) -> PyResult<Angles> {
+        let work = move |arm: &mut _, _: &mut _| motion::straight_line(arm, tip, tool, speed);
+        let planned = raised(py, self.worker.call(py, work)?)?;
+        let line = planned.map_err(|why| error::<OutOfReach>(py, &why, &[]))?;
+        self.play_moments(py, line, 1.0, 1)?;
+        self.angles(py)
+    }
+
+    fn play_moments(
+        &self,
+        py: Python<'_>,
+        moments: sevenbot::recording::Recording,
+        speed: f64,
+        times: u32,
+    ) -> PyResult<Recording> {
+        let work = move |arm: &mut _, watch: &mut _| motion::play(arm, &moments, speed, times, watch);
+        let measured = raised(py, self.worker.call(py, work)?)?;
+        Recording::parse(py, &measured)
+    }
+}

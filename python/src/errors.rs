@@ -1,0 +1,164 @@
+//! The exceptions of the module, and which failure of the library raises which one.
+
+use pyo3::exceptions::{PyException, PyKeyError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::type_object::PyTypeInfo;
+use pyo3::types::PyTuple;
+use sevenbot::cartesian::Unreachable;
+use sevenbot::checked_write::{MismatchCause, WriteMismatch, reasons};
+use sevenbot::hold::HoldError;
+use sevenbot::moves::MoveError;
+use sevenbot::names::NameError;
+use sevenbot::recording::RecordingError;
+use sevenbot::register_values::ValueError;
+use sevenbot::stream::StreamError;
+use sevenbot::{OpenError, advice};
+
+macro_rules! exceptions {
+    ($($name:ident($base:ty): $doc:literal;)*) => {
+        $(pyo3::create_exception!(sevenbot, $name, $base, $doc);)*
+
+        /// Adds the exceptions to the module.
+        pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+            let py = module.py();
+            py.get_type::<Error>().setattr("hints", PyTuple::empty(py))?;
+            $(module.add(stringify!($name), py.get_type::<$name>())?;)*
+            Ok(())
+        }
+    };
+}
+
+exceptions! {
+    Error(PyException): "A failure of this package. `hints` is a tuple of texts: what to try, the most likely cause first.";
+    PortError(Error): "The port cannot be opened, has no arm, or failed.";
+    NoAnswer(PortError): "The arm does not answer.";
+    NotTaken(Error): "The arm did not take a value. The message tells why.";
+    NotReached(Error): "Joints did not reach their targets, or still move.";
+    NotDriven(Error): "The motors do not drive the joints: `arm.set('motor-state', 1)` switches them on.";
+    MayMove(Error): "It is unknown whether the arm took a command, so it may be moving.";
+    OutOfReach(Error): "No joint angles reach the position.";
+    NotServed(Error): "The arm's firmware does not have this function.";
+    BadRecording(Error): "A text is not a recording, or the arm cannot play it.";
+    Interrupted(Error): "Another thread stopped the arm during this call.";
+    Closed(Error): "The arm is closed, or the stream is.";
+}
+
+impl Closed {
+    /// The exception of a call after `close()`.
+    pub(crate) fn raise_closed(py: Python<'_>) -> PyErr {
+        error::<Self>(py, "the arm is closed, or no stream is open", &[])
+    }
+}
+
+/// An exception with its hints.
+pub(crate) fn error<E: PyTypeInfo>(py: Python<'_>, message: &str, hints: &[String]) -> PyErr {
+    let lines = hints.iter().fold(message.to_owned(), |text, hint| format!("{text}\n  - {hint}"));
+    let error = PyErr::from_type(E::type_object(py), (lines,));
+    match PyTuple::new(py, hints).and_then(|hints| error.value(py).setattr("hints", hints)) {
+        Ok(()) => error,
+        Err(other) => other,
+    }
+}
+
+/// A failure of the library as an exception.
+pub(crate) trait Raise {
+    /// The exception.
+    fn raise(&self, py: Python<'_>) -> PyErr;
+}
+
+impl Raise for sevenbot::Error {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        let hints: Vec<String> = advice::exchange(self).iter().map(|&hint| hint.to_owned()).collect();
+        match self {
+            Self::OutsideMap { .. } => PyValueError::new_err(self.to_string()),
+            Self::NoAnswer { .. } => error::<NoAnswer>(py, &self.to_string(), &hints),
+            Self::Port(_) => error::<PortError>(py, &self.to_string(), &hints),
+        }
+    }
+}
+
+/// A port that does not open, with its name.
+pub(crate) fn not_opened(py: Python<'_>, port: &str, why: &OpenError) -> PyErr {
+    let (message, hints) = (format!("{port}: {why}"), advice::opening(why));
+    match why {
+        OpenError::Silent(sevenbot::Error::NoAnswer { .. }) => error::<NoAnswer>(py, &message, &hints),
+        _ => error::<PortError>(py, &message, &hints),
+    }
+}
+
+/// Registers that did not take their values.
+pub(crate) fn not_taken(py: Python<'_>, unchanged: &[WriteMismatch]) -> PyErr {
+    let is_locked = unchanged.iter().any(|register| register.cause == MismatchCause::Locked);
+    let hint =
+        "settings are protected by the EEPROM lock, register 28: `unlock=True` opens it for this write";
+    let hints = if is_locked { vec![hint.to_owned()] } else { Vec::new() };
+    error::<NotTaken>(py, &reasons(unchanged), &hints)
+}
+
+impl Raise for MoveError {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        let message = self.to_string();
+        let driven = ["`arm.set('motor-state', 1)` switches the motors on".to_owned()];
+        match self {
+            Self::Exchange(error) => error.raise(py),
+            Self::NotTaken(unchanged) => not_taken(py, unchanged),
+            Self::Stream(error) => error.raise(py),
+            Self::Interrupted => error::<Interrupted>(py, &message, &[]),
+            Self::NotDriven { .. } => error::<NotDriven>(py, &message, &driven),
+            Self::MayMove(_) => {
+                let hint = "`arm.stop()`, or switch off the supply of the servos".to_owned();
+                error::<MayMove>(py, &message, &[hint])
+            }
+            Self::StillMoving { .. } | Self::NotReached { .. } => error::<NotReached>(py, &message, &[]),
+            Self::ReportsStopped => error::<NoAnswer>(py, &message, &[]),
+        }
+    }
+}
+
+impl Raise for HoldError {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        MoveError::MayMove(self.to_string()).raise(py)
+    }
+}
+
+impl Raise for StreamError {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::NoExtendedBlock => error::<NotServed>(py, &self.to_string(), &[]),
+            Self::NotTaken(unchanged) => not_taken(py, unchanged),
+            Self::Exchange(error) => error.raise(py),
+        }
+    }
+}
+
+impl Raise for RecordingError {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        error::<BadRecording>(py, &self.to_string(), &[])
+    }
+}
+
+impl Raise for Unreachable {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        let hint = self
+            .other_tool
+            .map(|tool| format!("with tool=({}, {}, {}) the tip reaches this point", tool.x, tool.y, tool.z));
+        error::<OutOfReach>(py, &self.to_string(), &hint.into_iter().collect::<Vec<_>>())
+    }
+}
+
+impl Raise for NameError {
+    fn raise(&self, _: Python<'_>) -> PyErr {
+        PyKeyError::new_err(self.to_string())
+    }
+}
+
+impl Raise for ValueError {
+    fn raise(&self, _: Python<'_>) -> PyErr {
+        PyValueError::new_err(format!("{self}; nothing was written"))
+    }
+}
+
+/// Raises the error of a result.
+pub(crate) fn raised<T, E: Raise>(py: Python<'_>, result: Result<T, E>) -> PyResult<T> {
+    result.map_err(|error| error.raise(py))
+}

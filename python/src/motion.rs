@@ -1,0 +1,215 @@
+//! What the thread of the port does for one call of Python. Knows the library, not Python.
+
+use std::time::Duration;
+
+use sevenbot::cartesian::{StraightLine, StraightLineRequest, TargetResolution, TipTarget, Vector};
+use sevenbot::fine::FineTargets;
+use sevenbot::joints::frames_for;
+use sevenbot::map::{FINE_POSITION, MOTOR_STATE, SPEED, TIME, VACUUM_PUMP, motor_state};
+use sevenbot::moves::{JointMove, MoveError, Observer, Player, Recorder};
+use sevenbot::recording::{FileVersion, Moment, Recording, head};
+use sevenbot::{Angle, Arm, Error, FineAngle, MoveTime, Span, Speed};
+
+use crate::worker::Watch;
+
+/// The longest time between two questions whether the call goes on.
+const POLL_PERIOD: Duration = Duration::from_millis(20);
+
+/// How fast a move is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pace {
+    pub(crate) speed: Option<Speed>,
+    pub(crate) time: Option<MoveTime>,
+}
+
+/// The measured angles in degrees, as exact as the arm has them.
+pub(crate) fn angles(arm: &mut Arm) -> Result<[f64; 7], Error> {
+    let fine = arm.fine_state_if_served()?.map_or([None; 7], |state| state.positions);
+    if let [Some(a), Some(b), Some(c), Some(d), Some(e), Some(f), Some(g)] = fine {
+        return Ok([a, b, c, d, e, f, g].map(FineAngle::degrees));
+    }
+    Ok(arm.positions()?.map(|angle| f64::from(angle.degrees())))
+}
+
+/// Starts a move, as the command `pose` does.
+pub(crate) fn begin(arm: &mut Arm, targets: FineTargets, pace: Pace) -> Result<JointMove, MoveError> {
+    arm.driven_joints()?;
+    set_pace(arm, &targets, pace)?;
+    JointMove::begin_fine(arm, targets)
+}
+
+/// Waits for a move. If the caller ends the wait, the arm holds.
+pub(crate) fn finish(arm: &mut Arm, sent: &JointMove, watch: &mut Watch) -> Result<[f64; 7], MoveError> {
+    let finished = sent.finish(arm, watch);
+    if finished == Err(MoveError::Interrupted) {
+        arm.hold()?;
+    }
+    finished?;
+    Ok(angles(arm)?)
+}
+
+fn set_pace(arm: &mut Arm, targets: &FineTargets, pace: Pace) -> Result<(), MoveError> {
+    let for_targets = |steps: u8| targets.map(|target| target.map(|_| steps));
+    // A duration applies where the speed is the maximum (D11).
+    let speed = pace.speed.or(pace.time.map(|_| Speed::MAXIMUM));
+    let speeds = speed.map(|speed| frames_for(&SPEED, &for_targets(speed.steps())));
+    let times = pace.time.map(|time| frames_for(&TIME, &for_targets(time.steps())));
+    let frames: Vec<_> = speeds.into_iter().chain(times).flatten().collect();
+    if frames.is_empty() {
+        return Ok(());
+    }
+    all_taken(arm.write_all_checked(&frames)?)
+}
+
+fn all_taken(unchanged: Vec<sevenbot::checked_write::WriteMismatch>) -> Result<(), MoveError> {
+    if unchanged.is_empty() { Ok(()) } else { Err(MoveError::NotTaken(unchanged)) }
+}
+
+/// The targets of joints 1 to 5, as exact as the arm takes them.
+pub(crate) fn tip_targets(
+    arm: &mut Arm,
+    target: &TipTarget,
+    tip: Vector,
+    tool: Vector,
+) -> Result<FineTargets, Error> {
+    let fine = if arm.has_extended_block()? { target.in_hundredths(tip, tool) } else { None };
+    let whole = target.degrees.map(|degrees| Angle::from_register(degrees).into());
+    let [t1, t2, t3, t4, t5] = fine.map_or(whole, |fine| fine.angles).map(Some);
+    Ok([t1, t2, t3, t4, t5, None, None])
+}
+
+/// A straight line from the present targets, as a recording.
+pub(crate) fn straight_line(
+    arm: &mut Arm,
+    tip: Vector,
+    tool: Vector,
+    speed: f64,
+) -> Result<Result<Recording, String>, MoveError> {
+    let joints = arm.driven_joints()?;
+    let (resolution, start) = match arm.has_extended_block()? {
+        true => (TargetResolution::Hundredths, arm.fine_targets()?),
+        false => {
+            let whole = joints.targets().map(|degrees| FineAngle::from(Angle::from_register(degrees)));
+            (TargetResolution::Degrees, whole)
+        }
+    };
+    let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
+    let request = StraightLineRequest { start, resolution, vacuum, tip, tool, speed };
+    Ok(StraightLine::plan(&request).map(|line| line.recording).map_err(|why| why.to_string()))
+}
+
+/// Waits on the clock of the arm's line.
+pub(crate) fn sleep(arm: &mut Arm, time: Duration, watch: &mut Watch) -> Result<(), MoveError> {
+    let end = arm.now() + time;
+    loop {
+        let left = end.saturating_duration_since(arm.now());
+        if left.is_zero() {
+            return Ok(());
+        }
+        if !watch.goes_on() {
+            arm.hold()?;
+            return Err(MoveError::Interrupted);
+        }
+        arm.sleep(left.min(POLL_PERIOD));
+    }
+}
+
+/// Makes the arm hold if a joint moves. The maker's firmware does not tell, so it always holds.
+pub(crate) fn hold_if_moving(arm: &mut Arm) -> Result<(), MoveError> {
+    let is_moving = arm.status()?.is_none_or(|status| status.moving() != 0);
+    if is_moving {
+        arm.hold()?;
+    }
+    Ok(())
+}
+
+/// Reads all positions `count` times, one after the other or one each `period`. Returns times in seconds and angles.
+pub(crate) fn sample(
+    arm: &mut Arm,
+    count: u32,
+    period: Duration,
+    watch: &mut Watch,
+) -> Result<(Vec<f64>, Vec<[f64; 7]>), Error> {
+    let row = arm.has_extended_block()?.then_some(FINE_POSITION);
+    let start = arm.now();
+    let (mut times, mut rows) = (Vec::new(), Vec::new());
+    for number in 0..count {
+        if !watch.goes_on() {
+            break;
+        }
+        let due = start + period.saturating_mul(number);
+        arm.sleep(due.saturating_duration_since(arm.now()));
+        let angles = match row {
+            Some(row) => arm.read_span(Span::of(&row))?.words(&row).map(|word| f64::from(word) / 100.0),
+            None => arm.positions()?.map(|angle| f64::from(angle.degrees())),
+        };
+        times.push(arm.now().saturating_duration_since(start).as_secs_f64());
+        rows.push(angles);
+        watch.progress(sevenbot::moves::Stage::Playing, u64::from(number), u64::from(count));
+    }
+    Ok((times, rows))
+}
+
+/// What to record.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RecordOptions {
+    pub(crate) limit: Option<Duration>,
+    pub(crate) hz: u8,
+    pub(crate) is_guided: bool,
+}
+
+/// Records until the time is over or the caller ends it. Returns the text of the recording.
+pub(crate) fn record(arm: &mut Arm, options: RecordOptions, watch: &mut Watch) -> Result<String, MoveError> {
+    let RecordOptions { hz, is_guided, .. } = options;
+    if is_guided {
+        all_taken(arm.write_checked(MOTOR_STATE.address, &[motor_state::FORCELESS])?)?;
+    }
+    let content = arm.exact_positions()?;
+    let recorded = arm.with_reports(hz, content, |arm| record_reports(arm, options, content, watch));
+    if is_guided {
+        // The targets become the measured positions (D13).
+        all_taken(arm.write_checked(MOTOR_STATE.address, &[motor_state::SERVO])?)?;
+    }
+    recorded
+}
+
+fn record_reports(
+    arm: &mut Arm,
+    options: RecordOptions,
+    content: u8,
+    watch: &mut Watch,
+) -> Result<String, MoveError> {
+    let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
+    let mut text = head(FileVersion::Hundredths);
+    let mut recorder = Recorder::new(arm, options.hz, content);
+    while watch.goes_on() {
+        let Some(recorded) = recorder.next(arm, POLL_PERIOD)? else { continue };
+        if options.limit.is_some_and(|limit| recorded.time > limit) {
+            break;
+        }
+        let moment = Moment { time: recorded.time, pose: recorded.pose, vacuum };
+        text.push_str(&moment.line(FileVersion::Hundredths));
+        text.push('\n');
+    }
+    Ok(text)
+}
+
+/// Plays a recording, and returns the measured positions of the first run.
+pub(crate) fn play(
+    arm: &mut Arm,
+    recording: &Recording,
+    factor: f64,
+    times: u32,
+    watch: &mut Watch,
+) -> Result<String, MoveError> {
+    arm.driven_joints()?;
+    let mut player = Player::new(recording, factor);
+    player.play(arm, times, watch)?;
+    let mut text = head(FileVersion::Hundredths);
+    for (time, pose) in player.measured() {
+        let moment = Moment { time: *time, pose: *pose, vacuum: false };
+        text.push_str(&moment.line(FileVersion::Hundredths));
+        text.push('\n');
+    }
+    Ok(text)
+}

@@ -1,0 +1,175 @@
+//! `Simulation`: the arm behind `Arm.simulated()`, its clock, faults and hands.
+
+use std::sync::Mutex;
+use std::time::Duration;
+
+use arm_sim::faults::{ArmFault, FaultLocation};
+use motion_core::calibration::{MicroDegrees, counts_from_angle};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use sevenbot::Joint;
+use sevenbot::simulated::SharedSimulation;
+
+use crate::worker::lock;
+
+/// The simulated arm of `Arm.simulated()`.
+///
+/// Its time is virtual: it passes only while the arm is asked or slept for, and in `advance`. A program may think as long
+/// as it likes, and gets the same result on every machine.
+#[pyclass(frozen, module = "sevenbot")]
+pub(crate) struct Simulation(SharedSimulation);
+
+/// A simulated arm at one instant: servos, registers, settings and time.
+#[pyclass(frozen, module = "sevenbot")]
+pub(crate) struct SimulationSnapshot(Mutex<arm_sim::Simulation>);
+
+impl Simulation {
+    pub(crate) const fn of(simulation: SharedSimulation) -> Self {
+        Self(simulation)
+    }
+
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut arm_sim::Simulation) -> T + Send) -> T {
+        py.detach(|| self.0.with(work))
+    }
+}
+
+/// A time in seconds, at most a day.
+pub(crate) fn duration(seconds: f64) -> PyResult<Duration> {
+    const LONGEST: Duration = Duration::from_secs(86_400);
+    let time = Duration::try_from_secs_f64(seconds).ok().filter(|time| *time <= LONGEST);
+    time.ok_or_else(|| PyValueError::new_err(format!("{seconds} s: use 0 to 86400 seconds")))
+}
+
+/// A joint by its number.
+pub(crate) fn joint(number: u8) -> PyResult<Joint> {
+    Joint::new(number).ok_or_else(|| PyValueError::new_err(format!("joint {number}: use 1 to 7")))
+}
+
+fn virtual_time(duration: Duration) -> arm_sim::Duration {
+    arm_sim::Duration::from_micros(u64::try_from(duration.as_micros()).unwrap_or(u64::MAX))
+}
+
+#[pymethods]
+impl Simulation {
+    /// The virtual time since power-up, in seconds.
+    #[getter]
+    fn now(&self, py: Python<'_>) -> f64 {
+        let micros = self.with(py, |simulation| simulation.now().as_micros());
+        Duration::from_micros(micros).as_secs_f64()
+    }
+
+    /// Lets this many seconds pass, 0 to 86400.
+    fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let time = virtual_time(duration(seconds)?);
+        self.with(py, |simulation| simulation.advance(time));
+        Ok(())
+    }
+
+    /// Gives the arm a fault, for `seconds` or until `clear`: `"3=missing"`, `"5=late=20"`, `"supply=off"`, `"bus=echo"`.
+    ///
+    /// The words are those of `host-sim --fault`. A wrong word raises `ValueError` with the list.
+    #[pyo3(signature = (fault, seconds = None))]
+    fn fault(&self, py: Python<'_>, fault: &str, seconds: Option<f64>) -> PyResult<()> {
+        let fault: ArmFault =
+            fault.parse().map_err(|why| PyValueError::new_err(format!("{fault}: {why}")))?;
+        let time = seconds.map(duration).transpose()?.map(virtual_time);
+        self.with(py, |simulation| simulation.set_fault(fault, time));
+        Ok(())
+    }
+
+    /// Takes all faults back, or those at one location: `"3"`, `"supply"`, `"line"`.
+    ///
+    /// Returns how often each took effect, as text.
+    #[pyo3(signature = (location = None))]
+    fn clear(&self, py: Python<'_>, location: Option<&str>) -> PyResult<Vec<String>> {
+        let parse =
+            |text: &str| text.parse::<FaultLocation>().map_err(|why| PyValueError::new_err(why.to_string()));
+        let location = location.map(parse).transpose()?;
+        let ended = self.with(py, |simulation| simulation.end_faults(location));
+        Ok(ended.iter().map(ToString::to_string).collect())
+    }
+
+    /// The present faults, and how often each took effect so far, as text.
+    #[getter]
+    fn faults(&self, py: Python<'_>) -> Vec<String> {
+        self.with(py, |simulation| simulation.faults()).iter().map(ToString::to_string).collect()
+    }
+
+    /// The true angles of joints 1 to 7 in degrees, without offsets and without noise.
+    #[getter]
+    fn angles(&self, py: Python<'_>) -> (f64, f64, f64, f64, f64, f64, f64) {
+        let angles = self.with(py, |simulation| Joint::ALL.map(|joint| simulation.plant().angle(joint)));
+        angles.map(|angle| f64::from(angle) / 1_000.0).into()
+    }
+
+    /// Turns a joint by hand to an angle of 0 to 180 degrees, and holds it there until it has torque or `let_go`.
+    fn move_by_hand(&self, py: Python<'_>, joint: u8, degrees: f64) -> PyResult<()> {
+        let joint = self::joint(joint)?;
+        let angle = sevenbot::FineAngle::from_degrees(degrees)
+            .ok_or_else(|| PyValueError::new_err(format!("{degrees}: use 0 to 180 degrees")))?;
+        let counts = counts_from_angle(joint, MicroDegrees(i32::from(angle.hundredths()) * 10_000), 0);
+        self.with(py, |simulation| {
+            simulation.plant_mut().move_by_hand(joint, counts);
+            simulation.plant_mut().hold(joint);
+        });
+        Ok(())
+    }
+
+    /// Lets a hand hold a joint where it is, until it has torque. Has no effect on a joint with torque.
+    fn hold_by_hand(&self, py: Python<'_>, joint: u8) -> PyResult<()> {
+        let joint = self::joint(joint)?;
+        self.with(py, |simulation| simulation.plant_mut().hold(joint));
+        Ok(())
+    }
+
+    /// Takes the hand away from a joint: without torque, a loaded joint falls.
+    fn let_go(&self, py: Python<'_>, joint: u8) -> PyResult<()> {
+        let joint = self::joint(joint)?;
+        self.with(py, |simulation| simulation.plant_mut().let_go(joint));
+        Ok(())
+    }
+
+    /// The weight at the tip in grams, 0 to 65535.
+    #[getter]
+    fn load_grams(&self, py: Python<'_>) -> u16 {
+        self.with(py, |simulation| simulation.plant().load_grams())
+    }
+
+    #[setter]
+    fn set_load_grams(&self, py: Python<'_>, grams: u16) {
+        self.with(py, |simulation| simulation.plant_mut().set_load(grams));
+    }
+
+    /// Switches the arm off and on. The settings stay.
+    fn power_cycle(&self, py: Python<'_>) {
+        self.with(py, |simulation| simulation.power_cycle());
+    }
+
+    /// Switches the arm off, until `power_cycle`. Loaded joints fall.
+    fn power_off(&self, py: Python<'_>) {
+        self.with(py, |simulation| simulation.power_off());
+    }
+
+    /// A copy of the arm as it is now.
+    fn snapshot(&self, py: Python<'_>) -> SimulationSnapshot {
+        SimulationSnapshot(Mutex::new(self.with(py, |simulation| simulation.clone())))
+    }
+
+    /// Makes the arm as it was at a snapshot, its time included.
+    fn restore(&self, py: Python<'_>, snapshot: &SimulationSnapshot) {
+        let copy = lock(&snapshot.0).clone();
+        self.with(py, |simulation| *simulation = copy);
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!("<Simulation at {:.3} s, {} faults>", self.now(py), self.faults(py).len())
+    }
+}
+
+#[pymethods]
+impl SimulationSnapshot {
+    fn __repr__(&self) -> String {
+        let micros = lock(&self.0).now().as_micros();
+        format!("<SimulationSnapshot at {:.3} s>", Duration::from_micros(micros).as_secs_f64())
+    }
+}

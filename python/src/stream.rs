@@ -1,0 +1,92 @@
+//! `Stream`: set-points at a fixed period, in hundredths of a degree.
+
+use std::time::Duration;
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use sevenbot::moves::{MoveError, Observer};
+use sevenbot::stream::{StreamOptions, WatchdogAction};
+
+use crate::arm::{Arm, Goals};
+use crate::errors::raised;
+
+/// The longest time between two frames while a point is not due yet: a watchdog of 10 ms needs more than this.
+const SLICE: Duration = Duration::from_millis(20);
+
+/// A stream of set-points, a context manager: `with arm.stream(0.02) as stream: stream.send(...)`.
+///
+/// `send` waits until the next point is due. If the program sends nothing for longer than the watchdog's time, the arm
+/// holds. At the end the registers of the stream have their old values again.
+#[pyclass(frozen, module = "sevenbot")]
+pub(crate) struct Stream {
+    arm: Py<Arm>,
+    options: StreamOptions,
+}
+
+impl Stream {
+    pub(crate) fn new(arm: Py<Arm>, period: f64, watchdog: f64, damping: bool) -> PyResult<Self> {
+        let milliseconds = steps(period * 1_000.0, f64::from(u16::MAX));
+        let options = milliseconds.and_then(StreamOptions::new);
+        let options = options
+            .ok_or_else(|| PyValueError::new_err(format!("a period of {period} s: use 0.005 to 1 s")))?;
+        let watchdog = steps(watchdog * 100.0, 255.0).and_then(|steps| u8::try_from(steps).ok());
+        let watchdog = watchdog
+            .ok_or_else(|| PyValueError::new_err("use a watchdog of 0.01 to 2.55 s, or 0 for none"))?;
+        let action = if damping { WatchdogAction::Damping } else { WatchdogAction::Hold };
+        Ok(Self { arm, options: options.with_watchdog(watchdog, action) })
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked: 0 to the limit")]
+fn steps(number: f64, limit: f64) -> Option<u16> {
+    (0.0..=limit).contains(&number.round()).then(|| number.round() as u16)
+}
+
+#[pymethods]
+impl Stream {
+    fn __enter__<'py>(slf: PyRef<'py, Self>) -> PyResult<PyRef<'py, Self>> {
+        slf.arm.get().worker().open_stream(slf.py(), slf.options)?;
+        Ok(slf)
+    }
+
+    #[pyo3(signature = (*_exception))]
+    fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, PyAny>) -> PyResult<bool> {
+        self.arm.get().worker().close_stream(py)?;
+        Ok(false)
+    }
+
+    /// Sends a point when it is due: seven angles, 0 to 180 degrees in steps of 0.01, `None` for joints without a point.
+    ///
+    /// Returns the number of the point, which grows by more than one if the program was late.
+    fn send(&self, py: Python<'_>, angles: Goals) -> PyResult<u32> {
+        let point = angles.targets()?;
+        let sent = self.arm.get().worker().stream_call(py, move |open, watch| {
+            loop {
+                let left = open.pace.due().saturating_duration_since(open.stream.arm().now());
+                if left.is_zero() {
+                    break;
+                }
+                if !watch.goes_on() {
+                    return Err(MoveError::Interrupted);
+                }
+                open.stream.arm().sleep(left.min(SLICE));
+                open.stream.keep_alive()?;
+            }
+            let now = open.stream.arm().now();
+            let number = open.pace.take(now);
+            open.stream.send(&point)?;
+            Ok(number)
+        })?;
+        raised(py, sent)
+    }
+
+    /// The time between two points in seconds.
+    #[getter]
+    fn period(&self) -> f64 {
+        self.options.period().as_secs_f64()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Stream of a point each {} ms>", self.options.period().as_millis())
+    }
+}

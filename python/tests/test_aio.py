@@ -1,0 +1,65 @@
+"""`sevenbot.aio`: coroutines on an arm in virtual time."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+import sevenbot
+from sevenbot import aio
+
+
+def test_coroutines_do_what_the_methods_do() -> None:
+    async def run() -> None:
+        async with aio.Arm.simulated() as arm:
+            await arm.sleep(1)
+            await arm.pose(120, 90, 65, 90, 90, 90, 80)
+            assert (await arm.angles())[0] == pytest.approx(120, abs=1.5)
+            await arm.set("speed", 10)
+            assert await arm.get("speed.7") == 10
+            await arm.move_to(-50, 185, 50)
+            assert (await arm.where()).tip[0] == pytest.approx(-50, abs=6)
+            status = await arm.status()
+            assert status is not None and status.is_healthy
+            assert len(await arm.record(0.5)) > 10
+            times, _ = await arm.sample(5)
+            assert len(times) == 5
+        with pytest.raises(sevenbot.Closed):
+            arm.sync.get("speed")
+
+    asyncio.run(run())
+
+
+def test_two_arms_run_at_the_same_time() -> None:
+    async def run() -> None:
+        async with aio.Arm.simulated() as one, aio.Arm.simulated() as other:
+            await asyncio.gather(one.sleep(1), other.sleep(1))
+            await asyncio.gather(
+                one.pose(100, 90, 65, 90, 90, 90, 80), other.pose(80, 90, 65, 90, 90, 90, 80)
+            )
+            assert (await one.angles())[0] == pytest.approx(100, abs=1.5)
+            assert (await other.angles())[0] == pytest.approx(80, abs=1.5)
+
+    asyncio.run(run())
+
+
+def test_a_cancelled_call_makes_the_arm_hold() -> None:
+    async def forever(arm: aio.Arm) -> None:
+        while True:
+            await arm.sleep(86_400)
+
+    async def run() -> None:
+        async with aio.Arm.simulated() as arm:
+            await arm.sleep(1)
+            assert arm.simulation is not None
+            arm.simulation.fault("1=stuck")
+            await arm.pose(180, 90, 65, 90, 90, 90, 80, wait=False)
+            task = asyncio.create_task(forever(arm))
+            await asyncio.sleep(0)
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await task
+            assert await arm.get("target-position.1") == pytest.approx(90, abs=2)
+
+    asyncio.run(run())

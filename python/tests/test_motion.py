@@ -1,0 +1,113 @@
+"""Streams, recordings and samples, on an arm in virtual time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sevenbot
+
+REST = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0]
+
+
+def test_a_stream_leads_the_arm_and_puts_its_registers_back(simulated_arm: sevenbot.Arm) -> None:
+    world = simulated_arm.simulation
+    assert world is not None
+    start = world.now
+    with simulated_arm.stream(0.02) as stream:
+        assert simulated_arm.get("set-point-period") == 20
+        for step in range(100):
+            stream.send([90 + step * 0.2, *[None] * 6])
+    assert world.now - start == pytest.approx(2, abs=0.2)
+    assert simulated_arm.get("set-point-period") == 0
+    assert simulated_arm.get("fine-target.1") == 10980
+
+
+def test_a_silent_stream_holds_and_a_slow_one_does_not(simulated_arm: sevenbot.Arm) -> None:
+    with simulated_arm.stream(1.0) as stream:
+        for angle in (90, 91, 92):
+            stream.send([angle, *[None] * 6])
+        status = simulated_arm.status()
+        assert status is not None and "silent" not in status.faults
+    with simulated_arm.stream(0.02) as stream:
+        stream.send(REST)
+        assert simulated_arm.simulation is not None
+        simulated_arm.simulation.advance(1)
+        status = simulated_arm.status()
+        assert status is not None and "silent" in status.faults
+
+
+def test_a_stream_ends_after_an_exception_and_refuses_wrong_values(simulated_arm: sevenbot.Arm) -> None:
+    with pytest.raises(RuntimeError, match="mine"):
+        with simulated_arm.stream() as stream:
+            raise RuntimeError("mine")
+    assert simulated_arm.get("set-point-period") == 0
+    with pytest.raises(sevenbot.Closed):
+        stream.send(REST)
+    with pytest.raises(ValueError, match="0.005 to 1"):
+        simulated_arm.stream(0.001)
+    with pytest.raises(ValueError, match="watchdog"):
+        simulated_arm.stream(0.02, watchdog=9)
+
+
+def test_a_recording_is_played_and_saved(simulated_arm: sevenbot.Arm, tmp_path: Path) -> None:
+    simulated_arm.pose([130, *REST[1:]], speed=40, wait=False)
+    recorded = simulated_arm.record(2, hz=50)
+    assert 90 <= len(recorded) <= 102
+    assert recorded.duration == pytest.approx(2, abs=0.1)
+    angles = [row[0] for row in recorded.angles]
+    assert angles[0] < 95 and angles[-1] > 125
+    recorded.save(tmp_path / "wave.txt")
+    loaded = sevenbot.Recording.load(tmp_path / "wave.txt")
+    assert list(loaded.times) == list(recorded.times)
+    measured = simulated_arm.play(loaded)
+    assert measured.angles[-1][0] == pytest.approx(130, abs=2)
+    assert "moments" in repr(measured)
+
+
+def test_a_guided_arm_is_recorded_and_holds_at_the_end(simulated_arm: sevenbot.Arm) -> None:
+    assert simulated_arm.simulation is not None
+    for joint in range(1, 8):
+        simulated_arm.simulation.hold_by_hand(joint)
+    recorded = simulated_arm.record(1, guided=True)
+    assert len(recorded) > 20
+    assert simulated_arm.get("motor-state") == 1
+
+
+def test_points_make_a_recording_that_is_checked() -> None:
+    recording = sevenbot.Recording.from_points([0, 2], [REST, [120, *REST[1:]]])
+    assert recording.duration == 2 and recording.vacuum == [False, False]
+    recording.check()
+    with pytest.raises(sevenbot.BadRecording):
+        recording.check(100)
+    with pytest.raises(ValueError, match="lengths"):
+        sevenbot.Recording.from_points([0], [])
+    with pytest.raises(sevenbot.BadRecording):
+        sevenbot.Recording.from_points([1, 0], [REST, REST])
+
+
+def test_a_sample_is_evenly_spaced(simulated_arm: sevenbot.Arm) -> None:
+    times, angles = simulated_arm.sample(50, period=0.02)
+    assert len(times) == len(angles) == 50
+    assert times[-1] == pytest.approx(0.98, abs=0.01)
+    assert list(angles[-1]) == pytest.approx(REST, abs=1.5)
+
+
+def test_bulk_numbers_are_numpy_arrays(simulated_arm: sevenbot.Arm) -> None:
+    numpy = pytest.importorskip("numpy")
+    times, angles = simulated_arm.sample(10)
+    assert times.shape == (10,) and angles.shape == (10, 7)
+    assert angles.dtype == numpy.float64 and angles.flags.writeable
+
+
+def test_without_numpy_there_are_tuples(tmp_path: Path) -> None:
+    script = (
+        "import sys; sys.modules['numpy'] = None\n"
+        "import sevenbot\n"
+        "times, angles = sevenbot.Arm.simulated().sample(3)\n"
+        "assert isinstance(times, tuple) and isinstance(angles, tuple) and len(angles[0]) == 7\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, cwd=tmp_path)

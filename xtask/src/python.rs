@@ -1,0 +1,110 @@
+//! The Python package: built as a wheel, installed into a fresh environment, and tested there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::run::{TaskResult, root, target_directory};
+
+/// The packages from PyPI, at versions that were tried. numpy is optional for users, but has tests.
+const PACKAGES: [&str; 5] = [
+    "maturin==1.16.0",
+    "mypy==2.4.1",
+    "pytest==9.2.0",
+    "numpy==2.4.6; python_version >= '3.11'",
+    "numpy==2.2.6; python_version < '3.11'",
+];
+/// Interpreters that are tested if they are on PATH. The wheel is the same for all of them.
+const INTERPRETERS: [&str; 6] =
+    ["python3", "python3.10", "python3.11", "python3.12", "python3.13", "python3.14"];
+/// Prints the version, and fails below 3.10.
+const VERSION: &str = "import sys; assert sys.version_info >= (3, 10); print('%d.%d' % sys.version_info[:2])";
+
+/// Builds the wheel, and tests it with all interpreters on PATH.
+pub(crate) fn check() -> TaskResult {
+    let interpreters = interpreters();
+    let Some((version, program)) = interpreters.first() else {
+        return Err("no Python of at least 3.10 on PATH".into());
+    };
+    let wheel = build_wheel(&environment(version, program)?)?;
+    for (version, program) in &interpreters {
+        println!("Python {version}");
+        test(&environment(version, program)?, &wheel)?;
+    }
+    Ok(())
+}
+
+/// The versions on PATH, each once, with a program of each.
+fn interpreters() -> Vec<(String, &'static str)> {
+    let mut found: Vec<(String, &str)> = Vec::new();
+    for program in INTERPRETERS {
+        let output = Command::new(program).args(["-c", VERSION]).stderr(Stdio::null()).output();
+        let Some(output) = output.ok().filter(|output| output.status.success()) else { continue };
+        let version = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+        if found.iter().all(|(other, _)| *other != version) {
+            found.push((version, program));
+        }
+    }
+    found
+}
+
+fn folder() -> PathBuf {
+    target_directory().join("python")
+}
+
+/// A virtual environment with the packages. It is kept for the next run.
+fn environment(version: &str, program: &str) -> TaskResult<PathBuf> {
+    let folder = folder().join(version);
+    let python = folder.join("bin/python");
+    if !works(&python) {
+        run(Command::new(program).args(["-m", "venv", "--clear"]).arg(&folder))?;
+    }
+    run(pip(&python).args(PACKAGES))?;
+    Ok(python)
+}
+
+fn works(python: &Path) -> bool {
+    let mut pip = Command::new(python);
+    pip.args(["-m", "pip", "--version"]).stdout(Stdio::null()).stderr(Stdio::null());
+    pip.status().is_ok_and(|status| status.success())
+}
+
+fn pip(python: &Path) -> Command {
+    let mut command = Command::new(python);
+    command.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
+    command
+}
+
+/// The profile is that of the other tests, which builds quickly.
+fn build_wheel(python: &Path) -> TaskResult<PathBuf> {
+    let wheels = folder().join("wheels");
+    if wheels.exists() {
+        fs::remove_dir_all(&wheels)?;
+    }
+    let mut maturin = Command::new(python);
+    maturin.args(["-m", "maturin", "build", "--quiet", "--profile", "dev", "--manifest-path"]);
+    run(maturin.arg(root().join("python/Cargo.toml")).arg("--out").arg(&wheels))?;
+    let wheel = fs::read_dir(&wheels)?.next().ok_or("maturin built no wheel")??;
+    Ok(wheel.path())
+}
+
+/// Types and behaviour of the installed package. The folder of the sources is not the current one, so that it is not
+/// imported.
+fn test(python: &Path, wheel: &Path) -> TaskResult {
+    run(pip(python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
+    let module = |words: &[&str]| {
+        let mut command = Command::new(python);
+        command.arg("-m").args(words).current_dir(folder());
+        command
+    };
+    let [config, tests] = ["python/pyproject.toml", "python/tests"].map(|path| root().join(path));
+    run(module(&["mypy", "--strict", "--config-file"]).arg(&config).args(["-p", "sevenbot"]))?;
+    run(module(&["mypy", "--strict", "--config-file"]).arg(&config).arg(&tests))?;
+    run(&mut module(&["mypy.stubtest", "sevenbot"]))?;
+    run(module(&["pytest", "--quiet", "-p", "no:cacheprovider", "--config-file"]).arg(&config).arg(&tests))
+}
+
+fn run(command: &mut Command) -> TaskResult {
+    let status = command.status().map_err(|why| format!("cannot start {command:?}: {why}"))?;
+    if status.success() { Ok(()) } else { Err(format!("{command:?} failed").into()) }
+}
