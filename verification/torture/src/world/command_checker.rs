@@ -9,7 +9,7 @@ use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::Decoder;
 use motion_core::{CYCLE, TorqueCodes};
 use protocol_core::registers::map::{
-    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, SPEED, TARGET_POSITION, motor_state,
+    LIMITS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, SPEED, TARGET_POSITION, limit, motor_state,
 };
 use protocol_core::registers::{Joint, RegisterFile};
 use protocol_core::time::{Duration, Instant};
@@ -17,6 +17,7 @@ use protocol_core::time::{Duration, Instant};
 use super::disturbed_bus::DisturbedBus;
 use super::reachable_range::ReachableRange;
 use super::register_model::RegisterModel;
+use crate::linkage_goals::LinkageGoals;
 use crate::per_joint::PerJoint;
 use crate::violation::{Check, Violation, ensure};
 
@@ -50,6 +51,7 @@ pub(super) struct CommandChecker {
     /// Reads since the last reply.
     unanswered: PerJoint<u8>,
     wire_free_at: Instant,
+    linkage: LinkageGoals,
     pub(super) count: u64,
     pub(super) engagements: u64,
 }
@@ -76,6 +78,7 @@ impl CommandChecker {
             replies: PerJoint::all(0),
             unanswered: PerJoint::all(0),
             wire_free_at: now,
+            linkage: LinkageGoals::default(),
             count: 0,
             engagements: 0,
         }
@@ -105,12 +108,14 @@ impl CommandChecker {
 
     /// The joint is no longer driven. Its next goal need not be near the last one.
     pub(super) fn forget(&mut self, joint: Joint) {
+        self.linkage.reset();
         self.ranges[joint] = None;
         self.kept_goals[joint] = None;
     }
 
     /// The joint's servo was lost. It may hold its last goal.
     pub(super) fn servo_lost(&mut self, joint: Joint) {
+        self.linkage.reset();
         self.kept_goals[joint] = self.goal(joint).map(|goal| (goal, self.ahead)).or(self.kept_goals[joint]);
         self.ranges[joint] = None;
         self.is_on[joint] = false;
@@ -127,6 +132,7 @@ impl CommandChecker {
 
     /// Offsets changed: the controller computes its set-points again, from whole counts.
     pub(super) fn offsets_changed(&mut self) {
+        self.linkage.reset();
         self.ranges.0.iter_mut().flatten().for_each(ReachableRange::widen);
         self.kept_goals.0.iter_mut().flatten().for_each(|(_, tolerance)| *tolerance += 1);
     }
@@ -241,7 +247,18 @@ impl CommandChecker {
         for joint in Joint::ALL.into_iter().filter(|joint| !has_goal[*joint]) {
             self.ranges[joint] = None;
         }
-        Ok(())
+        self.check_linkage(context)
+    }
+
+    /// The goals of joints 2 and 3 keep the linkage, if it limits them (D25).
+    fn check_linkage(&mut self, context: &CommandContext<'_>) -> Check {
+        let [_, two, three, ..] = Joint::ALL;
+        if context.registers.get(LIMITS.address) & limit::LINKAGE == 0 {
+            self.linkage.reset();
+            return Ok(());
+        }
+        let offset = |joint| context.model.offset(joint);
+        self.linkage.check([self.goal(two), self.goal(three)], [offset(two), offset(three)])
     }
 
     fn check_goal(&mut self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
@@ -279,7 +296,7 @@ const MAX_FALL: u16 = 12;
 /// The servo position of a joint's target register.
 pub(super) fn target_counts(joint: Joint, registers: &RegisterFile, model: &RegisterModel) -> u16 {
     let degrees = MicroDegrees::from_degrees(registers.get(TARGET_POSITION.of(joint)));
-    counts_from_angle(joint, model.fine_target(joint).unwrap_or(degrees), model.offset(joint))
+    counts_from_angle(joint, model.host_target(joint).unwrap_or(degrees), model.offset(joint))
 }
 
 /// The goal of a joint that has arrived is its target. A target that the host did not write is the measured position,

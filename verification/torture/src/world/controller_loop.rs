@@ -1,21 +1,19 @@
 //! The shell's loop round the controller, with a check of every output.
 
 use motion_core::{Output, Vacuum};
-use protocol_core::registers::map::{
-    FRAMES_ACCEPTED, FRAMES_REFUSED, MOTOR_STATE, OFFSET, SPEED, VACUUM_PUMP,
-};
-use protocol_core::registers::{Image, Joint, Register};
+use protocol_core::registers::Image;
+use protocol_core::registers::map::{FRAMES_ACCEPTED, FRAMES_REFUSED};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer;
 
 use super::command_checker::CommandContext;
-use super::host_request::{HostRequest, MAX_LENGTH, alarm, reply, report};
+use super::extended_model;
+use super::host_request::{MAX_LENGTH, alarm, reply, report};
 use super::power::random_cut;
 use super::register_model::RequestEffect;
 use super::report_checker::ReportStream;
 use super::settings_storage::PowerOutcome;
 use super::state::{PoweredArm, TortureWorld};
-use super::status_checker::{StatusChecker, affects_motion};
 use crate::violation::{Check, Violation, ensure};
 
 /// The number of outputs after which the controller has to wait. Each waiting request causes at most one output, and
@@ -126,89 +124,6 @@ impl TortureWorld {
         Err(Violation(format!("{MAX_OUTPUTS} outputs without a wait")))
     }
 
-    /// Applies the next `count` requests to the model. `room` is the room of the link, in bytes. Returns the effect of the
-    /// last one.
-    fn apply_requests(
-        &mut self,
-        arm: &mut PoweredArm,
-        count: u16,
-        room: usize,
-    ) -> Check<Option<RequestEffect>> {
-        self.record_missing(arm);
-        let mut last = None;
-        for _ in 0..count {
-            let has_arrived = arm.pending.front().is_some_and(|first| first.arrived_at <= self.now);
-            let request = arm.pending.pop_front().filter(|_| has_arrived).map(|pending| pending.request);
-            let request = request
-                .ok_or_else(|| Violation("a request was executed that the host did not send".to_owned()))?;
-            let has_output = !matches!(last, None | Some(RequestEffect::NoReply { .. }));
-            ensure(!has_output, || format!("the output of {last:?} is missing before {request:?}"))?;
-            let was_servo = arm.model.is_servo();
-            let effect = arm.model.execute(&request, room);
-            if arm.model.is_servo() != was_servo {
-                Joint::ALL.into_iter().for_each(|joint| arm.command_checker.forget(joint));
-            }
-            if !arm.model.is_servo() {
-                self.bus.exempt_all_by_state(self.now);
-            }
-            self.record_write(arm, &request, effect);
-            last = Some(effect);
-        }
-        if count > 0 {
-            arm.model.compare(arm.controller.registers())?;
-        }
-        arm.model.compare_targets(arm.controller.registers())?;
-        Ok(last)
-    }
-
-    fn record_missing(&mut self, arm: &mut PoweredArm) {
-        let Some((lost, found)) = arm.status_checker.missing_changed(arm.controller.registers()) else {
-            return;
-        };
-        self.log.event(self.now, format!("servos lost: {lost:#b}, found: {found:#b}"));
-        for joint in Joint::ALL {
-            if lost & joint.bit() != 0 {
-                arm.model.has_host_target[joint] = false;
-                arm.command_checker.servo_lost(joint);
-            }
-        }
-        if found != 0 {
-            arm.check_status(self.now, &self.bus, StatusChecker::motion_changed);
-        }
-    }
-
-    /// Tells the checkers about an accepted write.
-    fn record_write(&self, arm: &mut PoweredArm, request: &HostRequest, effect: RequestEffect) {
-        let (HostRequest::Write { address, values } | HostRequest::WriteMap21 { address, values }) = request
-        else {
-            return;
-        };
-        if matches!(effect, RequestEffect::NoReply { accepted: false } | RequestEffect::Alarm { .. }) {
-            return;
-        }
-        let includes =
-            |at: u8| at.checked_sub(*address).is_some_and(|offset| usize::from(offset) < values.len());
-        let includes_any = |row: &Register| (row.address..row.address + row.count).any(includes);
-        let (frequencies, baud) = (arm.model.frequencies(), arm.controller.baud());
-        arm.status_checker.reports.frequencies_written(self.now, frequencies, baud);
-        if includes(VACUUM_PUMP.address) {
-            arm.status_checker.vacuum_written(self.now);
-        }
-        if includes(MOTOR_STATE.address) {
-            arm.status_checker.state_written(self.now);
-        }
-        if includes_any(&SPEED) {
-            arm.command_checker.speed_written(&arm.model);
-        }
-        if includes_any(&OFFSET) && matches!(effect, RequestEffect::Save(_)) {
-            arm.command_checker.offsets_changed();
-            arm.status_checker.offsets_changed(self.now);
-        }
-        if affects_motion(*address, values.len()) {
-            arm.check_status(self.now, &self.bus, StatusChecker::motion_changed);
-        }
-    }
-
     fn send_to_servos(&mut self, arm: &mut PoweredArm) -> Check {
         let PoweredArm { controller, model, command_checker, output_bytes: bytes, .. } = arm;
         self.log.bus(self.now, "to servos", bytes);
@@ -238,10 +153,14 @@ impl TortureWorld {
                 self.counts.reports += 1;
                 let stream = ReportStream::of(bytes);
                 arm.status_checker.reports.sent(self.now, stream)?;
-                let (function, address, count) = stream.frame();
+                let (function, address, count) = stream.frame(arm.model.report_content());
                 report(function, address, registers.read(address, count))
             }
         };
+        if extended_model::shows_block(&expected) {
+            arm.model.compare_fine_targets(arm.controller.registers())?;
+            arm.check_status(self.now, &self.bus, |checker, context| checker.check_fine_positions(context))?;
+        }
         ensure(arm.output_bytes == expected, || format!("the frame to the host should be {expected:02x?}"))
     }
 

@@ -25,6 +25,17 @@ impl HostRequest {
         }
     }
 
+    /// True if the range ends at address 255 at most (D2).
+    pub(super) fn is_well_formed(&self) -> bool {
+        let (address, count) = match self {
+            Self::Read { address, count } => (*address, usize::from(*count)),
+            Self::Write { address, values } | Self::WriteMap21 { address, values } => {
+                (*address, values.len())
+            }
+        };
+        usize::from(address) + count <= 256
+    }
+
     /// The length of the reply in bytes; 0 if there is no reply.
     pub(super) fn reply_length(&self) -> usize {
         match self {

@@ -82,6 +82,11 @@ pub(super) fn angles(address: u8, values: &[u8]) -> Result<[Option<f32>; 7], Out
     Ok(angles)
 }
 
+/// The first register of the blocks that a write covers.
+pub(super) fn block_of(address: u8, values: &[u8]) -> u8 {
+    if block::<9>(address, values, TIP).is_some() { TIP } else { WRIST }
+}
+
 fn put(angles: &mut [Option<f32>; 7], found: &[f32]) {
     angles.iter_mut().zip(found).for_each(|(angle, found)| *angle = Some(*found));
 }

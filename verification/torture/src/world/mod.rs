@@ -14,9 +14,12 @@ mod controller_loop;
 mod corruption;
 mod disturbed_bus;
 mod event_log;
+mod extended_model;
+mod extended_requests;
 mod fault_injection;
 mod host_link;
 mod host_request;
+mod limit_verdict;
 mod map21_model;
 mod map21_requests;
 mod motion_checker;
@@ -25,11 +28,14 @@ mod power;
 mod reachable_range;
 mod register_model;
 mod report_checker;
+mod request_effects;
 mod request_generator;
 mod settings_storage;
 mod state;
 mod status_checker;
 mod status_reply;
+mod watchdog_model;
+mod written_targets;
 
 use protocol_core::time::{Duration, Instant};
 
@@ -40,7 +46,7 @@ use crate::world_counts::WorldCounts;
 use disturbed_bus::DisturbedBus;
 use event_log::EventLog;
 use parameters::WorldParameters;
-use request_generator::RequestGenerator;
+use request_generator::{RequestGenerator, UsedMaps};
 pub use state::TortureWorld;
 use state::{PendingRequest, PowerState, PoweredArm};
 use status_checker::StatusChecker;
@@ -51,11 +57,6 @@ const MAX_PENDING: usize = 64;
 const MAX_QUEUE_TIME: Duration = Duration::from_millis(200);
 /// A pause of the host.
 const HOST_PAUSE: Duration = Duration::from_millis(100);
-
-/// True if the host of a seed's world uses both maps. The other worlds have map 2.2 only.
-const fn has_both_maps(seed: u64) -> bool {
-    seed / 8 % 2 == 1
-}
 
 /// A world that violated a rule.
 #[derive(Debug)]
@@ -84,7 +85,7 @@ impl TortureWorld {
             bus: DisturbedBus::new(now, parameters.plant(), parameters.reply_time_bounds()),
             storage: parameters.storage(),
             parameters,
-            generator: RequestGenerator::new(now, scenario.settings_per_mille, has_both_maps(seed)),
+            generator: RequestGenerator::new(now, scenario.settings_per_mille, UsedMaps::of(seed)),
             power: PowerState::Off { until: now, servos_too: false },
             is_servo: true,
             stalled_until: now,

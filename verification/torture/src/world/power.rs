@@ -13,6 +13,7 @@ use super::register_model::RegisterModel;
 use super::settings_storage::{PowerOutcome, StoredSettings};
 use super::state::{PowerState, PoweredArm, TortureWorld};
 use super::status_checker::StatusChecker;
+use super::watchdog_model::WatchdogModel;
 use crate::seeded_rng::SeededRng;
 use crate::violation::{Check, ensure};
 
@@ -72,6 +73,7 @@ impl TortureWorld {
             controller,
             output_bytes: Vec::new(),
             model,
+            watchdog: WatchdogModel::OFF,
             command_checker: CommandChecker::new(now, codes, timeout),
             status_checker: StatusChecker::new(now),
             to_arm: HostToArm::new(baud),

@@ -1,5 +1,8 @@
-//! A model of the registers, from docs/protocol.md alone. It does not model measured values, such as positions and
-//! missing servos.
+//! A model of the registers, from docs/protocol.md alone, without measured values such as positions.
+
+mod comparison;
+pub(crate) mod limits;
+mod targets;
 
 use motion_core::Storage;
 use motion_core::calibration::MicroDegrees;
@@ -7,12 +10,13 @@ use protocol_core::registers::map::{
     BAUD_RATE, EEPROM_LOCK, FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_REFUSED, LAST_REFUSAL,
     LAST_REFUSED_REGISTER, MAP, MOTOR_STATE, OFFSET, PRESENT_POSITION, TARGET_POSITION, motor_state, refusal,
 };
-use protocol_core::registers::{Access, Image, Joint, MAP_21, Region, Register, RegisterFile};
+use protocol_core::registers::{Access, Image, Joint, MAP_21, Region, Register};
 
+use super::extended_model;
 use super::host_request::HostRequest;
 use super::map21_model::{self, OutOfReach};
+use super::written_targets::WrittenTargets;
 use crate::per_joint::PerJoint;
-use crate::violation::{Check, ensure};
 
 /// The options of map 2.1: bit 0 biased offsets, bit 1 alarms (M6).
 const OPTIONS: u8 = 20;
@@ -26,7 +30,7 @@ const EEPROM: (u8, u8) = (8, 28);
 
 /// The required effect of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum RequestEffect {
+pub(crate) enum RequestEffect {
     /// A reply with `count` registers from `address` on.
     Reply { address: u8, count: u8 },
     /// Neither a reply nor a save.
@@ -38,29 +42,29 @@ pub(super) enum RequestEffect {
 }
 
 /// The modelled registers.
-#[derive(Debug)]
-pub(super) struct RegisterModel {
+#[derive(Clone, Debug)]
+pub(crate) struct RegisterModel {
     values: [u8; 256],
     rows: Vec<Option<&'static Register>>,
     storage: Storage,
     accepted: u16,
     refused: u16,
     /// True if the host's last target is in force: no release, loss of the servo or correction by the arm followed it.
-    pub(super) has_host_target: PerJoint<bool>,
+    pub(crate) has_host_target: PerJoint<bool>,
     /// Offsets are shown as 128 + offset (M5). `values` has them in sign and magnitude.
     has_biased_offsets: bool,
-    /// A target from inverse kinematics, with its fraction (M7).
-    fine_targets: PerJoint<Option<MicroDegrees>>,
+    /// The targets as the host wrote them, while no measured position can have replaced them.
+    pub(crate) targets: PerJoint<Option<MicroDegrees>>,
+    has_streams: bool,
+    /// Which of its possible outcomes the next write has.
+    pub(crate) choice: usize,
+    /// The number of possible outcomes of the last request.
+    outcomes: usize,
 }
-
-/// The first and last addresses of the registers whose values follow from requests alone. The host writes none of the
-/// extended block, 128 to 191.
-const MODELLED: &[(u8, u8)] =
-    &[(0, 45), (53, 53), (61, 82), (90, 90), (98, 127), (192, 240), (244, 247), (250, 251)];
 
 impl RegisterModel {
     /// The registers after power-up with the stored settings.
-    pub(super) fn new(chip_id: [u8; 6], stored: Option<&Image>, storage: Storage) -> Self {
+    pub(crate) fn new(chip_id: [u8; 6], stored: Option<&Image>, storage: Storage) -> Self {
         let rows: Vec<_> = (0..=255).map(protocol_core::registers::map::find).collect();
         let mut model = Self {
             values: [0; 256],
@@ -70,7 +74,10 @@ impl RegisterModel {
             refused: 0,
             has_host_target: PerJoint::all(false),
             has_biased_offsets: false,
-            fine_targets: PerJoint::all(None),
+            targets: PerJoint::all(None),
+            has_streams: false,
+            choice: 0,
+            outcomes: 1,
         };
         let bytes_of_21 = MAP_21.iter().filter(|row| row.region == Region::Ram);
         for row in bytes_of_21.chain(MAP) {
@@ -84,13 +91,9 @@ impl RegisterModel {
     /// Loads stored settings. A value outside its range is replaced by its default (D19), and reserved registers read 0.
     fn load(&mut self, image: &Image) {
         for (at, byte) in (EEPROM.0..EEPROM.1).zip(image.0) {
-            if self
-                .row(at)
-                .is_some_and(|row| row.access == Access::ReadWrite && row.range.contains(byte.into()))
-            {
-                self.set(at, byte);
-            }
-            if at == OPTIONS && byte <= 3 {
+            let is_stored =
+                |row: &Register| row.access == Access::ReadWrite && row.range.contains(byte.into());
+            if self.row(at).is_some_and(is_stored) || at == OPTIONS && byte <= 3 {
                 self.set(at, byte);
             }
         }
@@ -101,7 +104,7 @@ impl RegisterModel {
         self.rows.get(usize::from(at)).copied().flatten()
     }
 
-    pub(super) fn get(&self, at: u8) -> u8 {
+    pub(crate) fn get(&self, at: u8) -> u8 {
         self.values.get(usize::from(at)).copied().unwrap_or(0)
     }
 
@@ -109,27 +112,28 @@ impl RegisterModel {
         self.values.get_mut(usize::from(at)).into_iter().for_each(|slot| *slot = value);
     }
 
-    pub(super) fn is_servo(&self) -> bool {
+    pub(crate) fn is_servo(&self) -> bool {
         self.get(MOTOR_STATE.address) == motor_state::SERVO
     }
 
-    pub(super) fn baud_code(&self) -> u8 {
+    pub(crate) fn baud_code(&self) -> u8 {
         self.get(BAUD_RATE.address)
     }
 
-    pub(super) fn set_storage(&mut self, storage: Storage) {
+    pub(crate) fn set_storage(&mut self, storage: Storage) {
         self.storage = storage;
     }
 
     /// The present settings.
-    pub(super) fn image(&self) -> Image {
+    pub(crate) fn image(&self) -> Image {
         let mut image = Image([0; Image::LENGTH]);
         image.0.iter_mut().zip(EEPROM.0..EEPROM.1).for_each(|(byte, at)| *byte = self.get(at));
         image
     }
 
     /// Executes a request. An alarm needs `room` bytes on the link.
-    pub(super) fn execute(&mut self, request: &HostRequest, room: usize) -> RequestEffect {
+    pub(crate) fn execute(&mut self, request: &HostRequest, room: usize) -> RequestEffect {
+        self.outcomes = 1;
         match request {
             HostRequest::Read { address, count } if usize::from(*address) + usize::from(*count) > 256 => {
                 self.refuse(refusal::MALFORMED_RANGE, *address)
@@ -145,11 +149,11 @@ impl RegisterModel {
             }
             HostRequest::Write { address, values } => {
                 let items: Vec<_> = self.effective(*address, values).collect();
-                let is_wrong =
-                    |at, value| self.row(at).is_some_and(|row| !row.range.contains(u16::from(value)));
-                match items.iter().find(|(at, value)| is_wrong(*at, *value)) {
-                    Some((at, _)) => self.refuse(refusal::OUT_OF_RANGE, *at),
-                    None => self.write(&items),
+                match self.first_offence(&items) {
+                    Some((reason, at)) => self.refuse(reason, at),
+                    None => {
+                        self.write(&WrittenTargets { items: &items, reached: PerJoint::all(None), block: 0 })
+                    }
                 }
             }
             HostRequest::WriteMap21 { address, values } => self.write_map21(*address, values, room),
@@ -184,16 +188,33 @@ impl RegisterModel {
         })
     }
 
+    /// The reason for which a write is refused, and the register (D16, D22).
+    fn first_offence(&self, items: &[(u8, u8)]) -> Option<(u8, u8)> {
+        items.iter().find_map(|&(at, value)| {
+            let is_wrong = self.row(at).is_some_and(|row| !row.range.contains(u16::from(value)));
+            match extended_model::is_word(at) {
+                true => extended_model::word_offence(items, at),
+                false => is_wrong.then_some((refusal::OUT_OF_RANGE, at)),
+            }
+        })
+    }
+
     /// The first setting that a write changes.
     fn first_changed_setting(&self, items: &[(u8, u8)]) -> Option<u8> {
         let is_setting = |at| (EEPROM.0..EEPROM.1).contains(&at);
         items.iter().find(|(at, value)| is_setting(*at) && self.get(*at) != *value).map(|(at, _)| *at)
     }
 
-    fn write(&mut self, items: &[(u8, u8)]) -> RequestEffect {
+    fn write(&mut self, written: &WrittenTargets<'_>) -> RequestEffect {
+        let items = written.items;
         let changed = self.first_changed_setting(items);
         if let (Some(at), Storage::Full) = (changed, self.storage) {
             return self.refuse(refusal::STORAGE_FULL, at);
+        }
+        let outcomes = self.limit_outcomes(written);
+        self.outcomes = outcomes.len();
+        if let Some(at) = outcomes.get(self.choice).copied().flatten() {
+            return self.refuse(refusal::AGAINST_A_LIMIT, at);
         }
         self.apply(items);
         self.has_biased_offsets = false;
@@ -233,97 +254,57 @@ impl RegisterModel {
                 return if has_alarm { RequestEffect::Alarm { kind } } else { refused };
             }
         };
-        let effect = self.write(&items);
+        let reached = PerJoint(angles.map(|angle| angle.map(MicroDegrees::nearest)));
+        let block = map21_model::block_of(address, values);
+        let effect = self.write(&WrittenTargets { items: &items, reached, block });
+        if effect == (RequestEffect::NoReply { accepted: false }) {
+            return effect;
+        }
         self.has_biased_offsets = true;
         self.set(FEEDBACK_FREQUENCY.address, 0);
-        self.aim(&angles);
+        self.aim(&reached);
         effect
     }
 
     /// Sets the targets from inverse kinematics.
-    fn aim(&mut self, angles: &[Option<f32>; 7]) {
-        for (joint, angle) in Joint::ALL.into_iter().zip(angles) {
-            if let Some(angle) = angle {
-                let target = MicroDegrees::nearest(*angle);
-                self.set(TARGET_POSITION.of(joint), target.nearest_degree());
-                self.fine_targets[joint] = Some(target);
-                self.has_host_target[joint] = self.is_servo();
-            }
+    fn aim(&mut self, reached: &PerJoint<Option<MicroDegrees>>) {
+        for (joint, target) in Joint::ALL.into_iter().zip(reached.0) {
+            target.into_iter().for_each(|target| self.set_target(joint, target));
         }
+    }
+
+    /// True if fine targets were the points of a stream at any time since power-up (D23).
+    pub(crate) const fn has_streams(&self) -> bool {
+        self.has_streams
     }
 
     fn apply(&mut self, items: &[(u8, u8)]) {
         let was_servo = self.is_servo();
         items.iter().for_each(|(at, value)| self.set(*at, *value));
-        if self.is_servo() != was_servo {
-            self.has_host_target = PerJoint::all(false);
-        }
-        for (at, _) in items {
+        self.state_changed(was_servo);
+        for (at, value) in items {
             if let Some(joint) = TARGET_POSITION.joint_at(*at) {
-                self.fine_targets[joint] = None;
-                self.has_host_target[joint] = self.is_servo();
+                self.set_target(joint, MicroDegrees::from_degrees(*value));
             }
+        }
+        self.has_streams |= items.iter().any(|(at, value)| matches!(at, 184 | 185) && *value != 0);
+        for (joint, hundredths) in extended_model::fine_targets(items) {
+            self.set_target(joint, extended_model::angle(hundredths));
         }
     }
 
     /// The report frequencies in Hz: registers 53, 82 and 90.
-    pub(super) fn frequencies(&self) -> [u8; 3] {
+    pub(crate) fn frequencies(&self) -> [u8; 3] {
         [FEEDBACK_FREQUENCY.address, ANGLE_FREQUENCY, LOAD_FREQUENCY].map(|at| self.get(at))
     }
 
+    /// What the reports of register 53 hold (D26).
+    pub(crate) fn report_content(&self) -> u8 {
+        self.get(extended_model::REPORT_CONTENT)
+    }
+
     /// A joint's offset in degrees.
-    pub(super) fn offset(&self, joint: Joint) -> i8 {
+    pub(crate) fn offset(&self, joint: Joint) -> i8 {
         i8::try_from(OFFSET.range.decode_byte(self.get(OFFSET.of(joint)))).unwrap_or(0)
-    }
-
-    /// The target with its fraction, if inverse kinematics set it and it is in force.
-    pub(super) fn fine_target(&self, joint: Joint) -> Option<MicroDegrees> {
-        self.fine_targets[joint].filter(|_| self.has_host_target[joint])
-    }
-
-    /// The values that a read shows.
-    fn shown(&self, first: u8, last: u8) -> Vec<u8> {
-        let shown = |at| match self.has_biased_offsets {
-            true => map21_model::shown(at, self.get(at)),
-            false => self.get(at),
-        };
-        (first..=last).map(shown).collect()
-    }
-
-    /// Compares the model with the registers of the arm.
-    pub(super) fn compare(&self, registers: &RegisterFile) -> Check {
-        for (first, last) in MODELLED {
-            let ours = self.shown(*first, *last);
-            let theirs = registers.read(*first, last - first + 1);
-            ensure(ours == theirs, || {
-                let differs = (*first..).zip(ours.iter().zip(theirs)).find(|(_, (a, b))| a != b);
-                let (at, (wanted, found)) = differs.unwrap_or((0, (&0, &0)));
-                format!("register {at} holds {found} instead of {wanted}")
-            })?;
-        }
-        let [angles, positions] = [83, 54].map(|first| registers.read(first, 7));
-        ensure(angles == positions, || format!("angles {angles:?} of positions {positions:?}"))?;
-        let loads = registers.read(91, 7);
-        ensure(loads.iter().all(|load| (3..=253).contains(load)), || format!("loads {loads:?}"))
-    }
-
-    /// A target that differs from the model is the measured position (D12, D13). The model takes it over.
-    pub(super) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
-        for joint in Joint::ALL {
-            let (at, found) = (TARGET_POSITION.of(joint), registers.get(TARGET_POSITION.of(joint)));
-            if found == self.get(at) {
-                continue;
-            }
-            let present = registers.get(PRESENT_POSITION.of(joint));
-            ensure(found == present, || {
-                let wanted = self.get(at);
-                let number = joint.number();
-                format!("target {number} is {found}: the host wrote {wanted}, and the joint was at {present}")
-            })?;
-            self.set(at, found);
-            self.fine_targets[joint] = None;
-            self.has_host_target[joint] = false;
-        }
-        Ok(())
     }
 }

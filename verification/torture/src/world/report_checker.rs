@@ -26,12 +26,14 @@ impl ReportStream {
         }
     }
 
-    /// The function code of its frames, and their registers: the first, and how many.
-    pub(super) const fn frame(self) -> (u8, u8, u8) {
-        match self {
-            Self::Positions => (3, 54, 7),
-            Self::Angles => (5, 83, 7),
-            Self::Loads => (5, 91, 7),
+    /// The function code of its frames, and their registers: the first, and how many. `content` is register 189.
+    pub(super) const fn frame(self, content: u8) -> (u8, u8, u8) {
+        match (self, content) {
+            (Self::Positions, 0) => (3, 54, 7),
+            (Self::Positions, 1) => (3, 142, 14),
+            (Self::Positions, _) => (3, 142, 42),
+            (Self::Angles, _) => (5, 83, 7),
+            (Self::Loads, _) => (5, 91, 7),
         }
     }
 }
@@ -61,11 +63,11 @@ impl ReportChecker {
         self.0.iter_mut().for_each(|count| count.disturbed = true);
     }
 
-    /// A write was accepted. `frequencies` are the registers 53, 82 and 90.
-    pub(super) fn frequencies_written(&mut self, now: Instant, frequencies: [u8; 3], baud: u32) {
-        for (count, frequency) in
-            self.0.iter_mut().zip(limited(frequencies.map(u32::from), highest_frequency(baud, 7)))
-        {
+    /// A write was accepted. `frequencies` are the registers 53, 82 and 90, `content` is register 189.
+    pub(super) fn frequencies_written(&mut self, now: Instant, frequencies: [u8; 3], content: u8, baud: u32) {
+        let (_, _, length) = ReportStream::Positions.frame(content);
+        let most = [length, 7].map(|length| highest_frequency(baud, length));
+        for (count, frequency) in self.0.iter_mut().zip(limited(frequencies.map(u32::from), most)) {
             if frequency != count.frequency {
                 *count = ReportCount { frequency, since: now, count: 0, disturbed: false };
             }
@@ -106,13 +108,13 @@ impl ReportCount {
 }
 
 /// The frequencies on a line for `most` reports a second. Those of map 2.1 share it in their ratio, at least 1 Hz each.
-fn limited([positions, angles, loads]: [u32; 3], most: u32) -> [u32; 3] {
+fn limited([positions, angles, loads]: [u32; 3], [most_positions, most]: [u32; 2]) -> [u32; 3] {
     let sum = angles + loads;
     let share = |wanted: u32| match (wanted * most).checked_div(sum) {
         Some(share) if sum > most => share.max(wanted.min(1)),
         _ => wanted,
     };
-    [positions.min(most), share(angles), share(loads)]
+    [positions.min(most_positions), share(angles), share(loads)]
 }
 
 #[cfg(test)]
@@ -123,12 +125,12 @@ mod tests {
     fn a_report_of_a_stream_that_is_off_is_a_violation() {
         let at = |millis: u64| Instant::from_micros(millis * 1_000);
         let mut reports = ReportChecker::new(at(0));
-        reports.frequencies_written(at(0), [0, 10, 0], 115_200);
+        reports.frequencies_written(at(0), [0, 10, 0], 0, 115_200);
         assert!(reports.sent(at(100), ReportStream::Angles).is_ok());
         assert!(reports.sent(at(100), ReportStream::Positions).is_err());
         assert!(reports.sent(at(100), ReportStream::Angles).is_ok(), "one early");
         assert!(reports.sent(at(100), ReportStream::Angles).is_err());
         assert!(reports.check(at(500)).is_ok() && reports.check(at(700)).is_err());
-        assert_eq!(limited([50, 100, 100], 34), [34, 17, 17]);
+        assert_eq!(limited([50, 100, 100], [10, 34]), [10, 17, 17]);
     }
 }

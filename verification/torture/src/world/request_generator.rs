@@ -8,7 +8,7 @@ use protocol_core::time::{Duration, Instant};
 
 use super::corruption::{corrupt, noise};
 use super::host_request::{HostRequest, SentStream};
-use super::map21_requests;
+use super::{extended_requests, map21_requests};
 use crate::seeded_rng::SeededRng;
 
 /// A pause inside a frame. From 100 ms on the arm drops the frame.
@@ -16,6 +16,22 @@ const MAX_PAUSE: Duration = Duration::from_millis(90);
 
 /// The first and last address of the extended block.
 const EXTENDED: (usize, usize) = (128, 191);
+
+/// The parts of the register map that the host of a world writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct UsedMaps {
+    /// Half of the writes are in map 2.1. The other worlds have map 2.2 only.
+    both_maps: bool,
+    /// A quarter of the other writes are in the extended block.
+    extended_block: bool,
+}
+
+impl UsedMaps {
+    /// The parts in the world of a seed.
+    pub(super) const fn of(seed: u64) -> Self {
+        Self { both_maps: seed / 8 % 2 == 1, extended_block: seed / 16 % 4 == 3 }
+    }
+}
 
 /// How often the host sends requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,20 +62,19 @@ pub(super) struct RequestGenerator {
     /// The number of corrupted transmissions in a million.
     pub(super) corrupted_per_million: u64,
     settings_per_mille: u64,
-    /// True if half of the writes are in map 2.1.
-    has_both_maps: bool,
+    maps: UsedMaps,
     stream: SentStream,
 }
 
 impl RequestGenerator {
-    pub(super) fn new(now: Instant, settings_per_mille: u64, has_both_maps: bool) -> Self {
+    pub(super) fn new(now: Instant, settings_per_mille: u64, maps: UsedMaps) -> Self {
         Self {
             rate: RequestRate::Steady,
             rate_until: now,
             next_at: now,
             corrupted_per_million: 0,
             settings_per_mille,
-            has_both_maps,
+            maps,
             stream: SentStream::default(),
         }
     }
@@ -111,10 +126,15 @@ impl RequestGenerator {
     fn any_request(&self, rng: &mut SeededRng) -> HostRequest {
         match () {
             () if rng.one_in(2) => self.read(rng),
-            () if self.has_both_maps && rng.one_in(2) => self.write_map21(rng),
+            () if self.maps.both_maps && rng.one_in(2) => self.write_map21(rng),
             () => {
-                let (address, mut values) = self.write(rng);
-                leave_out_extended(address, &mut values);
+                let (address, mut values) = match self.maps.extended_block && rng.one_in(4) {
+                    true => extended_requests::write(rng),
+                    false => self.write(rng),
+                };
+                if !self.maps.extended_block {
+                    leave_out(EXTENDED, address, &mut values);
+                }
                 HostRequest::Write { address, values }
             }
         }
@@ -165,11 +185,11 @@ impl Transmission {
     }
 }
 
-/// Shortens a write that reaches the extended block, which the model does not know.
-fn leave_out_extended(address: u8, values: &mut Vec<u8>) {
+/// Shortens a write that reaches these registers.
+fn leave_out((from, to): (usize, usize), address: u8, values: &mut Vec<u8>) {
     let (first, end) = (usize::from(address), usize::from(address) + values.len());
-    if end <= 256 && first <= EXTENDED.1 && end > EXTENDED.0 {
-        values.truncate(EXTENDED.0.saturating_sub(first));
+    if end <= 256 && first <= to && end > from {
+        values.truncate(from.saturating_sub(first));
     }
 }
 

@@ -16,6 +16,7 @@ use super::register_model::RegisterModel;
 use super::request_generator::RequestGenerator;
 use super::settings_storage::SettingsStorage;
 use super::status_checker::{StatusChecker, StatusContext};
+use super::watchdog_model::WatchdogModel;
 use crate::scenario::Scenario;
 use crate::seeded_rng::SeededRng;
 use crate::world_counts::WorldCounts;
@@ -61,6 +62,7 @@ pub(super) struct PoweredArm {
     /// The bytes of the last output.
     pub(super) output_bytes: Vec<u8>,
     pub(super) model: RegisterModel,
+    pub(super) watchdog: WatchdogModel,
     pub(super) command_checker: CommandChecker,
     pub(super) status_checker: StatusChecker,
     pub(super) to_arm: HostToArm,
@@ -82,9 +84,9 @@ impl PoweredArm {
         bus: &DisturbedBus,
         check: impl FnOnce(&mut StatusChecker, &StatusContext<'_>) -> T,
     ) -> T {
-        let Self { controller, model, command_checker, status_checker, .. } = self;
+        let Self { controller, model, watchdog, command_checker, status_checker, .. } = self;
         let registers = controller.registers();
-        check(status_checker, &StatusContext { now, registers, model, bus, command_checker })
+        check(status_checker, &StatusContext { now, registers, model, watchdog, bus, command_checker })
     }
 }
 

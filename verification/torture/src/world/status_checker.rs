@@ -7,7 +7,7 @@ use motion_core::Vacuum;
 use motion_core::calibration::angle_from_counts;
 use protocol_core::registers::map::{
     FAULTS, FRAMES_CORRUPTED, MISSING_SERVOS, MOVING_JOINTS, OFFSET, PRESENT_POSITION, SERVO_BUS_ERRORS,
-    SERVO_TEMPERATURE, SPEED, SUPPLY_VOLTAGE, TIME, fault,
+    SERVO_TEMPERATURE, SPEED, SUPPLY_VOLTAGE, TIME, fault, limit,
 };
 use protocol_core::registers::map21::WRIST_POSITION;
 use protocol_core::registers::{Joint, Register, RegisterFile};
@@ -15,8 +15,10 @@ use protocol_core::time::{Duration, Instant};
 
 use super::command_checker::{CommandChecker, target_counts};
 use super::disturbed_bus::{Availability, DisturbedBus};
+use super::extended_model::{self, LIMITS};
 use super::register_model::RegisterModel;
 use super::report_checker::ReportChecker;
+use super::watchdog_model::WatchdogModel;
 use crate::per_joint::PerJoint;
 use crate::violation::{Check, ensure};
 
@@ -28,6 +30,10 @@ const DETECTION_TIME: Duration = Duration::from_millis(2_500);
 const RELEASE_TIME: Duration = Duration::from_millis(300);
 /// The time that a move may take beyond its distance at its speed.
 const MOVE_MARGIN: Duration = Duration::from_millis(1_000);
+/// A point of a stream is reached after two periods and a cycle (D23), of the longest period.
+const MAX_STREAM_MILLIS: u64 = 2_020;
+/// The time of a move over the whole range at the lowest speed, 1.9 degrees/s.
+const LONGEST_MOVE: Duration = Duration::from_millis(125_000);
 /// The longest time that the valve may be open (D20).
 const MAX_VALVE_TIME: Duration = Duration::from_millis(501);
 
@@ -61,6 +67,7 @@ pub(super) struct StatusContext<'a> {
     pub(super) now: Instant,
     pub(super) registers: &'a RegisterFile,
     pub(super) model: &'a RegisterModel,
+    pub(super) watchdog: &'a WatchdogModel,
     pub(super) bus: &'a DisturbedBus,
     pub(super) command_checker: &'a CommandChecker,
 }
@@ -110,9 +117,11 @@ impl StatusChecker {
     /// A write can move joints, or a servo was found: computes the time by which each joint has to be at rest.
     pub(super) fn motion_changed(&mut self, context: &StatusContext<'_>) {
         self.motion_at = context.now;
+        let in_stream =
+            Duration::from_millis(if context.model.has_streams() { MAX_STREAM_MILLIS } else { 0 });
         for joint in Joint::ALL {
             let time = move_time(joint, distance(joint, context), context.registers);
-            self.settled_by[joint] = context.now + time + MOVE_MARGIN;
+            self.settled_by[joint] = context.now + time + MOVE_MARGIN + in_stream;
         }
     }
 
@@ -141,6 +150,7 @@ impl StatusChecker {
         self.check_faults(context)?;
         self.check_counters(context)?;
         self.reports.check(context.now)?;
+        context.watchdog.check(context.now, self.unsettled_at, context.registers)?;
         let open = self.valve_open_since.map_or(Duration::ZERO, |since| context.now - since);
         ensure(open <= MAX_VALVE_TIME, || format!("the valve has been open for {} us", open.as_micros()))
     }
@@ -169,6 +179,12 @@ impl StatusChecker {
             }
             _ => {}
         }
+        // A joint of the linkage may wait for the other one (D25), even for one whose servo is missing.
+        let may_wait = context.model.get(LIMITS) & limit::LINKAGE != 0 && matches!(joint.number(), 2 | 3);
+        if may_wait {
+            // It has its full time once the limit is off.
+            self.settled_by[joint] = self.settled_by[joint].max(now + LONGEST_MOVE);
+        }
         let is_late = is_moving && now > self.settled_by[joint];
         ensure(!is_late, || format!("joint {number} has been moving for too long"))?;
         ensure(!(is_moving && is_missing), || format!("joint {number} is reported as moving and missing"))?;
@@ -176,6 +192,20 @@ impl StatusChecker {
         ensure(is_free || self.settled_time(now, self.state_at) < RELEASE_TIME, || {
             format!("joint {number} still has torque")
         })
+    }
+
+    /// Checks the positions of the extended block, which the arm has just shown (D21).
+    pub(super) fn check_fine_positions(&self, context: &StatusContext<'_>) -> Check {
+        extended_model::check_positions(context.registers)?;
+        for joint in Joint::ALL.into_iter().filter(|joint| self.is_responding(*joint, context)) {
+            let (position, since) = self.last_moves[joint];
+            let at_rest = self.settled_time(context.now, since.max(self.motion_at));
+            if position == context.bus.position(joint) && at_rest >= DETECTION_TIME {
+                let offset = context.model.offset(joint);
+                extended_model::check_position(joint, position, offset, context.registers)?;
+            }
+        }
+        Ok(())
     }
 
     /// The position register of a joint at rest holds its position.
@@ -274,5 +304,7 @@ const MAX_TIME_UNITS: u8 = {
 pub(super) fn affects_motion(first: u8, count: usize) -> bool {
     let last = usize::from(first) + count;
     let (from, to) = (OFFSET.address, WRIST_POSITION.address + WRIST_POSITION.count);
-    first < to && last > usize::from(from)
+    let is_extended =
+        first <= extended_model::REPORT_CONTENT && last > usize::from(extended_model::FINE_TARGETS.0);
+    (first < to && last > usize::from(from)) || is_extended
 }

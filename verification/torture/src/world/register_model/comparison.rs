@@ -1,0 +1,79 @@
+//! Compares the model with the registers of the arm.
+
+use protocol_core::registers::map::{PRESENT_POSITION, TARGET_POSITION};
+use protocol_core::registers::{Joint, RegisterFile};
+
+use super::super::{extended_model, map21_model};
+use super::RegisterModel;
+use crate::violation::{Check, ensure};
+
+/// The first and last addresses of the registers whose values follow from requests alone.
+const MODELLED: &[(u8, u8)] =
+    &[(0, 45), (53, 53), (61, 82), (90, 90), (98, 127), (184, 189), (191, 240), (244, 247), (250, 251)];
+
+impl RegisterModel {
+    /// The values that a read shows.
+    fn shown(&self, first: u8, last: u8) -> Vec<u8> {
+        let shown = |at| match self.has_biased_offsets {
+            true => map21_model::shown(at, self.get(at)),
+            false => self.get(at),
+        };
+        (first..=last).map(shown).collect()
+    }
+
+    /// Compares the model with the registers of the arm.
+    pub(crate) fn compare(&self, registers: &RegisterFile) -> Check {
+        for (first, last) in MODELLED {
+            let ours = self.shown(*first, *last);
+            let theirs = registers.read(*first, last - first + 1);
+            ensure(ours == theirs, || {
+                let differs = (*first..).zip(ours.iter().zip(theirs)).find(|(_, (a, b))| a != b);
+                let (at, (wanted, found)) = differs.unwrap_or((0, (&0, &0)));
+                format!("register {at} holds {found} instead of {wanted}")
+            })?;
+        }
+        let [angles, positions] = [83, 54].map(|first| registers.read(first, 7));
+        ensure(angles == positions, || format!("angles {angles:?} of positions {positions:?}"))?;
+        let loads = registers.read(91, 7);
+        ensure(loads.iter().all(|load| (3..=253).contains(load)), || format!("loads {loads:?}"))
+    }
+
+    /// True if the arm may have these registers.
+    pub(crate) fn fits(&self, registers: &RegisterFile) -> bool {
+        self.compare(registers).is_ok() && self.clone().compare_targets(registers).is_ok()
+    }
+
+    /// Compares the fine targets that the arm has just shown with the model (D21).
+    pub(crate) fn compare_fine_targets(&self, registers: &RegisterFile) -> Check {
+        Joint::ALL.into_iter().try_for_each(|joint| {
+            let shown = extended_model::word_of(registers, extended_model::fine_target(joint));
+            let coarse = u16::from(self.get(TARGET_POSITION.of(joint))) * 100;
+            let is_right = match self.targets[joint] {
+                Some(target) => shown == extended_model::hundredths(target),
+                // A half is rounded before it is shown in hundredths.
+                None => shown <= 18_000 && shown.abs_diff(coarse) <= 50,
+            };
+            ensure(is_right, || {
+                format!("fine target {} is {shown} instead of {:?}", joint.number(), self.targets[joint])
+            })
+        })
+    }
+
+    /// A target that differs from the model is the measured position (D12, D13). The model takes it over.
+    pub(crate) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
+        for joint in Joint::ALL {
+            let (at, found) = (TARGET_POSITION.of(joint), registers.get(TARGET_POSITION.of(joint)));
+            if found == self.get(at) {
+                continue;
+            }
+            let present = registers.get(PRESENT_POSITION.of(joint));
+            ensure(found == present, || {
+                let wanted = self.get(at);
+                let number = joint.number();
+                format!("target {number} is {found}: the host wrote {wanted}, and the joint was at {present}")
+            })?;
+            self.take_target(joint, found);
+        }
+        Ok(())
+    }
+}

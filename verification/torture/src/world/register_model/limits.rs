@@ -1,0 +1,93 @@
+//! The verdict of the limits on a write (D25), and how to find the one that the model cannot know.
+
+use protocol_core::registers::map::{MOTOR_STATE, limit, motor_state};
+use protocol_core::registers::{Joint, RegisterFile};
+
+use super::super::extended_model::{self, LIMITS};
+use super::super::host_request::HostRequest;
+use super::super::limit_verdict::{self, CLAW, LINKAGE, LimitVerdict};
+use super::super::written_targets::WrittenTargets;
+use super::RegisterModel;
+
+/// Requests of one poll have at most this many combinations of unknown verdicts that are tried.
+const MAX_TRIALS: usize = 1_024;
+
+/// The verdicts of the arm on the requests of a poll, as far as its registers tell them.
+#[derive(Debug, Default)]
+pub(crate) struct FoundVerdicts {
+    /// For each request: which of its possible outcomes it had.
+    pub(crate) choices: Vec<usize>,
+    /// The joints whose targets remain unknown, bit n-1 for joint n.
+    pub(crate) unclear: u8,
+}
+
+impl RegisterModel {
+    /// The possible outcomes of a write: the register because of which it is refused.
+    pub(crate) fn limit_outcomes(&self, write: &WrittenTargets<'_>) -> Vec<Option<u8>> {
+        let before = self.get(LIMITS);
+        let after = write.value_at(LIMITS).unwrap_or(before);
+        let enters_servo =
+            !self.is_servo() && write.value_at(MOTOR_STATE.address) == Some(motor_state::SERVO);
+        let known = |joint| write.of(joint).or(self.targets[joint].filter(|_| !enters_servo));
+        let [_, two, three, .., seven] = Joint::ALL;
+        let sum = known(two).zip(known(three)).map(|(two, three)| two.0 + three.0);
+        let linkage = sum.map(|sum| LINKAGE.0 <= sum && sum <= LINKAGE.1);
+        let claw = known(seven).map(|angle| angle.0 <= CLAW);
+        let of = |bit: u8, joints: &[Joint], is_kept: Option<bool>| {
+            let is_switched_on = before & bit == 0;
+            let at = if is_switched_on { Some(LIMITS) } else { write.first_register(joints) };
+            let Some(at) = at.filter(|_| after & bit != 0) else { return LimitVerdict::Allowed };
+            match is_kept {
+                Some(false) => LimitVerdict::Refused(at),
+                // A set-point may be against the limit.
+                Some(true) if is_switched_on && self.is_servo() => LimitVerdict::Unknown(at),
+                Some(true) => LimitVerdict::Allowed,
+                None => LimitVerdict::Unknown(at),
+            }
+        };
+        limit_verdict::outcomes([of(limit::LINKAGE, &[two, three], linkage), of(limit::CLAW, &[seven], claw)])
+    }
+
+    /// Finds which of the requests of a poll the arm refused where the model cannot know it: tries all combinations, and
+    /// keeps those that lead to the arm's registers.
+    pub(crate) fn find_verdicts(
+        &self,
+        requests: &[&HostRequest],
+        room: usize,
+        registers: &RegisterFile,
+    ) -> FoundVerdicts {
+        let mut trials = vec![(self.clone(), Vec::<usize>::new())];
+        for request in requests {
+            let mut next = Vec::new();
+            for (before, choices) in trials {
+                for choice in 0.. {
+                    let mut model = before.clone();
+                    model.choice = choice;
+                    model.execute(request, room);
+                    let is_last = choice + 1 >= model.outcomes;
+                    next.push((model, [choices.as_slice(), &[choice]].concat()));
+                    if is_last {
+                        break;
+                    }
+                }
+            }
+            next.truncate(MAX_TRIALS);
+            trials = next;
+        }
+        trials.retain(|(model, _)| model.fits(registers));
+        let Some((first, choices)) = trials.first() else { return FoundVerdicts::default() };
+        let differs =
+            |joint: &Joint| trials.iter().any(|(other, _)| other.targets[*joint] != first.targets[*joint]);
+        let unclear = Joint::ALL.into_iter().filter(differs).fold(0, |bits, joint| bits | joint.bit());
+        FoundVerdicts { choices: choices.clone(), unclear }
+    }
+
+    /// True if any of the requests may be against a limit.
+    pub(crate) fn may_limit(&self, requests: &[&HostRequest]) -> bool {
+        let switches_on = |request: &&HostRequest| match request {
+            HostRequest::Write { address, values } => extended_model::covers(*address, values.len(), LIMITS),
+            _ => false,
+        };
+        self.get(LIMITS) != 0 || requests.iter().any(switches_on)
+    }
+}

@@ -1,0 +1,51 @@
+//! The targets: as the host wrote them, or as the arm set them (D12, D13, D24).
+
+use motion_core::calibration::MicroDegrees;
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{MOTOR_STATE, TARGET_POSITION, motor_state};
+
+use super::RegisterModel;
+use crate::per_joint::PerJoint;
+
+impl RegisterModel {
+    /// The host set the target of a joint.
+    pub(super) fn set_target(&mut self, joint: Joint, target: MicroDegrees) {
+        self.set(TARGET_POSITION.of(joint), target.nearest_degree());
+        self.targets[joint] = Some(target);
+        self.has_host_target[joint] = self.is_servo();
+    }
+
+    /// The arm set the target of a joint: its register shows `degrees`.
+    pub(crate) fn take_target(&mut self, joint: Joint, degrees: u8) {
+        self.set(TARGET_POSITION.of(joint), degrees);
+        self.forget_target(joint);
+    }
+
+    /// A measured position may replace the target of a joint.
+    pub(crate) fn forget_target(&mut self, joint: Joint) {
+        self.targets[joint] = None;
+        self.has_host_target[joint] = false;
+    }
+
+    /// In the servo state, measured positions become the targets (D13).
+    pub(super) fn state_changed(&mut self, was_servo: bool) {
+        if self.is_servo() != was_servo {
+            self.has_host_target = PerJoint::all(false);
+        }
+        if self.is_servo() && !was_servo {
+            self.targets = PerJoint::all(None);
+        }
+    }
+
+    /// The watchdog damped the arm (D24).
+    pub(crate) fn damp(&mut self) {
+        let was_servo = self.is_servo();
+        self.set(MOTOR_STATE.address, motor_state::DAMPING);
+        self.state_changed(was_servo);
+    }
+
+    /// The target with its fraction, if the host set it and it is in force.
+    pub(crate) fn host_target(&self, joint: Joint) -> Option<MicroDegrees> {
+        self.targets[joint].filter(|_| self.has_host_target[joint])
+    }
+}

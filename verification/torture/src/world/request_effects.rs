@@ -1,0 +1,154 @@
+//! Applies the requests that the controller has executed to the models, and tells the checkers.
+
+use protocol_core::registers::map::{MOTOR_STATE, OFFSET, SPEED, TARGET_POSITION, VACUUM_PUMP, motor_state};
+use protocol_core::registers::{Joint, Register};
+
+use super::extended_model::{self, WATCHDOG, WATCHDOG_ACTION};
+use super::host_request::HostRequest;
+use super::register_model::RequestEffect;
+use super::register_model::limits::FoundVerdicts;
+use super::state::{PoweredArm, TortureWorld};
+use super::status_checker::{StatusChecker, affects_motion};
+use crate::violation::{Check, Violation, ensure};
+
+impl PoweredArm {
+    /// Finds which of the next `count` requests the arm refused against a limit where the model cannot know it (D25).
+    fn find_verdicts(&self, count: u16, room: usize) -> FoundVerdicts {
+        let requests: Vec<_> =
+            self.pending.iter().take(count.into()).map(|pending| &pending.request).collect();
+        if !self.model.may_limit(&requests) {
+            return FoundVerdicts::default();
+        }
+        self.model.find_verdicts(&requests, room, self.controller.registers())
+    }
+}
+
+impl TortureWorld {
+    /// Applies the next `count` requests to the model. `room` is the room of the link, in bytes. Returns the effect of the
+    /// last one.
+    pub(super) fn apply_requests(
+        &mut self,
+        arm: &mut PoweredArm,
+        count: u16,
+        room: usize,
+    ) -> Check<Option<RequestEffect>> {
+        self.record_missing(arm);
+        let verdicts = arm.find_verdicts(count, room);
+        let mut choices = verdicts.choices.into_iter();
+        let (mut last, mut is_heard) = (None, false);
+        for _ in 0..count {
+            let has_arrived = arm.pending.front().is_some_and(|first| first.arrived_at <= self.now);
+            let request = arm.pending.pop_front().filter(|_| has_arrived).map(|pending| pending.request);
+            let request = request
+                .ok_or_else(|| Violation("a request was executed that the host did not send".to_owned()))?;
+            let has_output = !matches!(last, None | Some(RequestEffect::NoReply { .. }));
+            ensure(!has_output, || format!("the output of {last:?} is missing before {request:?}"))?;
+            arm.model.choice = choices.next().unwrap_or(0);
+            is_heard |= request.is_well_formed();
+            last = Some(self.apply_request(arm, &request, room));
+        }
+        for joint in Joint::ALL.into_iter().filter(|joint| verdicts.unclear & joint.bit() != 0) {
+            arm.model.targets[joint] = None;
+        }
+        // A request that is heard in a poll has its turn before the watchdog.
+        if !is_heard && arm.watchdog.may_act(self.now) {
+            self.record_watchdog(arm);
+        }
+        let registers = arm.controller.registers();
+        arm.watchdog.check_fault(registers)?;
+        if count > 0 {
+            arm.model.compare(registers)?;
+        }
+        arm.model.compare_targets(registers)?;
+        Ok(last)
+    }
+
+    fn apply_request(&mut self, arm: &mut PoweredArm, request: &HostRequest, room: usize) -> RequestEffect {
+        let was_servo = arm.model.is_servo();
+        let effect = arm.model.execute(request, room);
+        if request.is_well_formed() {
+            arm.watchdog.heard(self.now);
+        }
+        if arm.model.is_servo() != was_servo {
+            Joint::ALL.into_iter().for_each(|joint| arm.command_checker.forget(joint));
+        }
+        if !arm.model.is_servo() {
+            self.bus.exempt_all_by_state(self.now);
+        }
+        self.record_write(arm, request, effect);
+        effect
+    }
+
+    fn record_missing(&mut self, arm: &mut PoweredArm) {
+        let Some((lost, found)) = arm.status_checker.missing_changed(arm.controller.registers()) else {
+            return;
+        };
+        self.log.event(self.now, format!("servos lost: {lost:#b}, found: {found:#b}"));
+        for joint in Joint::ALL {
+            if lost & joint.bit() != 0 {
+                arm.model.forget_target(joint);
+                arm.command_checker.servo_lost(joint);
+            }
+        }
+        if found != 0 {
+            arm.check_status(self.now, &self.bus, StatusChecker::motion_changed);
+        }
+    }
+
+    /// The watchdog may have acted in this poll (D24): the model takes over its effect.
+    fn record_watchdog(&mut self, arm: &mut PoweredArm) {
+        let registers = arm.controller.registers();
+        if arm.model.get(WATCHDOG_ACTION) == 0 {
+            for joint in Joint::ALL {
+                arm.model.take_target(joint, registers.get(TARGET_POSITION.of(joint)));
+            }
+        } else if registers.get(MOTOR_STATE.address) == motor_state::DAMPING
+            && arm.model.get(MOTOR_STATE.address) != motor_state::DAMPING
+        {
+            self.log.event(self.now, "the watchdog damps the arm".to_owned());
+            arm.model.damp();
+            arm.status_checker.state_written(self.now);
+            Joint::ALL.into_iter().for_each(|joint| arm.command_checker.forget(joint));
+            self.bus.exempt_all_by_state(self.now);
+        }
+    }
+
+    /// Tells the checkers about an accepted write.
+    fn record_write(&self, arm: &mut PoweredArm, request: &HostRequest, effect: RequestEffect) {
+        let (HostRequest::Write { address, values } | HostRequest::WriteMap21 { address, values }) = request
+        else {
+            return;
+        };
+        if matches!(effect, RequestEffect::NoReply { accepted: false } | RequestEffect::Alarm { .. }) {
+            return;
+        }
+        let includes = |at: u8| extended_model::covers(*address, values.len(), at);
+        let includes_any = |row: &Register| (row.address..row.address + row.count).any(includes);
+        let (frequencies, baud) = (arm.model.frequencies(), arm.controller.baud());
+        arm.status_checker.reports.frequencies_written(
+            self.now,
+            frequencies,
+            arm.model.report_content(),
+            baud,
+        );
+        if includes(WATCHDOG) && matches!(request, HostRequest::Write { .. }) {
+            arm.watchdog.set(self.now, arm.model.get(WATCHDOG));
+        }
+        if includes(VACUUM_PUMP.address) {
+            arm.status_checker.vacuum_written(self.now);
+        }
+        if includes(MOTOR_STATE.address) {
+            arm.status_checker.state_written(self.now);
+        }
+        if includes_any(&SPEED) {
+            arm.command_checker.speed_written(&arm.model);
+        }
+        if includes_any(&OFFSET) && matches!(effect, RequestEffect::Save(_)) {
+            arm.command_checker.offsets_changed();
+            arm.status_checker.offsets_changed(self.now);
+        }
+        if affects_motion(*address, values.len()) {
+            arm.check_status(self.now, &self.bus, StatusChecker::motion_changed);
+        }
+    }
+}
