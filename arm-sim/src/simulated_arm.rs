@@ -21,6 +21,7 @@ use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer::gap;
 use tracing::info;
 
+use crate::action::Action;
 use crate::controller::ArmController;
 use crate::faults::list::{EndedFaults, FaultList};
 use crate::faulty_flash::FaultyFlash;
@@ -219,9 +220,11 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// The last host disconnects: the bytes on the line to it are lost. The arm executes what the host sent before, and
     /// sends nothing for it. Then its reports end (M12).
     pub fn host_disconnect(&mut self) {
+        self.record_action(self.now, Action::Disconnect);
         self.to_host.clear(self.paced_baud());
         self.leaving = Some(self.to_arm.len());
         self.end_host();
+        self.process(self.now, false);
     }
 
     /// Tells the controller that the host has left, once the last bytes of the host are executed.

@@ -14,15 +14,11 @@ use crate::plant::Plant;
 impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
     /// Does something to the arm at `now`. Returns the reports of the faults that this ended.
     pub fn act(&mut self, now: Instant, action: Action) -> Vec<FaultReport> {
-        self.record_action(now, action);
-        let ended = self.carry_out(now, action);
-        self.advance(now, false);
-        ended
-    }
-
-    fn carry_out(&mut self, now: Instant, action: Action) -> Vec<FaultReport> {
         match action {
-            Action::Disconnect => self.host_disconnect(),
+            Action::Disconnect => {
+                self.advance(now, false);
+                self.host_disconnect();
+            }
             Action::PowerOff => self.power_off(now),
             Action::PowerCycle => self.power_cycle(now),
             Action::RestartController => self.restart_controller(now),
@@ -31,16 +27,20 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
                 return self.set_fault(now, fault, duration).into_iter().collect();
             }
             Action::Clear(location) => return self.end_faults(now, location),
-            Action::Seed(seed) => self.set_seed(seed),
-            Action::Hand(joint, counts) => self.plant_at(now).move_by_hand(joint, counts),
-            Action::Hold(joint) => self.plant_at(now).hold(joint),
-            Action::LetGo(joint) => self.plant_at(now).let_go(joint),
-            Action::Weight(grams) => self.plant_at(now).set_load(grams),
+            Action::Seed(seed) => {
+                self.advance(now, false);
+                self.set_seed(seed);
+            }
+            Action::Hand(joint, counts) => self.plant_for(now, action).move_by_hand(joint, counts),
+            Action::Hold(joint) => self.plant_for(now, action).hold(joint),
+            Action::LetGo(joint) => self.plant_for(now, action).let_go(joint),
+            Action::Weight(grams) => self.plant_for(now, action).set_load(grams),
         }
         Vec::new()
     }
 
-    fn plant_at(&mut self, now: Instant) -> &mut Plant {
+    fn plant_for(&mut self, now: Instant, action: Action) -> &mut Plant {
+        self.record_action(now, action);
         self.advance(now, false);
         self.plant_mut()
     }

@@ -7,6 +7,7 @@ use protocol_core::settings::Storage;
 use protocol_core::time::{Duration, Instant};
 
 use super::SimulatedArm;
+use crate::action::Action;
 use crate::controller::ArmController;
 use crate::fault_count::FaultCount;
 use crate::faults::list::ListedFault;
@@ -25,6 +26,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
 
     /// Draws the faults of the host line from this seed from now on. By default it is 1.
     pub fn set_seed(&mut self, seed: u64) {
+        self.record_action(self.now, Action::Seed(seed));
         (self.to_arm, self.to_host) = LineDirection::pair(seed);
         self.clear_host_line();
         for ListedFault { fault, .. } in self.faults.iter() {
@@ -50,6 +52,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         fault: ArmFault,
         duration: Option<Duration>,
     ) -> Option<FaultReport> {
+        self.record_action(now, Action::Fault(fault, duration));
         self.advance(now, false);
         let replaced = self.faults.take_replaced(fault).map(|replaced| self.end(replaced));
         self.faults.add(fault, duration.map(|duration| now + duration));
@@ -63,13 +66,17 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
             }
             _ => {}
         }
+        self.process(now, false);
         replaced
     }
 
     /// Takes the faults at a location back at `now`, or all faults. Returns how often they took effect.
     pub fn end_faults(&mut self, now: Instant, location: Option<FaultLocation>) -> Vec<FaultReport> {
+        self.record_action(now, Action::Clear(location));
         self.advance(now, false);
-        self.faults.take_at(location).into_iter().map(|listed| self.end(listed)).collect()
+        let ended = self.faults.take_at(location).into_iter().map(|listed| self.end(listed)).collect();
+        self.process(now, false);
+        ended
     }
 
     /// The faults of the arm.

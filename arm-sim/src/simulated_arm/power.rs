@@ -5,6 +5,7 @@ use protocol_core::registers::map::fault;
 use protocol_core::time::Instant;
 
 use super::{SimulatedArm, start};
+use crate::action::Action;
 use crate::controller::ArmController;
 use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
@@ -13,7 +14,8 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
     /// Switches the arm off at `now`, until [`SimulatedArm::power_cycle`]. RAM, the bytes on the host line and what the
     /// host sends are lost. Loaded joints fall.
     pub fn power_off(&mut self, now: Instant) {
-        self.halt_controller(now);
+        self.record_action(now, Action::PowerOff);
+        self.halt(now);
         self.is_off = true;
         self.bus.power_off(now);
         self.clear_host_line();
@@ -35,6 +37,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
 impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Switches the arm off and on at `now`. RAM and the bytes on the host line are lost; the flash stays.
     pub fn power_cycle(&mut self, now: Instant) {
+        self.record_action(now, Action::PowerCycle);
         self.advance(now, false);
         self.bus.power_cycle(now);
         self.start_controller(now, 0);
@@ -43,6 +46,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Restarts only the controller at `now`, as its watchdog does. RAM and the bytes on the host line are lost. The
     /// servos keep power, torque and goals.
     pub fn restart_controller(&mut self, now: Instant) {
+        self.record_action(now, Action::RestartController);
         self.advance(now, false);
         self.start_controller(now, fault::WATCHDOG_RESTART);
     }
@@ -50,6 +54,11 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Stops the controller at `now`, as a program that hangs. It sends and receives nothing until
     /// [`SimulatedArm::restart_controller`] or [`SimulatedArm::power_cycle`]. The servos keep their goals.
     pub fn halt_controller(&mut self, now: Instant) {
+        self.record_action(now, Action::HaltController);
+        self.halt(now);
+    }
+
+    fn halt(&mut self, now: Instant) {
         self.advance(now, false);
         self.is_halted = true;
         self.controller_due = Instant::FAR_FUTURE;
@@ -64,5 +73,6 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.is_off = false;
         self.leaving = None;
         self.start_host_line();
+        self.process(now, false);
     }
 }
