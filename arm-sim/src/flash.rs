@@ -45,8 +45,15 @@ pub struct Memory {
 impl Memory {
     /// Cells with this content. Those behind its end are erased.
     #[must_use]
-    pub const fn holding(bytes: Vec<u8>) -> Self {
-        Self { bytes }
+    pub fn holding(bytes: Vec<u8>) -> Self {
+        let mut memory = Self { bytes };
+        memory.drop_erased_end();
+        memory
+    }
+
+    fn drop_erased_end(&mut self) {
+        let used = self.bytes.iter().rposition(|&byte| byte != ERASED).map_or(0, |last| last + 1);
+        self.bytes.truncate(used);
     }
 
     /// The cells up to the last one that is not erased.
@@ -68,8 +75,7 @@ impl Cells for Memory {
         self.bytes.resize(self.bytes.len().max(end), ERASED);
         let target = self.bytes.get_mut(offset..end).ok_or(NorFlashErrorKind::OutOfBounds)?;
         target.copy_from_slice(bytes);
-        let used = self.bytes.iter().rposition(|&byte| byte != ERASED).map_or(0, |last| last + 1);
-        self.bytes.truncate(used);
+        self.drop_erased_end();
         Ok(())
     }
 }

@@ -70,7 +70,6 @@ pub enum ReplayError {
 /// An arm of either controller.
 trait ReplayedArm {
     fn now(&self) -> Instant;
-    fn advance(&mut self, now: Instant, host_is_idle: bool);
     fn apply(&mut self, entry: &Entry) -> Result<(), Difference>;
 }
 
@@ -79,13 +78,9 @@ impl<C: ArmController> ReplayedArm for SimulatedArm<Flash, Plant, C> {
         self.now()
     }
 
-    fn advance(&mut self, now: Instant, host_is_idle: bool) {
-        self.advance(now, host_is_idle);
-    }
-
     fn apply(&mut self, entry: &Entry) -> Result<(), Difference> {
         match &entry.event {
-            SessionEvent::Idle => {}
+            SessionEvent::Advanced(is_idle) => self.advance(entry.now, *is_idle),
             SessionEvent::Sent(bytes) => {
                 self.host_send(entry.now, bytes);
             }
@@ -155,12 +150,6 @@ impl Replay {
         if entry.now < self.arm.now() {
             return Err(ReplayError::Backwards { line });
         }
-        if entry.idle_until > self.arm.now() {
-            self.arm.advance(entry.idle_until, true);
-        }
-        if entry.now > self.arm.now() {
-            self.arm.advance(entry.now, false);
-        }
         self.arm.apply(&entry).map_err(|difference| ReplayError::Different { line, difference })
     }
 }
@@ -172,5 +161,8 @@ fn power_up<C: ArmController>(header: &SessionHeader) -> SimulatedArm<Flash, Pla
     let config = ArmConfig { chip_id, is_paced, torque_codes };
     let mut arm = SimulatedArm::power_up(Instant::ZERO, config, flash, plant);
     arm.set_seed(header.seed);
+    if header.is_bytewise {
+        arm.set_bytewise_line();
+    }
     arm
 }

@@ -1,16 +1,18 @@
 //! A recorded session: everything that was done to an arm from outside, and every byte that it sent, with virtual times.
 //!
 //! ```text
-//!   7bot-session 1 program=3.0.0 controller=sevenbot seed=1 chip-id=53494d000001 paced=true torque-codes=older
+//!   7bot-session 1 program=3.0.0 controller=sevenbot seed=1 chip-id=53494d000001 paced=true ...
 //!   settings aa55...                          the bytes of the settings, without erased ones at the end
-//!   1000000 0 > aa770102365b9f                at 1 s: the host starts to send these bytes
-//!   1002430 0 < aa77010336075a5a415a5a5a50..  the host takes these bytes
-//!   1009000 0 ~                               the host is idle for the first time after it sent
-//!   2000000 0 ! fault 3=missing               an action
+//!   1000000 > aa770102365b9f                  at 1 s: the host starts to send these bytes
+//!   1002430 ~                                 time passes until then, and the host is idle
+//!   1002430 < aa77010336075a5a415a5a5a50..    the host takes these bytes
+//!   1003000 =                                 time passes until then, and the host may have sent more
+//!   2000000 ! fault 3=missing                 an action
 //! ```
 //!
-//! Times are microseconds since power-up. The second number is how long ago the host was last known to be idle (D4). A
-//! [`Replay`](crate::replay::Replay) does the same to a new arm and compares what it sends. Where the arm starts to differ, it says what differs.
+//! Times are microseconds since power-up. Every call that lets time pass is recorded, because an idle host line has a
+//! meaning (D4). A [`Replay`](crate::replay::Replay) does the same to a new arm and compares what it sends. Where the arm
+//! starts to differ, it says what differs.
 
 use alloc::vec::Vec;
 use core::fmt::{self, Debug, Display, Formatter};
@@ -38,8 +40,8 @@ pub trait Recorder: Debug + Send {
 pub enum SessionEvent {
     /// The host started to send these bytes.
     Sent(Vec<u8>),
-    /// For the first time after it sent, the host was known to be idle.
-    Idle,
+    /// Time passed. Was the host known to be idle?
+    Advanced(bool),
     /// The host took these bytes off the line.
     Taken(Vec<u8>),
     /// Something else was done to the arm.
@@ -51,45 +53,42 @@ pub enum SessionEvent {
 pub struct Entry {
     /// When it happened.
     pub now: Instant,
-    /// When the host was last known to be idle.
-    pub idle_until: Instant,
     /// What happened.
     pub event: SessionEvent,
 }
 
 /// A line that is no entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("use MICROSECONDS IDLE and then '> HEX', '< HEX', '~' or '! ACTION'")]
+#[error("use MICROSECONDS and then '> HEX', '< HEX', '~', '=' or '! ACTION'")]
 pub struct NoEntry;
 
 impl core::str::FromStr for Entry {
     type Err = NoEntry;
 
     fn from_str(line: &str) -> Result<Self, NoEntry> {
-        let mut words = line.splitn(4, ' ');
+        let mut words = line.splitn(3, ' ');
         let mut word = || words.next().ok_or(NoEntry);
-        let now = word()?.parse().map_err(|_| NoEntry)?;
-        let idle: u64 = word()?.parse().map_err(|_| NoEntry)?;
+        let now = Instant::from_micros(word()?.parse().map_err(|_| NoEntry)?);
         let kind = word()?;
-        let content = if kind == "~" { "" } else { word()? };
+        let content = if matches!(kind, "~" | "=") { "" } else { word()? };
         let event = match kind {
-            "~" => SessionEvent::Idle,
+            "~" => SessionEvent::Advanced(true),
+            "=" => SessionEvent::Advanced(false),
             ">" => SessionEvent::Sent(bytes_from_hex(content).map_err(|_| NoEntry)?),
             "<" => SessionEvent::Taken(bytes_from_hex(content).map_err(|_| NoEntry)?),
             "!" => SessionEvent::Acted(content.parse().map_err(|_| NoEntry)?),
             _ => return Err(NoEntry),
         };
-        let idle_until = Instant::from_micros(u64::checked_sub(now, idle).ok_or(NoEntry)?);
-        Ok(Self { now: Instant::from_micros(now), idle_until, event })
+        Ok(Self { now, event })
     }
 }
 
 impl Display for Entry {
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
-        write!(out, "{} {} ", self.now.as_micros(), (self.now - self.idle_until).as_micros())?;
+        write!(out, "{} ", self.now.as_micros())?;
         match &self.event {
             SessionEvent::Sent(bytes) => write!(out, "> {}", Hex(bytes)),
-            SessionEvent::Idle => out.write_str("~"),
+            SessionEvent::Advanced(is_idle) => out.write_str(if *is_idle { "~" } else { "=" }),
             SessionEvent::Taken(bytes) => write!(out, "< {}", Hex(bytes)),
             SessionEvent::Acted(action) => write!(out, "! {action}"),
         }

@@ -33,6 +33,7 @@ use crate::settings_log;
 use crate::tap::{Slot, Tap};
 
 mod act;
+mod deadlines;
 mod disturbance;
 mod power;
 mod record;
@@ -41,12 +42,6 @@ mod record;
 const SERVO_TIMEOUT: Duration = Duration::from_millis(5);
 /// The pause of the controller before each frame on the servo bus: that of the reference board.
 const GUARD_TIME: Duration = Duration::from_micros(100);
-/// A deadline that stays in the past is checked again after this. Wake-ups without bytes on the host line are at
-/// multiples of it, so that many arms wake up together.
-const TICK: Duration = Duration::from_millis(1);
-/// Without a client the next wake-up may be this much later, because no client sees the difference.
-const TICK_WITHOUT_CLIENT: Duration = Duration::from_millis(50);
-
 /// What differs from one simulated arm to another.
 #[derive(Clone, Copy, Debug)]
 pub struct ArmConfig {
@@ -69,10 +64,6 @@ pub struct SimulatedArm<F, B = Plant, C = Controller> {
     to_host: LineDirection,
     tap: Slot<dyn Tap>,
     recorder: Slot<dyn Recorder>,
-    /// The host was last known to be idle then.
-    idle_until: Instant,
-    /// The host has sent nothing since then.
-    is_host_idle: bool,
     now: Instant,
     /// When the controller has to be polled again.
     controller_due: Instant,
@@ -129,8 +120,6 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
             to_host,
             tap: Slot::default(),
             recorder: Slot::default(),
-            idle_until: now,
-            is_host_idle: false,
             now,
             controller_due: now,
             is_halted: false,
@@ -194,10 +183,9 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
 
     /// The host starts to send bytes at `now`. Returns how many were accepted.
     pub fn host_send(&mut self, now: Instant, bytes: &[u8]) -> usize {
-        let idle_until = self.idle_until;
-        self.advance(now, false);
+        self.simulate(now, false);
         let accepted = if self.is_off { bytes.len() } else { self.to_arm.push(now, bytes) };
-        self.record_sent(idle_until, bytes.get(..accepted).unwrap_or(bytes));
+        self.record_sent(bytes.get(..accepted).unwrap_or(bytes));
         self.process(now, false);
         accepted
     }
@@ -238,49 +226,16 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Simulates all events up to `now`. `host_is_idle` tells that the host has sent nothing since the last call, apart
     /// from the bytes in [`SimulatedArm::host_send`].
     pub fn advance(&mut self, now: Instant, host_is_idle: bool) {
+        self.record_advance(now, host_is_idle);
+        self.simulate(now, host_is_idle);
+    }
+
+    fn simulate(&mut self, now: Instant, host_is_idle: bool) {
         // Real servos cannot catch up: an answer that has arrived but was not read has not timed out.
         while !B::IS_REAL && self.next_event() < now {
             self.process(self.next_event(), host_is_idle);
         }
         self.process(now, host_is_idle);
-        if host_is_idle {
-            self.record_idle();
-            self.idle_until = now;
-        }
-        self.is_host_idle = host_is_idle;
-    }
-
-    /// When to call [`SimulatedArm::advance`] next, unless the host sends bytes. Without a client the call can be later:
-    /// the events keep their times.
-    #[must_use]
-    pub fn deadline(&self, has_client: bool) -> Instant {
-        let line = self.line_deadline().unwrap_or(Instant::FAR_FUTURE).max(self.now);
-        if B::IS_REAL {
-            let later = self.now + TICK;
-            return line.min(if self.controller_due > self.now { self.controller_due } else { later });
-        }
-        let inside = self.bus.deadline().unwrap_or(Instant::FAR_FUTURE).min(self.controller_due);
-        let unobserved = self.now + TICK_WITHOUT_CLIENT;
-        if has_client {
-            let observed = self.controller.host_deadline().max(self.now + TICK);
-            line.min(next_tick(observed.min(inside.max(unobserved))))
-        } else {
-            next_tick(line.min(inside).max(unobserved))
-        }
-    }
-
-    fn line_deadline(&self) -> Option<Instant> {
-        [self.to_arm.deadline(), self.to_host.deadline()].into_iter().flatten().min()
-    }
-
-    /// The next event after the last call. A deadline that stays in the past depends on something else, for example on
-    /// an idle line, and is checked again after a tick.
-    #[must_use]
-    pub fn next_event(&self) -> Instant {
-        let candidates =
-            [self.line_deadline(), self.bus.deadline(), Some(self.controller_due), self.faults.deadline()];
-        let later = |deadline| if deadline > self.now { deadline } else { self.now + TICK };
-        candidates.into_iter().flatten().map(later).min().unwrap_or(Instant::FAR_FUTURE)
     }
 
     fn process(&mut self, now: Instant, host_is_idle: bool) {
@@ -342,12 +297,6 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
             }
         }
     }
-}
-
-/// The first multiple of [`TICK`] at or after a time.
-fn next_tick(at: Instant) -> Instant {
-    let micros = at.as_micros().checked_next_multiple_of(TICK.as_micros());
-    micros.map_or(Instant::FAR_FUTURE, Instant::from_micros)
 }
 
 /// A controller that starts.

@@ -24,6 +24,10 @@ impl<T: ?Sized> Slot<T> {
         Self(Some(watcher))
     }
 
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.0.is_none()
+    }
+
     pub(crate) fn get(&mut self) -> Option<&mut T> {
         self.0.as_deref_mut()
     }

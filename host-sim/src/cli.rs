@@ -98,8 +98,8 @@ SIGNALS
   SIGINT, SIGTERM   the end
 
 EXIT STATUS
-  0   ended by a signal, or after --help or --version
-  1   the operating system failed while the simulator ran
+  0   ended by a signal, or after --help, --version or an equal replay
+  1   the operating system failed while the simulator ran, or a replay differs
   2   an option or a file cannot be used; standard error says why, in one line";
 
 /// The ids of servos: one value of an option.
@@ -145,6 +145,15 @@ pub struct Options {
     #[arg(long, value_name = "VERSION", value_parser = maker_version,
           conflicts_with_all = ["servos", "servos_only", "servo_socket"])]
     pub as_maker: Option<String>,
+
+    /// Record the session to FILE: every byte, every fault and their virtual times
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["servos", "servos_only", "servo_socket"])]
+    pub record: Option<PathBuf>,
+
+    /// Replay a recorded session in virtual time, and end: status 1 and the first difference if the arm sends
+    /// something else
+    #[arg(long, value_name = "FILE", exclusive = true)]
+    pub replay: Option<PathBuf>,
 
     /// Print every frame in words on standard error
     #[arg(long)]

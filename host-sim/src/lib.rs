@@ -30,6 +30,7 @@ pub mod pty_arm;
 pub mod real_servos;
 pub mod servo_socket;
 pub mod servos_only;
+pub mod session_file;
 pub mod signals;
 pub mod trace;
 pub mod virtual_clock;

@@ -27,6 +27,7 @@ use host_sim::pty_arm::PtyArm;
 use host_sim::real_servos::{self, RealServos};
 use host_sim::servo_socket::ServoSocket;
 use host_sim::servos_only::{self, ServosOnly, ServosOnlyError};
+use host_sim::session_file::{self, SessionFile, SessionFileError};
 use host_sim::signals::Signals;
 use host_sim::trace::Trace;
 use host_sim::virtual_clock::VirtualClock;
@@ -64,6 +65,8 @@ enum Failure {
     FaultOfController(ArmFault),
     #[error("no pseudo-terminal: {0}: see that /dev/pts is mounted and has not run out, nor 'ulimit -n'")]
     Port(io::Error),
+    #[error(transparent)]
+    Session(#[from] SessionFileError),
     #[error("cannot catch signals: {0}")]
     Signals(io::Error),
     #[error("the operating system failed: {0}")]
@@ -82,7 +85,11 @@ impl From<ServosOnlyError> for Failure {
 impl Failure {
     /// The exit status, as in `--help`.
     const fn status(&self) -> u8 {
-        if matches!(self, Self::Running(_)) { 1 } else { 2 }
+        if matches!(self, Self::Running(_) | Self::Session(SessionFileError::Different { .. })) {
+            1
+        } else {
+            2
+        }
     }
 }
 
@@ -127,6 +134,12 @@ fn log_to_stderr(options: &Options) {
 }
 
 fn run(options: &Options) -> Result<(), Failure> {
+    if let Some(path) = &options.replay {
+        let lines = session_file::replay(path)?;
+        // Nothing has to read this line.
+        let _ = writeln!(io::stdout(), "{}: {lines} lines replayed, all equal", path.display());
+        return Ok(());
+    }
     let catch = if options.servos_only { Signals::catch_with_unplug } else { Signals::catch };
     let mut signals = catch().map_err(Failure::Signals)?;
     let mut clock = Clock::default();
@@ -198,7 +211,7 @@ fn run_real_servos(
     let path = pty.path().to_owned();
     let _symlink = options.link.as_ref().map(|link| Symlink::new(link, &path)).transpose()?;
     let line = BusLine::new(Duration::from_millis(options.usb_timeout.into()));
-    let arm = arm::<_, Controller>(options, None, pty, clock.now(), line)?;
+    let arm = arm::<_, Controller>(options, None, pty, flash(options, None)?, clock.now(), line);
     let config = real_servos::BusConfig {
         port: port.to_owned(),
         baud: options.servo_baud,
@@ -231,11 +244,20 @@ fn run_arms<C: ArmController>(options: &Options, signals: &mut Signals) -> Resul
             symlinks.push(Symlink::new(&per_arm::path(link, number), &port)?);
         }
         ports.push(port);
-        let plant = plant(options, Instant::ZERO);
-        let mut arm = arm::<_, C>(options, number, pty, Instant::ZERO, plant)?;
-        arm.set_seed(options.seed.wrapping_add(number.unwrap_or(0).into()));
+        let seed = options.seed.wrapping_add(number.unwrap_or(0).into());
+        let servos = ServoConfig { torque_codes: options.torque_codes, ..ServoConfig::default() };
+        let plant = Plant::with_config(Instant::ZERO, servos);
+        let mut flash = flash(options, number)?;
+        let settings = flash.cells_mut().copy();
+        let mut arm = arm::<_, C>(options, number, pty, flash, Instant::ZERO, plant);
+        arm.set_seed(seed);
         if clock.is_in_lockstep() {
             arm.simulation_mut().set_bytewise_line();
+        }
+        if let Some(path) = &options.record {
+            let header = session_file::header(options, number, seed, &settings);
+            let file = SessionFile::create(&per_arm::path(path, number), &header)?;
+            arm.simulation_mut().set_recorder(file);
         }
         options.faults.iter().for_each(|&fault| arm.set_fault(Instant::ZERO, fault));
         arm.simulation_mut().advance(clock.now(), true);
@@ -275,18 +297,13 @@ fn arm<B: ServoBus, C: ArmController>(
     options: &Options,
     number: Option<u16>,
     pty: Pty,
+    flash: Flash<ImageFile>,
     now: Instant,
     bus: B,
-) -> Result<PtyArm<Flash<ImageFile>, B, C>, Failure> {
+) -> PtyArm<Flash<ImageFile>, B, C> {
     // At level error, so that every log level shows it.
     let span = number.map_or_else(Span::none, |number| error_span!("arm", number));
     let inside = span.enter();
-    let default = match (&options.servos, &options.as_maker) {
-        (Some(_), _) => Eeprom::REAL_SERVOS,
-        (None, Some(_)) => Eeprom::STOCK,
-        (None, None) => Eeprom::SIMULATED,
-    };
-    let flash = options.eeprom.as_ref().unwrap_or(&default).open(number)?;
     let chip_id = per_arm::chip_id(options.chip_id, number);
     let config = ArmConfig { chip_id, is_paced: !options.unpaced, torque_codes: options.torque_codes };
     let mut simulation = SimulatedArm::power_up(now, config, flash, bus);
@@ -294,7 +311,17 @@ fn arm<B: ServoBus, C: ArmController>(
         simulation.set_tap(Trace::new(Box::new(|line| tracing::info!(target: FRAMES, "{line}"))));
     }
     drop(inside);
-    Ok(PtyArm::new(simulation, pty, span))
+    PtyArm::new(simulation, pty, span)
+}
+
+/// The flash with the settings of an arm.
+fn flash(options: &Options, number: Option<u16>) -> Result<Flash<ImageFile>, Failure> {
+    let default = match (&options.servos, &options.as_maker) {
+        (Some(_), _) => Eeprom::REAL_SERVOS,
+        (None, Some(_)) => Eeprom::STOCK,
+        (None, None) => Eeprom::SIMULATED,
+    };
+    Ok(options.eeprom.as_ref().unwrap_or(&default).open(number)?)
 }
 
 /// Raises the limit of open files, 1024 by default. An arm needs three. If the limit is too low, opening the port fails.

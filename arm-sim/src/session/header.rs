@@ -31,6 +31,8 @@ pub struct SessionHeader {
     pub chip_id: [u8; 6],
     /// Do bytes on the host line take the time that the baud rate requires?
     pub is_paced: bool,
+    /// Does each byte arrive at its own time, instead of in batches?
+    pub is_bytewise: bool,
     /// The meaning of the codes in the servos' torque switch.
     pub torque_codes: TorqueCodes,
     /// The bytes of the settings, without erased ones at the end.
@@ -46,6 +48,7 @@ impl Default for SessionHeader {
             seed: 1,
             chip_id,
             is_paced,
+            is_bytewise: false,
             torque_codes: servos.torque_codes,
             settings: settings.bytes().to_vec(),
         }
@@ -62,11 +65,11 @@ impl Display for SessionHeader {
             TorqueCodes::DampingOnFree => "older",
             TorqueCodes::FreeOnDamping => "current",
         };
-        let Self { program, seed, chip_id, is_paced, settings, .. } = self;
+        let Self { program, seed, chip_id, is_paced, is_bytewise, settings, .. } = self;
         writeln!(
             out,
             "7bot-session {VERSION} program={program} controller={controller} seed={seed} chip-id={} \
-             paced={is_paced} torque-codes={codes}",
+             paced={is_paced} bytewise={is_bytewise} torque-codes={codes}",
             Hex(chip_id)
         )?;
         write!(out, "settings {}", Hex(settings))
@@ -114,6 +117,7 @@ impl SessionHeader {
             seed: value("seed")?.parse().map_err(|_| HeaderError::Value("seed"))?,
             chip_id: chip_id.ok_or(HeaderError::Value("chip-id"))?,
             is_paced: value("paced")?.parse().map_err(|_| HeaderError::Value("paced"))?,
+            is_bytewise: value("bytewise")?.parse().map_err(|_| HeaderError::Value("bytewise"))?,
             torque_codes: match value("torque-codes")? {
                 "older" => TorqueCodes::DampingOnFree,
                 "current" => TorqueCodes::FreeOnDamping,

@@ -16,7 +16,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
     pub fn act(&mut self, now: Instant, action: Action) -> Vec<FaultReport> {
         match action {
             Action::Disconnect => {
-                self.advance(now, false);
+                self.simulate(now, false);
                 self.host_disconnect();
             }
             Action::PowerOff => self.power_off(now),
@@ -28,7 +28,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
             }
             Action::Clear(location) => return self.end_faults(now, location),
             Action::Seed(seed) => {
-                self.advance(now, false);
+                self.simulate(now, false);
                 self.set_seed(seed);
             }
             Action::Hand(joint, counts) => self.plant_for(now, action).move_by_hand(joint, counts),
@@ -41,7 +41,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
 
     fn plant_for(&mut self, now: Instant, action: Action) -> &mut Plant {
         self.record_action(now, action);
-        self.advance(now, false);
+        self.simulate(now, false);
         self.plant_mut()
     }
 }

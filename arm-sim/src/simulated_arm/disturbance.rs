@@ -53,7 +53,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         duration: Option<Duration>,
     ) -> Option<FaultReport> {
         self.record_action(now, Action::Fault(fault, duration));
-        self.advance(now, false);
+        self.simulate(now, false);
         let replaced = self.faults.take_replaced(fault).map(|replaced| self.end(replaced));
         self.faults.add(fault, duration.map(|duration| now + duration));
         fault.apply(&mut self.bus);
@@ -73,7 +73,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
     /// Takes the faults at a location back at `now`, or all faults. Returns how often they took effect.
     pub fn end_faults(&mut self, now: Instant, location: Option<FaultLocation>) -> Vec<FaultReport> {
         self.record_action(now, Action::Clear(location));
-        self.advance(now, false);
+        self.simulate(now, false);
         let ended = self.faults.take_at(location).into_iter().map(|listed| self.end(listed)).collect();
         self.process(now, false);
         ended

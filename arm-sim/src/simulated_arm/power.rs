@@ -38,7 +38,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Switches the arm off and on at `now`. RAM and the bytes on the host line are lost; the flash stays.
     pub fn power_cycle(&mut self, now: Instant) {
         self.record_action(now, Action::PowerCycle);
-        self.advance(now, false);
+        self.simulate(now, false);
         self.bus.power_cycle(now);
         self.start_controller(now, 0);
     }
@@ -47,7 +47,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// servos keep power, torque and goals.
     pub fn restart_controller(&mut self, now: Instant) {
         self.record_action(now, Action::RestartController);
-        self.advance(now, false);
+        self.simulate(now, false);
         self.start_controller(now, fault::WATCHDOG_RESTART);
     }
 
@@ -59,7 +59,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     }
 
     fn halt(&mut self, now: Instant) {
-        self.advance(now, false);
+        self.simulate(now, false);
         self.is_halted = true;
         self.controller_due = Instant::FAR_FUTURE;
     }

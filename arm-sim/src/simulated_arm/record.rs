@@ -1,7 +1,6 @@
 //! What is recorded of an arm: see [`crate::session`].
 
 use alloc::boxed::Box;
-use alloc::vec::Vec;
 
 use protocol_core::time::Instant;
 
@@ -17,35 +16,29 @@ impl<F, B, C> SimulatedArm<F, B, C> {
         self.recorder = Slot::holding(Box::new(recorder));
     }
 
-    pub(super) fn record_sent(&mut self, idle_until: Instant, bytes: &[u8]) {
-        let now = self.now;
-        if let Some(recorder) = self.recorder.get() {
-            recorder.add(&Entry { now, idle_until, event: SessionEvent::Sent(bytes.to_vec()) });
-        }
+    pub(super) fn record_advance(&mut self, now: Instant, host_is_idle: bool) {
+        self.record(now, |_| SessionEvent::Advanced(host_is_idle));
     }
 
-    /// The host is idle now.
-    pub(super) fn record_idle(&mut self) {
-        let now = self.now;
-        if !self.is_host_idle
-            && let Some(recorder) = self.recorder.get()
-        {
-            recorder.add(&Entry { now, idle_until: now, event: SessionEvent::Idle });
-        }
+    pub(super) fn record_sent(&mut self, bytes: &[u8]) {
+        self.record(self.now, |_| SessionEvent::Sent(bytes.to_vec()));
     }
 
     pub(super) fn record_taken(&mut self, count: usize) {
-        let (now, idle_until) = (self.now, self.idle_until);
-        if let Some(recorder) = self.recorder.get() {
-            let bytes: Vec<u8> = self.to_host.arrived().iter().copied().take(count).collect();
-            recorder.add(&Entry { now, idle_until, event: SessionEvent::Taken(bytes) });
-        }
+        self.record(self.now, |arm| {
+            SessionEvent::Taken(arm.to_host.arrived().iter().copied().take(count).collect())
+        });
     }
 
     pub(super) fn record_action(&mut self, now: Instant, action: Action) {
-        let idle_until = self.idle_until;
-        if let Some(recorder) = self.recorder.get() {
-            recorder.add(&Entry { now, idle_until, event: SessionEvent::Acted(action) });
+        self.record(now, |_| SessionEvent::Acted(action));
+    }
+
+    fn record(&mut self, now: Instant, event: impl FnOnce(&Self) -> SessionEvent) {
+        if self.recorder.is_empty() {
+            return;
         }
+        let entry = Entry { now, event: event(self) };
+        self.recorder.get().into_iter().for_each(|recorder| recorder.add(&entry));
     }
 }

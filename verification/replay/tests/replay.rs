@@ -53,9 +53,9 @@ fn what_is_no_session_is_refused() {
     assert_eq!(Replay::run(""), Err(HeaderError::NoSession.into()));
     assert_eq!(Replay::run("7bot-session 2"), Err(HeaderError::NoSession.into()));
     assert_eq!(Replay::run(&header.replace("seed=1", "seed=x")), Err(HeaderError::Value("seed").into()));
-    for line in ["5", "5 0 >", "x 0 ~", "5 6 ~", "5 0 > zz", "5 0 ! jump", "5 0 ? 00"] {
+    for line in ["5", "5 >", "x ~", "5 > zz", "5 ! jump", "5 ? 00"] {
         let error = Replay::run(&format!("{header}\n{line}")).unwrap_err();
         assert!(matches!(error, ReplayError::Line { line: 3, .. }), "{line}: {error}");
     }
-    assert_eq!(Replay::run(&format!("{header}\n5 0 ~\n4 0 ~")), Err(ReplayError::Backwards { line: 4 }));
+    assert_eq!(Replay::run(&format!("{header}\n5 ~\n4 ~")), Err(ReplayError::Backwards { line: 4 }));
 }

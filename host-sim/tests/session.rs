@@ -1,0 +1,91 @@
+//! `--record` and `--replay`: a session in real time, replayed in virtual time.
+
+#![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
+
+#[allow(dead_code)] // Each test file uses a part of it.
+mod sim;
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use protocol_core::registers::map::{
+    DEVICE_ID, EEPROM_LOCK, FEEDBACK_FREQUENCY, PRESENT_POSITION, TARGET_POSITION,
+};
+use rustix::process::Signal;
+use sim::{Client, Sim, command};
+
+/// A client moves an arm with a bad servo, stores a setting, and asks while reports come. The power fails once.
+fn record(file: &Path, arguments: &[&str]) {
+    let common = ["--record", file.to_str().unwrap(), "--fault", "3=garbled=4", "--seed", "5"];
+    let mut sim = Sim::start(&[&common, arguments].concat());
+    let mut client = Client::open(sim.port());
+    client.write(EEPROM_LOCK.address, &[0]);
+    client.write(DEVICE_ID.address, &[42]);
+    client.write(FEEDBACK_FREQUENCY.address, &[50]);
+    client.write(TARGET_POSITION.address, &[120, 90, 65, 90, 90, 90, 0]);
+    for _ in 0..100 {
+        client.read(0, 61);
+    }
+    sim.signal(Signal::HUP);
+    client.read_until(DEVICE_ID.address, &[42]);
+    sim.signal(Signal::USR2);
+    client.write(TARGET_POSITION.address, &[100]);
+    client.read_until(PRESENT_POSITION.address, &[100]);
+    drop(client);
+    Client::open(sim.port()).read(DEVICE_ID.address, 1);
+    assert_eq!(sim.end_with(Signal::TERM), Some(0));
+}
+
+fn replay(file: &Path) -> Output {
+    let state = tempfile::tempdir().unwrap();
+    command(state.path(), &["--replay", file.to_str().unwrap()]).output().unwrap()
+}
+
+#[test]
+fn a_replay_of_a_recorded_session_is_equal() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = folder.path().join("settings.bin");
+    let settings = settings.to_str().unwrap();
+    for (number, arguments) in
+        [&["--eeprom", "none"][..], &["--eeprom", settings], &["--eeprom", settings, "--unpaced"]]
+            .iter()
+            .enumerate()
+    {
+        let file = folder.path().join(format!("{number}.session"));
+        record(&file, arguments);
+        let output = replay(&file);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{arguments:?}: {errors}");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(text.ends_with("lines replayed, all equal\n"), "{text}");
+    }
+}
+
+#[test]
+fn a_replay_that_differs_says_where_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("session");
+    record(&file, &["--eeprom", "none"]);
+    let text = fs::read_to_string(&file).unwrap();
+    // The file says that the arm answered something else.
+    let answer = text.find("< aa7703").unwrap();
+    let changed = format!("{}< aa7703ff{}", &text[..answer], &text[answer + 10..]);
+    fs::write(&file, changed).unwrap();
+    let output = replay(&file);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(errors.contains("byte 4 differs") && errors.contains("In the session this was '<- "), "{errors}");
+}
+
+#[test]
+fn what_cannot_be_replayed_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("missing");
+    let errors = sim::refused(&["--replay", missing.to_str().unwrap()]);
+    assert!(errors.contains("cannot read"), "{errors}");
+    let other = folder.path().join("other");
+    fs::write(&other, "not a session\n").unwrap();
+    let errors = sim::refused(&["--replay", other.to_str().unwrap()]);
+    assert!(errors.contains("does not begin with '7bot-session"), "{errors}");
+}
