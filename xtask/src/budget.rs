@@ -13,11 +13,14 @@ use torture::text_table::TextTable;
 
 /// The accepted increase over the committed value, in percent.
 const TOLERANCE: u64 = 5;
+/// The committed value of a figure that varies from run to run.
+const VARIES: &str = "varies";
 /// The first lines of each file of budgets.
 const INTRODUCTION: &str = "\
 # name | committed | at most
 # Less is better. `cargo xtask test` fails where a figure is more than 5 % above the one committed, or above the most
-# that it may be; `cargo xtask size --accept` and `cargo xtask count --accept` commit what they measure.
+# that it may be; `cargo xtask size --accept` and `cargo xtask count --accept` commit what they measure. A figure that
+# varies from run to run has a limit only.
 ";
 
 /// A measured or counted value.
@@ -35,7 +38,8 @@ impl Figure {
 /// A line of a file of budgets.
 struct Budget {
     name: String,
-    committed: u64,
+    /// `None`: the figure varies from run to run.
+    committed: Option<u64>,
     max: Option<u64>,
 }
 
@@ -44,17 +48,22 @@ impl Budget {
         let mut cells = line.split('|').map(str::trim);
         let (name, committed, max) = (cells.next()?, cells.next()?, cells.next()?);
         let max = if max == "-" { None } else { Some(max.parse().ok()?) };
-        Some(Self { name: name.to_owned(), committed: committed.parse().ok()?, max })
+        let committed = if committed == VARIES { None } else { Some(committed.parse().ok()?) };
+        // Something has to be compared.
+        committed.or(max)?;
+        Some(Self { name: name.to_owned(), committed, max })
+    }
+
+    fn committed_text(&self) -> String {
+        self.committed.map_or_else(|| VARIES.to_owned(), |committed| committed.to_string())
     }
 
     /// The violated limit, if any.
     fn violation(&self, value: u64) -> Option<String> {
-        let limit = self.committed + self.committed * TOLERANCE / 100;
-        match self.max {
-            Some(max) if value > max => Some(format!("the limit is {max}")),
-            _ if value > limit => {
-                Some(format!("was {}: the increase is above {TOLERANCE} %", self.committed))
-            }
+        let is_increase = |committed: &u64| value > committed + committed * TOLERANCE / 100;
+        match (self.max, self.committed.filter(is_increase)) {
+            (Some(max), _) if value > max => Some(format!("the limit is {max}")),
+            (_, Some(committed)) => Some(format!("was {committed}: the increase is above {TOLERANCE} %")),
             _ => None,
         }
     }
@@ -84,7 +93,7 @@ fn compare(budgets: &[Budget], figures: &[Figure]) -> Vec<String> {
             Some(budget) => budget.violation(figure.value),
             None => Some("has no budget".to_owned()),
         };
-        let committed = budget.map_or_else(String::new, |budget| budget.committed.to_string());
+        let committed = budget.map_or_else(String::new, Budget::committed_text);
         let max = budget.and_then(|budget| budget.max).map_or_else(String::new, |max| max.to_string());
         let mark = violation.as_ref().map_or_else(String::new, |violation| format!("   <-- {violation}"));
         table.add([figure.value.to_string(), committed, max, format!("{}{mark}", figure.name)]);
@@ -101,7 +110,10 @@ fn compare(budgets: &[Budget], figures: &[Figure]) -> Vec<String> {
 fn write(path: &PathBuf, budgets: &[Budget], figures: &[Figure]) -> TaskResult {
     let mut text = INTRODUCTION.to_owned();
     for Figure { name, value } in figures {
-        let max = budgets.iter().find(|budget| budget.name == *name).and_then(|budget| budget.max);
+        let budget = budgets.iter().find(|budget| budget.name == *name);
+        let varies = budget.is_some_and(|budget| budget.committed.is_none());
+        let value = if varies { VARIES.to_owned() } else { value.to_string() };
+        let max = budget.and_then(|budget| budget.max);
         let max = max.map_or_else(|| "-".to_owned(), |max| max.to_string());
         text.push_str(&format!("{name} | {value} | {max}\n"));
     }
@@ -129,6 +141,13 @@ mod tests {
     fn a_figure_above_its_limit_fails() {
         assert_eq!(budget().violation(20_500), None);
         assert!(budget().violation(20_501).is_some());
+    }
+
+    #[test]
+    fn a_figure_that_varies_has_a_limit_only() {
+        let varying = Budget::parse("load | varies | 100").expect("a line");
+        assert_eq!((varying.violation(100), varying.violation(101).is_some()), (None, true));
+        assert!(Budget::parse("load | varies | -").is_none());
     }
 
     #[test]
