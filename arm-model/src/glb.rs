@@ -15,6 +15,7 @@ use gltf::json::{self, Accessor, Buffer, Index, Node, Root, Scene};
 
 use crate::ABOUT;
 use crate::chain::{Axes, LINKS, Link};
+use crate::look::of_link;
 use crate::mesh::Mesh;
 
 /// glTF has y up, z forward and x to the left: a third of a turn about the diagonal.
@@ -69,7 +70,7 @@ impl File {
     }
 
     fn node(&mut self, link: &Link, children: Vec<Index<Node>>) -> Index<Node> {
-        let mesh = (!link.solids.is_empty()).then(|| self.mesh(link));
+        let mesh = of_link(link.name).map(|mesh| self.mesh(link, mesh));
         let origin = link.joint.map(|joint| joint.origin);
         self.root.push(Node {
             children: (!children.is_empty()).then_some(children),
@@ -80,8 +81,10 @@ impl File {
         })
     }
 
-    fn mesh(&mut self, link: &Link) -> Index<json::Mesh> {
-        let mesh = Mesh::of(link.solids);
+    fn mesh(&mut self, link: &Link, mut mesh: Mesh) -> Index<json::Mesh> {
+        for position in &mut mesh.positions {
+            *position = position.map(|millimetres| millimetres / 1000.0);
+        }
         let positions = self.accessor(&mesh.positions, Some(mesh.bounds()));
         let normals = self.accessor(&mesh.normals, None);
         let attributes =

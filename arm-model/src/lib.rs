@@ -2,28 +2,35 @@
 //!
 //! ```text
 //!   kinematics::geometry ──▶ chain: links and joints ──▶ urdf: a tree, the elbow by a mimic joint
-//!                                   │                └──▶ glb: nodes with meshes, in the standard pose
-//!                                   └── the same ────▶ mjcf: the parallelogram closed by an equality constraint
+//!                   │               │                └──▶ glb: nodes with meshes, in the standard pose
+//!                   │               └── the same ────▶ mjcf: the parallelogram closed by an equality constraint
+//!                   └──▶ look: meshes of the bodies; pose: where they are, for programs that draw the arm
 //! ```
 //!
 //! Lengths are metres and angles radians, axes as in REP-103: x forward, y to the left, z up. All angles of the joints
 //! are 0 in the straight pose: the arm forward, the rear arm upright, forearm and hand level. There all links have the
 //! axes of the base. [`joint_angles`] converts the degrees of the registers.
 //!
-//! Shapes are cylinders along the axes of the parts. They show the arm; their radii are not measured. Joint 7, the
-//! claw, moves no point, and the model has none.
+//! Shapes of URDF and MJCF are cylinders along the axes of the parts; those of glTF are the meshes of [`Body`]. They show
+//! the arm; what the kinematics does not name is not measured. Joint 7, the claw, moves no point, and the three models
+//! have none.
 
 #![forbid(unsafe_code)]
 
 mod chain;
 mod glb;
+mod look;
 mod mesh;
 mod mjcf;
+mod pose;
 mod urdf;
 mod xml;
 
 pub use glb::glb;
+pub use look::{BASE_HEIGHT, Body};
+pub use mesh::{Finish, Mesh};
 pub use mjcf::mjcf;
+pub use pose::{Pose, poses};
 pub use urdf::urdf;
 
 /// The angles of joints 1 to 6 in degrees, as the registers have them, at which all joints of the model are 0.

@@ -1,29 +1,90 @@
-//! Meshes of cylinders: triangles with normals.
+//! Triangles of simple solids: solids of revolution, and plates with a convex outline. Lengths are millimetres.
 
-use crate::chain::{Axes, Solid};
+use std::f64::consts::TAU;
 
-/// Sides of a cylinder.
-const SIDES: u32 = 24;
+use crate::chain::Axes;
 
-/// Triangles, three corners each. Each corner has a position and a normal.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Mesh {
-    pub(crate) positions: Vec<[f32; 3]>,
-    pub(crate) normals: Vec<[f32; 3]>,
+/// Sides of a full circle.
+const SIDES: u32 = 20;
+/// The width of the chamfer of all edges, in mm.
+const CHAMFER: f64 = 1.2;
+
+/// What a triangle shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Finish {
+    /// The structure.
+    Shell,
+    /// A servo or another dark part.
+    Dark,
+    /// A hub or another part that names the joint.
+    Accent,
 }
 
-impl Mesh {
-    /// All shapes of a link.
-    pub(crate) fn of(solids: &[Solid]) -> Self {
-        let mut mesh = Self::default();
-        for solid in solids {
-            mesh.add(solid);
+/// Triangles, three corners each. The vectors have the same length.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Position of each corner, in mm.
+    pub positions: Vec<[f32; 3]>,
+    /// Direction out of the solid at each corner, of length 1.
+    pub normals: Vec<[f32; 3]>,
+    /// Finish of each corner.
+    pub finishes: Vec<Finish>,
+}
+
+/// The axis of a solid of revolution, or the direction of a plate's thickness.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+impl Axis {
+    /// The two coordinates across the axis and the one along it, as x, y, z.
+    fn xyz(self, [u, v, w]: Axes) -> Axes {
+        match self {
+            Self::X => [w, u, v],
+            Self::Y => [v, w, u],
+            Self::Z => [u, v, w],
         }
-        mesh
     }
 
-    /// The smallest and the largest coordinates.
-    pub(crate) fn bounds(&self) -> [[f32; 3]; 2] {
+    /// The two coordinates across the axis, in the order of [`Axis::xyz`].
+    fn across(self, [x, y, z]: Axes) -> [f64; 2] {
+        match self {
+            Self::X => [y, z],
+            Self::Y => [z, x],
+            Self::Z => [x, y],
+        }
+    }
+}
+
+/// A point of an outline, and its direction out of the solid.
+#[derive(Clone, Copy, Debug)]
+struct OutlinePoint {
+    at: [f64; 2],
+    normal: [f64; 2],
+}
+
+impl OutlinePoint {
+    fn on_circle([u, v]: [f64; 2], radius: f64, side: u32) -> Self {
+        let (sine, cosine) = (f64::from(side) * TAU / f64::from(SIDES)).sin_cos();
+        Self { at: [u + radius * cosine, v + radius * sine], normal: [cosine, sine] }
+    }
+
+    fn inset(self, by: f64) -> [f64; 2] {
+        let ([u, v], [nu, nv]) = (self.at, self.normal);
+        [u - nu * by, v - nv * by]
+    }
+}
+
+/// A corner of a triangle: position and normal.
+type Corner = (Axes, Axes);
+
+impl Mesh {
+    /// The smallest and the largest coordinates, in mm.
+    #[must_use]
+    pub fn bounds(&self) -> [[f32; 3]; 2] {
         let extreme = |choose: fn(f32, f32) -> f32| {
             let choose =
                 |[x, y, z]: [f32; 3], &[u, v, w]: &[f32; 3]| [choose(x, u), choose(y, v), choose(z, w)];
@@ -33,33 +94,117 @@ impl Mesh {
         [extreme(f32::min), extreme(f32::max)]
     }
 
-    fn add(&mut self, solid: &Solid) {
-        let along = unit(minus(solid.to, solid.from));
-        let across = unit(cross(along, if along[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }));
-        let third = cross(along, across);
-        let spoke = |side: u32| {
-            let (sine, cosine) = (f64::from(side) * std::f64::consts::TAU / f64::from(SIDES)).sin_cos();
-            plus(scaled(across, cosine), scaled(third, sine))
-        };
-        for side in 0..SIDES {
-            let spokes = [spoke(side), spoke(side + 1)];
-            let rim = |end: Axes| spokes.map(|spoke| plus(end, scaled(spoke, solid.radius)));
-            let ([a, b], [c, d]) = (rim(solid.from), rim(solid.to));
-            let [one, other] = spokes;
-            self.triangle([(a, one), (b, other), (d, other)]);
-            self.triangle([(a, one), (d, other), (c, one)]);
-            let back = scaled(along, -1.0);
-            self.triangle([(solid.from, back), (b, back), (a, back)]);
-            self.triangle([(solid.to, along), (c, along), (d, along)]);
+    /// Adds a cylinder about a line along `axis` through `centre`, between two coordinates along the axis.
+    pub(crate) fn cylinder(&mut self, finish: Finish, axis: Axis, centre: Axes, radius: f64, ends: [f64; 2]) {
+        let ([low, high], rim) = (ends, radius - CHAMFER);
+        let profile = [
+            [0.0, low],
+            [rim, low],
+            [radius, low + CHAMFER],
+            [radius, high - CHAMFER],
+            [rim, high],
+            [0.0, high],
+        ];
+        self.revolved(finish, axis, centre, &profile);
+    }
+
+    /// Adds a solid of revolution about a line along `axis` through `centre`. The profile is points of radius and
+    /// coordinate along the axis, from the low end to the high one; it begins and ends on the axis.
+    pub(crate) fn revolved(&mut self, finish: Finish, axis: Axis, centre: Axes, profile: &[[f64; 2]]) {
+        let centre = axis.across(centre);
+        for pair in profile.windows(2) {
+            let &[[radius, low], [end_radius, high]] = pair else { continue };
+            let [along, out] = unit([end_radius - radius, high - low]);
+            for side in 0..SIDES {
+                let corner = |side, radius, w| {
+                    let OutlinePoint { at: [u, v], normal: [nu, nv] } =
+                        OutlinePoint::on_circle(centre, radius, side);
+                    (axis.xyz([u, v, w]), axis.xyz([nu * out, nv * out, -along]))
+                };
+                let (a, b) = (corner(side, radius, low), corner(side + 1, radius, low));
+                let (c, d) = (corner(side + 1, end_radius, high), corner(side, end_radius, high));
+                if radius > 0.0 {
+                    self.triangle(finish, [a, b, c]);
+                }
+                if end_radius > 0.0 {
+                    self.triangle(finish, [a, c, d]);
+                }
+            }
         }
     }
 
-    fn triangle(&mut self, corners: [(Axes, Axes); 3]) {
+    /// Adds a plate: the convex hull of circles (a point in the plane across `axis` and a radius), between two
+    /// coordinates along the axis. Radii are larger than the chamfer of 1.2 mm.
+    pub(crate) fn plate(&mut self, finish: Finish, axis: Axis, circles: &[(Axes, f64)], ends: [f64; 2]) {
+        let outline = hull(circles.iter().flat_map(|&(centre, radius)| {
+            let centre = axis.across(centre);
+            (0..SIDES).map(move |side| OutlinePoint::on_circle(centre, radius, side))
+        }));
+        let [low, high] = ends;
+        let (bottom, top) = ([CHAMFER, low], [CHAMFER, high]);
+        let (above, below) = ([0.0, low + CHAMFER], [0.0, high - CHAMFER]);
+        let Some(&first) = outline.first() else { return };
+        for (&one, &other) in outline.iter().zip(outline.iter().cycle().skip(1)) {
+            for (tilt, from, to) in [(-1.0, bottom, above), (0.0, above, below), (1.0, below, top)] {
+                let corner = |point: OutlinePoint, [inset, w]: [f64; 2]| {
+                    let ([u, v], [nu, nv], length) = (point.inset(inset), point.normal, 1.0_f64.hypot(tilt));
+                    (axis.xyz([u, v, w]), axis.xyz([nu / length, nv / length, tilt / length]))
+                };
+                self.triangle(finish, [corner(one, from), corner(other, from), corner(other, to)]);
+                self.triangle(finish, [corner(one, from), corner(other, to), corner(one, to)]);
+            }
+            let cap = |point: OutlinePoint, w, up| {
+                let [u, v] = point.inset(CHAMFER);
+                (axis.xyz([u, v, w]), axis.xyz([0.0, 0.0, up]))
+            };
+            self.triangle(finish, [first, one, other].map(|point| cap(point, high, 1.0)));
+            self.triangle(finish, [first, other, one].map(|point| cap(point, low, -1.0)));
+        }
+    }
+
+    fn triangle(&mut self, finish: Finish, corners: [Corner; 3]) {
         for (position, normal) in corners {
             self.positions.push(position.map(single));
             self.normals.push(normal.map(single));
+            self.finishes.push(finish);
         }
     }
+}
+
+/// The convex hull of points, anticlockwise (Andrew's monotone chain).
+fn hull(points: impl Iterator<Item = OutlinePoint>) -> Vec<OutlinePoint> {
+    let mut sorted: Vec<OutlinePoint> = points.collect();
+    sorted.sort_by(|one, other| one.at.partial_cmp(&other.at).unwrap_or(std::cmp::Ordering::Equal));
+    let mut lower = half_hull(sorted.iter().copied());
+    let upper = half_hull(sorted.iter().rev().copied());
+    lower.extend(upper);
+    lower
+}
+
+/// One side of the hull of sorted points, without the last point.
+fn half_hull(points: impl Iterator<Item = OutlinePoint>) -> Vec<OutlinePoint> {
+    let mut side: Vec<OutlinePoint> = Vec::new();
+    for point in points {
+        while let [.., before, last] = side.as_slice() {
+            if turn(before.at, last.at, point.at) > 1e-9 {
+                break;
+            }
+            side.pop();
+        }
+        side.push(point);
+    }
+    side.pop();
+    side
+}
+
+/// Twice the area of a triangle; positive if the points turn to the left.
+fn turn([a, b]: [f64; 2], [c, d]: [f64; 2], [e, f]: [f64; 2]) -> f64 {
+    (c - a) * (f - b) - (d - b) * (e - a)
+}
+
+fn unit([u, v]: [f64; 2]) -> [f64; 2] {
+    let length = u.hypot(v);
+    [u / length, v / length]
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rounds to the nearest f32, which glTF demands")]
@@ -67,47 +212,54 @@ fn single(value: f64) -> f32 {
     value as f32
 }
 
-fn plus([x, y, z]: Axes, [u, v, w]: Axes) -> Axes {
-    [x + u, y + v, z + w]
-}
-
-fn minus(one: Axes, other: Axes) -> Axes {
-    plus(one, scaled(other, -1.0))
-}
-
-fn scaled(axes: Axes, factor: f64) -> Axes {
-    axes.map(|component| component * factor)
-}
-
-fn cross([x, y, z]: Axes, [u, v, w]: Axes) -> Axes {
-    [y * w - z * v, z * u - x * w, x * v - y * u]
-}
-
-fn unit(axes: Axes) -> Axes {
-    let [x, y, z] = axes;
-    scaled(axes, 1.0 / x.hypot(y).hypot(z))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_cylinder_is_closed_and_faces_outward() {
-        let solid = Solid { from: [0.0; 3], to: [0.0, 0.0, 2.0], radius: 1.0 };
-        let mesh = Mesh::of(&[solid]);
-        assert_eq!(mesh.positions.len(), 24 * 4 * 3);
-        // The sum of the tetrahedra to the origin is the volume, if all triangles face outward.
-        let corner = |index: usize| mesh.positions[index].map(f64::from);
-        let volume: f64 = (0..mesh.positions.len() / 3)
-            .map(|triangle| {
-                let [a, b, c] = [0, 1, 2].map(|place| corner(triangle * 3 + place));
-                let [x, y, z] = cross(b, c);
-                (a[0] * x + a[1] * y + a[2] * z) / 6.0
+    /// The sum of the tetrahedra to the origin: the volume, if the solid is closed and all triangles face outward.
+    fn volume(mesh: &Mesh) -> f64 {
+        mesh.positions
+            .chunks(3)
+            .map(|corners| {
+                let [a, b, c] = [0, 1, 2].map(|place| corners[place].map(f64::from));
+                let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+                (a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2]) / 6.0
             })
-            .sum();
-        assert!((volume - std::f64::consts::TAU).abs() < 0.1, "{volume}");
-        let [low, high] = mesh.bounds();
-        assert!(low[2] == 0.0 && high[2] == 2.0 && low[0] < -0.99 && high[1] > 0.99);
+            .sum()
+    }
+
+    #[test]
+    fn solids_are_closed_and_face_outward() {
+        // The area of a polygon of 20 sides in a circle of radius 1.
+        let circle = 10.0 * (TAU / 20.0).sin();
+        for axis in [Axis::X, Axis::Y, Axis::Z] {
+            let mut cylinder = Mesh::default();
+            cylinder.cylinder(Finish::Shell, axis, [3.0, 4.0, 5.0], 30.0, [-10.0, 40.0]);
+            let full = circle * 900.0 * 50.0;
+            assert!((volume(&cylinder) / full - 1.0).abs() < 0.01, "{axis:?}: {}", volume(&cylinder));
+            let mut plate = Mesh::default();
+            let ends = [(axis.xyz([0.0, 0.0, 0.0]), 20.0), (axis.xyz([100.0, 0.0, 0.0]), 20.0)];
+            plate.plate(Finish::Dark, axis, &ends, [5.0, 35.0]);
+            let full = (circle * 400.0 + 4_000.0) * 30.0;
+            assert!((volume(&plate) / full - 1.0).abs() < 0.02, "{axis:?}: {} {full}", volume(&plate));
+        }
+    }
+
+    #[test]
+    fn normals_have_length_1_and_the_side_of_their_triangle() {
+        let mut mesh = Mesh::default();
+        mesh.cylinder(Finish::Accent, Axis::X, [0.0; 3], 10.0, [0.0, 9.0]);
+        mesh.plate(Finish::Shell, Axis::Y, &[([0.0; 3], 5.0), ([30.0, 0.0, 9.0], 8.0)], [2.0, 6.0]);
+        for (corners, normals) in mesh.positions.chunks(3).zip(mesh.normals.chunks(3)) {
+            let side = |to: usize| [0, 1, 2].map(|axis| corners[to][axis] - corners[0][axis]);
+            let (a, b) = (side(1), side(2));
+            let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+            for normal in normals {
+                let length: f32 = normal.iter().map(|part| part * part).sum();
+                assert!((length - 1.0).abs() < 1e-5, "{normal:?}");
+                let dot: f32 = cross.iter().zip(normal).map(|(one, other)| one * other).sum();
+                assert!(dot > -1e-6, "{corners:?} {normal:?}");
+            }
+        }
     }
 }
