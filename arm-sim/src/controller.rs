@@ -8,7 +8,7 @@ use protocol_core::settings::Storage;
 use protocol_core::time::{Duration, Instant};
 
 /// A controller without hardware: bytes in, bytes out, time as an argument. [`Controller`] describes the calls.
-pub trait ArmController: Debug {
+pub trait ArmController: Clone + Debug {
     /// A controller that is powered up at `now`, with the settings found in the storage.
     fn power_up(now: Instant, config: Config, stored: Option<&Image>, storage: Storage) -> Self;
 

@@ -37,6 +37,7 @@ mod deadlines;
 mod disturbance;
 mod power;
 mod record;
+mod snapshot;
 
 /// How long the controller waits for a servo's answer.
 const SERVO_TIMEOUT: Duration = Duration::from_millis(5);

@@ -113,9 +113,11 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
                     SIGNALS => {}
                     CLIENTS => self.clients.as_mut().map_or(Ok(()), Clients::update)?,
                     data @ CONTROL.. => self.poll_control(index(data - CONTROL), clock)?,
-                    number => self.poll_arm(index(number), now)?,
+                    number => self.poll_arm(index(number), clock.now())?,
                 }
             }
+            // A snapshot that was restored has another time.
+            let now = clock.now();
             self.wake_arms_with_news(now);
             for number in 0..self.arms.len() {
                 if self.arms.get(number).is_some_and(|entry| entry.due <= now) {
@@ -187,7 +189,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         let now = clock.now();
         let data = EventData::new_u64(CONTROL + u64::try_from(number).unwrap_or(u64::MAX));
         let execute = |line: &[u8]| {
-            arm.simulation_mut().advance(now, false);
+            arm.simulation_mut().advance(clock.now(), false);
             arm.log_ended_faults();
             match request::parse(line).and_then(|request| execute(arm, clock, request)) {
                 Ok(Outcome::Done(result)) => Reply::Line(request::line(Ok(result))),
@@ -196,7 +198,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
             }
         };
         if control.poll(&self.epoll, data, now, execute)? {
-            *due = now;
+            *due = clock.now();
         }
         Ok(())
     }

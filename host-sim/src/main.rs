@@ -229,6 +229,7 @@ fn run_arms<C: ArmController>(options: &Options, signals: &mut Signals) -> Resul
         Some(millis) => VirtualClock::in_lockstep(LOCKSTEP_START, Duration::from_millis(millis.into())),
     };
     let numbers = options.arms.map_or(vec![None], |count| (1..=count).map(Some).collect());
+    clock.set_shared(numbers.len() > 1);
     if numbers.len() > 1 {
         allow_as_many_files_as_possible();
     }

@@ -1,5 +1,6 @@
 //! An arm on a pseudo-terminal: passes bytes between a [`SimulatedArm`] and a [`Pty`].
 
+use std::collections::BTreeMap;
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::path::Path;
@@ -21,6 +22,11 @@ use tracing::{Span, error, info};
 use tty_ports::clients::Clients;
 use tty_ports::pty::Pty;
 
+mod snapshots;
+
+use snapshots::Snapshot;
+pub use snapshots::SnapshotError;
+
 /// Faults that ended by themselves, of which the reports are kept.
 const ENDED_FAULTS: usize = 16;
 
@@ -35,6 +41,8 @@ pub struct PtyArm<F, B = Plant, C = Controller> {
     span: Span,
     /// The last faults that ended by themselves.
     ended_faults: Vec<FaultReport>,
+    /// Copies of the arm, by name.
+    snapshots: BTreeMap<String, Snapshot<F, B, C>>,
 }
 
 impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
@@ -103,7 +111,14 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
     /// Connects an arm to a pseudo-terminal. Its log lines are in `span`.
     #[must_use]
     pub const fn new(simulation: SimulatedArm<F, B, C>, pty: Pty, span: Span) -> Self {
-        Self { simulation, pty, is_blocked: false, span, ended_faults: Vec::new() }
+        Self {
+            simulation,
+            pty,
+            is_blocked: false,
+            span,
+            ended_faults: Vec::new(),
+            snapshots: BTreeMap::new(),
+        }
     }
 
     /// Switches it off and on.

@@ -44,6 +44,8 @@ pub struct VirtualClock {
     /// Virtual time goes from event to event until then.
     advance_until: Instant,
     lockstep: Option<Lockstep>,
+    /// Several arms have this time.
+    is_shared: bool,
 }
 
 #[derive(Debug)]
@@ -64,6 +66,7 @@ impl Default for VirtualClock {
             is_paused: false,
             advance_until: Instant::ZERO,
             lockstep: None,
+            is_shared: false,
         }
     }
 }
@@ -168,6 +171,26 @@ impl VirtualClock {
         end
     }
 
+    /// Sets whether several arms have this time.
+    pub const fn set_shared(&mut self, is_shared: bool) {
+        self.is_shared = is_shared;
+    }
+
+    /// Do several arms have this time?
+    #[must_use]
+    pub const fn is_shared(&self) -> bool {
+        self.is_shared
+    }
+
+    /// Sets virtual time. An advance that has not ended goes on to its end.
+    pub fn set_now(&mut self, now: Instant) {
+        if self.advance_until <= self.now {
+            self.advance_until = Instant::ZERO;
+        }
+        self.now = now;
+        self.rest_nanos = 0;
+    }
+
     /// The speed; `None` if virtual time stands.
     #[must_use]
     pub const fn speed(&self) -> Option<Speed> {
@@ -268,6 +291,20 @@ mod tests {
         assert_eq!((clock.tick_at(at(990), at(100), false), clock.speed()), (at(70), None));
         clock.pause(false).unwrap();
         assert_eq!(clock.tick_at(at(995), at(100), false), at(75), "the pause is not made up for");
+    }
+
+    #[test]
+    fn time_can_be_set_back() {
+        let mut clock = VirtualClock::default();
+        clock.pause(true).unwrap();
+        clock.advance(Duration::from_millis(70));
+        clock.tick_at(at(10), at(100), false);
+        clock.set_now(at(20));
+        assert_eq!(clock.tick_at(at(11), at(100), false), at(20), "the advance was over");
+        clock.advance(Duration::from_millis(70));
+        clock.tick_at(at(12), at(30), false);
+        clock.set_now(at(5));
+        assert_eq!(clock.tick_at(at(13), at(100), false), at(90), "the advance goes on to its end");
     }
 
     #[test]

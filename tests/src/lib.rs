@@ -20,6 +20,7 @@ pub mod frames;
 pub mod process;
 pub mod programs;
 pub mod registers;
+pub mod simulator;
 pub mod started_arm;
 pub mod terminal;
 pub mod test_arm;

@@ -4,85 +4,17 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output};
+use std::path::Path;
 use std::time::Duration;
 
 use serde_json::{Value, json};
 use system_tests::process::{self, Signal};
-use system_tests::programs::{host_sim, tool};
+use system_tests::programs::tool;
 use system_tests::registers::{
     EFFECTOR_TYPE, MISSING_SERVOS, MOTOR_STATE, PRESENT_POSITION, TARGET_POSITION,
 };
-use system_tests::{ArmClient, wait};
-use tempfile::TempDir;
-
-/// A simulator, and its folder for everything.
-struct Simulator {
-    process: Child,
-    ports: Vec<PathBuf>,
-    folder: TempDir,
-}
-
-impl Simulator {
-    fn start(arguments: &[&str]) -> Self {
-        let folder = tempfile::tempdir().expect("a folder");
-        let mut command = Command::new(host_sim());
-        command.args(["--eeprom", "none"]).args(arguments).env("XDG_RUNTIME_DIR", folder.path());
-        let arms = arguments.iter().position(|&argument| argument == "--arms");
-        let count = arms.map_or(1, |index| arguments[index + 1].parse().expect("a number"));
-        let (process, ports) = process::start(&mut command, count).expect("host-sim starts");
-        Self { process, ports, folder }
-    }
-
-    fn client(&self) -> ArmClient {
-        ArmClient::open(&self.ports[0], 115_200)
-    }
-
-    /// The control sockets, in the order of their names.
-    fn sockets(&self) -> Vec<PathBuf> {
-        let entries = fs::read_dir(self.folder.path().join("7bot")).expect("the folder of the sockets");
-        let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
-        paths.sort();
-        paths
-    }
-
-    fn sim(&self, arguments: &[&str]) -> Output {
-        let mut tool = tool();
-        tool.env("XDG_RUNTIME_DIR", self.folder.path()).env_remove("SEVENBOT_PORT");
-        tool.arg("sim").args(arguments).output().expect("sevenbot runs")
-    }
-
-    /// What a command prints that succeeds.
-    #[track_caller]
-    fn says(&self, arguments: &[&str]) -> String {
-        let output = self.sim(arguments);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8(output.stdout).expect("text")
-    }
-
-    /// What a command prints that fails with this exit status.
-    #[track_caller]
-    fn refuses(&self, arguments: &[&str], status: i32) -> String {
-        let output = self.sim(arguments);
-        assert_eq!(output.status.code(), Some(status), "{}", String::from_utf8_lossy(&output.stdout));
-        String::from_utf8(output.stderr).expect("text")
-    }
-
-    fn state(&self) -> Value {
-        serde_json::from_str(&self.says(&["state", "--json"])).expect("JSON")
-    }
-
-    fn joint(&self, number: usize, key: &str) -> Value {
-        self.state()["joints"][number - 1][key].clone()
-    }
-}
-
-impl Drop for Simulator {
-    fn drop(&mut self) {
-        process::kill(&mut self.process);
-    }
-}
+use system_tests::simulator::Simulator;
+use system_tests::wait;
 
 /// A client of a control socket.
 struct Control(BufReader<UnixStream>);

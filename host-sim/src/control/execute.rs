@@ -50,6 +50,8 @@ pub fn execute<F: NorFlash + Clone, C: ArmController>(
             "the time is not from 1 to 86400000 ms",
             "use several requests for more than a day",
         )),
+        Request::Snapshot { name } => snapshot(arm, clock, name),
+        Request::Restore { name } => restore(arm, clock, &name),
         Request::State => Ok(with_speed(state::of(arm, clock.now()), clock)),
         request => change(arm, clock.now(), request),
     };
@@ -83,6 +85,47 @@ fn with_speed(mut value: Value, clock: &VirtualClock) -> Value {
         object.insert("speed".to_owned(), speed);
     }
     value
+}
+
+fn snapshot<F: NorFlash + Clone, C: ArmController>(
+    arm: &mut PtyArm<F, Plant, C>,
+    clock: &VirtualClock,
+    name: String,
+) -> Result<Value, Refusal> {
+    can_go_back(arm, clock)?;
+    let answer = json!({ "snapshot": name, "time_us": clock.now().as_micros() });
+    arm.keep_snapshot(name).map_err(|error| Refusal::new(&error, error.hint()))?;
+    Ok(answer)
+}
+
+fn restore<F: NorFlash + Clone, C: ArmController>(
+    arm: &mut PtyArm<F, Plant, C>,
+    clock: &mut VirtualClock,
+    name: &str,
+) -> Result<Value, Refusal> {
+    can_go_back(arm, clock)?;
+    clock.set_now(arm.restore_snapshot(name).map_err(|error| Refusal::new(&error, error.hint()))?);
+    Ok(json!({ "snapshot": name, "time_us": clock.now().as_micros() }))
+}
+
+/// Refuses if virtual time cannot go back.
+fn can_go_back<F: NorFlash + Clone, C: ArmController>(
+    arm: &mut PtyArm<F, Plant, C>,
+    clock: &VirtualClock,
+) -> Result<(), Refusal> {
+    if clock.is_shared() {
+        return Err(Refusal::new(
+            "several arms have the same virtual time, because host-sim runs with --arms",
+            "only a simulator of one arm has snapshots",
+        ));
+    }
+    if arm.simulation_mut().is_recorded() {
+        return Err(Refusal::new(
+            "a recorded session cannot go back in time",
+            "only host-sim without --record has snapshots",
+        ));
+    }
+    Ok(())
 }
 
 /// Executes a request that changes the arm, or lists its faults, at `now`.

@@ -56,6 +56,16 @@ pub enum Request {
         /// The factor or `max`.
         factor: SpeedFactor,
     },
+    /// Keeps a copy of the arm and of virtual time.
+    Snapshot {
+        /// The name of the copy.
+        name: String,
+    },
+    /// Sets the arm and virtual time back to a copy.
+    Restore {
+        /// The name of the copy.
+        name: String,
+    },
     /// Asks for the state of the arm.
     State,
 }
@@ -170,6 +180,7 @@ mod tests {
             (r#"{"do":"advance","ms":250}"#, Request::Advance { ms: 250 }),
             (r#"{"do":"speed","factor":50}"#, Request::Speed { factor: SpeedFactor::Times(50.0) }),
             (r#"{"do":"speed","factor":"max"}"#, Request::Speed { factor: SpeedFactor::Max(MaxSpeed::Max) }),
+            (r#"{"do":"restore","name":"a b"}"#, Request::Restore { name: "a b".to_owned() }),
             (r#"{"do":"power","to":"cycle"}"#, Request::Power { to: Power::Cycle }),
             (
                 r#" {"do":"fault","fault":"3=missing","for_ms":2000} "#,
@@ -185,6 +196,7 @@ mod tests {
             r#"{"do":"stat"}"#,
             r#"{"do":"weight","grams":-1}"#,
             r#"{"do":"weight","gram":1}"#,
+            r#"{"do":"snapshot"}"#,
         ] {
             assert!(parse(wrong.as_bytes()).is_err(), "{wrong}");
         }

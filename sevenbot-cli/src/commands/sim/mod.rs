@@ -29,6 +29,7 @@ Examples:
   sevenbot sim weight 150g                     a weight in the gripper
   sevenbot sim power cycle                     off and on
   sevenbot sim speed 50                        virtual time; also max, pause, resume, advance 250ms
+  sevenbot sim snapshot before                 keeps a copy of the arm; `restore before` returns to it
   sevenbot sim state                           the true angles, whatever the arm says
 
 Without --control the only simulator that is running is used, or the one whose port is --port. host-sim
@@ -63,6 +64,10 @@ enum SimCommand {
     Resume,
     Advance(AdvanceArgs),
     Speed(SpeedArgs),
+    /// Keep a copy of the arm and of virtual time, until the simulator ends.
+    Snapshot(SnapshotArgs),
+    /// Set the arm and virtual time back to a copy: registers, settings, motion, faults, bytes on the host line.
+    Restore(SnapshotArgs),
     /// Show the true state of the arm: angles, torque, loads, supply and faults.
     State,
 }
@@ -157,6 +162,12 @@ struct SpeedArgs {
     factor: Value,
 }
 
+#[derive(Debug, Args)]
+struct SnapshotArgs {
+    /// Name of the copy, up to 64 characters. A new snapshot replaces one of the same name.
+    name: String,
+}
+
 #[derive(Clone, Copy, Debug, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 enum PowerState {
@@ -225,6 +236,7 @@ impl Printable for Answer<'_> {
             SimCommand::Fault(args) => text::faults(out, &args.action, &self.value),
             SimCommand::Hand(args) => text::hand(out, args.joint, &self.value),
             SimCommand::State => text::state(out, &self.value),
+            SimCommand::Snapshot(_) | SimCommand::Restore(_) => text::snapshot(out, &self.value),
             SimCommand::Pause | SimCommand::Resume | SimCommand::Advance(_) | SimCommand::Speed(_) => {
                 text::time(out, &self.value)
             }
@@ -258,6 +270,8 @@ fn request(command: &SimCommand) -> Result<Value, CommandError> {
         SimCommand::Resume => json!({ "do": "resume" }),
         SimCommand::Advance(AdvanceArgs { time }) => json!({ "do": "advance", "ms": time }),
         SimCommand::Speed(SpeedArgs { factor }) => json!({ "do": "speed", "factor": factor }),
+        SimCommand::Snapshot(SnapshotArgs { name }) => json!({ "do": "snapshot", "name": name }),
+        SimCommand::Restore(SnapshotArgs { name }) => json!({ "do": "restore", "name": name }),
         SimCommand::State => json!({ "do": "state" }),
     })
 }

@@ -57,6 +57,11 @@ pub(super) fn hand(out: &mut dyn Write, joint: u8, value: &Value) -> io::Result<
     writeln!(out)
 }
 
+/// The answer to a snapshot, or to its restoration.
+pub(super) fn snapshot(out: &mut dyn Write, value: &Value) -> io::Result<()> {
+    writeln!(out, "snapshot    {} at {:.3} s", string(value, "snapshot"), number(value, "time_us") / 1e6)
+}
+
 /// The virtual time, and its speed if the answer has it.
 pub(super) fn time(out: &mut dyn Write, value: &Value) -> io::Result<()> {
     writeln!(out, "time        {:.3} s{}", number(value, "time_us") / 1e6, speed(value))
