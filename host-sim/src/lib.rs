@@ -32,5 +32,6 @@ pub mod servo_socket;
 pub mod servos_only;
 pub mod session_file;
 pub mod signals;
+pub mod snapshots;
 pub mod trace;
 pub mod virtual_clock;

@@ -1,6 +1,5 @@
 //! An arm on a pseudo-terminal: passes bytes between a [`SimulatedArm`] and a [`Pty`].
 
-use std::collections::BTreeMap;
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::path::Path;
@@ -12,20 +11,16 @@ use arm_sim::pace;
 use arm_sim::plant::Plant;
 use arm_sim::servo_bus::ServoBus;
 use arm_sim::simulated_arm::SimulatedArm;
-use embedded_storage::nor_flash::NorFlash;
+use embedded_storage::nor_flash::{NorFlash, NorFlashError};
 use motion_core::Controller;
 use protocol_core::time::Instant;
 use rustix::event::PollFlags;
 use rustix::event::epoll::EventFlags;
 use tracing::{Span, error, info};
 
+use crate::snapshots::{SnapshotError, Snapshots};
 use tty_ports::clients::Clients;
 use tty_ports::pty::Pty;
-
-mod snapshots;
-
-use snapshots::Snapshot;
-pub use snapshots::SnapshotError;
 
 /// Faults that ended by themselves, of which the reports are kept.
 const ENDED_FAULTS: usize = 16;
@@ -42,7 +37,14 @@ pub struct PtyArm<F, B = Plant, C = Controller> {
     /// The last faults that ended by themselves.
     ended_faults: Vec<FaultReport>,
     /// Copies of the arm, by name.
-    snapshots: BTreeMap<String, Snapshot<F, B, C>>,
+    snapshots: Snapshots<Snapshot<F, B, C>>,
+}
+
+/// A copy of an arm.
+#[derive(Debug)]
+struct Snapshot<F, B, C> {
+    simulation: SimulatedArm<F, B, C>,
+    ended_faults: Vec<FaultReport>,
 }
 
 impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
@@ -100,6 +102,27 @@ impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
         &self.ended_faults
     }
 
+    /// Keeps a copy of the arm. It replaces one of the same name.
+    ///
+    /// # Errors
+    /// The name is wrong, or there are too many others.
+    pub fn keep_snapshot(&mut self, name: String) -> Result<(), SnapshotError> {
+        let (simulation, ended_faults) = (self.simulation.clone(), self.ended_faults.clone());
+        self.snapshots.keep(name, Snapshot { simulation, ended_faults })
+    }
+
+    /// Sets the arm back to a copy. Returns the time of the copy.
+    ///
+    /// # Errors
+    /// There is no such copy, or its settings cannot be written.
+    pub fn restore_snapshot(&mut self, name: &str) -> Result<Instant, SnapshotError> {
+        let snapshot = self.snapshots.get(name)?;
+        let restored = self.simulation.restore(&snapshot.simulation);
+        restored.map_err(|error| SnapshotError::Settings(error.kind()))?;
+        self.ended_faults.clone_from(&snapshot.ended_faults);
+        Ok(self.simulation.now())
+    }
+
     /// The path of the port.
     #[must_use]
     pub fn port(&self) -> &Path {
@@ -117,7 +140,7 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
             is_blocked: false,
             span,
             ended_faults: Vec::new(),
-            snapshots: BTreeMap::new(),
+            snapshots: Snapshots::new(),
         }
     }
 

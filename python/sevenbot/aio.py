@@ -9,13 +9,13 @@ One thread of each arm waits for its calls, so that they run in order. A cancell
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterable, Awaitable, Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 import sevenbot
 
-__all__ = ["Arm"]
+__all__ = ["Arm", "Stream"]
 
 _Result = TypeVar("_Result")
 
@@ -106,6 +106,12 @@ class Arm:
         """As `sevenbot.Arm.sample`."""
         return self._call(self.sync.sample, count, **options)
 
+    def stream(
+        self, period: float = 0.02, *, watchdog: float = 0.3, damping: bool = False
+    ) -> Stream:
+        """As `sevenbot.Arm.stream`: `async with arm.stream(0.02) as stream: await stream.send(...)`."""
+        return Stream(self, self.sync.stream(period, watchdog=watchdog, damping=damping))
+
     async def stop(self) -> list[int]:
         """As `sevenbot.Arm.stop`: does not wait for the call before it, but interrupts it."""
         return await asyncio.to_thread(self.sync.stop)
@@ -122,3 +128,41 @@ class Arm:
         """Stops what moves, and closes the port."""
         await self._call(self.sync.__exit__, *exception)
         self._thread.shutdown(wait=False)
+
+
+class Stream:
+    """As `sevenbot.Stream`, a context manager of `async with`."""
+
+    def __init__(self, arm: Arm, stream: sevenbot.Stream) -> None:
+        """A stream of this arm; `Arm.stream` makes it."""
+        self._arm = arm
+        self.sync = stream
+
+    async def __aenter__(self) -> Stream:
+        await self._arm._call(self.sync.__enter__)
+        return self
+
+    async def __aexit__(self, *exception: Any) -> None:
+        await self._arm._call(self.sync.__exit__, *exception)
+
+    def send(self, angles: Sequence[float | None]) -> Awaitable[int]:
+        """As `sevenbot.Stream.send`: waits until the point is due, and returns its number."""
+        return self._arm._call(self.sync.send, angles)
+
+    async def send_all(
+        self, points: AsyncIterable[Sequence[float | None]] | Iterable[Sequence[float | None]]
+    ) -> int:
+        """Sends each point of an iterator, or of an asynchronous one. Returns how many it sent.
+
+        If the next point takes longer than the watchdog's time, the arm holds.
+        """
+        count = 0
+        if isinstance(points, AsyncIterable):
+            async for point in points:
+                await self.send(point)
+                count += 1
+        else:
+            for point in points:
+                await self.send(point)
+                count += 1
+        return count

@@ -2,17 +2,16 @@
 
 use std::sync::{Arc, Mutex};
 
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyTuple, PyType};
 use sevenbot::cartesian::{DOWN, TipTarget, Vector};
-use sevenbot::fine::FineTargets;
-use sevenbot::moves::JointMove;
+use sevenbot::moves::{JointMove, TipMove};
 use sevenbot::simulated::{self, SharedSimulation, SimulationConfig};
-use sevenbot::{ArmOptions, FineAngle, Map, MoveTime, Speed};
 
-use crate::errors::{OutOfReach, error, not_opened, raised};
-use crate::motion::{self, Pace, RecordOptions};
+use crate::arguments::{Goals, options, pace};
+use crate::errors::{not_opened, raised};
+use crate::motion::{self, RecordOptions};
 use crate::recording::Recording;
 use crate::registers::{self, Registers, Shown, Values};
 use crate::simulation::{Simulation, duration};
@@ -21,6 +20,8 @@ use crate::stream::Stream;
 use crate::tip::Tip;
 use crate::worker::{Worker, lock};
 use crate::{bulk, ports};
+
+mod calls;
 
 /// Seven angles.
 type Angles = (f64, f64, f64, f64, f64, f64, f64);
@@ -41,74 +42,6 @@ pub(crate) struct Arm {
     firmware: String,
     chip: String,
     map: &'static str,
-}
-
-impl Arm {
-    fn of(arm: sevenbot::Arm, simulation: Option<SharedSimulation>) -> Self {
-        let (port, map) = (arm.port().to_owned(), arm.map().version());
-        let (firmware, chip) = (arm.identity().version(), arm.identity().chip_name());
-        Self { worker: Worker::start(arm), simulation, sent: Mutex::new(None), port, firmware, chip, map }
-    }
-
-    pub(crate) const fn worker(&self) -> &Worker {
-        &self.worker
-    }
-
-    /// Starts a move, and waits for it.
-    fn go(&self, py: Python<'_>, targets: FineTargets, pace: Pace, wait: bool) -> PyResult<Option<Angles>> {
-        let sent = self.worker.call(py, move |arm, _| motion::begin(arm, targets, pace))?;
-        *lock(&self.sent) = Some(Arc::new(raised(py, sent)?));
-        if wait { self.wait(py) } else { Ok(None) }
-    }
-}
-
-/// Angles of a pose: a number for each joint, or `None` for a joint that stays.
-#[derive(FromPyObject)]
-pub(crate) struct Goals([Option<f64>; 7]);
-
-impl Goals {
-    /// As the library takes them.
-    pub(crate) fn targets(&self) -> PyResult<FineTargets> {
-        let mut targets = [None; 7];
-        for ((target, goal), number) in targets.iter_mut().zip(self.0).zip(1..) {
-            let Some(degrees) = goal else { continue };
-            let angle = FineAngle::from_degrees(degrees);
-            *target = Some(angle.ok_or_else(|| {
-                PyValueError::new_err(format!(
-                    "joint {number}: {degrees} is out of range: use 0 to 180 degrees"
-                ))
-            })?);
-        }
-        Ok(targets)
-    }
-}
-
-/// Speed in degrees/s, in steps of 1.9; duration in seconds, in steps of 0.1.
-fn pace(speed: Option<f64>, duration: Option<f64>) -> PyResult<Pace> {
-    if speed.is_some() && duration.is_some() {
-        return Err(PyTypeError::new_err("give a speed or a duration, not both"));
-    }
-    let wrong = |text: &str| PyValueError::new_err(text.to_owned());
-    let speed = speed.map(|speed| {
-        let found =
-            (1..=100).filter_map(Speed::from_steps).rfind(|step| step.degrees_per_second() <= speed + 0.05);
-        found.filter(|_| speed <= 190.05).ok_or_else(|| wrong("use a speed of 1.9 to 190 degrees per second"))
-    });
-    let time = duration.map(|duration| {
-        let found = (1..=100)
-            .filter_map(MoveTime::from_steps)
-            .find(|step| step.duration().as_secs_f64() >= duration - 0.001);
-        found.filter(|_| duration > 0.0).ok_or_else(|| wrong("use a duration of 0.1 to 10 seconds"))
-    });
-    Ok(Pace { speed: speed.transpose()?, time: time.transpose()? })
-}
-
-fn options(baud: u32, timeout: f64, attempts: u32, map: Option<&str>) -> PyResult<ArmOptions> {
-    let wanted = |version: &str| {
-        let found = Map::ALL.into_iter().find(|map| map.version() == version);
-        found.ok_or_else(|| PyValueError::new_err(format!("map {version}: use \"2.1\" or \"2.2\"")))
-    };
-    Ok(ArmOptions { baud, reply_timeout: duration(timeout)?, attempts, map: map.map(wanted).transpose()? })
 }
 
 #[pymethods]
@@ -233,14 +166,7 @@ impl Arm {
         duration: Option<f64>,
         wait: bool,
     ) -> PyResult<Option<Angles>> {
-        let goals: Goals = match angles.len() {
-            1 => angles.get_item(0)?.extract()?,
-            7 => Goals(angles.extract::<[Option<f64>; 7]>()?),
-            other => {
-                return Err(PyTypeError::new_err(format!("{other} angles: use seven, or a list of seven")));
-            }
-        };
-        self.go(py, goals.targets()?, pace(speed, duration)?, wait)
+        self.go(py, Goals::of(angles)?.targets()?, pace(speed, duration)?, wait)
     }
 
     /// Moves the tip to x, y, z in millimetres, with the tool in a direction of any length, by default straight down.
@@ -269,8 +195,8 @@ impl Arm {
             return self.move_straight(py, tip, tool, speed.unwrap_or(50.0)).map(Some);
         }
         let pace = pace(speed, duration)?;
-        let targets = self.worker.call(py, move |arm, _| motion::tip_targets(arm, &target, tip, tool))?;
-        self.go(py, raised(py, targets)?, pace, wait)
+        let planned = self.worker.call(py, move |arm, _| TipMove::of(arm, &target, tip, tool))?;
+        self.go(py, raised(py, planned)?.targets, pace, wait)
     }
 
     /// Waits until the joints of the last move have arrived, and returns the measured angles.
@@ -391,27 +317,5 @@ impl Arm {
     fn __repr__(&self) -> String {
         let state = if self.worker.is_open() { "" } else { ", closed" };
         format!("<Arm at {}, firmware {}, map {}{state}>", self.port, self.firmware, self.map)
-    }
-}
-
-impl Arm {
-    fn move_straight(&self, py: Python<'_>, tip: Vector, tool: Vector, speed: f64) -> PyResult<Angles> {
-        let work = move |arm: &mut _, _: &mut _| motion::straight_line(arm, tip, tool, speed);
-        let planned = raised(py, self.worker.call(py, work)?)?;
-        let line = planned.map_err(|why| error::<OutOfReach>(py, &why, &[]))?;
-        self.play_moments(py, line, 1.0, 1)?;
-        self.angles(py)
-    }
-
-    fn play_moments(
-        &self,
-        py: Python<'_>,
-        moments: sevenbot::recording::Recording,
-        speed: f64,
-        times: u32,
-    ) -> PyResult<Recording> {
-        let work = move |arm: &mut _, watch: &mut _| motion::play(arm, &moments, speed, times, watch);
-        let measured = raised(py, self.worker.call(py, work)?)?;
-        Recording::parse(py, &measured)
     }
 }

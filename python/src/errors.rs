@@ -4,10 +4,10 @@ use pyo3::exceptions::{PyException, PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::type_object::PyTypeInfo;
 use pyo3::types::PyTuple;
-use sevenbot::cartesian::Unreachable;
+use sevenbot::cartesian::{StraightLineError, Unreachable};
 use sevenbot::checked_write::{MismatchCause, WriteMismatch, reasons};
 use sevenbot::hold::HoldError;
-use sevenbot::moves::MoveError;
+use sevenbot::moves::{LineStartError, MoveError};
 use sevenbot::names::NameError;
 use sevenbot::recording::RecordingError;
 use sevenbot::register_values::ValueError;
@@ -143,6 +143,31 @@ impl Raise for Unreachable {
             .other_tool
             .map(|tool| format!("with tool=({}, {}, {}) the tip reaches this point", tool.x, tool.y, tool.z));
         error::<OutOfReach>(py, &self.to_string(), &hint.into_iter().collect::<Vec<_>>())
+    }
+}
+
+/// Why a straight line does not begin.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum StraightMoveError {
+    #[error(transparent)]
+    Move(#[from] MoveError),
+    #[error(transparent)]
+    Start(#[from] LineStartError),
+    #[error(transparent)]
+    Line(#[from] StraightLineError),
+}
+
+impl Raise for StraightMoveError {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::Move(error) => error.raise(py),
+            Self::Start(LineStartError::Exchange(error)) => error.raise(py),
+            Self::Start(LineStartError::Unknown { .. }) => {
+                let hint = "`arm.stop()` sets the targets to the positions".to_owned();
+                error::<NotReached>(py, &self.to_string(), &[hint])
+            }
+            Self::Line(_) => error::<OutOfReach>(py, &self.to_string(), &[]),
+        }
     }
 }
 

@@ -12,6 +12,7 @@
 
 use pyo3::prelude::*;
 
+mod arguments;
 mod arm;
 mod bulk;
 mod errors;

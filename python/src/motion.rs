@@ -2,25 +2,18 @@
 
 use std::time::Duration;
 
-use sevenbot::cartesian::{StraightLine, StraightLineRequest, TargetResolution, TipTarget, Vector};
+use sevenbot::cartesian::{StraightLine, Vector};
 use sevenbot::fine::FineTargets;
-use sevenbot::joints::frames_for;
-use sevenbot::map::{FINE_POSITION, MOTOR_STATE, SPEED, TIME, VACUUM_PUMP, motor_state};
-use sevenbot::moves::{JointMove, MoveError, Observer, Player, Recorder};
+use sevenbot::map::{FINE_POSITION, MOTOR_STATE, VACUUM_PUMP, motor_state};
+use sevenbot::moves::{JointMove, LineStart, MoveError, Observer, Pace, Player, Recorder};
 use sevenbot::recording::{FileVersion, Moment, Recording, head};
-use sevenbot::{Angle, Arm, Error, FineAngle, MoveTime, Span, Speed};
+use sevenbot::{Arm, Error, FineAngle, Span};
 
+use crate::errors::StraightMoveError;
 use crate::worker::Watch;
 
 /// The longest time between two questions whether the call goes on.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
-
-/// How fast a move is.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Pace {
-    pub(crate) speed: Option<Speed>,
-    pub(crate) time: Option<MoveTime>,
-}
 
 /// The measured angles in degrees, as exact as the arm has them.
 pub(crate) fn angles(arm: &mut Arm) -> Result<[f64; 7], Error> {
@@ -34,7 +27,7 @@ pub(crate) fn angles(arm: &mut Arm) -> Result<[f64; 7], Error> {
 /// Starts a move, as the command `pose` does.
 pub(crate) fn begin(arm: &mut Arm, targets: FineTargets, pace: Pace) -> Result<JointMove, MoveError> {
     arm.driven_joints()?;
-    set_pace(arm, &targets, pace)?;
+    pace.set(arm, &targets)?;
     JointMove::begin_fine(arm, targets)
 }
 
@@ -48,34 +41,8 @@ pub(crate) fn finish(arm: &mut Arm, sent: &JointMove, watch: &mut Watch) -> Resu
     Ok(angles(arm)?)
 }
 
-fn set_pace(arm: &mut Arm, targets: &FineTargets, pace: Pace) -> Result<(), MoveError> {
-    let for_targets = |steps: u8| targets.map(|target| target.map(|_| steps));
-    // A duration applies where the speed is the maximum (D11).
-    let speed = pace.speed.or(pace.time.map(|_| Speed::MAXIMUM));
-    let speeds = speed.map(|speed| frames_for(&SPEED, &for_targets(speed.steps())));
-    let times = pace.time.map(|time| frames_for(&TIME, &for_targets(time.steps())));
-    let frames: Vec<_> = speeds.into_iter().chain(times).flatten().collect();
-    if frames.is_empty() {
-        return Ok(());
-    }
-    all_taken(arm.write_all_checked(&frames)?)
-}
-
 fn all_taken(unchanged: Vec<sevenbot::checked_write::WriteMismatch>) -> Result<(), MoveError> {
     if unchanged.is_empty() { Ok(()) } else { Err(MoveError::NotTaken(unchanged)) }
-}
-
-/// The targets of joints 1 to 5, as exact as the arm takes them.
-pub(crate) fn tip_targets(
-    arm: &mut Arm,
-    target: &TipTarget,
-    tip: Vector,
-    tool: Vector,
-) -> Result<FineTargets, Error> {
-    let fine = if arm.has_extended_block()? { target.in_hundredths(tip, tool) } else { None };
-    let whole = target.degrees.map(|degrees| Angle::from_register(degrees).into());
-    let [t1, t2, t3, t4, t5] = fine.map_or(whole, |fine| fine.angles).map(Some);
-    Ok([t1, t2, t3, t4, t5, None, None])
 }
 
 /// A straight line from the present targets, as a recording.
@@ -84,18 +51,10 @@ pub(crate) fn straight_line(
     tip: Vector,
     tool: Vector,
     speed: f64,
-) -> Result<Result<Recording, String>, MoveError> {
+) -> Result<Recording, StraightMoveError> {
     let joints = arm.driven_joints()?;
-    let (resolution, start) = match arm.has_extended_block()? {
-        true => (TargetResolution::Hundredths, arm.fine_targets()?),
-        false => {
-            let whole = joints.targets().map(|degrees| FineAngle::from(Angle::from_register(degrees)));
-            (TargetResolution::Degrees, whole)
-        }
-    };
-    let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
-    let request = StraightLineRequest { start, resolution, vacuum, tip, tool, speed };
-    Ok(StraightLine::plan(&request).map(|line| line.recording).map_err(|why| why.to_string()))
+    let request = LineStart::of(arm, &joints)?.line_to(tip, tool, speed);
+    Ok(StraightLine::plan(&request)?.recording)
 }
 
 /// Waits on the clock of the arm's line.

@@ -2,7 +2,7 @@
 
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use sevenbot::map::EEPROM_LOCK;
+use sevenbot::map::{EEPROM_LOCK, FINE_TARGET, TARGET_POSITION};
 use sevenbot::names::{name_of, parse};
 use sevenbot::register_text::{RegisterEntry, entries};
 use sevenbot::register_values::bytes;
@@ -63,6 +63,9 @@ pub(crate) fn set(py: Python<'_>, arm: &Arm, name: &str, values: &Values, unlock
         return Err(error::<NotServed>(py, &message, &[]));
     }
     let written = arm.worker().call(py, move |arm, _| {
+        if span.addresses().any(|address| TARGET_POSITION.holds(address) || FINE_TARGET.holds(address)) {
+            arm.end_abandoned_stream()?;
+        }
         let mut unchanged = Vec::new();
         if unlock {
             unchanged.extend(arm.write_checked(EEPROM_LOCK.address, &[0])?);

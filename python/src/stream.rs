@@ -7,7 +7,8 @@ use pyo3::prelude::*;
 use sevenbot::moves::{MoveError, Observer};
 use sevenbot::stream::{StreamOptions, WatchdogAction};
 
-use crate::arm::{Arm, Goals};
+use crate::arguments::Goals;
+use crate::arm::Arm;
 use crate::errors::raised;
 
 /// The longest time between two frames while a point is not due yet: a watchdog of 10 ms needs more than this.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
 
 import pytest
 
@@ -61,5 +62,46 @@ def test_a_cancelled_call_makes_the_arm_hold() -> None:
             with pytest.raises(asyncio.CancelledError):
                 await task
             assert await arm.get("target-position.1") == pytest.approx(90, abs=2)
+
+    asyncio.run(run())
+
+
+async def ramp(to: float) -> AsyncIterator[list[float | None]]:
+    for step in range(50):
+        await asyncio.sleep(0)
+        yield [90 + (to - 90) * step / 49, None, None, None, None, None, None]
+
+
+def test_an_asynchronous_producer_is_streamed() -> None:
+    async def run() -> None:
+        async with aio.Arm.simulated() as arm:
+            await arm.sleep(1)
+            async with arm.stream(0.02) as stream:
+                assert await stream.send_all(ramp(100)) == 50
+                number = await stream.send([100, None, None, None, None, None, None])
+                assert await stream.send_all([[100, *[None] * 6]] * 20) == 20
+                assert number == 50 and stream.sync.period == 0.02
+            assert (await arm.angles())[0] == pytest.approx(100, abs=1)
+            assert await arm.get("set-point-period") == 0
+
+    asyncio.run(run())
+
+
+def test_a_cancelled_stream_holds_and_ends() -> None:
+    async def forever(arm: aio.Arm) -> None:
+        async with arm.stream(0.02) as stream:
+            while True:
+                await stream.send([None] * 7)
+
+    async def run() -> None:
+        async with aio.Arm.simulated() as arm:
+            await arm.sleep(1)
+            task = asyncio.create_task(forever(arm))
+            while await arm.get("set-point-period") != 20:
+                await asyncio.sleep(0)
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await task
+            assert await arm.get("set-point-period") == 0
 
     asyncio.run(run())

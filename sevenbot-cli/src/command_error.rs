@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use sevenbot::moves::{ConnectionLost, MoveError};
+use sevenbot::moves::{ConnectionLost, LineStartError, MoveError};
 use sevenbot::register_text::motor_state_name;
 use sevenbot::servo_bench::ServoError;
 use sevenbot::stream::StreamError;
@@ -98,6 +98,15 @@ impl From<MoveError> for CommandError {
 impl ConnectionLost for CommandError {
     fn is_connection_lost(&self) -> bool {
         matches!(self, Self::Exchange(_) | Self::MayMove(_))
+    }
+}
+
+impl From<LineStartError> for CommandError {
+    fn from(error: LineStartError) -> Self {
+        match error {
+            LineStartError::Exchange(error) => Self::Exchange(error),
+            unknown @ LineStartError::Unknown { .. } => Self::Arm(unknown.to_string()),
+        }
     }
 }
 

@@ -6,9 +6,10 @@ use std::str::FromStr;
 use clap::{ArgAction, Args, value_parser};
 use serde::Serialize;
 use sevenbot::fine::FineTargets;
-use sevenbot::joints::{JointSnapshot, frames_for};
-use sevenbot::map::{SPEED, TARGET_POSITION, TIME};
-use sevenbot::{Angle, Arm, FineAngle, Joint, Speed};
+use sevenbot::joints::JointSnapshot;
+use sevenbot::map::TARGET_POSITION;
+use sevenbot::moves::{JointMove, Pace};
+use sevenbot::{Angle, Arm, FineAngle, Joint, MoveTime, Speed};
 
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
@@ -16,8 +17,6 @@ use crate::printer::Printable;
 use crate::session::Session;
 use crate::step_target::step_target;
 use crate::watch::{Watch, note_rounding};
-use crate::write_result::all_taken;
-use sevenbot::moves::JointMove;
 
 /// Move joints to a pose.
 #[derive(Debug, Args)]
@@ -66,6 +65,14 @@ struct PaceArgs {
     /// Wait until the joints have arrived.
     #[arg(long)]
     wait: bool,
+}
+
+impl PaceArgs {
+    /// The pace; values out of range are refused before.
+    fn pace(&self) -> Pace {
+        let time = self.time.and_then(MoveTime::from_steps);
+        Pace { speed: self.speed.and_then(Speed::from_steps), time }
+    }
 }
 
 /// The argument for one joint.
@@ -138,7 +145,7 @@ fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<
     let mut arm = session.connect()?;
     let reached = hold_on_interrupt(&mut arm, |arm, interrupt| {
         let targets = targets(goals, arm)?;
-        set_speed_and_time(arm, &targets, pace)?;
+        pace.pace().set(arm, &targets)?;
         interrupt.check()?;
         let begun = JointMove::begin_fine(arm, targets)?;
         note_rounding(&begun);
@@ -187,16 +194,6 @@ fn targets(goals: &[PoseArg], arm: &mut Arm) -> Result<FineTargets, CommandError
         *target = goal.target(joint, &joints, base)?;
     }
     Ok(targets)
-}
-
-/// Sets speed and duration of the joints with a target.
-fn set_speed_and_time(arm: &mut Arm, targets: &FineTargets, pace: &PaceArgs) -> Result<(), CommandError> {
-    let for_targets = |steps: u8| targets.map(|target| target.map(|_| steps));
-    let speed = pace.speed.or(pace.time.map(|_| Speed::MAXIMUM.steps()));
-    let speeds = speed.map(|steps| frames_for(&SPEED, &for_targets(steps)));
-    let times = pace.time.map(|steps| frames_for(&TIME, &for_targets(steps)));
-    let frames: Vec<_> = speeds.into_iter().chain(times).flatten().collect();
-    if frames.is_empty() { Ok(()) } else { all_taken(&arm.write_all_checked(&frames)?) }
 }
 
 /// Positions of the joints.

@@ -11,13 +11,17 @@
 mod error;
 mod joint_move;
 mod observer;
+mod pace;
 mod player;
 mod recorder;
 mod report_clock;
 mod report_session;
+mod tip_move;
 
 pub use error::{ConnectionLost, MoveError};
 pub use joint_move::{JointMove, Targets};
 pub use observer::{Observer, Stage};
+pub use pace::Pace;
 pub use player::Player;
 pub use recorder::{RecordedPose, Recorder};
+pub use tip_move::{LineStart, LineStartError, TipMove};

@@ -12,7 +12,7 @@ use crate::printer::Printable;
 
 /// A move to a point: the plan, and with --wait the measured result.
 #[derive(Debug, Serialize)]
-pub(super) struct TipMove {
+pub(super) struct TipArrival {
     asked_mm: [f64; 3],
     /// The direction of the tool.
     tool: [f64; 3],
@@ -60,7 +60,7 @@ pub(super) struct MeasuredTip {
     miss_mm: f64,
 }
 
-impl TipMove {
+impl TipArrival {
     /// A planned move.
     pub(super) fn planned(tip: Vector, target: &TipTarget, direction: Vector) -> Self {
         Self {
@@ -152,7 +152,7 @@ fn point([x, y, z]: [f64; 3]) -> PointText {
     PointText(Vector::new(x, y, z))
 }
 
-impl Printable for TipMove {
+impl Printable for TipArrival {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "tool     {}", DirectionText(self.direction))?;
         let joints = self.targets_degrees.texts().join(" ");
@@ -178,7 +178,7 @@ mod tests {
     fn the_miss_of_whole_degrees_is_told_and_then_what_was_measured() {
         let tip = Vector::new(-50.0, 185.0, 50.0);
         let target = TipTarget::of(tip, DOWN).expect("within reach");
-        let arrival = TipMove::planned(tip, &target, DOWN);
+        let arrival = TipArrival::planned(tip, &target, DOWN);
         assert_eq!(arrival.targets_degrees, TargetDegrees::Whole([105, 88, 110, 90, 135]));
         let arrival = arrival.with_measured(Some(MeasuredPose::whole([105, 88, 110, 90, 135, 90, 80])));
         let mut text = Vec::new();

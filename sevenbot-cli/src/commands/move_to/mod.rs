@@ -6,13 +6,14 @@
 //! ```
 
 use sevenbot::cartesian::{TipPose, TipTarget, Vector};
-use sevenbot::{Angle, Arm, FineAngle};
+use sevenbot::fine::FineTargets;
+use sevenbot::moves::{JointMove, TipMove};
+use sevenbot::{Angle, Arm};
 
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
 use crate::session::Session;
 use crate::watch::{Watch, note_rounding};
-use sevenbot::moves::JointMove;
 
 mod args;
 mod facts;
@@ -20,7 +21,7 @@ mod straight;
 
 pub(crate) use args::MoveToArgs;
 use args::target;
-use facts::{MeasuredPose, TipMove};
+use facts::{MeasuredPose, TipArrival};
 
 pub(crate) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), CommandError> {
     if args.straight {
@@ -46,16 +47,11 @@ fn take(
     target: &TipTarget,
     tool: Vector,
 ) -> Result<(), CommandError> {
-    let arrival = TipMove::planned(args.tip(), target, tool);
+    let arrival = TipArrival::planned(args.tip(), target, tool);
     let Some(mut arm) = arm else { return session.printer.print(&arrival) };
-    let fine = match arm.has_extended_block()? {
-        true => target.in_hundredths(args.tip(), tool),
-        false => None,
-    };
-    let arrival = fine.iter().fold(arrival, TipMove::in_hundredths);
-    let whole = target.degrees.map(|degrees| Angle::from_register(degrees).into());
-    let angles = fine.map_or(whole, |fine| fine.angles);
-    let measured = if args.dry_run { None } else { move_to(&mut arm, angles, args.wait)? };
+    let TipMove { targets, fine } = TipMove::of(&mut arm, target, args.tip(), tool)?;
+    let arrival = fine.iter().fold(arrival, TipArrival::in_hundredths);
+    let measured = if args.dry_run { None } else { move_to(&mut arm, targets, args.wait)? };
     session.printer.print(&arrival.with_measured(measured))
 }
 
@@ -66,12 +62,11 @@ fn present_tool(arm: &mut Arm) -> Result<Vector, CommandError> {
 }
 
 /// Moves joints 1 to 5. If `wait` is set, waits and returns the measured angles.
-fn move_to(arm: &mut Arm, angles: [FineAngle; 5], wait: bool) -> Result<Option<MeasuredPose>, CommandError> {
-    let [t1, t2, t3, t4, t5] = angles.map(Some);
+fn move_to(arm: &mut Arm, targets: FineTargets, wait: bool) -> Result<Option<MeasuredPose>, CommandError> {
     hold_on_interrupt(arm, |arm, interrupt| {
         arm.driven_joints()?;
         interrupt.check()?;
-        let begun = JointMove::begin_fine(arm, [t1, t2, t3, t4, t5, None, None])?;
+        let begun = JointMove::begin_fine(arm, targets)?;
         note_rounding(&begun);
         if !wait {
             return Ok(None);

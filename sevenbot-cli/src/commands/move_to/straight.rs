@@ -3,12 +3,11 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
+use sevenbot::FineAngle;
 use sevenbot::cartesian::{
     DirectionText, PointText, StraightLine, StraightLineRequest, TargetResolution, TipPose, Vector,
 };
-use sevenbot::joints::JointSnapshot;
-use sevenbot::map::VACUUM_PUMP;
-use sevenbot::{Angle, FineAngle, Joint, Span};
+use sevenbot::moves::LineStart;
 
 use super::super::play::follow;
 use super::super::position::components;
@@ -22,16 +21,11 @@ use crate::session::Session;
 pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let joints = if args.dry_run { arm.wait_until_settled()? } else { arm.driven_joints()? };
-    let whole = start(&joints)?;
-    let (resolution, start) = match arm.has_extended_block()? {
-        true => (TargetResolution::Hundredths, arm.fine_targets()?),
-        false => (TargetResolution::Degrees, whole.map(FineAngle::from)),
-    };
-    let tool = args.tool().unwrap_or_else(|| TipPose::of_fine(start).tool);
+    let start = LineStart::of(&mut arm, &joints)?;
+    let tool = args.tool().unwrap_or_else(|| TipPose::of_fine(start.targets).tool);
     // Only this check gives the nearest point and another direction of the tool.
     target(args.tip(), tool)?;
-    let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
-    let request = StraightLineRequest { start, resolution, vacuum, tip: args.tip(), tool, speed: args.speed };
+    let request = start.line_to(args.tip(), tool, args.speed);
     let line = StraightLine::plan(&request)
         .map_err(|reason| CommandError::Arm(format!("{reason}; nothing was moved")))?;
     let course = StraightMove::of(&line, &request);
@@ -41,21 +35,6 @@ pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
     follow(&mut arm, &line.recording)?;
     let measured = MeasuredTip::of(MeasuredPose::read(&mut arm)?, args.tip());
     session.printer.print(&StraightMove { measured: Some(measured), ..course })
-}
-
-/// The targets at the start of the line. The arm is there or moves there.
-fn start(joints: &JointSnapshot) -> Result<[Angle; 7], CommandError> {
-    let mut start = [Angle::from_register(0); 7];
-    for (angle, joint) in start.iter_mut().zip(Joint::ALL) {
-        let base = joints.step_base(joint).map_err(|reason| {
-            let number = joint.number();
-            CommandError::Arm(format!(
-                "the start of the line is not known: joint {number}: {reason}; nothing was moved"
-            ))
-        })?;
-        *angle = Angle::from_register(base);
-    }
-    Ok(start)
 }
 
 /// A straight line: the plan, and the measured end.

@@ -1,25 +1,13 @@
 //! Copies of an arm, kept by name until the simulator ends.
 
-use arm_sim::controller::ArmController;
-use arm_sim::faults::FaultReport;
-use arm_sim::plant::Plant;
-use arm_sim::simulated_arm::SimulatedArm;
-use embedded_storage::nor_flash::{NorFlash, NorFlashError, NorFlashErrorKind};
-use protocol_core::time::Instant;
+use std::collections::BTreeMap;
 
-use super::PtyArm;
+use embedded_storage::nor_flash::NorFlashErrorKind;
 
 /// Copies of an arm. Each has about 20 KiB.
 const SNAPSHOTS: usize = 64;
 /// The longest name, in characters.
 const LONGEST_NAME: usize = 64;
-
-/// A copy of an arm.
-#[derive(Debug)]
-pub(super) struct Snapshot<F, B, C> {
-    simulation: SimulatedArm<F, B, C>,
-    ended_faults: Vec<FaultReport>,
-}
 
 /// Why a snapshot is not kept or restored.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -62,36 +50,45 @@ impl SnapshotError {
     }
 }
 
-impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
-    /// Keeps a copy of the arm. It replaces one of the same name.
+/// Copies of an arm, by name.
+#[derive(Debug)]
+pub struct Snapshots<T>(BTreeMap<String, T>);
+
+impl<T> Snapshots<T> {
+    /// No copies.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self(BTreeMap::new())
+    }
+
+    /// Keeps a copy. It replaces one of the same name.
     ///
     /// # Errors
     /// The name is wrong, or there are 64 others.
-    pub fn keep_snapshot(&mut self, name: String) -> Result<(), SnapshotError> {
+    pub fn keep(&mut self, name: String, copy: T) -> Result<(), SnapshotError> {
         if !(1..=LONGEST_NAME).contains(&name.chars().count()) {
             return Err(SnapshotError::Name);
         }
-        if self.snapshots.len() >= SNAPSHOTS && !self.snapshots.contains_key(&name) {
+        if self.0.len() >= SNAPSHOTS && !self.0.contains_key(&name) {
             return Err(SnapshotError::Full);
         }
-        let snapshot =
-            Snapshot { simulation: self.simulation.clone(), ended_faults: self.ended_faults.clone() };
-        self.snapshots.insert(name, snapshot);
+        self.0.insert(name, copy);
         Ok(())
     }
 
-    /// Sets the arm back to a copy. Returns the time of the copy.
+    /// The copy with this name.
     ///
     /// # Errors
-    /// There is no such copy, or its settings cannot be written.
-    pub fn restore_snapshot(&mut self, name: &str) -> Result<Instant, SnapshotError> {
-        let Some(snapshot) = self.snapshots.get(name) else {
-            let others = self.snapshots.keys().cloned().collect();
-            return Err(SnapshotError::Unknown { name: name.to_owned(), others });
-        };
-        let restored = self.simulation.restore(&snapshot.simulation);
-        restored.map_err(|error| SnapshotError::Settings(error.kind()))?;
-        self.ended_faults.clone_from(&snapshot.ended_faults);
-        Ok(self.simulation.now())
+    /// There is none.
+    pub fn get(&self, name: &str) -> Result<&T, SnapshotError> {
+        let unknown =
+            || SnapshotError::Unknown { name: name.to_owned(), others: self.0.keys().cloned().collect() };
+        self.0.get(name).ok_or_else(unknown)
+    }
+}
+
+impl<T> Default for Snapshots<T> {
+    fn default() -> Self {
+        Self::new()
     }
 }
