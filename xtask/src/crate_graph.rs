@@ -31,6 +31,7 @@ const GROUPS: [Group; 3] = [
             "sevenbot-cli",
             "sevenbot-serve",
             "sevenbot-python",
+            "sevenbot-web",
         ],
     ),
     ("proof", &["flash-model", "replay", "system-tests", "torture", "xtask"]),

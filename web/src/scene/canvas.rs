@@ -1,0 +1,185 @@
+//! The scene on a canvas.
+
+use std::cell::Cell;
+use std::rc::Rc;
+
+use glam::{Vec2, Vec3};
+use wasm_bindgen::closure::Closure;
+use wasm_bindgen::{JsCast, JsValue};
+use web_sys::{Event, HtmlCanvasElement, WebGl2RenderingContext as Gl, WebGlContextAttributes};
+
+use super::arm::{Angles, Arm, Part};
+use super::camera::Camera;
+use super::pointer::{self, Button, Pointer, SceneEvent};
+use super::renderer::Renderer;
+use super::view::View;
+
+/// More device pixels per CSS pixel than this cost time and show nothing more.
+const LARGEST_RATIO: f64 = 2.0;
+
+/// The arm on a canvas: picture, camera and pointers.
+pub struct Scene {
+    canvas: HtmlCanvasElement,
+    gl: Gl,
+    arm: Arm,
+    camera: Camera,
+    pointer: Pointer,
+    /// `None` after the browser took the graphics context away.
+    renderer: Option<Renderer>,
+    drawn: Option<Picture>,
+    /// Set by the browser when it gives the graphics context back.
+    is_restored: Rc<Cell<bool>>,
+}
+
+/// What a picture depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Picture {
+    view: View,
+    camera: Camera,
+    pixels: [u32; 2],
+}
+
+impl Scene {
+    /// Prepares the graphics of a canvas.
+    ///
+    /// # Errors
+    /// The browser has no WebGL2, or the message of its graphics driver.
+    pub fn new(canvas: HtmlCanvasElement) -> Result<Self, JsValue> {
+        let attributes = WebGlContextAttributes::new();
+        attributes.set_alpha(false);
+        attributes.set_antialias(true);
+        attributes.set_stencil(true);
+        let context = canvas.get_context_with_context_options("webgl2", &attributes)?;
+        let gl: Gl = context.ok_or("this browser has no WebGL2")?.dyn_into()?;
+        let arm = Arm::default();
+        let renderer = Some(Renderer::new(gl.clone(), &arm)?);
+        let is_restored = watch_context(&canvas)?;
+        let (camera, pointer) = (Camera::default(), Pointer::default());
+        Ok(Self { canvas, gl, arm, camera, pointer, renderer, drawn: None, is_restored })
+    }
+
+    /// Draws a view, unless the last picture was the same. True if it drew.
+    ///
+    /// # Errors
+    /// The message of the graphics driver, where the browser took the graphics context away and gave it back.
+    pub fn draw(&mut self, view: &View) -> Result<bool, JsValue> {
+        if self.is_restored.take() {
+            self.renderer = Some(Renderer::new(self.gl.clone(), &self.arm)?);
+            self.drawn = None;
+        }
+        let ratio = self.resize();
+        let pixels = [self.canvas.width(), self.canvas.height()];
+        let picture = Picture { view: *view, camera: self.camera, pixels };
+        if self.gl.is_context_lost() || self.drawn == Some(picture) {
+            return Ok(false);
+        }
+        let Some(renderer) = &self.renderer else { return Ok(false) };
+        let size = pixels.map(|length| i32::try_from(length).unwrap_or(i32::MAX));
+        renderer.draw(view, &self.camera, size, ratio);
+        self.drawn = Some(picture);
+        Ok(true)
+    }
+
+    /// Where a point of the arm's frame, in mm, is drawn, in CSS pixels from the top left of the canvas. `None` behind the
+    /// camera.
+    #[must_use]
+    pub fn project(&self, point: Vec3) -> Option<Vec2> {
+        self.camera.project(point)
+    }
+
+    /// What an arm with these angles has at a point of the canvas, in CSS pixels from its top left.
+    #[must_use]
+    pub fn pick(&self, x: f32, y: f32, angles: Angles) -> Option<Part> {
+        Pointer::part_at(&self.arm, &self.camera, angles, Vec2::new(x, y))
+    }
+
+    /// The camera, to read.
+    #[must_use]
+    pub const fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The camera, to move.
+    pub const fn camera_mut(&mut self) -> &mut Camera {
+        &mut self.camera
+    }
+
+    /// Is a joint or the tip being dragged?
+    #[must_use]
+    pub const fn is_dragging(&self) -> bool {
+        self.pointer.is_dragging()
+    }
+
+    /// A pointer went down: its identifier, its position in CSS pixels from the top left of the canvas, and the measured
+    /// angles of the arm.
+    pub fn pointer_down(
+        &mut self,
+        id: i32,
+        [x, y]: [f32; 2],
+        button: Button,
+        angles: Angles,
+    ) -> Option<SceneEvent> {
+        self.pointer.down((id, Vec2::new(x, y), button), &self.arm, &self.camera, angles)
+    }
+
+    /// A pointer moved.
+    pub fn pointer_moved(&mut self, id: i32, [x, y]: [f32; 2], angles: Angles) -> Option<SceneEvent> {
+        self.pointer.moved((id, Vec2::new(x, y)), &self.arm, &mut self.camera, angles)
+    }
+
+    /// A pointer went up or was cancelled.
+    pub fn pointer_up(&mut self, id: i32) -> Option<SceneEvent> {
+        self.pointer.up(id)
+    }
+
+    /// A pointer that is not down left the canvas.
+    pub fn pointer_left(&mut self) -> Option<SceneEvent> {
+        self.pointer.left()
+    }
+
+    /// The wheel turned by this many CSS pixels.
+    pub fn wheel(&mut self, pixels: f32) {
+        pointer::wheel(&mut self.camera, pixels);
+    }
+
+    /// A key was pressed while the canvas has the focus, named as in `KeyboardEvent.key`. False if the camera knows no
+    /// such key.
+    pub fn key(&mut self, key: &str, shift: bool) -> bool {
+        pointer::key(&mut self.camera, key, shift)
+    }
+
+    /// Fits the canvas to its place on the page. Returns device pixels per CSS pixel.
+    #[expect(clippy::cast_possible_truncation, reason = "sizes of a screen, at most thousands")]
+    #[expect(clippy::cast_sign_loss, reason = "sizes are positive")]
+    fn resize(&mut self) -> f32 {
+        let ratio =
+            web_sys::window().map_or(1.0, |window| window.device_pixel_ratio()).clamp(0.5, LARGEST_RATIO);
+        let size =
+            [self.canvas.client_width(), self.canvas.client_height()].map(|length| f64::from(length.max(1)));
+        let [width, height] = size.map(|length| (length * ratio).round() as u32);
+        // Setting either erases the picture, even to the same value.
+        if self.canvas.width() != width {
+            self.canvas.set_width(width);
+        }
+        if self.canvas.height() != height {
+            self.canvas.set_height(height);
+        }
+        let [width, height] = size.map(|length| length as f32);
+        self.camera.resize(width, height);
+        ratio as f32
+    }
+}
+
+/// Asks the browser to give a lost graphics context back. The result is set when it did.
+fn watch_context(canvas: &HtmlCanvasElement) -> Result<Rc<Cell<bool>>, JsValue> {
+    let is_restored = Rc::new(Cell::new(false));
+    let lost = Closure::<dyn Fn(Event)>::new(|event: Event| event.prevent_default());
+    canvas.add_event_listener_with_callback("webglcontextlost", lost.as_ref().unchecked_ref())?;
+    let flag = Rc::clone(&is_restored);
+    let restored = Closure::<dyn Fn()>::new(move || flag.set(true));
+    canvas.add_event_listener_with_callback("webglcontextrestored", restored.as_ref().unchecked_ref())?;
+    // The listeners live as long as the canvas, which is as long as the page.
+    lost.forget();
+    restored.forget();
+    Ok(is_restored)
+}

@@ -1,0 +1,286 @@
+//! Dragging: a joint by a point of its part, and the tip by inverse kinematics.
+
+use arm_model::Body;
+use glam::{Vec2, Vec3};
+use kinematics::geometry::{CLAW_MAX, JOINT_MAX, LEVEL_FOREARM, LINKAGE_MAX, LINKAGE_MIN};
+use kinematics::nearest::nearest_tip;
+use kinematics::{NoSolution, forward, ik6, ik6_all};
+
+use super::arm::{Angles, Hit, from_vector, point_of, tip_of, to_vector};
+use super::camera::Camera;
+
+/// How far from the last angle a step of a drag looks for a better one, in degrees.
+const SEARCH: f32 = 24.0;
+/// What a change of one degree costs, in square pixels: an angle that moves nothing on the screen stays.
+const COST_OF_TURNING: f32 = 0.02;
+
+/// A joint that is turned by a point of its part. The angle is the one that brings the point nearest to the pointer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointDrag {
+    joint: u8,
+    body: Body,
+    local: Vec3,
+    /// From where the point is drawn to the pointer, at the start.
+    offset: Vec2,
+    angle: f32,
+}
+
+impl JointDrag {
+    /// Takes hold of what the pointer met. `None` for the base.
+    #[must_use]
+    pub fn start(hit: Hit, angles: Angles, camera: &Camera, pointer: Vec2) -> Option<Self> {
+        let joint = hit.body.joint()?;
+        let angle = *angles.get(usize::from(joint).checked_sub(1)?)?;
+        let drawn = camera.project(point_of(angles, hit.body, hit.local))?;
+        Some(Self { joint, body: hit.body, local: hit.local, offset: pointer - drawn, angle })
+    }
+
+    /// The number of the joint, 1 to 7.
+    #[must_use]
+    pub const fn joint(&self) -> u8 {
+        self.joint
+    }
+
+    /// The angle of the joint, in degrees, that follows the pointer, with the other joints at `angles`. It keeps the
+    /// limits of the joint, of the linkage and of the claw.
+    pub fn to(&mut self, pointer: Vec2, angles: Angles, camera: &Camera) -> f32 {
+        let [low, high] = limits(self.joint, angles);
+        let wanted = pointer - self.offset;
+        let last = self.angle.clamp(low, high);
+        let cost = |angle: f32| {
+            let point = point_of(with_joint(angles, self.joint, angle), self.body, self.local);
+            let missed = camera.project(point).map_or(f32::MAX, |drawn| drawn.distance_squared(wanted));
+            missed + COST_OF_TURNING * (angle - last).powi(2)
+        };
+        let mut best = last;
+        let mut step = 2.0;
+        let mut reach = SEARCH;
+        while step > 0.01 {
+            let candidates = steps(best, reach, step).map(|angle| angle.clamp(low, high));
+            best = candidates.min_by(|one, other| cost(*one).total_cmp(&cost(*other))).unwrap_or(best);
+            (reach, step) = (step, step / 8.0);
+        }
+        self.angle = best;
+        best
+    }
+}
+
+/// Angles from `middle` on to both sides, the nearest first.
+fn steps(middle: f32, reach: f32, step: f32) -> impl Iterator<Item = f32> {
+    let outward = std::iter::successors(Some(0.0), move |offset| Some(offset + step));
+    outward
+        .take_while(move |offset| *offset <= reach)
+        .flat_map(move |offset| [middle + offset, middle - offset])
+}
+
+/// The lowest and the highest angle of a joint with the others at these angles, in degrees.
+#[expect(clippy::cast_possible_truncation, reason = "limits in whole degrees")]
+#[must_use]
+pub fn limits(joint: u8, angles: Angles) -> [f32; 2] {
+    let [_, t2, t3, ..] = angles;
+    let top = JOINT_MAX as f32;
+    let linked = |other: f32| {
+        let [low, high] = [LINKAGE_MIN, LINKAGE_MAX].map(|limit| (limit + LEVEL_FOREARM) as f32 - other);
+        let low = low.clamp(0.0, top);
+        [low, high.clamp(low, top)]
+    };
+    match joint {
+        2 => linked(t3),
+        3 => linked(t2),
+        7 => [0.0, CLAW_MAX as f32],
+        _ => [0.0, top],
+    }
+}
+
+/// The same angles but for one joint, 1 to 7.
+#[must_use]
+pub fn with_joint(mut angles: Angles, joint: u8, degrees: f32) -> Angles {
+    if let Some(angle) = usize::from(joint).checked_sub(1).and_then(|place| angles.get_mut(place)) {
+        *angle = degrees;
+    }
+    angles
+}
+
+/// Where the tip is wanted, and what the arm can do about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipWish {
+    /// The wanted position of the tip, in mm.
+    pub tip: Vec3,
+    /// The angles that bring it there, or why there are none.
+    pub reach: Result<Angles, Unreachable>,
+}
+
+/// A position out of reach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unreachable {
+    /// Why.
+    pub why: NoSolution,
+    /// Angles with the tip as near to it as the arm comes with the same direction of the tool.
+    pub nearest: Option<Angles>,
+}
+
+/// Solves for a position of the tip in mm, with the direction of the tool that `angles` has. Joints 6 and 7 stay.
+#[must_use]
+pub fn wish(tip: Vec3, angles: Angles) -> TipWish {
+    let [t1, t2, t3, t4, t5, t6, _] = angles.map(f64::from);
+    let tool = forward([t1, t2, t3, t4, t5, t6]).hand.tool;
+    let asked = to_vector(tip);
+    let reach =
+        ik6(asked, tool).map(|solution| nearest_solution(tip, angles).unwrap_or(extended(solution, angles)));
+    let reach = reach.map_err(|why| {
+        let nearest = nearest_tip(asked, tool).and_then(|point| nearest_solution(from_vector(point), angles));
+        Unreachable { why, nearest }
+    });
+    TipWish { tip, reach }
+}
+
+/// Of all solutions for a position, the one with the smallest turn of any joint.
+fn nearest_solution(tip: Vec3, angles: Angles) -> Option<Angles> {
+    let [t1, t2, t3, t4, t5, t6, _] = angles.map(f64::from);
+    let tool = forward([t1, t2, t3, t4, t5, t6]).hand.tool;
+    let solutions = ik6_all(to_vector(tip), tool).ok()?;
+    let all = solutions.into_iter().flatten().map(|solution| extended(solution, angles));
+    all.min_by(|one, other| largest_turn(*one, angles).total_cmp(&largest_turn(*other, angles)))
+}
+
+fn largest_turn(one: Angles, other: Angles) -> f32 {
+    one.iter().zip(other).map(|(one, other)| (one - other).abs()).fold(0.0, f32::max)
+}
+
+/// Angles of joints 1 to 5, with those of 6 and 7 from `angles`.
+#[expect(clippy::cast_possible_truncation, reason = "rounds to the nearest f32")]
+fn extended(solution: [f64; 5], angles: Angles) -> Angles {
+    let [t1, t2, t3, t4, t5] = solution.map(|angle| angle as f32);
+    let [.., t6, t7] = angles;
+    [t1, t2, t3, t4, t5, t6, t7]
+}
+
+/// The tip that is moved in the plane through it that faces the camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipDrag {
+    /// From where the tip is drawn to the pointer, at the start.
+    offset: Vec2,
+    /// The angles at the start: the tool keeps their direction.
+    start: Angles,
+}
+
+impl TipDrag {
+    /// Takes hold of the tip. `None` if it is behind the camera.
+    #[must_use]
+    pub fn start(angles: Angles, camera: &Camera, pointer: Vec2) -> Option<Self> {
+        Some(Self { offset: pointer - camera.project(tip_of(angles))?, start: angles })
+    }
+
+    /// Where the pointer wants the tip.
+    #[must_use]
+    pub fn to(&self, pointer: Vec2, camera: &Camera) -> TipWish {
+        wish(camera.on_facing_plane(pointer - self.offset, tip_of(self.start)), self.start)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::arm::Arm;
+    use crate::scene::camera::Preset;
+    use kinematics::limits::check;
+
+    const POSE: Angles = [90.0, 100.0, 75.0, 80.0, 110.0, 70.0, 60.0];
+
+    /// A point of the part of each joint, away from its axis.
+    const GRIPS: [(Body, [f32; 3]); 7] = [
+        (Body::Turret, [40.0, 34.0, 20.0]),
+        (Body::RearArm, [0.0, 30.0, 100.0]),
+        (Body::Forearm, [120.0, 0.0, 38.0]),
+        (Body::Wrist, [-20.0, 12.0, 16.0]),
+        (Body::Hand, [16.0, 0.0, 11.0]),
+        (Body::Disc, [0.0, 19.0, 0.0]),
+        (Body::Finger, [48.0, -3.0, 8.0]),
+    ];
+
+    #[test]
+    fn a_dragged_joint_follows_its_point_from_every_side() {
+        for preset in [Preset::Corner, Preset::Front, Preset::Side, Preset::Top] {
+            let mut camera = Camera::default();
+            camera.look_from(preset);
+            for (body, grip) in GRIPS {
+                let (local, joint) = (Vec3::from(grip), body.joint().expect("a joint"));
+                let place = usize::from(joint) - 1;
+                let drawn = |angle: f32| {
+                    camera.project(point_of(with_joint(POSE, joint, angle), body, local)).expect("in front")
+                };
+                let hit = Hit { body, local, distance: 0.0 };
+                let mut drag = JointDrag::start(hit, POSE, &camera, drawn(POSE[place])).expect("a joint");
+                // Twelve degrees in steps of one: the drag ends where the point was led to on the screen.
+                let led = POSE[place] + 12.0;
+                for step in 1..=12 {
+                    drag.to(drawn(POSE[place] + step as f32), POSE, &camera);
+                }
+                let ended = drag.to(drawn(led), POSE, &camera);
+                let missed = (drawn(ended) - drawn(led)).length();
+                assert!(missed < 0.6, "joint {joint} {preset:?}: {ended} instead of {led}, {missed} px");
+            }
+        }
+    }
+
+    #[test]
+    fn a_drag_keeps_the_limits() {
+        let camera = Camera::default();
+        for (body, grip) in GRIPS {
+            let joint = body.joint().expect("a joint");
+            let hit = Hit { body, local: Vec3::from(grip), distance: 0.0 };
+            for far in [[-3000.0, 50.0], [3000.0, -2000.0], [0.0, 4000.0]] {
+                let pointer = camera.project(point_of(POSE, body, hit.local)).expect("in front");
+                let mut drag = JointDrag::start(hit, POSE, &camera, pointer).expect("a joint");
+                for step in 1..40 {
+                    let towards = pointer.lerp(Vec2::from(far), step as f32 / 40.0);
+                    let angle = drag.to(towards, POSE, &camera);
+                    let all = with_joint(POSE, joint, angle).map(f64::from);
+                    assert_eq!(check(all), Ok(()), "joint {joint} at {angle}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_base_cannot_be_dragged() {
+        let hit = Hit { body: Body::Base, local: Vec3::ZERO, distance: 1.0 };
+        assert_eq!(JointDrag::start(hit, POSE, &Camera::default(), Vec2::ZERO), None);
+    }
+
+    #[test]
+    fn a_dragged_tip_is_where_the_pointer_is_and_keeps_its_direction() {
+        let camera = Camera::default();
+        let start = camera.project(tip_of(POSE)).expect("in front");
+        let drag = TipDrag::start(POSE, &camera, start + Vec2::new(3.0, 2.0)).expect("a tip");
+        let wish = drag.to(start + Vec2::new(-27.0, 22.0), &camera);
+        let angles = wish.reach.expect("within reach");
+        let drawn = camera.project(tip_of(angles)).expect("in front");
+        assert!((drawn - (start + Vec2::new(-30.0, 20.0))).length() < 0.1, "{drawn}");
+        assert!((tip_of(angles) - wish.tip).length() < 0.01);
+        let tool = |angles: Angles| point_of(angles, Body::Disc, Vec3::X) - tip_of(angles);
+        assert!((tool(angles) - tool(POSE)).length() < 1e-3);
+        assert_eq!(angles[5..], POSE[5..]);
+    }
+
+    #[test]
+    fn a_tip_out_of_reach_is_told_with_the_nearest_pose() {
+        let far = wish(Vec3::new(0.0, 600.0, 100.0), POSE);
+        let unreachable = far.reach.expect_err("too far");
+        assert_eq!((far.tip, unreachable.why), (Vec3::new(0.0, 600.0, 100.0), NoSolution::TooFar));
+        let nearest = unreachable.nearest.expect("a pose");
+        assert_eq!(check(nearest.map(f64::from)), Ok(()));
+        let gap = (tip_of(nearest) - far.tip).length();
+        assert!(gap > 100.0 && gap < 350.0, "{gap}");
+    }
+
+    #[test]
+    fn what_is_picked_can_be_dragged() {
+        let (arm, camera) = (Arm::default(), Camera::default());
+        let pixel =
+            camera.project(point_of(POSE, Body::RearArm, Vec3::new(0.0, 30.0, 60.0))).expect("in front");
+        let hit = arm.pick(POSE, camera.ray(pixel)).expect("a body");
+        let drag = JointDrag::start(hit, POSE, &camera, pixel).expect("a joint");
+        assert_eq!(drag.clone().to(pixel, POSE, &camera), POSE[usize::from(drag.joint()) - 1]);
+    }
+}

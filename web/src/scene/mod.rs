@@ -1,0 +1,29 @@
+//! The arm in 3D: a WebGL2 picture of a [`View`], and what a pointer on it means.
+//!
+//! ```text
+//!   kinematics ──▶ arm-model ──▶ arm: triangles, pick ──▶ drag ──▶ pointer ──▶ SceneEvent
+//!                                 │                                  ▲
+//!   View ──▶ lines, arm ──▶ renderer ──▶ pixels ◀── camera ──────────┘
+//! ```
+//!
+//! Positions are millimetres in the frame of the arm: x to the right, y forward, z up. Pixels are CSS pixels from the top
+//! left of the canvas. All but the renderer and the canvas runs on the host too.
+
+pub mod arm;
+pub mod camera;
+pub mod canvas;
+pub mod drag;
+mod lines;
+pub mod pointer;
+mod renderer;
+mod shaders;
+pub mod theme;
+pub mod view;
+
+pub use arm::{Angles, Part};
+pub use camera::{Camera, Preset};
+pub use canvas::Scene;
+pub use drag::{TipWish, Unreachable};
+pub use pointer::{Button, SceneEvent};
+pub use theme::{Rgb, Theme};
+pub use view::View;

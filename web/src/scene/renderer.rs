@@ -1,0 +1,299 @@
+//! Draws a view with WebGL2.
+//!
+//! ```text
+//!   table ─▶ grid ─▶ shadow (stencil: once a pixel) ─▶ arm ─▶ ghost (depth first, so that it is one layer) ─▶ markers
+//! ```
+
+use arm_model::Finish;
+use glam::{Mat4, Vec3, Vec4};
+use wasm_bindgen::JsValue;
+use web_sys::{WebGl2RenderingContext as Gl, WebGlBuffer, WebGlProgram, WebGlVertexArrayObject};
+
+use super::arm::{Angles, Arm, BODIES, Part, tip_of, transforms};
+use super::camera::Camera;
+use super::lines::{LineEnd, Lines, TABLE};
+use super::shaders;
+use super::theme::{Palette, Rgb};
+use super::view::View;
+
+/// Numbers of one corner of the arm: position, normal, body and finish.
+const CORNER: usize = 8;
+/// The direction to the lamp that casts the shadow.
+const LAMP: Vec3 = Vec3::new(0.25, -0.2, 1.0);
+/// Diameters of the markers, in CSS pixels.
+const TIP_SIZE: f32 = 13.0;
+const WISH_SIZE: f32 = 18.0;
+/// Radius of the table, in mm, and the corners of its edge.
+const TABLE_RADIUS: f32 = 520.0;
+const TABLE_SIDES: u8 = 48;
+/// How much of the highlight's colour a hovered part gets.
+const HIGHLIGHT: f32 = 0.4;
+
+/// Programs and buffers of one graphics context.
+pub struct Renderer {
+    gl: Gl,
+    arm: Layer,
+    corners: i32,
+    lines: Layer,
+    markers: Layer,
+}
+
+/// A program, and a buffer in the layout that it reads.
+struct Layer {
+    program: WebGlProgram,
+    buffer: WebGlBuffer,
+    layout: WebGlVertexArrayObject,
+}
+
+/// How the bodies of the arm are drawn.
+struct Look {
+    tint: Vec4,
+    shading: f32,
+    opacity: f32,
+}
+
+impl Renderer {
+    /// Compiles the programs and uploads the meshes.
+    ///
+    /// # Errors
+    /// The message of the graphics driver.
+    pub fn new(gl: Gl, arm: &Arm) -> Result<Self, JsValue> {
+        let layer =
+            |vertex, fragment, attributes: &[(&str, i32)]| Layer::new(&gl, vertex, fragment, attributes);
+        let of_arm = layer(
+            shaders::ARM_VERTEX,
+            shaders::ARM_FRAGMENT,
+            &[("position", 3), ("normal", 3), ("kind", 2)],
+        )?;
+        let ends = [("position", 3), ("colour", 4)];
+        let lines = layer(shaders::LINE_VERTEX, shaders::LINE_FRAGMENT, &ends)?;
+        let markers = layer(shaders::MARKER_VERTEX, shaders::MARKER_FRAGMENT, &ends)?;
+        let corners = corners(arm);
+        of_arm.upload(&gl, &corners, Gl::STATIC_DRAW);
+        gl.enable(Gl::CULL_FACE);
+        gl.blend_func(Gl::ONE, Gl::ONE_MINUS_SRC_ALPHA);
+        Ok(Self { arm: of_arm, corners: count(corners.len() / CORNER), lines, markers, gl })
+    }
+
+    /// Draws a view. Width and height are device pixels; `ratio` is device pixels per CSS pixel.
+    pub fn draw(&self, view: &View, camera: &Camera, [width, height]: [i32; 2], ratio: f32) {
+        let (gl, palette) = (&self.gl, view.theme.palette());
+        gl.viewport(0, 0, width, height);
+        let [red, green, blue] = palette.background.floats();
+        gl.clear_color(red, green, blue, 1.0);
+        gl.clear(Gl::COLOR_BUFFER_BIT | Gl::DEPTH_BUFFER_BIT | Gl::STENCIL_BUFFER_BIT);
+        let projection = camera.view_projection();
+        let lines = Lines::of(view, camera);
+        self.blended(|| {
+            self.draw_lines(Gl::TRIANGLES, &table(palette), projection);
+            self.draw_lines(Gl::LINES, &lines.ground, projection);
+            self.draw_shadow(view, palette, projection);
+        });
+        self.use_arm(view, palette);
+        let own = Look { tint: Vec4::ZERO, shading: 1.0, opacity: 1.0 };
+        gl.enable(Gl::DEPTH_TEST);
+        self.draw_bodies(view.measured, projection, &own);
+        if let Some(ghost) = view.ghost() {
+            self.draw_ghost(ghost, palette, projection);
+        }
+        gl.disable(Gl::DEPTH_TEST);
+        self.blended(|| self.draw_lines(Gl::LINES, &lines.over, projection));
+        self.draw_markers(view, palette, projection, ratio);
+    }
+
+    fn blended(&self, draw: impl FnOnce()) {
+        self.gl.enable(Gl::BLEND);
+        draw();
+        self.gl.disable(Gl::BLEND);
+    }
+
+    /// Selects the arm's program, with the colours of a view.
+    fn use_arm(&self, view: &View, palette: &Palette) {
+        let (gl, arm) = (&self.gl, &self.arm);
+        arm.select(gl);
+        arm.set_colour(gl, "shell", palette.shell);
+        arm.set_colour(gl, "dark", palette.dark);
+        arm.set_colour(gl, "highlight", palette.hover);
+        let accents = transforms(view.measured).map(|(body, _)| {
+            let part = Part::of(body);
+            let colour = match part {
+                Part::Joint(joint) => view.colours.get(usize::from(joint).wrapping_sub(1)).copied(),
+                Part::Base | Part::Tip => None,
+            };
+            let [red, green, blue] = colour.unwrap_or(palette.shell).floats();
+            let is_hovered = view.hovered == Some(part) && part != Part::Base;
+            [red, green, blue, if is_hovered { HIGHLIGHT } else { 0.0 }]
+        });
+        gl.uniform4fv_with_f32_array(arm.uniform(gl, "accents").as_ref(), accents.as_flattened());
+    }
+
+    fn draw_bodies(&self, angles: Angles, projection: Mat4, look: &Look) {
+        let (gl, arm) = (&self.gl, &self.arm);
+        let mut bodies = [0.0; BODIES * 16];
+        for (place, (_, transform)) in bodies.as_chunks_mut::<16>().0.iter_mut().zip(transforms(angles)) {
+            *place = Mat4::from(transform).to_cols_array();
+        }
+        arm.set_projection(gl, projection);
+        gl.uniform_matrix4fv_with_f32_array(arm.uniform(gl, "bodies").as_ref(), false, &bodies);
+        gl.uniform4fv_with_f32_array(arm.uniform(gl, "tint").as_ref(), &look.tint.to_array());
+        gl.uniform1f(arm.uniform(gl, "shading").as_ref(), look.shading);
+        gl.uniform1f(arm.uniform(gl, "opacity").as_ref(), look.opacity);
+        gl.draw_arrays(Gl::TRIANGLES, 0, self.corners);
+    }
+
+    /// The arm, flattened onto the table along the light. The stencil keeps a pixel from being darkened twice.
+    fn draw_shadow(&self, view: &View, palette: &Palette, projection: Mat4) {
+        let gl = &self.gl;
+        let slope = -LAMP.truncate() / LAMP.z;
+        let flatten = Mat4::from_cols(
+            Vec4::X,
+            Vec4::Y,
+            Vec4::new(slope.x, slope.y, 0.0, 0.0),
+            Vec4::new(-slope.x * TABLE, -slope.y * TABLE, TABLE, 1.0),
+        );
+        let [red, green, blue] = palette.shadow.floats();
+        let look = Look { tint: Vec4::new(red, green, blue, 1.0), shading: 0.0, opacity: 0.35 };
+        gl.enable(Gl::STENCIL_TEST);
+        gl.stencil_func(Gl::EQUAL, 0, 1);
+        gl.stencil_op(Gl::KEEP, Gl::KEEP, Gl::INCR);
+        self.use_arm(view, palette);
+        self.draw_bodies(view.measured, projection * flatten, &look);
+        gl.disable(Gl::STENCIL_TEST);
+    }
+
+    /// First only the depth, then only what is in front.
+    fn draw_ghost(&self, angles: Angles, palette: &Palette, projection: Mat4) {
+        let gl = &self.gl;
+        let [red, green, blue] = palette.ghost.floats();
+        let look = Look { tint: Vec4::new(red, green, blue, 0.85), shading: 0.7, opacity: 0.4 };
+        gl.color_mask(false, false, false, false);
+        self.draw_bodies(angles, projection, &look);
+        gl.color_mask(true, true, true, true);
+        gl.depth_func(Gl::EQUAL);
+        self.blended(|| self.draw_bodies(angles, projection, &look));
+        gl.depth_func(Gl::LESS);
+    }
+
+    fn draw_lines(&self, mode: u32, ends: &[LineEnd], projection: Mat4) {
+        let (gl, lines) = (&self.gl, &self.lines);
+        lines.select(gl);
+        lines.set_projection(gl, projection);
+        lines.upload(gl, ends.as_flattened(), Gl::DYNAMIC_DRAW);
+        gl.draw_arrays(mode, 0, count(ends.len()));
+    }
+
+    fn draw_markers(&self, view: &View, palette: &Palette, projection: Mat4, ratio: f32) {
+        let (gl, markers) = (&self.gl, &self.markers);
+        markers.select(gl);
+        markers.set_projection(gl, projection);
+        let marker = |at: Vec3, colour: Rgb, size: f32, is_hollow: bool| {
+            let ([x, y, z], [red, green, blue]) = (at.to_array(), colour.floats());
+            markers.upload(gl, &[x, y, z, red, green, blue, 1.0], Gl::DYNAMIC_DRAW);
+            gl.uniform1f(markers.uniform(gl, "size").as_ref(), size * ratio);
+            gl.uniform1f(markers.uniform(gl, "hollow").as_ref(), if is_hollow { 1.0 } else { 0.0 });
+            markers.set_colour(gl, "rim", palette.table);
+            gl.draw_arrays(Gl::POINTS, 0, 1);
+        };
+        if let Some(wish) = view.unreachable {
+            marker(wish, palette.unreachable, WISH_SIZE, true);
+        }
+        let size = if view.hovered == Some(Part::Tip) { WISH_SIZE } else { TIP_SIZE };
+        marker(tip_of(view.measured), palette.tip, size, false);
+    }
+}
+
+impl Layer {
+    fn new(gl: &Gl, vertex: &str, fragment: &str, attributes: &[(&str, i32)]) -> Result<Self, JsValue> {
+        let program = gl.create_program().ok_or("no graphics program")?;
+        for (kind, source) in [(Gl::VERTEX_SHADER, vertex), (Gl::FRAGMENT_SHADER, fragment)] {
+            let shader = gl.create_shader(kind).ok_or("no shader")?;
+            gl.shader_source(&shader, source);
+            gl.compile_shader(&shader);
+            gl.attach_shader(&program, &shader);
+        }
+        for (place, (name, _)) in (0..).zip(attributes) {
+            gl.bind_attrib_location(&program, place, name);
+        }
+        gl.link_program(&program);
+        if !gl.get_program_parameter(&program, Gl::LINK_STATUS).is_truthy() {
+            return Err(gl.get_program_info_log(&program).unwrap_or_default().into());
+        }
+        let buffer = gl.create_buffer().ok_or("no buffer")?;
+        let layout = gl.create_vertex_array().ok_or("no vertex array")?;
+        let layer = Self { program, buffer, layout };
+        layer.select(gl);
+        let stride: i32 = attributes.iter().map(|(_, numbers)| numbers * 4).sum();
+        let mut offset = 0;
+        for (place, (_, numbers)) in (0..).zip(attributes) {
+            gl.enable_vertex_attrib_array(place);
+            gl.vertex_attrib_pointer_with_i32(place, *numbers, Gl::FLOAT, false, stride, offset);
+            offset += numbers * 4;
+        }
+        Ok(layer)
+    }
+
+    fn select(&self, gl: &Gl) {
+        gl.use_program(Some(&self.program));
+        gl.bind_vertex_array(Some(&self.layout));
+        gl.bind_buffer(Gl::ARRAY_BUFFER, Some(&self.buffer));
+    }
+
+    fn upload(&self, gl: &Gl, numbers: &[f32], usage: u32) {
+        self.select(gl);
+        let numbers = js_sys::Float32Array::from(numbers);
+        gl.buffer_data_with_array_buffer_view(Gl::ARRAY_BUFFER, &numbers, usage);
+    }
+
+    fn uniform(&self, gl: &Gl, name: &str) -> Option<web_sys::WebGlUniformLocation> {
+        gl.get_uniform_location(&self.program, name)
+    }
+
+    fn set_projection(&self, gl: &Gl, projection: Mat4) {
+        let place = self.uniform(gl, "view_projection");
+        gl.uniform_matrix4fv_with_f32_array(place.as_ref(), false, &projection.to_cols_array());
+    }
+
+    fn set_colour(&self, gl: &Gl, name: &str, colour: Rgb) {
+        let [red, green, blue] = colour.floats();
+        gl.uniform3f(self.uniform(gl, name).as_ref(), red, green, blue);
+    }
+}
+
+/// All corners of the arm, in the layout of the arm's program.
+fn corners(arm: &Arm) -> Vec<f32> {
+    let mut numbers = Vec::new();
+    for (number, (_, mesh)) in (0_u8..).zip(arm.meshes()) {
+        let corners = mesh.positions.iter().zip(&mesh.normals).zip(&mesh.finishes);
+        for ((position, normal), finish) in corners {
+            let finish = match finish {
+                Finish::Shell => 0.0,
+                Finish::Dark => 1.0,
+                Finish::Accent => 2.0,
+            };
+            numbers.extend(position.iter().chain(normal).chain(&[f32::from(number), finish]));
+        }
+    }
+    numbers
+}
+
+/// The table: a disc that fades at its edge.
+fn table(palette: &Palette) -> Vec<LineEnd> {
+    let [red, green, blue] = palette.table.floats();
+    let corner = |radius: f32, side: u8, opacity| {
+        let angle = f32::from(side) * std::f32::consts::TAU / f32::from(TABLE_SIDES);
+        let (sine, cosine) = angle.sin_cos();
+        [radius * cosine, radius * sine, TABLE, red, green, blue, opacity]
+    };
+    let inner = TABLE_RADIUS * 0.7;
+    let sides = (0..TABLE_SIDES).flat_map(|side| {
+        let (a, b) = (corner(inner, side, 1.0), corner(inner, side + 1, 1.0));
+        let (c, d) = (corner(TABLE_RADIUS, side + 1, 0.0), corner(TABLE_RADIUS, side, 0.0));
+        [corner(0.0, 0, 1.0), a, b, a, d, c, a, c, b]
+    });
+    sides.collect()
+}
+
+/// A number of corners as WebGL takes it.
+fn count(corners: usize) -> i32 {
+    i32::try_from(corners).unwrap_or(i32::MAX)
+}
