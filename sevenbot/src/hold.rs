@@ -4,15 +4,20 @@
 //!   read the joints ──▶ targets that hold them ──▶ write ──▶ read again, until no target differs
 //! ```
 //!
-//! [`crate::joints`] interprets the registers of each joint.
+//! On an arm with the extended block, targets are the measured positions in hundredths of a degree, so that a stop moves no
+//! joint. On other arms they are whole degrees. [`crate::joints`] interprets the registers of each joint.
 
-use protocol_core::registers::Joint;
-use protocol_core::registers::map::TARGET_POSITION;
+use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, SET_POINT_PERIOD, TARGET_POSITION};
+use protocol_core::registers::{Joint, Register};
 
 use crate::arm::Arm;
 use crate::checked_write::{MismatchCause, WriteMismatch, cause_from_counters};
 use crate::error::Error;
+use crate::fine::fine_frames;
+use crate::fine_angle::FineAngle;
 use crate::joints::{JointSnapshot, POLL_PERIOD, START_UP_TIME, frames_for};
+use crate::snapshot::Snapshot;
+use crate::span::Span;
 
 /// Targets are written this many times before their loss is an error.
 const HOLD_ATTEMPTS: u32 = 5;
@@ -42,7 +47,8 @@ fn first_of(unchanged: &[WriteMismatch]) -> String {
 /// A target that was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct SentTarget {
-    degrees: u8,
+    /// The raw value of the register.
+    value: u16,
     /// The target is 0, and the joint was possibly not measured.
     may_be_unmeasured: bool,
 }
@@ -56,56 +62,108 @@ impl Arm {
     /// - A joint whose servo does not answer gets its last measured position as its target, and none if it was never
     ///   measured.
     /// - After power-up waits up to 0.7 s for the joints that are not measured yet. The other joints hold at once.
+    /// - A stream of another program ends at each joint. Its set-point period stays as it was (D23).
     ///
     /// # Errors
     /// No answer, or the arm does not take the targets: it may be moving.
     pub fn hold(&mut self) -> Result<JointSnapshot, HoldError> {
-        self.with_min_attempts(Self::hold_until_verified)
+        self.with_min_attempts(|arm| {
+            let has_extended_block = arm.has_extended_block()?;
+            if !has_extended_block {
+                return arm.hold_until_verified(false);
+            }
+            let period = arm.read_span(Span::of(&SET_POINT_PERIOD))?;
+            if period.word(SET_POINT_PERIOD.address) == 0 {
+                return arm.hold_until_verified(true);
+            }
+            // With a period, a target would be one more point of the stream.
+            arm.write(SET_POINT_PERIOD.address, &[0, 0])?;
+            let joints = arm.hold_until_verified(true);
+            arm.write(SET_POINT_PERIOD.address, &period.values)?;
+            joints
+        })
     }
 
-    fn hold_until_verified(&mut self) -> Result<JointSnapshot, HoldError> {
+    fn hold_until_verified(&mut self, is_fine: bool) -> Result<JointSnapshot, HoldError> {
         let start = self.now();
         let mut before = None;
         let mut sent = NOTHING_SENT;
         let mut losses = 0;
         loop {
-            let joints = self.joints()?;
-            if !joints.is_driven() {
-                return Ok(joints);
+            let now = self.held_joints(is_fine)?;
+            if !now.joints.is_driven() {
+                return Ok(now.joints);
             }
             let is_past_start_up = self.now() >= start + START_UP_TIME;
-            let before: &JointSnapshot = before.get_or_insert_with(|| joints.clone());
-            let lost = joints.lost_targets(&sent, before);
+            let before: &JointSnapshot = before.get_or_insert_with(|| now.joints.clone());
+            let lost = now.lost_targets(&sent, before);
             losses += u32::from(!lost.is_empty());
             if losses >= HOLD_ATTEMPTS {
                 return Err(HoldError::NotTaken(lost));
             }
-            let targets = joints.targets_to_write(&sent, is_past_start_up);
-            for (address, degrees) in frames_for(&TARGET_POSITION, &targets) {
-                self.write(address, &degrees)?;
+            let targets = now.targets_to_write(&sent, is_past_start_up);
+            for (address, values) in now.frames(&targets) {
+                self.write(address, &values)?;
             }
             for ((sent, target), joint) in sent.iter_mut().zip(targets).zip(Joint::ALL) {
-                let may_be_unmeasured = joints.may_be_unmeasured(joint, is_past_start_up);
-                *sent = target.map(|degrees| SentTarget { degrees, may_be_unmeasured }).or(*sent);
+                let may_be_unmeasured = now.may_be_unmeasured(joint, is_past_start_up);
+                *sent = target.map(|value| SentTarget { value, may_be_unmeasured }).or(*sent);
             }
             if targets == [None; 7] {
-                if !Joint::ALL.into_iter().any(|joint| joints.may_be_unmeasured(joint, is_past_start_up)) {
-                    return Ok(joints);
+                if !Joint::ALL.into_iter().any(|joint| now.may_be_unmeasured(joint, is_past_start_up)) {
+                    return Ok(now.joints);
                 }
                 self.sleep(POLL_PERIOD);
             }
         }
     }
+
+    fn held_joints(&mut self, is_fine: bool) -> Result<HeldJoints, Error> {
+        let fine =
+            is_fine.then(|| self.read_span(Span::between(&FINE_TARGET, &FINE_POSITION))).transpose()?;
+        Ok(HeldJoints { fine, joints: self.joints()? })
+    }
 }
 
-impl JointSnapshot {
+/// The joints of an arm that has to hold.
+struct HeldJoints {
+    /// Targets and positions in hundredths of a degree, from an arm with the extended block.
+    fine: Option<Snapshot>,
+    joints: JointSnapshot,
+}
+
+impl HeldJoints {
+    const fn row(&self) -> &'static Register {
+        if self.fine.is_some() { &FINE_TARGET } else { &TARGET_POSITION }
+    }
+
+    fn target(&self, joint: Joint) -> u16 {
+        let coarse = || self.joints.target(joint).into();
+        self.fine.as_ref().map_or_else(coarse, |fine| fine.word(FINE_TARGET.of(joint)))
+    }
+
+    /// Is the joint possibly not measured yet?
+    fn may_be_unmeasured(&self, joint: Joint, is_past_start_up: bool) -> bool {
+        if self.fine.is_none() {
+            return self.joints.may_be_unmeasured(joint, is_past_start_up);
+        }
+        let is_start_up_over = is_past_start_up || self.joints.missing() != 0;
+        !is_start_up_over && self.measured(joint).is_none()
+    }
+
+    /// The position of a joint that was measured since power-up, if the arm tells that.
+    fn measured(&self, joint: Joint) -> Option<u16> {
+        let position = self.fine.as_ref()?.word(FINE_POSITION.of(joint));
+        FineAngle::from_hundredths(position).map(FineAngle::hundredths)
+    }
+
     /// The targets to write now so that the joints hold, after `sent` was written.
-    fn targets_to_write(&self, sent: &[Option<SentTarget>; 7], is_past_start_up: bool) -> [Option<u8>; 7] {
+    fn targets_to_write(&self, sent: &[Option<SentTarget>; 7], is_past_start_up: bool) -> [Option<u16>; 7] {
         let mut targets = [None; 7];
         for ((target, sent), joint) in targets.iter_mut().zip(sent).zip(Joint::ALL) {
             let is_done = sent.is_some_and(|sent| {
-                let is_measured_now = sent.may_be_unmeasured && self.present(joint) != 0;
-                self.target(joint) == sent.degrees && !is_measured_now
+                let is_measured_now = sent.may_be_unmeasured && self.joints.present(joint) != 0;
+                self.target(joint) == sent.value && !is_measured_now
             });
             *target = self.hold_target(joint, is_past_start_up).filter(|_| !is_done);
         }
@@ -113,29 +171,41 @@ impl JointSnapshot {
     }
 
     /// The position at which the joint has to hold; `None` if it is unknown.
-    fn hold_target(&self, joint: Joint, is_past_start_up: bool) -> Option<u8> {
-        let present = self.present(joint);
-        let is_unknown = present == 0 && self.is_missing(joint);
+    fn hold_target(&self, joint: Joint, is_past_start_up: bool) -> Option<u16> {
+        if self.fine.is_some() {
+            return self.measured(joint);
+        }
+        let joints = &self.joints;
+        let present = joints.present(joint);
+        let is_unknown = present == 0 && joints.is_missing(joint);
         // A joint that moves at position 0 cannot wait: it has just left 0 degrees, or start-up is not over. In
         // start-up the arm does not drive a joint before it is measured, and the next read shows that.
-        let can_wait = self.may_be_unmeasured(joint, is_past_start_up) && !self.is_moving(joint);
-        (!is_unknown && !can_wait).then_some(present)
+        let can_wait = self.may_be_unmeasured(joint, is_past_start_up) && !joints.is_moving(joint);
+        (!is_unknown && !can_wait).then_some(present.into())
+    }
+
+    /// The frames that write these targets.
+    fn frames(&self, targets: &[Option<u16>; 7]) -> Vec<(u8, Vec<u8>)> {
+        if self.fine.is_some() {
+            return fine_frames(&targets.map(|target| FineAngle::from_hundredths(target?)));
+        }
+        frames_for(&TARGET_POSITION, &targets.map(|target| u8::try_from(target?).ok()))
     }
 
     /// The targets that differ from what was sent.
-    fn lost_targets(&self, sent: &[Option<SentTarget>; 7], before: &Self) -> Vec<WriteMismatch> {
-        let cause = match (&before.status, &self.status) {
+    fn lost_targets(&self, sent: &[Option<SentTarget>; 7], before: &JointSnapshot) -> Vec<WriteMismatch> {
+        let cause = match (&before.status, &self.joints.status) {
             (Some(before), Some(after)) => cause_from_counters(before, after),
             _ => MismatchCause::Unknown,
         };
         let pairs = Joint::ALL.into_iter().zip(sent).filter_map(|(joint, sent)| Some((joint, (*sent)?)));
         pairs
-            .map(|(joint, sent)| (joint, sent.degrees, self.target(joint)))
+            .map(|(joint, sent)| (joint, sent.value, self.target(joint)))
             .filter(|(_, wanted, found)| wanted != found)
             .map(|(joint, wanted, found)| WriteMismatch {
-                address: TARGET_POSITION.of(joint),
-                wanted: wanted.into(),
-                found: found.into(),
+                address: self.row().of(joint),
+                wanted,
+                found,
                 cause,
             })
             .collect()
@@ -145,18 +215,34 @@ impl JointSnapshot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::joints::tests::{POSE, joint_snapshot, power_up};
+    use crate::joints::tests::{self, POSE};
+
+    fn coarse(joints: JointSnapshot) -> HeldJoints {
+        HeldJoints { fine: None, joints }
+    }
+
+    fn joint_snapshot(targets: [u8; 7], positions: [u8; 7], missing: u8, moving: u8) -> HeldJoints {
+        coarse(tests::joint_snapshot(targets, positions, missing, moving))
+    }
+
+    fn power_up(positions: [u8; 7], missing: u8, moving: u8) -> HeldJoints {
+        coarse(tests::power_up(positions, missing, moving))
+    }
+
+    fn held(pose: [u8; 7]) -> [Option<u16>; 7] {
+        pose.map(|degrees| Some(degrees.into()))
+    }
 
     #[test]
     fn every_measured_joint_is_held_where_it_is() {
         let joints = joint_snapshot([170, 90, 65, 90, 90, 90, 80], POSE, 0, 1);
-        assert_eq!(joints.targets_to_write(&NOTHING_SENT, false), POSE.map(Some));
+        assert_eq!(joints.targets_to_write(&NOTHING_SENT, false), held(POSE));
         assert!(!joints.may_be_unmeasured(Joint::ALL[0], false));
     }
 
     #[test]
     fn only_targets_that_differ_are_written_again() {
-        let sent = POSE.map(|degrees| Some(SentTarget { degrees, may_be_unmeasured: false }));
+        let sent = POSE.map(|degrees| Some(SentTarget { value: degrees.into(), may_be_unmeasured: false }));
         assert_eq!(joint_snapshot(POSE, POSE, 0, 0).targets_to_write(&sent, false), [None; 7]);
         let lost = joint_snapshot([170, 90, 65, 90, 90, 90, 80], [125, 90, 65, 90, 90, 90, 80], 0, 1);
         let again = lost.targets_to_write(&sent, false);
@@ -187,9 +273,9 @@ mod tests {
 
     #[test]
     fn a_target_of_start_up_is_replaced_as_soon_as_the_joint_is_measured() {
-        let sent = [Some(SentTarget { degrees: 0, may_be_unmeasured: true }); 7];
+        let sent = [Some(SentTarget { value: 0, may_be_unmeasured: true }); 7];
         let joints = joint_snapshot([0; 7], POSE, 0, 0x7F);
-        assert_eq!(joints.targets_to_write(&sent, false), POSE.map(Some));
+        assert_eq!(joints.targets_to_write(&sent, false), held(POSE));
     }
 
     #[test]
@@ -197,5 +283,22 @@ mod tests {
         let joints = joint_snapshot([170, 90, 170, 90, 90, 90, 80], [120, 90, 0, 90, 90, 90, 80], 0b101, 0);
         let held = joints.targets_to_write(&NOTHING_SENT, true);
         assert_eq!((held[0], held[2]), (Some(120), None));
+    }
+
+    #[test]
+    fn an_arm_with_hundredths_is_held_where_it_was_measured() {
+        let mut values = vec![0; 28];
+        values[0..4].copy_from_slice(&[0x28, 0x23, 0x28, 0x23]);
+        values[14..18].copy_from_slice(&[0xFF, 0xFF, 0x2D, 0x23]);
+        let fine = Some(Snapshot { address: FINE_TARGET.address, values });
+        let now = HeldJoints { fine, joints: tests::power_up(POSE, 0, 0b11) };
+        let targets = now.targets_to_write(&NOTHING_SENT, false);
+        assert_eq!(targets[..3], [None, Some(9_005), Some(0)], "joint 1 was not measured");
+        assert_eq!(now.frames(&targets)[0].0, FINE_TARGET.address + 2);
+        assert!(now.may_be_unmeasured(Joint::ALL[0], false), "it is waited for");
+        assert!(!now.may_be_unmeasured(Joint::ALL[2], false), "0 was measured");
+        let sent = [Some(SentTarget { value: 9_005, may_be_unmeasured: false }); 7];
+        let lost = now.lost_targets(&sent, &now.joints);
+        assert_eq!((lost[0].address, lost[0].wanted, lost[0].found), (128, 9_005, 9_000));
     }
 }
