@@ -1,19 +1,21 @@
-"""Runs the Python blocks of docs/python.md, in order, in one namespace."""
+"""Runs the Python blocks of the pages in docs/, each page in order."""
 
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-PAGE = Path(__file__).parents[2] / "docs" / "python.md"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
-def blocks() -> list[tuple[int, str]]:
+def blocks(page: Path) -> list[tuple[int, str]]:
     """The blocks with their first lines."""
-    text = PAGE.read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
     found = re.finditer(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     return [(text.count("\n", 0, block.start(1)) + 1, block.group(1)) for block in found]
 
@@ -21,7 +23,20 @@ def blocks() -> list[tuple[int, str]]:
 def test_the_blocks_of_the_first_steps_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {"__name__": "first_steps"}
-    for line, block in blocks():
+    page = DOCS / "python.md"
+    for line, block in blocks(page):
         # The empty lines give a traceback the line of the page.
-        exec(compile("\n" * (line - 1) + block, str(PAGE), "exec"), names)
-    assert len(blocks()) >= 8
+        exec(compile("\n" * (line - 1) + block, str(page), "exec"), names)
+    assert len(blocks(page)) >= 8
+
+
+@pytest.mark.parametrize("page", ["python.md", "simulation.md"])
+def test_the_tests_on_a_page_pass(page: str, tmp_path: Path) -> None:
+    tests = [block for _, block in blocks(DOCS / page) if "def test_" in block]
+    file = tmp_path / "test_page.py"
+    file.write_text("\n".join(tests), encoding="utf-8")
+    # As a user does: a file in another folder, with the fixture of the installed package.
+    command = [sys.executable, "-m", "pytest", "--quiet", "-p", "no:cacheprovider", str(file)]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert tests, "the page has a test"

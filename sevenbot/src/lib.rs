@@ -76,3 +76,8 @@ pub use snapshot::Snapshot;
 pub use span::Span;
 pub use status_block::StatusBlock;
 pub use units::{Angle, MoveTime, Speed};
+
+/// Runs the Rust block of a page as a documentation test.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/simulation.md")]
+struct SimulationPage;
