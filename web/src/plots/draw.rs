@@ -58,7 +58,7 @@ impl Area {
 /// The height of the title with the legend for a plot of this width, in CSS pixels.
 #[must_use]
 pub fn legend_height(width: f64) -> f64 {
-    if is_narrow(width) { 2.0 * TEXT + 6.0 } else { TEXT + 6.0 }
+    if is_narrow(width) { 2.0 * TEXT + 12.0 } else { TEXT + 12.0 }
 }
 
 /// Is there no room for the legend beside the title?

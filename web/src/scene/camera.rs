@@ -7,6 +7,9 @@ const FIELD_OF_VIEW: f32 = 0.6;
 /// Depth range, in mm.
 const NEAR: f32 = 40.0;
 const FAR: f32 = 6_000.0;
+/// Where the page begins: the middle of the picture, and the distance to it, in mm.
+const STANDARD_TARGET: Vec3 = Vec3::new(0.0, 100.0, 95.0);
+const STANDARD_DISTANCE: f32 = 840.0;
 /// Bounds of the distance to the target, in mm.
 const DISTANCE: [f32; 2] = [250.0, 3_000.0];
 /// Bounds of the elevation, in radians: from a little below the table's plane to almost above the arm.
@@ -55,10 +58,10 @@ pub struct Camera {
 impl Default for Camera {
     fn default() -> Self {
         let mut camera = Self {
-            target: Vec3::new(0.0, 110.0, 110.0),
+            target: STANDARD_TARGET,
             azimuth: 0.0,
             elevation: 0.0,
-            distance: 950.0,
+            distance: STANDARD_DISTANCE,
             size: Vec2::new(1280.0, 720.0),
         };
         camera.look_from(Preset::Corner);
@@ -80,8 +83,8 @@ impl Camera {
             Preset::Side => (0.0, 0.12),
             Preset::Top => (-std::f32::consts::FRAC_PI_2, ELEVATION[1]),
         };
-        self.target = Vec3::new(0.0, 110.0, 110.0);
-        self.distance = 950.0;
+        self.target = STANDARD_TARGET;
+        self.distance = STANDARD_DISTANCE;
     }
 
     /// Turns round the target by a drag in CSS pixels: to the right turns the arm to the right.
@@ -207,9 +210,9 @@ mod tests {
     #[test]
     fn the_target_is_in_the_middle_and_up_is_up() {
         let camera = Camera::default();
-        let middle = camera.project(Vec3::new(0.0, 110.0, 110.0)).expect("in front");
+        let middle = camera.project(STANDARD_TARGET).expect("in front");
         assert!((middle - Vec2::new(640.0, 360.0)).length() < 0.01, "{middle}");
-        let above = camera.project(Vec3::new(0.0, 110.0, 130.0)).expect("in front");
+        let above = camera.project(STANDARD_TARGET + Vec3::Z * 20.0).expect("in front");
         assert!(above.y < middle.y - 10.0, "{above}");
     }
 
@@ -225,7 +228,7 @@ mod tests {
     #[test]
     fn a_pan_follows_the_pointer() {
         let mut camera = Camera::default();
-        let point = Vec3::new(0.0, 110.0, 110.0);
+        let point = STANDARD_TARGET;
         let before = camera.project(point).expect("in front");
         camera.pan(50.0, 30.0);
         let moved = camera.project(point).expect("in front") - before;
@@ -235,7 +238,7 @@ mod tests {
     #[test]
     fn a_point_behind_the_camera_has_no_pixel() {
         let camera = Camera::default();
-        let behind = camera.position() * 2.0 - Vec3::new(0.0, 110.0, 110.0);
+        let behind = camera.position() * 2.0 - STANDARD_TARGET;
         assert_eq!(camera.project(behind), None);
     }
 

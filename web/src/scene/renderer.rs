@@ -4,7 +4,7 @@
 //!   table ─▶ grid ─▶ shadow (stencil: once a pixel) ─▶ arm ─▶ ghost (depth first, so that it is one layer) ─▶ markers
 //! ```
 
-use arm_model::Finish;
+use arm_model::{Body, Finish};
 use glam::{Mat4, Vec3, Vec4};
 use wasm_bindgen::JsValue;
 use web_sys::{WebGl2RenderingContext as Gl, WebGlBuffer, WebGlProgram, WebGlVertexArrayObject};
@@ -28,6 +28,9 @@ const TABLE_RADIUS: f32 = 520.0;
 const TABLE_SIDES: u8 = 48;
 /// How much of the highlight's colour a hovered part gets.
 const HIGHLIGHT: f32 = 0.4;
+/// How much of its joint's colour a shell gets: where the joint works, and in any other state.
+const SHELL_WEIGHT: f32 = 0.12;
+const SHELL_WEIGHT_ELSE: f32 = 0.4;
 
 /// Programs and buffers of one graphics context.
 pub struct Renderer {
@@ -114,16 +117,12 @@ impl Renderer {
         arm.set_colour(gl, "shell", palette.shell);
         arm.set_colour(gl, "dark", palette.dark);
         arm.set_colour(gl, "highlight", palette.hover);
-        let accents = transforms(view.measured).map(|(body, _)| {
+        let accents = Body::ALL.map(|body| accent(view, palette, Part::of(body)));
+        let highlights = Body::ALL.map(|body| {
             let part = Part::of(body);
-            let colour = match part {
-                Part::Joint(joint) => view.colours.get(usize::from(joint).wrapping_sub(1)).copied(),
-                Part::Base | Part::Tip => None,
-            };
-            let [red, green, blue] = colour.unwrap_or(palette.shell).floats();
-            let is_hovered = view.hovered == Some(part) && part != Part::Base;
-            [red, green, blue, if is_hovered { HIGHLIGHT } else { 0.0 }]
+            if view.hovered == Some(part) && part != Part::Base { HIGHLIGHT } else { 0.0 }
         });
+        gl.uniform1fv_with_f32_array(arm.uniform(gl, "highlights").as_ref(), &highlights);
         gl.uniform4fv_with_f32_array(arm.uniform(gl, "accents").as_ref(), accents.as_flattened());
     }
 
@@ -161,17 +160,20 @@ impl Renderer {
         gl.disable(Gl::STENCIL_TEST);
     }
 
-    /// First only the depth, then only what is in front.
+    /// First only the depth, then only what is in front. Where ghost and arm coincide, the offset lets the arm be seen.
     fn draw_ghost(&self, angles: Angles, palette: &Palette, projection: Mat4) {
         let gl = &self.gl;
         let [red, green, blue] = palette.ghost.floats();
         let look = Look { tint: Vec4::new(red, green, blue, 0.85), shading: 0.7, opacity: 0.4 };
+        gl.enable(Gl::POLYGON_OFFSET_FILL);
+        gl.polygon_offset(2.0, 8.0);
         gl.color_mask(false, false, false, false);
         self.draw_bodies(angles, projection, &look);
         gl.color_mask(true, true, true, true);
         gl.depth_func(Gl::EQUAL);
         self.blended(|| self.draw_bodies(angles, projection, &look));
         gl.depth_func(Gl::LESS);
+        gl.disable(Gl::POLYGON_OFFSET_FILL);
     }
 
     fn draw_lines(&self, mode: u32, ends: &[LineEnd], projection: Mat4) {
@@ -257,6 +259,17 @@ impl Layer {
         let [red, green, blue] = colour.floats();
         gl.uniform3f(self.uniform(gl, name).as_ref(), red, green, blue);
     }
+}
+
+/// The colour of a part's joint, and its weight in the part's shell: a joint that does not work is seen from afar.
+fn accent(view: &View, palette: &Palette, part: Part) -> [f32; 4] {
+    let colour = match part {
+        Part::Joint(joint) => view.colours.get(usize::from(joint).wrapping_sub(1)).copied(),
+        Part::Base | Part::Tip => None,
+    };
+    let [red, green, blue] = colour.unwrap_or(palette.shell).floats();
+    let weight = if colour == Some(palette.joint_ok) { SHELL_WEIGHT } else { SHELL_WEIGHT_ELSE };
+    [red, green, blue, weight]
 }
 
 /// All corners of the arm, in the layout of the arm's program.

@@ -4,8 +4,10 @@
 pub const ARM_VERTEX: &str = r"#version 300 es
 uniform mat4 view_projection;
 uniform mat4 bodies[11];
-// Colour of each body's accent; a body with a weight above 0 is highlighted.
+// Colour of each body's accent; the last part is its weight in the body's shell.
 uniform vec4 accents[11];
+// The weight of the highlight's colour in each body.
+uniform float highlights[11];
 uniform vec3 shell;
 uniform vec3 dark;
 uniform vec3 highlight;
@@ -24,9 +26,9 @@ void main() {
     float key = max(dot(direction, normalize(vec3(0.55, 0.35, 0.95))), 0.0);
     float fill = max(dot(direction, normalize(vec3(-0.6, 0.5, 0.2))), 0.0);
     float light = mix(1.0, 0.52 + 0.44 * key + 0.12 * fill, shading);
-    vec3 accent = accents[body].rgb;
-    vec3 own = kind.y < 0.5 ? mix(shell, accent, 0.12) : (kind.y < 1.5 ? dark : accent);
-    own = mix(own, highlight, accents[body].a);
+    vec4 accent = accents[body];
+    vec3 own = kind.y < 0.5 ? mix(shell, accent.rgb, accent.a) : dark;
+    own = kind.y < 1.5 ? mix(own, highlight, highlights[body]) : accent.rgb;
     colour = mix(own, tint.rgb, tint.a) * light;
     gl_Position = view_projection * (bodies[body] * vec4(position, 1.0));
 }
