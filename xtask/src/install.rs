@@ -3,7 +3,7 @@
 use std::process::{Command, Stdio};
 
 use crate::emulate::QEMU;
-use crate::run::{CHIP, TaskResult, run};
+use crate::run::{BROWSER, CHIP, TaskResult, run};
 
 /// A program that Rust does not include.
 struct Tool {
@@ -34,7 +34,7 @@ const TOOLS: [Tool; 4] = [
 /// Installs the missing tools.
 pub(crate) fn all() -> TaskResult {
     run("rustup", "component add clippy rustfmt", &[])?;
-    run("rustup", &format!("target add {CHIP}"), &[])?;
+    run("rustup", &format!("target add {CHIP} {BROWSER}"), &[])?;
     let missing: Vec<_> = TOOLS.iter().filter(|tool| !tool.works()).collect();
     if missing.is_empty() {
         return Ok(());

@@ -38,6 +38,7 @@ mod thumb_decode;
 mod times;
 mod torture;
 mod trials;
+mod web;
 mod workspace;
 
 use run::TaskResult;
@@ -78,6 +79,14 @@ enum Task {
     Mujoco,
     /// Build the Python package and test it with each Python on PATH from 3.10 on (installs packages from PyPI)
     Python,
+    /// Build the page in web/dist, and fail if it is too large
+    Web,
+    /// Build the page, then run `sevenbot view` with these arguments
+    View {
+        /// Arguments of `sevenbot view`, or options before the command
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<String>,
+    },
     /// Link the cores for the chip and fail if a panic is reachable
     NoPanic,
     /// Print the size of the cores and the image on the chip, and compare it with the budgets
@@ -154,6 +163,8 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Deny => deny::check(),
         Task::Mujoco => mujoco::check(),
         Task::Python => python::check(),
+        Task::Web => web::build(),
+        Task::View { arguments } => web::view(arguments),
         Task::NoPanic => no_panic::check(),
         Task::Size { by_file: true, .. } => size::print(),
         Task::Size { accept, .. } => footprint::check(accept.accept),

@@ -1,0 +1,101 @@
+//! `cargo xtask web`: the page in web/dist.
+//!
+//! ```text
+//!   web/src  ── cargo ──▶ sevenbot_web.wasm ── wasm-bindgen ──▶ web/dist/sevenbot_web.js, sevenbot_web_bg.wasm
+//!   web/page ─────────────────────── copy ──▶ web/dist
+//! ```
+//!
+//! wasm-bindgen is a library here, at exactly the version of the crate that the page is linked with. So no other program has
+//! to be installed.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use torture::text_table::Column::{Left, Right};
+use torture::text_table::TextTable;
+use wasm_bindgen_cli_support::Bindgen;
+
+use crate::budget::{self, Figure};
+use crate::run::{BROWSER, TaskResult, cargo, root, run, target_directory};
+
+/// The profile of the page's module.
+const PROFILE: &str = "web";
+
+/// Builds the page, prints its size and compares it with its budget.
+pub(crate) fn build() -> TaskResult {
+    run("rustup", &format!("--quiet target add {BROWSER}"), &[])?;
+    cargo(&format!("build --quiet --package sevenbot-web --lib --target {BROWSER} --profile {PROFILE}"))?;
+    let dist = root().join("web/dist");
+    if dist.exists() {
+        fs::remove_dir_all(&dist)?;
+    }
+    copy_folder(&root().join("web/page"), &dist)?;
+    let module = target_directory().join(BROWSER).join(PROFILE).join("sevenbot_web.wasm");
+    Bindgen::new()
+        .input_path(module)
+        .remove_name_section(true)
+        .remove_producers_section(true)
+        .web(true)
+        .and_then(|bindgen| bindgen.typescript(false).generate(&dist))
+        .map_err(|why| format!("wasm-bindgen: {why:#}"))?;
+    budget::check("web", &[Figure::new("page: all files with gzip, bytes", print_sizes(&dist)?)], false)
+}
+
+/// Builds the page, then runs `sevenbot view`, which contains it.
+pub(crate) fn view(arguments: &[String]) -> TaskResult {
+    build()?;
+    let mut cargo = Command::new("cargo");
+    cargo.args(["run", "--quiet", "--release", "--package", "sevenbot-cli", "--", "view"]).args(arguments);
+    let status = cargo.status()?;
+    if status.success() { Ok(()) } else { Err("`sevenbot view` failed".into()) }
+}
+
+fn copy_folder(from: &Path, to: &Path) -> TaskResult {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let (path, copy) = (entry?.path(), |name: &Path| to.join(name));
+        let name = PathBuf::from(path.file_name().unwrap_or_default());
+        if path.is_dir() {
+            copy_folder(&path, &copy(&name))?;
+        } else {
+            fs::copy(&path, copy(&name))?;
+        }
+    }
+    Ok(())
+}
+
+/// Prints the size of each file. Returns the sum with gzip, in bytes.
+fn print_sizes(dist: &Path) -> TaskResult<u64> {
+    let mut table = TextTable::new([Right("bytes"), Right("gzip"), Left("file")]);
+    let mut sum = 0;
+    for path in files(dist)? {
+        let bytes = fs::read(&path)?;
+        let compressed = compressed_size(&bytes)?;
+        let name = path.strip_prefix(dist)?.display().to_string();
+        table.add([bytes.len().to_string(), compressed.to_string(), name]);
+        sum += compressed;
+    }
+    println!("{table}");
+    Ok(sum)
+}
+
+/// All files below a folder, in the order of their names.
+fn files(folder: &Path) -> TaskResult<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() { found.extend(files(&path)?) } else { found.push(path) }
+    }
+    found.sort();
+    Ok(found)
+}
+
+fn compressed_size(bytes: &[u8]) -> TaskResult<u64> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(bytes)?;
+    Ok(u64::try_from(encoder.finish()?.len())?)
+}
