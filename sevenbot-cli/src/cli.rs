@@ -4,14 +4,14 @@ use clap::{Args, CommandFactory, Parser, Subcommand, value_parser};
 use sevenbot::Map;
 
 use crate::command_error::CommandError;
-#[cfg(target_os = "linux")]
-use crate::commands::serve;
 #[cfg(unix)]
 use crate::commands::sim;
 use crate::commands::{
     backup, baud, calibrate, effector, get, info, model, monitor, move_to, play, plot, ports, pose, position,
     record, registers, servo, set, shell, sniff, state, stop, stream,
 };
+#[cfg(target_os = "linux")]
+use crate::commands::{serve, view};
 use crate::session::Session;
 
 const EXAMPLES: &str = "\
@@ -98,6 +98,8 @@ pub(crate) enum Command {
     Sniff(sniff::SniffArgs),
     #[cfg(target_os = "linux")]
     Serve(serve::ServeArgs),
+    #[cfg(target_os = "linux")]
+    View(view::ViewArgs),
     Servo(servo::ServoArgs),
     #[cfg(unix)]
     Sim(sim::SimArgs),
@@ -134,6 +136,8 @@ impl Command {
             Self::Sniff(args) => sniff::run(session, &args),
             #[cfg(target_os = "linux")]
             Self::Serve(args) => serve::run(session, &args),
+            #[cfg(target_os = "linux")]
+            Self::View(args) => view::run(session, &args),
             Self::Servo(args) => servo::run(session, &args),
             #[cfg(unix)]
             Self::Sim(args) => sim::run(session, &args),

@@ -92,11 +92,12 @@ fn an_arm_that_comes_back_under_another_name_is_found_among_others() {
     let (sender, notices) = mpsc::channel();
     let server = thread::spawn(move || {
         let config = ServerConfig {
-            arm: ArmLocation::Search { first: port("ttyUSB0"), list: ports },
+            arm: Some(ArmLocation::Search { first: port("ttyUSB0"), list: ports }),
             baud: 115_200,
             ptys: Vec::new(),
             tcp: None,
             web_socket: None,
+            page: None,
             access: AccessPolicy { token: None, allows_any_page: false },
             is_read_only: false,
         };

@@ -27,3 +27,5 @@ pub(crate) mod sniff;
 pub(crate) mod state;
 pub(crate) mod stop;
 pub(crate) mod stream;
+#[cfg(target_os = "linux")]
+pub(crate) mod view;

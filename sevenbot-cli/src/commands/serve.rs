@@ -92,11 +92,12 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
         ));
     }
     let config = ServerConfig {
-        arm: location(session)?,
+        arm: Some(location(session)?),
         baud: session.options.baud,
         ptys: args.pty.clone(),
         tcp: args.tcp.map(|port| SocketAddr::new(args.listen, port)),
         web_socket: args.ws.map(|port| SocketAddr::new(args.listen, port)),
+        page: None,
         access: AccessPolicy { token: args.token.clone(), allows_any_page: args.maker_pages },
         is_read_only: args.read_only,
     };
@@ -117,14 +118,14 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
 }
 
 /// A port from the command line is kept. Otherwise the arm is searched again each time it was unplugged.
-fn location(session: &Session) -> Result<ArmLocation, CommandError> {
+pub(super) fn location(session: &Session) -> Result<ArmLocation, CommandError> {
     let first = PathBuf::from(session.port_name()?);
     let list = || ports::available().into_iter().map(|port| port.name.into()).collect();
     Ok(if session.port.is_some() { ArmLocation::Port(first) } else { ArmLocation::Search { first, list } })
 }
 
 /// Becomes readable at Ctrl-C, and at signals that ask a program to end.
-fn stop_signal() -> Result<UnixStream, CommandError> {
+pub(super) fn stop_signal() -> Result<UnixStream, CommandError> {
     let (stop, mut trigger) = UnixStream::pair()?;
     let handler = move || drop(trigger.write_all(&[0]));
     ctrlc::set_handler(handler)
@@ -137,7 +138,7 @@ fn is_token(token: &str) -> bool {
     (8..=128).contains(&token.len()) && token.bytes().all(|byte| byte.is_ascii_graphic())
 }
 
-fn report(notice: &Notice) {
+pub(super) fn report(notice: &Notice) {
     match notice {
         Notice::ArmFound(port) => note(format_args!("{}: the arm answers", port.display())),
         Notice::ArmLost { reason, .. } => warn(format_args!("no arm: {reason}. Trying again all the time")),

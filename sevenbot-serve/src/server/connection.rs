@@ -72,6 +72,19 @@ impl FrameConnection {
         Ok(())
     }
 
+    /// Takes replies and reports from the hub, for a wire that carries messages.
+    pub(crate) fn take_output(&mut self, hub: &mut Hub) -> Vec<u8> {
+        self.client.collect(hub);
+        let bytes = self.client.output().to_vec();
+        self.client.consume(bytes.len());
+        bytes
+    }
+
+    /// Are there no bytes that wait?
+    pub(crate) fn has_room(&self) -> bool {
+        self.input.is_empty()
+    }
+
     pub(crate) fn interest(&self) -> PollFlags {
         let mut interest = PollFlags::empty();
         interest.set(PollFlags::IN, self.input.is_empty());

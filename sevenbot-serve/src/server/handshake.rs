@@ -51,12 +51,12 @@ impl AccessPolicy {
 }
 
 /// The token in an address such as `/ws?token=TOKEN`.
-fn token_of(uri: &Uri) -> Option<&str> {
+pub(crate) fn token_of(uri: &Uri) -> Option<&str> {
     uri.query()?.split('&').find_map(|pair| pair.strip_prefix("token="))
 }
 
 /// Is it an IP address or `localhost`? Another name may belong to a site that points it to this computer.
-fn is_address(authority: &str) -> bool {
+pub(crate) fn is_address(authority: &str) -> bool {
     let name = without_port(authority);
     let inner = name.strip_prefix('[').and_then(|name| name.strip_suffix(']'));
     name == "localhost"

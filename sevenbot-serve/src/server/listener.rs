@@ -10,7 +10,7 @@ use super::start_error::StartError;
 
 /// Bytes that the kernel keeps for a client that does not read; the kernel doubles it. Its default of megabytes would
 /// hand old reports to a slow client.
-const SEND_BUFFER: usize = 4_096;
+pub(crate) const SEND_BUFFER: usize = 4_096;
 
 /// A TCP port that clients connect to.
 #[derive(Debug)]

@@ -1,0 +1,155 @@
+//! `view`: the arm in a browser.
+
+use std::io::{self, Write};
+use std::net::{Ipv4Addr, SocketAddr};
+
+use clap::Args;
+use rust_embed::RustEmbed;
+use rustix::rand::{GetRandomFlags, getrandom};
+use serde::Serialize;
+use sevenbot_serve::server::{AccessPolicy, ArmLocation, PageConfig, Server, ServerConfig, StartError};
+
+use super::serve::{location, report, stop_signal};
+use crate::command_error::CommandError;
+use crate::printer::{Printable, note};
+use crate::session::Session;
+
+/// The port that is tried first. A browser keeps its permissions and settings for each port.
+const USUAL_PORT: u16 = 7780;
+
+/// Show and move the arm in a browser.
+///
+/// Opens a page with the arm in 3D, its state, its registers and its recordings. Without an arm the page simulates one. The
+/// page and the arm are for programs of this computer only. Nothing is loaded from the internet. Ctrl-C ends the server.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The address contains a token, which is different each time. A page without it can show and move a simulated arm only. So
+do not pass the address on. Keep the page's window in view while the arm moves: the space bar stops the arm.
+
+Other programs can use the arm at the same time through `sevenbot serve`, and `view --port` accepts a link of `serve`.
+
+Examples:
+  sevenbot view                                   the only port that leads to an arm; without one, a simulated arm
+  sevenbot --port /dev/ttyUSB0 view
+  sevenbot --port /dev/ttyUSB0 view --read-only   the page shows the arm and cannot move it
+  sevenbot view --simulate                        look for no arm
+  sevenbot view --no-open --http 8000             prints the address, and opens no browser")]
+pub(crate) struct ViewArgs {
+    /// Serve the page on this port; 0: a free one. Without this option 7780, or a free one.
+    #[arg(long, value_name = "PORT")]
+    http: Option<u16>,
+    /// Print the address, and open no browser.
+    #[arg(long)]
+    no_open: bool,
+    /// Write nothing to the arm.
+    #[arg(long)]
+    read_only: bool,
+    /// Look for no arm: the page simulates one.
+    #[arg(long, conflicts_with = "read_only")]
+    simulate: bool,
+}
+
+/// The page, if `cargo xtask web` had built it before this program was built.
+#[derive(RustEmbed)]
+#[folder = "../web/dist"]
+#[allow_missing = true]
+struct PageFile;
+
+/// The address of the page.
+#[derive(Serialize)]
+struct Address {
+    ready: String,
+}
+
+impl Printable for Address {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "ready {}", self.ready)
+    }
+}
+
+pub(crate) fn run(session: &mut Session, args: &ViewArgs) -> Result<(), CommandError> {
+    if PageFile::get("index.html").is_none() {
+        return Err(CommandError::Usage(
+            "this program was built without the page: in the project's folder, `cargo view` builds and opens it"
+                .to_owned(),
+        ));
+    }
+    let arm = if args.simulate { None } else { find_arm(session)? };
+    let token = token()?;
+    let page = PageConfig {
+        address: SocketAddr::from((Ipv4Addr::LOCALHOST, args.http.unwrap_or(USUAL_PORT))),
+        token: token.clone(),
+        files: |path| PageFile::get(path).map(|file| file.data),
+    };
+    let query = if arm.is_some() { format!("?token={token}") } else { String::new() };
+    let config = ServerConfig {
+        arm,
+        baud: session.options.baud,
+        ptys: Vec::new(),
+        tcp: None,
+        web_socket: None,
+        page: Some(page),
+        access: AccessPolicy { token: None, allows_any_page: false },
+        is_read_only: args.read_only,
+    };
+    let stop = stop_signal()?;
+    let server = open(config, args.http.is_none()).map_err(|error| CommandError::Arm(error.to_string()))?;
+    if let Some(address) = server.page_address() {
+        let address = format!("http://{address}/{query}");
+        session.printer.print(&Address { ready: address.clone() })?;
+        if !args.no_open && open::that_detached(&address).is_err() {
+            note(format_args!("no browser starts: open the address above"));
+        }
+    }
+    let ended = server.run(&stop, &mut |notice| report(&notice));
+    ended.map_err(|error| CommandError::Arm(format!("the operating system failed: {error}")))
+}
+
+/// `None`: no port leads to an arm.
+fn find_arm(session: &Session) -> Result<Option<ArmLocation>, CommandError> {
+    match location(session) {
+        Ok(arm) => Ok(Some(arm)),
+        Err(CommandError::NoArm { .. }) => {
+            note(format_args!(
+                "no arm found: the page simulates one. To use an arm, connect it and start again"
+            ));
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Opens the server. With `any_port` a port in use is replaced by a free one.
+fn open(mut config: ServerConfig, any_port: bool) -> Result<Server, StartError> {
+    match Server::open(config.clone()) {
+        Err(StartError::InUse(_)) if any_port => {
+            if let Some(page) = &mut config.page {
+                page.address.set_port(0);
+            }
+            Server::open(config)
+        }
+        outcome => outcome,
+    }
+}
+
+/// 128 random bits.
+fn token() -> Result<String, CommandError> {
+    let mut bytes = [0_u8; 16];
+    let count = getrandom(&mut bytes, GetRandomFlags::empty()).map_err(io::Error::from)?;
+    if count != bytes.len() {
+        return Err(CommandError::Arm("the operating system has no random numbers".to_owned()));
+    }
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_token_is_another_one() {
+        let tokens = [token().expect("a token"), token().expect("a token")];
+        assert!(tokens.iter().all(|token| token.len() == 32));
+        assert_ne!(tokens[0], tokens[1]);
+    }
+}
