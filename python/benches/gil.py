@@ -1,13 +1,15 @@
 """What the interpreter's lock costs: reads of all positions alone, and beside a Python thread that computes.
 
-    cargo run --release -p host-sim -- --link /tmp/arm --unpaced
+    taskset --cpu-list 0 cargo run --release -p host-sim -- --link /tmp/arm
     python python/benches/gil.py /tmp/arm
 
-`in the thread` reads in `Arm.sample`, without Python between two reads. `one call each` reads in a Python loop.
+`in the thread` reads in `Arm.sample`, without Python between two reads. `one call each` reads in a Python loop. Each
+figure is the median of runs in turn, and the spread of the kept rates is that from the worst to the best run.
 """
 
 from __future__ import annotations
 
+import statistics
 import sys
 import threading
 import time
@@ -16,7 +18,10 @@ from dataclasses import dataclass
 
 import sevenbot
 
-READS = 2_000
+READS = 600
+RUNS = 9
+# CPython's default, and a shorter one, in seconds.
+INTERVALS = (0.005, 0.0001)
 
 
 @dataclass
@@ -51,25 +56,41 @@ def alone(work: Callable[[], None]) -> float:
     return time.perf_counter() - start
 
 
+def shown(rates: list[float]) -> str:
+    """Rates of one run each, as parts of the rate alone."""
+    return f"{statistics.median(rates):.0%} ({min(rates):.0%} to {max(rates):.0%})"
+
+
 def main() -> None:
     with sevenbot.Arm(sys.argv[1]) as arm:
-        _, spinner = spinning(lambda: time.sleep(2))
 
         def bulk() -> None:
             arm.sample(READS)
 
-        def calls(reads: int = READS) -> None:
-            for _ in range(reads):
+        def calls() -> None:
+            for _ in range(READS):
                 arm.get("present-position")
 
-        print(f"{'reads':<16}{'alone':>10}{'beside a spinner':>20}{'spinner keeps':>16}")
-        for name, work, count in [
-            ("in the thread", bulk, READS),
-            ("one call each", calls, READS),
+        print(f"{'reads':<16}{'interval':>9}{'alone':>10}{'beside':>10}{'link keeps':>24}{'spinner keeps':>24}")
+        for name, work, interval in [
+            ("in the thread", bulk, INTERVALS[0]),
+            *(("one call each", calls, interval) for interval in INTERVALS),
         ]:
-            rate = count / alone(work)
-            seconds, kept = spinning(work)
-            print(f"{name:<16}{rate:>7.0f} Hz{count / seconds:>17.0f} Hz{kept / spinner:>15.0%}")
+            sys.setswitchinterval(interval)
+            rates, links, spinners = [], [], []
+            for _ in range(RUNS):
+                _, counts = spinning(lambda: time.sleep(1))
+                rate = READS / alone(work)
+                seconds, kept = spinning(work)
+                rates.append(rate)
+                links.append(READS / seconds / rate)
+                spinners.append(kept / counts)
+            rate = statistics.median(rates)
+            print(
+                f"{name:<16}{interval * 1_000:>6} ms{rate:>7.0f} Hz{rate * statistics.median(links):>7.0f} Hz"
+                f"{shown(links):>24}{shown(spinners):>24}",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":
