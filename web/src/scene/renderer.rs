@@ -4,6 +4,8 @@
 //!   table ─▶ grid ─▶ shadow (stencil: once a pixel) ─▶ arm ─▶ ghost (depth first, so that it is one layer) ─▶ markers
 //! ```
 
+use std::collections::HashMap;
+
 use arm_model::{Body, Finish};
 use glam::{Mat4, Vec3, Vec4};
 use wasm_bindgen::JsValue;
@@ -36,7 +38,7 @@ const SHELL_WEIGHT_ELSE: f32 = 0.4;
 pub struct Renderer {
     gl: Gl,
     arm: Layer,
-    corners: i32,
+    indices: i32,
     lines: Layer,
     markers: Layer,
 }
@@ -71,11 +73,15 @@ impl Renderer {
         let ends = [("position", 3), ("colour", 4)];
         let lines = layer(shaders::LINE_VERTEX, shaders::LINE_FRAGMENT, &ends)?;
         let markers = layer(shaders::MARKER_VERTEX, shaders::MARKER_FRAGMENT, &ends)?;
-        let corners = corners(arm);
-        of_arm.upload(&gl, &corners, Gl::STATIC_DRAW);
+        let (corners, indices) = corners(arm);
+        of_arm.upload(&gl, corners.as_flattened(), Gl::STATIC_DRAW);
+        // The layout of the arm keeps the binding.
+        gl.bind_buffer(Gl::ELEMENT_ARRAY_BUFFER, gl.create_buffer().as_ref());
+        let array = js_sys::Uint16Array::from(indices.as_slice());
+        gl.buffer_data_with_array_buffer_view(Gl::ELEMENT_ARRAY_BUFFER, &array, Gl::STATIC_DRAW);
         gl.enable(Gl::CULL_FACE);
         gl.blend_func(Gl::ONE, Gl::ONE_MINUS_SRC_ALPHA);
-        Ok(Self { arm: of_arm, corners: count(corners.len() / CORNER), lines, markers, gl })
+        Ok(Self { arm: of_arm, indices: count(indices.len()), lines, markers, gl })
     }
 
     /// Draws a view. Width and height are device pixels; `ratio` is device pixels per CSS pixel.
@@ -137,7 +143,7 @@ impl Renderer {
         gl.uniform4fv_with_f32_array(arm.uniform(gl, "tint").as_ref(), &look.tint.to_array());
         gl.uniform1f(arm.uniform(gl, "shading").as_ref(), look.shading);
         gl.uniform1f(arm.uniform(gl, "opacity").as_ref(), look.opacity);
-        gl.draw_arrays(Gl::TRIANGLES, 0, self.corners);
+        gl.draw_elements_with_i32(Gl::TRIANGLES, self.indices, Gl::UNSIGNED_SHORT, 0);
     }
 
     /// The arm, flattened onto the table along the light. The stencil keeps a pixel from being darkened twice.
@@ -272,21 +278,27 @@ fn accent(view: &View, palette: &Palette, part: Part) -> [f32; 4] {
     [red, green, blue, weight]
 }
 
-/// All corners of the arm, in the layout of the arm's program.
-fn corners(arm: &Arm) -> Vec<f32> {
-    let mut numbers = Vec::new();
+/// All different corners of the arm, in the layout of the arm's program, and their indices in the order of the triangles:
+/// a corner that triangles share is computed once.
+fn corners(arm: &Arm) -> (Vec<[f32; CORNER]>, Vec<u16>) {
+    let (mut corners, mut indices, mut known) = (Vec::new(), Vec::new(), HashMap::new());
     for (number, (_, mesh)) in (0_u8..).zip(arm.meshes()) {
-        let corners = mesh.positions.iter().zip(&mesh.normals).zip(&mesh.finishes);
-        for ((position, normal), finish) in corners {
+        for ((&[x, y, z], &[u, v, w]), finish) in mesh.positions.iter().zip(&mesh.normals).zip(&mesh.finishes)
+        {
             let finish = match finish {
                 Finish::Shell => 0.0,
                 Finish::Dark => 1.0,
                 Finish::Accent => 2.0,
             };
-            numbers.extend(position.iter().chain(normal).chain(&[f32::from(number), finish]));
+            let corner: [f32; CORNER] = [x, y, z, u, v, w, f32::from(number), finish];
+            let index = *known.entry(corner.map(f32::to_bits)).or_insert_with(|| {
+                corners.push(corner);
+                u16::try_from(corners.len() - 1).unwrap_or_default()
+            });
+            indices.push(index);
         }
     }
-    numbers
+    (corners, indices)
 }
 
 /// The table: a disc that fades at its edge.
@@ -309,4 +321,26 @@ fn table(palette: &Palette) -> Vec<LineEnd> {
 /// A number of corners as WebGL takes it.
 fn count(corners: usize) -> i32 {
     i32::try_from(corners).unwrap_or(i32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shared_corners_are_kept_once_and_have_an_index() {
+        let arm = Arm::default();
+        let (corners, indices) = corners(&arm);
+        let positions: Vec<[f32; 3]> =
+            arm.meshes().iter().flat_map(|(_, mesh)| mesh.positions.iter().copied()).collect();
+        assert_eq!(indices.len(), positions.len());
+        assert!(
+            corners.len() < usize::from(u16::MAX) && corners.len() * 2 < indices.len(),
+            "{}",
+            corners.len()
+        );
+        for (index, position) in indices.into_iter().zip(positions) {
+            assert_eq!(corners[usize::from(index)][..3], position);
+        }
+    }
 }
