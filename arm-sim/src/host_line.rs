@@ -264,8 +264,9 @@ impl LineDirection {
 
     /// When the next bytes have arrived, or end their delay; `None` if none are on the way.
     pub(crate) fn deadline(&self) -> Option<Instant> {
-        let delayed = self.delayed.front().map(|&(due, _)| due);
-        [delayed, self.pacer.deadline()].into_iter().flatten().min()
+        let arrival = self.pacer.deadline();
+        let Some(&(due, _)) = self.delayed.front() else { return arrival };
+        Some(arrival.map_or(due, |arrival| arrival.min(due)))
     }
 }
 

@@ -79,7 +79,7 @@ impl Wire {
 
     /// Lets a servo send bytes from `start` on.
     pub(crate) fn send(&mut self, start: Instant, bytes: &[u8]) {
-        self.insert(Transmission { start, bytes: bytes.iter().copied().collect(), is_from_servo: true });
+        self.insert(Transmission { start, bytes: bytes.to_vec().into(), is_from_servo: true });
     }
 
     /// Lets the master receive its own bytes, from `start` on; damaged if they collided.
@@ -101,17 +101,23 @@ impl Wire {
             let start = first.start.max(self.free_at);
             let whole_bytes = (now - start).as_micros() / BYTE_TIME_US;
             let count = usize::try_from(whole_bytes).unwrap_or(usize::MAX).min(first.bytes.len());
-            arrived.extend(first.bytes.drain(..count));
             if count > 0 {
                 self.free_at = start + time_of(count);
             }
-            if !first.bytes.is_empty() {
+            if count < first.bytes.len() {
+                arrived.extend(first.bytes.drain(..count));
                 break;
             }
             if first.is_from_servo {
                 self.driven_until = self.free_at + DRIVE_TIME;
             }
-            self.queue.pop_front();
+            let whole = self.queue.pop_front().map_or(VecDeque::new(), |last| last.bytes);
+            // Usually one answer arrives at a time: then its memory is passed on.
+            if arrived.is_empty() {
+                arrived = whole.into();
+            } else {
+                arrived.extend(whole);
+            }
         }
         arrived
     }

@@ -41,10 +41,11 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// an idle line, and is checked again after a tick.
     #[must_use]
     pub fn next_event(&self) -> Instant {
-        let candidates =
-            [self.line_deadline(), self.bus.deadline(), Some(self.controller_due), self.faults.deadline()];
         let later = |deadline| if deadline > self.now { deadline } else { self.now + TICK };
-        candidates.into_iter().flatten().map(later).min().unwrap_or(Instant::FAR_FUTURE)
+        let or_never = |deadline: Option<Instant>| deadline.map_or(Instant::FAR_FUTURE, later);
+        let line = or_never(self.to_arm.deadline()).min(or_never(self.to_host.deadline()));
+        let inside = later(self.controller_due).min(or_never(self.bus.deadline()));
+        line.min(inside).min(or_never(self.faults.deadline()))
     }
 }
 
