@@ -14,6 +14,7 @@ use crate::frame_port::{FramePort, Received};
 use crate::host_line::HostLine;
 use crate::identity::{Firmware, Identity};
 use crate::map_view::{MapView, WriteFrame};
+#[cfg(feature = "serial")]
 use crate::open_port::OpenPort;
 use crate::pending::PendingReads;
 use crate::reports::{Report, ReportQueue, report_period};
@@ -84,6 +85,7 @@ impl fmt::Debug for Arm {
     }
 }
 
+#[cfg(feature = "serial")]
 impl Arm {
     /// Opens a port and checks that a 7Bot V2 answers.
     ///
@@ -100,7 +102,9 @@ impl Arm {
     pub fn open_with(path: &str, options: ArmOptions) -> Result<Self, OpenError> {
         Self::over(Box::new(OpenPort::open(path, options.baud)?), path, options)
     }
+}
 
+impl Arm {
     /// An arm at the other end of a line. `name` is what [`Arm::port`] returns.
     ///
     /// # Errors

@@ -4,7 +4,6 @@ use std::fmt;
 use std::io;
 use std::time::Duration;
 
-use crate::permission;
 use crate::span::Span;
 
 /// Why a port cannot be opened, or has no arm.
@@ -34,7 +33,7 @@ pub enum OpenError {
     Busy,
     /// The port cannot be used as a serial port, with the reason of the system.
     #[error("this port cannot be used: {0}")]
-    Unusable(serialport::Error),
+    Unusable(String),
     /// The port opened, but no arm answered.
     #[error(transparent)]
     Silent(#[from] Error),
@@ -44,23 +43,6 @@ pub enum OpenError {
         /// The device code.
         code: u8,
     },
-}
-
-impl OpenError {
-    /// The reason why the port at `path` did not open.
-    pub(crate) fn of(path: &str, error: serialport::Error) -> Self {
-        use io::ErrorKind;
-        match error.kind() {
-            serialport::ErrorKind::Io(ErrorKind::NotFound) => Self::NotFound,
-            serialport::ErrorKind::Io(ErrorKind::PermissionDenied) => {
-                Self::PermissionDenied { group: permission::group_of(path) }
-            }
-            // The serialport crate reports a locked port like this. On Windows a missing port is reported like this
-            // too.
-            serialport::ErrorKind::NoDevice if !cfg!(windows) => Self::Busy,
-            _ => Self::Unusable(error),
-        }
-    }
 }
 
 /// Why an exchange with an open arm failed.

@@ -44,16 +44,20 @@ mod map21_text;
 mod map_view;
 pub mod moves;
 pub mod names;
+#[cfg(feature = "serial")]
 pub mod open_port;
 mod pending;
+#[cfg(feature = "serial")]
 mod permission;
 pub mod playback;
 pub mod point_path;
+#[cfg(feature = "serial")]
 pub mod ports;
 pub mod recording;
 pub mod register_text;
 pub mod register_values;
 mod reports;
+#[cfg(feature = "serial")]
 pub mod servo_bench;
 pub mod simulated;
 pub mod snapshot;

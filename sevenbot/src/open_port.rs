@@ -9,6 +9,7 @@ use serialport::SerialPort;
 
 use crate::error::{OpenError, PortError};
 use crate::host_line::HostLine;
+use crate::permission;
 
 /// The shortest timeout that works on every platform.
 const SHORTEST_WAIT: Duration = Duration::from_millis(1);
@@ -40,7 +41,7 @@ impl OpenPort {
     pub fn open(name: &str, baud: u32) -> Result<Self, OpenError> {
         let deadline = Instant::now() + UNLOCK_TIMEOUT;
         loop {
-            match open_once(name, baud).map_err(|error| OpenError::of(name, error)) {
+            match open_once(name, baud).map_err(|error| open_error(name, &error)) {
                 Err(OpenError::Busy) if Instant::now() < deadline => sleep(TRY_AGAIN),
                 opened => return opened.map(|port| Self { port, opened: Instant::now() }),
             }
@@ -98,6 +99,19 @@ impl HostLine for OpenPort {
 
     fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
         self.receive(timeout)
+    }
+}
+
+/// The reason why the port at `path` did not open.
+fn open_error(path: &str, error: &serialport::Error) -> OpenError {
+    match error.kind() {
+        serialport::ErrorKind::Io(ErrorKind::NotFound) => OpenError::NotFound,
+        serialport::ErrorKind::Io(ErrorKind::PermissionDenied) => {
+            OpenError::PermissionDenied { group: permission::group_of(path) }
+        }
+        // The serialport crate reports a locked port like this. On Windows a missing port is reported like this too.
+        serialport::ErrorKind::NoDevice if !cfg!(windows) => OpenError::Busy,
+        _ => OpenError::Unusable(error.to_string()),
     }
 }
 

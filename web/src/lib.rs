@@ -1,6 +1,26 @@
 //! The page that simulates, shows and drives a 7Bot V2 arm in a browser.
+//!
+//! ```text
+//!   Source: simulator, WebSocket, Web Serial
+//!      │ ▲  bytes
+//!      ▼ │
+//!   Client: frames ──▶ registers ──▶ ArmState ──▶ scene, plots, panels
+//!        ▲
+//!        └── commands ◀── events of a person
+//! ```
+//!
+//! All but `app`, the renderer and the sources of a browser is plain Rust, and is tested on the host.
 
 #![forbid(unsafe_code)]
 
+#[cfg(target_arch = "wasm32")]
+mod app;
+pub mod arm_state;
+pub mod client;
+pub mod movement;
 pub mod plots;
 pub mod scene;
+pub mod source;
+pub mod stop;
+pub mod texts;
+pub mod words;

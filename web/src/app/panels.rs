@@ -1,0 +1,221 @@
+//! What the page shows beside the picture of the arm.
+
+use sevenbot::map::{EXTENDED_VERSION, SERVO_TEMPERATURE};
+use sevenbot::{Span, register_text};
+use wasm_bindgen::JsValue;
+use web_sys::{Element, HtmlInputElement};
+
+use super::dom::{Dom, set_attribute, set_text};
+use super::{App, Line, tip};
+use crate::arm_state::ArmState;
+use crate::source::LineState;
+use crate::texts::Language;
+use crate::words::{Answers, state_line};
+
+/// The highest angle of a slider, in degrees, per joint; joint 7 ends where its claw is open.
+const HIGHEST: [&str; 7] = ["180", "180", "180", "180", "180", "180", "84"];
+/// The registers of the table: all that are read.
+const SHOWN: [std::ops::RangeInclusive<u8>; 3] =
+    [0..=60, 128..=EXTENDED_VERSION.address, 240..=SERVO_TEMPERATURE.address];
+
+/// Makes the elements that there are many of.
+pub(super) fn build(dom: &Dom) -> Result<(), JsValue> {
+    let joints: Element = dom.get("joints")?;
+    let broken: Element = dom.get("fault-joint")?;
+    for (number, highest) in (1..=7).zip(HIGHEST) {
+        let row = dom.add(&joints, "div")?;
+        row.set_class_name("joint");
+        row.set_id(&format!("row-{number}"));
+        let label = dom.add(&row, "label")?;
+        label.set_attribute("for", &format!("joint-{number}"))?;
+        let slider = dom.add(&row, "input")?;
+        for (name, value) in [("type", "range"), ("min", "0"), ("max", highest), ("step", "0.5")] {
+            slider.set_attribute(name, value)?;
+        }
+        slider.set_id(&format!("joint-{number}"));
+        slider.set_attribute("data-joint", &number.to_string())?;
+        dom.add(&row, "output")?.set_id(&format!("angle-{number}"));
+        let option = dom.add(&broken, "option")?;
+        option.set_attribute("value", &number.to_string())?;
+        set_text(&option, &number.to_string());
+    }
+    Ok(())
+}
+
+/// Shows the names of the joints in a language.
+pub(super) fn translate(dom: &Dom, language: Language) {
+    for number in 1..=7 {
+        for label in dom.all(&format!("#row-{number} label")) {
+            set_text(&label, &format!("{} {number}", language.text("joint")));
+        }
+    }
+}
+
+/// Shows the arm as it is now.
+pub(super) fn show(app: &mut App, state: &ArmState) {
+    show_line(app, state);
+    let (dom, language) = (&app.dom, app.language);
+    show_joints(dom, language, state);
+    dom.press("motors", &state.motor_state.to_string());
+    let [x, y, z] = tip(state.angles());
+    let reach = if app.unreachable.is_some() { language.text("unreachable") } else { "" };
+    dom.set_text("tip", &format!("{}: x {x:.0}, y {y:.0}, z {z:.0} mm {reach}", language.text("tip")));
+    show_recording(app);
+    if let Line::Simulated(source) = &app.line {
+        app.dom.set_text("time", &format!("{:.1} s", seconds(source.now())));
+    }
+    if is_open(&app.dom, "frames-panel") {
+        show_frames(app);
+    }
+    if is_open(&app.dom, "registers-panel") {
+        show_registers(app);
+    }
+}
+
+fn show_line(app: &mut App, state: &ArmState) {
+    let answers = match (app.client.rounds(), app.client.is_connected()) {
+        (_, true) => Answers::Yes,
+        (0, _) => Answers::NotYet,
+        _ => Answers::NoLonger,
+    };
+    let (line, mood) = state_line(app.language, answers, state, app.client.stop_progress());
+    app.dom.set_text("state", &line);
+    if let Some(element) = app.dom.element("state") {
+        set_attribute(&element, "class", mood.class());
+    }
+    if let LineState::Closed(reason) = app.line_state() {
+        let text = if app.client.rounds() > 0 { "closed" } else { "no-server" };
+        notice(&app.dom, &format!("{} {reason}", app.language.text(text)));
+    }
+}
+
+fn show_joints(dom: &Dom, language: Language, state: &ArmState) {
+    for ((index, measured), target) in (0..).zip(state.measured).zip(state.targets) {
+        let number = index + 1;
+        let is_missing = state.missing >> index & 1 == 1;
+        let measured = match measured {
+            _ if is_missing => language.text("no-answer").to_owned(),
+            Some(angle) => format!("{angle:.1}°"),
+            None => language.text("not-measured").to_owned(),
+        };
+        dom.set_text(&format!("angle-{number}"), &format!("{measured} → {target:.1}°"));
+        if let Some(row) = dom.element(&format!("row-{number}")) {
+            set_attribute(&row, "class", if is_missing { "joint bad" } else { "joint" });
+        }
+        let Ok(slider) = dom.get::<HtmlInputElement>(&format!("joint-{number}")) else { continue };
+        // A slider in a hand shows what the hand wants.
+        if !(dom.has_focus(&slider) && state.moving >> index & 1 == 1) {
+            let value = format!("{target:.1}");
+            if slider.value().parse() != Ok(target) {
+                slider.set_value(&value);
+            }
+        }
+    }
+}
+
+fn show_recording(app: &App) {
+    let text = |name| app.language.text(name);
+    let line = match (&app.recorder, &app.player, &app.recording) {
+        (Some(_), ..) => format!("● {}", text("record")),
+        (_, Some(player), _) => format!("{} {:.0} %", text("playing"), player.progress(app.now()) * 100.0),
+        (_, _, Some(recording)) => {
+            format!("{}: {}", text("recorded"), recording.lines().count().saturating_sub(2))
+        }
+        _ => text("no-recording").to_owned(),
+    };
+    app.dom.set_text("recording", &line);
+    for button in app.dom.all("[data-action=record]") {
+        set_attribute(&button, "aria-pressed", if app.recorder.is_some() { "true" } else { "false" });
+    }
+}
+
+fn show_frames(app: &App) {
+    let Some(list) = app.dom.element("frames") else { return };
+    let frames = app.client.frames().rev().map(|(time, is_to_arm, traffic)| {
+        format!("{:9.3} {} {traffic}", seconds(*time), if *is_to_arm { "→" } else { "←" })
+    });
+    let text = frames.collect::<Vec<_>>().join("\n");
+    if list.get_attribute("data-shown").as_deref() == Some(text.as_str()) {
+        return;
+    }
+    set_attribute(&list, "data-shown", &text);
+    list.set_text_content(None);
+    for line in text.lines() {
+        if let Ok(item) = app.dom.add(&list, "li") {
+            set_text(&item, line);
+        }
+    }
+}
+
+fn show_registers(app: &App) {
+    let Some(table) = app.dom.element("registers") else { return };
+    let registers = app.client.registers();
+    for range in SHOWN {
+        let (first, last) = (*range.start(), *range.end());
+        let values =
+            registers.values.get(usize::from(first)..=usize::from(last)).unwrap_or_default().to_vec();
+        for entry in register_text::entries(&sevenbot::Snapshot { address: first, values }) {
+            let id = format!("register-{}", entry.address);
+            if app.dom.element(&id).is_none() && add_register(&app.dom, &table, &id, &entry).is_err() {
+                return;
+            }
+            app.dom.set_text(&format!("{id}-meaning"), &entry.meaning);
+            if let Ok(input) = app.dom.get::<HtmlInputElement>(&format!("{id}-value")) {
+                if !app.dom.has_focus(&input) && input.value() != entry.value {
+                    input.set_value(&entry.value);
+                }
+            } else {
+                app.dom.set_text(&format!("{id}-value"), &entry.value);
+            }
+        }
+    }
+}
+
+fn add_register(
+    dom: &Dom,
+    table: &Element,
+    id: &str,
+    entry: &register_text::RegisterEntry,
+) -> Result<(), JsValue> {
+    let row = dom.add(table, "tr")?;
+    row.set_id(id);
+    set_text(&dom.add(&row, "td")?, &format!("{} {}", entry.address, entry.name));
+    let value = dom.add(&row, "td")?;
+    let count = u8::try_from(entry.bytes.len()).unwrap_or(1);
+    let can_write = Span::new(entry.address, count).is_some() && is_writable(entry.address);
+    let value = if can_write { dom.add(&value, "input")? } else { value };
+    value.set_id(&format!("{id}-value"));
+    if can_write {
+        value.set_attribute("data-register", &entry.address.to_string())?;
+        value.set_attribute("inputmode", "numeric")?;
+        value.set_attribute("aria-label", &entry.name)?;
+    }
+    dom.add(&row, "td")?.set_id(&format!("{id}-meaning"));
+    Ok(())
+}
+
+fn is_writable(address: u8) -> bool {
+    use protocol_core::registers::Access;
+    sevenbot::map::find(address).is_some_and(|row| row.access == Access::ReadWrite)
+}
+
+/// Says something that a person should know now.
+pub(super) fn notice(dom: &Dom, text: &str) {
+    dom.set_text("notice", text);
+    dom.set_hidden("notice", false);
+}
+
+/// Takes the last notice back.
+pub(super) fn end_notice(dom: &Dom) {
+    dom.set_hidden("notice", true);
+    dom.set_text("notice", "");
+}
+
+fn is_open(dom: &Dom, id: &str) -> bool {
+    dom.element(id).is_some_and(|panel| panel.has_attribute("open"))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "times of years are exact enough")]
+fn seconds(time: protocol_core::time::Instant) -> f64 {
+    time.as_micros() as f64 / 1e6
+}

@@ -1,0 +1,95 @@
+//! What the registers say of an arm, in units.
+
+use sevenbot::map::{
+    EXTENDED_VERSION, FAULTS, FINE_POSITION, FINE_TARGET, LOAD, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS,
+    PRESENT_POSITION, SERVO_TEMPERATURE, STATUS_VERSION, SUPPLY_VOLTAGE, TARGET_POSITION, VELOCITY,
+};
+use sevenbot::{FineAngle, Snapshot};
+
+/// An arm at one instant, joint 1 first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArmState {
+    /// In degrees; `None` for a joint that was not measured since power-up.
+    pub measured: [Option<f32>; 7],
+    /// In degrees.
+    pub targets: [f32; 7],
+    /// In degrees per second, positive towards greater angles. 0 from an arm without the extended block.
+    pub velocities: [f32; 7],
+    /// In percent of the stall torque, positive towards greater angles. 0 from an arm without the extended block.
+    pub loads: [f32; 7],
+    /// Register 29: 0 damping, 1 servo, 2 forceless.
+    pub motor_state: u8,
+    /// Register 241.
+    pub faults: u8,
+    /// Bit n-1 for joint n, as in `moving`.
+    pub missing: u8,
+    /// Joints whose set-point moves.
+    pub moving: u8,
+    /// In volts; `None` while unknown.
+    pub volts: Option<f32>,
+    /// Of the hottest servo, in degrees Celsius; `None` while unknown.
+    pub celsius: Option<u8>,
+}
+
+impl ArmState {
+    /// From registers 0 to 255.
+    #[must_use]
+    pub fn new(registers: &Snapshot) -> Self {
+        let is_fine = has_extended_block(registers);
+        let whole = |row| registers.joints(row).map(f32::from);
+        let hundredths = |word| f32::from(word) / 100.0;
+        let tenths = |row| registers.words(row).map(|word| f32::from(word.cast_signed()) / 10.0);
+        let measured = if is_fine {
+            let angle = |word| FineAngle::from_hundredths(word).map(|angle| hundredths(angle.hundredths()));
+            registers.words(&FINE_POSITION).map(angle)
+        } else {
+            whole(&PRESENT_POSITION).map(Some)
+        };
+        let targets =
+            if is_fine { registers.words(&FINE_TARGET).map(hundredths) } else { whole(&TARGET_POSITION) };
+        let [velocities, loads] = [&VELOCITY, &LOAD].map(|row| if is_fine { tenths(row) } else { [0.0; 7] });
+        let has_status = registers.byte(&STATUS_VERSION) == 1;
+        let status = |row| if has_status { registers.byte(row) } else { 0 };
+        let known = |value: u8| (value != 0).then_some(value);
+        Self {
+            measured,
+            targets,
+            velocities,
+            loads,
+            motor_state: registers.byte(&MOTOR_STATE),
+            faults: status(&FAULTS),
+            missing: status(&MISSING_SERVOS),
+            moving: status(&MOVING_JOINTS),
+            volts: known(status(&SUPPLY_VOLTAGE)).map(|decivolts| f32::from(decivolts) / 10.0),
+            celsius: known(status(&SERVO_TEMPERATURE)),
+        }
+    }
+
+    /// The measured angles, and the targets of joints that were not measured.
+    #[must_use]
+    pub fn angles(&self) -> [f32; 7] {
+        let mut angles = self.targets;
+        for (angle, measured) in angles.iter_mut().zip(self.measured) {
+            *angle = measured.unwrap_or(*angle);
+        }
+        angles
+    }
+}
+
+/// Does the arm have registers 128 to 191 (D21 to D26)?
+#[must_use]
+pub fn has_extended_block(registers: &Snapshot) -> bool {
+    registers.byte(&EXTENDED_VERSION) == 1
+}
+
+/// The frame that sends one joint, 1 to 7, to an angle in degrees. `None` if there is no such joint or angle.
+#[must_use]
+pub fn target_frame(registers: &Snapshot, joint: u8, degrees: f32) -> Option<(u8, Vec<u8>)> {
+    let joint = sevenbot::Joint::new(joint)?;
+    let angle = FineAngle::from_degrees(degrees.into())?;
+    Some(if has_extended_block(registers) {
+        (FINE_TARGET.of(joint), angle.hundredths().to_le_bytes().to_vec())
+    } else {
+        (TARGET_POSITION.of(joint), vec![angle.nearest().degrees()])
+    })
+}

@@ -1,0 +1,84 @@
+//! An arm behind `sevenbot view`: a WebSocket whose binary messages carry the bytes of frames.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use wasm_bindgen::prelude::Closure;
+use wasm_bindgen::{JsCast, JsValue};
+use web_sys::{BinaryType, CloseEvent, MessageEvent, WebSocket};
+
+use super::{LineState, Source};
+
+/// A WebSocket to a server.
+pub struct SocketSource {
+    socket: WebSocket,
+    shared: Rc<RefCell<Shared>>,
+    // The browser calls these while the socket is open.
+    _message: Closure<dyn FnMut(MessageEvent)>,
+    _close: Closure<dyn FnMut(CloseEvent)>,
+}
+
+#[derive(Default)]
+struct Shared {
+    received: Vec<u8>,
+    closed: Option<String>,
+}
+
+impl SocketSource {
+    /// Connects to the server that this page came from. The page's address has its token.
+    ///
+    /// # Errors
+    /// The browser refuses the address.
+    pub fn connect() -> Result<Self, JsValue> {
+        let location = web_sys::window().ok_or("no window")?.location();
+        let scheme = if location.protocol()? == "https:" { "wss" } else { "ws" };
+        let address = format!("{scheme}://{}/frames{}", location.host()?, location.search()?);
+        let socket = WebSocket::new(&address)?;
+        socket.set_binary_type(BinaryType::Arraybuffer);
+        let shared = Rc::new(RefCell::new(Shared::default()));
+        let inbox = Rc::clone(&shared);
+        let message = Closure::<dyn FnMut(MessageEvent)>::new(move |event: MessageEvent| {
+            if let Ok(buffer) = event.data().dyn_into::<js_sys::ArrayBuffer>() {
+                inbox.borrow_mut().received.extend(js_sys::Uint8Array::new(&buffer).to_vec());
+            }
+        });
+        socket.set_onmessage(Some(message.as_ref().unchecked_ref()));
+        let inbox = Rc::clone(&shared);
+        let close = Closure::<dyn FnMut(CloseEvent)>::new(move |event: CloseEvent| {
+            inbox.borrow_mut().closed = Some(event.reason());
+        });
+        socket.set_onclose(Some(close.as_ref().unchecked_ref()));
+        Ok(Self { socket, shared, _message: message, _close: close })
+    }
+}
+
+impl Drop for SocketSource {
+    fn drop(&mut self) {
+        self.socket.set_onmessage(None);
+        self.socket.set_onclose(None);
+        // It may be closed already.
+        let _ = self.socket.close();
+    }
+}
+
+impl Source for SocketSource {
+    fn send(&mut self, bytes: &[u8]) {
+        if self.state() == LineState::Open && !bytes.is_empty() {
+            // A failure closes the socket, which is seen there.
+            let _ = self.socket.send_with_u8_array(bytes);
+        }
+    }
+
+    fn receive(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.shared.borrow_mut().received)
+    }
+
+    fn state(&self) -> LineState {
+        match (self.socket.ready_state(), &self.shared.borrow().closed) {
+            (_, Some(reason)) => LineState::Closed(reason.clone()),
+            (WebSocket::OPEN, None) => LineState::Open,
+            (WebSocket::CONNECTING, None) => LineState::Opening,
+            _ => LineState::Closed(String::new()),
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! Every text of the page, in English and Chinese.
+
+/// A language of the page.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Language {
+    /// English.
+    #[default]
+    English,
+    /// Simplified Chinese.
+    Chinese,
+}
+
+impl Language {
+    /// The language for a tag of the browser, such as `zh-CN`.
+    #[must_use]
+    pub fn of_tag(tag: &str) -> Self {
+        if tag.starts_with("zh") { Self::Chinese } else { Self::English }
+    }
+
+    /// The tag of the language.
+    #[must_use]
+    pub const fn tag(self) -> &'static str {
+        match self {
+            Self::English => "en",
+            Self::Chinese => "zh-CN",
+        }
+    }
+
+    /// The other language.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::English => Self::Chinese,
+            Self::Chinese => Self::English,
+        }
+    }
+
+    /// A text; its name if there is no such text.
+    #[must_use]
+    pub fn text(self, name: &'static str) -> &'static str {
+        self.find(name).unwrap_or(name)
+    }
+
+    /// A text that the page names; `None` if there is no such text.
+    #[must_use]
+    pub fn find(self, name: &str) -> Option<&'static str> {
+        let (_, english, chinese) = TEXTS.iter().find(|(known, ..)| *known == name)?;
+        Some(if self == Self::English { english } else { chinese })
+    }
+}
+
+/// Names, English, Chinese.
+const TEXTS: &[(&str, &str, &str)] = &[
+    ("source", "Arm", "机械臂"),
+    ("source-simulator", "simulated in this page", "本页面内模拟"),
+    ("source-server", "at this server", "服务器上的机械臂"),
+    ("source-usb", "on USB", "USB 上的机械臂"),
+    ("tour", "Tour", "导览"),
+    ("other-language", "中文", "English"),
+    ("stop", "STOP", "停止"),
+    ("stop-key", "space bar", "空格键"),
+    ("view", "The arm", "机械臂视图"),
+    (
+        "view-label",
+        "The arm in 3D. Drag a joint or the tip to move it. Arrow keys turn the camera, plus and minus zoom.",
+        "机械臂三维视图。拖动关节或末端可移动机械臂。方向键旋转视角，加减键缩放。",
+    ),
+    ("plot", "Plot", "曲线"),
+    ("plot-label", "The last ten seconds of each joint", "各关节最近十秒的曲线"),
+    ("angle", "angle", "角度"),
+    ("velocity", "velocity", "速度"),
+    ("load", "load", "负载"),
+    ("joints", "Joints", "关节"),
+    ("joint", "Joint", "关节"),
+    ("motors", "Motors", "电机"),
+    ("motors-on", "hold", "保持"),
+    ("motors-off", "limp", "松开"),
+    ("motors-damp", "damped", "阻尼"),
+    ("recording", "Movements", "动作"),
+    (
+        "recording-hint",
+        "Record, move the arm, and press Record again. Then play it, or save it for `sevenbot play`.",
+        "按“录制”，移动机械臂，再按一次结束。然后可以播放，或保存供 `sevenbot play` 使用。",
+    ),
+    ("record", "Record", "录制"),
+    ("play", "Play", "播放"),
+    ("download", "Save", "保存"),
+    ("upload", "Open…", "打开…"),
+    ("recorded", "recorded", "已录制"),
+    ("no-recording", "nothing recorded yet", "尚未录制"),
+    ("playing", "playing", "播放中"),
+    ("simulator", "Simulation", "模拟"),
+    ("speed", "Speed of time", "时间速度"),
+    ("pause", "pause", "暂停"),
+    ("hurry", "as fast as possible", "尽可能快"),
+    (
+        "fault-hint",
+        "Break a servo and see what the arm does and says.",
+        "让一个舵机出故障，看看机械臂如何反应。",
+    ),
+    ("fault-where", "Servo", "舵机"),
+    ("fault-what", "Fault", "故障"),
+    ("fault-missing", "does not answer", "无应答"),
+    ("fault-stuck", "is stuck", "卡住"),
+    ("break", "Break it", "使其故障"),
+    ("repair", "Repair all", "全部修复"),
+    ("power", "Power off and on", "断电重启"),
+    ("frames", "Frames on the line", "通信帧"),
+    (
+        "frames-hint",
+        "What this page writes to the arm, newest first. Its reads are left out.",
+        "本页面写给机械臂的帧，最新的在前。不显示读取。",
+    ),
+    ("registers", "Registers", "寄存器"),
+    (
+        "registers-hint",
+        "As they are now. Type a value and press Enter to write it.",
+        "当前值。输入数值并按回车写入。",
+    ),
+    ("register", "Register", "寄存器"),
+    ("value", "Value", "数值"),
+    ("meaning", "Meaning", "含义"),
+    ("tour-title", "The first minute", "第一分钟"),
+    ("next", "Next", "下一步"),
+    ("end", "Close", "关闭"),
+    (
+        "tour-1",
+        "This is a whole arm: the same controller program as in the real one, seven servos, and gravity. Drag a slider, \
+         or drag a part of the arm in the picture.",
+        "这是一台完整的机械臂：与真机相同的控制程序、七个舵机和重力。拖动滑块，或在画面中拖动机械臂的部件。",
+    ),
+    (
+        "tour-2",
+        "The red button and the space bar stop the arm, wherever you are on the page. The line below the title then says \
+         whether the arm holds.",
+        "红色按钮和空格键可随时停止机械臂。标题下方会显示机械臂是否已保持。",
+    ),
+    (
+        "tour-3",
+        "Under Simulation, break a servo. Its joint changes colour, and the line below the title says what is wrong. \
+         Repair all puts it right.",
+        "在“模拟”中让一个舵机出故障。该关节会变色，标题下方会说明问题。按“全部修复”恢复。",
+    ),
+    (
+        "tour-4",
+        "Under Movements, press Record, move the arm, and press Record again. Play repeats the movement.",
+        "在“动作”中按“录制”，移动机械臂，再按一次。按“播放”重复动作。",
+    ),
+    (
+        "tour-5",
+        "With a real arm, choose it at the top of the page. Before it moves, make sure that nothing is in its way.",
+        "如有真机，请在页面顶部选择。移动之前，请确保周围没有障碍物。",
+    ),
+    ("ready", "The arm is ready.", "机械臂已就绪。"),
+    ("moving", "The arm is moving.", "机械臂正在移动。"),
+    ("stopping", "Stopping …", "正在停止……"),
+    ("holds", "Stopped: the arm holds.", "已停止：机械臂保持不动。"),
+    ("stop-limp", "The motors are off: there is nothing to stop.", "电机已关闭，无需停止。"),
+    (
+        "stop-failed",
+        "The arm did not take the stop. It may be moving: switch it off.",
+        "机械臂没有接受停止命令，可能仍在移动：请关闭电源。",
+    ),
+    ("limp", "The motors are off. The arm gives way.", "电机已关闭，机械臂可被推动。"),
+    ("damped", "The motors are damped. The arm sinks slowly.", "电机处于阻尼状态，机械臂缓慢下沉。"),
+    ("connecting", "Waiting for the arm …", "正在等待机械臂……"),
+    (
+        "lost",
+        "The arm does not answer. Check its power and its cable.",
+        "机械臂没有应答。请检查电源和连接线。",
+    ),
+    (
+        "missing",
+        "These servos do not answer, check their cables: joint",
+        "以下舵机没有应答，请检查连接线：关节",
+    ),
+    ("faults", "The arm reports:", "机械臂报告："),
+    ("not-measured", "unknown", "未知"),
+    ("no-answer", "no answer", "无应答"),
+    ("tip", "Tip", "末端"),
+    ("unreachable", "out of reach", "无法到达"),
+    ("drag-limp", "a hand holds this joint", "手握住此关节"),
+    (
+        "no-serial",
+        "This browser cannot open USB ports. Chrome and Edge can; or run `sevenbot view` beside the arm.",
+        "此浏览器无法打开 USB 端口。请使用 Chrome 或 Edge，或在机械臂旁运行 `sevenbot view`。",
+    ),
+    (
+        "no-server",
+        "There is no arm at this address. Start this page with `sevenbot view`.",
+        "此地址没有机械臂。请用 `sevenbot view` 打开本页面。",
+    ),
+    ("closed", "The connection ended:", "连接已断开："),
+    ("bad-file", "This file is no recording:", "此文件不是动作录制："),
+    ("bad-value", "This value cannot be written:", "无法写入此数值："),
+    ("out-of-page", "no 3D picture:", "无法显示三维画面："),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn names_are_unique_and_no_text_is_empty() {
+        let mut names = HashSet::new();
+        for (name, english, chinese) in TEXTS {
+            assert!(names.insert(name), "{name} stands twice");
+            assert!(!english.is_empty() && !chinese.is_empty());
+        }
+    }
+
+    #[test]
+    fn the_page_names_only_texts_that_exist() {
+        let page = include_str!("../page/index.html");
+        let names = ["data-text=\"", "data-label=\""].into_iter().flat_map(|key| page.split(key).skip(1));
+        for name in names.filter_map(|rest| rest.split('"').next()) {
+            assert!(Language::English.find(name).is_some(), "there is no text {name}");
+        }
+    }
+}

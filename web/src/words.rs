@@ -1,0 +1,119 @@
+//! What the page says of the arm, in one line.
+
+use sevenbot::map::motor_state;
+use sevenbot::register_text;
+
+use crate::arm_state::ArmState;
+use crate::stop::StopProgress;
+use crate::texts::Language;
+
+/// Is the news good, bad or neither?
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mood {
+    /// All is well.
+    Good,
+    /// A person should act.
+    Bad,
+    /// Neither.
+    Plain,
+}
+
+impl Mood {
+    /// The class of the line on the page.
+    #[must_use]
+    pub const fn class(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Bad => "bad",
+            Self::Plain => "",
+        }
+    }
+}
+
+/// Does an arm answer?
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answers {
+    /// Not yet.
+    NotYet,
+    /// It does.
+    Yes,
+    /// It did.
+    NoLonger,
+}
+
+/// The line, and its mood: the most important thing first.
+#[must_use]
+pub fn state_line(
+    language: Language,
+    answers: Answers,
+    state: &ArmState,
+    stop: StopProgress,
+) -> (String, Mood) {
+    let plain = |name| (language.text(name).to_owned(), Mood::Plain);
+    let bad = |name| (language.text(name).to_owned(), Mood::Bad);
+    match answers {
+        Answers::NotYet => return plain("connecting"),
+        Answers::NoLonger => return bad("lost"),
+        Answers::Yes => {}
+    }
+    match stop {
+        StopProgress::Failed => return bad("stop-failed"),
+        StopProgress::Verifying => return plain("stopping"),
+        _ => {}
+    }
+    if state.missing != 0 {
+        return (format!("{} {}", language.text("missing"), joints(state.missing)), Mood::Bad);
+    }
+    if state.faults != 0 {
+        return (format!("{} {}", language.text("faults"), register_text::faults(state.faults)), Mood::Bad);
+    }
+    match (stop, state.motor_state) {
+        (StopProgress::NotDriven, 0 | 2) => plain("stop-limp"),
+        (_, motor_state::DAMPING) => plain("damped"),
+        (_, motor_state::FORCELESS) => plain("limp"),
+        _ if state.moving != 0 => plain("moving"),
+        (StopProgress::Holds, _) => (language.text("holds").to_owned(), Mood::Good),
+        _ => (language.text("ready").to_owned(), Mood::Good),
+    }
+}
+
+/// The numbers of joints, bit n-1 for joint n.
+fn joints(bits: u8) -> String {
+    let numbers = (1..=7).filter(|number| bits >> (number - 1) & 1 == 1);
+    numbers.map(|number| number.to_string()).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn state() -> ArmState {
+        let mut registers = sevenbot::Snapshot { address: 0, values: vec![0; 256] };
+        registers.values[29] = motor_state::SERVO;
+        ArmState::new(&registers)
+    }
+
+    fn said(state: &ArmState, stop: StopProgress) -> String {
+        state_line(Language::English, Answers::Yes, state, stop).0
+    }
+
+    #[test]
+    fn the_most_important_thing_is_said() {
+        assert_eq!(said(&state(), StopProgress::None), "The arm is ready.");
+        assert_eq!(said(&state(), StopProgress::Holds), "Stopped: the arm holds.");
+        let moving = ArmState { moving: 1, ..state() };
+        assert_eq!(said(&moving, StopProgress::Holds), "The arm is moving.", "it was moved again");
+        let missing = ArmState { missing: 0b101, faults: 1, ..moving };
+        assert!(said(&missing, StopProgress::None).ends_with("joint 1, 3"));
+        assert!(said(&missing, StopProgress::Failed).starts_with("The arm did not take the stop."));
+        let limp = ArmState { motor_state: 2, ..state() };
+        assert!(said(&limp, StopProgress::NotDriven).contains("nothing to stop"));
+    }
+
+    #[test]
+    fn a_silent_arm_is_said_first() {
+        let missing = ArmState { missing: 1, ..state() };
+        let (line, mood) = state_line(Language::English, Answers::NoLonger, &missing, StopProgress::None);
+        assert!(line.starts_with("The arm does not answer") && mood == Mood::Bad);
+    }
+}
