@@ -71,7 +71,13 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("velocity", "velocity", "速度"),
     ("load", "load", "负载"),
     ("joints", "Joints", "关节"),
-    ("joint", "Joint", "关节"),
+    ("joint-1", "1 base", "1 底座"),
+    ("joint-2", "2 shoulder", "2 大臂"),
+    ("joint-3", "3 elbow", "3 小臂"),
+    ("joint-4", "4 forearm", "4 前臂旋转"),
+    ("joint-5", "5 wrist", "5 手腕"),
+    ("joint-6", "6 hand", "6 手部旋转"),
+    ("joint-7", "7 gripper", "7 夹爪"),
     ("motors", "Motors", "电机"),
     ("motors-on", "hold", "保持"),
     ("motors-off", "limp", "松开"),
@@ -102,6 +108,8 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("fault-what", "Fault", "故障"),
     ("fault-missing", "does not answer", "无应答"),
     ("fault-stuck", "is stuck", "卡住"),
+    ("fault-garbled", "answers with damaged bytes", "应答字节损坏"),
+    ("weak-supply", "Weak supply", "供电不足"),
     ("break", "Break it", "使其故障"),
     ("repair", "Repair all", "全部修复"),
     ("power", "Power off and on", "断电重启"),
@@ -179,7 +187,6 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("no-answer", "no answer", "无应答"),
     ("tip", "Tip", "末端"),
     ("unreachable", "out of reach", "无法到达"),
-    ("drag-limp", "a hand holds this joint", "手握住此关节"),
     (
         "no-serial",
         "This browser cannot open USB ports. Chrome and Edge can; or run `sevenbot view` beside the arm.",
@@ -187,13 +194,13 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ),
     (
         "no-server",
-        "There is no arm at this address. Start this page with `sevenbot view`.",
-        "此地址没有机械臂。请用 `sevenbot view` 打开本页面。",
+        "There is no arm at this address. Connect one, and start `sevenbot view` again.",
+        "此地址没有机械臂。请连接机械臂，然后重新运行 `sevenbot view`。",
     ),
     ("closed", "The connection ended:", "连接已断开："),
     ("bad-file", "This file is no recording:", "此文件不是动作录制："),
     ("bad-value", "This value cannot be written:", "无法写入此数值："),
-    ("out-of-page", "no 3D picture:", "无法显示三维画面："),
+    ("no-picture", "There is no 3D picture:", "无法显示三维画面："),
 ];
 
 #[cfg(test)]

@@ -34,6 +34,12 @@ impl Dom {
         self.get::<HtmlSelectElement>(id).map(|select| select.value()).unwrap_or_default()
     }
 
+    pub(super) fn choose(&self, id: &str, value: &str) {
+        if let Ok(select) = self.get::<HtmlSelectElement>(id) {
+            select.set_value(value);
+        }
+    }
+
     /// Sets a text, if it is another one. A screen reader reads a live text only when it changes.
     pub(super) fn set_text(&self, id: &str, text: &str) {
         if let Some(element) = self.element(id) {

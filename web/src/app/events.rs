@@ -21,7 +21,7 @@ use crate::scene::{Button, SceneEvent};
 use crate::source::serial::SerialSource;
 use crate::source::socket::SocketSource;
 
-/// The texts of the tour, in their order.
+/// The texts of the tour, in their order. The last one is for a real arm.
 const TOUR: [&str; 5] = ["tour-1", "tour-2", "tour-3", "tour-4", "tour-5"];
 
 /// Calls `act` for each event of this kind on an element, as long as the page lives.
@@ -109,10 +109,10 @@ impl App {
                 self.dom.press("speed", value);
             }
             "break" => {
-                let fault =
-                    format!("fault {}={}", self.dom.choice("fault-joint"), self.dom.choice("fault-kind"));
-                self.act_on_simulation(&fault);
+                let fault = format!("{}={}", self.dom.choice("fault-joint"), self.dom.choice("fault-kind"));
+                self.act("fault", &fault);
             }
+            "fault" => self.act_on_simulation(&format!("fault {value}")),
             "repair" => self.act_on_simulation("clear"),
             "power" => self.act_on_simulation("power-cycle"),
             "record" => self.record(),
@@ -187,6 +187,17 @@ impl App {
         }
     }
 
+    /// Shows the arm behind the server if the opened address has its token, or else the simulated one.
+    pub(super) fn show_first_arm(&mut self) {
+        let query = web_sys::window().and_then(|window| window.location().search().ok());
+        if query.is_some_and(|query| query.contains("token=")) {
+            self.dom.choose("source", "server");
+            self.choose_source();
+            self.tour_step = TOUR.len() - 1;
+        }
+        self.begin_tour();
+    }
+
     fn choose_source(&mut self) {
         let line = match self.dom.choice("source").as_str() {
             "server" => SocketSource::connect().map(|source| Line::Remote(Box::new(source))).ok(),
@@ -195,7 +206,11 @@ impl App {
         };
         match line {
             Some(line) => self.set_line(line),
-            None => panels::notice(&self.dom, self.language.text("no-serial")),
+            None => {
+                self.dom.choose("source", "simulator");
+                self.set_line(Line::Simulated(Box::default()));
+                panels::notice(&self.dom, self.language.text("no-serial"));
+            }
         }
     }
 

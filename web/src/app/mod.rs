@@ -106,7 +106,7 @@ pub fn start() -> Result<(), JsValue> {
     events::listen(&dom)?;
     with_app(|app| {
         app.set_language(app.language);
-        app.begin_tour();
+        app.show_first_arm();
     });
     request_frames()
 }
@@ -138,12 +138,13 @@ fn browser_now() -> f64 {
 
 impl App {
     fn new(dom: Dom) -> Result<Self, JsValue> {
+        let tag = web_sys::window().and_then(|window| window.navigator().language());
+        let language = Language::of_tag(&tag.unwrap_or_default());
         let scene = Scene::new(dom.canvas("scene")?);
         if let Err(reason) = &scene {
-            panels::notice(&dom, &format!("{reason:?}"));
+            panels::notice(&dom, &format!("{} {reason:?}", language.text("no-picture")));
         }
         let plot = dom.canvas("plot")?.get_context("2d")?.ok_or("no 2D canvas")?;
-        let tag = web_sys::window().and_then(|window| window.navigator().language());
         panels::build(&dom)?;
         Ok(Self {
             dom,
@@ -153,7 +154,7 @@ impl App {
             plot: plot.unchecked_into(),
             history: History::new(PLOT_SECONDS),
             quantity: Quantity::Angle,
-            language: Language::of_tag(&tag.unwrap_or_default()),
+            language,
             speed: 1.0,
             last_frame: browser_now(),
             shown_round: 0,
@@ -281,7 +282,6 @@ impl App {
     fn set_language(&mut self, language: Language) {
         self.language = language;
         self.dom.translate(language);
-        panels::translate(&self.dom, language);
         self.show_tour();
     }
 

@@ -27,7 +27,9 @@ pub(super) fn build(dom: &Dom) -> Result<(), JsValue> {
         row.set_class_name("joint");
         row.set_id(&format!("row-{number}"));
         let label = dom.add(&row, "label")?;
-        label.set_attribute("for", &format!("joint-{number}"))?;
+        let name = format!("joint-{number}");
+        label.set_attribute("for", &name)?;
+        label.set_attribute("data-text", &name)?;
         let slider = dom.add(&row, "input")?;
         for (name, value) in [("type", "range"), ("min", "0"), ("max", highest), ("step", "0.5")] {
             slider.set_attribute(name, value)?;
@@ -37,18 +39,9 @@ pub(super) fn build(dom: &Dom) -> Result<(), JsValue> {
         dom.add(&row, "output")?.set_id(&format!("angle-{number}"));
         let option = dom.add(&broken, "option")?;
         option.set_attribute("value", &number.to_string())?;
-        set_text(&option, &number.to_string());
+        option.set_attribute("data-text", &name)?;
     }
     Ok(())
-}
-
-/// Shows the names of the joints in a language.
-pub(super) fn translate(dom: &Dom, language: Language) {
-    for number in 1..=7 {
-        for label in dom.all(&format!("#row-{number} label")) {
-            set_text(&label, &format!("{} {number}", language.text("joint")));
-        }
-    }
 }
 
 /// Shows the arm as it is now.
@@ -58,8 +51,8 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     show_joints(dom, language, state);
     dom.press("motors", &state.motor_state.to_string());
     let [x, y, z] = tip(state.angles());
-    let reach = if app.unreachable.is_some() { language.text("unreachable") } else { "" };
-    dom.set_text("tip", &format!("{}: x {x:.0}, y {y:.0}, z {z:.0} mm {reach}", language.text("tip")));
+    let reach = app.unreachable.map_or(String::new(), |_| format!(" · {}", language.text("unreachable")));
+    dom.set_text("tip", &format!("{}: x {x:.0}, y {y:.0}, z {z:.0} mm{reach}", language.text("tip")));
     show_recording(app);
     if let Line::Simulated(source) = &app.line {
         app.dom.set_text("time", &format!("{:.1} s", seconds(source.now())));
