@@ -1,7 +1,6 @@
 //! What the page says of the arm, in one line.
 
-use sevenbot::map::motor_state;
-use sevenbot::register_text;
+use sevenbot::map::{fault, motor_state};
 
 use crate::arm_state::ArmState;
 use crate::stop::StopProgress;
@@ -65,7 +64,7 @@ pub fn state_line(
         return (format!("{} {}", language.text("missing"), joints(state.missing)), Mood::Bad);
     }
     if state.faults != 0 {
-        return (format!("{} {}", language.text("faults"), register_text::faults(state.faults)), Mood::Bad);
+        return (faults(language, state.faults), Mood::Bad);
     }
     match (stop, state.motor_state) {
         (StopProgress::NotDriven, 0 | 2) => plain("stop-limp"),
@@ -75,6 +74,21 @@ pub fn state_line(
         (StopProgress::Holds, _) => (language.text("holds").to_owned(), Mood::Good),
         _ => (language.text("ready").to_owned(), Mood::Good),
     }
+}
+
+/// What a person should know of these bits of register 241.
+fn faults(language: Language, bits: u8) -> String {
+    const NAMES: [(u8, &str); 7] = [
+        (fault::SERVO_BUS, "fault-servo-bus"),
+        (fault::HOST_SILENT, "fault-host-silent"),
+        (fault::SETTINGS_STORAGE, "fault-settings"),
+        (fault::BROWN_OUT_RESTART, "fault-brown-out"),
+        (fault::WATCHDOG_RESTART, "fault-watchdog"),
+        (fault::CRYSTAL_FAILED, "fault-crystal"),
+        (fault::RECEIVE_OVERRUN, "fault-overrun"),
+    ];
+    let set = NAMES.into_iter().filter(|(bit, _)| bits & bit != 0);
+    set.map(|(_, name)| language.text(name)).collect::<Vec<_>>().join(" ")
 }
 
 /// The numbers of joints, bit n-1 for joint n.
@@ -106,6 +120,9 @@ mod tests {
         let missing = ArmState { missing: 0b101, faults: 1, ..moving };
         assert!(said(&missing, StopProgress::None).ends_with("joint 1, 3"));
         assert!(said(&missing, StopProgress::Failed).starts_with("The arm did not take the stop."));
+        let overloaded = ArmState { missing: 0, faults: 0b100_0010, ..missing.clone() };
+        let line = said(&overloaded, StopProgress::None);
+        assert!(line.starts_with("A servo reports") && line.contains("fell silent"), "{line}");
         let limp = ArmState { motor_state: 2, ..state() };
         assert!(said(&limp, StopProgress::NotDriven).contains("nothing to stop"));
     }

@@ -131,6 +131,14 @@ fn request_frame(callback: &Closure<dyn FnMut(f64)>) -> Result<(), JsValue> {
     window.request_animation_frame(callback.as_ref().unchecked_ref()).map(|_| ())
 }
 
+/// The plot is drawn by the processor: a software renderer of the graphics processor takes seconds for it while the page scrolls.
+fn plot_context(dom: &Dom) -> Result<CanvasRenderingContext2d, JsValue> {
+    let options = js_sys::Object::new();
+    js_sys::Reflect::set(&options, &"willReadFrequently".into(), &true.into())?;
+    let context = dom.canvas("plot")?.get_context_with_context_options("2d", &options)?;
+    Ok(context.ok_or("no 2D canvas")?.unchecked_into())
+}
+
 /// The browser's clock, in milliseconds.
 fn browser_now() -> f64 {
     web_sys::window().and_then(|window| window.performance()).map_or(0.0, |clock| clock.now())
@@ -144,14 +152,14 @@ impl App {
         if let Err(reason) = &scene {
             panels::notice(&dom, &format!("{} {reason:?}", language.text("no-picture")));
         }
-        let plot = dom.canvas("plot")?.get_context("2d")?.ok_or("no 2D canvas")?;
+        let plot = plot_context(&dom)?;
         panels::build(&dom)?;
         Ok(Self {
             dom,
             line: Line::Simulated(Box::default()),
             client: Client::default(),
             scene: scene.ok(),
-            plot: plot.unchecked_into(),
+            plot,
             history: History::new(PLOT_SECONDS),
             quantity: Quantity::Angle,
             language,
@@ -307,7 +315,7 @@ fn colours(state: &ArmState, theme: Theme) -> [Rgb; 7] {
     std::array::from_fn(|index| {
         if state.missing >> index & 1 == 1 {
             palette.joint_missing
-        } else if state.faults != 0 && state.missing == 0 {
+        } else if state.faults & sevenbot::map::fault::SERVO_BUS != 0 && state.missing == 0 {
             palette.joint_fault
         } else if state.motor_state != sevenbot::map::motor_state::SERVO {
             palette.joint_limp

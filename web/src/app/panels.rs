@@ -53,6 +53,7 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     let [x, y, z] = tip(state.angles());
     let reach = app.unreachable.map_or(String::new(), |_| format!(" · {}", language.text("unreachable")));
     dom.set_text("tip", &format!("{}: x {x:.0}, y {y:.0}, z {z:.0} mm{reach}", language.text("tip")));
+    dom.set_text("health", &health(language, state));
     show_recording(app);
     if let Line::Simulated(source) = &app.line {
         app.dom.set_text("time", &format!("{:.1} s", seconds(source.now())));
@@ -63,6 +64,13 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     if is_open(&app.dom, "registers-panel") {
         show_registers(app);
     }
+}
+
+/// Supply and temperature, as far as they are known.
+fn health(language: Language, state: &ArmState) -> String {
+    let volts = state.volts.map(|volts| format!("{} {volts:.1} V", language.text("supply")));
+    let celsius = state.celsius.map(|celsius| format!("{} {celsius} °C", language.text("temperature")));
+    volts.into_iter().chain(celsius).collect::<Vec<_>>().join(" · ")
 }
 
 fn show_line(app: &mut App, state: &ArmState) {
