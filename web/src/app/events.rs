@@ -1,23 +1,19 @@
 //! What a person does: clicks, keys, sliders, the pointer on the picture, files.
 
-use arm_sim::Action;
-use motion_core::calibration::{MicroDegrees, counts_from_angle};
-use sevenbot::map::{FINE_TARGET, MOTOR_STATE, motor_state};
-use sevenbot::{FineAngle, Joint, Span, register_values};
+use sevenbot::map::{MOTOR_STATE, motor_state};
+use sevenbot::{Span, register_values};
 use wasm_bindgen::prelude::Closure;
 use wasm_bindgen::{JsCast, JsValue};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
 use web_sys::{
-    Blob, Element, Event, HtmlAnchorElement, HtmlDialogElement, HtmlInputElement, KeyboardEvent,
-    PointerEvent, Url, WheelEvent,
+    Blob, Element, Event, HtmlAnchorElement, HtmlDialogElement, HtmlInputElement, KeyboardEvent, Url,
 };
 
 use super::dom::{Dom, number};
-use super::{App, Line, panels, with_app};
+use super::{App, Line, hand, panels, with_app};
 use crate::arm_state::target_frame;
 use crate::movement::{self, Player, Recorder};
 use crate::plots::Quantity;
-use crate::scene::{Button, SceneEvent};
 use crate::source::serial::SerialSource;
 use crate::source::socket::SocketSource;
 
@@ -25,7 +21,7 @@ use crate::source::socket::SocketSource;
 const TOUR: [&str; 5] = ["tour-1", "tour-2", "tour-3", "tour-4", "tour-5"];
 
 /// Calls `act` for each event of this kind on an element, as long as the page lives.
-fn on<E: JsCast>(
+pub(super) fn on<E: JsCast>(
     target: &Element,
     kind: &str,
     mut act: impl FnMut(&mut App, &E, &Event) + 'static,
@@ -53,41 +49,7 @@ pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
             event.prevent_default();
         }
     })?;
-    let canvas: Element = dom.get("scene")?;
-    on(&canvas, "pointerdown", |app, pointer: &PointerEvent, _| app.pointer_down(pointer))?;
-    on(&canvas, "pointermove", |app, pointer: &PointerEvent, _| {
-        let angles = app.client.state().angles();
-        let event = app
-            .scene
-            .as_mut()
-            .and_then(|scene| scene.pointer_moved(pointer.pointer_id(), place(pointer), angles));
-        app.scene_event(event);
-    })?;
-    for kind in ["pointerup", "pointercancel"] {
-        on(&canvas, kind, |app, pointer: &PointerEvent, _| {
-            let event = app.scene.as_mut().and_then(|scene| scene.pointer_up(pointer.pointer_id()));
-            app.scene_event(event);
-        })?;
-    }
-    on(&canvas, "pointerleave", |app, _: &PointerEvent, _| {
-        let event = app.scene.as_mut().and_then(crate::scene::Scene::pointer_left);
-        app.scene_event(event);
-    })?;
-    on(&canvas, "wheel", |app, wheel: &WheelEvent, event| {
-        event.prevent_default();
-        if let Some(scene) = &mut app.scene {
-            scene.wheel(narrow(wheel.delta_y()));
-        }
-    })
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "pixels")]
-const fn narrow(number: f64) -> f32 {
-    number as f32
-}
-
-fn place(pointer: &PointerEvent) -> [f32; 2] {
-    [narrow(f64::from(pointer.offset_x())), narrow(f64::from(pointer.offset_y()))]
+    hand::listen(dom)
 }
 
 impl App {
@@ -131,7 +93,7 @@ impl App {
         }
     }
 
-    fn write(&mut self, address: u8, values: &[u8]) {
+    pub(super) fn write(&mut self, address: u8, values: &[u8]) {
         let now = self.now();
         self.client.write(now, address, values);
     }
@@ -153,7 +115,7 @@ impl App {
         self.dom.press("plot", value);
     }
 
-    fn act_on_simulation(&mut self, action: &str) {
+    pub(super) fn act_on_simulation(&mut self, action: &str) {
         if let (Line::Simulated(source), Ok(action)) = (&mut self.line, action.parse()) {
             source.act(action);
         }
@@ -170,7 +132,7 @@ impl App {
         }
     }
 
-    fn send_joint(&mut self, joint: u8, degrees: f32) {
+    pub(super) fn send_joint(&mut self, joint: u8, degrees: f32) {
         if let Some((address, values)) = target_frame(self.client.registers(), joint, degrees) {
             self.write(address, &values);
         }
@@ -246,66 +208,6 @@ impl App {
         }
         if key.key() == "Escape" {
             self.end_tour();
-        }
-    }
-
-    fn pointer_down(&mut self, pointer: &PointerEvent) {
-        let angles = self.client.state().angles();
-        let button = if pointer.button() == 0 { Button::Primary } else { Button::Secondary };
-        if let Ok(canvas) = self.dom.canvas("scene") {
-            // The drag goes on where the pointer leaves the picture. A pointer that is gone already needs none.
-            let _ = canvas.set_pointer_capture(pointer.pointer_id());
-        }
-        let event = self
-            .scene
-            .as_mut()
-            .and_then(|scene| scene.pointer_down(pointer.pointer_id(), place(pointer), button, angles));
-        self.scene_event(event);
-    }
-
-    fn scene_event(&mut self, event: Option<SceneEvent>) {
-        match event {
-            None => {}
-            Some(SceneEvent::Hovered(part)) => self.hovered = part,
-            Some(SceneEvent::JointDragged { joint, degrees }) => self.drag_joint(joint, degrees),
-            Some(SceneEvent::TipDragged(wish)) => {
-                self.unreachable = wish.reach.is_err().then_some(wish.tip);
-                if let Ok(angles) = wish.reach {
-                    self.send_pose(angles);
-                }
-            }
-            Some(SceneEvent::Released) => {
-                self.unreachable = None;
-                if let Some(joint) = self.hand.take() {
-                    self.act_on_simulation(&format!("let-go {joint}"));
-                }
-            }
-        }
-    }
-
-    /// Moves a joint by its motor. A limp joint of a simulated arm is moved by a hand.
-    fn drag_joint(&mut self, joint: u8, degrees: f32) {
-        let is_driven = self.client.state().motor_state == motor_state::SERVO;
-        let (Line::Simulated(source), Some(named), false) = (&mut self.line, Joint::new(joint), is_driven)
-        else {
-            return self.send_joint(joint, degrees);
-        };
-        source.act(Action::Hand(named, counts_from_angle(named, MicroDegrees::nearest(degrees), 0)));
-        self.hand = Some(joint);
-    }
-
-    fn send_pose(&mut self, angles: [f32; 7]) {
-        let values: Vec<u8> = angles
-            .iter()
-            .filter_map(|&degrees| FineAngle::from_degrees(f64::from(degrees)))
-            .flat_map(|angle| angle.hundredths().to_le_bytes())
-            .collect();
-        if crate::arm_state::has_extended_block(self.client.registers()) && values.len() == 14 {
-            self.write(FINE_TARGET.address, &values);
-        } else {
-            for (joint, degrees) in (1..).zip(angles) {
-                self.send_joint(joint, degrees);
-            }
         }
     }
 

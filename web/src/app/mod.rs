@@ -8,23 +8,25 @@
 
 mod dom;
 mod events;
+mod exports;
+mod hand;
 mod panels;
+mod picture;
 
 use std::cell::RefCell;
 use std::rc::Rc;
 
 use glam::Vec3;
-use kinematics::forward;
 use protocol_core::time::Instant;
+use sevenbot::map::VACUUM_PUMP;
 use wasm_bindgen::prelude::{Closure, wasm_bindgen};
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::CanvasRenderingContext2d;
 
-use crate::arm_state::ArmState;
 use crate::client::Client;
 use crate::movement::{Player, Recorder};
-use crate::plots::{History, Plot, Quantity, Sample, draw};
-use crate::scene::{Part, Rgb, Scene, Theme, View};
+use crate::plots::{History, Quantity, Sample};
+use crate::scene::{Part, Scene};
 use crate::source::simulator::SimulatedSource;
 use crate::source::{LineState, Source};
 use crate::texts::Language;
@@ -232,59 +234,13 @@ impl App {
     #[expect(clippy::cast_precision_loss, reason = "times of years are exact enough")]
     fn new_state(&mut self, now: Instant) {
         let state = self.client.state();
-        let vacuum = self.client.registers().byte(&sevenbot::map::VACUUM_PUMP) != 0;
+        let vacuum = self.client.registers().byte(&VACUUM_PUMP) != 0;
         if let Some(recorder) = &mut self.recorder {
             recorder.add(now, &state, vacuum);
         }
         let time = now.as_micros() as f64 / 1e6;
         let (angles, loads, velocities) = (state.angles(), state.loads, state.velocities);
         self.history.push(Sample { time, angles, loads, velocities });
-    }
-
-    fn theme(&self) -> Theme {
-        let query =
-            web_sys::window().and_then(|window| window.match_media("(prefers-color-scheme: dark)").ok()?);
-        if query.is_some_and(|query| query.matches()) { Theme::Dark } else { Theme::Light }
-    }
-
-    fn show(&mut self) {
-        let (state, theme) = (self.client.state(), self.theme());
-        let view = View {
-            measured: state.angles(),
-            targets: self.client.is_connected().then_some(state.targets),
-            colours: colours(&state, theme),
-            unreachable: self.unreachable,
-            hovered: self.hovered,
-            theme,
-        };
-        if let Some(scene) = &mut self.scene
-            && let Err(reason) = scene.draw(&view)
-        {
-            panels::notice(&self.dom, &format!("{reason:?}"));
-        }
-        self.show_plot(theme);
-        panels::show(self, &state);
-    }
-
-    fn show_plot(&self, theme: Theme) {
-        let Some(canvas) = self.plot.canvas() else { return };
-        let ratio = web_sys::window().map_or(1.0, |window| window.device_pixel_ratio());
-        let size = [canvas.client_width(), canvas.client_height()].map(f64::from);
-        let [width, height] = size.map(|length| u32::try_from(whole(length * ratio)).unwrap_or(0));
-        if [canvas.width(), canvas.height()] != [width, height] {
-            canvas.set_width(width);
-            canvas.set_height(height);
-        }
-        let (name, unit) = match self.quantity {
-            Quantity::Angle => ("angle", "°"),
-            Quantity::Load => ("load", "%"),
-            Quantity::Velocity => ("velocity", "°/s"),
-        };
-        let title = format!("{} ({unit})", self.language.text(name));
-        let (quantity, shown) = (self.quantity, [true; 7]);
-        let plot = Plot { quantity, title: &title, seconds: "s", shown, theme, size, ratio };
-        // Only an invalid context is refused.
-        let _ = draw(&self.plot, &plot, &self.history);
     }
 
     fn set_language(&mut self, language: Language) {
@@ -309,73 +265,8 @@ impl App {
     }
 }
 
-/// The colour of each joint: what is wrong with it comes first.
-fn colours(state: &ArmState, theme: Theme) -> [Rgb; 7] {
-    let palette = theme.palette();
-    std::array::from_fn(|index| {
-        if state.missing >> index & 1 == 1 {
-            palette.joint_missing
-        } else if state.faults & sevenbot::map::fault::SERVO_BUS != 0 && state.missing == 0 {
-            palette.joint_fault
-        } else if state.motor_state != sevenbot::map::motor_state::SERVO {
-            palette.joint_limp
-        } else {
-            palette.joint_ok
-        }
-    })
-}
-
-/// The tip of the arm in mm.
-fn tip(angles: [f32; 7]) -> [f64; 3] {
-    let [one, two, three, four, five, six, _] = angles.map(f64::from);
-    let tip = forward([one, two, three, four, five, six]).hand.tip;
-    [tip.x, tip.y, tip.z]
-}
-
 /// Not negative, and far below the limit.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 const fn whole(number: f64) -> u64 {
     number as u64
-}
-
-/// What the page shows, for tests: angles and targets in degrees, the tip in mm.
-#[wasm_bindgen]
-#[must_use]
-pub fn state() -> String {
-    with_app(|app| {
-        let state = app.client.state();
-        let registers = app.client.registers();
-        let bytes = registers.values.iter().map(u8::to_string).collect::<Vec<_>>().join(",");
-        format!(
-            r#"{{"connected":{},"measured":{:?},"targets":{:?},"missing":{},"faults":{},"motors":{},"tip":{:?},"time":{},"stop":"{:?}","registers":[{bytes}]}}"#,
-            app.client.is_connected(),
-            state.angles(),
-            state.targets,
-            state.missing,
-            state.faults,
-            state.motor_state,
-            tip(state.angles()),
-            app.now().as_micros(),
-            app.client.stop_progress(),
-        )
-    })
-    .unwrap_or_default()
-}
-
-/// Where a point in mm is drawn, in CSS pixels from the top left of the page's window, for tests.
-#[wasm_bindgen]
-#[must_use]
-pub fn project(x: f32, y: f32, z: f32) -> Option<Vec<f64>> {
-    with_app(|app| {
-        let place = app.scene.as_ref()?.project(Vec3::new(x, y, z))?;
-        let canvas = app.dom.element("scene")?.get_bounding_client_rect();
-        Some(vec![f64::from(place.x) + canvas.left(), f64::from(place.y) + canvas.top()])
-    })?
-}
-
-/// The number of frames since the start, for tests.
-#[wasm_bindgen]
-#[must_use]
-pub fn frame_count() -> u32 {
-    with_app(|app| app.frames).unwrap_or(0)
 }

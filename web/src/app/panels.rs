@@ -6,7 +6,8 @@ use wasm_bindgen::JsValue;
 use web_sys::{Element, HtmlInputElement};
 
 use super::dom::{Dom, set_attribute, set_text};
-use super::{App, Line, tip};
+use super::picture::tip;
+use super::{App, Line};
 use crate::arm_state::ArmState;
 use crate::source::LineState;
 use crate::texts::Language;

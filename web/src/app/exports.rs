@@ -1,0 +1,49 @@
+//! What the module exports for tests and for the console of the browser.
+
+use glam::Vec3;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use super::picture::tip;
+use super::with_app;
+
+/// What the page shows: angles and targets in degrees, the tip in mm.
+#[wasm_bindgen]
+#[must_use]
+pub fn state() -> String {
+    with_app(|app| {
+        let state = app.client.state();
+        let registers = app.client.registers();
+        let bytes = registers.values.iter().map(u8::to_string).collect::<Vec<_>>().join(",");
+        format!(
+            r#"{{"connected":{},"measured":{:?},"targets":{:?},"missing":{},"faults":{},"motors":{},"tip":{:?},"time":{},"stop":"{:?}","registers":[{bytes}]}}"#,
+            app.client.is_connected(),
+            state.angles(),
+            state.targets,
+            state.missing,
+            state.faults,
+            state.motor_state,
+            tip(state.angles()),
+            app.now().as_micros(),
+            app.client.stop_progress(),
+        )
+    })
+    .unwrap_or_default()
+}
+
+/// Where a point in mm is drawn, in CSS pixels from the top left of the page's window.
+#[wasm_bindgen]
+#[must_use]
+pub fn project(x: f32, y: f32, z: f32) -> Option<Vec<f64>> {
+    with_app(|app| {
+        let place = app.scene.as_ref()?.project(Vec3::new(x, y, z))?;
+        let canvas = app.dom.element("scene")?.get_bounding_client_rect();
+        Some(vec![f64::from(place.x) + canvas.left(), f64::from(place.y) + canvas.top()])
+    })?
+}
+
+/// The number of frames since the start.
+#[wasm_bindgen]
+#[must_use]
+pub fn frame_count() -> u32 {
+    with_app(|app| app.frames).unwrap_or(0)
+}

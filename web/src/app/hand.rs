@@ -1,0 +1,115 @@
+//! The pointer on the picture: a hand that drags a joint, the tip or the camera.
+
+use arm_sim::Action;
+use motion_core::calibration::{MicroDegrees, counts_from_angle};
+use sevenbot::map::{FINE_TARGET, motor_state};
+use sevenbot::{FineAngle, Joint};
+use wasm_bindgen::JsValue;
+use web_sys::{Element, PointerEvent, WheelEvent};
+
+use super::dom::Dom;
+use super::events::on;
+use super::{App, Line};
+use crate::arm_state::has_extended_block;
+use crate::scene::{Button, Scene, SceneEvent};
+
+/// Listens to pointers and the wheel.
+pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
+    let canvas: Element = dom.get("scene")?;
+    on(&canvas, "pointerdown", |app, pointer: &PointerEvent, _| app.pointer_down(pointer))?;
+    on(&canvas, "pointermove", |app, pointer: &PointerEvent, _| {
+        let angles = app.client.state().angles();
+        let event = app
+            .scene
+            .as_mut()
+            .and_then(|scene| scene.pointer_moved(pointer.pointer_id(), place(pointer), angles));
+        app.scene_event(event);
+    })?;
+    for kind in ["pointerup", "pointercancel"] {
+        on(&canvas, kind, |app, pointer: &PointerEvent, _| {
+            let event = app.scene.as_mut().and_then(|scene| scene.pointer_up(pointer.pointer_id()));
+            app.scene_event(event);
+        })?;
+    }
+    on(&canvas, "pointerleave", |app, _: &PointerEvent, _| {
+        let event = app.scene.as_mut().and_then(Scene::pointer_left);
+        app.scene_event(event);
+    })?;
+    on(&canvas, "wheel", |app, wheel: &WheelEvent, event| {
+        event.prevent_default();
+        if let Some(scene) = &mut app.scene {
+            scene.wheel(narrow(wheel.delta_y()));
+        }
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "pixels")]
+const fn narrow(number: f64) -> f32 {
+    number as f32
+}
+
+fn place(pointer: &PointerEvent) -> [f32; 2] {
+    [narrow(f64::from(pointer.offset_x())), narrow(f64::from(pointer.offset_y()))]
+}
+
+impl App {
+    fn pointer_down(&mut self, pointer: &PointerEvent) {
+        let angles = self.client.state().angles();
+        let button = if pointer.button() == 0 { Button::Primary } else { Button::Secondary };
+        if let Ok(canvas) = self.dom.canvas("scene") {
+            // The drag goes on where the pointer leaves the picture. A pointer that is gone already needs none.
+            let _ = canvas.set_pointer_capture(pointer.pointer_id());
+        }
+        let event = self
+            .scene
+            .as_mut()
+            .and_then(|scene| scene.pointer_down(pointer.pointer_id(), place(pointer), button, angles));
+        self.scene_event(event);
+    }
+
+    fn scene_event(&mut self, event: Option<SceneEvent>) {
+        match event {
+            None => {}
+            Some(SceneEvent::Hovered(part)) => self.hovered = part,
+            Some(SceneEvent::JointDragged { joint, degrees }) => self.drag_joint(joint, degrees),
+            Some(SceneEvent::TipDragged(wish)) => {
+                self.unreachable = wish.reach.is_err().then_some(wish.tip);
+                if let Ok(angles) = wish.reach {
+                    self.send_pose(angles);
+                }
+            }
+            Some(SceneEvent::Released) => {
+                self.unreachable = None;
+                if let Some(joint) = self.hand.take() {
+                    self.act_on_simulation(&format!("let-go {joint}"));
+                }
+            }
+        }
+    }
+
+    /// Moves a joint by its motor. A limp joint of a simulated arm is moved by a hand.
+    fn drag_joint(&mut self, joint: u8, degrees: f32) {
+        let is_driven = self.client.state().motor_state == motor_state::SERVO;
+        let (Line::Simulated(source), Some(named), false) = (&mut self.line, Joint::new(joint), is_driven)
+        else {
+            return self.send_joint(joint, degrees);
+        };
+        source.act(Action::Hand(named, counts_from_angle(named, MicroDegrees::nearest(degrees), 0)));
+        self.hand = Some(joint);
+    }
+
+    fn send_pose(&mut self, angles: [f32; 7]) {
+        let values: Vec<u8> = angles
+            .iter()
+            .filter_map(|&degrees| FineAngle::from_degrees(f64::from(degrees)))
+            .flat_map(|angle| angle.hundredths().to_le_bytes())
+            .collect();
+        if has_extended_block(self.client.registers()) && values.len() == 14 {
+            self.write(FINE_TARGET.address, &values);
+        } else {
+            for (joint, degrees) in (1..).zip(angles) {
+                self.send_joint(joint, degrees);
+            }
+        }
+    }
+}

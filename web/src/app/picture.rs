@@ -1,0 +1,80 @@
+//! The arm in 3D and the plot, before each picture of the browser.
+
+use kinematics::forward;
+use sevenbot::map::{fault, motor_state};
+
+use super::{App, panels, whole};
+use crate::arm_state::ArmState;
+use crate::plots::{Plot, Quantity, draw};
+use crate::scene::{Rgb, Theme, View};
+
+impl App {
+    fn theme(&self) -> Theme {
+        let query =
+            web_sys::window().and_then(|window| window.match_media("(prefers-color-scheme: dark)").ok()?);
+        if query.is_some_and(|query| query.matches()) { Theme::Dark } else { Theme::Light }
+    }
+
+    pub(super) fn show(&mut self) {
+        let (state, theme) = (self.client.state(), self.theme());
+        let view = View {
+            measured: state.angles(),
+            targets: (state.motor_state == motor_state::SERVO).then_some(state.targets),
+            colours: colours(&state, theme),
+            unreachable: self.unreachable,
+            hovered: self.hovered,
+            theme,
+        };
+        if let Some(scene) = &mut self.scene
+            && let Err(reason) = scene.draw(&view)
+        {
+            panels::notice(&self.dom, &format!("{reason:?}"));
+        }
+        self.show_plot(theme);
+        panels::show(self, &state);
+    }
+
+    fn show_plot(&self, theme: Theme) {
+        let Some(canvas) = self.plot.canvas() else { return };
+        let ratio = web_sys::window().map_or(1.0, |window| window.device_pixel_ratio());
+        let size = [canvas.client_width(), canvas.client_height()].map(f64::from);
+        let [width, height] = size.map(|length| u32::try_from(whole(length * ratio)).unwrap_or(0));
+        if [canvas.width(), canvas.height()] != [width, height] {
+            canvas.set_width(width);
+            canvas.set_height(height);
+        }
+        let (name, unit) = match self.quantity {
+            Quantity::Angle => ("angle", "°"),
+            Quantity::Load => ("load", "%"),
+            Quantity::Velocity => ("velocity", "°/s"),
+        };
+        let title = format!("{} ({unit})", self.language.text(name));
+        let (quantity, shown) = (self.quantity, [true; 7]);
+        let plot = Plot { quantity, title: &title, seconds: "s", shown, theme, size, ratio };
+        // Only an invalid context is refused.
+        let _ = draw(&self.plot, &plot, &self.history);
+    }
+}
+
+/// The colour of each joint: what is wrong with it comes first.
+fn colours(state: &ArmState, theme: Theme) -> [Rgb; 7] {
+    let palette = theme.palette();
+    std::array::from_fn(|index| {
+        if state.missing >> index & 1 == 1 {
+            palette.joint_missing
+        } else if state.faults & fault::SERVO_BUS != 0 && state.missing == 0 {
+            palette.joint_fault
+        } else if state.motor_state != motor_state::SERVO {
+            palette.joint_limp
+        } else {
+            palette.joint_ok
+        }
+    })
+}
+
+/// The tip of the arm in mm.
+pub(super) fn tip(angles: [f32; 7]) -> [f64; 3] {
+    let [one, two, three, four, five, six, _] = angles.map(f64::from);
+    let tip = forward([one, two, three, four, five, six]).hand.tip;
+    [tip.x, tip.y, tip.z]
+}
