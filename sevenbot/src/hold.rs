@@ -53,8 +53,6 @@ struct SentTarget {
     may_be_unmeasured: bool,
 }
 
-const NOTHING_SENT: [Option<SentTarget>; 7] = [None; 7];
-
 impl Arm {
     /// Makes every joint hold its present position, and verifies the targets. Returns the joints as read back.
     ///
@@ -86,53 +84,96 @@ impl Arm {
 
     fn hold_until_verified(&mut self, is_fine: bool) -> Result<JointSnapshot, HoldError> {
         let start = self.now();
-        let mut before = None;
-        let mut sent = NOTHING_SENT;
-        let mut losses = 0;
+        let mut hold = Hold::default();
         loop {
             let now = self.held_joints(is_fine)?;
-            if !now.joints.is_driven() {
-                return Ok(now.joints);
-            }
-            let is_past_start_up = self.now() >= start + START_UP_TIME;
-            let before: &JointSnapshot = before.get_or_insert_with(|| now.joints.clone());
-            let lost = now.lost_targets(&sent, before);
-            losses += u32::from(!lost.is_empty());
-            if losses >= HOLD_ATTEMPTS {
-                return Err(HoldError::NotTaken(lost));
-            }
-            let targets = now.targets_to_write(&sent, is_past_start_up);
-            for (address, values) in now.frames(&targets) {
-                self.write(address, &values)?;
-            }
-            for ((sent, target), joint) in sent.iter_mut().zip(targets).zip(Joint::ALL) {
-                let may_be_unmeasured = now.may_be_unmeasured(joint, is_past_start_up);
-                *sent = target.map(|value| SentTarget { value, may_be_unmeasured }).or(*sent);
-            }
-            if targets == [None; 7] {
-                if !Joint::ALL.into_iter().any(|joint| now.may_be_unmeasured(joint, is_past_start_up)) {
-                    return Ok(now.joints);
+            match hold.step(&now, self.now() >= start + START_UP_TIME) {
+                HoldStep::Holds | HoldStep::NotDriven => return Ok(now.joints),
+                HoldStep::NotTaken(lost) => return Err(HoldError::NotTaken(lost)),
+                HoldStep::Wait => self.sleep(POLL_PERIOD),
+                HoldStep::Write(frames) => {
+                    for (address, values) in frames {
+                        self.write(address, &values)?;
+                    }
                 }
-                self.sleep(POLL_PERIOD);
             }
         }
     }
 
     fn held_joints(&mut self, is_fine: bool) -> Result<HeldJoints, Error> {
-        let fine =
-            is_fine.then(|| self.read_span(Span::between(&FINE_TARGET, &FINE_POSITION))).transpose()?;
-        Ok(HeldJoints { fine, joints: self.joints()? })
+        let fine = is_fine.then(|| self.read_span(HeldJoints::FINE_REGISTERS)).transpose()?;
+        Ok(HeldJoints::new(self.joints()?, fine))
+    }
+}
+
+/// A stop in progress, without input and output: [`Arm::hold`] and clients of their own give it what they read.
+#[derive(Clone, Debug, Default)]
+pub struct Hold {
+    /// At the first step.
+    before: Option<JointSnapshot>,
+    sent: [Option<SentTarget>; 7],
+    losses: u32,
+}
+
+/// What a stop has to do next.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HoldStep {
+    /// Write these frames, each an address and its values. Then read the joints, and take the next step.
+    Write(Vec<(u8, Vec<u8>)>),
+    /// A joint is not measured yet. Read the joints again, and take the next step.
+    Wait,
+    /// Every joint that is known holds: the stop is over.
+    Holds,
+    /// The motors do not drive the joints: there is nothing to stop.
+    NotDriven,
+    /// The arm does not take these targets. It may be moving.
+    NotTaken(Vec<WriteMismatch>),
+}
+
+impl Hold {
+    /// The next step, given the joints as they are now. `is_past_start_up`: 0.7 s have passed since the first step, after
+    /// which each joint is measured or missing.
+    pub fn step(&mut self, now: &HeldJoints, is_past_start_up: bool) -> HoldStep {
+        if !now.joints.is_driven() {
+            return HoldStep::NotDriven;
+        }
+        let before = self.before.get_or_insert_with(|| now.joints.clone());
+        let lost = now.lost_targets(&self.sent, before);
+        self.losses += u32::from(!lost.is_empty());
+        if self.losses >= HOLD_ATTEMPTS {
+            return HoldStep::NotTaken(lost);
+        }
+        let targets = now.targets_to_write(&self.sent, is_past_start_up);
+        for ((sent, target), joint) in self.sent.iter_mut().zip(targets).zip(Joint::ALL) {
+            let may_be_unmeasured = now.may_be_unmeasured(joint, is_past_start_up);
+            *sent = target.map(|value| SentTarget { value, may_be_unmeasured }).or(*sent);
+        }
+        if targets != [None; 7] {
+            return HoldStep::Write(now.frames(&targets));
+        }
+        let is_waiting = Joint::ALL.into_iter().any(|joint| now.may_be_unmeasured(joint, is_past_start_up));
+        if is_waiting { HoldStep::Wait } else { HoldStep::Holds }
     }
 }
 
 /// The joints of an arm that has to hold.
-struct HeldJoints {
+#[derive(Clone, Debug)]
+pub struct HeldJoints {
     /// Targets and positions in hundredths of a degree, from an arm with the extended block.
     fine: Option<Snapshot>,
     joints: JointSnapshot,
 }
 
 impl HeldJoints {
+    /// What an arm with the extended block reads for the second argument of [`Self::new`].
+    pub const FINE_REGISTERS: Span = Span::between(&FINE_TARGET, &FINE_POSITION);
+
+    /// From the joints, and on an arm with the extended block a read that holds [`Self::FINE_REGISTERS`].
+    #[must_use]
+    pub const fn new(joints: JointSnapshot, fine: Option<Snapshot>) -> Self {
+        Self { fine, joints }
+    }
+
     const fn row(&self) -> &'static Register {
         if self.fine.is_some() { &FINE_TARGET } else { &TARGET_POSITION }
     }
@@ -216,6 +257,8 @@ impl HeldJoints {
 mod tests {
     use super::*;
     use crate::joints::tests::{self, POSE};
+
+    const NOTHING_SENT: [Option<SentTarget>; 7] = [None; 7];
 
     fn coarse(joints: JointSnapshot) -> HeldJoints {
         HeldJoints { fine: None, joints }

@@ -25,7 +25,7 @@ use crate::status_block::StatusBlock;
 use crate::units::Speed;
 
 /// After power-up the arm measures each joint or finds it missing within 500 ms (D12). The rest is for the reply.
-pub(crate) const START_UP_TIME: Duration = Duration::from_millis(700);
+pub const START_UP_TIME: Duration = Duration::from_millis(700);
 /// Time between two reads during start-up.
 pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(20);
 /// A joint this near to its target has arrived: a loaded servo stops a few degrees short.
@@ -100,7 +100,7 @@ impl JointSnapshot {
     /// The registers of a snapshot, from the motor state to the present positions.
     pub const REGISTERS: Span = Span::between(&MOTOR_STATE, &PRESENT_POSITION);
 
-    /// From a read of [`Self::REGISTERS`], and the status block if the firmware has one.
+    /// From a read that holds [`Self::REGISTERS`], and the status block if the firmware has one.
     #[must_use]
     pub const fn new(registers: Snapshot, status: Option<StatusBlock>) -> Self {
         Self { registers, status }

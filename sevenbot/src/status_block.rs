@@ -43,7 +43,7 @@ impl Arm {
 }
 
 impl From<Snapshot> for StatusBlock {
-    /// From a read of [`STATUS`].
+    /// From a read that holds [`STATUS`].
     fn from(registers: Snapshot) -> Self {
         Self(registers)
     }

@@ -116,7 +116,7 @@ impl Client {
 
     /// Lets every joint hold where it is. [`Client::stop_progress`] tells whether the arm took it.
     pub fn stop(&mut self) {
-        self.stop.start(self.rounds);
+        self.stop.start();
     }
 
     /// Takes bytes of the arm; none if its line is silent at `now`.
@@ -158,7 +158,7 @@ impl Client {
 
     fn continue_stop(&mut self, now: Instant) {
         let mut stop = std::mem::take(&mut self.stop);
-        for (address, values) in stop.frames(&self.registers, self.rounds) {
+        for (address, values) in stop.frames(now, &self.registers, self.rounds) {
             self.write(now, address, &values);
         }
         self.stop = stop;

@@ -1,16 +1,18 @@
 //! A stop that is verified: the measured positions become the targets, and are read back.
 //!
-//! As `sevenbot stop` does it, with registers that are read in rounds.
+//! [`sevenbot::hold`] decides what to write, as for `sevenbot stop`. The registers here are those that are read in rounds.
 
-use sevenbot::map::{
-    FINE_POSITION, FINE_TARGET, MOTOR_STATE, PRESENT_POSITION, SET_POINT_PERIOD, TARGET_POSITION, motor_state,
-};
-use sevenbot::{FineAngle, Joint, Snapshot};
+use protocol_core::time::{Duration, Instant};
+use sevenbot::Snapshot;
+use sevenbot::hold::{HeldJoints, Hold, HoldStep};
+use sevenbot::joints::{JointSnapshot, START_UP_TIME};
+use sevenbot::map::{SET_POINT_PERIOD, STATUS_VERSION};
+use sevenbot::status_block::StatusBlock;
 
 use crate::arm_state::has_extended_block;
 
-/// The targets are written this many times before the stop has failed.
-const ATTEMPTS: u32 = 5;
+/// An address and its values.
+type Frame = (u8, Vec<u8>);
 
 /// How far a stop has come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,16 +34,17 @@ pub enum StopProgress {
 #[derive(Debug, Default)]
 pub struct Stop {
     progress: StopProgress,
-    attempts: u32,
-    /// The rounds that were complete when the last targets were written.
-    written_in: u64,
-    sent: Vec<(u8, u16)>,
+    hold: Hold,
+    /// When the first step was taken.
+    start: Option<Instant>,
+    /// The next step needs this many complete rounds.
+    next_round: u64,
 }
 
 impl Stop {
-    /// Begins a stop after this number of complete rounds.
-    pub fn start(&mut self, rounds: u64) {
-        *self = Self { progress: StopProgress::Verifying, written_in: rounds, ..Self::default() };
+    /// Begins a stop.
+    pub fn start(&mut self) {
+        *self = Self { progress: StopProgress::Verifying, ..Self::default() };
     }
 
     /// How far the stop has come.
@@ -50,38 +53,34 @@ impl Stop {
         self.progress
     }
 
-    /// The frames to write after a round, given the number of complete rounds. A round that was already on its way when the
-    /// targets were written shows the targets before it.
-    pub fn frames(&mut self, registers: &Snapshot, rounds: u64) -> Vec<(u8, Vec<u8>)> {
-        let is_old = !self.sent.is_empty() && rounds <= self.written_in + 1;
-        if self.progress != StopProgress::Verifying || is_old {
+    /// The frames to write after a round, given the number of complete rounds.
+    pub fn frames(&mut self, now: Instant, registers: &Snapshot, rounds: u64) -> Vec<Frame> {
+        if self.progress != StopProgress::Verifying || rounds < self.next_round {
             return Vec::new();
         }
-        if registers.byte(&MOTOR_STATE) != motor_state::SERVO {
-            self.progress = StopProgress::NotDriven;
-            return Vec::new();
-        }
-        let is_fine = has_extended_block(registers);
-        let value = |address| if is_fine { registers.word(address) } else { registers.at(address).into() };
-        if !self.sent.is_empty() && self.sent.iter().all(|&(address, sent)| value(address) == sent) {
-            self.progress = StopProgress::Holds;
-            return Vec::new();
-        }
-        if self.attempts >= ATTEMPTS {
-            self.progress = StopProgress::Failed;
-            return Vec::new();
-        }
-        self.attempts += 1;
-        self.written_in = rounds;
-        let (target, position) =
-            if is_fine { (&FINE_TARGET, &FINE_POSITION) } else { (&TARGET_POSITION, &PRESENT_POSITION) };
-        let held = |joint| (target.of(joint), value(position.of(joint)));
-        let is_measured = |&(_, value): &(u8, u16)| FineAngle::from_hundredths(value).is_some();
-        self.sent = Joint::ALL.map(held).into_iter().filter(is_measured).collect();
-        // With a period, a target would be one more point of a stream (D23).
-        let ends_stream = is_fine.then(|| (SET_POINT_PERIOD.address, vec![0, 0]));
-        let bytes = |[low, high]: [u8; 2]| if is_fine { vec![low, high] } else { vec![low] };
-        let frame = |&(address, value): &(u8, u16)| (address, bytes(value.to_le_bytes()));
-        ends_stream.into_iter().chain(self.sent.iter().map(frame)).collect()
+        let start_up = Duration::from_micros(u64::try_from(START_UP_TIME.as_micros()).unwrap_or(u64::MAX));
+        let is_past_start_up = now >= *self.start.get_or_insert(now) + start_up;
+        self.progress = match self.hold.step(&held_joints(registers), is_past_start_up) {
+            HoldStep::Wait => return Vec::new(),
+            HoldStep::Write(targets) => {
+                // The next round may have been on its way before these targets.
+                self.next_round = rounds + 2;
+                // With a period, a target would be one more point of a stream (D23). Later moves need their speed.
+                let ends_stream =
+                    has_extended_block(registers).then(|| (SET_POINT_PERIOD.address, vec![0, 0]));
+                return ends_stream.into_iter().chain(targets).collect();
+            }
+            HoldStep::Holds => StopProgress::Holds,
+            HoldStep::NotDriven => StopProgress::NotDriven,
+            HoldStep::NotTaken(_) => StopProgress::Failed,
+        };
+        Vec::new()
     }
+}
+
+fn held_joints(registers: &Snapshot) -> HeldJoints {
+    let all = || registers.clone();
+    let has_status = registers.byte(&STATUS_VERSION) == 1;
+    let joints = JointSnapshot::new(all(), has_status.then(|| StatusBlock::from(all())));
+    HeldJoints::new(joints, has_extended_block(registers).then(all))
 }

@@ -160,6 +160,7 @@ const TEXTS: &[(&str, &str, &str)] = &[
         "如有真机，请在页面顶部选择。移动之前，请确保周围没有障碍物。",
     ),
     ("ready", "The arm is ready.", "机械臂已就绪。"),
+    ("starting", "The arm starts and measures its joints.", "机械臂正在启动并测量各关节。"),
     ("moving", "The arm is moving.", "机械臂正在移动。"),
     ("stopping", "Stopping …", "正在停止……"),
     ("holds", "Stopped: the arm holds.", "已停止：机械臂保持不动。"),

@@ -70,6 +70,7 @@ pub fn state_line(
         (StopProgress::NotDriven, 0 | 2) => plain("stop-limp"),
         (_, motor_state::DAMPING) => plain("damped"),
         (_, motor_state::FORCELESS) => plain("limp"),
+        _ if state.measured.contains(&None) => plain("starting"),
         _ if state.moving != 0 => plain("moving"),
         (StopProgress::Holds, _) => (language.text("holds").to_owned(), Mood::Good),
         _ => (language.text("ready").to_owned(), Mood::Good),
@@ -105,6 +106,13 @@ mod tests {
         let mut registers = sevenbot::Snapshot { address: 0, values: vec![0; 256] };
         registers.values[29] = motor_state::SERVO;
         ArmState::new(&registers)
+    }
+
+    #[test]
+    fn an_arm_that_measures_its_joints_is_not_ready() {
+        let mut starting = state();
+        starting.measured[2] = None;
+        assert_eq!(said(&starting, StopProgress::None), "The arm starts and measures its joints.");
     }
 
     fn said(state: &ArmState, stop: StopProgress) -> String {

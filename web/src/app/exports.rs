@@ -47,3 +47,10 @@ pub fn project(x: f32, y: f32, z: f32) -> Option<Vec<f64>> {
 pub fn frame_count() -> u32 {
     with_app(|app| app.frames).unwrap_or(0)
 }
+
+/// The memory of the module in bytes.
+#[wasm_bindgen]
+#[must_use]
+pub fn memory_size() -> u32 {
+    u32::try_from(core::arch::wasm32::memory_size(0) << 16).unwrap_or(u32::MAX)
+}

@@ -106,6 +106,22 @@ mod tests {
         assert!(held.targets[0] < 140.0 && held.moving == 0, "{held:?}");
     }
 
+    /// A joint that is not measured yet holds only after it was measured: until then it goes where it was sent.
+    #[test]
+    fn a_stop_during_start_up_waits_for_every_joint() {
+        let (mut client, mut arm) = (Client::default(), SimulatedSource::default());
+        while !client.is_connected() {
+            pass(&mut client, &mut arm, 1);
+        }
+        let (address, values) = target_frame(client.registers(), 1, 180.0).expect("a target");
+        client.write(arm.now(), address, &values);
+        client.stop();
+        pass(&mut client, &mut arm, 100);
+        assert_eq!(client.stop_progress(), StopProgress::Holds);
+        let held = client.state();
+        assert!((held.targets[0] - 90.0).abs() < 1.0 && held.moving == 0, "{held:?}");
+    }
+
     #[test]
     fn a_stop_of_a_limp_arm_writes_nothing() {
         let (mut client, mut arm) = connected();
