@@ -107,8 +107,11 @@ impl Client {
         self.frames.iter()
     }
 
-    /// Writes registers from `address` on.
+    /// Writes registers from `address` on. What a stop has found out is no longer news.
     pub fn write(&mut self, now: Instant, address: u8, values: &[u8]) {
+        if self.stop.progress() != StopProgress::Verifying {
+            self.stop = Stop::default();
+        }
         let request = Request::Write { address, values };
         self.show(now, true, Traffic::from(&request));
         self.encode(&request);

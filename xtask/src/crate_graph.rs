@@ -34,7 +34,7 @@ const GROUPS: [Group; 3] = [
             "sevenbot-web",
         ],
     ),
-    ("proof", &["flash-model", "replay", "system-tests", "torture", "xtask"]),
+    ("proof", &["browser-tests", "flash-model", "replay", "system-tests", "torture", "xtask"]),
     ("measurement", &["bench", "footprint", "peers"]),
 ];
 

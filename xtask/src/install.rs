@@ -19,9 +19,15 @@ struct Tool {
 /// All programs know this.
 const VERSION: &[&str] = &["--version"];
 
-const TOOLS: [Tool; 4] = [
+const TOOLS: [Tool; 5] = [
     Tool { program: QEMU, arguments: VERSION, package: QEMU, purpose: "runs the image for the arm" },
     Tool { program: "c++", arguments: VERSION, package: "g++", purpose: "builds the fuzzer" },
+    Tool {
+        program: "chromium",
+        arguments: VERSION,
+        package: "chromium",
+        purpose: "shows the page in its tests",
+    },
     Tool { program: "python3", arguments: VERSION, package: "python3", purpose: "runs the Python package" },
     Tool {
         program: "python3",

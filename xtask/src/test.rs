@@ -8,7 +8,7 @@ use crate::run::{CHIP, HOST, TaskResult, build_for_browser, cargo, run};
 use crate::steps::{TestScope, TestStep, long, quick, whole};
 use crate::{
     count, crate_graph, decisions, deny, drawings, footprint, fuzz, install, modules, mujoco, no_panic,
-    python, registers_md, replays, start_up, steps, system_tests, torture, trials,
+    python, registers_md, replays, start_up, steps, system_tests, torture, trials, web,
 };
 
 /// The scope of the run.
@@ -60,7 +60,11 @@ const STEPS: &[TestStep] = &[
     whole("start-up of the image", start_up::check),
     whole("instructions are within their budgets", || count::check(false)),
     quick("the simulated arm builds for a browser, without an operating system", build_for_browser),
+    quick("the page builds within its budget", web::build),
     quick("programs under test", || cargo(&format!("build {HOST}"))),
+    whole("the page in a browser", || {
+        run("cargo", "test -p browser-tests", &[("RUST_TEST_THREADS", "1"), ("POSES", "1000")])
+    }),
     whole("system tests, the image for the arm in an emulator", || {
         system_tests::run_on(&system_tests::EMULATOR)
     }),
@@ -88,7 +92,7 @@ const STEPS: &[TestStep] = &[
     quick("tests, and the system tests on the simulator", || {
         // More threads than processors, because most system tests wait for an arm.
         let threads = [("RUST_TEST_THREADS", "8")];
-        run("cargo", "test --workspace --exclude footprint", &threads)
+        run("cargo", "test --workspace --exclude footprint --exclude browser-tests", &threads)
     }),
 ];
 

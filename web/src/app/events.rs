@@ -267,8 +267,10 @@ impl App {
 
 /// Reads the file that a person chose.
 fn upload(element: &Element) {
-    let file = element.dyn_ref::<HtmlInputElement>().and_then(|input| input.files()?.get(0));
-    let Some(file) = file else { return };
+    let Some(input) = element.dyn_ref::<HtmlInputElement>() else { return };
+    let Some(file) = input.files().and_then(|files| files.get(0)) else { return };
+    // So that the same file can be chosen again after a change.
+    input.set_value("");
     spawn_local(async move {
         let text =
             JsFuture::from(file.text()).await.ok().and_then(|text| text.as_string()).unwrap_or_default();

@@ -1,0 +1,81 @@
+//! `sevenbot view`, with or without a simulated arm behind it.
+
+use std::path::PathBuf;
+use std::process::{Child, Command};
+
+use system_tests::process;
+use system_tests::programs::{host_sim, tool};
+use tempfile::TempDir;
+
+use crate::page::Page;
+
+/// A running server of the page.
+#[derive(Debug)]
+pub struct Viewed {
+    simulator: Option<Child>,
+    server: Child,
+    /// The address to open, with its token if there is an arm.
+    pub url: String,
+    folder: TempDir,
+}
+
+impl Viewed {
+    /// Without an arm: the page simulates one.
+    #[must_use]
+    pub fn without_arm() -> Self {
+        Self::start(false)
+    }
+
+    /// With an arm of `host-sim`.
+    #[must_use]
+    pub fn with_arm() -> Self {
+        Self::start(true)
+    }
+
+    fn start(has_arm: bool) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let simulator = has_arm.then(|| simulator(&folder));
+        let mut command = tool();
+        command.current_dir(&folder);
+        let arm: &[&str] = if has_arm { &["--port", "./arm"] } else { &["--simulate"] };
+        command.args(["view", "--no-open", "--http", "0"]).args(arm);
+        let (server, addresses) = process::start(&mut command, 1).expect("the server is ready");
+        let url = addresses.first().expect("an address").display().to_string();
+        Self { simulator, server, url, folder }
+    }
+
+    /// Opens the page, ends its tour, and waits until an arm answers.
+    #[must_use]
+    pub fn open(&self) -> Page {
+        let mut page = Page::open(&self.url);
+        page.key("Escape");
+        page.wait_for_state("the arm answers", |state| state["connected"] == true);
+        page.wait_for_text("#state", "The arm is ready.");
+        page
+    }
+
+    /// A file in the folder of this server.
+    #[must_use]
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The address without path and token.
+    #[must_use]
+    pub fn origin(&self) -> &str {
+        self.url.split("/?").next().unwrap_or_default().trim_end_matches('/')
+    }
+}
+
+impl Drop for Viewed {
+    fn drop(&mut self) {
+        process::kill(&mut self.server);
+        self.simulator.iter_mut().for_each(process::kill);
+    }
+}
+
+fn simulator(folder: &TempDir) -> Child {
+    let mut command = Command::new(host_sim());
+    command.args(["--quiet", "--eeprom", "none", "--link"]).arg(folder.path().join("arm"));
+    process::start(&mut command, 1).expect("the simulator is ready").0
+}

@@ -1,0 +1,94 @@
+//! Faults of the simulated arm, in colour and in words.
+
+use browser_tests::picture::Picture;
+use browser_tests::{Page, Viewed};
+
+/// The part of the window with the arm.
+fn scene(page: &mut Page) -> Picture {
+    page.evaluate("scrollTo(0, 0)");
+    page.pass(0.1);
+    page.picture_of([30.0, 118.0], [780.0, 420.0])
+}
+
+/// Pixels in the colour of joints that work, in any light.
+fn working(picture: &Picture) -> usize {
+    picture.count(|[red, green, blue]| green > red.saturating_add(25) && blue > red.saturating_add(25))
+}
+
+/// Pixels in the colour of a joint with a fault, in any light.
+fn faulty(picture: &Picture) -> usize {
+    picture.count(|[red, green, blue]| red > green.saturating_add(70) && red > blue.saturating_add(90))
+}
+
+#[test]
+fn each_servo_that_does_not_answer_loses_its_colour_and_is_named() {
+    let viewed = Viewed::without_arm();
+    for joint in 1..=7 {
+        let mut page = viewed.open();
+        let whole = working(&scene(&mut page));
+        page.choose("#fault-joint", &joint.to_string());
+        page.click("[data-action=break]");
+        page.wait_for_text("#state", &format!("check their cables: joint {joint}"));
+        page.wait_for_text(&format!("#angle-{joint}"), "no answer");
+        let broken = working(&scene(&mut page));
+        assert!(broken + 40 < whole, "joint {joint}: {broken} of {whole} pixels");
+        page.click("[data-action=repair]");
+        page.wait_for_text("#state", "The arm is ready.");
+        let repaired = working(&scene(&mut page));
+        assert!(repaired > broken + 20, "joint {joint}: {repaired} after {broken} pixels");
+        assert_eq!(page.errors(), [""; 0]);
+    }
+}
+
+#[test]
+fn a_weak_supply_is_said_and_shown() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    assert_eq!(faulty(&scene(&mut page)), 0);
+    page.click("[data-action=fault]");
+    page.wait_for_text("#state", "a wrong supply");
+    // Load lowers it below the 4.8 V of the supply.
+    page.wait_for_text("#health", "Supply 4.");
+    let red = faulty(&scene(&mut page));
+    assert!(red > 500, "{red} pixels");
+    page.click("[data-action=repair]");
+    page.wait_for_text("#state", "The arm is ready.");
+    assert_eq!(faulty(&scene(&mut page)), 0);
+}
+
+#[test]
+fn after_a_power_cut_the_arm_holds_where_it_fell() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    page.click("[data-action=power]");
+    page.pass(1.5);
+    page.wait_for_text("#state", "The arm is ready.");
+    let state = page.state();
+    for (joint, measured) in page.measured().into_iter().enumerate() {
+        let target = state["targets"][joint].as_f64().expect("a target");
+        assert!((measured - target).abs() < 1.0, "joint {}: {state}", joint + 1);
+    }
+}
+
+#[test]
+fn a_register_is_written_in_the_table_and_a_wrong_value_is_refused_in_words() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    page.evaluate("document.querySelectorAll('details').forEach(panel => panel.open = true)");
+    page.wait_for_text("#registers", "motor-state");
+    let write = |page: &mut Page, text: &str| {
+        page.evaluate(&format!(
+            "(input => {{ input.focus(); input.value = `{text}`; \
+             input.dispatchEvent(new Event('change', {{bubbles: true}})); }})\
+             (document.querySelector('#register-29-value'))"
+        ));
+    };
+    write(&mut page, "2");
+    page.wait_for_state("the motors are off", |state| state["motors"] == 2);
+    page.wait_for_text("#frames", "write motor-state = 2");
+    write(&mut page, "lots");
+    page.wait_for_text("#notice", "This value cannot be written: lots");
+    write(&mut page, "7");
+    page.wait_for_text("#notice", "This value cannot be written:");
+    assert_eq!(page.state()["motors"], 2);
+}

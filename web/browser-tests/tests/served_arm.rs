@@ -1,0 +1,80 @@
+//! The page in front of an arm of its own: behind `sevenbot view`, and on a serial port of the browser.
+
+use browser_tests::{Page, Viewed};
+
+/// A port of Web Serial whose bytes go through the server to `host-sim`: the browser of a test has no ports.
+const SERIAL_PORT: &str = "
+    class Port {
+      async open({ baudRate }) {
+        window.baudRate = baudRate;
+        const socket = new WebSocket('ws://' + location.host + '/frames' + location.search);
+        socket.binaryType = 'arraybuffer';
+        await new Promise((done, failed) => { socket.onopen = done; socket.onerror = failed; });
+        this.readable = new ReadableStream({
+          start(stream) { socket.onmessage = ({ data }) => stream.enqueue(new Uint8Array(data)); },
+        });
+        this.writable = new WritableStream({ write: bytes => socket.send(bytes) });
+        this.socket = socket;
+      }
+      async close() { this.socket.close(); }
+    }
+    Object.defineProperty(navigator, 'serial', { value: { requestPort: async () => new Port() } });";
+
+/// Turns joint 1 by the keyboard, and waits until the arm has done so.
+fn check_it_moves(page: &mut Page) {
+    let start = page.measured()[0];
+    page.focus("#joint-1");
+    page.keys("ArrowRight", 30);
+    page.wait_for_state("joint 1 turns", |state| {
+        state["measured"][0].as_f64().is_some_and(|angle| (angle - start - 15.0).abs() < 0.5)
+    });
+    page.key(" ");
+    page.wait_for_text("#state", "Stopped: the arm holds.");
+    assert_eq!(page.errors(), [""; 0]);
+}
+
+#[test]
+fn the_page_shows_moves_and_stops_the_arm_behind_the_server() {
+    let viewed = Viewed::with_arm();
+    let mut page = viewed.open();
+    assert_eq!(page.evaluate("document.querySelector('#source').value"), "server");
+    check_it_moves(&mut page);
+    let sockets: Vec<_> = page.requests().into_iter().filter(|url| url.starts_with("ws:")).collect();
+    assert!(!sockets.is_empty());
+    assert!(
+        sockets.iter().all(|url| url.starts_with(&viewed.origin().replace("http:", "ws:"))),
+        "{sockets:?}"
+    );
+}
+
+#[test]
+fn an_arm_on_a_serial_port_is_shown_moved_and_left() {
+    let viewed = Viewed::with_arm();
+    let mut page = Page::open_after(&viewed.url, SERIAL_PORT);
+    page.key("Escape");
+    page.choose("#source", "usb");
+    page.wait_for_text("#state", "The arm is ready.");
+    assert_eq!(page.evaluate("window.baudRate"), 115_200);
+    check_it_moves(&mut page);
+    page.choose("#source", "simulator");
+    page.wait_for_text("#state", "The arm is ready.");
+    assert!((page.measured()[0] - 90.0).abs() < 1.0, "the simulated arm did not move");
+}
+
+#[test]
+fn a_browser_without_serial_ports_says_what_to_do() {
+    let viewed = Viewed::without_arm();
+    let mut page = Page::open_after(&viewed.url, "delete Navigator.prototype.serial");
+    page.choose("#source", "usb");
+    page.wait_for_text("#notice", "This browser cannot open USB ports.");
+    assert_eq!(page.evaluate("document.querySelector('#source').value"), "simulator");
+}
+
+#[test]
+fn a_page_without_a_token_moves_no_arm() {
+    let viewed = Viewed::with_arm();
+    let mut page = Page::open(&format!("{}/", viewed.origin()));
+    assert_eq!(page.evaluate("document.querySelector('#source').value"), "simulator");
+    page.choose("#source", "server");
+    page.wait_for_text("#notice", "There is no arm at this address.");
+}
