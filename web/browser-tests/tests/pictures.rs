@@ -52,7 +52,7 @@ fn write_the_animation() {
         page.key(key);
         for _ in 0..6 {
             page.pass(0.15);
-            pictures.push(page.picture_of([16.0, 104.0], [818.0, 460.0]).half());
+            pictures.push(page.picture_of([30.0, 118.0], [800.0, 430.0]).half());
         }
     }
     write_animation(&folder().join("web.png"), &pictures, 6);

@@ -95,12 +95,12 @@ fn show_joints(dom: &Dom, language: Language, state: &ArmState) {
     for ((index, measured), target) in (0..).zip(state.measured).zip(state.targets) {
         let number = index + 1;
         let is_missing = state.missing >> index & 1 == 1;
-        let measured = match measured {
+        let angle = match measured {
             _ if is_missing => language.text("no-answer").to_owned(),
-            Some(angle) => format!("{angle:.1}°"),
+            Some(angle) => format!("{angle:.1}° → {target:.1}°"),
             None => language.text("not-measured").to_owned(),
         };
-        dom.set_text(&format!("angle-{number}"), &format!("{measured} → {target:.1}°"));
+        dom.set_text(&format!("angle-{number}"), &angle);
         if let Some(row) = dom.element(&format!("row-{number}")) {
             set_attribute(&row, "class", if is_missing { "joint bad" } else { "joint" });
         }

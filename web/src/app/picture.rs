@@ -8,6 +8,9 @@ use crate::arm_state::ArmState;
 use crate::plots::{Plot, Quantity, draw};
 use crate::scene::{Rgb, Theme, View};
 
+/// The plot is drawn with every third picture.
+const PLOT_PERIOD: u32 = 3;
+
 impl App {
     fn theme(&self) -> Theme {
         let query =
@@ -30,7 +33,10 @@ impl App {
         {
             panels::notice(&self.dom, &format!("{reason:?}"));
         }
-        self.show_plot(theme);
+        // A plot is read at leisure, and costs as much time as the arm.
+        if self.frames.is_multiple_of(PLOT_PERIOD) {
+            self.show_plot(theme);
+        }
         panels::show(self, &state);
     }
 

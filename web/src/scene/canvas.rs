@@ -14,8 +14,10 @@ use super::pointer::{self, Button, Pointer, SceneEvent};
 use super::renderer::Renderer;
 use super::view::View;
 
-/// More device pixels per CSS pixel than this cost time and show nothing more.
-const LARGEST_RATIO: f64 = 2.0;
+/// Of the extension `WEBGL_debug_renderer_info`: the name of the graphics processor.
+const UNMASKED_RENDERER: u32 = 0x9246;
+/// Device pixels per CSS pixel on a graphics processor: the browser makes edges smooth as it fits the picture to the screen.
+const SMOOTH_RATIO: f32 = 2.0;
 
 /// The arm on a canvas: picture, camera and pointers.
 pub struct Scene {
@@ -24,6 +26,8 @@ pub struct Scene {
     arm: Arm,
     camera: Camera,
     pointer: Pointer,
+    /// Device pixels per CSS pixel.
+    ratio: f32,
     /// `None` after the browser took the graphics context away.
     renderer: Option<Renderer>,
     drawn: Option<Picture>,
@@ -45,16 +49,13 @@ impl Scene {
     /// # Errors
     /// The browser has no WebGL2, or the message of its graphics driver.
     pub fn new(canvas: HtmlCanvasElement) -> Result<Self, JsValue> {
-        let context = match context(&canvas, true)? {
-            None => context(&canvas, false)?,
-            context => context,
-        };
-        let gl = context.ok_or("this browser has no WebGL2")?;
+        let gl = context(&canvas)?.ok_or("this browser has no WebGL2")?;
+        let ratio = pixel_ratio(&gl)?;
         let arm = Arm::default();
         let renderer = Some(Renderer::new(gl.clone(), &arm)?);
         let is_restored = watch_context(&canvas)?;
         let (camera, pointer) = (Camera::default(), Pointer::default());
-        Ok(Self { canvas, gl, arm, camera, pointer, renderer, drawn: None, is_restored })
+        Ok(Self { canvas, gl, arm, camera, pointer, ratio, renderer, drawn: None, is_restored })
     }
 
     /// Draws a view, unless the last picture was the same. True if it drew.
@@ -66,7 +67,7 @@ impl Scene {
             self.renderer = Some(Renderer::new(self.gl.clone(), &self.arm)?);
             self.drawn = None;
         }
-        let ratio = self.resize();
+        self.resize();
         let pixels = [self.canvas.width(), self.canvas.height()];
         let picture = Picture { view: *view, camera: self.camera, pixels };
         if self.gl.is_context_lost() || self.drawn == Some(picture) {
@@ -74,7 +75,7 @@ impl Scene {
         }
         let Some(renderer) = &self.renderer else { return Ok(false) };
         let size = pixels.map(|length| i32::try_from(length).unwrap_or(i32::MAX));
-        renderer.draw(view, &self.camera, size, ratio);
+        renderer.draw(view, &self.camera, size, self.ratio);
         self.drawn = Some(picture);
         Ok(true)
     }
@@ -147,15 +148,14 @@ impl Scene {
         pointer::key(&mut self.camera, key, shift)
     }
 
-    /// Fits the canvas to its place on the page. Returns device pixels per CSS pixel.
+    /// Fits the canvas to its place on the page.
     #[expect(clippy::cast_possible_truncation, reason = "sizes of a screen, at most thousands")]
     #[expect(clippy::cast_sign_loss, reason = "sizes are positive")]
-    fn resize(&mut self) -> f32 {
-        let ratio =
-            web_sys::window().map_or(1.0, |window| window.device_pixel_ratio()).clamp(0.5, LARGEST_RATIO);
+    #[expect(clippy::cast_precision_loss, reason = "sizes of a screen, at most thousands")]
+    fn resize(&mut self) {
         let size =
-            [self.canvas.client_width(), self.canvas.client_height()].map(|length| f64::from(length.max(1)));
-        let [width, height] = size.map(|length| (length * ratio).round() as u32);
+            [self.canvas.client_width(), self.canvas.client_height()].map(|length| length.max(1) as f32);
+        let [width, height] = size.map(|length| (length * self.ratio).round() as u32);
         // Setting either erases the picture, even to the same value.
         if self.canvas.width() != width {
             self.canvas.set_width(width);
@@ -163,22 +163,29 @@ impl Scene {
         if self.canvas.height() != height {
             self.canvas.set_height(height);
         }
-        let [width, height] = size.map(|length| length as f32);
-        self.camera.resize(width, height);
-        ratio as f32
+        self.camera.resize(size[0], size[1]);
     }
 }
 
-/// The graphics context of a canvas: with smooth edges, `None` where a graphics processor is missing; or without them,
-/// which halves the time of software rendering.
-fn context(canvas: &HtmlCanvasElement, has_smooth_edges: bool) -> Result<Option<Gl>, JsValue> {
+/// The graphics context of a canvas. Its own smooth edges would double the time of software rendering, so pictures are drawn
+/// larger instead, see [`SMOOTH_RATIO`].
+fn context(canvas: &HtmlCanvasElement) -> Result<Option<Gl>, JsValue> {
     let attributes = WebGlContextAttributes::new();
     attributes.set_alpha(false);
     attributes.set_stencil(true);
-    attributes.set_antialias(has_smooth_edges);
-    attributes.set_fail_if_major_performance_caveat(has_smooth_edges);
+    attributes.set_antialias(false);
     let context = canvas.get_context_with_context_options("webgl2", &attributes)?;
     context.map(|context| context.dyn_into::<Gl>().map_err(JsValue::from)).transpose()
+}
+
+/// Device pixels per CSS pixel.
+fn pixel_ratio(gl: &Gl) -> Result<f32, JsValue> {
+    // A browser that hides the name of the graphics processor has no such extension, or an answer that names none of these.
+    gl.get_extension("WEBGL_debug_renderer_info")?;
+    let name = gl.get_parameter(UNMASKED_RENDERER)?.as_string().unwrap_or_default().to_lowercase();
+    let is_software =
+        ["swiftshader", "llvmpipe", "software", "basic render"].iter().any(|known| name.contains(known));
+    Ok(if is_software { 1.0 } else { SMOOTH_RATIO })
 }
 
 /// Asks the browser to give a lost graphics context back. The result is set when it did.
