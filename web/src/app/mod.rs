@@ -152,7 +152,7 @@ impl App {
         let language = Language::of_tag(&tag.unwrap_or_default());
         let scene = Scene::new(dom.canvas("scene")?);
         if let Err(reason) = &scene {
-            panels::notice(&dom, &format!("{} {reason:?}", language.text("no-picture")));
+            panels::no_picture(&dom, language, reason);
         }
         let plot = plot_context(&dom)?;
         panels::build(&dom)?;

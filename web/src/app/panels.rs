@@ -207,6 +207,12 @@ pub(super) fn notice(dom: &Dom, text: &str) {
     dom.set_hidden("notice", false);
 }
 
+/// Says why there is no picture of the arm. The rest of the page works.
+pub(super) fn no_picture(dom: &Dom, language: Language, reason: &JsValue) {
+    let reason = reason.as_string().unwrap_or_else(|| format!("{reason:?}"));
+    notice(dom, &format!("{} {reason}", language.text("no-picture")));
+}
+
 /// Takes the last notice back.
 pub(super) fn end_notice(dom: &Dom) {
     dom.set_hidden("notice", true);

@@ -31,7 +31,7 @@ impl App {
         if let Some(scene) = &mut self.scene
             && let Err(reason) = scene.draw(&view)
         {
-            panels::notice(&self.dom, &format!("{reason:?}"));
+            panels::no_picture(&self.dom, self.language, &reason);
         }
         // A plot is read at leisure, and costs as much time as the arm.
         if self.frames.is_multiple_of(PLOT_PERIOD) {
