@@ -2,7 +2,8 @@
 
 use browser_tests::{Page, Viewed};
 
-/// A port of Web Serial whose bytes go through the server to `host-sim`: the browser of a test has no ports.
+/// A port of Web Serial whose bytes go through the server to `host-sim`: the browser of a test has no ports. Its line is slow:
+/// each reply comes 150 ms late.
 const SERIAL_PORT: &str = "
     class Port {
       async open({ baudRate }) {
@@ -11,7 +12,9 @@ const SERIAL_PORT: &str = "
         socket.binaryType = 'arraybuffer';
         await new Promise((done, failed) => { socket.onopen = done; socket.onerror = failed; });
         this.readable = new ReadableStream({
-          start(stream) { socket.onmessage = ({ data }) => stream.enqueue(new Uint8Array(data)); },
+          start(stream) {
+            socket.onmessage = ({ data }) => setTimeout(() => stream.enqueue(new Uint8Array(data)), 150);
+          },
         });
         this.writable = new WritableStream({ write: bytes => socket.send(bytes) });
         this.socket = socket;

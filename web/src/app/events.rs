@@ -128,6 +128,8 @@ impl App {
         };
         let joint = slider.get_attribute("data-joint").and_then(|joint| joint.parse().ok());
         if let Some((joint, degrees)) = joint.zip(number(&slider)) {
+            // The round that is on its way may be older than this target.
+            self.slid_round = self.client.rounds() + 2;
             self.send_joint(joint, degrees);
         }
     }

@@ -73,6 +73,8 @@ pub(crate) struct App {
     /// The time of the last frame, in the browser's milliseconds.
     last_frame: f64,
     shown_round: u64,
+    /// Before this round the arm may not have taken what a slider was set to.
+    slid_round: u64,
     frames: u32,
     hovered: Option<Part>,
     unreachable: Option<Vec3>,
@@ -168,6 +170,7 @@ impl App {
             speed: 1.0,
             last_frame: browser_now(),
             shown_round: 0,
+            slid_round: 0,
             frames: 0,
             hovered: None,
             unreachable: None,
@@ -207,6 +210,8 @@ impl App {
 
     /// Sends what is due, lets virtual time pass, and takes what the arm has sent.
     fn exchange(&mut self, virtual_ms: f64, until: f64) {
+        // A reply that came since the last picture is not late, however slow the pictures are.
+        self.receive();
         let now = self.now();
         self.play(now);
         let bytes = self.client.poll(now);
@@ -214,6 +219,10 @@ impl App {
         if let Line::Simulated(source) = &mut self.line {
             source.advance(virtual_ms * 1e3, || browser_now() < until);
         }
+        self.receive();
+    }
+
+    fn receive(&mut self) {
         let bytes = self.line.source().receive();
         let now = self.now();
         self.client.receive(now, &bytes);
@@ -252,7 +261,8 @@ impl App {
     /// Changes to another arm: everything that belonged to the last one ends.
     fn set_line(&mut self, line: Line) {
         (self.line, self.client) = (line, Client::default());
-        (self.shown_round, self.hand, self.unreachable) = (0, None, None);
+        (self.shown_round, self.slid_round) = (0, 0);
+        (self.hand, self.unreachable) = (None, None);
         (self.recorder, self.player) = (None, None);
         self.history = History::new(PLOT_SECONDS);
         let is_simulated = matches!(self.line, Line::Simulated(_));

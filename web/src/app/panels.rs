@@ -8,7 +8,7 @@ use web_sys::{Element, HtmlInputElement};
 use super::dom::{Dom, set_attribute, set_text};
 use super::picture::tip;
 use super::{App, Line};
-use crate::arm_state::ArmState;
+use crate::arm_state::{ArmState, has_extended_block};
 use crate::source::LineState;
 use crate::texts::Language;
 use crate::words::{Answers, state_line};
@@ -32,7 +32,7 @@ pub(super) fn build(dom: &Dom) -> Result<(), JsValue> {
         label.set_attribute("for", &name)?;
         label.set_attribute("data-text", &name)?;
         let slider = dom.add(&row, "input")?;
-        for (name, value) in [("type", "range"), ("min", "0"), ("max", highest), ("step", "0.5")] {
+        for (name, value) in [("type", "range"), ("min", "0"), ("max", highest)] {
             slider.set_attribute(name, value)?;
         }
         slider.set_id(&format!("joint-{number}"));
@@ -50,6 +50,10 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     show_line(app, state);
     let (dom, language) = (&app.dom, app.language);
     show_joints(dom, language, state);
+    if app.client.rounds() >= app.slid_round {
+        let step = if has_extended_block(app.client.registers()) { "0.5" } else { "1" };
+        show_sliders(dom, state, step);
+    }
     dom.press("motors", &state.motor_state.to_string());
     let [x, y, z] = tip(state.angles());
     let reach = app.unreachable.map_or(String::new(), |_| format!(" · {}", language.text("unreachable")));
@@ -104,13 +108,16 @@ fn show_joints(dom: &Dom, language: Language, state: &ArmState) {
         if let Some(row) = dom.element(&format!("row-{number}")) {
             set_attribute(&row, "class", if is_missing { "joint bad" } else { "joint" });
         }
+    }
+}
+
+/// The sliders at the targets, in steps of what the arm can take.
+fn show_sliders(dom: &Dom, state: &ArmState, step: &str) {
+    for (number, target) in (1..).zip(state.targets) {
         let Ok(slider) = dom.get::<HtmlInputElement>(&format!("joint-{number}")) else { continue };
-        // A slider in a hand shows what the hand wants.
-        if !(dom.has_focus(&slider) && state.moving >> index & 1 == 1) {
-            let value = format!("{target:.1}");
-            if slider.value().parse() != Ok(target) {
-                slider.set_value(&value);
-            }
+        set_attribute(&slider, "step", step);
+        if slider.value().parse() != Ok(target) {
+            slider.set_value(&target.to_string());
         }
     }
 }
