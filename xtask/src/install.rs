@@ -19,7 +19,7 @@ struct Tool {
 /// All programs know this.
 const VERSION: &[&str] = &["--version"];
 
-const TOOLS: [Tool; 5] = [
+const TOOLS: [Tool; 7] = [
     Tool { program: QEMU, arguments: VERSION, package: QEMU, purpose: "runs the image for the arm" },
     Tool { program: "c++", arguments: VERSION, package: "g++", purpose: "builds the fuzzer" },
     Tool {
@@ -28,6 +28,13 @@ const TOOLS: [Tool; 5] = [
         package: "chromium",
         purpose: "shows the page in its tests",
     },
+    Tool {
+        program: "firefox-esr",
+        arguments: VERSION,
+        package: "firefox-esr",
+        purpose: "shows the page in another browser",
+    },
+    Tool { program: "Xvfb", arguments: &["-help"], package: "xvfb", purpose: "is the screen of Firefox" },
     Tool { program: "python3", arguments: VERSION, package: "python3", purpose: "runs the Python package" },
     Tool {
         program: "python3",

@@ -1,0 +1,183 @@
+//! Debian's Firefox, driven by WebDriver BiDi (a standard of the W3C).
+//!
+//! Without a screen this Firefox has no WebGL, so it gets one that no monitor shows: `Xvfb`, with OpenGL in software.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc;
+use std::thread;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
+use system_tests::process;
+use system_tests::wait::{TIMEOUT, wait_for};
+use tempfile::TempDir;
+use tungstenite::{Message, WebSocket};
+
+use crate::picture::Picture;
+
+/// WebGL in software, and no reports to the makers of Firefox.
+const PREFERENCES: &str = "\
+user_pref(\"webgl.force-enabled\", true);
+user_pref(\"datareporting.policy.dataSubmissionEnabled\", false);
+";
+
+/// A running browser with one page.
+#[derive(Debug)]
+pub struct Firefox {
+    // The browser is killed before its screen.
+    _browser: Running,
+    _screen: Running,
+    _profile: TempDir,
+    socket: WebSocket<TcpStream>,
+    last_id: u64,
+    /// The identifier of the page.
+    context: Value,
+    /// What the page logged and requested.
+    events: Vec<Value>,
+}
+
+/// A process that ends with its owner.
+#[derive(Debug)]
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        process::kill(&mut self.0);
+    }
+}
+
+impl Firefox {
+    /// Starts a browser, and opens an address.
+    #[must_use]
+    pub fn open(url: &str) -> Self {
+        let profile = tempfile::tempdir().expect("a temporary folder");
+        fs::write(profile.path().join("user.js"), PREFERENCES).expect("a file");
+
+        let mut screen = Command::new("Xvfb");
+        screen.args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", "1280x800x24"]);
+        let mut screen = Running::start(screen.stdout(Stdio::piped()).stderr(Stdio::null()));
+        let display = line_after("", screen.0.stdout.take());
+
+        let mut browser = Command::new("firefox-esr");
+        browser.args(["--no-remote", "--remote-debugging-port", "0", "--profile"]).arg(profile.path());
+        browser.env("DISPLAY", format!(":{display}")).env("HOME", profile.path());
+        let mut browser = Running::start(browser.stdout(Stdio::null()).stderr(Stdio::piped()));
+        let address = line_after("WebDriver BiDi listening on ws://", browser.0.stderr.take());
+
+        let stream = TcpStream::connect(&address).expect("a connection");
+        stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
+        let (socket, _) =
+            tungstenite::client(format!("ws://{address}/session"), stream).expect("a WebSocket");
+        let mut firefox = Self {
+            _browser: browser,
+            _screen: screen,
+            _profile: profile,
+            socket,
+            last_id: 0,
+            context: Value::Null,
+            events: Vec::new(),
+        };
+        firefox.call("session.new", json!({ "capabilities": {} }));
+        firefox.context =
+            firefox.call("browsingContext.getTree", json!({}))["contexts"][0]["context"].clone();
+        let events = ["log.entryAdded", "network.beforeRequestSent"];
+        firefox.call("session.subscribe", json!({ "events": events, "contexts": [firefox.context] }));
+        let page = json!({ "context": firefox.context, "url": url, "wait": "complete" });
+        firefox.call("browsingContext.navigate", page);
+        firefox
+    }
+
+    /// Calls a method of the protocol.
+    #[track_caller]
+    fn call(&mut self, method: &str, parameters: Value) -> Value {
+        self.last_id += 1;
+        let request = json!({ "id": self.last_id, "method": method, "params": parameters });
+        self.socket.send(Message::text(request.to_string())).expect("the browser listens");
+        loop {
+            let message = self.socket.read().expect("the browser answers");
+            let mut message: Value = serde_json::from_slice(&message.into_data()).expect("JSON");
+            if message["id"] == self.last_id {
+                assert_eq!(message["type"], "success", "{method}: {message}");
+                return message["result"].take();
+            }
+            self.events.push(message);
+        }
+    }
+
+    /// The value of a JavaScript expression, which may wait.
+    #[track_caller]
+    pub fn evaluate(&mut self, expression: &str) -> Value {
+        let parameters = json!({
+            "expression": format!("(async () => JSON.stringify(await ({expression})))()"),
+            "target": { "context": self.context },
+            "awaitPromise": true,
+        });
+        let answer = self.call("script.evaluate", parameters);
+        assert_eq!(answer["type"], "success", "{expression}: {answer}");
+        answer["result"]["value"]
+            .as_str()
+            .map_or(Value::Null, |text| serde_json::from_str(text).expect("JSON"))
+    }
+
+    /// Waits until an expression has a value that meets a condition.
+    #[track_caller]
+    pub fn wait_for(&mut self, event: &str, expression: &str, holds: impl Fn(&Value) -> bool) -> Value {
+        wait_for(event, || {
+            let value = self.evaluate(expression);
+            if holds(&value) { Ok(value) } else { Err(format!("{value}; {:?}", self.events)) }
+        })
+    }
+
+    /// Presses a key, by its code in the standard, as often as asked.
+    pub fn keys(&mut self, key: char, times: usize) {
+        let press = ["keyDown", "keyUp"].map(|kind| json!({ "type": kind, "value": key }));
+        let actions: Vec<_> = press.iter().cycle().take(2 * times).collect();
+        let keyboard = json!({ "type": "key", "id": "keyboard", "actions": actions });
+        self.call("input.performActions", json!({ "context": self.context, "actions": [keyboard] }));
+    }
+
+    /// The pixels of the window.
+    pub fn picture(&mut self) -> Picture {
+        let picture = self.call("browsingContext.captureScreenshot", json!({ "context": self.context }));
+        let png = STANDARD.decode(picture["data"].as_str().expect("base64")).expect("base64");
+        Picture::decode(&png)
+    }
+
+    /// Exceptions of the page, and its errors in the console.
+    pub fn errors(&self) -> impl Iterator<Item = &str> {
+        let errors = self.events.iter().filter(|event| event["params"]["level"] == "error");
+        errors.filter_map(|event| event["params"]["text"].as_str())
+    }
+
+    /// The addresses of all requests.
+    pub fn requests(&self) -> impl Iterator<Item = &str> {
+        self.events.iter().filter_map(|event| event["params"]["request"]["url"].as_str())
+    }
+}
+
+impl Running {
+    fn start(command: &mut Command) -> Self {
+        Self(command.spawn().unwrap_or_else(|error| {
+            panic!("{}: {error}; `cargo xtask test` installs it", command.get_program().display())
+        }))
+    }
+}
+
+/// The rest of the first line of a process that begins like this.
+#[track_caller]
+fn line_after(beginning: &str, output: Option<impl Read + Send + 'static>) -> String {
+    let output = BufReader::new(output.expect("a pipe"));
+    let (sender, lines) = mpsc::channel();
+    // Reads to the end, so that the program never writes into a closed pipe.
+    thread::spawn(move || output.lines().map_while(Result::ok).for_each(|line| drop(sender.send(line))));
+    loop {
+        let line = lines.recv_timeout(TIMEOUT).expect("a line");
+        if let Some(rest) = line.strip_prefix(beginning) {
+            return rest.to_owned();
+        }
+    }
+}
