@@ -3,8 +3,14 @@
 use sevenbot::map::{
     EXTENDED_VERSION, FAULTS, FINE_POSITION, FINE_TARGET, LOAD, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS,
     PRESENT_POSITION, SERVO_TEMPERATURE, STATUS_VERSION, SUPPLY_VOLTAGE, TARGET_POSITION, VELOCITY,
+    motor_state,
 };
 use sevenbot::{FineAngle, Snapshot};
+
+/// A joint is stalled at more than this distance from its target, in degrees. Under its load a servo that works is nearer.
+const STALLED_DISTANCE: f32 = 3.0;
+/// A joint below this velocity rests, in degrees per second.
+const RESTING_VELOCITY: f32 = 1.0;
 
 /// An arm at one instant, joint 1 first.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +31,9 @@ pub struct ArmState {
     pub missing: u8,
     /// Joints whose set-point moves.
     pub moving: u8,
+    /// Joints 1 to 6 that rest away from their target: something holds them, or their servo gives no force. A gripper that holds
+    /// something does so, too. 0 from an arm without the extended block.
+    pub stalled: u8,
     /// In volts; `None` while unknown.
     pub volts: Option<f32>,
     /// Of the hottest servo, in degrees Celsius; `None` while unknown.
@@ -51,7 +60,7 @@ impl ArmState {
         let has_status = registers.byte(&STATUS_VERSION) == 1;
         let status = |row| if has_status { registers.byte(row) } else { 0 };
         let known = |value: u8| (value != 0).then_some(value);
-        Self {
+        let mut state = Self {
             measured,
             targets,
             velocities,
@@ -60,9 +69,24 @@ impl ArmState {
             faults: status(&FAULTS),
             missing: status(&MISSING_SERVOS),
             moving: status(&MOVING_JOINTS),
+            stalled: 0,
             volts: known(status(&SUPPLY_VOLTAGE)).map(|decivolts| f32::from(decivolts) / 10.0),
             celsius: known(status(&SERVO_TEMPERATURE)),
+        };
+        if is_fine && has_status && state.motor_state == motor_state::SERVO {
+            state.stalled = state.stalled();
         }
+        state
+    }
+
+    fn stalled(&self) -> u8 {
+        let joints = (0..6).zip(self.measured).zip(self.targets).zip(self.velocities);
+        let stalled = joints.filter(|(((index, measured), target), velocity)| {
+            let distance = measured.map_or(0.0, |measured| (measured - target).abs());
+            let is_sent = self.moving >> index & 1 == 1;
+            !is_sent && distance > STALLED_DISTANCE && velocity.abs() < RESTING_VELOCITY
+        });
+        stalled.fold(0, |bits, (((index, _), _), _)| bits | 1 << index)
     }
 
     /// The measured angles, and the targets of joints that were not measured.

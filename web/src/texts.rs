@@ -184,6 +184,11 @@ const TEXTS: &[(&str, &str, &str)] = &[
         "以下舵机没有应答，请检查连接线：关节",
     ),
     (
+        "stalled",
+        "Away from its target, look for what holds it, then press limp, then hold: joint",
+        "以下关节未到达目标位置，请检查是否被卡住，然后先按“松开”，再按“保持”：关节",
+    ),
+    (
         "fault-servo-bus",
         "A servo reports overload, heat or a wrong supply. Press limp, then hold, to end an overload.",
         "有舵机报告过载、过热或供电异常。过载时请先按“松开”，再按“保持”。",

@@ -60,8 +60,12 @@ pub fn state_line(
         StopProgress::Verifying => return plain("stopping"),
         _ => {}
     }
+    let named = |name, bits| (format!("{} {}", language.text(name), joints(bits)), Mood::Bad);
     if state.missing != 0 {
-        return (format!("{} {}", language.text("missing"), joints(state.missing)), Mood::Bad);
+        return named("missing", state.missing);
+    }
+    if state.stalled != 0 {
+        return named("stalled", state.stalled);
     }
     if state.faults != 0 {
         return (faults(language, state.faults), Mood::Bad);
@@ -131,6 +135,8 @@ mod tests {
         let overloaded = ArmState { missing: 0, faults: 0b100_0010, ..missing.clone() };
         let line = said(&overloaded, StopProgress::None);
         assert!(line.starts_with("A servo reports") && line.contains("fell silent"), "{line}");
+        let stalled = ArmState { stalled: 0b10, ..overloaded };
+        assert!(said(&stalled, StopProgress::None).ends_with("then hold: joint 2"));
         let limp = ArmState { motor_state: 2, ..state() };
         assert!(said(&limp, StopProgress::NotDriven).contains("nothing to stop"));
     }

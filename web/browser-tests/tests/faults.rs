@@ -41,6 +41,30 @@ fn each_servo_that_does_not_answer_loses_its_colour_and_is_named() {
 }
 
 #[test]
+fn each_joint_that_is_stuck_has_the_colour_of_a_fault_and_is_named() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    for joint in 1..=6 {
+        page.choose("#fault-joint", &joint.to_string());
+        page.choose("#fault-kind", "stuck");
+        page.click("[data-action=break]");
+        assert_eq!(faulty(&scene(&mut page)), 0);
+        page.focus(&format!("#joint-{joint}"));
+        page.keys("ArrowRight", 20);
+        page.wait_for_text("#state", &format!("then hold: joint {joint}"));
+        let picture = scene(&mut page);
+        let (red, others) = (faulty(&picture), working(&picture));
+        assert!(red > 40 && others > 500, "joint {joint}: {red} pixels, {others} of joints that work");
+        page.click("[data-action=repair]");
+        page.click("[data-action=motors][data-value='2']");
+        page.wait_for_text("#state", "The motors are off.");
+        page.click("[data-action=motors][data-value='1']");
+        page.wait_for_text("#state", "The arm is ready.");
+    }
+    assert_eq!(page.errors(), [""; 0]);
+}
+
+#[test]
 fn a_weak_supply_is_said_and_shown() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();

@@ -148,6 +148,8 @@ fn a_joint_follows_the_mouse() {
 fn a_hand_moves_a_limp_arm_and_it_falls_when_let_go() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();
+    // An arm that was never driven stays on its support.
+    page.pass(1.0);
     page.click("[data-action=motors][data-value='2']");
     page.wait_for_text("#state", "The motors are off.");
     page.pass(2.0);

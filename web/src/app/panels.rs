@@ -106,7 +106,8 @@ fn show_joints(dom: &Dom, language: Language, state: &ArmState) {
         };
         dom.set_text(&format!("angle-{number}"), &angle);
         if let Some(row) = dom.element(&format!("row-{number}")) {
-            set_attribute(&row, "class", if is_missing { "joint bad" } else { "joint" });
+            let is_bad = (state.missing | state.stalled) >> index & 1 == 1;
+            set_attribute(&row, "class", if is_bad { "joint bad" } else { "joint" });
         }
     }
 }

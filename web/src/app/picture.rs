@@ -65,10 +65,13 @@ impl App {
 /// The colour of each joint: what is wrong with it comes first.
 fn colours(state: &ArmState, theme: Theme) -> [Rgb; 7] {
     let palette = theme.palette();
+    // The arm does not tell which servo reports a fault.
+    let is_unknown = state.faults & fault::SERVO_BUS != 0 && state.missing | state.stalled == 0;
+    let faulty = if is_unknown { u8::MAX } else { state.stalled };
     std::array::from_fn(|index| {
         if state.missing >> index & 1 == 1 {
             palette.joint_missing
-        } else if state.faults & fault::SERVO_BUS != 0 && state.missing == 0 {
+        } else if faulty >> index & 1 == 1 {
             palette.joint_fault
         } else if state.motor_state != motor_state::SERVO {
             palette.joint_limp

@@ -144,6 +144,24 @@ mod tests {
     }
 
     #[test]
+    fn a_servo_that_is_stuck_is_told_from_those_that_work() {
+        let (mut client, mut arm) = connected();
+        arm.act("fault 3=stuck".parse().expect("an action"));
+        for (joint, degrees) in [(2, 80.0), (3, 90.0), (7, 20.0)] {
+            let (address, values) = target_frame(client.registers(), joint, degrees).expect("a target");
+            client.write(arm.now(), address, &values);
+        }
+        let mut overloaded = 0;
+        for _ in 0..240 {
+            pass(&mut client, &mut arm, 1);
+            let state = client.state();
+            assert!(matches!(state.stalled, 0 | 0b100), "{state:?}");
+            overloaded |= state.faults;
+        }
+        assert_eq!((client.state().stalled, overloaded), (0b100, sevenbot::map::fault::SERVO_BUS));
+    }
+
+    #[test]
     fn a_movement_is_played_to_its_end() {
         let (mut client, mut arm) = connected();
         let movement = "7bot-recording 2\n0 90 90 65 90 90 90 80 0\n1 110 90 65 90 90 90 80 1\n";
