@@ -191,6 +191,13 @@ impl Page {
         })
     }
 
+    /// Waits until the arm that the page has now answers, and nothing is wrong with it.
+    #[track_caller]
+    pub fn wait_until_ready(&mut self) {
+        self.wait_for_state("the arm answers", |state| state["connected"] == true);
+        self.wait_for_text("#state", "The arm is ready.");
+    }
+
     /// Waits until an element has a text.
     #[track_caller]
     pub fn wait_for_text(&mut self, selector: &str, part: &str) {

@@ -49,8 +49,7 @@ impl Viewed {
     pub fn open(&self) -> Page {
         let mut page = Page::open(&self.url);
         page.key("Escape");
-        page.wait_for_state("the arm answers", |state| state["connected"] == true);
-        page.wait_for_text("#state", "The arm is ready.");
+        page.wait_until_ready();
         page
     }
 

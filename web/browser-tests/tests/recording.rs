@@ -17,7 +17,7 @@ fn record(page: &mut Page, folder: &Path) -> PathBuf {
         state["measured"][0].as_f64().is_some_and(|angle| (angle - start - 20.0).abs() < 0.3)
     });
     page.click("[data-action=record]");
-    page.wait_for_text("#recording", "recorded");
+    page.wait_for_text("#recording", "recorded: ");
     page.click("[data-action=download]");
     let file = folder.join("movement.7bot");
     wait_for("the file is saved", || {
@@ -47,13 +47,13 @@ fn a_recording_of_the_tool_is_played_and_another_file_is_refused() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();
     let file = viewed.path("wave.7bot");
-    let text = "7bot-recording 2\n0.000 90 90 65 90 90 90 80 0\n1.000 120.5 90 65 90 90 90 80 0\n";
+    let text = "7bot-recording 2\n0.000 90 90 65 90 90 90 80 0\n3.000 120.5 90 65 90 90 90 80 0\n";
     std::fs::write(&file, text).expect("a file");
     page.choose_file("#upload", &file);
-    page.wait_for_text("#recording", "recorded");
+    page.wait_for_text("#recording", "recorded: ");
     page.click("[data-action=play]");
     page.wait_for_text("#recording", "playing");
-    page.wait_for_text("#recording", "recorded");
+    page.wait_for_text("#recording", "recorded: ");
     let played = page.wait_for_state("the movement ends", |state| {
         state["measured"][0].as_f64().is_some_and(|angle| (angle - 120.5).abs() < 0.3)
     });
@@ -62,7 +62,7 @@ fn a_recording_of_the_tool_is_played_and_another_file_is_refused() {
     std::fs::write(&file, "no recording").expect("a file");
     page.choose_file("#upload", &file);
     page.wait_for_text("#notice", "This file is no recording:");
-    assert!(page.text("#recording").contains("recorded"), "the last one is kept");
+    assert!(page.text("#recording").contains("recorded: "), "the last one is kept");
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn a_stop_ends_a_movement_that_is_played() {
     let text = "7bot-recording 2\n0.000 90 90 65 90 90 90 80 0\n60.000 180 90 65 90 90 90 80 0\n";
     std::fs::write(&file, text).expect("a file");
     page.choose_file("#upload", &file);
-    page.wait_for_text("#recording", "recorded");
+    page.wait_for_text("#recording", "recorded: ");
     page.click("[data-action=play]");
     page.wait_for_state("joint 1 turns", |state| state["measured"][0].as_f64() > Some(92.0));
     page.key(" ");

@@ -1,6 +1,7 @@
 //! The page in front of an arm of its own: behind `sevenbot view`, and on a serial port of the browser.
 
 use browser_tests::{Page, Viewed};
+use system_tests::wait::wait_until;
 
 /// A port of Web Serial whose bytes go through the server to `host-sim`: the browser of a test has no ports. Its line is slow:
 /// each reply comes 150 ms late.
@@ -13,7 +14,10 @@ const SERIAL_PORT: &str = "
         await new Promise((done, failed) => { socket.onopen = done; socket.onerror = failed; });
         this.readable = new ReadableStream({
           start(stream) {
-            socket.onmessage = ({ data }) => setTimeout(() => stream.enqueue(new Uint8Array(data)), 150);
+            socket.onmessage = ({ data }) => setTimeout(() => {
+              stream.enqueue(new Uint8Array(data));
+              window.usesPort = true;
+            }, 150);
           },
         });
         this.writable = new WritableStream({ write: bytes => socket.send(bytes) });
@@ -56,11 +60,13 @@ fn an_arm_on_a_serial_port_is_shown_moved_and_left() {
     let mut page = Page::open_after(&viewed.url, SERIAL_PORT);
     page.key("Escape");
     page.choose("#source", "usb");
-    page.wait_for_text("#state", "The arm is ready.");
+    // Until then it is the arm behind the server that is ready.
+    wait_until("the page uses the port", || page.evaluate("window.usesPort") == true);
+    page.wait_until_ready();
     assert_eq!(page.evaluate("window.baudRate"), 115_200);
     check_it_moves(&mut page);
     page.choose("#source", "simulator");
-    page.wait_for_text("#state", "The arm is ready.");
+    page.wait_until_ready();
     assert!((page.measured()[0] - 90.0).abs() < 1.0, "the simulated arm did not move");
 }
 
