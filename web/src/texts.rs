@@ -185,7 +185,7 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ),
     (
         "stalled",
-        "Away from its target, look for what holds it, then press limp, then hold: joint",
+        "Not at its target. Look for what holds it, then press limp, then hold: joint",
         "以下关节未到达目标位置，请检查是否被卡住，然后先按“松开”，再按“保持”：关节",
     ),
     (
