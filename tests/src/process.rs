@@ -1,9 +1,9 @@
 //! Processes under test: start, signals and end.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::mpsc;
+use std::sync::mpsc::{self, Receiver};
 use std::thread;
 
 use rustix::process::{Pid, kill_process};
@@ -19,10 +19,7 @@ use crate::wait::{TIMEOUT, wait_for};
 pub fn start(command: &mut Command, ports: usize) -> Result<(Child, Vec<PathBuf>), String> {
     let process = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn();
     let mut process = process.expect("the program starts");
-    let output = BufReader::new(process.stdout.take().expect("a pipe"));
-    let (sender, lines) = mpsc::channel();
-    // Reads to the end, so that the program never writes into a closed pipe.
-    thread::spawn(move || output.lines().map_while(Result::ok).for_each(|line| drop(sender.send(line))));
+    let lines = lines(process.stdout.take().expect("a pipe"));
     let port = |_| {
         let line = lines.recv_timeout(TIMEOUT).unwrap_or_default();
         line.strip_prefix("ready ").map(PathBuf::from).ok_or(line)
@@ -32,6 +29,14 @@ pub fn start(command: &mut Command, ports: usize) -> Result<(Child, Vec<PathBuf>
         kill(&mut process);
     }
     Ok((process, ports?))
+}
+
+/// The lines of a pipe. They are read to the end, so that the program never writes into a closed pipe.
+pub fn lines(output: impl Read + Send + 'static) -> Receiver<String> {
+    let output = BufReader::new(output);
+    let (sender, lines) = mpsc::channel();
+    thread::spawn(move || output.lines().map_while(Result::ok).for_each(|line| drop(sender.send(line))));
+    lines
 }
 
 /// Sends a signal to a running process.

@@ -31,8 +31,8 @@ pub struct ArmState {
     pub missing: u8,
     /// Joints whose set-point moves.
     pub moving: u8,
-    /// Joints 1 to 6 that rest away from their target: something holds them, or their servo gives no force. A gripper that holds
-    /// something does so, too. 0 from an arm without the extended block.
+    /// Joints 1 to 6 that rest away from their target: something holds them, or their servo gives no force. Joint 7 is left out,
+    /// because a gripper that holds something rests away from its target, too. 0 from an arm without the extended block.
     pub stalled: u8,
     /// In volts; `None` while unknown.
     pub volts: Option<f32>,

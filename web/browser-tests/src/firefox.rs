@@ -3,11 +3,9 @@
 //! Without a screen this Firefox has no WebGL, so it gets one that no monitor shows: `Xvfb`, with OpenGL in software.
 
 use std::fs;
-use std::io::{BufRead, BufReader, Read};
+use std::io::Read;
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc;
-use std::thread;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -170,10 +168,7 @@ impl Running {
 /// The rest of the first line of a process that begins like this.
 #[track_caller]
 fn line_after(beginning: &str, output: Option<impl Read + Send + 'static>) -> String {
-    let output = BufReader::new(output.expect("a pipe"));
-    let (sender, lines) = mpsc::channel();
-    // Reads to the end, so that the program never writes into a closed pipe.
-    thread::spawn(move || output.lines().map_while(Result::ok).for_each(|line| drop(sender.send(line))));
+    let lines = process::lines(output.expect("a pipe"));
     loop {
         let line = lines.recv_timeout(TIMEOUT).expect("a line");
         if let Some(rest) = line.strip_prefix(beginning) {

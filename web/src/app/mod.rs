@@ -195,6 +195,8 @@ impl App {
         let elapsed = (time - self.last_frame).clamp(0.0, LONGEST_FRAME_MS);
         self.last_frame = time;
         let until = browser_now() + FRAME_BUDGET_MS;
+        // A reply that came since the last picture is not late, however slow the pictures are.
+        self.receive();
         let mut rest = if matches!(self.line, Line::Simulated(_)) { elapsed * self.speed } else { 0.0 };
         loop {
             let step = rest.min(STEP_MS);
@@ -210,8 +212,6 @@ impl App {
 
     /// Sends what is due, lets virtual time pass, and takes what the arm has sent.
     fn exchange(&mut self, virtual_ms: f64, until: f64) {
-        // A reply that came since the last picture is not late, however slow the pictures are.
-        self.receive();
         let now = self.now();
         self.play(now);
         let bytes = self.client.poll(now);
