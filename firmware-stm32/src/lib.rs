@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bus_pause;
+pub mod byte_queue;
 pub mod clock_rates;
 pub mod flash;
 pub mod led_pattern;

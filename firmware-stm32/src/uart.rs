@@ -13,10 +13,8 @@
 //! queue. In the emulator the sender then waits. On a wire the byte after the next one is an overrun. Overruns and all
 //! other receive errors are counted.
 //!
-//! Both sides access the queues in a critical section. The loop moves eight bytes at a time: even on the internal
-//! oscillator that takes less than the 10 microseconds within which a byte of the servo bus has to be read. The split
-//! halves of a heapless queue need no critical section. But they divide by a length known only at run time: that costs a
-//! division per byte and adds a path to a panic in every interrupt.
+//! Both sides access the queues in a critical section. The loop moves few bytes in each, so that even on the internal
+//! oscillator it takes less than the 10 microseconds within which a byte of the servo bus has to be read.
 
 use core::cell::RefCell;
 use core::convert::Infallible;
@@ -25,12 +23,14 @@ use core::ops::Deref;
 use cortex_m::peripheral::NVIC;
 use critical_section::Mutex;
 use embedded_io::{BufRead, ErrorType, Read, ReadReady, Write, WriteReady};
+use firmware_stm32::byte_queue::ByteQueue;
 use firmware_stm32::line_errors::{self, LineErrors};
-use heapless::spsc::Queue;
 use stm32f4::stm32f405 as pac;
 
-/// Bytes that the loop moves in one critical section.
+/// Received bytes that the loop takes in one critical section.
 pub(crate) const CHUNK: usize = 8;
+/// Bytes to send that the loop queues in one critical section: seven instructions for each.
+const SEND_CHUNK: usize = 16;
 
 /// One of the chip's USARTs.
 pub(crate) trait Usart: Deref<Target = pac::usart1::RegisterBlock> {
@@ -46,15 +46,15 @@ impl Usart for pac::USART2 {
     const INTERRUPT: pac::Interrupt = pac::Interrupt::USART2;
 }
 
-/// The state that interrupt and loop share. Each queue holds one byte less than its size.
+/// The state that interrupt and loop share.
 pub(crate) struct SharedUart<U, const RECEIVE: usize, const TRANSMIT: usize>(
     Mutex<RefCell<State<U, RECEIVE, TRANSMIT>>>,
 );
 
 struct State<U, const RECEIVE: usize, const TRANSMIT: usize> {
     usart: Option<U>,
-    received: Queue<u8, RECEIVE>,
-    to_send: Queue<u8, TRANSMIT>,
+    received: ByteQueue<RECEIVE>,
+    to_send: ByteQueue<TRANSMIT>,
     errors: LineErrors,
 }
 
@@ -71,8 +71,12 @@ pub(crate) struct Setup {
 impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> SharedUart<U, RECEIVE, TRANSMIT> {
     /// A closed line.
     pub(crate) const fn new() -> Self {
-        let state =
-            State { usart: None, received: Queue::new(), to_send: Queue::new(), errors: LineErrors::new() };
+        let state = State {
+            usart: None,
+            received: ByteQueue::new(),
+            to_send: ByteQueue::new(),
+            errors: LineErrors::new(),
+        };
         Self(Mutex::new(RefCell::new(state)))
     }
 
@@ -125,7 +129,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> State<U, RECEIVE, TR
 }
 
 /// Moves a received byte to the queue. Returns false if the queue is full.
-fn receive<const N: usize>(usart: &impl Usart, received: &mut Queue<u8, N>, errors: &mut LineErrors) -> bool {
+fn receive<const N: usize>(usart: &impl Usart, received: &mut ByteQueue<N>, errors: &mut LineErrors) -> bool {
     let status = usart.sr().read().bits();
     let seen = status & (line_errors::RECEIVED | line_errors::ERRORS);
     if seen == 0 {
@@ -142,16 +146,15 @@ fn receive<const N: usize>(usart: &impl Usart, received: &mut Queue<u8, N>, erro
             return true;
         }
     }
-    // Cannot fail: the queue is not full.
-    let _ = received.enqueue(byte);
+    received.push(byte);
     true
 }
 
 /// Passes queued bytes to the transmitter, and enables its interrupt if more bytes are queued.
-fn send<const N: usize>(usart: &impl Usart, to_send: &mut Queue<u8, N>) {
+fn send<const N: usize>(usart: &impl Usart, to_send: &mut ByteQueue<N>) {
     while !to_send.is_empty()
         && usart.sr().read().txe().bit_is_set()
-        && let Some(byte) = to_send.dequeue()
+        && let Some(byte) = to_send.pop()
     {
         usart.dr().write(|w| w.dr().set(u16::from(byte)));
     }
@@ -179,7 +182,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> UartPort<U, RECEIVE,
 
     /// Number of bytes that can be written without waiting.
     pub(crate) fn room(&self) -> usize {
-        self.line.with(|state| state.to_send.capacity() - state.to_send.len())
+        self.line.with(|state| state.to_send.room())
     }
 
     /// Receive errors since start.
@@ -208,7 +211,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> UartPort<U, RECEIVE,
             *taken = 0;
             line.with(|state| {
                 while !chunk.is_full()
-                    && let Some(byte) = state.received.dequeue()
+                    && let Some(byte) = state.received.pop()
                 {
                     // Cannot fail: the chunk is not full.
                     let _ = chunk.push(byte);
@@ -265,9 +268,8 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> WriteReady for UartP
 impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Write for UartPort<U, RECEIVE, TRANSMIT> {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         loop {
-            let count = self.line.with(|state| {
-                bytes.iter().take(CHUNK).take_while(|&&byte| state.to_send.enqueue(byte).is_ok()).count()
-            });
+            let chunk = bytes.get(..SEND_CHUNK).unwrap_or(bytes);
+            let count = self.line.with(|state| state.to_send.push_all(chunk));
             if count > 0 || bytes.is_empty() {
                 NVIC::pend(U::INTERRUPT);
                 return Ok(count);
