@@ -284,6 +284,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
                     }
                     self.to_host.push(self.now, bytes);
                 }
+                Output::ServoFrameStart(_) => {}
                 Output::ToServos(bytes) => self.bus.bytes(self.now, bytes),
                 Output::Vacuum(vacuum) => log_vacuum(vacuum),
                 Output::Save(image) => {

@@ -58,11 +58,17 @@ impl MainLoop<'_> {
 
     /// Carries out all outputs that are due at `now`. Returns the time of the next poll.
     fn act(&mut self, now: Instant, arm: &mut Controller) -> Instant {
+        let mut begun = 0;
         loop {
             match arm.poll(now, self.host.room()) {
                 Output::ToHost(bytes) => send(&mut self.host, bytes),
-                Output::ToServos(bytes) => {
+                Output::ServoFrameStart(bytes) => {
                     send(&mut self.servos, bytes);
+                    begun = bytes.len();
+                }
+                Output::ToServos(bytes) => {
+                    send(&mut self.servos, bytes.get(begun..).unwrap_or(&[]));
+                    begun = 0;
                     self.watchdog_gate.control_cycle_ran();
                 }
                 Output::Vacuum(vacuum) => self.switch(vacuum),

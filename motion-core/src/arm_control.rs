@@ -69,8 +69,8 @@ impl ArmControl {
         }
     }
 
-    /// Processes the answers of the servos, and advances all set-points if a control cycle is due.
-    pub(crate) fn advance(&mut self, now: Instant) {
+    /// Processes the answers of the servos.
+    pub(crate) fn take_answers(&mut self, now: Instant) {
         while let Some(outcome) = self.bus.outcome(now) {
             match outcome {
                 Outcome::Measured { joint, reading, alarms, is_timely } => {
@@ -82,25 +82,37 @@ impl ArmControl {
         if self.bus.end_start_up(now, &self.joints) {
             self.show_servos();
         }
-        if let Some(end) = self.bus.begin_cycle(now) {
-            if self.joints.advance(end, &self.registers) {
-                self.bus.goals_changed();
-            }
-            Status::show_moving(&mut self.registers, &self.joints);
-            self.watchdog_is_due = true;
+    }
+
+    /// Advances all set-points if a control cycle is due. If it can send goals, it first prepares the start of their frame
+    /// and returns true: then the next call advances the set-points, and nothing but that call may come in between.
+    pub(crate) fn advance(&mut self, now: Instant) -> bool {
+        let Some(end) = self.bus.cycle_due(now) else { return false };
+        if self.bus.begin_goals(now, &self.joints) {
+            return true;
         }
+        self.bus.begin_cycle(end);
+        if self.joints.advance(end, &self.registers) {
+            self.bus.goals_changed();
+        }
+        Status::show_moving(&mut self.registers, &self.joints);
+        self.watchdog_is_due = true;
+        false
     }
 
     fn measured(&mut self, now: Instant, joint: Joint, reading: (Reading, u8), is_timely: bool) {
         let may_engage = is_timely && !self.bus.is_starting();
-        match self.joints.measured(now, joint, reading, may_engage, &mut self.registers) {
+        let outcome = self.joints.measured(now, joint, reading, may_engage, &mut self.registers);
+        match outcome {
             Measured::Rejected => return,
             Measured::FellSilent => return self.show_servos(),
-            Measured::Accepted => {}
+            Measured::Accepted | Measured::ServoChanged => {}
             Measured::Engaged => self.bus.joint_engaged(),
         }
         self.registers.set(SUPPLY_VOLTAGE.address, reading.0.voltage_decivolts);
-        self.show_servos();
+        if outcome != Measured::Accepted {
+            self.show_servos();
+        }
     }
 
     fn failed(&mut self, now: Instant, joint: Joint) {

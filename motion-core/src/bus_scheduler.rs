@@ -29,6 +29,8 @@ pub(crate) struct BusScheduler {
     starting_until: Option<Instant>,
     next_cycle: Instant,
     goals_due: bool,
+    /// The start of the goals' frame was prepared. The whole frame follows next.
+    has_begun_goals: bool,
     torque_due: bool,
     torque_refresh_in: u8,
     next_to_read: Joint,
@@ -44,6 +46,7 @@ impl BusScheduler {
             starting_until: Some(now + START_UP_TIME),
             next_cycle: now,
             goals_due: false,
+            has_begun_goals: false,
             torque_due: false,
             torque_refresh_in: TORQUE_REFRESH_CYCLES,
             next_to_read: Joint::ALL[0],
@@ -101,18 +104,37 @@ impl BusScheduler {
         self.torque_due = true;
     }
 
-    /// Begins a control cycle if one is due at `now`, and returns when it was due. At most one missed cycle is repeated: a
-    /// late call makes motion late, not fast.
-    pub(crate) fn begin_cycle(&mut self, now: Instant) -> Option<Instant> {
-        if now < self.next_cycle {
-            return None;
+    /// Prepares the start of the goals' frame if the bus is free. Returns whether there is one. Until
+    /// [`BusScheduler::prepare_frame`] has prepared the whole, no joint may engage or be released, and this returns false.
+    pub(crate) fn begin_goals(&mut self, now: Instant, joints: &Joints) -> bool {
+        if self.has_begun_goals || self.torque_due || !self.bus.is_free(now) {
+            return false;
         }
-        let due = self.next_cycle.max(earlier(now, CYCLE));
+        let driven = joints.driven();
+        self.has_begun_goals = driven > 0;
+        if driven > 0 {
+            self.bus.begin_goals(driven);
+        }
+        driven > 0
+    }
+
+    /// Must the whole frame of the goals follow next?
+    pub(crate) const fn has_begun_goals(&self) -> bool {
+        self.has_begun_goals
+    }
+
+    /// When the control cycle was due that has to begin at `now`; `None` before it is due. At most one missed cycle is
+    /// repeated: a late call makes motion late, not fast.
+    pub(crate) fn cycle_due(&self, now: Instant) -> Option<Instant> {
+        (now >= self.next_cycle).then(|| self.next_cycle.max(earlier(now, CYCLE)))
+    }
+
+    /// Begins the control cycle that was due at `due`.
+    pub(crate) fn begin_cycle(&mut self, due: Instant) {
         self.next_cycle = due + CYCLE;
         self.left_to_read = JOINTS;
         self.torque_refresh_in = self.torque_refresh_in.saturating_sub(1);
         self.torque_due |= self.torque_refresh_in == 0;
-        Some(due)
     }
 
     /// Schedules goals, because the set-points have advanced.
@@ -127,13 +149,17 @@ impl BusScheduler {
         joints: &mut Joints,
         registers: &RegisterFile,
     ) -> bool {
+        if self.has_begun_goals {
+            self.has_begun_goals = false;
+            return self.prepare_goals(now, joints, registers);
+        }
         if self.torque_due {
             joints.expire_pending(now);
         }
         self.bus.is_free(now)
             && (self.prepare_goals(now, joints, registers)
                 || self.prepare_torque(now, joints)
-                || (self.bus.is_idle(now) && self.prepare_read(now, joints)))
+                || self.prepare_read(now, joints))
     }
 
     fn prepare_goals(&mut self, now: Instant, joints: &Joints, registers: &RegisterFile) -> bool {
@@ -158,9 +184,9 @@ impl BusScheduler {
         any
     }
 
-    /// Reads the next servo of this cycle.
+    /// Reads the next servo of this cycle, if no read is outstanding.
     fn prepare_read(&mut self, now: Instant, joints: &Joints) -> bool {
-        while self.left_to_read > 0 {
+        while self.left_to_read > 0 && !self.bus.is_asking() {
             self.left_to_read -= 1;
             let joint = self.next_to_read;
             self.next_to_read = Joint::from_index(joint.index() + 1).unwrap_or(Joint::ALL[0]);
@@ -186,8 +212,8 @@ fn earlier(now: Instant, by: Duration) -> Instant {
 mod tests {
     use super::*;
     use crate::motor_state::MotorState;
-    use crate::servo_bus::TorqueCodes;
     use crate::servo_bus::frame::Instruction;
+    use crate::servo_bus::{Reading, TorqueCodes};
 
     fn at(micros: u64) -> Instant {
         Instant::from_micros(micros)
@@ -207,7 +233,7 @@ mod tests {
     /// The instructions and ids of the frames in one cycle without answers.
     fn cycle(scheduler: &mut BusScheduler, joints: &mut Joints, start: u64) -> Vec<(u8, u8)> {
         let registers = RegisterFile::new([0; 6], None);
-        assert!(scheduler.begin_cycle(at(start)).is_some());
+        scheduler.begin_cycle(at(start));
         let mut frames = Vec::new();
         for now in (start..start + 10_000).step_by(100).map(at) {
             let _ = scheduler.outcome(now);
@@ -241,11 +267,35 @@ mod tests {
     }
 
     #[test]
+    fn d12_goals_do_not_begin_before_it_is_clear_which_joints_get_torque() {
+        let (mut scheduler, mut joints) = (scheduler(), Joints::new(MotorState::Servo));
+        let mut registers = RegisterFile::new([0; 6], None);
+        assert!(scheduler.end_start_up(at(500_000), &joints));
+        let reading = Reading {
+            position_counts: 511,
+            speed: 0,
+            load: 0,
+            voltage_decivolts: 74,
+            temperature_celsius: 31,
+        };
+        for now in [500_000, 510_000].map(at) {
+            joints.measured(now, Joint::ALL[0], (reading, 0), true, &mut registers);
+        }
+        assert_eq!(joints.driven(), 1);
+        scheduler.joint_engaged();
+        // So late, the joint has to be measured again.
+        assert!(!scheduler.begin_goals(at(550_000), &joints));
+        let frames = cycle(&mut scheduler, &mut joints, 550_000);
+        assert!(frames.iter().all(|&(code, _)| code == READ), "{frames:?}");
+    }
+
+    #[test]
     fn at_most_one_missed_cycle_is_repeated() {
         let mut scheduler = scheduler();
-        assert_eq!(scheduler.begin_cycle(at(0)), Some(at(0)));
-        assert_eq!(scheduler.begin_cycle(at(9_999)), None);
-        let late = [3_000_000, 3_000_000, 3_009_999, 3_010_000].map(|now| scheduler.begin_cycle(at(now)));
+        let mut cycle = |now| scheduler.cycle_due(at(now)).inspect(|&due| scheduler.begin_cycle(due));
+        assert_eq!(cycle(0), Some(at(0)));
+        assert_eq!(cycle(9_999), None);
+        let late = [3_000_000, 3_000_000, 3_009_999, 3_010_000].map(cycle);
         assert_eq!(late, [Some(at(2_990_000)), Some(at(3_000_000)), None, Some(at(3_010_000))]);
     }
 }

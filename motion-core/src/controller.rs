@@ -28,7 +28,10 @@ use crate::vacuum::Vacuum;
 pub enum Output<'a> {
     /// Send these bytes to the host. They fit the room that was passed to `poll`.
     ToHost(&'a [u8]),
-    /// Send these bytes on the servo bus. The bus is free: at most one read is outstanding.
+    /// These are the first bytes of the frame for the servos that the next `poll` returns. A shell may send them at once, and
+    /// then only the rest of that frame, so that the goals are on their way while they are calculated. Or it ignores them.
+    ServoFrameStart(&'a [u8]),
+    /// Send this frame on the servo bus. The bus is free: at most one read is outstanding.
     ToServos(&'a [u8]),
     /// Switch the pump and the valve (D20).
     Vacuum(Vacuum),
@@ -76,11 +79,17 @@ impl Controller {
     /// can take at once now. A read whose reply does not fit waits, and every request behind it waits, too (D5). An
     /// idle link must take the longest frame, 262 bytes.
     pub fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_> {
-        self.arm.advance(now);
+        if !self.arm.bus.has_begun_goals() {
+            self.arm.take_answers(now);
+            // Before the control cycle, so that targets that have come go out with its goals.
+            self.execute_requests(now, host_room);
+        }
+        if self.arm.advance(now) {
+            return Output::ServoFrameStart(self.arm.bus.frame());
+        }
         if self.arm.prepare_servo_frame(now) {
             return Output::ToServos(self.arm.bus.frame());
         }
-        self.execute_requests(now, host_room);
         if self.arm.watchdog_is_due && self.arm.poll_watchdog(now) {
             // Its effect on the servos is due now.
             return Output::Wait(now);

@@ -21,8 +21,10 @@ pub(crate) enum Measured {
     Rejected,
     /// The filter rejected the reading, and the servo counts as silent from now on.
     FellSilent,
-    /// The filter accepted the reading.
+    /// The filter accepted the reading. Nothing but position, velocity and load changed.
     Accepted,
+    /// The filter accepted the reading. The servo was silent, or its error bits or its temperature changed.
+    ServoChanged,
     /// The filter accepted the reading, and the joint engaged: it needs its goal, then torque.
     Engaged,
 }
@@ -86,6 +88,7 @@ impl JointState {
         may_engage: bool,
         registers: &mut RegisterFile,
     ) -> Measured {
+        let was_known = self.position.is_known();
         let counts = match self.position.answered(now, reading.position_counts) {
             FilterOutcome::Accepted(counts) => counts,
             FilterOutcome::Rejected => return Measured::Rejected,
@@ -98,14 +101,15 @@ impl JointState {
         self.measured = Some(angle);
         self.servo_velocity = reading.speed;
         self.load = load_from_servo(self.joint, reading.load);
-        self.alarms = alarms;
-        self.temperature = reading.temperature_celsius;
+        let servo = (alarms, reading.temperature_celsius);
+        let is_unchanged = was_known && servo == (self.alarms, self.temperature);
+        (self.alarms, self.temperature) = servo;
         registers.set(PRESENT_POSITION.of(self.joint), angle.nearest_degree());
         registers.set(PRESENT_ANGLE.of(self.joint), angle.nearest_degree());
         registers.set(PRESENT_LOAD.of(self.joint), shown_load(self.load));
         let may_engage = may_engage && self.position.is_steady();
         let Some(target) = (if may_engage { self.drive.engage(angle) } else { None }) else {
-            return Measured::Accepted;
+            return if is_unchanged { Measured::Accepted } else { Measured::ServoChanged };
         };
         if target == Target::Measured {
             self.set_target(angle, registers);

@@ -229,6 +229,11 @@ impl Joints {
         registers.set(MEASURED_JOINTS.address, self.set_of(JointState::was_measured));
     }
 
+    /// How many joints are driven.
+    pub(crate) fn driven(&self) -> usize {
+        self.joints.iter().filter(|state| state.drive.is_driven()).count()
+    }
+
     /// The goals of the driven joints, in servo counts.
     pub(crate) fn goals(&self, registers: &RegisterFile) -> impl Iterator<Item = (Joint, u16)> {
         self.each().filter(|(_, state)| state.drive.is_driven()).map(|(joint, state)| {
@@ -305,6 +310,22 @@ mod tests {
         let torque = joints.take_torque();
         assert_eq!((torque[0], &torque[1..]), (Some(Torque::On), [None; 6].as_slice()));
         assert_eq!((joints.silent(), joints.hottest(), joints.any_alarm()), (0b111_1110, 31, true));
+    }
+
+    #[test]
+    fn a_reading_tells_whether_anything_changed_beside_position_velocity_and_load() {
+        let (mut joints, mut registers) =
+            (Joints::new(MotorState::Forceless), RegisterFile::new([0; 6], None));
+        let mut measure = |millis, alarms, temperature_celsius| {
+            let reading = Reading { temperature_celsius, ..reading(511).0 };
+            joints.measured(at_ms(millis), J1, (reading, alarms), true, &mut registers)
+        };
+        assert_eq!(measure(0, 0, 0), Measured::Rejected, "nothing to compare it with");
+        assert_eq!(measure(10, 0, 0), Measured::ServoChanged, "it answers, at 0 degrees Celsius");
+        assert_eq!(measure(20, 0, 0), Measured::Accepted);
+        assert_eq!(measure(30, 0, 1), Measured::ServoChanged);
+        assert_eq!(measure(40, 4, 1), Measured::ServoChanged);
+        assert_eq!(measure(50, 4, 1), Measured::Accepted);
     }
 
     #[test]

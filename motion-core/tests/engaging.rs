@@ -5,8 +5,9 @@
 mod rig;
 
 use arm_sim::servo::ServoFault;
+use motion_core::Output;
 use protocol_core::registers::Joint;
-use protocol_core::time::Duration;
+use protocol_core::time::{Duration, Instant};
 use rig::{Rig, STANDARD_COUNTS, ToServos, write};
 
 #[test]
@@ -34,6 +35,37 @@ fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
         rig.run_ms(200);
         assert_eq!(goals_at_torque(&rig), STANDARD_COUNTS.map(Some), "phase {phase}");
     }
+}
+
+/// The same bytes may bring an answer and the write: then the answer counts first.
+#[test]
+fn d13_an_answer_that_has_come_is_where_the_servo_state_is_entered() {
+    let mut rig = Rig::started();
+    rig.write(29, &[0]);
+    rig.run_ms(20);
+    rig.hand(1, STANDARD_COUNTS[0] + 12);
+    rig.forget();
+    while rig.to_servos.last().is_none_or(|(_, told)| *told != ToServos::Ask(0)) {
+        rig.run_us(10);
+    }
+    let answered_at = rig.plant.deadline().expect("an answer").as_micros();
+    rig.run_us(answered_at - 1 - rig.now_us);
+    // The answer and the write in one turn of the shell.
+    rig.now_us = answered_at;
+    rig.write(29, &[1]);
+    assert_eq!((rig.targets()[0], rig.present()[0]), (93, 93), "12 counts are 3.5 degrees");
+}
+
+#[test]
+fn the_goals_follow_their_start_whatever_comes_in_between() {
+    let mut rig = Rig::started();
+    rig.run_us(9_999);
+    let now = Instant::from_micros(rig.now_us + 1);
+    let Output::ServoFrameStart(start) = rig.controller.poll(now, rig.room) else { panic!("a start") };
+    let start = start.to_vec();
+    rig.controller.host_bytes(now, &write(29, &[0]));
+    let Output::ToServos(frame) = rig.controller.poll(now, rig.room) else { panic!("the frame") };
+    assert_eq!((&frame[..start.len()], frame.len()), (&start[..], 57), "seven goals, as announced");
 }
 
 /// Each joint's goal at the moment when it was first given torque.

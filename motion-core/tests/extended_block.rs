@@ -115,6 +115,18 @@ fn d22_half_a_word_is_refused_whole() {
 }
 
 #[test]
+fn d23_a_fine_target_that_came_before_a_control_cycle_goes_out_with_its_goals() {
+    let mut rig = Rig::started();
+    // Up to the moment before the next cycle.
+    rig.run_us(9_999);
+    rig.now_us += 1;
+    rig.forget();
+    rig.write(FINE_TARGET, &fine(&[9_150]));
+    let goals: Vec<_> = rig.goals().map(|(at, goals)| (at, goals[0])).collect();
+    assert_eq!(goals, [(rig.now_us, (0, 516))], "1.5 degrees are 5 counts");
+}
+
+#[test]
 fn d23_a_stream_ends_with_a_coarse_target_and_stops_at_its_last_point() {
     let mut rig = Rig::started();
     rig.write(PERIOD, &20_u16.to_le_bytes());

@@ -14,6 +14,8 @@ use crate::CYCLE;
 const BYTE_TIME_US: usize = 10;
 /// The longest time that noise may delay a frame. A frame that damps the servos must not wait for noise to end.
 const MAX_NOISE_DELAY: Duration = Duration::from_millis(1);
+/// The registers of a goal: position, time and speed, two bytes each.
+const GOAL_REGISTERS: usize = 6;
 /// How many different read lengths there are.
 const READ_LENGTHS: u8 = 4;
 
@@ -162,13 +164,13 @@ impl Bus {
         Some(Outcome::Failed { joint })
     }
 
-    /// May a read be sent?
+    /// Is a read outstanding? Until its outcome, no other read may be sent.
     #[must_use]
-    pub fn is_idle(&self, now: Instant) -> bool {
-        self.awaited.is_none() && self.is_free(now)
+    pub const fn is_asking(&self) -> bool {
+        self.awaited.is_some()
     }
 
-    /// May a frame without an answer be sent?
+    /// Is the wire free for a frame?
     #[must_use]
     pub fn is_free(&self, now: Instant) -> bool {
         now >= self.free_at()
@@ -215,6 +217,11 @@ impl Bus {
         self.rest_after_frame(now);
     }
 
+    /// The first bytes of the frame that [`Bus::set_goals`] prepares for this many joints.
+    pub fn begin_goals(&mut self, joints: usize) {
+        frame::sync_write_start::<GOAL_REGISTERS>(&mut self.frame, register::GOAL_POSITION, joints);
+    }
+
     /// Sets the goals of some joints in servo counts, simultaneously. Each goal time is one control cycle, so that
     /// consecutive goals give an even movement. No servo answers.
     pub fn set_goals(&mut self, now: Instant, goals: impl Iterator<Item = (Joint, u16)>) {
@@ -224,7 +231,8 @@ impl Bus {
             register::GOAL_POSITION,
             goals.map(|(joint, counts)| {
                 let [high, low] = counts.to_be_bytes();
-                (joint.index(), [high, low, time_high, time_low, 0, 0])
+                let values: [u8; GOAL_REGISTERS] = [high, low, time_high, time_low, 0, 0];
+                (joint.index(), values)
             }),
         );
         self.rest_after_frame(now);

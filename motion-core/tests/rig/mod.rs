@@ -114,10 +114,16 @@ impl Rig {
         self.controller.host_bytes(now, &[]);
         let answer = self.plant.poll(now);
         self.controller.servo_bytes(now, &answer);
+        let mut begun = Vec::new();
         loop {
-            match self.controller.poll(now, self.room) {
+            let output = self.controller.poll(now, self.room);
+            assert!(begun.is_empty() || matches!(output, Output::ToServos(_)), "{output:?} after {begun:?}");
+            match output {
                 Output::ToHost(bytes) => self.to_host.push((self.now_us, bytes.to_vec())),
+                Output::ServoFrameStart(bytes) => begun.extend(bytes),
                 Output::ToServos(bytes) => {
+                    assert!(bytes.starts_with(&begun), "{bytes:?} after {begun:?}");
+                    begun.clear();
                     self.plant.bytes(now, bytes);
                     let told = decode(bytes);
                     self.to_servos.push((self.now_us, told));

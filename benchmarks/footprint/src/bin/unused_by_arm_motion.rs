@@ -100,7 +100,7 @@ fn bus() {
     let mut bus = opaque(Bus::new(Duration::from_millis(opaque(0)), Duration::from_micros(opaque(0)), codes));
     bus.bytes(any_time(), any_bytes());
     opaque(bus.poll(any_time()));
-    opaque((bus.is_idle(any_time()), bus.is_free(any_time()), bus.deadline(any_time())));
+    opaque((bus.is_asking(), bus.is_free(any_time()), bus.deadline(any_time())));
     bus.ask(any_time(), Joint::from_index(opaque(0)).unwrap_or(Joint::ALL[0]));
     bus.set_torque(any_time(), Joint::ALL.into_iter().zip(opaque([Torque::Free; JOINTS])));
     bus.set_goals(any_time(), Joint::ALL.into_iter().zip(core::iter::repeat_with(|| opaque(0))));

@@ -25,6 +25,7 @@ const MAX_EXPIRED_WAITS: u32 = 4;
 /// An [`Output`] without a borrow of the controller: its bytes are in [`PoweredArm::output_bytes`].
 enum OwnedOutput {
     ToHost,
+    ServoFrameStart,
     ToServos,
     Vacuum(Vacuum),
     Save(Image),
@@ -41,6 +42,7 @@ impl PoweredArm {
         };
         match controller.poll(now, room) {
             Output::ToHost(bytes) => copy(bytes, OwnedOutput::ToHost),
+            Output::ServoFrameStart(bytes) => copy(bytes, OwnedOutput::ServoFrameStart),
             Output::ToServos(bytes) => copy(bytes, OwnedOutput::ToServos),
             Output::Vacuum(vacuum) => OwnedOutput::Vacuum(vacuum),
             Output::Save(image) => OwnedOutput::Save(image),
@@ -97,6 +99,7 @@ impl TortureWorld {
 
     /// Executes the outputs of the controller until it waits. Returns true if the power is still on.
     fn poll(&mut self, arm: &mut PoweredArm) -> Check<bool> {
+        let mut begun = Vec::new();
         for _ in 0..MAX_OUTPUTS {
             if self.parameters.receives_before_every_poll {
                 arm.deliver_host_bytes(self.now);
@@ -105,16 +108,20 @@ impl TortureWorld {
             let before = arm.executed();
             let output = arm.poll(self.now, room);
             let count = arm.executed().wrapping_sub(before);
-            let effect = self.apply_requests(arm, count, room)?;
+            self.apply_requests(arm, count, room)?;
+            let is_rest = matches!(output, OwnedOutput::ToServos) && arm.output_bytes.starts_with(&begun);
+            ensure(begun.is_empty() || is_rest, || format!("{begun:02x?} is not followed by its frame"))?;
+            begun.clear();
             match output {
+                OwnedOutput::ServoFrameStart => begun.extend_from_slice(&arm.output_bytes),
                 OwnedOutput::ToServos => self.send_to_servos(arm)?,
-                OwnedOutput::ToHost => self.send_to_host(arm, effect, room)?,
+                OwnedOutput::ToHost => self.send_to_host(arm, room)?,
                 OwnedOutput::Vacuum(vacuum) => {
                     self.log.event(self.now, format!("{vacuum:?}"));
                     arm.status_checker.vacuum_switched(self.now, vacuum)?;
                 }
                 OwnedOutput::Save(image) => {
-                    if !self.save(arm, image, effect)? {
+                    if !self.save(arm, image)? {
                         return Ok(false);
                     }
                 }
@@ -133,7 +140,8 @@ impl TortureWorld {
         Ok(())
     }
 
-    fn send_to_host(&mut self, arm: &mut PoweredArm, effect: Option<RequestEffect>, room: usize) -> Check {
+    fn send_to_host(&mut self, arm: &mut PoweredArm, room: usize) -> Check {
+        let effect = arm.owed.take();
         let bytes = arm.output_bytes.as_slice();
         self.log.host(self.now, "arm", bytes);
         ensure(bytes.len() <= room, || format!("{} bytes to the host with room for {room}", bytes.len()))?;
@@ -165,7 +173,8 @@ impl TortureWorld {
     }
 
     /// Saves settings. Returns true if the power is still on.
-    fn save(&mut self, arm: &mut PoweredArm, image: Image, effect: Option<RequestEffect>) -> Check<bool> {
+    fn save(&mut self, arm: &mut PoweredArm, image: Image) -> Check<bool> {
+        let effect = arm.owed.take();
         let is_expected = effect == Some(RequestEffect::Save(image));
         ensure(is_expected, || format!("{image:?} is saved after {effect:?}"))?;
         self.counts.saves += 1;

@@ -72,6 +72,7 @@ impl TortureWorld {
         self.power = PowerState::On(Box::new(PoweredArm {
             controller,
             output_bytes: Vec::new(),
+            owed: None,
             model,
             watchdog: WatchdogModel::OFF,
             command_checker: CommandChecker::new(now, codes, timeout),

@@ -24,18 +24,13 @@ impl PoweredArm {
 }
 
 impl TortureWorld {
-    /// Applies the next `count` requests to the model. `room` is the room of the link, in bytes. Returns the effect of the
-    /// last one.
-    pub(super) fn apply_requests(
-        &mut self,
-        arm: &mut PoweredArm,
-        count: u16,
-        room: usize,
-    ) -> Check<Option<RequestEffect>> {
+    /// Applies the next `count` requests to the model. `room` is the room of the link, in bytes. The effect of the last one
+    /// is owed from then on; frames to the servos may come before it.
+    pub(super) fn apply_requests(&mut self, arm: &mut PoweredArm, count: u16, room: usize) -> Check {
         self.record_missing(arm);
         let verdicts = arm.find_verdicts(count, room);
         let mut choices = verdicts.choices.into_iter();
-        let (mut last, mut is_heard) = (None, false);
+        let (mut last, mut is_heard) = (arm.owed.take(), false);
         for _ in 0..count {
             let has_arrived = arm.pending.front().is_some_and(|first| first.arrived_at <= self.now);
             let request = arm.pending.pop_front().filter(|_| has_arrived).map(|pending| pending.request);
@@ -60,7 +55,8 @@ impl TortureWorld {
             arm.model.compare(registers)?;
         }
         arm.model.compare_targets(registers)?;
-        Ok(last)
+        arm.owed = last;
+        Ok(())
     }
 
     fn apply_request(&mut self, arm: &mut PoweredArm, request: &HostRequest, room: usize) -> RequestEffect {

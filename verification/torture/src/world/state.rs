@@ -12,7 +12,7 @@ use super::event_log::EventLog;
 use super::host_link::{ArmToHost, HostToArm};
 use super::host_request::HostRequest;
 use super::parameters::WorldParameters;
-use super::register_model::RegisterModel;
+use super::register_model::{RegisterModel, RequestEffect};
 use super::request_generator::RequestGenerator;
 use super::settings_storage::SettingsStorage;
 use super::status_checker::{StatusChecker, StatusContext};
@@ -61,6 +61,8 @@ pub(super) struct PoweredArm {
     pub(super) controller: Controller,
     /// The bytes of the last output.
     pub(super) output_bytes: Vec<u8>,
+    /// The effect of the last request, until its reply, alarm or save.
+    pub(super) owed: Option<RequestEffect>,
     pub(super) model: RegisterModel,
     pub(super) watchdog: WatchdogModel,
     pub(super) command_checker: CommandChecker,

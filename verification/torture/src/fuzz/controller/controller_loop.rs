@@ -22,6 +22,8 @@ pub struct ControllerLoop {
     wake_at: Instant,
     /// Host bytes that the controller has not taken yet.
     waiting: Vec<u8>,
+    /// The start of a frame for the servos that has to follow.
+    frame_start: Vec<u8>,
     checker: InvariantChecker,
 }
 
@@ -37,6 +39,7 @@ impl ControllerLoop {
             now_us: 0,
             wake_at: Instant::ZERO,
             waiting: Vec::new(),
+            frame_start: Vec::new(),
             checker,
         }
     }
@@ -90,7 +93,10 @@ impl ControllerLoop {
                 let bytes = bytes.to_vec();
                 self.checker.frame_to_host(&bytes, self.controller.registers());
             }
+            Output::ServoFrameStart(bytes) => self.frame_start.extend_from_slice(bytes),
             Output::ToServos(bytes) => {
+                assert!(bytes.starts_with(&self.frame_start));
+                self.frame_start.clear();
                 let command = decode(bytes);
                 self.checker.command_to_servos(
                     self.now_us,
