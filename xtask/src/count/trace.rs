@@ -12,6 +12,9 @@ use std::ops::Range;
 
 use crate::thumb_decode::Effect;
 
+/// TIM2_CNT (RM0090, section 18.4.21).
+const TIME: u64 = 0x4000_0024;
+
 /// An event of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TraceEvent {
@@ -22,7 +25,9 @@ pub(crate) enum TraceEvent {
         /// True in an exception handler.
         in_handler: bool,
     },
-    /// A peripheral's register was read.
+    /// The time was read: the count of TIM2, in microseconds.
+    Time(u64),
+    /// Another register of a peripheral was read.
     Read(u64),
     /// A peripheral's register was written.
     Wrote(u64),
@@ -50,8 +55,13 @@ fn event(line: &str) -> Option<TraceEvent> {
         return Some(TraceEvent::Step { at: hexadecimal(fields.next()?)?, in_handler: flags & 1 == 1 });
     }
     let access = line.strip_prefix("memory_region_ops_")?;
-    let address = hexadecimal(access.split_once("addr 0x")?.1.split(' ').next()?)?;
-    Some(if access.starts_with("read") { TraceEvent::Read(address) } else { TraceEvent::Wrote(address) })
+    let (address, rest) = access.split_once("addr 0x")?.1.split_once(" value 0x")?;
+    let address = hexadecimal(address)?;
+    Some(match (access.starts_with("read"), address) {
+        (true, TIME) => TraceEvent::Time(hexadecimal(rest.split(' ').next()?)?),
+        (true, _) => TraceEvent::Read(address),
+        (false, _) => TraceEvent::Wrote(address),
+    })
 }
 
 fn hexadecimal(digits: &str) -> Option<u64> {
@@ -132,6 +142,12 @@ Trace 0: 0x7f81a810adc0 [00800408/0800e7a4/00000010/ff020201] _ZN14firmware_stm3
         let events = parse(LOG);
         assert_eq!(steps(&events), 5);
         assert_eq!(times(&events, TraceEvent::Read(0x4001_1000)), 1);
+    }
+
+    #[test]
+    fn the_time_is_read_with_its_value() {
+        let line = "memory_region_ops_read cpu 0 mr 0x55a0 addr 0x40000024 value 0x1f40 size 4 name 'stm32f2xx_timer'\n";
+        assert_eq!(parse(line), [TraceEvent::Time(8_000)]);
     }
 
     const fn step(at: u64) -> TraceEvent {
