@@ -17,6 +17,7 @@ mod commands;
 mod confirm;
 mod interrupt;
 mod line_file;
+mod measured_pose;
 mod plot;
 mod printer;
 mod progress;

@@ -36,6 +36,7 @@ fn where_shows_the_tip_of_the_standard_pose() {
         let text = succeeded(arm.sevenbot(&["where"]));
         // Two degrees of play at 250 mm.
         assert!(distance(&numbers(&text, "tip")[..3], [0.0, 250.3, 219.5]) < 20.0, "{text}");
+        assert!(numbers(&text, "tip")[3] < 2.0, "the servos' counts leave 1.2 mm open: {text}");
         assert!(text.contains("tool") && text.contains("wrist"), "{text}");
         let json = succeeded(arm.sevenbot(&["where", "--json"]));
         for field in ["\"tip_mm\":[", "\"tool\":[", "\"wrist_mm\":[", "\"uncertainty_mm\":"] {

@@ -4,12 +4,13 @@ use std::io::{self, Write};
 
 use clap::Args;
 use serde::Serialize;
+use sevenbot::Joint;
 use sevenbot::cartesian::{DirectionText, PointText, TipPose, Vector};
 use sevenbot::joints::JointSnapshot;
 use sevenbot::register_text::joints;
-use sevenbot::{Angle, Joint};
 
 use crate::command_error::CommandError;
+use crate::measured_pose::{MeasuredPose, PositionDegrees};
 use crate::printer::{Printable, warn};
 use crate::session::Session;
 
@@ -25,14 +26,16 @@ forward, z up. The tip is the middle of the disc that joint 6 turns; a suction c
 included. The tool direction has length 1 and points from the wrist to the tip. The wrist is where the axes
 of joints 4, 5 and 6 meet.
 
-Joints are measured in whole degrees, so the tip is known to some millimetres.")]
+An arm with this project's firmware tells its joints to a count of the servos, about a quarter of a degree,
+so the tip is known to a millimetre or two. Others tell whole degrees: some millimetres. The play of the
+joints and a bent arm are not included.")]
 pub(crate) struct WhereArgs {}
 
 pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let joints = arm.wait_until_settled()?;
     warn_of_silent(&joints);
-    session.printer.print(&TipPosition::of(joints.positions()))
+    session.printer.print(&TipPosition::of(&MeasuredPose::read(&mut arm)?))
 }
 
 /// Warns about joints with an unknown position.
@@ -50,27 +53,26 @@ fn warn_of_silent(snapshot: &JointSnapshot) {
 
 /// The position of an arm.
 #[derive(Debug, Serialize)]
-pub(crate) struct TipPosition {
+struct TipPosition {
     tip_mm: [f64; 3],
     tool: [f64; 3],
     wrist_mm: [f64; 3],
     uncertainty_mm: f64,
-    positions_degrees: [u8; 7],
+    positions_degrees: PositionDegrees,
     #[serde(skip)]
     pose: TipPose,
 }
 
 impl TipPosition {
-    /// From the joint angles in degrees, joint 1 first.
-    pub(crate) fn of(positions_degrees: [u8; 7]) -> Self {
-        let angles = positions_degrees.map(Angle::from_register);
-        let pose = TipPose::of(angles);
+    /// From the measured angles.
+    fn of(measured: &MeasuredPose) -> Self {
+        let pose = measured.tip_pose();
         Self {
             tip_mm: components(pose.tip, 100.0),
             tool: components(pose.tool, 10_000.0),
             wrist_mm: components(pose.wrist, 100.0),
-            uncertainty_mm: (TipPose::rounding_mm(angles) * 10.0).round() / 10.0,
-            positions_degrees,
+            uncertainty_mm: (measured.rounding_mm() * 10.0).round() / 10.0,
+            positions_degrees: measured.degrees(),
             pose,
         }
     }
@@ -85,8 +87,8 @@ pub(crate) fn components(vector: Vector, steps: f64) -> [f64; 3] {
 impl Printable for TipPosition {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         let TipPose { tip, tool, wrist } = self.pose;
-        let angles = self.positions_degrees.map(|degrees| degrees.to_string()).join(" ");
-        writeln!(out, "tip     {} mm, within {:.0} mm", PointText(tip), self.uncertainty_mm)?;
+        let angles = self.positions_degrees.texts().join(" ");
+        writeln!(out, "tip     {} mm, within {:.1} mm", PointText(tip), self.uncertainty_mm)?;
         writeln!(out, "tool    {}", DirectionText(tool))?;
         writeln!(out, "wrist   {} mm", PointText(wrist))?;
         writeln!(out, "joints  {angles} degrees")
@@ -96,15 +98,17 @@ impl Printable for TipPosition {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sevenbot::Angle;
 
     #[test]
     fn the_standard_pose_has_a_position() {
-        let position = TipPosition::of([90, 90, 65, 90, 90, 90, 80]);
+        let whole = [90, 90, 65, 90, 90, 90, 80].map(Angle::from_register);
+        let position = TipPosition::of(&MeasuredPose::whole(whole));
         let mut text = Vec::new();
         position.write_text(&mut text).expect("memory");
         assert_eq!(
             String::from_utf8(text).expect("text"),
-            "tip     0 250.3 219.5 mm, within 5 mm\ntool    forward (0 1 0)\nwrist   0 227.9 219.5 mm\n\
+            "tip     0 250.3 219.5 mm, within 5.4 mm\ntool    forward (0 1 0)\nwrist   0 227.9 219.5 mm\n\
              joints  90 90 65 90 90 90 80 degrees\n"
         );
         let json = serde_json::to_string(&position).expect("JSON");

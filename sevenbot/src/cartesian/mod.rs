@@ -36,8 +36,26 @@ pub type Vector = kinematics::Vector<f64>;
 /// The tool straight down.
 pub const DOWN: Vector = Vector::new(0.0, 0.0, -1.0);
 
-/// Half of the step of the registers of positions, in degrees.
-const ROUNDING_DEGREES: f64 = 0.5;
+/// The step in which the angles of the joints are known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AngleStep {
+    /// The registers of map 2.1 and 2.2: one degree.
+    WholeDegree,
+    /// The extended block: one count of the servo, 180 / 850 of a degree at joints 1 to 4, and 180 / 625 at joints 5 and 6.
+    ServoCount,
+}
+
+impl AngleStep {
+    /// The steps of joints 1 to 6, in degrees.
+    const fn degrees(self) -> [f64; 6] {
+        const ARM: f64 = 180.0 / 850.0;
+        const HAND: f64 = 180.0 / 625.0;
+        match self {
+            Self::WholeDegree => [1.0; 6],
+            Self::ServoCount => [ARM, ARM, ARM, ARM, HAND, HAND],
+        }
+    }
+}
 
 /// The position of the tip, and the direction of the tool.
 ///
@@ -79,17 +97,17 @@ impl TipPose {
         Self { tip: hand.tip, tool: hand.tool, wrist: arm.wrist }
     }
 
-    /// The largest error of a position computed from whole degrees, in millimetres: each joint may be
-    /// half a degree away from its register.
+    /// The largest error of a position computed from angles that are known in steps, in millimetres: each joint may be half a
+    /// step away.
     #[must_use]
-    pub fn rounding_mm([t1, t2, t3, t4, t5, t6, _]: [Angle; 7]) -> f64 {
-        let angles = [t1, t2, t3, t4, t5, t6].map(|angle| f64::from(angle.degrees()));
+    pub fn rounding_mm([t1, t2, t3, t4, t5, t6, _]: [FineAngle; 7], step: AngleStep) -> f64 {
+        let angles = [t1, t2, t3, t4, t5, t6].map(FineAngle::degrees);
         let tip = Self::at(angles).tip;
-        (0..angles.len())
-            .map(|joint| {
+        (step.degrees().into_iter().enumerate())
+            .map(|(joint, step)| {
                 let mut turned = angles;
                 if let Some(angle) = turned.get_mut(joint) {
-                    *angle += ROUNDING_DEGREES;
+                    *angle += step / 2.0;
                 }
                 (Self::at(turned).tip - tip).length()
             })
@@ -162,12 +180,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whole_degrees_leave_some_millimetres_open() {
-        let pose = [90, 90, 65, 90, 90, 90, 80].map(Angle::from_register);
+    fn steps_of_the_angles_leave_millimetres_open() {
+        let pose = [90, 90, 65, 90, 90, 90, 80].map(Angle::from_register).map(FineAngle::from);
         // Half a degree of joint 1 at 250 mm, joint 2 at 120 mm, joint 3 at 222 mm, and the hand.
-        let open = TipPose::rounding_mm(pose);
-        let expected = 0.5_f64.to_radians() * (250.31 + 120.0 + 220.96_f64.hypot(25.0) + 22.46);
-        assert!((open - expected).abs() < 0.05, "{open} {expected}");
+        let (arm, hand) = (250.31 + 120.0 + 220.96_f64.hypot(25.0), 22.46);
+        for (step, expected) in [
+            (AngleStep::WholeDegree, 0.5_f64.to_radians() * (arm + hand)),
+            (
+                AngleStep::ServoCount,
+                (90.0_f64 / 850.0).to_radians() * arm + (90.0_f64 / 625.0).to_radians() * hand,
+            ),
+        ] {
+            let open = TipPose::rounding_mm(pose, step);
+            assert!((open - expected).abs() < 0.05, "{open} {expected}");
+        }
     }
 
     #[test]

@@ -3,11 +3,11 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use sevenbot::cartesian::{DirectionText, FineTipTarget, PointText, TipPose, TipTarget, Vector};
-use sevenbot::{Angle, Arm, FineAngle};
+use sevenbot::FineAngle;
+use sevenbot::cartesian::{DirectionText, FineTipTarget, PointText, TipTarget, Vector};
 
 use super::super::position::components;
-use crate::command_error::CommandError;
+use crate::measured_pose::{MeasuredPose, PositionDegrees};
 use crate::printer::Printable;
 
 /// A move to a point: the plan, and with --wait the measured result.
@@ -94,47 +94,10 @@ impl TipArrival {
     }
 }
 
-/// Measured angles, joint 1 first.
-#[derive(Clone, Copy, Debug, Serialize)]
-#[serde(untagged)]
-enum PositionDegrees {
-    Whole([u8; 7]),
-    Hundredths([f64; 7]),
-}
-
-/// The measured angles, and the tip there.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct MeasuredPose {
-    positions_degrees: PositionDegrees,
-    tip: Vector,
-}
-
-impl MeasuredPose {
-    /// From whole degrees.
-    pub(super) fn whole(positions: [u8; 7]) -> Self {
-        let tip = TipPose::of(positions.map(Angle::from_register)).tip;
-        Self { positions_degrees: PositionDegrees::Whole(positions), tip }
-    }
-
-    /// Reads the positions as exactly as the arm measures them.
-    pub(super) fn read(arm: &mut Arm) -> Result<Self, CommandError> {
-        let whole = arm.positions()?;
-        if !arm.has_extended_block()? {
-            return Ok(Self::whole(whole.map(Angle::degrees)));
-        }
-        let mut pose = whole.map(FineAngle::from);
-        for (angle, fine) in pose.iter_mut().zip(arm.fine_state()?.positions) {
-            *angle = fine.unwrap_or(*angle);
-        }
-        let positions_degrees = PositionDegrees::Hundredths(pose.map(FineAngle::degrees));
-        Ok(Self { positions_degrees, tip: TipPose::of_fine(pose).tip })
-    }
-}
-
 impl MeasuredTip {
     /// From the measured angles and the requested tip.
     pub(super) fn of(pose: MeasuredPose, asked: Vector) -> Self {
-        let MeasuredPose { positions_degrees, tip } = pose;
+        let (positions_degrees, tip) = (pose.degrees(), pose.tip_pose().tip);
         Self { positions_degrees, tip_mm: components(tip, 100.0), miss_mm: rounded((tip - asked).length()) }
     }
 
@@ -172,6 +135,7 @@ impl Printable for TipArrival {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sevenbot::Angle;
     use sevenbot::cartesian::DOWN;
 
     #[test]
@@ -180,7 +144,9 @@ mod tests {
         let target = TipTarget::of(tip, DOWN).expect("within reach");
         let arrival = TipArrival::planned(tip, &target, DOWN);
         assert_eq!(arrival.targets_degrees, TargetDegrees::Whole([105, 88, 110, 90, 135]));
-        let arrival = arrival.with_measured(Some(MeasuredPose::whole([105, 88, 110, 90, 135, 90, 80])));
+        let arrival = arrival.with_measured(Some(MeasuredPose::whole(
+            [105, 88, 110, 90, 135, 90, 80].map(Angle::from_register),
+        )));
         let mut text = Vec::new();
         arrival.write_text(&mut text).expect("memory");
         let text = String::from_utf8(text).expect("text");

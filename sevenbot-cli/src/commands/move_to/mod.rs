@@ -5,13 +5,14 @@
 //!              └──▶ StraightLine, or StraightLineError ──▶ played like a recording
 //! ```
 
-use sevenbot::cartesian::{TipPose, TipTarget, Vector};
+use sevenbot::Arm;
+use sevenbot::cartesian::{TipTarget, Vector};
 use sevenbot::fine::FineTargets;
 use sevenbot::moves::{JointMove, TipMove};
-use sevenbot::{Angle, Arm};
 
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
+use crate::measured_pose::MeasuredPose;
 use crate::session::Session;
 use crate::watch::{Watch, note_rounding};
 
@@ -21,7 +22,7 @@ mod straight;
 
 pub(crate) use args::MoveToArgs;
 use args::target;
-use facts::{MeasuredPose, TipArrival};
+use facts::TipArrival;
 
 pub(crate) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), CommandError> {
     if args.straight {
@@ -57,8 +58,8 @@ fn take(
 
 /// The present direction of the tool.
 fn present_tool(arm: &mut Arm) -> Result<Vector, CommandError> {
-    let positions = arm.wait_until_settled()?.positions();
-    Ok(TipPose::of(positions.map(Angle::from_register)).tool)
+    arm.wait_until_settled()?;
+    Ok(MeasuredPose::read(arm)?.tip_pose().tool)
 }
 
 /// Moves joints 1 to 5. If `wait` is set, waits and returns the measured angles.
@@ -72,6 +73,6 @@ fn move_to(arm: &mut Arm, targets: FineTargets, wait: bool) -> Result<Option<Mea
             return Ok(None);
         }
         begun.finish(arm, &mut Watch::new(interrupt))?;
-        MeasuredPose::read(arm).map(Some)
+        Ok(Some(MeasuredPose::read(arm)?))
     })
 }

@@ -12,8 +12,9 @@ use sevenbot::moves::LineStart;
 use super::super::play::follow;
 use super::super::position::components;
 use super::args::{MoveToArgs, target};
-use super::facts::{MeasuredPose, MeasuredTip, rounded};
+use super::facts::{MeasuredTip, rounded};
 use crate::command_error::CommandError;
+use crate::measured_pose::MeasuredPose;
 use crate::printer::Printable;
 use crate::session::Session;
 

@@ -1,0 +1,68 @@
+//! The measured angles of the joints, as exactly as the arm tells them.
+
+use serde::Serialize;
+use sevenbot::cartesian::{AngleStep, TipPose};
+use sevenbot::{Angle, Arm, Error, FineAngle};
+
+/// Measured angles, joint 1 first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MeasuredPose {
+    angles: [FineAngle; 7],
+    step: AngleStep,
+}
+
+/// Angles in degrees, joint 1 first.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[serde(untagged)]
+pub(crate) enum PositionDegrees {
+    Whole([u8; 7]),
+    Hundredths([f64; 7]),
+}
+
+impl MeasuredPose {
+    /// From whole degrees.
+    pub(crate) fn whole(positions: [Angle; 7]) -> Self {
+        Self { angles: positions.map(FineAngle::from), step: AngleStep::WholeDegree }
+    }
+
+    /// Reads the positions.
+    pub(crate) fn read(arm: &mut Arm) -> Result<Self, Error> {
+        let whole = Self::whole(arm.positions()?);
+        let Some(fine) = arm.fine_state_if_served()? else { return Ok(whole) };
+        let mut angles = whole.angles;
+        for (angle, measured) in angles.iter_mut().zip(fine.positions) {
+            *angle = measured.unwrap_or(*angle);
+        }
+        Ok(Self { angles, step: AngleStep::ServoCount })
+    }
+
+    /// Tip, tool and wrist.
+    pub(crate) fn tip_pose(&self) -> TipPose {
+        TipPose::of_fine(self.angles)
+    }
+
+    /// The largest error of the tip that follows from the step of the angles, in millimetres.
+    pub(crate) fn rounding_mm(&self) -> f64 {
+        TipPose::rounding_mm(self.angles, self.step)
+    }
+
+    /// The angles as the arm tells them.
+    pub(crate) fn degrees(&self) -> PositionDegrees {
+        match self.step {
+            AngleStep::WholeDegree => {
+                PositionDegrees::Whole(self.angles.map(|angle| angle.nearest().degrees()))
+            }
+            AngleStep::ServoCount => PositionDegrees::Hundredths(self.angles.map(FineAngle::degrees)),
+        }
+    }
+}
+
+impl PositionDegrees {
+    /// The text of each angle.
+    pub(crate) fn texts(self) -> [String; 7] {
+        match self {
+            Self::Whole(degrees) => degrees.map(|degrees| degrees.to_string()),
+            Self::Hundredths(degrees) => degrees.map(|degrees| format!("{degrees:.2}")),
+        }
+    }
+}
