@@ -19,9 +19,9 @@ use tempfile::TempDir;
 const PING: u8 = 0x01;
 const READ: u8 = 0x02;
 const SYNC_WRITE: u8 = 0x83;
-/// The fault handler sends this three times: it sets the torque switch (register 40) of seven servos to 0, damping.
+/// The fault handler sends this four times: it sets the torque switch (register 40) of seven servos to 0, damping.
 const DAMPING: [u8; 22] = [0xFF, 0xFF, 0xFE, 18, 0x83, 40, 1, 0, 0, 1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 0, 0x2E];
-const REPEATS: usize = 3;
+const REPEATS: usize = 4;
 /// The number of frames without an echo after which the image reports no echo.
 const ECHO_TRIES: usize = 20;
 

@@ -33,8 +33,8 @@ pub const WATCHDOG_TIME: Duration = Duration::from_millis(2_000);
 pub const DISTURBANCE_TIME: Duration = Duration::from_millis(3_000);
 /// Random bytes of noise per millisecond.
 pub const NOISE_BYTES: usize = 4;
-/// The panic handler of the firmware sends the same frame three times, with a pause before each.
-const PANIC_FRAMES: usize = 3;
+/// The panic handler of the firmware sends the same frame four times, with a pause before each.
+const PANIC_FRAMES: usize = 4;
 const PANIC_PAUSE: Duration = Duration::from_millis(2);
 
 /// Joint 3, which lifts the forearm.
@@ -47,7 +47,7 @@ pub enum SagCause {
     WarmRestart,
     /// The program hangs for two seconds, then the watchdog restarts the controller.
     Watchdog,
-    /// The program panics, puts every servo into state 0 three times, and restarts.
+    /// The program panics, puts every servo into state 0 four times, and restarts.
     Panic,
     /// Three seconds of random bytes to the servos, while each reply has an invalid checksum.
     Noise,
@@ -64,7 +64,7 @@ impl SagCause {
         match self {
             Self::WarmRestart => "warm restart (the controller alone)",
             Self::Watchdog => "watchdog restart (the controller hangs for 2 s)",
-            Self::Panic => "panic (state 0 to all servos three times, then a restart)",
+            Self::Panic => "panic (state 0 to all servos four times, then a restart)",
             Self::Noise => "noise on the servo bus for 3 s",
             Self::SilentServo => "answers of joint 3 lost for 3 s",
         }

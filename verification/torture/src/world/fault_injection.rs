@@ -126,14 +126,14 @@ impl TortureWorld {
         self.power = PowerState::Off { until: self.now + time, servos_too: false };
     }
 
-    /// The controller panics: its panic handler sends damping to all servos three times and restarts.
+    /// The controller panics: its panic handler sends damping to all servos four times and restarts.
     fn panic(&mut self, arm: &PoweredArm) {
         self.power_down(arm, false);
         let mut frame = ServoFrameBuffer::new();
         let code = self.bus.torque_codes().code(Torque::Damping);
         let items = Joint::ALL.into_iter().map(|joint| (joint.index(), [code]));
         sync_write(&mut frame, register::TORQUE_SWITCH, items);
-        for _ in 0..3 {
+        for _ in 0..4 {
             self.now = self.now + PANIC_PAUSE;
             self.log.bus(self.now, "to servos, by the panic handler", &frame);
             self.bus.send_panic_frame(self.now, &frame);
