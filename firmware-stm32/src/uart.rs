@@ -27,10 +27,8 @@ use firmware_stm32::byte_queue::ByteQueue;
 use firmware_stm32::line_errors::{self, LineErrors};
 use stm32f4::stm32f405 as pac;
 
-/// Received bytes that the loop takes in one critical section.
+/// Bytes that the loop moves in one critical section.
 pub(crate) const CHUNK: usize = 8;
-/// Bytes to send that the loop queues in one critical section: seven instructions for each.
-const SEND_CHUNK: usize = 16;
 
 /// One of the chip's USARTs.
 pub(crate) trait Usart: Deref<Target = pac::usart1::RegisterBlock> {
@@ -96,7 +94,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> SharedUart<U, RECEIV
         // SAFETY: no code relies on a priority to exclude an interrupt.
         unsafe { nvic.set_priority(U::INTERRUPT, setup.priority) };
         self.unmask();
-        UartPort { line: self, chunk: heapless::Vec::new(), taken: 0 }
+        UartPort { line: self, chunk: [0; CHUNK], len: 0, taken: 0 }
     }
 
     /// The interrupt handler.
@@ -164,7 +162,9 @@ fn send<const N: usize>(usart: &impl Usart, to_send: &mut ByteQueue<N>) {
 /// A line as the main loop uses it.
 pub(crate) struct UartPort<U: 'static, const RECEIVE: usize, const TRANSMIT: usize> {
     line: &'static SharedUart<U, RECEIVE, TRANSMIT>,
-    chunk: heapless::Vec<u8, CHUNK>,
+    chunk: [u8; CHUNK],
+    /// Bytes in the chunk.
+    len: usize,
     /// Consumed bytes of the chunk.
     taken: usize,
 }
@@ -172,12 +172,12 @@ pub(crate) struct UartPort<U: 'static, const RECEIVE: usize, const TRANSMIT: usi
 impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> UartPort<U, RECEIVE, TRANSMIT> {
     /// True if a byte is ready to be read.
     pub(crate) fn has_received(&self) -> bool {
-        self.taken < self.chunk.len() || self.line.with(|state| !state.received.is_empty())
+        self.taken < self.len || self.line.with(|state| !state.received.is_empty())
     }
 
     /// Number of bytes that are ready to be read.
     pub(crate) fn waiting(&self) -> usize {
-        self.chunk.len() - self.taken + self.line.with(|state| state.received.len())
+        self.len - self.taken + self.line.with(|state| state.received.len())
     }
 
     /// Number of bytes that can be written without waiting.
@@ -202,23 +202,15 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> UartPort<U, RECEIVE,
 
     /// The first bytes that are ready to be read; empty if there are none.
     pub(crate) fn received(&mut self) -> &[u8] {
-        let Self { line, chunk, taken } = self;
+        let Self { line, chunk, len, taken } = self;
         // Unmask even if the loop takes no byte. The masked interrupt also sends, and the controller may wait for room to
         // send before it takes more bytes.
         line.unmask();
-        if *taken >= chunk.len() {
-            chunk.clear();
+        if *taken >= *len {
             *taken = 0;
-            line.with(|state| {
-                while !chunk.is_full()
-                    && let Some(byte) = state.received.pop()
-                {
-                    // Cannot fail: the chunk is not full.
-                    let _ = chunk.push(byte);
-                }
-            });
+            *len = line.with(|state| state.received.pop_all(chunk));
         }
-        chunk.get(*taken..).unwrap_or(&[])
+        chunk.get(*taken..*len).unwrap_or(&[])
     }
 
     fn wait(&self) {
@@ -246,7 +238,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> BufRead for UartPort
     }
 
     fn consume(&mut self, count: usize) {
-        self.taken = self.chunk.len().min(self.taken + count);
+        self.taken = self.len.min(self.taken + count);
     }
 }
 
@@ -268,7 +260,7 @@ impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> WriteReady for UartP
 impl<U: Usart, const RECEIVE: usize, const TRANSMIT: usize> Write for UartPort<U, RECEIVE, TRANSMIT> {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         loop {
-            let chunk = bytes.get(..SEND_CHUNK).unwrap_or(bytes);
+            let chunk = bytes.get(..CHUNK).unwrap_or(bytes);
             let count = self.line.with(|state| state.to_send.push_all(chunk));
             if count > 0 || bytes.is_empty() {
                 NVIC::pend(U::INTERRUPT);

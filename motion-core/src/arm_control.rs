@@ -84,20 +84,21 @@ impl ArmControl {
         }
     }
 
-    /// Advances all set-points if a control cycle is due. If it can send goals, it first prepares the start of their frame
-    /// and returns true: then the next call advances the set-points, and nothing but that call may come in between.
-    pub(crate) fn advance(&mut self, now: Instant) -> bool {
-        let Some(end) = self.bus.cycle_due(now) else { return false };
-        if self.bus.begin_goals(now, &self.joints) {
-            return true;
-        }
+    /// Prepares the start of the goals' frame if a control cycle is due that can send goals, and returns whether it did. Then
+    /// [`ArmControl::advance`] and the frame come next: until then no joint may engage, fall silent or be released.
+    pub(crate) fn begin_goals(&mut self, now: Instant) -> bool {
+        self.bus.cycle_due(now).is_some() && self.bus.begin_goals(now, &self.joints)
+    }
+
+    /// Advances all set-points if a control cycle is due.
+    pub(crate) fn advance(&mut self, now: Instant) {
+        let Some(end) = self.bus.cycle_due(now) else { return };
         self.bus.begin_cycle(end);
         if self.joints.advance(end, &self.registers) {
             self.bus.goals_changed();
         }
         Status::show_moving(&mut self.registers, &self.joints);
         self.watchdog_is_due = true;
-        false
     }
 
     fn measured(&mut self, now: Instant, joint: Joint, reading: (Reading, u8), is_timely: bool) {

@@ -104,18 +104,15 @@ impl BusScheduler {
         self.torque_due = true;
     }
 
-    /// Prepares the start of the goals' frame if the bus is free. Returns whether there is one. Until
-    /// [`BusScheduler::prepare_frame`] has prepared the whole, no joint may engage or be released, and this returns false.
+    /// Prepares the start of the goals' frame if the bus is free and no torque is due. Returns whether there is one. Then
+    /// [`BusScheduler::prepare_frame`] has to prepare the whole, with the same joints.
     pub(crate) fn begin_goals(&mut self, now: Instant, joints: &Joints) -> bool {
-        if self.has_begun_goals || self.torque_due || !self.bus.is_free(now) {
-            return false;
-        }
         let driven = joints.driven();
-        self.has_begun_goals = driven > 0;
-        if driven > 0 {
+        self.has_begun_goals = driven > 0 && !self.torque_due && self.bus.is_free(now);
+        if self.has_begun_goals {
             self.bus.begin_goals(driven);
         }
-        driven > 0
+        self.has_begun_goals
     }
 
     /// Must the whole frame of the goals follow next?

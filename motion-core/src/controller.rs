@@ -29,7 +29,8 @@ pub enum Output<'a> {
     /// Send these bytes to the host. They fit the room that was passed to `poll`.
     ToHost(&'a [u8]),
     /// These are the first bytes of the frame for the servos that the next `poll` returns. A shell may send them at once, and
-    /// then only the rest of that frame, so that the goals are on their way while they are calculated. Or it ignores them.
+    /// then only the rest of that frame, so that the line is busy with them while the next `poll` calculates the goals. Or it
+    /// ignores them.
     ServoFrameStart(&'a [u8]),
     /// Send this frame on the servo bus. The bus is free: at most one read is outstanding.
     ToServos(&'a [u8]),
@@ -81,12 +82,13 @@ impl Controller {
     pub fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_> {
         if !self.arm.bus.has_begun_goals() {
             self.arm.take_answers(now);
-            // Before the control cycle, so that targets that have come go out with its goals.
+            // Before the control cycle, so that targets go out with its goals if no read waits before them.
             self.execute_requests(now, host_room);
+            if self.arm.begin_goals(now) {
+                return Output::ServoFrameStart(self.arm.bus.frame());
+            }
         }
-        if self.arm.advance(now) {
-            return Output::ServoFrameStart(self.arm.bus.frame());
-        }
+        self.arm.advance(now);
         if self.arm.prepare_servo_frame(now) {
             return Output::ToServos(self.arm.bus.frame());
         }

@@ -21,7 +21,7 @@ pub(crate) enum Measured {
     Rejected,
     /// The filter rejected the reading, and the servo counts as silent from now on.
     FellSilent,
-    /// The filter accepted the reading. Nothing but position, velocity and load changed.
+    /// The filter accepted the reading. The servo was not silent, and its error bits and its temperature are as before.
     Accepted,
     /// The filter accepted the reading. The servo was silent, or its error bits or its temperature changed.
     ServoChanged,

@@ -64,6 +64,10 @@ fn the_goals_follow_their_start_whatever_comes_in_between() {
     let Output::ServoFrameStart(start) = rig.controller.poll(now, rig.room) else { panic!("a start") };
     let start = start.to_vec();
     rig.controller.host_bytes(now, &write(29, &[0]));
+    // Noise on the bus, which is no longer free after it.
+    rig.controller.servo_bytes(now, &[0x55]);
+    rig.controller.raise_faults(1);
+    rig.controller.host_left(now);
     let Output::ToServos(frame) = rig.controller.poll(now, rig.room) else { panic!("the frame") };
     assert_eq!((&frame[..start.len()], frame.len()), (&start[..], 57), "seven goals, as announced");
 }

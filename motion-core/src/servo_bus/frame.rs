@@ -155,14 +155,15 @@ fn finish(buffer: &mut ServoFrameBuffer) {
 
 /// The complement of the sum of `bytes`.
 fn checksum(bytes: &[u8]) -> u8 {
-    // Four bytes at a time: the sums of the even and of the odd bytes, 16 bits each.
+    // Four bytes at a time: the low half sums bytes 0 and 1 of each word, the high half bytes 2 and 3. A frame is too short to
+    // overflow 16 bits.
     let (words, rest) = bytes.as_chunks();
-    let [even, _, odd, _] = words
+    let [low, _, high, _] = words
         .iter()
         .map(|&word| u32::from_le_bytes(word))
         .fold(0_u32, |sum, word| sum.wrapping_add(word & 0x00FF_00FF).wrapping_add(word >> 8 & 0x00FF_00FF))
         .to_le_bytes();
-    !rest.iter().fold(even.wrapping_add(odd), |sum, &byte| sum.wrapping_add(byte))
+    !rest.iter().fold(low.wrapping_add(high), |sum, &byte| sum.wrapping_add(byte))
 }
 
 /// A complete frame with a correct checksum.

@@ -41,8 +41,8 @@ const DROP_TIME: Duration = Duration::from_millis(300);
 /// Bytes of the frame with seven goals. It is the longest frame to the servos.
 const GOAL_FRAME_BYTES: usize = 57;
 /// Bytes that the loop queues at once. The emulator's transmitter is always empty, so one interrupt sends them all. Of the
-/// goals' frame, interrupts send 7, 16, 16, 16 and 2 bytes.
-const SEND_CHUNK: usize = 16;
+/// goals' frame, interrupts send 7 bytes, six times 8, and 2.
+const SEND_CHUNK: usize = 8;
 /// Bytes that the transmitter of a USART holds: one in the shift register and one in the data register.
 const TRANSMITTER_BYTES: u64 = 2;
 

@@ -195,6 +195,8 @@ impl TortureWorld {
     }
 
     fn wait(&mut self, arm: &mut PoweredArm, until: Instant, room: usize) -> Check {
+        let is_done = matches!(arm.owed, None | Some(RequestEffect::NoReply { .. }));
+        ensure(is_done || until <= self.now, || format!("the arm waits and owes {:?}", arm.owed))?;
         let has_room = room >= MAX_LENGTH;
         if !has_room {
             arm.status_checker.reports.disturb();

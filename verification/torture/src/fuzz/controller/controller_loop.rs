@@ -87,7 +87,9 @@ impl ControllerLoop {
     /// Polls once. Returns the deadline of a wait.
     fn poll(&mut self) -> Option<Instant> {
         let now = Instant::from_micros(self.now_us);
-        match self.controller.poll(now, self.room) {
+        let output = self.controller.poll(now, self.room);
+        assert!(self.frame_start.is_empty() || matches!(output, Output::ToServos(_)));
+        match output {
             Output::ToHost(bytes) => {
                 assert!(bytes.len() <= self.room);
                 let bytes = bytes.to_vec();
