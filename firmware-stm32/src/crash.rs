@@ -26,8 +26,9 @@ static ENTERED: AtomicBool = AtomicBool::new(false);
 #[unsafe(link_section = ".uninit.RESET_CAUSE")]
 static RESET_CAUSE: AtomicU32 = AtomicU32::new(0);
 
-/// How often the frame is sent. A servo may still wait for up to 55 bytes of an interrupted frame of goals. If no pause ends
-/// its wait, it takes the first two frames and a part of the third for them. A servo that misses all four holds its goal.
+/// How often the frame is sent. A servo that has the length of an interrupted frame of goals may wait for 53 more bytes. If
+/// no pause ends its wait, it takes two frames of 22 bytes and a part of the third for them. A servo that hears none of the
+/// four holds its goal.
 const REPEATS: usize = 4;
 /// Pause before each frame, in core cycles: 2 ms at 168 MHz, longer than the longest frame and its answer.
 const PAUSE_CYCLES: u32 = 336_000;

@@ -21,13 +21,14 @@ pub(crate) enum PositionDegrees {
 
 impl MeasuredPose {
     /// From whole degrees.
-    pub(crate) fn whole(positions: [Angle; 7]) -> Self {
-        Self { angles: positions.map(FineAngle::from), step: AngleStep::WholeDegree }
+    pub(crate) fn whole(positions: [u8; 7]) -> Self {
+        let angles = positions.map(|degrees| Angle::from_register(degrees).into());
+        Self { angles, step: AngleStep::WholeDegree }
     }
 
-    /// Reads the positions.
-    pub(crate) fn read(arm: &mut Arm) -> Result<Self, Error> {
-        let whole = Self::whole(arm.positions()?);
+    /// Reads hundredths of a degree if the arm has them, else from `positions`, in whole degrees.
+    pub(crate) fn read(arm: &mut Arm, positions: [u8; 7]) -> Result<Self, Error> {
+        let whole = Self::whole(positions);
         let Some(fine) = arm.fine_state_if_served()? else { return Ok(whole) };
         let mut angles = whole.angles;
         for (angle, measured) in angles.iter_mut().zip(fine.positions) {

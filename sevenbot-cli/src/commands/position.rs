@@ -35,7 +35,7 @@ pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let joints = arm.wait_until_settled()?;
     warn_of_silent(&joints);
-    session.printer.print(&TipPosition::of(&MeasuredPose::read(&mut arm)?))
+    session.printer.print(&TipPosition::of(&MeasuredPose::read(&mut arm, joints.positions())?))
 }
 
 /// Warns about joints with an unknown position.
@@ -98,12 +98,10 @@ impl Printable for TipPosition {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sevenbot::Angle;
 
     #[test]
     fn the_standard_pose_has_a_position() {
-        let whole = [90, 90, 65, 90, 90, 90, 80].map(Angle::from_register);
-        let position = TipPosition::of(&MeasuredPose::whole(whole));
+        let position = TipPosition::of(&MeasuredPose::whole([90, 90, 65, 90, 90, 90, 80]));
         let mut text = Vec::new();
         position.write_text(&mut text).expect("memory");
         assert_eq!(

@@ -11,11 +11,14 @@
 //! Origin: the base axis at the height of the top plate. x is to the right, y forward, z up. The tip is the point where
 //! the axis of joint 6 meets the outer face of its disc. The tool direction points from the wrist to the tip.
 //!
-//! The geometry comes from [`kinematics`]. This module does not know the arm.
+//! The geometry comes from [`kinematics`], the step of a servo from [`motion_core::calibration`]. This module does not talk to
+//! the arm.
 
 use std::fmt;
 
 use kinematics::{Frames, forward};
+use motion_core::calibration::angle_from_counts;
+use protocol_core::registers::Joint;
 
 use crate::fine_angle::FineAngle;
 use crate::units::Angle;
@@ -41,20 +44,26 @@ pub const DOWN: Vector = Vector::new(0.0, 0.0, -1.0);
 pub enum AngleStep {
     /// The registers of map 2.1 and 2.2: one degree.
     WholeDegree,
-    /// The extended block: one count of the servo, 180 / 850 of a degree at joints 1 to 4, and 180 / 625 at joints 5 and 6.
+    /// The extended block: one count of the servo, 0.21 degrees at joints 1 to 4, and 0.29 at joints 5 and 6.
     ServoCount,
 }
 
 impl AngleStep {
     /// The steps of joints 1 to 6, in degrees.
-    const fn degrees(self) -> [f64; 6] {
-        const ARM: f64 = 180.0 / 850.0;
-        const HAND: f64 = 180.0 / 625.0;
+    fn degrees(self) -> [f64; 6] {
+        let [one, two, three, four, five, six, _] = Joint::ALL;
         match self {
             Self::WholeDegree => [1.0; 6],
-            Self::ServoCount => [ARM, ARM, ARM, ARM, HAND, HAND],
+            Self::ServoCount => [one, two, three, four, five, six].map(degrees_per_count),
         }
     }
+}
+
+/// The angle of one count of a joint's servo, in degrees.
+fn degrees_per_count(joint: Joint) -> f64 {
+    const COUNTS: u16 = 1_000;
+    let [from, to] = [0, COUNTS].map(|counts| angle_from_counts(joint, counts, 0).0);
+    f64::from(from.abs_diff(to)) / 1e6 / f64::from(COUNTS)
 }
 
 /// The position of the tip, and the direction of the tool.

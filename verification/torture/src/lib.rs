@@ -19,6 +19,7 @@ pub mod seeded_rng;
 pub mod fuzz;
 mod linkage_goals;
 pub mod load;
+mod panic_handler;
 pub mod parser_trial;
 pub mod per_joint;
 pub mod result_table;

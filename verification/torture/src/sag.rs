@@ -11,14 +11,13 @@ use arm_sim::plant::Plant;
 use arm_sim::servo::ServoFault;
 use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::TorqueCodes;
-use motion_core::servo_bus::Torque;
-use motion_core::servo_bus::frame::{ServoFrameBuffer, register, sync_write};
 use protocol_core::registers::map::TARGET_POSITION;
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::FrameBuffer;
 
+use crate::panic_handler::{FRAMES, damping_frame};
 use crate::seeded_rng::SeededRng;
 
 /// Targets in degrees: the rear arm leans to the front, the forearm points down by 35 degrees.
@@ -33,8 +32,7 @@ pub const WATCHDOG_TIME: Duration = Duration::from_millis(2_000);
 pub const DISTURBANCE_TIME: Duration = Duration::from_millis(3_000);
 /// Random bytes of noise per millisecond.
 pub const NOISE_BYTES: usize = 4;
-/// The panic handler of the firmware sends the same frame four times, with a pause before each.
-const PANIC_FRAMES: usize = 4;
+/// The pause before each frame of the panic handler.
 const PANIC_PAUSE: Duration = Duration::from_millis(2);
 
 /// Joint 3, which lifts the forearm.
@@ -166,15 +164,9 @@ impl PosedArm {
     }
 
     fn panic(&mut self) {
-        let mut frame = ServoFrameBuffer::new();
-        let damping = [TorqueCodes::default().code(Torque::Damping)];
-        sync_write(
-            &mut frame,
-            register::TORQUE_SWITCH,
-            Joint::ALL.map(|joint| (joint.index(), damping)).into_iter(),
-        );
+        let frame = damping_frame(TorqueCodes::default());
         self.world.halt_controller(self.now);
-        for _ in 0..PANIC_FRAMES {
+        for _ in 0..FRAMES {
             self.run(PANIC_PAUSE);
             self.world.plant_mut().bytes(self.now, &frame);
         }

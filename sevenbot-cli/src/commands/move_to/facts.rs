@@ -135,7 +135,6 @@ impl Printable for TipArrival {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sevenbot::Angle;
     use sevenbot::cartesian::DOWN;
 
     #[test]
@@ -144,9 +143,7 @@ mod tests {
         let target = TipTarget::of(tip, DOWN).expect("within reach");
         let arrival = TipArrival::planned(tip, &target, DOWN);
         assert_eq!(arrival.targets_degrees, TargetDegrees::Whole([105, 88, 110, 90, 135]));
-        let arrival = arrival.with_measured(Some(MeasuredPose::whole(
-            [105, 88, 110, 90, 135, 90, 80].map(Angle::from_register),
-        )));
+        let arrival = arrival.with_measured(Some(MeasuredPose::whole([105, 88, 110, 90, 135, 90, 80])));
         let mut text = Vec::new();
         arrival.write_text(&mut text).expect("memory");
         let text = String::from_utf8(text).expect("text");

@@ -58,8 +58,8 @@ fn take(
 
 /// The present direction of the tool.
 fn present_tool(arm: &mut Arm) -> Result<Vector, CommandError> {
-    arm.wait_until_settled()?;
-    Ok(MeasuredPose::read(arm)?.tip_pose().tool)
+    let positions = arm.wait_until_settled()?.positions();
+    Ok(MeasuredPose::read(arm, positions)?.tip_pose().tool)
 }
 
 /// Moves joints 1 to 5. If `wait` is set, waits and returns the measured angles.
@@ -72,7 +72,7 @@ fn move_to(arm: &mut Arm, targets: FineTargets, wait: bool) -> Result<Option<Mea
         if !wait {
             return Ok(None);
         }
-        begun.finish(arm, &mut Watch::new(interrupt))?;
-        Ok(Some(MeasuredPose::read(arm)?))
+        let positions = begun.finish(arm, &mut Watch::new(interrupt))?;
+        Ok(Some(MeasuredPose::read(arm, positions)?))
     })
 }

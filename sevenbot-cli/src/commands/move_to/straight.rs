@@ -3,11 +3,11 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use sevenbot::FineAngle;
 use sevenbot::cartesian::{
     DirectionText, PointText, StraightLine, StraightLineRequest, TargetResolution, TipPose, Vector,
 };
 use sevenbot::moves::LineStart;
+use sevenbot::{Angle, FineAngle};
 
 use super::super::play::follow;
 use super::super::position::components;
@@ -34,7 +34,8 @@ pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
         return session.printer.print(&course);
     }
     follow(&mut arm, &line.recording)?;
-    let measured = MeasuredTip::of(MeasuredPose::read(&mut arm)?, args.tip());
+    let positions = arm.positions()?.map(Angle::degrees);
+    let measured = MeasuredTip::of(MeasuredPose::read(&mut arm, positions)?, args.tip());
     session.printer.print(&StraightMove { measured: Some(measured), ..course })
 }
 

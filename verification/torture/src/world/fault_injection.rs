@@ -1,14 +1,12 @@
 //! Injects the faults of the scenario, one at a time.
 
 use arm_sim::servo::ServoFault;
-use motion_core::servo_bus::Torque;
-use motion_core::servo_bus::frame::{ServoFrameBuffer, register, sync_write};
-use protocol_core::registers::Joint;
 use protocol_core::registers::map::MISSING_SERVOS;
 use protocol_core::time::Duration;
 
 use super::disturbed_bus::DisturbanceRates;
 use super::state::{Hand, PowerState, PoweredArm, TortureWorld};
+use crate::panic_handler::{FRAMES, damping_frame};
 use crate::scenario::InjectedFault;
 
 /// The time between two steps of a hand.
@@ -126,14 +124,11 @@ impl TortureWorld {
         self.power = PowerState::Off { until: self.now + time, servos_too: false };
     }
 
-    /// The controller panics: its panic handler sends damping to all servos four times and restarts.
+    /// The controller panics: its panic handler sends its frames to all servos and restarts.
     fn panic(&mut self, arm: &PoweredArm) {
         self.power_down(arm, false);
-        let mut frame = ServoFrameBuffer::new();
-        let code = self.bus.torque_codes().code(Torque::Damping);
-        let items = Joint::ALL.into_iter().map(|joint| (joint.index(), [code]));
-        sync_write(&mut frame, register::TORQUE_SWITCH, items);
-        for _ in 0..4 {
+        let frame = damping_frame(self.bus.torque_codes());
+        for _ in 0..FRAMES {
             self.now = self.now + PANIC_PAUSE;
             self.log.bus(self.now, "to servos, by the panic handler", &frame);
             self.bus.send_panic_frame(self.now, &frame);
