@@ -69,6 +69,9 @@ impl Arm {
 pub struct JointMove {
     targets: Targets,
     is_rounded: bool,
+    /// A joint this near to its target, in whole degrees, needs no more time to settle. 0 for targets in hundredths: rounded
+    /// as they are, one degree could be nearly two.
+    arrived: u8,
     /// Speeds, durations and positions before the move.
     plan: Snapshot,
     start: Instant,
@@ -82,7 +85,7 @@ impl JointMove {
     pub fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, MoveError> {
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         motors_obey(arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets)))?;
-        Ok(Self { targets, is_rounded: false, plan, start: arm.now() })
+        Ok(Self { targets, is_rounded: false, arrived: ARRIVED_DEGREES, plan, start: arm.now() })
     }
 
     /// As [`Self::begin`], in hundredths of a degree. An arm without the extended block takes the nearest whole degrees.
@@ -99,7 +102,7 @@ impl JointMove {
         }
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         motors_obey(arm.set_fine_targets_checked(&targets))?;
-        Ok(Self { targets: whole, is_rounded: false, plan, start: arm.now() })
+        Ok(Self { targets: whole, is_rounded: false, arrived: 0, plan, start: arm.now() })
     }
 
     /// Did the arm get whole degrees because it has no finer ones?
@@ -168,7 +171,7 @@ impl JointMove {
         let mut changed = start;
         // Without moving bits the joints may still be on their way: their duration is only an estimate.
         let timeout = if arm.identity().has_status_block() { SETTLE_TIMEOUT } else { self.timeout() };
-        while !self.away(&last, ARRIVED_DEGREES).is_empty()
+        while !self.away(&last, self.arrived).is_empty()
             && arm.now() < changed + STILL_TIME
             && arm.now() < start + timeout
         {
