@@ -342,3 +342,36 @@ fn d05_a_search_behind_a_head_goes_on_where_it_stopped() {
         assert_eq!(received.len(), expected, "{received:?}");
     }
 }
+
+/// A byte with a framing error belongs to no frame (D3): the frame around it is lost, and no other one.
+#[test]
+fn d03_no_frame_continues_across_a_damaged_byte() {
+    let frames = [frame(6, 46, &[1]), frame(6, 46, &[2]), frame(6, 46, &[3])];
+    let (length, bytes) = (frames[0].len(), frames.concat());
+    for cut in 0..=bytes.len() {
+        let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+        let mut received = Vec::new();
+        let (before, behind) = bytes.split_at(cut);
+        assert_eq!(deframer.push(Instant::ZERO, before), cut);
+        deframer.break_off();
+        stream::drain(&mut deframer, &mut received);
+        assert_eq!(deframer.push(Instant::ZERO, behind), behind.len());
+        stream::drain(&mut deframer, &mut received);
+        let is_split = |index: &usize| (index * length + 1..(index + 1) * length).contains(&cut);
+        let whole =
+            (0..3).filter(|index| !is_split(index)).map(|index| Received::Frame(frames[index].clone()));
+        let found: Vec<_> = received.into_iter().filter(|found| *found != Received::WrongCrc).collect();
+        assert_eq!(found, whole.collect::<Vec<_>>(), "damage after {cut} bytes");
+    }
+}
+
+#[test]
+fn d03_a_frame_in_the_data_of_a_broken_one_comes_out_at_once() {
+    let inner = frame(6, 46, &[90; 7]);
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    deframer.push(Instant::ZERO, &[&[0xAA, 0x77, 6, 0x10, 0xFF], inner.as_slice()].concat());
+    deframer.break_off();
+    assert_eq!(deframer.push(Instant::ZERO, &[1]), 0, "pull first");
+    assert_eq!(stream::pull(&mut deframer), Some(Received::Frame(inner)));
+    assert_eq!(stream::pull(&mut deframer), None);
+}

@@ -8,8 +8,8 @@ use super::joint::{JOINTS, Joint};
 use super::map::{CHIP_ID, EEPROM_LOCK, OFFSET, refusal};
 use super::map21::{self, Map, OPTIONS, option};
 use super::rules::{
-    DEFAULTS, EEPROM_END, EEPROM_START, Refused, WORDS_START, first_refused_word, keeps_bytes_of_21, rule,
-    rule_21, rules_21_from, rules_from,
+    DEFAULTS, EEPROM_END, EEPROM_START, EXTENDED_START, Refused, first_refused_value, keeps_bytes_of_21,
+    rule, rule_21, rules_21_from, rules_from,
 };
 use super::spec::Register;
 
@@ -56,10 +56,10 @@ impl Accepted<'_> {
         self.values_at(address).map(u16::from_le_bytes)
     }
 
-    /// Does the write reach the extended block? No other registers have two bytes.
+    /// Does the write reach the extended block? The registers before it have one byte, and no minimum.
     #[must_use]
-    pub fn has_words(&self) -> bool {
-        usize::from(self.start) + self.values.len() > usize::from(WORDS_START)
+    pub fn is_extended(&self) -> bool {
+        usize::from(self.start) + self.values.len() > usize::from(EXTENDED_START)
     }
 
     /// The bytes for `N` registers from `address` on; `None` unless the write has an effect on all of them.
@@ -193,7 +193,7 @@ impl RegisterFile {
     pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, Refused> {
         let (start, values) = self.unlocked(address, values);
         let accepted = Accepted { map: Map::V22, start, values };
-        let word = if accepted.has_words() { first_refused_word(start, values) } else { None };
+        let word = if accepted.is_extended() { first_refused_value(start, values) } else { None };
         for ((rule, &value), address) in rules_from(start).iter().zip(values).zip(start..) {
             if !rule.allows(value) {
                 let byte = Refused { reason: refusal::OUT_OF_RANGE, address };
@@ -310,7 +310,8 @@ mod tests {
         let targets = [9_000_u16, 9_000, 6_500, 9_000, 9_000, 9_000, 8_000].map(u16::to_le_bytes);
         assert_eq!(file.read(128, 14), targets.as_flattened());
         assert_eq!((file.read(142, 14), file.read(156, 35)), ([0xFF; 14].as_slice(), [0; 35].as_slice()));
-        assert_eq!((file.read(191, 1), file.read(192, 48)), ([1].as_slice(), [0; 48].as_slice()));
+        assert_eq!(file.read(191, 9), [1, 1, 70, 40, 0, 0, 0, 0, 1]);
+        assert_eq!(file.read(200, 40), [0; 40]);
     }
 
     #[test]
@@ -382,7 +383,7 @@ mod tests {
             [128, 130, 132].map(|address| accepted.word_at(address)),
             [Some(0x201), Some(0x403), None]
         );
-        assert!(accepted.has_words() && !file.check(46, &[0; 82]).unwrap().has_words());
+        assert!(accepted.is_extended() && !file.check(46, &[0; 82]).unwrap().is_extended());
         file.set_word(142, 0x1234);
         assert_eq!((file.word(142), file.read(142, 2)), (0x1234, [0x34, 0x12].as_slice()));
     }

@@ -1,4 +1,4 @@
-//! THE TABLE: every register of the 7Bot V2 (docs/protocol.md, sections 3 to 6).
+//! THE TABLE: every register of the 7Bot V2 (docs/protocol.md).
 //!
 //! No other file holds a register address as a number.
 
@@ -85,6 +85,23 @@ register_map! {
     MEASURED_JOINTS = ram(190).read_only();
     /// Layout version of the extended block, this project's addition.
     EXTENDED_VERSION = ram(191).read_only().default(1);
+    /// 1: a joint that pushes harder than its limit gives way, and a servo that let go engages anew. 0: neither does (D27,
+    /// D28).
+    PROTECTION = ram(192).up_to(1).default(1);
+    /// How hard a joint may push; joint 7 too while the effector is a suction cup (D27).
+    PUSH_LIMIT = ram(193).between(20, 100).default(70).unit(Unit::PercentOfStall);
+    /// How hard joint 7 may push while the effector is a gripper (D27).
+    GRIP_LIMIT = ram(194).between(10, 100).default(40).unit(Unit::PercentOfStall);
+    /// Joints that an obstacle keeps from their targets: bit n-1 is joint n (D27).
+    BLOCKED_JOINTS = ram(195).read_only();
+    /// Joints whose servo holds no torque although it should: bit n-1 is joint n (D28).
+    LET_GO_JOINTS = ram(196).read_only();
+    /// Error bits of the servos' last answers, of all together: 0 voltage, 2 heat, 5 overload (D28).
+    SERVO_ALARMS = ram(197).read_only();
+    /// 1: the supply of the servos was lost, so the motor state is 0 until register 29 is written (D29).
+    SUPPLY_LOST = ram(198).read_only();
+    /// Layout version of the protection block, this project's addition.
+    PROTECTION_VERSION = ram(199).read_only().default(1);
     /// Layout version of the status block, this project's addition.
     STATUS_VERSION = ram(240).read_only().default(1);
     /// Bits: 0 settings storage, 1 servo bus, 2 watchdog restart, 3 brown-out restart, 4 crystal failed,
@@ -141,6 +158,16 @@ pub mod fault {
     pub const HOST_SILENT: u8 = 1 << 6;
 }
 
+/// The bits of [`SERVO_ALARMS`], and of the error byte in a servo's answers.
+pub mod servo_alarm {
+    /// The supply is too low or too high.
+    pub const VOLTAGE: u8 = 1 << 0;
+    /// The motor is too hot.
+    pub const OVERHEAT: u8 = 1 << 2;
+    /// The motor was overloaded for too long. The bit stays until torque is switched off and on.
+    pub const OVERLOAD: u8 = 1 << 5;
+}
+
 /// The reasons of [`LAST_REFUSAL`].
 pub mod refusal {
     /// Nothing was refused yet.
@@ -167,6 +194,14 @@ pub mod motor_state {
     pub const SERVO: u8 = 1;
     /// The joints move freely.
     pub const FORCELESS: u8 = 2;
+}
+
+/// The values of [`EFFECTOR_TYPE`].
+pub mod effector {
+    /// A suction cup.
+    pub const SUCTION_CUP: u8 = 0;
+    /// A gripper: joint 7 is its claw.
+    pub const GRIPPER: u8 = 1;
 }
 
 /// The bits of [`LIMITS`].

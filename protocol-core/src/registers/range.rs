@@ -5,6 +5,8 @@
 pub enum Range {
     /// Every byte up to and including this one.
     UpTo(u8),
+    /// Every byte from the first one to the second.
+    Between(u8, u8),
     /// Bit 7 is the sign, the rest a magnitude up to and including this one; 0x80 is a zero (D9).
     SignMagnitude(u8),
     /// A number from minus this one to this one, at most 56, in any of three encodings: 128 more than the number, the
@@ -26,7 +28,7 @@ impl Range {
     #[must_use]
     pub const fn width(self) -> u8 {
         match self {
-            Self::UpTo(_) | Self::SignMagnitude(_) | Self::Biased(_) => 1,
+            Self::UpTo(_) | Self::Between(..) | Self::SignMagnitude(_) | Self::Biased(_) => 1,
             Self::WordUpTo(_) | Self::ZeroOr(..) | Self::SignedWord => 2,
         }
     }
@@ -37,6 +39,7 @@ impl Range {
         let [byte, high] = raw.to_le_bytes();
         match self {
             Self::UpTo(max) => high == 0 && byte <= max,
+            Self::Between(min, max) => high == 0 && min <= byte && byte <= max,
             Self::SignMagnitude(max) => high == 0 && byte & !SIGN <= max,
             Self::Biased(max) => high == 0 && byte.wrapping_add(max) & !SIGN <= 2 * max,
             Self::WordUpTo(max) => raw <= max,
@@ -94,6 +97,7 @@ impl Range {
     pub const fn bounds(self) -> (i32, i32) {
         match self {
             Self::UpTo(max) => (0, max as i32),
+            Self::Between(min, max) => (min as i32, max as i32),
             Self::SignMagnitude(max) | Self::Biased(max) => (-(max as i32), max as i32),
             Self::WordUpTo(max) | Self::ZeroOr(_, max) => (0, max as i32),
             Self::SignedWord => (-0x8000, 0x7FFF),
@@ -119,7 +123,13 @@ mod tests {
 
     #[test]
     fn every_value_of_a_range_survives_decode_and_encode() {
-        for range in [Range::UpTo(0), Range::UpTo(100), Range::UpTo(255), Range::SignMagnitude(16)] {
+        for range in [
+            Range::UpTo(0),
+            Range::UpTo(100),
+            Range::UpTo(255),
+            Range::Between(20, 100),
+            Range::SignMagnitude(16),
+        ] {
             for byte in (0..=255).filter(|&byte| range.contains(byte) && byte != u16::from(SIGN)) {
                 assert_eq!(range.encode(range.decode(byte)), Some(byte), "{range:?}");
             }
@@ -165,7 +175,8 @@ mod tests {
 
     #[test]
     fn a_byte_register_takes_no_second_byte() {
-        for range in [Range::UpTo(255), Range::SignMagnitude(127), Range::Biased(16)] {
+        for range in [Range::UpTo(255), Range::Between(0, 255), Range::SignMagnitude(127), Range::Biased(16)]
+        {
             assert!(range.contains(0) && !range.contains(0x100) && range.width() == 1, "{range:?}");
         }
     }

@@ -1,5 +1,5 @@
-//! The rules for writes, generated from both tables at compile time. The image holds two bytes per register and map, six
-//! per word, and none of the tables' text. A word is a register of two bytes.
+//! The rules for writes, generated from both tables at compile time. The image holds two bytes per register and map, eight
+//! per value that these two do not check, and none of the tables' text.
 
 use super::map::{MAP, PRESENT_POSITION, refusal};
 use super::map21::MAP_21;
@@ -16,11 +16,11 @@ const _: () = assert!(EEPROM_END == eeprom_bounds(MAP_21).1, "both maps have the
 static RULES: [Rule; writable_end(MAP)] = rules(MAP);
 /// The rules of all addresses that function 04 can write.
 static RULES_21: [Rule; writable_end(MAP_21)] = rules(MAP_21);
-/// The rules of all words that function 06 can write, in ascending order. Map 2.1 has none.
-static WORDS: [WordRule; writable_words(MAP)] = word_rules(MAP);
-/// Address of the first word that can be written.
-pub(super) const WORDS_START: u8 = first_word(MAP);
-const _: () = assert!(writable_words(MAP_21) == 0, "function 04 writes no words");
+/// The rules of all values that function 06 can write and a [`Rule`] does not check, in ascending order. Map 2.1 has none.
+static VALUE_RULES: [ValueRule; checked_values(MAP)] = value_rules(MAP);
+/// Address of the first value that a [`ValueRule`] checks: the start of the extended block.
+pub(super) const EXTENDED_START: u8 = first_checked_value(MAP);
+const _: () = assert!(checked_values(MAP_21) == 0, "function 04 writes bytes that a mask and a limit check");
 /// The values of a new arm after power-up.
 pub(super) static DEFAULTS: [u8; 256] = defaults();
 
@@ -75,7 +75,7 @@ impl Rule {
             (Access::ReadWrite, Range::UpTo(max)) => Self { mask: 0xFF, max },
             (Access::ReadWrite, Range::SignMagnitude(max)) => Self { mask: !SIGN, max },
             (Access::ReadWrite, Range::Biased(max)) => Self { mask: !SIGN, max: 2 * max },
-            // The two bytes are checked together, by a `WordRule`.
+            // A `ValueRule` checks it.
             (Access::ReadWrite, _) => Self { mask: 0xFF, max: 0xFF },
             _ => Self::CLOSED,
         }
@@ -97,49 +97,37 @@ impl Rule {
     }
 }
 
-/// The rule for a write to one word: 0, or a number from `min` to `max`.
+/// The rule for a write to a value of two bytes, or to a byte with a minimum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct WordRule {
-    /// The address of the low byte.
+struct ValueRule {
+    /// The address of the byte, or of the low byte.
     address: u8,
-    min: u16,
-    max: u16,
+    range: Range,
 }
 
-impl WordRule {
-    const fn of(register: &Register, address: u8) -> Self {
-        let (min, max) = match register.range {
-            Range::WordUpTo(max) => (0, max),
-            Range::ZeroOr(min, max) => (min, max),
-            _ => (0, u16::MAX),
-        };
-        Self { address, min, max }
-    }
-
-    const fn allows(self, word: u16) -> bool {
-        word == 0 || (self.min <= word && word <= self.max)
-    }
-
-    /// The reason why a write of `values` from `start` on is refused because of this word, if it is (D22).
+impl ValueRule {
+    /// The reason why a write of `values` from `start` on is refused because of this value, if it is (D16, D22).
     fn refusal(self, start: u8, values: &[u8]) -> Option<u8> {
         let byte = |address: u8| values.get(usize::from(address.checked_sub(start)?)).copied();
-        match (byte(self.address), byte(self.address + 1)) {
-            (None, None) => None,
+        let high = if self.range.width() == 2 { byte(self.address + 1) } else { Some(0) };
+        match (byte(self.address), high) {
             (Some(low), Some(high)) => {
-                (!self.allows(u16::from_le_bytes([low, high]))).then_some(refusal::OUT_OF_RANGE)
+                (!self.range.contains(u16::from_le_bytes([low, high]))).then_some(refusal::OUT_OF_RANGE)
             }
+            (None, None) => None,
+            (None, _) if self.range.width() == 1 => None,
             _ => Some(refusal::HALF_A_WORD),
         }
     }
 }
 
-/// The first word because of which a write of `values` from `start` on is refused (D22).
-pub(super) fn first_refused_word(start: u8, values: &[u8]) -> Option<Refused> {
-    let refused = |word: &WordRule| {
-        let reason = word.refusal(start, values)?;
-        Some(Refused { reason, address: word.address })
+/// The first value because of which a write of `values` from `start` on is refused (D16, D22).
+pub(super) fn first_refused_value(start: u8, values: &[u8]) -> Option<Refused> {
+    let refused = |value: &ValueRule| {
+        let reason = value.refusal(start, values)?;
+        Some(Refused { reason, address: value.address })
     };
-    WORDS.iter().find_map(refused)
+    VALUE_RULES.iter().find_map(refused)
 }
 
 // The functions below run at compile time and in a test. An index out of bounds is a build error, not a panic.
@@ -171,26 +159,28 @@ const fn eeprom_bounds(map: &[Register]) -> (u8, u8) {
     (start, end)
 }
 
-const fn is_writable_word(row: &Register) -> bool {
-    matches!(row.access, Access::ReadWrite) && row.range.width() == 2
+/// Does a [`ValueRule`] check the values of this row?
+const fn needs_value_rule(row: &Register) -> bool {
+    let has_minimum = matches!(row.range, Range::Between(..));
+    matches!(row.access, Access::ReadWrite) && (row.range.width() == 2 || has_minimum)
 }
 
-const fn writable_words(map: &[Register]) -> usize {
-    let mut words = 0;
+const fn checked_values(map: &[Register]) -> usize {
+    let mut values = 0;
     let mut rest = map;
     while let [row, tail @ ..] = rest {
-        if is_writable_word(row) {
-            words += row.count as usize / 2;
+        if needs_value_rule(row) {
+            values += row.count as usize / row.range.width() as usize;
         }
         rest = tail;
     }
-    words
+    values
 }
 
-const fn first_word(map: &[Register]) -> u8 {
+const fn first_checked_value(map: &[Register]) -> u8 {
     let mut rest = map;
     while let [row, tail @ ..] = rest {
-        if is_writable_word(row) {
+        if needs_value_rule(row) {
             return row.address;
         }
         rest = tail;
@@ -199,18 +189,18 @@ const fn first_word(map: &[Register]) -> u8 {
 }
 
 #[allow(clippy::indexing_slicing, clippy::cast_possible_truncation)]
-const fn word_rules<const WORDS: usize>(map: &[Register]) -> [WordRule; WORDS] {
-    let mut words = [WordRule { address: 0, min: 0, max: 0 }; WORDS];
+const fn value_rules<const VALUES: usize>(map: &[Register]) -> [ValueRule; VALUES] {
+    let mut values = [ValueRule { address: 0, range: Range::UpTo(0) }; VALUES];
     let (mut rest, mut index) = (map, 0);
     while let [row, tail @ ..] = rest {
         let mut offset = 0;
-        while is_writable_word(row) && offset < row.count {
-            words[index] = WordRule::of(row, row.address + offset);
-            (index, offset) = (index + 1, offset + 2);
+        while needs_value_rule(row) && offset < row.count {
+            values[index] = ValueRule { address: row.address + offset, range: row.range };
+            (index, offset) = (index + 1, offset + row.range.width());
         }
         rest = tail;
     }
-    words
+    values
 }
 
 #[allow(clippy::indexing_slicing)]
@@ -255,8 +245,8 @@ mod tests {
     /// Runs the compile-time functions at run time, so that coverage and mutation tests see them.
     #[test]
     fn the_rules_and_defaults_follow_from_the_table() {
-        assert_eq!((writable_end(MAP), eeprom_bounds(MAP)), (190, (8, 28)));
-        let rules: [Rule; 190] = rules(MAP);
+        assert_eq!((writable_end(MAP), eeprom_bounds(MAP)), (195, (8, 28)));
+        let rules: [Rule; 195] = rules(MAP);
         assert_eq!(rules.as_slice(), RULES.as_slice());
         assert_eq!(defaults(), DEFAULTS);
         let rule = |mask, max| Rule { mask, max };
@@ -277,24 +267,38 @@ mod tests {
     }
 
     #[test]
-    fn d22_the_word_rules_follow_from_the_table() {
-        assert_eq!((writable_words(MAP), writable_words(MAP_21), first_word(MAP)), (8, 0, 128));
-        assert_eq!(first_word(MAP_21), u8::MAX);
-        let words: [WordRule; 8] = word_rules(MAP);
-        assert_eq!(words, WORDS);
-        let addresses = words.map(|word| word.address);
-        assert_eq!(addresses, [128, 130, 132, 134, 136, 138, 140, 184]);
-        for (word, raw) in words.iter().flat_map(|word| (0..=u16::MAX).map(move |raw| (word, raw))) {
-            let row = MAP.iter().find(|row| row.holds(word.address));
-            assert_eq!(Some(word.allows(raw)), row.map(|row| row.range.contains(raw)), "{word:?}: {raw}");
+    fn d22_the_value_rules_follow_from_the_table() {
+        assert_eq!((checked_values(MAP), checked_values(MAP_21), first_checked_value(MAP)), (10, 0, 128));
+        assert_eq!(first_checked_value(MAP_21), u8::MAX);
+        let values: [ValueRule; 10] = value_rules(MAP);
+        assert_eq!(values, VALUE_RULES);
+        let addresses = values.map(|value| value.address);
+        assert_eq!(addresses, [128, 130, 132, 134, 136, 138, 140, 184, 193, 194]);
+    }
+
+    #[test]
+    fn d27_a_byte_with_a_minimum_is_refused_below_it_and_never_half() {
+        let refused = |start, values: &[u8]| first_refused_value(start, values);
+        let out_of_range = |address| Some(Refused { reason: refusal::OUT_OF_RANGE, address });
+        for (limits, expected) in [
+            ([20, 10], None),
+            ([100, 100], None),
+            ([19, 10], out_of_range(193)),
+            ([20, 9], out_of_range(194)),
+            ([101, 101], out_of_range(193)),
+        ] {
+            assert_eq!(refused(193, &limits), expected, "{limits:?}");
+            assert_eq!(refused(192, &[1, limits[0], limits[1]]), expected, "{limits:?}");
         }
-        assert_eq!(WordRule::of(&MAP[0], 0), WordRule { address: 0, min: 0, max: u16::MAX });
+        assert_eq!(refused(193, &[20]), None);
+        assert_eq!(refused(194, &[9]), out_of_range(194));
+        assert_eq!(refused(185, &[0]), Some(Refused { reason: refusal::HALF_A_WORD, address: 184 }));
     }
 
     #[test]
     fn a_rule_allows_what_the_range_of_its_row_contains() {
         for row in
-            MAP.iter().chain(MAP_21).filter(|row| row.access == Access::ReadWrite && row.range.width() == 1)
+            MAP.iter().chain(MAP_21).filter(|row| row.access == Access::ReadWrite && !needs_value_rule(row))
         {
             let is_biased = matches!(row.range, Range::Biased(_));
             let is_signed = matches!(row.range, Range::SignMagnitude(_));

@@ -40,6 +40,8 @@ pub enum Unit {
     DecidegreePerSecond,
     /// Tenths of a percent of the stall torque.
     PermilleOfStall,
+    /// Percent of the stall torque.
+    PercentOfStall,
     /// Milliseconds.
     Millisecond,
     /// Hundredths of a second.
@@ -68,6 +70,7 @@ impl Unit {
             Self::Centidegree => "× 0.01 °",
             Self::DecidegreePerSecond => "× 0.1 °/s",
             Self::PermilleOfStall => "× 0.1 %",
+            Self::PercentOfStall => "%",
             Self::Millisecond => "ms",
             Self::Centisecond => "× 10 ms",
             Self::SpeedStep => "× 1.9 °/s",
@@ -172,6 +175,12 @@ impl Register {
     /// Sets the range 0 to `max`.
     pub(crate) const fn up_to(mut self, max: u8) -> Self {
         self.range = Range::UpTo(max);
+        self
+    }
+
+    /// Sets the range `min` to `max`.
+    pub(crate) const fn between(mut self, min: u8, max: u8) -> Self {
+        self.range = Range::Between(min, max);
         self
     }
 

@@ -96,6 +96,16 @@ impl<D: Direction> Deframer<D> {
         taken.len()
     }
 
+    /// Records that a byte was damaged or lost behind all bytes so far. As after a timeout, no frame continues across this
+    /// place, complete frames before it come out, and nothing is taken until [`Deframer::pull`] has passed it.
+    pub fn break_off(&mut self) {
+        let end = self.buffer.len();
+        if self.search.finished() < end {
+            self.search.note_gap(end);
+            self.search.note_timeout(end);
+        }
+    }
+
     /// The next frame or defect; `None` once the bytes so far hold no more. Call it until then.
     pub fn pull(&mut self) -> Option<Result<Frame<'_>, Defect>> {
         self.search.next::<D>(&self.buffer)
