@@ -9,9 +9,9 @@
 //! A write is checked completely, then executed completely (D15 to D17). This file does not know the host's stream.
 
 use protocol_core::registers::map::{
-    FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_CORRUPTED, HOST_WATCHDOG, LIMITS, MOTOR_STATE,
-    REPORT_CONTENT, SERVO_BUS_ERRORS, SUPPLY_VOLTAGE, VACUUM_PUMP, WATCHDOG_ACTION, fault, motor_state,
-    refusal,
+    FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_CORRUPTED, HOST_WATCHDOG, LIMITS, MOTOR_STATE, PROTECTION,
+    REPORT_CONTENT, SERVO_BUS_ERRORS, SUPPLY_LOST, SUPPLY_VOLTAGE, VACUUM_PUMP, WATCHDOG_ACTION, fault,
+    motor_state, refusal,
 };
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, OPTIONS, option};
 use protocol_core::registers::{Accepted, Image, Joint, RegisterFile};
@@ -27,7 +27,7 @@ use crate::joints::Joints;
 use crate::limit_check::LimitCheck;
 use crate::motor_state::MotorState;
 use crate::reach::{self, Reached};
-use crate::servo_bus::{Outcome, Reading};
+use crate::servo_bus::{Answer, Outcome};
 use crate::status::Status;
 use crate::vacuum::VacuumControl;
 
@@ -73,8 +73,8 @@ impl ArmControl {
     pub(crate) fn take_answers(&mut self, now: Instant) {
         while let Some(outcome) = self.bus.outcome(now) {
             match outcome {
-                Outcome::Measured { joint, reading, alarms, is_timely } => {
-                    self.measured(now, joint, (reading, alarms), is_timely);
+                Outcome::Measured { joint, answer, is_timely } => {
+                    self.measured(now, joint, &answer, is_timely);
                 }
                 Outcome::Failed { joint } => self.failed(now, joint),
             }
@@ -84,33 +84,33 @@ impl ArmControl {
         }
     }
 
-    /// Prepares the start of the goals' frame if a control cycle is due that can send goals, and returns whether it did. Then
-    /// [`ArmControl::advance`] and the frame come next: until then no joint may engage, fall silent or be released.
-    pub(crate) fn begin_goals(&mut self, now: Instant) -> bool {
-        self.bus.cycle_due(now).is_some() && self.bus.begin_goals(now, &self.joints)
-    }
-
     /// Advances all set-points if a control cycle is due.
     pub(crate) fn advance(&mut self, now: Instant) {
         let Some(end) = self.bus.cycle_due(now) else { return };
         self.bus.begin_cycle(end);
-        if self.joints.advance(end, &self.registers) {
+        self.joints.doubt_torque(now);
+        if self.joints.advance(end, &mut self.registers) {
             self.bus.goals_changed();
         }
         Status::show_moving(&mut self.registers, &self.joints);
         self.watchdog_is_due = true;
     }
 
-    fn measured(&mut self, now: Instant, joint: Joint, reading: (Reading, u8), is_timely: bool) {
+    fn measured(&mut self, now: Instant, joint: Joint, answer: &Answer, is_timely: bool) {
         let may_engage = is_timely && !self.bus.is_starting();
-        let outcome = self.joints.measured(now, joint, reading, may_engage, &mut self.registers);
+        let outcome = self.joints.measured(now, joint, answer, may_engage, &mut self.registers);
         match outcome {
             Measured::Rejected => return,
             Measured::FellSilent => return self.show_servos(),
-            Measured::Accepted | Measured::ServoChanged => {}
+            Measured::Accepted | Measured::ServoChanged | Measured::TorqueLost => {}
             Measured::Engaged => self.bus.joint_engaged(),
+            Measured::Freed => self.bus.torque_changed(),
+            Measured::SupplyLost => {
+                self.registers.set(SUPPLY_LOST.address, 1);
+                self.damp();
+            }
         }
-        self.registers.set(SUPPLY_VOLTAGE.address, reading.0.voltage_decivolts);
+        self.registers.set(SUPPLY_VOLTAGE.address, answer.reading.voltage_decivolts);
         if outcome != Measured::Accepted {
             self.show_servos();
         }
@@ -142,7 +142,7 @@ impl ArmControl {
             return self.refuse(refusal::AGAINST_A_LIMIT, address);
         }
         self.execute(now, &accepted, changes_settings);
-        if accepted.has_words() {
+        if accepted.is_extended() {
             self.execute_extended(now, &accepted);
         }
         let sets_frequency = accepted.value_at(FEEDBACK_FREQUENCY.address).is_some();
@@ -180,7 +180,7 @@ impl ArmControl {
 
     fn against_limit(&self, accepted: &Accepted<'_>, reached: &Reached) -> Option<u8> {
         let limits = self.registers.get(LIMITS.address);
-        let may_change = accepted.has_words() && accepted.value_at(LIMITS.address).is_some();
+        let may_change = accepted.is_extended() && accepted.value_at(LIMITS.address).is_some();
         if limits == 0 && !may_change {
             return None;
         }
@@ -216,12 +216,15 @@ impl ArmControl {
         Status::show_moving(&mut self.registers, &self.joints);
     }
 
-    /// Executes what only the extended block has.
+    /// Executes what only the extended block and the protection block have.
     fn execute_extended(&mut self, now: Instant, accepted: &Accepted<'_>) {
         if let Some(value) = accepted.value_at(HOST_WATCHDOG.address) {
             self.watchdog.set(now, value);
             self.status.clear_faults(fault::HOST_SILENT);
             self.status.show_faults(&mut self.registers, &self.joints);
+        }
+        if accepted.value_at(PROTECTION.address) == Some(0) {
+            self.joints.forget_obstacles();
         }
     }
 
@@ -234,8 +237,7 @@ impl ArmControl {
         if self.registers.get(WATCHDOG_ACTION.address) == 0 {
             self.joints.hold(&mut self.registers);
         } else {
-            self.registers.set(MOTOR_STATE.address, motor_state::DAMPING);
-            self.enter_state(MotorState::Damping);
+            self.damp();
         }
         Status::show_moving(&mut self.registers, &self.joints);
         self.raise_faults(fault::HOST_SILENT);
@@ -256,13 +258,23 @@ impl ArmControl {
 
     fn set_motor_state(&mut self, accepted: &Accepted<'_>) {
         if let Some(value) = accepted.value_at(MOTOR_STATE.address) {
+            self.registers.set(SUPPLY_LOST.address, 0);
             self.enter_state(MotorState::from_register(value));
+            if self.joints.order() {
+                self.bus.torque_changed();
+            }
         }
+    }
+
+    /// Enters state 0 by itself (D24, D29).
+    fn damp(&mut self) {
+        self.registers.set(MOTOR_STATE.address, motor_state::DAMPING);
+        self.enter_state(MotorState::Damping);
     }
 
     fn enter_state(&mut self, state: MotorState) {
         if self.joints.set_state(state, &mut self.registers) {
-            self.bus.state_changed();
+            self.bus.torque_changed();
         }
     }
 

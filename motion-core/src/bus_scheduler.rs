@@ -7,6 +7,7 @@
 //! Goals are sent before torque, so that no servo gets torque with an old goal. During start-up only reads are sent.
 //! This file does not know angles.
 
+use protocol_core::registers::map::PROTECTION;
 use protocol_core::registers::{JOINTS, Joint, RegisterFile};
 use protocol_core::time::{Duration, Instant};
 
@@ -20,6 +21,9 @@ use crate::servo_bus::{Bus, Outcome};
 const START_UP_TIME: Duration = Duration::from_millis(500);
 /// The torque switches are set again after this many control cycles, in case a frame was lost.
 const TORQUE_REFRESH_CYCLES: u8 = 25;
+/// A torque switch is refreshed only if it was read on at most this many cycles before (D28): enough for a bus on which a
+/// question takes 16 ms.
+const TORQUE_READ_CYCLES: u8 = 12;
 
 /// The servo bus and its schedule.
 #[derive(Clone, Debug)]
@@ -29,8 +33,6 @@ pub(crate) struct BusScheduler {
     starting_until: Option<Instant>,
     next_cycle: Instant,
     goals_due: bool,
-    /// The start of the goals' frame was prepared. The whole frame follows next.
-    has_begun_goals: bool,
     torque_due: bool,
     torque_refresh_in: u8,
     next_to_read: Joint,
@@ -42,11 +44,10 @@ impl BusScheduler {
     /// A bus at the start of the controller. The servos may have power already.
     pub(crate) fn new(now: Instant, config: &Config) -> Self {
         Self {
-            bus: Bus::new(config.servo_timeout, config.guard_time, config.torque_codes),
+            bus: Bus::new(config.servo_baud, config.servo_timeout, config.guard_time, config.torque_codes),
             starting_until: Some(now + START_UP_TIME),
             next_cycle: now,
             goals_due: false,
-            has_begun_goals: false,
             torque_due: false,
             torque_refresh_in: TORQUE_REFRESH_CYCLES,
             next_to_read: Joint::ALL[0],
@@ -57,6 +58,11 @@ impl BusScheduler {
     /// Takes bytes that were received by `now`.
     pub(crate) fn servo_bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.bus.bytes(now, bytes);
+    }
+
+    /// See [`Bus::damaged_byte`].
+    pub(crate) fn servo_byte_damaged(&mut self, now: Instant) {
+        self.bus.damaged_byte(now);
     }
 
     /// See [`Bus::set_answer_delay`].
@@ -99,25 +105,9 @@ impl BusScheduler {
         self.torque_due = true;
     }
 
-    /// Schedules torque, because the motor state changed.
-    pub(crate) const fn state_changed(&mut self) {
+    /// Schedules torque, because the motor state changed, or an alarm has freed a joint.
+    pub(crate) const fn torque_changed(&mut self) {
         self.torque_due = true;
-    }
-
-    /// Prepares the start of the goals' frame if the bus is free and no torque is due. Returns whether there is one. Then
-    /// [`BusScheduler::prepare_frame`] has to prepare the whole, with the same joints.
-    pub(crate) fn begin_goals(&mut self, now: Instant, joints: &Joints) -> bool {
-        let driven = joints.driven();
-        self.has_begun_goals = driven > 0 && !self.torque_due && self.bus.is_free(now);
-        if self.has_begun_goals {
-            self.bus.begin_goals(driven);
-        }
-        self.has_begun_goals
-    }
-
-    /// Must the whole frame of the goals follow next?
-    pub(crate) const fn has_begun_goals(&self) -> bool {
-        self.has_begun_goals
     }
 
     /// When the control cycle was due that has to begin at `now`; `None` before it is due. At most one missed cycle is
@@ -146,16 +136,12 @@ impl BusScheduler {
         joints: &mut Joints,
         registers: &RegisterFile,
     ) -> bool {
-        if self.has_begun_goals {
-            self.has_begun_goals = false;
-            return self.prepare_goals(now, joints, registers);
-        }
         if self.torque_due {
             joints.expire_pending(now);
         }
         self.bus.is_free(now)
             && (self.prepare_goals(now, joints, registers)
-                || self.prepare_torque(now, joints)
+                || self.prepare_torque(now, joints, registers)
                 || self.prepare_read(now, joints))
     }
 
@@ -167,12 +153,12 @@ impl BusScheduler {
         any
     }
 
-    fn prepare_torque(&mut self, now: Instant, joints: &mut Joints) -> bool {
+    fn prepare_torque(&mut self, now: Instant, joints: &mut Joints, registers: &RegisterFile) -> bool {
         if self.is_starting() || !core::mem::take(&mut self.torque_due) {
             return false;
         }
         self.torque_refresh_in = TORQUE_REFRESH_CYCLES;
-        let switches = joints.take_torque();
+        let switches = joints.take_torque(registers.get(PROTECTION.address) != 0);
         let any = switches.iter().any(Option::is_some);
         if any {
             let named = Joint::ALL.into_iter().zip(switches);
@@ -187,8 +173,9 @@ impl BusScheduler {
             self.left_to_read -= 1;
             let joint = self.next_to_read;
             self.next_to_read = Joint::from_index(joint.index() + 1).unwrap_or(Joint::ALL[0]);
-            if joints.wants_asking(joint, now) {
-                self.bus.ask(now, joint);
+            let is_refresh_near = self.torque_refresh_in <= TORQUE_READ_CYCLES;
+            if let Some(question) = joints.question(joint, now, is_refresh_near) {
+                self.bus.ask(now, joint, question);
                 return true;
             }
         }
@@ -209,8 +196,8 @@ fn earlier(now: Instant, by: Duration) -> Instant {
 mod tests {
     use super::*;
     use crate::motor_state::MotorState;
+    use crate::servo_bus::TorqueCodes;
     use crate::servo_bus::frame::Instruction;
-    use crate::servo_bus::{Reading, TorqueCodes};
 
     fn at(micros: u64) -> Instant {
         Instant::from_micros(micros)
@@ -220,6 +207,7 @@ mod tests {
         let config = Config {
             chip_id: [0; 6],
             faults: 0,
+            servo_baud: 1_000_000,
             servo_timeout: Duration::from_millis(1),
             guard_time: Duration::from_micros(100),
             torque_codes: TorqueCodes::default(),
@@ -254,36 +242,13 @@ mod tests {
     #[test]
     fn d12_a_change_of_state_waits_for_the_end_of_start_up() {
         let (mut scheduler, mut joints) = (scheduler(), Joints::new(MotorState::Damping));
-        scheduler.state_changed();
+        scheduler.torque_changed();
         assert!(cycle(&mut scheduler, &mut joints, 0).iter().all(|&(code, _)| code == READ));
         assert!(
             !scheduler.end_start_up(at(499_999), &joints) && scheduler.end_start_up(at(500_000), &joints)
         );
         let first = cycle(&mut scheduler, &mut joints, 500_000).first().copied();
         assert_eq!(first, Some((Instruction::SyncWrite as u8, 0xFE)));
-    }
-
-    #[test]
-    fn d12_goals_do_not_begin_before_it_is_clear_which_joints_get_torque() {
-        let (mut scheduler, mut joints) = (scheduler(), Joints::new(MotorState::Servo));
-        let mut registers = RegisterFile::new([0; 6], None);
-        assert!(scheduler.end_start_up(at(500_000), &joints));
-        let reading = Reading {
-            position_counts: 511,
-            speed: 0,
-            load: 0,
-            voltage_decivolts: 74,
-            temperature_celsius: 31,
-        };
-        for now in [500_000, 510_000].map(at) {
-            joints.measured(now, Joint::ALL[0], (reading, 0), true, &mut registers);
-        }
-        assert_eq!(joints.driven(), 1);
-        scheduler.joint_engaged();
-        // So late, the joint has to be measured again.
-        assert!(!scheduler.begin_goals(at(550_000), &joints));
-        let frames = cycle(&mut scheduler, &mut joints, 550_000);
-        assert!(frames.iter().all(|&(code, _)| code == READ), "{frames:?}");
     }
 
     #[test]

@@ -149,6 +149,20 @@ pub const fn load_from_servo(joint: Joint, load: i16) -> i16 {
     if Mounting::of(joint).reversed { load.saturating_neg() } else { load }
 }
 
+/// The push of a joint in 0.1 % of the stall torque, positive towards greater angles: the load of its servo less what its
+/// speed needs, 100 % at 372 degrees/s (D27). `speed` is in counts per second.
+#[must_use]
+pub fn push_from_servo(joint: Joint, load: i16, speed: i16) -> i16 {
+    let mounting = Mounting::of(joint);
+    // Thousandths of the load per count per second, times 1024: 372 degrees/s are 1757 or 1292 counts per second.
+    let share = match mounting.scale {
+        Scale::Counts850 => 583,
+        Scale::Counts625 => 793,
+    };
+    let push = i32::from(load) - i32::from(speed) * share / 1_024;
+    i16::try_from(if mounting.reversed { -push } else { push }).unwrap_or(0)
+}
+
 /// `number` / `DIVISOR`, rounded to the nearest integer. The divisor is a constant, so the division cannot panic.
 fn rounded<const DIVISOR: i32>(number: i32) -> i32 {
     number.saturating_add(DIVISOR / 2).div_euclid(DIVISOR)
@@ -260,6 +274,15 @@ mod tests {
         assert_eq!(MicroDegrees::nearest(0.000_000_6), MicroDegrees(1));
         assert_eq!(MicroDegrees::nearest(-0.000_000_6), MicroDegrees(-1));
         assert_eq!(MicroDegrees::nearest(f32::MAX), MicroDegrees(i32::MAX));
+    }
+
+    #[test]
+    fn d27_a_push_is_the_load_less_what_the_speed_needs() {
+        let push = |number, load, speed| push_from_servo(joint(number), load, speed);
+        assert_eq!([push(1, 700, 0), push(2, 700, 0), push(7, -400, 0)], [700, -700, -400]);
+        assert_eq!([push(1, 1_000, 1_757), push(1, -1_000, -1_757)], [0, 0], "free at full speed");
+        assert_eq!([push(5, 1_000, 1_292), push(1, 1_000, -1_757)], [0, 2_000], "driven backwards");
+        assert_eq!(push(1, i16::MAX, i16::MIN), 0, "no servo answers this");
     }
 
     #[test]

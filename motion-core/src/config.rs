@@ -11,6 +11,8 @@ pub struct Config {
     pub chip_id: [u8; 6],
     /// Fault bits known at start: reset cause, clock (`protocol_core::registers::map::fault`).
     pub faults: u8,
+    /// The baud rate of the servo bus, in bits per second.
+    pub servo_baud: u32,
     /// How long a servo may take to answer, from the last byte sent to the last byte received.
     pub servo_timeout: Duration,
     /// The pause on the servo bus between the last byte, received or sent, and the next frame. A servo needs some

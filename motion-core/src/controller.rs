@@ -28,10 +28,6 @@ use crate::vacuum::Vacuum;
 pub enum Output<'a> {
     /// Send these bytes to the host. They fit the room that was passed to `poll`.
     ToHost(&'a [u8]),
-    /// These are the first bytes of the frame for the servos that the next `poll` returns. A shell may send them at once, and
-    /// then only the rest of that frame, so that the line is busy with them while the next `poll` calculates the goals. Or it
-    /// ignores them.
-    ServoFrameStart(&'a [u8]),
     /// Send this frame on the servo bus. The bus is free: at most one read is outstanding.
     ToServos(&'a [u8]),
     /// Switch the pump and the valve (D20).
@@ -76,18 +72,25 @@ impl Controller {
         self.arm.bus.servo_bytes(now, bytes);
     }
 
+    /// A byte from the servo bus was received damaged by `now`: with a framing error, noise or a parity error. Call it after
+    /// the bytes before it were taken. The answer that the byte belongs to fails.
+    pub fn servo_byte_damaged(&mut self, now: Instant) {
+        self.arm.bus.servo_byte_damaged(now);
+    }
+
+    /// A byte from the host was received damaged. Call it after the bytes before it were taken. No frame continues across
+    /// it: what is complete before it is executed, the rest is dropped.
+    pub fn host_byte_damaged(&mut self) {
+        self.host.byte_damaged();
+    }
+
     /// The next action at `now`. Call it until it returns [`Output::Wait`]. `host_room` is how many bytes the host link
     /// can take at once now. A read whose reply does not fit waits, and every request behind it waits, too (D5). An
     /// idle link must take the longest frame, 262 bytes.
     pub fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_> {
-        if !self.arm.bus.has_begun_goals() {
-            self.arm.take_answers(now);
-            // Before the control cycle, so that targets go out with its goals if no read waits before them.
-            self.execute_requests(now, host_room);
-            if self.arm.begin_goals(now) {
-                return Output::ServoFrameStart(self.arm.bus.frame());
-            }
-        }
+        self.arm.take_answers(now);
+        // Before the control cycle, so that targets go out with its goals if no read waits before them.
+        self.execute_requests(now, host_room);
         self.arm.advance(now);
         if self.arm.prepare_servo_frame(now) {
             return Output::ToServos(self.arm.bus.frame());

@@ -120,7 +120,7 @@ impl Drive {
         else {
             return None;
         };
-        let continues = self.is_silent() && self.is_near(angle);
+        let continues = self.is_silent() && is_near(self.set_point(), angle);
         let target = if continues || has_target { Target::FromHost } else { Target::Measured };
         if target == Target::Measured {
             self.trajectory = Trajectory::holding(angle);
@@ -131,12 +131,28 @@ impl Drive {
         Some(target)
     }
 
-    fn is_silent(&self) -> bool {
-        matches!(self.engagement, Engagement::Silent { .. })
+    /// The servo has no torque any more: the joint engages anew where it is measured. Unless `keeps_target`, a target of the
+    /// host that came before is forgotten.
+    pub fn lose_torque(&mut self, keeps_target: bool) {
+        self.engagement = match self.engagement {
+            Engagement::Engaged | Engagement::TorquePending => {
+                Engagement::Waiting { has_target: keeps_target && self.trajectory.is_moving() }
+            }
+            Engagement::Silent { has_new_target } => Engagement::Waiting { has_target: has_new_target },
+            other => other,
+        };
     }
 
-    fn is_near(&self, angle: MicroDegrees) -> bool {
-        angle.0.abs_diff(self.set_point().0) <= REJOIN_WITHIN.0.unsigned_abs()
+    /// Is the joint engaged?
+    #[must_use]
+    pub fn is_engaged(&self) -> bool {
+        self.engagement == Engagement::Engaged
+    }
+
+    /// Has the servo of a driven joint fallen silent?
+    #[must_use]
+    pub fn is_silent(&self) -> bool {
+        matches!(self.engagement, Engagement::Silent { .. })
     }
 
     /// Records that the joint has torque. From now on its set-point may move.
@@ -196,11 +212,22 @@ impl Drive {
         }
     }
 
+    /// The target of the trajectory; in a stream its newest point.
+    #[must_use]
+    pub const fn target(&self) -> MicroDegrees {
+        self.trajectory.target()
+    }
+
     /// The present set-point of a joint that has one.
     #[must_use]
     pub const fn set_point(&self) -> MicroDegrees {
         self.trajectory.set_point()
     }
+}
+
+/// Is a joint measured at `angle` so near to its set-point that it goes on from there (D12)?
+pub(crate) fn is_near(set_point: MicroDegrees, angle: MicroDegrees) -> bool {
+    angle.0.abs_diff(set_point.0) <= REJOIN_WITHIN.0.unsigned_abs()
 }
 
 #[cfg(test)]

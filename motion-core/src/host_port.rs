@@ -11,7 +11,7 @@
 //! A read waits until its reply fits the room of the link. All requests behind it wait, too. This file only reads
 //! registers.
 
-use protocol_core::registers::map::{EXTENDED_VERSION, FINE_TARGET};
+use protocol_core::registers::map::{FINE_TARGET, PROTECTION_VERSION};
 use protocol_core::registers::{Map, RegisterFile};
 use protocol_core::request::{Alarm, Reply, Report, Request};
 use protocol_core::time::Instant;
@@ -31,11 +31,11 @@ impl Read {
         MIN_LENGTH + self.count as usize <= room
     }
 
-    /// Does the range hold registers of the extended block?
+    /// Does the range hold registers of the extended block or of the protection block?
     pub(crate) const fn is_extended(self) -> bool {
         // `as` widens here: `From` is not const.
         let end = self.address as usize + self.count as usize;
-        end > FINE_TARGET.address as usize && self.address <= EXTENDED_VERSION.address
+        end > FINE_TARGET.address as usize && self.address <= PROTECTION_VERSION.address
     }
 }
 
@@ -82,6 +82,11 @@ impl HostPort {
     /// Takes bytes and returns how many. An empty slice states that the line is silent at `now`.
     pub(crate) fn bytes(&mut self, now: Instant, bytes: &[u8]) -> usize {
         self.deframer.push(now, bytes)
+    }
+
+    /// A damaged byte came behind all bytes so far.
+    pub(crate) fn byte_damaged(&mut self) {
+        self.deframer.break_off();
     }
 
     /// How many more bytes are needed before there is a new event, unless the line becomes silent.

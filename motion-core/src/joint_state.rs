@@ -1,18 +1,28 @@
-//! One joint: its drive, its target, and what its servo measured (D12, D21).
+//! One joint: its drive, its target, what its servo measured, and what protects it (D12, D21, D27, D28).
 //!
 //! This file does not know the other joints.
 
 use protocol_core::registers::map::{
-    FINE_POSITION, FINE_TARGET, LOAD, PRESENT_POSITION, TARGET_POSITION, VELOCITY,
+    EFFECTOR_TYPE, FINE_POSITION, FINE_TARGET, GRIP_LIMIT, LOAD, PRESENT_POSITION, PROTECTION, PUSH_LIMIT,
+    TARGET_POSITION, VELOCITY, effector,
 };
 use protocol_core::registers::map21::{PRESENT_ANGLE, PRESENT_LOAD};
-use protocol_core::registers::{Joint, RegisterFile};
-use protocol_core::time::Instant;
+use protocol_core::registers::{Joint, Register, RegisterFile};
+use protocol_core::time::{Duration, Instant};
 
-use crate::calibration::{MicroDegrees, angle_from_counts, load_from_servo, velocity_from_servo};
-use crate::drive::{Drive, Target};
+use crate::calibration::{
+    MicroDegrees, angle_from_counts, load_from_servo, push_from_servo, velocity_from_servo,
+};
+use crate::drive::{Drive, Target, is_near};
+use crate::let_go::LetGo;
+use crate::obstacle::Obstacle;
 use crate::position_filter::{FilterOutcome, PositionFilter};
-use crate::servo_bus::Reading;
+use crate::push_limiter::{PushLimit, PushSample};
+use crate::servo_bus::{Answer, Torque};
+use crate::torque_check::{TorqueCheck, TorqueFound};
+
+/// A servo that restarts executes nothing for about 200 ms. Within less than this after an answer it is the same servo.
+const RESTART_TIME: Duration = Duration::from_millis(180);
 
 /// The effect of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +37,19 @@ pub(crate) enum Measured {
     ServoChanged,
     /// The filter accepted the reading, and the joint engaged: it needs its goal, then torque.
     Engaged,
+    /// An alarm has freed the joint: its servo needs torque-off, which frees nothing and ends a latched overload (D28).
+    Freed,
+    /// The servo of a driven joint has no torque. [`Joints`](crate::joints::Joints) decides what that means (D29).
+    TorqueLost,
+    /// All driven servos have no torque after a long silence (D29).
+    SupplyLost,
+}
+
+/// What became of a joint that has a set-point.
+enum Protected {
+    Holds,
+    Freed,
+    TorqueLost,
 }
 
 /// The state of one joint.
@@ -43,6 +66,13 @@ pub(crate) struct JointState {
     servo_velocity: i16,
     /// In 0.1 % of the stall torque, positive towards greater angles.
     load: i16,
+    obstacle: Obstacle,
+    let_go: LetGo,
+    torque: TorqueCheck,
+    /// The joint has not engaged since power-up, so its servo may hold it.
+    is_first_engagement: bool,
+    /// The last question to the servo was not answered.
+    pub(crate) is_unanswered: bool,
     /// The error bits of the servo's last answer.
     pub(crate) alarms: u8,
     /// In degrees Celsius; 0 while unknown.
@@ -60,6 +90,11 @@ impl JointState {
             measured: None,
             servo_velocity: 0,
             load: 0,
+            obstacle: Obstacle::NONE,
+            let_go: LetGo::NO,
+            torque: TorqueCheck::ORDERED,
+            is_first_engagement: true,
+            is_unanswered: false,
             alarms: 0,
             temperature: 0,
         }
@@ -80,15 +115,17 @@ impl JointState {
         self.measured.is_some()
     }
 
-    /// Processes a reading. If `may_engage`, a waiting joint at rest engages.
+    /// Processes an answer. If `may_engage`, a waiting joint at rest engages.
     pub(crate) fn read(
         &mut self,
         now: Instant,
-        (reading, alarms): (Reading, u8),
+        answer: &Answer,
         may_engage: bool,
         registers: &mut RegisterFile,
     ) -> Measured {
+        self.is_unanswered = false;
         let was_known = self.position.is_known();
+        let reading = &answer.reading;
         let counts = match self.position.answered(now, reading.position_counts) {
             FilterOutcome::Accepted(counts) => counts,
             FilterOutcome::Rejected => return Measured::Rejected,
@@ -101,32 +138,240 @@ impl JointState {
         self.measured = Some(angle);
         self.servo_velocity = reading.speed;
         self.load = load_from_servo(self.joint, reading.load);
-        let servo = (alarms, reading.temperature_celsius);
+        let servo = (answer.alarms, reading.temperature_celsius);
         let is_unchanged = was_known && servo == (self.alarms, self.temperature);
         (self.alarms, self.temperature) = servo;
         registers.set(PRESENT_POSITION.of(self.joint), angle.nearest_degree());
         registers.set(PRESENT_ANGLE.of(self.joint), angle.nearest_degree());
         registers.set(PRESENT_LOAD.of(self.joint), shown_load(self.load));
-        let may_engage = may_engage && self.position.is_steady();
-        let Some(target) = (if may_engage { self.drive.engage(angle) } else { None }) else {
-            return if is_unchanged { Measured::Accepted } else { Measured::ServoChanged };
-        };
+        if self.drive.has_set_point() {
+            match self.protect(now, answer, angle, registers) {
+                Protected::Holds => {}
+                Protected::Freed => return Measured::Freed,
+                Protected::TorqueLost => return Measured::TorqueLost,
+            }
+        } else if self.let_go.is_let_go() {
+            self.follow(now, answer, angle, registers);
+        }
+        if may_engage
+            && self.position.is_steady()
+            && self.engages(now, self.place(answer, angle, registers), registers)
+        {
+            return Measured::Engaged;
+        }
+        if is_unchanged { Measured::Accepted } else { Measured::ServoChanged }
+    }
+
+    /// Checks the torque and the push of a joint that has a set-point.
+    fn protect(
+        &mut self,
+        now: Instant,
+        answer: &Answer,
+        angle: MicroDegrees,
+        registers: &RegisterFile,
+    ) -> Protected {
+        let set_point = self.drive.set_point();
+        if !self.drive.is_torque_pending() {
+            match self.torque.answered(answer.torque.map(|held| held.is_on)) {
+                TorqueFound::AsBefore | TorqueFound::Kept => {}
+                TorqueFound::OrderLost => {
+                    self.drive.lose_torque(true);
+                    return Protected::Holds;
+                }
+                TorqueFound::Lost => return Protected::TorqueLost,
+            }
+            if self.let_go.is_freed(now, answer, angle, set_point) {
+                self.lose_torque(now);
+                self.let_go.follow(now, answer);
+                return Protected::Freed;
+            }
+        }
+        if self.drive.is_engaged() && registers.get(PROTECTION.address) != 0 {
+            let push = push_from_servo(self.joint, answer.reading.load, answer.reading.speed);
+            let limit = self.push_limit(registers);
+            self.obstacle.measured(now, PushSample { angle, push }, set_point, limit);
+        }
+        Protected::Holds
+    }
+
+    /// How hard the joint may push (D27).
+    fn push_limit(&self, registers: &RegisterFile) -> PushLimit {
+        let permille = |row: &Register| i16::from(registers.get(row.address)) * 10;
+        if self.joint == Joint::ALL[6] && registers.get(EFFECTOR_TYPE.address) == effector::GRIPPER {
+            PushLimit::of_grip(permille(&GRIP_LIMIT))
+        } else {
+            PushLimit::of_arm(permille(&PUSH_LIMIT))
+        }
+    }
+
+    /// Lets the target of a joint that is let go follow its position, unless the host wrote one.
+    fn follow(&mut self, now: Instant, answer: &Answer, angle: MicroDegrees, registers: &mut RegisterFile) {
+        self.let_go.follow(now, answer);
+        if registers.get(PROTECTION.address) != 0 && !self.drive.is_moving() {
+            self.set_target(angle, registers);
+        }
+    }
+
+    /// Where a joint that was measured at `angle` engages. After a restart of the controller alone its servo may hold a
+    /// goal: at another one the joint would sag by the distance at which the servo carries its load.
+    fn place(&self, answer: &Answer, angle: MicroDegrees, registers: &RegisterFile) -> MicroDegrees {
+        let held = answer.torque.filter(|held| self.is_first_engagement && held.is_on);
+        let goal =
+            held.map(|held| angle_from_counts(self.joint, held.goal_counts, registers.offset(self.joint)));
+        goal.filter(|goal| is_near(*goal, angle)).unwrap_or(angle)
+    }
+
+    /// Engages a waiting joint at `angle`, and returns whether it did.
+    fn engages(&mut self, now: Instant, angle: MicroDegrees, registers: &mut RegisterFile) -> bool {
+        // It is not known yet whether a silent servo has restarted.
+        if self.drive.is_silent() && !self.torque.is_trusted() {
+            return false;
+        }
+        let is_protected = registers.get(PROTECTION.address) != 0;
+        if !self.let_go.may_engage(now, self.temperature, is_protected) {
+            return false;
+        }
+        let Some(target) = self.drive.engage(angle) else { return false };
+        self.let_go.engaged(now);
+        self.torque = TorqueCheck::ORDERED;
+        self.obstacle = Obstacle::NONE;
+        self.is_first_engagement = false;
         if target == Target::Measured {
             self.set_target(angle, registers);
         }
-        Measured::Engaged
+        true
     }
 
-    pub(crate) fn fall_silent(&mut self) {
+    /// The servo holds no torque: the joint is let go (D28).
+    pub(crate) fn lose_torque(&mut self, now: Instant) {
+        self.drive.lose_torque(false);
+        self.obstacle = Obstacle::NONE;
+        self.let_go.let_go(now);
+    }
+
+    /// The servo did not answer. Returns whether it counts as silent from now on.
+    pub(crate) fn failed(&mut self, now: Instant) -> bool {
+        self.is_unanswered = true;
+        if self.drive.is_torque_pending() {
+            self.drive.mark_silent();
+        } else if self.drive.has_set_point() {
+            self.torque.unanswered();
+        }
+        let fell_silent = self.position.failed(now);
+        if fell_silent {
+            self.fall_silent();
+        }
+        fell_silent
+    }
+
+    /// Doubts the torque of a servo that was not heard for long, so that it is read before the next goal: after a late call,
+    /// or on a bus with many missing servos, it may have restarted unnoticed (D29).
+    pub(crate) fn doubt_torque(&mut self, now: Instant) {
+        if self.drive.is_engaged() && !self.position.was_heard_within(now, RESTART_TIME) {
+            self.torque.doubt();
+        }
+    }
+
+    /// Is the joint sent goals? Not while it is doubtful whether its servo has restarted (D29).
+    pub(crate) fn takes_goals(&self) -> bool {
+        self.drive.is_torque_pending() || (self.drive.is_engaged() && self.torque.is_trusted())
+    }
+
+    /// Has the next question to ask for the torque switch? `is_refresh_near` tells that torque is refreshed soon.
+    pub(crate) fn wants_torque_read(&self, is_refresh_near: bool) -> bool {
+        let is_driven = self.drive.has_set_point();
+        (!is_driven && self.is_first_engagement)
+            || (is_driven && (self.torque.is_urgent() || (is_refresh_near && !self.torque.is_fresh())))
+    }
+
+    /// The torque for the servo in the servo state; `None` leaves its switch unchanged. A servo is refreshed only if its
+    /// torque was read on since the last time, so that none is switched on that has let go.
+    pub(crate) fn take_torque(&mut self, is_protected: bool) -> Option<Torque> {
+        let is_on = self.drive.is_torque_pending() || (self.takes_goals() && self.torque.is_fresh());
+        self.drive.torque_is_on();
+        self.torque.refreshed();
+        if self.let_go.needs_torque_off(is_protected) {
+            self.let_go.torque_off_is_sent();
+            Some(Torque::Damping)
+        } else {
+            is_on.then_some(Torque::On)
+        }
+    }
+
+    /// Advances the set-point by the control cycle that ends at `end`, as far as an obstacle allows (D27).
+    pub(crate) fn advance(&mut self, end: Instant, speed: u8, registers: &mut RegisterFile) {
+        self.drive.advance(end, speed);
+        let Some(angle) = self.measured else { return };
+        let (set_point, target) = (self.drive.set_point(), self.drive.target());
+        if let Some(held) = self.obstacle.hold_back(end, set_point, target, angle) {
+            self.drive.hold_back(held.set_point);
+            if held.ends_move {
+                self.hold(registers);
+            }
+        }
+    }
+
+    fn fall_silent(&mut self) {
         self.drive.mark_silent();
+        self.obstacle = Obstacle::NONE;
         self.temperature = 0;
         self.alarms = 0;
+    }
+
+    /// Enters or leaves the servo state: what held or freed the joint before is over.
+    pub(crate) fn set_driven(&mut self, is_driven: bool) {
+        (self.obstacle, self.let_go) = (Obstacle::NONE, LetGo::NO);
+        self.is_first_engagement = false;
+        if is_driven { self.drive.wait() } else { self.drive.release() }
+    }
+
+    /// The host wrote the motor state: a joint that is let go may engage again (D28).
+    pub(crate) const fn order(&mut self) {
+        self.let_go.ordered();
+    }
+
+    /// Forgets an obstacle: the set-point is free (D27).
+    pub(crate) const fn forget_obstacle(&mut self) {
+        self.obstacle = Obstacle::NONE;
+    }
+
+    /// Is the joint blocked (D27)?
+    pub(crate) const fn is_blocked(&self) -> bool {
+        self.obstacle.is_blocked()
+    }
+
+    /// Is the joint let go (D28)?
+    pub(crate) const fn is_let_go(&self) -> bool {
+        self.let_go.is_let_go()
     }
 
     /// Moves to a target that the register shows already.
     pub(crate) fn move_to(&mut self, degrees: u8, time: u8) {
         self.target = MicroDegrees::from_degrees(degrees);
+        self.obstacle.target_written();
         self.drive.set_target(self.target, time);
+    }
+
+    /// Moves to the next point of a stream, whose frame came at `now`. A joint that is let go takes none (D28).
+    pub(crate) fn stream_to(
+        &mut self,
+        now: Instant,
+        angle: MicroDegrees,
+        period: Duration,
+        registers: &mut RegisterFile,
+    ) {
+        if !self.let_go.is_let_go() {
+            self.set_target(angle, registers);
+            self.obstacle.point_written(now);
+            self.drive.stream_to(angle, now, period);
+        }
+    }
+
+    /// Moves to a target.
+    pub(crate) fn approach(&mut self, angle: MicroDegrees, time: u8, registers: &mut RegisterFile) {
+        self.set_target(angle, registers);
+        self.obstacle.target_written();
+        self.drive.set_target(angle, time);
     }
 
     /// Sets the target, without a move.

@@ -9,8 +9,8 @@
 //! This file does not know the frames or the timing of the bus.
 
 use protocol_core::registers::map::{
-    FINE_TARGET, LIMITS, MEASURED_JOINTS, MOTOR_STATE, SET_POINT_PERIOD, SPEED, TARGET_POSITION, TIME, limit,
-    motor_state,
+    BLOCKED_JOINTS, FINE_TARGET, LET_GO_JOINTS, LIMITS, MEASURED_JOINTS, MOTOR_STATE, SERVO_ALARMS,
+    SET_POINT_PERIOD, SPEED, TARGET_POSITION, TIME, limit, motor_state,
 };
 use protocol_core::registers::{Accepted, JOINTS, Joint, RegisterFile};
 use protocol_core::time::{Duration, Instant};
@@ -22,13 +22,15 @@ use crate::limit_check::LimitCheck;
 use crate::limits::linkage_step;
 use crate::motor_state::MotorState;
 use crate::reach::Reached;
-use crate::servo_bus::{Reading, Torque};
+use crate::servo_bus::{Answer, Question, Torque};
+use crate::supply_watch::{SupplyWatch, Verdict};
 
 /// The seven joints and their motor state.
 #[derive(Clone, Debug)]
 pub(crate) struct Joints {
     joints: [JointState; JOINTS],
     state: MotorState,
+    supply: SupplyWatch,
 }
 
 impl Joints {
@@ -38,7 +40,8 @@ impl Joints {
         if state == MotorState::Servo {
             drive.wait();
         }
-        Self { joints: Joint::ALL.map(|joint| JointState::new(joint, drive.clone())), state }
+        let joints = Joint::ALL.map(|joint| JointState::new(joint, drive.clone()));
+        Self { joints, state, supply: SupplyWatch::NEW }
     }
 
     fn joint(&self, joint: Joint) -> Option<&JointState> {
@@ -68,17 +71,28 @@ impl Joints {
             return false;
         }
         self.state = state;
+        self.supply = SupplyWatch::NEW;
         for joint in &mut self.joints {
-            if state != MotorState::Servo {
-                joint.drive.release();
-                continue;
-            }
-            joint.drive.wait();
-            if let Some(angle) = joint.known_angle() {
+            joint.set_driven(state == MotorState::Servo);
+            if state == MotorState::Servo
+                && let Some(angle) = joint.known_angle()
+            {
                 joint.set_target(angle, registers);
             }
         }
         true
+    }
+
+    /// The host wrote the motor state, perhaps the present one: joints that are let go may engage again (D28). Returns
+    /// whether there is one.
+    pub(crate) fn order(&mut self) -> bool {
+        self.joints.iter_mut().for_each(JointState::order);
+        self.joints.iter().any(JointState::is_let_go)
+    }
+
+    /// Forgets all obstacles, because the protection is switched off (D27).
+    pub(crate) fn forget_obstacles(&mut self) {
+        self.joints.iter_mut().for_each(JointState::forget_obstacle);
     }
 
     /// Starts the moves to the targets in a write that was applied, whose frame came at `now`.
@@ -93,7 +107,7 @@ impl Joints {
                 state.move_to(degrees, registers.get(TIME.of(joint)));
             }
         }
-        if accepted.has_words() {
+        if accepted.is_extended() {
             self.set_fine_targets(now, accepted, registers);
         }
     }
@@ -102,10 +116,9 @@ impl Joints {
         for (joint, state) in self.each_mut() {
             let Some(centidegrees) = accepted.word_at(FINE_TARGET.of(joint)) else { continue };
             let angle = MicroDegrees::from_centidegrees(centidegrees);
-            state.set_target(angle, registers);
             match registers.word(SET_POINT_PERIOD.address) {
-                0 => state.drive.set_target(angle, registers.get(TIME.of(joint))),
-                millis => state.drive.stream_to(angle, now, Duration::from_millis(millis.into())),
+                0 => state.approach(angle, registers.get(TIME.of(joint)), registers),
+                millis => state.stream_to(now, angle, Duration::from_millis(millis.into()), registers),
             }
         }
     }
@@ -114,8 +127,7 @@ impl Joints {
     pub(crate) fn reach(&mut self, reached: &Reached, registers: &mut RegisterFile) {
         for ((joint, state), target) in self.each_mut().zip(reached.targets) {
             if let Some(angle) = target {
-                state.set_target(angle, registers);
-                state.drive.set_target(angle, registers.get(TIME.of(joint)));
+                state.approach(angle, registers.get(TIME.of(joint)), registers);
             }
         }
     }
@@ -129,31 +141,60 @@ impl Joints {
                 let counts = counts_from_angle(joint, state.drive.set_point(), before);
                 let set_point = angle_from_counts(joint, counts, offset);
                 state.drive.rebase_offset(set_point, state.target(), registers.get(TIME.of(joint)));
+                state.forget_obstacle();
             }
         }
     }
 
-    /// Processes a reading. If `may_engage`, a waiting joint at rest engages.
+    /// Processes an answer. If `may_engage`, a waiting joint at rest engages.
     pub(crate) fn measured(
         &mut self,
         now: Instant,
         joint: Joint,
-        reading: (Reading, u8),
+        answer: &Answer,
         may_engage: bool,
         registers: &mut RegisterFile,
     ) -> Measured {
         let Some(state) = self.joint_mut(joint) else { return Measured::Rejected };
-        state.read(now, reading, may_engage, registers)
+        let outcome = state.read(now, answer, may_engage, registers);
+        if state.drive.has_set_point() {
+            self.supply.answered(now);
+        }
+        if outcome == Measured::TorqueLost {
+            return self.torque_lost(now, joint);
+        }
+        if answer.torque.is_some_and(|held| held.is_on) {
+            self.supply.has_torque();
+        }
+        outcome
+    }
+
+    /// Decides what it means that the servo of a driven joint has no torque (D28, D29).
+    fn torque_lost(&mut self, now: Instant, joint: Joint) -> Measured {
+        let driven = self.set_of(|state| state.drive.has_set_point());
+        match self.supply.has_no_torque(now, joint.bit(), driven) {
+            Verdict::Undecided => Measured::Accepted,
+            Verdict::SupplyLost => Measured::SupplyLost,
+            Verdict::Restarted => {
+                self.joint_mut(joint).into_iter().for_each(|state| state.lose_torque(now));
+                Measured::ServoChanged
+            }
+        }
     }
 
     /// Records that a servo did not answer. Returns whether it counts as silent from now on.
     pub(crate) fn failed(&mut self, now: Instant, joint: Joint) -> bool {
         let Some(state) = self.joint_mut(joint) else { return false };
-        let fell_silent = state.position.failed(now);
-        if fell_silent {
-            state.fall_silent();
-        }
+        let fell_silent = state.failed(now);
+        let mut driven = self.joints.iter().filter(|state| state.drive.has_set_point()).peekable();
+        let are_all_silent = driven.peek().is_some() && driven.all(|state| state.is_unanswered);
+        self.supply.unanswered(now, are_all_silent);
         fell_silent
+    }
+
+    /// See [`JointState::doubt_torque`].
+    pub(crate) fn doubt_torque(&mut self, now: Instant) {
+        self.joints.iter_mut().for_each(|state| state.doubt_torque(now));
     }
 
     /// Lets joints whose torque is pending wait again if their measurement is too old. After a late call they may no
@@ -167,13 +208,13 @@ impl Joints {
     }
 
     /// Advances all set-points by the control cycle that ends at `end`. Returns whether any joint is driven.
-    pub(crate) fn advance(&mut self, end: Instant, registers: &RegisterFile) -> bool {
+    pub(crate) fn advance(&mut self, end: Instant, registers: &mut RegisterFile) -> bool {
         let keeps_linkage = registers.get(LIMITS.address) & limit::LINKAGE != 0;
         let before = if keeps_linkage { self.linkage_set_points() } else { None };
         let mut any = false;
         for (joint, state) in self.each_mut() {
-            if state.drive.is_driven() {
-                state.drive.advance(end, registers.get(SPEED.of(joint)));
+            if state.takes_goals() {
+                state.advance(end, registers.get(SPEED.of(joint)), registers);
                 any = true;
             }
         }
@@ -221,40 +262,40 @@ impl Joints {
         }
     }
 
-    /// Shows the registers of the extended block that follow from the joints (D21).
+    /// Shows the registers of the extended block and of the protection block that follow from the joints (D21, D27, D28).
     pub(crate) fn show_extended(&self, registers: &mut RegisterFile) {
         for joint in &self.joints {
             joint.show_extended(registers);
         }
         registers.set(MEASURED_JOINTS.address, self.set_of(JointState::was_measured));
-    }
-
-    /// How many joints are driven.
-    pub(crate) fn driven(&self) -> usize {
-        self.joints.iter().filter(|state| state.drive.is_driven()).count()
+        registers.set(BLOCKED_JOINTS.address, self.set_of(JointState::is_blocked));
+        registers.set(LET_GO_JOINTS.address, self.set_of(JointState::is_let_go));
+        let alarms = self.joints.iter().fold(0, |alarms, state| alarms | state.alarms);
+        registers.set(SERVO_ALARMS.address, alarms);
     }
 
     /// The goals of the driven joints, in servo counts.
     pub(crate) fn goals(&self, registers: &RegisterFile) -> impl Iterator<Item = (Joint, u16)> {
-        self.each().filter(|(_, state)| state.drive.is_driven()).map(|(joint, state)| {
+        self.each().filter(|(_, state)| state.takes_goals()).map(|(joint, state)| {
             (joint, counts_from_angle(joint, state.drive.set_point(), registers.offset(joint)))
         })
     }
 
     /// The torque for each servo; `None` leaves the switch unchanged. The caller has to send all of them: from now on
     /// joints whose torque was pending may move.
-    pub(crate) fn take_torque(&mut self) -> [Option<Torque>; JOINTS] {
+    pub(crate) fn take_torque(&mut self, is_protected: bool) -> [Option<Torque>; JOINTS] {
         let mut switches = [None; JOINTS];
         for (switch, joint) in switches.iter_mut().zip(&mut self.joints) {
-            *switch = self.state.torque(joint.drive.is_driven());
-            joint.drive.torque_is_on();
+            *switch = self.state.torque().or_else(|| joint.take_torque(is_protected));
         }
         switches
     }
 
-    /// Is the joint's servo to be read at `now`?
-    pub(crate) fn wants_asking(&self, joint: Joint, now: Instant) -> bool {
-        self.joint(joint).is_some_and(|state| state.position.wants_asking(now))
+    /// What the joint's servo is to be asked at `now`, if anything. See [`JointState::wants_torque_read`].
+    pub(crate) fn question(&self, joint: Joint, now: Instant, is_refresh_near: bool) -> Option<Question> {
+        let state = self.joint(joint).filter(|state| state.position.wants_asking(now))?;
+        let wants_torque = state.wants_torque_read(is_refresh_near);
+        Some(if wants_torque { Question::TorqueAndReading } else { Question::Reading })
     }
 
     /// The joints whose servos do not answer, bit n-1 for joint n.
@@ -281,6 +322,7 @@ impl Joints {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::servo_bus::Reading;
     use protocol_core::registers::map::PRESENT_POSITION;
 
     const J1: Joint = Joint::ALL[0];
@@ -289,16 +331,18 @@ mod tests {
         Instant::from_micros(millis * 1_000)
     }
 
-    fn reading(position_counts: u16) -> (Reading, u8) {
-        (Reading { position_counts, speed: 0, load: 0, voltage_decivolts: 74, temperature_celsius: 31 }, 4)
+    fn answer(position_counts: u16) -> Answer {
+        let reading =
+            Reading { position_counts, speed: 0, load: 0, voltage_decivolts: 74, temperature_celsius: 31 };
+        Answer { reading, alarms: 4, torque: None }
     }
 
     /// Joints of which joint 1 was measured twice at 90 degrees.
     fn measured(state: MotorState) -> (Joints, RegisterFile) {
         let mut registers = RegisterFile::new([0; 6], None);
         let mut joints = Joints::new(state);
-        joints.measured(at_ms(0), J1, reading(511), true, &mut registers);
-        joints.measured(at_ms(10), J1, reading(511), true, &mut registers);
+        joints.measured(at_ms(0), J1, &answer(511), true, &mut registers);
+        joints.measured(at_ms(10), J1, &answer(511), true, &mut registers);
         (joints, registers)
     }
 
@@ -307,7 +351,7 @@ mod tests {
         let (mut joints, registers) = measured(MotorState::Servo);
         assert_eq!((registers.get(PRESENT_POSITION.of(J1)), registers.get(TARGET_POSITION.of(J1))), (90, 90));
         assert_eq!(joints.goals(&registers).collect::<Vec<_>>(), [(J1, 511)]);
-        let torque = joints.take_torque();
+        let torque = joints.take_torque(true);
         assert_eq!((torque[0], &torque[1..]), (Some(Torque::On), [None; 6].as_slice()));
         assert_eq!((joints.silent(), joints.hottest(), joints.any_alarm()), (0b111_1110, 31, true));
     }
@@ -317,8 +361,9 @@ mod tests {
         let (mut joints, mut registers) =
             (Joints::new(MotorState::Forceless), RegisterFile::new([0; 6], None));
         let mut measure = |millis, alarms, temperature_celsius| {
-            let reading = Reading { temperature_celsius, ..reading(511).0 };
-            joints.measured(at_ms(millis), J1, (reading, alarms), true, &mut registers)
+            let reading = Reading { temperature_celsius, ..answer(511).reading };
+            let answer = Answer { reading, alarms, torque: None };
+            joints.measured(at_ms(millis), J1, &answer, true, &mut registers)
         };
         assert_eq!(measure(0, 0, 0), Measured::Rejected, "nothing to compare it with");
         assert_eq!(measure(10, 0, 0), Measured::ServoChanged, "it answers, at 0 degrees Celsius");
@@ -331,10 +376,10 @@ mod tests {
     #[test]
     fn d12_a_silent_joint_is_told_nothing() {
         let (mut joints, registers) = measured(MotorState::Servo);
-        joints.take_torque();
+        joints.take_torque(true);
         assert_eq!([2, 3, 4].map(|cycle| joints.failed(at_ms(cycle * 10), J1)), [false, false, true]);
         assert_eq!(joints.goals(&registers).count(), 0);
-        assert_eq!(joints.take_torque(), [None; JOINTS]);
+        assert_eq!(joints.take_torque(true), [None; JOINTS]);
         assert_eq!((joints.silent(), joints.hottest(), joints.any_alarm()), (0x7F, 0, false));
     }
 
@@ -345,7 +390,7 @@ mod tests {
         assert_eq!(joints.goals(&registers).count(), 1);
         joints.expire_pending(at_ms(31));
         assert_eq!(joints.goals(&registers).count(), 0);
-        assert_eq!(joints.take_torque(), [None; JOINTS]);
+        assert_eq!(joints.take_torque(true), [None; JOINTS]);
     }
 
     #[test]
@@ -355,9 +400,9 @@ mod tests {
             let (mut joints, mut registers) = measured(MotorState::Servo);
             assert!(joints.set_state(state, &mut registers));
             assert!(!joints.set_state(state, &mut registers), "the state did not change");
-            assert_eq!(joints.take_torque(), [Some(torque); JOINTS]);
+            assert_eq!(joints.take_torque(true), [Some(torque); JOINTS]);
             assert_eq!(joints.goals(&registers).count(), 0);
-            assert!(!joints.advance(at_ms(0), &registers));
+            assert!(!joints.advance(at_ms(0), &mut registers));
         }
     }
 

@@ -27,14 +27,12 @@ impl MotorState {
         }
     }
 
-    /// The torque of a joint; `None` leaves its switch unchanged. In the servo state a joint that is not driven yet
-    /// keeps its torque, because its servo may be holding it (D12).
+    /// The torque of every joint; `None` in the servo state, where each joint decides.
     #[must_use]
-    pub const fn torque(self, is_driven: bool) -> Option<Torque> {
+    pub const fn torque(self) -> Option<Torque> {
         match self {
             Self::Damping => Some(Torque::Damping),
             Self::Forceless => Some(Torque::Free),
-            Self::Servo if is_driven => Some(Torque::On),
             Self::Servo => None,
         }
     }

@@ -112,6 +112,12 @@ impl PositionFilter {
         self.last.is_some_and(|(_, then)| now - then <= FRESH_FOR)
     }
 
+    /// Has the servo answered within this time?
+    #[must_use]
+    pub fn was_heard_within(&self, now: Instant, time: Duration) -> bool {
+        self.last.is_some_and(|(_, then)| now - then <= time)
+    }
+
     /// Is the servo to be read at `now`?
     #[must_use]
     pub fn wants_asking(&self, now: Instant) -> bool {

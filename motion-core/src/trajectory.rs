@@ -39,6 +39,12 @@ impl Trajectory {
         self.set_point
     }
 
+    /// The target; in a stream its newest point.
+    #[must_use]
+    pub const fn target(&self) -> MicroDegrees {
+        self.target
+    }
+
     /// Has the set-point not reached the target yet?
     #[must_use]
     pub fn is_moving(&self) -> bool {

@@ -5,9 +5,8 @@
 mod rig;
 
 use arm_sim::servo::ServoFault;
-use motion_core::Output;
 use protocol_core::registers::Joint;
-use protocol_core::time::{Duration, Instant};
+use protocol_core::time::Duration;
 use rig::{Rig, STANDARD_COUNTS, ToServos, write};
 
 #[test]
@@ -54,22 +53,6 @@ fn d13_an_answer_that_has_come_is_where_the_servo_state_is_entered() {
     rig.now_us = answered_at;
     rig.write(29, &[1]);
     assert_eq!((rig.targets()[0], rig.present()[0]), (93, 93), "12 counts are 3.5 degrees");
-}
-
-#[test]
-fn the_goals_follow_their_start_whatever_comes_in_between() {
-    let mut rig = Rig::started();
-    rig.run_us(9_999);
-    let now = Instant::from_micros(rig.now_us + 1);
-    let Output::ServoFrameStart(start) = rig.controller.poll(now, rig.room) else { panic!("a start") };
-    let start = start.to_vec();
-    rig.controller.host_bytes(now, &write(29, &[0]));
-    // Noise on the bus, which is no longer free after it.
-    rig.controller.servo_bytes(now, &[0x55]);
-    rig.controller.raise_faults(1);
-    rig.controller.host_left(now);
-    let Output::ToServos(frame) = rig.controller.poll(now, rig.room) else { panic!("the frame") };
-    assert_eq!((&frame[..start.len()], frame.len()), (&start[..], 57), "seven goals, as announced");
 }
 
 /// Each joint's goal at the moment when it was first given torque.

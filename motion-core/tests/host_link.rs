@@ -13,7 +13,7 @@ use rig::{Rig, STANDARD_POSE, config, frame, reply, write};
 
 #[test]
 fn golden_conversation() {
-    let mut rig = Rig::started();
+    let mut rig = Rig::on_a_stand();
     rig.send(&[0xAA, 0x77, 0x03, 0x36, 0x07, 0x81, 0xCE]);
     rig.send(&[0xAA, 0x77, 0x03, 0x0A, 0x00, 0xD1, 0x0C]);
     let answers: Vec<_> = rig.to_host.drain(..).map(|(_, bytes)| bytes).collect();
@@ -133,7 +133,7 @@ fn d06_a_write_has_no_answer_and_its_fate_is_counted() {
 
 #[test]
 fn d14_feedback_comes_at_its_rate_until_it_is_stopped() {
-    let mut rig = Rig::started();
+    let mut rig = Rig::on_a_stand();
     rig.send(&[0xAA, 0x77, 0x06, 0x35, 0x01, 0x1E, 0x7D, 0x04]);
     let start = rig.now_us;
     rig.run_ms(10_000);
@@ -286,4 +286,20 @@ fn nothing_reaches_the_host_before_its_deadline() {
         rig.run_us(1);
         assert_eq!(rig.to_host.len(), 1, "a report at {due}");
     }
+}
+
+#[test]
+fn d03_no_frame_is_accepted_across_a_damaged_byte() {
+    let mut rig = Rig::started();
+    let frame = write(46, &[91]);
+    let (head, tail) = frame.split_at(4);
+    let now = Instant::from_micros(rig.now_us);
+    rig.controller.host_bytes(now, head);
+    rig.controller.host_byte_damaged();
+    rig.run_ms(1);
+    rig.controller.host_bytes(now, tail);
+    rig.run_ms(1);
+    assert_eq!(rig.targets()[0], 90);
+    rig.write(46, &[91]);
+    assert_eq!(rig.targets()[0], 91, "the next frame counts");
 }

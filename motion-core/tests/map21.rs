@@ -64,6 +64,7 @@ fn m02_a_value_out_of_range_refuses_the_whole_frame() {
 fn m03_angles_and_loads_are_read_without_a_write_before() {
     let mut rig = Rig::new();
     assert_eq!((rig.read(83, 7), rig.read(91, 7)), (vec![0; 7], vec![128; 7]));
+    rig = Rig::on_a_stand();
     rig.run_ms(1_000);
     assert_eq!((rig.read(83, 7), rig.read(54, 7)), (STANDARD_POSE.to_vec(), STANDARD_POSE.to_vec()));
     assert_eq!((rig.get(66), rig.get(82), rig.get(90)), (1, 0, 0));
@@ -71,7 +72,7 @@ fn m03_angles_and_loads_are_read_without_a_write_before() {
 
 #[test]
 fn m04_reports_have_the_form_of_the_register_that_armed_them() {
-    let mut rig = Rig::started();
+    let mut rig = Rig::on_a_stand();
     write_21(&mut rig, 82, &[10]);
     write_21(&mut rig, 90, &[5]);
     rig.run_ms(400);
@@ -87,7 +88,7 @@ fn m04_reports_have_the_form_of_the_register_that_armed_them() {
 
 #[test]
 fn m04_a_report_of_angles_is_a_whole_frame() {
-    let mut rig = Rig::started();
+    let mut rig = Rig::on_a_stand();
     write_21(&mut rig, 82, &[30]);
     rig.run_ms(34);
     let report = [0xAA, 0x77, 5, 0x53, 7, 0x5A, 0x5A, 0x41, 0x5A, 0x5A, 0x5A, 0x50, 0x34, 0xCC];
@@ -177,10 +178,11 @@ fn m07_a_position_becomes_targets_and_the_arm_goes_there() {
     write_21(&mut rig, 54, &IK6);
     assert_eq!(rig.targets(), IK6_TARGETS);
     assert_eq!(rig.read(61, 2), [0x80, 0x7F], "61 and 62 read back");
-    assert_eq!(rig.present(), STANDARD_POSE, "54 to 60 are the present positions");
+    rig.assert_at(STANDARD_POSE, "54 to 60 are the present positions");
     rig.run_until_still();
     rig.run_ms(100);
-    assert_eq!((rig.present(), rig.read(83, 7)), (IK6_TARGETS.to_vec(), IK6_TARGETS.to_vec()));
+    rig.assert_at(IK6_TARGETS, "it goes there");
+    assert_eq!(rig.present(), rig.read(83, 7));
 }
 
 #[test]
@@ -259,8 +261,9 @@ fn m09_loads_show_which_way_a_joint_pushes() {
     let mut rig = Rig::started();
     rig.run_ms(1_000);
     let loads = rig.read(91, 7);
-    // The level forearm takes 28.4 % of the stall torque of joint 3, towards more counts: that is towards smaller angles.
-    assert_eq!(loads[2], 128 - 35, "284 / 8");
+    // The level forearm takes 18.8 % of the stall torque of joint 3, less up to 5 % that static friction holds. That is
+    // towards more counts, which are smaller angles: 137 to 188, in steps of 8.
+    assert!((128 - 23..=128 - 17).contains(&loads[2]), "{}", loads[2]);
     assert_eq!((loads[0], loads[6]), (128, 128));
 }
 

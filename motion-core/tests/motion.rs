@@ -35,7 +35,7 @@ fn d12_power_up_measures_then_holds_then_drives() {
     assert!(first_goal < first_on, "no servo wakes up with an old goal");
     assert!(rig.goals().all(|(_, goals)| goals.iter().all(|&(id, counts)| id != 0 || counts == 300)));
     assert_eq!(rig.targets(), [45, 90, 65, 90, 90, 90, 80]);
-    assert_eq!(rig.present(), [45, 90, 65, 90, 90, 90, 80]);
+    rig.assert_at([45, 90, 65, 90, 90, 90, 80], "it holds");
     assert_eq!(rig.read(240, 4), [1, 0, 0, 0]);
     assert_eq!(rig.counter(252), 0, "servos that start up are no errors");
 }
@@ -76,7 +76,7 @@ fn d10_d11_a_pose_at_the_default_speed() {
     let millis = rig.run_until_still();
     assert!((490..=510).contains(&millis), "57 degrees at 114 degrees/s, not {millis} ms");
     rig.run_ms(100);
-    assert_eq!(rig.present(), [147, 90, 65, 90, 90, 90, 80]);
+    rig.assert_at([147, 90, 65, 90, 90, 90, 80], "it arrives");
 }
 
 #[test]
@@ -133,6 +133,7 @@ fn d13_forceless_lets_go_and_servo_holds_what_the_hand_showed() {
     rig.write(29, &[FORCELESS]);
     rig.run_ms(100);
     assert_eq!(rig.torques().last(), Some([Some(2); 7]));
+    let forearm = rig.present()[2];
     rig.forget();
     rig.write(46, &[10; 7]);
     rig.hand(1, 511); // 90 degrees
@@ -140,14 +141,14 @@ fn d13_forceless_lets_go_and_servo_holds_what_the_hand_showed() {
     rig.run_ms(500);
     assert_eq!(rig.goals().count(), 0, "nothing is commanded");
     assert_eq!(rig.get(243), 0);
-    assert_eq!(rig.present(), [90, 90, 65, 135, 90, 90, 80], "measured all the time");
+    assert_eq!(rig.present(), [90, 90, forearm, 135, 90, 90, 80], "measured all the time");
     assert_eq!(rig.targets(), [10; 7], "a target may be written, and is forgotten");
     rig.write(29, &[SERVO]);
-    assert_eq!(rig.targets(), [90, 90, 65, 135, 90, 90, 80], "at once");
+    assert_eq!(rig.targets(), [90, 90, forearm, 135, 90, 90, 80], "at once");
     rig.run_ms(500);
     assert!(rig.goals().all(|(_, goals)| goals.iter().all(|&(id, counts)| id != 3 || counts == 300)));
     assert_eq!(rig.torques().last(), Some([Some(1); 7]));
-    assert_eq!(rig.present(), [90, 90, 65, 135, 90, 90, 80]);
+    rig.assert_at([90, 90, forearm, 135, 90, 90, 80], "it holds what the hand showed");
 }
 
 #[test]
@@ -174,9 +175,10 @@ fn d13_targets_in_the_frame_that_enters_servo_win_over_the_measured_ones() {
     values.extend([0; 7]); // time
     values.extend([120, 100]); // two targets
     rig.write(29, &values);
-    assert_eq!(rig.targets(), [120, 100, 65, 90, 90, 90, 80]);
+    // The forearm was measured where it had drooped to.
+    assert_eq!(rig.targets(), [120, 100, 66, 90, 90, 90, 80]);
     rig.run_ms(2_000);
-    assert_eq!(rig.present(), [120, 100, 65, 90, 90, 90, 80]);
+    rig.assert_at([120, 100, 66, 90, 90, 90, 80], "it arrives");
 }
 
 #[test]
@@ -203,12 +205,12 @@ fn d09_an_offset_changes_what_is_seen_and_where_the_servo_goes() {
     rig.run_ms(1_000);
     assert_eq!(rig.present()[0], 90, "it went to where 90 is now");
     let after = rig.plant.position_counts(joint(1));
-    assert_eq!(after.abs_diff(before), 24, "5 degrees are 23.6 counts");
+    assert!((23..=25).contains(&after.abs_diff(before)), "5 degrees are 23.6 counts: {before} to {after}");
     assert!(after > before, "servo angle = angle wanted - offset");
     rig.write(13, &[0x80]);
     rig.run_ms(1_000);
     assert_eq!(rig.get(13), 0x80);
-    assert_eq!(rig.plant.position_counts(joint(1)), before, "minus zero is zero");
+    assert!(rig.plant.position_counts(joint(1)).abs_diff(before) <= 1, "minus zero is zero");
 }
 
 #[test]

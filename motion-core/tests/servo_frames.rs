@@ -254,3 +254,32 @@ proptest! {
         prop_assert_eq!(Reading::parse(&reading.to_bytes()), Some(reading));
     }
 }
+
+/// Of two frames, one that damage splits is lost. Bytes between two damaged ones may be lost, too.
+#[test]
+fn no_frame_continues_across_damage() {
+    let stream = [encoded(|buffer| ping(buffer, 1)), encoded(|buffer| ping(buffer, 2))].concat();
+    let ids = |said: &[Said]| {
+        said.iter().filter_map(|said| said.as_ref().ok().map(|frame| frame.0)).collect::<Vec<_>>()
+    };
+    for (first, last) in (0..=12).flat_map(|first| (first..=12).map(move |last| (first, last))) {
+        for is_pulled in [false, true] {
+            let (mut decoder, mut said) = (Decoder::new(), Vec::new());
+            decoder.push(&stream[..first]);
+            decoder.push_damaged();
+            if is_pulled {
+                pull_all(&mut decoder, &mut said);
+            }
+            decoder.push(&stream[first..last]);
+            decoder.push_damaged();
+            decoder.push(&stream[last..]);
+            pull_all(&mut decoder, &mut said);
+            let is_split = |start: usize| [first, last].iter().any(|at| (start + 1..start + 6).contains(at));
+            let is_between = |start: usize| !is_pulled && first > 0 && first <= start && start + 6 <= last;
+            let whole = |start| !is_split(start) && !is_between(start);
+            let expected: Vec<u8> =
+                [(1, 0), (2, 6)].into_iter().filter(|(_, at)| whole(*at)).map(|(id, _)| id).collect();
+            assert_eq!(ids(&said), expected, "damage at {first} and {last}, pulled between: {is_pulled}");
+        }
+    }
+}

@@ -6,18 +6,79 @@
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::{Duration, Instant};
 
+use super::byte_time::ByteTime;
 use super::frame::{self, Decoder, Reading, ServoFrameBuffer, register};
 use super::torque::{Torque, TorqueCodes};
 use crate::CYCLE;
 
-/// Time on the wire of one byte at 1 Mbaud, ten bits.
-const BYTE_TIME_US: usize = 10;
 /// The longest time that noise may delay a frame. A frame that damps the servos must not wait for noise to end.
 const MAX_NOISE_DELAY: Duration = Duration::from_millis(1);
 /// The registers of a goal: position, time and speed, two bytes each.
 const GOAL_REGISTERS: usize = 6;
 /// How many different read lengths there are.
 const READ_LENGTHS: u8 = 4;
+
+/// What a servo answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// The measured values.
+    pub reading: Reading,
+    /// The error bits, see [`frame::error`].
+    pub alarms: u8,
+    /// Its torque and its goal, if the read asked for them.
+    pub torque: Option<HeldGoal>,
+}
+
+/// The torque and the goal of a servo.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HeldGoal {
+    /// Is its torque switch on?
+    pub is_on: bool,
+    /// The goal that it holds or moves to, in counts.
+    pub goal_counts: u16,
+}
+
+/// The registers of a read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Question {
+    /// The measurements.
+    Reading,
+    /// The torque switch, the goal, and the measurements.
+    TorqueAndReading,
+}
+
+impl Question {
+    /// The registers between the torque switch and the measurements.
+    const DISTANCE: u8 = register::PRESENT_POSITION - register::TORQUE_SWITCH;
+
+    const fn first(self) -> u8 {
+        match self {
+            Self::Reading => register::PRESENT_POSITION,
+            Self::TorqueAndReading => register::TORQUE_SWITCH,
+        }
+    }
+
+    const fn count(self) -> u8 {
+        match self {
+            Self::Reading => Reading::REGISTERS,
+            Self::TorqueAndReading => Self::DISTANCE + Reading::REGISTERS,
+        }
+    }
+
+    /// Parses the values of an answer.
+    fn parse(self, values: &[u8], alarms: u8, codes: TorqueCodes) -> Option<Answer> {
+        let measurements = values.get(usize::from(self.count() - Reading::REGISTERS)..)?;
+        let reading = Reading::parse(measurements.get(..usize::from(Reading::REGISTERS))?)?;
+        let torque = match (self, values) {
+            (Self::TorqueAndReading, &[code, _, high, low, ..]) => Some(HeldGoal {
+                is_on: code == codes.code(Torque::On),
+                goal_counts: u16::from_be_bytes([high, low]),
+            }),
+            _ => None,
+        };
+        Some(Answer { reading, alarms, torque })
+    }
+}
 
 /// The outcome of a read from a servo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,10 +87,8 @@ pub enum Outcome {
     Measured {
         /// The joint of the servo.
         joint: Joint,
-        /// The measured values.
-        reading: Reading,
-        /// The error bits of the answer, see [`frame::error`].
-        alarms: u8,
+        /// What it answered.
+        answer: Answer,
         /// Was the answer processed within a control cycle after the timeout? After that the joint may have moved.
         is_timely: bool,
     },
@@ -43,6 +102,7 @@ pub enum Outcome {
 /// The master's end of the servo bus.
 #[derive(Clone, Debug)]
 pub struct Bus {
+    byte_time: ByteTime,
     timeout: Duration,
     guard_time: Duration,
     /// How much later than on the wire an answer may arrive here, because a USB adapter buffers it.
@@ -50,8 +110,8 @@ pub struct Bus {
     codes: TorqueCodes,
     decoder: Decoder,
     frame: ServoFrameBuffer,
-    /// The joint of the outstanding read.
-    awaited: Option<Joint>,
+    /// The outstanding read.
+    awaited: Option<(Joint, Question)>,
     /// How many additional registers the next read of each servo asks for. The number changes with each read that
     /// failed, so a late answer to that read differs in length from the answer to the next.
     read_length_tags: [u8; JOINTS],
@@ -70,11 +130,12 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// An idle bus. A servo has to answer within `timeout` of the last byte sent. A frame follows the byte before it
+    /// An idle bus at `baud` bits per second. A servo has to answer within `timeout` of the last byte sent. A frame follows the byte before it
     /// after `guard_time` at the earliest.
     #[must_use]
-    pub const fn new(timeout: Duration, guard_time: Duration, codes: TorqueCodes) -> Self {
+    pub const fn new(baud: u32, timeout: Duration, guard_time: Duration, codes: TorqueCodes) -> Self {
         Self {
+            byte_time: ByteTime::at_baud(baud),
             timeout,
             guard_time,
             answer_delay: Duration::ZERO,
@@ -101,9 +162,19 @@ impl Bus {
     /// Takes bytes that were received by `now`. The guard time begins after them, whoever sent them.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.decoder.push(bytes);
-        if bytes.is_empty() {
-            return;
+        if !bytes.is_empty() {
+            self.heard(now);
         }
+    }
+
+    /// Takes a byte that was received damaged by `now`: with a framing error, noise or a parity error. It belongs to no
+    /// frame, so the answer around it fails. A whole answer before or behind it counts.
+    pub fn damaged_byte(&mut self, now: Instant) {
+        self.decoder.push_damaged();
+        self.heard(now);
+    }
+
+    fn heard(&mut self, now: Instant) {
         if now >= self.quiet_at {
             self.heard_since = now;
         }
@@ -122,17 +193,16 @@ impl Bus {
     }
 
     fn answer(&mut self, now: Instant) -> Option<Outcome> {
-        let joint = self.awaited?;
+        let (joint, question) = self.awaited?;
         let tag = self.read_length_tag(joint);
         while let Some(result) = self.decoder.pull() {
-            if let Ok(answer) = result
-                && answer.id == joint.index()
-                && answer.params.len() == usize::from(Reading::REGISTERS + tag)
-                && let Some(reading) =
-                    answer.params.get(..usize::from(Reading::REGISTERS)).and_then(Reading::parse)
+            if let Ok(frame) = result
+                && frame.id == joint.index()
+                && frame.params.len() == usize::from(question.count() + tag)
+                && let Some(answer) = question.parse(frame.params, frame.code, self.codes)
             {
                 let is_timely = now <= self.answer_until + CYCLE;
-                return Some(Outcome::Measured { joint, reading, alarms: answer.code, is_timely });
+                return Some(Outcome::Measured { joint, answer, is_timely });
             }
         }
         None
@@ -157,7 +227,7 @@ impl Bus {
     }
 
     fn expired(&mut self, now: Instant) -> Option<Outcome> {
-        let joint = self.awaited.filter(|_| now >= self.answer_until)?;
+        let (joint, _) = self.awaited.filter(|_| now >= self.answer_until)?;
         if let Some(tag) = self.read_length_tags.get_mut(usize::from(joint.index())) {
             *tag = (*tag + 1) % READ_LENGTHS;
         }
@@ -196,12 +266,12 @@ impl Bus {
         &self.frame
     }
 
-    /// Reads the measurements of a joint's servo.
-    pub fn ask(&mut self, now: Instant, joint: Joint) {
+    /// Reads registers of a joint's servo.
+    pub fn ask(&mut self, now: Instant, joint: Joint, question: Question) {
         self.decoder.clear();
-        let count = Reading::REGISTERS + self.read_length_tag(joint);
-        frame::read(&mut self.frame, joint.index(), register::PRESENT_POSITION, count);
-        self.awaited = Some(joint);
+        let count = question.count() + self.read_length_tag(joint);
+        frame::read(&mut self.frame, joint.index(), question.first(), count);
+        self.awaited = Some((joint, question));
         self.busy_until = self.sent(now) + self.timeout;
         self.answer_until = self.busy_until + self.answer_delay;
     }
@@ -215,11 +285,6 @@ impl Bus {
             switches.map(|(joint, torque)| (joint.index(), [codes.code(torque)])),
         );
         self.rest_after_frame(now);
-    }
-
-    /// The first bytes of the frame that [`Bus::set_goals`] prepares for this many joints.
-    pub fn begin_goals(&mut self, joints: usize) {
-        frame::sync_write_start::<GOAL_REGISTERS>(&mut self.frame, register::GOAL_POSITION, joints);
     }
 
     /// Sets the goals of some joints in servo counts, simultaneously. Each goal time is one control cycle, so that
@@ -246,8 +311,7 @@ impl Bus {
 
     /// When the last byte of the frame has left.
     fn sent(&self, now: Instant) -> Instant {
-        let micros = u64::try_from(self.frame.len() * BYTE_TIME_US).unwrap_or(0);
-        now + Duration::from_micros(micros)
+        now + self.byte_time.of(self.frame.len())
     }
 }
 

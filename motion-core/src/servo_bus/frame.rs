@@ -96,7 +96,8 @@ pub fn sync_write<const W: usize>(
     items: impl Iterator<Item = (u8, [u8; W])>,
 ) {
     const { assert!(W < MAX_FRAME, "an item must fit a frame") };
-    begin_sync_write(buffer, register, W);
+    begin(buffer, BROADCAST, Instruction::SyncWrite as u8);
+    append(buffer, &[register, W.to_le_bytes()[0]]);
     for (id, values) in items {
         if buffer.len() + 1 + W < MAX_FRAME {
             append(buffer, &[id]);
@@ -104,18 +105,6 @@ pub fn sync_write<const W: usize>(
         }
     }
     finish(buffer);
-}
-
-fn begin_sync_write(buffer: &mut ServoFrameBuffer, register: u8, width: usize) {
-    begin(buffer, BROADCAST, Instruction::SyncWrite as u8);
-    append(buffer, &[register, width.to_le_bytes()[0]]);
-}
-
-/// Encodes the first bytes of a [`sync_write`] of `W` registers with this many items: all that does not depend on ids and
-/// values.
-pub fn sync_write_start<const W: usize>(buffer: &mut ServoFrameBuffer, register: u8, items: usize) {
-    begin_sync_write(buffer, register, W);
-    set_length(buffer, buffer.len() + items * (1 + W));
 }
 
 /// Encodes a servo's answer: its error bits and, after a read, the values. If there are more than 58 values, the frame
@@ -139,16 +128,11 @@ fn append(buffer: &mut ServoFrameBuffer, bytes: &[u8]) {
     }
 }
 
-/// Sets the length byte of a frame of `bytes` bytes and a checksum.
-fn set_length(buffer: &mut ServoFrameBuffer, bytes: usize) {
-    let [length, ..] = (bytes + 1 - UNCOUNTED).to_le_bytes();
+fn finish(buffer: &mut ServoFrameBuffer) {
+    let [length, ..] = (buffer.len() + 1 - UNCOUNTED).to_le_bytes();
     if let Some(field) = buffer.get_mut(3) {
         *field = length;
     }
-}
-
-fn finish(buffer: &mut ServoFrameBuffer) {
-    set_length(buffer, buffer.len());
     // Cannot fail: `append` leaves room.
     let _ = buffer.push(checksum(buffer.get(2..).unwrap_or(&[])));
 }

@@ -7,9 +7,11 @@
 //! ```
 
 pub mod bus;
+mod byte_time;
 pub mod frame;
 mod torque;
 
-pub use bus::{Bus, Outcome};
+pub use bus::{Answer, Bus, HeldGoal, Outcome, Question};
+pub use byte_time::ByteTime;
 pub use frame::Reading;
 pub use torque::{Torque, TorqueCodes};

@@ -13,6 +13,8 @@ pub struct Decoder {
     buffer: heapless::Vec<u8, { Decoder::CAPACITY }>,
     /// Everything before the head is finished.
     head: usize,
+    /// A damaged byte came here. No frame continues across it.
+    damaged_at: usize,
 }
 
 /// What [`parse`] finds at the beginning of its input.
@@ -30,7 +32,7 @@ impl Decoder {
     /// A decoder with an empty buffer.
     #[must_use]
     pub const fn new() -> Self {
-        Self { buffer: heapless::Vec::new(), head: 0 }
+        Self { buffer: heapless::Vec::new(), head: 0, damaged_at: 0 }
     }
 
     /// Takes received bytes. Beyond [`Decoder::CAPACITY`] the oldest bytes are lost, so pull in between.
@@ -44,13 +46,24 @@ impl Decoder {
         let _ = self.buffer.extend_from_slice(newest);
     }
 
+    /// Records that a damaged byte came behind all bytes so far. It belongs to no frame.
+    pub fn push_damaged(&mut self) {
+        if self.head < self.damaged_at {
+            // Only one position is kept: drop the bytes between the two.
+            self.buffer.truncate(self.damaged_at);
+        }
+        self.damaged_at = self.buffer.len();
+    }
+
     /// The next frame or wrong checksum; `None` once more bytes are needed. Call it until then. After a wrong checksum
     /// the search continues with the next byte, so a damaged frame does not cost the next one.
     pub fn pull(&mut self) -> Option<Result<ServoFrame<'_>, WrongChecksum>> {
         loop {
-            match parse(self.buffer.get(self.head..)?) {
-                DecodeOutcome::Incomplete => return None,
-                DecodeOutcome::NotAFrame => self.head += 1,
+            let is_before_damage = self.head < self.damaged_at;
+            let end = if is_before_damage { self.damaged_at } else { self.buffer.len() };
+            match parse(self.buffer.get(self.head..end)?) {
+                DecodeOutcome::Incomplete if !is_before_damage => return None,
+                DecodeOutcome::Incomplete | DecodeOutcome::NotAFrame => self.head += 1,
                 DecodeOutcome::WrongChecksum => {
                     self.head += 1;
                     return Some(Err(WrongChecksum));
@@ -74,6 +87,7 @@ impl Decoder {
         let _ = kept.extend_from_slice(self.buffer.get(count..).unwrap_or(&[]));
         self.buffer = kept;
         self.head = self.head.saturating_sub(count);
+        self.damaged_at = self.damaged_at.saturating_sub(count);
     }
 }
 

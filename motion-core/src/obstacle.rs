@@ -1,0 +1,91 @@
+//! What an obstacle does to one joint: it holds the set-point back, and after a second the joint counts as blocked (D27).
+//!
+//! This file does not know registers or the bus.
+
+use protocol_core::time::{Duration, Instant};
+
+use crate::calibration::MicroDegrees;
+use crate::push_limiter::{PushLimit, PushLimiter, PushSample};
+
+/// A joint that is held back for this long, and comes no nearer to its target, is blocked.
+const BLOCKED_AFTER: Duration = Duration::from_millis(1_000);
+/// A joint that came nearer by more than a count has moved: 0.29 degrees of joints 5 to 7.
+const NEARER_BY: u32 = 300_000;
+
+/// A set-point that an obstacle holds back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct HeldBack {
+    pub(crate) set_point: MicroDegrees,
+    /// The joint is blocked and tries nothing, so its target is the set-point.
+    pub(crate) ends_move: bool,
+}
+
+/// The obstacle of one joint.
+#[derive(Clone, Debug)]
+pub(crate) struct Obstacle {
+    limiter: PushLimiter,
+    /// Since when the joint is held back and came no nearer than this distance to its target.
+    held: Option<(Instant, u32)>,
+    is_blocked: bool,
+    /// When the last point of a stream came, if the joint is blocked and tries to reach it.
+    retrying_since: Option<Instant>,
+}
+
+impl Obstacle {
+    /// Nothing is in the way.
+    pub(crate) const NONE: Self =
+        Self { limiter: PushLimiter::FREE, held: None, is_blocked: false, retrying_since: None };
+
+    /// Is the joint blocked?
+    pub(crate) const fn is_blocked(&self) -> bool {
+        self.is_blocked
+    }
+
+    /// See [`PushLimiter::measured`].
+    pub(crate) fn measured(
+        &mut self,
+        now: Instant,
+        sample: PushSample,
+        set_point: MicroDegrees,
+        limit: PushLimit,
+    ) {
+        self.limiter.measured(now, sample, set_point, limit);
+    }
+
+    /// The host wrote a target: the joint tries again.
+    pub(crate) const fn target_written(&mut self) {
+        (self.held, self.is_blocked, self.retrying_since) = (None, false, None);
+    }
+
+    /// The host wrote a point of a stream at `now`: a blocked joint tries again, and counts as blocked until it is free.
+    pub(crate) fn point_written(&mut self, now: Instant) {
+        self.retrying_since = self.is_blocked.then_some(now);
+    }
+
+    /// Checks the set-point of the control cycle that ends at `end`, of a joint measured at `angle`. Returns what becomes of
+    /// the set-point if it is held back.
+    pub(crate) fn hold_back(
+        &mut self,
+        end: Instant,
+        set_point: MicroDegrees,
+        target: MicroDegrees,
+        angle: MicroDegrees,
+    ) -> Option<HeldBack> {
+        let Some(set_point) = self.limiter.hold_back(set_point) else {
+            self.held = None;
+            if self.retrying_since.is_some() && !self.limiter.is_limiting() {
+                self.target_written();
+            }
+            return None;
+        };
+        let distance = target.0.abs_diff(angle.0);
+        let (since, nearest) = *self.held.get_or_insert((end, distance));
+        if distance.saturating_add(NEARER_BY) < nearest {
+            self.held = Some((end, distance));
+        } else if end - since >= BLOCKED_AFTER {
+            self.is_blocked = true;
+        }
+        let is_trying = self.retrying_since.is_some_and(|since| end - since < BLOCKED_AFTER);
+        Some(HeldBack { set_point, ends_move: self.is_blocked && !is_trying })
+    }
+}

@@ -1,0 +1,228 @@
+//! Keeps one joint from pushing harder than its limit (D27).
+//!
+//! ```text
+//!            over the limit for longer than its grace
+//!   Free ──────────────────────────────────────────────────────────▶ Limiting
+//!    ▲                                                                  │
+//!    └── clearly under the limit, and the set-point needs no bound ─────┘
+//! ```
+//!
+//! A servo pushes in proportion to the distance of its goal. So a limited joint keeps its set-point within a distance of
+//! the measured position, and this distance is scaled by limit / push until the push is the limit. The stiffness of the
+//! servo need not be known. Push is in 0.1 % of the stall torque, positive towards greater angles. This file does not know
+//! registers, targets or the bus.
+
+use protocol_core::time::{Duration, Instant};
+
+use crate::calibration::MicroDegrees;
+
+/// The limit of a joint's push.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PushLimit {
+    /// In 0.1 % of the stall torque.
+    pub permille: i16,
+    /// How long a turning joint may exceed it, and one at a standstill. D27 allows 300 ms.
+    pub grace: [Duration; 2],
+}
+
+impl PushLimit {
+    /// The limit of a joint that carries the arm. It stays over it for less than 250 ms while it accelerates freely with
+    /// 300 g, and turns after a push of 80 ms.
+    #[must_use]
+    pub const fn of_arm(permille: i16) -> Self {
+        Self { permille, grace: [Duration::from_millis(250), Duration::from_millis(80)] }
+    }
+
+    /// The limit of the claw, which carries nothing: what it holds may break.
+    #[must_use]
+    pub const fn of_grip(permille: i16) -> Self {
+        Self { permille, grace: [Duration::from_millis(50), Duration::from_millis(30)] }
+    }
+}
+
+/// A joint that turns by at most one count is at a standstill: 0.29 degrees of joints 5 to 7.
+const STANDSTILL: u32 = 300_000;
+/// The first guess for the distance at which a servo pushes with its stall torque, until its push is measured.
+const STALL_DISTANCE: i32 = 4_300_000;
+/// From this load on a servo may give all it has, so its push does not tell the distance any more.
+const SATURATED: i16 = 950;
+/// How far the push may exceed the limit while a joint sinks slowly (D27).
+const TOLERANCE: i16 = 50;
+/// The largest speed at which a joint with a push up to the tolerance sinks: 10 degrees/s (D27), in
+/// micro-degrees per millisecond. Goals are whole counts, so the bound itself moves at 8 degrees/s.
+const SINK_PER_MILLISECOND: i32 = 8_000;
+/// This far under the limit, the distance may grow again; half the limit if that is less.
+const SLACK: i16 = 100;
+/// The growth of the distance after each average.
+const GROWTH: i32 = 100_000;
+/// Measurements in an average. The push follows a new goal after two of them.
+const AVERAGED: i16 = 3;
+
+/// What a servo measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PushSample {
+    /// The position.
+    pub angle: MicroDegrees,
+    /// The load less what the speed needs, in 0.1 % of the stall torque.
+    pub push: i16,
+}
+
+/// The push limiter of one joint.
+#[derive(Clone, Debug)]
+pub struct PushLimiter {
+    phase: Phase,
+}
+
+#[derive(Clone, Debug)]
+enum Phase {
+    Free,
+    /// The push is over the limit.
+    Over {
+        since: Instant,
+        /// The joint has not turned since this time, from this angle.
+        still: (Instant, MicroDegrees),
+        is_positive: bool,
+    },
+    Limiting(Bound),
+}
+
+/// How far the set-point may go in the direction of the push.
+#[derive(Clone, Debug)]
+struct Bound {
+    is_positive: bool,
+    /// The allowed distance between measured position and set-point.
+    distance: i32,
+    set_point: MicroDegrees,
+    measured_at: Instant,
+    /// The sum and the number of the pushes in the present average.
+    sum: i32,
+    samples: i16,
+    /// The push is over the tolerance, so the bound follows the measured position at once.
+    is_urgent: bool,
+    /// The set-point of the last control cycle was beyond the bound.
+    is_holding_back: bool,
+}
+
+impl PushLimiter {
+    /// A joint that nothing holds back.
+    pub const FREE: Self = Self { phase: Phase::Free };
+
+    /// Takes a measurement of a driven joint.
+    pub fn measured(&mut self, now: Instant, sample: PushSample, set_point: MicroDegrees, limit: PushLimit) {
+        let PushLimit { permille: limit, grace: [grace, grace_at_standstill] } = limit;
+        match &mut self.phase {
+            Phase::Free => {
+                if sample.push.saturating_abs() > limit {
+                    let is_positive = sample.push > 0;
+                    self.phase = Phase::Over { since: now, still: (now, sample.angle), is_positive };
+                }
+            }
+            Phase::Over { since, still, is_positive } => {
+                if directed(sample.push, *is_positive) <= limit {
+                    self.phase = Phase::Free;
+                    return;
+                }
+                let (still_since, at) = still;
+                if at.0.abs_diff(sample.angle.0) > STANDSTILL {
+                    (*still_since, *at) = (now, sample.angle);
+                }
+                if now - *since >= grace || now - *still_since >= grace_at_standstill {
+                    let bound = Bound::new(now, sample, set_point, limit);
+                    self.phase = Phase::Limiting(bound);
+                }
+            }
+            Phase::Limiting(bound) => {
+                if !bound.measured(now, sample, limit) {
+                    self.phase = Phase::Free;
+                }
+            }
+        }
+    }
+
+    /// The set-point that a joint has to keep instead of `set_point`; `None` if it may go there. Call it in each control
+    /// cycle.
+    pub fn hold_back(&mut self, set_point: MicroDegrees) -> Option<MicroDegrees> {
+        let Phase::Limiting(bound) = &mut self.phase else { return None };
+        let ahead = if bound.is_positive { set_point > bound.set_point } else { set_point < bound.set_point };
+        bound.is_holding_back = ahead;
+        ahead.then_some(bound.set_point)
+    }
+
+    /// Is the joint limited?
+    #[must_use]
+    pub const fn is_limiting(&self) -> bool {
+        matches!(self.phase, Phase::Limiting(_))
+    }
+}
+
+impl Bound {
+    fn new(now: Instant, sample: PushSample, set_point: MicroDegrees, limit: i16) -> Self {
+        let is_positive = sample.push > 0;
+        let error = directed_angle(set_point.0.saturating_sub(sample.angle.0), is_positive).max(0);
+        let push = sample.push.saturating_abs();
+        let distance = if push < SATURATED {
+            scaled(error, limit, push)
+        } else {
+            error.min(STALL_DISTANCE / 1_000 * i32::from(limit))
+        };
+        let mut bound = Self {
+            is_positive,
+            distance,
+            set_point,
+            measured_at: now,
+            sum: 0,
+            samples: 0,
+            is_urgent: push > limit + TOLERANCE,
+            is_holding_back: true,
+        };
+        bound.follow(now, sample.angle);
+        bound
+    }
+
+    /// Returns whether the joint still has to be limited.
+    fn measured(&mut self, now: Instant, sample: PushSample, limit: i16) -> bool {
+        self.sum += i32::from(directed(sample.push, self.is_positive));
+        self.samples += 1;
+        if self.samples == AVERAGED {
+            let average = i16::try_from(self.sum / i32::from(AVERAGED)).unwrap_or(i16::MAX);
+            (self.sum, self.samples) = (0, 0);
+            self.is_urgent = average > limit + TOLERANCE;
+            let is_low = average < limit - SLACK.min(limit / 2);
+            if is_low && !self.is_holding_back {
+                return false;
+            }
+            if average > limit {
+                self.distance = scaled(self.distance, limit, average);
+            } else if is_low {
+                self.distance = self.distance.saturating_add(GROWTH);
+            }
+        }
+        self.follow(now, sample.angle);
+        true
+    }
+
+    /// Moves the bound with the measured position. It comes back slowly as long as the push is within the tolerance.
+    fn follow(&mut self, now: Instant, angle: MicroDegrees) {
+        let reach = directed_angle(self.distance, self.is_positive);
+        let ahead = directed_angle(angle.0.saturating_add(reach) - self.set_point.0, self.is_positive);
+        let millis = i32::try_from((now - self.measured_at).as_micros() / 1_000).unwrap_or(1_000).min(1_000);
+        let least = if self.is_urgent { i32::MIN } else { -SINK_PER_MILLISECOND * millis };
+        self.set_point.0 += directed_angle(ahead.max(least), self.is_positive);
+        self.measured_at = now;
+    }
+}
+
+/// `distance` × limit / push, for a push over the limit.
+fn scaled(distance: i32, limit: i16, push: i16) -> i32 {
+    (distance / i32::from(push.max(1))).saturating_mul(limit.into())
+}
+
+/// A push, positive in this direction.
+const fn directed(push: i16, is_positive: bool) -> i16 {
+    if is_positive { push } else { push.saturating_neg() }
+}
+
+/// An angle, positive in this direction.
+const fn directed_angle(angle: i32, is_positive: bool) -> i32 {
+    if is_positive { angle } else { angle.saturating_neg() }
+}

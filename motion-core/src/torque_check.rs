@@ -1,0 +1,104 @@
+//! What is known of the torque switch of one servo that should be on (D28, D29).
+//!
+//! ```text
+//!                 read: on                 a question was not answered
+//!   Ordered ───────────────────▶ On ─────────────────────────────────────▶ Doubtful: nothing is sent but questions
+//!      │                         ▲ │                                          │
+//!      │ read: off, twice        │ │ read: off, twice            read: on ────┘ (back to On)
+//!      ▼                         │ ▼
+//!   the order was lost           └ it let go
+//! ```
+
+/// Two answers have to say that torque is off: one of 256 damaged answers passes its checksum.
+const CONFIRMED_BY: u8 = 2;
+
+/// What is known of a torque switch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Known {
+    /// It was ordered on, and not read since.
+    Ordered,
+    /// It was read on.
+    On,
+    /// A question was not answered since it was read, or the servo was not heard for long.
+    Doubtful,
+}
+
+/// What an answer says of a torque switch that should be on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum TorqueFound {
+    /// Nothing new.
+    AsBefore,
+    /// The switch is on although a question was not answered before.
+    Kept,
+    /// The order to switch torque on was lost.
+    OrderLost,
+    /// The switch is off although it was on.
+    Lost,
+}
+
+/// The torque switch of one servo.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TorqueCheck {
+    known: Known,
+    /// Successive answers that say off.
+    offs: u8,
+    /// It was read on since torque was last refreshed.
+    is_fresh: bool,
+}
+
+impl TorqueCheck {
+    /// Torque is to be switched on.
+    pub(crate) const ORDERED: Self = Self { known: Known::Ordered, offs: 0, is_fresh: false };
+
+    /// A question was not answered.
+    pub(crate) const fn unanswered(&mut self) {
+        *self = Self { known: Known::Doubtful, offs: 0, is_fresh: false };
+    }
+
+    /// It is not known any more whether the switch is on, although no question was lost.
+    pub(crate) const fn doubt(&mut self) {
+        self.known = Known::Doubtful;
+        self.is_fresh = false;
+    }
+
+    /// Takes what an answer says.
+    pub(crate) fn answered(&mut self, has_torque: Option<bool>) -> TorqueFound {
+        match has_torque {
+            None => TorqueFound::AsBefore,
+            Some(true) => {
+                let was_doubtful = self.known == Known::Doubtful;
+                *self = Self { known: Known::On, offs: 0, is_fresh: true };
+                if was_doubtful { TorqueFound::Kept } else { TorqueFound::AsBefore }
+            }
+            Some(false) => {
+                self.offs = self.offs.saturating_add(1);
+                self.is_fresh = false;
+                match self.known {
+                    _ if self.offs < CONFIRMED_BY => TorqueFound::AsBefore,
+                    Known::Ordered => TorqueFound::OrderLost,
+                    Known::On | Known::Doubtful => TorqueFound::Lost,
+                }
+            }
+        }
+    }
+
+    /// May goals and torque be sent to the servo?
+    pub(crate) fn is_trusted(self) -> bool {
+        self.known != Known::Doubtful && self.offs == 0
+    }
+
+    /// Has the switch to be read with the next question, whenever torque is refreshed next?
+    pub(crate) fn is_urgent(self) -> bool {
+        self.known != Known::On || self.offs > 0
+    }
+
+    /// Was the switch read on since torque was last refreshed?
+    pub(crate) const fn is_fresh(self) -> bool {
+        self.is_fresh
+    }
+
+    /// Torque is refreshed.
+    pub(crate) const fn refreshed(&mut self) {
+        self.is_fresh = false;
+    }
+}
