@@ -11,7 +11,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use kinematics::geometry::{
-    DISC_RADIUS, ELBOW_OFFSET, FOREARM, JOINT_MAX, LEVEL_FOREARM, REAR_ARM, SHOULDER_FORWARD,
+    BASE_HEIGHT, DISC_RADIUS, ELBOW_OFFSET, FOREARM, JOINT_MAX, LEVEL_FOREARM, REAR_ARM, SHOULDER_FORWARD,
     SHOULDER_HEIGHT, TOOL,
 };
 
@@ -104,7 +104,7 @@ const WRIST: Axes = [FOREARM, 0.0, ELBOW_OFFSET];
 const DISC: Axes = [TOOL, 0.0, 0.0];
 
 // Radii, and lengths that the kinematics does not need, are estimates.
-pub(crate) const BASE_SOLIDS: &[Solid] = &[solid([0.0, 0.0, -60.0], [0.0, 0.0, 0.0], 65.0)];
+pub(crate) const BASE_SOLIDS: &[Solid] = &[solid([0.0, 0.0, -BASE_HEIGHT], [0.0, 0.0, 0.0], 65.0)];
 pub(crate) const TURRET_SOLIDS: &[Solid] = &[
     solid(ORIGIN, [0.0, 0.0, SHOULDER_HEIGHT - 15.0], 45.0),
     solid([SHOULDER_FORWARD, -35.0, SHOULDER_HEIGHT], [SHOULDER_FORWARD, 35.0, SHOULDER_HEIGHT], 20.0),

@@ -27,7 +27,7 @@ mod urdf;
 mod xml;
 
 pub use glb::glb;
-pub use look::{BASE_HEIGHT, Body};
+pub use look::Body;
 pub use mesh::{Finish, Mesh};
 pub use mjcf::mjcf;
 pub use pose::{Pose, poses};

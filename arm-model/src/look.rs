@@ -4,15 +4,13 @@
 //! the model look like an arm for a desk.
 
 use kinematics::geometry::{
-    DISC_RADIUS, ELBOW_OFFSET, FOREARM, LEVER, REAR_ARM, SHOULDER_FORWARD, SHOULDER_HEIGHT, TOOL,
+    BASE_HEIGHT, BASE_RADIUS, DISC_RADIUS, ELBOW_OFFSET, FOREARM, LEVER, REAR_ARM, SHOULDER_FORWARD,
+    SHOULDER_HEIGHT, TOOL,
 };
 
 use crate::chain::Axes;
 use crate::mesh::Finish::{Accent, Dark, Shell};
 use crate::mesh::{Axis, Mesh};
-
-/// From the table up to the top plate, in mm; an estimate.
-pub const BASE_HEIGHT: f64 = 60.0;
 
 /// A rigid body of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,7 +131,7 @@ fn rounded_box(mesh: &mut Mesh, finish: crate::Finish, [x0, x1]: [f64; 2], [z0, 
 
 fn base(mesh: &mut Mesh) {
     let floor = -BASE_HEIGHT;
-    mesh.cylinder(Dark, Axis::Z, ORIGIN, 78.0, [floor, floor + 8.0]);
+    mesh.cylinder(Dark, Axis::Z, ORIGIN, BASE_RADIUS, [floor, floor + 8.0]);
     let profile =
         [[0.0, floor + 8.0], [66.0, floor + 8.0], [64.0, -16.0], [57.0, -6.0], [55.0, -5.0], [0.0, -5.0]];
     mesh.revolved(Shell, Axis::Z, ORIGIN, &profile);
@@ -265,6 +263,7 @@ mod tests {
     fn the_base_stands_on_the_table_and_ends_at_the_top_plate() {
         let [low, high] = Body::Base.mesh().bounds();
         assert_eq!((f64::from(low[2]), high[2]), (-BASE_HEIGHT, 0.0));
+        assert_eq!((f64::from(low[0]), f64::from(high[1])), (-BASE_RADIUS, BASE_RADIUS));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use protocol_core::registers::Joint;
 use protocol_core::time::Duration;
 
 use crate::faults::{ArmFault, FaultLocation};
+use crate::servo::Trip;
 
 /// Something that is done to an arm. Times are in microseconds in its words, and positions in counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +35,10 @@ pub enum Action {
     LetGo(Joint),
     /// `weight 150`: grams in the gripper.
     Weight(u16),
+    /// `drop`: what is between the claws falls, with its weight.
+    Drop,
+    /// `trip 2` latches an overload of a joint's servo; `trip 2 heat` makes it too hot.
+    Trip(Joint, Trip),
     /// `seed 7`: what the faults of the host line are drawn from.
     Seed(u64),
 }
@@ -41,8 +46,8 @@ pub enum Action {
 /// A text that names no action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "use disconnect, power-off, power-cycle, restart, halt, fault, clear, hand, hold, let-go, weight or seed, with \
-     their values"
+    "use disconnect, power-off, power-cycle, restart, halt, fault, clear, hand, hold, let-go, weight, \
+     drop, trip or seed, with their values"
 )]
 pub struct UnknownAction;
 
@@ -71,6 +76,9 @@ impl FromStr for Action {
             ["hold", number] => Self::Hold(joint(number)?),
             ["let-go", number] => Self::LetGo(joint(number)?),
             ["weight", grams] => Self::Weight(value(grams)?),
+            ["drop"] => Self::Drop,
+            ["trip", number] => Self::Trip(joint(number)?, Trip::Overload),
+            ["trip", number, "heat"] => Self::Trip(joint(number)?, Trip::Heat),
             ["seed", seed] => Self::Seed(value(seed)?),
             _ => return Err(UnknownAction),
         })
@@ -93,6 +101,9 @@ impl Display for Action {
             Self::Hold(joint) => write!(out, "hold {}", joint.number()),
             Self::LetGo(joint) => write!(out, "let-go {}", joint.number()),
             Self::Weight(grams) => write!(out, "weight {grams}"),
+            Self::Drop => out.write_str("drop"),
+            Self::Trip(joint, Trip::Overload) => write!(out, "trip {}", joint.number()),
+            Self::Trip(joint, Trip::Heat) => write!(out, "trip {} heat", joint.number()),
             Self::Seed(seed) => write!(out, "seed {seed}"),
         }
     }
@@ -122,13 +133,29 @@ mod tests {
             "hold 7",
             "let-go 1",
             "weight 150",
+            "drop",
+            "trip 2",
+            "trip 2 heat",
+            "fault 2=wall=60.5/500 2000000",
             "seed 18446744073709551615",
         ] {
             assert_eq!(text.parse::<Action>().map(|action| action.to_string()), Ok(text.into()));
         }
-        for text in
-            ["", "hand 2", "hand 0 1", "hand 8 1", "fault", "fault 3", "clear x", "weight -1", "seed", "on"]
-        {
+        for text in [
+            "",
+            "trip",
+            "trip 8",
+            "trip 2 cold",
+            "hand 2",
+            "hand 0 1",
+            "hand 8 1",
+            "fault",
+            "fault 3",
+            "clear x",
+            "weight -1",
+            "seed",
+            "on",
+        ] {
             assert_eq!(text.parse::<Action>(), Err(UnknownAction), "{text}");
         }
     }

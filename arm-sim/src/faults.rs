@@ -2,7 +2,7 @@
 //!
 //! | location | faults |
 //! | --- | --- |
-//! | a joint, 1 to 7 | [`ServoFault`] |
+//! | a joint, 1 to 7 | [`ServoFault`], [`Obstacle`] |
 //! | `bus` | `echo` |
 //! | `supply` | [`SupplyFault`] |
 //! | `flash` | [`FlashFault`] |
@@ -23,12 +23,17 @@ use crate::plant::{Plant, SupplyFault, UnknownSupplyFault};
 use crate::servo::{ServoFault, UnknownFault};
 
 pub(crate) mod list;
+mod obstacle;
+
+pub use obstacle::{Obstacle, UnknownObstacle};
 
 /// A fault of the simulated arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArmFault {
     /// Of this joint's servo.
     Servo(Joint, ServoFault),
+    /// No fault: this joint meets something.
+    Obstacle(Joint, Obstacle),
     /// Of the bus: the controller receives its own bytes.
     Echo,
     /// Of the supply of all servos.
@@ -72,6 +77,12 @@ pub enum UnknownArmFault {
     /// The part after it is no fault of a servo.
     #[error(transparent)]
     Kind(#[from] UnknownFault),
+    /// Likewise, no obstacle.
+    #[error(transparent)]
+    Obstacle(#[from] UnknownObstacle),
+    /// Something is between the claws, and those are moved by joint 7.
+    #[error("only joint 7 moves the claws: use 7=thing=DEGREES")]
+    NoClaw,
     /// Likewise, of the supply.
     #[error(transparent)]
     Supply(#[from] UnknownSupplyFault),
@@ -125,6 +136,11 @@ impl FromStr for ArmFault {
             (Ok(FaultLocation::Bus), "echo") => Self::Echo,
             (Ok(FaultLocation::Arm), "supported") => Self::Supported,
             (Ok(FaultLocation::Arm), "goal-starts-torque") => Self::GoalStartsTorque,
+            (Ok(FaultLocation::Joint(joint)), kind) if Obstacle::is_kind(kind) => {
+                let obstacle: Obstacle = kind.parse()?;
+                let is_possible = obstacle.is_possible_at(joint);
+                is_possible.then_some(Self::Obstacle(joint, obstacle)).ok_or(UnknownArmFault::NoClaw)?
+            }
             (Ok(FaultLocation::Joint(joint)), kind) => Self::Servo(joint, kind.parse()?),
             (Ok(FaultLocation::Supply), kind) => Self::Supply(kind.parse()?),
             (Ok(FaultLocation::Flash), kind) => Self::Flash(kind.parse()?),
@@ -138,6 +154,7 @@ impl Display for ArmFault {
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
         match self {
             Self::Servo(joint, fault) => write!(out, "{}={fault}", joint.number()),
+            Self::Obstacle(joint, obstacle) => write!(out, "{}={obstacle}", joint.number()),
             Self::Echo => out.write_str("bus=echo"),
             Self::Supply(fault) => write!(out, "supply={fault}"),
             Self::Flash(fault) => write!(out, "flash={fault}"),
@@ -153,7 +170,7 @@ impl ArmFault {
     #[must_use]
     pub const fn location(self) -> FaultLocation {
         match self {
-            Self::Servo(joint, _) => FaultLocation::Joint(joint),
+            Self::Servo(joint, _) | Self::Obstacle(joint, _) => FaultLocation::Joint(joint),
             Self::Echo => FaultLocation::Bus,
             Self::Supply(_) => FaultLocation::Supply,
             Self::Flash(_) => FaultLocation::Flash,
@@ -168,11 +185,15 @@ impl ArmFault {
         !matches!(self, Self::Flash(_) | Self::Line(_))
     }
 
-    /// Does it take the place of another one? A servo and the supply have one fault at a time.
+    /// Does it take the place of another one? A servo and the supply have one fault at a time, and a joint has one obstacle
+    /// of each kind.
     #[must_use]
     pub fn replaces(self, other: Self) -> bool {
         match (self, other) {
             (Self::Flash(new), Self::Flash(old)) => new == old,
+            (Self::Obstacle(joint, new), Self::Obstacle(other, old)) => {
+                joint == other && discriminant(&new) == discriminant(&old)
+            }
             (Self::Line(new), Self::Line(old)) => discriminant(&new) == discriminant(&old),
             (new, old) => new.location() == old.location() && discriminant(&new) == discriminant(&old),
         }
@@ -184,7 +205,7 @@ impl ArmFault {
         Some(match self {
             Self::Servo(_, ServoFault::Missing) => "frames",
             Self::Servo(_, ServoFault::Late(_) | ServoFault::Garbled(_)) => "answers",
-            Self::Servo(_, ServoFault::Stuck) => "ms",
+            Self::Servo(_, ServoFault::Stuck) | Self::Obstacle(..) => "ms",
             Self::Servo(_, ServoFault::Restarting(_)) => "restarts",
             Self::Echo | Self::Line(_) => "bytes",
             Self::Supply(SupplyFault::Dips(_)) => "dips",
@@ -198,6 +219,7 @@ impl ArmFault {
     pub fn apply(self, plant: &mut Plant) {
         match self {
             Self::Servo(joint, fault) => plant.set_fault(joint, Some(fault)),
+            Self::Obstacle(joint, obstacle) => obstacle.apply(joint, plant),
             Self::Echo => plant.set_echo(true),
             Self::Supply(fault) => plant.set_supply_fault(Some(fault)),
             Self::Supported => plant.support(true),
@@ -210,6 +232,7 @@ impl ArmFault {
     pub(crate) fn remove(self, plant: &mut Plant) {
         match self {
             Self::Servo(joint, _) => plant.set_fault(joint, None),
+            Self::Obstacle(joint, obstacle) => obstacle.remove(joint, plant),
             Self::Echo => plant.set_echo(false),
             Self::Supply(_) => plant.set_supply_fault(None),
             Self::Supported => plant.support(false),

@@ -3,14 +3,16 @@
 //! ```text
 //!   plant.bytes(now, ..) ──▶ Decoder ──▶ each Servo gets each frame
 //!                                             │ answers
-//!   plant.poll(now) ◀── Wire: 1 Mbaud ◀───────┘
+//!   plant.poll(now) ◀── Wire ◀────────────────┘
 //! ```
 //!
-//! A loaded joint falls without torque and droops a little with torque. After power-up a hand holds each joint until it
+//! A loaded joint falls without torque and droops with torque, by its load. After power-up a hand holds each joint until it
 //! has torque. The same calls at the same times give the same bytes on every machine. The plant does not know the
 //! controller.
 
 mod disturbance;
+mod inertia;
+mod obstacles;
 mod pose;
 mod sine;
 mod supply;
@@ -29,10 +31,15 @@ use protocol_core::time::{Duration, Instant};
 use crate::fault_count::FaultCount;
 use crate::servo::units::STEP;
 use crate::servo::{Servo, ServoConfig, ServoFault};
+pub use obstacles::{HIGHEST_STIFFNESS, STRONGEST_PUSH, Thing, Wall};
+use pose::{AngleScale, Pose};
 use supply::Supply;
 pub use supply::{SupplyFault, UnknownSupplyFault};
 pub use weight::HEAVIEST_LOAD_G;
 use wire::Wire;
+
+/// The baud rate of servos as delivered, in bits per second.
+const DELIVERED_BAUD: u32 = 1_000_000;
 
 /// If no call comes for longer than this, the arm stands still during the time before.
 const LONGEST_CATCH_UP: Duration = Duration::from_millis(100_000);
@@ -42,11 +49,14 @@ const LONGEST_CATCH_UP: Duration = Duration::from_millis(100_000);
 pub struct Plant {
     config: ServoConfig,
     servos: [Servo; JOINTS],
+    scales: [AngleScale; JOINTS],
     decoder: Decoder,
     wire: Wire,
     supply: Supply,
     /// The weight in the gripper, in grams.
     load_g: u16,
+    /// The claws have touched what is between them.
+    is_thing_gripped: bool,
     has_echo: bool,
     /// Of the echo, in bytes.
     echo_count: FaultCount,
@@ -75,10 +85,12 @@ impl Plant {
         let mut plant = Self {
             config,
             servos: Joint::ALL.map(servo),
+            scales: Joint::ALL.map(AngleScale::of),
             decoder: Decoder::new(),
-            wire: Wire::new(),
+            wire: Wire::at_baud(DELIVERED_BAUD),
             supply: Supply::default(),
             load_g: 0,
+            is_thing_gripped: false,
             has_echo: false,
             echo_count: FaultCount::default(),
             has_exact_times: true,
@@ -88,6 +100,17 @@ impl Plant {
         };
         plant.update_weight();
         plant
+    }
+
+    /// Sets the baud rate of the wire, in bits per second. It is 1 Mbaud at first. Bytes on the wire are lost.
+    pub fn set_baud(&mut self, baud: u32) {
+        self.wire = Wire::at_baud(baud);
+    }
+
+    /// The baud rate of the wire, in bits per second.
+    #[must_use]
+    pub const fn baud(&self) -> u32 {
+        self.wire.baud()
     }
 
     /// Takes bytes that the controller starts to send at `now`: a whole frame, or a part of one. The servos do not
@@ -175,6 +198,7 @@ impl Plant {
             has_turned |= servo.step(self.now, supply);
         }
         if has_turned {
+            self.follow_claw();
             self.update_weight();
         } else {
             let supply = self.supply_decivolts();
@@ -197,23 +221,25 @@ impl Plant {
         &mut self.servos
     }
 
-    /// Loads each servo with its share of the arm's weight in this pose.
+    /// Loads each servo with its share of the arm's weight and inertia in this pose.
     fn update_weight(&mut self) {
-        let torques = weight::torques(self.pose(), self.load_g.into());
-        for ((servo, joint), torque) in self.servos_mut().iter_mut().zip(Joint::ALL).zip(torques) {
-            servo.set_weight(if pose::is_reversed(joint) { -torque } else { torque });
+        let mut angles = [0; JOINTS];
+        for ((angle, servo), scale) in angles.iter_mut().zip(&self.servos).zip(self.scales) {
+            *angle = scale.angle(servo.position());
         }
-    }
-
-    /// The angles of the joints in thousandths of a degree.
-    fn pose(&self) -> [i64; JOINTS] {
-        Joint::ALL.map(|joint| self.servo(joint).map_or(0, |servo| pose::angle(joint, servo.position())))
+        let pose = Pose::of(angles);
+        let torques = weight::torques(pose, self.load_g.into());
+        let inertias = inertia::inertias(pose, self.load_g.into());
+        let (arm, scales) = (torques.into_iter().zip(inertias), self.scales);
+        for ((servo, scale), (torque, inertia)) in self.servos_mut().iter_mut().zip(scales).zip(arm) {
+            servo.set_arm(scale.torque_towards_counts(torque), inertia);
+        }
     }
 
     /// The supply voltage of the servos at the last call with a time, in 0.1 V. 0 without supply.
     #[must_use]
     pub fn supply_decivolts(&self) -> u8 {
-        self.supply.decivolts(self.now, self.servos.iter().map(Servo::load).sum())
+        self.supply.decivolts(self.now, self.servos.iter().map(Servo::current).sum())
     }
 
     /// Leaves only servos with these ids on the bus. An id from 0 to 6 goes to its joint's servo if that has no id yet;
@@ -235,11 +261,12 @@ impl Plant {
     /// The true angle of a joint in thousandths of a degree, without any offset, at the last call with a time.
     #[must_use]
     pub fn angle(&self, joint: Joint) -> i32 {
-        let angle = self.servo(joint).map_or(0, |servo| pose::angle(joint, servo.position()));
+        let angle = self.servo(joint).map_or(0, |servo| AngleScale::of(joint).angle(servo.position()));
         i32::try_from(angle).unwrap_or(0)
     }
 
-    /// The torque of a joint's motor at the last call with a time. `None` without power, and after an overload.
+    /// The torque of a joint's motor at the last call with a time. `None` without power, and while an alarm switches
+    /// the motor off.
     #[must_use]
     pub fn torque(&self, joint: Joint) -> Option<Torque> {
         self.servo(joint).and_then(|servo| servo.torque(self.now))
@@ -251,7 +278,27 @@ impl Plant {
         self.servo(joint).map_or(0, Servo::position_counts)
     }
 
-    /// The load of a joint's motor in 0.1 %. Positive values are towards more counts.
+    /// The torque of a joint's motor in 0.1 % of its stall torque: its load less what its speed needs. Positive values
+    /// are towards more counts.
+    #[must_use]
+    pub fn motor_torque(&self, joint: Joint) -> i16 {
+        self.servo(joint).map_or(0, Servo::motor_torque)
+    }
+
+    /// How far its present load from outside turns a driven joint off its set-point at most, in thousandths of a degree.
+    /// `None`: the load exceeds its stall torque.
+    #[must_use]
+    pub fn droop(&self, joint: Joint) -> Option<i32> {
+        self.servo(joint)?.droop().and_then(|droop| i32::try_from(droop).ok())
+    }
+
+    /// The distance in which its stall torque stops a joint at its present speed, in thousandths of a degree.
+    #[must_use]
+    pub fn stopping_distance(&self, joint: Joint) -> i32 {
+        self.servo(joint).map_or(0, |servo| i32::try_from(servo.stopping_distance()).unwrap_or(i32::MAX))
+    }
+
+    /// The load of a joint's motor, its duty, in 0.1 %. Positive values are towards more counts.
     #[must_use]
     pub fn load(&self, joint: Joint) -> i16 {
         self.servo(joint).map_or(0, Servo::signed_load)
@@ -263,7 +310,8 @@ impl Plant {
         self.servo(joint).is_some_and(Servo::is_held)
     }
 
-    /// Does a joint's servo drive it? Not without torque or power, and not after an overload.
+    /// Does a joint's servo drive it? Not without torque or power, and not while an alarm switches its
+    /// motor off.
     #[must_use]
     pub fn has_torque(&self, joint: Joint) -> bool {
         self.servo(joint).is_some_and(Servo::has_torque)

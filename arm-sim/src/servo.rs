@@ -6,16 +6,19 @@
 //!                   └──── position, speed, load ──────────┘
 //! ```
 //!
-//! Time passes in steps of a millisecond. The servo does not know the timing of the wire or other servos. Voltage,
-//! temperature and load are plausible values: no servo was measured.
+//! Time passes in steps of a millisecond. The servo does not know the timing of the wire or other servos. The values
+//! of its motor, gear and temperature are in [`parameters`](crate::parameters).
 
 mod config;
 mod fault;
 mod fault_state;
 mod gear;
 mod motor;
+mod obstacles;
+mod protection;
 mod registers;
 mod steps;
+pub(crate) mod surroundings;
 mod temperature;
 pub(crate) mod units;
 
@@ -29,6 +32,8 @@ pub use config::ServoConfig;
 pub use fault::{ServoFault, UnknownFault};
 use fault_state::FaultState;
 use motor::Motor;
+pub use obstacles::Trip;
+use protection::Protection;
 use registers::ServoRegisters;
 use temperature::Temperature;
 
@@ -56,11 +61,14 @@ pub struct Servo {
     is_held: bool,
     /// A stand holds it whenever it has no torque.
     is_supported: bool,
-    /// It turned its motor off after an overload.
-    is_overloaded: bool,
-    /// Number of successive steps with an overload.
-    overload_steps: u32,
+    protection: Protection,
     temperature: Temperature,
+    /// Milliseconds at its wall.
+    wall_count: FaultCount,
+    /// Milliseconds at the thing between the claws.
+    thing_count: FaultCount,
+    /// Milliseconds of a push.
+    push_count: FaultCount,
     /// What the registers hold, apart from the measurements of the motor.
     reported: Option<Reported>,
 }
@@ -70,7 +78,7 @@ pub struct Servo {
 struct Reported {
     decivolts: u8,
     celsius: u8,
-    is_overloaded: bool,
+    errors: u8,
 }
 
 impl Servo {
@@ -86,9 +94,11 @@ impl Servo {
             is_on: false,
             is_held: true,
             is_supported: false,
-            is_overloaded: false,
-            overload_steps: 0,
+            protection: Protection::default(),
             temperature: Temperature::default(),
+            wall_count: FaultCount::default(),
+            thing_count: FaultCount::default(),
+            push_count: FaultCount::default(),
             reported: None,
         }
     }
@@ -98,8 +108,7 @@ impl Servo {
         self.registers.power_cycle();
         self.ready_at = ready_at;
         self.is_on = false;
-        self.is_overloaded = false;
-        self.overload_steps = 0;
+        self.protection.release();
         self.fault.start();
         self.reported = None;
     }
@@ -175,8 +184,7 @@ impl Servo {
             self.motor.start(self.registers.goal());
         }
         if !is_on {
-            self.is_overloaded = false;
-            self.overload_steps = 0;
+            self.protection.release();
         }
         self.is_on = is_on;
     }
@@ -189,25 +197,44 @@ impl Servo {
         [Torque::On, Torque::Damping].into_iter().find(has_code).unwrap_or(Torque::Free)
     }
 
-    /// The torque of the motor at `now`. `None` without power, and after an overload.
+    /// The torque of the motor at `now`. `None` without power, and while an alarm switches the motor off.
     #[must_use]
     pub fn torque(&self, now: Instant) -> Option<Torque> {
-        (self.has_power(now) && !self.is_overloaded).then(|| self.torque_switch())
+        let switch = self.torque_switch();
+        // An alarm takes the motor its voltage. The brake needs none: assumed.
+        let is_freed = switch == Torque::On && self.protection.is_unloaded();
+        (self.has_power(now) && !is_freed).then_some(switch)
     }
 
     fn has_power(&self, now: Instant) -> bool {
         now >= self.ready_at && !self.fault.is_missing()
     }
 
-    /// The load in either direction, in 0.1 %.
+    /// The current in 0.1 % of that of a blocked motor: the torque in either direction, as the supply has to give it.
     #[must_use]
-    pub fn load(&self) -> u16 {
-        self.motor.load().unsigned_abs()
+    pub fn current(&self) -> u16 {
+        self.motor.torque().unsigned_abs().min(1_000)
+    }
+
+    /// The torque of the motor in 0.1 % of its stall torque. Positive values are towards more counts.
+    #[must_use]
+    pub(crate) fn motor_torque(&self) -> i16 {
+        self.motor.torque()
     }
 
     /// The load in 0.1 %. Positive values are towards more counts.
     pub(crate) fn signed_load(&self) -> i16 {
         self.motor.load()
+    }
+
+    /// How far its load turns it off its set-point at most, in thousandths of a degree.
+    pub(crate) fn droop(&self) -> Option<i64> {
+        self.motor.droop()
+    }
+
+    /// The distance in which its stall torque stops it, in thousandths of a degree.
+    pub(crate) fn stopping_distance(&self) -> i64 {
+        self.motor.stopping_distance()
     }
 
     /// The position in counts, 0 to 1023.
@@ -219,17 +246,12 @@ impl Servo {
     /// Does it drive its joint?
     #[must_use]
     pub const fn has_torque(&self) -> bool {
-        self.is_on && !self.is_overloaded
+        self.is_on && !self.protection.is_unloaded()
     }
 
     /// The position in millionths of a count.
     pub(crate) const fn position(&self) -> i64 {
         self.motor.position()
-    }
-
-    /// Sets the torque of the arm's weight, in micronewton metres, towards more counts.
-    pub(crate) const fn set_weight(&mut self, weight: i64) {
-        self.motor.set_weight(weight);
     }
 
     /// Turns it by hand, and holds it there. A servo with torque turns back.

@@ -11,6 +11,9 @@ pub trait ServoBus {
     /// Do the servos run in real time? Then a caller that is late cannot catch up.
     const IS_REAL: bool;
 
+    /// The baud rate, in bits per second.
+    fn baud(&self) -> u32;
+
     /// An answer may arrive this much later than on the wire.
     fn answer_delay(&self) -> Duration;
 
@@ -34,6 +37,10 @@ pub trait ServoBus {
 
 impl ServoBus for Plant {
     const IS_REAL: bool = false;
+
+    fn baud(&self) -> u32 {
+        Self::baud(self)
+    }
 
     fn answer_delay(&self) -> Duration {
         Duration::ZERO

@@ -110,7 +110,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     #[must_use]
     pub fn power_up(now: Instant, config: ArmConfig, flash: F, bus: B) -> Self {
         let settings = Settings::open(FaultyFlash::new(flash));
-        let controller = start(now, config, &settings, 0, bus.answer_delay());
+        let controller = start(now, config, &settings, 0, &bus);
         let (to_arm, to_host) = LineDirection::pair(1);
         let mut simulation = Self {
             config,
@@ -284,7 +284,6 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
                     }
                     self.to_host.push(self.now, bytes);
                 }
-                Output::ServoFrameStart(_) => {}
                 Output::ToServos(bytes) => self.bus.bytes(self.now, bytes),
                 Output::Vacuum(vacuum) => log_vacuum(vacuum),
                 Output::Save(image) => {
@@ -302,23 +301,24 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
 }
 
 /// A controller that starts.
-fn start<F: NorFlash, C: ArmController>(
+fn start<F: NorFlash, B: ServoBus, C: ArmController>(
     now: Instant,
     arm: ArmConfig,
     settings: &Settings<F>,
     faults: u8,
-    answer_delay: Duration,
+    bus: &B,
 ) -> C {
     settings_log::opened(settings);
     let config = Config {
         chip_id: arm.chip_id,
         faults,
+        servo_baud: bus.baud(),
         servo_timeout: SERVO_TIMEOUT,
         guard_time: GUARD_TIME,
         torque_codes: arm.torque_codes,
     };
     let mut controller = C::power_up(now, config, settings.found(), settings.storage());
-    controller.set_answer_delay(answer_delay);
+    controller.set_answer_delay(bus.answer_delay());
     controller
 }
 

@@ -13,7 +13,7 @@ use motion_core::servo_bus::Torque;
 use protocol_core::registers::map::{FAULTS, MISSING_SERVOS, fault};
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::{Duration, Instant};
-use rig::Rig;
+use rig::{Rig, near};
 
 const BASE: Joint = Joint::ALL[0];
 const REAR_ARM: Joint = Joint::ALL[1];
@@ -85,21 +85,22 @@ fn a_fall_ends_by_friction_or_at_the_end_of_the_servo() {
 }
 
 #[test]
-fn a_driven_joint_droops_by_less_than_a_tenth_of_a_degree_and_measures_the_load() {
+fn a_driven_joint_droops_by_its_load_and_measures_it() {
     let mut rig = Rig::driven();
     let [base, rear, forearm, _, pitch, ..] = rig.pose();
     assert_eq!([base, rear], [90 * DEGREE; 2], "no load, no droop");
-    let standard = 65_012; // 684 counts
-    assert!((50..70).contains(&(forearm - standard)), "{forearm}");
-    let goal = 89_856; // 512 counts
-    assert!((50..70).contains(&(pitch - goal)), "{pitch}");
-    assert_eq!(rig.reading(FOREARM).unwrap().0.load, 284, "towards more counts, which is up");
+    // 459 of 2450 mN m are 0.81 degrees of 4.3; static friction holds 123 mN m of them.
+    let droop = forearm - 65_012; // 684 counts
+    assert!((590..=810).contains(&droop), "{droop}");
+    let droop = pitch - 89_856; // 512 counts
+    assert!((220..=360).contains(&droop), "{droop}: 49 of 588 mN m");
+    let load = rig.reading(FOREARM).unwrap().0.load;
+    assert!((137..=188).contains(&load), "{load}: towards more counts, which is up");
     assert_eq!(rig.reading(BASE).unwrap().0.load, 0);
     rig.all_goals([511, 850, LEVEL, 511, 512, 512, 1_008]);
     rig.pass(2_000);
-    let goal = 4_235; // 850 counts
-    let droop = goal - rig.plant.angle(REAR_ARM);
-    assert!((45..70).contains(&droop), "{droop}: the rear arm is level");
+    let droop = 4_235 - rig.plant.angle(REAR_ARM); // 850 counts
+    assert!((530..=960).contains(&droop), "{droop}: the rear arm is level, 424 of 2450 mN m");
 }
 
 #[test]
@@ -181,7 +182,7 @@ fn a_goal_switches_torque_on_after_a_restart_only_if_configured() {
         rig.pass(200);
         rig.all_goals([600; JOINTS]);
         rig.pass(2_000);
-        assert_eq!(rig.counts(BASE) == 600, goal_starts_torque);
+        assert_eq!(near(rig.counts(BASE), 600), goal_starts_torque);
         // After a write to the torque switch, a goal does not change it.
         rig.all_torque(Torque::Free);
         rig.all_goals([500; JOINTS]);
@@ -192,7 +193,7 @@ fn a_goal_switches_torque_on_after_a_restart_only_if_configured() {
         rig.pass(200);
         rig.all_goals([500; JOINTS]);
         rig.pass(2_000);
-        assert_eq!(rig.counts(BASE) == 500, goal_starts_torque);
+        assert_eq!(near(rig.counts(BASE), 500), goal_starts_torque);
     }
 }
 
@@ -249,6 +250,7 @@ fn servos_keep_torque_and_goal_while_the_controller_restarts() {
     assert_eq!(simulation.registers().get(FAULTS.address), fault::WATCHDOG_RESTART);
     for (joint, before) in Joint::ALL.into_iter().zip(start) {
         let sag = simulation.plant().angle(joint) - before;
+        // The controller keeps the goal that the servo holds (D12).
         assert_eq!(sag, 0, "joint {}", joint.number());
     }
     assert_eq!(simulation.plant().collisions(), 0);

@@ -8,7 +8,7 @@ use arm_sim::servo::ServoFault;
 use motion_core::servo_bus::frame::{error, ping, register, sync_write, write};
 use protocol_core::registers::Joint;
 use protocol_core::time::Duration;
-use rig::Rig;
+use rig::{Rig, near};
 
 const BASE: Joint = Joint::ALL[0];
 const CLAW: Joint = Joint::ALL[6];
@@ -28,10 +28,10 @@ fn a_missing_servo_does_not_answer_and_returns_without_torque() {
     rig.plant.set_fault(BASE, None);
     assert!(rig.reading(BASE).is_none(), "it starts");
     rig.pass(200);
-    assert_eq!(rig.reading(BASE).map(|(reading, _)| reading.position_counts), Some(600));
+    assert_eq!(rig.reading(BASE).map(|(reading, _)| near(reading.position_counts, 600)), Some(true));
     rig.goal(BASE, 700, 0, 0);
     rig.pass(1_000);
-    assert_eq!(rig.counts(BASE), 600);
+    assert!(near(rig.counts(BASE), 600));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use motion_core::servo_bus::frame::{ping, read, register, sync_write};
 use motion_core::servo_bus::{Torque, TorqueCodes};
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::time::Duration;
-use rig::Rig;
+use rig::{Rig, near};
 
 const BASE: Joint = Joint::ALL[0];
 /// The position of joint 1 in the standard pose.
@@ -58,9 +58,9 @@ fn servos_do_not_answer_until_they_have_started() {
     rig.plant.power_cycle(rig.now);
     assert!(rig.reading(BASE).is_none());
     rig.pass(200);
-    assert_eq!(rig.reading(BASE).map(|(reading, _)| reading.position_counts), Some(600));
+    assert_eq!(rig.reading(BASE).map(|(reading, _)| near(reading.position_counts, 600)), Some(true));
     rig.pass(1_000);
-    assert_eq!(rig.counts(BASE), 600, "torque is off, and the old goal is lost");
+    assert!(near(rig.counts(BASE), 600), "torque is off, and the old goal is lost");
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn goals_take_their_running_time_or_speed() {
         let almost = rig.counts(BASE);
         assert!(almost < BASE_START + 300, "time {time_ms}, speed {speed}: too early");
         rig.pass(160);
-        assert_eq!(rig.counts(BASE), BASE_START + 300, "time {time_ms}, speed {speed}: too late");
+        assert!(near(rig.counts(BASE), BASE_START + 300), "time {time_ms}, speed {speed}: too late");
     }
 }
 
@@ -102,9 +102,10 @@ fn a_sync_write_starts_all_joints_together() {
     for _ in 0..9 {
         rig.pass(100);
         let gone = [0, 1, 2, 3, 4, 5, 6].map(|i| start[i] - rig.counts(Joint::ALL[i]));
-        assert!(gone.iter().all(|counts| counts.abs_diff(gone[0]) <= 1), "apart from droop: {gone:?}");
+        // The droop of a level joint is up to 4 counts, and changes on the way.
+        assert!(gone.iter().all(|counts| counts.abs_diff(gone[0]) <= 4), "{gone:?}");
     }
-    assert_eq!(start[0] - rig.counts(BASE), 200, "300 counts/s");
+    assert!(near(start[0] - rig.counts(BASE), 200), "300 counts/s");
 }
 
 #[test]
@@ -124,10 +125,10 @@ fn only_a_servo_with_torque_is_driven() {
         }
         rig.torque(BASE, codes.code(Torque::On));
         rig.pass(1_000);
-        assert_eq!(rig.counts(BASE), 700, "with torque, a servo moves to the goal from before");
+        assert!(near(rig.counts(BASE), 700), "with torque, a servo moves to the goal from before");
         rig.plant.move_by_hand(BASE, 650);
         rig.pass(1_000);
-        assert_eq!(rig.counts(BASE), 700, "a servo with torque returns to its goal");
+        assert!(near(rig.counts(BASE), 700), "a servo with torque returns to its goal");
     }
 }
 
@@ -137,7 +138,7 @@ fn a_servo_with_torque_and_without_a_goal_moves_to_0() {
     let mut rig = Rig::ready();
     rig.torque(BASE, 1);
     rig.pass(2_000);
-    assert_eq!(rig.counts(BASE), 0);
+    assert!(near(rig.counts(BASE), 0));
 }
 
 #[test]
@@ -157,11 +158,8 @@ fn a_moving_arm_becomes_warm_and_lowers_the_supply_voltage() {
     assert!((26..40).contains(&warm.temperature_celsius), "{} degrees", warm.temperature_celsius);
     (0..10).for_each(|_| rig.pass(100_000));
     let (rested, _) = rig.reading(BASE).unwrap();
-    assert_eq!(
-        (rested.voltage_decivolts, rested.load, rested.speed),
-        (73, 0, 0),
-        "other joints carry weight"
-    );
+    assert_eq!((rested.voltage_decivolts, rested.speed), (73, 0), "other joints carry weight");
+    assert!(rested.load.abs() < 41, "static friction holds up to 100 of 2450 mN m: {}", rested.load);
     assert!(rested.temperature_celsius < warm.temperature_celsius);
 }
 

@@ -78,7 +78,8 @@ fn it_answers_with_the_makers_bytes() {
         (&[0xAA, 0x77, 3, 1, 1, 0x17, 0xFC], &[0xAA, 0x77, 3, 1, 1, 21, 0x7D, 0xC1]),
         (
             &[0xAA, 0x77, 3, 83, 7, 0xAA, 0x9E],
-            &[0xAA, 0x77, 3, 83, 7, 90, 90, 65, 90, 90, 90, 80, 0xD4, 0xD3],
+            // The level forearm droops by 0.7 degrees.
+            &[0xAA, 0x77, 3, 83, 7, 90, 90, 66, 90, 90, 90, 80, 0x90, 0xD3],
         ),
     ] {
         bench.arm.host_send(bench.now, request);
@@ -111,7 +112,7 @@ fn it_takes_values_that_are_out_of_range() {
 fn feedback_comes_a_little_slower_than_asked() {
     let mut bench = Bench::new();
     bench.send(&[4, 82, 1, 30]);
-    let frame = with_envelope(&[5, 83, 7, 90, 90, 65, 90, 90, 90, 80]);
+    let frame = with_envelope(&[5, 83, 7, 90, 90, 66, 90, 90, 90, 80]);
     let received = bench.after(1_000);
     assert_eq!(received, frame.repeat(30), "one at once, then one each 34 ms");
     bench.send(&[4, 82, 1, 0]);
@@ -165,7 +166,7 @@ fn settings_are_stored_only_with_the_lock_open() {
 #[test]
 fn a_missing_servo_delays_the_reply_and_keeps_its_last_angle() {
     let mut bench = Bench::new();
-    assert_eq!(bench.read(83, 7), [90, 90, 65, 90, 90, 90, 80]);
+    assert_eq!(bench.read(83, 7), [90, 90, 66, 90, 90, 90, 80]);
     bench.arm.plant_mut().set_fault(Joint::ALL[2], Some(ServoFault::Missing));
-    assert_eq!(bench.read(83, 7), [90, 90, 65, 90, 90, 90, 80]);
+    assert_eq!(bench.read(83, 7), [90, 90, 66, 90, 90, 90, 80]);
 }

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use protocol_core::time::Instant;
 
-use super::{ArmFault, FaultLocation, FaultReport};
+use super::{ArmFault, FaultLocation, FaultReport, Obstacle};
 
 /// Reports of ended faults that are kept.
 const REPORTS: usize = 16;
@@ -35,6 +35,16 @@ impl FaultList {
     /// Takes the faults at a location, or all faults.
     pub(crate) fn take_at(&mut self, location: Option<FaultLocation>) -> Vec<ListedFault> {
         self.take(|listed| location.is_none_or(|location| listed.fault.location() == location))
+    }
+
+    /// Is something between the claws?
+    pub(crate) fn has_thing(&self) -> bool {
+        self.0.iter().any(|listed| matches!(listed.fault, ArmFault::Obstacle(_, Obstacle::Thing(_))))
+    }
+
+    /// Takes what is between the claws.
+    pub(crate) fn take_things(&mut self) -> Vec<ListedFault> {
+        self.take(|listed| matches!(listed.fault, ArmFault::Obstacle(_, Obstacle::Thing(_))))
     }
 
     /// Takes the faults that end by `now`.

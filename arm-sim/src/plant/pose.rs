@@ -1,30 +1,90 @@
-//! The angle of a joint from the position of its servo, finer than a count.
+//! The angles of the joints from the positions of their servos, finer than a count, and the directions of the arm's parts.
 
 use motion_core::calibration::angle_from_counts;
-use protocol_core::registers::Joint;
+use protocol_core::registers::{JOINTS, Joint};
 
+use super::sine::{cosine, sine};
 use crate::servo::units::COUNT;
 
 /// For either kind of servo, the angle of this many counts is a whole number of thousandths of a degree.
 const SPAN: u16 = 850;
 
-/// The angle of a joint in thousandths of a degree, at a servo position in millionths of a count.
-pub(crate) fn angle(joint: Joint, position: i64) -> i64 {
-    let (first, last) = ends(joint);
-    let span = i64::from(SPAN) * COUNT;
-    first + ((last - first) * position + span / 2).div_euclid(span)
+/// How positions of a joint's servo become angles, and back.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AngleScale {
+    /// The angle at 0 counts, in thousandths of a degree.
+    first: i64,
+    /// The angle of [`SPAN`] counts. It is negative if more counts mean a smaller angle.
+    span: i64,
 }
 
-/// Do more counts mean a smaller angle?
-pub(crate) fn is_reversed(joint: Joint) -> bool {
-    let (first, last) = ends(joint);
-    last < first
+impl AngleScale {
+    pub(crate) fn of(joint: Joint) -> Self {
+        let angle = |counts| i64::from(angle_from_counts(joint, counts, 0).0) / 1_000;
+        Self { first: angle(0), span: angle(SPAN) - angle(0) }
+    }
+
+    /// The angle in thousandths of a degree, at a servo position in millionths of a count.
+    pub(crate) fn angle(self, position: i64) -> i64 {
+        let span = i64::from(SPAN) * COUNT;
+        self.first + (self.span * position + span / 2).div_euclid(span)
+    }
+
+    /// The servo position in millionths of a count, at an angle in thousandths of a degree.
+    pub(crate) fn position(self, angle: i64) -> i64 {
+        ((angle - self.first) * i64::from(SPAN) * COUNT).checked_div(self.span).unwrap_or(0)
+    }
+
+    /// A torque in millinewton metres for each degree, in micronewton metres for each count.
+    pub(crate) fn torque_per_count(self, torque_per_degree: i64) -> i64 {
+        torque_per_degree * self.span.abs() / i64::from(SPAN)
+    }
+
+    /// A torque towards greater angles, towards more counts; and back.
+    pub(crate) const fn torque_towards_counts(self, torque: i64) -> i64 {
+        if self.span < 0 { -torque } else { torque }
+    }
 }
 
-/// The angles at 0 and at [`SPAN`] counts, in thousandths of a degree.
-fn ends(joint: Joint) -> (i64, i64) {
-    let angle = |counts| i64::from(angle_from_counts(joint, counts, 0).0) / 1_000;
-    (angle(0), angle(SPAN))
+/// The sine and the cosine of an angle, in millionths.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Direction {
+    pub(crate) sin: i64,
+    pub(crate) cos: i64,
+}
+
+impl Direction {
+    const fn of(millidegrees: i64) -> Self {
+        Self { sin: sine(millidegrees), cos: cosine(millidegrees) }
+    }
+}
+
+/// The directions of the parts of the arm that have weight.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pose {
+    /// The rear arm above the horizontal.
+    pub(crate) rear: Direction,
+    /// The forearm below the horizontal.
+    pub(crate) drop: Direction,
+    /// Joint 4.
+    pub(crate) roll: Direction,
+    /// Joint 5.
+    pub(crate) pitch: Direction,
+}
+
+/// The angle of joint 3 at which the forearm is level, in thousandths of a degree.
+const LEVEL: i64 = 65_000;
+
+impl Pose {
+    /// Of the angles of the joints in thousandths of a degree.
+    pub(crate) const fn of([_, rear, forearm, roll, pitch, _, _]: [i64; JOINTS]) -> Self {
+        Self {
+            rear: Direction::of(rear),
+            drop: Direction::of(forearm - LEVEL),
+            roll: Direction::of(roll),
+            pitch: Direction::of(pitch),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -36,16 +96,33 @@ mod tests {
         for joint in Joint::ALL {
             for counts in 0..=1_023 {
                 let wanted = angle_from_counts(joint, counts, 0).0 / 1_000;
-                let is = angle(joint, i64::from(counts) * COUNT);
+                let is = AngleScale::of(joint).angle(i64::from(counts) * COUNT);
                 assert!((is - i64::from(wanted)).abs() <= 1, "{joint:?} at {counts}: {is}, not {wanted}");
             }
         }
     }
 
     #[test]
+    fn a_position_is_that_of_its_angle() {
+        for joint in Joint::ALL {
+            for degrees in (0..=180).step_by(10) {
+                let wanted = degrees * 1_000;
+                let scale = AngleScale::of(joint);
+                assert!((scale.angle(scale.position(wanted)) - wanted).abs() <= 1, "{joint:?} {degrees}");
+            }
+        }
+        // 180 degrees are 850 counts of joint 1 and 625 counts of joint 7.
+        assert_eq!(
+            [0, 6].map(|index| AngleScale::of(Joint::ALL[index]).torque_per_count(850)),
+            [180_000, 244_800]
+        );
+    }
+
+    #[test]
     fn a_tenth_of_a_count_changes_the_angle() {
-        let joint = Joint::ALL[0];
-        assert_eq!(angle(joint, 511 * COUNT + COUNT / 10) - angle(joint, 511 * COUNT), 21);
-        assert_eq!(Joint::ALL.map(is_reversed), [false, true, true, true, true, true, false]);
+        let scale = AngleScale::of(Joint::ALL[0]);
+        assert_eq!(scale.angle(511 * COUNT + COUNT / 10) - scale.angle(511 * COUNT), 21);
+        let towards_counts = Joint::ALL.map(|joint| AngleScale::of(joint).torque_towards_counts(1));
+        assert_eq!(towards_counts, [1, -1, -1, -1, -1, -1, 1]);
     }
 }

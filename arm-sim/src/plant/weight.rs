@@ -8,36 +8,19 @@
 //!   shoulder
 //! ```
 //!
-//! The model has three point masses, and a fourth in the gripper. The lengths are the maker's; masses and their positions
-//! are assumed, as no arm was weighed. Joints 1 (vertical axis), 6 (the tool's own axis) and 7 (the claw) carry no weight. All values are integers.
-//! Servos and friction are not part of the model.
+//! The model has three point masses, and a fourth in the gripper. Lengths and masses are in
+//! [`parameters`](crate::parameters). Joints 1 (vertical axis), 6 (the tool's own axis) and 7 (the claw) carry no weight.
+//! All values are integers. Servos and friction are not part of the model.
 
 use protocol_core::registers::JOINTS;
 
-use super::sine::{ONE, cosine, sine};
+use super::pose::Pose;
+use super::sine::ONE;
+use crate::parameters::{
+    ELBOW_OFFSET_MM, FOREARM_CENTI_MM, FOREARM_CENTRE_MM, FOREARM_G, GRIP_MM, REAR_ARM_CENTRE_MM, REAR_ARM_G,
+    REAR_ARM_MM, TOOL_CENTRE_MM, TOOL_G,
+};
 
-/// Shoulder to elbow, in millimetres (the maker's length a).
-const REAR_ARM_MM: i64 = 120;
-/// Elbow pin to the axis of the forearm, at a right angle, in millimetres (the maker's length h).
-const ELBOW_OFFSET_MM: i64 = 25;
-/// Elbow to joint 5, in hundredths of a millimetre (the maker's length c).
-const FOREARM_CENTI_MM: i64 = 19_850;
-
-/// The rear arm, in grams: assumed.
-const REAR_ARM_G: i64 = 120;
-/// Its centre of mass, from the shoulder, in millimetres: assumed in the middle.
-const REAR_ARM_CENTRE_MM: i64 = 60;
-/// The forearm with the servos of joints 4 and 5, in grams: assumed.
-const FOREARM_G: i64 = 200;
-/// Its centre of mass, from the elbow, in millimetres: assumed.
-const FOREARM_CENTRE_MM: i64 = 110;
-/// The tool: the servos of joints 6 and 7, and the claw or the cup, in grams: assumed.
-const TOOL_G: i64 = 100;
-/// Its centre of mass, from the axis of joint 5, in millimetres: assumed.
-const TOOL_CENTRE_MM: i64 = 50;
-
-/// The grip, from the axis of joint 5, in millimetres: assumed.
-const GRIP_MM: i64 = 90;
 /// The heaviest weight in the gripper, in grams.
 pub const HEAVIEST_LOAD_G: u16 = 1_000;
 
@@ -52,29 +35,22 @@ const FOREARM: i64 = FOREARM_G * FOREARM_CENTRE_MM + TOOL_G * FOREARM_CENTI_MM /
 const ELBOW: i64 = (FOREARM_G + TOOL_G) * ELBOW_OFFSET_MM;
 /// The moment on joints 3, 4 and 5 along the tool.
 const TOOL: i64 = TOOL_G * TOOL_CENTRE_MM;
-/// The angle of joint 3 at which the forearm is level, in thousandths of a degree.
-const LEVEL: i64 = 65_000;
-
-/// The torque of gravity on each joint, in micronewton metres, towards greater angles, in a pose given in
-/// thousandths of a degree, with this weight in the gripper in grams.
-pub(crate) fn torques(pose: [i64; JOINTS], load_g: i64) -> [i64; JOINTS] {
-    let [_, rear, forearm, roll, pitch, _, _] = pose;
-    let drop = forearm - LEVEL;
-    let (sin_drop, cos_drop) = (sine(drop), cosine(drop));
-    let (sin_roll, cos_roll) = (sine(roll), cosine(roll));
-    let (sin_pitch, cos_pitch) = (sine(pitch), cosine(pitch));
+/// The torque of gravity on each joint, in micronewton metres, towards greater angles, with this weight in the gripper in
+/// grams.
+pub(crate) fn torques(pose: Pose, load_g: i64) -> [i64; JOINTS] {
+    let Pose { rear, drop, roll, pitch } = pose;
     let shoulder = SHOULDER + load_g * REAR_ARM_MM;
     let forearm = FOREARM + load_g * FOREARM_CENTI_MM / 100;
     let elbow = ELBOW + load_g * ELBOW_OFFSET_MM;
     let tool = TOOL + load_g * GRIP_MM;
     // Each is a derivative of the height of the masses.
-    let along = forearm * cos_drop + elbow * sin_drop;
-    let tool_at_elbow = sin_pitch * cos_drop + cos_pitch * sin_roll / ONE * sin_drop;
-    let tool_at_pitch = cos_pitch * sin_drop + sin_pitch * sin_roll / ONE * cos_drop;
-    let tool_at_roll = cos_pitch * cos_roll / ONE * cos_drop;
+    let along = forearm * drop.cos + elbow * drop.sin;
+    let tool_at_elbow = pitch.sin * drop.cos + pitch.cos * roll.sin / ONE * drop.sin;
+    let tool_at_pitch = pitch.cos * drop.sin + pitch.sin * roll.sin / ONE * drop.cos;
+    let tool_at_roll = pitch.cos * roll.cos / ONE * drop.cos;
     [
         0,
-        torque(-shoulder * cosine(rear)),
+        torque(-shoulder * rear.cos),
         torque(along + tool * (tool_at_elbow / ONE)),
         torque(-tool * (tool_at_roll / ONE)),
         torque(tool * (tool_at_pitch / ONE)),
@@ -90,7 +66,10 @@ const fn torque(moment: i64) -> i64 {
 
 #[cfg(test)]
 mod tests {
+    use protocol_core::registers::Joint;
+
     use super::*;
+    use crate::parameters::{LOAD_FRICTION_PERCENT, ServoParameters};
 
     const fn pose(rear: i64, forearm: i64, roll: i64, pitch: i64) -> [i64; JOINTS] {
         [90_000, rear * 1_000, forearm * 1_000, roll * 1_000, pitch * 1_000, 90_000, 80_000]
@@ -124,22 +103,42 @@ mod tests {
                     energy(shifted, f64::from(load_g) / 1_000.0)
                 };
                 let slope = (shifted(-500) - shifted(500)) / 1_f64.to_radians();
-                let torque = torques(at, load_g.into())[joint] as f64 / 1e6;
+                let torque = torques(Pose::of(at), load_g.into())[joint] as f64 / 1e6;
                 assert!((torque - slope).abs() < 0.001, "joint {}: {torque} N m, not {slope}", joint + 1);
             }
         }
     }
 
     #[test]
+    fn the_makers_payload_is_lifted_with_at_most_65_percent_of_the_stall_torque_in_every_legal_pose() {
+        let grid = || (0..=180).step_by(6);
+        let mut highest = [0; JOINTS];
+        for (rear, forearm) in grid().flat_map(|rear| grid().map(move |forearm| (rear, forearm))) {
+            if !(19..=161).contains(&(forearm - 65 + rear)) {
+                continue;
+            }
+            for (roll, pitch) in grid().flat_map(|roll| grid().map(move |pitch| (roll, pitch))) {
+                let torques = torques(Pose::of(pose(rear, forearm, roll, pitch)), 300);
+                for ((highest, torque), joint) in highest.iter_mut().zip(torques).zip(Joint::ALL) {
+                    let servo = ServoParameters::of(joint);
+                    let friction = servo.sliding_friction + torque.abs() * LOAD_FRICTION_PERCENT / 100;
+                    *highest = ((torque.abs() + friction) * 1_000 / servo.stall_torque).max(*highest);
+                }
+            }
+        }
+        assert_eq!(highest, [32, 365, 597, 167, 580, 20, 20]);
+    }
+
+    #[test]
     fn the_level_forearm_has_weight_and_the_upright_rear_arm_has_none() {
-        let [base, rear, forearm, roll, pitch, wrist, claw] = torques(pose(90, 65, 90, 90), 0);
+        let [base, rear, forearm, roll, pitch, wrist, claw] = torques(Pose::of(pose(90, 65, 90, 90)), 0);
         assert_eq!([base, rear, roll, wrist, claw], [0; 5]);
         assert_eq!([forearm, pitch], [459_457, 49_035], "towards greater angles: down");
         assert_eq!(
-            torques(pose(0, 65, 90, 90), 0)[1],
+            torques(Pose::of(pose(0, 65, 90, 90)), 0)[1],
             -423_662,
             "a rear arm that leans to the front falls to the front"
         );
-        assert!(torques(pose(120, 65, 90, 90), 0)[1] > 0, "a rear arm that leans back falls back");
+        assert!(torques(Pose::of(pose(120, 65, 90, 90)), 0)[1] > 0, "a rear arm that leans back falls back");
     }
 }

@@ -1,4 +1,4 @@
-//! The wire of the servo bus at 1 Mbaud: when each byte arrives.
+//! The wire of the servo bus: when each byte arrives.
 //!
 //! A servo drives the line until some time after its last stop bit. A frame of the master that overlaps with this time is
 //! lost, and it damages the bytes of the servo that it overlaps with. Two frames of the master cannot overlap: the second
@@ -8,10 +8,9 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
+use motion_core::servo_bus::ByteTime;
 use protocol_core::time::{Duration, Instant};
 
-/// Time on the wire of one byte at 1 Mbaud, ten bits, in microseconds.
-const BYTE_TIME_US: u64 = 10;
 /// How long a servo drives the line after its last stop bit. The datasheet says "some microseconds", so this is
 /// assumed.
 pub(crate) const DRIVE_TIME: Duration = Duration::from_micros(20);
@@ -31,6 +30,9 @@ struct Transmission {
 /// The bytes to the master that have not arrived.
 #[derive(Clone, Debug)]
 pub(crate) struct Wire {
+    /// In bits per second.
+    baud: u32,
+    byte_time: ByteTime,
     /// In the order of the starts.
     queue: VecDeque<Transmission>,
     /// The end of the last byte to the master.
@@ -42,8 +44,11 @@ pub(crate) struct Wire {
 }
 
 impl Wire {
-    pub(crate) const fn new() -> Self {
+    /// A free wire at `baud` bits per second.
+    pub(crate) const fn at_baud(baud: u32) -> Self {
         Self {
+            baud,
+            byte_time: ByteTime::at_baud(baud),
             queue: VecDeque::new(),
             free_at: Instant::ZERO,
             master_done_at: Instant::ZERO,
@@ -51,10 +56,15 @@ impl Wire {
         }
     }
 
+    /// The baud rate, in bits per second.
+    pub(crate) const fn baud(&self) -> u32 {
+        self.baud
+    }
+
     /// Reserves the wire for this many bytes of the master, at `now` or after its earlier bytes. Returns start and end.
     pub(crate) fn reserve(&mut self, now: Instant, count: usize) -> (Instant, Instant) {
         let start = self.master_done_at.max(now);
-        self.master_done_at = start + time_of(count);
+        self.master_done_at = start + self.byte_time.of(count);
         (start, self.master_done_at)
     }
 
@@ -65,7 +75,7 @@ impl Wire {
         let mut free_at = self.free_at;
         for transmission in &mut self.queue {
             let start = transmission.start.max(free_at);
-            free_at = start + time_of(transmission.bytes.len());
+            free_at = start + self.byte_time.of(transmission.bytes.len());
             if !transmission.is_from_servo || start >= end || begin >= free_at + DRIVE_TIME {
                 continue;
             }
@@ -99,10 +109,10 @@ impl Wire {
         let mut arrived = Vec::new();
         while let Some(first) = self.queue.front_mut() {
             let start = first.start.max(self.free_at);
-            let whole_bytes = (now - start).as_micros() / BYTE_TIME_US;
+            let whole_bytes = self.byte_time.count_within(now - start);
             let count = usize::try_from(whole_bytes).unwrap_or(usize::MAX).min(first.bytes.len());
             if count > 0 {
-                self.free_at = start + time_of(count);
+                self.free_at = start + self.byte_time.of(count);
             }
             if count < first.bytes.len() {
                 arrived.extend(first.bytes.drain(..count));
@@ -124,17 +134,13 @@ impl Wire {
 
     /// When the last byte of the next transmission arrives.
     pub(crate) fn deadline(&self) -> Option<Instant> {
-        self.queue.front().map(|first| first.start.max(self.free_at) + time_of(first.bytes.len()))
+        self.queue.front().map(|first| first.start.max(self.free_at) + self.byte_time.of(first.bytes.len()))
     }
 
     /// Drops all bytes, as without power.
     pub(crate) fn clear(&mut self) {
-        *self = Self::new();
+        *self = Self::at_baud(self.baud);
     }
-}
-
-fn time_of(bytes: usize) -> Duration {
-    Duration::from_micros(u64::try_from(bytes).unwrap_or(u64::MAX).saturating_mul(BYTE_TIME_US))
 }
 
 #[cfg(test)]
@@ -145,9 +151,13 @@ mod tests {
         Instant::from_micros(micros)
     }
 
+    fn wire() -> Wire {
+        Wire::at_baud(1_000_000)
+    }
+
     #[test]
     fn a_byte_arrives_after_ten_microseconds() {
-        let mut wire = Wire::new();
+        let mut wire = wire();
         wire.send(at(100), &[1, 2, 3]);
         assert_eq!(wire.deadline(), Some(at(130)));
         assert_eq!(wire.take(at(0)), []);
@@ -161,8 +171,18 @@ mod tests {
     }
 
     #[test]
+    fn a_slower_wire_takes_longer() {
+        let mut wire = Wire::at_baud(115_200);
+        wire.send(at(0), &[7; 57]);
+        assert_eq!(wire.deadline(), Some(at(4_949)), "57 bytes of 86.8 us");
+        assert_eq!((wire.take(at(86)).len(), wire.take(at(87)).len()), (0, 1));
+        wire.clear();
+        assert_eq!(wire.baud(), 115_200);
+    }
+
+    #[test]
     fn a_transmission_waits_until_the_wire_is_free() {
-        let mut wire = Wire::new();
+        let mut wire = wire();
         wire.send(at(110), &[3, 4]);
         wire.send(at(100), &[1, 2]);
         assert_eq!(wire.take(at(120)), [1, 2]);
@@ -173,7 +193,7 @@ mod tests {
 
     #[test]
     fn a_late_call_takes_all_bytes_in_order() {
-        let mut wire = Wire::new();
+        let mut wire = wire();
         wire.send(at(500), &[5]);
         wire.send(at(110), &[3, 4]);
         wire.send(at(100), &[1, 2]);
@@ -185,7 +205,7 @@ mod tests {
     #[test]
     fn a_servo_drives_the_line_for_20_us_after_its_last_byte() {
         for is_taken in [false, true] {
-            let mut wire = Wire::new();
+            let mut wire = wire();
             wire.send(at(100), &[1, 2]);
             if is_taken {
                 assert_eq!(wire.take(at(120)), [1, 2]);
@@ -202,7 +222,7 @@ mod tests {
     #[test]
     fn a_frame_that_overlaps_with_an_answer_damages_it() {
         for (begin, end) in [(50, 101), (105, 300), (119, 120)] {
-            let mut wire = Wire::new();
+            let mut wire = wire();
             wire.send(at(100), &[1, 2]);
             assert!(!wire.collide(at(50), at(100)), "before it");
             assert!(wire.collide(at(begin), at(end)));
@@ -212,7 +232,7 @@ mod tests {
 
     #[test]
     fn the_echo_of_the_master_is_no_collision() {
-        let mut wire = Wire::new();
+        let mut wire = wire();
         wire.echo(at(100), &[1], false);
         assert!(!wire.collide(at(105), at(200)));
         wire.echo(at(110), &[2], true);
@@ -221,7 +241,7 @@ mod tests {
 
     #[test]
     fn a_frame_of_the_master_waits_for_the_one_before() {
-        let mut wire = Wire::new();
+        let mut wire = wire();
         assert_eq!(wire.reserve(at(100), 8), (at(100), at(180)));
         assert_eq!(wire.reserve(at(110), 2), (at(180), at(200)));
         assert_eq!(wire.reserve(at(300), 1), (at(300), at(310)));

@@ -1,142 +1,124 @@
-//! The gear of a simulated servo: torque, friction and inertia, and the motion without torque.
+//! The gear of a simulated servo: friction, inertia and drag, and the speed that a torque gives a joint.
 //!
-//! | | joints 1 to 4 | joints 5 to 7 | source |
-//! | --- | --- | --- | --- |
-//! | stall torque | 1618 mN m | 230 mN m | datasheet of the 15 kg cm servo at 7.4 V (16.5 kg cm); assumed |
-//! | friction of the gear | 100 mN m | 15 mN m | assumed |
-//! | drag without torque | 200 mN m s/rad | 40 mN m s/rad | assumed |
-//! | drag, damping | 5000 mN m s/rad | 1000 mN m s/rad | assumed |
-//! | inertia, with the arm's share | 20 g m² | 1 g m² | assumed |
-//!
-//! A joint at rest does not move if its load is below the friction. Otherwise it accelerates until the drag equals the
-//! rest of the load: a level forearm falls at up to 103 degrees/s without torque and sinks at 4.1 degrees/s with damping.
-//! All values are integers.
+//! A joint at rest turns when the torque exceeds the static friction. A joint that turns loses the sliding friction.
+//! Both grow by a share of the torque from outside. Friction stops a joint exactly, so that a
+//! joint comes to rest. The step is semi-implicit: no drag and no friction makes it unstable. The values are in
+//! [`parameters`](crate::parameters), all integers.
 
-use protocol_core::registers::Joint;
+use super::units::COUNT_PER_SECOND;
+use crate::parameters::{CREEP_COUNTS_PER_SECOND, LOAD_FRICTION_PERCENT, ServoParameters};
 
-use super::units::{COUNT_PER_SECOND, STEP};
+/// Below this speed, in millionths of a count per step, a joint has static friction.
+const CREEP: i64 = CREEP_COUNTS_PER_SECOND * COUNT_PER_SECOND;
+
+/// The torques on a joint in a step, in micronewton metres, towards more counts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Torques {
+    /// Of the motor.
+    pub(super) motor: i64,
+    /// From outside the servo.
+    pub(super) outside: i64,
+}
+
+impl Torques {
+    /// Their sum.
+    pub(super) const fn net(self) -> i64 {
+        self.motor + self.outside
+    }
+
+    const fn load_friction(self) -> i64 {
+        self.outside.abs() * LOAD_FRICTION_PERCENT / 100
+    }
+}
 
 /// The constants of a gear.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Gear {
-    /// The torque at which it cannot turn, in micronewton metres.
-    stall: i64,
-    /// The torque below which it does not start to turn, and which it loses while it turns; likewise.
-    friction: i64,
-    /// The torque that it loses per speed, in millinewton metre seconds per radian.
-    free_drag: i64,
-    /// Likewise, while the motor brakes.
-    damped_drag: i64,
-    /// The moment of inertia, in gram square metres.
-    inertia: i64,
-    /// Counts in a thousand radians.
-    counts_per_kiloradian: i64,
-}
-
-/// Joints 1 to 4: 850 counts in half a turn.
-const LARGE: Gear = Gear {
-    stall: 1_618_000,
-    friction: 100_000,
-    free_drag: 200,
-    damped_drag: 5_000,
-    inertia: 20,
-    counts_per_kiloradian: 270_563,
-};
-
-/// Joints 5 to 7: 625 counts in half a turn.
-const SMALL: Gear = Gear {
-    stall: 230_000,
-    friction: 15_000,
-    free_drag: 40,
-    damped_drag: 1_000,
-    inertia: 1,
-    counts_per_kiloradian: 198_944,
-};
-
-/// The resistance of a motor without torque.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Drag {
-    /// The gear alone.
-    Free,
-    /// The gear, and the motor with its windings shorted.
-    Damped,
-}
+pub(super) struct Gear(pub(super) &'static ServoParameters);
 
 impl Gear {
-    pub(crate) const fn of(joint: Joint) -> Self {
-        if joint.number() < 5 { LARGE } else { SMALL }
+    /// Does static friction hold a joint at rest?
+    pub(super) const fn holds(self, torques: Torques) -> bool {
+        torques.net().abs() <= self.0.static_friction + torques.load_friction()
     }
 
-    /// A torque in micronewton metres, in millionths of the stall torque.
-    pub(crate) fn share_of_stall(&self, torque: i64) -> i64 {
-        torque * 1_000_000 / self.stall.max(1)
+    /// The greatest torque that a motor has to hold against the torque from outside, with all friction against it.
+    pub(super) const fn highest_load(self, torques: Torques) -> i64 {
+        torques.outside.abs() + self.0.static_friction + torques.load_friction()
     }
 
-    /// Does the friction hold this torque?
-    pub(crate) const fn holds(&self, torque: i64) -> bool {
-        torque.abs() <= self.friction
-    }
-
-    /// The speed after a step at this torque, in millionths of a count per step.
-    pub(crate) fn speed_after(&self, speed: i64, torque: i64, drag: Drag) -> i64 {
-        let towards = if speed == 0 { torque.signum() } else { speed.signum() };
-        if speed == 0 && self.holds(torque) {
+    /// The speed after a step, in millionths of a count per step. `drag` is in micronewton metre seconds per radian,
+    /// `inertia` is that of the arm in gram square millimetres.
+    pub(super) fn speed_after(self, speed: i64, torques: Torques, drag: i64, inertia: i64) -> i64 {
+        if speed == 0 && self.holds(torques) {
             return 0;
         }
-        let drag = match drag {
-            Drag::Free => self.free_drag,
-            Drag::Damped => self.damped_drag,
-        };
-        let net = torque - towards * self.friction;
-        // Micronewton metres by millinewton metre seconds: thousandths of a radian per second.
-        let last = net * self.counts_per_kiloradian / drag.max(1) * COUNT_PER_SECOND / 1_000_000;
-        let rate = drag * STEP_MICROS / self.inertia.max(1);
-        let after = speed + (last - speed) * rate.min(1_000_000) / 1_000_000;
-        // Friction stops a joint and does not reverse it.
-        if after * towards < COUNT_PER_SECOND && self.holds(torque) { 0 } else { after }
+        // A torque in micronewton metres by an inertia in gram square millimetres is the change of speed in a
+        // millisecond in radians per second. A drag, likewise, is the share of the speed that is lost in a millisecond.
+        let inertia = self.0.rotor_inertia + inertia;
+        let momentum = speed * inertia + torques.net() * self.0.counts_per_kiloradian;
+        let own = if speed.abs() < CREEP { self.0.static_friction } else { self.0.sliding_friction };
+        let friction = (own + torques.load_friction()) * self.0.counts_per_kiloradian;
+        let left = (momentum.abs() - friction).max(0) * momentum.signum();
+        left / (inertia + drag).max(1)
     }
 }
-
-/// The length of a step in millionths of a second.
-const STEP_MICROS: i64 = STEP.as_micros().cast_signed();
 
 #[cfg(test)]
 mod tests {
+    use protocol_core::registers::Joint;
+
     use super::*;
 
+    const LEVEL: i64 = 459_448;
+    /// Of the forearm with its tool, in gram square millimetres.
+    const INERTIA: i64 = 8_700_000;
+
+    fn gear() -> Gear {
+        Gear(ServoParameters::of(Joint::ALL[2]))
+    }
+
     /// The speed of joint 3 in degrees per second, after this many milliseconds at this torque from rest.
-    fn degrees_per_second(torque: i64, drag: Drag, millis: u32) -> i64 {
-        let gear = Gear::of(Joint::ALL[2]);
-        let speed = (0..millis).fold(0, |speed, _| gear.speed_after(speed, torque, drag));
+    fn degrees_per_second(outside: i64, drag: i64, millis: u32) -> i64 {
+        let torques = Torques { motor: 0, outside };
+        let speed = (0..millis).fold(0, |speed, _| gear().speed_after(speed, torques, drag, INERTIA));
         speed * 180 / 850 / COUNT_PER_SECOND
     }
 
     #[test]
     fn friction_holds_a_light_load() {
-        assert_eq!(degrees_per_second(100_000, Drag::Free, 1_000), 0);
-        assert_eq!(degrees_per_second(-100_000, Drag::Damped, 1_000), 0);
+        let ServoParameters { free_drag, damped_drag, .. } = *gear().0;
+        assert_eq!(degrees_per_second(105_000, free_drag, 1_000), 0);
+        assert_eq!(degrees_per_second(-105_000, damped_drag, 1_000), 0);
+        assert!(degrees_per_second(110_000, free_drag, 1_000) > 0);
     }
 
     #[test]
-    fn a_level_forearm_reaches_103_degrees_per_second_free_and_4_damped() {
-        let level = 459_448;
-        assert_eq!(degrees_per_second(level, Drag::Free, 2_000), 102);
-        assert_eq!(degrees_per_second(-level, Drag::Free, 2_000), -102);
-        assert_eq!(degrees_per_second(level, Drag::Damped, 2_000), 4);
-        let after_a_time_constant = degrees_per_second(level, Drag::Free, 100);
+    fn a_level_forearm_reaches_102_degrees_per_second_free_and_4_damped() {
+        let ServoParameters { free_drag, damped_drag, .. } = *gear().0;
+        assert_eq!(degrees_per_second(LEVEL, free_drag, 2_000), 102);
+        assert_eq!(degrees_per_second(-LEVEL, free_drag, 2_000), -102);
+        assert_eq!(degrees_per_second(LEVEL, damped_drag, 2_000), 4);
+        let after_a_time_constant = degrees_per_second(LEVEL, free_drag, 94);
         assert!((63..=66).contains(&after_a_time_constant), "{after_a_time_constant}");
     }
 
     #[test]
     fn friction_stops_a_joint_whose_load_is_gone() {
-        let gear = Gear::of(Joint::ALL[2]);
         let mut speed = 500_000;
         let mut steps = 0;
         while speed != 0 {
-            speed = gear.speed_after(speed, 50_000, Drag::Free);
+            let torques = Torques { motor: 0, outside: 50_000 };
+            speed = gear().speed_after(speed, torques, gear().0.free_drag, INERTIA);
             assert!(speed >= 0, "it reverses");
             steps += 1;
-            assert!(steps < 1_000, "it does not stop");
+            assert!(steps < 2_000, "it does not stop");
         }
+    }
+
+    #[test]
+    fn a_loaded_gear_needs_a_share_of_its_load_more() {
+        let holds = |motor, outside| gear().holds(Torques { motor, outside });
+        assert!(holds(1_000_000 + 150_000, -1_000_000) && !holds(1_000_000 + 150_001, -1_000_000));
+        assert!(holds(1_000_000 - 150_000, -1_000_000) && !holds(1_000_000 - 150_001, -1_000_000));
     }
 }

@@ -1,48 +1,48 @@
 //! The motor and the position control of a simulated servo, in steps of a millisecond.
 //!
 //! ```text
-//!   goal ──▶ set-point, at the speed or in the time of the goal ──▶ position, which lags behind
-//!                                                   arm's weight ──▶ and droops
+//!   goal ──▶ set-point, at the speed or in the time of the goal ──▶ error ──▶ duty ──▶ torque ──▶ speed ──▶ position
+//!                                                                    ▲      weight, hand, obstacles ─┘         │
+//!                                                                    └─────────────────────────────────────────┘
 //! ```
 //!
-//! With torque, control is proportional: a load turns the joint away from its set-point, by a count at the stall
-//! torque. Without torque, the weight turns the joint as [`gear`](super::gear) describes, to the mechanical ends of the
-//! servo at 0 and 1023 counts.
+//! Control is proportional, with a derivative term: `duty = (error + D × change of the error) / 4.3 degrees`, from
+//! -1 to 1. The motor is voltage-driven: `torque = stall torque × (duty - speed / 372 degrees per second)`. So droop,
+//! load (register 60, the duty) and following error belong together: a joint that carries half the stall torque is about
+//! 2 degrees off its set-point.
 //!
-//! All values are integers and all steps are equal, so a run does not depend on how often its caller looks. The speed
-//! limit is the motor's (62 rpm); lag and droop are assumed, as no arm was measured. There are no frames here.
+//! Without torque, the weight turns the joint against friction and drag, to the mechanical ends of the servo at 0 and
+//! 1023 counts. All values are integers and all steps are equal, so a run does not depend on how often its caller looks.
+//! There are no frames here.
 
-use motion_core::calibration::angle_from_counts;
 use motion_core::servo_bus::Reading;
 use protocol_core::registers::Joint;
 
-use super::gear::{Drag, Gear};
+use super::gear::{Gear, Torques};
 use super::registers::Goal;
+use super::surroundings::Surroundings;
 use super::units::{COUNT, COUNT_PER_SECOND};
+use crate::parameters::{DERIVATIVE_FILTER_MS, FULL_DUTY_ERROR, NO_LOAD_SPEED, ServoParameters};
 
 /// The upper mechanical end of the servo. The lower end is 0.
 const END: i64 = Reading::MAX_POSITION as i64 * COUNT;
-/// 62 revolutions a minute, in micro-degrees per second.
-const MAX_SPEED: i64 = 372_000_000;
-/// Each step reduces the distance to the set-point by this part: a time constant of 20 ms.
-const LAG_STEPS: i64 = 20;
-/// At a distance of less than 1/16 count the position becomes the set-point.
-const SNAP_DISTANCE: i64 = COUNT / 16;
-/// The load of the motor for each count between set-point and position, in 0.1 %.
-const LOAD_PER_COUNT: i64 = 10;
-/// The distance by which a load turns the joint away from its set-point, in millionths of a count for each millionth of
-/// the stall torque: a count (0.21 degrees of joints 1 to 4) at that torque.
-const DROOP: i64 = 1;
+/// Thousandths of a degree in a radian.
+const MILLIDEGREES_PER_RADIAN: i64 = 57_296;
+/// The duty at which the motor gets the whole voltage.
+const FULL_DUTY: i64 = 1_000_000;
 
 /// A motor with its gear and its position sensor.
 #[derive(Clone, Debug)]
 pub(crate) struct Motor {
     gear: Gear,
-    /// The longest distance of a step.
-    max_distance: i64,
+    /// The distance of a step at full speed without load.
+    no_load_distance: i64,
+    /// The error for full duty.
+    full_error: i64,
+    /// The drag of the driven motor by its own voltage, in micronewton metre seconds per radian.
+    back_emf: i64,
+    pub(crate) surroundings: Surroundings,
     position: i64,
-    /// The torque of the arm's weight, in micronewton metres, towards more counts.
-    weight: i64,
     /// The mode in the last step.
     mode: MotorMode,
     /// The position that the control aims at in this step.
@@ -52,35 +52,63 @@ pub(crate) struct Motor {
     rate: i64,
     /// The distance that the motor turned in the last step.
     moved: i64,
+    /// The distance between set-point and position in the last step.
+    error: i64,
+    /// The filtered change of the error in a step.
+    error_change: i64,
+    /// In millionths. Positive values are towards more counts.
+    duty: i64,
+    /// The torque in the last step, in 0.1 % of the stall torque.
+    torque: i16,
 }
 
-/// What acts on a motor in a step.
+/// What acts on a motor in a step, besides its surroundings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum MotorMode {
     /// Something outside the servo holds it in place.
     Held,
-    /// Weight, friction and this drag.
-    Released(Drag),
+    /// The drag of the gear.
+    Free,
+    /// The drag of the gear, and of the motor with its windings shorted.
+    Damped,
     /// Its control.
     Driven,
     /// Its control, but something keeps it from turning.
     Blocked,
 }
 
+impl MotorMode {
+    const fn is_controlled(self) -> bool {
+        matches!(self, Self::Driven | Self::Blocked)
+    }
+
+    const fn is_held(self) -> bool {
+        matches!(self, Self::Held | Self::Blocked)
+    }
+}
+
 impl Motor {
     /// The motor of a joint's servo, at rest.
     pub(crate) fn new(joint: Joint, position_counts: u16) -> Self {
         let position = i64::from(position_counts) * COUNT;
+        let parameters = ServoParameters::of(joint);
+        let no_load_distance = NO_LOAD_SPEED * parameters.half_turn * COUNT_PER_SECOND / 180_000;
         Self {
-            gear: Gear::of(joint),
-            max_distance: max_distance(joint),
+            gear: Gear(parameters),
+            no_load_distance,
+            full_error: FULL_DUTY_ERROR * parameters.half_turn * COUNT / 180_000,
+            back_emf: parameters.stall_torque * parameters.counts_per_kiloradian / no_load_distance.max(1),
+            surroundings: Surroundings::default(),
             position,
-            weight: 0,
             mode: MotorMode::Held,
             set_point: position,
             target: position,
             rate: 0,
             moved: 0,
+            error: 0,
+            error_change: 0,
+            duty: 0,
+            torque: 0,
         }
     }
 
@@ -89,57 +117,71 @@ impl Motor {
         self.target = i64::from(goal.position_counts) * COUNT;
         let distance = (self.target - self.set_point).abs();
         let rate = match (i64::from(goal.speed), i64::from(goal.time_ms)) {
-            (0, 0) => self.max_distance,
+            (0, 0) => self.no_load_distance,
             // Rounded up: otherwise the move takes a step too many.
             (0, millis) => (distance + millis - 1) / millis,
             (speed, _) => speed * COUNT_PER_SECOND,
         };
-        self.rate = rate.min(self.max_distance);
+        self.rate = rate.min(self.no_load_distance);
     }
 
-    /// Ends the move: set-point and target become the position.
+    /// Ends the move: set-point and target become the position, and the motor has no duty.
     pub(crate) const fn stop(&mut self) {
         self.set_point = self.position;
         self.target = self.position;
+        (self.error, self.error_change, self.duty) = (0, 0, 0);
     }
 
     /// Simulates a [`STEP`](super::units::STEP).
     pub(crate) fn step(&mut self, mode: MotorMode) {
         self.mode = mode;
-        if let MotorMode::Held | MotorMode::Released(_) = mode {
-            self.stop();
-        }
-        self.set_point += (self.target - self.set_point).clamp(-self.rate, self.rate);
-        let distance = match mode {
-            MotorMode::Held | MotorMode::Blocked => 0,
-            MotorMode::Driven => self.driven_distance(),
-            MotorMode::Released(drag) => self.gear.speed_after(self.moved, self.weight, drag),
-        };
-        let before = self.position;
-        self.position = (before + distance).clamp(0, END);
-        self.moved = self.position - before;
-        if let MotorMode::Released(_) = mode {
-            self.stop();
-        }
-    }
-
-    fn driven_distance(&self) -> i64 {
-        let lag = self.equilibrium() - self.position;
-        if lag.abs() <= SNAP_DISTANCE {
-            lag
+        if mode.is_controlled() {
+            self.control();
         } else {
-            (lag / LAG_STEPS).clamp(-self.max_distance, self.max_distance)
+            self.stop();
+        }
+        let before = self.position;
+        if !mode.is_held() {
+            let (low, high) = self.range();
+            self.position = (before + self.next_speed()).clamp(low, high);
+        }
+        self.moved = self.position - before;
+        self.torque = self.torque_in_step();
+        if !mode.is_controlled() {
+            self.stop();
         }
     }
 
-    /// The position at which control and weight are in equilibrium.
-    fn equilibrium(&self) -> i64 {
-        (self.set_point + DROOP * self.gear.share_of_stall(self.weight)).clamp(0, END)
+    /// Moves the set-point on, and sets the duty.
+    fn control(&mut self) {
+        self.set_point += (self.target - self.set_point).clamp(-self.rate, self.rate);
+        let error = self.set_point - self.position;
+        let change = error - self.error;
+        self.error_change = (self.error_change * (DERIVATIVE_FILTER_MS - 1) + change) / DERIVATIVE_FILTER_MS;
+        self.error = error;
+        let aim = error + self.gear.0.derivative_ms * self.error_change;
+        self.duty = (aim * FULL_DUTY / self.full_error.max(1)).clamp(-FULL_DUTY, FULL_DUTY);
     }
 
-    /// Sets the torque of the arm's weight, in micronewton metres, towards more counts.
-    pub(crate) const fn set_weight(&mut self, weight: i64) {
-        self.weight = weight;
+    /// The speed in this step, if no obstacle is in the way.
+    fn next_speed(&self) -> i64 {
+        let drag = match self.mode {
+            MotorMode::Damped => self.gear.0.damped_drag,
+            MotorMode::Driven => self.back_emf,
+            _ => self.gear.0.free_drag,
+        };
+        self.gear.speed_after(self.moved, self.torques(), drag, self.surroundings.inertia)
+    }
+
+    /// The torques at standstill.
+    fn torques(&self) -> Torques {
+        let motor = self.gear.0.stall_torque * self.duty / FULL_DUTY;
+        Torques { motor, outside: self.surroundings.torque(self.position) }
+    }
+
+    /// The positions that it can reach from here.
+    fn range(&self) -> (i64, i64) {
+        self.surroundings.range(self.position, (0, END))
     }
 
     /// Turns it from outside.
@@ -164,59 +206,65 @@ impl Motor {
         i16::try_from(self.moved / COUNT_PER_SECOND).unwrap_or(0)
     }
 
-    /// The load in 0.1 %. Positive values are towards more counts.
+    /// The load in 0.1 %: its duty. Positive values are towards more counts.
     pub(crate) fn load(&self) -> i16 {
-        let load = match self.mode {
-            MotorMode::Held | MotorMode::Released(_) => 0,
-            MotorMode::Blocked => self.control_load(self.set_point),
-            MotorMode::Driven => {
-                self.control_load(self.equilibrium()) - self.gear.share_of_stall(self.weight) / 1_000
-            }
-        };
-        i16::try_from(load.clamp(-1_000, 1_000)).unwrap_or(0)
+        i16::try_from(self.duty * 1_000 / FULL_DUTY).unwrap_or(0)
     }
 
-    const fn control_load(&self, aim: i64) -> i64 {
-        (aim - self.position) * LOAD_PER_COUNT / COUNT
+    /// The torque of the motor in 0.1 % of its stall torque: the duty without what the speed needs.
+    pub(crate) const fn torque(&self) -> i16 {
+        self.torque
+    }
+
+    fn torque_in_step(&self) -> i16 {
+        if !self.mode.is_controlled() {
+            return 0;
+        }
+        let for_speed = self.moved * FULL_DUTY / self.no_load_distance.max(1);
+        i16::try_from((self.duty - for_speed) * 1_000 / FULL_DUTY).unwrap_or(0)
+    }
+
+    /// How far its load from outside turns it off its set-point at most, in thousandths of a degree. `None`: the load
+    /// exceeds the stall torque.
+    pub(crate) fn droop(&self) -> Option<i64> {
+        let load = self.gear.highest_load(self.torques());
+        (load < self.gear.0.stall_torque).then_some(FULL_DUTY_ERROR * load / self.gear.0.stall_torque.max(1))
+    }
+
+    /// The distance in which its stall torque stops it, in thousandths of a degree.
+    pub(crate) fn stopping_distance(&self) -> i64 {
+        let milliradians_per_second = self.moved * 1_000 / self.gear.0.counts_per_kiloradian.max(1);
+        // Half the inertia in gram square millimetres by the square of the speed is the energy in femtojoules.
+        let inertia = self.gear.0.rotor_inertia + self.surroundings.inertia;
+        let energy = inertia / 1_000 * milliradians_per_second * milliradians_per_second / 2;
+        energy / self.gear.0.stall_torque.max(1) * MILLIDEGREES_PER_RADIAN / 1_000_000
     }
 
     /// Does a step in this mode change nothing?
     pub(crate) fn is_at_rest(&self, mode: MotorMode) -> bool {
-        let is_still = match mode {
-            MotorMode::Held | MotorMode::Blocked => self.position == self.set_point,
-            MotorMode::Released(_) => self.position == self.set_point && self.holds_weight(),
-            MotorMode::Driven => self.position == self.equilibrium(),
+        mode == self.mode
+            && self.moved == 0
+            && self.set_point == self.target
+            && (self.error_change, self.error) == (0, self.set_point - self.position)
+            && (mode.is_held() || self.is_balanced())
+    }
+
+    /// Do friction, an obstacle or a mechanical end hold it against all torques?
+    pub(crate) fn is_balanced(&self) -> bool {
+        let torques = self.torques();
+        let (low, high) = self.range();
+        let is_stopped = match torques.net().signum() {
+            1 => self.position >= high,
+            -1 => self.position <= low,
+            _ => true,
         };
-        is_still && mode == self.mode && self.moved == 0 && self.set_point == self.target
-    }
-
-    /// Is the position the set-point?
-    pub(crate) const fn is_at_set_point(&self) -> bool {
-        self.position == self.set_point
-    }
-
-    /// Do friction or a mechanical end hold the weight, without torque?
-    pub(crate) const fn holds_weight(&self) -> bool {
-        self.gear.holds(self.weight) || self.is_at_end()
-    }
-
-    /// Does a mechanical end stop the weight?
-    const fn is_at_end(&self) -> bool {
-        (self.position <= 0 && self.weight < 0) || (self.position >= END && self.weight > 0)
+        is_stopped || self.gear.holds(torques)
     }
 
     /// Does it turn, or has it not reached its target?
     pub(crate) const fn is_moving(&self) -> bool {
         self.moved != 0 || self.set_point != self.target
     }
-}
-
-/// The longest distance of a step, from the number of degrees in a count.
-fn max_distance(joint: Joint) -> i64 {
-    /// For either kind of servo, the angle of this many counts is a whole number of thousandths of a degree.
-    const SPAN: u16 = 850;
-    let angle = angle_from_counts(joint, SPAN, 0).0 - angle_from_counts(joint, 0, 0).0;
-    MAX_SPEED * i64::from(SPAN) * COUNT_PER_SECOND / i64::from(angle).abs().max(1)
 }
 
 #[cfg(test)]

@@ -11,6 +11,8 @@ use motion_core::servo_bus::frame::{
     self, BAUD_RATES, BROADCAST, Instruction, Reading, ServoFrame, ServoFrameBuffer, register,
 };
 
+use super::protection::Limits;
+
 /// The registers of one servo.
 #[derive(Clone, Debug)]
 pub(super) struct ServoRegisters {
@@ -170,6 +172,13 @@ impl ServoRegisters {
     /// The goal, if any part of it was written since the last call. A new goal starts a move, even to the same position.
     pub(super) fn take_new_goal(&mut self) -> Option<Goal> {
         core::mem::take(&mut self.has_new_goal).then(|| self.goal())
+    }
+
+    /// The limits of its protections.
+    pub(super) fn limits(&self) -> Limits {
+        let [max_celsius, max_decivolts, min_decivolts] = self.field(register::MAX_TEMPERATURE);
+        let [unloading] = self.field(register::UNLOAD_CONDITIONS);
+        Limits { max_celsius, max_decivolts, min_decivolts, unloading }
     }
 
     /// Sets the measurements.

@@ -1,22 +1,13 @@
-//! The steps of a servo: supply, mode of the motor, overload, and what the registers report.
+//! The steps of a servo: supply, alarms, mode of the motor, and what the registers report.
 
-use motion_core::servo_bus::frame::error;
 use motion_core::servo_bus::{Reading, Torque};
 use protocol_core::time::Instant;
 
-use super::gear::Drag;
 use super::motor::MotorMode;
+use super::protection::Protection;
 use super::units::STEP;
 use super::{Reported, Servo};
-
-/// A load above this, in 0.1 %, is an overload.
-const OVERLOAD: u16 = 800;
-/// After this many steps of overload a servo turns its motor off, until torque is switched off and on.
-const OVERLOAD_STEPS: u32 = 1_000;
-/// A servo restarts below this supply voltage, in 0.1 V: assumed.
-const BROWN_OUT_DECIVOLTS: u8 = 45;
-/// A servo reports a wrong voltage below this, in 0.1 V: Feetech's factory setting.
-const LOWEST_DECIVOLTS: u8 = 50;
+use crate::parameters::BROWN_OUT_DECIVOLTS;
 
 impl Servo {
     /// Simulates the millisecond that ends at `now`, with this supply voltage. Returns whether the servo turned.
@@ -25,17 +16,18 @@ impl Servo {
             self.power_cycle(now + self.config.boot_time);
         }
         self.follow_supply(now, supply_decivolts);
-        self.temperature.steps(self.load(), 1);
+        self.temperature.steps(self.motor.torque(), 1);
+        self.count_obstacles(1);
         let mode = self.motor_mode(now);
-        self.fault.count_steps(1, self.would_turn());
+        self.count_stuck(1);
         if self.is_at_rest(mode, supply_decivolts) {
             // Most steps change nothing.
-            self.overload_steps = 0;
+            self.protection.rest();
             return false;
         }
         let before = self.motor.position();
         self.motor.step(mode);
-        self.check_overload();
+        self.protection.step(self.motor.torque());
         self.update_registers(supply_decivolts);
         before != self.motor.position()
     }
@@ -52,7 +44,7 @@ impl Servo {
 
     /// Does a step in this mode, with this supply voltage, change nothing?
     fn is_at_rest(&self, mode: MotorMode, supply_decivolts: u8) -> bool {
-        let is_steady = self.motor.is_at_rest(mode) && self.load() <= OVERLOAD;
+        let is_steady = self.motor.is_at_rest(mode) && !Protection::is_overload(self.motor.torque());
         is_steady && self.reported == Some(self.report(supply_decivolts))
     }
 
@@ -70,9 +62,10 @@ impl Servo {
 
     /// Simulates steps that change nothing.
     pub(crate) fn rest(&mut self, steps: u32) {
-        self.temperature.steps(self.load(), steps);
-        self.fault.count_steps(steps, self.would_turn());
-        self.overload_steps = 0;
+        self.temperature.steps(self.motor.torque(), steps);
+        self.count_obstacles(steps);
+        self.count_stuck(steps);
+        self.protection.rest();
     }
 
     /// The mode of the motor in the step that ends at `now`.
@@ -84,42 +77,63 @@ impl Servo {
         if is_stuck || self.is_held || self.is_supported {
             MotorMode::Held
         } else if self.torque(now) == Some(Torque::Damping) {
-            MotorMode::Released(Drag::Damped)
+            MotorMode::Damped
         } else {
-            MotorMode::Released(Drag::Free)
+            MotorMode::Free
+        }
+    }
+
+    fn count_stuck(&mut self, steps: u32) {
+        if self.fault.is_stuck() {
+            self.fault.count_steps(steps, self.would_turn());
         }
     }
 
     /// Would it turn if it were not stuck?
     fn would_turn(&self) -> bool {
-        if self.has_torque() {
-            !self.motor.is_at_set_point()
-        } else {
-            !self.is_held && !self.is_supported && !self.motor.holds_weight()
+        let is_held = !self.has_torque() && (self.is_held || self.is_supported);
+        !is_held && !self.motor.is_balanced()
+    }
+
+    fn count_obstacles(&mut self, steps: u32) {
+        let Self { motor, wall_count, thing_count, push_count, .. } = self;
+        let (around, position) = (&motor.surroundings, motor.position());
+        let touches = [
+            (around.wall.map(|wall| wall.is_touched(position)), wall_count),
+            (around.thing.map(|thing| thing.is_touched(position)), thing_count),
+            ((around.push != 0).then_some(true), push_count),
+        ];
+        for (touches, count) in touches {
+            touches.into_iter().for_each(|touches| count.count_many(steps.into(), touches));
         }
     }
 
-    fn check_overload(&mut self) {
-        self.overload_steps = if self.load() > OVERLOAD { self.overload_steps + 1 } else { 0 };
-        self.is_overloaded |= self.overload_steps >= OVERLOAD_STEPS;
+    fn report(&self, decivolts: u8) -> Reported {
+        let celsius = self.temperature.celsius();
+        let errors = self.protection.errors(self.registers.limits(), celsius, decivolts);
+        Reported { decivolts, celsius, errors }
     }
 
-    fn report(&self, decivolts: u8) -> Reported {
-        Reported { decivolts, celsius: self.temperature.celsius(), is_overloaded: self.is_overloaded }
+    /// Begins and ends alarms. When an alarm ends that switched the motor off, the motor moves to the stored goal.
+    fn update_errors(&mut self, errors: u8) {
+        self.registers.set_errors(errors);
+        if self.protection.unload(errors, self.registers.limits()) && self.is_on {
+            self.motor.stop();
+            self.motor.start(self.registers.goal());
+        }
     }
 
     fn update_registers(&mut self, voltage_decivolts: u8) {
-        self.reported = Some(self.report(voltage_decivolts));
+        let reported = self.report(voltage_decivolts);
+        self.reported = Some(reported);
         self.registers.set_reading(&Reading {
             position_counts: self.motor.position_counts(),
             speed: self.motor.speed(),
             load: self.motor.load(),
             voltage_decivolts,
-            temperature_celsius: self.temperature.celsius(),
+            temperature_celsius: reported.celsius,
         });
         self.registers.set_moving(self.motor.is_moving());
-        let overload = if self.is_overloaded { error::OVERLOAD } else { 0 };
-        let voltage = if voltage_decivolts < LOWEST_DECIVOLTS { error::VOLTAGE } else { 0 };
-        self.registers.set_errors(overload | voltage);
+        self.update_errors(reported.errors);
     }
 }

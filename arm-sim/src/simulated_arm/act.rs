@@ -34,6 +34,8 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
             Action::Hand(joint, counts) => self.plant_for(now, action).move_by_hand(joint, counts),
             Action::Hold(joint) => self.plant_for(now, action).hold(joint),
             Action::LetGo(joint) => self.plant_for(now, action).let_go(joint),
+            Action::Drop => return self.drop_thing(now),
+            Action::Trip(joint, trip) => self.plant_for(now, action).trip(joint, trip),
             Action::Weight(grams) => self.plant_for(now, action).set_load(grams),
         }
         Vec::new()

@@ -79,6 +79,16 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         ended
     }
 
+    /// Drops what is in the gripper at `now`. Returns the report of the thing between the claws.
+    pub(super) fn drop_thing(&mut self, now: Instant) -> Vec<FaultReport> {
+        self.record_action(now, Action::Drop);
+        self.simulate(now, false);
+        let things = self.faults.take_things();
+        let ended = things.into_iter().map(|listed| self.end(listed)).collect();
+        self.bus.drop_thing();
+        ended
+    }
+
     /// The faults of the arm.
     pub fn faults(&mut self) -> Vec<FaultReport> {
         let listed: Vec<ListedFault> = self.faults.iter().collect();
@@ -101,6 +111,13 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
 impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Ends the faults whose time is over.
     pub(super) fn end_due_faults(&mut self) {
+        if self.faults.has_thing() && self.bus.plant_mut().is_some_and(|plant| !plant.has_thing()) {
+            // The claws opened and dropped it.
+            for listed in self.faults.take_things() {
+                let report = self.end(listed);
+                self.ended_faults.push(report);
+            }
+        }
         if self.faults.deadline().is_none_or(|deadline| deadline > self.now) {
             return;
         }
@@ -138,6 +155,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     fn fault_count(&mut self, fault: ArmFault) -> Option<FaultCount> {
         match fault {
             ArmFault::Servo(joint, _) => Some(self.bus.plant_mut()?.fault_count(joint)),
+            ArmFault::Obstacle(joint, obstacle) => Some(obstacle.count(joint, self.bus.plant_mut()?)),
             ArmFault::Echo => Some(self.bus.plant_mut()?.echo_count()),
             ArmFault::Supply(_) => Some(self.bus.plant_mut()?.supply_fault_count()),
             ArmFault::Flash(FlashFault::Fails) => Some(self.settings.flash_mut().count()),

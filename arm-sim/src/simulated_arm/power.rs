@@ -66,7 +66,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
 
     fn start_controller(&mut self, now: Instant, faults: u8) {
         self.settings.reopen();
-        self.controller = start(now, self.config, &self.settings, faults, self.bus.answer_delay());
+        self.controller = start(now, self.config, &self.settings, faults, &self.bus);
         self.controller_due = now;
         self.controller.set_storage(self.storage());
         self.is_halted = false;

@@ -103,7 +103,7 @@ impl ArmController for StockController {
         let joints = registers.joints(&TARGET_POSITION).map(joint);
         let is_fast = registers.get(BAUD_RATE.address) == FAST;
         Self {
-            servos: ServoMaster::new(config.servo_timeout, config.guard_time),
+            servos: ServoMaster::new(config.servo_baud, config.servo_timeout, config.guard_time),
             stored: stored.copied().unwrap_or(Image([0xFF; Image::LENGTH])),
             to_save: None,
             parser: Parser::default(),

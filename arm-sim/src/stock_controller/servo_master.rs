@@ -2,12 +2,10 @@
 
 use alloc::collections::VecDeque;
 
+use motion_core::servo_bus::ByteTime;
 use motion_core::servo_bus::frame::{self, Decoder, Reading, ServoFrameBuffer, register};
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
-
-/// The time on the wire of one byte at 1 Mbaud.
-const BYTE_TIME: Duration = Duration::from_micros(10);
 
 /// A goal of a servo, as the maker's firmware sends it: time and speed together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,18 +34,20 @@ pub(super) struct ServoMaster {
     asked: Option<Joint>,
     /// No frame starts before this time. If an answer is outstanding, its timeout.
     busy_until: Instant,
+    byte_time: ByteTime,
     timeout: Duration,
     guard_time: Duration,
 }
 
 impl ServoMaster {
-    pub(super) fn new(timeout: Duration, guard_time: Duration) -> Self {
+    pub(super) fn new(baud: u32, timeout: Duration, guard_time: Duration) -> Self {
         Self {
             queue: VecDeque::new(),
             sending: ServoFrameBuffer::new(),
             decoder: Decoder::new(),
             asked: None,
             busy_until: Instant::ZERO,
+            byte_time: ByteTime::at_baud(baud),
             timeout,
             guard_time,
         }
@@ -97,8 +97,7 @@ impl ServoMaster {
             return false;
         }
         let Some((frame, has_answer)) = self.queue.pop_front() else { return false };
-        let bytes = u64::try_from(frame.len()).unwrap_or(0);
-        let sent = now + Duration::from_micros(bytes * BYTE_TIME.as_micros());
+        let sent = now + self.byte_time.of(frame.len());
         self.busy_until = sent + if has_answer { self.timeout } else { self.guard_time };
         if has_answer {
             self.decoder.clear();

@@ -14,6 +14,11 @@ use protocol_core::time::{Duration, Instant};
 /// The pause of a master between the last byte that it received and its next frame.
 const GUARD_TIME: Duration = Duration::from_micros(100);
 
+/// Is a joint without load at its goal? Static friction holds it within a count.
+pub fn near(counts: u16, goal: u16) -> bool {
+    counts.abs_diff(goal) <= 1
+}
+
 pub struct Rig {
     pub plant: Plant,
     pub now: Instant,
