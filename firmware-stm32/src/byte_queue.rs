@@ -81,6 +81,11 @@ impl<const N: usize> ByteQueue<N> {
         count
     }
 
+    /// Drops the newest bytes, so that `len` are left.
+    pub fn truncate(&mut self, len: usize) {
+        self.len = self.len.min(len);
+    }
+
     /// Takes the oldest byte.
     pub fn pop(&mut self) -> Option<u8> {
         if self.is_empty() {
@@ -127,6 +132,19 @@ mod tests {
         assert_eq!((queue.push_all(&[6]), queue.len(), queue.room()), (0, 4, 0));
         assert_eq!(drain(&mut queue), [1, 2, 3, 4]);
         assert_eq!(queue.pop(), None);
+    }
+
+    #[test]
+    fn truncation_drops_the_newest_bytes() {
+        let mut queue = ByteQueue::<4>::new();
+        queue.push_all(&[1, 2]);
+        queue.pop();
+        queue.push_all(&[3, 4, 5]);
+        queue.truncate(9);
+        assert_eq!(queue.len(), 4);
+        queue.truncate(2);
+        queue.push(6);
+        assert_eq!(drain(&mut queue), [2, 3, 6]);
     }
 
     /// Every start, fill and length of a small queue, beside a queue of the standard library.

@@ -81,6 +81,14 @@ pub const fn microsecond_prescaler(timer_hz: u32) -> u16 {
     u16::from_be_bytes([high, low])
 }
 
+/// The argument of `cortex_m::asm::delay` for a delay of `micros`, at least. A step of its loop takes three cycles of the core,
+/// although the argument counts as one (cortex-m 0.7.10; subtraction and taken branch of a Cortex-M4).
+#[must_use]
+pub const fn delay_steps(core_hz: u32, micros: u32) -> u32 {
+    const CYCLES_PER_STEP: u32 = 3;
+    (core_hz / 1_000_000).saturating_mul(micros).div_ceil(CYCLES_PER_STEP)
+}
+
 #[cfg(test)]
 mod tests {
     use protocol_core::registers::map::BAUD_RATES;
@@ -113,6 +121,14 @@ mod tests {
         assert_eq!(usart_divisor(16_000_000, 4_000_000), 16);
         assert_eq!(usart_divisor(84_000_000, 300), u16::MAX);
         assert_eq!(usart_divisor(84_000_000, 0), u16::MAX);
+    }
+
+    #[test]
+    fn a_delay_of_2_ms_takes_2_ms_on_every_clock() {
+        let steps = [ClockSource::Crystal, ClockSource::InternalPll, ClockSource::Internal]
+            .map(|source| delay_steps(source.rates().core, 2_000));
+        assert_eq!(steps, [112_000, 112_000, 10_667], "336,000 and 32,000 cycles");
+        assert_eq!(delay_steps(u32::MAX, u32::MAX), u32::MAX.div_ceil(3));
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! Counts of the receive errors of a USART. An overrun is a byte that was not read in time. Framing errors and noise come
 //! from bad edges or from a wrong baud rate.
 
+use crate::usart_status::{FRAMING, NOISE, OVERRUN};
+
 /// Number of errors of each kind since start. The counts saturate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
@@ -12,16 +14,6 @@ pub struct LineErrors {
     /// The samples of a bit differed.
     pub noise: u16,
 }
-
-/// Bits of USART_SR (RM0090, section 30.6.1).
-const FRAMING: u16 = 1 << 1;
-const NOISE: u16 = 1 << 2;
-const OVERRUN: u16 = 1 << 3;
-
-/// RXNE: a byte is ready to be read.
-pub const RECEIVED: u16 = 1 << 5;
-/// The bits that [`LineErrors::count`] counts.
-pub const ERRORS: u16 = FRAMING | NOISE | OVERRUN;
 
 impl LineErrors {
     /// Counts of zero.
@@ -48,8 +40,7 @@ impl LineErrors {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const PARITY: u16 = 1 << 0;
+    use crate::usart_status::{PARITY, RECEIVED};
 
     #[test]
     fn each_error_has_its_own_count() {

@@ -12,34 +12,25 @@
 #![no_std]
 #![no_main]
 
-mod board;
-mod clock;
-mod crash;
-mod flash_registers;
-mod gpio;
-mod host_link;
+mod log;
 mod main_loop;
-mod mpu;
-mod outputs;
-mod servo_link;
-mod uart;
-mod watchdog;
 
 use cortex_m_rt::entry;
 use defmt_rtt as _;
+use firmware_stm32::chip::clock::{Clock, StartedClock};
+use firmware_stm32::chip::flash_registers::ChipFlashRegisters;
+use firmware_stm32::chip::outputs::Outputs;
+use firmware_stm32::chip::watchdog::Watchdog;
+use firmware_stm32::chip::{board, clock, crash, gpio, host_link, mpu, servo_link};
 use firmware_stm32::flash::Flash;
 use firmware_stm32::reset_cause::{self, ResetCause};
 use firmware_stm32::watchdog_gate::WatchdogGate;
 use motion_core::{Config, Controller};
 use protocol_core::settings::Settings;
-use protocol_core::time::Instant;
 use stm32f4::stm32f405 as pac;
 
-use crate::clock::Clock;
-use crate::flash_registers::ChipFlashRegisters;
+use crate::log::Log;
 use crate::main_loop::MainLoop;
-use crate::outputs::Outputs;
-use crate::watchdog::Watchdog;
 
 #[entry]
 fn main() -> ! {
@@ -50,7 +41,8 @@ fn main() -> ! {
     gpio::enable(&chip.RCC);
     let outputs = Outputs::open();
     mpu::protect_stack(&core.MPU);
-    let source = clock::start(&chip.RCC, &chip.FLASH, &chip.DBGMCU);
+    let StartedClock { source, crystal_khz } =
+        clock::start(&chip.RCC, &chip.FLASH, &chip.DBGMCU, &chip.TIM11);
     let rates = source.rates();
     clock::enable_peripherals(&chip.RCC);
     let mut clock = Clock::start(&chip.TIM2, core.SYST, rates);
@@ -65,13 +57,16 @@ fn main() -> ! {
     let config = Config {
         chip_id: board::chip_id(source),
         faults,
+        servo_baud: board::SERVO_BAUD,
         servo_timeout: board::servo_timeout(source),
         guard_time: board::SERVO_GUARD_TIME,
         torque_codes: board::TORQUE_CODES,
     };
     let controller = Controller::new(clock.now(), config, settings.found(), settings.storage());
+    // Before the host link is open: a log line masks the interrupts for longer than a byte may wait.
+    defmt::info!("ready: clock {}, crystal {} kHz", source, crystal_khz);
+    defmt::info!("faults {=u8:#b}, {=u32} baud", faults, controller.baud());
     let host = host_link::open(chip.USART1, rates, controller.baud(), &mut core.NVIC);
-    defmt::info!("ready: clock {}, faults {=u8:#b}, {=u32} baud", source, faults, controller.baud());
     let main_loop = MainLoop {
         clock,
         host,
@@ -80,7 +75,7 @@ fn main() -> ! {
         outputs,
         watchdog: &watchdog,
         watchdog_gate: WatchdogGate::new(),
-        next_log: Instant::ZERO,
+        log: Log::new(),
     };
     main_loop.run(controller)
 }

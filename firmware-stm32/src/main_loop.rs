@@ -4,26 +4,25 @@ use core::convert::Infallible;
 
 use embedded_io::{BufRead, Write};
 use firmware_stm32::bus_pause::PauseWait;
+use firmware_stm32::chip::board;
+use firmware_stm32::chip::clock::{self, Clock};
+use firmware_stm32::chip::flash_registers::ChipFlashRegisters;
+use firmware_stm32::chip::host_link::HostLink;
+use firmware_stm32::chip::outputs::Outputs;
+use firmware_stm32::chip::servo_link::ServoLink;
+use firmware_stm32::chip::uart::{CHUNK, Received};
+use firmware_stm32::chip::watchdog::Watchdog;
 use firmware_stm32::flash::Flash;
 use firmware_stm32::watchdog_gate::WatchdogGate;
 use motion_core::{Controller, Output, Vacuum};
 use protocol_core::registers::map::{FAULTS, fault as fault_bit};
 use protocol_core::settings::Settings;
-use protocol_core::time::{Duration, Instant};
+use protocol_core::time::Instant;
 
-use crate::board;
-use crate::clock::{self, Clock};
-use crate::flash_registers::ChipFlashRegisters;
-use crate::host_link::HostLink;
-use crate::outputs::Outputs;
-use crate::servo_link::ServoLink;
-use crate::uart::CHUNK;
-use crate::watchdog::Watchdog;
+use crate::log::Log;
 
 /// Half the period of the blinking LED, in microseconds.
 const BLINK_MICROS: u64 = 250_000;
-/// Time between two log lines about the serial lines.
-const LOG_PERIOD: Duration = Duration::from_millis(1_000);
 
 /// The drivers that the loop connects to the controller.
 pub(crate) struct MainLoop<'a> {
@@ -34,7 +33,7 @@ pub(crate) struct MainLoop<'a> {
     pub(crate) outputs: Outputs,
     pub(crate) watchdog: &'a Watchdog,
     pub(crate) watchdog_gate: WatchdogGate,
-    pub(crate) next_log: Instant,
+    pub(crate) log: Log,
 }
 
 impl MainLoop<'_> {
@@ -49,8 +48,8 @@ impl MainLoop<'_> {
             }
             self.watchdog.feed_through(&mut self.watchdog_gate);
             self.update_led(now, &arm);
-            if now >= self.next_log {
-                self.log_lines(now, &mut arm);
+            if self.log.is_due(now) {
+                self.log.poll(now, &self.host, &self.servos, &mut arm);
             }
             self.sleep(until, arm.host_bytes_wanted());
         }
@@ -58,24 +57,22 @@ impl MainLoop<'_> {
 
     /// Carries out all outputs that are due at `now`. Returns the time of the next poll.
     fn act(&mut self, now: Instant, arm: &mut Controller) -> Instant {
-        let mut begun = 0;
         loop {
             match arm.poll(now, self.host.room()) {
-                Output::ToHost(bytes) => send(&mut self.host, bytes),
-                Output::ServoFrameStart(bytes) => {
-                    send(&mut self.servos, bytes);
-                    begun = bytes.len();
+                Output::ToHost(bytes) => {
+                    send(&mut self.host, bytes);
+                    self.log.note_bytes(now);
                 }
                 Output::ToServos(bytes) => {
-                    send(&mut self.servos, bytes.get(begun..).unwrap_or(&[]));
-                    begun = 0;
+                    send(&mut self.servos, bytes);
+                    self.log.note_bytes(now);
                     self.watchdog_gate.control_cycle_ran();
                 }
                 Output::Vacuum(vacuum) => self.switch(vacuum),
                 Output::Save(image) => {
                     self.wait_for_pause();
                     let storage = self.settings.save(&image);
-                    defmt::info!("save: {}, room for {=usize}", storage, self.settings.room());
+                    self.log.note_save(storage, self.settings.room());
                     arm.set_storage(storage);
                     // The save took up to 5 ms, so read the clock again before the next poll.
                     return now;
@@ -96,10 +93,16 @@ impl MainLoop<'_> {
 
     fn receive(&mut self, now: Instant, arm: &mut Controller) {
         loop {
-            let bytes = self.host.received();
+            let Received::Bytes(bytes) = self.host.received() else {
+                arm.host_byte_damaged();
+                continue;
+            };
             let taken = arm.host_bytes(now, bytes);
             if taken > 0 || bytes.is_empty() {
                 self.watchdog_gate.host_link_ran();
+            }
+            if taken > 0 {
+                self.log.note_bytes(now);
             }
             self.host.consume(taken);
             // Less than a whole chunk: the queue is empty, or the controller takes no more.
@@ -108,35 +111,30 @@ impl MainLoop<'_> {
             }
         }
         loop {
-            let bytes = self.servos.received();
+            let Received::Bytes(bytes) = self.servos.received() else {
+                arm.servo_byte_damaged(now);
+                continue;
+            };
             let count = bytes.len();
             if count == 0 {
                 break;
             }
             arm.servo_bytes(now, bytes);
             self.servos.consume(count);
+            self.log.note_bytes(now);
         }
     }
 
     fn switch(&mut self, vacuum: Vacuum) {
         self.outputs.pump.set(vacuum.pump);
         self.outputs.valve.set(vacuum.valve);
-        defmt::info!("{}", vacuum);
+        self.log.note_vacuum(vacuum);
     }
 
     /// Lights the LED: steady without a fault, blinking while register 241 shows one.
     fn update_led(&mut self, now: Instant, arm: &Controller) {
         let is_well = arm.registers().get(FAULTS.address) == 0;
         self.outputs.led.set(is_well || (now.as_micros() / BLINK_MICROS).is_multiple_of(2));
-    }
-
-    /// Logs the errors of both lines once a second, and the longest answer time of each servo. An overrun is a byte that
-    /// was not read in time. Framing errors and noise come from bad edges.
-    fn log_lines(&mut self, now: Instant, arm: &mut Controller) {
-        self.next_log = now + LOG_PERIOD;
-        let (host, servos) = (self.host.errors(), self.servos.errors());
-        let answers = arm.take_longest_answers();
-        defmt::info!("host {}, servos {}, longest answers {} us", host, servos, answers);
     }
 
     /// Sleeps until `until`, the next tick of the system timer, or the arrival of enough bytes. Fewer bytes, and interrupts

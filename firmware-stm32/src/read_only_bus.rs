@@ -1,18 +1,17 @@
 //! The servo bus of the self-test image. It sends only questions.
 
-use embedded_io::Write;
+use embedded_io::{BufRead, Write};
+use firmware_stm32::chip::board;
+use firmware_stm32::chip::clock;
+use firmware_stm32::chip::delay::delay_micros;
+use firmware_stm32::chip::servo_link::ServoLink;
+use firmware_stm32::chip::uart::Received;
 use firmware_stm32::line_errors::LineErrors;
 use firmware_stm32::question::{Answer, Question};
-
-use crate::board;
-use crate::clock;
-use crate::delay::delay_micros;
-use crate::servo_link::ServoLink;
+use motion_core::servo_bus::ByteTime;
 
 /// Room for the echo of a question and the answer to it.
 const RECEIVED: usize = 64;
-/// Duration of a byte at 1 Mbaud.
-const BYTE_MICROS: u32 = 10;
 
 /// The bytes received after a question.
 pub(crate) type ReceivedBytes = heapless::Vec<u8, RECEIVED>;
@@ -60,29 +59,39 @@ impl ReadOnlyBus {
     /// Sends a question and receives until `is_enough` or the timeout. Returns the time after the last byte sent.
     fn listen(&mut self, question: &Question, mut is_enough: impl FnMut(&[u8]) -> bool) -> u32 {
         delay_micros(u32::try_from(board::SERVO_GUARD_TIME.as_micros()).unwrap_or(u32::MAX));
-        while self.take().is_some() {}
-        let length = u32::try_from(question.frame().len()).unwrap_or(0);
+        self.take(&mut ReceivedBytes::new());
         let Ok(()) = self.link.write_all(question.frame());
-        let sent = clock::micros().wrapping_add(length * BYTE_MICROS);
+        let length = ByteTime::at_baud(board::SERVO_BAUD).of(question.frame().len());
+        let sent = clock::micros().wrapping_add(u32::try_from(length.as_micros()).unwrap_or(0));
         let mut received = ReceivedBytes::new();
         loop {
             // The difference is negative until the last byte is sent: count that as 0.
             let since = clock::micros().wrapping_sub(sent);
             let since = if since > u32::MAX / 2 { 0 } else { since };
             let before = received.len();
-            while let Some(byte) = self.take() {
-                // Drop bytes that do not fit: they cannot belong to an answer.
-                let _ = received.push(byte);
-            }
+            self.take(&mut received);
             if (received.len() > before && is_enough(&received)) || since > self.timeout_micros {
                 return since;
             }
         }
     }
 
-    fn take(&mut self) -> Option<u8> {
-        let byte = self.link.received().first().copied();
-        embedded_io::BufRead::consume(&mut self.link, usize::from(byte.is_some()));
-        byte
+    /// Takes what has arrived. No answer continues across a damaged byte, so the bytes before it are dropped.
+    fn take(&mut self, received: &mut ReceivedBytes) {
+        loop {
+            let count = match self.link.received() {
+                Received::Bytes([]) => return,
+                Received::Bytes(bytes) => {
+                    // Drop bytes that do not fit: they cannot belong to an answer.
+                    bytes.iter().for_each(|&byte| _ = received.push(byte));
+                    bytes.len()
+                }
+                Received::Damage => {
+                    received.clear();
+                    0
+                }
+            };
+            self.link.consume(count);
+        }
     }
 }

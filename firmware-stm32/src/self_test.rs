@@ -17,37 +17,20 @@
 #![no_std]
 #![no_main]
 
-mod adc;
-#[allow(dead_code, reason = "the firmware uses the rest")]
-mod board;
-#[allow(dead_code, reason = "the firmware uses the rest")]
-mod clock;
-#[allow(dead_code, reason = "the firmware uses the rest")]
-mod crash;
-mod delay;
-mod gpio;
-mod host_link;
-mod mpu;
-#[allow(dead_code, reason = "the firmware uses the rest")]
-mod outputs;
 mod read_only_bus;
-mod servo_link;
 mod steps;
-#[allow(dead_code, reason = "the firmware uses the rest")]
-mod uart;
-#[allow(dead_code, reason = "the firmware uses the rest")]
-mod watchdog;
 
 use cortex_m_rt::entry;
 use defmt_rtt as _;
+use firmware_stm32::chip::clock::{Clock, StartedClock};
+use firmware_stm32::chip::outputs::Outputs;
+use firmware_stm32::chip::watchdog::Watchdog;
+use firmware_stm32::chip::{adc, board, clock, crash, gpio, host_link, mpu, servo_link};
 use firmware_stm32::reset_cause::ResetCause;
 use stm32f4::stm32f405 as pac;
 
-use crate::clock::Clock;
-use crate::outputs::Outputs;
 use crate::read_only_bus::ReadOnlyBus;
 use crate::steps::{Board, SelfTest};
-use crate::watchdog::Watchdog;
 
 /// Baud rate of the host link: the default of register 12.
 const BAUD: u32 = 115_200;
@@ -60,7 +43,8 @@ fn main() -> ! {
     gpio::enable(&chip.RCC);
     let outputs = Outputs::open();
     mpu::protect_stack(&core.MPU);
-    let source = clock::start(&chip.RCC, &chip.FLASH, &chip.DBGMCU);
+    let StartedClock { source, crystal_khz } =
+        clock::start(&chip.RCC, &chip.FLASH, &chip.DBGMCU, &chip.TIM11);
     let rates = source.rates();
     clock::enable_peripherals(&chip.RCC);
     let clock = Clock::start(&chip.TIM2, core.SYST, rates);
@@ -69,6 +53,7 @@ fn main() -> ! {
     let (flags, cause) = crash::take_cause(&chip.RCC);
     let board = Board {
         source,
+        crystal_khz,
         flags,
         cause,
         // BOR_LEV 0 is level 3, 3 is off (RM0090, FLASH_OPTCR).

@@ -3,6 +3,12 @@
 use core::fmt::{self, Write as _};
 
 use embedded_io::{BufRead, Write as _};
+use firmware_stm32::chip::board;
+use firmware_stm32::chip::clock::{self, Clock};
+use firmware_stm32::chip::gpio::{DigitalOutput, Switch};
+use firmware_stm32::chip::host_link::HostLink;
+use firmware_stm32::chip::uart::Received;
+use firmware_stm32::chip::watchdog::Watchdog;
 use firmware_stm32::clock_rates::ClockSource;
 use firmware_stm32::question::{Echoes, Question};
 use firmware_stm32::reset_cause::ResetCause;
@@ -10,12 +16,7 @@ use firmware_stm32::{led_pattern, vdd};
 use motion_core::servo_bus::Reading;
 use protocol_core::registers::JOINTS;
 
-use crate::board;
-use crate::clock::{self, Clock};
-use crate::gpio::{DigitalOutput, Switch};
-use crate::host_link::HostLink;
 use crate::read_only_bus::ReadOnlyBus;
-use crate::watchdog::Watchdog;
 
 /// Frames that step b sends.
 const ECHOES: u16 = 1_000;
@@ -44,6 +45,8 @@ macro_rules! say {
 /// Facts about the board, read at start.
 pub(crate) struct Board {
     pub(crate) source: ClockSource,
+    /// The crystal as measured at start.
+    pub(crate) crystal_khz: Option<u32>,
     pub(crate) flags: u32,
     pub(crate) cause: Option<ResetCause>,
     pub(crate) brown_out_level: u8,
@@ -101,7 +104,7 @@ impl SelfTest {
     /// Waits for a letter.
     fn command(&mut self) -> u8 {
         loop {
-            if let Some(&letter) = self.host.received().first() {
+            if let Received::Bytes(&[letter, ..]) = self.host.received() {
                 self.host.consume(1);
                 return letter;
             }
@@ -124,8 +127,9 @@ impl SelfTest {
     }
 
     fn board_alone(&mut self) {
-        let Board { source, flags, brown_out_level, calibration, reference, .. } = self.board;
+        let Board { source, crystal_khz, flags, brown_out_level, calibration, reference, .. } = self.board;
         say!(self, "a: clock {:?}, RCC_CSR {:08x}, brown-out level {}", source, flags, brown_out_level);
+        say!(self, "a: crystal {:?} kHz", crystal_khz);
         let supply = calibration.zip(reference).and_then(|(then, now)| vdd::millivolts(then, now));
         say!(self, "a: VDD {:?} mV", supply);
         let [a, b, c, d, e, f] = board::chip_id(source);

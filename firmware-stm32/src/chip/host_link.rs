@@ -1,12 +1,13 @@
 //! The host link: USART1, at the baud rate from the settings.
 
 use cortex_m::peripheral::NVIC;
-use firmware_stm32::clock_rates::{self, ClockRates};
 use stm32f4::stm32f405::{USART1, interrupt};
 
-use crate::board;
-use crate::gpio::OutputType;
-use crate::uart::{Setup, SharedUart, UartPort};
+use super::board;
+use super::gpio::OutputType;
+use super::uart::{Setup, SharedUart, UartPort};
+use crate::clock_rates::{self, ClockRates};
+use crate::serial_line::NoDirection;
 
 /// Room for a burst of requests while replies of 262 bytes are sent.
 const RECEIVE: usize = 2048;
@@ -14,12 +15,12 @@ const RECEIVE: usize = 2048;
 const TRANSMIT: usize = 1024;
 
 /// The host link as the main loop uses it.
-pub(crate) type HostLink = UartPort<USART1, RECEIVE, TRANSMIT>;
+pub type HostLink = UartPort<USART1, NoDirection, RECEIVE, TRANSMIT>;
 
-static LINE: SharedUart<USART1, RECEIVE, TRANSMIT> = SharedUart::new();
+static LINE: SharedUart<USART1, NoDirection, RECEIVE, TRANSMIT> = SharedUart::new(NoDirection);
 
 /// Opens the host link.
-pub(crate) fn open(usart: USART1, rates: ClockRates, baud: u32, nvic: &mut NVIC) -> HostLink {
+pub fn open(usart: USART1, rates: ClockRates, baud: u32, nvic: &mut NVIC) -> HostLink {
     board::HOST_TRANSMIT.give_to(board::USART_FUNCTION, OutputType::PushPull);
     board::HOST_RECEIVE.give_to(board::USART_FUNCTION, OutputType::PushPull);
     let divisor = clock_rates::usart_divisor(rates.apb2, baud);

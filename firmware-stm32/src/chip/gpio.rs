@@ -7,7 +7,7 @@ use stm32f4::stm32f405 as pac;
 
 /// Enables the clocks of the ports. The read gives them the delay that they need before the first access (errata ES0182,
 /// delay after an RCC peripheral clock enabling).
-pub(crate) fn enable(rcc: &pac::RCC) {
+pub fn enable(rcc: &pac::RCC) {
     rcc.ahb1enr().modify(|_, w| w.gpioaen().enabled().gpioben().enabled().gpiocen().enabled());
     let _ = rcc.ahb1enr().read();
 }
@@ -17,30 +17,34 @@ type GpioRegisters = pac::gpioi::RegisterBlock;
 
 /// Ports of the 64-pin package.
 #[derive(Clone, Copy)]
-pub(crate) enum GpioPort {
+pub enum GpioPort {
+    /// Port A.
     A,
-    #[allow(dead_code, reason = "for other wiring")]
+    /// Port B.
     B,
+    /// Port C.
     C,
 }
 
 /// A pin of the chip.
 #[derive(Clone, Copy)]
-pub(crate) struct Pin {
+pub struct Pin {
     port: GpioPort,
     number: u8,
 }
 
 /// The level that switches the connected device on.
 #[derive(Clone, Copy)]
-pub(crate) enum Active {
+pub enum Active {
+    /// The high level.
     High,
+    /// The low level.
     Low,
 }
 
 /// How a peripheral drives its pin.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum OutputType {
+pub enum OutputType {
     /// Drives high and low. The chip's weak pull-up is on: it keeps an unconnected input high.
     PushPull,
     /// Drives low only; the pull-up is outside the chip. With its internal pull-up on, a pin would not be 5 V tolerant: at
@@ -63,13 +67,13 @@ impl GpioPort {
 
 impl Pin {
     /// Pin `number`, 0 to 15, of a port.
-    pub(crate) const fn new(port: GpioPort, number: u8) -> Self {
+    pub const fn new(port: GpioPort, number: u8) -> Self {
         assert!(number < 16);
         Self { port, number }
     }
 
     /// Connects the pin to a peripheral.
-    pub(crate) fn give_to(self, function: u8, drive: OutputType) {
+    pub fn give_to(self, function: u8, drive: OutputType) {
         let port = self.port.registers();
         let n = self.n();
         if n < 8 {
@@ -92,14 +96,19 @@ impl Pin {
     }
 
     /// Makes the pin an output that is off.
-    pub(crate) fn into_switch(self, active: Active) -> Switch<DigitalOutput> {
+    pub fn into_switch(self, active: Active) -> Switch<DigitalOutput> {
         let switch = Switch::new(DigitalOutput(self), active);
-        self.port.registers().moder().modify(|_, w| w.moder(self.n()).output());
+        self.make_output();
         switch
     }
 
+    /// Makes the pin an output, at the level that was set last.
+    pub fn make_output(self) {
+        self.port.registers().moder().modify(|_, w| w.moder(self.n()).output());
+    }
+
     /// Sets the level of the pin. The crash handler uses it without owning the pin.
-    pub(crate) fn drive(self, state: PinState) {
+    pub fn drive(self, state: PinState) {
         // BSRR sets or clears one pin and leaves the others unchanged (RM0090, section 8.4.7).
         self.port.registers().bsrr().write(|w| match state {
             PinState::High => w.bs(self.n()).set_bit(),
@@ -115,13 +124,13 @@ impl Pin {
 
 impl Active {
     /// The level for on or off.
-    pub(crate) fn level(self, on: bool) -> PinState {
+    pub fn level(self, on: bool) -> PinState {
         PinState::from(on == matches!(self, Self::High))
     }
 }
 
 /// A pin that is an output.
-pub(crate) struct DigitalOutput(Pin);
+pub struct DigitalOutput(Pin);
 
 impl ErrorType for DigitalOutput {
     type Error = Infallible;
@@ -143,7 +152,7 @@ impl OutputPin for DigitalOutput {
 }
 
 /// A device that is switched on and off by a pin.
-pub(crate) struct Switch<P> {
+pub struct Switch<P> {
     pin: P,
     active: Active,
     on: bool,
@@ -157,7 +166,7 @@ impl<P: OutputPin<Error = Infallible>> Switch<P> {
     }
 
     /// Switches the device. Writes to the pin only on a change.
-    pub(crate) fn set(&mut self, on: bool) {
+    pub fn set(&mut self, on: bool) {
         if self.on != on {
             let Ok(()) = self.pin.set_state(self.active.level(on));
             self.on = on;

@@ -1,11 +1,11 @@
-//! Access to the registers and cells of the chip's flash and to its supply monitor. `firmware_stm32::flash` decides what
+//! Access to the registers and cells of the chip's flash and to its supply monitor. `crate::flash` decides what
 //! to write and when.
 
-use firmware_stm32::flash::{FlashRegisters, JOURNAL, SECTOR, WORD};
 use stm32f4::stm32f405 as pac;
 
-use crate::clock;
-use crate::watchdog::Watchdog;
+use super::clock;
+use super::watchdog::Watchdog;
+use crate::flash::{FlashRegisters, JOURNAL, SECTOR, WORD};
 
 /// Bytes of the flash. Its start address is a multiple of this, and sector 0 begins there.
 const FLASH: usize = 1024 * 1024;
@@ -16,7 +16,7 @@ unsafe extern "C" {
 }
 
 /// The registers of the chip's flash.
-pub(crate) struct ChipFlashRegisters<'a> {
+pub struct ChipFlashRegisters<'a> {
     registers: pac::FLASH,
     power: pac::PWR,
     watchdog: &'a Watchdog,
@@ -24,7 +24,7 @@ pub(crate) struct ChipFlashRegisters<'a> {
 
 impl<'a> ChipFlashRegisters<'a> {
     /// Takes ownership of the registers.
-    pub(crate) const fn new(registers: pac::FLASH, power: pac::PWR, watchdog: &'a Watchdog) -> Self {
+    pub const fn new(registers: pac::FLASH, power: pac::PWR, watchdog: &'a Watchdog) -> Self {
         Self { registers, power, watchdog }
     }
 }

@@ -1,18 +1,21 @@
 //! Pump, valve and status LED.
 
-use crate::board;
-use crate::gpio::{DigitalOutput, Switch};
+use super::board;
+use super::gpio::{DigitalOutput, Switch};
 
 /// The devices that the firmware switches.
-pub(crate) struct Outputs {
-    pub(crate) pump: Switch<DigitalOutput>,
-    pub(crate) valve: Switch<DigitalOutput>,
-    pub(crate) led: Switch<DigitalOutput>,
+pub struct Outputs {
+    /// The vacuum pump.
+    pub pump: Switch<DigitalOutput>,
+    /// The valve that lets air into the cup.
+    pub valve: Switch<DigitalOutput>,
+    /// The status LED.
+    pub led: Switch<DigitalOutput>,
 }
 
 impl Outputs {
     /// Makes their pins outputs, all off.
-    pub(crate) fn open() -> Self {
+    pub fn open() -> Self {
         Self {
             pump: board::PUMP.into_switch(board::VACUUM_ACTIVE),
             valve: board::VALVE.into_switch(board::VACUUM_ACTIVE),

@@ -1,10 +1,10 @@
-//! A reading of the chip's internal voltage reference. `firmware_stm32::vdd` computes the supply from it.
+//! A reading of the chip's internal voltage reference. `crate::vdd` computes the supply from it.
 
-use firmware_stm32::clock_rates::ClockSource;
-use firmware_stm32::wait::wait_for;
 use stm32f4::stm32f405 as pac;
 
-use crate::delay::delay_micros;
+use super::delay::delay_micros;
+use crate::clock_rates::ClockSource;
+use crate::wait::wait_for;
 
 /// Channel of the internal reference (RM0090, section 13.10).
 const REFERENCE: u8 = 17;
@@ -14,14 +14,14 @@ const START_UP_MICROS: u32 = 20;
 const DONE_POLLS: u32 = 10_000;
 
 /// The factory's reading of the internal reference at 3.3 V (DS8626); `None` in the emulator.
-pub(crate) fn calibration(source: ClockSource) -> Option<u16> {
+pub fn calibration(source: ClockSource) -> Option<u16> {
     const ADDRESS: *const u16 = 0x1FFF_7A2A as *const _;
     // SAFETY: every STM32F405 has this read-only memory. The emulator lacks it and is excluded here.
     (source != ClockSource::Emulated).then(|| unsafe { ADDRESS.read_volatile() })
 }
 
 /// Reads the reference; `None` if the conversion does not end.
-pub(crate) fn read_reference(rcc: &pac::RCC, adc: &pac::ADC1, common: &pac::ADC_COMMON) -> Option<u16> {
+pub fn read_reference(rcc: &pac::RCC, adc: &pac::ADC1, common: &pac::ADC_COMMON) -> Option<u16> {
     rcc.apb2enr().modify(|_, w| w.adc1en().enabled());
     let _ = rcc.apb2enr().read();
     common.ccr().modify(|_, w| w.adcpre().div4().tsvrefe().enabled());

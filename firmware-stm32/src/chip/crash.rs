@@ -10,14 +10,16 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
-use firmware_stm32::clock_rates::{self, ClockSource};
-use firmware_stm32::reset_cause::ResetCause;
-use firmware_stm32::wait::wait_for;
 use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{ServoFrameBuffer, register, sync_write};
 use stm32f4::stm32f405 as pac;
 
-use crate::board;
+use super::board;
+use super::servo_link::ServoDirection;
+use crate::clock_rates::{self, ClockRates, ClockSource};
+use crate::reset_cause::ResetCause;
+use crate::serial_line::BusDirection;
+use crate::wait::wait_for;
 
 /// Set when the crash handler runs. A second fault while it is set restarts at once.
 static ENTERED: AtomicBool = AtomicBool::new(false);
@@ -30,14 +32,14 @@ static RESET_CAUSE: AtomicU32 = AtomicU32::new(0);
 /// no pause ends its wait, it takes two frames of 22 bytes and a part of the third for them. A servo that hears none of the
 /// four holds its goal.
 const REPEATS: usize = 4;
-/// Pause before each frame, in core cycles: 2 ms at 168 MHz, longer than the longest frame and its answer.
-const PAUSE_CYCLES: u32 = 336_000;
+/// Pause before each frame, in microseconds: longer than the longest frame and its answer.
+const PAUSE_MICROS: u32 = 2_000;
 /// Polls until a byte is sent, which takes 1,680 cycles at 168 MHz.
 const SEND_POLLS: u32 = 20_000;
 
 /// Returns why the chip started: RCC_CSR, and the recorded cause if the last run ended in a crash. Clears both, because
 /// the next start would report them again.
-pub(crate) fn take_cause(rcc: &pac::RCC) -> (u32, Option<ResetCause>) {
+pub fn take_cause(rcc: &pac::RCC) -> (u32, Option<ResetCause>) {
     let flags = rcc.csr().read().bits();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
     let cause = ResetCause::from_record(RESET_CAUSE.swap(0, Ordering::Relaxed));
@@ -46,7 +48,7 @@ pub(crate) fn take_cause(rcc: &pac::RCC) -> (u32, Option<ResetCause>) {
 }
 
 /// Makes the arm safe and restarts the chip.
-pub(crate) fn restart(cause: ResetCause) -> ! {
+pub fn restart(cause: ResetCause) -> ! {
     if make_safe(cause) {
         defmt::error!("restart: {}", cause);
     }
@@ -70,28 +72,37 @@ fn make_safe(cause: ResetCause) -> bool {
 fn stop_servos() {
     // SAFETY: interrupts are off, and the code that owns these registers does not run again.
     let (usart, rcc) = unsafe { (pac::USART2::steal(), pac::RCC::steal()) };
-    keep_rate(&usart, &rcc);
+    let rates = keep_rate(&usart, &rcc);
     let mut frame = ServoFrameBuffer::new();
     let code = board::TORQUE_CODES.code(Torque::Damping);
     sync_write(&mut frame, register::TORQUE_SWITCH, (0..board::SERVOS).map(|id| (id, [code])));
+    let mut direction = ServoDirection;
     for _ in 0..REPEATS {
-        cortex_m::asm::delay(PAUSE_CYCLES);
+        // A servo may still answer.
+        direction.receive();
+        // Not timed by TIM2: after a failure of the clock it counts at another rate, and early in a start it stands still.
+        cortex_m::asm::delay(clock_rates::delay_steps(rates.core, PAUSE_MICROS));
+        direction.transmit();
         for &byte in &frame {
             let _ = wait_for(SEND_POLLS, || usart.sr().read().txe().bit_is_set());
             usart.dr().write(|w| w.dr().set(u16::from(byte)));
         }
         let _ = wait_for(SEND_POLLS, || usart.sr().read().tc().bit_is_set());
+        direction.receive();
     }
 }
 
 /// Corrects the baud rate if the crystal has just stopped. The chip then runs on its internal oscillator, with the bus
-/// divider still set for the PLL.
-fn keep_rate(usart: &pac::USART2, rcc: &pac::RCC) {
-    if rcc.cfgr().read().sws().is_hsi() {
-        rcc.cfgr().modify(|_, w| w.ppre1().div1());
-        let divisor = clock_rates::usart_divisor(ClockSource::Internal.rates().apb1, board::SERVO_BAUD);
-        usart.brr().write(|w| w.div_mantissa().set(divisor >> 4));
+/// divider still set for the PLL. Returns the present rates.
+fn keep_rate(usart: &pac::USART2, rcc: &pac::RCC) -> ClockRates {
+    if !rcc.cfgr().read().sws().is_hsi() {
+        return ClockSource::Crystal.rates();
     }
+    let rates = ClockSource::Internal.rates();
+    rcc.cfgr().modify(|_, w| w.ppre1().div1());
+    let divisor = clock_rates::usart_divisor(rates.apb1, board::SERVO_BAUD);
+    usart.brr().write(|w| w.div_mantissa().set(divisor >> 4));
+    rates
 }
 
 #[panic_handler]

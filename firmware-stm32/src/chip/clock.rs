@@ -1,7 +1,7 @@
 //! The clock tree and the time.
 //!
 //! ```text
-//!   crystal ──▶ PLL ──▶ 168 MHz        the crystal fails: PLL from the internal oscillator
+//!   crystal ──▶ PLL ──▶ 168 MHz        the crystal fails, or is none of the board's: PLL from the internal oscillator
 //!                                      the PLL fails: the internal oscillator, 16 MHz
 //!                                      none of the three is ready: the emulator, which has no clock tree
 //! ```
@@ -14,44 +14,95 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::exception;
-use firmware_stm32::clock_rates::{self, ClockRates, ClockSource};
-use firmware_stm32::tick;
-use firmware_stm32::timeline::Timeline;
-use firmware_stm32::wait::wait_for;
 use protocol_core::time::{Duration, Instant};
 use stm32f4::stm32f405 as pac;
 
-use crate::board;
+use super::board;
+use crate::clock_rates::{self, ClockRates, ClockSource};
+use crate::crystal;
+use crate::tick;
+use crate::timeline::Timeline;
+use crate::wait::wait_for;
 
 /// Polls until a clock is ready: some 0.1 s, as the core runs on the internal oscillator meanwhile. A crystal takes a few
 /// milliseconds (DS8626, table 33).
 const READY_POLLS: u32 = 200_000;
-/// The input of the PLL, in Hz. RM0090, section 7.3.2 recommends 2 MHz.
-const PLL_INPUT_HZ: u32 = 2_000_000;
+/// Polls until a capture of the crystal. With the slowest, 4 MHz, it takes 62 us: 1,000 cycles of the core.
+const CAPTURE_POLLS: u32 = 2_000;
+/// Frequency of the internal oscillator, in MHz.
+const INTERNAL_MHZ: u8 = 16;
 
-const _: () = assert!(board::CRYSTAL_HZ.is_multiple_of(PLL_INPUT_HZ) && board::CRYSTAL_HZ <= 26_000_000);
+const _: () = assert!(clock_rates::INTERNAL_HZ == INTERNAL_MHZ as u32 * 1_000_000);
 
-/// Starts the best clock that works and returns it. After a reset the chip runs on its internal oscillator.
-pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH, dbgmcu: &pac::DBGMCU) -> ClockSource {
+/// What [`start`] found.
+#[derive(Clone, Copy)]
+pub struct StartedClock {
+    /// The source of the core clock.
+    pub source: ClockSource,
+    /// The crystal as measured against the internal oscillator; `None` if it did not start.
+    pub crystal_khz: Option<u32>,
+}
+
+/// Starts the best clock that works. After a reset the chip runs on its internal oscillator.
+pub fn start(rcc: &pac::RCC, flash: &pac::FLASH, dbgmcu: &pac::DBGMCU, timer: &pac::TIM11) -> StartedClock {
     // Without DBG_SLEEP, WFI also stops the clock of the debug port, and no probe can attach to a sleeping chip
     // (RM0090, DBGMCU_CR). A probe clears the bit when it detaches; a reset does not.
     dbgmcu.cr().modify(|_, w| w.dbg_sleep().set_bit());
     if is_emulated(rcc, dbgmcu) {
-        return ClockSource::Emulated;
+        return StartedClock { source: ClockSource::Emulated, crystal_khz: None };
     }
     rcc.cr().modify(|_, w| w.hseon().on());
-    let crystal = wait_for(READY_POLLS, || rcc.cr().read().hserdy().is_ready());
-    if crystal && lock_pll(rcc, board::CRYSTAL_HZ, true) && switch_to_pll(rcc, flash) {
+    let is_ready = wait_for(READY_POLLS, || rcc.cr().read().hserdy().is_ready());
+    let crystal_khz = if is_ready { measure_crystal(rcc, timer) } else { None };
+    let source = select(rcc, flash, crystal_khz.and_then(|khz| crystal::identify(khz, board::CRYSTALS_MHZ)));
+    StartedClock { source, crystal_khz }
+}
+
+/// Switches to the best clock that works. `crystal_mhz` is one of the board's crystals; `None` if there is none to be used.
+fn select(rcc: &pac::RCC, flash: &pac::FLASH, crystal_mhz: Option<u8>) -> ClockSource {
+    if let Some(mhz) = crystal_mhz
+        && lock_pll(rcc, mhz, true)
+        && switch_to_pll(rcc, flash)
+    {
         // From now on a crystal that stops raises an NMI (RM0090, section 7.2.7), which restarts the chip.
         rcc.cr().modify(|_, w| w.csson().on());
         return ClockSource::Crystal;
     }
     rcc.cr().modify(|_, w| w.hseon().off());
-    if lock_pll(rcc, clock_rates::INTERNAL_HZ, false) && switch_to_pll(rcc, flash) {
+    if lock_pll(rcc, INTERNAL_MHZ, false) && switch_to_pll(rcc, flash) {
         return ClockSource::InternalPll;
     }
     rcc.cr().modify(|_, w| w.pllon().off());
     ClockSource::Internal
+}
+
+/// Measures the crystal with TIM11, in kHz. The internal oscillator clocks the core and the timer meanwhile (RM0090, section
+/// 7.2.11). `None` if no signal arrives.
+fn measure_crystal(rcc: &pac::RCC, timer: &pac::TIM11) -> Option<u32> {
+    // SAFETY: 31 is the largest of the dividers 2 to 31 (RM0090, RCC_CFGR).
+    rcc.cfgr().modify(|_, w| unsafe { w.rtcpre().bits(crystal::DIVIDER) });
+    rcc.apb2enr().modify(|_, w| w.tim11en().enabled());
+    let _ = rcc.apb2enr().read();
+    // SAFETY: 2 is a value of the field: input 1 is the divided crystal (RM0090, TIM11_OR).
+    timer.or().write(|w| unsafe { w.rmp().bits(0b10) });
+    timer.arr().write(|w| w.arr().set(u16::MAX));
+    // Capture each eighth rising edge of input 1.
+    timer.ccmr1_input().write(|w| w.cc1s().ti1().ic1psc().set(0b11));
+    timer.ccer().write(|w| w.cc1e().set_bit());
+    timer.cr1().write(|w| w.cen().enabled());
+    let khz = crystal::measure_khz(|| next_capture(timer));
+    rcc.apb2enr().modify(|_, w| w.tim11en().disabled());
+    khz
+}
+
+/// The next captured count; `None` if none comes, or if one was missed.
+fn next_capture(timer: &pac::TIM11) -> Option<u16> {
+    if !wait_for(CAPTURE_POLLS, || timer.sr().read().cc1if().bit_is_set()) {
+        return None;
+    }
+    // Reading the count clears CC1IF. CC1OF shows a capture that was overwritten.
+    let count = timer.ccr1().read().ccr().bits();
+    (!timer.sr().read().cc1of().bit_is_set()).then_some(count)
 }
 
 /// True in the emulator. On the chip the internal oscillator is ready at the first instruction, and the id is never 0.
@@ -63,17 +114,17 @@ fn is_emulated(rcc: &pac::RCC, dbgmcu: &pac::DBGMCU) -> bool {
         && dbgmcu.idcode().read().bits() == 0
 }
 
-/// Locks the PLL at 2 MHz x 168 / 2 = 168 MHz. Returns false if it does not lock.
-fn lock_pll(rcc: &pac::RCC, input_hz: u32, from_crystal: bool) -> bool {
-    let [divisor, ..] = (input_hz / PLL_INPUT_HZ).to_le_bytes();
+/// Locks the PLL at 1 MHz x 336 / 2 = 168 MHz. Returns false if it does not lock. An input of 1 MHz serves every crystal of
+/// whole megahertz; with the 2 MHz that RM0090 recommends there would be less jitter, and no 25 MHz.
+fn lock_pll(rcc: &pac::RCC, input_mhz: u8, from_crystal: bool) -> bool {
     rcc.cr().modify(|_, w| w.pllon().off());
     if !wait_for(READY_POLLS, || rcc.cr().read().pllrdy().is_not_ready()) {
         return false;
     }
     rcc.pllcfgr().write(|w| {
-        // SAFETY: all values are in range (RM0090, section 7.3.2). M is 8 / 2 to 26 / 2 in 2..63, N is 168 in 50..432.
+        // SAFETY: all values are in range (RM0090, section 7.3.2). M is 4 to 26 in 2..63, N is 336 in 50..432.
         // Q is 7 in 2..15; its output is not used.
-        unsafe { w.pllm().bits(divisor).plln().bits(168).pllq().bits(7) };
+        unsafe { w.pllm().bits(input_mhz).plln().bits(336).pllq().bits(7) };
         w.pllp().div2().pllsrc().bit(from_crystal)
     });
     rcc.cr().modify(|_, w| w.pllon().on());
@@ -99,7 +150,7 @@ fn switch_to_pll(rcc: &pac::RCC, flash: &pac::FLASH) -> bool {
 
 /// Enables the clocks of the peripherals. The reads give them the delay that they need before the first access (errata
 /// ES0182, delay after an RCC peripheral clock enabling).
-pub(crate) fn enable_peripherals(rcc: &pac::RCC) {
+pub fn enable_peripherals(rcc: &pac::RCC) {
     rcc.apb1enr().modify(|_, w| w.tim2en().enabled().usart2en().enabled().pwren().enabled());
     let _ = rcc.apb1enr().read();
     rcc.apb2enr().modify(|_, w| w.usart1en().enabled());
@@ -112,7 +163,7 @@ static TICKED: AtomicBool = AtomicBool::new(false);
 static FULL_TICK: AtomicU32 = AtomicU32::new(0);
 
 /// The time since start, and the system timer that wakes the core.
-pub(crate) struct Clock {
+pub struct Clock {
     timeline: Timeline,
     ticker: SYST,
     cycles_per_micro: u32,
@@ -120,7 +171,7 @@ pub(crate) struct Clock {
 
 impl Clock {
     /// Starts TIM2 and the system timer.
-    pub(crate) fn start(timer: &pac::TIM2, mut ticker: SYST, rates: ClockRates) -> Self {
+    pub fn start(timer: &pac::TIM2, mut ticker: SYST, rates: ClockRates) -> Self {
         timer.psc().write(|w| w.psc().set(clock_rates::microsecond_prescaler(rates.timer)));
         // An update event loads the prescaler and clears the count.
         timer.egr().write(|w| w.ug().update());
@@ -134,7 +185,7 @@ impl Clock {
     }
 
     /// Makes the next tick come within `wait`. The ticks after it have the usual period.
-    pub(crate) fn tick_within(&mut self, wait: Duration) {
+    pub fn tick_within(&mut self, wait: Duration) {
         if let Some(cycles) = tick::cycles(wait, self.cycles_per_micro)
             && cycles < SYST::get_current()
         {
@@ -145,7 +196,7 @@ impl Clock {
     }
 
     /// True if the system timer has ticked since the last call.
-    pub(crate) fn has_ticked(&mut self) -> bool {
+    pub fn has_ticked(&mut self) -> bool {
         // Load and store cost less than a swap. A tick between them is not lost: the call returns true anyway.
         let ticked = TICKED.load(Ordering::Relaxed);
         if ticked {
@@ -155,7 +206,7 @@ impl Clock {
     }
 
     /// The time since start.
-    pub(crate) fn now(&mut self) -> Instant {
+    pub fn now(&mut self) -> Instant {
         self.timeline.extend(micros())
     }
 }
@@ -183,7 +234,7 @@ fn SysTick() {
 }
 
 /// The count of TIM2 in microseconds. It wraps every 71 minutes.
-pub(crate) fn micros() -> u32 {
+pub fn micros() -> u32 {
     // SAFETY: reading the count of a timer has no side effect.
     unsafe { pac::TIM2::steal() }.cnt().read().bits()
 }

@@ -1,0 +1,19 @@
+//! The drivers of the chip: all accesses to registers, interrupts, and the handlers of crashes. `board.rs` is the table of
+//! the pins.
+//!
+//! Firmware and self-test image link the same drivers. Their tests run in the emulator, or on the host where the logic has
+//! a file of its own.
+
+pub mod adc;
+pub mod board;
+pub mod clock;
+pub mod crash;
+pub mod delay;
+pub mod flash_registers;
+pub mod gpio;
+pub mod host_link;
+pub mod mpu;
+pub mod outputs;
+pub mod servo_link;
+pub mod uart;
+pub mod watchdog;
