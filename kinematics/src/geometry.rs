@@ -34,6 +34,10 @@ pub const TOOL: f64 = 22.46;
 pub const DISC_RADIUS: f64 = 20.0;
 /// From the shoulder axis to the end of the parallelogram's lever. It moves no other point.
 pub const LEVER: f64 = 40.0;
+/// From the top plate down to the foot of the base; an estimate. The foot stands on the table.
+pub const BASE_HEIGHT: f64 = 60.0;
+/// Radius of the foot, the widest part of the base; an estimate.
+pub const BASE_RADIUS: f64 = 78.0;
 
 /// From the elbow axis to the wrist: the hypotenuse of [`FOREARM`] and [`ELBOW_OFFSET`].
 pub(crate) const ELBOW_TO_WRIST: f64 = 200.068_113_401_411_37;

@@ -8,12 +8,14 @@
 //!   tip, tool, disc ────────▶ ik7 ──▶ [T1 .. T6]
 //!
 //!   point out of reach ─────▶ nearest ──▶ the nearest point within reach
+//!   [T1 .. T5] ─────────────▶ workspace ──▶ the distance from the table and from the base
 //! ```
 //!
 //! T1 to T7 are the angles of joints 1 to 7 in degrees, as the registers have them. T7, the claw, moves no point.
 //! Positions are millimetres from where the base axis meets the top plate: x to the right, y forward, z up.
 //!
-//! The functions are generic over `f32` for the chip and `f64` for the host. They use only exact operations and `libm`,
+//! The functions are generic over `f32` for the chip and `f64` for the host, but for those of [`workspace`], which only
+//! hosts need. They use only exact operations and `libm`,
 //! so all machines get the same bits. The crate uses no heap. It has no unsafe code and no path to a panic.
 
 #![cfg_attr(not(test), no_std)]
@@ -27,9 +29,11 @@ pub mod inverse;
 pub mod limits;
 pub mod nearest;
 mod vector;
+pub mod workspace;
 
 pub use branches::{ik5_all, ik6_all};
 pub use float::Float;
 pub use forward::{Frames, forward};
 pub use inverse::{NoSolution, ik5, ik6, ik7};
 pub use vector::Vector;
+pub use workspace::{Clearance, Obstacle, Part, Workspace};

@@ -94,6 +94,10 @@ class Arm:
         """As `sevenbot.Arm.status`."""
         return self._call(self.sync.status)
 
+    def park(self, *angles: Any, **options: Any) -> Awaitable[Any]:
+        """As `sevenbot.Arm.park`."""
+        return self._call(self.sync.park, *angles, **options)
+
     def record(self, seconds: float, **options: Any) -> Awaitable[sevenbot.Recording]:
         """As `sevenbot.Arm.record`."""
         return self._call(self.sync.record, seconds, **options)
@@ -106,11 +110,9 @@ class Arm:
         """As `sevenbot.Arm.sample`."""
         return self._call(self.sync.sample, count, **options)
 
-    def stream(
-        self, period: float = 0.02, *, watchdog: float = 0.3, damping: bool = False
-    ) -> Stream:
+    def stream(self, period: float = 0.02, **options: Any) -> Stream:
         """As `sevenbot.Arm.stream`: `async with arm.stream(0.02) as stream: await stream.send(...)`."""
-        return Stream(self, self.sync.stream(period, watchdog=watchdog, damping=damping))
+        return Stream(self, self.sync.stream(period, **options))
 
     async def stop(self) -> list[int]:
         """As `sevenbot.Arm.stop`: does not wait for the call before it, but interrupts it."""

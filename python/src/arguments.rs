@@ -3,6 +3,8 @@
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
+use sevenbot::approach::ApproachRule;
+use sevenbot::cartesian::Guard;
 use sevenbot::fine::FineTargets;
 use sevenbot::moves::Pace;
 use sevenbot::{ArmOptions, FineAngle, Map, MoveTime, Speed};
@@ -57,6 +59,24 @@ pub(crate) fn pace(speed: Option<f64>, duration: Option<f64>) -> PyResult<Pace> 
         found.filter(|_| duration > 0.0).ok_or_else(|| wrong("use a duration of 0.1 to 10 seconds"))
     });
     Ok(Pace { speed: speed.transpose()?, time: time.transpose()? })
+}
+
+/// The guard of the workspace: `table` is the height of the table in mm; with `guard=False` there is none.
+pub(crate) fn guard(table: Option<f64>, guard: bool) -> PyResult<Option<Guard>> {
+    match table {
+        Some(_) if !guard => Err(PyTypeError::new_err("give a table or guard=False, not both")),
+        Some(table) if !table.is_finite() => Err(PyValueError::new_err("use a finite height of the table")),
+        table => Ok(guard.then(|| table.map_or_else(Guard::default, Guard::above))),
+    }
+}
+
+/// The rule for the way to a first point: `approach` is its time in seconds.
+pub(crate) fn approach(seconds: Option<f64>) -> PyResult<ApproachRule> {
+    match seconds {
+        None => Ok(ApproachRule::Near),
+        Some(seconds) if (0.1..=60.0).contains(&seconds) => Ok(ApproachRule::Within(duration(seconds)?)),
+        Some(_) => Err(PyValueError::new_err("use an approach of 0.1 to 60 seconds")),
+    }
 }
 
 /// How a port is opened. The timeout is in seconds.

@@ -2,16 +2,16 @@
 
 use std::sync::{Arc, Mutex};
 
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyTuple, PyType};
 use sevenbot::cartesian::{DOWN, TipTarget, Vector};
-use sevenbot::moves::{JointMove, TipMove};
+use sevenbot::moves::JointMove;
 use sevenbot::simulated::{self, SharedSimulation, SimulationConfig};
 
-use crate::arguments::{Goals, options, pace};
-use crate::errors::{not_opened, raised};
-use crate::motion::{self, RecordOptions};
+use crate::arguments::{self, Goals, options, pace};
+use crate::errors::{not_opened, raised, warn_of};
+use crate::motion::{self, PlayOptions, RecordOptions, TipWish};
 use crate::recording::Recording;
 use crate::registers::{self, Registers, Shown, Values};
 use crate::simulation::{Simulation, duration};
@@ -156,8 +156,12 @@ impl Arm {
     ///
     /// Angles are 0 to 180 degrees in steps of 0.01; `None` leaves a joint. `speed` is 1.9 to 190 degrees per second in
     /// steps of 1.9, rounded down; or `duration` 0.1 to 10 seconds. Both stay set for later moves. Waits until the joints
-    /// have arrived and returns the measured angles; with `wait=False` returns `None` at once.
-    #[pyo3(signature = (*angles, speed = None, duration = None, wait = true))]
+    /// have arrived and returns the measured angles; with `wait=False` returns `None` at once. Raises `ArmProblem` if a joint of the
+    /// move is blocked, let go or silent, the servos have no supply, or the controller restarted.
+    ///
+    /// Warns with `GuardWarning` if the way leads below the table or into the base: see `move_to`.
+    #[pyo3(signature = (*angles, speed = None, duration = None, wait = true, table = None, guard = true))]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn pose(
         &self,
         py: Python<'_>,
@@ -165,8 +169,12 @@ impl Arm {
         speed: Option<f64>,
         duration: Option<f64>,
         wait: bool,
+        table: Option<f64>,
+        guard: bool,
     ) -> PyResult<Option<Angles>> {
-        self.go(py, Goals::of(angles)?.targets()?, pace(speed, duration)?, wait)
+        let (targets, pace) = (Goals::of(angles)?.targets()?, pace(speed, duration)?);
+        self.warn_of_way(py, targets, pace, arguments::guard(table, guard)?)?;
+        self.go(py, targets, pace, wait)
     }
 
     /// Moves the tip to x, y, z in millimetres, with the tool in a direction of any length, by default straight down.
@@ -174,7 +182,12 @@ impl Arm {
     /// `speed` and `duration` are those of `pose`. With `straight` the tip moves on a straight line, from its present
     /// targets, with `speed` in millimetres per second (default 50). Raises `OutOfReach` with the nearest point within
     /// reach; then nothing moves.
-    #[pyo3(signature = (x, y, z, *, tool = None, speed = None, duration = None, wait = true, straight = false))]
+    ///
+    /// The guard keeps the arm above a table at the height `table` in millimetres, by default the foot of the base (-60),
+    /// and 10 mm away from the base, also on the way. It knows no suction cup and no claw: raise the table by its length.
+    /// Raises `OutsideGuard` with the nearest allowed point; then nothing moves. `guard=False` checks none of this.
+    #[pyo3(signature = (x, y, z, *, tool = None, speed = None, duration = None, wait = true, straight = false,
+                        table = None, guard = true))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn move_to(
         &self,
@@ -187,16 +200,18 @@ impl Arm {
         duration: Option<f64>,
         wait: bool,
         straight: bool,
+        table: Option<f64>,
+        guard: bool,
     ) -> PyResult<Option<Angles>> {
         let tip = Vector::new(x, y, z);
         let tool = tool.map_or(DOWN, |(x, y, z)| Vector::new(x, y, z));
-        let target = raised(py, TipTarget::of(tip, tool))?;
+        let guard = arguments::guard(table, guard)?;
+        let wish = TipWish { tip, tool, speed, guard };
+        let target = raised(py, TipTarget::guarded(tip, tool, guard.as_ref()))?;
         if straight {
-            return self.move_straight(py, tip, tool, speed.unwrap_or(50.0)).map(Some);
+            return self.move_straight(py, wish).map(Some);
         }
-        let pace = pace(speed, duration)?;
-        let planned = self.worker.call(py, move |arm, _| TipMove::of(arm, &target, tip, tool))?;
-        self.go(py, raised(py, planned)?.targets, pace, wait)
+        self.go_to_tip(py, wish, target, pace(speed, duration)?, wait)
     }
 
     /// Waits until the joints of the last move have arrived, and returns the measured angles.
@@ -225,19 +240,47 @@ impl Arm {
         raised(py, held).map(|joints| joints.targets().map(u16::from).to_vec())
     }
 
-    /// The status block; `None` if the firmware has none, as the maker's.
+    /// The health of the arm: each joint, alarms, supply, and what needs attention. `None` if the firmware does not tell, as
+    /// the maker's.
     fn status(&self, py: Python<'_>) -> PyResult<Option<Status>> {
-        let read = self.worker.call(py, |arm, _| arm.status())?;
-        Ok(raised(py, read)?.map(Status::from))
+        let read = self.worker.call(py, |arm, _| Status::read(arm))?;
+        raised(py, read)
+    }
+
+    /// Moves slowly to a pose in which the arm may be let go, switches the motors to damping, and checks for two seconds that the
+    /// arm stays. Returns the measured angles.
+    ///
+    /// Without angles it is the pose that was kept for this arm, or the standard park pose, which is right for an empty gripper:
+    /// rear arm upright, forearm folded up. `keep=True` keeps the given angles for this arm. If a joint sinks by more than 2 degrees,
+    /// the arm holds again, and `NotReached` is raised. `arm.set("motor-state", 1)` makes a parked arm hold.
+    #[pyo3(signature = (*angles, keep = false))]
+    fn park(&self, py: Python<'_>, angles: &Bound<'_, PyTuple>, keep: bool) -> PyResult<Angles> {
+        let pose = if angles.is_empty() { None } else { Some(Goals::of(angles)?.targets()?) };
+        if keep && pose.is_none() {
+            return Err(PyValueError::new_err("keep=True needs seven angles"));
+        }
+        let parked = self.worker.call(py, move |arm, watch| motion::park(arm, pose, keep, watch))?;
+        Ok(raised(py, parked)?.map_err(|error| PyOSError::new_err(error.to_string()))?.into())
     }
 
     /// A stream of set-points, one each `period` seconds, 0.005 to 1: a context manager.
     ///
     /// If the program sends nothing for `watchdog` seconds, 0.01 to 2.55 or 0 for never, the arm holds; with `damping` it
-    /// sinks slowly. Needs this project's firmware, or raises `NotServed`.
-    #[pyo3(signature = (period = 0.02, *, watchdog = 0.3, damping = false))]
-    fn stream(slf: Bound<'_, Self>, period: f64, watchdog: f64, damping: bool) -> PyResult<Stream> {
-        Stream::new(slf.unbind(), period, watchdog, damping)
+    /// sinks slowly. Needs this project's firmware, or raises `NotServed`. `approach`: seconds to go smoothly to the first
+    /// point, 0.1 to 60; without it a point further than 5 degrees raises `TooFar`. `table` and `guard`: see `pose`.
+    #[pyo3(signature = (period = 0.02, *, watchdog = 0.3, damping = false, approach = None, table = None,
+                        guard = true))]
+    fn stream(
+        slf: Bound<'_, Self>,
+        period: f64,
+        watchdog: f64,
+        damping: bool,
+        approach: Option<f64>,
+        table: Option<f64>,
+        guard: bool,
+    ) -> PyResult<Stream> {
+        let (rule, guard) = (arguments::approach(approach)?, arguments::guard(table, guard)?);
+        Stream::new(slf.unbind(), period, (watchdog, damping), rule, guard)
     }
 
     /// Records the positions for `seconds`, 0 to 86400, or until Ctrl-C, `hz` times a second, 1 to 50.
@@ -250,26 +293,38 @@ impl Arm {
             return Err(PyValueError::new_err("use 1 to 50 moments per second"));
         }
         let limit = seconds.map(duration).transpose()?;
-        let options = RecordOptions { limit, hz, is_guided: guided };
-        let work = move |arm: &mut _, watch: &mut _| motion::record(arm, options, watch);
-        let (recorded, signal) = self.worker.call_until_signal(py, work)?;
-        match signal.filter(|_| limit.is_some()) {
-            Some(signal) => Err(signal),
-            None => Recording::parse(py, &raised(py, recorded)?),
-        }
+        self.record_moments(py, RecordOptions { limit, hz, is_guided: guided })
     }
 
     /// Plays a recording, `speed` times as fast (0.1 to 10), `times` times, and returns the measured positions of the
     /// first run.
     ///
-    /// The whole recording is checked before the arm moves. The arm moves slowly to the first pose. Ctrl-C makes it hold.
-    #[pyo3(signature = (recording, *, speed = 1.0, times = 1))]
-    fn play(&self, py: Python<'_>, recording: &Recording, speed: f64, times: u32) -> PyResult<Recording> {
+    /// The whole recording is checked before the arm moves. Ctrl-C makes it hold. `approach`: seconds to go smoothly to the
+    /// first pose, 0.1 to 60, also between the runs; without it a pose further than 5 degrees raises `TooFar`.
+    ///
+    /// Warns with `GuardWarning` if the recording leads below the table or into the base: see `move_to`.
+    #[pyo3(signature = (recording, *, speed = 1.0, times = 1, approach = None, table = None, guard = true))]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn play(
+        &self,
+        py: Python<'_>,
+        recording: &Recording,
+        speed: f64,
+        times: u32,
+        approach: Option<f64>,
+        table: Option<f64>,
+        guard: bool,
+    ) -> PyResult<Recording> {
         if !(0.1..=10.0).contains(&speed) || times == 0 {
             return Err(PyValueError::new_err("use a speed of 0.1 to 10, and at least one time"));
         }
         raised(py, recording.moments().check_speeds(speed))?;
-        self.play_moments(py, recording.moments().clone(), speed, times)
+        let guard = arguments::guard(table, guard)?;
+        if let Some(breach) = guard.and_then(|guard| guard.check_recording(recording.moments()).err()) {
+            warn_of(py, &breach)?;
+        }
+        let options = PlayOptions { factor: speed, times, approach: arguments::approach(approach)? };
+        self.play_moments(py, recording.moments().clone(), options)
     }
 
     /// Reads all positions `count` times, one read after the other, or one each `period` seconds.
@@ -300,14 +355,8 @@ impl Arm {
 
     #[pyo3(signature = (*exception))]
     fn __exit__(&self, py: Python<'_>, exception: &Bound<'_, PyTuple>) -> PyResult<bool> {
-        if !self.worker.is_open() {
-            return Ok(false);
-        }
-        let held = self.worker.call(py, |arm, _| motion::hold_if_moving(arm));
-        self.worker.close(py);
-        let held = held.and_then(|held| raised(py, held));
         let failed = exception.get_item(0).is_ok_and(|kind| !kind.is_none());
-        match held {
+        match self.hold_and_close(py) {
             // The first failure is the cause of this one.
             Err(_) if failed => Ok(false),
             other => other.map(|()| false),

@@ -1,18 +1,24 @@
 //! The exceptions of the module, and which failure of the library raises which one.
 
-use pyo3::exceptions::{PyException, PyKeyError, PyValueError};
+use std::ffi::CString;
+use std::fmt::Display;
+
+use pyo3::exceptions::{PyException, PyKeyError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::type_object::PyTypeInfo;
 use pyo3::types::PyTuple;
-use sevenbot::cartesian::{StraightLineError, Unreachable};
+use sevenbot::cartesian::{StraightLineError, StraightLineFault, TipRefusal};
 use sevenbot::checked_write::{MismatchCause, WriteMismatch, reasons};
+use sevenbot::health::{remedies, sentences};
 use sevenbot::hold::HoldError;
-use sevenbot::moves::{LineStartError, MoveError};
+use sevenbot::moves::{GuardedMoveError, LineStartError, MoveError, ParkError};
 use sevenbot::names::NameError;
 use sevenbot::recording::RecordingError;
 use sevenbot::register_values::ValueError;
 use sevenbot::stream::StreamError;
-use sevenbot::{OpenError, advice};
+use sevenbot::{Joint, OpenError, advice};
+
+use crate::health::Problem;
 
 macro_rules! exceptions {
     ($($name:ident($base:ty): $doc:literal;)*) => {
@@ -22,6 +28,8 @@ macro_rules! exceptions {
         pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
             let py = module.py();
             py.get_type::<Error>().setattr("hints", PyTuple::empty(py))?;
+            py.get_type::<ArmProblem>().setattr("problems", PyTuple::empty(py))?;
+            py.get_type::<ArmProblem>().setattr("joints", PyTuple::empty(py))?;
             $(module.add(stringify!($name), py.get_type::<$name>())?;)*
             Ok(())
         }
@@ -34,13 +42,31 @@ exceptions! {
     NoAnswer(PortError): "The arm does not answer.";
     NotTaken(Error): "The arm did not take a value. The message tells why.";
     NotReached(Error): "Joints did not reach their targets, or still move.";
+    ArmProblem(NotReached): "The arm does not carry out a move: a joint is blocked, let go or silent, the servos have no supply, or the controller restarted. `problems` is a tuple of `Problem`, `joints` the numbers of their joints, `hints` what to do.";
     NotDriven(Error): "The motors do not drive the joints: `arm.set('motor-state', 1)` switches them on.";
     MayMove(Error): "It is unknown whether the arm took a command, so it may be moving.";
     OutOfReach(Error): "No joint angles reach the position.";
+    TooFar(Error): "The first point of a stream or a recording is far from where the arm stands.";
+    OutsideGuard(Error): "The move would take the arm below the table or into its base.";
     NotServed(Error): "The arm's firmware does not have this function.";
     BadRecording(Error): "A text is not a recording, or the arm cannot play it.";
     Interrupted(Error): "Another thread stopped the arm during this call.";
     Closed(Error): "The arm is closed, or the stream is.";
+    GuardWarning(PyUserWarning): "Joints were sent below the table or into the base of the arm.";
+}
+
+/// How to go on where the guard does not allow a move.
+const GUARD_HINTS: [&str; 2] = [
+    "table=Z sets the height of the table in mm: -60 is the foot of the base",
+    "guard=False switches the guard off: nothing then keeps the arm from its base and the table",
+];
+
+/// Warns of joints that the guard would not allow.
+pub(crate) fn warn_of(py: Python<'_>, breach: &dyn Display) -> PyResult<()> {
+    let text = CString::new(format!(
+        "{breach}; table=Z sets the height of the table, guard=False ends this warning"
+    ))?;
+    PyErr::warn(py, py.get_type::<GuardWarning>().as_any(), &text, 1)
 }
 
 impl Closed {
@@ -95,12 +121,40 @@ pub(crate) fn not_taken(py: Python<'_>, unchanged: &[WriteMismatch]) -> PyErr {
     error::<NotTaken>(py, &reasons(unchanged), &hints)
 }
 
+/// Problems that end a move, with the joints and what to do.
+fn arm_problem(py: Python<'_>, problems: &[sevenbot::Problem]) -> PyErr {
+    let hints: Vec<String> = remedies(problems).into_iter().map(str::to_owned).collect();
+    let raised = error::<ArmProblem>(py, &sentences(problems), &hints);
+    let joints = problems.iter().filter_map(|problem| problem.joint.map(Joint::number));
+    let set = || -> PyResult<()> {
+        let value = raised.value(py);
+        value.setattr("joints", PyTuple::new(py, joints.collect::<Vec<_>>())?)?;
+        let problems: Vec<Problem> = problems.iter().copied().map(Problem::from).collect();
+        let told: PyResult<Vec<_>> = problems.into_iter().map(|problem| Py::new(py, problem)).collect();
+        value.setattr("problems", PyTuple::new(py, told?)?)
+    };
+    match set() {
+        Ok(()) => raised,
+        Err(other) => other,
+    }
+}
+
+impl Raise for ParkError {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::Move(error) => error.raise(py),
+            Self::Sinks { .. } => error::<NotReached>(py, &self.to_string(), &[]),
+        }
+    }
+}
+
 impl Raise for MoveError {
     fn raise(&self, py: Python<'_>) -> PyErr {
         let message = self.to_string();
         let driven = ["`arm.set('motor-state', 1)` switches the motors on".to_owned()];
         match self {
             Self::Exchange(error) => error.raise(py),
+            Self::Problems(problems) => arm_problem(py, problems),
             Self::NotTaken(unchanged) => not_taken(py, unchanged),
             Self::Stream(error) => error.raise(py),
             Self::Interrupted => error::<Interrupted>(py, &message, &[]),
@@ -110,6 +164,10 @@ impl Raise for MoveError {
                 error::<MayMove>(py, &message, &[hint])
             }
             Self::StillMoving { .. } | Self::NotReached { .. } => error::<NotReached>(py, &message, &[]),
+            Self::StartTooFar(_) => {
+                let hint = "approach=SECONDS goes there smoothly first: look that the way is free".to_owned();
+                error::<TooFar>(py, &message, &[hint])
+            }
             Self::ReportsStopped => error::<NoAnswer>(py, &message, &[]),
         }
     }
@@ -137,12 +195,35 @@ impl Raise for RecordingError {
     }
 }
 
-impl Raise for Unreachable {
+impl Raise for TipRefusal {
     fn raise(&self, py: Python<'_>) -> PyErr {
         let hint = self
-            .other_tool
-            .map(|tool| format!("with tool=({}, {}, {}) the tip reaches this point", tool.x, tool.y, tool.z));
-        error::<OutOfReach>(py, &self.to_string(), &hint.into_iter().collect::<Vec<_>>())
+            .other_tool()
+            .map(|tool| format!("with tool=({}, {}, {}) the tip may go there", tool.x, tool.y, tool.z));
+        match self {
+            Self::Unreachable(_) => {
+                error::<OutOfReach>(py, &self.to_string(), &hint.into_iter().collect::<Vec<_>>())
+            }
+            Self::Guarded(_) => outside_guard(py, &self.to_string(), hint),
+        }
+    }
+}
+
+fn outside_guard(py: Python<'_>, message: &str, first: Option<String>) -> PyErr {
+    let hints: Vec<String> = first.into_iter().chain(GUARD_HINTS.map(str::to_owned)).collect();
+    error::<OutsideGuard>(py, message, &hints)
+}
+
+impl Raise for GuardedMoveError {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::Exchange(error) => error.raise(py),
+            Self::Guarded(breach) => {
+                let hint = "go to a point above first; or use straight=True, where the tip takes no curve";
+                let message = format!("the way there is not allowed: {breach}; nothing was moved");
+                outside_guard(py, &message, Some(hint.to_owned()))
+            }
+        }
     }
 }
 
@@ -165,6 +246,9 @@ impl Raise for StraightMoveError {
             Self::Start(LineStartError::Unknown { .. }) => {
                 let hint = "`arm.stop()` sets the targets to the positions".to_owned();
                 error::<NotReached>(py, &self.to_string(), &[hint])
+            }
+            Self::Line(StraightLineError { fault: StraightLineFault::Guarded(_), .. }) => {
+                outside_guard(py, &self.to_string(), None)
             }
             Self::Line(_) => error::<OutOfReach>(py, &self.to_string(), &[]),
         }

@@ -16,6 +16,7 @@ mod arguments;
 mod arm;
 mod bulk;
 mod errors;
+mod health;
 mod motion;
 mod ports;
 mod progress;
@@ -32,6 +33,8 @@ mod worker;
 fn _sevenbot(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     module.add_class::<arm::Arm>()?;
+    module.add_class::<health::JointStatus>()?;
+    module.add_class::<health::Problem>()?;
     module.add_class::<recording::Recording>()?;
     module.add_class::<registers::Registers>()?;
     module.add_class::<simulation::Simulation>()?;

@@ -1,19 +1,36 @@
 //! What the thread of the port does for one call of Python. Knows the library, not Python.
 
+use std::io;
 use std::time::Duration;
 
-use sevenbot::cartesian::{StraightLine, Vector};
+use sevenbot::approach::ApproachRule;
+use sevenbot::cartesian::{Guard, PathBreach, StraightLine, StraightLineRequest, Vector};
 use sevenbot::fine::FineTargets;
 use sevenbot::map::{FINE_POSITION, MOTOR_STATE, VACUUM_PUMP, motor_state};
-use sevenbot::moves::{JointMove, LineStart, MoveError, Observer, Pace, Player, Recorder};
+use sevenbot::moves::{
+    GuardedMoveError, JointMove, LineStart, MoveError, Observer, Pace, ParkError, Player, Recorder,
+};
 use sevenbot::recording::{FileVersion, Moment, Recording, head};
-use sevenbot::{Arm, Error, FineAngle, Span};
+use sevenbot::{Arm, Error, FineAngle, Span, park_poses};
 
 use crate::errors::StraightMoveError;
 use crate::worker::Watch;
 
 /// The longest time between two questions whether the call goes on.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
+
+/// Speed of the tip on a straight line, in mm/s.
+const DEFAULT_MM_PER_SECOND: f64 = 50.0;
+
+/// Where the tip shall go.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TipWish {
+    pub(crate) tip: Vector,
+    pub(crate) tool: Vector,
+    /// Of the joints in degrees per second, or of the tip on a straight line in mm/s.
+    pub(crate) speed: Option<f64>,
+    pub(crate) guard: Option<Guard>,
+}
 
 /// The measured angles in degrees, as exact as the arm has them.
 pub(crate) fn angles(arm: &mut Arm) -> Result<[f64; 7], Error> {
@@ -45,16 +62,53 @@ fn all_taken(unchanged: Vec<sevenbot::checked_write::WriteMismatch>) -> Result<(
     if unchanged.is_empty() { Ok(()) } else { Err(MoveError::NotTaken(unchanged)) }
 }
 
-/// A straight line from the present targets, as a recording.
-pub(crate) fn straight_line(
+/// Parks the arm in this pose, or in the kept one, or in the standard one. The inner error is that of the file of kept poses.
+pub(crate) fn park(
     arm: &mut Arm,
-    tip: Vector,
-    tool: Vector,
-    speed: f64,
-) -> Result<Recording, StraightMoveError> {
+    pose: Option<FineTargets>,
+    keep: bool,
+    watch: &mut Watch,
+) -> Result<io::Result<[f64; 7]>, ParkError> {
+    let (path, chip) = (park_poses::path(), arm.identity().chip_name());
+    let kept = match (&path, pose) {
+        (Some(path), None) => park_poses::load(path, &chip),
+        _ => Ok(pose),
+    };
+    let pose = match kept {
+        Ok(pose) => pose,
+        Err(error) => return Ok(Err(error)),
+    };
+    let parked = arm.park(pose, watch);
+    if parked == Err(ParkError::Move(MoveError::Interrupted)) {
+        arm.hold().map_err(MoveError::from)?;
+    }
+    let parked = parked?.map(FineAngle::degrees);
+    match (path, pose) {
+        (Some(path), Some(pose)) if keep => Ok(park_poses::keep(&path, &chip, &pose).map(|()| parked)),
+        _ => Ok(Ok(parked)),
+    }
+}
+
+/// What the guard says of the way of the joints to these targets: `None` where it allows it.
+pub(crate) fn breach_on_way(
+    arm: &mut Arm,
+    targets: &FineTargets,
+    pace: Pace,
+    guard: &Guard,
+) -> Result<Option<PathBreach>, Error> {
+    match arm.check_way(targets, pace, guard) {
+        Ok(()) => Ok(None),
+        Err(GuardedMoveError::Guarded(breach)) => Ok(Some(breach)),
+        Err(GuardedMoveError::Exchange(error)) => Err(error),
+    }
+}
+
+/// A straight line from the present targets, as a recording.
+pub(crate) fn straight_line(arm: &mut Arm, wish: TipWish) -> Result<Recording, StraightMoveError> {
+    let TipWish { tip, tool, guard, .. } = wish;
     let joints = arm.driven_joints()?;
-    let request = LineStart::of(arm, &joints)?.line_to(tip, tool, speed);
-    Ok(StraightLine::plan(&request)?.recording)
+    let line = LineStart::of(arm, &joints)?.line_to(tip, tool, wish.speed.unwrap_or(DEFAULT_MM_PER_SECOND));
+    Ok(StraightLine::plan(&StraightLineRequest { guard, ..line })?.recording)
 }
 
 /// Waits on the clock of the arm's line.
@@ -153,17 +207,24 @@ fn record_reports(
     Ok(text)
 }
 
+/// How a recording is played.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlayOptions {
+    pub(crate) factor: f64,
+    pub(crate) times: u32,
+    pub(crate) approach: ApproachRule,
+}
+
 /// Plays a recording, and returns the measured positions of the first run.
 pub(crate) fn play(
     arm: &mut Arm,
     recording: &Recording,
-    factor: f64,
-    times: u32,
+    options: PlayOptions,
     watch: &mut Watch,
 ) -> Result<String, MoveError> {
     arm.driven_joints()?;
-    let mut player = Player::new(recording, factor);
-    player.play(arm, times, watch)?;
+    let mut player = Player::new(recording, options.factor).with_approach(options.approach);
+    player.play(arm, options.times, watch)?;
     let mut text = head(FileVersion::Hundredths);
     for (time, pose) in player.measured() {
         let moment = Moment { time: *time, pose: *pose, vacuum: false };

@@ -66,6 +66,8 @@ impl Simulation {
     }
 
     /// Gives the arm a fault, for `seconds` or until `clear`: `"3=missing"`, `"5=late=20"`, `"supply=off"`, `"bus=echo"`.
+    /// Also what a joint meets: `"2=wall=60"`, `"2=wall=60/500"` (soft, mN m per degree), `"2=push=-300"` (mN m),
+    /// `"7=thing=30"`.
     ///
     /// The words are those of `host-sim --fault`. A wrong word raises `ValueError` with the list.
     #[pyo3(signature = (fault, seconds = None))]
@@ -138,6 +140,25 @@ impl Simulation {
     #[setter]
     fn set_load_grams(&self, py: Python<'_>, grams: u16) {
         self.with(py, |simulation| simulation.plant_mut().set_load(grams));
+    }
+
+    /// Drops what is in the gripper: the thing between the claws, and the weight.
+    fn drop_load(&self, py: Python<'_>) {
+        self.with(py, |arm| drop(arm.act(arm_sim::Action::Drop)));
+    }
+
+    /// Forces an alarm on a joint's servo, which switches its motor off: `"overload"`, until its torque is switched off
+    /// and on, or `"heat"`, until it has cooled down. An overload has no effect on a joint without torque.
+    #[pyo3(signature = (joint, alarm = "overload"))]
+    fn trip(&self, py: Python<'_>, joint: u8, alarm: &str) -> PyResult<()> {
+        let joint = self::joint(joint)?;
+        let alarm = match alarm {
+            "overload" => arm_sim::servo::Trip::Overload,
+            "heat" => arm_sim::servo::Trip::Heat,
+            _ => return Err(PyValueError::new_err("alarm must be \"overload\" or \"heat\"")),
+        };
+        self.with(py, |arm| drop(arm.act(arm_sim::Action::Trip(joint, alarm))));
+        Ok(())
     }
 
     /// Switches the arm off and on. The settings stay.

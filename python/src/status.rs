@@ -1,27 +1,41 @@
-//! `Status`: the status block of an arm.
+//! `Status`: the health of an arm and its status block.
 
 use pyo3::prelude::*;
-use sevenbot::register_text::{faults, joints, refusal_reason};
-use sevenbot::{Joint, StatusBlock};
+use sevenbot::joints::JointSnapshot;
+use sevenbot::register_text::{faults, joints, motor_state_name, refusal_reason, servo_alarms};
+use sevenbot::{Arm, Error, Health, Joint, StatusBlock};
 
+use crate::health::{JointStatus, Problem};
 use crate::tip::html_table;
 
-/// The status block at one instant. Only this project's firmware has one.
+/// The health of the arm at one instant. Only this project's firmware tells it.
 #[pyclass(frozen, module = "sevenbot")]
-pub(crate) struct Status(StatusBlock);
+pub(crate) struct Status(StatusBlock, Health);
 
-impl From<StatusBlock> for Status {
-    fn from(block: StatusBlock) -> Self {
-        Self(block)
+impl Status {
+    /// Reads it from an arm; `None` if the firmware has no status block.
+    pub(crate) fn read(arm: &mut Arm) -> Result<Option<Self>, Error> {
+        let joints = arm.read_span(JointSnapshot::REGISTERS)?;
+        let registers = arm.with_blocks(&joints)?;
+        let health = Health::new(&registers);
+        Ok(health.faults.is_some().then(|| Self(StatusBlock::from(registers), health)))
     }
 }
 
 impl Status {
-    fn rows(&self) -> [(&'static str, String); 7] {
+    fn rows(&self) -> [(&'static str, String); 8] {
         let unknown = || "unknown".to_owned();
         [
             ("faults", faults(self.0.faults())),
             ("not answering", joints(self.0.missing())),
+            ("needs attention", {
+                let problems = self.1.problems();
+                if problems.is_empty() {
+                    "nothing".to_owned()
+                } else {
+                    sevenbot::health::sentences(&problems)
+                }
+            }),
             ("moving", joints(self.0.moving())),
             ("supply", self.0.supply_volts().map_or_else(unknown, |volts| format!("{volts:.1} V"))),
             (
@@ -43,10 +57,52 @@ impl Status {
 
 #[pymethods]
 impl Status {
-    /// Is there no fault, and does every servo answer?
+    /// Does nothing need attention?
     #[getter]
     fn is_healthy(&self) -> bool {
-        self.0.is_healthy()
+        self.1.problems().is_empty()
+    }
+
+    /// What needs attention, the most important first; each has a `remedy`.
+    #[getter]
+    fn problems(&self) -> Vec<Problem> {
+        self.1.problems().into_iter().map(Problem::from).collect()
+    }
+
+    /// The joints, joint 1 first.
+    #[getter]
+    fn joints(&self) -> Vec<JointStatus> {
+        self.1.joints.iter().map(|joint| JointStatus::of(*joint, self.1.is_driven())).collect()
+    }
+
+    /// The motor state: `"servo"`, `"damping protection"` or `"forceless"`.
+    #[getter]
+    fn motor_state(&self) -> &'static str {
+        motor_state_name(self.1.motor_state)
+    }
+
+    /// The joints, 1 to 7, that an obstacle keeps from their targets.
+    #[getter]
+    fn blocked(&self) -> Vec<u16> {
+        self.numbers_of(|joint| joint.is_blocked)
+    }
+
+    /// The joints, 1 to 7, whose servo holds no torque although it should.
+    #[getter]
+    fn let_go(&self) -> Vec<u16> {
+        self.numbers_of(|joint| joint.has_let_go)
+    }
+
+    /// The alarms of the servos as text, `"none"` without any; `None` if unknown.
+    #[getter]
+    fn alarms(&self) -> Option<String> {
+        self.1.alarms.map(servo_alarms)
+    }
+
+    /// Did the controller switch the motors off because the servos lost their supply? `None` if unknown.
+    #[getter]
+    fn supply_lost(&self) -> Option<bool> {
+        self.1.is_supply_lost
     }
 
     /// The faults as text; `"none"` without any.
@@ -126,6 +182,13 @@ impl Status {
 
     fn _repr_html_(&self) -> String {
         html_table(&self.rows())
+    }
+}
+
+impl Status {
+    fn numbers_of(&self, is_so: fn(&sevenbot::health::JointHealth) -> Option<bool>) -> Vec<u16> {
+        let joints = self.1.joints.iter().filter(|joint| is_so(joint) == Some(true));
+        joints.map(|joint| joint.joint.number().into()).collect()
     }
 }
 

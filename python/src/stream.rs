@@ -1,15 +1,21 @@
 //! `Stream`: set-points at a fixed period, in hundredths of a degree.
 
+use std::sync::Mutex;
 use std::time::Duration;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use sevenbot::FineAngle;
+use sevenbot::approach::{Approach, ApproachRule};
+use sevenbot::cartesian::Guard;
+use sevenbot::fine::FineTargets;
 use sevenbot::moves::{MoveError, Observer};
-use sevenbot::stream::{StreamOptions, WatchdogAction};
+use sevenbot::stream::{StreamOptions, StreamPace, WatchdogAction};
 
 use crate::arguments::Goals;
 use crate::arm::Arm;
-use crate::errors::raised;
+use crate::errors::{raised, warn_of};
+use crate::worker::{PacedStream, Watch, lock};
 
 /// The longest time between two frames while a point is not due yet: a watchdog of 10 ms needs more than this.
 const SLICE: Duration = Duration::from_millis(20);
@@ -22,10 +28,20 @@ const SLICE: Duration = Duration::from_millis(20);
 pub(crate) struct Stream {
     arm: Py<Arm>,
     options: StreamOptions,
+    rule: ApproachRule,
+    /// `None` after the first warning, too.
+    guard: Mutex<Option<Guard>>,
 }
 
 impl Stream {
-    pub(crate) fn new(arm: Py<Arm>, period: f64, watchdog: f64, damping: bool) -> PyResult<Self> {
+    pub(crate) fn new(
+        arm: Py<Arm>,
+        period: f64,
+        watchdog: (f64, bool),
+        rule: ApproachRule,
+        guard: Option<Guard>,
+    ) -> PyResult<Self> {
+        let (watchdog, damping) = watchdog;
         let milliseconds = steps(period * 1_000.0, f64::from(u16::MAX));
         let options = milliseconds.and_then(StreamOptions::new);
         let options = options
@@ -34,13 +50,44 @@ impl Stream {
         let watchdog = watchdog
             .ok_or_else(|| PyValueError::new_err("use a watchdog of 0.01 to 2.55 s, or 0 for none"))?;
         let action = if damping { WatchdogAction::Damping } else { WatchdogAction::Hold };
-        Ok(Self { arm, options: options.with_watchdog(watchdog, action) })
+        Ok(Self { arm, options: options.with_watchdog(watchdog, action), rule, guard: Mutex::new(guard) })
     }
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked: 0 to the limit")]
 fn steps(number: f64, limit: f64) -> Option<u16> {
     (0.0..=limit).contains(&number.round()).then(|| number.round() as u16)
+}
+
+impl Stream {
+    /// Warns once if the guard would not allow the points of the stream.
+    fn warn_of_pose(&self, py: Python<'_>, [t1, t2, t3, t4, t5, ..]: [f64; 7]) -> PyResult<()> {
+        let mut guard = lock(&self.guard);
+        let breach = guard.and_then(|guard| guard.check_pose([t1, t2, t3, t4, t5]).err());
+        *guard = guard.filter(|_| breach.is_none());
+        drop(guard);
+        breach.map_or(Ok(()), |breach| warn_of(py, &breach))
+    }
+}
+
+impl PacedStream<'_> {
+    /// Goes to the first point of joints. The next point is due afterwards.
+    fn approach(
+        &mut self,
+        first: &FineTargets,
+        rule: ApproachRule,
+        watch: &mut Watch,
+    ) -> Result<(), MoveError> {
+        let way = Approach::plan(&self.stream.arm().standing()?, first, rule)?;
+        self.stream.approach(&way, watch)?;
+        let now = self.stream.arm().now();
+        if self.pace.counts().points == 0 {
+            self.pace = StreamPace::new(now, self.stream.period());
+        } else if !way.duration().is_zero() {
+            self.pace.restart(now);
+        }
+        Ok(())
+    }
 }
 
 #[pymethods]
@@ -58,10 +105,19 @@ impl Stream {
 
     /// Sends a point when it is due: seven angles, 0 to 180 degrees in steps of 0.01, `None` for joints without a point.
     ///
-    /// Returns the number of the point, which grows by more than one if the program was late.
+    /// Returns the number of the point, which grows by more than one if the program was late. Raises `ArmProblem` if a joint of
+    /// the stream is blocked, let go or silent, the servos have no supply, or the controller restarted.
+    ///
+    /// The first point of a joint has to be within 5 degrees of where it stands, and is approached at up to 30 degrees per
+    /// second; else `TooFar` is raised, unless the stream has an `approach`. Then the call takes that time. The first point below
+    /// the table or in the base gives a `GuardWarning`.
     fn send(&self, py: Python<'_>, angles: Goals) -> PyResult<u32> {
-        let point = angles.targets()?;
+        let (point, rule) = (angles.targets()?, self.rule);
         let sent = self.arm.get().worker().stream_call(py, move |open, watch| {
+            if let Some(first) = { open.first }.take(&point) {
+                open.approach(&first, rule, watch)?;
+                open.first.take(&point);
+            }
             loop {
                 let left = open.pace.due().saturating_duration_since(open.stream.arm().now());
                 if left.is_zero() {
@@ -76,9 +132,15 @@ impl Stream {
             let now = open.stream.arm().now();
             let number = open.pace.take(now);
             open.stream.send(&point)?;
-            Ok(number)
+            open.stream.check()?;
+            for (degrees, angle) in open.pose.iter_mut().zip(point) {
+                *degrees = angle.map_or(*degrees, FineAngle::degrees);
+            }
+            Ok((number, open.pose))
         })?;
-        raised(py, sent)
+        let (number, pose) = raised(py, sent)?;
+        self.warn_of_pose(py, pose)?;
+        Ok(number)
     }
 
     /// The time between two points in seconds.

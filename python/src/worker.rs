@@ -14,6 +14,7 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use sevenbot::Arm;
+use sevenbot::approach::FirstPoints;
 use sevenbot::moves::{Observer, Stage};
 use sevenbot::stream::{SetPointStream, StreamError, StreamOptions, StreamPace};
 
@@ -23,10 +24,22 @@ use crate::progress::ProgressLine;
 /// Time between two checks of Python's signals.
 const SIGNAL_PERIOD: Duration = Duration::from_millis(50);
 
-/// A stream, and when its next point is due.
+/// A stream, when its next point is due, and which joints had one.
 pub(crate) struct PacedStream<'a> {
     pub(crate) stream: SetPointStream<'a>,
     pub(crate) pace: StreamPace,
+    pub(crate) first: FirstPoints,
+    /// The last point of each joint in degrees, and the target at the start where it had none.
+    pub(crate) pose: [f64; 7],
+}
+
+impl<'a> PacedStream<'a> {
+    fn open(arm: &'a mut Arm, options: StreamOptions) -> Result<Self, StreamError> {
+        let mut stream = SetPointStream::open(arm, options)?;
+        let pose = stream.arm().standing()?.targets;
+        let pace = StreamPace::new(stream.arm().now(), options.period());
+        Ok(Self { stream, pace, first: FirstPoints::default(), pose })
+    }
 }
 
 type ArmCall = Box<dyn FnOnce(&mut Arm) + Send>;
@@ -201,11 +214,10 @@ fn serve(mut arm: Arm, messages: &Receiver<Message>) {
     while let Ok(message) = messages.recv() {
         match message {
             Message::Call(call) => call(&mut arm),
-            Message::OpenStream(options, opened) => match SetPointStream::open(&mut arm, options) {
-                Ok(mut stream) => {
-                    let pace = StreamPace::new(stream.arm().now(), options.period());
+            Message::OpenStream(options, opened) => match PacedStream::open(&mut arm, options) {
+                Ok(stream) => {
                     let _ = opened.send(Ok(()));
-                    serve_stream(PacedStream { stream, pace }, messages);
+                    serve_stream(stream, messages);
                 }
                 Err(error) => drop(opened.send(Err(error))),
             },

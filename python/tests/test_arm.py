@@ -5,6 +5,7 @@ from __future__ import annotations
 import _thread
 import signal
 import threading
+import warnings
 from collections.abc import Iterator
 
 import pytest
@@ -122,6 +123,33 @@ def test_the_tip_moves_to_millimetres(simulated_arm: sevenbot.Arm) -> None:
     assert "mm" in str(where) and "<table>" in where._repr_html_()
     with pytest.raises(sevenbot.OutOfReach, match="nearest point"):
         simulated_arm.move_to(0, 900, 0)
+
+
+def test_the_guard_keeps_the_arm_above_the_table_and_out_of_its_base(simulated_arm: sevenbot.Arm) -> None:
+    before = simulated_arm.get("fine-target")
+    with pytest.raises(sevenbot.OutsideGuard, match="40.0 mm below the table at z = -60 mm") as refused:
+        simulated_arm.move_to(0, 185, -100)
+    assert any("guard=False" in hint for hint in refused.value.hints)
+    with pytest.raises(sevenbot.OutsideGuard, match="space of the base"):
+        simulated_arm.move_to(0, 100, -40)
+    with pytest.raises(sevenbot.OutsideGuard, match="below the table at z = 100 mm"):
+        simulated_arm.move_to(0, 250, 50, straight=True, table=100)
+    with pytest.raises(TypeError):
+        simulated_arm.move_to(0, 185, 50, table=0, guard=False)
+    assert simulated_arm.get("fine-target") == before
+    simulated_arm.move_to(0, 185, -70, table=-80)
+
+
+def test_joints_below_the_table_are_warned_of(simulated_arm: sevenbot.Arm) -> None:
+    below = [90, 20, 140, 90, 90, 90, 80]
+    with pytest.warns(sevenbot.GuardWarning, match="below the table"):
+        simulated_arm.pose(below)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulated_arm.pose(90, 90, 65, 90, 90, 90, 80, guard=False)
+    recording = sevenbot.Recording.from_points([0, 3], [[90, 90, 65, 90, 90, 90, 80], below])
+    with pytest.warns(sevenbot.GuardWarning, match="at 3.00 s"):
+        simulated_arm.play(recording)
 
 
 def test_the_tip_moves_on_a_straight_line(simulated_arm: sevenbot.Arm) -> None:

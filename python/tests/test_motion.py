@@ -26,6 +26,29 @@ def test_a_stream_leads_the_arm_and_puts_its_registers_back(simulated_arm: seven
     assert simulated_arm.get("fine-target.1") == 10980
 
 
+def test_a_stream_that_begins_elsewhere_is_refused_or_approached(simulated_arm: sevenbot.Arm) -> None:
+    world = simulated_arm.simulation
+    assert world is not None
+    simulated_arm.set("speed", 0)
+    with pytest.raises(sevenbot.TooFar, match="joint 1") as refused:
+        with simulated_arm.stream() as stream:
+            stream.send([150, *[None] * 6])
+    assert any("approach=" in hint for hint in refused.value.hints)
+    assert simulated_arm.get("fine-target.1") == 9000
+    start = world.now
+    with simulated_arm.stream(approach=1.5) as stream:
+        assert stream.send([150, *[None] * 6]) == 0
+        assert world.now - start > 1.5
+        assert stream.send([150.2, *[None] * 6]) == 1
+    simulated_arm.sleep(1)
+    assert world.angles[0] == pytest.approx(150, abs=1.5)
+    with pytest.raises(ValueError, match="approach"):
+        simulated_arm.stream(approach=0)
+    with pytest.warns(sevenbot.GuardWarning, match="below the table"):
+        with simulated_arm.stream(approach=1) as stream:
+            stream.send([90, 20, 140, 90, 90, 90, 80])
+
+
 def test_a_silent_stream_holds_and_a_slow_one_does_not(simulated_arm: sevenbot.Arm) -> None:
     with simulated_arm.stream(1.0) as stream:
         for angle in (90, 91, 92):
@@ -63,7 +86,9 @@ def test_a_recording_is_played_and_saved(simulated_arm: sevenbot.Arm, tmp_path: 
     recorded.save(tmp_path / "wave.txt")
     loaded = sevenbot.Recording.load(tmp_path / "wave.txt")
     assert list(loaded.times) == list(recorded.times)
-    measured = simulated_arm.play(loaded)
+    with pytest.raises(sevenbot.TooFar, match="joint 1 is at .* from"):
+        simulated_arm.play(loaded)
+    measured = simulated_arm.play(loaded, approach=2)
     assert measured.angles[-1][0] == pytest.approx(130, abs=2)
     assert "moments" in repr(measured)
 

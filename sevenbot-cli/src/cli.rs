@@ -1,5 +1,7 @@
 //! The command line: global options, commands and help. The arguments of a command are in the command's own file.
 
+use std::path::PathBuf;
+
 use clap::{Args, CommandFactory, Parser, Subcommand, value_parser};
 use sevenbot::Map;
 
@@ -7,8 +9,8 @@ use crate::command_error::CommandError;
 #[cfg(unix)]
 use crate::commands::sim;
 use crate::commands::{
-    backup, baud, calibrate, effector, get, info, model, monitor, move_to, play, plot, ports, pose, position,
-    record, registers, servo, set, shell, sniff, state, stop, stream,
+    backup, baud, calibrate, effector, get, info, model, monitor, move_to, park, play, plot, ports, pose,
+    position, record, recover, registers, servo, set, shell, sniff, state, status, stop, stream,
 };
 #[cfg(target_os = "linux")]
 use crate::commands::{serve, view};
@@ -27,7 +29,7 @@ Without --port and SEVENBOT_PORT the only port that leads to an arm is used.
 
 Exit status:
   0    done
-  1    the arm refused or failed, `info` found a fault, or a file cannot be used
+  1    the arm refused or failed, `info` or `status` found a fault, or a file cannot be used
   2    the arguments are invalid, or a question needs a terminal or --yes
   3    no connection: the port cannot be opened, no 7Bot V2 answers, or the connection was lost
   130  interrupted by Ctrl-C; a moving arm then holds its position. A second Ctrl-C ends at once";
@@ -62,6 +64,9 @@ pub(crate) struct Global {
     /// Print results as JSON, one value per line.
     #[arg(long, global = true)]
     pub(crate) json: bool,
+    /// Write all bytes to and from the arm, with times, to a new FILE. `sevenbot sniff FILE` shows it as text.
+    #[arg(long, global = true, value_name = "FILE")]
+    pub(crate) log: Option<PathBuf>,
     /// Print every frame as text on standard error.
     #[arg(short, long, global = true)]
     pub(crate) verbose: bool,
@@ -76,10 +81,13 @@ fn map(text: &str) -> Result<Map, &'static str> {
 pub(crate) enum Command {
     Ports(ports::PortsArgs),
     Info(info::InfoArgs),
+    Status(status::StatusArgs),
+    Recover(recover::RecoverArgs),
     Get(get::GetArgs),
     Set(set::SetArgs),
     Pose(pose::PoseArgs),
     Home(pose::HomeArgs),
+    Park(park::ParkArgs),
     Where(position::WhereArgs),
     MoveTo(move_to::MoveToArgs),
     Stop(stop::StopArgs),
@@ -114,10 +122,13 @@ impl Command {
         match self {
             Self::Ports(args) => ports::run(session, &args),
             Self::Info(_) => info::run(session),
+            Self::Status(_) => status::run(session),
+            Self::Recover(args) => recover::run(session, &args),
             Self::Get(args) => get::run(session, &args),
             Self::Set(args) => set::run(session, &args),
             Self::Pose(args) => pose::run(session, &args),
             Self::Home(args) => pose::home(session, &args),
+            Self::Park(args) => park::run(session, &args),
             Self::Where(_) => position::run(session),
             Self::MoveTo(args) => move_to::run(session, &args),
             Self::Stop(_) => stop::run(session),

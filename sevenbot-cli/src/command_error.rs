@@ -4,6 +4,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use sevenbot::approach::StartTooFar;
+use sevenbot::health::{MoveCheckError, Problem, ProblemKind, remedies, sentences};
 use sevenbot::moves::{ConnectionLost, LineStartError, MoveError};
 use sevenbot::register_text::motor_state_name;
 use sevenbot::servo_bench::ServoError;
@@ -28,6 +30,8 @@ const SAFETY: [&str; 3] = [
 pub(crate) enum CommandError {
     /// The arm did not do what was asked.
     Arm(String),
+    /// The arm does not carry out the command, for these reasons.
+    Problems(Vec<Problem>),
     /// The arm may be moving, for this reason.
     MayMove(String),
     /// The arguments do not fit the register, or an answer from the user is missing.
@@ -79,6 +83,12 @@ impl From<StreamError> for CommandError {
     }
 }
 
+impl From<MoveCheckError> for CommandError {
+    fn from(error: MoveCheckError) -> Self {
+        MoveError::from(error).into()
+    }
+}
+
 impl From<MoveError> for CommandError {
     fn from(error: MoveError) -> Self {
         match error {
@@ -86,12 +96,25 @@ impl From<MoveError> for CommandError {
             MoveError::Exchange(error) => Self::Exchange(error),
             MoveError::Stream(error) => error.into(),
             MoveError::MayMove(reason) => Self::MayMove(reason),
+            MoveError::StartTooFar(far) => too_far(&far),
+            MoveError::Problems(problems) => Self::Problems(problems),
             MoveError::NotDriven { state } => Self::Arm(format!(
                 "the arm's motors are in state {state}, {}: use `sevenbot state servo` first",
                 motor_state_name(state)
             )),
             other => Self::Arm(other.to_string()),
         }
+    }
+}
+
+/// A first point far from where the arm stands, with the ways out.
+fn too_far(far: &StartTooFar) -> CommandError {
+    CommandError::WithAdvice {
+        message: format!("{far}. The arm was not sent there"),
+        advice: &[
+            "--approach SECONDS goes there smoothly first: look that the way is free",
+            "or move the arm there yourself: `sevenbot pose --speed 10 --wait`, or `sevenbot home`",
+        ],
     }
 }
 
@@ -127,7 +150,7 @@ impl CommandError {
         ExitCode::from(match self {
             // The reader of the pipe, such as `head`, has ended.
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
-            Self::Arm(_) | Self::MayMove(_) | Self::File { .. } | Self::Output(_) => 1,
+            Self::Arm(_) | Self::Problems(_) | Self::MayMove(_) | Self::File { .. } | Self::Output(_) => 1,
             Self::Usage(_) => 2,
             Self::NoArm { .. } | Self::SeveralArms { .. } => 3,
             Self::Open { .. } | Self::NoRate { .. } | Self::Exchange(_) => 3,
@@ -156,6 +179,7 @@ impl CommandError {
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => None,
             Self::Output(error) => Some(format!("cannot write the output: {error}")),
             Self::Arm(message) | Self::Usage(message) => Some(message.clone()),
+            Self::Problems(problems) => Some(sentences(problems)),
             Self::MayMove(reason) => Some(format!("the arm may still be moving: {reason}")),
             Self::NoArm { tried } if tried.is_empty() => {
                 Some("no port was given, and this machine has no serial port".to_owned())
@@ -198,6 +222,7 @@ impl CommandError {
                     .map(str::to_owned)
                     .to_vec()
             }
+            Self::Problems(problems) => problem_advice(problems),
             Self::MayMove(_) => SAFETY.map(str::to_owned).to_vec(),
             Self::Open { error, .. } => advice::opening(error),
             Self::Exchange(error) => owned(advice::exchange(error)),
@@ -214,6 +239,14 @@ impl CommandError {
             _ => Vec::new(),
         }
     }
+}
+
+/// What to do about the problems of an arm.
+fn problem_advice(problems: &[Problem]) -> Vec<String> {
+    let remedies = remedies(problems).into_iter().map(str::to_owned);
+    let is_recoverable = |problem: &Problem| problem.kind != ProblemKind::Blocked;
+    let recover = problems.iter().any(is_recoverable).then_some("`sevenbot recover` goes through the steps");
+    remedies.chain(recover.map(str::to_owned)).collect()
 }
 
 /// Advice if no servo answers.

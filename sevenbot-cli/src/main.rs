@@ -11,10 +11,12 @@
 #![forbid(unsafe_code)]
 
 mod advice;
+mod approach_args;
 mod cli;
 mod command_error;
 mod commands;
 mod confirm;
+mod guard_args;
 mod interrupt;
 mod line_file;
 mod measured_pose;
@@ -52,7 +54,7 @@ fn main() -> ExitCode {
     let port = global.port.filter(|port| !port.is_empty());
     let reply_timeout = Duration::from_millis(global.timeout.into());
     let options = ArmOptions { baud: global.baud, reply_timeout, map: global.map, ..ArmOptions::default() };
-    let mut session = Session { port, options, printer };
+    let mut session = Session { port, options, printer, log: global.log };
     match command.run(&mut session) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -1,6 +1,11 @@
 //! What every command needs: the arm and the printer. Chooses the port.
 
+use std::fs::File;
+use std::path::PathBuf;
+
+use sevenbot::open_port::OpenPort;
 use sevenbot::ports::{self, ProbeResult};
+use sevenbot::wire_log::LoggedLine;
 use sevenbot::{Arm, ArmOptions, Firmware, OpenError};
 
 use crate::command_error::CommandError;
@@ -14,13 +19,15 @@ pub(crate) struct Session {
     pub(crate) options: ArmOptions,
     /// Prints results.
     pub(crate) printer: Printer,
+    /// The file for all bytes to and from the arm.
+    pub(crate) log: Option<PathBuf>,
 }
 
 impl Session {
     /// Opens the arm. Warns if its firmware has limits.
     pub(crate) fn connect(&self) -> Result<Arm, CommandError> {
         let port = self.port_name()?;
-        let arm = Arm::open_with(&port, self.options).map_err(|error| CommandError::Open { port, error })?;
+        let arm = self.open(port)?;
         let version = arm.identity().version();
         match arm.identity().firmware() {
             Firmware::Ours => {}
@@ -33,6 +40,17 @@ impl Session {
             )),
         }
         Ok(arm)
+    }
+
+    /// Opens a port, with a log if there is to be one. A log that exists already is not overwritten.
+    fn open(&self, port: String) -> Result<Arm, CommandError> {
+        let failed = |error| CommandError::Open { port: port.clone(), error };
+        let Some(path) = &self.log else { return Arm::open_with(&port, self.options).map_err(failed) };
+        let line = OpenPort::open(&port, self.options.baud).map_err(failed)?;
+        let file = File::create_new(path).map_err(|error| CommandError::file(path, error))?;
+        let logged = LoggedLine::new(line, Box::new(file), &port, self.options.baud);
+        let line = logged.map_err(|error| CommandError::file(path, error))?;
+        Arm::over(Box::new(line), &port, self.options).map_err(failed)
     }
 
     /// The port from the command line, or the only one that leads to an arm.

@@ -9,6 +9,7 @@ use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, OFFSET, SERVO_TEMPERAT
 use protocol_core::registers::map21::Map;
 use protocol_core::request::Request;
 
+use crate::background_read::BackgroundRead;
 use crate::error::{Error, OpenError};
 use crate::frame_port::{FramePort, Received};
 use crate::host_line::HostLine;
@@ -76,6 +77,7 @@ pub struct Arm {
     identity: Identity,
     pub(crate) view: MapView,
     pending: PendingReads,
+    background: Option<BackgroundRead>,
     reports: ReportQueue,
 }
 
@@ -115,7 +117,8 @@ impl Arm {
         let path = name.to_owned();
         let (pending, reports) = (PendingReads::default(), ReportQueue::default());
         let view = MapView { map: Map::V22, firmware: Firmware::Unknown };
-        let mut arm = Self { link, path, options, identity: nobody, view, pending, reports };
+        let mut arm =
+            Self { link, path, options, identity: nobody, view, pending, background: None, reports };
         // Registers 0 to 7 are the same in both maps.
         arm.identity = Identity::from(arm.read_span(Span::between(&DEVICE_CODE, &CHIP_ID))?);
         let map = options.map.unwrap_or_else(|| arm.identity.map());
@@ -272,7 +275,7 @@ impl Arm {
                 return Ok(report);
             }
             let Some(received) = self.link.receive(deadline)? else { return Ok(None) };
-            self.reports.keep(&received, self.view, self.link.now());
+            self.keep(&received);
         }
     }
 
@@ -280,15 +283,46 @@ impl Arm {
     fn answer(&mut self, asked: &[Span]) -> Result<Option<Snapshot>, Error> {
         let deadline = self.now() + self.options.reply_timeout;
         while let Some(received) = self.link.receive(deadline)? {
-            self.reports.keep(&received, self.view, self.link.now());
-            if let Received::Reply(reply) = received {
-                self.pending.replied(reply.span());
-                if asked.contains(&reply.span()) {
-                    return Ok(Some(reply));
-                }
+            self.keep(&received);
+            if let Received::Reply(reply) = received
+                && asked.contains(&reply.span())
+            {
+                return Ok(Some(reply));
             }
         }
         Ok(None)
+    }
+
+    /// Asks for registers, and does not wait. An earlier question without an answer is given up.
+    ///
+    /// # Errors
+    /// The port failed.
+    pub(crate) fn ask_in_background(&mut self, wanted: Span) -> Result<(), Error> {
+        let asked = self.pending.add(self.view.read_span(wanted), self.view.reports());
+        self.link.send(&Request::Read { address: asked.address(), count: asked.count() })?;
+        self.background = Some(BackgroundRead::new(wanted, asked));
+        Ok(())
+    }
+
+    /// Forgets the last background question: its answer tells what was before.
+    pub(crate) fn forget_background_question(&mut self) {
+        self.background = None;
+    }
+
+    /// Takes the answer to the last background question, if it has arrived.
+    ///
+    /// # Errors
+    /// The port failed.
+    pub(crate) fn take_background_answer(&mut self) -> Result<Option<Snapshot>, Error> {
+        self.take_waiting_replies()?;
+        let Some(read) = self.background.take_if(|read| read.answer.is_some()) else { return Ok(None) };
+        Ok(read.answer.map(|answer| self.view.view(&answer, read.wanted)))
+    }
+
+    /// The error of an arm that answers no background question.
+    pub(crate) fn no_background_answer(&mut self, span: Span, waited: Duration) -> Error {
+        let received = self.link.take_received();
+        Error::NoAnswer { span, attempts: 1, waited, received }
     }
 
     fn no_answer(&mut self, span: Span) -> Error {
@@ -300,11 +334,19 @@ impl Arm {
     /// Takes the replies received since the last read: reports, and late replies.
     fn take_waiting_replies(&mut self) -> Result<(), Error> {
         while let Some(received) = self.link.receive_waiting()? {
-            self.reports.keep(&received, self.view, self.link.now());
-            if let Received::Reply(reply) = received {
-                self.pending.replied(reply.span());
-            }
+            self.keep(&received);
         }
         Ok(())
+    }
+
+    /// Keeps a frame if it is a report or the answer to a background read, and marks the read that it answers.
+    fn keep(&mut self, received: &Received) {
+        self.reports.keep(received, self.view, self.link.now());
+        if let Some(read) = &mut self.background {
+            read.keep(received);
+        }
+        if let Received::Reply(reply) = received {
+            self.pending.replied(reply.span());
+        }
     }
 }

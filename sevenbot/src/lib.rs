@@ -8,7 +8,7 @@
 //! ```
 //!
 //! All calls block, with timeouts. Frames and the register table come from `protocol-core`, which the arm uses too.
-//! `D1` to `D26` are rules in `docs/protocol.md`. The library sends targets; the arm plans the motion.
+//! `D1` to `D30` are rules in `docs/protocol.md`. The library sends targets; the arm plans the motion.
 //!
 //! ```no_run
 //! use sevenbot::{Angle, Arm, Joint};
@@ -27,8 +27,10 @@
 #![forbid(unsafe_code)]
 
 pub mod advice;
+pub mod approach;
 pub mod arm;
 mod arm_values;
+mod background_read;
 pub mod cartesian;
 pub mod checked_write;
 pub mod error;
@@ -36,6 +38,7 @@ pub mod fine;
 pub mod fine_angle;
 mod fine_state;
 mod frame_port;
+pub mod health;
 pub mod hold;
 pub mod host_line;
 pub mod identity;
@@ -46,6 +49,7 @@ pub mod moves;
 pub mod names;
 #[cfg(feature = "serial")]
 pub mod open_port;
+pub mod park_poses;
 mod pending;
 #[cfg(feature = "serial")]
 mod permission;
@@ -68,10 +72,12 @@ pub mod table;
 pub mod traffic;
 mod traffic_text;
 pub mod units;
+pub mod wire_log;
 
 pub use arm::{Arm, ArmOptions};
 pub use error::{Error, OpenError, PortError, ReceiveCounts};
 pub use fine_angle::FineAngle;
+pub use health::{Health, Problem, ProblemKind};
 pub use identity::{Firmware, Identity};
 pub use protocol_core::registers::map21::Map;
 pub use protocol_core::registers::{Joint, Range, Register, map, map21};

@@ -12,7 +12,7 @@
 use std::ops::RangeInclusive;
 
 use protocol_core::registers::map::{
-    EXTENDED_VERSION, FEEDBACK_FREQUENCY, FINE_POSITION, FINE_TARGET, LOAD, MAP, OFFSET, PRESENT_POSITION,
+    FEEDBACK_FREQUENCY, FINE_POSITION, FINE_TARGET, LOAD, MAP, OFFSET, PRESENT_POSITION, PROTECTION_VERSION,
     TIME,
 };
 use protocol_core::registers::map21::{
@@ -38,8 +38,8 @@ const NO_OFFSET: u8 = 64;
 pub(crate) const REPORTS: [Span; 3] =
     [Span::of(&PRESENT_POSITION), Span::of(&FINE_POSITION), Span::between(&FINE_POSITION, &LOAD)];
 
-/// The extended block.
-const EXTENDED_BLOCK: RangeInclusive<u8> = FINE_TARGET.address..=EXTENDED_VERSION.address;
+/// The extended block and the protection block.
+const OUR_BLOCKS: RangeInclusive<u8> = FINE_TARGET.address..=PROTECTION_VERSION.address;
 
 /// How an arm sees the registers of map 2.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,8 +62,8 @@ impl MapView {
     /// Does the arm have this register? Only a register of map 2.1 or of this project can be missing.
     pub(crate) fn serves(self, address: u8) -> bool {
         let has_map21 = self.firmware == Firmware::Ours || self.map == Map::V21;
-        // Register 20 (M6) and the extended block (D21) are this project's additions.
-        let is_ours = OPTIONS.holds(address) || EXTENDED_BLOCK.contains(&address);
+        // Register 20 (M6), the extended block (D21) and the protection block (D27) are this project's additions.
+        let is_ours = OPTIONS.holds(address) || OUR_BLOCKS.contains(&address);
         (!is_only_map21(address) || has_map21) && (!is_ours || self.firmware == Firmware::Ours)
     }
 
@@ -291,8 +291,8 @@ mod tests {
     fn an_arm_serves_the_registers_of_its_firmware() {
         let missing = |view: MapView| (0..=255).filter(|&address| !view.serves(address)).collect::<Vec<u8>>();
         assert_eq!(missing(BOTH), []);
-        assert_eq!(missing(MAP_21), [20].into_iter().chain(128..=191).collect::<Vec<u8>>());
-        let only_map21 = [20].into_iter().chain(61..=66).chain(68..=73).chain(82..=97).chain(128..=191);
+        assert_eq!(missing(MAP_21), [20].into_iter().chain(128..=199).collect::<Vec<u8>>());
+        let only_map21 = [20].into_iter().chain(61..=66).chain(68..=73).chain(82..=97).chain(128..=199);
         assert_eq!(missing(MAP_22), only_map21.collect::<Vec<u8>>());
     }
 

@@ -1,16 +1,17 @@
 //! Register values as text, from the register table: `-5 °`, `servo`, `joints 2 and 3`.
 
 use protocol_core::registers::map::{
-    BAUD_RATE, CHIP_ID, EEPROM_LOCK, EFFECTOR_TYPE, FAULTS, FINE_POSITION, HOST_WATCHDOG, LAST_REFUSAL,
-    LAST_REFUSED_REGISTER, LIMITS, MEASURED_JOINTS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS,
-    REPORT_CONTENT, SET_POINT_PERIOD, VACUUM_PUMP, WATCHDOG_ACTION, baud_rate, fault, limit, motor_state,
-    refusal, report_content,
+    BAUD_RATE, BLOCKED_JOINTS, CHIP_ID, EEPROM_LOCK, EFFECTOR_TYPE, FAULTS, FINE_POSITION, HOST_WATCHDOG,
+    LAST_REFUSAL, LAST_REFUSED_REGISTER, LET_GO_JOINTS, LIMITS, MEASURED_JOINTS, MISSING_SERVOS, MOTOR_STATE,
+    MOVING_JOINTS, PROTECTION, REPORT_CONTENT, SERVO_ALARMS, SET_POINT_PERIOD, SUPPLY_LOST, VACUUM_PUMP,
+    WATCHDOG_ACTION, baud_rate, limit, motor_state, refusal, report_content,
 };
 use protocol_core::registers::map21::{
     DISC_DIRECTION, OPTIONS, PRESENT_LOAD, WRIST_POSITION, find_readable, option,
 };
 use protocol_core::registers::{Access, Joint, Range, Register, Unit};
 
+use crate::health::{ALARM_BITS, FAULT_BITS};
 use crate::map21_text;
 use crate::names::name_of_register;
 use crate::snapshot::Snapshot;
@@ -127,7 +128,12 @@ pub fn meaning(row: &Register, byte: u8) -> String {
         EFFECTOR_TYPE => (if byte == 0 { "suction cup" } else { "gripper" }).to_owned(),
         VACUUM_PUMP => (if byte == 0 { "release" } else { "suck" }).to_owned(),
         FAULTS => faults(byte),
-        MISSING_SERVOS | MOVING_JOINTS | MEASURED_JOINTS => joints(byte),
+        MISSING_SERVOS | MOVING_JOINTS | MEASURED_JOINTS | BLOCKED_JOINTS | LET_GO_JOINTS => joints(byte),
+        PROTECTION => (if byte == 0 { "off" } else { "on" }).to_owned(),
+        SERVO_ALARMS => servo_alarms(byte),
+        SUPPLY_LOST => {
+            (if byte == 0 { "no" } else { "yes: the motors are off until 29 is written" }).to_owned()
+        }
         HOST_WATCHDOG if byte == 0 => "off".to_owned(),
         WATCHDOG_ACTION => (if byte == 0 { "hold" } else { "damping protection" }).to_owned(),
         LIMITS => limits(byte),
@@ -186,16 +192,18 @@ pub const fn refusal_reason(reason: u8) -> &'static str {
 /// The faults in these bits.
 #[must_use]
 pub fn faults(bits: u8) -> String {
-    const WORDS: [(u8, &str); 7] = [
-        (fault::SETTINGS_STORAGE, "settings storage"),
-        (fault::SERVO_BUS, "servo bus"),
-        (fault::WATCHDOG_RESTART, "restarted by the watchdog"),
-        (fault::BROWN_OUT_RESTART, "restarted after a drop of the supply"),
-        (fault::CRYSTAL_FAILED, "crystal failed"),
-        (fault::RECEIVE_OVERRUN, "over-run of the receive buffer"),
-        (fault::HOST_SILENT, "host was silent"),
-    ];
-    let set = WORDS.iter().filter(|(bit, _)| bits & bit != 0).map(|&(_, word)| word.to_owned());
+    set_words(bits, &FAULT_BITS.map(|(bit, problem)| (bit, problem.name())))
+}
+
+/// The alarms of servos in these bits of register 197 (D28).
+#[must_use]
+pub fn servo_alarms(bits: u8) -> String {
+    set_words(bits, &ALARM_BITS.map(|(bit, problem)| (bit, problem.name())))
+}
+
+/// The words of the bits that are set, as a list.
+fn set_words(bits: u8, words: &[(u8, &str)]) -> String {
+    let set = words.iter().filter(|(bit, _)| bits & bit != 0).map(|&(_, word)| word.to_owned());
     list(set.collect()).unwrap_or_else(|| "none".to_owned())
 }
 
@@ -210,9 +218,7 @@ fn options(bits: u8) -> String {
 /// The limits in these bits.
 #[must_use]
 pub fn limits(bits: u8) -> String {
-    let set =
-        [(limit::LINKAGE, "linkage"), (limit::CLAW, "claw")].into_iter().filter(|(bit, _)| bits & bit != 0);
-    list(set.map(|(_, word)| word.to_owned()).collect()).unwrap_or_else(|| "none".to_owned())
+    set_words(bits, &[(limit::LINKAGE, "linkage"), (limit::CLAW, "claw")])
 }
 
 const fn report_content_name(content: u8) -> &'static str {
@@ -249,7 +255,7 @@ pub fn range(address: u8) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol_core::registers::map::{FRAMES_ACCEPTED, OFFSET, SPEED, VELOCITY};
+    use protocol_core::registers::map::{FRAMES_ACCEPTED, OFFSET, SPEED, VELOCITY, fault};
 
     #[test]
     fn bits_are_shown_as_lists() {

@@ -63,6 +63,13 @@ impl Snapshot {
         Joint::ALL.map(|joint| self.word(row.of(joint)))
     }
 
+    /// Takes the values of another snapshot, as far as this one holds their registers.
+    pub(crate) fn put(&mut self, other: &Self) {
+        let first = usize::from(other.address).checked_sub(usize::from(self.address));
+        let held = first.and_then(|first| self.values.get_mut(first..)).unwrap_or_default();
+        held.iter_mut().zip(&other.values).for_each(|(held, value)| *held = *value);
+    }
+
     /// The registers; none if they would reach past 255.
     #[must_use]
     pub fn span(&self) -> Span {

@@ -10,6 +10,7 @@
 
 use std::time::{Duration, Instant};
 
+use protocol_core::registers::Joint;
 use protocol_core::registers::map::{FINE_TARGET, SET_POINT_PERIOD, WATCHDOG_ACTION, fault};
 
 use crate::arm::Arm;
@@ -17,6 +18,7 @@ use crate::checked_write::WriteMismatch;
 use crate::error::Error;
 use crate::fine::fine_frames;
 use crate::fine_state::FineTargets;
+use crate::health::{MoveCheck, MoveCheckError, MoveState};
 use crate::span::Span;
 
 mod pace;
@@ -125,6 +127,7 @@ pub enum StreamError {
 ///     sleep(pace.due().saturating_duration_since(Instant::now()));
 ///     pace.take(Instant::now());
 ///     stream.send(&[FineAngle::from_hundredths(hundredths), None, None, None, None, None, None])?;
+///     stream.check()?;
 /// }
 /// stream.close()?;
 /// # Ok(())
@@ -137,6 +140,8 @@ pub struct SetPointStream<'a> {
     /// The registers of the stream before it; `None` once they are put back.
     before: Option<Vec<u8>>,
     last_sent: Instant,
+    /// Watches over the joints that got a point.
+    check: MoveCheck,
 }
 
 impl<'a> SetPointStream<'a> {
@@ -150,7 +155,8 @@ impl<'a> SetPointStream<'a> {
         }
         let before = registers_before(arm)?;
         let last_sent = arm.now();
-        let mut stream = Self { arm, options, before: Some(before), last_sent };
+        let check = MoveCheck::idle(arm).with_period(options.period_ms);
+        let mut stream = Self { arm, options, before: Some(before), last_sent, check };
         let unchanged = stream.arm.write_checked(STREAM_REGISTERS.address(), &options.registers())?;
         stream.last_sent = stream.arm.now();
         if unchanged.is_empty() { Ok(stream) } else { Err(StreamError::NotTaken(unchanged)) }
@@ -165,7 +171,32 @@ impl<'a> SetPointStream<'a> {
             self.arm.write(address, &values)?;
             self.last_sent = self.arm.now();
         }
+        let joints = Joint::ALL.into_iter().zip(point).filter(|(_, angle)| angle.is_some());
+        self.check.add_joints(joints.fold(0, |bits, (joint, _)| bits | joint.bit()), self.last_sent);
         Ok(())
+    }
+
+    /// Does the arm follow? Asks it ten times a second, and never waits for its answer. Call it at least that often.
+    ///
+    /// # Errors
+    /// A joint of the stream is blocked, let go or silent, the supply was lost, the controller restarted, the motors are off, or
+    /// the arm does not answer any more.
+    pub fn check(&mut self) -> Result<(), MoveCheckError> {
+        self.check.poll(self.arm)
+    }
+
+    /// As [`Self::check`], but asks now and waits for the answer.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub fn check_now(&mut self) -> Result<MoveState, MoveCheckError> {
+        self.check.check(self.arm)
+    }
+
+    /// The joints that got a point, as [`Joint::bit`]s.
+    #[must_use]
+    pub const fn joints(&self) -> u8 {
+        self.check.joints()
     }
 
     /// Sends an empty write if the watchdog would act soon. Call it while no point is due.
@@ -178,6 +209,12 @@ impl<'a> SetPointStream<'a> {
             self.last_sent = self.arm.now();
         }
         Ok(())
+    }
+
+    /// The time between two points.
+    #[must_use]
+    pub const fn period(&self) -> Duration {
+        self.options.period()
     }
 
     /// The arm, for other requests and its reports during the stream.

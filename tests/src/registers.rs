@@ -36,6 +36,10 @@ pub const STATUS: u8 = 240;
 pub const FAULTS: u8 = 241;
 /// Servos that do not reply, bit n-1 for joint n.
 pub const MISSING_SERVOS: u8 = 242;
+/// 0: the protection is off.
+pub const PROTECTION: u8 = 192;
+/// Joints that an obstacle keeps from their targets.
+pub const BLOCKED_JOINTS: u8 = 195;
 /// Moving joints, bit n-1 for joint n.
 pub const MOVING_JOINTS: u8 = 243;
 /// The reason of the last refusal. The next register holds the address of the refused register.

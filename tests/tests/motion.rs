@@ -161,7 +161,9 @@ fn d12_the_arm_holds_its_position_after_power_up() {
         while start.elapsed() < Duration::from_secs(1) {
             let values = arm.read(TARGET_POSITION, 15);
             assert_eq!(values[..7], STANDARD_POSE, "targets");
-            assert_eq!(values[8..], STANDARD_POSE, "positions");
+            let is_held =
+                values[8..].iter().zip(STANDARD_POSE).all(|(&actual, expected)| near(actual, expected));
+            assert!(is_held, "{values:?}: a loaded joint droops by less than a degree");
             assert_eq!(arm.register(MOVING_JOINTS), 0);
         }
     });

@@ -46,7 +46,8 @@ fn a_new_arm_has_the_documented_defaults() {
         assert_eq!(arm.read(98, 30), unused[..30], "unused addresses read 0");
         assert_eq!(arm.read(184, 6), [0; 6], "no stream, no watchdog, no limits, reports in degrees");
         assert_eq!(arm.register(191), 1, "the layout of the extended block");
-        assert_eq!(arm.read(192, 48), unused, "unused addresses read 0");
+        assert_eq!(arm.read(192, 8), [1, 70, 40, 0, 0, 0, 0, 1], "the protection block");
+        assert_eq!(arm.read(200, 40), unused[..40], "unused addresses read 0");
         let faults = u8::from(!arm.has(Need::Persistence));
         assert_eq!(
             arm.read(STATUS, 3),

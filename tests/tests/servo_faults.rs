@@ -4,8 +4,8 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use system_tests::registers::{
-    FAULTS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, SERVO_BUS_ERRORS, STANDARD_POSE,
-    TARGET_POSITION,
+    BLOCKED_JOINTS, FAULTS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, PROTECTION,
+    SERVO_BUS_ERRORS, STANDARD_POSE, TARGET_POSITION,
 };
 use system_tests::{TestArm, TestSetup, near, with_arm};
 
@@ -90,25 +90,28 @@ fn a_late_servo_is_reported_and_has_no_effect_on_others() {
     });
 }
 
-/// The position of a stuck joint is right, and the alarm of its servo is reported as a servo bus fault.
+/// The position of a stuck joint is right, and the joint counts as blocked before its servo switches itself off (D27).
 #[test]
-fn a_stuck_joint_reports_its_position_and_the_fault() {
+fn d27_a_stuck_joint_reports_its_position_and_is_blocked() {
     with_arm(TestSetup::any().fault("3=stuck"), |arm| {
         arm.wait_for_pose(&STANDARD_POSE);
         move_others(arm);
         arm.write(TARGET_POSITION + 2, &[STANDARD_POSE[FAULTY] - 30]);
-        arm.wait_until("the overload is reported", |arm| arm.register(FAULTS) & SERVO_BUS != 0);
+        arm.wait_until("the joint is blocked", |arm| arm.register(BLOCKED_JOINTS) == FAULTY_BIT);
         arm.wait_until("set-points have arrived", |arm| arm.register(MOVING_JOINTS) == 0);
         assert!(near(arm.register(PRESENT_POSITION + 2), STANDARD_POSE[FAULTY]));
+        assert_eq!(arm.register(FAULTS) & SERVO_BUS, 0, "no alarm");
         assert_eq!(arm.register(MISSING_SERVOS), 0, "its servo replies");
     });
 }
 
-/// The overload alarm of a servo lasts until its torque is off. So it shows that the motor states reach the servos (D13).
+/// Without protection a servo switches itself off. Its overload alarm lasts until its torque is off, so it shows that the
+/// motor states reach the servos (D13).
 #[test]
 fn d13_an_overload_alarm_ends_when_the_torque_is_off() {
     with_arm(TestSetup::any().fault("3=stuck"), |arm| {
         arm.wait_for_pose(&STANDARD_POSE);
+        arm.write(PROTECTION, &[0]);
         arm.write(TARGET_POSITION + 2, &[STANDARD_POSE[FAULTY] - 30]);
         arm.wait_until("the overload is reported", |arm| arm.register(FAULTS) & SERVO_BUS != 0);
         for state in [0, 2] {

@@ -113,7 +113,7 @@ fn an_arm_of_the_maker_takes_the_nearest_whole_degrees() {
         assert!(succeeded(output).starts_with("9"), "whole degrees");
         assert!(succeeded(sevenbot(&["get", "target-position.1"])).contains(" 96 "));
         fs::write(path("fine.txt"), FINE_WAVE).expect("a file");
-        succeeded(sevenbot(&["play", &path("fine.txt")]));
+        succeeded(sevenbot(&["play", &path("fine.txt"), "--approach", "1"]));
         assert!(succeeded(sevenbot(&["get", "target-position.1"])).contains(" 95 "));
         succeeded(sevenbot(&["record", &path("r.txt"), "--driven", "--seconds", "1"]));
         let recorded = fs::read_to_string(path("r.txt")).expect("a recording");

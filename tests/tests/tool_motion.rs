@@ -89,7 +89,8 @@ fn a_move_is_recorded_played_and_plotted() {
 
         arm.write(TARGET_POSITION, &STANDARD_POSE);
         arm.wait_for_pose(&STANDARD_POSE);
-        succeeded(arm.sevenbot(&["play", text(&recording), "--speed", "4", "--plot", text(&drawing)]));
+        let play = ["play", text(&recording), "--speed", "4", "--approach", "2", "--plot", text(&drawing)];
+        succeeded(arm.sevenbot(&play));
         assert!(near(arm.positions()[0], 120), "{:?}", arm.positions());
         assert_eq!(arm.read(SPEED, 7), [3; 7], "the speeds are restored");
         assert_eq!(arm.register(FEEDBACK_FREQUENCY), 0);
@@ -163,6 +164,24 @@ fn a_file_with_an_error_moves_nothing() {
         let text = refused(arm, WAVE, &[]);
         assert!(text.contains("forceless"), "{text}");
         arm.write(MOTOR_STATE, &[1]);
+    });
+}
+
+#[test]
+fn a_movement_that_begins_elsewhere_is_refused_or_approached() {
+    with_arm(TestSetup::any(), |arm| {
+        let far = "7bot-recording 2\n0 120 90 65 90 90 90 80 0\n0.5 125 90 65 90 90 90 80 0\n";
+        let (_folder, recording) = file("far.txt", far);
+        arm.drive_to(&STANDARD_POSE);
+        let refused = failed(&arm.sevenbot(&["play", text(&recording)]), 1);
+        assert!(refused.contains("the first point is far from where the arm stands: joint 1"), "{refused}");
+        assert!(refused.contains("from 120.00°") && refused.contains("--approach SECONDS"), "{refused}");
+        assert_eq!(arm.read(TARGET_POSITION, 7), STANDARD_POSE);
+        let looped = ["play", text(&recording), "--approach", "1", "--loop=2", "--json"];
+        assert!(succeeded(arm.sevenbot(&looped)).contains("\"times\":2"));
+        assert_eq!((arm.read(TARGET_POSITION, 1), arm.read(SPEED, 7)), (vec![125], vec![60; 7]));
+        failed(&arm.sevenbot(&["play", text(&recording), "--approach", "0"]), 2);
+        arm.drive_to(&STANDARD_POSE);
     });
 }
 

@@ -93,6 +93,56 @@ fn reach_is_checked_without_an_arm() {
 }
 
 #[test]
+fn the_guard_is_checked_without_an_arm() {
+    let dry = |words: &[&str]| -> Output {
+        run_without_arm(&[&["--port", "/nonexistent", "move-to"], words, &["--dry-run"]].concat())
+    };
+    let text = failed(&dry(&["0", "185", "-100"]), 1);
+    assert!(text.contains("the tip would be 40.0 mm below the table at z = -60 mm"), "{text}");
+    assert!(text.contains("the nearest allowed point is 0 185 -60 mm, 40.0 mm away"), "{text}");
+    assert!(text.contains("--table Z") && text.contains("--no-guard"), "what to do: {text}");
+    succeeded(dry(&["0", "185", "-60"]));
+    succeeded(dry(&["0", "185", "-100", "--table", "-120"]));
+    succeeded(dry(&["0", "185", "-100", "--no-guard"]));
+    failed(&dry(&["0", "185", "50", "--table", "55.5"]), 1);
+    failed(&dry(&["0", "185", "50", "--table", "40", "--no-guard"]), 2);
+    // The nearest point to the middle of the base is not within the base.
+    let text = failed(&dry(&["0", "0", "0"]), 1);
+    let (_, nearest) = text.split_once("nearest point within reach is ").expect("a point");
+    let point: Vec<&str> = nearest.split_whitespace().take(3).collect();
+    succeeded(dry(&[point[0], point[1], point[2]]));
+    let text = failed(&dry(&["0", "100", "-40"]), 1);
+    assert!(text.contains("inside the space of the base"), "{text}");
+}
+
+#[test]
+fn the_way_to_a_point_is_guarded_and_joints_only_warn() {
+    with_arm(TestSetup::any(), |arm| {
+        arm.drive_to(&[105, 88, 110, 90, 135, 90, 80]);
+        let before = arm.read(TARGET_POSITION, 7);
+        // Both ends are 5 mm above this table, and the line between them.
+        let line = ["move-to", "50", "185", "50", "--table", "45", "--straight", "--dry-run"];
+        succeeded(arm.sevenbot(&line));
+        // Joint 1 arrives last, so the tip is lower than both ends on the way to a point further away.
+        let text = failed(&arm.sevenbot(&["move-to", "0", "300", "0", "--straight", "--table", "30"]), 1);
+        assert!(
+            text.contains("below the table at z = 30 mm") && text.contains("nothing was moved"),
+            "{text}"
+        );
+        assert_eq!(arm.read(TARGET_POSITION, 7), before);
+        let into_base = ["pose", "90", "140", "180", "90", "90", "90", "80", "--speed", "1"];
+        let warned = arm.sevenbot(&into_base);
+        let text = all_output(&warned);
+        assert_eq!(warned.status.code(), Some(0), "{text}");
+        assert!(text.contains("warning: ") && text.contains("--no-guard ends this warning"), "{text}");
+        let quiet = arm.sevenbot(&["home", "--no-guard", "--speed", "60", "--wait"]);
+        assert!(!all_output(&quiet).contains("warning"), "{}", all_output(&quiet));
+        arm.write(SPEED, &[60; 7]);
+        arm.drive_to(&STANDARD_POSE);
+    });
+}
+
+#[test]
 fn ctrl_c_holds_an_arm_on_its_way_to_a_point() {
     with_arm(TestSetup::any(), |arm| {
         arm.drive_to(&STANDARD_POSE);

@@ -103,6 +103,23 @@ fn scan_tries_all_ids_through_a_slow_adapter() {
 }
 
 #[test]
+fn registers_are_read_and_written_by_name() {
+    let bus = SimulatedAdapter::start(&[], 0);
+    let text = succeeded(bus.servo(&["get", "1", "id", "max-torque"]));
+    assert_eq!(words(&text, "5 "), ["5", "id", "1"]);
+    let text = succeeded(bus.servo(&["set", "1", "max-torque", "600"]));
+    assert_eq!(words(&text, "16")[..3], ["16", "max-torque", "600"]);
+    let text = failed(&bus.servo(&["set", "1", "max-torque", "1001"]), 2);
+    assert!(text.contains("max-torque takes 0 to 1000; nothing was written"), "{text}");
+    failed(&bus.servo(&["set", "1", "status", "0"]), 2);
+    failed(&bus.servo(&["set", "1", "goal-position", "500"]), 2);
+    let text = succeeded(bus.servo(&["dump", "1"]));
+    assert_eq!(words(&text, "48")[..4], ["48", "lock", "1", "locked"]);
+    let toml = succeeded(bus.servo(&["dump", "1", "--format", "toml"]));
+    assert!(toml.contains("max-torque = 600") && !toml.contains("present-position"), "{toml}");
+}
+
+#[test]
 fn scan_tries_other_rates() {
     let bus = SimulatedAdapter::start_at(115_200, &["--servo-baud", "115200", "--ids", "1"], 1);
     let rates = ["--rates", "1000000,115200,38400", "--ids", "0-3", "--wait", "500"];

@@ -73,7 +73,8 @@ fn a_hand_a_weight_and_the_power_switch_act_on_the_arm() {
     assert!(refusal.contains("has torque") && refusal.contains("JOINT=stuck"), "{refusal}");
     simulator.says(&["weight", "150g"]);
     wait::wait_until("the forearm carries it", || {
-        simulator.joint(3, "load_percent").as_f64().expect("a load").abs() > 40.0
+        // 14 % without the weight, and 17 % for it.
+        simulator.joint(3, "load_percent").as_f64().expect("a load").abs() > 27.0
     });
     assert_eq!(simulator.state()["weight_grams"], 150);
     arm.write(MOTOR_STATE, &[2]);

@@ -169,7 +169,7 @@ fn a_movement_is_recorded_by_hand_and_played() {
     assert!(target < 45 && target.abs_diff(present) <= 1, "target {target}, present {present}");
     fs::write(&file, "7bot-recording 1\n0.0 90 90 65 90 90 90 80 0\n0.5 110 90 65 90 90 90 80 1\n")
         .expect("a file");
-    succeeded(arm.sevenbot(&["play", &file]));
+    succeeded(arm.sevenbot(&["play", &file, "--approach", "2"]));
     assert!(succeeded(arm.sevenbot(&["get", "vacuum-pump"])).contains("suck"));
 }
 

@@ -5,7 +5,7 @@ mod tool_output;
 use std::io::{Read, Write};
 use std::process::{Child, ChildStdin, Output, Stdio};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use system_tests::process::{Signal, send_signal, start, wait_for_exit};
 use system_tests::programs::{host_sim, tool};
@@ -34,13 +34,13 @@ fn start_stream(arm: &mut TestArm, options: &[&str]) -> Child {
     tool.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("sevenbot runs")
 }
 
-/// Starts `sevenbot stream` with a point far away, and waits until it is sent. The joint needs 6 s.
+/// Starts `sevenbot stream` with a point far away, and waits until the first one is sent. The joint turns by 6 degrees/s.
 fn start_slow_stream(arm: &mut TestArm) -> (Child, ChildStdin) {
     arm.write(SPEED, &[5]);
     assert_eq!(arm.register(SPEED), 5);
     let mut tool = start_stream(arm, &["--verbose"]);
     let mut lines = tool.stdin.take().expect("a pipe");
-    lines.write_all(b"0,150,90,65,90,90,90,80\n").expect("the tool reads");
+    lines.write_all(b"0,90,90,65,90,90,90,80\n10,150,90,65,90,90,90,80\n").expect("the tool reads");
     let mut stderr = tool.stderr.take().expect("a pipe");
     let mut received = Vec::new();
     while !String::from_utf8_lossy(&received).contains("-> write fine-target") {
@@ -82,8 +82,35 @@ fn d23_points_of_both_forms_move_the_arm_in_hundredths() {
         assert_eq!(arm.read(STREAM_REGISTERS, 6), [50, 0, 0, 0, 0, 0], "as before");
         assert_eq!(arm.register(FEEDBACK_FREQUENCY), 0);
         arm.write(STREAM_REGISTERS, &[0, 0]);
-        let text = succeeded(stream(arm, &["--period", "40"], "0,90,90,65,90,90,90,80\n"));
+        let text = succeeded(stream(arm, &["--period", "40", "--approach", "1"], "0,90,90,65,90,90,90,80\n"));
         assert!(text.contains("sent      1 points, one each 40 ms") && text.contains("jitter"), "{text}");
+        arm.drive_to(&STANDARD_POSE);
+    });
+}
+
+#[test]
+fn a_first_point_far_away_is_refused_unless_it_is_approached() {
+    with_arm(TestSetup::any(), |arm| {
+        arm.drive_to(&STANDARD_POSE);
+        // The speed that `pose --time` leaves behind.
+        arm.write(SPEED, &[0; 7]);
+        let far = "0,150,90,65,90,90,90,20\n";
+        let text = failed(&stream(arm, &[], far), 1);
+        assert!(text.contains("from 150.00°") && text.contains("joint 7 is at"), "{text}");
+        assert!(text.contains("--approach SECONDS"), "the way out: {text}");
+        assert_eq!(
+            (arm.read(TARGET_POSITION, 7), arm.read(STREAM_REGISTERS, 4)),
+            (STANDARD_POSE.to_vec(), vec![0; 4])
+        );
+        let begin = Instant::now();
+        succeeded(stream(arm, &["--approach", "1.5"], far));
+        assert!(begin.elapsed() >= Duration::from_millis(1500));
+        assert_eq!([1, 7].map(|joint| fine_target(arm, joint)), [15_000, 2_000]);
+        // Joint 2 has its first point in the second line.
+        let later = "0,150,,65,90,90,90,20\n0.1,150,60,65,90,90,90,20\n0.2,150,60,65,90,90,90,20\n";
+        let text = failed(&stream(arm, &[], later), 1);
+        assert!(text.contains("joint 2 is at"), "{text}");
+        arm.write(SPEED, &[60; 7]);
         arm.drive_to(&STANDARD_POSE);
     });
 }
@@ -127,7 +154,7 @@ fn d24_a_killed_stream_leaves_an_arm_that_holds_and_takes_the_next_client() {
             "nothing fell: {others:?}"
         );
         arm.write(SPEED, &[60]);
-        let next = stream(arm, &[], "0,90,90,65,90,90,90,80\n1,90.5,90,65,90,90,90,80\n");
+        let next = stream(arm, &["--approach", "1"], "0,90,90,65,90,90,90,80\n1,90.5,90,65,90,90,90,80\n");
         assert_eq!(next.status.code(), Some(0), "{}", all_output(&next));
         assert_eq!(fine_target(arm, 1), 9_050);
         assert_eq!(arm.read(STREAM_REGISTERS, 4), [0; 4], "what the dead program left is switched off");

@@ -1,11 +1,12 @@
 //! What the registers say of an arm, in units.
 
+use sevenbot::cartesian::{Breach, Guard, JointPath, Obstacle};
 use sevenbot::map::{
     EXTENDED_VERSION, FAULTS, FINE_POSITION, FINE_TARGET, LOAD, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS,
-    PRESENT_POSITION, SERVO_TEMPERATURE, STATUS_VERSION, SUPPLY_VOLTAGE, TARGET_POSITION, VELOCITY,
-    motor_state,
+    PRESENT_POSITION, SERVO_TEMPERATURE, SPEED, STATUS_VERSION, SUPPLY_VOLTAGE, TARGET_POSITION, TIME,
+    VELOCITY, motor_state,
 };
-use sevenbot::{FineAngle, Snapshot};
+use sevenbot::{FineAngle, Health, Joint, MoveTime, Problem, Snapshot, Speed};
 
 /// A joint is stalled at more than this distance from its target, in degrees. Under its load a servo that works is nearer.
 const STALLED_DISTANCE: f32 = 3.0;
@@ -34,6 +35,8 @@ pub struct ArmState {
     /// Joints 1 to 6 that rest away from their target: something holds them, or their servo gives no force. Joint 7 is left out,
     /// because a gripper that holds something rests away from its target, too. 0 from an arm without the extended block.
     pub stalled: u8,
+    /// What needs attention, the most important first.
+    pub problems: Vec<Problem>,
     /// In volts; `None` while unknown.
     pub volts: Option<f32>,
     /// Of the hottest servo, in degrees Celsius; `None` while unknown.
@@ -70,6 +73,7 @@ impl ArmState {
             missing: status(&MISSING_SERVOS),
             moving: status(&MOVING_JOINTS),
             stalled: 0,
+            problems: Health::new(registers).problems(),
             volts: known(status(&SUPPLY_VOLTAGE)).map(|decivolts| f32::from(decivolts) / 10.0),
             celsius: known(status(&SERVO_TEMPERATURE)),
         };
@@ -97,6 +101,39 @@ impl ArmState {
             *angle = measured.unwrap_or(*angle);
         }
         angles
+    }
+}
+
+/// Where the guard of the workspace does not allow the way of the joints to these angles, at the speeds of the registers.
+#[must_use]
+pub fn breach_on_way(registers: &Snapshot, to: [f32; 7]) -> Option<Breach> {
+    let [from, to] = [ArmState::new(registers).angles(), to].map(first_five);
+    let (mut speeds, mut times) = ([Speed::MAXIMUM; 5], [MoveTime::NONE; 5]);
+    for ((speed, time), joint) in speeds.iter_mut().zip(&mut times).zip(Joint::ALL) {
+        *speed = Speed::from_steps(registers.at(SPEED.of(joint))).unwrap_or(*speed);
+        *time = MoveTime::from_steps(registers.at(TIME.of(joint))).unwrap_or(*time);
+    }
+    let path = JointPath::at_pace(from, to, speeds, times);
+    Guard::default().check_path(&path).err().map(|on_way| on_way.breach)
+}
+
+/// What of the arm is below the table or in its base at these angles.
+#[must_use]
+pub fn breach(angles: [f32; 7]) -> Option<Breach> {
+    Guard::default().check_pose(first_five(angles)).err()
+}
+
+fn first_five(angles: [f32; 7]) -> [f64; 5] {
+    let [t1, t2, t3, t4, t5, ..] = angles.map(f64::from);
+    [t1, t2, t3, t4, t5]
+}
+
+/// The name of the text that says what a breach is.
+#[must_use]
+pub const fn breach_text(breach: &Breach) -> &'static str {
+    match breach.obstacle {
+        Obstacle::Table => "below-table",
+        Obstacle::Base => "in-base",
     }
 }
 

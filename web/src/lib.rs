@@ -18,6 +18,7 @@ mod app;
 pub mod arm_state;
 pub mod client;
 pub mod movement;
+pub mod park;
 pub mod plots;
 pub mod scene;
 pub mod source;

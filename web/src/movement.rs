@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use protocol_core::time::Instant;
-use sevenbot::FineAngle;
-use sevenbot::map::{FINE_TARGET, HOST_WATCHDOG, SET_POINT_PERIOD, TARGET_POSITION, VACUUM_PUMP};
+use sevenbot::approach::{Approach, ApproachRule, Standing, StartTooFar};
+use sevenbot::map::{FINE_TARGET, HOST_WATCHDOG, SET_POINT_PERIOD, SPEED, TARGET_POSITION, VACUUM_PUMP};
 use sevenbot::recording::{FileVersion, Moment, Recording, RecordingError, head};
+use sevenbot::{FineAngle, Snapshot, Speed};
 
 use crate::arm_state::{ArmState, has_extended_block};
 use crate::client::Client;
@@ -14,8 +15,6 @@ use crate::client::Client;
 const PERIOD: Duration = Duration::from_millis(20);
 /// The arm holds if the page is silent for this long while it plays: 500 ms, in units of 10 ms (D24).
 const WATCHDOG: u8 = 50;
-/// A joint this near to the first pose, in degrees, has arrived there.
-const ARRIVED: f32 = 3.0;
 
 /// A movement that grows while it is recorded.
 #[derive(Debug)]
@@ -53,11 +52,22 @@ impl Recorder {
     }
 }
 
+/// Why a movement is not played.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlayRefusal {
+    /// The text is no recording.
+    NoRecording(RecordingError),
+    /// It begins too far from where the arm stands.
+    TooFar(StartTooFar),
+}
+
 /// A movement that is played.
 #[derive(Debug)]
 pub struct Player {
     moments: Vec<Moment>,
-    /// When the first moment was reached; `None` on the way there.
+    /// The way to the first moment.
+    approach: Approach,
+    /// When the way began; `None` before the first poll.
     start: Option<Instant>,
     /// When the next point is due.
     due: Instant,
@@ -65,39 +75,55 @@ pub struct Player {
 }
 
 impl Player {
-    /// Parses a recording, to be played from now on.
+    /// Parses a recording, to be played from now on by the arm with these registers. With `approach` the arm goes to the
+    /// first pose in this time, or longer if a joint would exceed its speed.
     ///
     /// # Errors
-    /// The text is no recording.
-    pub fn new(text: &str, now: Instant) -> Result<Self, RecordingError> {
-        let moments = Recording::parse(text)?.moments().collect();
-        Ok(Self { moments, start: None, due: now, vacuum: None })
+    /// The text is no recording; or without `approach` the first pose is further than 5 degrees from where a joint stands.
+    pub fn new(
+        text: &str,
+        registers: &Snapshot,
+        approach: Option<Duration>,
+        now: Instant,
+    ) -> Result<Self, PlayRefusal> {
+        let moments: Vec<Moment> =
+            Recording::parse(text).map_err(PlayRefusal::NoRecording)?.moments().collect();
+        let first = moments.first().map_or([None; 7], |first| first.pose.map(Some));
+        let rule = approach.map_or(ApproachRule::Near, ApproachRule::Within);
+        let approach = Approach::plan(&standing(registers), &first, rule).map_err(PlayRefusal::TooFar)?;
+        Ok(Self { moments, approach, start: None, due: now, vacuum: None })
     }
 
     /// How much was played, from 0 to 1.
     #[must_use]
     pub fn progress(&self, now: Instant) -> f64 {
         let Some((start, last)) = self.start.zip(self.moments.last()) else { return 0.0 };
-        let elapsed = Duration::from_micros((now - start).as_micros());
-        (elapsed.as_secs_f64() / last.time.as_secs_f64().max(0.001)).min(1.0)
+        let played = elapsed(start, now).saturating_sub(self.approach.duration());
+        (played.as_secs_f64() / last.time.as_secs_f64().max(0.001)).min(1.0)
     }
 
-    /// Writes the points that are due. First sends the arm to the first pose, at the speed of its registers. False once the
-    /// movement is over.
+    /// Writes the points that are due: of the way to the first pose, then of the movement. False once it is over.
     pub fn poll(&mut self, now: Instant, client: &mut Client) -> bool {
         let (Some(first), Some(last)) = (self.moments.first().copied(), self.moments.last().copied()) else {
             return false;
         };
         let is_fine = has_extended_block(client.registers());
-        let Some(start) = self.start else {
-            self.approach(now, client, &first, is_fine);
-            return true;
-        };
+        let start = self.start.unwrap_or_else(|| {
+            begin(client, now);
+            now
+        });
+        self.start = Some(start);
         if now < self.due {
             return true;
         }
         self.due = now + protocol_core::time::Duration::from_micros(20_000);
-        let time = Duration::from_micros((now - start).as_micros()) + first.time;
+        let Some(played) = elapsed(start, now).checked_sub(self.approach.duration()) else {
+            let way =
+                self.approach.at(elapsed(start, now)).map(|angle| angle.map_or(0.0, FineAngle::degrees));
+            write_pose(client, now, &way, is_fine);
+            return true;
+        };
+        let time = played + first.time;
         write_pose(client, now, &at(&self.moments, time), is_fine);
         let vacuum = self.moments.iter().rev().find(|moment| moment.time <= time).map(|moment| moment.vacuum);
         if vacuum != self.vacuum {
@@ -110,25 +136,29 @@ impl Player {
         }
         !is_over
     }
+}
 
-    fn approach(&mut self, now: Instant, client: &mut Client, first: &Moment, is_fine: bool) {
-        let pose = first.pose.map(|angle| angle.degrees());
-        let near = |(angle, wanted): (f32, f64)| (f64::from(angle) - wanted).abs() < f64::from(ARRIVED);
-        let state = client.state();
-        let has_targets = state.targets.into_iter().zip(pose).all(|(target, wanted)| near((target, wanted)));
-        if !has_targets && now >= self.due {
-            self.due = now + protocol_core::time::Duration::from_micros(500_000);
-            write_pose(client, now, &pose, is_fine);
-        }
-        if has_targets && state.moving & !state.missing == 0 {
-            self.start = Some(now);
-            self.due = now;
-            if is_fine {
-                let [low, high] = u16::try_from(PERIOD.as_millis()).unwrap_or(0).to_le_bytes();
-                client.write(now, SET_POINT_PERIOD.address, &[low, high]);
-                client.write(now, HOST_WATCHDOG.address, &[WATCHDOG]);
-            }
-        }
+/// Where the arm with these registers stands.
+fn standing(registers: &Snapshot) -> Standing {
+    let state = ArmState::new(registers);
+    let speeds = registers.joints(&SPEED).map(|steps| Speed::from_steps(steps).unwrap_or(Speed::MAXIMUM));
+    Standing {
+        measured: state.measured.map(|angle| angle.map(f64::from)),
+        targets: state.targets.map(f64::from),
+        speeds,
+    }
+}
+
+fn elapsed(start: Instant, now: Instant) -> Duration {
+    Duration::from_micros((now - start).as_micros())
+}
+
+/// Begins the stream of a player, if the arm takes one.
+fn begin(client: &mut Client, now: Instant) {
+    if has_extended_block(client.registers()) {
+        let [low, high] = u16::try_from(PERIOD.as_millis()).unwrap_or(0).to_le_bytes();
+        client.write(now, SET_POINT_PERIOD.address, &[low, high]);
+        client.write(now, HOST_WATCHDOG.address, &[WATCHDOG]);
     }
 }
 
@@ -180,14 +210,37 @@ mod tests {
 
     #[test]
     fn points_lie_on_straight_lines() {
-        let player = Player::new(WAVE, seconds(0)).expect("a recording");
+        let player = Player::new(WAVE, &registers(9_005), None, seconds(0)).expect("a recording");
         let first = |millis| at(&player.moments, Duration::from_millis(millis))[0];
         assert_eq!([0, 1_000, 2_000, 9_000].map(first), [90.0, 105.25, 120.5, 120.5]);
     }
 
+    /// The registers of an arm in its standard pose, but for joint 1, whose angle is in hundredths of a degree.
+    fn registers(joint_1: u16) -> Snapshot {
+        let mut registers = Snapshot { address: 0, values: vec![0; 256] };
+        let angles = [joint_1, 9_000, 6_500, 9_000, 9_000, 9_000, 8_000].map(u16::to_le_bytes);
+        for first in [128, 142] {
+            registers.values[first..first + 14].copy_from_slice(angles.as_flattened());
+        }
+        registers.values[191] = 1;
+        registers
+    }
+
+    #[test]
+    fn a_movement_that_begins_elsewhere_is_refused_or_approached() {
+        let refused = Player::new(WAVE, &registers(10_000), None, seconds(0)).expect_err("10 degrees");
+        let PlayRefusal::TooFar(far) = refused else { panic!("{refused:?}") };
+        assert_eq!((far.joints.len(), far.joints[0].1, far.joints[0].2), (1, 100.0, 90.0));
+        let way = Some(Duration::from_secs(2));
+        let player = Player::new(WAVE, &registers(10_000), way, seconds(0)).expect("a way");
+        assert_eq!(player.approach.duration(), Duration::from_secs(2));
+        let near = Player::new(WAVE, &registers(9_400), None, seconds(0)).expect("near");
+        assert_eq!(near.approach.duration(), Duration::from_millis(200));
+    }
+
     #[test]
     fn a_recording_is_a_file_of_the_command_line() {
-        let mut registers = sevenbot::Snapshot { address: 0, values: vec![0; 256] };
+        let mut registers = Snapshot { address: 0, values: vec![0; 256] };
         registers.values[142..156].copy_from_slice(&[0x2D, 0x23].repeat(7));
         registers.values[191] = 1;
         let mut recorder = Recorder::new(seconds(1));
@@ -204,6 +257,7 @@ mod tests {
 
     #[test]
     fn a_file_that_is_no_recording_is_refused() {
-        assert!(Player::new("hello", seconds(0)).is_err());
+        let refused = Player::new("hello", &registers(9_000), None, seconds(0)).expect_err("no recording");
+        assert_eq!(refused, PlayRefusal::NoRecording(RecordingError::NotARecording));
     }
 }

@@ -1,4 +1,6 @@
-//! Every text of the page, in English and Chinese.
+//! Every text of the page, in English and Chinese. The English words for what is wrong, and what to do, are those of the library.
+
+use sevenbot::{Problem, ProblemKind};
 
 /// A language of the page.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,6 +51,75 @@ impl Language {
     }
 }
 
+impl Language {
+    /// What is wrong, and what to do.
+    #[must_use]
+    pub fn problem(self, problem: Problem) -> String {
+        if self == Self::English {
+            let (what, remedy) = (problem.to_string(), problem.kind.remedy());
+            let mut first = what.chars();
+            let capital = first.next().map(char::to_uppercase).into_iter().flatten();
+            return format!("{}{}. To do: {remedy}.", capital.collect::<String>(), first.as_str());
+        }
+        let (words, remedy) = chinese(problem.kind);
+        let joint = problem.joint.map(|joint| format!("关节 {} ", joint.number())).unwrap_or_default();
+        format!("{joint}{words}：{remedy}。")
+    }
+}
+
+/// The translation of the library's words and remedies.
+const fn chinese(kind: ProblemKind) -> (&'static str, &'static str) {
+    match kind {
+        ProblemKind::Restarted => {
+            ("控制器已重启，机械臂保持在原处", "请查找原因（供电、连接线、程序故障），然后重新运行程序")
+        }
+        ProblemKind::SupplyLost => {
+            ("舵机曾断电，电机保持关闭", "请确认机械臂周围没有障碍物，然后按“保持”打开电机：机械臂会停在原处")
+        }
+        ProblemKind::NoServoAnswers => ("所有舵机都没有应答", "请复位急停开关，检查舵机供电和舵机总线连接线"),
+        ProblemKind::NoAnswer => {
+            ("没有应答，位置未知", "请检查该舵机的插头和连接线；舵机可能仍在用力，请勿靠近")
+        }
+        ProblemKind::LetGo => (
+            "已松开，舵机没有保持力",
+            "请托住机械臂并排除原因（负载、过热、供电、插头松动）；若没有自行恢复，请按“保持”",
+        ),
+        ProblemKind::Blocked => (
+            "被挡住，无法到达目标位置",
+            "请移开障碍物，下一个目标会重新尝试（夹爪夹住物体时，请将末端类型设为 1）",
+        ),
+        ProblemKind::Overload => {
+            ("有舵机过载，可能已自行关闭", "请减轻负载或移开障碍物，让关节休息；若报警仍在，请按“保持”")
+        }
+        ProblemKind::Overheat => {
+            ("有舵机过热", "请让其冷却几分钟：减轻负载，换省力的姿态，或托住机械臂后关闭电机")
+        }
+        ProblemKind::Voltage => {
+            ("有舵机供电过低或过高", "请检查舵机供电：带负载时应为 6 至 8.4 V，并检查插头和导线")
+        }
+        ProblemKind::ServoBus => (
+            "有舵机报告错误，此固件无法说明是哪一个",
+            "请检查过载、过热和供电；过载时请托住机械臂，先按“松开”，再按“保持”",
+        ),
+        ProblemKind::HostSilent => {
+            ("控制程序没有继续发送，机械臂的看门狗已动作", "请重新运行程序：下一次发送会清除此提示")
+        }
+        ProblemKind::SettingsStorage => {
+            ("设置无法存储或读取", "请将控制器断电重启；若仍出现，请另存设置：闪存可能已磨损")
+        }
+        ProblemKind::WatchdogRestart => {
+            ("控制器曾停止响应并已重启", "请将控制器断电重启以清除此提示，并报告当时的情况")
+        }
+        ProblemKind::BrownOutRestart => ("控制器因供电下降而重启", "请检查控制器供电；断电重启可清除此提示"),
+        ProblemKind::CrystalFailed => {
+            ("控制器晶振故障，时钟不准", "机械臂最多只能在室温下工作：请维修控制板")
+        }
+        ProblemKind::ReceiveOverrun => {
+            ("数据到达过快，部分字节丢失", "请降低波特率或减少发送；断电重启可清除此提示")
+        }
+    }
+}
+
 /// Names, English, Chinese.
 const TEXTS: &[(&str, &str, &str)] = &[
     ("source", "Arm", "机械臂"),
@@ -82,6 +153,18 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("motors-on", "hold", "保持"),
     ("motors-off", "limp", "松开"),
     ("motors-damp", "damped", "阻尼"),
+    ("park", "park", "停放"),
+    (
+        "parking",
+        "The arm goes to its park pose, and is let go there.",
+        "机械臂正在移动到停放姿态，然后松开。",
+    ),
+    ("parked", "Parked: the motors are off, and the arm stays.", "已停放：电机已关闭，机械臂保持不动。"),
+    (
+        "park-failed",
+        "Not parked: the arm did not get there or did not stay, so it holds.",
+        "停放失败：机械臂未到达或未能保持，现已保持不动。",
+    ),
     ("recording", "Movements", "动作"),
     (
         "recording-hint",
@@ -92,6 +175,13 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("play", "Play", "播放"),
     ("download", "Save", "保存"),
     ("upload", "Open…", "打开…"),
+    ("approach", "go to its start in (s)", "先移动到起点（秒）"),
+    (
+        "too-far",
+        "The movement begins more than 5° from where the arm stands, so it is not played. Move these joints, or type the \
+         seconds for the way there:",
+        "动作起点与机械臂当前位置相差超过 5°，未播放。请移动以下关节，或填写移动到起点的秒数：",
+    ),
     ("recorded", "recorded", "已录制"),
     ("no-recording", "nothing recorded yet", "尚未录制"),
     ("playing", "playing", "播放中"),
@@ -107,6 +197,8 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("fault-where", "Servo", "舵机"),
     ("fault-what", "Fault", "故障"),
     ("fault-missing", "does not answer", "无应答"),
+    ("fault-wall", "meets a wall at 60°", "碰到 60° 处的墙"),
+    ("fault-push", "is pushed (0.8 N m)", "被手推（0.8 N·m）"),
     ("fault-stuck", "is stuck", "卡住"),
     ("fault-garbled", "answers with damaged bytes", "应答字节损坏"),
     ("weak-supply", "Weak supply", "供电不足"),
@@ -179,33 +271,9 @@ const TEXTS: &[(&str, &str, &str)] = &[
         "机械臂没有应答。请检查电源和连接线。",
     ),
     (
-        "missing",
-        "These servos do not answer, check their cables: joint",
-        "以下舵机没有应答，请检查连接线：关节",
-    ),
-    (
         "stalled",
         "Not at its target. Look for what holds it, then press limp, then hold: joint",
         "以下关节未到达目标位置，请检查是否被卡住，然后先按“松开”，再按“保持”：关节",
-    ),
-    (
-        "fault-servo-bus",
-        "A servo reports overload, heat or a wrong supply. Press limp, then hold, to end an overload.",
-        "有舵机报告过载、过热或供电异常。过载时请先按“松开”，再按“保持”。",
-    ),
-    (
-        "fault-host-silent",
-        "The program that moved the arm fell silent, so the arm holds.",
-        "控制程序没有继续发送，机械臂保持不动。",
-    ),
-    ("fault-settings", "Settings could not be stored or read.", "设置无法存储或读取。"),
-    ("fault-brown-out", "The controller restarted after a drop of its supply.", "控制器因供电下降而重启。"),
-    ("fault-watchdog", "The controller hung and restarted.", "控制器曾停止响应并已重启。"),
-    ("fault-crystal", "The clock of the controller failed: it needs service.", "控制器晶振故障，需要维修。"),
-    (
-        "fault-overrun",
-        "Bytes came faster than the controller could take them.",
-        "数据到达过快，控制器来不及接收。",
     ),
     ("supply", "Supply", "供电"),
     ("temperature", "hottest servo", "最热舵机"),
@@ -213,6 +281,8 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("no-answer", "no answer", "无应答"),
     ("tip", "Tip", "末端"),
     ("unreachable", "out of reach", "无法到达"),
+    ("below-table", "below the table", "低于桌面"),
+    ("in-base", "in the space of the base", "进入底座区域"),
     (
         "no-serial",
         "This browser cannot open USB ports. Chrome and Edge can; or run `sevenbot view` beside the arm.",
@@ -240,6 +310,18 @@ mod tests {
         for (name, english, chinese) in TEXTS {
             assert!(names.insert(name), "{name} stands twice");
             assert!(!english.is_empty() && !chinese.is_empty());
+        }
+    }
+
+    #[test]
+    fn every_problem_is_told_with_what_to_do() {
+        let blocked = Problem { kind: ProblemKind::Blocked, joint: sevenbot::Joint::new(2) };
+        let english = Language::English.problem(blocked);
+        assert!(english.starts_with("Joint 2 is blocked") && english.contains("To do: remove"), "{english}");
+        assert!(Language::Chinese.problem(blocked).starts_with("关节 2 被挡住"));
+        for kind in ProblemKind::ALL {
+            let (words, remedy) = chinese(kind);
+            assert!(!words.is_empty() && !remedy.is_empty());
         }
     }
 

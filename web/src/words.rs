@@ -1,10 +1,14 @@
 //! What the page says of the arm, in one line.
 
-use sevenbot::map::{fault, motor_state};
+use sevenbot::ProblemKind;
+use sevenbot::map::motor_state;
 
 use crate::arm_state::ArmState;
 use crate::stop::StopProgress;
 use crate::texts::Language;
+
+/// So many problems are told at a time: the line is short.
+const PROBLEMS_SHOWN: usize = 2;
 
 /// Is the news good, bad or neither?
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,15 +64,15 @@ pub fn state_line(
         StopProgress::Verifying => return plain("stopping"),
         _ => {}
     }
-    let named = |name, bits| (format!("{} {}", language.text(name), joints(bits)), Mood::Bad);
-    if state.missing != 0 {
-        return named("missing", state.missing);
-    }
-    if state.stalled != 0 {
-        return named("stalled", state.stalled);
-    }
-    if state.faults != 0 {
-        return (faults(language, state.faults), Mood::Bad);
+    let stalled = || format!("{} {}", language.text("stalled"), joints(state.stalled));
+    // A joint that rests away from its target tells more than the fault of an unknown servo.
+    match state.problems.first() {
+        Some(problem) if problem.kind < ProblemKind::ServoBus || state.stalled == 0 => {
+            let texts = state.problems.iter().take(PROBLEMS_SHOWN).map(|&problem| language.problem(problem));
+            return (texts.collect::<Vec<_>>().join(" "), Mood::Bad);
+        }
+        _ if state.stalled != 0 => return (stalled(), Mood::Bad),
+        _ => {}
     }
     match (stop, state.motor_state) {
         (StopProgress::NotDriven, 0 | 2) => plain("stop-limp"),
@@ -81,21 +85,6 @@ pub fn state_line(
     }
 }
 
-/// What a person should know of these bits of register 241.
-fn faults(language: Language, bits: u8) -> String {
-    const NAMES: [(u8, &str); 7] = [
-        (fault::SERVO_BUS, "fault-servo-bus"),
-        (fault::HOST_SILENT, "fault-host-silent"),
-        (fault::SETTINGS_STORAGE, "fault-settings"),
-        (fault::BROWN_OUT_RESTART, "fault-brown-out"),
-        (fault::WATCHDOG_RESTART, "fault-watchdog"),
-        (fault::CRYSTAL_FAILED, "fault-crystal"),
-        (fault::RECEIVE_OVERRUN, "fault-overrun"),
-    ];
-    let set = NAMES.into_iter().filter(|(bit, _)| bits & bit != 0);
-    set.map(|(_, name)| language.text(name)).collect::<Vec<_>>().join(" ")
-}
-
 /// The numbers of joints, bit n-1 for joint n.
 fn joints(bits: u8) -> String {
     let numbers = (1..=7).filter(|number| bits >> (number - 1) & 1 == 1);
@@ -106,10 +95,17 @@ fn joints(bits: u8) -> String {
 mod tests {
     use super::*;
 
+    /// An arm with these registers besides those of one that is well.
+    fn with(registers: &[(u8, u8)]) -> ArmState {
+        let mut all = sevenbot::Snapshot { address: 0, values: vec![0; 256] };
+        for &(address, value) in [(29, motor_state::SERVO), (199, 1), (240, 1)].iter().chain(registers) {
+            all.values[usize::from(address)] = value;
+        }
+        ArmState::new(&all)
+    }
+
     fn state() -> ArmState {
-        let mut registers = sevenbot::Snapshot { address: 0, values: vec![0; 256] };
-        registers.values[29] = motor_state::SERVO;
-        ArmState::new(&registers)
+        with(&[])
     }
 
     #[test]
@@ -129,21 +125,27 @@ mod tests {
         assert_eq!(said(&state(), StopProgress::Holds), "Stopped: the arm holds.");
         let moving = ArmState { moving: 1, ..state() };
         assert_eq!(said(&moving, StopProgress::Holds), "The arm is moving.", "it was moved again");
-        let missing = ArmState { missing: 0b101, faults: 1, ..moving };
-        assert!(said(&missing, StopProgress::None).ends_with("joint 1, 3"));
+        let missing = with(&[(242, 0b101), (241, 1), (243, 1)]);
+        let line = said(&missing, StopProgress::None);
+        assert!(line.starts_with("Joint 1 does not answer") && line.contains("Joint 3 does not"), "{line}");
         assert!(said(&missing, StopProgress::Failed).starts_with("The arm did not take the stop."));
-        let overloaded = ArmState { missing: 0, faults: 0b100_0010, ..missing.clone() };
+        let overloaded = with(&[(241, 0b100_0010)]);
         let line = said(&overloaded, StopProgress::None);
-        assert!(line.starts_with("A servo reports") && line.contains("fell silent"), "{line}");
+        assert!(line.starts_with("A servo reports an error") && line.contains("fell silent"), "{line}");
         let stalled = ArmState { stalled: 0b10, ..overloaded };
         assert!(said(&stalled, StopProgress::None).ends_with("then hold: joint 2"));
+        let blocked = with(&[(195, 0b10), (196, 0b100), (197, 0b100)]);
+        let line = said(&blocked, StopProgress::None);
+        assert!(line.starts_with("Joint 3 let go") && line.contains("Joint 2 is blocked"), "{line}");
+        let supply = with(&[(198, 1), (29, 0)]);
+        assert!(said(&supply, StopProgress::None).starts_with("The servos lost their supply"));
         let limp = ArmState { motor_state: 2, ..state() };
         assert!(said(&limp, StopProgress::NotDriven).contains("nothing to stop"));
     }
 
     #[test]
     fn a_silent_arm_is_said_first() {
-        let missing = ArmState { missing: 1, ..state() };
+        let missing = with(&[(242, 1)]);
         let (line, mood) = state_line(Language::English, Answers::NoLonger, &missing, StopProgress::None);
         assert!(line.starts_with("The arm does not answer") && mood == Mood::Bad);
     }

@@ -5,13 +5,14 @@ use arm_sim::controller::ArmController;
 use arm_sim::faults::{ArmFault, FaultLocation};
 use arm_sim::plant::HEAVIEST_LOAD_G;
 use arm_sim::plant::Plant;
+use arm_sim::servo::Trip;
 use embedded_storage::nor_flash::NorFlash;
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 use serde_json::{Value, json};
 
-use super::request::{Grip, HandAction, Power, Refusal, Request, SpeedFactor};
+use super::request::{Alarm, Grip, HandAction, Power, Refusal, Request, SpeedFactor};
 use super::state;
 use crate::pty_arm::PtyArm;
 use crate::virtual_clock::{Speed, VirtualClock};
@@ -139,6 +140,11 @@ fn change<F: NorFlash + Clone, C: ArmController>(
         Request::Clear { at } => end_faults(arm, now, at.as_deref()),
         Request::Hand { joint, to } => hand(arm, now, joint, to),
         Request::Weight { grams } => weight(arm, now, grams),
+        Request::Drop => {
+            let ended = arm.act(now, Action::Drop);
+            Ok(json!({ "ended": state::reports(&ended, now) }))
+        }
+        Request::Trip { joint, alarm } => trip(arm, now, joint, alarm),
         Request::Power { to } => power(arm, now, to),
         Request::Restart => {
             needs_power(arm).map(|arm| arm.act(now, Action::RestartController)).map(|_| json!({}))
@@ -206,6 +212,27 @@ fn hand<F: NorFlash + Clone, C: ArmController>(
     arm.act(now, action);
     let plant = arm.simulation_mut().plant();
     Ok(json!({ "has_torque": has_torque, "angle_degrees": f64::from(plant.angle(joint)) / 1_000.0 }))
+}
+
+fn trip<F: NorFlash + Clone, C: ArmController>(
+    arm: &mut PtyArm<F, Plant, C>,
+    now: Instant,
+    joint: u8,
+    alarm: Alarm,
+) -> Result<Value, Refusal> {
+    let joint = Joint::new(joint).ok_or_else(|| Refusal::new("no such joint", "joints are 1 to 7"))?;
+    let trip = match alarm {
+        Alarm::Overload if !arm.simulation_mut().plant().has_torque(joint) => {
+            return Err(Refusal::new(
+                "the joint has no torque, so its servo cannot be overloaded",
+                "switch the motors on first (motor state 1), or use the alarm heat",
+            ));
+        }
+        Alarm::Overload => Trip::Overload,
+        Alarm::Heat => Trip::Heat,
+    };
+    arm.act(now, Action::Trip(joint, trip));
+    Ok(json!({}))
 }
 
 /// The position of a joint's servo in counts.

@@ -33,6 +33,16 @@ pub enum Request {
         /// The weight; 0 takes it away.
         grams: u16,
     },
+    /// Drops what is in the gripper: the thing between the claws, and the weight.
+    Drop,
+    /// Forces an alarm on a servo.
+    Trip {
+        /// The joint, 1 to 7.
+        joint: u8,
+        /// The alarm; an overload without it.
+        #[serde(default)]
+        alarm: Alarm,
+    },
     /// Switches the power.
     Power {
         /// The state of the power.
@@ -68,6 +78,17 @@ pub enum Request {
     },
     /// Asks for the state of the arm.
     State,
+}
+
+/// An alarm that is forced on a servo.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Alarm {
+    /// It latches an overload: free until its torque is switched off and on.
+    #[default]
+    Overload,
+    /// It is 5 degrees Celsius hotter than its limit: free until it has cooled down.
+    Heat,
 }
 
 /// What a hand does with a joint.

@@ -9,12 +9,14 @@ pub(crate) mod info;
 pub(crate) mod model;
 pub(crate) mod monitor;
 pub(crate) mod move_to;
+pub(crate) mod park;
 pub(crate) mod play;
 pub(crate) mod plot;
 pub(crate) mod ports;
 pub(crate) mod pose;
 pub(crate) mod position;
 pub(crate) mod record;
+pub(crate) mod recover;
 pub(crate) mod registers;
 #[cfg(target_os = "linux")]
 pub(crate) mod serve;
@@ -25,6 +27,7 @@ pub(crate) mod shell;
 pub(crate) mod sim;
 pub(crate) mod sniff;
 pub(crate) mod state;
+pub(crate) mod status;
 pub(crate) mod stop;
 pub(crate) mod stream;
 #[cfg(target_os = "linux")]

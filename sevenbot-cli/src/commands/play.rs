@@ -12,10 +12,13 @@ use std::time::Duration;
 use clap::{Args, value_parser};
 use serde::Serialize;
 use sevenbot::Arm;
+use sevenbot::approach::ApproachRule;
 use sevenbot::moves::Player;
 use sevenbot::recording::Recording;
 
+use crate::approach_args::ApproachArgs;
 use crate::command_error::CommandError;
+use crate::guard_args::{GuardArgs, warn_of};
 use crate::interrupt::hold_on_interrupt;
 use crate::plot::{self, Track};
 use crate::printer::Printable;
@@ -24,17 +27,24 @@ use crate::watch::{Watch, note_rounding_of};
 
 /// Play a recorded movement.
 ///
-/// The whole file is checked before the arm moves. The arm moves slowly to the first pose. Ctrl-C makes it hold its
-/// position.
+/// The whole file is checked before the arm moves, and that it begins within 5 degrees of where each joint stands. Ctrl-C
+/// makes the arm hold its position.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   sevenbot play wave.txt
+  sevenbot play wave.txt --approach 3          goes to the first pose in 3 s
   sevenbot play wave.txt --speed 0.5 --loop=3
   sevenbot play wave.txt --plot wave.svg       plots targets and measured positions
 
 An arm with this project's firmware gets a point in hundredths of a degree each 20 ms, and its watchdog makes it
-hold if this program dies. Others get whole degrees and speeds each 50 ms.")]
+hold if this program dies. Others get whole degrees and speeds each 50 ms.
+
+A first pose within 5 degrees is approached at 30 degrees per second. Further away it is refused with the distance of each
+joint, unless --approach goes there first; with --loop, the same holds for the way from the last pose to the first.
+
+A recording that leads below the table or into the base is played with a warning; `sevenbot move-to --help` describes
+this guard.")]
 pub(crate) struct PlayArgs {
     /// A recording of `sevenbot record`, or one written by hand.
     file: PathBuf,
@@ -48,6 +58,10 @@ pub(crate) struct PlayArgs {
     /// Write an SVG plot of the targets and the measured positions of the first run.
     #[arg(long, value_name = "SVG")]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    approach: ApproachArgs,
+    #[command(flatten)]
+    guard: GuardArgs,
 }
 
 /// The result of `play`.
@@ -67,10 +81,13 @@ impl Printable for Played {
 
 pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), CommandError> {
     let recording = load(args)?;
+    if let Some(breach) = args.guard.guard().and_then(|guard| guard.check_recording(&recording).err()) {
+        warn_of(&breach);
+    }
     let mut arm = session.connect()?;
     arm.driven_joints()?;
     note_rounding_of(&recording, &mut arm)?;
-    let mut player = Player::new(&recording, args.speed);
+    let mut player = Player::new(&recording, args.speed).with_approach(args.approach.rule());
     let done = play(&mut player, &mut arm, args.times.unwrap_or(1));
     if let Some(path) = &args.plot {
         let svg = drawing(&recording, &player, args);
@@ -81,10 +98,10 @@ pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), CommandE
     session.printer.print(&Played { times: player.played(), seconds })
 }
 
-/// Makes an arm follow a planned movement once. Restores the speeds and times that it had before.
+/// Makes an arm follow a movement once that was planned from its targets. Restores the speeds and times that it had before.
 pub(super) fn follow(arm: &mut Arm, recording: &Recording) -> Result<(), CommandError> {
     arm.driven_joints()?;
-    play(&mut Player::new(recording, 1.0), arm, 1)
+    play(&mut Player::new(recording, 1.0).with_approach(ApproachRule::Slowly), arm, 1)
 }
 
 fn play(player: &mut Player, arm: &mut Arm, times: u32) -> Result<(), CommandError> {

@@ -12,6 +12,7 @@ use sevenbot::moves::{JointMove, Pace};
 use sevenbot::{Angle, Arm, FineAngle, Joint, MoveTime, Speed};
 
 use crate::command_error::CommandError;
+use crate::guard_args::GuardArgs;
 use crate::interrupt::hold_on_interrupt;
 use crate::printer::Printable;
 use crate::session::Session;
@@ -31,10 +32,14 @@ Examples:
 Angles take up to two decimals. An arm without hundredths, such as one with the maker's firmware, goes to the
 nearest whole degrees, and a note says so.
 
+If the joints would take the arm below the table or into its own base, on the way too, a warning says so: joints go where
+they are sent. `sevenbot move-to` refuses that, and its help describes the guard.
+
 After Ctrl-C the arm holds its position.
 
 Exit status 1 if the arm did not take the pose, or with --wait did not reach it. If that is unknown, the
-message says that the arm may be moving.")]
+message says that the arm may be moving. A joint that does not answer or has let go takes no pose: nothing
+is sent then, and the message tells what to do. With --wait a joint that is blocked on its way ends the wait.")]
 pub(crate) struct PoseArgs {
     /// Joints 1 to 7: degrees from 0 to 180, up to two decimals; +N or -N for a step from the present target; _ or . for no change.
     #[arg(value_names = ["A1", "A2", "A3", "A4", "A5", "A6", "A7"], num_args = 7, required = true,
@@ -65,6 +70,8 @@ struct PaceArgs {
     /// Wait until the joints have arrived.
     #[arg(long)]
     wait: bool,
+    #[command(flatten)]
+    guard: GuardArgs,
 }
 
 impl PaceArgs {
@@ -145,6 +152,7 @@ fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<
     let mut arm = session.connect()?;
     let reached = hold_on_interrupt(&mut arm, |arm, interrupt| {
         let targets = targets(goals, arm)?;
+        pace.guard.warn_of_way(arm, &targets, pace.pace())?;
         pace.pace().set(arm, &targets)?;
         interrupt.check()?;
         let begun = JointMove::begin_fine(arm, targets)?;
@@ -210,8 +218,8 @@ impl Printable for Positions {
 
 /// Positions of the joints, in hundredths of a degree.
 #[derive(Serialize)]
-struct FinePositions {
-    positions_degrees: [f64; 7],
+pub(crate) struct FinePositions {
+    pub(crate) positions_degrees: [f64; 7],
 }
 
 impl Printable for FinePositions {

@@ -1,6 +1,6 @@
 //! `sniff`: shows the traffic of a line as text.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -9,6 +9,7 @@ use clap::Args;
 use serde::Serialize;
 use sevenbot::open_port::OpenPort;
 use sevenbot::traffic::{Traffic, TrafficParser};
+use sevenbot::wire_log::{self, Sender};
 
 use crate::command_error::CommandError;
 use crate::printer::{Printable, Printer};
@@ -24,25 +25,58 @@ reports appear.
 Examples:
   sevenbot --port /dev/ttyUSB1 sniff
   sevenbot sniff capture.bin
+  sevenbot --log run.log pose 120 90 65 90 90 90 80 --wait; sevenbot sniff run.log
   some-program | sevenbot sniff -")]
 pub(crate) struct SniffArgs {
-    /// File with the bytes of a line; - is standard input. Without it, the port.
+    /// File with the bytes of a line, a log of --log, or a session of `host-sim --record`; - is standard input. Without it, the port.
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
 }
 
+/// The first words of a log are in so many bytes.
+const LONGEST_HEAD: u64 = 64;
 /// An empty line for this time ends an unfinished frame (D4).
 const GAP: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(session: &mut Session, args: &SniffArgs) -> Result<(), CommandError> {
     match &args.file {
         Some(path) if path.as_os_str() == "-" => file(&mut session.printer, path, &mut io::stdin().lock()),
+        Some(path) if is_log_file(path)? => log(&mut session.printer, path),
         Some(path) => {
             let mut opened = File::open(path).map_err(|error| CommandError::file(path, error))?;
             file(&mut session.printer, path, &mut opened)
         }
         None => port(session),
     }
+}
+
+fn is_log_file(path: &Path) -> Result<bool, CommandError> {
+    let mut start = Vec::new();
+    let opened = File::open(path).map_err(|error| CommandError::file(path, error))?;
+    opened.take(LONGEST_HEAD).read_to_end(&mut start).map_err(|error| CommandError::file(path, error))?;
+    Ok(wire_log::is_log(&start))
+}
+
+/// A log of `--log`, or a recorded session: each direction by itself, with its times.
+fn log(printer: &mut Printer, path: &Path) -> Result<(), CommandError> {
+    let text = fs::read_to_string(path).map_err(|error| CommandError::file(path, error))?;
+    let entries = wire_log::entries(&text)
+        .map_err(|line| CommandError::file(path, format!("line {line} is no entry of a log")))?;
+    let (mut host, mut arm) = (TrafficParser::default(), TrafficParser::default());
+    for entry in &entries {
+        let parser = if entry.sender == Sender::Host { &mut host } else { &mut arm };
+        parser.push(&entry.bytes);
+        while let Some(item) = parser.next() {
+            printer.print(&TrafficLine::new(Some(entry.time.as_secs_f64()), &item))?;
+        }
+    }
+    let end = entries.last().map_or(0.0, |entry| entry.time.as_secs_f64());
+    for mut parser in [host, arm] {
+        while let Some(item) = parser.next_at_gap() {
+            printer.print(&TrafficLine::new(Some(end), &item))?;
+        }
+    }
+    Ok(())
 }
 
 fn file(printer: &mut Printer, path: &Path, source: &mut dyn Read) -> Result<(), CommandError> {

@@ -4,7 +4,10 @@
 
 use kinematics::{Frames, forward};
 
-use super::{TipTarget, Unreachable, Vector};
+use super::Vector;
+use super::guard::{Guard, JointPath, PathBreach};
+use super::refusal::TipRefusal;
+use super::target::TipTarget;
 use crate::units::Angle;
 
 /// The axes of a step.
@@ -23,9 +26,9 @@ pub enum JogAxes {
 /// use sevenbot::cartesian::{Jog, JogAxes, Vector};
 ///
 /// let targets = [90, 91, 110, 90, 135, 90, 80].map(Angle::from_register);
-/// let jog = Jog::step(None, targets, JogAxes::Base, Vector::new(5.0, 0.0, 0.0))?;
+/// let jog = Jog::step(None, targets, JogAxes::Base, Vector::new(5.0, 0.0, 0.0), None)?;
 /// assert_eq!(jog.targets[0].degrees(), 88);
-/// # Ok::<(), sevenbot::cartesian::Unreachable>(())
+/// # Ok::<(), sevenbot::cartesian::JogRefusal>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jog {
@@ -37,18 +40,30 @@ pub struct Jog {
     pub targets: [Angle; 7],
 }
 
+/// Why a step is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum JogRefusal {
+    /// The end of the step is out of reach, or the guard does not allow it.
+    #[error("{}", .0.reason())]
+    End(Box<TipRefusal>),
+    /// The guard does not allow the way there.
+    #[error(transparent)]
+    Way(PathBreach),
+}
+
 impl Jog {
     /// A step of so many millimetres. It goes on from the jog `before` if the arm's targets are still those of that jog,
-    /// else from the position of the targets.
+    /// else from the position of the targets. A guard checks the way there, too; `None`: there is none.
     ///
     /// # Errors
-    /// Why the arm does not reach the new position.
+    /// Why the arm does not reach the new position, or may not.
     pub fn step(
         before: Option<Self>,
         targets: [Angle; 7],
         axes: JogAxes,
         millimetres: Vector,
-    ) -> Result<Self, Unreachable> {
+        guard: Option<&Guard>,
+    ) -> Result<Self, JogRefusal> {
         let [t1, t2, t3, t4, t5, sixth, seventh] = targets;
         let angles = [t1, t2, t3, t4, t5, sixth].map(|angle| f64::from(angle.degrees()));
         let Frames { hand, .. } = forward(angles);
@@ -61,7 +76,11 @@ impl Jog {
             }
         };
         let tip = tip + way;
-        let [t1, t2, t3, t4, t5] = TipTarget::of(tip, tool)?.degrees.map(Angle::from_register);
+        let target = TipTarget::guarded(tip, tool, guard).map_err(|why| JogRefusal::End(Box::new(why)))?;
+        let [a1, a2, a3, a4, a5, _] = angles;
+        let way = JointPath::together([a1, a2, a3, a4, a5], target.degrees.map(f64::from));
+        guard.map_or(Ok(()), |guard| guard.check_path(&way)).map_err(JogRefusal::Way)?;
+        let [t1, t2, t3, t4, t5] = target.degrees.map(Angle::from_register);
         Ok(Self { tip, tool, targets: [t1, t2, t3, t4, t5, sixth, seventh] })
     }
 }
@@ -79,7 +98,7 @@ mod tests {
         let mut jog: Option<Jog> = None;
         for _ in 0..count {
             let targets = jog.map_or(start, |jog| jog.targets);
-            jog = Some(Jog::step(jog, targets, axes, Vector::new(x, y, z)).expect("within reach"));
+            jog = Some(Jog::step(jog, targets, axes, Vector::new(x, y, z), None).expect("within reach"));
         }
         (TipPose::of(start), jog.expect("a step"))
     }
@@ -107,7 +126,7 @@ mod tests {
     fn an_arm_that_was_sent_elsewhere_jogs_from_there() {
         let (_, jog) = jogged(3, JogAxes::Base, [1.0, 0.0, 0.0]);
         let elsewhere = [80, 91, 110, 90, 135, 90, 80].map(Angle::from_register);
-        let next = Jog::step(Some(jog), elsewhere, JogAxes::Base, Vector::new(0.0, 0.0, 5.0));
+        let next = Jog::step(Some(jog), elsewhere, JogAxes::Base, Vector::new(0.0, 0.0, 5.0), None);
         let moved = next.expect("within reach").tip - TipPose::of(elsewhere).tip;
         assert!((moved - Vector::new(0.0, 0.0, 5.0)).length() < 1e-9);
     }
@@ -115,6 +134,26 @@ mod tests {
     #[test]
     fn a_step_out_of_reach_is_refused() {
         let start = AT_WORK.map(Angle::from_register);
-        assert!(Jog::step(None, start, JogAxes::Base, Vector::new(0.0, 500.0, 0.0)).is_err());
+        assert!(Jog::step(None, start, JogAxes::Base, Vector::new(0.0, 500.0, 0.0), None).is_err());
+    }
+
+    #[test]
+    fn steps_down_end_above_the_table() {
+        let (guard, down) = (Guard::above(30.0), Vector::new(0.0, 0.0, -5.0));
+        let mut jog: Option<Jog> = None;
+        let refused = (0..100).find_map(|_| {
+            let targets = jog.map_or(AT_WORK.map(Angle::from_register), |jog| jog.targets);
+            match Jog::step(jog, targets, JogAxes::Base, down, Some(&guard)) {
+                Ok(next) => {
+                    assert!(TipPose::of(next.targets).tip.z >= 29.9, "{next:?}");
+                    jog = Some(next);
+                    None
+                }
+                Err(refusal) => Some(refusal.to_string()),
+            }
+        });
+        let refused = refused.expect("the table is there");
+        assert!(refused.contains("below the table at z = 30 mm"), "{refused}");
+        assert!((30.0..36.0).contains(&jog.expect("a step").tip.z), "{jog:?}");
     }
 }

@@ -8,41 +8,23 @@
 
 use std::time::Duration;
 
-use kinematics::limits::check_arm;
 use kinematics::{NoSolution, ik6_all};
 
-use super::target::TipTarget;
-use super::{TipPose, Unreachable, Vector, angle_between};
+use super::guard::{Escape, Guard};
+use super::refusal::Unreachable;
+use super::{TipPose, Vector};
 use crate::fine_angle::FineAngle;
-use crate::playback::MAX_SEGMENT;
 use crate::recording::{Moment, Recording};
-use crate::units::{Angle, Speed};
+use crate::units::Speed;
 
 mod fault;
 mod path;
+mod rounding;
 
 pub use fault::{StraightLineError, StraightLineFault};
 use path::TipPath;
-
-/// The resolution of the targets, and with it the time between them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TargetResolution {
-    /// Whole degrees, for playback with speeds.
-    Degrees,
-    /// Hundredths of a degree, for a stream.
-    Hundredths,
-}
-
-impl TargetResolution {
-    /// Time between two targets.
-    #[must_use]
-    pub const fn period(self) -> Duration {
-        match self {
-            Self::Degrees => MAX_SEGMENT,
-            Self::Hundredths => Duration::from_millis(20),
-        }
-    }
-}
+pub use rounding::TargetResolution;
+use rounding::{Angles, PlannedPose, Rounding};
 
 /// The largest turning speed of the tool, in degrees/s.
 const TURN_SPEED: f64 = 60.0;
@@ -54,9 +36,6 @@ const CHECK_EVERY: f64 = 0.5;
 const JUMP: f64 = 5.0;
 /// Joint 5 at this angle points the tool along the forearm. Joint 4 then turns neither tip nor tool.
 const IN_LINE: f64 = 90.0;
-
-/// Angles of joints 1 to 5, in degrees.
-type Angles = [f64; 5];
 
 /// A straight line of the tip that the arm can follow.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,6 +71,8 @@ pub struct StraightLineRequest {
     pub tool: Vector,
     /// Speed of the tip in mm/s. A large turn of the tool makes the line slower.
     pub speed: f64,
+    /// The guard of the workspace; `None`: there is none.
+    pub guard: Option<Guard>,
 }
 
 impl StraightLine {
@@ -110,7 +91,7 @@ impl StraightLine {
         let path = TipPath::new(start, request.tip, end);
         let pace = LineTiming::of(&path, request.speed, request.resolution);
         let angles = start_angles(request, &path, &pace);
-        let poses = pace.follow(&path, angles, request.speed)?;
+        let poses = pace.follow(&path, angles, request)?;
         let last = request.start.get(3).copied();
         let turned = poses.first().map(|pose| pose.angles[3]);
         Ok(Self {
@@ -133,7 +114,6 @@ impl StraightLine {
 /// The division of a line in time.
 struct LineTiming {
     duration: Duration,
-    resolution: TargetResolution,
     /// Targets after the first.
     periods: u32,
     /// Checks in a period.
@@ -152,7 +132,7 @@ impl LineTiming {
         let periods = (seconds / period.as_secs_f64()).ceil().max(1.0);
         let checks = (path.length / periods / CHECK_EVERY).ceil().max(LEAST_CHECKS);
         let duration = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX).max(period);
-        Self { duration, resolution, periods: periods as u32, checks: checks as u32 }
+        Self { duration, periods: periods as u32, checks: checks as u32 }
     }
 
     /// The fraction of the line at a check, 0 to 1.
@@ -170,15 +150,17 @@ impl LineTiming {
         &self,
         path: &TipPath,
         start: Angles,
-        speed: f64,
+        request: &StraightLineRequest,
     ) -> Result<Vec<PlannedPose>, StraightLineError> {
-        let mut angles = start;
-        let mut fastest = JointTurn::default();
-        let mut poses = vec![self.pose(start, path, 0.0)];
+        let rounding = Rounding { resolution: request.resolution, guard: request.guard };
+        let mut guarded = GuardedLine::new(path, request);
+        let (mut angles, mut fastest) = (start, JointTurn::default());
+        let mut poses = vec![rounding.pose(start, path, 0.0)];
+        guarded.check(0.0, start, poses.last())?;
         let end = self.periods.saturating_mul(self.checks);
         for check in 1..=end {
             let share = self.share(check);
-            let next = solved(path, share, angles)?;
+            let next = solved(path, share, angles, request.guard.as_ref())?;
             let turn = JointTurn::between(angles, next, share);
             if turn.degrees > JUMP {
                 let JointTurn { joint, degrees, .. } = turn;
@@ -190,22 +172,15 @@ impl LineTiming {
             }
             fastest = if turn.degrees > fastest.degrees { turn } else { fastest };
             angles = next;
-            if check == end && self.resolution == TargetResolution::Degrees {
-                poses.push(PlannedPose::of(best_degrees(angles, path, share), path, share));
-            } else if check == end || check % self.checks == 0 {
-                poses.push(self.pose(angles, path, share));
-            }
+            let pose = if check == end {
+                Some(rounding.last_pose(angles, path))
+            } else {
+                (check % self.checks == 0).then(|| rounding.pose(angles, path, share))
+            };
+            guarded.check(share, angles, pose.as_ref())?;
+            poses.extend(pose);
         }
-        self.check_speed(path, fastest, speed).map(|()| poses)
-    }
-
-    /// The targets for exact angles, in the resolution of the line.
-    fn pose(&self, angles: Angles, path: &TipPath, share: f64) -> PlannedPose {
-        let targets = match self.resolution {
-            TargetResolution::Degrees => nearest_degrees(angles, path, share),
-            TargetResolution::Hundredths => nearest_hundredths(angles, path, share),
-        };
-        PlannedPose::of(targets, path, share)
+        self.check_speed(path, fastest, request.speed).map(|()| poses)
     }
 
     /// Checks the speed of the joint that turns fastest.
@@ -220,6 +195,37 @@ impl LineTiming {
         let fault =
             StraightLineFault::TooFast { joint: fastest.joint, degrees_per_second, slower_mm_per_second };
         Err(StraightLineError::new(path, fastest.share, fault))
+    }
+}
+
+/// The guard along a line. The targets in whole degrees have a check of their own: they are up to 3 mm from the line.
+struct GuardedLine<'a> {
+    path: &'a TipPath,
+    guard: Option<Guard>,
+    is_rounded: bool,
+    exact: Escape,
+    rounded: Escape,
+}
+
+impl<'a> GuardedLine<'a> {
+    fn new(path: &'a TipPath, request: &StraightLineRequest) -> Self {
+        let is_rounded = request.resolution == TargetResolution::Degrees;
+        let (exact, rounded) = (Escape::default(), Escape::default());
+        Self { path, guard: request.guard, is_rounded, exact, rounded }
+    }
+
+    /// Checks exact angles, and the targets for them.
+    fn check(
+        &mut self,
+        share: f64,
+        exact: Angles,
+        targets: Option<&PlannedPose>,
+    ) -> Result<(), StraightLineError> {
+        let Some(guard) = self.guard else { return Ok(()) };
+        let targets = targets.filter(|_| self.is_rounded).map(PlannedPose::degrees);
+        let checked = self.exact.check(&guard, exact);
+        let checked = checked.and_then(|()| targets.map_or(Ok(()), |it| self.rounded.check(&guard, it)));
+        checked.map_err(|why| StraightLineError::new(self.path, share, StraightLineFault::Guarded(why)))
     }
 }
 
@@ -240,31 +246,20 @@ impl JointTurn {
     }
 }
 
-/// The targets of joints 1 to 5, and their distance from the line.
-struct PlannedPose {
-    angles: [FineAngle; 5],
-    deviation_mm: f64,
-    tilt_degrees: f64,
-}
-
-impl PlannedPose {
-    fn of(angles: [FineAngle; 5], path: &TipPath, share: f64) -> Self {
-        let [t1, t2, t3, t4, t5] = angles.map(FineAngle::degrees);
-        let TipPose { tip, tool, .. } = TipPose::at([t1, t2, t3, t4, t5, 90.0]);
-        let tilt_degrees = angle_between(tool, path.at(share).1);
-        Self { angles, deviation_mm: path.distance(tip), tilt_degrees }
-    }
-}
-
 /// The solution at this fraction of the line that is nearest to the angles before.
-fn solved(path: &TipPath, share: f64, before: Angles) -> Result<Angles, StraightLineError> {
+fn solved(
+    path: &TipPath,
+    share: f64,
+    before: Angles,
+    guard: Option<&Guard>,
+) -> Result<Angles, StraightLineError> {
     let (tip, tool) = path.at(share);
     let all = ik6_all(tip, tool);
     let all = all.map_err(|why| {
         StraightLineError::new(
             path,
             share,
-            StraightLineFault::Unreachable(Box::new(Unreachable::because(why, tip, tool))),
+            StraightLineFault::Unreachable(Box::new(Unreachable::because(why, tip, tool, guard))),
         )
     })?;
     let furthest = |angles: &Angles| {
@@ -295,36 +290,8 @@ fn start_angles(request: &StraightLineRequest, path: &TipPath, pace: &LineTiming
     if (t5 - IN_LINE).abs() > f64::EPSILON {
         return angles;
     }
-    let next = solved(path, pace.share(1), angles);
+    let next = solved(path, pace.share(1), angles, request.guard.as_ref());
     next.map_or(angles, |[_, _, _, roll, _]| [t1, t2, t3, roll.round(), t5])
-}
-
-/// The nearest whole degrees within the limits of the arm.
-fn nearest_degrees(angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
-    let whole = angles.map(f64::round);
-    let [t1, t2, t3, t4, t5] = whole;
-    if check_arm([t1, t2, t3, t4, t5, 90.0]).is_ok() {
-        return whole.map(in_range);
-    }
-    best_degrees(angles, path, share)
-}
-
-/// The nearest hundredths; whole degrees where those would break a limit of the arm.
-fn nearest_hundredths(angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
-    let fine = angles.map(in_range);
-    let [t1, t2, t3, t4, t5] = fine.map(FineAngle::degrees);
-    if check_arm([t1, t2, t3, t4, t5, 90.0]).is_ok() { fine } else { best_degrees(angles, path, share) }
-}
-
-/// The whole degrees within the limits that are nearest to the path.
-fn best_degrees(angles: Angles, path: &TipPath, share: f64) -> [FineAngle; 5] {
-    let (tip, tool) = path.at(share);
-    TipTarget::near(angles, tip, tool).degrees.map(|degrees| Angle::from_register(degrees).into())
-}
-
-/// The nearest hundredth from 0 to 180 degrees.
-fn in_range(degrees: f64) -> FineAngle {
-    FineAngle::from_degrees(degrees.clamp(0.0, 180.0)).unwrap_or(Angle::from_register(0).into())
 }
 
 fn recording(request: &StraightLineRequest, pace: &LineTiming, poses: &[PlannedPose]) -> Recording {

@@ -3,9 +3,10 @@
 //! ```text
 //!   angles of the joints ──▶ TipPose: tip, tool, wrist
 //!
-//!   tip, tool ──▶ TipTarget: whole degrees of joints 1 to 5     or Unreachable: reason and nearest point
+//!   tip, tool ──▶ TipTarget: whole degrees of joints 1 to 5     or TipRefusal: reason and nearest point
 //!   tip, tool, speed ──▶ Line: a straight line as moments    or StraightLineError: place and reason
 //!   step along axes ──▶ Jog: the same, from the position of the step before
+//!   poses, ways of the joints ──▶ Guard: above the table, out of the base
 //! ```
 //!
 //! Origin: the base axis at the height of the top plate. x is to the right, y forward, z up. The tip is the point where
@@ -23,15 +24,22 @@ use protocol_core::registers::Joint;
 use crate::fine_angle::FineAngle;
 use crate::units::Angle;
 
+mod guard;
 mod jog;
 mod line;
 mod nearest;
+mod refusal;
+mod solve;
 mod target;
 
-pub use jog::{Jog, JogAxes};
-pub use kinematics::NoSolution;
+pub use guard::{
+    BASE_MARGIN, Breach, Guard, JointPath, KEEP_OUT_RADIUS, KEEP_OUT_TOP, PathBreach, TimedBreach,
+};
+pub use jog::{Jog, JogAxes, JogRefusal};
+pub use kinematics::{NoSolution, Obstacle, Part};
 pub use line::{StraightLine, StraightLineError, StraightLineFault, StraightLineRequest, TargetResolution};
-pub use target::{FineTipTarget, TipTarget, Unreachable};
+pub use refusal::{GuardedTip, TipRefusal, Unreachable};
+pub use target::{FineTipTarget, TipTarget};
 
 /// A point in millimetres, or a direction.
 pub type Vector = kinematics::Vector<f64>;

@@ -1,13 +1,15 @@
 //! The nearest point within reach, rounded to tenths of a millimetre so that the rounded point is within reach too.
 //!
-//! If the wrist limits the reach, [`nearest_tip`] gives the point. If the bend of the hand limits it, the set of
-//! points has no simple shape. Then a grid search finds a point: coarse over the whole reach, then finer around the
+//! If the wrist limits the reach, [`nearest_tip`] gives the point. If the bend of the hand or the guard limits it, the set
+//! of points has no simple shape. Then a grid search finds a point: coarse over the whole reach, then finer around the
 //! best.
 
 use kinematics::ik6;
 use kinematics::nearest::nearest_tip;
 
 use super::Vector;
+use super::guard::Guard;
+use super::target::TipTarget;
 
 /// Points in a millimetre.
 const TENTHS: f64 = 10.0;
@@ -19,44 +21,73 @@ const MIDDLE: Vector = Vector::new(0.0, 0.0, 75.0);
 /// The finest grid, in millimetres.
 const FINE: f64 = 0.05;
 
-/// The nearest point to `tip` that is within reach with the tool in this direction. `None` if there is none.
-pub(super) fn nearest(tip: Vector, tool: Vector) -> Option<Vector> {
-    let exact = nearest_tip(tip, tool).or_else(|| searched(tip, tool))?;
-    Some(in_tenths(exact, tip, tool).unwrap_or(exact))
+/// The nearest point to `tip` that is within reach with the tool in this direction, and that the guard allows. `None` if
+/// there is none.
+pub(super) fn nearest(tip: Vector, tool: Vector, guard: Option<&Guard>) -> Option<Vector> {
+    let wish = Wish { tip, tool, guard };
+    let exact = nearest_tip(tip, tool).filter(|&point| wish.is_allowed(point)).or_else(|| wish.searched())?;
+    Some(wish.in_tenths(exact).unwrap_or(exact))
 }
 
-/// The point in tenths of a millimetre beside `exact` that is nearest to `tip`.
-fn in_tenths(exact: Vector, tip: Vector, tool: Vector) -> Option<Vector> {
-    let tenths = |number: f64, step: i32| ((number * TENTHS).round() + f64::from(step)) / TENTHS;
-    let candidates =
-        cube(2).map(|(x, y, z)| Vector::new(tenths(exact.x, x), tenths(exact.y, y), tenths(exact.z, z)));
-    best(candidates, tip, tool)
+/// A position that cannot be, and what is allowed instead.
+struct Wish<'a> {
+    tip: Vector,
+    tool: Vector,
+    guard: Option<&'a Guard>,
 }
 
-fn searched(tip: Vector, tool: Vector) -> Option<Vector> {
-    let round = |middle: Vector, step: f64, steps: i32| {
-        cube(steps).map(move |(x, y, z)| middle + Vector::new(x.into(), y.into(), z.into()) * step)
-    };
-    let mut nearest = best(round(MIDDLE, COARSE, COARSE_STEPS), tip, tool)?;
-    let mut step = COARSE / 2.0;
-    while step > FINE {
-        let next = best(round(nearest, step, 2), tip, tool).unwrap_or(nearest);
-        // A better point may itself have a better neighbour.
-        if (next - tip).length() < (nearest - tip).length() {
-            nearest = next;
-        } else {
-            step /= 2.0;
-        }
+impl Wish<'_> {
+    /// Is the point within reach, and outside every obstacle? For an arm that takes whole degrees, too.
+    fn is_allowed(&self, point: Vector) -> bool {
+        let is_clear = |angles, guard: &Guard| {
+            guard.is_clear(angles)
+                && TipTarget::near(angles, point, self.tool, Some(guard)).is_allowed_by(guard)
+        };
+        ik6(point, self.tool).is_ok_and(|angles| self.guard.is_none_or(|guard| is_clear(angles, guard)))
     }
-    Some(nearest)
-}
 
-/// The nearest of the points that are within reach.
-fn best(points: impl Iterator<Item = Vector>, tip: Vector, tool: Vector) -> Option<Vector> {
-    let distance = |point: Vector| (point - tip).length();
-    points
-        .filter(|&point| ik6(point, tool).is_ok())
-        .reduce(|nearest, point| if distance(point) < distance(nearest) { point } else { nearest })
+    /// The point in tenths of a millimetre beside `exact` that is nearest to the tip.
+    fn in_tenths(&self, exact: Vector) -> Option<Vector> {
+        let tenths = |number: f64, step: i32| ((number * TENTHS).round() + f64::from(step)) / TENTHS;
+        let candidates =
+            cube(2).map(|(x, y, z)| Vector::new(tenths(exact.x, x), tenths(exact.y, y), tenths(exact.z, z)));
+        self.best(candidates)
+    }
+
+    fn searched(&self) -> Option<Vector> {
+        let round = |middle: Vector, step: f64, steps: i32| {
+            cube(steps).map(move |(x, y, z)| middle + Vector::new(x.into(), y.into(), z.into()) * step)
+        };
+        let mut nearest = self.best(round(MIDDLE, COARSE, COARSE_STEPS))?;
+        let mut step = COARSE / 2.0;
+        while step > FINE {
+            let next = self.best(round(nearest, step, 2)).unwrap_or(nearest);
+            // A better point may itself have a better neighbour.
+            if self.distance(next) < self.distance(nearest) {
+                nearest = next;
+            } else {
+                step /= 2.0;
+            }
+        }
+        Some(nearest)
+    }
+
+    /// The nearest of the points that are allowed.
+    fn best(&self, points: impl Iterator<Item = Vector>) -> Option<Vector> {
+        let mut best: Option<Vector> = None;
+        for point in points {
+            // The distance is cheaper than the check.
+            let is_nearer = best.is_none_or(|best| self.distance(point) < self.distance(best));
+            if is_nearer && self.is_allowed(point) {
+                best = Some(point);
+            }
+        }
+        best
+    }
+
+    fn distance(&self, point: Vector) -> f64 {
+        (point - self.tip).length()
+    }
 }
 
 /// Whole numbers from `-steps` to `steps` in three dimensions.
@@ -75,7 +106,7 @@ mod tests {
         for (x, y, z) in [(0.0, 500.0, 50.0), (400.0, 300.0, -100.0), (0.0, 50.0, 0.0), (0.0, -200.0, 100.0)]
         {
             let tip = Vector::new(x, y, z);
-            let found = nearest(tip, DOWN).expect("one");
+            let found = nearest(tip, DOWN, None).expect("one");
             assert!(ik6(found, DOWN).is_ok());
             for number in [found.x, found.y, found.z] {
                 assert!((number * TENTHS - (number * TENTHS).round()).abs() < 1e-6, "{found:?}");
@@ -88,7 +119,7 @@ mod tests {
         for (x, y, z) in [(0.0, 500.0, 50.0), (300.0, 300.0, -50.0), (-350.0, 100.0, 120.0)] {
             let tip = Vector::new(x, y, z);
             let exact = nearest_tip(tip, DOWN).expect("one");
-            let found = searched(tip, DOWN).expect("one");
+            let found = Wish { tip, tool: DOWN, guard: None }.searched().expect("one");
             let (exact, found) = ((exact - tip).length(), (found - tip).length());
             assert!(found >= exact - 1e-9 && found < exact + 1.0, "{found} {exact}");
         }
@@ -98,7 +129,7 @@ mod tests {
     fn where_the_hand_cannot_bend_a_point_beside_is_found() {
         let (tip, up) = (Vector::new(100.0, 200.0, 150.0), -DOWN);
         assert_eq!(nearest_tip(tip, up), None);
-        let found = nearest(tip, up).expect("one");
+        let found = nearest(tip, up, None).expect("one");
         assert!(ik6(found, up).is_ok() && (found - tip).length() < 250.0, "{found:?}");
     }
 }

@@ -1,12 +1,9 @@
 //! Computes targets in whole degrees for a position of the tip.
 
-use std::fmt;
-
 use kinematics::limits::check_arm;
-use kinematics::{NoSolution, ik6};
 
-use super::nearest::nearest;
-use super::{DirectionText, PointText, TipPose, Vector, angle_between};
+use super::guard::Guard;
+use super::{TipPose, Vector, angle_between};
 use crate::fine_angle::FineAngle;
 use crate::units::Angle;
 
@@ -51,22 +48,21 @@ pub struct FineTipTarget {
 }
 
 impl TipTarget {
-    /// The targets for a tip in millimetres, with the tool in a direction of any length.
-    ///
-    /// # Errors
-    /// The position is out of reach: the reason, and the nearest point within reach.
-    pub fn of(tip: Vector, tool: Vector) -> Result<Self, Unreachable> {
-        let angles = ik6(tip, tool).map_err(|why| Unreachable::because(why, tip, tool))?;
-        Ok(Self::near(angles, tip, tool.unit().unwrap_or(tool)))
+    /// The whole degrees beside exact angles that the arm can take, with the smallest miss. Those that the guard allows go
+    /// first.
+    pub(super) fn near(angles: [f64; 5], tip: Vector, tool: Vector, guard: Option<&Guard>) -> Self {
+        let candidates = || (0..32).map(|choice| Self::with(angles, beside(angles, choice), tip, tool));
+        let legal = || candidates().filter(|target| check_arm(target.pose()).is_ok());
+        let allowed = legal().filter(|target| guard.is_none_or(|guard| target.is_allowed_by(guard)));
+        let better = |best: Self, next: Self| if next.cost() < best.cost() { next } else { best };
+        // The limits are whole degrees, so one of the candidates is within them.
+        let best = allowed.reduce(better).or_else(|| legal().reduce(better));
+        best.unwrap_or_else(|| Self::with(angles, angles.map(f64::round), tip, tool))
     }
 
-    /// The whole degrees beside exact angles that the arm can take, with the smallest miss.
-    pub(super) fn near(angles: [f64; 5], tip: Vector, tool: Vector) -> Self {
-        let candidates = (0..32).map(|choice| Self::with(angles, beside(angles, choice), tip, tool));
-        let legal = candidates.filter(|target| check_arm(target.pose()).is_ok());
-        // The limits are whole degrees, so one of the candidates is within them.
-        let best = legal.reduce(|best, next| if next.cost() < best.cost() { next } else { best });
-        best.unwrap_or_else(|| Self::with(angles, angles.map(f64::round), tip, tool))
+    /// Does the guard allow the whole degrees?
+    pub(super) fn is_allowed_by(&self, guard: &Guard) -> bool {
+        guard.check_pose(self.degrees.map(f64::from)).is_ok()
     }
 
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 180 degrees")]
@@ -117,155 +113,4 @@ fn beside(angles: [f64; 5], choice: u8) -> [f64; 5] {
         *angle = if choice >> joint & 1 == 0 { down } else { angle.ceil() };
     }
     whole
-}
-
-/// Why the arm does not reach a position.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unreachable {
-    /// The reason.
-    pub why: NoSolution,
-    /// The requested tip, in millimetres.
-    pub tip: Vector,
-    /// The requested direction of the tool.
-    pub tool: Vector,
-    /// The nearest point that the tip reaches with this direction of the tool, to a tenth of a millimetre. `None` if
-    /// there is none within reach or the numbers are no position.
-    pub nearest: Option<Vector>,
-    /// A usual direction of the tool with which the tip reaches the requested point; `None` if there is none.
-    pub other_tool: Option<Vector>,
-}
-
-impl Unreachable {
-    pub(super) fn because(why: NoSolution, tip: Vector, tool: Vector) -> Self {
-        Self { why, tip, tool, nearest: nearest(tip, tool), other_tool: other_tool(tip) }
-    }
-
-    /// The distance from the requested point to the nearest point within reach, in millimetres.
-    #[must_use]
-    pub fn distance_mm(&self) -> Option<f64> {
-        self.nearest.map(|nearest| (nearest - self.tip).length())
-    }
-}
-
-/// The first of the usual directions with which the tip reaches a point: down, outward, between them, up.
-fn other_tool(tip: Vector) -> Option<Vector> {
-    let outward = Vector::new(tip.x, tip.y, 0.0).unit().unwrap_or(Vector::new(0.0, 1.0, 0.0));
-    let [x, y] = [outward.x, outward.y].map(|component| (component * 100.0).round() / 100.0);
-    let usual = [(0.0, -1.0), (1.0, -1.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
-    let directions = usual.map(|(outward, up)| Vector::new(x * outward, y * outward, up));
-    directions.into_iter().find(|&tool| ik6(tip, tool).is_ok())
-}
-
-impl fmt::Display for Unreachable {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.why {
-            NoSolution::NoToolDirection => return out.write_str("the tool direction 0 0 0 points nowhere"),
-            NoSolution::NotFinite => return out.write_str("a position is three finite numbers"),
-            _ => {}
-        }
-        let (tip, tool) = (PointText(self.tip), DirectionText(self.tool));
-        write!(out, "{tip} mm with the tool {tool} is out of reach: {}", self.reason())?;
-        match (self.nearest, self.distance_mm()) {
-            (Some(nearest), Some(mm)) => {
-                write!(out, "; the nearest point within reach is {} mm, {mm:.1} mm away", PointText(nearest))
-            }
-            _ => out.write_str("; no point is within reach with this tool direction"),
-        }
-    }
-}
-
-impl Unreachable {
-    /// The reason as text, with the parts that a user sees.
-    #[must_use]
-    pub const fn reason(&self) -> &'static str {
-        match self.why {
-            NoSolution::TooFar => "it is too far from the shoulder",
-            NoSolution::TooNear => "it is too near to the shoulder",
-            NoSolution::Joint(1) => "it is behind the arm, and the base (joint 1) turns by 180° only",
-            NoSolution::Joint(2) => "the rear arm (joint 2) does not lean so far",
-            NoSolution::Joint(_) => "the forearm (joint 3) does not tilt so far",
-            NoSolution::ToolDirection => "the hand (joint 5) does not bend so far back",
-            NoSolution::NoHeading => "the wrist would be on the axis of the base, where joint 1 has no angle",
-            NoSolution::NoToolDirection | NoSolution::NoDiscDirection | NoSolution::NotFinite => {
-                "no position"
-            }
-        }
-    }
-}
-
-impl std::error::Error for Unreachable {}
-
-#[cfg(test)]
-mod tests {
-    use super::super::DOWN;
-    use super::*;
-    use kinematics::forward;
-
-    fn v(x: f64, y: f64, z: f64) -> Vector {
-        Vector::new(x, y, z)
-    }
-
-    #[test]
-    fn the_makers_example_is_reached_to_a_millimetre() {
-        let target = TipTarget::of(v(-50.0, 185.0, 50.0), DOWN).expect("within reach");
-        let exact = [105.124, 88.229, 109.746, 90.0, 135.254];
-        assert!(target.angles.iter().zip(exact).all(|(angle, exact)| (angle - exact).abs() < 0.001));
-        assert_eq!(target.degrees, [105, 88, 110, 90, 135]);
-        assert!(target.miss_mm < 1.0 && target.tilt_degrees < 1.0, "{target:?}");
-        let fine = target.in_hundredths(v(-50.0, 185.0, 50.0), DOWN).expect("within the limits");
-        assert_eq!(fine.angles[0].hundredths(), 10_512);
-        assert!(fine.miss_mm < 0.05 && fine.tilt_degrees < 0.02, "{fine:?}");
-    }
-
-    #[test]
-    fn whole_degrees_keep_the_limits_and_miss_by_little() {
-        let mut worst: f64 = 0.0;
-        for (t2, t3) in (0..=180_u8).flat_map(|t2| (0..=180_u8).map(move |t3| (t2, t3))) {
-            for part in [0.0, 0.5] {
-                let pose = [77.3, f64::from(t2), f64::from(t3) + part, 80.0, 100.4, 90.0];
-                if check_arm(pose).is_err() {
-                    continue;
-                }
-                let hand = forward(pose).hand;
-                let target = TipTarget::of(hand.tip, hand.tool).expect("a legal pose");
-                assert_eq!(check_arm(target.pose()), Ok(()), "{pose:?}");
-                worst = worst.max(target.miss_mm);
-            }
-        }
-        assert!(worst < 3.0, "{worst} mm");
-    }
-
-    #[test]
-    fn what_is_out_of_reach_says_how_far_and_what_is_within() {
-        let refused = TipTarget::of(v(0.0, 500.0, 50.0), DOWN).expect_err("too far");
-        let words = refused.to_string();
-        assert!(
-            words.starts_with(
-                "0 500 50 mm with the tool straight down (0 0 -1) is out of reach: it is too far"
-            )
-        );
-        let nearest = refused.nearest.expect("one");
-        assert!(words.ends_with(&format!(
-            "the nearest point within reach is {} mm, {:.1} mm away",
-            PointText(nearest),
-            (nearest - refused.tip).length()
-        )));
-        assert!(TipTarget::of(nearest, DOWN).is_ok(), "the point that is told can be asked for");
-    }
-
-    #[test]
-    fn a_direction_that_works_is_found_where_the_one_asked_for_does_not() {
-        let refused = TipTarget::of(v(0.0, 250.0, 280.0), DOWN).expect_err("too high for that");
-        let other = refused.other_tool.expect("forward or so");
-        assert!(TipTarget::of(refused.tip, other).is_ok());
-        let refused = TipTarget::of(v(0.0, 900.0, 0.0), DOWN).expect_err("too far for all");
-        assert_eq!(refused.other_tool, None);
-    }
-
-    #[test]
-    fn numbers_that_are_no_position_are_told() {
-        let words = |tip, tool| TipTarget::of(tip, tool).expect_err("none").to_string();
-        assert!(words(v(0.0, 200.0, 50.0), v(0.0, 0.0, 0.0)).contains("points nowhere"));
-        assert!(words(v(f64::NAN, 200.0, 50.0), DOWN).contains("finite"));
-    }
 }

@@ -2,15 +2,17 @@
 
 use std::time::Duration;
 
+use crate::approach::StartTooFar;
 use crate::checked_write::{WriteMismatch, reasons};
 use crate::error::Error;
+use crate::health::{MoveCheckError, Problem, sentences};
 use crate::hold::HoldError;
 use crate::register_text::{joints, motor_state_name};
 use crate::stream::StreamError;
 use protocol_core::registers::Joint;
 
 /// Why a move does not start or end.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MoveError {
     /// [`Observer::goes_on`](super::Observer::goes_on) said no. A player has made the arm hold; after another call it may
     /// still be moving.
@@ -22,6 +24,11 @@ pub enum MoveError {
         /// The value of register 29.
         state: u8,
     },
+    /// The arm does not carry out the move, for these reasons. Each tells what to do: [`ProblemKind::remedy`].
+    ///
+    /// [`ProblemKind::remedy`]: crate::health::ProblemKind::remedy
+    #[error("{}", sentences(.0))]
+    Problems(Vec<Problem>),
     /// The arm did not take these values.
     #[error("{}", reasons(.0))]
     NotTaken(Vec<WriteMismatch>),
@@ -47,6 +54,9 @@ pub enum MoveError {
     /// The arm answers, but its reports have ended.
     #[error("the arm has stopped reporting its positions: was it switched off and on?")]
     ReportsStopped,
+    /// The first point of a stream or a recording is too far away. Nothing was moved.
+    #[error(transparent)]
+    StartTooFar(#[from] StartTooFar),
     /// A stream of points failed.
     #[error(transparent)]
     Stream(StreamError),
@@ -61,6 +71,16 @@ impl From<StreamError> for MoveError {
             StreamError::Exchange(error) => Self::Exchange(error),
             StreamError::NotTaken(unchanged) => Self::NotTaken(unchanged),
             other @ StreamError::NoExtendedBlock => Self::Stream(other),
+        }
+    }
+}
+
+impl From<MoveCheckError> for MoveError {
+    fn from(error: MoveCheckError) -> Self {
+        match error {
+            MoveCheckError::Problems(problems) => Self::Problems(problems),
+            MoveCheckError::NotDriven { state } => Self::NotDriven { state },
+            MoveCheckError::Exchange(error) => Self::Exchange(error),
         }
     }
 }

@@ -13,6 +13,7 @@ use super::observer::{Observer, Stage};
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::fine_state::FineTargets;
+use crate::health::{MoveCheck, MoveState, Problem, ProblemKind};
 use crate::joints::{JointSnapshot, frames_for};
 use crate::snapshot::Snapshot;
 use crate::span::Span;
@@ -39,12 +40,14 @@ impl Arm {
     /// [`Arm::end_abandoned_stream`].
     ///
     /// # Errors
-    /// [`MoveError::NotDriven`] if the motors do not drive the joints, and the errors of [`Arm::read`].
+    /// [`MoveError::NotDriven`] if the motors do not drive the joints, [`MoveError::Problems`] if that follows from a lost supply, and the errors of [`Arm::read`].
     pub fn driven_joints(&mut self) -> Result<JointSnapshot, MoveError> {
         let joints = self.wait_until_settled()?;
         if joints.is_driven() {
             self.end_abandoned_stream()?;
             Ok(joints)
+        } else if self.health()?.is_supply_lost == Some(true) {
+            Err(MoveError::Problems(vec![Problem::of_arm(ProblemKind::SupplyLost)]))
         } else {
             Err(MoveError::NotDriven { state: joints.motor_state() })
         }
@@ -74,6 +77,7 @@ pub struct JointMove {
     arrived: u8,
     /// Speeds, durations and positions before the move.
     plan: Snapshot,
+    check: MoveCheck,
     start: Instant,
 }
 
@@ -81,11 +85,13 @@ impl JointMove {
     /// Sends the targets to all joints at the same time.
     ///
     /// # Errors
-    /// The arm does not take the targets, or an exchange failed.
+    /// A joint with a target cannot be driven now: [`MoveError::Problems`], and nothing was sent. Or the arm does not take the
+    /// targets, or an exchange failed.
     pub fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, MoveError> {
+        let check = MoveCheck::begin(arm, joints_of(&targets))?;
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         motors_obey(arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets)))?;
-        Ok(Self { targets, is_rounded: false, arrived: ARRIVED_DEGREES, plan, start: arm.now() })
+        Ok(Self { targets, is_rounded: false, arrived: ARRIVED_DEGREES, plan, check, start: arm.now() })
     }
 
     /// As [`Self::begin`], in hundredths of a degree. An arm without the extended block takes the nearest whole degrees.
@@ -100,9 +106,10 @@ impl JointMove {
         if !arm.has_extended_block()? {
             return Ok(Self { is_rounded: true, ..Self::begin(arm, whole)? });
         }
+        let check = MoveCheck::begin(arm, joints_of(&whole))?;
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         motors_obey(arm.set_fine_targets_checked(&targets))?;
-        Ok(Self { targets: whole, is_rounded: false, arrived: 0, plan, start: arm.now() })
+        Ok(Self { targets: whole, is_rounded: false, arrived: 0, plan, check, start: arm.now() })
     }
 
     /// Did the arm get whole degrees because it has no finer ones?
@@ -114,11 +121,13 @@ impl JointMove {
     /// Waits until all joints have arrived. Returns their positions in degrees.
     ///
     /// # Errors
-    /// A joint still moves after twice its duration, or settles away from its target; the observer ends the wait; or an
-    /// exchange failed.
+    /// A joint with a target is blocked, let go or silent, the supply was lost, or the controller restarted:
+    /// [`MoveError::Problems`]. A joint still moves after twice its duration, or settles away from its target; the observer ends
+    /// the wait; or an exchange failed.
     pub fn finish(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<[u8; 7], MoveError> {
-        self.wait_until_still(arm, observer)?;
-        self.settle(arm, observer)
+        let mut check = self.check.clone();
+        self.wait_until_still(arm, &mut check, observer)?;
+        self.settle(arm, &mut check, observer)
     }
 
     /// The duration of the slowest joint.
@@ -135,10 +144,16 @@ impl JointMove {
         self.duration() * 2 + MARGIN
     }
 
-    fn wait_until_still(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
+    fn wait_until_still(
+        &self,
+        arm: &mut Arm,
+        check: &mut MoveCheck,
+        observer: &mut dyn Observer,
+    ) -> Result<(), MoveError> {
         let timeout = self.timeout();
         loop {
-            let moving = self.moving(arm)?;
+            let state = check.check(arm)?;
+            let moving = self.moving(arm, state)?;
             if moving == 0 {
                 return Ok(());
             }
@@ -151,31 +166,36 @@ impl JointMove {
         }
     }
 
-    /// The joints of this move whose set-point moves, without those whose servo does not answer.
-    fn moving(&self, arm: &mut Arm) -> Result<u8, MoveError> {
-        let ours = self.goals().fold(0, |bits, (joint, _)| bits | joint.bit());
-        if let Some(status) = arm.status()? {
-            return Ok(status.moving() & !status.missing() & ours);
+    /// The joints of this move whose set-point moves.
+    fn moving(&self, arm: &mut Arm, state: MoveState) -> Result<u8, MoveError> {
+        if let Some(moving) = state.moving {
+            return Ok(moving & joints_of(&self.targets));
         }
         // The maker's firmware has no moving bits: take the joints away from their targets, for the duration of the
         // move.
-        let away = self.away(&positions(arm)?, ARRIVED_DEGREES);
+        let away = self.away(&positions(arm)?, ARRIVED_DEGREES, state);
         let is_due = self.elapsed(arm) >= self.duration();
         Ok(if is_due { 0 } else { away.iter().fold(0, |bits, (joint, ..)| bits | joint.bit()) })
     }
 
     /// Waits until the joints have settled. Fails if one has not reached its target.
-    fn settle(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<[u8; 7], MoveError> {
-        let mut last = positions(arm)?;
+    fn settle(
+        &self,
+        arm: &mut Arm,
+        check: &mut MoveCheck,
+        observer: &mut dyn Observer,
+    ) -> Result<[u8; 7], MoveError> {
+        let (mut state, mut last) = (check.check(arm)?, positions(arm)?);
         let start = arm.now();
         let mut changed = start;
         // Without moving bits the joints may still be on their way: their duration is only an estimate.
         let timeout = if arm.identity().has_status_block() { SETTLE_TIMEOUT } else { self.timeout() };
-        while !self.away(&last, self.arrived).is_empty()
+        while !self.away(&last, self.arrived, state).is_empty()
             && arm.now() < changed + STILL_TIME
             && arm.now() < start + timeout
         {
             pause(arm, observer)?;
+            state = check.check(arm)?;
             let present = positions(arm)?;
             if present != last {
                 changed = arm.now();
@@ -183,7 +203,7 @@ impl JointMove {
             last = present;
             self.report(observer, Stage::Settling, &last);
         }
-        match self.away(&last, TOLERANCE_DEGREES).as_slice() {
+        match self.away(&last, TOLERANCE_DEGREES, state).as_slice() {
             [] => Ok(last),
             away => Err(not_reached(arm, away.to_vec())),
         }
@@ -197,22 +217,32 @@ impl JointMove {
         Joint::ALL.into_iter().zip(self.targets).filter_map(|(joint, goal)| Some((joint, goal?)))
     }
 
-    /// The joints more than `degrees` from their targets: joint, position, target.
-    fn away(&self, present: &[u8; 7], degrees: u8) -> Vec<(Joint, u8, u8)> {
+    /// The joints more than `degrees` from their targets: joint, position, target. A gripper that holds something has arrived.
+    fn away(&self, present: &[u8; 7], degrees: u8, state: MoveState) -> Vec<(Joint, u8, u8)> {
         let pairs = Joint::ALL.into_iter().zip(present).zip(self.targets);
         let away = pairs.filter_map(|((joint, &is), goal)| Some((joint, is, goal?)));
-        away.filter(|(_, is, goal)| is.abs_diff(*goal) > degrees).collect()
+        let grips = |joint: Joint| state.is_gripping && Joint::new(7) == Some(joint);
+        away.filter(|(joint, is, goal)| is.abs_diff(*goal) > degrees && !grips(*joint)).collect()
     }
 
     /// The degrees left, summed over all joints.
     fn degrees_left(&self, present: &[u8; 7]) -> u64 {
-        self.away(present, 0).iter().map(|(_, is, goal)| u64::from(is.abs_diff(*goal))).sum()
+        self.away(present, 0, MoveState::default())
+            .iter()
+            .map(|(_, is, goal)| u64::from(is.abs_diff(*goal)))
+            .sum()
     }
 
     fn report(&self, observer: &mut dyn Observer, stage: Stage, present: &[u8; 7]) {
         let total = self.degrees_left(&self.plan.joints(&PRESENT_POSITION));
         observer.progress(stage, total.saturating_sub(self.degrees_left(present)), total);
     }
+}
+
+/// The joints with a target, as [`Joint::bit`]s.
+fn joints_of(targets: &Targets) -> u8 {
+    let joints = Joint::ALL.into_iter().zip(targets).filter(|(_, goal)| goal.is_some());
+    joints.fold(0, |bits, (joint, _)| bits | joint.bit())
 }
 
 /// Waits for the time between two reads.

@@ -8,10 +8,12 @@
 //!
 //! All calls block on the clock of the arm's line.
 
+mod approach;
 mod error;
 mod joint_move;
 mod observer;
 mod pace;
+mod park;
 mod player;
 mod recorder;
 mod report_clock;
@@ -22,6 +24,7 @@ pub use error::{ConnectionLost, MoveError};
 pub use joint_move::{JointMove, Targets};
 pub use observer::{Observer, Stage};
 pub use pace::Pace;
+pub use park::{PARK_POSE, ParkError, park_way};
 pub use player::Player;
 pub use recorder::{RecordedPose, Recorder};
-pub use tip_move::{LineStart, LineStartError, TipMove};
+pub use tip_move::{GuardedMoveError, LineStart, LineStartError, TipMove};

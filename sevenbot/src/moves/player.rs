@@ -1,8 +1,8 @@
 //! Makes an arm follow a recording, and keeps the measured positions.
 //!
 //! ```text
-//!   slow approach to the first pose ──▶ stream of points, or one frame per step ──▶ last pose
-//!                                                          └── reports ──▶ measured
+//!   ApproachRule ──▶ way to the first pose ──▶ stream of points, or one frame per step ──▶ last pose
+//!           └──▶ StartTooFar                                   └── reports ──▶ measured
 //! ```
 
 use std::time::{Duration, Instant};
@@ -12,6 +12,7 @@ use protocol_core::registers::map::{SPEED, TIME, VACUUM_PUMP};
 use super::error::{ConnectionLost, MoveError, all_taken};
 use super::joint_move::JointMove;
 use super::observer::{Observer, Stage};
+use crate::approach::{Approach, ApproachRule, Standing, StartTooFar};
 use crate::arm::Arm;
 use crate::fine_angle::FineAngle;
 use crate::playback::{self, Step};
@@ -59,6 +60,9 @@ pub struct Player {
     moments: Vec<Moment>,
     steps: Vec<Step>,
     path: PointPath,
+    rule: ApproachRule,
+    /// The speeds of the joints before the first run.
+    speeds: [Speed; 7],
     measured: Vec<(Duration, [FineAngle; 7])>,
     played: u32,
 }
@@ -71,9 +75,17 @@ impl Player {
             moments: recording.moments().collect(),
             steps: playback::steps(recording, factor),
             path: PointPath::new(recording, factor),
+            rule: ApproachRule::Near,
+            speeds: [Speed::MAXIMUM; 7],
             measured: Vec::new(),
             played: 0,
         }
+    }
+
+    /// With another rule for the way to the first pose. Without it a pose further than 5 degrees is refused.
+    #[must_use]
+    pub fn with_approach(self, rule: ApproachRule) -> Self {
+        Self { rule, ..self }
     }
 
     /// How many times the recording was played to its end.
@@ -92,8 +104,12 @@ impl Player {
     /// that the arm had before. The motors must drive the joints: [`Arm::driven_joints`].
     ///
     /// # Errors
-    /// The observer ended it, the arm did not take a value or reach a pose, its reports ended, or an exchange failed.
+    /// The first pose is too far from where the arm stands or, played more than once, from the last pose: then nothing is
+    /// moved. A joint is blocked, let go or silent, the supply was lost, or the controller restarted:
+    /// [`MoveError::Problems`]. The observer ended it, the arm did not take a value or reach a pose, its reports ended, or an
+    /// exchange failed.
     pub fn play(&mut self, arm: &mut Arm, times: u32, observer: &mut dyn Observer) -> Result<(), MoveError> {
+        self.check_start(arm, times)?;
         let before = arm.read_span(Span::between(&SPEED, &TIME))?;
         let content = arm.exact_positions()?;
         let done = arm.with_reports(FEEDBACK_HZ, content, |arm| {
@@ -125,9 +141,27 @@ impl Player {
         Ok(())
     }
 
-    /// Moves slowly to the first pose.
+    /// Checks the ways to the first pose before anything moves.
+    fn check_start(&mut self, arm: &mut Arm, times: u32) -> Result<(), MoveError> {
+        let Some((first, last)) = self.moments.first().zip(self.moments.last()) else { return Ok(()) };
+        let standing = arm.standing()?;
+        self.speeds = standing.speeds;
+        let first = first.pose.map(Some);
+        Approach::plan(&standing, &first, self.rule)?;
+        if times != 1 {
+            let end = Standing::at_pose(last.pose, self.speeds);
+            let seam = Approach::plan(&end, &first, self.rule);
+            seam.map_err(|far| StartTooFar { is_seam: true, ..far })?;
+        }
+        Ok(())
+    }
+
+    /// Moves to the first pose, and waits until the arm is there.
     fn approach(&self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
         let Some(first) = self.moments.first() else { return Ok(()) };
+        if let ApproachRule::Within(_) = self.rule {
+            self.blend(first, arm, observer)?;
+        }
         let step = playback::approach(arm.positions()?, *first);
         let pace = step.registers();
         let pace = pace.get(..pace.len().saturating_sub(step.targets.len())).unwrap_or_default();
@@ -135,12 +169,27 @@ impl Player {
         move_to(arm, first.pose, observer)
     }
 
+    /// Goes smoothly to the first pose.
+    fn blend(&self, first: &Moment, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
+        let standing = Standing { speeds: self.speeds, ..arm.standing()? };
+        let way = Approach::plan(&standing, &first.pose.map(Some), self.rule)?;
+        all_taken(arm.write_checked(VACUUM_PUMP.address, &[u8::from(first.vacuum)])?)?;
+        if arm.has_extended_block()? {
+            let options = StreamOptions::new(PERIOD_MS).ok_or(StreamError::NoExtendedBlock)?;
+            let mut stream = SetPointStream::open(arm, options)?;
+            stream.approach(&way, observer)?;
+            return Ok(stream.close()?);
+        }
+        let mut run = Run { measured: Vec::new(), start: arm.now(), last_report: arm.now() };
+        self.send_steps(&playback::steps(&way.recording(*first), 1.0), &mut run, arm, observer)
+    }
+
     fn play_once(&mut self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
         let mut run = Run { measured: Vec::new(), start: arm.now(), last_report: arm.now() };
         let done = if arm.has_extended_block()? {
             self.stream(&mut run, arm, observer)
         } else {
-            self.send_steps(&mut run, arm, observer)
+            self.send_steps(&self.steps, &mut run, arm, observer)
         };
         if self.played == 0 {
             self.measured = run.measured;
@@ -150,14 +199,20 @@ impl Player {
     }
 
     /// Sends one frame per step.
-    fn send_steps(&self, run: &mut Run, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
+    fn send_steps(
+        &self,
+        steps: &[Step],
+        run: &mut Run,
+        arm: &mut Arm,
+        observer: &mut dyn Observer,
+    ) -> Result<(), MoveError> {
         run.restart(arm);
-        for (number, step) in (1..).zip(&self.steps) {
+        for (number, step) in (1..).zip(steps) {
             run.take_reports_until(step.time, arm, observer)?;
             arm.write(VACUUM_PUMP.address, &step.registers())?;
-            observer.progress(Stage::Playing, number, count(self.steps.len()));
+            observer.progress(Stage::Playing, number, count(steps.len()));
         }
-        let end = self.steps.last().map_or(Duration::ZERO, |step| step.time);
+        let end = steps.last().map_or(Duration::ZERO, |step| step.time);
         run.take_reports_until(end + TAIL, arm, observer)
     }
 
@@ -183,6 +238,7 @@ impl Player {
                 stream.arm().write(VACUUM_PUMP.address, &[u8::from(vacuum)])?;
             }
             stream.send(&point.pose.map(Some))?;
+            stream.check()?;
             observer.progress(Stage::Playing, number.into(), u64::try_from(points).unwrap_or(u64::MAX));
         }
         run.take_reports_until(time + 2 * period + TAIL, stream.arm(), observer)?;

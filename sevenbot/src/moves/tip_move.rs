@@ -1,16 +1,24 @@
 //! Moves of the tip: what [`crate::cartesian`] needs to know of the arm.
+//!
+//! ```text
+//!   TipMove: targets of this arm ──▶ JointPath: from where it stands, at its speeds ──▶ Guard
+//!   LineStart: its present targets ──▶ StraightLineRequest
+//! ```
 
 use protocol_core::registers::Joint;
-use protocol_core::registers::map::VACUUM_PUMP;
+use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TIME, VACUUM_PUMP};
 
+use super::pace::Pace;
 use crate::arm::Arm;
-use crate::cartesian::{FineTipTarget, StraightLineRequest, TargetResolution, TipTarget, Vector};
+use crate::cartesian::{
+    FineTipTarget, Guard, JointPath, PathBreach, StraightLineRequest, TargetResolution, TipTarget, Vector,
+};
 use crate::error::Error;
 use crate::fine_angle::FineAngle;
 use crate::fine_state::FineTargets;
 use crate::joints::{JointSnapshot, StepBaseError};
 use crate::span::Span;
-use crate::units::Angle;
+use crate::units::{Angle, MoveTime, Speed};
 
 /// The targets that bring the tip to a position, as exact as an arm takes them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +39,53 @@ impl TipMove {
         let whole = target.degrees.map(|degrees| Angle::from_register(degrees).into());
         let [t1, t2, t3, t4, t5] = fine.map_or(whole, |fine| fine.angles).map(Some);
         Ok(Self { targets: [t1, t2, t3, t4, t5, None, None], fine })
+    }
+}
+
+/// Why a way of the joints is not checked or not allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GuardedMoveError {
+    /// The guard does not allow it.
+    #[error(transparent)]
+    Guarded(#[from] PathBreach),
+    /// An exchange failed.
+    #[error(transparent)]
+    Exchange(#[from] Error),
+}
+
+impl Arm {
+    /// Checks the way from where the joints are measured to these targets, at this pace; what it leaves open is that of the
+    /// registers. Joints without a target stay at theirs.
+    ///
+    /// # Errors
+    /// The guard does not allow the way, or an exchange failed.
+    pub fn check_way(
+        &mut self,
+        targets: &FineTargets,
+        pace: Pace,
+        guard: &Guard,
+    ) -> Result<(), GuardedMoveError> {
+        let path = self.way_to(targets, pace)?;
+        Ok(guard.check_path(&path)?)
+    }
+
+    fn way_to(&mut self, targets: &FineTargets, pace: Pace) -> Result<JointPath, Error> {
+        let registers = self.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
+        let fine = self.fine_state_if_served()?.map_or([None; 7], |state| state.positions);
+        let (mut from, mut to) = ([0.0; 5], [0.0; 5]);
+        let (mut speeds, mut times) = ([Speed::MAXIMUM; 5], [MoveTime::NONE; 5]);
+        let joints = Joint::ALL.into_iter().zip(fine).zip(targets);
+        let ways = from.iter_mut().zip(&mut to).zip(speeds.iter_mut().zip(&mut times));
+        for (((joint, fine), target), ((from, to), (speed, time))) in joints.zip(ways) {
+            let whole = Angle::from_register(registers.at(PRESENT_POSITION.of(joint)));
+            *from = fine.unwrap_or(whole.into()).degrees();
+            *to = target.map_or(*from, FineAngle::degrees);
+            let (set_speed, set_time) = (registers.at(SPEED.of(joint)), registers.at(TIME.of(joint)));
+            let timed = pace.time.map(|_| Speed::MAXIMUM);
+            *speed = pace.speed.or(timed).or(Speed::from_steps(set_speed)).unwrap_or(Speed::MAXIMUM);
+            *time = pace.time.or(MoveTime::from_steps(set_time)).unwrap_or(MoveTime::NONE);
+        }
+        Ok(JointPath::at_pace(from, to, speeds, times))
     }
 }
 
@@ -81,10 +136,11 @@ impl LineStart {
         Ok(Self { targets, resolution, vacuum })
     }
 
-    /// A line from here to a tip in millimetres, with a direction of the tool and a speed in millimetres per second.
+    /// A line from here to a tip in millimetres, with a direction of the tool and a speed in millimetres per second. No
+    /// guard checks it: set [`StraightLineRequest::guard`].
     #[must_use]
     pub const fn line_to(self, tip: Vector, tool: Vector, speed: f64) -> StraightLineRequest {
         let Self { targets: start, resolution, vacuum } = self;
-        StraightLineRequest { start, resolution, vacuum, tip, tool, speed }
+        StraightLineRequest { start, resolution, vacuum, tip, tool, speed, guard: None }
     }
 }

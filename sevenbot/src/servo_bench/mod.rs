@@ -1,9 +1,9 @@
 //! Single servos without the arm's controller, for building and repairing an arm.
 //!
 //! ```text
-//!   scan, servo_info, set_id, center ──▶ BusMaster ──▶ ServoLine ──▶ half-duplex adapter ──▶ servos
-//!                                            │
-//!                                            └── frames of motion-core, as in the arm's controller
+//!   scan, servo_info, register_table, set_id, center ──▶ BusMaster ──▶ ServoLine ──▶ half-duplex adapter ──▶ servos
+//!                                                            │
+//!                                                            └── frames of motion-core, as in the arm's controller
 //! ```
 //!
 //! Talks to SCS servos through a half-duplex TTL adapter. Disconnect the arm's controller from the bus first: two
@@ -22,6 +22,7 @@
 pub mod bus_master;
 pub mod center;
 pub mod error;
+pub mod register_table;
 pub mod scan;
 pub mod servo_info;
 pub mod servo_line;

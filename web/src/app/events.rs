@@ -1,6 +1,10 @@
 //! What a person does: clicks, keys, sliders, the pointer on the picture, files.
 
+use std::time::Duration;
+
+use protocol_core::time::Instant;
 use sevenbot::map::{MOTOR_STATE, motor_state};
+use sevenbot::recording::{Recording, RecordingError};
 use sevenbot::{Span, register_values};
 use wasm_bindgen::prelude::Closure;
 use wasm_bindgen::{JsCast, JsValue};
@@ -12,11 +16,14 @@ use web_sys::{
 use super::dom::{Dom, number};
 use super::{App, Line, hand, panels, with_app};
 use crate::arm_state::target_frame;
-use crate::movement::{self, Player, Recorder};
+use crate::movement::{self, PlayRefusal, Player, Recorder};
+use crate::park::{Park, ParkProgress};
 use crate::plots::Quantity;
 use crate::source::serial::SerialSource;
 use crate::source::socket::SocketSource;
 
+/// The longest way to the first pose of a movement, in seconds.
+const LONGEST_APPROACH: f32 = 60.0;
 /// The texts of the tour, in their order. The last one is for a real arm.
 const TOUR: [&str; 5] = ["tour-1", "tour-2", "tour-3", "tour-4", "tour-5"];
 
@@ -65,6 +72,7 @@ impl App {
             "stop" => self.stop(),
             "language" => self.set_language(self.language.other()),
             "motors" => self.write(MOTOR_STATE.address, &[value.parse().unwrap_or(motor_state::SERVO)]),
+            "park" => self.begin_park(),
             "plot" => self.choose_plot(value),
             "speed" => {
                 self.speed = value.parse().unwrap_or(1.0);
@@ -94,11 +102,34 @@ impl App {
     }
 
     pub(super) fn write(&mut self, address: u8, values: &[u8]) {
+        self.park = None;
         let now = self.now();
         self.client.write(now, address, values);
     }
 
+    fn begin_park(&mut self) {
+        self.player = None;
+        self.park = Park::new(&self.client.state(), &self.client);
+        let text = if self.park.is_some() { "parking" } else { "park-failed" };
+        panels::notice(&self.dom, self.language.text(text));
+    }
+
+    /// Goes on with parking.
+    pub(super) fn park_on(&mut self, now: Instant) {
+        let Some(mut park) = self.park.take() else { return };
+        let text = match park.poll(now, &mut self.client) {
+            ParkProgress::Moving => {
+                self.park = Some(park);
+                return;
+            }
+            ParkProgress::Parked => "parked",
+            ParkProgress::Failed => "park-failed",
+        };
+        panels::notice(&self.dom, self.language.text(text));
+    }
+
     fn stop(&mut self) {
+        self.park = None;
         if self.player.take().is_some() {
             let now = self.now();
             movement::end(&mut self.client, now);
@@ -222,11 +253,30 @@ impl App {
     }
 
     fn begin_play(&mut self) {
+        self.park = None;
         let Some(recording) = &self.recording else { return };
-        match Player::new(recording, self.now()) {
-            Ok(player) => self.player = Some(player),
-            Err(why) => panels::notice(&self.dom, &format!("{} {why}", self.language.text("bad-file"))),
+        let seconds = self.dom.get::<HtmlInputElement>("approach").ok().and_then(|field| number(&field));
+        let approach = seconds.filter(|seconds| *seconds > 0.0);
+        let approach = approach.map(|seconds| Duration::from_secs_f32(seconds.min(LONGEST_APPROACH)));
+        match Player::new(recording, self.client.registers(), approach, self.now()) {
+            Ok(player) => {
+                self.player = Some(player);
+                panels::end_notice(&self.dom);
+            }
+            Err(PlayRefusal::NoRecording(why)) => self.refuse_file(&why),
+            Err(PlayRefusal::TooFar(far)) => {
+                let joints = far
+                    .joints
+                    .iter()
+                    .map(|(joint, here, first)| format!("{}: {here:.1}° → {first:.1}°", joint.number()));
+                let joints = joints.collect::<Vec<_>>().join(", ");
+                panels::notice(&self.dom, &format!("{} {joints}", self.language.text("too-far")));
+            }
         }
+    }
+
+    fn refuse_file(&self, why: &RecordingError) {
+        panels::notice(&self.dom, &format!("{} {why}", self.language.text("bad-file")));
     }
 
     fn download(&self) {
@@ -276,12 +326,12 @@ fn upload(element: &Element) {
     spawn_local(async move {
         let text =
             JsFuture::from(file.text()).await.ok().and_then(|text| text.as_string()).unwrap_or_default();
-        with_app(|app| match Player::new(&text, app.now()) {
+        with_app(|app| match Recording::parse(&text) {
             Ok(_) => {
                 app.recording = Some(text.clone());
                 panels::end_notice(&app.dom);
             }
-            Err(why) => panels::notice(&app.dom, &format!("{} {why}", app.language.text("bad-file"))),
+            Err(why) => app.refuse_file(&why),
         });
     });
 }

@@ -10,8 +10,8 @@ use web_sys::{Element, PointerEvent, WheelEvent};
 use super::dom::Dom;
 use super::events::on;
 use super::{App, Line};
-use crate::arm_state::has_extended_block;
-use crate::scene::{Button, Scene, SceneEvent};
+use crate::arm_state::{breach_on_way, breach_text, has_extended_block};
+use crate::scene::{Button, Refusal, Scene, SceneEvent, Unreachable};
 
 /// Listens to pointers and the wheel.
 pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
@@ -73,10 +73,12 @@ impl App {
             Some(SceneEvent::Hovered(part)) => self.hovered = part,
             Some(SceneEvent::JointDragged { joint, degrees }) => self.drag_joint(joint, degrees),
             Some(SceneEvent::TipDragged(wish)) => {
-                self.unreachable = wish.reach.is_err().then_some(wish.tip);
-                if let Ok(angles) = wish.reach {
-                    self.send_pose(angles);
-                }
+                let refused = match wish.reach {
+                    Err(Unreachable { why: Refusal::OutOfReach(_), .. }) => Some("unreachable"),
+                    Err(Unreachable { why: Refusal::Guarded(breach), .. }) => Some(breach_text(&breach)),
+                    Ok(angles) => self.drag_tip(angles),
+                };
+                self.unreachable = refused.map(|why| (wish.tip, why));
             }
             Some(SceneEvent::Released) => {
                 self.unreachable = None;
@@ -85,6 +87,15 @@ impl App {
                 }
             }
         }
+    }
+
+    /// Sends the arm to a pose of a dragged tip. Returns the text that says why not, if the way there is not allowed.
+    fn drag_tip(&mut self, angles: [f32; 7]) -> Option<&'static str> {
+        let breach = breach_on_way(self.client.registers(), angles);
+        if breach.is_none() {
+            self.send_pose(angles);
+        }
+        breach.map(|breach| breach_text(&breach))
     }
 
     /// Moves a joint by its motor. A limp joint of a simulated arm is moved by a hand.

@@ -25,6 +25,7 @@ use web_sys::CanvasRenderingContext2d;
 
 use crate::client::Client;
 use crate::movement::{Player, Recorder};
+use crate::park::Park;
 use crate::plots::{History, Quantity, Sample};
 use crate::scene::{Part, Scene};
 use crate::source::simulator::SimulatedSource;
@@ -77,10 +78,12 @@ pub(crate) struct App {
     slid_round: u64,
     frames: u32,
     hovered: Option<Part>,
-    unreachable: Option<Vec3>,
+    /// Where the pointer wants the tip although it cannot go there, and the name of the text that says why.
+    unreachable: Option<(Vec3, &'static str)>,
     /// A joint of a limp arm that the pointer holds.
     hand: Option<u8>,
     recorder: Option<Recorder>,
+    park: Option<Park>,
     player: Option<Player>,
     recording: Option<String>,
     tour_step: usize,
@@ -176,6 +179,7 @@ impl App {
             unreachable: None,
             hand: None,
             recorder: None,
+            park: None,
             player: None,
             recording: None,
             tour_step: 0,
@@ -233,6 +237,7 @@ impl App {
     }
 
     fn play(&mut self, now: Instant) {
+        self.park_on(now);
         let Some(mut player) = self.player.take() else { return };
         if player.poll(now, &mut self.client) {
             self.player = Some(player);
@@ -263,7 +268,7 @@ impl App {
         (self.line, self.client) = (line, Client::default());
         (self.shown_round, self.slid_round) = (0, 0);
         (self.hand, self.unreachable) = (None, None);
-        (self.recorder, self.player) = (None, None);
+        (self.recorder, self.player, self.park) = (None, None, None);
         self.history = History::new(PLOT_SECONDS);
         let is_simulated = matches!(self.line, Line::Simulated(_));
         self.dom.set_hidden("simulator", !is_simulated);

@@ -8,7 +8,7 @@ use web_sys::{Element, HtmlInputElement};
 use super::dom::{Dom, set_attribute, set_text};
 use super::picture::tip;
 use super::{App, Line};
-use crate::arm_state::{ArmState, has_extended_block};
+use crate::arm_state::{ArmState, breach, breach_text, has_extended_block};
 use crate::source::LineState;
 use crate::texts::Language;
 use crate::words::{Answers, state_line};
@@ -56,7 +56,10 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     }
     dom.press("motors", &state.motor_state.to_string());
     let [x, y, z] = tip(state.angles());
-    let reach = app.unreachable.map_or(String::new(), |_| format!(" · {}", language.text("unreachable")));
+    // Sliders go anywhere: this is the warning.
+    let at = breach(state.angles()).or(breach(state.targets)).map(|breach| breach_text(&breach));
+    let reach = app.unreachable.map(|(_, why)| why).or(at);
+    let reach = reach.map_or(String::new(), |why| format!(" · {}", language.text(why)));
     dom.set_text("tip", &format!("{}: x {x:.0}, y {y:.0}, z {z:.0} mm{reach}", language.text("tip")));
     dom.set_text("health", &health(language, state));
     show_recording(app);

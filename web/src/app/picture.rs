@@ -24,7 +24,7 @@ impl App {
             measured: state.angles(),
             targets: (state.motor_state == motor_state::SERVO).then_some(state.targets),
             colours: colours(&state, theme),
-            unreachable: self.unreachable,
+            unreachable: self.unreachable.map(|(tip, _)| tip),
             hovered: self.hovered,
             theme,
         };

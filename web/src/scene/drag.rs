@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3};
 use kinematics::geometry::{CLAW_MAX, JOINT_MAX, LEVEL_FOREARM, LINKAGE_MAX, LINKAGE_MIN};
 use kinematics::nearest::nearest_tip;
 use kinematics::{NoSolution, forward, ik6, ik6_all};
+use sevenbot::cartesian::{Breach, Guard};
 
 use super::arm::{Angles, Hit, from_vector, point_of, tip_of, to_vector};
 use super::camera::Camera;
@@ -110,16 +111,26 @@ pub struct TipWish {
     pub reach: Result<Angles, Unreachable>,
 }
 
-/// A position out of reach.
+/// Why the tip cannot follow the pointer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Refusal {
+    /// No angles reach the position.
+    OutOfReach(NoSolution),
+    /// The guard of the workspace does not allow it.
+    Guarded(Breach),
+}
+
+/// A position out of reach, or not allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unreachable {
     /// Why.
-    pub why: NoSolution,
+    pub why: Refusal,
     /// Angles with the tip as near to it as the arm comes with the same direction of the tool.
     pub nearest: Option<Angles>,
 }
 
-/// Solves for a position of the tip in mm, with the direction of the tool that `angles` has. Joints 6 and 7 stay.
+/// Solves for a position of the tip in mm, with the direction of the tool that `angles` has. Joints 6 and 7 stay. The
+/// position is above the table, and outside the base.
 #[must_use]
 pub fn wish(tip: Vec3, angles: Angles) -> TipWish {
     let [t1, t2, t3, t4, t5, t6, _] = angles.map(f64::from);
@@ -129,9 +140,17 @@ pub fn wish(tip: Vec3, angles: Angles) -> TipWish {
         ik6(asked, tool).map(|solution| nearest_solution(tip, angles).unwrap_or(extended(solution, angles)));
     let reach = reach.map_err(|why| {
         let nearest = nearest_tip(asked, tool).and_then(|point| nearest_solution(from_vector(point), angles));
-        Unreachable { why, nearest }
+        let nearest = nearest.filter(|&nearest| allowed(nearest).is_ok());
+        Unreachable { why: Refusal::OutOfReach(why), nearest }
     });
-    TipWish { tip, reach }
+    TipWish { tip, reach: reach.and_then(|reached| allowed(reached).map(|()| reached)) }
+}
+
+/// Does the guard of the workspace allow these angles?
+fn allowed(angles: Angles) -> Result<(), Unreachable> {
+    let [t1, t2, t3, t4, t5, ..] = angles.map(f64::from);
+    let refused = |breach| Unreachable { why: Refusal::Guarded(breach), nearest: None };
+    Guard::default().check_pose([t1, t2, t3, t4, t5]).map_err(refused)
 }
 
 /// Of all solutions for a position, the one with the smallest turn of any joint.
@@ -184,6 +203,7 @@ mod tests {
     use crate::scene::arm::Arm;
     use crate::scene::camera::Preset;
     use kinematics::limits::check;
+    use sevenbot::cartesian::Obstacle;
 
     const POSE: Angles = [90.0, 100.0, 75.0, 80.0, 110.0, 70.0, 60.0];
 
@@ -267,11 +287,24 @@ mod tests {
     fn a_tip_out_of_reach_is_told_with_the_nearest_pose() {
         let far = wish(Vec3::new(0.0, 600.0, 100.0), POSE);
         let unreachable = far.reach.expect_err("too far");
-        assert_eq!((far.tip, unreachable.why), (Vec3::new(0.0, 600.0, 100.0), NoSolution::TooFar));
+        let too_far = Refusal::OutOfReach(NoSolution::TooFar);
+        assert_eq!((far.tip, unreachable.why), (Vec3::new(0.0, 600.0, 100.0), too_far));
         let nearest = unreachable.nearest.expect("a pose");
         assert_eq!(check(nearest.map(f64::from)), Ok(()));
         let gap = (tip_of(nearest) - far.tip).length();
         assert!(gap > 100.0 && gap < 350.0, "{gap}");
+    }
+
+    #[test]
+    fn a_tip_below_the_table_or_in_the_base_is_refused() {
+        let down: Angles = [90.0, 88.0, 110.0, 90.0, 135.0, 90.0, 80.0];
+        let refused = |x: f32, y: f32, z: f32| match wish(Vec3::new(x, y, z), down).reach {
+            Err(Unreachable { why: Refusal::Guarded(breach), .. }) => Some(breach.obstacle),
+            _ => None,
+        };
+        assert_eq!(refused(0.0, 185.0, -50.0), None);
+        assert_eq!(refused(0.0, 185.0, -100.0), Some(Obstacle::Table));
+        assert_eq!(refused(0.0, 100.0, -40.0), Some(Obstacle::Base));
     }
 
     #[test]

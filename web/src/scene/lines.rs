@@ -1,7 +1,7 @@
 //! Lines of the scene: the grid on the table with its labels in mm, the line below the tip, and a position out of reach.
 
-use arm_model::BASE_HEIGHT;
 use glam::{Vec2, Vec3};
+use kinematics::geometry::BASE_HEIGHT;
 
 use super::arm::tip_of;
 use super::camera::Camera;

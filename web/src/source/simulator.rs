@@ -165,7 +165,7 @@ mod tests {
     fn a_movement_is_played_to_its_end() {
         let (mut client, mut arm) = connected();
         let movement = "7bot-recording 2\n0 90 90 65 90 90 90 80 0\n1 110 90 65 90 90 90 80 1\n";
-        let mut player = Player::new(movement, arm.now()).expect("a recording");
+        let mut player = Player::new(movement, client.registers(), None, arm.now()).expect("a recording");
         let mut frames = 0;
         while player.poll(arm.now(), &mut client) {
             pass(&mut client, &mut arm, 1);

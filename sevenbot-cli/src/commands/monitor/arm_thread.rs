@@ -5,7 +5,7 @@
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
-use sevenbot::cartesian::{Jog, JogAxes, Vector};
+use sevenbot::cartesian::{Guard, Jog, JogAxes, Vector};
 use sevenbot::joints::JointSnapshot;
 use sevenbot::map::{MOTOR_STATE, SPEED, TARGET_POSITION, motor_state};
 use sevenbot::{Angle, Arm, ArmOptions, Error, Joint, ports};
@@ -39,6 +39,8 @@ pub(crate) struct ArmThread {
     pub(crate) arm: Option<Arm>,
     /// Where steps of the tip have brought it.
     pub(crate) jog: Option<Jog>,
+    /// Bounds the steps of the tip; `None`: nothing does.
+    pub(crate) guard: Option<Guard>,
 }
 
 /// The screen has closed its channel.
@@ -143,8 +145,11 @@ impl ArmThread {
 
     /// Executes a command, and reports a refusal to the screen.
     fn execute(&mut self, arm: &mut Arm, command: UiCommand) -> Result<(), WatchEnd> {
-        let (refusal, lost) = match try_execute(arm, &mut self.jog, command) {
-            Ok(()) => return Ok(()),
+        let (refusal, lost) = match self.try_execute(arm, command) {
+            Ok(None) => return Ok(()),
+            Ok(Some(warning)) => {
+                return self.tell(ArmEvent::Warned(warning)).map_err(|ChannelClosed| WatchEnd::Quit);
+            }
             Err(CommandError::Exchange(error)) => (CommandError::MayMove(error.to_string()), Some(error)),
             Err(failure) => (failure, None),
         };
@@ -154,6 +159,24 @@ impl ArmThread {
             Some(error @ Error::Port(_)) => Err(error.into()),
             _ => Ok(()),
         }
+    }
+
+    /// Executes a command and verifies it. Returns a warning for the user.
+    fn try_execute(&mut self, arm: &mut Arm, command: UiCommand) -> Result<Option<String>, CommandError> {
+        let guard = self.guard.as_ref();
+        match command {
+            UiCommand::Nudge { joint, degrees } => return nudge(arm, guard, joint, degrees),
+            UiCommand::Jog { axes, millimetres } => jog_tip(arm, &mut self.jog, guard, axes, millimetres)?,
+            UiCommand::SpeedChange { joint, change } => {
+                let joints = arm.read(SPEED.of(joint), 1)?;
+                let steps = joints.first().copied().unwrap_or(0);
+                all_taken(&arm.write_checked(SPEED.address, &[change.after(steps); 7])?)?;
+            }
+            // Writing state 1 again does not stop an arm in state 1.
+            UiCommand::State(motor_state::SERVO) if arm.joints()?.is_driven() => hold(arm).map(drop)?,
+            UiCommand::State(state) => motors_obey(arm.write_checked(MOTOR_STATE.address, &[state]))?,
+        }
+        Ok(None)
     }
 
     fn tell(&self, event: ArmEvent) -> Result<(), ChannelClosed> {
@@ -173,33 +196,32 @@ impl ArmThread {
     }
 }
 
-/// Executes a command and verifies it.
-fn try_execute(arm: &mut Arm, jog: &mut Option<Jog>, command: UiCommand) -> Result<(), CommandError> {
-    match command {
-        UiCommand::Nudge { joint, degrees } => nudge(arm, joint, degrees),
-        UiCommand::Jog { axes, millimetres } => jog_tip(arm, jog, axes, millimetres),
-        UiCommand::SpeedChange { joint, change } => {
-            let joints = arm.read(SPEED.of(joint), 1)?;
-            let steps = joints.first().copied().unwrap_or(0);
-            all_taken(&arm.write_checked(SPEED.address, &[change.after(steps); 7])?)
-        }
-        // Writing state 1 again does not stop an arm in state 1.
-        UiCommand::State(motor_state::SERVO) if arm.joints()?.is_driven() => hold(arm).map(drop),
-        UiCommand::State(state) => motors_obey(arm.write_checked(MOTOR_STATE.address, &[state])),
-    }
-}
-
-/// Changes a joint's target by some degrees. Reads the target first: the one on the screen may be old.
-fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> {
-    let wanted = step_target(&arm.wait_until_settled()?, joint, degrees)?.max(0);
+/// Changes a joint's target by some degrees. Reads the target first: the one on the screen may be old. Returns a warning
+/// if the guard would not allow the pose.
+fn nudge(
+    arm: &mut Arm,
+    guard: Option<&Guard>,
+    joint: Joint,
+    degrees: i16,
+) -> Result<Option<String>, CommandError> {
+    let joints = arm.wait_until_settled()?;
+    let wanted = step_target(&joints, joint, degrees)?.max(0);
     let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
-    motors_obey(arm.write_checked(TARGET_POSITION.of(joint), &[wanted]))
+    motors_obey(arm.write_checked(TARGET_POSITION.of(joint), &[wanted]))?;
+    let mut targets = joints.targets();
+    for (target, _) in targets.iter_mut().zip(Joint::ALL).filter(|(_, other)| *other == joint) {
+        *target = wanted;
+    }
+    let [t1, t2, t3, t4, t5, ..] = targets.map(f64::from);
+    let breach = guard.and_then(|guard| guard.check_pose([t1, t2, t3, t4, t5]).err());
+    Ok(breach.map(|breach| breach.to_string()))
 }
 
 /// Moves the tip by some millimetres. Reads the targets first: those on the screen may be old.
 fn jog_tip(
     arm: &mut Arm,
     jog: &mut Option<Jog>,
+    guard: Option<&Guard>,
     axes: JogAxes,
     millimetres: [i16; 3],
 ) -> Result<(), CommandError> {
@@ -210,8 +232,8 @@ fn jog_tip(
     }
     let targets = joints.targets().map(Angle::from_register);
     let [x, y, z] = millimetres.map(f64::from);
-    let next = Jog::step(*jog, targets, axes, Vector::new(x, y, z));
-    let next = next.map_err(|reason| CommandError::Arm(format!("no step: {}", reason.reason())))?;
+    let next = Jog::step(*jog, targets, axes, Vector::new(x, y, z), guard);
+    let next = next.map_err(|reason| CommandError::Arm(format!("no step: {reason}")))?;
     motors_obey(arm.write_checked(TARGET_POSITION.address, &next.targets.map(Angle::degrees)))?;
     *jog = Some(next);
     Ok(())

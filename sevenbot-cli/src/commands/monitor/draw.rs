@@ -40,6 +40,8 @@ const LONGEST_GAP: Duration = Duration::from_millis(1500);
 /// Width of the table without its bars, in columns.
 const TABLE_WIDTH: usize = 49;
 
+/// Problems at the foot of the screen.
+const PROBLEMS_SHOWN: usize = 2;
 /// Height of the table: a header and seven joints.
 const JOINT_ROWS: u16 = 8;
 /// From this height on there are empty lines around the plot.
@@ -47,7 +49,8 @@ const ROOMY: u16 = 18;
 
 /// Draws the view.
 pub(crate) fn draw(frame: &mut Frame<'_>, view: &View) {
-    let heights = heights(frame.area().height);
+    let problems = problem_lines(view);
+    let heights = heights(frame.area().height, u16::try_from(problems.len()).unwrap_or(0));
     let [title, table, _, plot, _, foot, keys] = Layout::vertical(heights).areas(frame.area());
     frame.render_widget(Paragraph::new(title_left(view)), title);
     frame.render_widget(Paragraph::new(title_right(view)).alignment(Alignment::Right), title);
@@ -55,7 +58,8 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &View) {
     draw_plot(frame, view, plot);
     // Values of a lost arm are old.
     let age = if view.arm().is_some() { Style::new() } else { FAINT };
-    frame.render_widget(Paragraph::new(vec![health(view), link(view)]).style(age), foot);
+    let lines: Vec<Line<'_>> = problems.into_iter().chain([health(view), link(view)]).collect();
+    frame.render_widget(Paragraph::new(lines).style(age), foot);
     frame.render_widget(Paragraph::new(last_line(view)), keys);
     if let Some(dialog) = view.dialog {
         draw_dialog(frame, dialog);
@@ -63,7 +67,7 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &View) {
 }
 
 /// Heights of title, table, gap, plot, gap, foot and keys. A low screen loses the plot first and the table last.
-fn heights(screen: u16) -> [Constraint; 7] {
+fn heights(screen: u16, problem_lines: u16) -> [Constraint; 7] {
     let (gap, joints) = match screen {
         ROOMY.. => (1, Constraint::Length(JOINT_ROWS)),
         _ => (0, Constraint::Min(JOINT_ROWS)),
@@ -74,9 +78,21 @@ fn heights(screen: u16) -> [Constraint; 7] {
         Constraint::Length(gap),
         Constraint::Fill(1),
         Constraint::Length(gap),
-        Constraint::Length(2),
+        Constraint::Length(2 + problem_lines),
         Constraint::Length(1),
     ]
+}
+
+/// The most important problems, and below each what to do.
+fn problem_lines(view: &View) -> Vec<Line<'static>> {
+    let problems = view.sample.as_ref().map(|sample| sample.health.problems()).unwrap_or_default();
+    let shown = problems.iter().take(PROBLEMS_SHOWN);
+    let lines = shown.flat_map(|problem| {
+        [Line::styled(format!(" {problem}"), BAD), Line::raw(format!("   - {}", problem.kind.remedy()))]
+    });
+    let more = problems.len().saturating_sub(PROBLEMS_SHOWN);
+    let rest = (more > 0).then(|| Line::styled(format!(" and {more} more: `sevenbot status`"), BAD));
+    lines.chain(rest).collect()
 }
 
 fn title_left(view: &View) -> Line<'_> {
@@ -131,11 +147,7 @@ fn colour(joint: Joint) -> Style {
 fn row(view: &View, sample: &Sample, joint: Joint, bar: usize) -> Line<'static> {
     let (target, present) = (sample.joints.target(joint), sample.joints.present(joint));
     let stale = if view.arm().is_some() { Style::new() } else { FAINT };
-    let (word, style) = match (sample.joints.is_missing(joint), sample.joints.is_moving(joint)) {
-        (true, _) => ("no answer", BAD),
-        (false, true) => ("moving", Style::new().fg(Color::Cyan)),
-        (false, false) => ("", Style::new()),
-    };
+    let (word, style) = joint_word(sample, joint);
     let speed = sample.joints.speed(joint).degrees_per_second();
     let numbers = format!("  {target:>5}°  {present:>7}°  {speed:>5.1} °/s  ");
     let mut spans = vec![marker(view, joint), number(joint)];
@@ -146,6 +158,19 @@ fn row(view: &View, sample: &Sample, joint: Joint, bar: usize) -> Line<'static> 
         (_, None) => spans.push(Span::styled("      –", FAINT)),
     }
     Line::from(spans)
+}
+
+/// The most important problem of a joint, or what it does.
+fn joint_word(sample: &Sample, joint: Joint) -> (&'static str, Style) {
+    let health = sample.health.joints.iter().find(|health| health.joint == joint);
+    let problem = health.and_then(|health| health.problems().next());
+    let is_gripping = health.is_some_and(|health| health.is_gripping == Some(true));
+    match (problem, sample.joints.is_moving(joint)) {
+        (Some(problem), _) => (problem.name(), BAD),
+        _ if is_gripping => ("holding", Style::new()),
+        (None, true) => ("moving", Style::new().fg(Color::Cyan)),
+        (None, false) => ("", Style::new()),
+    }
 }
 
 /// A bar from 0 to 180 degrees with the present position and the target.

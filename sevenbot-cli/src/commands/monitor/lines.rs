@@ -4,8 +4,10 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 use sevenbot::fine::FineState;
+use sevenbot::health::JointHealth;
 use sevenbot::{FineAngle, Joint, StatusBlock};
 
+use super::super::status::ProblemText;
 use super::sample::Sample;
 use crate::printer::Printable;
 
@@ -27,7 +29,8 @@ impl LineFormat {
                 format!("seconds {} {} moving", joints("target").join(" "), joints("present").join(" "))
             }
             Self::Csv => format!(
-                "seconds,{},{},{},{},motor_state,faults,missing,supply_volts,hottest_celsius,round_trip_ms,{},{},{}",
+                "seconds,{},{},{},{},motor_state,faults,missing,supply_volts,hottest_celsius,round_trip_ms,{},{},{},\
+                 blocked,let_go,alarms,supply_lost",
                 joints("target").join(","),
                 joints("present").join(","),
                 joints("degrees_per_second").join(","),
@@ -76,8 +79,21 @@ fn csv(sample: &Sample) -> String {
         optional(sample.fine.map(|fine| fine.positions.map(|angle| angle.map(FineAngle::degrees))), 2),
         optional(sample.fine.map(|fine| fine.velocities.map(|tenths| Some(f64::from(tenths) / 10.0))), 1),
         optional(sample.fine.map(|fine| fine.loads.map(|tenths| Some(f64::from(tenths) / 10.0))), 1),
+        number(joint_bits(sample, |joint| joint.is_blocked)),
+        number(joint_bits(sample, |joint| joint.has_let_go)),
+        number(sample.health.alarms),
+        number(sample.health.is_supply_lost.map(u8::from)),
     ]
     .join(",")
+}
+
+/// The joints of which this is so; `None` if the firmware does not tell.
+fn joint_bits(sample: &Sample, is_so: fn(&JointHealth) -> Option<bool>) -> Option<u8> {
+    sample
+        .health
+        .joints
+        .iter()
+        .try_fold(0, |bits, joint| Some(if is_so(joint)? { bits | joint.joint.bit() } else { bits }))
 }
 
 /// Seven fields, empty where there is no number.
@@ -104,6 +120,9 @@ pub(crate) struct SampleJson {
     supply_volts: Option<f64>,
     hottest_celsius: Option<u8>,
     round_trip_ms: f64,
+    alarms: Option<u8>,
+    /// What needs attention, and what to do.
+    problems: Vec<ProblemText>,
     #[serde(skip_serializing_if = "Option::is_none")]
     fine: Option<FineJson>,
 }
@@ -143,6 +162,8 @@ impl From<&Sample> for SampleJson {
             supply_volts: status.and_then(StatusBlock::supply_volts),
             hottest_celsius: status.and_then(StatusBlock::hottest_celsius),
             round_trip_ms: thousandths(sample.round_trip.as_secs_f64() * 1e3),
+            alarms: sample.health.alarms,
+            problems: sample.health.problems().iter().map(ProblemText::from).collect(),
             fine: sample.fine.map(FineJson::from),
         }
     }

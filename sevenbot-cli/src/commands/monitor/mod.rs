@@ -30,6 +30,7 @@ use self::plot_kind::PlotKind;
 use self::sample::Sample;
 use self::view::{ArmEvent, PLOT_SPAN, View};
 use crate::command_error::CommandError;
+use crate::guard_args::GuardArgs;
 use crate::line_file::LineFile;
 use crate::session::Session;
 
@@ -46,6 +47,9 @@ Examples:
   sevenbot monitor --json --hz 2 | jq .positions
   sevenbot monitor --hz 20 --samples 100 > move.txt
 
+The keys that move the tip keep it above the table and out of the base; `sevenbot move-to --help` describes this guard.
+A key that turns a joint only warns.
+
 CSV and JSON also have positions in hundredths of a degree, velocities in degrees per second and loads in
 percent of the stall torque, if the arm measures them.")]
 pub(crate) struct MonitorArgs {
@@ -61,6 +65,8 @@ pub(crate) struct MonitorArgs {
     /// What the plot on the screen shows at first; p changes it.
     #[arg(long, value_enum, default_value_t)]
     plot: PlotKind,
+    #[command(flatten)]
+    guard: GuardArgs,
     /// Write the last screen to FILE, as SVG.
     #[arg(long, value_name = "FILE", hide = true, conflicts_with_all = ["csv", "json"])]
     picture: Option<PathBuf>,
@@ -73,18 +79,15 @@ impl MonitorArgs {
 }
 
 pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandError> {
+    let show_screen = |session: &Session| screen::run(session, args.period(), args.plot, args.guard.guard());
     let on_screen = session.printer.is_terminal() && args.csv.is_none() && args.samples.is_none();
     match (&args.picture, &args.csv) {
         (Some(path), _) => {
-            let view = if on_screen {
-                screen::run(session, args.period(), args.plot)?
-            } else {
-                view_without_screen(session, args)?
-            };
+            let view = if on_screen { show_screen(session)? } else { view_without_screen(session, args)? };
             fs::write(path, picture::picture(&view)).map_err(|error| CommandError::file(path, error))
         }
         (None, Some(path)) => write_csv(session, args, path),
-        (None, None) if on_screen => screen::run(session, args.period(), args.plot).map(drop),
+        (None, None) if on_screen => show_screen(session).map(drop),
         (None, None) => show_lines(session, args),
     }
 }

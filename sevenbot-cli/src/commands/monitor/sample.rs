@@ -1,10 +1,11 @@
-//! A sample of the arm: two or three reads, and the round-trip time of the first.
+//! A sample of the arm: one or two reads, and the round-trip time of the first.
 
 use std::time::{Duration, Instant};
 
 use sevenbot::fine::FineState;
 use sevenbot::joints::JointSnapshot;
-use sevenbot::{Arm, Error};
+use sevenbot::map::EXTENDED_VERSION;
+use sevenbot::{Arm, Error, Health, StatusBlock};
 
 /// The state of an arm at one time.
 #[derive(Clone, Debug)]
@@ -14,6 +15,8 @@ pub(crate) struct Sample {
     pub(crate) joints: JointSnapshot,
     /// Positions in hundredths, velocities and loads; `None` from an arm without the extended block.
     pub(crate) fine: Option<FineState>,
+    /// What is wrong, joint by joint.
+    pub(crate) health: Health,
     /// From a request to its reply.
     pub(crate) round_trip: Duration,
 }
@@ -24,8 +27,17 @@ impl Sample {
         let asked = Instant::now();
         let registers = arm.read_span(JointSnapshot::REGISTERS)?;
         let round_trip = asked.elapsed();
-        let joints = JointSnapshot::new(registers, arm.status()?);
-        let fine = arm.fine_state_if_served()?;
-        Ok(Self { time: start.elapsed(), joints, fine, round_trip })
+        let all = arm.with_blocks(&registers)?;
+        let health = Health::new(&all);
+        let has_block = all.byte(&EXTENDED_VERSION) == EXTENDED_VERSION.default_at(EXTENDED_VERSION.address);
+        let fine = has_block.then(|| FineState::new(&all));
+        let status = health.faults.is_some().then(|| StatusBlock::from(all));
+        Ok(Self {
+            time: start.elapsed(),
+            joints: JointSnapshot::new(registers, status),
+            fine,
+            health,
+            round_trip,
+        })
     }
 }

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
+use sevenbot::cartesian::Guard;
 
 use super::arm_thread::ArmThread;
 use super::draw::draw;
@@ -22,7 +23,12 @@ use crate::session::Session;
 const FRAME: Duration = Duration::from_millis(40);
 
 /// Shows the arm until the user quits. Returns the last view.
-pub(crate) fn run(session: &Session, period: Duration, plot: PlotKind) -> Result<View, CommandError> {
+pub(crate) fn run(
+    session: &Session,
+    period: Duration,
+    plot: PlotKind,
+    guard: Option<Guard>,
+) -> Result<View, CommandError> {
     // Without a port there is an error. A port without an answer is tried again.
     let port = session.port_name()?;
     let start = Instant::now();
@@ -41,6 +47,7 @@ pub(crate) fn run(session: &Session, period: Duration, plot: PlotKind) -> Result
         commands,
         arm: None,
         jog: None,
+        guard,
     };
     let watching = thread::spawn(|| watcher.run());
     let shown = on_terminal(|terminal| show(terminal, &mut view, start, &hear, &command));

@@ -25,6 +25,7 @@ const MEAN_WEIGHT: f64 = 0.1;
 
 /// An event from the arm's thread.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "nearly every event is a sample")]
 pub(crate) enum ArmEvent {
     /// Connected: port and firmware version.
     Found { port: String, firmware: String },
@@ -36,6 +37,8 @@ pub(crate) enum ArmEvent {
     Unanswered { damaged: usize },
     /// A command failed.
     Refused(String),
+    /// A command was executed, and the user should know this.
+    Warned(String),
 }
 
 /// A command from the user to the arm.
@@ -192,7 +195,7 @@ impl View {
                 self.link.unanswered += 1;
                 self.link.damaged += damaged;
             }
-            ArmEvent::Refused(reason) => self.show_note(reason),
+            ArmEvent::Refused(text) | ArmEvent::Warned(text) => self.show_note(text),
         }
     }
 
@@ -252,8 +255,13 @@ pub(crate) mod tests {
         let mut status = zeros(STATUS);
         set(&mut status, STATUS.address(), &[1, 0, 0, u8::from(position != 120) << 1]);
         set(&mut status, 254, &[74, 31]);
+        let mut all = Snapshot { address: 0, values: vec![0; 256] };
+        for part in [&registers, &status] {
+            set(&mut all, part.address, &part.values);
+        }
         Sample {
             time: Duration::from_millis(millis),
+            health: sevenbot::Health::new(&all),
             joints: JointSnapshot::new(registers, Some(StatusBlock::from(status))),
             fine: None,
             round_trip: Duration::from_micros(4200),

@@ -1,14 +1,15 @@
 //! The arguments of `move-to`, and the check of the point.
 
 use clap::Args;
-use sevenbot::cartesian::{DOWN, TipTarget, Unreachable, Vector};
+use sevenbot::cartesian::{DOWN, TipTarget, Vector};
 
 use crate::command_error::CommandError;
+use crate::guard_args::{GuardArgs, millimetres, refused};
 
 /// Move the tip to a point, in millimetres.
 ///
-/// The whole move is checked before the arm moves. If the point is out of reach, the error gives the nearest point
-/// within reach.
+/// The whole move is checked before the arm moves. If the point is out of reach, below the table or in the base, the error
+/// gives the nearest point that is none of these.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -19,6 +20,7 @@ Examples:
   sevenbot move-to 20 250 219 --keep-tool         with the tool as it points now
   sevenbot move-to 0 500 50 --dry-run             is it within reach? Needs no arm
   sevenbot move-to 60 200 50 --straight --speed 20    on a straight line, at 20 mm/s
+  sevenbot move-to 0 185 60 --table 30            nothing goes below z = 30: a suction cup of 90 mm
 
 Positions are millimetres from the point where the axis of the base meets the top plate: x to the right, y
 forward, z up. The tip is the middle of the disc that joint 6 turns; add the length of a suction cup or claw.
@@ -34,9 +36,17 @@ speed of each joint. It begins where the joints are sent now. The tool turns eve
 a target in hundredths of a degree each 20 ms, others one in whole degrees each 50 ms. The largest distance from
 the line that the rounding causes is shown.
 
+The guard keeps elbow, forearm, wrist, hand, tip and the edge of the disc above the table, and 10 mm away from the
+base: 88 mm round its axis, up to 10 mm above the top plate. It checks the point, and the whole way there: of the
+joints from where they are measured, at each 0.1 degrees, or of the straight line. A suction cup or claw on the disc is
+not known to it: set --table higher by its length. An arm that is inside already may leave. --dry-run without
+--keep-tool and --straight checks the point only.
+--no-guard checks none of this: the arm may hit the table and its own base, and the nearest point in an error may be
+inside them.
+
 Ctrl-C leaves the arm holding where it is.
 
-Exit status 1 when the point is out of reach, when the arm did not take the move, or with --wait did not
+Exit status 1 when the point is out of reach or not allowed, when the arm did not take the move, or with --wait did not
 reach it.")]
 pub(crate) struct MoveToArgs {
     /// Millimetres to the right of the base axis; negative to the left.
@@ -67,11 +77,8 @@ pub(crate) struct MoveToArgs {
     /// Check and show the move, but do not move.
     #[arg(long)]
     pub(super) dry_run: bool,
-}
-
-fn millimetres(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-    number.ok_or_else(|| "a number, such as 185 or -50.5".to_owned())
+    #[command(flatten)]
+    pub(super) guard: GuardArgs,
 }
 
 fn speed(text: &str) -> Result<f64, String> {
@@ -94,18 +101,10 @@ impl MoveToArgs {
     }
 }
 
-/// The targets of the joints. Fails if the point is out of reach.
-pub(super) fn target(tip: Vector, tool: Vector) -> Result<TipTarget, CommandError> {
-    TipTarget::of(tip, tool).map_err(|reason| unreachable(&reason))
-}
-
-/// A point out of reach, with advice if another direction of the tool reaches it.
-fn unreachable(reason: &Unreachable) -> CommandError {
-    let other = reason.other_tool.map(|tool| {
-        let Vector { x, y, z } = tool;
-        format!(". With --tool {x} {y} {z} the tip reaches the point")
-    });
-    CommandError::Arm(format!("{reason}{}; nothing was moved", other.unwrap_or_default()))
+/// The targets of the joints. Fails if the point is out of reach or not allowed.
+pub(super) fn target(args: &MoveToArgs, tool: Vector) -> Result<TipTarget, CommandError> {
+    let target = TipTarget::guarded(args.tip(), tool, args.guard.guard().as_ref());
+    target.map_err(|reason| refused(&reason))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! `move-to`: moves the tip to a point in millimetres.
 //!
 //! ```text
-//!   x y z, tool ──▶ TipTarget, or Unreachable ──▶ JointMove, as for `pose`
+//!   x y z, tool ──▶ TipTarget, or TipRefusal ──▶ Guard of the way ──▶ JointMove, as for `pose`
 //!              └──▶ StraightLine, or StraightLineError ──▶ played like a recording
 //! ```
 
@@ -31,11 +31,11 @@ pub(crate) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
     let Some(tool) = args.tool() else {
         let mut arm = session.connect()?;
         let tool = present_tool(&mut arm)?;
-        let target = target(args.tip(), tool)?;
+        let target = target(args, tool)?;
         return take(session, Some(arm), args, &target, tool);
     };
     // Check the point before opening the arm.
-    let target = target(args.tip(), tool)?;
+    let target = target(args, tool)?;
     let arm = if args.dry_run { None } else { Some(session.connect()?) };
     take(session, arm, args, &target, tool)
 }
@@ -52,7 +52,11 @@ fn take(
     let Some(mut arm) = arm else { return session.printer.print(&arrival) };
     let TipMove { targets, fine } = TipMove::of(&mut arm, target, args.tip(), tool)?;
     let arrival = fine.iter().fold(arrival, TipArrival::in_hundredths);
-    let measured = if args.dry_run { None } else { move_to(&mut arm, targets, args.wait)? };
+    if args.dry_run {
+        args.guard.check_way(&mut arm, &targets)?;
+        return session.printer.print(&arrival);
+    }
+    let measured = move_to(&mut arm, targets, args)?;
     session.printer.print(&arrival.with_measured(measured))
 }
 
@@ -62,14 +66,19 @@ fn present_tool(arm: &mut Arm) -> Result<Vector, CommandError> {
     Ok(MeasuredPose::read(arm, positions)?.tip_pose().tool)
 }
 
-/// Moves joints 1 to 5. If `wait` is set, waits and returns the measured angles.
-fn move_to(arm: &mut Arm, targets: FineTargets, wait: bool) -> Result<Option<MeasuredPose>, CommandError> {
+/// Moves joints 1 to 5, if the guard allows their way. With --wait waits and returns the measured angles.
+fn move_to(
+    arm: &mut Arm,
+    targets: FineTargets,
+    args: &MoveToArgs,
+) -> Result<Option<MeasuredPose>, CommandError> {
     hold_on_interrupt(arm, |arm, interrupt| {
         arm.driven_joints()?;
+        args.guard.check_way(arm, &targets)?;
         interrupt.check()?;
         let begun = JointMove::begin_fine(arm, targets)?;
         note_rounding(&begun);
-        if !wait {
+        if !args.wait {
             return Ok(None);
         }
         let positions = begun.finish(arm, &mut Watch::new(interrupt))?;

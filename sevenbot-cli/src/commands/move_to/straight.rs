@@ -14,6 +14,7 @@ use super::super::position::components;
 use super::args::{MoveToArgs, target};
 use super::facts::{MeasuredTip, rounded};
 use crate::command_error::CommandError;
+use crate::guard_args::refused_line;
 use crate::measured_pose::MeasuredPose;
 use crate::printer::Printable;
 use crate::session::Session;
@@ -25,10 +26,10 @@ pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
     let start = LineStart::of(&mut arm, &joints)?;
     let tool = args.tool().unwrap_or_else(|| TipPose::of_fine(start.targets).tool);
     // Only this check gives the nearest point and another direction of the tool.
-    target(args.tip(), tool)?;
-    let request = start.line_to(args.tip(), tool, args.speed);
-    let line = StraightLine::plan(&request)
-        .map_err(|reason| CommandError::Arm(format!("{reason}; nothing was moved")))?;
+    target(args, tool)?;
+    let line = start.line_to(args.tip(), tool, args.speed);
+    let request = StraightLineRequest { guard: args.guard.guard(), ..line };
+    let line = StraightLine::plan(&request).map_err(|reason| refused_line(&reason))?;
     let course = StraightMove::of(&line, &request);
     if args.dry_run {
         return session.printer.print(&course);

@@ -3,6 +3,7 @@
 mod center;
 mod info;
 mod port;
+mod registers;
 mod scan;
 mod set_id;
 mod torque_codes;
@@ -27,6 +28,8 @@ Examples:
   export SEVENBOT_PORT=/dev/ttyUSB0            the adapter
   sevenbot servo scan                          which servos are there, and at which baud rate?
   sevenbot servo info 3                        the servo of joint 4: position, supply, limits
+  sevenbot servo dump 3                        all its registers, by name
+  sevenbot servo set 3 max-torque 800          writes one, with a check of its range
   sevenbot servo set-id 1 3                    gives a new servo, alone on the bus, the id of joint 4
   sevenbot servo center 3                      turns it to its middle, before its horn goes on
   sevenbot servo torque-codes                  which of the two tables of register 40 do they have?
@@ -41,6 +44,9 @@ pub(crate) struct ServoArgs {
 enum ServoSubcommand {
     Scan(scan::ScanArgs),
     Info(info::ServoInfoArgs),
+    Get(registers::GetRegistersArgs),
+    Set(registers::SetRegisterArgs),
+    Dump(registers::DumpArgs),
     SetId(set_id::SetIdArgs),
     Center(center::CenterArgs),
     TorqueCodes(torque_codes::TorqueCodesArgs),
@@ -50,6 +56,9 @@ pub(crate) fn run(session: &mut Session, args: &ServoArgs) -> Result<(), Command
     match &args.command {
         ServoSubcommand::Scan(args) => scan::run(session, args),
         ServoSubcommand::Info(args) => info::run(session, args),
+        ServoSubcommand::Get(args) => registers::run_get(session, args),
+        ServoSubcommand::Set(args) => registers::run_set(session, args),
+        ServoSubcommand::Dump(args) => registers::run_dump(session, args),
         ServoSubcommand::SetId(args) => set_id::run(session, args),
         ServoSubcommand::Center(args) => center::run(session, args),
         ServoSubcommand::TorqueCodes(args) => torque_codes::run(session, args),

@@ -14,7 +14,7 @@ use crate::printer::Printable;
 use crate::session::Session;
 use socket::Connection;
 
-/// Control a running simulator: faults, a hand, a weight, power, virtual time.
+/// Control a running simulator: faults, obstacles, a hand, a weight, power, virtual time.
 ///
 /// host-sim opens a control socket beside the arm's port. These commands use it, so that another program can drive the
 /// arm at the same time. All durations are virtual time.
@@ -27,6 +27,8 @@ Examples:
   sevenbot sim fault list                      the faults, and how often each took effect
   sevenbot sim hand 2 120                      a hand turns joint 2 to 120 degrees, and holds it there
   sevenbot sim weight 150g                     a weight in the gripper
+  sevenbot sim fault 2=wall=60                 a wall at 60 degrees, in the way of joint 2
+  sevenbot sim trip 2                          the servo of joint 2 latches an overload
   sevenbot sim power cycle                     off and on
   sevenbot sim speed 50                        virtual time; also max, pause, resume, advance 250ms
   sevenbot sim snapshot before                 keeps a copy of the arm; `restore before` returns to it
@@ -49,6 +51,9 @@ enum SimCommand {
     Fault(FaultArgs),
     Hand(HandArgs),
     Weight(WeightArgs),
+    /// Drop what is in the gripper: the thing between the claws, and the weight.
+    Drop,
+    Trip(TripArgs),
     /// Switch the power of the arm.
     Power {
         /// 'off' loses what is in RAM, and loaded joints fall; 'cycle' is off and on.
@@ -81,6 +86,10 @@ Faults:
   3=garbled, 3=garbled=N     each answer has a wrong checksum, or each Nth one
   3=stuck                    something keeps it from turning
   3=restarting=MS            it restarts each MS, and loses its torque
+  2=wall=60                  a wall at 60 degrees stops joint 2, from where the joint is now
+  2=wall=60/500              a soft one: it pushes back with 500 mN m for each degree
+  2=push=-300                a hand pushes joint 2 with 300 mN m, towards smaller angles
+  7=thing=30, 7=thing=30/100 a thing between the claws: they cannot close below 30 degrees of joint 7
   bus=echo                   the controller receives its own bytes
   supply=volts=V             the supply has V volts instead of 7.4; a servo restarts below 4.5
   supply=dips=MS             each MS it falls to 3 V for 20 ms
@@ -134,6 +143,23 @@ struct WeightArgs {
     weight: u16,
 }
 
+/// Force an alarm on a servo: it switches its motor off.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sevenbot sim trip 2                          an overload: free until its torque is switched off and on
+  sevenbot sim trip 2 heat                     5 degrees C too hot: free until it has cooled down, then its
+                                               torque comes back by itself, towards the goal it holds
+
+A loaded joint falls. A wall in its way trips a servo by itself: `sevenbot sim fault 2=wall=60`.")]
+struct TripArgs {
+    /// The joint, 1 to 7.
+    joint: u8,
+    /// The alarm.
+    #[arg(default_value = "overload")]
+    alarm: Alarm,
+}
+
 /// Let virtual time pass as fast as possible, and wait for its end.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -166,6 +192,15 @@ struct SpeedArgs {
 struct SnapshotArgs {
     /// Name of the copy, up to 64 characters. A new snapshot replaces one of the same name.
     name: String,
+}
+
+#[derive(Clone, Copy, Debug, Serialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+enum Alarm {
+    /// The servo latches it.
+    Overload,
+    /// It lasts until the servo has cooled down.
+    Heat,
 }
 
 #[derive(Clone, Copy, Debug, Serialize, ValueEnum)]
@@ -240,9 +275,12 @@ impl Printable for Answer<'_> {
             SimCommand::Pause | SimCommand::Resume | SimCommand::Advance(_) | SimCommand::Speed(_) => {
                 text::time(out, &self.value)
             }
-            SimCommand::Weight(_) | SimCommand::Power { .. } | SimCommand::Restart | SimCommand::Halt => {
-                Ok(())
-            }
+            SimCommand::Weight(_)
+            | SimCommand::Drop
+            | SimCommand::Trip(_)
+            | SimCommand::Power { .. }
+            | SimCommand::Restart
+            | SimCommand::Halt => Ok(()),
         }
     }
 }
@@ -263,6 +301,10 @@ fn request(command: &SimCommand) -> Result<Value, CommandError> {
         SimCommand::Fault(args) => return fault_request(args),
         SimCommand::Hand(HandArgs { joint, to }) => json!({ "do": "hand", "joint": joint, "to": to }),
         SimCommand::Weight(WeightArgs { weight }) => json!({ "do": "weight", "grams": weight }),
+        SimCommand::Drop => json!({ "do": "drop" }),
+        SimCommand::Trip(TripArgs { joint, alarm }) => {
+            json!({ "do": "trip", "joint": joint, "alarm": alarm })
+        }
         SimCommand::Power { to } => json!({ "do": "power", "to": to }),
         SimCommand::Restart => json!({ "do": "restart" }),
         SimCommand::Halt => json!({ "do": "halt" }),

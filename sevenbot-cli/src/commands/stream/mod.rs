@@ -14,7 +14,11 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum, value_parser};
+use sevenbot::approach::{Approach, ApproachRule, FirstPoints};
+use sevenbot::cartesian::Guard;
+use sevenbot::fine::FineTargets;
 use sevenbot::map::report_content;
+use sevenbot::moves::MoveError;
 use sevenbot::stream::{PaceCounts, SetPointStream, StreamError, StreamOptions, StreamPace, WatchdogAction};
 use sevenbot::{Arm, StatusBlock};
 
@@ -22,9 +26,12 @@ use self::feed::Feed;
 use self::input::TimedPoint;
 use self::summary::StreamSummary;
 use self::tracking::Tracking;
+use crate::approach_args::ApproachArgs;
 use crate::command_error::CommandError;
+use crate::guard_args::{GuardArgs, warn_of};
 use crate::interrupt::{Interrupt, hold_on_interrupt};
 use crate::session::Session;
+use crate::watch::Watch;
 
 /// Stream set-points from standard input, in hundredths of a degree.
 ///
@@ -35,15 +42,21 @@ Examples:
   policy.py | sevenbot stream
   sevenbot stream --period 10 < move.csv
   printf '0,90,90,65,90,90,90,80\\n2,95.5,90,65,90,90,90,80\\n' | sevenbot stream
+  policy.py | sevenbot stream --approach 3         goes to the first point in 3 s
 
 One set-point per line, with its time in seconds and the seven joints in degrees, 0 to 180:
 
   {\"t\": 0.02, \"joints\": [90.25, 88, 65, 90, 90, 90, null]}      as JSON; null: this joint gets no point
   0.02, 90.25, 88, 65, 90, 90, 90,                             or separated by commas; empty: no point
 
+The first point has to be within 5 degrees of where each joint stands, and is approached at up to 30 degrees per second.
+Further away it is refused with the distance of each joint, unless --approach goes there first. A joint whose first
+angle comes in a later line is treated alike.
+
 Times ascend. The first line is due at once. Between two lines the joints move in straight lines. A line that
 comes late delays what follows: nothing is speeded up. The arm lags one and a half periods behind the points.
-No joint goes faster than its speed (`sevenbot get speed`), also on the way to the first point.
+No joint goes faster than its speed (`sevenbot get speed`), also on the way to the first point. A point that takes the arm
+below the table or into the base is sent with a warning; `sevenbot move-to --help` describes this guard.
 
 A bad line ends the stream with its number. The lines before it are sent, and the arm holds at the last of
 them. Ctrl-C also makes it hold. At the end the registers of the period and of the watchdog have their old
@@ -56,7 +69,9 @@ values again, and the summary shows:
 
 Only for arms with this project's firmware: others take whole degrees and no stream.
 
-Exit status 1 after a bad line, or if the arm takes no stream.")]
+Exit status 1 after a bad line, if the first point is refused, if the arm takes no stream, and if it does not follow:
+a joint of the stream is blocked, let go or silent, the servos have no supply, or the controller restarted. The message
+tells what to do.")]
 pub(crate) struct StreamArgs {
     /// Time between two points in milliseconds, 5 to 1000.
     #[arg(long, value_name = "MS", default_value_t = 20, value_parser = value_parser!(u16).range(5..=1_000))]
@@ -67,6 +82,10 @@ pub(crate) struct StreamArgs {
     /// What the watchdog of the arm does.
     #[arg(long, value_name = "ACTION", value_enum, default_value_t = Action::Hold)]
     watchdog_action: Action,
+    #[command(flatten)]
+    approach: ApproachArgs,
+    #[command(flatten)]
+    guard: GuardArgs,
 }
 
 /// What the arm does if this program is silent.
@@ -93,6 +112,8 @@ const FEEDBACK_HZ: u8 = 50;
 const POLL_PERIOD: Duration = Duration::from_millis(2);
 /// After the last point a joint at 1.9 degrees/s may need 95 s.
 const ARRIVAL_TIMEOUT: Duration = Duration::from_secs(100);
+/// After that the joints have this time to settle.
+const SETTLE_TIMEOUT: Duration = Duration::from_secs(2);
 /// One step of the watchdog's time, in milliseconds.
 const WATCHDOG_STEP_MS: u16 = 10;
 
@@ -114,8 +135,9 @@ pub(crate) fn run(session: &mut Session, args: &StreamArgs) -> Result<(), Comman
     arm.driven_joints()?;
     let refused_before = refused(arm.status()?);
     let mut tracking = Tracking::new(arm.fine_targets()?, options.period());
+    let start = StreamStart { rule: args.approach.rule(), first: FirstPoints::default() };
     let done = arm.with_reports(FEEDBACK_HZ, report_content::FINE_POSITIONS, |arm| {
-        hold_on_interrupt(arm, |arm, interrupt| stream(arm, interrupt, options, &mut tracking))
+        hold_on_interrupt(arm, |arm, interrupt| stream(arm, interrupt, args, start, &mut tracking))
     });
     let (counts, ended) = done?;
     let refused = refused(arm.status()?).wrapping_sub(refused_before);
@@ -131,15 +153,18 @@ fn refused(status: Option<StatusBlock>) -> u16 {
 fn stream(
     arm: &mut Arm,
     interrupt: Interrupt,
-    options: StreamOptions,
+    args: &StreamArgs,
+    start: StreamStart,
     tracking: &mut Tracking,
 ) -> Result<(PaceCounts, Result<(), String>), CommandError> {
+    let (options, guard) = (args.options()?, args.guard.guard());
     let stream = SetPointStream::open(arm, options)?;
     let pace = StreamPace::new(Instant::now(), options.period());
     let source = Source { lines: input::read_in_background(), feed: Feed::default(), end: None };
-    let mut streamer = Streamer { stream, pace, source, tracking, period: options.period() };
+    let mut streamer = Streamer { stream, pace, source, start, guard, tracking, period: options.period() };
     while streamer.play(interrupt)? {}
     streamer.wait_until_still(interrupt)?;
+    streamer.wait_until_arrived(interrupt)?;
     let Streamer { stream, pace, source, .. } = streamer;
     stream.close()?;
     Ok((pace.counts(), source.end.unwrap_or(Ok(()))))
@@ -172,23 +197,65 @@ struct Streamer<'a, 'b> {
     stream: SetPointStream<'a>,
     pace: StreamPace,
     source: Source,
+    start: StreamStart,
+    /// `None` after the first warning, too.
+    guard: Option<Guard>,
     tracking: &'b mut Tracking,
     period: Duration,
+}
+
+/// How joints get to their first points.
+struct StreamStart {
+    rule: ApproachRule,
+    first: FirstPoints,
 }
 
 impl Streamer<'_, '_> {
     /// Sends points until the input pauses; `false` at its end.
     fn play(&mut self, interrupt: Interrupt) -> Result<bool, CommandError> {
-        let Some(start) = self.wait_for_points(interrupt)? else { return Ok(false) };
+        let Some(mut start) = self.wait_for_points(interrupt)? else { return Ok(false) };
         loop {
             self.take_reports_until(self.pace.due(), interrupt)?;
             self.source.poll();
-            let now = Instant::now();
-            let time = start + self.period.saturating_mul(self.pace.number_at(now));
+            let time = start + self.period.saturating_mul(self.pace.number_at(Instant::now()));
             let Some(point) = self.source.feed.take(time) else { return Ok(true) };
+            if let Some(first) = self.start.first.take(&point) {
+                self.approach(&first, interrupt)?;
+                // The time of the stream stands still meanwhile.
+                start = time;
+                self.make_due(Instant::now());
+            }
+            let now = Instant::now();
             self.pace.take(now);
             self.stream.send(&point)?;
+            self.stream.check()?;
             self.tracking.add_point(now, &point);
+            self.warn_of_pose();
+        }
+    }
+
+    /// Goes to the first point of joints that had none yet.
+    fn approach(&mut self, first: &FineTargets, interrupt: Interrupt) -> Result<(), CommandError> {
+        let standing = self.stream.arm().standing()?;
+        let way = Approach::plan(&standing, first, self.start.rule).map_err(MoveError::from)?;
+        Ok(self.stream.approach(&way, &mut Watch::new(interrupt))?)
+    }
+
+    /// Makes the next point due, as the first of the stream or after a pause.
+    fn make_due(&mut self, now: Instant) {
+        if self.pace.counts().points == 0 {
+            self.pace = StreamPace::new(now, self.period);
+        } else {
+            self.pace.restart(now);
+        }
+    }
+
+    /// Warns once if the guard would not allow the points of the stream.
+    fn warn_of_pose(&mut self) {
+        let [t1, t2, t3, t4, t5, ..] = self.tracking.pose();
+        if let Some(breach) = self.guard.and_then(|guard| guard.check_pose([t1, t2, t3, t4, t5]).err()) {
+            warn_of(&breach);
+            self.guard = None;
         }
     }
 
@@ -201,14 +268,10 @@ impl Streamer<'_, '_> {
             }
             self.take_reports_until(Instant::now() + POLL_PERIOD, interrupt)?;
             self.stream.keep_alive()?;
+            self.stream.check()?;
             self.source.poll();
         }
-        let now = Instant::now();
-        if self.pace.counts().points == 0 {
-            self.pace = StreamPace::new(now, self.period);
-        } else {
-            self.pace.restart(now);
-        }
+        self.make_due(Instant::now());
         Ok(Some(self.source.feed.resume_time(self.period)))
     }
 
@@ -233,12 +296,28 @@ impl Streamer<'_, '_> {
         self.take_reports_until(Instant::now() + 2 * self.period, interrupt)?;
         while Instant::now() < deadline {
             // Each read is a sign of life.
-            let status = self.stream.arm().status()?;
-            if status.is_none_or(|status| status.moving() & !status.missing() == 0) {
+            let state = self.stream.check_now()?;
+            if state.moving.is_none_or(|moving| moving & !state.missing == 0) {
                 break;
             }
             self.take_reports_until(Instant::now() + self.period, interrupt)?;
         }
         Ok(())
+    }
+
+    /// Waits until the joints stand at the last points. Fails if one does not get there.
+    fn wait_until_arrived(&mut self, interrupt: Interrupt) -> Result<(), CommandError> {
+        let deadline = Instant::now() + SETTLE_TIMEOUT;
+        loop {
+            self.stream.check_now()?;
+            let away = self.stream.arm().health()?.away_from_targets(self.stream.joints());
+            if away.is_empty() {
+                return Ok(());
+            }
+            if Instant::now() >= deadline {
+                return Err(MoveError::NotReached { away, missing: 0 }.into());
+            }
+            self.take_reports_until(Instant::now() + self.period, interrupt)?;
+        }
     }
 }

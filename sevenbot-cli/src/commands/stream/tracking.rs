@@ -50,6 +50,11 @@ impl Tracking {
         }
     }
 
+    /// The last point of each joint, in degrees; the target at the start where it had none.
+    pub(super) const fn pose(&self) -> [f64; 7] {
+        self.pose
+    }
+
     /// Adds measured positions.
     pub(super) fn add_measured(&mut self, received: Instant, positions: &FineTargets) {
         let Some(expected) = received.checked_sub(self.delay).and_then(|time| self.at(time)) else { return };

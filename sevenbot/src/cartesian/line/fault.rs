@@ -4,7 +4,9 @@ use std::fmt;
 
 use kinematics::NoSolution;
 
-use super::super::{PointText, Unreachable, Vector};
+use super::super::guard::Breach;
+use super::super::refusal::Unreachable;
+use super::super::{PointText, Vector};
 use super::path::TipPath;
 
 /// The point where the arm cannot follow a line, and the reason.
@@ -25,6 +27,8 @@ pub struct StraightLineError {
 pub enum StraightLineFault {
     /// A point of the line is out of reach.
     Unreachable(Box<Unreachable>),
+    /// The guard of the workspace does not allow a point of the line.
+    Guarded(Breach),
     /// A joint would have to jump, because the line passes a singular position.
     Singular {
         /// Its number.
@@ -50,7 +54,7 @@ impl StraightLineError {
 
     /// The error for an end that is not a valid position.
     pub(super) fn at_start(why: NoSolution, tip: Vector, tool: Vector) -> Self {
-        let fault = StraightLineFault::Unreachable(Box::new(Unreachable::because(why, tip, tool)));
+        let fault = StraightLineFault::Unreachable(Box::new(Unreachable::because(why, tip, tool, None)));
         Self { at_mm: 0.0, length_mm: 0.0, tip, fault }
     }
 }
@@ -62,6 +66,7 @@ impl fmt::Display for StraightLineError {
         write!(out, "the straight line breaks {at_mm:.0} mm from its start, of {length_mm:.0} mm: ")?;
         match &self.fault {
             StraightLineFault::Unreachable(why) => why.fmt(out),
+            StraightLineFault::Guarded(breach) => write!(out, "at {tip} mm {breach}"),
             StraightLineFault::Singular { joint, degrees } => write!(
                 out,
                 "at {tip} mm joint {joint} would have to turn by {degrees:.0}° at once. The position is \

@@ -1,5 +1,7 @@
-use super::super::DOWN;
+use super::super::{DOWN, TipTarget, angle_between};
 use super::*;
+use crate::playback::MAX_SEGMENT;
+use crate::units::Angle;
 
 const STANDARD: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];
 /// The maker's example, with the tool down.
@@ -8,7 +10,15 @@ const AT_WORK: [u8; 7] = [105, 88, 110, 90, 135, 30, 40];
 fn request(start: [u8; 7], [x, y, z]: [f64; 3], tool: Vector, speed: f64) -> StraightLineRequest {
     let start = start.map(|degrees| Angle::from_register(degrees).into());
     let resolution = TargetResolution::Degrees;
-    StraightLineRequest { start, resolution, vacuum: true, tip: Vector::new(x, y, z), tool, speed }
+    StraightLineRequest {
+        start,
+        resolution,
+        vacuum: true,
+        tip: Vector::new(x, y, z),
+        tool,
+        speed,
+        guard: None,
+    }
 }
 
 fn plan(start: [u8; 7], tip: [f64; 3], tool: Vector, speed: f64) -> Result<StraightLine, StraightLineError> {

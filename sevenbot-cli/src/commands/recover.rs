@@ -1,0 +1,186 @@
+//! `recover`: brings an arm back after an obstacle, an alarm or a lost supply, step by step.
+//!
+//! ```text
+//!   health ──▶ what is wrong, what to do by hand ──▶ question ──▶ motor state 1, targets where it is ──▶ health
+//! ```
+
+use std::io::{self, Write};
+use std::time::Duration;
+
+use clap::Args;
+use serde::Serialize;
+use sevenbot::health::{ProblemKind, sentences};
+use sevenbot::map::{MOTOR_STATE, motor_state};
+use sevenbot::{Arm, Health, Problem};
+
+use super::status::ArmStatus;
+use crate::command_error::CommandError;
+use crate::confirm::confirm;
+use crate::interrupt::hold;
+use crate::printer::{Printable, note, warn};
+use crate::session::Session;
+use crate::write_result::motors_obey;
+
+/// Bring the arm back after an obstacle, an alarm or a lost supply, step by step.
+///
+/// Says what is wrong and what you have to do by hand. Then asks, switches the motors on, makes the arm hold where it is, waits,
+/// and checks. No joint is sent anywhere else.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The steps, as far as they are necessary:
+
+  1. Shows each problem, and what to do: remove an obstacle, close the emergency stop, let a servo cool.
+  2. Asks whether that is done. A servo that holds again may turn a joint by a few degrees: keep clear of the arm.
+  3. Writes motor state 1, so that servos that let go hold again where they are, and sets the targets to the measured
+     positions. It does not do that while no servo answers, or while a servo is too hot or has a wrong supply.
+     Firmware that does not tell which servo was overloaded needs motor state 2 for a moment: the arm falls unless you hold
+     it, and that is asked for separately.
+  4. Waits, looks again for two seconds, and says what is still wrong.
+
+Examples:
+  sevenbot recover
+  sevenbot recover --yes                 for a program: the steps by hand are done
+
+Exit status 1 if something is still wrong. The faults of a restart stay until the controller is switched off and on.")]
+pub(crate) struct RecoverArgs {
+    /// Do not ask.
+    #[arg(long)]
+    yes: bool,
+}
+
+/// Servos that were switched on need about this long until they answer.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(3);
+/// The arm has this time to recover.
+const RECOVERY_TIMEOUT: Duration = Duration::from_secs(6);
+/// It has recovered if nothing is wrong for this time: a joint is blocked after a second (D27).
+const QUIET_TIME: Duration = Duration::from_secs(2);
+const POLL_PERIOD: Duration = Duration::from_millis(100);
+/// How long the motors are off to end an overload (forceless, then servo).
+const OFF_TIME: Duration = Duration::from_millis(500);
+
+/// The result of `recover`.
+#[derive(Serialize)]
+struct Recovered {
+    recovered: bool,
+    /// What was wrong before.
+    before: Vec<String>,
+    status: ArmStatus,
+}
+
+impl Printable for Recovered {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        self.status.write_text(out)?;
+        match (self.recovered, self.before.as_slice()) {
+            (true, []) => writeln!(out, "there was nothing to recover from: the motors hold the arm"),
+            (true, _) => writeln!(out, "recovered: the motors hold the arm where it is"),
+            (false, _) => Ok(()),
+        }
+    }
+}
+
+pub(crate) fn run(session: &mut Session, args: &RecoverArgs) -> Result<(), CommandError> {
+    let mut arm = session.connect()?;
+    arm.wait_until_settled()?;
+    let before = arm.health()?;
+    let wrong = before.problems();
+    if !wrong.is_empty() || !before.is_driven() {
+        tell(&before);
+        recover(&mut arm, &before, args.yes)?;
+    }
+    let after = wait_until_well(&mut arm)?;
+    let left = after.problems();
+    let recovered = left.is_empty() && after.is_driven();
+    let before = wrong.iter().map(Problem::to_string).collect();
+    session.printer.print(&Recovered { recovered, before, status: ArmStatus::from(&after) })?;
+    match (recovered, after.is_driven()) {
+        (true, _) => Ok(()),
+        (_, true) => Err(CommandError::Arm(format!("not recovered: {}", sentences(&left)))),
+        (_, false) => Err(CommandError::Arm("not recovered: the motors are off".to_owned())),
+    }
+}
+
+/// Step 1.
+fn tell(health: &Health) {
+    for problem in health.problems() {
+        warn(problem);
+        note(format_args!("to do: {}", problem.kind.remedy()));
+    }
+    if health.problems().is_empty() {
+        note("the motors are off, and nothing is wrong: they will be switched on");
+    }
+}
+
+/// Steps 2 and 3.
+fn recover(arm: &mut Arm, before: &Health, yes: bool) -> Result<(), CommandError> {
+    arm.end_abandoned_stream()?;
+    if before.is_driven() && before.problems().iter().all(|problem| !needs_motors(problem.kind)) {
+        return Ok(());
+    }
+    confirm(
+        "Is that done, the arm supported, and nothing in its way? The motors then hold the arm where it is. Go on?",
+        yes,
+    )?;
+    let now = wait_for_servos(arm)?;
+    let prevents = |problem: &&Problem| prevents_motors(problem.kind);
+    let preventing: Vec<Problem> = now.problems().iter().filter(prevents).copied().collect();
+    if !preventing.is_empty() {
+        note("the motors were not switched on");
+        return Err(CommandError::Problems(preventing));
+    }
+    if now.problems().contains(&Problem::of_arm(ProblemKind::ServoBus)) {
+        confirm(
+            "This firmware ends an overload only with the motors off for a moment: the arm falls. Do you hold it?",
+            yes,
+        )?;
+        motors_obey(arm.write_checked(MOTOR_STATE.address, &[motor_state::FORCELESS]))?;
+        arm.sleep(OFF_TIME);
+    }
+    motors_obey(arm.write_checked(MOTOR_STATE.address, &[motor_state::SERVO]))?;
+    hold(arm).map(drop)
+}
+
+/// Does the problem end only when the motor state or a target is written?
+const fn needs_motors(kind: ProblemKind) -> bool {
+    kind.ends_moves()
+        || matches!(
+            kind,
+            ProblemKind::Overload | ProblemKind::Overheat | ProblemKind::Voltage | ProblemKind::ServoBus
+        )
+}
+
+/// Is it useless or harmful to switch the motors on?
+const fn prevents_motors(kind: ProblemKind) -> bool {
+    matches!(kind, ProblemKind::NoServoAnswers | ProblemKind::Overheat | ProblemKind::Voltage)
+}
+
+/// The health once servos answer, or after a time.
+fn wait_for_servos(arm: &mut Arm) -> Result<Health, CommandError> {
+    let deadline = arm.now() + ANSWER_TIMEOUT;
+    loop {
+        let health = arm.health()?;
+        let is_silent = health.problems().contains(&Problem::of_arm(ProblemKind::NoServoAnswers));
+        if !is_silent || arm.now() >= deadline {
+            return Ok(health);
+        }
+        arm.sleep(POLL_PERIOD);
+    }
+}
+
+/// Step 4: the health once nothing was wrong for [`QUIET_TIME`], or after [`RECOVERY_TIMEOUT`].
+fn wait_until_well(arm: &mut Arm) -> Result<Health, CommandError> {
+    let start = arm.now();
+    let mut well_since = start;
+    loop {
+        let health = arm.health()?;
+        let now = arm.now();
+        let is_well =
+            health.is_driven() && health.problems().iter().all(|problem| !needs_motors(problem.kind));
+        if !is_well {
+            well_since = now;
+        }
+        if now >= well_since + QUIET_TIME || (!is_well && now >= start + RECOVERY_TIMEOUT) {
+            return Ok(health);
+        }
+        arm.sleep(POLL_PERIOD);
+    }
+}

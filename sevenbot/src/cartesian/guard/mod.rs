@@ -1,0 +1,210 @@
+//! The guard of the workspace: keeps the arm above a table and out of its own base.
+//!
+//! ```text
+//!   pose ────────▶ Guard::check_pose ──▶ Breach: which part, how deep, in what
+//!   JointPath ───▶ Guard::check_path ──▶ PathBreach: the deepest one, and where on the way
+//!   Recording ───▶ Guard::check_recording ──▶ TimedBreach: the first one
+//! ```
+//!
+//! [`kinematics::workspace`] knows the geometry. A suction cup or a claw is not part of it: raise the table by its length.
+
+use std::fmt;
+use std::time::Duration;
+
+pub use kinematics::workspace::{BASE_MARGIN, KEEP_OUT_RADIUS, KEEP_OUT_TOP};
+use kinematics::{Clearance, Obstacle, Part, Workspace};
+
+use crate::fine_angle::FineAngle;
+use crate::recording::{Moment, Recording};
+
+mod joint_path;
+
+pub use joint_path::JointPath;
+
+/// Targets in hundredths of a degree take the tip by less than this from the point, in mm.
+const ROUNDING_MM: f64 = 0.1;
+
+/// What keeps the arm above a table and out of its base.
+///
+/// ```
+/// use sevenbot::cartesian::Guard;
+///
+/// let guard = Guard::default();
+/// assert!(guard.check_pose([90.0, 90.0, 65.0, 90.0, 90.0]).is_ok());
+/// let below = guard.check_pose([90.0, 20.0, 140.0, 90.0, 90.0]).unwrap_err();
+/// assert!(below.to_string().contains("below the table"));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Guard(Workspace);
+
+impl Guard {
+    /// A guard with the table at this height in mm. The foot of the base is at -60, as the table of the default.
+    #[must_use]
+    pub const fn above(table_mm: f64) -> Self {
+        Self(Workspace { table: table_mm })
+    }
+
+    /// The height of the table, in mm.
+    #[must_use]
+    pub const fn table_mm(&self) -> f64 {
+        self.0.table
+    }
+
+    /// Checks the angles of joints 1 to 5, in degrees. Less than 0.1 mm is rounding.
+    ///
+    /// # Errors
+    /// The part that is deepest in an obstacle.
+    pub fn check_pose(&self, angles: [f64; 5]) -> Result<(), Breach> {
+        let breach = self.depth(angles);
+        if breach.depth_mm > ROUNDING_MM { Err(breach) } else { Ok(()) }
+    }
+
+    /// Do these exact angles of joints 1 to 5 break nothing, with no allowance for rounding?
+    pub(super) fn is_clear(&self, angles: [f64; 5]) -> bool {
+        // A millionth of a millimetre is the rounding of the arithmetic.
+        self.depth(angles).depth_mm < 1e-6
+    }
+
+    /// Checks a way of the joints, at each 0.1 degrees of the fastest one.
+    ///
+    /// Between two checks no point of the arm moves by more than 1.4 mm. So the way comes at most 0.7 mm nearer to the
+    /// base than it does at a check, and the margin is 10 mm. The table is flat: there the difference is the bend of the
+    /// way between two checks, below 0.001 mm.
+    ///
+    /// A way that begins inside an obstacle may leave it, but go no deeper.
+    ///
+    /// # Errors
+    /// The deepest place.
+    pub fn check_path(&self, path: &JointPath) -> Result<(), PathBreach> {
+        let mut escape = Escape::default();
+        let mut deepest: Option<PathBreach> = None;
+        for (share, angles) in path.poses() {
+            let Err(breach) = escape.check(self, angles) else { continue };
+            if deepest.is_none_or(|deepest| breach.depth_mm > deepest.breach.depth_mm) {
+                deepest = Some(PathBreach { breach, share });
+            }
+        }
+        deepest.map_or(Ok(()), Err)
+    }
+
+    /// Checks a recording: its poses, and the ways of the joints between them.
+    ///
+    /// # Errors
+    /// The first place that breaks the guard.
+    pub fn check_recording(&self, recording: &Recording) -> Result<(), TimedBreach> {
+        let mut before: Option<[f64; 5]> = None;
+        for Moment { time, pose, .. } in recording.moments() {
+            let [t1, t2, t3, t4, t5, ..] = pose.map(FineAngle::degrees);
+            let angles = [t1, t2, t3, t4, t5];
+            let way = JointPath::together(before.unwrap_or(angles), angles);
+            if let Some(breach) = way.poses().find_map(|(_, pose)| self.check_pose(pose).err()) {
+                return Err(TimedBreach { time, breach });
+            }
+            before = Some(angles);
+        }
+        Ok(())
+    }
+
+    fn depth(&self, angles: [f64; 5]) -> Breach {
+        let Clearance { part, obstacle, mm } = self.0.clearance(angles);
+        Breach { part, obstacle, depth_mm: -mm, table_mm: self.0.table }
+    }
+}
+
+/// How deep a way may still be: as deep as it was before, once it has left an obstacle not at all.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Escape {
+    depth_mm: Option<f64>,
+}
+
+impl Escape {
+    /// Checks the next pose of the way.
+    pub(super) fn check(&mut self, guard: &Guard, angles: [f64; 5]) -> Result<(), Breach> {
+        let breach = guard.depth(angles);
+        let allowed = self.depth_mm.unwrap_or(f64::INFINITY);
+        self.depth_mm = Some(breach.depth_mm.min(allowed));
+        if breach.depth_mm > allowed.max(0.0) + ROUNDING_MM { Err(breach) } else { Ok(()) }
+    }
+}
+
+/// A part of the arm inside an obstacle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Breach {
+    /// The part.
+    pub part: Part,
+    /// The obstacle.
+    pub obstacle: Obstacle,
+    /// How deep it is, in mm.
+    pub depth_mm: f64,
+    /// The height of the table, in mm.
+    pub table_mm: f64,
+}
+
+impl Breach {
+    const fn part_name(&self) -> &'static str {
+        match self.part {
+            Part::Elbow => "the elbow",
+            Part::Forearm => "the forearm",
+            Part::Wrist => "the wrist",
+            Part::Hand => "the hand",
+            Part::Tip => "the tip",
+            Part::DiscEdge => "the edge of the disc",
+        }
+    }
+}
+
+impl fmt::Display for Breach {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (part, depth, table) = (self.part_name(), self.depth_mm, self.table_mm);
+        match self.obstacle {
+            Obstacle::Table => write!(out, "{part} would be {depth:.1} mm below the table at z = {table} mm"),
+            Obstacle::Base => write!(
+                out,
+                "{part} would be {depth:.1} mm inside the space of the base ({KEEP_OUT_RADIUS} mm round its axis, up to \
+                 {KEEP_OUT_TOP} mm above the top plate)"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Breach {}
+
+/// The deepest place of a way inside an obstacle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathBreach {
+    /// What breaks the guard there.
+    pub breach: Breach,
+    /// The fraction of the way's duration, 0 to 1.
+    pub share: f64,
+}
+
+impl fmt::Display for PathBreach {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.share >= 1.0 {
+            return write!(out, "at its end {}", self.breach);
+        }
+        write!(out, "after {:.0} % of the way {}", self.share * 100.0, self.breach)
+    }
+}
+
+impl std::error::Error for PathBreach {}
+
+/// The first place of a recording inside an obstacle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedBreach {
+    /// The time of the moment there, or on the way to it.
+    pub time: Duration,
+    /// What breaks the guard there.
+    pub breach: Breach,
+}
+
+impl fmt::Display for TimedBreach {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "at {:.2} s {}", self.time.as_secs_f64(), self.breach)
+    }
+}
+
+impl std::error::Error for TimedBreach {}
+
+#[cfg(test)]
+mod tests;

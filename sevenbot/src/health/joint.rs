@@ -1,0 +1,118 @@
+//! The health of one joint.
+
+use protocol_core::registers::map::{
+    BLOCKED_JOINTS, EFFECTOR_TYPE, FINE_POSITION, FINE_TARGET, LET_GO_JOINTS, LOAD, MEASURED_JOINTS,
+    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, TARGET_POSITION, VELOCITY, motor_state,
+};
+use protocol_core::registers::{Joint, Register};
+
+use super::problem::ProblemKind;
+use super::told::{CLAW, GRIPPER, ToldBlocks};
+use crate::fine_angle::FineAngle;
+use crate::snapshot::Snapshot;
+use crate::units::Angle;
+
+/// A joint at rest this near to its target is there: under a load a servo stops a few degrees short.
+const AT_TARGET_DEGREES: f64 = 3.0;
+
+/// One joint at one instant. A value is `None` where the firmware does not tell it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointHealth {
+    /// The joint.
+    pub joint: Joint,
+    /// The target.
+    pub target: FineAngle,
+    /// The measured position, of a silent joint the last one; `None` if it was never measured. In whole degrees from
+    /// firmware without hundredths, where 0 may also mean that it was never measured.
+    pub position: Option<FineAngle>,
+    /// The velocity in degrees per second, positive towards greater angles.
+    pub velocity: Option<f64>,
+    /// The load in percent of the stall torque, positive if the motor pushes towards greater angles.
+    pub load_percent: Option<f64>,
+    /// Does the set-point move?
+    pub is_moving: Option<bool>,
+    /// Does the servo not answer?
+    pub is_silent: Option<bool>,
+    /// Does an obstacle keep the joint from its target (D27)? Not of a gripper that holds something.
+    pub is_blocked: Option<bool>,
+    /// Does the joint, a gripper, hold something?
+    pub is_gripping: Option<bool>,
+    /// Does the servo hold no torque although it should (D28)?
+    pub has_let_go: Option<bool>,
+    /// Is the joint driven, at rest, and within 3 degrees of its target?
+    pub is_at_target: bool,
+}
+
+impl JointHealth {
+    pub(super) fn new(joint: Joint, registers: &Snapshot, told: ToldBlocks) -> Self {
+        let bit = |is_told: bool, row: &Register| is_told.then(|| registers.byte(row) & joint.bit() != 0);
+        let tenths = |row: &Register| {
+            told.extended.then(|| f64::from(registers.word(row.of(joint)).cast_signed()) / 10.0)
+        };
+        let (target, position) = if told.extended { fine(joint, registers) } else { whole(joint, registers) };
+        let is_moving = bit(told.status, &MOVING_JOINTS);
+        let is_gripper = CLAW == Some(joint) && registers.byte(&EFFECTOR_TYPE) == GRIPPER;
+        let is_stopped = bit(told.protection, &BLOCKED_JOINTS);
+        let is_near = position
+            .is_some_and(|position| (position.degrees() - target.degrees()).abs() <= AT_TARGET_DEGREES);
+        Self {
+            joint,
+            target,
+            position,
+            velocity: tenths(&VELOCITY),
+            load_percent: tenths(&LOAD),
+            is_moving,
+            is_silent: bit(told.status, &MISSING_SERVOS),
+            is_blocked: is_stopped.map(|stopped| stopped && !is_gripper),
+            is_gripping: is_stopped.map(|stopped| stopped && is_gripper),
+            has_let_go: bit(told.protection, &LET_GO_JOINTS),
+            is_at_target: is_near
+                && is_moving != Some(true)
+                && registers.byte(&MOTOR_STATE) == motor_state::SERVO,
+        }
+    }
+
+    /// What is wrong with the joint, the most important first.
+    pub fn problems(&self) -> impl Iterator<Item = ProblemKind> + use<> {
+        let rows = [
+            (self.is_silent, ProblemKind::NoAnswer),
+            (self.has_let_go, ProblemKind::LetGo),
+            (self.is_blocked, ProblemKind::Blocked),
+        ];
+        rows.into_iter().filter(|(is_so, _)| *is_so == Some(true)).map(|(_, kind)| kind)
+    }
+
+    /// What the joint does: its most important problem, or `moving`, `at its target`, `holds something`, `3.2° from its target`; empty if the motors
+    /// are off.
+    #[must_use]
+    pub fn word(&self, is_driven: bool) -> String {
+        if let Some(problem) = self.problems().next() {
+            return problem.name().to_owned();
+        }
+        match (is_driven, self.is_moving, self.position) {
+            (false, ..) => String::new(),
+            _ if self.is_gripping == Some(true) => "holds something".to_owned(),
+            (_, Some(true), _) => "moving".to_owned(),
+            _ if self.is_at_target => "at its target".to_owned(),
+            (.., None) => "not measured".to_owned(),
+            (.., Some(position)) => {
+                let away = (position.degrees() - self.target.degrees()).abs();
+                format!("{away:.1}° from its target")
+            }
+        }
+    }
+}
+
+/// Target and position in hundredths of a degree.
+fn fine(joint: Joint, registers: &Snapshot) -> (FineAngle, Option<FineAngle>) {
+    let angle = |row: &Register| FineAngle::from_hundredths(registers.word(row.of(joint)));
+    let is_measured = registers.byte(&MEASURED_JOINTS) & joint.bit() != 0;
+    let target = angle(&FINE_TARGET).unwrap_or_else(|| Angle::from_register(0).into());
+    (target, angle(&FINE_POSITION).filter(|_| is_measured))
+}
+
+/// Target and position in whole degrees.
+fn whole(joint: Joint, registers: &Snapshot) -> (FineAngle, Option<FineAngle>) {
+    let angle = |row: &Register| Angle::from_register(registers.at(row.of(joint))).into();
+    (angle(&TARGET_POSITION), Some(angle(&PRESENT_POSITION)))
+}

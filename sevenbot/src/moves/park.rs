@@ -1,0 +1,220 @@
+//! Parks an arm: moves it to a pose in which friction holds every joint, and lets it go there.
+//!
+//! ```text
+//!   forearm away from its limit ──▶ rear arm upright ──▶ park pose ──▶ damping ──▶ watched: does a joint sink?
+//! ```
+//!
+//! The motors go to damping (state 0), not to forceless (state 2): if a joint is loaded after all, it sinks slowly, is noticed, and
+//! is driven again.
+
+use std::time::Duration;
+
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TIME, motor_state};
+
+use super::error::{MoveError, motors_obey};
+use super::joint_move::JointMove;
+use super::observer::Observer;
+use super::pace::Pace;
+use crate::arm::Arm;
+use crate::fine_angle::FineAngle;
+use crate::fine_state::FineTargets;
+use crate::span::Span;
+use crate::units::Speed;
+
+/// The pose in degrees: rear arm upright, forearm folded up and back, tool pointing up. Joints 1, 6 and 7 carry no weight and stay.
+///
+/// Found on the simulated arm without payload: no joint carries more than its friction holds (`docs/design.md`).
+pub const PARK_POSE: [Option<u8>; 7] = [None, Some(90), Some(0), Some(90), Some(48), None, None];
+
+/// The forearm beyond this angle comes down before the rear arm goes up: the linkage ends at 161 degrees.
+const FOREARM_LIMIT_DEGREES: u8 = 120;
+/// 19 degrees/s.
+const SPEED_STEPS: u8 = 10;
+/// The arm is watched for this time after it was let go.
+const WATCH_TIME: Duration = Duration::from_secs(2);
+const POLL_PERIOD: Duration = Duration::from_millis(50);
+/// A joint that moves by more than this after it was let go, in hundredths of a degree, does not stay.
+const STAYS_HUNDREDTHS: u16 = 200;
+
+/// Why an arm is not parked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ParkError {
+    /// The move to the pose failed. The motors are as they were.
+    #[error(transparent)]
+    Move(#[from] MoveError),
+    /// The joint sank when it was let go. The motors drive it again, and the arm holds.
+    #[error(
+        "not parked: joint {} sank by more than 2° when it was let go; the arm holds again. Is something in the gripper, or is \
+         another pose better for this arm?",
+        joint.number()
+    )]
+    Sinks {
+        /// The joint that moved first.
+        joint: Joint,
+    },
+}
+
+impl From<crate::error::Error> for ParkError {
+    fn from(error: crate::error::Error) -> Self {
+        Self::Move(error.into())
+    }
+}
+
+impl Arm {
+    /// Moves slowly to a pose in which the arm may be let go, lets it go (motor state 0), and checks for two seconds that it stays.
+    /// `None`: [`PARK_POSE`], which is right for an arm with an empty gripper. Speeds and times are those of before at the end.
+    ///
+    /// # Errors
+    /// The arm does not reach the pose. Or a joint moves by more than 2 degrees when it is let go: then the arm holds again.
+    pub fn park(
+        &mut self,
+        pose: Option<FineTargets>,
+        observer: &mut dyn Observer,
+    ) -> Result<[FineAngle; 7], ParkError> {
+        self.driven_joints()?;
+        let before = self.read_span(Span::between(&SPEED, &TIME))?;
+        let moved = self.go_to_park_pose(pose, observer);
+        let restored = self.write_checked(before.address, &before.values);
+        moved?;
+        restored?;
+        self.let_go_and_watch()
+    }
+
+    fn go_to_park_pose(
+        &mut self,
+        pose: Option<FineTargets>,
+        observer: &mut dyn Observer,
+    ) -> Result<(), MoveError> {
+        let slowly = Pace { speed: Speed::from_steps(SPEED_STEPS), time: None };
+        for targets in park_way(pose, self.park_positions()?) {
+            slowly.set(self, &targets)?;
+            JointMove::begin_fine(self, targets)?.finish(self, observer)?;
+        }
+        Ok(())
+    }
+
+    fn let_go_and_watch(&mut self) -> Result<[FineAngle; 7], ParkError> {
+        let start = self.park_positions()?;
+        motors_obey(self.write_checked(MOTOR_STATE.address, &[motor_state::DAMPING]))?;
+        let deadline = self.now() + WATCH_TIME;
+        loop {
+            let now = self.park_positions()?;
+            if let Some(joint) = moved_joint(&start, &now) {
+                motors_obey(self.write_checked(MOTOR_STATE.address, &[motor_state::SERVO]))?;
+                return Err(ParkError::Sinks { joint });
+            }
+            if self.now() >= deadline {
+                return Ok(now);
+            }
+            self.sleep(POLL_PERIOD);
+        }
+    }
+
+    /// The measured positions, as exact as the arm has them.
+    fn park_positions(&mut self) -> Result<[FineAngle; 7], crate::error::Error> {
+        let whole = self.read_span(Span::of(&PRESENT_POSITION))?.joints(&PRESENT_POSITION);
+        let mut positions = whole.map(|degrees| FineAngle::from(crate::units::Angle::from_register(degrees)));
+        if let Some(fine) = self.fine_state_if_served()? {
+            for (position, measured) in positions.iter_mut().zip(fine.positions) {
+                *position = measured.unwrap_or(*position);
+            }
+        }
+        Ok(positions)
+    }
+}
+
+/// The poses on the way. The way to [`PARK_POSE`] keeps the linkage of joints 2 and 3 within its limits; a pose of the user is
+/// approached directly.
+#[must_use]
+pub fn park_way(pose: Option<FineTargets>, now: [FineAngle; 7]) -> Vec<FineTargets> {
+    if let Some(pose) = pose {
+        return vec![pose];
+    }
+    let park =
+        PARK_POSE.map(|degrees| degrees.map(|degrees| crate::units::Angle::from_register(degrees).into()));
+    let only = |joint: usize, target: Option<FineAngle>| {
+        let mut targets = [None; 7];
+        targets.iter_mut().skip(joint).take(1).for_each(|slot| *slot = target);
+        targets
+    };
+    let limit = FineAngle::from(crate::units::Angle::from_register(FOREARM_LIMIT_DEGREES));
+    let [_, _, forearm, ..] = now;
+    let [_, rear, ..] = park;
+    let down = (forearm > limit).then(|| only(2, Some(limit)));
+    down.into_iter().chain([only(1, rear), park]).collect()
+}
+
+fn moved_joint(start: &[FineAngle; 7], now: &[FineAngle; 7]) -> Option<Joint> {
+    let pairs = Joint::ALL.into_iter().zip(start.iter().zip(now));
+    pairs
+        .filter(|(_, (start, now))| start.hundredths().abs_diff(now.hundredths()) > STAYS_HUNDREDTHS)
+        .map(|(joint, _)| joint)
+        .next()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulated::{self, SharedSimulation, SimulationConfig};
+
+    /// The true angles in thousandths of a degree.
+    fn angles(simulation: &SharedSimulation) -> [i32; 7] {
+        simulation.with(|simulation| Joint::ALL.map(|joint| simulation.plant().angle(joint)))
+    }
+
+    #[test]
+    fn a_parked_arm_stays_where_it_is_with_free_motors() {
+        for start in
+            [[90, 90, 65, 90, 90, 90, 80], [30, 130, 60, 90, 90, 60, 20], [140, 40, 130, 60, 120, 90, 80]]
+        {
+            let (mut arm, simulation) = simulated::arm(SimulationConfig::default()).expect("an arm");
+            arm.driven_joints().expect("it is driven");
+            JointMove::begin(&mut arm, start.map(Some))
+                .and_then(|sent| sent.finish(&mut arm, &mut ()))
+                .expect("a pose");
+            arm.park(None, &mut ()).unwrap_or_else(|error| panic!("{start:?}: {error}"));
+            let parked = angles(&simulation);
+            arm.write(MOTOR_STATE.address, &[motor_state::FORCELESS]).expect("a write");
+            arm.sleep(Duration::from_secs(60));
+            for (joint, (before, after)) in parked.into_iter().zip(angles(&simulation)).enumerate() {
+                assert!((after - before).abs() <= 2_000, "joint {}: {before} to {after}", joint + 1);
+            }
+        }
+    }
+
+    #[test]
+    fn the_way_keeps_the_linkage_within_its_limits() {
+        for (rear, forearm) in (0..=180_u8).flat_map(|rear| (0..=180_u8).map(move |forearm| (rear, forearm)))
+        {
+            let (rear, forearm) = (i32::from(rear), i32::from(forearm));
+            let is_legal = |rear: i32, forearm: i32| (19..=161).contains(&(forearm - 65 + rear));
+            if !is_legal(rear, forearm) {
+                continue;
+            }
+            let whole = |degrees: i32| FineAngle::from_degrees(degrees.into()).expect("an angle");
+            let mut now =
+                [whole(90), whole(rear), whole(forearm), whole(90), whole(90), whole(90), whole(80)];
+            for targets in park_way(None, now) {
+                for (joint, target) in now.iter_mut().zip(targets) {
+                    *joint = target.unwrap_or(*joint);
+                }
+                let [rear, forearm] = [now[1], now[2]].map(|angle| i32::from(angle.nearest().degrees()));
+                assert!(is_legal(rear, forearm), "{rear} {forearm}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_arm_that_sinks_is_held_again() {
+        let (mut arm, simulation) = simulated::arm(SimulationConfig::default()).expect("an arm");
+        arm.driven_joints().expect("it is driven");
+        let level = [90, 90, 65, 90, 90, 90, 80].map(|degrees| FineAngle::from_degrees(degrees.into()));
+        assert_eq!(arm.park(Some(level), &mut ()).map(drop), Err(ParkError::Sinks { joint: Joint::ALL[2] }));
+        let held = angles(&simulation);
+        arm.sleep(Duration::from_secs(10));
+        let [.., after, _, _, _, _] = angles(&simulation);
+        assert!((after - held[2]).abs() < 1_000, "{} to {after}", held[2]);
+        assert!(arm.health().is_ok_and(|health| health.is_driven()));
+    }
+}
