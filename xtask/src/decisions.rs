@@ -1,4 +1,4 @@
-//! The table in docs/protocol.md of the tests for each decision, D1 to D26 and M1 to M12, generated from the names of the
+//! The table in docs/protocol.md of the tests for each decision, D1 to D29 and M1 to M12, generated from the names of the
 //! tests.
 //!
 //! A test of D3 and M4 has a name like `d03_m04_...`.
@@ -16,7 +16,7 @@ type Decision = (char, u8);
 
 /// All decisions on the device. M11 is about the host.
 fn all_decisions() -> impl Iterator<Item = Decision> {
-    let of_map22 = (1..=26).map(|number| ('D', number));
+    let of_map22 = (1..=29).map(|number| ('D', number));
     of_map22.chain((1..=10).chain([12]).map(|number| ('M', number)))
 }
 

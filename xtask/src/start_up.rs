@@ -40,6 +40,8 @@ const PUMP_AND_VALVE_OFF: [RegisterAccess<'_>; 4] = [
     Write("GPIOC", SET_RESET, 1 << 23),
     Write("GPIOC", MODE, 1 << 14),
 ];
+/// PA1, the direction of a buffered servo bus: first driven low, then made an output.
+const LISTENING: [RegisterAccess<'_>; 2] = [Write("GPIOA", SET_RESET, 1 << 17), Write("GPIOA", MODE, 1 << 2)];
 /// PA10 becomes the input of the host link, which ends the start.
 const HOST_LINK_OPEN: RegisterAccess<'_> = Write("GPIOA", MODE, 2 << 20);
 /// Start, unlock, divisor, reload value, wait for both, feed.
@@ -98,6 +100,10 @@ const RULES: &[StartUpRule] = &[
     ("the servo line has no pull inside the chip", |accesses| {
         let pulls = |access: &RegisterAccess<'_>| matches!(access, Write("GPIOA", PULL, value) if value >> 4 & 3 != 0);
         accesses.contains(&Write("GPIOA", PULL, 0)) && !accesses.iter().any(pulls)
+    }),
+    ("the direction of a buffered servo bus listens before its pin becomes an output", |accesses| {
+        let writes: Vec<_> = accesses.iter().copied().filter(|access| is_write(access)).collect();
+        writes.windows(2).any(|pair| pair == LISTENING)
     }),
     ("the watchdog is fed once its registers have taken their values", |accesses| {
         accesses.iter().filter(|access| is_at(access, WATCHDOG)).take(6).eq(&WATCHDOG_STARTED)

@@ -61,6 +61,8 @@ pub enum TortureCommand {
     Load(load::LoadArgs),
     /// Measure how far the arm sags during restarts of the controller, noise, and a silent servo
     Sag,
+    /// Measure what becomes of the arm at walls, after alarms and after emergency stops, with and without protection
+    Obstacles,
 }
 
 fn positive(text: &str) -> Result<f64, &'static str> {

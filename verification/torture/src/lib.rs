@@ -19,6 +19,7 @@ pub mod seeded_rng;
 pub mod fuzz;
 mod linkage_goals;
 pub mod load;
+pub mod obstacles;
 mod panic_handler;
 pub mod parser_trial;
 pub mod per_joint;

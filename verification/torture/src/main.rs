@@ -9,13 +9,14 @@ use torture::campaign::{self, CampaignPlan, CampaignResult};
 use torture::cli::{CampaignArgs, TortureCommand};
 use torture::load;
 use torture::result_table::{ResultTable, days};
-use torture::sag;
+use torture::{obstacles, sag};
 
 fn main() -> ExitCode {
     let args = CampaignArgs::parse();
     match &args.command {
         Some(TortureCommand::Load(args)) => load_port(args),
         Some(TortureCommand::Sag) => measure_sag(),
+        Some(TortureCommand::Obstacles) => measure_obstacles(),
         None => run_campaign(&args.plan(), args.rows),
     }
 }
@@ -53,6 +54,11 @@ fn show_progress(result: &CampaignResult, elapsed: Duration) {
 
 fn measure_sag() -> ExitCode {
     print_line(&sag::SagTable::measure().to_string());
+    ExitCode::SUCCESS
+}
+
+fn measure_obstacles() -> ExitCode {
+    print_line(&obstacles::ObstacleTables::measure().to_string());
     ExitCode::SUCCESS
 }
 

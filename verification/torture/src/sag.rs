@@ -232,21 +232,39 @@ fn degrees(millidegrees: u32) -> String {
 mod tests {
     use super::*;
 
-    /// The droop of a joint under the weight of the arm is below this, in thousandths of a degree.
-    const MAX_DROOP: u32 = 100;
+    /// The droop of each joint in the pose, and how far the plant's load lets it swing about it, in thousandths of a
+    /// degree.
+    fn droops() -> [u32; JOINTS] {
+        let arm = PosedArm::new();
+        Joint::ALL.map(|joint| arm.world.plant().droop(joint).unwrap().unsigned_abs())
+    }
 
     #[test]
-    fn an_arm_that_fails_holds_its_pose() {
-        for cause in [SagCause::WarmRestart, SagCause::Watchdog, SagCause::Noise, SagCause::SilentServo] {
+    fn an_arm_whose_controller_keeps_its_goals_holds_its_pose() {
+        for cause in [SagCause::Noise, SagCause::SilentServo] {
             let sag = Sag::over(cause);
-            assert!(sag.of(sag.worst()) <= MAX_DROOP, "{cause:?}: {sag:?}");
+            assert_eq!(sag.of(sag.worst()), 0, "{cause:?}: {sag:?}");
+        }
+    }
+
+    #[test]
+    fn a_restart_of_the_controller_costs_at_most_a_droop() {
+        // The measured position is the new goal (D12), so each joint droops once more. It was rounded to a count.
+        for cause in [SagCause::WarmRestart, SagCause::Watchdog] {
+            let sag = Sag::over(cause);
+            for (joint, droop) in Joint::ALL.into_iter().zip(droops()) {
+                assert!(sag.of(joint) <= droop + 150, "{cause:?}: {sag:?} of {droop}");
+            }
         }
     }
 
     #[test]
     fn an_arm_that_panics_sinks_and_is_caught() {
         let sag = Sag::over(SagCause::Panic);
-        assert!((1..=350).contains(&sag.of(sag.worst())), "{sag:?}");
+        for (joint, droop) in Joint::ALL.into_iter().zip(droops()) {
+            assert!(sag.of(joint) <= droop + 350, "{sag:?}");
+        }
+        assert!(sag.of(sag.worst()) > 0, "{sag:?}");
     }
 
     #[test]

@@ -8,7 +8,9 @@ use protocol_core::registers::JOINTS;
 use protocol_core::registers::map::{FINE_TARGET, PRESENT_POSITION, SPEED, TARGET_POSITION};
 use protocol_core::request::Request;
 
+use super::direction;
 use super::machine::{Machine, frame};
+use super::masked::longest_stretch;
 use super::trace::{self, TraceEvent};
 use crate::budget::Figure;
 use crate::elf::Program;
@@ -32,6 +34,8 @@ const MIN_CYCLES: usize = 20;
 const SILENCE: Duration = Duration::from_secs(4);
 /// The period of the idle arm in milliseconds: it reads missing servos ten times a second, and its LED blinks twice.
 const PATTERN_MILLIS: usize = 500;
+/// The log lines of each second.
+const LOG_LINES: usize = 3;
 /// The number of requests after a false header. A header claims up to 262 bytes.
 const DELAYED_READS: usize = 34;
 /// The number of measurements of their delay.
@@ -41,7 +45,7 @@ const DROP_TIME: Duration = Duration::from_millis(300);
 /// Bytes of the frame with seven goals. It is the longest frame to the servos.
 const GOAL_FRAME_BYTES: usize = 57;
 /// Bytes that the loop queues at once. The emulator's transmitter is always empty, so one interrupt sends them all. Of the
-/// goals' frame, interrupts send 7 bytes, six times 8, and 2.
+/// goals' frame, interrupts send seven times 8 bytes, and 1.
 const SEND_CHUNK: usize = 8;
 /// Bytes that the transmitter of a USART holds: one in the shift register and one in the data register.
 const TRANSMITTER_BYTES: u64 = 2;
@@ -57,8 +61,18 @@ struct ImageAddresses {
     host_interrupt: u64,
     servo_interrupt: u64,
     wake_up: u64,
+    /// Where a log line begins, and masks the interrupts.
+    log_line: u64,
     handlers: Vec<u64>,
     effects: HashMap<u64, Effect>,
+}
+
+/// Instructions of the idle arm.
+struct Silence {
+    /// In ten milliseconds.
+    ten_millis: u64,
+    /// The longest stretch with interrupts masked, log lines included.
+    masked: u64,
 }
 
 /// Instructions of iterations of the loop.
@@ -89,8 +103,9 @@ pub(crate) fn figures() -> TaskResult<Vec<Figure>> {
     let last_but_one = addresses.paths(&mut machine, READ, 2, asleep)?;
     let first = addresses.paths(&mut machine, READ, 7, asleep)?;
     let moving = while_moving(&mut machine)?;
+    direction::check(&moving)?;
     let mut figures = vec![
-        Figure::new("image: 10 ms without traffic", silence),
+        Figure::new("image: 10 ms without traffic", silence.ten_millis),
         Figure::new("image: read of 7, last byte in to first byte out", read),
         Figure::new("image: read of 7, last byte in to asleep again", read_whole),
         Figure::new("image: write of 7, last byte in to asleep again", write),
@@ -100,10 +115,12 @@ pub(crate) fn figures() -> TaskResult<Vec<Figure>> {
         Figure::new("image: microseconds that 34 reads are held up by a false header", delayed),
     ];
     let passes = addresses.passes(&moving)?;
+    let masked = silence.masked.max(longest_stretch(&moving, &addresses.effects));
     figures.extend([
         Figure::new("image: pass of the loop that moves seven joints", passes.cycle),
         Figure::new("image: pass of the loop with nothing to do", passes.idle),
         Figure::new("image: control cycle, wake-up to first byte of seven goals", passes.first_goal_byte),
+        Figure::new("image: longest stretch with interrupts masked", masked),
     ]);
     figures.extend(addresses.interrupts(&moving)?);
     Ok(figures)
@@ -175,6 +192,7 @@ impl ImageAddresses {
             host_interrupt: program.address_of("USART1")?,
             servo_interrupt: program.address_of("USART2")?,
             wake_up: program.address_of("SysTick")?,
+            log_line: program.address_of("_defmt_acquire")?,
             handlers: program.handlers().to_vec(),
             effects: program.effects(),
         })
@@ -185,23 +203,28 @@ impl ImageAddresses {
     }
 
     /// Instructions in ten milliseconds of the idle arm: one control cycle, ten polls of its lines, and reads of missing
-    /// servos. The median, because a log may or may not contain the log line of each second.
-    fn silence(&self) -> TaskResult<u64> {
+    /// servos. The median, because a log may or may not contain the log lines of each second. The longest masked stretch needs
+    /// one of each.
+    fn silence(&self) -> TaskResult<Silence> {
         let mut machine = Machine::alone()?;
         // The pattern repeats in virtual time, which runs fast.
         sleep(SILENCE);
+        let (mut log_lines, mut masked) = (0, 0);
         for _ in 0..MAX_WATCHES {
             let events = watch_for(&mut machine, SILENCE)?;
+            log_lines += events.iter().filter(|event| trace::is_step_at(event, self.log_line)).count();
+            masked = masked.max(longest_stretch(&events, &self.effects));
             let ticks = trace::between(&events, |event| trace::is_step_at(event, self.wake_up));
             let millis: Vec<_> =
                 ticks.into_iter().filter_map(|tick| Some(trace::steps(events.get(tick)?))).collect();
-            if millis.len() >= PATTERN_MILLIS {
+            if millis.len() >= PATTERN_MILLIS && log_lines >= LOG_LINES {
                 // Ten ticks are less than 10 ms, because a control cycle begins before its tick.
                 let sums = millis.windows(11).map(|millis| millis.iter().sum()).collect();
-                return median(sums, "ten milliseconds of silence");
+                let ten_millis = median(sums, "ten milliseconds of silence")?;
+                return Ok(Silence { ten_millis, masked });
             }
         }
-        Err("the log shows too few milliseconds of silence".into())
+        Err("the log shows too few milliseconds of silence, or too few log lines".into())
     }
 
     /// Instructions from the interrupt of a request's byte, counted from the last one, until `end`. The arm sleeps when that
@@ -285,9 +308,8 @@ impl ImageAddresses {
             let counts = calls.iter().filter(matches).map(|call| trace::steps(call));
             counts.max().ok_or("the log does not show an interrupt of every kind")
         };
-        let (receives, sends_two, sends_chunk) = (which(1, 0)?, which(0, 2)?, which(0, SEND_CHUNK)?);
-        let per_byte_sent = (sends_chunk - sends_two) / (SEND_CHUNK as u64 - 2);
-        let sends_one = sends_two - per_byte_sent;
+        let (receives, sends_one, sends_chunk) = (which(1, 0)?, which(0, 1)?, which(0, SEND_CHUNK)?);
+        let per_byte_sent = (sends_chunk - sends_one) / (SEND_CHUNK as u64 - 1);
         Ok([
             Figure::new("image: interrupt that receives a byte", receives),
             Figure::new("image: interrupt that sends a byte", sends_one),

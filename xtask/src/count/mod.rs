@@ -4,9 +4,11 @@
 //! reproducible, so they show every increase.
 
 mod cores;
+mod direction;
 mod image;
 mod load;
 mod machine;
+mod masked;
 mod trace;
 
 pub(crate) use cores::NamedCount;

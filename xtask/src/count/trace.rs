@@ -14,6 +14,8 @@ use crate::thumb_decode::Effect;
 
 /// TIM2_CNT (RM0090, section 18.4.21).
 const TIME: u64 = 0x4000_0024;
+/// GPIOA_BSRR (RM0090, section 8.4.7).
+const PORT_A: u64 = 0x4002_0018;
 
 /// An event of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,9 +29,11 @@ pub(crate) enum TraceEvent {
     },
     /// The time was read: the count of TIM2, in microseconds.
     Time(u64),
+    /// Pins of port A were set or cleared: the bits of GPIOA_BSRR.
+    SwitchedPortA(u64),
     /// Another register of a peripheral was read.
     Read(u64),
-    /// A peripheral's register was written.
+    /// Another register of a peripheral was written.
     Wrote(u64),
 }
 
@@ -57,8 +61,10 @@ fn event(line: &str) -> Option<TraceEvent> {
     let access = line.strip_prefix("memory_region_ops_")?;
     let (address, rest) = access.split_once("addr 0x")?.1.split_once(" value 0x")?;
     let address = hexadecimal(address)?;
+    let value = || hexadecimal(rest.split(' ').next()?);
     Some(match (access.starts_with("read"), address) {
-        (true, TIME) => TraceEvent::Time(hexadecimal(rest.split(' ').next()?)?),
+        (true, TIME) => TraceEvent::Time(value()?),
+        (false, PORT_A) => TraceEvent::SwitchedPortA(value()?),
         (true, _) => TraceEvent::Read(address),
         (false, _) => TraceEvent::Wrote(address),
     })
@@ -148,6 +154,13 @@ Trace 0: 0x7f81a810adc0 [00800408/0800e7a4/00000010/ff020201] _ZN14firmware_stm3
     fn the_time_is_read_with_its_value() {
         let line = "memory_region_ops_read cpu 0 mr 0x55a0 addr 0x40000024 value 0x1f40 size 4 name 'stm32f2xx_timer'\n";
         assert_eq!(parse(line), [TraceEvent::Time(8_000)]);
+    }
+
+    #[test]
+    fn pins_of_port_a_are_logged_with_their_value() {
+        let line =
+            "memory_region_ops_write cpu 0 mr 0x55a0 addr 0x40020018 value 0x20000 size 4 name 'GPIOA'\n";
+        assert_eq!(parse(line), [TraceEvent::SwitchedPortA(1 << 17)]);
     }
 
     const fn step(at: u64) -> TraceEvent {

@@ -35,7 +35,7 @@ fn servo_bus() -> Drawing {
 }
 
 fn servo_bus_buffered() -> Drawing {
-    let board = [(12, "3.3 V"), (22, "PA2"), (42, "DIR"), (52, "GND")];
+    let board = [(12, "3.3 V"), (22, "PA2"), (42, "PA1"), (52, "GND")];
     let parts = vec![
         connector(15, 10, Side::Right, "Board", &board),
         wire(&[(15, 12), (20, 12)]),
@@ -70,15 +70,10 @@ fn servo_bus_buffered() -> Drawing {
         label(
             (2, 57),
             Anchor::Start,
-            "DIR high: the board drives the bus. R2 keeps a board in reset listening.",
+            "PA1 is the direction. High: the board drives the bus. R2 keeps a board in reset listening.",
         ),
     ];
-    Drawing {
-        name: "servo-bus-buffered",
-        title: "Servo bus with a buffer at 5 V (no direction pin in board.rs yet)",
-        size: (115, 60),
-        parts,
-    }
+    Drawing { name: "servo-bus-buffered", title: "Servo bus with a buffer at 5 V", size: (115, 60), parts }
 }
 
 fn power() -> Drawing {
@@ -89,8 +84,11 @@ fn power() -> Drawing {
         wire(&[(28, 12), (46, 12)]),
         dot(33, 12),
         two(Kind::Switch, (46, 12), (54, 12), "S1  emergency stop"),
-        wire(&[(54, 12), (96, 12)]),
-        // The regulator: a frame with terminals on both sides.
+        wire(&[(54, 12), (58, 12)]),
+        // Inrush limiter and regulator: frames with terminals on both sides.
+        connector(58, 13, Side::Left, "Inrush limiter", &[(12, "in")]),
+        connector(73, 13, Side::Right, "", &[(12, "out")]),
+        wire(&[(73, 12), (96, 12)]),
         wire(&[(33, 12), (33, 24), (36, 24)]),
         connector(36, 13, Side::Left, "Regulator", &[(24, "in"), (30, "GND")]),
         connector(51, 13, Side::Right, "", &[(24, "5 V"), (30, "GND")]),
@@ -113,11 +111,16 @@ fn power() -> Drawing {
             "The board is supplied before S1: the servos are never on while the board is off.",
         ),
         label((2, 54), Anchor::Start, "S1 breaks 10 A of direct current, and stays open when it is hit."),
+        label(
+            (2, 57),
+            Anchor::Start,
+            "The limiter charges C1 with 1 A. Without it, closing S1 welds its contacts: about 100 A.",
+        ),
     ];
     Drawing {
         name: "power",
         title: "Power, and the switch that is the emergency stop",
-        size: (111, 57),
+        size: (111, 60),
         parts,
     }
 }

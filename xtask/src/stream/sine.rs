@@ -71,6 +71,10 @@ struct Recorder {
 impl ServoBus for Recorder {
     const IS_REAL: bool = false;
 
+    fn baud(&self) -> u32 {
+        self.plant.baud()
+    }
+
     fn answer_delay(&self) -> Duration {
         Duration::ZERO
     }

@@ -14,6 +14,7 @@ fn main() -> ! {
     let config = Config {
         chip_id: opaque([0; 6]),
         faults: opaque(0),
+        servo_baud: opaque(1_000_000),
         servo_timeout: opaque(Duration::from_millis(5)),
         guard_time: opaque(Duration::from_micros(100)),
         torque_codes: opaque(TorqueCodes::DampingOnFree),
@@ -23,6 +24,8 @@ fn main() -> ! {
     loop {
         opaque(arm.host_bytes(any_time(), any_bytes()));
         arm.servo_bytes(any_time(), any_bytes());
+        arm.servo_byte_damaged(any_time());
+        arm.host_byte_damaged();
         if let Output::Save(image) = opaque(arm.poll(any_time(), opaque(512))) {
             opaque(image);
             arm.set_storage(opaque(Storage::Full));

@@ -46,6 +46,7 @@ fn main() -> ! {
     let config = Config {
         chip_id: opaque([0; 6]),
         faults: 0,
+        servo_baud: opaque(1_000_000),
         servo_timeout: Duration::from_millis(3),
         guard_time: Duration::from_micros(100),
         torque_codes: TorqueCodes::default(),
@@ -135,12 +136,17 @@ impl ScriptedServos {
                 }
                 None
             }
-            &[0xFF, 0xFF, id, 4, READ, register::PRESENT_POSITION, count, _] => {
+            &[0xFF, 0xFF, id, 4, READ, first, count, _] => {
                 let [high, low] = self.positions.get(usize::from(id))?.to_be_bytes();
-                // Position, speed, load, 7.4 V, 30 degrees, and registers that are 0.
-                let values = [high, low, 0, 0, 0, 0, 74, 30, 0, 0, 0];
+                // From register 40 on: torque on, the goal, and registers that are 0. From register 56 on: position, speed,
+                // load, 7.4 V, 30 degrees, and registers that are 0.
+                let values = [
+                    1, 0, high, low, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, high, low, 0, 0, 0, 0, 74, 30, 0, 0,
+                    0,
+                ];
+                let start = usize::from(first.checked_sub(register::TORQUE_SWITCH)?);
                 let mut reply = frame::ServoFrameBuffer::new();
-                frame::status(&mut reply, id, 0, values.get(..usize::from(count))?);
+                frame::status(&mut reply, id, 0, values.get(start..start + usize::from(count))?);
                 Some(reply)
             }
             _ => None,

@@ -9,9 +9,10 @@ use motion_core::calibration::{MicroDegrees, angle_from_counts, counts_from_angl
 use motion_core::drive::Drive;
 use motion_core::motor_state::MotorState;
 use motion_core::position_filter::PositionFilter;
+use motion_core::push_limiter::{PushLimit, PushLimiter, PushSample};
 use motion_core::report_timer::ReportTimer;
 use motion_core::servo_bus::frame::{self, Decoder, Instruction, Reading, ServoFrameBuffer};
-use motion_core::servo_bus::{Bus, Torque, TorqueCodes};
+use motion_core::servo_bus::{Bus, ByteTime, Question, Torque, TorqueCodes};
 use motion_core::trajectory::Trajectory;
 use motion_core::vacuum::VacuumControl;
 use protocol_core::registers::{JOINTS, Joint};
@@ -22,6 +23,7 @@ fn main() -> ! {
     loop {
         calibration();
         one_joint();
+        push();
         timers();
         servo_frames();
         decoder();
@@ -62,6 +64,13 @@ fn one_joint() {
     opaque((filter.is_known(), filter.position(), filter.wants_asking(any_time())));
 }
 
+fn push() {
+    let mut limiter = opaque(PushLimiter::FREE);
+    let sample = PushSample { angle: MicroDegrees(opaque(0)), push: opaque(0) };
+    limiter.measured(any_time(), sample, MicroDegrees(opaque(0)), PushLimit::of_arm(opaque(0)));
+    opaque((limiter.hold_back(MicroDegrees(opaque(0))), limiter.is_limiting()));
+}
+
 fn timers() {
     let mut reports = opaque(ReportTimer::OFF);
     reports.set(any_time(), opaque(0), opaque(0));
@@ -69,7 +78,7 @@ fn timers() {
     let mut vacuum = opaque(VacuumControl::default());
     vacuum.set(any_time(), opaque(true));
     opaque((vacuum.poll(any_time()), vacuum.deadline()));
-    opaque(MotorState::from_register(opaque(0)).torque(opaque(true)));
+    opaque(MotorState::from_register(opaque(0)).torque());
 }
 
 fn servo_frames() {
@@ -97,11 +106,13 @@ fn decoder() {
 
 fn bus() {
     let codes = opaque(TorqueCodes::DampingOnFree);
-    let mut bus = opaque(Bus::new(Duration::from_millis(opaque(0)), Duration::from_micros(opaque(0)), codes));
+    let (timeout, guard_time) = (Duration::from_millis(opaque(0)), Duration::from_micros(opaque(0)));
+    let mut bus = opaque(Bus::new(opaque(0), timeout, guard_time, codes));
+    opaque(ByteTime::at_baud(opaque(0)).count_within(timeout));
     bus.bytes(any_time(), any_bytes());
     opaque(bus.poll(any_time()));
     opaque((bus.is_asking(), bus.is_free(any_time()), bus.deadline(any_time())));
-    bus.ask(any_time(), Joint::from_index(opaque(0)).unwrap_or(Joint::ALL[0]));
+    bus.ask(any_time(), Joint::from_index(opaque(0)).unwrap_or(Joint::ALL[0]), Question::TorqueAndReading);
     bus.set_torque(any_time(), Joint::ALL.into_iter().zip(opaque([Torque::Free; JOINTS])));
     bus.set_goals(any_time(), Joint::ALL.into_iter().zip(core::iter::repeat_with(|| opaque(0))));
     opaque(bus.frame());

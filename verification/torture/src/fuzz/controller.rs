@@ -85,6 +85,7 @@ pub fn run(input: &Input<'_>) {
     let config = Config {
         chip_id: [1, 2, 3, 4, 5, 6],
         faults: 0,
+        servo_baud: 1_000_000,
         servo_timeout: timeout,
         guard_time: Duration::from_micros(100),
         torque_codes,

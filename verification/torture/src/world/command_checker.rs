@@ -3,10 +3,12 @@
 //! - No goal is out of reach at the allowed speed.
 //! - Goals are sent only in motor state servo, and torque switches follow the motor state.
 //! - Until the end of start-up, and to silent servos, only reads are sent.
+//! - Torque is switched on only where a servo stands, or was read on. After an unanswered question it is read before the
+//!   next goal (D28, D29).
+//! - A goal that no speed allows comes nearer to the measured position, because the joint gives way (D27).
 
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use motion_core::servo_bus::Torque;
-use motion_core::servo_bus::frame::Decoder;
 use motion_core::{CYCLE, TorqueCodes};
 use protocol_core::registers::map::{
     LIMITS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, SPEED, TARGET_POSITION, limit, motor_state,
@@ -17,14 +19,13 @@ use protocol_core::time::{Duration, Instant};
 use super::disturbed_bus::DisturbedBus;
 use super::reachable_range::ReachableRange;
 use super::register_model::RegisterModel;
+use super::servo_replies::ServoReplies;
 use crate::linkage_goals::LinkageGoals;
 use crate::per_joint::PerJoint;
 use crate::violation::{Check, Violation, ensure};
 
 /// Start-up ends after this time at the latest (D12).
 const MAX_START_UP: Duration = Duration::from_millis(500);
-/// Start-up ends earlier if each servo has sent this many replies.
-const START_UP_REPLIES: u8 = 2;
 /// The number of reads without a reply after which a servo is silent: three have failed (D12), one may be in progress.
 const MAX_UNANSWERED: u8 = 4;
 
@@ -36,20 +37,23 @@ const ONE_CYCLE: u16 = 19;
 #[derive(Debug)]
 pub(super) struct CommandChecker {
     codes: TorqueCodes,
-    /// The largest distance of a set-point from the last goal, in counts.
+    /// The largest distance of a set-point from the last goal, in counts, and its time.
     ahead: u16,
+    ahead_time: Duration,
     started_at: Instant,
     ranges: PerJoint<Option<ReachableRange>>,
+    /// The ranges of joints that get no goals for the time being. Their set-points stand still (D29).
+    paused: PerJoint<Option<ReachableRange>>,
+    /// When a joint last got no goal beside others that did.
+    pub(super) paused_at: PerJoint<Instant>,
     /// The last goal of a joint whose servo was lost, and its tolerance in counts. A found servo may continue from that
     /// goal (D12). The tolerance grows when offsets change.
     kept_goals: PerJoint<Option<(u16, u16)>>,
+    /// The joint is not driven any more, whatever its servo does: its next torque is for a new goal.
+    is_released: PerJoint<bool>,
     /// True if the last command switched the torque on. False for a lost servo.
     is_on: PerJoint<bool>,
-    /// Decodes the bytes that the controller receives.
-    decoder: Decoder,
-    replies: PerJoint<u8>,
-    /// Reads since the last reply.
-    unanswered: PerJoint<u8>,
+    replies: ServoReplies,
     wire_free_at: Instant,
     linkage: LinkageGoals,
     pub(super) count: u64,
@@ -69,14 +73,16 @@ impl CommandChecker {
         let cycles = 1 + servo_timeout.as_micros() / CYCLE.as_micros();
         Self {
             codes,
+            ahead_time: Duration::from_micros(servo_timeout.as_micros() + 2 * CYCLE.as_micros()),
             ahead: ONE_CYCLE.saturating_mul(u16::try_from(cycles).unwrap_or(u16::MAX)),
             started_at: now,
             ranges: PerJoint::all(None),
+            paused: PerJoint::all(None),
+            paused_at: PerJoint::all(now),
             kept_goals: PerJoint::all(None),
+            is_released: PerJoint::all(false),
             is_on: PerJoint::all(false),
-            decoder: Decoder::new(),
-            replies: PerJoint::all(0),
-            unanswered: PerJoint::all(0),
+            replies: ServoReplies::new(codes),
             wire_free_at: now,
             linkage: LinkageGoals::default(),
             count: 0,
@@ -84,17 +90,23 @@ impl CommandChecker {
         }
     }
 
-    /// Counts the replies in bytes that the controller receives.
-    pub(super) fn replies_received(&mut self, bytes: &[u8]) {
-        for piece in bytes.chunks(Decoder::CAPACITY / 2) {
-            self.decoder.push(piece);
-            while let Some(heard) = self.decoder.pull() {
-                let Some(frame) = heard.ok().filter(|frame| frame.params.len() >= 8) else { continue };
-                let Some(joint) = Joint::from_index(frame.id) else { continue };
-                self.replies[joint] = self.replies[joint].saturating_add(1);
-                self.unanswered[joint] = 0;
-            }
-        }
+    /// Takes bytes that the controller receives.
+    pub(super) fn replies_received(&mut self, now: Instant, bytes: &[u8]) {
+        self.replies.received(now, bytes);
+    }
+
+    /// The arm may find its supply lost only after all its driven servos were silent (D29).
+    pub(super) fn check_lost_supply(&self, now: Instant, bus: &DisturbedBus) -> Check {
+        let was_silent = Joint::ALL.into_iter().any(|joint| self.replies.was_silent_for_a_second(joint, now));
+        let holds = |joint: &Joint| {
+            bus.has_torque(*joint) && !bus.may_be_let_go(*joint, now) && self.replies.is_steady(*joint, now)
+        };
+        let holding = Joint::ALL.into_iter().find(holds).map(Joint::number);
+        ensure(!bus.is_undisturbed(now) || (was_silent && holding.is_none()), || {
+            format!(
+                "the supply counts as lost, after a silence: {was_silent}, and joint {holding:?} has torque"
+            )
+        })
     }
 
     pub(super) fn is_on(&self, joint: Joint) -> bool {
@@ -103,28 +115,30 @@ impl CommandChecker {
 
     /// The last goal of a joint that is driven.
     pub(super) fn goal(&self, joint: Joint) -> Option<u16> {
-        self.ranges[joint].map(|range| range.last_goal)
+        self.ranges[joint].or(self.paused[joint]).map(|range| range.last_goal)
     }
 
     /// The joint is no longer driven. Its next goal need not be near the last one.
     pub(super) fn forget(&mut self, joint: Joint) {
         self.linkage.reset();
-        self.ranges[joint] = None;
+        (self.ranges[joint], self.paused[joint]) = (None, None);
         self.kept_goals[joint] = None;
+        self.is_released[joint] = true;
+        self.replies.forget_doubt(joint);
     }
 
     /// The joint's servo was lost. It may hold its last goal.
     pub(super) fn servo_lost(&mut self, joint: Joint) {
         self.linkage.reset();
         self.kept_goals[joint] = self.goal(joint).map(|goal| (goal, self.ahead)).or(self.kept_goals[joint]);
-        self.ranges[joint] = None;
+        (self.ranges[joint], self.paused[joint]) = (None, None);
         self.is_on[joint] = false;
     }
 
     /// A written speed is allowed until the next frame, even if another write replaces it.
     pub(super) fn speed_written(&mut self, model: &RegisterModel) {
-        for (joint, range) in Joint::ALL.into_iter().zip(&mut self.ranges.0) {
-            if let Some(range) = range {
+        for (joint, ranges) in Joint::ALL.into_iter().zip(self.ranges.0.iter_mut().zip(&mut self.paused.0)) {
+            for range in [ranges.0, ranges.1].into_iter().flatten() {
                 range.allow_speed(joint, model.get(SPEED.of(joint)));
             }
         }
@@ -134,6 +148,7 @@ impl CommandChecker {
     pub(super) fn offsets_changed(&mut self) {
         self.linkage.reset();
         self.ranges.0.iter_mut().flatten().for_each(ReachableRange::widen);
+        self.paused.0.iter_mut().flatten().for_each(ReachableRange::widen);
         self.kept_goals.0.iter_mut().flatten().for_each(|(_, tolerance)| *tolerance += 1);
     }
 
@@ -147,11 +162,11 @@ impl CommandChecker {
         let is_whole = usize::from(*length) == body.len() + 1 && *sum == !covered;
         match body {
             _ if !is_whole => Err(invalid_frame(frame)),
-            [2, 56, 8..=16] if *id < 7 => {
+            [2, 56, 8..=11] | [2, 40, 24..=27] if *id < 7 => {
                 let joint = Joint::from_index(*id).ok_or_else(|| invalid_frame(frame))?;
-                self.unanswered[joint] = self.unanswered[joint].saturating_add(1);
-                // The controller does the same: bytes from before a read are not its reply.
-                self.decoder.clear();
+                let is_driven =
+                    (self.is_on[joint] && !self.is_released[joint]) || self.kept_goals[joint].is_some();
+                self.replies.asked(context.now, joint, is_driven);
                 Ok(())
             }
             _ if self.is_starting(context.now) => {
@@ -164,8 +179,7 @@ impl CommandChecker {
     }
 
     fn is_starting(&self, now: Instant) -> bool {
-        now < self.started_at + MAX_START_UP
-            && self.replies.0.iter().any(|replies| *replies < START_UP_REPLIES)
+        now < self.started_at + MAX_START_UP && !self.replies.have_all_started()
     }
 
     /// Torque switches are set to the motor state in register 29 (D13).
@@ -179,23 +193,55 @@ impl CommandChecker {
         for item in items.chunks(2) {
             let [id, code] = *item else { return Err(invalid_frame(items)) };
             let Some(joint) = Joint::from_index(id) else { return Err(invalid_frame(items)) };
+            if torque == Torque::On && code == self.codes.code(Torque::Damping) {
+                self.check_torque_off(joint, context)?;
+                continue;
+            }
             ensure(code == self.codes.code(torque), || {
                 format!("the torque switch of joint {} is set to {code} in state {state}", joint.number())
             })?;
-            let is_on = torque == Torque::On;
-            if is_on {
-                self.check_responding(joint, "is given torque", context)?;
+            if torque == Torque::On {
+                self.check_torque_on(joint, context)?;
             }
-            if is_on && !self.is_on[joint] {
-                let range = self.ranges[joint].ok_or_else(|| {
-                    Violation(format!("joint {} is given torque without a goal", joint.number()))
-                })?;
-                self.check_position(joint, range.last_goal, "is given torque", context)?;
-                self.kept_goals[joint] = None;
-                self.engagements += 1;
-            }
-            self.is_on[joint] = is_on;
+            self.is_on[joint] = torque == Torque::On;
         }
+        Ok(())
+    }
+
+    /// Only a servo that holds no torque is switched off in state servo (D28).
+    fn check_torque_off(&mut self, joint: Joint, context: &CommandContext<'_>) -> Check {
+        let bus = context.bus;
+        let is_known = bus.is_undisturbed(context.now) && !bus.may_be_misread(joint, context.now);
+        ensure(!is_known || !bus.has_torque(joint), || {
+            format!("joint {} holds its torque and is freed in state servo", joint.number())
+        })?;
+        self.forget(joint);
+        self.is_on[joint] = false;
+        Ok(())
+    }
+
+    /// Torque is switched on where a joint stands, and refreshed where it was read on.
+    fn check_torque_on(&mut self, joint: Joint, context: &CommandContext<'_>) -> Check {
+        let number = joint.number();
+        self.check_responding(joint, "is given torque", context)?;
+        let is_fresh = self.replies.take_read_on(joint);
+        let is_released = std::mem::take(&mut self.is_released[joint]);
+        let is_known = context.bus.is_undisturbed(context.now);
+        let is_engaging = !self.is_on[joint]
+            || is_released
+            || self.replies.was_read_off(joint)
+            || (context.bus.is_free(joint) && is_known);
+        if !is_engaging {
+            return ensure(is_fresh || !is_known, || {
+                format!("the torque of joint {number} is refreshed, but was not read on since the last time")
+            });
+        }
+        let range = self.ranges[joint]
+            .ok_or_else(|| Violation(format!("joint {number} is given torque without a goal")))?;
+        self.check_position(joint, range.last_goal, "is given torque", context)?;
+        self.kept_goals[joint] = None;
+        self.replies.forget_doubt(joint);
+        self.engagements += 1;
         Ok(())
     }
 
@@ -203,9 +249,10 @@ impl CommandChecker {
     fn check_responding(&self, joint: Joint, what: &str, context: &CommandContext<'_>) -> Check {
         let is_flagged = context.registers.get(MISSING_SERVOS.address) & joint.bit() != 0;
         // On a disturbed bus the controller may decode a reply that this decoder misses.
-        let is_silent = self.unanswered[joint] >= MAX_UNANSWERED && context.bus.is_undisturbed(context.now);
+        let unanswered = self.replies.unanswered(joint);
+        let is_silent = unanswered >= MAX_UNANSWERED && context.bus.is_undisturbed(context.now);
         ensure(!is_flagged && !is_silent, || {
-            let (number, unanswered) = (joint.number(), self.unanswered[joint]);
+            let number = joint.number();
             format!("joint {number} {what} while its servo is silent: {unanswered} reads without a reply")
         })
     }
@@ -245,7 +292,8 @@ impl CommandChecker {
             self.check_goal(joint, u16::from_be_bytes([high, low]), context)?;
         }
         for joint in Joint::ALL.into_iter().filter(|joint| !has_goal[*joint]) {
-            self.ranges[joint] = None;
+            self.paused[joint] = self.ranges[joint].take().or(self.paused[joint]);
+            self.paused_at[joint] = context.now;
         }
         self.check_linkage(context)
     }
@@ -258,24 +306,64 @@ impl CommandChecker {
             return Ok(());
         }
         let offset = |joint| context.model.offset(joint);
-        self.linkage.check([self.goal(two), self.goal(three)], [offset(two), offset(three)])
+        let goal = |joint| self.ranges[joint].map(|range: ReachableRange| range.last_goal);
+        self.linkage.check([goal(two), goal(three)], [offset(two), offset(three)])
     }
 
     fn check_goal(&mut self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
         let speed = context.registers.get(SPEED.of(joint));
-        let Some(before) = self.ranges[joint] else {
-            self.check_position(joint, goal, "is driven", context)?;
-            self.ranges[joint] = Some(ReachableRange::at(joint, goal, speed, context.now));
+        let since_trusted = context.now - self.replies.trusted_at(joint);
+        let ahead = Duration::from_micros(self.ahead_time.as_micros() + since_trusted.as_micros());
+        let paused = self.paused[joint].take().map(|range| range.resumed(context.now, ahead));
+        let before = self.ranges[joint].or(paused);
+        let reached = before.and_then(|range| range.after(joint, goal, speed, context.now));
+        let new = ReachableRange::at(joint, goal, speed, context.now);
+        self.ranges[joint] = reached.filter(|_| paused.is_none()).or(Some(new));
+        self.check_doubt(joint, goal, context)?;
+        match before {
+            _ if reached.is_some() => check_arrival(joint, goal, context),
+            Some(before) if self.gives_way(joint, before, goal, context) => {
+                check_arrival(joint, goal, context)
+            }
+            Some(before) if paused.is_none() && !self.replies.was_read_off(joint) => Err(Violation(format!(
+                "joint {} gets the goal {goal} after {}, out of reach with speed {speed}",
+                joint.number(),
+                before.last_goal
+            ))),
+            _ => {
+                self.linkage.reset();
+                self.check_position(joint, goal, "is driven", context)
+            }
+        }
+    }
+
+    /// A servo without torque gets no goal but where it stands. After an unanswered question its torque is read first
+    /// (D29).
+    fn check_doubt(&self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
+        if !context.bus.is_undisturbed(context.now) {
             return Ok(());
-        };
-        let range = before.after(joint, goal, speed, context.now).ok_or_else(|| {
-            let (number, last) = (joint.number(), before.last_goal);
-            Violation(format!(
-                "joint {number} gets the goal {goal} after {last}, out of reach with speed {speed}"
-            ))
+        }
+        ensure(!self.replies.is_doubtful(joint), || {
+            format!("joint {} gets a goal, but its torque was not read after a silence", joint.number())
         })?;
-        self.ranges[joint] = Some(range);
-        check_arrival(joint, goal, context)
+        if context.bus.is_free(joint) {
+            return self.check_position(joint, goal, "gets a goal without torque", context);
+        }
+        Ok(())
+    }
+
+    /// True if this goal brings the set-point of a joint that pushes too hard nearer to the measured position (D27).
+    fn gives_way(
+        &self,
+        joint: Joint,
+        before: ReachableRange,
+        goal: u16,
+        context: &CommandContext<'_>,
+    ) -> bool {
+        let speed = context.registers.get(SPEED.of(joint));
+        let reached = |position| before.giving_way(position).after(joint, goal, speed, context.now);
+        let is_nearer = self.replies.position(joint).and_then(reached).is_some();
+        is_nearer && context.bus.truth(joint).may_give_way(context.now)
     }
 }
 

@@ -25,7 +25,6 @@ const MAX_EXPIRED_WAITS: u32 = 4;
 /// An [`Output`] without a borrow of the controller: its bytes are in [`PoweredArm::output_bytes`].
 enum OwnedOutput {
     ToHost,
-    ServoFrameStart,
     ToServos,
     Vacuum(Vacuum),
     Save(Image),
@@ -42,7 +41,6 @@ impl PoweredArm {
         };
         match controller.poll(now, room) {
             Output::ToHost(bytes) => copy(bytes, OwnedOutput::ToHost),
-            Output::ServoFrameStart(bytes) => copy(bytes, OwnedOutput::ServoFrameStart),
             Output::ToServos(bytes) => copy(bytes, OwnedOutput::ToServos),
             Output::Vacuum(vacuum) => OwnedOutput::Vacuum(vacuum),
             Output::Save(image) => OwnedOutput::Save(image),
@@ -86,7 +84,7 @@ impl TortureWorld {
         let bytes = self.bus.receive(self.now, &mut self.rng);
         if !bytes.is_empty() {
             self.log.bus(self.now, "from servos", &bytes);
-            arm.command_checker.replies_received(&bytes);
+            arm.command_checker.replies_received(self.now, &bytes);
             arm.controller.servo_bytes(self.now, &bytes);
         }
         while arm.deliver_host_bytes(self.now) {
@@ -99,7 +97,6 @@ impl TortureWorld {
 
     /// Executes the outputs of the controller until it waits. Returns true if the power is still on.
     fn poll(&mut self, arm: &mut PoweredArm) -> Check<bool> {
-        let mut begun = Vec::new();
         for _ in 0..MAX_OUTPUTS {
             if self.parameters.receives_before_every_poll {
                 arm.deliver_host_bytes(self.now);
@@ -109,11 +106,7 @@ impl TortureWorld {
             let output = arm.poll(self.now, room);
             let count = arm.executed().wrapping_sub(before);
             self.apply_requests(arm, count, room)?;
-            let is_rest = matches!(output, OwnedOutput::ToServos) && arm.output_bytes.starts_with(&begun);
-            ensure(begun.is_empty() || is_rest, || format!("{begun:02x?} is not followed by its frame"))?;
-            begun.clear();
             match output {
-                OwnedOutput::ServoFrameStart => begun.extend_from_slice(&arm.output_bytes),
                 OwnedOutput::ToServos => self.send_to_servos(arm)?,
                 OwnedOutput::ToHost => self.send_to_host(arm, room)?,
                 OwnedOutput::Vacuum(vacuum) => {

@@ -14,6 +14,7 @@ use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
 use super::corruption::corrupt;
+use super::joint_truth::JointTruth;
 use super::motion_checker::{Exemption, MotionChecker};
 use super::status_reply::{StatusFields, status_replies, whole_status};
 use crate::per_joint::PerJoint;
@@ -54,6 +55,7 @@ pub(super) struct DisturbanceRates {
 pub(super) struct DisturbedBus {
     plant: Plant,
     motion_checker: MotionChecker,
+    truths: PerJoint<JointTruth>,
     settings: ServoConfig,
     disturbance: DisturbanceRates,
     /// Frames that are delayed on the wire, with the time of their arrival.
@@ -86,6 +88,7 @@ impl DisturbedBus {
         Self {
             plant: Plant::with_config(now, settings),
             motion_checker: MotionChecker::new(now),
+            truths: PerJoint::default(),
             settings,
             disturbance: DisturbanceRates::default(),
             delayed: VecDeque::new(),
@@ -150,9 +153,40 @@ impl DisturbedBus {
         self.motion_checker.exempt_all(now, Exemption::MotorState);
     }
 
-    /// Checks that no joint has moved by itself.
-    pub(super) fn check_motion(&mut self, now: Instant, is_servo: bool) -> Check {
+    /// Checks that no joint has moved by itself. `limits` are those of the pushes in 0.1 %; `None` without protection.
+    pub(super) fn check_motion(
+        &mut self,
+        now: Instant,
+        is_servo: bool,
+        limits: PerJoint<Option<i16>>,
+    ) -> Check {
+        // The joints move while the controller is off, too.
+        self.plant.bytes(now, &[]);
+        if !is_servo {
+            self.truths = PerJoint::default();
+        }
+        for joint in Joint::ALL.into_iter().filter(|_| is_servo) {
+            let (torque, push) = (self.plant.torque(joint), self.plant.motor_torque(joint));
+            self.truths[joint].observe(now, torque, push, limits[joint]);
+        }
         self.motion_checker.check(now, is_servo, &self.plant)
+    }
+
+    /// What the servo of a joint did.
+    pub(super) fn truth(&self, joint: Joint) -> &JointTruth {
+        &self.truths[joint]
+    }
+
+    /// True if the servo may be let go, as the controller sees it (D28): it lost its torque, or a false reading says so.
+    pub(super) fn may_be_let_go(&self, joint: Joint, now: Instant) -> bool {
+        let is_off = self.plant.torque(joint) != Some(Torque::On);
+        let lacks_order = is_off && !self.is_undisturbed(now);
+        self.truths[joint].may_be_let_go(now) || lacks_order || self.may_be_misread(joint, now)
+    }
+
+    /// True if the servo has power and holds no torque.
+    pub(super) fn is_free(&self, joint: Joint) -> bool {
+        matches!(self.plant.torque(joint), Some(torque) if torque != Torque::On)
     }
 
     /// True if the servo drives its motor.
@@ -249,6 +283,10 @@ impl DisturbedBus {
         self.faults[joint] = fault;
         if was_missing || fault == Some(ServoFault::Missing) {
             self.motion_checker.exempt(now, joint, Exemption::PowerLoss);
+        }
+        if fault == Some(ServoFault::Stuck) {
+            // It may stop where it overshot its goal.
+            self.motion_checker.exempt(now, joint, Exemption::Hand);
         }
         self.since[joint] = if was_missing { now + BOOT_TIME } else { now };
     }

@@ -19,17 +19,20 @@ mod extended_requests;
 mod fault_injection;
 mod host_link;
 mod host_request;
+mod joint_truth;
 mod limit_verdict;
 mod map21_model;
 mod map21_requests;
 mod motion_checker;
 mod parameters;
 mod power;
+mod protection_model;
 mod reachable_range;
 mod register_model;
 mod report_checker;
 mod request_effects;
 mod request_generator;
+mod servo_replies;
 mod settings_storage;
 mod state;
 mod status_checker;
@@ -37,8 +40,10 @@ mod status_reply;
 mod watchdog_model;
 mod written_targets;
 
+use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
+use crate::per_joint::PerJoint;
 use crate::scenario::Scenario;
 use crate::seeded_rng::SeededRng;
 use crate::violation::{Check, Violation};
@@ -124,7 +129,7 @@ impl TortureWorld {
         if let PowerState::On(arm) = &self.power {
             self.is_servo = arm.model.is_servo();
         }
-        self.bus.check_motion(self.now, self.is_servo)
+        self.bus.check_motion(self.now, self.is_servo, self.push_limits())
     }
 
     fn advance(&mut self) -> Check {
@@ -139,6 +144,14 @@ impl TortureWorld {
                 self.power = off;
                 Ok(())
             }
+        }
+    }
+
+    /// The limits of the pushes in 0.1 %, as far as the controller keeps them.
+    fn push_limits(&self) -> PerJoint<Option<i16>> {
+        match &self.power {
+            PowerState::On(arm) => PerJoint(Joint::ALL.map(|joint| arm.model.push_limit(joint))),
+            _ => PerJoint::all(None),
         }
     }
 

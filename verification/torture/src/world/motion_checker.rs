@@ -8,6 +8,10 @@
 //! The checker outlives restarts of the controller: a joint that holds its goal continues to hold it. The range shrinks
 //! behind a joint that moves to its goal, more slowly than a servo moves. So a joint that lags behind is inside the
 //! range, and a joint that falls is outside.
+//!
+//! A joint yields to its load: it droops, and when the controller alone restarts, the measured position is its new goal
+//! and it droops once more. With a payload it also runs past its goal. The tolerance follows from the load and the speed
+//! of each joint.
 
 use arm_sim::plant::Plant;
 use motion_core::calibration::{MicroDegrees, angle_from_counts};
@@ -22,8 +26,8 @@ use crate::violation::{Check, ensure};
 
 /// The time between two checks. The heaviest joint, if it falls, exceeds the tolerance in 30 ms.
 const CHECK_PERIOD: Duration = Duration::from_millis(5);
-/// The accepted distance of a joint from its range, in millidegrees. A goal is a multiple of up to 0.29 degrees, the
-/// plant droops by less than 0.1 degrees at the heaviest load, and its motor stops within 0.02 degrees.
+/// The accepted distance of a joint from its range, in millidegrees, without load and speed. A goal is a multiple of up
+/// to 0.29 degrees, and the angle is measured after the goal is computed.
 const TOLERANCE: i32 = 450;
 /// Millidegrees per second by which the range shrinks behind the joint. A servo far from its goal moves at 372 degrees/s.
 const SHRINK_PER_SECOND: u64 = 80_000;
@@ -41,7 +45,7 @@ pub(super) enum Exemption {
     PowerLoss,
     /// The motor state is not servo.
     MotorState,
-    /// A hand turns it.
+    /// A hand turns it, or something holds it.
     Hand,
     /// The panic handler switched the servos to damping.
     Panic,
@@ -87,13 +91,23 @@ struct JointBounds {
     /// The goals of the present period of [`GOAL_AGE`], and of the period before.
     goals: [AngleRange; 2],
     range: AngleRange,
+    /// The greatest yield in the present period, and in the period before.
+    yields: [i32; 2],
 }
 
 impl JointBounds {
-    /// Starts a new period for the goals.
+    /// Starts a new period for the goals and for the yield.
     fn age(&mut self) {
         let [new, _] = self.goals;
         self.goals = [AngleRange::at(self.goal.unwrap_or(0)), new];
+        let [new, _] = self.yields;
+        self.yields = [0, new];
+    }
+
+    /// How far the joint may be outside its range.
+    fn tolerance(&self) -> i32 {
+        let [new, old] = self.yields;
+        new.max(old).saturating_add(TOLERANCE)
     }
 }
 
@@ -116,6 +130,7 @@ impl MotionChecker {
                 goal: None,
                 goals: [AngleRange::at(0); 2],
                 range: AngleRange::at(0),
+                yields: [0; 2],
             }),
             checked_at: now,
             decoder: Decoder::new(),
@@ -212,6 +227,8 @@ impl MotionChecker {
 
     fn check_joint(&mut self, now: Instant, joint: Joint, by: i32, plant: &Plant) -> Check {
         let (angle, torque) = (plant.angle(joint), plant.torque(joint));
+        let [largest, _] = &mut self.joints[joint].yields;
+        *largest = (*largest).max(yield_of(joint, plant));
         if torque.is_none() {
             self.exempt(now, joint, Exemption::PowerLoss);
         }
@@ -229,17 +246,25 @@ impl MotionChecker {
             return Ok(());
         }
         bounds.range.shrink(goals, angle, by);
-        let JointBounds { range, .. } = *bounds;
-        ensure(range.excess(angle) <= TOLERANCE, || {
+        let (range, tolerance) = (bounds.range, bounds.tolerance());
+        ensure(range.excess(angle) <= tolerance, || {
             format!(
                 "joint {} moved by itself to {angle} millidegrees with the goal {goal} and torque {torque:?}; \
-                 its range is {} to {}",
+                 its range is {} to {}, and its tolerance {tolerance}",
                 joint.number(),
                 range.low,
                 range.high
             )
         })
     }
+}
+
+/// How far a driven joint may be off its set-point, in millidegrees: by the droop of its own load, and by the distance
+/// in which its motor can stop it. The second one hides no fall: a joint that falls has a smaller torque than its motor,
+/// so it falls further than that distance.
+fn yield_of(joint: Joint, plant: &Plant) -> i32 {
+    let droop = plant.droop(joint).unwrap_or(i32::MAX);
+    droop.saturating_add(plant.stopping_distance(joint))
 }
 
 /// The effect of a frame on one servo.

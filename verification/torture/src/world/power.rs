@@ -56,6 +56,7 @@ impl TortureWorld {
         let config = Config {
             chip_id: CHIP_ID,
             faults: 0,
+            servo_baud: 1_000_000,
             servo_timeout: self.parameters.servo_timeout,
             guard_time: GUARD_TIME,
             torque_codes: self.parameters.torque_codes,

@@ -39,6 +39,19 @@ impl ReachableRange {
         self.lower -= NANOCOUNTS;
     }
 
+    /// The range of a joint whose set-point stood still until now, but for `ahead` after the last goal.
+    pub(super) fn resumed(self, now: Instant, ahead: Duration) -> Self {
+        let moved = (now - self.at).min(ahead);
+        Self { at: Instant::from_micros(now.as_micros().saturating_sub(moved.as_micros())), ..self }
+    }
+
+    /// The range of a set-point that may have come nearer to this position at any speed, because the joint gives way.
+    pub(super) fn giving_way(self, position: u16) -> Self {
+        let [position, goal] = [position, self.last_goal].map(|counts| i64::from(counts) * NANOCOUNTS);
+        let (upper, lower) = (self.upper.max(position).max(goal), self.lower.min(position).min(goal));
+        Self { upper, lower, ..self }
+    }
+
     /// The range after the next goal; `None` if that goal is out of reach.
     pub(super) fn after(self, joint: Joint, goal: u16, speed: u8, now: Instant) -> Option<Self> {
         let next = Self::at(joint, goal, speed, now);

@@ -15,8 +15,10 @@ use protocol_core::registers::{Access, Image, Joint, MAP_21, Region, Register};
 use super::extended_model;
 use super::host_request::HostRequest;
 use super::map21_model::{self, OutOfReach};
+use super::protection_model;
 use super::written_targets::WrittenTargets;
 use crate::per_joint::PerJoint;
+pub(crate) use targets::OwnTarget;
 
 /// The options of map 2.1: bit 0 biased offsets, bit 1 alarms (M6).
 const OPTIONS: u8 = 20;
@@ -56,6 +58,10 @@ pub(crate) struct RegisterModel {
     /// The targets as the host wrote them, while no measured position can have replaced them.
     pub(crate) targets: PerJoint<Option<MicroDegrees>>,
     has_streams: bool,
+    /// The last targets in degrees. A point of a stream in the same frame replaces them, but for a joint that is let go.
+    coarse_targets: PerJoint<u8>,
+    /// The targets that the arm may have set itself (D27, D28).
+    pub(crate) own_targets: PerJoint<OwnTarget>,
     /// Which of its possible outcomes the next write has.
     pub(crate) choice: usize,
     /// The number of possible outcomes of the last request.
@@ -76,6 +82,8 @@ impl RegisterModel {
             has_biased_offsets: false,
             targets: PerJoint::all(None),
             has_streams: false,
+            coarse_targets: PerJoint::all(0),
+            own_targets: PerJoint::all(OwnTarget::Measured),
             choice: 0,
             outcomes: 1,
         };
@@ -281,10 +289,14 @@ impl RegisterModel {
     fn apply(&mut self, items: &[(u8, u8)]) {
         let was_servo = self.is_servo();
         items.iter().for_each(|(at, value)| self.set(*at, *value));
+        if items.iter().any(|(at, _)| *at == MOTOR_STATE.address) {
+            self.set(protection_model::SUPPLY_LOST, 0);
+        }
         self.state_changed(was_servo);
         for (at, value) in items {
             if let Some(joint) = TARGET_POSITION.joint_at(*at) {
                 self.set_target(joint, MicroDegrees::from_degrees(*value));
+                self.coarse_targets[joint] = *value;
             }
         }
         self.has_streams |= items.iter().any(|(at, value)| matches!(at, 184 | 185) && *value != 0);
@@ -301,6 +313,11 @@ impl RegisterModel {
     /// What the reports of register 53 hold (D26).
     pub(crate) fn report_content(&self) -> u8 {
         self.get(extended_model::REPORT_CONTENT)
+    }
+
+    /// The limit of a joint's push in 0.1 % of the stall torque; `None` without protection (D27).
+    pub(crate) fn push_limit(&self, joint: Joint) -> Option<i16> {
+        protection_model::limit(joint, |at| self.get(at)).filter(|_| self.is_servo())
     }
 
     /// A joint's offset in degrees.

@@ -1,12 +1,14 @@
 //! Applies the requests that the controller has executed to the models, and tells the checkers.
 
+use motion_core::calibration::angle_from_counts;
 use protocol_core::registers::map::{MOTOR_STATE, OFFSET, SPEED, TARGET_POSITION, VACUUM_PUMP, motor_state};
 use protocol_core::registers::{Joint, Register};
 
 use super::extended_model::{self, WATCHDOG, WATCHDOG_ACTION};
 use super::host_request::HostRequest;
-use super::register_model::RequestEffect;
+use super::protection_model::SUPPLY_LOST;
 use super::register_model::limits::FoundVerdicts;
+use super::register_model::{OwnTarget, RequestEffect};
 use super::state::{PoweredArm, TortureWorld};
 use super::status_checker::{StatusChecker, affects_motion};
 use crate::violation::{Check, Violation, ensure};
@@ -28,6 +30,8 @@ impl TortureWorld {
     /// is owed from then on; frames to the servos may come before it.
     pub(super) fn apply_requests(&mut self, arm: &mut PoweredArm, count: u16, room: usize) -> Check {
         self.record_missing(arm);
+        self.record_lost_supply(arm)?;
+        self.allow_own_targets(arm);
         let verdicts = arm.find_verdicts(count, room);
         let mut choices = verdicts.choices.into_iter();
         let (mut last, mut is_heard) = (arm.owed.take(), false);
@@ -91,6 +95,48 @@ impl TortureWorld {
         }
     }
 
+    /// The arm may set these targets itself: a joint is let go, or gives way (D27, D28).
+    fn allow_own_targets(&self, arm: &mut PoweredArm) {
+        for joint in Joint::ALL {
+            let before = arm.model.get(TARGET_POSITION.of(joint));
+            let gives_way = self.bus.truth(joint).may_give_way(self.now);
+            arm.model.own_targets[joint] = match arm.command_checker.goal(joint) {
+                _ if !arm.model.is_servo() => OwnTarget::Measured,
+                Some(counts) if gives_way => {
+                    let offset = arm.model.offset(joint);
+                    let degrees = |counts| angle_from_counts(joint, counts, offset).nearest_degree();
+                    let (goal, present) = (degrees(counts), degrees(self.bus.position(joint)));
+                    let (low, high) = (goal.min(present).saturating_sub(2), goal.max(present) + 2);
+                    // A set-point may lie beyond the end of the servo's range.
+                    let (low, high) = if matches!(counts, 0 | 1_023) { (0, 180) } else { (low, high) };
+                    OwnTarget::GaveWay { low, high, before }
+                }
+                _ if self.bus.may_be_let_go(joint, self.now) => OwnTarget::Before(before),
+                _ => OwnTarget::Measured,
+            };
+        }
+    }
+
+    /// The arm enters state 0 if the supply of its servos was lost (D29): the model takes over the effect.
+    fn record_lost_supply(&mut self, arm: &mut PoweredArm) -> Check {
+        let is_told = arm.controller.registers().get(SUPPLY_LOST) == 1;
+        if !is_told || arm.model.get(SUPPLY_LOST) == 1 {
+            return Ok(());
+        }
+        self.log.event(self.now, "the arm has lost its supply".to_owned());
+        arm.command_checker.check_lost_supply(self.now, &self.bus)?;
+        arm.model.lose_supply();
+        self.record_damping(arm);
+        Ok(())
+    }
+
+    /// The arm has entered state 0 by itself.
+    fn record_damping(&mut self, arm: &mut PoweredArm) {
+        arm.status_checker.state_written(self.now);
+        Joint::ALL.into_iter().for_each(|joint| arm.command_checker.forget(joint));
+        self.bus.exempt_all_by_state(self.now);
+    }
+
     /// The watchdog may have acted in this poll (D24): the model takes over its effect.
     fn record_watchdog(&mut self, arm: &mut PoweredArm) {
         let registers = arm.controller.registers();
@@ -103,9 +149,7 @@ impl TortureWorld {
         {
             self.log.event(self.now, "the watchdog damps the arm".to_owned());
             arm.model.damp();
-            arm.status_checker.state_written(self.now);
-            Joint::ALL.into_iter().for_each(|joint| arm.command_checker.forget(joint));
-            self.bus.exempt_all_by_state(self.now);
+            self.record_damping(arm);
         }
     }
 

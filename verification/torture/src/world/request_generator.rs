@@ -14,8 +14,8 @@ use crate::seeded_rng::SeededRng;
 /// A pause inside a frame. From 100 ms on the arm drops the frame.
 const MAX_PAUSE: Duration = Duration::from_millis(90);
 
-/// The first and last address of the extended block.
-const EXTENDED: (usize, usize) = (128, 191);
+/// The first and last address of the extended block and the protection block.
+const EXTENDED: (usize, usize) = (128, 199);
 
 /// The parts of the register map that the host of a world writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,6 +16,7 @@ use protocol_core::time::{Duration, Instant};
 use super::command_checker::{CommandChecker, target_counts};
 use super::disturbed_bus::{Availability, DisturbedBus};
 use super::extended_model::{self, LIMITS};
+use super::protection_model::PROTECTION;
 use super::register_model::RegisterModel;
 use super::report_checker::ReportChecker;
 use super::watchdog_model::WatchdogModel;
@@ -72,6 +73,16 @@ pub(super) struct StatusContext<'a> {
     pub(super) command_checker: &'a CommandChecker,
 }
 
+impl StatusContext<'_> {
+    /// True if a joint need not go on with its move: it gives way, it is let go, or some questions are not answered.
+    fn may_be_late(&self, joint: Joint) -> bool {
+        self.bus.truth(joint).may_give_way(self.now)
+            || self.bus.may_be_let_go(joint, self.now)
+            || self.bus.availability(joint) == Availability::Uncertain
+            || self.now - self.command_checker.paused_at[joint] < MOVE_MARGIN
+    }
+}
+
 fn counter(registers: &RegisterFile, row: &Register) -> u16 {
     u16::from_le_bytes([registers.get(row.address), registers.get(row.address.wrapping_add(1))])
 }
@@ -117,11 +128,9 @@ impl StatusChecker {
     /// A write can move joints, or a servo was found: computes the time by which each joint has to be at rest.
     pub(super) fn motion_changed(&mut self, context: &StatusContext<'_>) {
         self.motion_at = context.now;
-        let in_stream =
-            Duration::from_millis(if context.model.has_streams() { MAX_STREAM_MILLIS } else { 0 });
         for joint in Joint::ALL {
             let time = move_time(joint, distance(joint, context), context.registers);
-            self.settled_by[joint] = context.now + time + MOVE_MARGIN + in_stream;
+            self.settled_by[joint] = context.now + time + MOVE_MARGIN + in_stream(context.model);
         }
     }
 
@@ -150,7 +159,9 @@ impl StatusChecker {
         self.check_faults(context)?;
         self.check_counters(context)?;
         self.reports.check(context.now)?;
-        context.watchdog.check(context.now, self.unsettled_at, context.registers)?;
+        let own = |joint: &Joint| context.may_be_late(*joint);
+        let own = Joint::ALL.into_iter().filter(own).fold(0, |bits, joint| bits | joint.bit());
+        context.watchdog.check(context.now, self.unsettled_at, own, context.registers)?;
         let open = self.valve_open_since.map_or(Duration::ZERO, |since| context.now - since);
         ensure(open <= MAX_VALVE_TIME, || format!("the valve has been open for {} us", open.as_micros()))
     }
@@ -184,6 +195,11 @@ impl StatusChecker {
         if may_wait {
             // It has its full time once the limit is off.
             self.settled_by[joint] = self.settled_by[joint].max(now + LONGEST_MOVE);
+        }
+        if context.may_be_late(joint) {
+            let time = move_time(joint, WHOLE_RANGE, context.registers);
+            let settled_by = now + time + MOVE_MARGIN + in_stream(context.model);
+            self.settled_by[joint] = self.settled_by[joint].max(settled_by);
         }
         let is_late = is_moving && now > self.settled_by[joint];
         ensure(!is_late, || format!("joint {number} has been moving for too long"))?;
@@ -231,7 +247,13 @@ impl StatusChecker {
         let is_due =
             context.model.is_servo() && self.settled_time(context.now, self.state_at) > DETECTION_TIME;
         let is_on = context.command_checker.is_on(joint);
-        ensure(is_on || !is_due, || format!("servo {} responds and has no torque", joint.number()))
+        let may_wait = context.bus.truth(joint).may_wait_for_torque(context.now)
+            || context.bus.may_be_misread(joint, context.now)
+            || context.bus.last_status(joint).alarms != 0
+            || context.model.get(PROTECTION) == 0;
+        ensure(is_on || may_wait || !is_due, || {
+            format!("servo {} responds and has no torque", joint.number())
+        })
     }
 
     fn check_faults(&self, context: &StatusContext<'_>) -> Check {
@@ -272,13 +294,21 @@ impl StatusChecker {
     }
 }
 
+/// More than the whole range of a joint, in counts.
+const WHOLE_RANGE: u16 = 1_100;
+
+/// The time by which a point of a stream may be late.
+fn in_stream(model: &RegisterModel) -> Duration {
+    Duration::from_millis(if model.has_streams() { MAX_STREAM_MILLIS } else { 0 })
+}
+
 /// The largest distance that a joint may have to move, in counts.
 fn distance(joint: Joint, context: &StatusContext<'_>) -> u16 {
     let target = target_counts(joint, context.registers, context.model);
     match context.command_checker.goal(joint) {
         // A set-point may lie beyond the end of the servo's range.
         Some(goal @ 1..1_023) if (1..1_023).contains(&target) => goal.abs_diff(target) + 5,
-        _ => 1_100,
+        _ => WHOLE_RANGE,
     }
 }
 

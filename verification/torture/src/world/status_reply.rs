@@ -3,6 +3,9 @@
 use motion_core::servo_bus::frame::{Decoder, Reading};
 use protocol_core::registers::Joint;
 
+/// The registers from the torque switch to the measurements.
+const TO_MEASUREMENTS: usize = 16;
+
 /// The fields of a servo's last reply, before any corruption.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct StatusFields {
@@ -31,15 +34,28 @@ pub(super) fn status_replies(bytes: &[u8]) -> Vec<(Joint, Vec<u8>)> {
 
 /// The status in `bytes`, if they are exactly one reply with a valid checksum.
 pub(super) fn whole_status(bytes: &[u8]) -> Option<(Joint, StatusFields)> {
-    let &[0xFF, 0xFF, id, length, alarms, _, _, s1, s0, _, _, decivolts, celsius, ref rest @ ..] = bytes
-    else {
-        return None;
-    };
-    let is_whole = usize::from(length) == rest.len() + 9 && has_valid_checksum(bytes);
+    let &[0xFF, 0xFF, id, length, alarms, ref params @ .., _] = bytes else { return None };
+    let is_whole = usize::from(length) == params.len() + 2 && has_valid_checksum(bytes);
+    let &[_, _, s1, s0, _, _, decivolts, celsius, ..] = measurements(params)? else { return None };
     let speed = u16::from_be_bytes([s1 & 0x7F, s0]);
     Joint::from_index(id)
         .filter(|_| is_whole)
         .map(|joint| (joint, StatusFields { alarms, speed, decivolts, celsius }))
+}
+
+/// The measurements in the parameters of a status reply, from the position on.
+pub(super) fn measurements(params: &[u8]) -> Option<&[u8]> {
+    let first = if has_torque_switch(params) { TO_MEASUREMENTS } else { 0 };
+    params.get(first..)
+}
+
+/// The torque switch in the parameters of a status reply, if the question asked for it.
+pub(super) fn torque_switch(params: &[u8]) -> Option<u8> {
+    params.first().copied().filter(|_| has_torque_switch(params))
+}
+
+fn has_torque_switch(params: &[u8]) -> bool {
+    params.len() >= TO_MEASUREMENTS + usize::from(Reading::REGISTERS)
 }
 
 fn has_valid_checksum(frame: &[u8]) -> bool {

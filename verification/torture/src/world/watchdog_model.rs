@@ -48,13 +48,20 @@ impl WatchdogModel {
         ensure(!is_set || self.may_have_acted, || "the watchdog acted without a silence".to_owned())
     }
 
-    /// The watchdog has acted if the silence is long enough. The shell has run without a stall since `unsettled_at`.
-    pub(crate) fn check(&self, now: Instant, unsettled_at: Instant, registers: &RegisterFile) -> Check {
+    /// The watchdog has acted if the silence is long enough. The shell has run without a stall since `unsettled_at`. The
+    /// joints of the bits `own` may give way to an obstacle meanwhile.
+    pub(crate) fn check(
+        &self,
+        now: Instant,
+        unsettled_at: Instant,
+        own: u8,
+        registers: &RegisterFile,
+    ) -> Check {
         let is_due = self.due.is_some_and(|due| due.max(unsettled_at) + ACTS_WITHIN < now);
         let is_set = registers.get(FAULTS.address) & fault::HOST_SILENT != 0;
         let is_damped = registers.get(MOTOR_STATE.address) == motor_state::DAMPING;
         let has_acted = match registers.get(WATCHDOG_ACTION) {
-            0 => registers.get(MOVING_JOINTS.address) == 0,
+            0 => registers.get(MOVING_JOINTS.address) & !own == 0,
             _ => is_damped,
         };
         ensure(!is_due || (is_set && has_acted), || {
@@ -76,12 +83,12 @@ mod tests {
         assert!(!watchdog.may_act(at(100_000)));
         watchdog.set(at(0), 20);
         assert!(!watchdog.may_act(at(199)) && watchdog.may_act(at(200)));
-        assert!(watchdog.check(at(230), at(0), &registers).is_ok());
-        assert!(watchdog.check(at(231), at(0), &registers).is_err());
-        assert!(watchdog.check(at(231), at(201), &registers).is_ok(), "the shell stalled");
+        assert!(watchdog.check(at(230), at(0), 0, &registers).is_ok());
+        assert!(watchdog.check(at(231), at(0), 0, &registers).is_err());
+        assert!(watchdog.check(at(231), at(201), 0, &registers).is_ok(), "the shell stalled");
         registers.set(FAULTS.address, fault::HOST_SILENT);
         assert!(
-            watchdog.check(at(231), at(0), &registers).is_ok() && watchdog.check_fault(&registers).is_ok()
+            watchdog.check(at(231), at(0), 0, &registers).is_ok() && watchdog.check_fault(&registers).is_ok()
         );
         watchdog.set(at(300), 20);
         assert!(watchdog.check_fault(&registers).is_err(), "cleared by the write");

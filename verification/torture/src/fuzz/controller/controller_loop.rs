@@ -22,8 +22,6 @@ pub struct ControllerLoop {
     wake_at: Instant,
     /// Host bytes that the controller has not taken yet.
     waiting: Vec<u8>,
-    /// The start of a frame for the servos that has to follow.
-    frame_start: Vec<u8>,
     checker: InvariantChecker,
 }
 
@@ -39,7 +37,6 @@ impl ControllerLoop {
             now_us: 0,
             wake_at: Instant::ZERO,
             waiting: Vec::new(),
-            frame_start: Vec::new(),
             checker,
         }
     }
@@ -87,18 +84,13 @@ impl ControllerLoop {
     /// Polls once. Returns the deadline of a wait.
     fn poll(&mut self) -> Option<Instant> {
         let now = Instant::from_micros(self.now_us);
-        let output = self.controller.poll(now, self.room);
-        assert!(self.frame_start.is_empty() || matches!(output, Output::ToServos(_)));
-        match output {
+        match self.controller.poll(now, self.room) {
             Output::ToHost(bytes) => {
                 assert!(bytes.len() <= self.room);
                 let bytes = bytes.to_vec();
                 self.checker.frame_to_host(&bytes, self.controller.registers());
             }
-            Output::ServoFrameStart(bytes) => self.frame_start.extend_from_slice(bytes),
             Output::ToServos(bytes) => {
-                assert!(bytes.starts_with(&self.frame_start));
-                self.frame_start.clear();
                 let command = decode(bytes);
                 self.checker.command_to_servos(
                     self.now_us,

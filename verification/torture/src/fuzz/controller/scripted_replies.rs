@@ -2,10 +2,13 @@
 
 use motion_core::servo_bus::frame::{Decoder, Instruction, Reading, ServoFrameBuffer, register, status};
 
+/// The longest read from the position on.
+const MOST_FROM_POSITION: u8 = 11;
+
 /// A decoded command. Servos count from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ServoCommand {
-    /// A read of this many registers of a servo, from its position on.
+    /// A read of this many registers of a servo: up to 11 from its position on, more from its torque switch on.
     Read(u8, u8),
     /// The torque code for each servo in the frame.
     Torque([Option<u8>; 7]),
@@ -16,13 +19,15 @@ pub struct ScriptedReplies {
     /// The servos that reply: bit n for servo n.
     pub responding: u8,
     pub counts: [u16; 7],
+    /// The code in each servo's torque switch.
+    torque: [u8; 7],
     /// The position in each servo's last reply, in counts.
     pub reported_positions: [u16; 7],
 }
 
 impl ScriptedReplies {
     pub const fn new() -> Self {
-        Self { responding: 0x7F, counts: [512; 7], reported_positions: [512; 7] }
+        Self { responding: 0x7F, counts: [512; 7], torque: [0; 7], reported_positions: [512; 7] }
     }
 
     /// Executes a command. Returns the reply.
@@ -33,7 +38,13 @@ impl ScriptedReplies {
                 goals.iter().for_each(|&(id, counts)| self.counts[usize::from(id)] = counts);
                 None
             }
-            _ => None,
+            ServoCommand::Torque(codes) => {
+                for (torque, code) in self.torque.iter_mut().zip(codes) {
+                    *torque = code.unwrap_or(*torque);
+                }
+                None
+            }
+            ServoCommand::Read(..) => None,
         }
     }
 
@@ -47,7 +58,13 @@ impl ScriptedReplies {
             temperature_celsius: 30,
         };
         let mut frame = ServoFrameBuffer::new();
-        let mut values = reading.to_bytes().to_vec();
+        let mut values = Vec::new();
+        if count > MOST_FROM_POSITION {
+            let [high, low] = self.counts[usize::from(id)].to_be_bytes();
+            values.extend([self.torque[usize::from(id)], 0, high, low]);
+            values.resize(usize::from(register::PRESENT_POSITION - register::TORQUE_SWITCH), 0);
+        }
+        values.extend(reading.to_bytes());
         values.resize(count.into(), 0);
         status(&mut frame, id, 0, &values);
         frame
@@ -61,9 +78,11 @@ pub fn decode(bytes: &[u8]) -> ServoCommand {
     let frame = decoder.pull().expect("a complete frame").expect("a valid checksum");
     assert_eq!(frame.params.len() + 6, bytes.len(), "exactly one frame");
     match (Instruction::from_code(frame.code), frame.params) {
-        (Some(Instruction::Read), [register::PRESENT_POSITION, count @ 8..=11]) => {
-            ServoCommand::Read(frame.id, *count)
-        }
+        (
+            Some(Instruction::Read),
+            [register::PRESENT_POSITION, count @ 8..=MOST_FROM_POSITION]
+            | [register::TORQUE_SWITCH, count @ 24..=27],
+        ) => ServoCommand::Read(frame.id, *count),
         (Some(Instruction::SyncWrite), [register::TORQUE_SWITCH, 1, items @ ..]) => {
             assert!(!items.is_empty() && items.len().is_multiple_of(2));
             let mut codes = [None; 7];

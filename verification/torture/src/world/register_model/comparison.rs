@@ -4,12 +4,22 @@ use protocol_core::registers::map::{PRESENT_POSITION, TARGET_POSITION};
 use protocol_core::registers::{Joint, RegisterFile};
 
 use super::super::{extended_model, map21_model};
-use super::RegisterModel;
+use super::{OwnTarget, RegisterModel};
 use crate::violation::{Check, ensure};
 
 /// The first and last addresses of the registers whose values follow from requests alone.
-const MODELLED: &[(u8, u8)] =
-    &[(0, 45), (53, 53), (61, 82), (90, 90), (98, 127), (184, 189), (191, 240), (244, 247), (250, 251)];
+const MODELLED: &[(u8, u8)] = &[
+    (0, 45),
+    (53, 53),
+    (61, 82),
+    (90, 90),
+    (98, 127),
+    (184, 189),
+    (191, 194),
+    (198, 240),
+    (244, 247),
+    (250, 251),
+];
 
 impl RegisterModel {
     /// The values that a read shows.
@@ -59,15 +69,21 @@ impl RegisterModel {
         })
     }
 
-    /// A target that differs from the model is the measured position (D12, D13). The model takes it over.
+    /// A target that differs from the model is the measured position (D12, D13), or where the joint gave way (D27). The
+    /// model takes it over.
     pub(crate) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
         for joint in Joint::ALL {
             let (at, found) = (TARGET_POSITION.of(joint), registers.get(TARGET_POSITION.of(joint)));
+            if self.own_targets[joint] != OwnTarget::Measured {
+                self.forget_target(joint);
+            }
             if found == self.get(at) {
                 continue;
             }
             let present = registers.get(PRESENT_POSITION.of(joint));
-            ensure(found == present, || {
+            let own = self.own_targets[joint];
+            let is_own = own.may_be(found) || own.is_without_streams() && found == self.coarse_targets[joint];
+            ensure(found == present || is_own, || {
                 let wanted = self.get(at);
                 let number = joint.number();
                 format!("target {number} is {found}: the host wrote {wanted}, and the joint was at {present}")

@@ -1,0 +1,156 @@
+//! What the controller can know of each servo from its replies.
+
+use motion_core::TorqueCodes;
+use motion_core::servo_bus::Torque;
+use motion_core::servo_bus::frame::Decoder;
+use protocol_core::registers::Joint;
+use protocol_core::time::{Duration, Instant};
+
+use super::status_reply::{measurements, torque_switch};
+use crate::per_joint::PerJoint;
+
+/// Start-up ends if each servo has sent this many replies.
+const START_UP_REPLIES: u8 = 2;
+/// After all servos were silent for a second, they restarted (D29). The first question fails later than it was sent.
+const LOST_AFTER: Duration = Duration::from_millis(900);
+/// So long after a silence its end may still matter.
+const NOTICE_TIME: Duration = Duration::from_millis(3_000);
+/// The registers of a reading.
+const READING: usize = 8;
+
+/// What is known of one servo.
+#[derive(Clone, Copy, Debug, Default)]
+struct Known {
+    replies: u8,
+    /// Reads since the last reply.
+    unanswered: u8,
+    asked_at: Instant,
+    /// The first read of the present silence.
+    silent_since: Option<Instant>,
+    /// The start and the end of the last silence.
+    silence: (Instant, Instant),
+    /// A driven servo left a question unanswered, and its torque was not read since then.
+    is_doubtful: bool,
+    /// Its torque was read on since it was last switched on.
+    is_read_on: bool,
+    /// Its torque was read off last.
+    is_read_off: bool,
+    /// When its torque was read after that.
+    trusted_at: Instant,
+    /// In counts.
+    position: Option<u16>,
+}
+
+/// What is known of all servos.
+#[derive(Debug)]
+pub(super) struct ServoReplies {
+    codes: TorqueCodes,
+    /// Decodes the bytes that the controller receives.
+    decoder: Decoder,
+    servos: PerJoint<Known>,
+}
+
+impl ServoReplies {
+    pub(super) fn new(codes: TorqueCodes) -> Self {
+        Self { codes, decoder: Decoder::new(), servos: PerJoint::default() }
+    }
+
+    /// The controller reads a servo.
+    pub(super) fn asked(&mut self, now: Instant, joint: Joint, is_driven: bool) {
+        let servo = &mut self.servos[joint];
+        if servo.unanswered > 0 {
+            servo.silent_since.get_or_insert(servo.asked_at);
+            servo.is_doubtful |= is_driven && !servo.is_read_off;
+            servo.is_read_on = false;
+        }
+        servo.unanswered = servo.unanswered.saturating_add(1);
+        servo.asked_at = now;
+        // The controller does the same: bytes from before a read are not its reply.
+        self.decoder.clear();
+    }
+
+    /// Takes bytes that the controller receives.
+    pub(super) fn received(&mut self, now: Instant, bytes: &[u8]) {
+        for piece in bytes.chunks(Decoder::CAPACITY / 2) {
+            self.decoder.push(piece);
+            while let Some(heard) = self.decoder.pull() {
+                let Some(frame) = heard.ok().filter(|frame| frame.params.len() >= READING) else { continue };
+                let Some(joint) = Joint::from_index(frame.id) else { continue };
+                self.servos[joint].answered(now, frame.params, self.codes.code(Torque::On));
+            }
+        }
+    }
+
+    /// True if each servo has replied often enough for the end of start-up.
+    pub(super) fn have_all_started(&self) -> bool {
+        self.servos.0.iter().all(|servo| servo.replies >= START_UP_REPLIES)
+    }
+
+    /// Reads since the last reply.
+    pub(super) fn unanswered(&self, joint: Joint) -> u8 {
+        self.servos[joint].unanswered
+    }
+
+    /// The last measured position, in counts.
+    pub(super) fn position(&self, joint: Joint) -> Option<u16> {
+        self.servos[joint].position
+    }
+
+    /// True if a driven servo left a question unanswered, and its torque was not read since then.
+    pub(super) fn is_doubtful(&self, joint: Joint) -> bool {
+        self.servos[joint].is_doubtful
+    }
+
+    /// When the last doubt about a servo's torque ended. From then on its set-point may move.
+    pub(super) fn trusted_at(&self, joint: Joint) -> Instant {
+        self.servos[joint].trusted_at
+    }
+
+    /// The joint is given torque where it was measured, or is not driven any more.
+    pub(super) fn forget_doubt(&mut self, joint: Joint) {
+        let servo = &mut self.servos[joint];
+        (servo.is_doubtful, servo.is_read_on, servo.is_read_off) = (false, false, false);
+    }
+
+    /// True if the torque was read on since the last call.
+    pub(super) fn take_read_on(&mut self, joint: Joint) -> bool {
+        std::mem::take(&mut self.servos[joint].is_read_on)
+    }
+
+    /// True if the torque was off when it was read last.
+    pub(super) fn was_read_off(&self, joint: Joint) -> bool {
+        self.servos[joint].is_read_off
+    }
+
+    /// True if a silence of a second or longer ended a moment ago.
+    pub(super) fn was_silent_for_a_second(&self, joint: Joint, now: Instant) -> bool {
+        let (start, end) = self.servos[joint].silence;
+        end - start >= LOST_AFTER && now - end < NOTICE_TIME
+    }
+
+    /// True if the servo has answered for a while.
+    pub(super) fn is_steady(&self, joint: Joint, now: Instant) -> bool {
+        let servo = &self.servos[joint];
+        servo.silent_since.is_none() && now - servo.silence.1 > NOTICE_TIME
+    }
+}
+
+impl Known {
+    fn answered(&mut self, now: Instant, params: &[u8], on: u8) {
+        self.replies = self.replies.saturating_add(1);
+        self.unanswered = 0;
+        if let Some(since) = self.silent_since.take() {
+            self.silence = (since, now);
+        }
+        if let Some(&[high, low, ..]) = measurements(params) {
+            self.position = Some(u16::from_be_bytes([high, low]));
+        }
+        if let Some(code) = torque_switch(params) {
+            if self.is_doubtful {
+                (self.is_doubtful, self.trusted_at) = (false, now);
+            }
+            self.is_read_on = code == on;
+            self.is_read_off = code != on;
+        }
+    }
+}
