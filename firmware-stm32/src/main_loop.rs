@@ -21,8 +21,8 @@ use protocol_core::time::Instant;
 
 use crate::log::Log;
 
-/// Half the period of the blinking LED, in microseconds.
-const BLINK_MICROS: u64 = 250_000;
+/// The bit of the time in microseconds that makes the LED blink: on for 262 ms, off for 262 ms.
+const BLINK: u64 = 1 << 18;
 
 /// The drivers that the loop connects to the controller.
 pub(crate) struct MainLoop<'a> {
@@ -134,7 +134,7 @@ impl MainLoop<'_> {
     /// Lights the LED: steady without a fault, blinking while register 241 shows one.
     fn update_led(&mut self, now: Instant, arm: &Controller) {
         let is_well = arm.registers().get(FAULTS.address) == 0;
-        self.outputs.led.set(is_well || (now.as_micros() / BLINK_MICROS).is_multiple_of(2));
+        self.outputs.led.set(is_well || now.as_micros() & BLINK == 0);
     }
 
     /// Sleeps until `until`, the next tick of the system timer, or the arrival of enough bytes. Fewer bytes, and interrupts

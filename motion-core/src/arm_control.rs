@@ -72,12 +72,7 @@ impl ArmControl {
     /// Processes the answers of the servos.
     pub(crate) fn take_answers(&mut self, now: Instant) {
         while let Some(outcome) = self.bus.outcome(now) {
-            match outcome {
-                Outcome::Measured { joint, answer, is_timely } => {
-                    self.measured(now, joint, &answer, is_timely);
-                }
-                Outcome::Failed { joint } => self.failed(now, joint),
-            }
+            self.take_outcome(now, outcome);
         }
         if self.bus.end_start_up(now, &self.joints) {
             self.show_servos();
@@ -86,14 +81,28 @@ impl ArmControl {
 
     /// Advances all set-points if a control cycle is due.
     pub(crate) fn advance(&mut self, now: Instant) {
-        let Some(end) = self.bus.cycle_due(now) else { return };
+        if let Some(end) = self.bus.cycle_due(now) {
+            self.begin_cycle(now, end);
+        }
+    }
+
+    // Not in `poll`: most polls begin no cycle, and would save its registers.
+    #[inline(never)]
+    fn begin_cycle(&mut self, now: Instant, end: Instant) {
         self.bus.begin_cycle(end);
-        self.joints.doubt_torque(now);
-        if self.joints.advance(end, &mut self.registers) {
+        if self.joints.advance(now, end, &mut self.registers) {
             self.bus.goals_changed();
         }
         Status::show_moving(&mut self.registers, &self.joints);
         self.watchdog_is_due = true;
+    }
+
+    #[inline(never)]
+    fn take_outcome(&mut self, now: Instant, outcome: Outcome) {
+        match outcome {
+            Outcome::Measured { joint, answer, is_timely } => self.measured(now, joint, &answer, is_timely),
+            Outcome::Failed { joint } => self.failed(now, joint),
+        }
     }
 
     fn measured(&mut self, now: Instant, joint: Joint, answer: &Answer, is_timely: bool) {
@@ -132,6 +141,7 @@ impl ArmControl {
 
     /// Executes a write of the host in map 2.2, or refuses it completely. Returns whether it may have changed a report
     /// frequency.
+    #[inline(never)]
     pub(crate) fn write(&mut self, now: Instant, address: u8, values: &[u8]) -> bool {
         let accepted = match self.registers.check(address, values) {
             Ok(accepted) => accepted,
@@ -154,6 +164,7 @@ impl ArmControl {
 
     /// Executes a write of the host in map 2.1, or refuses it completely. `has_room` tells whether an alarm can be sent.
     /// Returns whether it may have changed a report frequency.
+    #[inline(never)]
     pub(crate) fn write_map21(&mut self, now: Instant, address: u8, values: &[u8], has_room: bool) -> bool {
         let accepted = match self.registers.check_map21(address, values) {
             Ok(accepted) => accepted,

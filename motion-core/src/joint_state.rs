@@ -21,9 +21,6 @@ use crate::push_limiter::{PushLimit, PushSample};
 use crate::servo_bus::{Answer, Torque};
 use crate::torque_check::{TorqueCheck, TorqueFound};
 
-/// A servo that restarts executes nothing for about 200 ms. Within less than this after an answer it is the same servo.
-const RESTART_TIME: Duration = Duration::from_millis(180);
-
 /// The effect of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Measured {
@@ -264,12 +261,9 @@ impl JointState {
         fell_silent
     }
 
-    /// Doubts the torque of a servo that was not heard for long, so that it is read before the next goal: after a late call,
-    /// or on a bus with many missing servos, it may have restarted unnoticed (D29).
-    pub(crate) fn doubt_torque(&mut self, now: Instant) {
-        if self.drive.is_engaged() && !self.position.was_heard_within(now, RESTART_TIME) {
-            self.torque.doubt();
-        }
+    /// Its servo may have restarted unnoticed.
+    pub(crate) const fn doubt_torque(&mut self) {
+        self.torque.doubt();
     }
 
     /// Is the joint sent goals? Not while it is doubtful whether its servo has restarted (D29).

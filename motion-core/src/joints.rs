@@ -25,12 +25,17 @@ use crate::reach::Reached;
 use crate::servo_bus::{Answer, Question, Torque};
 use crate::supply_watch::{SupplyWatch, Verdict};
 
+/// A servo that restarts executes nothing for about 200 ms. Within less than this after an answer it is the same servo.
+const RESTART_TIME: Duration = Duration::from_millis(180);
+
 /// The seven joints and their motor state.
 #[derive(Clone, Debug)]
 pub(crate) struct Joints {
     joints: [JointState; JOINTS],
     state: MotorState,
     supply: SupplyWatch,
+    /// Until then every engaged joint was heard a moment ago.
+    doubt_at: Instant,
 }
 
 impl Joints {
@@ -41,7 +46,7 @@ impl Joints {
             drive.wait();
         }
         let joints = Joint::ALL.map(|joint| JointState::new(joint, drive.clone()));
-        Self { joints, state, supply: SupplyWatch::NEW }
+        Self { joints, state, supply: SupplyWatch::NEW, doubt_at: Instant::ZERO }
     }
 
     fn joint(&self, joint: Joint) -> Option<&JointState> {
@@ -192,9 +197,19 @@ impl Joints {
         fell_silent
     }
 
-    /// See [`JointState::doubt_torque`].
-    pub(crate) fn doubt_torque(&mut self, now: Instant) {
-        self.joints.iter_mut().for_each(|state| state.doubt_torque(now));
+    /// Doubts the torque of servos that were not heard for long, so that it is read before the next goal: after a late call,
+    /// or on a bus with many missing servos, they may have restarted unnoticed (D29).
+    fn doubt_torque(&mut self, now: Instant) {
+        if now < self.doubt_at {
+            return;
+        }
+        self.doubt_at = now + RESTART_TIME;
+        for joint in self.joints.iter_mut().filter(|joint| joint.drive.is_engaged()) {
+            match joint.position.heard_at().map(|heard| heard + RESTART_TIME) {
+                Some(later) if now <= later => self.doubt_at = self.doubt_at.min(later),
+                _ => joint.doubt_torque(),
+            }
+        }
     }
 
     /// Lets joints whose torque is pending wait again if their measurement is too old. After a late call they may no
@@ -207,8 +222,9 @@ impl Joints {
         }
     }
 
-    /// Advances all set-points by the control cycle that ends at `end`. Returns whether any joint is driven.
-    pub(crate) fn advance(&mut self, end: Instant, registers: &mut RegisterFile) -> bool {
+    /// Advances all set-points at `now` by the control cycle that ends at `end`. Returns whether any joint takes goals.
+    pub(crate) fn advance(&mut self, now: Instant, end: Instant, registers: &mut RegisterFile) -> bool {
+        self.doubt_torque(now);
         let keeps_linkage = registers.get(LIMITS.address) & limit::LINKAGE != 0;
         let before = if keeps_linkage { self.linkage_set_points() } else { None };
         let mut any = false;
@@ -402,7 +418,7 @@ mod tests {
             assert!(!joints.set_state(state, &mut registers), "the state did not change");
             assert_eq!(joints.take_torque(true), [Some(torque); JOINTS]);
             assert_eq!(joints.goals(&registers).count(), 0);
-            assert!(!joints.advance(at_ms(0), &mut registers));
+            assert!(!joints.advance(at_ms(0), at_ms(0), &mut registers));
         }
     }
 

@@ -112,10 +112,10 @@ impl PositionFilter {
         self.last.is_some_and(|(_, then)| now - then <= FRESH_FOR)
     }
 
-    /// Has the servo answered within this time?
+    /// When the servo answered last; `None` if it is silent.
     #[must_use]
-    pub fn was_heard_within(&self, now: Instant, time: Duration) -> bool {
-        self.last.is_some_and(|(_, then)| now - then <= time)
+    pub fn heard_at(&self) -> Option<Instant> {
+        self.last.map(|(_, then)| then)
     }
 
     /// Is the servo to be read at `now`?

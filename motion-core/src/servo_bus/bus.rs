@@ -123,6 +123,8 @@ pub struct Bus {
     heard_since: Instant,
     /// When the guard time after the last byte received ends.
     quiet_at: Instant,
+    /// When the wire is free for a frame: neither busy nor noisy. It follows from the three times above.
+    free_at: Instant,
     /// When the outstanding read fails. Later than `busy_until` by the answer delay.
     answer_until: Instant,
     /// When the guard time after the last frame without an answer ends.
@@ -148,6 +150,7 @@ impl Bus {
             busy_until: Instant::ZERO,
             heard_since: Instant::ZERO,
             quiet_at: Instant::ZERO,
+            free_at: Instant::ZERO,
             answer_until: Instant::ZERO,
             sent_until: Instant::ZERO,
         }
@@ -179,30 +182,39 @@ impl Bus {
             self.heard_since = now;
         }
         self.quiet_at = now + self.guard_time;
+        self.update_free_at();
     }
 
     /// The outcome of the outstanding read, once it is known.
     pub fn poll(&mut self, now: Instant) -> Option<Outcome> {
-        let outcome = self.answer(now).or_else(|| self.expired(now))?;
-        if let Outcome::Measured { joint, .. } = outcome {
+        let (joint, question) = self.awaited?;
+        if let Some(answer) = self.answer(joint, question) {
+            self.awaited = None;
             self.note_answer(now, joint);
-            self.busy_until = self.sent_until.max(now + self.guard_time);
+            self.set_busy_until(self.sent_until.max(now + self.guard_time));
+            let is_timely = now <= self.answer_until + CYCLE;
+            return Some(Outcome::Measured { joint, answer, is_timely });
+        }
+        if now < self.answer_until {
+            return None;
         }
         self.awaited = None;
-        Some(outcome)
+        if let Some(tag) = self.read_length_tags.get_mut(usize::from(joint.index())) {
+            *tag = (*tag + 1) % READ_LENGTHS;
+        }
+        Some(Outcome::Failed { joint })
     }
 
-    fn answer(&mut self, now: Instant) -> Option<Outcome> {
-        let (joint, question) = self.awaited?;
-        let tag = self.read_length_tag(joint);
+    /// The answer to this read, if it is among the received bytes.
+    fn answer(&mut self, joint: Joint, question: Question) -> Option<Answer> {
+        let count = usize::from(question.count() + self.read_length_tag(joint));
         while let Some(result) = self.decoder.pull() {
             if let Ok(frame) = result
                 && frame.id == joint.index()
-                && frame.params.len() == usize::from(question.count() + tag)
+                && frame.params.len() == count
                 && let Some(answer) = question.parse(frame.params, frame.code, self.codes)
             {
-                let is_timely = now <= self.answer_until + CYCLE;
-                return Some(Outcome::Measured { joint, answer, is_timely });
+                return Some(answer);
             }
         }
         None
@@ -226,14 +238,6 @@ impl Bus {
         self.read_length_tags.get(usize::from(joint.index())).copied().unwrap_or(0)
     }
 
-    fn expired(&mut self, now: Instant) -> Option<Outcome> {
-        let (joint, _) = self.awaited.filter(|_| now >= self.answer_until)?;
-        if let Some(tag) = self.read_length_tags.get_mut(usize::from(joint.index())) {
-            *tag = (*tag + 1) % READ_LENGTHS;
-        }
-        Some(Outcome::Failed { joint })
-    }
-
     /// Is a read outstanding? Until its outcome, no other read may be sent.
     #[must_use]
     pub const fn is_asking(&self) -> bool {
@@ -243,18 +247,23 @@ impl Bus {
     /// Is the wire free for a frame?
     #[must_use]
     pub fn is_free(&self, now: Instant) -> bool {
-        now >= self.free_at()
+        now >= self.free_at
     }
 
-    fn free_at(&self) -> Instant {
-        self.busy_until.max(self.quiet_at.min(self.heard_since + MAX_NOISE_DELAY))
+    fn set_busy_until(&mut self, until: Instant) {
+        self.busy_until = until;
+        self.update_free_at();
+    }
+
+    fn update_free_at(&mut self) {
+        self.free_at = self.busy_until.max(self.quiet_at.min(self.heard_since + MAX_NOISE_DELAY));
     }
 
     /// When the bus becomes free or the outstanding read fails; `None` while the bus is idle.
     #[must_use]
     pub fn deadline(&self, now: Instant) -> Option<Instant> {
         match (self.is_free(now), self.awaited) {
-            (false, _) => Some(self.free_at()),
+            (false, _) => Some(self.free_at),
             (true, Some(_)) => Some(self.answer_until),
             (true, None) => None,
         }
@@ -272,7 +281,7 @@ impl Bus {
         let count = question.count() + self.read_length_tag(joint);
         frame::read(&mut self.frame, joint.index(), question.first(), count);
         self.awaited = Some((joint, question));
-        self.busy_until = self.sent(now) + self.timeout;
+        self.set_busy_until(self.sent(now) + self.timeout);
         self.answer_until = self.busy_until + self.answer_delay;
     }
 
@@ -306,7 +315,7 @@ impl Bus {
     /// Keeps the wire busy for a frame without an answer and the guard time after it.
     fn rest_after_frame(&mut self, now: Instant) {
         self.sent_until = self.sent(now) + self.guard_time;
-        self.busy_until = self.sent_until;
+        self.set_busy_until(self.sent_until);
     }
 
     /// When the last byte of the frame has left.

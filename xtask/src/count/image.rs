@@ -32,7 +32,7 @@ const MAX_WATCHES: usize = 20;
 const MIN_CYCLES: usize = 20;
 /// The time of a log of the idle arm.
 const SILENCE: Duration = Duration::from_secs(4);
-/// The period of the idle arm in milliseconds: it reads missing servos ten times a second, and its LED blinks twice.
+/// The period of the idle arm in milliseconds: it reads missing servos ten times a second, and its LED goes on or off twice.
 const PATTERN_MILLIS: usize = 500;
 /// The log lines of each second.
 const LOG_LINES: usize = 3;
