@@ -16,7 +16,8 @@ use protocol_core::registers::map::{
 use protocol_core::registers::{Joint, RegisterFile};
 use protocol_core::time::{Duration, Instant};
 
-use super::disturbed_bus::DisturbedBus;
+use super::attempts::EngagementAttempts;
+use super::disturbed_bus::{Availability, DisturbedBus};
 use super::reachable_range::ReachableRange;
 use super::register_model::RegisterModel;
 use super::servo_replies::ServoReplies;
@@ -28,6 +29,9 @@ use crate::violation::{Check, Violation, ensure};
 const MAX_START_UP: Duration = Duration::from_millis(500);
 /// The number of reads without a reply after which a servo is silent: three have failed (D12), one may be in progress.
 const MAX_UNANSWERED: u8 = 4;
+
+/// A servo that has responded for this long has shown its torque.
+const ANSWERS_AFTER: Duration = Duration::from_millis(3_000);
 
 /// Counts of one control cycle at 372 degrees/s. A set-point may be ahead of the last goal by one cycle, and by one more
 /// for each cycle in which a read delays the goals.
@@ -49,6 +53,8 @@ pub(super) struct CommandChecker {
     /// The last goal of a joint whose servo was lost, and its tolerance in counts. A found servo may continue from that
     /// goal (D12). The tolerance grows when offsets change.
     kept_goals: PerJoint<Option<(u16, u16)>>,
+    /// The joint had no goal since the start: its first one may be the goal that its servo holds (D12).
+    is_first: PerJoint<bool>,
     /// The joint is not driven any more, whatever its servo does: its next torque is for a new goal.
     is_released: PerJoint<bool>,
     /// True if the last command switched the torque on. False for a lost servo.
@@ -56,6 +62,8 @@ pub(super) struct CommandChecker {
     replies: ServoReplies,
     wire_free_at: Instant,
     linkage: LinkageGoals,
+    /// How often each joint was given torque since register 29 was written.
+    attempts: PerJoint<EngagementAttempts>,
     pub(super) count: u64,
     pub(super) engagements: u64,
 }
@@ -80,11 +88,13 @@ impl CommandChecker {
             paused: PerJoint::all(None),
             paused_at: PerJoint::all(now),
             kept_goals: PerJoint::all(None),
+            is_first: PerJoint::all(true),
             is_released: PerJoint::all(false),
             is_on: PerJoint::all(false),
             replies: ServoReplies::new(codes),
             wire_free_at: now,
             linkage: LinkageGoals::default(),
+            attempts: PerJoint::default(),
             count: 0,
             engagements: 0,
         }
@@ -95,16 +105,24 @@ impl CommandChecker {
         self.replies.received(now, bytes);
     }
 
-    /// The arm may find its supply lost only after all its driven servos were silent (D29).
+    /// The arm finds its supply lost only after its driven servos were silent, and while none answers with torque (D29).
     pub(super) fn check_lost_supply(&self, now: Instant, bus: &DisturbedBus) -> Check {
-        let was_silent = Joint::ALL.into_iter().any(|joint| self.replies.was_silent_for_a_second(joint, now));
-        let holds = |joint: &Joint| {
-            bus.has_torque(*joint) && !bus.may_be_let_go(*joint, now) && self.replies.is_steady(*joint, now)
+        let responding_for = |joint: Joint| match bus.availability(joint) {
+            Availability::Responding(since) => now - since,
+            Availability::Silent(_) | Availability::Uncertain => Duration::ZERO,
         };
-        let holding = Joint::ALL.into_iter().find(holds).map(Joint::number);
-        ensure(!bus.is_undisturbed(now) || (was_silent && holding.is_none()), || {
+        let was_silent = |joint: Joint| {
+            self.replies.was_silent_for_a_second(joint, now) || responding_for(joint) == Duration::ZERO
+        };
+        let holds = |joint: Joint| {
+            let answers = responding_for(joint) > ANSWERS_AFTER && self.replies.is_steady(joint, now);
+            answers && bus.has_torque(joint) && !bus.may_be_let_go(joint, now)
+        };
+        let any_silent = Joint::ALL.into_iter().any(was_silent);
+        let holding = Joint::ALL.into_iter().find(|joint| holds(*joint)).map(Joint::number);
+        ensure(!bus.is_undisturbed(now) || (any_silent && holding.is_none()), || {
             format!(
-                "the supply counts as lost, after a silence: {was_silent}, and joint {holding:?} has torque"
+                "the supply counts as lost, after a silence: {any_silent}, and joint {holding:?} has torque"
             )
         })
     }
@@ -113,9 +131,25 @@ impl CommandChecker {
         self.is_on[joint]
     }
 
+    /// The goal that the servo of a joint held with torque before the controller started, in counts. Until the joint has
+    /// torque from this controller, its goal may be this one (D12).
+    pub(super) fn held_goal(&self, joint: Joint) -> Option<u16> {
+        self.replies.held_goal(joint).filter(|_| self.is_first[joint])
+    }
+
     /// The last goal of a joint that is driven.
     pub(super) fn goal(&self, joint: Joint) -> Option<u16> {
         self.ranges[joint].or(self.paused[joint]).map(|range| range.last_goal)
+    }
+
+    /// True if the joint was given torque so often that only a write of register 29 gives it torque again (D28).
+    pub(super) fn is_exhausted(&self, joint: Joint) -> bool {
+        self.attempts[joint].is_exhausted
+    }
+
+    /// Register 29 was written: the attempts count anew (D28).
+    pub(super) fn state_written(&mut self) {
+        self.attempts = PerJoint::default();
     }
 
     /// The joint is no longer driven. Its next goal need not be near the last one.
@@ -123,6 +157,7 @@ impl CommandChecker {
         self.linkage.reset();
         (self.ranges[joint], self.paused[joint]) = (None, None);
         self.kept_goals[joint] = None;
+        self.is_first[joint] = false;
         self.is_released[joint] = true;
         self.replies.forget_doubt(joint);
     }
@@ -240,7 +275,9 @@ impl CommandChecker {
             .ok_or_else(|| Violation(format!("joint {number} is given torque without a goal")))?;
         self.check_position(joint, range.last_goal, "is given torque", context)?;
         self.kept_goals[joint] = None;
+        self.is_first[joint] = false;
         self.replies.forget_doubt(joint);
+        self.attempts[joint].add(context.now);
         self.engagements += 1;
         Ok(())
     }
@@ -257,11 +294,13 @@ impl CommandChecker {
         })
     }
 
-    /// A joint starts from its position, or from a near goal that it kept while its servo was lost (D12).
+    /// A joint starts from its position, or from a near goal that it kept while its servo was lost or the controller
+    /// restarted (D12).
     fn check_position(&self, joint: Joint, goal: u16, what: &str, context: &CommandContext<'_>) -> Check {
         let bus = context.bus;
-        let is_kept =
-            self.kept_goals[joint].is_some_and(|(kept, tolerance)| goal.abs_diff(kept) <= tolerance);
+        let held = self.held_goal(joint).map(|held| (held, 1));
+        let is_at = |(kept, tolerance): (u16, u16)| goal.abs_diff(kept) <= tolerance;
+        let is_kept = self.kept_goals[joint].into_iter().chain(held).any(is_at);
         let degrees = if is_kept { 4 } else { 1 };
         let fall = if bus.has_torque(joint) { 0 } else { MAX_FALL };
         // After its reading the joint may go on moving: the servo may execute a corrupted goal. A reply may be old.

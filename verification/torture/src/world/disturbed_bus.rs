@@ -168,6 +168,9 @@ impl DisturbedBus {
         for joint in Joint::ALL.into_iter().filter(|_| is_servo) {
             let (torque, push) = (self.plant.torque(joint), self.plant.motor_torque(joint));
             self.truths[joint].observe(now, torque, push, limits[joint]);
+            if self.truths[joint].may_give_way(now) {
+                self.motion_checker.may_recoil(joint, &self.plant);
+            }
         }
         self.motion_checker.check(now, is_servo, &self.plant)
     }

@@ -8,9 +8,8 @@ use protocol_core::time::{Duration, Instant};
 /// The controller finds within this time that a servo has lost its torque, and that it has torque again. Its shell may
 /// stall for five seconds of it.
 const NOTICE_TIME: Duration = Duration::from_millis(7_500);
-/// A servo that lost its torque without an alarm gets it again within this time, but for a minute three times at most.
+/// A servo that lost its torque without an alarm gets it again within this time.
 const ENGAGE_TIME: Duration = Duration::from_millis(10_000);
-const MAX_ATTEMPTS: u8 = 3;
 /// The set-point of a joint that pushed too hard may give way for this time.
 const GIVE_WAY_TIME: Duration = Duration::from_millis(7_000);
 /// The controller measures a push this much too high at most, in 0.1 %: speed and load are not of the same instant.
@@ -22,8 +21,6 @@ pub(super) struct JointTruth {
     is_on: bool,
     /// The last loss of torque in the motor state servo.
     lost_at: Option<Instant>,
-    /// The number of losses.
-    losses: u8,
     /// The last time without torque after a loss.
     off_at: Instant,
     /// The last push over the limit.
@@ -36,7 +33,6 @@ impl JointTruth {
         let is_on = torque == Some(Torque::On);
         if self.is_on && !is_on {
             self.lost_at = Some(now);
-            self.losses = self.losses.saturating_add(1);
         }
         if !is_on {
             self.off_at = now;
@@ -47,15 +43,9 @@ impl JointTruth {
         }
     }
 
-    /// The last loss of torque in this motor state.
-    pub(super) const fn lost_at(&self) -> Option<Instant> {
-        self.lost_at
-    }
-
-    /// True if the controller need not have given torque again by now (D28): the joint was let go a moment ago, or too often.
+    /// True if the controller need not have given torque again by now (D28): the joint was let go a moment ago.
     pub(super) fn may_wait_for_torque(&self, now: Instant) -> bool {
-        let is_recent = self.lost_at.is_some_and(|at| now - at < ENGAGE_TIME);
-        is_recent || self.losses > MAX_ATTEMPTS
+        self.lost_at.is_some_and(|at| now - at < ENGAGE_TIME)
     }
 
     /// True if the controller may take the joint for let go (D28).

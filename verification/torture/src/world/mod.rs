@@ -9,6 +9,7 @@
 //!
 //! The simulation steps from event to event. The same seed and scenario reproduce every byte.
 
+mod attempts;
 mod command_checker;
 mod controller_loop;
 mod corruption;

@@ -33,6 +33,9 @@ const TOLERANCE: i32 = 450;
 const SHRINK_PER_SECOND: u64 = 80_000;
 /// A servo may still approach a goal of this age: its set-point and its motor lag behind by 30 ms.
 const GOAL_AGE: Duration = Duration::from_millis(100);
+/// When the set-point of a joint that pushes comes back at once (D27), the derivative term of its servo turns the joint
+/// away from its goal for a moment: by this much, in millidegrees.
+const RECOIL: i32 = 2_000;
 /// A joint that is given torque may still fall, or approach an older goal, for this time.
 const SETTLE_TIME: Duration = Duration::from_millis(200);
 /// The number of sent frames that are kept for comparison. A servo may decode a frame late, after noise.
@@ -143,6 +146,12 @@ impl MotionChecker {
         let bounds = &mut self.joints[joint];
         bounds.exemption = Some((exemption, now + SETTLE_TIME));
         bounds.goal = None;
+    }
+
+    /// The set-point of a joint that pushes may come back at once (D27).
+    pub(super) fn may_recoil(&mut self, joint: Joint, plant: &Plant) {
+        let [largest, _] = &mut self.joints[joint].yields;
+        *largest = (*largest).max(yield_of(joint, plant).saturating_add(RECOIL));
     }
 
     /// Exempts all joints.

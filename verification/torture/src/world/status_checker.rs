@@ -248,6 +248,7 @@ impl StatusChecker {
             context.model.is_servo() && self.settled_time(context.now, self.state_at) > DETECTION_TIME;
         let is_on = context.command_checker.is_on(joint);
         let may_wait = context.bus.truth(joint).may_wait_for_torque(context.now)
+            || context.command_checker.is_exhausted(joint)
             || context.bus.may_be_misread(joint, context.now)
             || context.bus.last_status(joint).alarms != 0
             || context.model.get(PROTECTION) == 0;
