@@ -23,11 +23,18 @@ pub(super) struct JointTruth {
     lost_at: Option<Instant>,
     /// The last time without torque after a loss.
     off_at: Instant,
+    /// The last alarm. A joint that nothing moves counts as held as long as its servo has an alarm (D28).
+    alarm_at: Instant,
     /// The last push over the limit.
     pushed_at: Option<Instant>,
 }
 
 impl JointTruth {
+    /// The servo has an alarm.
+    pub(super) fn has_alarm(&mut self, now: Instant) {
+        self.alarm_at = now;
+    }
+
     /// Takes the torque of the servo, and its push and its limit in 0.1 %.
     pub(super) fn observe(&mut self, now: Instant, torque: Option<Torque>, push: i16, limit: Option<i16>) {
         let is_on = torque == Some(Torque::On);
@@ -45,7 +52,7 @@ impl JointTruth {
 
     /// True if the controller need not have given torque again by now (D28): the joint was let go a moment ago.
     pub(super) fn may_wait_for_torque(&self, now: Instant) -> bool {
-        self.lost_at.is_some_and(|at| now - at < ENGAGE_TIME)
+        self.lost_at.is_some_and(|at| now - at.max(self.alarm_at) < ENGAGE_TIME)
     }
 
     /// True if the controller may take the joint for let go (D28).

@@ -25,9 +25,11 @@ mod limit_verdict;
 mod map21_model;
 mod map21_requests;
 mod motion_checker;
+mod outside_injection;
 mod parameters;
 mod power;
 mod protection_model;
+mod push_rule;
 mod reachable_range;
 mod register_model;
 mod report_checker;
@@ -38,6 +40,7 @@ mod settings_storage;
 mod state;
 mod status_checker;
 mod status_reply;
+mod supply_rule;
 mod watchdog_model;
 mod written_targets;
 
@@ -56,6 +59,7 @@ use request_generator::{RequestGenerator, UsedMaps};
 pub use state::TortureWorld;
 use state::{PendingRequest, PowerState, PoweredArm};
 use status_checker::StatusChecker;
+use supply_rule::SupplyRule;
 
 /// The host pauses while this many requests are not executed.
 const MAX_PENDING: usize = 64;
@@ -97,6 +101,8 @@ impl TortureWorld {
             stalled_until: now,
             next_fault_at: now + rng.wait(scenario.mean_interval),
             hand: None,
+            endings: Vec::new(),
+            supply_rule: SupplyRule::default(),
             log: EventLog::default(),
             counts: WorldCounts::default(),
             rng,
@@ -137,6 +143,7 @@ impl TortureWorld {
         if self.now >= self.next_fault_at {
             self.inject_fault();
         }
+        self.end_outside();
         self.move_hand();
         match std::mem::replace(&mut self.power, PowerState::Taken) {
             PowerState::Off { until, servos_too } if self.now >= until => self.power_up(servos_too),
@@ -151,14 +158,16 @@ impl TortureWorld {
     /// The limits of the pushes in 0.1 %, as far as the controller keeps them.
     fn push_limits(&self) -> PerJoint<Option<i16>> {
         match &self.power {
-            PowerState::On(arm) => PerJoint(Joint::ALL.map(|joint| arm.model.push_limit(joint))),
+            PowerState::On(arm) if self.now >= self.stalled_until => {
+                PerJoint(Joint::ALL.map(|joint| arm.model.push_limit(joint)))
+            }
             _ => PerJoint::all(None),
         }
     }
 
     fn next_event(&self) -> Instant {
         let hand = self.hand.as_ref().map_or(Instant::FAR_FUTURE, |hand| hand.next_at);
-        let external = self.next_fault_at.min(hand);
+        let external = self.next_fault_at.min(hand).min(self.next_ending());
         match &self.power {
             PowerState::On(arm) => {
                 let inputs = [arm.to_arm.next_arrival(), self.bus.deadline(), Some(arm.wake_at)];
@@ -180,6 +189,8 @@ impl TortureWorld {
         let is_on = self.now < self.stalled_until || self.run_loop(&mut arm)?;
         if is_on && self.now >= arm.status_checker.next_at {
             arm.check_status(self.now, &self.bus, StatusChecker::check)?;
+            let is_checked = self.supply_rule.check(self.now, arm.controller.registers())?;
+            self.counts.checked_stops += u64::from(is_checked);
         }
         if is_on {
             self.power = PowerState::On(arm);

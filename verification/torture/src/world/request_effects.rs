@@ -156,7 +156,7 @@ impl TortureWorld {
     }
 
     /// Tells the checkers about an accepted write.
-    fn record_write(&self, arm: &mut PoweredArm, request: &HostRequest, effect: RequestEffect) {
+    fn record_write(&mut self, arm: &mut PoweredArm, request: &HostRequest, effect: RequestEffect) {
         let (HostRequest::Write { address, values } | HostRequest::WriteMap21 { address, values }) = request
         else {
             return;
@@ -182,6 +182,7 @@ impl TortureWorld {
         if includes(MOTOR_STATE.address) {
             arm.status_checker.state_written(self.now);
             arm.command_checker.state_written();
+            self.supply_rule.forget();
         }
         if includes_any(&SPEED) {
             arm.command_checker.speed_written(&arm.model);
