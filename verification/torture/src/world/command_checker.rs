@@ -5,6 +5,7 @@
 //! - Until the end of start-up, and to silent servos, only reads are sent.
 //! - Torque is switched on only where a servo stands, or was read on. After an unanswered question it is read before the
 //!   next goal (D28, D29).
+//! - A joint that lost its torque holds where it gets torque again, unless the host wrote a target meanwhile (D28, D29).
 //! - A goal that no speed allows comes nearer to the measured position, because the joint gives way (D27).
 
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
@@ -62,6 +63,9 @@ pub(super) struct CommandChecker {
     replies: ServoReplies,
     wire_free_at: Instant,
     linkage: LinkageGoals,
+    /// When each joint was last given torque, and when the host last wrote its target.
+    engaged_at: PerJoint<Option<Instant>>,
+    target_written_at: PerJoint<Option<Instant>>,
     /// How often each joint was given torque since register 29 was written.
     attempts: PerJoint<EngagementAttempts>,
     pub(super) count: u64,
@@ -94,6 +98,8 @@ impl CommandChecker {
             replies: ServoReplies::new(codes),
             wire_free_at: now,
             linkage: LinkageGoals::default(),
+            engaged_at: PerJoint::all(None),
+            target_written_at: PerJoint::all(None),
             attempts: PerJoint::default(),
             count: 0,
             engagements: 0,
@@ -145,6 +151,11 @@ impl CommandChecker {
     /// True if the joint was given torque so often that only a write of register 29 gives it torque again (D28).
     pub(super) fn is_exhausted(&self, joint: Joint) -> bool {
         self.attempts[joint].is_exhausted
+    }
+
+    /// The host wrote the target of a joint.
+    pub(super) fn target_written(&mut self, now: Instant, joint: Joint) {
+        self.target_written_at[joint] = Some(now);
     }
 
     /// Register 29 was written: the attempts count anew (D28).
@@ -277,9 +288,33 @@ impl CommandChecker {
         self.kept_goals[joint] = None;
         self.is_first[joint] = false;
         self.replies.forget_doubt(joint);
+        self.check_held_target(joint, range.last_goal, context)?;
+        self.engaged_at[joint] = Some(context.now);
         self.attempts[joint].add(context.now);
         self.engagements += 1;
         Ok(())
+    }
+
+    /// The target of a joint that lost its torque since it was last given torque is where it gets torque again, unless the
+    /// host wrote one since then.
+    fn check_held_target(&self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
+        let bus = context.bus;
+        let Some((lost_at, engaged_at)) = bus.truth(joint).lost_at().zip(self.engaged_at[joint]) else {
+            return Ok(());
+        };
+        let is_written = self.target_written_at[joint].is_some_and(|at| at >= lost_at);
+        let is_known = bus.is_undisturbed(context.now) && !bus.may_be_misread(joint, context.now);
+        let target = context.registers.get(TARGET_POSITION.of(joint));
+        if lost_at < engaged_at || is_written || !is_known || matches!(target, 0 | 180) {
+            return Ok(());
+        }
+        let wanted = target_counts(joint, context.registers, context.model);
+        ensure(goal.abs_diff(wanted) <= degree(joint) / 2 + 1, || {
+            format!(
+                "joint {} gets torque again at {goal} counts, and its target is {target} degrees ({wanted} counts)",
+                joint.number()
+            )
+        })
     }
 
     /// A silent servo receives only reads (D12).

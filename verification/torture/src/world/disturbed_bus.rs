@@ -32,6 +32,8 @@ const MAX_DELAY: Duration = Duration::from_millis(40);
 const MAX_REPLY: usize = 32;
 /// The controller repeats a lost torque frame within this time.
 const REPEAT_TIME: Duration = Duration::from_millis(600);
+/// Half of a servo timeout with which silent servos do not delay the readings of the others.
+const SHORT: Duration = Duration::from_micros(2_500);
 /// A servo that has responded for this long is known to the controller.
 const SETTLED: Duration = Duration::from_millis(3_000);
 /// The controller may accept a false reading if two undetected errors come within this time.
@@ -170,11 +172,13 @@ impl DisturbedBus {
         self.motion_checker.exempt_all(now, Exemption::MotorState);
     }
 
-    /// Checks that no joint has moved by itself. `limits` are those of the pushes in 0.1 %; `None` without protection.
+    /// Checks that no joint has moved by itself. `is_guarded` tells that the controller runs and protects the servos.
+    /// `limits` are those of the pushes in 0.1 %; `None` without protection.
     pub(super) fn check_motion(
         &mut self,
         now: Instant,
         is_servo: bool,
+        is_guarded: bool,
         limits: PerJoint<Option<i16>>,
     ) -> Check {
         // The joints move while the controller is off, too.
@@ -202,14 +206,18 @@ impl DisturbedBus {
                 self.motion_checker.may_overrun(now, joint);
             }
         }
-        self.motion_checker.check(now, is_servo, &self.plant)
+        let is_guarded = is_guarded && self.is_undisturbed(now);
+        self.motion_checker.check(now, is_servo, is_guarded, &self.plant)
     }
 
     /// Checks the push of a joint, with the limit that the controller keeps.
     fn check_push(&mut self, now: Instant, joint: Joint, limit: Option<i16>) -> Check {
         let responds =
-            matches!(self.availability(joint), Availability::Responding(since) if now >= since);
-        let can_limit = responds && self.has_torque(joint) && self.is_undisturbed(now);
+            |joint| matches!(self.availability(joint), Availability::Responding(since) if now >= since);
+        // Each silent servo costs a timeout: with long ones the others are read a few times a second.
+        let is_read_often = self.timely_limit <= SHORT || Joint::ALL.into_iter().all(responds);
+        let can_limit =
+            is_read_often && responds(joint) && self.has_torque(joint) && self.is_undisturbed(now);
         let push = Push {
             permille: self.plant.motor_torque(joint),
             speed: self.plant.load(joint).saturating_sub(self.plant.motor_torque(joint)),
@@ -221,12 +229,9 @@ impl DisturbedBus {
 
     /// True if all servos respond and have torque.
     pub(super) fn all_hold(&self, now: Instant) -> bool {
-        let responds = |joint: Joint| {
-            matches!(self.availability(joint), Availability::Responding(since) if now - since > SETTLED)
-        };
-        let holds = |joint: &Joint| {
-            responds(*joint) && self.has_torque(*joint) && !self.may_be_let_go(*joint, now)
-        };
+        let responds = |joint: Joint| matches!(self.availability(joint), Availability::Responding(since) if now - since > SETTLED);
+        let holds =
+            |joint: &Joint| responds(*joint) && self.has_torque(*joint) && !self.may_be_let_go(*joint, now);
         Joint::ALL.iter().all(holds)
     }
 

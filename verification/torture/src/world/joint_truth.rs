@@ -50,6 +50,11 @@ impl JointTruth {
         }
     }
 
+    /// The last loss of torque in this motor state.
+    pub(super) const fn lost_at(&self) -> Option<Instant> {
+        self.lost_at
+    }
+
     /// True if the controller need not have given torque again by now (D28): the joint was let go a moment ago.
     pub(super) fn may_wait_for_torque(&self, now: Instant) -> bool {
         self.lost_at.is_some_and(|at| now - at.max(self.alarm_at) < ENGAGE_TIME)

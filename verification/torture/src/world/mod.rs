@@ -55,6 +55,7 @@ use crate::world_counts::WorldCounts;
 use disturbed_bus::DisturbedBus;
 use event_log::EventLog;
 use parameters::WorldParameters;
+use protection_model::PROTECTION;
 use request_generator::{RequestGenerator, UsedMaps};
 pub use state::TortureWorld;
 use state::{PendingRequest, PowerState, PoweredArm};
@@ -136,7 +137,7 @@ impl TortureWorld {
         if let PowerState::On(arm) = &self.power {
             self.is_servo = arm.model.is_servo();
         }
-        self.bus.check_motion(self.now, self.is_servo, self.push_limits())
+        self.bus.check_motion(self.now, self.is_servo, self.is_guarded(), self.push_limits())
     }
 
     fn advance(&mut self) -> Check {
@@ -153,6 +154,12 @@ impl TortureWorld {
                 Ok(())
             }
         }
+    }
+
+    /// True if the controller protects the servos, and knows them.
+    fn is_guarded(&self) -> bool {
+        matches!(&self.power, PowerState::On(arm)
+            if arm.model.get(PROTECTION) == 1 && arm.status_checker.is_settled(self.now))
     }
 
     /// The limits of the pushes in 0.1 %, as far as the controller keeps them.

@@ -9,6 +9,8 @@
 //! behind a joint that moves to its goal, more slowly than a servo moves. So a joint that lags behind is inside the
 //! range, and a joint that falls is outside.
 //!
+//! Torque comes back with a goal of the controller, never by itself with the goal that the servo had before (D28).
+//!
 //! A joint with a payload, or that meets an obstacle or a hand, may be past its goals as long as its servo drives it back.
 //!
 //! A joint yields to its load: it droops, and when the controller alone restarts, the measured position is its new goal
@@ -107,6 +109,8 @@ struct JointBounds {
     range: AngleRange,
     /// Until then the joint may run past its goals if its servo drives it back.
     overruns_until: Instant,
+    /// Its servo had torque at the last check.
+    had_torque: bool,
     /// How far it was outside its range at the last check.
     excess: i32,
     /// The greatest yield in the present period, and in the period before.
@@ -149,6 +153,7 @@ impl MotionChecker {
                 goals: [AngleRange::at(0); 2],
                 range: AngleRange::at(0),
                 overruns_until: now,
+                had_torque: false,
                 excess: 0,
                 yields: [0; 2],
             }),
@@ -239,8 +244,9 @@ impl MotionChecker {
         }
     }
 
-    /// Checks all joints. `is_servo` is true if the motor state is servo, or was when the controller stopped.
-    pub(super) fn check(&mut self, now: Instant, is_servo: bool, plant: &Plant) -> Check {
+    /// Checks all joints. `is_servo` is true if the motor state is servo, or was when the controller stopped. `is_guarded`
+    /// tells that the controller knows the servos and protects them.
+    pub(super) fn check(&mut self, now: Instant, is_servo: bool, is_guarded: bool, plant: &Plant) -> Check {
         if !is_servo {
             self.exempt_all(now, Exemption::MotorState);
         }
@@ -253,7 +259,22 @@ impl MotionChecker {
         }
         self.checked_at = now;
         let by = i32::try_from(shrunk).unwrap_or(i32::MAX).min(1_000_000);
-        Joint::ALL.into_iter().try_for_each(|joint| self.check_joint(now, joint, by, plant))
+        for joint in Joint::ALL {
+            self.check_return_of_torque(joint, is_guarded, plant)?;
+            self.check_joint(now, joint, by, plant)?;
+        }
+        Ok(())
+    }
+
+    /// A servo that lost its torque does not have it again before it has received a goal.
+    fn check_return_of_torque(&mut self, joint: Joint, is_guarded: bool, plant: &Plant) -> Check {
+        let bounds = &mut self.joints[joint];
+        let has_torque = plant.torque(joint) == Some(Torque::On);
+        let is_back = has_torque && !std::mem::replace(&mut bounds.had_torque, has_torque);
+        let was_lost = matches!(bounds.exemption, Some((Exemption::PowerLoss, _)));
+        ensure(!(is_back && was_lost && is_guarded) || bounds.goal.is_some(), || {
+            format!("the torque of joint {} came back by itself", joint.number())
+        })
     }
 
     fn check_joint(&mut self, now: Instant, joint: Joint, by: i32, plant: &Plant) -> Check {

@@ -51,7 +51,8 @@ impl PushRule {
 
     /// Checks the joint.
     pub(super) fn check(&mut self, now: Instant, joint: Joint, push: Push) -> Check {
-        let has_tripped = push.is_overloaded && !std::mem::replace(&mut self.was_overloaded, push.is_overloaded);
+        let has_tripped =
+            push.is_overloaded && !std::mem::replace(&mut self.was_overloaded, push.is_overloaded);
         let is_able_for = now - self.unable_at;
         ensure(!has_tripped || is_able_for < ABLE_FOR, || {
             format!("the servo of joint {} protects itself by switching itself off", joint.number())
@@ -65,7 +66,11 @@ impl PushRule {
             self.low_at = now;
         }
         ensure(now - self.low_at < LASTS_FOR || is_able_for < ABLE_FOR, || {
-            format!("joint {} goes on pushing with {} over its limit {limit:?}", joint.number(), push.permille)
+            format!(
+                "joint {} goes on pushing with {} over its limit {limit:?}",
+                joint.number(),
+                push.permille
+            )
         })
     }
 }

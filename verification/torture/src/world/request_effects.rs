@@ -65,7 +65,12 @@ impl TortureWorld {
 
     fn apply_request(&mut self, arm: &mut PoweredArm, request: &HostRequest, room: usize) -> RequestEffect {
         let was_servo = arm.model.is_servo();
+        let writes = arm.model.target_writes;
         let effect = arm.model.execute(request, room);
+        for joint in Joint::ALL.into_iter().filter(|joint| arm.model.target_writes[*joint] != writes[*joint])
+        {
+            arm.command_checker.target_written(self.now, joint);
+        }
         if request.is_well_formed() {
             arm.watchdog.heard(self.now);
         }

@@ -108,6 +108,11 @@ impl StatusChecker {
         }
     }
 
+    /// True if the arm has run without a stall for so long that it knows its servos.
+    pub(super) fn is_settled(&self, now: Instant) -> bool {
+        now - self.unsettled_at > DETECTION_TIME
+    }
+
     /// The shell stalls until `now`, for a time of `by`.
     pub(super) fn shell_was_late(&mut self, now: Instant, by: Duration) {
         self.unsettled_at = now;
