@@ -372,10 +372,12 @@ impl CommandChecker {
         self.check_linkage(context)
     }
 
-    /// The goals of joints 2 and 3 keep the linkage, if it limits them (D25).
+    /// The goals of joints 2 and 3 keep the linkage, if it limits them (D25). A joint that gives way may leave it (D27).
     fn check_linkage(&mut self, context: &CommandContext<'_>) -> Check {
         let [_, two, three, ..] = Joint::ALL;
-        if context.registers.get(LIMITS.address) & limit::LINKAGE == 0 {
+        let gives_way = |joint| context.bus.truth(joint).may_give_way(context.now);
+        let is_off = context.registers.get(LIMITS.address) & limit::LINKAGE == 0;
+        if is_off || gives_way(two) || gives_way(three) {
             self.linkage.reset();
             return Ok(());
         }
