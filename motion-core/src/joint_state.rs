@@ -329,6 +329,12 @@ impl JointState {
         self.obstacle = Obstacle::NONE;
     }
 
+    /// Does the set-point give way with the step that it made from `before`, towards the measured position (D27)?
+    pub(crate) fn gives_way_from(&self, before: MicroDegrees) -> bool {
+        let distance = |angle: MicroDegrees| self.measured.map(|at| at.0.abs_diff(angle.0));
+        self.obstacle.is_holding_back() && distance(self.drive.set_point()) < distance(before)
+    }
+
     /// Is the joint blocked (D27)?
     pub(crate) const fn is_blocked(&self) -> bool {
         self.obstacle.is_blocked()

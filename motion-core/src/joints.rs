@@ -247,13 +247,16 @@ impl Joints {
         both.then(|| [two.drive.set_point(), three.drive.set_point()])
     }
 
-    /// Lets joints 2 and 3 wait for each other where their step would break the linkage (D25).
+    /// Lets joints 2 and 3 wait for each other where their step would break the linkage (D25). A joint that gives way to an
+    /// obstacle does not wait: it would go on pushing until its servo switches itself off (D27).
     fn keep_linkage(&mut self, before: [MicroDegrees; 2]) {
         let Some(after) = self.linkage_set_points() else { return };
         let allowed = linkage_step(before, after);
         let [_, two, three, ..] = &mut self.joints;
-        for (joint, (after, allowed)) in [two, three].into_iter().zip(after.into_iter().zip(allowed)) {
-            if allowed != after {
+        for ((joint, before), (after, allowed)) in
+            [two, three].into_iter().zip(before).zip(after.into_iter().zip(allowed))
+        {
+            if allowed != after && !joint.gives_way_from(before) {
                 joint.drive.hold_back(allowed);
             }
         }

@@ -36,6 +36,11 @@ impl Obstacle {
     pub(crate) const NONE: Self =
         Self { limiter: PushLimiter::FREE, held: None, is_blocked: false, retrying_since: None };
 
+    /// Was the set-point held back in the last control cycle?
+    pub(crate) const fn is_holding_back(&self) -> bool {
+        self.held.is_some()
+    }
+
     /// Is the joint blocked?
     pub(crate) const fn is_blocked(&self) -> bool {
         self.is_blocked

@@ -6,6 +6,7 @@ mod rig;
 
 use arm_sim::plant::{Thing, Wall};
 use arm_sim::servo::Trip;
+use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use motion_core::servo_bus::Torque;
 use protocol_core::registers::Joint;
 use protocol_core::time::Instant;
@@ -164,6 +165,28 @@ fn d27_a_joint_at_a_wall_gives_way_is_blocked_and_stays() {
         }
     }
     assert!(bad.is_empty(), "{bad:#?}");
+}
+
+#[test]
+fn d27_a_joint_gives_way_also_out_of_the_linkage() {
+    let mut rig = Rig::started();
+    rig.write(188, &[1]);
+    rig.write(29, &[2]);
+    rig.run_ms(100);
+    for (number, degrees) in [(2, 20), (3, 40)] {
+        let counts = counts_from_angle(joint(number), MicroDegrees::from_degrees(degrees), 0);
+        rig.plant.move_by_hand(joint(number), counts);
+    }
+    rig.run_ms(500);
+    rig.write(29, &[1]);
+    rig.run_ms(500);
+    // From outside, the set-point goes inwards: to the obstacle it has to come back outwards.
+    rig.plant.set_wall(joint(2), stiff_wall(22));
+    rig.write(47, &[90]);
+    rig.run_ms(1_000);
+    let load = largest_average_load(&mut rig, joint(2), 3_000);
+    assert!(load <= 750, "{load}");
+    assert_eq!((rig.get(BLOCKED), rig.get(ALARMS), rig.get(LET_GO)), (bit(2), 0, 0));
 }
 
 /// Runs a stream of points of a joint, one each 20 ms, in hundredths of a degree.

@@ -79,6 +79,12 @@ impl Plant {
         self.servo_mut(joint).into_iter().for_each(|servo| servo.trip(trip));
     }
 
+    /// Has the overload protection of a joint's servo switched it off?
+    #[must_use]
+    pub fn is_overloaded(&self, joint: Joint) -> bool {
+        self.servo(joint).is_some_and(Servo::is_overloaded)
+    }
+
     /// Milliseconds in which a joint touched its wall, since the wall was set.
     #[must_use]
     pub fn wall_count(&self, joint: Joint) -> FaultCount {

@@ -58,6 +58,11 @@ impl Servo {
         if self.motor.position() <= position { Side::MoreCounts } else { Side::FewerCounts }
     }
 
+    /// Is an overload latched?
+    pub(crate) const fn is_overloaded(&self) -> bool {
+        self.protection.is_overloaded()
+    }
+
     /// Forces an alarm. An overload has no effect on a servo whose torque is off.
     pub(crate) fn trip(&mut self, trip: Trip) {
         match trip {

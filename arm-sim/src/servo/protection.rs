@@ -55,6 +55,11 @@ impl Protection {
         self.is_overloaded |= self.overload_steps >= OVERLOAD_MS;
     }
 
+    /// Is an overload latched?
+    pub(super) const fn is_overloaded(&self) -> bool {
+        self.is_overloaded
+    }
+
     /// Latches an overload.
     pub(super) const fn trip(&mut self) {
         self.is_overloaded = true;

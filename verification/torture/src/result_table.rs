@@ -64,6 +64,7 @@ impl ResultTable<'_> {
             requests, replies, reports, alarms, corrupted_bursts, commands, engagements, ..
         } = counts;
         let WorldCounts { disturbed_servo_frames, undetected_errors, servo_faults, stalls, .. } = counts;
+        let WorldCounts { obstacles, servo_trips, emergency_stops, checked_stops, .. } = counts;
         let WorldCounts { power_cuts, cut_starts, cut_saves, saves, .. } = counts;
         let counts = [
             ("all worlds", amount(worlds, &counts)),
@@ -75,6 +76,12 @@ impl ResultTable<'_> {
             ("  corrupted or delayed frames on the servo bus", disturbed_servo_frames.to_string()),
             ("    of these, corrupted replies with a valid checksum", undetected_errors.to_string()),
             ("  changes of a servo fault, and restarts of a servo", servo_faults.to_string()),
+            ("  walls, pushes, things between the claws, payloads", obstacles.to_string()),
+            ("  overloads and heat forced on servos", servo_trips.to_string()),
+            (
+                "  emergency stops; of these long ones that had to end in state 0",
+                format!("{emergency_stops}; {checked_stops}"),
+            ),
             ("  stalls of the shell of up to 5 s", stalls.to_string()),
             (
                 "  power cuts and restarts; of these during a start, during a save",

@@ -3,8 +3,9 @@
 use protocol_core::time::Duration;
 
 use InjectedFault::{
-    BusDisturbance, BusEcho, FlashWear, Hand, HostLinkCorruption, HostStopsReading, Panic, PowerCut,
-    PowerCutInSave, Restart, ServoFault, ServoRestart, ShellStall, Watchdog,
+    BusDisturbance, BusEcho, EmergencyStop, FlashWear, Hand, HostLinkCorruption, HostStopsReading, Panic,
+    Payload, PowerCut, PowerCutInSave, Push, Restart, ServoFault, ServoRestart, ServoTrip, ShellStall, Thing,
+    Wall, Watchdog,
 };
 
 /// A fault to inject.
@@ -38,6 +39,18 @@ pub enum InjectedFault {
     FlashWear,
     /// A hand turns a joint.
     Hand,
+    /// A wall is put in the way of a joint, stiff or soft, for up to a minute.
+    Wall,
+    /// A hand pushes a joint for up to a minute.
+    Push,
+    /// A thing is put between the claws.
+    Thing,
+    /// The weight in the gripper becomes one up to 500 g.
+    Payload,
+    /// Overload or heat is forced on a servo.
+    ServoTrip,
+    /// The supply of the servos is cut for 0.3, 3 or 30 s. The controller keeps its own.
+    EmergencyStop,
 }
 
 /// A kind of world.
@@ -71,7 +84,7 @@ const NO_FAULTS: Scenario = Scenario {
 };
 
 /// All scenarios. Consecutive seeds select them in turn.
-pub static SCENARIOS: [Scenario; 8] = [
+pub static SCENARIOS: [Scenario; 10] = [
     Scenario {
         name: "calm",
         description: "no faults, and none reported",
@@ -151,9 +164,28 @@ pub static SCENARIOS: [Scenario; 8] = [
             Watchdog,
             Panic,
             Hand,
+            Wall,
+            Push,
+            Thing,
+            Payload,
+            ServoTrip,
+            EmergencyStop,
         ],
         settings_per_mille: 100,
         cut_starts_percent: 20,
+    },
+    Scenario {
+        name: "obstacles",
+        description: "walls, pushes, things between the claws, payloads of up to 500 g",
+        faults: &[Wall, Wall, Push, Thing, Payload],
+        ..NO_FAULTS
+    },
+    Scenario {
+        name: "stops",
+        description: "emergency stops of 0.3, 3 and 30 s, forced overload and heat, payloads, restarting servos",
+        mean_interval: seconds(8),
+        faults: &[EmergencyStop, ServoTrip, Payload, ServoRestart],
+        ..NO_FAULTS
     },
 ];
 

@@ -37,6 +37,14 @@ counts! {
     undetected_errors,
     /// Changes of a servo fault, and restarts of a servo.
     servo_faults,
+    /// Walls, pushes, things and changes of the payload.
+    obstacles,
+    /// Alarms that were forced on servos.
+    servo_trips,
+    /// Emergency stops.
+    emergency_stops,
+    /// Emergency stops after which the arm had to enter state 0.
+    checked_stops,
     /// Stalls of the shell.
     stalls,
     /// Power cuts and restarts.

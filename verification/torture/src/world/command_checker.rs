@@ -5,6 +5,7 @@
 //! - Until the end of start-up, and to silent servos, only reads are sent.
 //! - Torque is switched on only where a servo stands, or was read on. After an unanswered question it is read before the
 //!   next goal (D28, D29).
+//! - A joint that lost its torque holds where it gets torque again, unless the host wrote a target meanwhile (D28, D29).
 //! - A goal that no speed allows comes nearer to the measured position, because the joint gives way (D27).
 
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
@@ -16,7 +17,8 @@ use protocol_core::registers::map::{
 use protocol_core::registers::{Joint, RegisterFile};
 use protocol_core::time::{Duration, Instant};
 
-use super::disturbed_bus::DisturbedBus;
+use super::attempts::EngagementAttempts;
+use super::disturbed_bus::{Availability, DisturbedBus};
 use super::reachable_range::ReachableRange;
 use super::register_model::RegisterModel;
 use super::servo_replies::ServoReplies;
@@ -28,6 +30,9 @@ use crate::violation::{Check, Violation, ensure};
 const MAX_START_UP: Duration = Duration::from_millis(500);
 /// The number of reads without a reply after which a servo is silent: three have failed (D12), one may be in progress.
 const MAX_UNANSWERED: u8 = 4;
+
+/// A servo that has responded for this long has shown its torque.
+const ANSWERS_AFTER: Duration = Duration::from_millis(3_000);
 
 /// Counts of one control cycle at 372 degrees/s. A set-point may be ahead of the last goal by one cycle, and by one more
 /// for each cycle in which a read delays the goals.
@@ -49,6 +54,8 @@ pub(super) struct CommandChecker {
     /// The last goal of a joint whose servo was lost, and its tolerance in counts. A found servo may continue from that
     /// goal (D12). The tolerance grows when offsets change.
     kept_goals: PerJoint<Option<(u16, u16)>>,
+    /// The joint had no goal since the start: its first one may be the goal that its servo holds (D12).
+    is_first: PerJoint<bool>,
     /// The joint is not driven any more, whatever its servo does: its next torque is for a new goal.
     is_released: PerJoint<bool>,
     /// True if the last command switched the torque on. False for a lost servo.
@@ -56,6 +63,11 @@ pub(super) struct CommandChecker {
     replies: ServoReplies,
     wire_free_at: Instant,
     linkage: LinkageGoals,
+    /// When each joint was last given torque, and when the host last wrote its target.
+    engaged_at: PerJoint<Option<Instant>>,
+    target_written_at: PerJoint<Option<Instant>>,
+    /// How often each joint was given torque since register 29 was written.
+    attempts: PerJoint<EngagementAttempts>,
     pub(super) count: u64,
     pub(super) engagements: u64,
 }
@@ -80,11 +92,15 @@ impl CommandChecker {
             paused: PerJoint::all(None),
             paused_at: PerJoint::all(now),
             kept_goals: PerJoint::all(None),
+            is_first: PerJoint::all(true),
             is_released: PerJoint::all(false),
             is_on: PerJoint::all(false),
             replies: ServoReplies::new(codes),
             wire_free_at: now,
             linkage: LinkageGoals::default(),
+            engaged_at: PerJoint::all(None),
+            target_written_at: PerJoint::all(None),
+            attempts: PerJoint::default(),
             count: 0,
             engagements: 0,
         }
@@ -95,16 +111,24 @@ impl CommandChecker {
         self.replies.received(now, bytes);
     }
 
-    /// The arm may find its supply lost only after all its driven servos were silent (D29).
+    /// The arm finds its supply lost only after its driven servos were silent, and while none answers with torque (D29).
     pub(super) fn check_lost_supply(&self, now: Instant, bus: &DisturbedBus) -> Check {
-        let was_silent = Joint::ALL.into_iter().any(|joint| self.replies.was_silent_for_a_second(joint, now));
-        let holds = |joint: &Joint| {
-            bus.has_torque(*joint) && !bus.may_be_let_go(*joint, now) && self.replies.is_steady(*joint, now)
+        let responding_for = |joint: Joint| match bus.availability(joint) {
+            Availability::Responding(since) => now - since,
+            Availability::Silent(_) | Availability::Uncertain => Duration::ZERO,
         };
-        let holding = Joint::ALL.into_iter().find(holds).map(Joint::number);
-        ensure(!bus.is_undisturbed(now) || (was_silent && holding.is_none()), || {
+        let was_silent = |joint: Joint| {
+            self.replies.was_silent_for_a_second(joint, now) || responding_for(joint) == Duration::ZERO
+        };
+        let holds = |joint: Joint| {
+            let answers = responding_for(joint) > ANSWERS_AFTER && self.replies.is_steady(joint, now);
+            answers && bus.has_torque(joint) && !bus.may_be_let_go(joint, now)
+        };
+        let any_silent = Joint::ALL.into_iter().any(was_silent);
+        let holding = Joint::ALL.into_iter().find(|joint| holds(*joint)).map(Joint::number);
+        ensure(!bus.is_undisturbed(now) || (any_silent && holding.is_none()), || {
             format!(
-                "the supply counts as lost, after a silence: {was_silent}, and joint {holding:?} has torque"
+                "the supply counts as lost, after a silence: {any_silent}, and joint {holding:?} has torque"
             )
         })
     }
@@ -113,9 +137,30 @@ impl CommandChecker {
         self.is_on[joint]
     }
 
+    /// The goal that the servo of a joint held with torque before the controller started, in counts. Until the joint has
+    /// torque from this controller, its goal may be this one (D12).
+    pub(super) fn held_goal(&self, joint: Joint) -> Option<u16> {
+        self.replies.held_goal(joint).filter(|_| self.is_first[joint])
+    }
+
     /// The last goal of a joint that is driven.
     pub(super) fn goal(&self, joint: Joint) -> Option<u16> {
         self.ranges[joint].or(self.paused[joint]).map(|range| range.last_goal)
+    }
+
+    /// True if the joint was given torque so often that only a write of register 29 gives it torque again (D28).
+    pub(super) fn is_exhausted(&self, joint: Joint) -> bool {
+        self.attempts[joint].is_exhausted
+    }
+
+    /// The host wrote the target of a joint.
+    pub(super) fn target_written(&mut self, now: Instant, joint: Joint) {
+        self.target_written_at[joint] = Some(now);
+    }
+
+    /// Register 29 was written: the attempts count anew (D28).
+    pub(super) fn state_written(&mut self) {
+        self.attempts = PerJoint::default();
     }
 
     /// The joint is no longer driven. Its next goal need not be near the last one.
@@ -123,6 +168,7 @@ impl CommandChecker {
         self.linkage.reset();
         (self.ranges[joint], self.paused[joint]) = (None, None);
         self.kept_goals[joint] = None;
+        self.is_first[joint] = false;
         self.is_released[joint] = true;
         self.replies.forget_doubt(joint);
     }
@@ -240,9 +286,35 @@ impl CommandChecker {
             .ok_or_else(|| Violation(format!("joint {number} is given torque without a goal")))?;
         self.check_position(joint, range.last_goal, "is given torque", context)?;
         self.kept_goals[joint] = None;
+        self.is_first[joint] = false;
         self.replies.forget_doubt(joint);
+        self.check_held_target(joint, range.last_goal, context)?;
+        self.engaged_at[joint] = Some(context.now);
+        self.attempts[joint].add(context.now);
         self.engagements += 1;
         Ok(())
+    }
+
+    /// The target of a joint that lost its torque since it was last given torque is where it gets torque again, unless the
+    /// host wrote one since then.
+    fn check_held_target(&self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
+        let bus = context.bus;
+        let Some((lost_at, engaged_at)) = bus.truth(joint).lost_at().zip(self.engaged_at[joint]) else {
+            return Ok(());
+        };
+        let is_written = self.target_written_at[joint].is_some_and(|at| at >= lost_at);
+        let is_known = bus.is_undisturbed(context.now) && !bus.may_be_misread(joint, context.now);
+        let target = context.registers.get(TARGET_POSITION.of(joint));
+        if lost_at < engaged_at || is_written || !is_known || matches!(target, 0 | 180) {
+            return Ok(());
+        }
+        let wanted = target_counts(joint, context.registers, context.model);
+        ensure(goal.abs_diff(wanted) <= degree(joint) / 2 + 1, || {
+            format!(
+                "joint {} gets torque again at {goal} counts, and its target is {target} degrees ({wanted} counts)",
+                joint.number()
+            )
+        })
     }
 
     /// A silent servo receives only reads (D12).
@@ -257,11 +329,13 @@ impl CommandChecker {
         })
     }
 
-    /// A joint starts from its position, or from a near goal that it kept while its servo was lost (D12).
+    /// A joint starts from its position, or from a near goal that it kept while its servo was lost or the controller
+    /// restarted (D12).
     fn check_position(&self, joint: Joint, goal: u16, what: &str, context: &CommandContext<'_>) -> Check {
         let bus = context.bus;
-        let is_kept =
-            self.kept_goals[joint].is_some_and(|(kept, tolerance)| goal.abs_diff(kept) <= tolerance);
+        let held = self.held_goal(joint).map(|held| (held, 1));
+        let is_at = |(kept, tolerance): (u16, u16)| goal.abs_diff(kept) <= tolerance;
+        let is_kept = self.kept_goals[joint].into_iter().chain(held).any(is_at);
         let degrees = if is_kept { 4 } else { 1 };
         let fall = if bus.has_torque(joint) { 0 } else { MAX_FALL };
         // After its reading the joint may go on moving: the servo may execute a corrupted goal. A reply may be old.
@@ -298,10 +372,12 @@ impl CommandChecker {
         self.check_linkage(context)
     }
 
-    /// The goals of joints 2 and 3 keep the linkage, if it limits them (D25).
+    /// The goals of joints 2 and 3 keep the linkage, if it limits them (D25). A joint that gives way may leave it (D27).
     fn check_linkage(&mut self, context: &CommandContext<'_>) -> Check {
         let [_, two, three, ..] = Joint::ALL;
-        if context.registers.get(LIMITS.address) & limit::LINKAGE == 0 {
+        let gives_way = |joint| context.bus.truth(joint).may_give_way(context.now);
+        let is_off = context.registers.get(LIMITS.address) & limit::LINKAGE == 0;
+        if is_off || gives_way(two) || gives_way(three) {
             self.linkage.reset();
             return Ok(());
         }

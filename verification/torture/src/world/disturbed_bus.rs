@@ -7,8 +7,8 @@
 
 use std::collections::VecDeque;
 
-use arm_sim::plant::Plant;
-use arm_sim::servo::{ServoConfig, ServoFault};
+use arm_sim::plant::{Plant, SupplyFault, Thing, Wall};
+use arm_sim::servo::{ServoConfig, ServoFault, Trip};
 use motion_core::servo_bus::Torque;
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
@@ -16,6 +16,7 @@ use protocol_core::time::{Duration, Instant};
 use super::corruption::corrupt;
 use super::joint_truth::JointTruth;
 use super::motion_checker::{Exemption, MotionChecker};
+use super::push_rule::{Push, PushRule};
 use super::status_reply::{StatusFields, status_replies, whole_status};
 use crate::per_joint::PerJoint;
 use crate::seeded_rng::SeededRng;
@@ -23,12 +24,18 @@ use crate::violation::Check;
 
 /// A servo does not respond for this long after it is switched on.
 const BOOT_TIME: Duration = Duration::from_millis(200);
+/// A servo starts in the first step with supply.
+const STEP: Duration = Duration::from_millis(1);
 /// The longest delay of a reply on the wire.
 const MAX_DELAY: Duration = Duration::from_millis(40);
 /// Kept bytes of an incomplete reply. The longest reply of a servo is shorter.
 const MAX_REPLY: usize = 32;
 /// The controller repeats a lost torque frame within this time.
 const REPEAT_TIME: Duration = Duration::from_millis(600);
+/// Half of a servo timeout with which silent servos do not delay the readings of the others.
+const SHORT: Duration = Duration::from_micros(2_500);
+/// A servo that has responded for this long is known to the controller.
+const SETTLED: Duration = Duration::from_millis(3_000);
 /// The controller may accept a false reading if two undetected errors come within this time.
 const MISREAD_TIME: Duration = Duration::from_millis(1_000);
 
@@ -56,6 +63,13 @@ pub(super) struct DisturbedBus {
     plant: Plant,
     motion_checker: MotionChecker,
     truths: PerJoint<JointTruth>,
+    /// A hand pushes the joint, a wall is in its way, or a thing is between the claws.
+    has_push: PerJoint<bool>,
+    has_wall: PerJoint<bool>,
+    has_thing: bool,
+    push_rules: PerJoint<PushRule>,
+    /// The supply of the servos is cut.
+    is_stopped: bool,
     settings: ServoConfig,
     disturbance: DisturbanceRates,
     /// Frames that are delayed on the wire, with the time of their arrival.
@@ -89,6 +103,11 @@ impl DisturbedBus {
             plant: Plant::with_config(now, settings),
             motion_checker: MotionChecker::new(now),
             truths: PerJoint::default(),
+            has_push: PerJoint::default(),
+            has_wall: PerJoint::default(),
+            has_thing: false,
+            push_rules: PerJoint::default(),
+            is_stopped: false,
             settings,
             disturbance: DisturbanceRates::default(),
             delayed: VecDeque::new(),
@@ -153,11 +172,13 @@ impl DisturbedBus {
         self.motion_checker.exempt_all(now, Exemption::MotorState);
     }
 
-    /// Checks that no joint has moved by itself. `limits` are those of the pushes in 0.1 %; `None` without protection.
+    /// Checks that no joint has moved by itself. `is_guarded` tells that the controller runs and protects the servos.
+    /// `limits` are those of the pushes in 0.1 %; `None` without protection.
     pub(super) fn check_motion(
         &mut self,
         now: Instant,
         is_servo: bool,
+        is_guarded: bool,
         limits: PerJoint<Option<i16>>,
     ) -> Check {
         // The joints move while the controller is off, too.
@@ -165,11 +186,53 @@ impl DisturbedBus {
         if !is_servo {
             self.truths = PerJoint::default();
         }
+        for joint in Joint::ALL {
+            self.check_push(now, joint, limits[joint])?;
+        }
         for joint in Joint::ALL.into_iter().filter(|_| is_servo) {
             let (torque, push) = (self.plant.torque(joint), self.plant.motor_torque(joint));
             self.truths[joint].observe(now, torque, push, limits[joint]);
+            if self.last_status[joint].alarms != 0 {
+                self.truths[joint].has_alarm(now);
+            }
+            if self.truths[joint].may_give_way(now) {
+                self.motion_checker.may_recoil(joint, &self.plant);
+            }
         }
-        self.motion_checker.check(now, is_servo, &self.plant)
+        for joint in Joint::ALL {
+            let meets_thing = joint.number() == 7 && self.has_thing;
+            let meets_any = self.has_push[joint] || self.has_wall[joint] || meets_thing;
+            if meets_any || self.plant.load_grams() > 0 {
+                self.motion_checker.may_overrun(now, joint);
+            }
+        }
+        let is_guarded = is_guarded && self.is_undisturbed(now);
+        self.motion_checker.check(now, is_servo, is_guarded, &self.plant)
+    }
+
+    /// Checks the push of a joint, with the limit that the controller keeps.
+    fn check_push(&mut self, now: Instant, joint: Joint, limit: Option<i16>) -> Check {
+        let responds =
+            |joint| matches!(self.availability(joint), Availability::Responding(since) if now >= since);
+        // Each silent servo costs a timeout: with long ones the others are read a few times a second.
+        let is_read_often = self.timely_limit <= SHORT || Joint::ALL.into_iter().all(responds);
+        let can_limit =
+            is_read_often && responds(joint) && self.has_torque(joint) && self.is_undisturbed(now);
+        let push = Push {
+            permille: self.plant.motor_torque(joint),
+            speed: self.plant.load(joint).saturating_sub(self.plant.motor_torque(joint)),
+            limit: limit.filter(|_| can_limit),
+            is_overloaded: self.plant.is_overloaded(joint),
+        };
+        self.push_rules[joint].check(now, joint, push)
+    }
+
+    /// True if all servos respond and have torque.
+    pub(super) fn all_hold(&self, now: Instant) -> bool {
+        let responds = |joint: Joint| matches!(self.availability(joint), Availability::Responding(since) if now - since > SETTLED);
+        let holds =
+            |joint: &Joint| responds(*joint) && self.has_torque(*joint) && !self.may_be_let_go(*joint, now);
+        Joint::ALL.iter().all(holds)
     }
 
     /// What the servo of a joint did.
@@ -299,10 +362,69 @@ impl DisturbedBus {
     }
 
     pub(super) fn power_cycle(&mut self, now: Instant) {
+        self.end_stop(now);
         self.plant.power_cycle(now);
         self.motion_checker.power_cycle(now);
         self.delayed.clear();
         self.since = PerJoint::all(now + BOOT_TIME);
+    }
+
+    /// The true angle of a joint in millidegrees.
+    pub(super) fn angle(&self, joint: Joint) -> i32 {
+        self.plant.angle(joint)
+    }
+
+    /// Puts a wall in the way of a joint, or takes it away.
+    pub(super) fn set_wall(&mut self, now: Instant, joint: Joint, wall: Option<Wall>) {
+        self.plant.bytes(now, &[]);
+        self.plant.set_wall(joint, wall);
+        self.has_wall[joint] = wall.is_some();
+    }
+
+    /// Puts a thing between the claws, or takes it away.
+    pub(super) fn set_thing(&mut self, now: Instant, thing: Option<Thing>) {
+        self.plant.bytes(now, &[]);
+        self.plant.set_thing(thing);
+        self.has_thing = thing.is_some();
+    }
+
+    /// Pushes a joint with a torque in millinewton metres. 0 ends the push, and the joint may turn back.
+    pub(super) fn push(&mut self, now: Instant, joint: Joint, torque: i16) {
+        self.plant.bytes(now, &[]);
+        self.motion_checker.exempt(now, joint, Exemption::Hand);
+        self.plant.push(joint, torque);
+        self.has_push[joint] = torque != 0;
+    }
+
+    /// Puts a weight into the gripper, in grams.
+    pub(super) fn set_load(&mut self, now: Instant, grams: u16) {
+        self.plant.bytes(now, &[]);
+        self.plant.set_load(grams);
+    }
+
+    /// Forces an alarm on a servo.
+    pub(super) fn trip(&mut self, now: Instant, joint: Joint, trip: Trip) {
+        self.plant.bytes(now, &[]);
+        self.plant.trip(joint, trip);
+        self.push_rules[joint].overload_is_forced();
+    }
+
+    /// Cuts the supply of all servos.
+    pub(super) fn begin_stop(&mut self, now: Instant) {
+        self.plant.bytes(now, &[]);
+        self.plant.set_supply_fault(Some(SupplyFault::Off));
+        self.motion_checker.exempt_all(now, Exemption::PowerLoss);
+        self.is_stopped = true;
+        self.since = PerJoint::all(now);
+    }
+
+    /// The supply of the servos is back.
+    pub(super) fn end_stop(&mut self, now: Instant) {
+        self.plant.bytes(now, &[]);
+        self.plant.set_supply_fault(None);
+        if std::mem::take(&mut self.is_stopped) {
+            self.since = PerJoint::all(now + BOOT_TIME + STEP);
+        }
     }
 
     /// A hand moves the joint to this position.
@@ -341,6 +463,7 @@ impl DisturbedBus {
         // A corrupted reply with a valid checksum ends a silence.
         let silent = Availability::Silent(since.max(self.misread_until[joint]));
         match self.faults[joint] {
+            _ if self.is_stopped => silent,
             Some(ServoFault::Missing | ServoFault::Garbled(1)) => silent,
             // After a restart, the controller may take an old reply for the reply to its next read, and so on.
             Some(ServoFault::Late(_)) if self.restarted_at > since => Availability::Uncertain,

@@ -25,6 +25,7 @@ impl TortureWorld {
             return;
         };
         self.log.event(self.now, format!("{fault:?}"));
+        self.supply_rule.forget();
         match fault {
             InjectedFault::ServoFault => self.change_servo_fault(),
             InjectedFault::ServoRestart => {
@@ -43,6 +44,12 @@ impl TortureWorld {
             InjectedFault::ShellStall => self.stall_shell(),
             InjectedFault::Hand => self.start_hand(),
             InjectedFault::FlashWear => self.wear_flash(),
+            InjectedFault::Wall
+            | InjectedFault::Push
+            | InjectedFault::Thing
+            | InjectedFault::Payload
+            | InjectedFault::ServoTrip
+            | InjectedFault::EmergencyStop => self.inject_outside(fault),
             InjectedFault::HostStopsReading
             | InjectedFault::PowerCut
             | InjectedFault::Restart

@@ -8,9 +8,8 @@ use protocol_core::time::{Duration, Instant};
 /// The controller finds within this time that a servo has lost its torque, and that it has torque again. Its shell may
 /// stall for five seconds of it.
 const NOTICE_TIME: Duration = Duration::from_millis(7_500);
-/// A servo that lost its torque without an alarm gets it again within this time, but for a minute three times at most.
+/// A servo that lost its torque without an alarm gets it again within this time.
 const ENGAGE_TIME: Duration = Duration::from_millis(10_000);
-const MAX_ATTEMPTS: u8 = 3;
 /// The set-point of a joint that pushed too hard may give way for this time.
 const GIVE_WAY_TIME: Duration = Duration::from_millis(7_000);
 /// The controller measures a push this much too high at most, in 0.1 %: speed and load are not of the same instant.
@@ -22,21 +21,25 @@ pub(super) struct JointTruth {
     is_on: bool,
     /// The last loss of torque in the motor state servo.
     lost_at: Option<Instant>,
-    /// The number of losses.
-    losses: u8,
     /// The last time without torque after a loss.
     off_at: Instant,
+    /// The last alarm. A joint that nothing moves counts as held as long as its servo has an alarm (D28).
+    alarm_at: Instant,
     /// The last push over the limit.
     pushed_at: Option<Instant>,
 }
 
 impl JointTruth {
+    /// The servo has an alarm.
+    pub(super) fn has_alarm(&mut self, now: Instant) {
+        self.alarm_at = now;
+    }
+
     /// Takes the torque of the servo, and its push and its limit in 0.1 %.
     pub(super) fn observe(&mut self, now: Instant, torque: Option<Torque>, push: i16, limit: Option<i16>) {
         let is_on = torque == Some(Torque::On);
         if self.is_on && !is_on {
             self.lost_at = Some(now);
-            self.losses = self.losses.saturating_add(1);
         }
         if !is_on {
             self.off_at = now;
@@ -52,10 +55,9 @@ impl JointTruth {
         self.lost_at
     }
 
-    /// True if the controller need not have given torque again by now (D28): the joint was let go a moment ago, or too often.
+    /// True if the controller need not have given torque again by now (D28): the joint was let go a moment ago.
     pub(super) fn may_wait_for_torque(&self, now: Instant) -> bool {
-        let is_recent = self.lost_at.is_some_and(|at| now - at < ENGAGE_TIME);
-        is_recent || self.losses > MAX_ATTEMPTS
+        self.lost_at.is_some_and(|at| now - at.max(self.alarm_at) < ENGAGE_TIME)
     }
 
     /// True if the controller may take the joint for let go (D28).

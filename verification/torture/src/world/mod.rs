@@ -9,6 +9,7 @@
 //!
 //! The simulation steps from event to event. The same seed and scenario reproduce every byte.
 
+mod attempts;
 mod command_checker;
 mod controller_loop;
 mod corruption;
@@ -24,9 +25,11 @@ mod limit_verdict;
 mod map21_model;
 mod map21_requests;
 mod motion_checker;
+mod outside_injection;
 mod parameters;
 mod power;
 mod protection_model;
+mod push_rule;
 mod reachable_range;
 mod register_model;
 mod report_checker;
@@ -37,6 +40,7 @@ mod settings_storage;
 mod state;
 mod status_checker;
 mod status_reply;
+mod supply_rule;
 mod watchdog_model;
 mod written_targets;
 
@@ -51,10 +55,12 @@ use crate::world_counts::WorldCounts;
 use disturbed_bus::DisturbedBus;
 use event_log::EventLog;
 use parameters::WorldParameters;
+use protection_model::PROTECTION;
 use request_generator::{RequestGenerator, UsedMaps};
 pub use state::TortureWorld;
 use state::{PendingRequest, PowerState, PoweredArm};
 use status_checker::StatusChecker;
+use supply_rule::SupplyRule;
 
 /// The host pauses while this many requests are not executed.
 const MAX_PENDING: usize = 64;
@@ -96,6 +102,8 @@ impl TortureWorld {
             stalled_until: now,
             next_fault_at: now + rng.wait(scenario.mean_interval),
             hand: None,
+            endings: Vec::new(),
+            supply_rule: SupplyRule::default(),
             log: EventLog::default(),
             counts: WorldCounts::default(),
             rng,
@@ -129,13 +137,14 @@ impl TortureWorld {
         if let PowerState::On(arm) = &self.power {
             self.is_servo = arm.model.is_servo();
         }
-        self.bus.check_motion(self.now, self.is_servo, self.push_limits())
+        self.bus.check_motion(self.now, self.is_servo, self.is_guarded(), self.push_limits())
     }
 
     fn advance(&mut self) -> Check {
         if self.now >= self.next_fault_at {
             self.inject_fault();
         }
+        self.end_outside();
         self.move_hand();
         match std::mem::replace(&mut self.power, PowerState::Taken) {
             PowerState::Off { until, servos_too } if self.now >= until => self.power_up(servos_too),
@@ -147,17 +156,25 @@ impl TortureWorld {
         }
     }
 
+    /// True if the controller protects the servos, and knows them.
+    fn is_guarded(&self) -> bool {
+        matches!(&self.power, PowerState::On(arm)
+            if arm.model.get(PROTECTION) == 1 && arm.status_checker.is_settled(self.now))
+    }
+
     /// The limits of the pushes in 0.1 %, as far as the controller keeps them.
     fn push_limits(&self) -> PerJoint<Option<i16>> {
         match &self.power {
-            PowerState::On(arm) => PerJoint(Joint::ALL.map(|joint| arm.model.push_limit(joint))),
+            PowerState::On(arm) if self.now >= self.stalled_until => {
+                PerJoint(Joint::ALL.map(|joint| arm.model.push_limit(joint)))
+            }
             _ => PerJoint::all(None),
         }
     }
 
     fn next_event(&self) -> Instant {
         let hand = self.hand.as_ref().map_or(Instant::FAR_FUTURE, |hand| hand.next_at);
-        let external = self.next_fault_at.min(hand);
+        let external = self.next_fault_at.min(hand).min(self.next_ending());
         match &self.power {
             PowerState::On(arm) => {
                 let inputs = [arm.to_arm.next_arrival(), self.bus.deadline(), Some(arm.wake_at)];
@@ -179,6 +196,8 @@ impl TortureWorld {
         let is_on = self.now < self.stalled_until || self.run_loop(&mut arm)?;
         if is_on && self.now >= arm.status_checker.next_at {
             arm.check_status(self.now, &self.bus, StatusChecker::check)?;
+            let is_checked = self.supply_rule.check(self.now, arm.controller.registers())?;
+            self.counts.checked_stops += u64::from(is_checked);
         }
         if is_on {
             self.power = PowerState::On(arm);

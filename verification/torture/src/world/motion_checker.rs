@@ -9,6 +9,10 @@
 //! behind a joint that moves to its goal, more slowly than a servo moves. So a joint that lags behind is inside the
 //! range, and a joint that falls is outside.
 //!
+//! Torque comes back with a goal of the controller, never by itself with the goal that the servo had before (D28).
+//!
+//! A joint with a payload, or that meets an obstacle or a hand, may be past its goals as long as its servo drives it back.
+//!
 //! A joint yields to its load: it droops, and when the controller alone restarts, the measured position is its new goal
 //! and it droops once more. With a payload it also runs past its goal. The tolerance follows from the load and the speed
 //! of each joint.
@@ -33,6 +37,13 @@ const TOLERANCE: i32 = 450;
 const SHRINK_PER_SECOND: u64 = 80_000;
 /// A servo may still approach a goal of this age: its set-point and its motor lag behind by 30 ms.
 const GOAL_AGE: Duration = Duration::from_millis(100);
+/// When the set-point of a joint that pushes comes back at once (D27), the derivative term of its servo turns the joint
+/// away from its goal for a moment: by this much, in millidegrees.
+const RECOIL: i32 = 2_000;
+/// A joint that something has turned past its goals is back this long after it is gone.
+const OVERRUN_TIME: Duration = Duration::from_millis(1_000);
+/// A servo with this load, in 0.1 %, drives its joint back.
+const DRIVES_BACK: i16 = 100;
 /// A joint that is given torque may still fall, or approach an older goal, for this time.
 const SETTLE_TIME: Duration = Duration::from_millis(200);
 /// The number of sent frames that are kept for comparison. A servo may decode a frame late, after noise.
@@ -76,6 +87,11 @@ impl AngleRange {
         self.high = (self.high - by).max(angle.min(self.high)).max(goals.high);
     }
 
+    /// True if a servo with this load, positive towards greater angles, drives a joint at this angle towards the range.
+    fn is_driven_back(&self, angle: i32, load: i16) -> bool {
+        (angle > self.high && load < -DRIVES_BACK) || (angle < self.low && load > DRIVES_BACK)
+    }
+
     fn excess(&self, angle: i32) -> i32 {
         (angle - self.high).max(self.low - angle)
     }
@@ -91,6 +107,12 @@ struct JointBounds {
     /// The goals of the present period of [`GOAL_AGE`], and of the period before.
     goals: [AngleRange; 2],
     range: AngleRange,
+    /// Until then the joint may run past its goals if its servo drives it back.
+    overruns_until: Instant,
+    /// Its servo had torque at the last check.
+    had_torque: bool,
+    /// How far it was outside its range at the last check.
+    excess: i32,
     /// The greatest yield in the present period, and in the period before.
     yields: [i32; 2],
 }
@@ -130,6 +152,9 @@ impl MotionChecker {
                 goal: None,
                 goals: [AngleRange::at(0); 2],
                 range: AngleRange::at(0),
+                overruns_until: now,
+                had_torque: false,
+                excess: 0,
                 yields: [0; 2],
             }),
             checked_at: now,
@@ -143,6 +168,17 @@ impl MotionChecker {
         let bounds = &mut self.joints[joint];
         bounds.exemption = Some((exemption, now + SETTLE_TIME));
         bounds.goal = None;
+    }
+
+    /// The set-point of a joint that pushes may come back at once (D27).
+    pub(super) fn may_recoil(&mut self, joint: Joint, plant: &Plant) {
+        let [largest, _] = &mut self.joints[joint].yields;
+        *largest = (*largest).max(yield_of(joint, plant).saturating_add(RECOIL));
+    }
+
+    /// A payload, an obstacle or a hand may turn or hold the joint past its goals while its servo drives it back.
+    pub(super) fn may_overrun(&mut self, now: Instant, joint: Joint) {
+        self.joints[joint].overruns_until = now + OVERRUN_TIME;
     }
 
     /// Exempts all joints.
@@ -208,8 +244,9 @@ impl MotionChecker {
         }
     }
 
-    /// Checks all joints. `is_servo` is true if the motor state is servo, or was when the controller stopped.
-    pub(super) fn check(&mut self, now: Instant, is_servo: bool, plant: &Plant) -> Check {
+    /// Checks all joints. `is_servo` is true if the motor state is servo, or was when the controller stopped. `is_guarded`
+    /// tells that the controller knows the servos and protects them.
+    pub(super) fn check(&mut self, now: Instant, is_servo: bool, is_guarded: bool, plant: &Plant) -> Check {
         if !is_servo {
             self.exempt_all(now, Exemption::MotorState);
         }
@@ -222,7 +259,22 @@ impl MotionChecker {
         }
         self.checked_at = now;
         let by = i32::try_from(shrunk).unwrap_or(i32::MAX).min(1_000_000);
-        Joint::ALL.into_iter().try_for_each(|joint| self.check_joint(now, joint, by, plant))
+        for joint in Joint::ALL {
+            self.check_return_of_torque(joint, is_guarded, plant)?;
+            self.check_joint(now, joint, by, plant)?;
+        }
+        Ok(())
+    }
+
+    /// A servo that lost its torque does not have it again before it has received a goal.
+    fn check_return_of_torque(&mut self, joint: Joint, is_guarded: bool, plant: &Plant) -> Check {
+        let bounds = &mut self.joints[joint];
+        let has_torque = plant.torque(joint) == Some(Torque::On);
+        let is_back = has_torque && !std::mem::replace(&mut bounds.had_torque, has_torque);
+        let was_lost = matches!(bounds.exemption, Some((Exemption::PowerLoss, _)));
+        ensure(!(is_back && was_lost && is_guarded) || bounds.goal.is_some(), || {
+            format!("the torque of joint {} came back by itself", joint.number())
+        })
     }
 
     fn check_joint(&mut self, now: Instant, joint: Joint, by: i32, plant: &Plant) -> Check {
@@ -247,7 +299,11 @@ impl MotionChecker {
         }
         bounds.range.shrink(goals, angle, by);
         let (range, tolerance) = (bounds.range, bounds.tolerance());
-        ensure(range.excess(angle) <= tolerance, || {
+        let excess = range.excess(angle);
+        let comes_back = excess < std::mem::replace(&mut bounds.excess, excess);
+        let is_driven_back = comes_back || range.is_driven_back(angle, load_of(joint, plant));
+        let overruns = now < bounds.overruns_until && is_driven_back;
+        ensure(overruns || excess <= tolerance, || {
             format!(
                 "joint {} moved by itself to {angle} millidegrees with the goal {goal} and torque {torque:?}; \
                  its range is {} to {}, and its tolerance {tolerance}",
@@ -265,6 +321,12 @@ impl MotionChecker {
 fn yield_of(joint: Joint, plant: &Plant) -> i32 {
     let droop = plant.droop(joint).unwrap_or(i32::MAX);
     droop.saturating_add(plant.stopping_distance(joint))
+}
+
+/// The load of a joint in 0.1 %, positive towards greater angles.
+fn load_of(joint: Joint, plant: &Plant) -> i16 {
+    let load = plant.load(joint);
+    if millidegrees(joint, 1_000) > millidegrees(joint, 0) { load } else { -load }
 }
 
 /// The effect of a frame on one servo.

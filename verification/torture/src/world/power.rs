@@ -90,6 +90,7 @@ impl TortureWorld {
 
     /// Drops the controller and the requests that it has not executed.
     pub(super) fn power_down(&mut self, arm: &PoweredArm, servos_too: bool) {
+        self.supply_rule.forget();
         self.counts.power_cuts += 1;
         self.counts.commands += arm.command_checker.count;
         self.counts.engagements += arm.command_checker.engagements;

@@ -60,6 +60,10 @@ pub(crate) struct RegisterModel {
     has_streams: bool,
     /// The last targets in degrees. A point of a stream in the same frame replaces them, but for a joint that is let go.
     coarse_targets: PerJoint<u8>,
+    /// How often the host wrote each target.
+    pub(crate) target_writes: PerJoint<u64>,
+    /// The goals that servos with torque held when the controller started, in degrees. They may become targets (D12).
+    pub(crate) held_targets: PerJoint<Option<u8>>,
     /// The targets that the arm may have set itself (D27, D28).
     pub(crate) own_targets: PerJoint<OwnTarget>,
     /// Which of its possible outcomes the next write has.
@@ -83,6 +87,8 @@ impl RegisterModel {
             targets: PerJoint::all(None),
             has_streams: false,
             coarse_targets: PerJoint::all(0),
+            target_writes: PerJoint::all(0),
+            held_targets: PerJoint::all(None),
             own_targets: PerJoint::all(OwnTarget::Measured),
             choice: 0,
             outcomes: 1,

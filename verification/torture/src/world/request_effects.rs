@@ -65,7 +65,12 @@ impl TortureWorld {
 
     fn apply_request(&mut self, arm: &mut PoweredArm, request: &HostRequest, room: usize) -> RequestEffect {
         let was_servo = arm.model.is_servo();
+        let writes = arm.model.target_writes;
         let effect = arm.model.execute(request, room);
+        for joint in Joint::ALL.into_iter().filter(|joint| arm.model.target_writes[*joint] != writes[*joint])
+        {
+            arm.command_checker.target_written(self.now, joint);
+        }
         if request.is_well_formed() {
             arm.watchdog.heard(self.now);
         }
@@ -95,16 +100,17 @@ impl TortureWorld {
         }
     }
 
-    /// The arm may set these targets itself: a joint is let go, or gives way (D27, D28).
+    /// The arm may set these targets itself: a servo held a goal at the start (D12), a joint gives way (D27), or is let go
+    /// (D28).
     fn allow_own_targets(&self, arm: &mut PoweredArm) {
         for joint in Joint::ALL {
             let before = arm.model.get(TARGET_POSITION.of(joint));
+            let offset = arm.model.offset(joint);
+            let degrees = |counts| angle_from_counts(joint, counts, offset).nearest_degree();
             let gives_way = self.bus.truth(joint).may_give_way(self.now);
             arm.model.own_targets[joint] = match arm.command_checker.goal(joint) {
                 _ if !arm.model.is_servo() => OwnTarget::Measured,
                 Some(counts) if gives_way => {
-                    let offset = arm.model.offset(joint);
-                    let degrees = |counts| angle_from_counts(joint, counts, offset).nearest_degree();
                     let (goal, present) = (degrees(counts), degrees(self.bus.position(joint)));
                     let (low, high) = (goal.min(present).saturating_sub(2), goal.max(present) + 2);
                     // A set-point may lie beyond the end of the servo's range.
@@ -114,6 +120,7 @@ impl TortureWorld {
                 _ if self.bus.may_be_let_go(joint, self.now) => OwnTarget::Before(before),
                 _ => OwnTarget::Measured,
             };
+            arm.model.held_targets[joint] = arm.command_checker.held_goal(joint).map(degrees);
         }
     }
 
@@ -154,7 +161,7 @@ impl TortureWorld {
     }
 
     /// Tells the checkers about an accepted write.
-    fn record_write(&self, arm: &mut PoweredArm, request: &HostRequest, effect: RequestEffect) {
+    fn record_write(&mut self, arm: &mut PoweredArm, request: &HostRequest, effect: RequestEffect) {
         let (HostRequest::Write { address, values } | HostRequest::WriteMap21 { address, values }) = request
         else {
             return;
@@ -179,6 +186,8 @@ impl TortureWorld {
         }
         if includes(MOTOR_STATE.address) {
             arm.status_checker.state_written(self.now);
+            arm.command_checker.state_written();
+            self.supply_rule.forget();
         }
         if includes_any(&SPEED) {
             arm.command_checker.speed_written(&arm.model);

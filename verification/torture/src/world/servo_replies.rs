@@ -6,7 +6,7 @@ use motion_core::servo_bus::frame::Decoder;
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
-use super::status_reply::{measurements, torque_switch};
+use super::status_reply::{goal, measurements, torque_switch};
 use crate::per_joint::PerJoint;
 
 /// Start-up ends if each servo has sent this many replies.
@@ -37,6 +37,8 @@ struct Known {
     is_read_off: bool,
     /// When its torque was read after that.
     trusted_at: Instant,
+    /// The goal that it held with torque when its torque was read last, in counts.
+    held_goal: Option<u16>,
     /// In counts.
     position: Option<u16>,
 }
@@ -96,6 +98,11 @@ impl ServoReplies {
         self.servos[joint].position
     }
 
+    /// The goal that the servo held with torque when its torque was read last, in counts.
+    pub(super) fn held_goal(&self, joint: Joint) -> Option<u16> {
+        self.servos[joint].held_goal
+    }
+
     /// True if a driven servo left a question unanswered, and its torque was not read since then.
     pub(super) fn is_doubtful(&self, joint: Joint) -> bool {
         self.servos[joint].is_doubtful
@@ -151,6 +158,7 @@ impl Known {
             }
             self.is_read_on = code == on;
             self.is_read_off = code != on;
+            self.held_goal = goal(params).filter(|_| code == on);
         }
     }
 }

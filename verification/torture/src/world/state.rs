@@ -11,11 +11,13 @@ use super::disturbed_bus::DisturbedBus;
 use super::event_log::EventLog;
 use super::host_link::{ArmToHost, HostToArm};
 use super::host_request::HostRequest;
+use super::outside_injection::Ending;
 use super::parameters::WorldParameters;
 use super::register_model::{RegisterModel, RequestEffect};
 use super::request_generator::RequestGenerator;
 use super::settings_storage::SettingsStorage;
 use super::status_checker::{StatusChecker, StatusContext};
+use super::supply_rule::SupplyRule;
 use super::watchdog_model::WatchdogModel;
 use crate::scenario::Scenario;
 use crate::seeded_rng::SeededRng;
@@ -39,6 +41,9 @@ pub struct TortureWorld {
     pub(super) stalled_until: Instant,
     pub(super) next_fault_at: Instant,
     pub(super) hand: Option<Hand>,
+    /// What ends later.
+    pub(super) endings: Vec<(Instant, Ending)>,
+    pub(super) supply_rule: SupplyRule,
     pub(super) log: EventLog,
     pub(super) counts: WorldCounts,
 }

@@ -35,6 +35,8 @@ const MOVE_MARGIN: Duration = Duration::from_millis(1_000);
 const MAX_STREAM_MILLIS: u64 = 2_020;
 /// The time of a move over the whole range at the lowest speed, 1.9 degrees/s.
 const LONGEST_MOVE: Duration = Duration::from_millis(125_000);
+/// A servo that was too hot gets torque again when it is 5 degrees cooler (D28). Its limit is 80 degrees Celsius.
+const COOL: u8 = 75;
 /// The longest time that the valve may be open (D20).
 const MAX_VALVE_TIME: Duration = Duration::from_millis(501);
 
@@ -104,6 +106,11 @@ impl StatusChecker {
             reports: ReportChecker::new(now),
             valve_open_since: None,
         }
+    }
+
+    /// True if the arm has run without a stall for so long that it knows its servos.
+    pub(super) fn is_settled(&self, now: Instant) -> bool {
+        now - self.unsettled_at > DETECTION_TIME
     }
 
     /// The shell stalls until `now`, for a time of `by`.
@@ -248,8 +255,10 @@ impl StatusChecker {
             context.model.is_servo() && self.settled_time(context.now, self.state_at) > DETECTION_TIME;
         let is_on = context.command_checker.is_on(joint);
         let may_wait = context.bus.truth(joint).may_wait_for_torque(context.now)
+            || context.command_checker.is_exhausted(joint)
             || context.bus.may_be_misread(joint, context.now)
             || context.bus.last_status(joint).alarms != 0
+            || context.bus.last_status(joint).celsius > COOL
             || context.model.get(PROTECTION) == 0;
         ensure(is_on || may_wait || !is_due, || {
             format!("servo {} responds and has no torque", joint.number())

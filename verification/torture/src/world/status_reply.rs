@@ -54,6 +54,12 @@ pub(super) fn torque_switch(params: &[u8]) -> Option<u8> {
     params.first().copied().filter(|_| has_torque_switch(params))
 }
 
+/// The goal in the parameters of a status reply in counts, if the question asked for the torque switch.
+pub(super) fn goal(params: &[u8]) -> Option<u16> {
+    let &[_, _, high, low, ..] = params else { return None };
+    has_torque_switch(params).then_some(u16::from_be_bytes([high, low]))
+}
+
 fn has_torque_switch(params: &[u8]) -> bool {
     params.len() >= TO_MEASUREMENTS + usize::from(Reading::REGISTERS)
 }

@@ -69,8 +69,8 @@ impl RegisterModel {
         })
     }
 
-    /// A target that differs from the model is the measured position (D12, D13), or where the joint gave way (D27). The
-    /// model takes it over.
+    /// A target that differs from the model is the measured position (D12, D13), the goal that a servo held when the
+    /// controller started (D12), or where the joint gave way (D27). The model takes it over.
     pub(crate) fn compare_targets(&mut self, registers: &RegisterFile) -> Check {
         for joint in Joint::ALL {
             let (at, found) = (TARGET_POSITION.of(joint), registers.get(TARGET_POSITION.of(joint)));
@@ -83,7 +83,8 @@ impl RegisterModel {
             let present = registers.get(PRESENT_POSITION.of(joint));
             let own = self.own_targets[joint];
             let is_own = own.may_be(found) || own.is_without_streams() && found == self.coarse_targets[joint];
-            ensure(found == present || is_own, || {
+            let is_held = self.held_targets[joint] == Some(found);
+            ensure(found == present || is_held || is_own, || {
                 let wanted = self.get(at);
                 let number = joint.number();
                 format!("target {number} is {found}: the host wrote {wanted}, and the joint was at {present}")

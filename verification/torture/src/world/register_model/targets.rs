@@ -39,6 +39,7 @@ impl RegisterModel {
     pub(super) fn set_target(&mut self, joint: Joint, target: MicroDegrees) {
         self.set(TARGET_POSITION.of(joint), target.nearest_degree());
         self.targets[joint] = Some(target);
+        self.target_writes[joint] += 1;
         self.has_host_target[joint] = self.is_servo();
     }
 

@@ -1,0 +1,50 @@
+//! After the supply of the servos was lost for long, the arm enters state 0 by itself (D29).
+
+use protocol_core::registers::RegisterFile;
+use protocol_core::time::{Duration, Instant};
+
+use super::protection_model::SUPPLY_LOST;
+use crate::violation::{Check, ensure};
+
+/// The arm enters state 0 after a stop of this time. It may do so from a second on.
+const SURELY_LOST: Duration = Duration::from_millis(1_500);
+/// The servos start in 0.2 s. The arm notices that they restarted within this time, also on a bus with long timeouts.
+const NOTICE_TIME: Duration = Duration::from_millis(2_500);
+
+/// The present emergency stop, while nothing else disturbs the arm.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SupplyRule {
+    from: Option<Instant>,
+    /// When the arm has to be in state 0.
+    due: Option<Instant>,
+}
+
+impl SupplyRule {
+    /// The supply of an arm whose joints are all driven is cut.
+    pub(super) fn stop_begins(&mut self, now: Instant) {
+        *self = Self { from: Some(now), due: None };
+    }
+
+    /// The supply is back.
+    pub(super) fn stop_ends(&mut self, now: Instant) {
+        let was_long = self.from.is_some_and(|from| now - from >= SURELY_LOST);
+        self.due = was_long.then(|| now + NOTICE_TIME);
+    }
+
+    /// Something else disturbs the arm, or register 29 was written.
+    pub(super) fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Checks the arm. Returns whether it had to be in state 0.
+    pub(super) fn check(&mut self, now: Instant, registers: &RegisterFile) -> Check<bool> {
+        let is_due = self.due.is_some_and(|due| now >= due);
+        ensure(!is_due || registers.get(SUPPLY_LOST) == 1, || {
+            "the supply was lost and came back, and the arm did not enter state 0".to_owned()
+        })?;
+        if is_due {
+            self.forget();
+        }
+        Ok(is_due)
+    }
+}
