@@ -2,7 +2,8 @@
 
 use super::*;
 use protocol_core::registers::map::{
-    FINE_POSITION, FINE_TARGET, LOAD, MEASURED_JOINTS, MOVING_JOINTS, PRESENT_POSITION, TARGET_POSITION,
+    EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, LOAD, MEASURED_JOINTS, MOVING_JOINTS, PRESENT_POSITION,
+    PROTECTION_VERSION, STATUS_VERSION, TARGET_POSITION,
 };
 
 /// Registers of an arm of this firmware that stands in the standard pose.
