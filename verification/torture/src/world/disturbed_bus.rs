@@ -187,7 +187,7 @@ impl DisturbedBus {
             self.truths = PerJoint::default();
         }
         for joint in Joint::ALL {
-            self.check_push(now, joint, limits[joint])?;
+            self.check_push(now, joint, limits[joint].filter(|_| is_guarded))?;
         }
         for joint in Joint::ALL.into_iter().filter(|_| is_servo) {
             let (torque, push) = (self.plant.torque(joint), self.plant.motor_torque(joint));
@@ -216,8 +216,7 @@ impl DisturbedBus {
             |joint| matches!(self.availability(joint), Availability::Responding(since) if now >= since);
         // Each silent servo costs a timeout: with long ones the others are read a few times a second.
         let is_read_often = self.timely_limit <= SHORT || Joint::ALL.into_iter().all(responds);
-        let can_limit =
-            is_read_often && responds(joint) && self.has_torque(joint) && self.is_undisturbed(now);
+        let can_limit = is_read_often && responds(joint) && self.is_undisturbed(now);
         let push = Push {
             permille: self.plant.motor_torque(joint),
             speed: self.plant.load(joint).saturating_sub(self.plant.motor_torque(joint)),

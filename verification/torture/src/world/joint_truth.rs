@@ -24,7 +24,7 @@ pub(super) struct JointTruth {
     /// The last time without torque after a loss.
     off_at: Instant,
     /// The last alarm. A joint that nothing moves counts as held as long as its servo has an alarm (D28).
-    alarm_at: Instant,
+    alarm_at: Option<Instant>,
     /// The last push over the limit.
     pushed_at: Option<Instant>,
 }
@@ -32,7 +32,7 @@ pub(super) struct JointTruth {
 impl JointTruth {
     /// The servo has an alarm.
     pub(super) fn has_alarm(&mut self, now: Instant) {
-        self.alarm_at = now;
+        self.alarm_at = Some(now);
     }
 
     /// Takes the torque of the servo, and its push and its limit in 0.1 %.
@@ -57,12 +57,13 @@ impl JointTruth {
 
     /// True if the controller need not have given torque again by now (D28): the joint was let go a moment ago.
     pub(super) fn may_wait_for_torque(&self, now: Instant) -> bool {
-        self.lost_at.is_some_and(|at| now - at.max(self.alarm_at) < ENGAGE_TIME)
+        self.lost_at.max(self.alarm_at).is_some_and(|at| now - at < ENGAGE_TIME)
     }
 
     /// True if the controller may take the joint for let go (D28).
     pub(super) fn may_be_let_go(&self, now: Instant) -> bool {
-        self.lost_at.is_some() && now - self.off_at < NOTICE_TIME
+        let has_alarm = self.alarm_at.is_some_and(|at| now - at < NOTICE_TIME);
+        has_alarm || self.lost_at.is_some() && now - self.off_at < NOTICE_TIME
     }
 
     /// True if the set-point may give way, or gave way a moment ago (D27).

@@ -165,9 +165,7 @@ impl TortureWorld {
     /// The limits of the pushes in 0.1 %, as far as the controller keeps them.
     fn push_limits(&self) -> PerJoint<Option<i16>> {
         match &self.power {
-            PowerState::On(arm) if self.now >= self.stalled_until => {
-                PerJoint(Joint::ALL.map(|joint| arm.model.push_limit(joint)))
-            }
+            PowerState::On(arm) => PerJoint(Joint::ALL.map(|joint| arm.model.push_limit(joint))),
             _ => PerJoint::all(None),
         }
     }

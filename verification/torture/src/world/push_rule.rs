@@ -1,7 +1,7 @@
 //! No servo's own overload protection ever acts while the controller limits its push, and no push lasts (D27).
 //!
-//! The rule binds while the controller can limit: the servo responds and has torque, the bus is undisturbed, the shell
-//! runs, and the limit is one up to which D27 holds.
+//! The rule binds while the controller can limit: the servo responds, the bus is undisturbed, the shell runs, and the limit
+//! is one up to which D27 holds.
 
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
@@ -51,16 +51,16 @@ impl PushRule {
 
     /// Checks the joint.
     pub(super) fn check(&mut self, now: Instant, joint: Joint, push: Push) -> Check {
+        let limit = push.limit.filter(|limit| *limit <= HIGHEST_LIMIT);
+        if limit.is_none() {
+            self.unable_at = now;
+        }
         let has_tripped =
             push.is_overloaded && !std::mem::replace(&mut self.was_overloaded, push.is_overloaded);
         let is_able_for = now - self.unable_at;
         ensure(!has_tripped || is_able_for < ABLE_FOR, || {
             format!("the servo of joint {} protects itself by switching itself off", joint.number())
         })?;
-        let limit = push.limit.filter(|limit| *limit <= HIGHEST_LIMIT);
-        if limit.is_none() {
-            self.unable_at = now;
-        }
         let gives_way = push.speed.signum() == -push.permille.signum() && push.speed.abs() > GIVES_WAY;
         if gives_way || limit.is_none_or(|limit| push.permille.saturating_abs() <= limit + TOLERANCE) {
             self.low_at = now;

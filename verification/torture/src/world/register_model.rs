@@ -58,8 +58,8 @@ pub(crate) struct RegisterModel {
     /// The targets as the host wrote them, while no measured position can have replaced them.
     pub(crate) targets: PerJoint<Option<MicroDegrees>>,
     has_streams: bool,
-    /// The last targets in degrees. A point of a stream in the same frame replaces them, but for a joint that is let go.
-    coarse_targets: PerJoint<u8>,
+    /// The last targets in degrees that were no points of a stream: a joint that is let go takes these alone (D28).
+    firm_targets: PerJoint<u8>,
     /// How often the host wrote each target.
     pub(crate) target_writes: PerJoint<u64>,
     /// The goals that servos with torque held when the controller started, in degrees. They may become targets (D12).
@@ -86,7 +86,7 @@ impl RegisterModel {
             has_biased_offsets: false,
             targets: PerJoint::all(None),
             has_streams: false,
-            coarse_targets: PerJoint::all(0),
+            firm_targets: PerJoint::all(0),
             target_writes: PerJoint::all(0),
             held_targets: PerJoint::all(None),
             own_targets: PerJoint::all(OwnTarget::Measured),
@@ -283,7 +283,9 @@ impl RegisterModel {
     /// Sets the targets from inverse kinematics.
     fn aim(&mut self, reached: &PerJoint<Option<MicroDegrees>>) {
         for (joint, target) in Joint::ALL.into_iter().zip(reached.0) {
-            target.into_iter().for_each(|target| self.set_target(joint, target));
+            let Some(target) = target else { continue };
+            self.set_target(joint, target);
+            self.firm_targets[joint] = target.nearest_degree();
         }
     }
 
@@ -302,12 +304,17 @@ impl RegisterModel {
         for (at, value) in items {
             if let Some(joint) = TARGET_POSITION.joint_at(*at) {
                 self.set_target(joint, MicroDegrees::from_degrees(*value));
-                self.coarse_targets[joint] = *value;
+                self.firm_targets[joint] = *value;
             }
         }
         self.has_streams |= items.iter().any(|(at, value)| matches!(at, 184 | 185) && *value != 0);
+        let is_stream = [184, 185].into_iter().any(|at| self.get(at) != 0);
         for (joint, hundredths) in extended_model::fine_targets(items) {
-            self.set_target(joint, extended_model::angle(hundredths));
+            let target = extended_model::angle(hundredths);
+            self.set_target(joint, target);
+            if !is_stream {
+                self.firm_targets[joint] = target.nearest_degree();
+            }
         }
     }
 

@@ -82,7 +82,7 @@ impl RegisterModel {
             }
             let present = registers.get(PRESENT_POSITION.of(joint));
             let own = self.own_targets[joint];
-            let is_own = own.may_be(found) || own.is_without_streams() && found == self.coarse_targets[joint];
+            let is_own = own.may_be(found) || own.is_without_streams() && found == self.firm_targets[joint];
             let is_held = self.held_targets[joint] == Some(found);
             ensure(found == present || is_held || is_own, || {
                 let wanted = self.get(at);

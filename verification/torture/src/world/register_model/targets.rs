@@ -20,9 +20,9 @@ pub(crate) enum OwnTarget {
 }
 
 impl OwnTarget {
-    /// True if points of a stream may not be taken.
+    /// True if points of a stream may not be taken: a joint that gives way may also be let go.
     pub(crate) const fn is_without_streams(self) -> bool {
-        matches!(self, Self::Before(_))
+        !matches!(self, Self::Measured)
     }
 
     pub(crate) fn may_be(self, degrees: u8) -> bool {
