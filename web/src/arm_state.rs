@@ -6,7 +6,7 @@ use sevenbot::map::{
     PRESENT_POSITION, SERVO_TEMPERATURE, SPEED, STATUS_VERSION, SUPPLY_VOLTAGE, TARGET_POSITION, TIME,
     VELOCITY, motor_state,
 };
-use sevenbot::{FineAngle, Health, Joint, MoveTime, Problem, Snapshot, Speed};
+use sevenbot::{FineAngle, Health, Joint, MoveTime, Problem, ProblemKind, Snapshot, Speed};
 
 /// A joint is stalled at more than this distance from its target, in degrees. Under its load a servo that works is nearer.
 const STALLED_DISTANCE: f32 = 3.0;
@@ -32,8 +32,9 @@ pub struct ArmState {
     pub missing: u8,
     /// Joints whose set-point moves.
     pub moving: u8,
-    /// Joints 1 to 6 that rest away from their target: something holds them, or their servo gives no force. Joint 7 is left out,
-    /// because a gripper that holds something rests away from its target, too. 0 from an arm without the extended block.
+    /// Joints that something holds, or whose servo gives no force: those that the arm reports, and those of 1 to 6 that rest away
+    /// from their target. A gripper that holds something rests away from its target, too. 0 from an arm without the extended
+    /// block.
     pub stalled: u8,
     /// What needs attention, the most important first.
     pub problems: Vec<Problem>,
@@ -78,12 +79,19 @@ impl ArmState {
             celsius: known(status(&SERVO_TEMPERATURE)),
         };
         if is_fine && has_status && state.motor_state == motor_state::SERVO {
-            state.stalled = state.stalled();
+            state.stalled = state.reported_stalled() | state.resting_away();
         }
         state
     }
 
-    fn stalled(&self) -> u8 {
+    fn reported_stalled(&self) -> u8 {
+        let is_stalled =
+            |problem: &&Problem| matches!(problem.kind, ProblemKind::Blocked | ProblemKind::LetGo);
+        let joints = self.problems.iter().filter(is_stalled).filter_map(|problem| problem.joint);
+        joints.fold(0, |bits, joint| bits | joint.bit())
+    }
+
+    fn resting_away(&self) -> u8 {
         let joints = (0..6).zip(self.measured).zip(self.targets).zip(self.velocities);
         let stalled = joints.filter(|(((index, measured), target), velocity)| {
             let distance = measured.map_or(0.0, |measured| (measured - target).abs());

@@ -14,7 +14,7 @@ use protocol_core::request::{Reply, Request};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::deframer::gap;
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
-use sevenbot::map::{DEVICE_CODE, EXTENDED_VERSION, FINE_TARGET, SERVO_TEMPERATURE, STATUS_VERSION};
+use sevenbot::map::{DEVICE_CODE, FINE_TARGET, PROTECTION_VERSION, SERVO_TEMPERATURE, STATUS_VERSION};
 use sevenbot::traffic::Traffic;
 use sevenbot::{Snapshot, Span};
 
@@ -33,7 +33,7 @@ const BAUD: u32 = 115_200;
 /// What each round reads.
 const ROUND: [Span; 3] = [
     Span::between(&DEVICE_CODE, &sevenbot::map::PRESENT_POSITION),
-    Span::between(&FINE_TARGET, &EXTENDED_VERSION),
+    Span::between(&FINE_TARGET, &PROTECTION_VERSION),
     Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE),
 ];
 

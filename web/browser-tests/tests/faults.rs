@@ -28,7 +28,7 @@ fn each_servo_that_does_not_answer_loses_its_colour_and_is_named() {
         let whole = working(&scene(&mut page));
         page.choose("#fault-joint", &joint.to_string());
         page.click("[data-action=break]");
-        page.wait_for_text("#state", &format!("check their cables: joint {joint}"));
+        page.wait_for_text("#state", &format!("oint {joint} does not answer"));
         page.wait_for_text(&format!("#angle-{joint}"), "no answer");
         let broken = working(&scene(&mut page));
         assert!(broken + 40 < whole, "joint {joint}: {broken} of {whole} pixels");
@@ -51,7 +51,7 @@ fn each_joint_that_is_stuck_has_the_colour_of_a_fault_and_is_named() {
         assert_eq!(faulty(&scene(&mut page)), 0);
         page.focus(&format!("#joint-{joint}"));
         page.keys("ArrowRight", 20);
-        page.wait_for_text("#state", &format!("then hold: joint {joint}"));
+        page.wait_for_text("#state", &format!("oint {joint} is blocked"));
         let picture = scene(&mut page);
         let (red, others) = (faulty(&picture), working(&picture));
         assert!(red > 40 && others > 500, "joint {joint}: {red} pixels, {others} of joints that work");

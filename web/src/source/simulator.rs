@@ -73,6 +73,7 @@ mod tests {
     use crate::client::Client;
     use crate::movement::Player;
     use crate::stop::StopProgress;
+    use sevenbot::{Joint, Problem, ProblemKind};
 
     /// A client and an arm that was switched on a second ago.
     fn connected() -> (Client, SimulatedSource) {
@@ -151,14 +152,14 @@ mod tests {
             let (address, values) = target_frame(client.registers(), joint, degrees).expect("a target");
             client.write(arm.now(), address, &values);
         }
-        let mut overloaded = 0;
         for _ in 0..240 {
             pass(&mut client, &mut arm, 1);
             let state = client.state();
-            assert!(matches!(state.stalled, 0 | 0b100), "{state:?}");
-            overloaded |= state.faults;
+            assert!(matches!(state.stalled, 0 | 0b100) && state.faults == 0, "{state:?}");
         }
-        assert_eq!((client.state().stalled, overloaded), (0b100, sevenbot::map::fault::SERVO_BUS));
+        let state = client.state();
+        let blocked = Problem { kind: ProblemKind::Blocked, joint: Joint::new(3) };
+        assert_eq!((state.stalled, &state.problems), (0b100, &vec![blocked]));
     }
 
     #[test]
