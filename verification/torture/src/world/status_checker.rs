@@ -5,6 +5,7 @@
 
 use motion_core::Vacuum;
 use motion_core::calibration::angle_from_counts;
+use motion_core::servo_bus::frame::error;
 use protocol_core::registers::map::{
     FAULTS, FRAMES_CORRUPTED, MISSING_SERVOS, MOVING_JOINTS, OFFSET, PRESENT_POSITION, SERVO_BUS_ERRORS,
     SERVO_TEMPERATURE, SPEED, SUPPLY_VOLTAGE, TIME, fault, limit,
@@ -54,6 +55,8 @@ pub(super) struct StatusChecker {
     settled_by: PerJoint<Instant>,
     /// The last position of each joint, and the time of its last change.
     last_moves: PerJoint<(u16, Instant)>,
+    /// The last time at which a joint that is let go had no latched overload.
+    unlatched_at: PerJoint<Instant>,
     missing: u8,
     corrupted: u16,
     bus_errors: u16,
@@ -98,6 +101,7 @@ impl StatusChecker {
             state_at: now,
             settled_by: PerJoint::all(now),
             last_moves: PerJoint::all((0, now)),
+            unlatched_at: PerJoint::all(now),
             missing: 0,
             corrupted: 0,
             bus_errors: 0,
@@ -197,6 +201,7 @@ impl StatusChecker {
             }
             _ => {}
         }
+        self.check_latch(joint, context)?;
         // A joint of the linkage may wait for the other one (D25), even for one whose servo is missing.
         let may_wait = context.model.get(LIMITS) & limit::LINKAGE != 0 && matches!(joint.number(), 2 | 3);
         if may_wait {
@@ -246,6 +251,22 @@ impl StatusChecker {
         let shown = context.registers.get(PRESENT_POSITION.of(joint));
         ensure(shown.abs_diff(angle) == 0, || {
             format!("joint {} is at {angle} degrees, and its register holds {shown}", joint.number())
+        })
+    }
+
+    /// A joint that is let go gets torque-off, which ends a latched overload (D28).
+    fn check_latch(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
+        // Register 196 is as old as its last read. A joint that gets no goals beside others that do is let go.
+        let is_let_go = context.now - context.command_checker.paused_at[joint] < CHECK_PERIOD;
+        let is_due = is_let_go
+            && context.model.is_servo()
+            && context.model.get(PROTECTION) == 1
+            && self.is_responding(joint, context);
+        if !is_due || context.bus.last_status(joint).alarms & error::OVERLOAD == 0 {
+            self.unlatched_at[joint] = context.now;
+        }
+        ensure(context.now - self.unlatched_at[joint] < DETECTION_TIME, || {
+            format!("joint {} is let go, and its overload stays latched", joint.number())
         })
     }
 
