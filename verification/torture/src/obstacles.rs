@@ -97,7 +97,7 @@ pub struct WallResult {
     pub lasting: u16,
     /// The servo's own overload protection has switched it off.
     pub has_tripped: bool,
-    /// How far the joint moved after the wall was taken away, in thousandths of a degree.
+    /// How far from the wall the joint was after the wall was taken away, in thousandths of a degree.
     pub sag: u32,
 }
 
@@ -129,11 +129,11 @@ pub fn push_against_wall(joint: Joint, case: &WallCase, is_protected: bool) -> W
     let average = |window: &[u16]| window.iter().map(|&push| u32::from(push)).sum::<u32>() / 100;
     let averages = lasting.windows(AVERAGED_MS).map(average);
     result.lasting = u16::try_from(averages.max().unwrap_or(0)).unwrap_or(u16::MAX);
-    let before = arm.angle(joint);
     arm.world.plant_mut().set_wall(joint, None);
     for _ in 0..AFTER_MS {
         arm.run(1);
-        result.sag = result.sag.max(arm.angle(joint).abs_diff(before));
+        // From the wall: a joint whose servo switched itself off may have fallen before the wall leaves.
+        result.sag = result.sag.max(arm.angle(joint).abs_diff(wall));
     }
     result
 }

@@ -1,4 +1,4 @@
-//! The register file against a model with its own tables, written from `docs/protocol.md`, sections 3 and 8, alone.
+//! The register file against a model with its own tables, written from `docs/protocol.md`, sections 3, 8, 9 and 10, alone.
 
 use arbitrary::Arbitrary;
 use protocol_core::registers::map::{FRAMES_ACCEPTED, FRAMES_CORRUPTED};
@@ -160,7 +160,8 @@ impl TableModel {
             values[place..place + 2].copy_from_slice(&target.to_le_bytes());
         }
         values[142..156].copy_from_slice(&[0xFF; 14]);
-        values[191] = 1;
+        values[191..195].copy_from_slice(&[1, 1, 70, 40]);
+        values[199] = 1;
         values[240] = 1;
         let offsets_in = if values[20] % 2 == 1 { Map::V21 } else { Map::V22 };
         Self { values, offsets_in }
@@ -170,7 +171,7 @@ impl TableModel {
         match (address, map) {
             (11..=19, _) | (20, Map::V21) => self.values[28] == 0,
             (28..=52, _)
-            | (53 | 128..=141 | 184..=189, Map::V22)
+            | (53 | 128..=141 | 184..=189 | 192..=194, Map::V22)
             | (54..=66 | 68..=73 | 82 | 90, Map::V21) => true,
             _ => false,
         }
@@ -248,6 +249,9 @@ fn is_in_range(map: Map, address: u8, value: u8) -> bool {
         (_, 188) => 3,
         (_, 32..=45 | 82 | 90) => 100,
         (_, 46..=52) => 180,
+        (_, 192) => 1,
+        (_, 193) => return (20..=100).contains(&value),
+        (_, 194) => return (10..=100).contains(&value),
         (_, 53) => 50,
         _ => 255,
     };
