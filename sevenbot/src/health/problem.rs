@@ -18,6 +18,8 @@ pub enum ProblemKind {
     NoServoAnswers,
     /// The joint's servo does not answer.
     NoAnswer,
+    /// A servo reports that its supply is too low or too high.
+    Voltage,
     /// The joint's servo holds no torque although it should (D28).
     LetGo,
     /// An obstacle keeps the joint from its target (D27).
@@ -26,8 +28,6 @@ pub enum ProblemKind {
     Overload,
     /// A servo reports that it is too hot.
     Overheat,
-    /// A servo reports that its supply is too low or too high.
-    Voltage,
     /// A servo reports an error, and the firmware does not tell which.
     ServoBus,
     /// The watchdog of the host acted (D24).
@@ -88,6 +88,12 @@ const TABLE: [ProblemTexts; 16] = [
         "check the plugs and the cable of its servo; keep clear, the servo may still hold or drive the joint",
     ),
     ProblemTexts::of(
+        ProblemKind::Voltage,
+        "wrong voltage",
+        "the supply of a servo is too low or too high",
+        "check the servos' supply: 6 to 8.4 V under load, and its plugs and wires",
+    ),
+    ProblemTexts::of(
         ProblemKind::LetGo,
         "let go",
         "let go: its servo holds no torque",
@@ -112,12 +118,6 @@ const TABLE: [ProblemTexts; 16] = [
         "a servo is too hot",
         "let it cool, which takes minutes: less load, a pose that needs less force, or the motors off with the arm \
          supported",
-    ),
-    ProblemTexts::of(
-        ProblemKind::Voltage,
-        "wrong voltage",
-        "the supply of a servo is too low or too high",
-        "check the servos' supply: 6 to 8.4 V under load, and its plugs and wires",
     ),
     ProblemTexts::of(
         ProblemKind::ServoBus,
@@ -188,11 +188,11 @@ impl ProblemKind {
         Self::SupplyLost,
         Self::NoServoAnswers,
         Self::NoAnswer,
+        Self::Voltage,
         Self::LetGo,
         Self::Blocked,
         Self::Overload,
         Self::Overheat,
-        Self::Voltage,
         Self::ServoBus,
         Self::HostSilent,
         Self::SettingsStorage,

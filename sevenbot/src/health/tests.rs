@@ -66,7 +66,7 @@ fn d30_each_flag_of_a_joint_is_a_problem_with_the_joint_named() {
 fn d30_alarms_and_a_lost_supply_are_problems_of_the_arm() {
     let alarms = with(SERVO_ALARMS.address, &[0b10_0101]);
     let kinds: Vec<_> = alarms.problems().iter().map(|problem| problem.kind).collect();
-    assert_eq!(kinds, [ProblemKind::Overload, ProblemKind::Overheat, ProblemKind::Voltage]);
+    assert_eq!(kinds, [ProblemKind::Voltage, ProblemKind::Overload, ProblemKind::Overheat]);
     let lost = with(SUPPLY_LOST.address, &[1]);
     assert_eq!(lost.problems(), [Problem::of_arm(ProblemKind::SupplyLost)]);
 }
