@@ -51,6 +51,8 @@ pub(super) struct CommandChecker {
     paused: PerJoint<Option<ReachableRange>>,
     /// When a joint last got no goal beside others that did.
     pub(super) paused_at: PerJoint<Instant>,
+    /// When a joint last got a goal.
+    pub(super) goal_at: PerJoint<Instant>,
     /// The last goal of a joint whose servo was lost, and its tolerance in counts. A found servo may continue from that
     /// goal (D12). The tolerance grows when offsets change.
     kept_goals: PerJoint<Option<(u16, u16)>>,
@@ -91,6 +93,7 @@ impl CommandChecker {
             ranges: PerJoint::all(None),
             paused: PerJoint::all(None),
             paused_at: PerJoint::all(now),
+            goal_at: PerJoint::all(now),
             kept_goals: PerJoint::all(None),
             is_first: PerJoint::all(true),
             is_released: PerJoint::all(false),
@@ -208,11 +211,11 @@ impl CommandChecker {
         let is_whole = usize::from(*length) == body.len() + 1 && *sum == !covered;
         match body {
             _ if !is_whole => Err(invalid_frame(frame)),
-            [2, 56, 8..=11] | [2, 40, 24..=27] if *id < 7 => {
+            [2, 56, count @ 8..=11] | [2, 40, count @ 24..=27] if *id < 7 => {
                 let joint = Joint::from_index(*id).ok_or_else(|| invalid_frame(frame))?;
                 let is_driven =
                     (self.is_on[joint] && !self.is_released[joint]) || self.kept_goals[joint].is_some();
-                self.replies.asked(context.now, joint, is_driven);
+                self.replies.asked(context.now, joint, *count, is_driven);
                 Ok(())
             }
             _ if self.is_starting(context.now) => {
@@ -362,6 +365,7 @@ impl CommandChecker {
                 format!("time and speed of joint {}: {rest:?}", joint.number())
             })?;
             has_goal[joint] = true;
+            self.goal_at[joint] = context.now;
             self.check_responding(joint, "is driven", context)?;
             self.check_goal(joint, u16::from_be_bytes([high, low]), context)?;
         }

@@ -25,6 +25,8 @@ struct Known {
     /// Reads since the last reply.
     unanswered: u8,
     asked_at: Instant,
+    /// The registers of the last read. A late reply to an earlier read may have another length.
+    asked_count: u8,
     /// The first read of the present silence.
     silent_since: Option<Instant>,
     /// The start and the end of the last silence.
@@ -58,7 +60,7 @@ impl ServoReplies {
     }
 
     /// The controller reads a servo.
-    pub(super) fn asked(&mut self, now: Instant, joint: Joint, is_driven: bool) {
+    pub(super) fn asked(&mut self, now: Instant, joint: Joint, count: u8, is_driven: bool) {
         let servo = &mut self.servos[joint];
         if servo.unanswered > 0 {
             servo.silent_since.get_or_insert(servo.asked_at);
@@ -67,6 +69,7 @@ impl ServoReplies {
         }
         servo.unanswered = servo.unanswered.saturating_add(1);
         servo.asked_at = now;
+        servo.asked_count = count;
         // The controller does the same: bytes from before a read are not its reply.
         self.decoder.clear();
     }
@@ -78,6 +81,9 @@ impl ServoReplies {
             while let Some(heard) = self.decoder.pull() {
                 let Some(frame) = heard.ok().filter(|frame| frame.params.len() >= READING) else { continue };
                 let Some(joint) = Joint::from_index(frame.id) else { continue };
+                if frame.params.len() != usize::from(self.servos[joint].asked_count) {
+                    continue;
+                }
                 self.servos[joint].answered(now, frame.params, self.codes.code(Torque::On));
             }
         }

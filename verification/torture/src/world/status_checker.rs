@@ -256,8 +256,8 @@ impl StatusChecker {
 
     /// A joint that is let go gets torque-off, which ends a latched overload (D28).
     fn check_latch(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
-        // Register 196 is as old as its last read. A joint that gets no goals beside others that do is let go.
-        let is_let_go = context.now - context.command_checker.paused_at[joint] < CHECK_PERIOD;
+        // Register 196 is as old as its last read. A joint that gets no goals at all is let go.
+        let is_let_go = context.now - context.command_checker.goal_at[joint] > CHECK_PERIOD;
         let is_due = is_let_go
             && context.model.is_servo()
             && context.model.get(PROTECTION) == 1
