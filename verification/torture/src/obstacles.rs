@@ -91,9 +91,9 @@ impl Arm {
 /// What became of a joint at a wall.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WallResult {
-    /// The greatest push, and the greatest average push after [`LASTING_AFTER_MS`], in 0.1 %.
+    /// The greatest push, in 0.1 %.
     pub peak: u16,
-    /// See `peak`.
+    /// The greatest average push, from 400 ms after the joint came to the wall, in 0.1 %.
     pub lasting: u16,
     /// The servo's own overload protection has switched it off.
     pub has_tripped: bool,

@@ -70,7 +70,7 @@ fn a_weak_supply_is_said_and_shown() {
     let mut page = viewed.open();
     assert_eq!(faulty(&scene(&mut page)), 0);
     page.click("[data-action=fault]");
-    page.wait_for_text("#state", "a wrong supply");
+    page.wait_for_text("#state", "The supply of a servo is too low or too high");
     // Load lowers it below the 4.8 V of the supply.
     page.wait_for_text("#health", "Supply 4.");
     let red = faulty(&scene(&mut page));

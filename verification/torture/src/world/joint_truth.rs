@@ -60,10 +60,12 @@ impl JointTruth {
         self.lost_at.max(self.alarm_at).is_some_and(|at| now - at < ENGAGE_TIME)
     }
 
-    /// True if the controller may take the joint for let go (D28).
+    /// True if the controller may take the joint for let go (D28): it has an alarm, or it lost its torque, or an alarm kept it
+    /// from getting any.
     pub(super) fn may_be_let_go(&self, now: Instant) -> bool {
         let has_alarm = self.alarm_at.is_some_and(|at| now - at < NOTICE_TIME);
-        has_alarm || self.lost_at.is_some() && now - self.off_at < NOTICE_TIME
+        let had_cause = self.lost_at.is_some() || self.alarm_at.is_some();
+        has_alarm || had_cause && now - self.off_at < NOTICE_TIME
     }
 
     /// True if the set-point may give way, or gave way a moment ago (D27).

@@ -26,6 +26,8 @@ use crate::violation::{Check, ensure};
 
 /// The time between two checks.
 pub(super) const CHECK_PERIOD: Duration = Duration::from_millis(250);
+/// A position that was not checked for longer may have changed meanwhile: two checks.
+const UNCHECKED_TIME: Duration = Duration::from_millis(500);
 /// A lost or found servo is reported within this time, even after a restart and with all other servos silent.
 const DETECTION_TIME: Duration = Duration::from_millis(2_500);
 /// Torque is off this long after a change to another motor state than servo.
@@ -55,6 +57,8 @@ pub(super) struct StatusChecker {
     settled_by: PerJoint<Instant>,
     /// The last position of each joint, and the time of its last change.
     last_moves: PerJoint<(u16, Instant)>,
+    /// When the position of each joint was checked last.
+    position_checked_at: PerJoint<Instant>,
     /// The last time at which a joint that is let go had no latched overload.
     unlatched_at: PerJoint<Instant>,
     missing: u8,
@@ -101,6 +105,7 @@ impl StatusChecker {
             state_at: now,
             settled_by: PerJoint::all(now),
             last_moves: PerJoint::all((0, now)),
+            position_checked_at: PerJoint::all(now),
             unlatched_at: PerJoint::all(now),
             missing: 0,
             corrupted: 0,
@@ -240,11 +245,14 @@ impl StatusChecker {
     fn check_position(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
         let position = context.bus.position(joint);
         let (last, since) = self.last_moves[joint];
-        if last != position {
+        let checked_at = std::mem::replace(&mut self.position_checked_at[joint], context.now);
+        // While it was not checked, the joint may have moved away and back.
+        let may_have_moved = last != position || context.now - checked_at > UNCHECKED_TIME;
+        if may_have_moved {
             self.last_moves[joint] = (position, context.now);
         }
-        // Between two checks, a write may have moved the joint away and back.
-        if last != position || self.settled_time(context.now, since.max(self.motion_at)) < DETECTION_TIME {
+        // So it may after a write.
+        if may_have_moved || self.settled_time(context.now, since.max(self.motion_at)) < DETECTION_TIME {
             return Ok(());
         }
         let angle = angle_from_counts(joint, position, context.model.offset(joint)).nearest_degree();
