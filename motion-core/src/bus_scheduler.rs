@@ -14,7 +14,7 @@ use protocol_core::time::{Duration, Instant};
 use crate::CYCLE;
 use crate::config::Config;
 use crate::joints::Joints;
-use crate::servo_bus::{Bus, Outcome, Question};
+use crate::servo_bus::{Bus, Outcome};
 
 /// How long start-up lasts at most. A servo that has not answered by then counts as silent. Real servos need about
 /// 200 ms after power-up.
@@ -38,8 +38,6 @@ pub(crate) struct BusScheduler {
     next_to_read: Joint,
     /// How many servos are still to be read in this cycle.
     left_to_read: usize,
-    /// No torque switch was read in this cycle for the next refresh. The answer is three times as long, so one is enough.
-    may_read_torque: bool,
 }
 
 impl BusScheduler {
@@ -54,7 +52,6 @@ impl BusScheduler {
             torque_refresh_in: TORQUE_REFRESH_CYCLES,
             next_to_read: Joint::ALL[0],
             left_to_read: 0,
-            may_read_torque: false,
         }
     }
 
@@ -123,7 +120,6 @@ impl BusScheduler {
     pub(crate) fn begin_cycle(&mut self, due: Instant) {
         self.next_cycle = due + CYCLE;
         self.left_to_read = JOINTS;
-        self.may_read_torque = self.torque_refresh_in <= TORQUE_READ_CYCLES;
         self.torque_refresh_in = self.torque_refresh_in.saturating_sub(1);
         self.torque_due |= self.torque_refresh_in == 0;
     }
@@ -177,8 +173,8 @@ impl BusScheduler {
             self.left_to_read -= 1;
             let joint = self.next_to_read;
             self.next_to_read = Joint::from_index(joint.index() + 1).unwrap_or(Joint::ALL[0]);
-            if let Some(question) = joints.question(joint, now, self.may_read_torque) {
-                self.may_read_torque &= question == Question::Reading;
+            let is_refresh_near = self.torque_refresh_in <= TORQUE_READ_CYCLES;
+            if let Some(question) = joints.question(joint, now, is_refresh_near) {
                 self.bus.ask(now, joint, question);
                 return true;
             }
