@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Time passes in steps of a millisecond. The servo does not know the timing of the wire or other servos. The values
-//! of its motor, gear and temperature are in [`parameters`](crate::parameters).
+//! of its motor, gear and temperature are in `parameters.rs`.
 
 mod config;
 mod fault;

@@ -1,7 +1,7 @@
 //! The registers of a servo by name: read, write with a check of the range, and show.
 //!
 //! The only table of their names, widths, ranges and units. The addresses that the controller uses are
-//! [`register`](super::register).
+//! [`super::register`].
 
 use motion_core::servo_bus::frame::{BAUD_RATES, register};
 
