@@ -25,6 +25,7 @@ mod limit_verdict;
 mod map21_model;
 mod map21_requests;
 mod motion_checker;
+mod outside_ending;
 mod outside_injection;
 mod parameters;
 mod power;

@@ -5,6 +5,7 @@ use arm_sim::servo::Trip;
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
+use super::outside_ending::Ending;
 use super::state::{PowerState, TortureWorld};
 use crate::scenario::InjectedFault;
 
@@ -23,15 +24,6 @@ const FARTHEST_WALL: i32 = 40_000;
 const STRONGEST_PUSH: [usize; 2] = [1_500, 250];
 /// The heaviest payload in grams.
 const HEAVIEST: usize = 500;
-
-/// What ends at a time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Ending {
-    Wall(Joint),
-    Push(Joint),
-    Thing,
-    Stop,
-}
 
 impl TortureWorld {
     /// Injects one of the faults of this file.

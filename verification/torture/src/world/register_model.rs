@@ -2,6 +2,7 @@
 
 mod comparison;
 pub(crate) mod limits;
+mod own_target;
 mod targets;
 
 use motion_core::Storage;
@@ -18,7 +19,7 @@ use super::map21_model::{self, OutOfReach};
 use super::protection_model;
 use super::written_targets::WrittenTargets;
 use crate::per_joint::PerJoint;
-pub(crate) use targets::OwnTarget;
+pub(crate) use own_target::OwnTarget;
 
 /// The options of map 2.1: bit 0 biased offsets, bit 1 alarms (M6).
 const OPTIONS: u8 = 20;

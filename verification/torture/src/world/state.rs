@@ -11,7 +11,7 @@ use super::disturbed_bus::DisturbedBus;
 use super::event_log::EventLog;
 use super::host_link::{ArmToHost, HostToArm};
 use super::host_request::HostRequest;
-use super::outside_injection::Ending;
+use super::outside_ending::Ending;
 use super::parameters::WorldParameters;
 use super::register_model::{RegisterModel, RequestEffect};
 use super::request_generator::RequestGenerator;

@@ -1,0 +1,28 @@
+//! The targets that the arm may set itself (D27, D28).
+
+/// What the arm may have made of a target, beside the measured position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum OwnTarget {
+    /// The measured position alone.
+    Measured,
+    /// The joint may be let go: its target follows the measured position, and a point of a stream is not taken (D28). This
+    /// was the target before.
+    Before(u8),
+    /// The joint may have given way to an obstacle: its set-point between these degrees (D27), or the target before.
+    GaveWay { low: u8, high: u8, before: u8 },
+}
+
+impl OwnTarget {
+    /// True if points of a stream may not be taken: a joint that gives way may also be let go.
+    pub(crate) const fn is_without_streams(self) -> bool {
+        !matches!(self, Self::Measured)
+    }
+
+    pub(crate) fn may_be(self, degrees: u8) -> bool {
+        match self {
+            Self::Measured => false,
+            Self::Before(before) => degrees == before,
+            Self::GaveWay { low, high, before } => (low..=high).contains(&degrees) || degrees == before,
+        }
+    }
+}
