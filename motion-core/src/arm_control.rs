@@ -86,7 +86,7 @@ impl ArmControl {
         }
     }
 
-    // Not in `poll`: most polls begin no cycle, and would save its registers.
+    // Like the other functions that are not inlined here: most polls do not call it, and would save its registers.
     #[inline(never)]
     fn begin_cycle(&mut self, now: Instant, end: Instant) {
         self.bus.begin_cycle(end);
