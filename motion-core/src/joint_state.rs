@@ -170,7 +170,7 @@ impl JointState {
         let set_point = self.drive.set_point();
         if !self.drive.is_torque_pending() {
             match self.torque.answered(answer.torque.map(|held| held.is_on)) {
-                TorqueFound::AsBefore | TorqueFound::Kept => {}
+                TorqueFound::AsBefore => {}
                 TorqueFound::OrderLost => {
                     self.drive.lose_torque(true);
                     return Protected::Holds;

@@ -28,8 +28,6 @@ enum Known {
 pub(crate) enum TorqueFound {
     /// Nothing new.
     AsBefore,
-    /// The switch is on although a question was not answered before.
-    Kept,
     /// The order to switch torque on was lost.
     OrderLost,
     /// The switch is off although it was on.
@@ -66,9 +64,8 @@ impl TorqueCheck {
         match has_torque {
             None => TorqueFound::AsBefore,
             Some(true) => {
-                let was_doubtful = self.known == Known::Doubtful;
                 *self = Self { known: Known::On, offs: 0, is_fresh: true };
-                if was_doubtful { TorqueFound::Kept } else { TorqueFound::AsBefore }
+                TorqueFound::AsBefore
             }
             Some(false) => {
                 self.offs = self.offs.saturating_add(1);
