@@ -190,13 +190,17 @@ fn end_faults<F: NorFlash + Clone, C: ArmController>(
     Ok(json!({ "ended": state::reports(&ended, now) }))
 }
 
+fn numbered(joint: u8) -> Result<Joint, Refusal> {
+    Joint::new(joint).ok_or_else(|| Refusal::new("no such joint", "joints are 1 to 7"))
+}
+
 fn hand<F: NorFlash + Clone, C: ArmController>(
     arm: &mut PtyArm<F, Plant, C>,
     now: Instant,
     joint: u8,
     to: HandAction,
 ) -> Result<Value, Refusal> {
-    let joint = Joint::new(joint).ok_or_else(|| Refusal::new("no such joint", "joints are 1 to 7"))?;
+    let joint = numbered(joint)?;
     let has_torque = arm.simulation_mut().plant().has_torque(joint);
     let action = match to {
         HandAction::Degrees(degrees) => Action::Hand(joint, counts(joint, degrees)?),
@@ -220,7 +224,7 @@ fn trip<F: NorFlash + Clone, C: ArmController>(
     joint: u8,
     alarm: Alarm,
 ) -> Result<Value, Refusal> {
-    let joint = Joint::new(joint).ok_or_else(|| Refusal::new("no such joint", "joints are 1 to 7"))?;
+    let joint = numbered(joint)?;
     let trip = match alarm {
         Alarm::Overload if !arm.simulation_mut().plant().has_torque(joint) => {
             return Err(Refusal::new(
