@@ -22,6 +22,7 @@ mod jump_table;
 mod modules;
 mod mujoco;
 mod no_panic;
+mod obstacles;
 mod python;
 mod registers_md;
 mod replays;
@@ -118,6 +119,8 @@ enum Task {
     Emulate(emulate::EmulateArgs),
     /// Measure how far the emulated arm sags during restarts, a panic, noise and a silent servo
     Sag,
+    /// Measure what becomes of the emulated arm at walls, after emergency stops, and with a thing in its gripper (ten minutes)
+    Obstacles,
 }
 
 /// What to do with the figures.
@@ -173,6 +176,7 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Coverage => coverage::check(),
         Task::Emulate(options) => emulate::run(options),
         Task::Sag => sag::measure(),
+        Task::Obstacles => obstacles::measure(),
         Task::Stream { image: true } => stream::measure_image(),
         Task::Stream { image: false } => stream::measure(),
         Task::Bench(options) => bench::run(options),
