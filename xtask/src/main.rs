@@ -11,7 +11,6 @@ mod coverage;
 mod crate_graph;
 mod decisions;
 mod deny;
-mod drawings;
 mod elf;
 mod emulate;
 mod footprint;
@@ -55,8 +54,7 @@ struct XtaskArgs {
 enum Task {
     /// Install what the tests need, then run all checks and tests, and print the time of each step
     Test(test::TestArgs),
-    /// Write the generated documents: docs/registers.md, the table of tests in docs/protocol.md, the crates in docs/design.md,
-    /// and docs/circuits
+    /// Write the generated documents: docs/registers.md, the table of tests in docs/protocol.md, and the crates in docs/design.md
     Docs {
         /// Change nothing; fail if a document is out of date
         #[arg(long)]
@@ -144,11 +142,10 @@ struct Document {
     check: fn() -> TaskResult,
 }
 
-const DOCUMENTS: [Document; 4] = [
+const DOCUMENTS: [Document; 3] = [
     Document { write: registers_md::write, check: registers_md::check },
     Document { write: decisions::write, check: decisions::check },
     Document { write: crate_graph::write, check: crate_graph::check },
-    Document { write: drawings::write, check: drawings::check },
 ];
 
 fn run_task(task: &Task) -> TaskResult {

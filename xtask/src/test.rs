@@ -7,7 +7,7 @@ use clap::Args;
 use crate::run::{CHIP, HOST, TaskResult, build_for_browser, cargo, run};
 use crate::steps::{TestScope, TestStep, long, quick, whole};
 use crate::{
-    count, crate_graph, decisions, deny, drawings, footprint, fuzz, install, modules, mujoco, no_panic,
+    count, crate_graph, decisions, deny, footprint, fuzz, install, modules, mujoco, no_panic,
     python, registers_md, replays, start_up, steps, system_tests, torture, trials, web,
 };
 
@@ -50,7 +50,6 @@ const STEPS: &[TestStep] = &[
     quick("every decision of docs/protocol.md has tests", decisions::check),
     quick("the crates in docs/design.md are up to date", crate_graph::check),
     quick("no cycle between files of a crate", modules::check),
-    quick("the drawings in docs are up to date", drawings::check),
     quick("licences, versions and sources of dependencies", deny::rules),
     whole("documentation", || {
         run("cargo", &format!("doc {HOST} --no-deps"), &[("RUSTDOCFLAGS", "-D warnings")])
