@@ -4,7 +4,6 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-mod bench;
 mod budget;
 mod count;
 mod coverage;
@@ -21,6 +20,7 @@ mod jump_table;
 mod modules;
 mod mujoco;
 mod no_panic;
+mod peers;
 mod python;
 mod registers_md;
 mod replays;
@@ -30,7 +30,6 @@ mod size;
 mod stack;
 mod start_up;
 mod steps;
-mod stream;
 mod system_tests;
 mod test;
 mod thumb_decode;
@@ -102,13 +101,7 @@ enum Task {
     /// Print the coverage of the cores, and fail below its limits
     Coverage,
     /// Compare the parse-and-reply path with its peers: Modbus, postcard with COBS, MAVLink
-    Bench(bench::BenchArgs),
-    /// Print how evenly and how late set-points follow streams of points with jitter, losses and pauses, beside other methods
-    Stream {
-        /// Stream a sine to the image in the emulator instead, and draw it beside the simulated arm (some minutes)
-        #[arg(long)]
-        image: bool,
-    },
+    Bench(peers::BenchArgs),
     /// Run the image for the arm in an emulator with simulated servos, and print its port.
     ///
     /// SIGHUP (`kill -HUP`) switches the arm off and on, SIGUSR2 restarts the chip alone, Ctrl-C ends it. The emulator keeps no
@@ -170,8 +163,6 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Coverage => coverage::check(),
         Task::Emulate(options) => emulate::run(options),
         Task::Sag => sag::measure(),
-        Task::Stream { image: true } => stream::measure_image(),
-        Task::Stream { image: false } => stream::measure(),
-        Task::Bench(options) => bench::run(options),
+        Task::Bench(options) => peers::run(options),
     }
 }
