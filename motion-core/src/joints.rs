@@ -341,7 +341,7 @@ impl Joints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::servo_bus::Reading;
+    use crate::servo_bus::{HeldGoal, Reading};
     use protocol_core::registers::map::PRESENT_POSITION;
 
     const J1: Joint = Joint::ALL[0];
@@ -356,12 +356,14 @@ mod tests {
         Answer { reading, alarms: 4, torque: None }
     }
 
-    /// Joints of which joint 1 was measured twice at 90 degrees.
+    /// Joints of which joint 1 was measured at 90 degrees. In the servo state its servo has shown its goal.
     fn measured(state: MotorState) -> (Joints, RegisterFile) {
         let mut registers = RegisterFile::new([0; 6], None);
         let mut joints = Joints::new(state);
         joints.measured(at_ms(0), J1, &answer(511), true, &mut registers);
         joints.measured(at_ms(10), J1, &answer(511), true, &mut registers);
+        let torque = Some(HeldGoal { is_on: false, goal_counts: 511 });
+        joints.measured(at_ms(10), J1, &Answer { torque, ..answer(511) }, true, &mut registers);
         (joints, registers)
     }
 
