@@ -32,6 +32,7 @@ use self::view::{ArmEvent, PLOT_SPAN, View};
 use crate::command_error::CommandError;
 use crate::guard_args::GuardArgs;
 use crate::line_file::LineFile;
+use crate::output_file::{ForceArg, check_replaceable};
 use crate::session::Session;
 
 /// Watch the arm: targets, positions, movement, health and link quality.
@@ -43,15 +44,17 @@ use crate::session::Session;
 Examples:
   sevenbot monitor
   sevenbot monitor --plot load
-  sevenbot monitor --csv move.csv                  until Ctrl-C, or the arm goes away
+  sevenbot monitor --csv move.csv  until Ctrl-C, or the arm goes away
   sevenbot monitor --json --hz 2 | jq .positions
   sevenbot monitor --hz 20 --samples 100 > move.txt
 
-The keys that move the tip keep it above the table and out of the base; `sevenbot move-to --help` describes this guard.
-A key that turns a joint only warns.
+The keys that move the tip keep it above the table and out of the base;
+`sevenbot move-to --help` describes this guard. A key that turns a joint
+only warns.
 
-CSV and JSON also have positions in hundredths of a degree, velocities in degrees per second and loads in
-percent of the stall torque, if the arm measures them.")]
+CSV and JSON also have positions in hundredths of a degree, velocities in
+degrees per second and loads in percent of the stall torque, if the arm
+measures them.")]
 pub(crate) struct MonitorArgs {
     /// Samples per second.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = value_parser!(u8).range(1..=50))]
@@ -62,6 +65,8 @@ pub(crate) struct MonitorArgs {
     /// Write all values to FILE, separated by commas.
     #[arg(long, value_name = "FILE", conflicts_with = "json")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    force: ForceArg,
     /// What the plot on the screen shows at first; p changes it.
     #[arg(long, value_enum, default_value_t)]
     plot: PlotKind,
@@ -81,6 +86,11 @@ impl MonitorArgs {
 pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandError> {
     let show_screen = |session: &Session| screen::run(session, args.period(), args.plot, args.guard.guard());
     let on_screen = session.printer.is_terminal() && args.csv.is_none() && args.samples.is_none();
+    if on_screen && session.log.is_some() {
+        let reason =
+            "--log: a screen opens the arm again after each loss; use --samples N, --csv or a pipe for a log";
+        return Err(CommandError::Usage(reason.to_owned()));
+    }
     match (&args.picture, &args.csv) {
         (Some(path), _) => {
             let view = if on_screen { show_screen(session)? } else { view_without_screen(session, args)? };
@@ -126,6 +136,7 @@ fn show_lines(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandEr
 }
 
 fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), CommandError> {
+    check_replaceable(path, args.force)?;
     let mut arm = session.connect()?;
     let mut file = LineFile::create(path)?;
     let mut write = |line: String| file.add(&format!("{line}\n"));
