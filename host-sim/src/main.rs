@@ -264,6 +264,9 @@ fn simulated_arm<C: ArmController>(
     let settings = flash.cells_mut().copy();
     let mut arm = arm::<_, C>(options, number, pty, flash, Instant::ZERO, plant);
     arm.set_seed(seed);
+    if options.strict_baud {
+        arm.set_strict_baud();
+    }
     if clock.is_in_lockstep() {
         arm.simulation_mut().set_bytewise_line();
     }
