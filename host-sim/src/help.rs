@@ -17,8 +17,8 @@ THE FIRST MINUTE
   ./7bot pose ...
 
   Any serial client can open the port, at any baud rate; with --strict-baud only
-  at that of the arm. The first line on standard output is 'ready <tty path>', as
-  soon as the port can be opened; with --arms there is one such line for each
+  at that of the arm. The first line on standard output is 'ready <tty path>',
+  as soon as the port can be opened; with --arms there is one such line for each
   arm, in their order. Everything else is on standard error.
 
 THE ARM HAS WEIGHT
@@ -101,7 +101,7 @@ REAL SERVOS
 
 SERVOS ONLY
   host-sim --servos-only --link ./bus  seven servos, as behind a USB adapter
-  host-sim --servos-only --link ./bus --usb-latency 1-20 --fault bus=echo --trace
+  host-sim --servos-only --link ./bus --usb-latency 1-20 --fault bus=echo
   The port carries raw frames of the servo bus. The servos receive bytes only at
   their own baud rate, --servo-baud, so set the port to it. --trace prints the
   bytes on the wire. A fault has the number of its joint, from 1 to 7, even if

@@ -240,12 +240,11 @@ fn run_arms<C: ArmController>(options: &Options, signals: &mut Signals) -> Resul
     let paths: Vec<PathBuf> = ports.iter().map(|(pty, _)| pty.path().to_owned()).collect();
     // They exist as long as the loop runs.
     let _symlinks = symlinks(options, &numbers, &paths)?;
-    let controls = control_sockets(options, &numbers)?;
     let arms = numbers.iter().zip(ports);
     let arms = arms.map(|(&number, (pty, flash))| simulated_arm::<C>(options, number, pty, flash, &clock));
-    let mut event_loop =
-        EventLoop::new(arms.collect::<Result<_, _>>()?, clients).map_err(Failure::Running)?;
-    event_loop.add_controls(controls).map_err(Failure::Running)?;
+    let arms = arms.collect::<Result<_, _>>()?;
+    let mut event_loop = EventLoop::new(arms, clients).map_err(Failure::Running)?;
+    event_loop.add_controls(control_sockets(options, &numbers)?).map_err(Failure::Running)?;
     print_ready(&paths);
     event_loop.run(&mut clock, signals).map_err(Failure::Running)
 }
