@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::fine::fine_frames;
 use crate::fine_state::FineTargets;
 use crate::health::{MoveCheck, MoveCheckError, MoveState};
-use crate::span::Span;
+use host_link::Span;
 
 mod pace;
 
