@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::time::Duration;
 
-use crate::span::Span;
+use host_link::Span;
 
 /// Why a port cannot be opened, or has no arm.
 ///

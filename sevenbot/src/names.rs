@@ -4,7 +4,7 @@
 use protocol_core::registers::map21::{MAP_21, find_readable};
 use protocol_core::registers::{Joint, MAP, Register};
 
-use crate::span::Span;
+use host_link::Span;
 
 /// Why a text is not the name of registers.
 ///

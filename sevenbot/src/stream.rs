@@ -22,8 +22,8 @@ use crate::error::Error;
 use crate::fine::fine_frames;
 use crate::fine_state::FineTargets;
 use crate::health::{MoveCheck, MoveCheckError, MoveState};
-use crate::span::Span;
 use crate::units::Speed;
+use host_link::Span;
 
 mod pace;
 
