@@ -17,8 +17,8 @@ use crate::drive::{Drive, Target, is_near};
 use crate::let_go::LetGo;
 use crate::obstacle::Obstacle;
 use crate::position_filter::{FilterOutcome, PositionFilter};
-use crate::push_limiter::{PushLimit, PushSample};
-use crate::servo_bus::{Answer, Torque};
+use crate::push_limiter::{FULL_LOAD, PushLimit, PushSample};
+use crate::servo_bus::{Answer, Reading, Torque};
 use crate::torque_check::{TorqueCheck, TorqueFound};
 
 /// The effect of a reading.
@@ -184,9 +184,10 @@ impl JointState {
             }
         }
         if self.drive.is_engaged() && registers.get(PROTECTION.address) != 0 {
-            let push = push_from_servo(self.joint, answer.reading.load, answer.reading.speed);
-            let limit = self.push_limit(registers);
-            self.obstacle.measured(now, PushSample { angle, push }, set_point, limit);
+            let Reading { load, speed, .. } = answer.reading;
+            let push = push_from_servo(self.joint, load, speed);
+            let sample = PushSample { angle, push, is_saturated: load.saturating_abs() >= FULL_LOAD };
+            self.obstacle.measured(now, sample, set_point, self.push_limit(registers));
         }
         Protected::Holds
     }

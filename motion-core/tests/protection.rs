@@ -189,6 +189,39 @@ fn d27_a_joint_gives_way_also_out_of_the_linkage() {
     assert_eq!((rig.get(BLOCKED), rig.get(ALARMS), rig.get(LET_GO)), (bit(2), 0, 0));
 }
 
+/// Puts a joint somewhere by hand, while the arm is forceless.
+fn put(rig: &mut Rig, number: u8, degrees: u8) {
+    rig.hand(number, counts_from_angle(joint(number), MicroDegrees::from_degrees(degrees), 0));
+}
+
+#[test]
+fn d27_a_lift_at_full_load_keeps_its_limit_while_the_target_is_far_away() {
+    for (speed, payload) in [(0, 475), (100, 475), (0, 500), (100, 500), (60, 500)] {
+        let (mut rig, pitch) = (Rig::started(), joint(5));
+        rig.write(193, &[75]);
+        rig.write(36, &[speed]);
+        rig.write(29, &[2]);
+        rig.run_ms(500);
+        put(&mut rig, 3, 125);
+        put(&mut rig, 5, 180);
+        rig.plant.set_load(payload);
+        rig.run_ms(300);
+        rig.write(29, &[1]);
+        rig.run_ms(100);
+        [3, 5].into_iter().for_each(|number| rig.plant.let_go(joint(number)));
+        // The joint turns, but so slowly that its push is over the limit. Its servo gives all it has.
+        rig.write(50, &[0]);
+        let (mut over, mut longest) = (0, 0);
+        for _ in 0..4_000 {
+            rig.run_ms(1);
+            over = if rig.plant.motor_torque(pitch).abs() > 800 { over + 1 } else { 0 };
+            longest = longest.max(over);
+        }
+        assert!((1..=300).contains(&longest), "over the limit for {longest} ms, speed {speed}, {payload} g");
+        assert_eq!((rig.get(ALARMS), rig.get(LET_GO)), (0, 0));
+    }
+}
+
 /// Runs a stream of points of a joint, one each 20 ms, in hundredths of a degree.
 fn stream(rig: &mut Rig, number: u8, points: impl Iterator<Item = u16>) {
     for point in points {
