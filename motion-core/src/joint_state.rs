@@ -285,7 +285,7 @@ impl JointState {
         let is_on = self.drive.is_torque_pending() || (self.takes_goals() && self.torque.is_fresh());
         self.drive.torque_is_on();
         self.torque.refreshed();
-        if self.let_go.needs_torque_off(is_protected) {
+        if self.position.is_known() && self.let_go.needs_torque_off(is_protected) {
             self.let_go.torque_off_is_sent();
             Some(Torque::Damping)
         } else {

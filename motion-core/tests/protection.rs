@@ -437,6 +437,31 @@ fn d28_a_latched_overload_gets_torque_off_before_torque() {
 }
 
 #[test]
+fn d28_a_servo_that_holds_again_by_itself_is_not_freed() {
+    for (register, value) in [(192, 1), (29, 1)] {
+        let mut rig = Rig::started();
+        rig.write(192, &[0]);
+        rig.plant.trip(joint(3), Trip::Heat);
+        rig.run_ms(2_000);
+        assert_eq!((rig.get(LET_GO), rig.get(ALARMS)), (bit(3), 4));
+        while rig.get(ALARMS) != 0 {
+            rig.run_ms(1_000);
+        }
+        rig.run_ms(2_000);
+        let held = rig.plant.angle(joint(3));
+        rig.forget();
+        rig.write(register, &[value]);
+        for _ in 0..300 {
+            rig.run_ms(1_000);
+            let moved = (rig.plant.angle(joint(3)) - held).abs();
+            assert!(moved < 2_000, "register {register}: it sinks by {moved}");
+        }
+        assert!(rig.torques().all(|torques| matches!(torques[2], None | Some(1))), "no torque-off");
+        assert_eq!((rig.get(LET_GO), rig.plant.torque(joint(3))), (0, Some(Torque::On)), "it engaged");
+    }
+}
+
+#[test]
 fn d28_a_target_is_taken_after_the_joint_engaged_and_a_point_of_a_stream_is_not() {
     for (period, goes_there) in [(0, true), (20, false)] {
         let (mut rig, _) = tripped(Trip::Overload);
