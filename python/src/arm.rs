@@ -34,7 +34,7 @@ type Angles = (f64, f64, f64, f64, f64, f64, f64);
 /// Angles are degrees, 0 to 180, joint 1 first; positions millimetres; times seconds.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct Arm {
-    worker: Worker,
+    worker: Arc<Worker>,
     simulation: Option<SharedSimulation>,
     /// The move that `wait` waits for.
     sent: Mutex<Option<Arc<JointMove>>>,
@@ -115,15 +115,15 @@ impl Arm {
 
     /// The registers as a mapping: `arm.registers["speed.1"] = 10`.
     #[getter]
-    fn registers(slf: Bound<'_, Self>) -> Registers {
-        Registers::of(slf.unbind())
+    fn registers(&self) -> Registers {
+        Registers::of(Arc::clone(&self.worker))
     }
 
     /// The value of a register, or a list if the name has several: `arm.get("offset")`.
     ///
     /// Numbers are in the units of docs/registers.md. An unknown name raises `KeyError`.
     fn get(&self, py: Python<'_>, name: &str) -> PyResult<Shown> {
-        registers::get(py, self, name)
+        registers::get(py, &self.worker, name)
     }
 
     /// Writes a register, or several with one number for all or one each, and reads them back.
@@ -132,7 +132,7 @@ impl Arm {
     /// EEPROM lock (register 28) for this write.
     #[pyo3(signature = (name, values, *, unlock = false))]
     fn set(&self, py: Python<'_>, name: &str, values: Values, unlock: bool) -> PyResult<()> {
-        registers::set(py, self, name, &values, unlock)
+        registers::set(py, &self.worker, name, &values, unlock)
     }
 
     /// The measured angles in degrees, joint 1 first: in steps of 0.01 with this project's firmware, else of 1.
@@ -271,7 +271,7 @@ impl Arm {
     #[pyo3(signature = (period = 0.02, *, watchdog = 0.3, damping = false, approach = None, table = None,
                         guard = true))]
     fn stream(
-        slf: Bound<'_, Self>,
+        &self,
         period: f64,
         watchdog: f64,
         damping: bool,
@@ -280,7 +280,7 @@ impl Arm {
         guard: bool,
     ) -> PyResult<Stream> {
         let (rule, guard) = (arguments::approach(approach)?, arguments::guard(table, guard)?);
-        Stream::new(slf.unbind(), period, (watchdog, damping), rule, guard)
+        Stream::new(Arc::clone(&self.worker), period, (watchdog, damping), rule, guard)
     }
 
     /// Records the positions for `seconds`, 0 to 86400, or until Ctrl-C, `hz` times a second, 1 to 50.

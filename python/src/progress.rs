@@ -1,11 +1,8 @@
 //! The progress of a long call on a terminal.
 
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget};
-
-use crate::worker::CallState;
 
 /// Shorter calls show nothing.
 const DELAY_CALLS: u32 = 10;
@@ -20,9 +17,8 @@ pub(crate) struct ProgressLine {
 }
 
 impl ProgressLine {
-    /// Shows the state of a call. Called each 50 ms.
-    pub(crate) fn show(&mut self, state: &CallState) {
-        let total = state.total.load(Ordering::Relaxed);
+    /// Shows how much of a call is done. A total of 0 is not known yet. Called each 50 ms.
+    pub(crate) fn show(&mut self, done: u64, total: u64) {
         self.calls = self.calls.saturating_add(1);
         if total == 0 || self.calls < DELAY_CALLS {
             return;
@@ -34,7 +30,7 @@ impl ProgressLine {
             bar
         });
         bar.set_length(total);
-        bar.set_position(state.done.load(Ordering::Relaxed));
+        bar.set_position(done);
     }
 }
 

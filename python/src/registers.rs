@@ -1,16 +1,18 @@
 //! Registers by their names, with the numbers of the register table.
 
+use std::sync::Arc;
+
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use sevenbot::map::{EEPROM_LOCK, FINE_TARGET, TARGET_POSITION};
+use sevenbot::map::{FINE_TARGET, TARGET_POSITION};
 use sevenbot::names::{name_of, parse};
 use sevenbot::register_text::{RegisterEntry, entries};
 use sevenbot::register_values::bytes;
 use sevenbot::table::{access, range, rows};
 use sevenbot::{Register, Span};
 
-use crate::arm::Arm;
-use crate::errors::{NotServed, error, not_taken, raised};
+use crate::errors::{NotServed, error, raised};
+use crate::worker::Worker;
 
 /// A number, or one for each register.
 #[derive(FromPyObject)]
@@ -43,9 +45,9 @@ impl From<&RegisterEntry> for Shown {
 }
 
 /// Reads the registers of a name.
-pub(crate) fn get(py: Python<'_>, arm: &Arm, name: &str) -> PyResult<Shown> {
+pub(crate) fn get(py: Python<'_>, worker: &Worker, name: &str) -> PyResult<Shown> {
     let span = raised(py, parse(name))?;
-    let snapshot = raised(py, arm.worker().call(py, move |arm, _| arm.read_span(span))?)?;
+    let snapshot = raised(py, worker.call(py, move |arm, _| arm.read_span(span))?)?;
     match entries(&snapshot).as_slice() {
         [only] => Ok(only.into()),
         several => Ok(Shown::Each(several.iter().map(Shown::from).collect())),
@@ -53,32 +55,28 @@ pub(crate) fn get(py: Python<'_>, arm: &Arm, name: &str) -> PyResult<Shown> {
 }
 
 /// Writes the registers of a name, and verifies them.
-pub(crate) fn set(py: Python<'_>, arm: &Arm, name: &str, values: &Values, unlock: bool) -> PyResult<()> {
+pub(crate) fn set(
+    py: Python<'_>,
+    worker: &Worker,
+    name: &str,
+    values: &Values,
+    unlock: bool,
+) -> PyResult<()> {
     let span = raised(py, parse(name))?;
     let bytes = raised(py, bytes(span, values.as_slice()))?;
-    let unserved =
-        arm.worker().call(py, move |arm, _| span.addresses().find(|&address| !arm.serves(address)))?;
+    let unserved = worker.call(py, move |arm, _| span.addresses().find(|&address| !arm.serves(address)))?;
     if let Some(address) = unserved {
         let message = format!("this arm does not have {}", sevenbot::names::name_of_register(address));
         return Err(error::<NotServed>(py, &message, &[]));
     }
-    let written = arm.worker().call(py, move |arm, _| {
+    let written = worker.call(py, move |arm, _| {
         if span.addresses().any(|address| TARGET_POSITION.holds(address) || FINE_TARGET.holds(address)) {
             arm.end_abandoned_stream()?;
         }
-        let mut unchanged = Vec::new();
-        if unlock {
-            unchanged.extend(arm.write_checked(EEPROM_LOCK.address, &[0])?);
-        }
-        let written = arm.write_checked(span.address(), &bytes);
-        if unlock {
-            unchanged.extend(arm.write_checked(EEPROM_LOCK.address, &[1])?);
-        }
-        unchanged.extend(written?);
-        Ok::<_, sevenbot::Error>(unchanged)
+        let write = |arm: &mut sevenbot::Arm| arm.write_checked(span.address(), &bytes);
+        if unlock { arm.with_open_lock(write) } else { write(arm) }
     })?;
-    let unchanged = raised(py, written)?;
-    if unchanged.is_empty() { Ok(()) } else { Err(not_taken(py, &unchanged)) }
+    raised(py, written)
 }
 
 /// The registers of an arm as a mapping from names to numbers: `arm.registers["speed.1"]`.
@@ -87,11 +85,11 @@ pub(crate) fn set(py: Python<'_>, arm: &Arm, name: &str, values: &Values, unlock
 /// and ranges, `"54..60"`. Numbers are in the units of the table. Each access asks the arm, and each assignment is read
 /// back.
 #[pyclass(frozen, mapping, module = "sevenbot")]
-pub(crate) struct Registers(Py<Arm>);
+pub(crate) struct Registers(Arc<Worker>);
 
 impl Registers {
-    pub(crate) const fn of(arm: Py<Arm>) -> Self {
-        Self(arm)
+    pub(crate) const fn of(worker: Arc<Worker>) -> Self {
+        Self(worker)
     }
 }
 
@@ -110,11 +108,11 @@ fn row(name: &str) -> Option<&'static Register> {
 #[pymethods]
 impl Registers {
     fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Shown> {
-        get(py, self.0.get(), name)
+        get(py, &self.0, name)
     }
 
     fn __setitem__(&self, py: Python<'_>, name: &str, value: Values) -> PyResult<()> {
-        set(py, self.0.get(), name, &value, false)
+        set(py, &self.0, name, &value, false)
     }
 
     fn __contains__(&self, name: &str) -> bool {

@@ -1,6 +1,6 @@
 //! `Stream`: set-points at a fixed period, in hundredths of a degree.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use pyo3::exceptions::PyValueError;
@@ -13,9 +13,8 @@ use sevenbot::moves::{MoveError, Observer};
 use sevenbot::stream::{StreamOptions, StreamPace, WatchdogAction};
 
 use crate::arguments::Goals;
-use crate::arm::Arm;
 use crate::errors::{raised, warn_of};
-use crate::worker::{PacedStream, Watch, lock};
+use crate::worker::{PacedStream, Watch, Worker, lock};
 
 /// The longest time between two frames while a point is not due yet: a watchdog of 10 ms needs more than this.
 const SLICE: Duration = Duration::from_millis(20);
@@ -26,7 +25,7 @@ const SLICE: Duration = Duration::from_millis(20);
 /// holds. At the end the registers of the stream have their old values again.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct Stream {
-    arm: Py<Arm>,
+    worker: Arc<Worker>,
     options: StreamOptions,
     rule: ApproachRule,
     /// `None` after the first warning, too.
@@ -35,7 +34,7 @@ pub(crate) struct Stream {
 
 impl Stream {
     pub(crate) fn new(
-        arm: Py<Arm>,
+        worker: Arc<Worker>,
         period: f64,
         watchdog: (f64, bool),
         rule: ApproachRule,
@@ -50,7 +49,7 @@ impl Stream {
         let watchdog = watchdog
             .ok_or_else(|| PyValueError::new_err("use a watchdog of 0.01 to 2.55 s, or 0 for none"))?;
         let action = if damping { WatchdogAction::Damping } else { WatchdogAction::Hold };
-        Ok(Self { arm, options: options.with_watchdog(watchdog, action), rule, guard: Mutex::new(guard) })
+        Ok(Self { worker, options: options.with_watchdog(watchdog, action), rule, guard: Mutex::new(guard) })
     }
 }
 
@@ -93,13 +92,13 @@ impl PacedStream<'_> {
 #[pymethods]
 impl Stream {
     fn __enter__<'py>(slf: PyRef<'py, Self>) -> PyResult<PyRef<'py, Self>> {
-        slf.arm.get().worker().open_stream(slf.py(), slf.options)?;
+        slf.worker.open_stream(slf.py(), slf.options)?;
         Ok(slf)
     }
 
     #[pyo3(signature = (*_exception))]
     fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, PyAny>) -> PyResult<bool> {
-        self.arm.get().worker().close_stream(py)?;
+        self.worker.close_stream(py)?;
         Ok(false)
     }
 
@@ -113,7 +112,7 @@ impl Stream {
     /// the table or in the base gives a `GuardWarning`.
     fn send(&self, py: Python<'_>, angles: Goals) -> PyResult<u32> {
         let (point, rule) = (angles.targets()?, self.rule);
-        let sent = self.arm.get().worker().stream_call(py, move |open, watch| {
+        let sent = self.worker.stream_call(py, move |open, watch| {
             if let Some(first) = { open.first }.take(&point) {
                 open.approach(&first, rule, watch)?;
                 open.first.take(&point);

@@ -60,8 +60,8 @@ pub(crate) struct CallState {
     /// The number of stops so far, and that at the start of the call.
     stops: Arc<AtomicU64>,
     stops_before: u64,
-    pub(crate) done: AtomicU64,
-    pub(crate) total: AtomicU64,
+    done: AtomicU64,
+    total: AtomicU64,
 }
 
 impl CallState {
@@ -201,7 +201,9 @@ fn wait<T: Send>(py: Python<'_>, mut answer: Receiver<T>, state: &CallState) -> 
         match received {
             Ok(result) => return Ok((result, signal)),
             Err(RecvTimeoutError::Disconnected) => return Err(Closed::raise_closed(py)),
-            Err(RecvTimeoutError::Timeout) => line.show(state),
+            Err(RecvTimeoutError::Timeout) => {
+                line.show(state.done.load(Ordering::Relaxed), state.total.load(Ordering::Relaxed));
+            }
         }
         if let Err(raised) = py.check_signals() {
             state.is_interrupted.store(true, Ordering::Relaxed);

@@ -217,15 +217,3 @@ fn json_output_has_a_line_per_sample() {
         }
     });
 }
-
-#[test]
-fn the_screen_can_be_saved_as_a_picture() {
-    with_arm(TestSetup::any(), |arm| {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let file = folder.path().join("monitor.svg");
-        let path = file.to_str().expect("UTF-8");
-        succeeded(arm.sevenbot(&["monitor", "--picture", path, "--samples", "5", "--hz", "50"]));
-        let picture = fs::read_to_string(&file).expect("a picture");
-        assert!(picture.starts_with("<svg") && picture.contains(">7Bot<") && picture.contains("<circle"));
-    });
-}

@@ -4,14 +4,12 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-mod bench;
 mod budget;
 mod count;
 mod coverage;
 mod crate_graph;
 mod decisions;
 mod deny;
-mod drawings;
 mod elf;
 mod emulate;
 mod footprint;
@@ -22,6 +20,8 @@ mod jump_table;
 mod modules;
 mod mujoco;
 mod no_panic;
+mod obstacles;
+mod peers;
 mod python;
 mod registers_md;
 mod replays;
@@ -31,7 +31,6 @@ mod size;
 mod stack;
 mod start_up;
 mod steps;
-mod stream;
 mod system_tests;
 mod test;
 mod thumb_decode;
@@ -55,8 +54,7 @@ struct XtaskArgs {
 enum Task {
     /// Install what the tests need, then run all checks and tests, and print the time of each step
     Test(test::TestArgs),
-    /// Write the generated documents: docs/registers.md, the table of tests in docs/protocol.md, the crates in docs/design.md,
-    /// and docs/circuits
+    /// Write the generated documents: docs/registers.md, the table of tests in docs/protocol.md, and the crates in docs/design.md
     Docs {
         /// Change nothing; fail if a document is out of date
         #[arg(long)]
@@ -104,13 +102,7 @@ enum Task {
     /// Print the coverage of the cores, and fail below its limits
     Coverage,
     /// Compare the parse-and-reply path with its peers: Modbus, postcard with COBS, MAVLink
-    Bench(bench::BenchArgs),
-    /// Print how evenly and how late set-points follow streams of points with jitter, losses and pauses, beside other methods
-    Stream {
-        /// Stream a sine to the image in the emulator instead, and draw it beside the simulated arm (some minutes)
-        #[arg(long)]
-        image: bool,
-    },
+    Bench(peers::BenchArgs),
     /// Run the image for the arm in an emulator with simulated servos, and print its port.
     ///
     /// SIGHUP (`kill -HUP`) switches the arm off and on, SIGUSR2 restarts the chip alone, Ctrl-C ends it. The emulator keeps no
@@ -118,6 +110,8 @@ enum Task {
     Emulate(emulate::EmulateArgs),
     /// Measure how far the emulated arm sags during restarts, a panic, noise and a silent servo
     Sag,
+    /// Measure what becomes of the emulated arm at walls, after emergency stops, and with a thing in its gripper (ten minutes)
+    Obstacles,
 }
 
 /// What to do with the figures.
@@ -144,11 +138,10 @@ struct Document {
     check: fn() -> TaskResult,
 }
 
-const DOCUMENTS: [Document; 4] = [
+const DOCUMENTS: [Document; 3] = [
     Document { write: registers_md::write, check: registers_md::check },
     Document { write: decisions::write, check: decisions::check },
     Document { write: crate_graph::write, check: crate_graph::check },
-    Document { write: drawings::write, check: drawings::check },
 ];
 
 fn run_task(task: &Task) -> TaskResult {
@@ -173,8 +166,7 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Coverage => coverage::check(),
         Task::Emulate(options) => emulate::run(options),
         Task::Sag => sag::measure(),
-        Task::Stream { image: true } => stream::measure_image(),
-        Task::Stream { image: false } => stream::measure(),
-        Task::Bench(options) => bench::run(options),
+        Task::Obstacles => obstacles::measure(),
+        Task::Bench(options) => peers::run(options),
     }
 }

@@ -15,9 +15,11 @@ pub(crate) const CHIP: &str = "thumbv7em-none-eabihf";
 /// The target triple of a browser.
 pub(crate) const BROWSER: &str = "wasm32-unknown-unknown";
 
-/// The packages of a build for the host. All commands select the same packages, because another selection may enable other
-/// features and cause a second build.
-pub(crate) const HOST: &str = "--workspace --exclude footprint --exclude firmware-stm32";
+/// The packages whose programs and tests are built for the host. All commands select the same packages, because another
+/// selection may enable other features, and then their dependencies are built again. The tasks are built before.
+pub(crate) const TESTED: &str = "--workspace --exclude footprint --exclude xtask";
+/// The packages with all their targets for the host.
+pub(crate) const CHECKED: &str = "--workspace --exclude footprint --exclude firmware-stm32";
 
 /// The root of the workspace.
 pub(crate) fn root() -> &'static Path {
@@ -121,6 +123,11 @@ pub(crate) fn link() -> TaskResult<&'static [ChipProgram]> {
 pub(crate) fn build_image() -> TaskResult {
     run("rustup", &format!("--quiet target add {CHIP}"), &[])?;
     cargo("fw --quiet")
+}
+
+/// Builds the simulator, with one of its tests: cargo then selects features as for all tests.
+pub(crate) fn build_host_sim() -> TaskResult {
+    cargo(&format!("test --quiet {TESTED} --test command_line --no-run"))
 }
 
 /// Builds the simulated arm and its kinematics for a browser, without an operating system.

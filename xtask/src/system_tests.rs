@@ -3,7 +3,7 @@
 //! A test is skipped by its name if the arm lacks a capability. A test that is skipped without need, or not skipped, fails:
 //! see `with_arm` in `tests/src/test_arm.rs`.
 
-use crate::run::{TaskResult, run};
+use crate::run::{TESTED, TaskResult, run};
 
 /// The system tests for a kind of arm.
 pub(crate) struct SystemTests {
@@ -61,9 +61,8 @@ pub(crate) const ADAPTER: SystemTests = SystemTests {
 
 /// Runs the system tests on this kind of arm.
 pub(crate) fn run_on(tests: &SystemTests) -> TaskResult {
-    // Selects tests of the whole workspace, so that no package is built again with other features.
     let files: String = tests.files.iter().map(|file| format!(" --test {file}")).collect();
     let skipped: String = tests.skipped.iter().map(|test| format!(" --skip {test}")).collect();
-    let words = format!("test --workspace --exclude footprint{files} -- {skipped}");
+    let words = format!("test {TESTED}{files} -- {skipped}");
     run("cargo", &words, &[("ARM", tests.arm), ("ARM_MEETS_ALL_NEEDS", "1")])
 }

@@ -4,11 +4,11 @@
 
 use clap::Args;
 
-use crate::run::{CHIP, HOST, TaskResult, build_for_browser, cargo, run};
-use crate::steps::{TestScope, TestStep, long, quick, whole};
+use crate::run::{CHECKED, CHIP, TESTED, TaskResult, build_for_browser, cargo, run};
+use crate::steps::{self, Stage, TestScope, long, quick, whole};
 use crate::{
-    count, crate_graph, decisions, deny, drawings, footprint, fuzz, install, modules, mujoco, no_panic,
-    python, registers_md, replays, start_up, steps, system_tests, torture, trials, web,
+    count, crate_graph, decisions, deny, footprint, fuzz, install, modules, mujoco, no_panic, python,
+    registers_md, replays, start_up, system_tests, torture, trials, web,
 };
 
 /// The scope of the run.
@@ -20,6 +20,9 @@ pub(crate) struct TestArgs {
     /// Run the long steps too: more torture and fuzzing, the long form of the settings' tests, and the model in MuJoCo
     #[arg(long, conflicts_with = "quick")]
     long: bool,
+    /// Do the work of one step: how the run itself starts it
+    #[arg(long, hide = true, value_name = "HEADING")]
+    step: Option<String>,
 }
 
 impl TestArgs {
@@ -35,68 +38,82 @@ impl TestArgs {
 /// Seconds of fuzzing for each target, with another seed in each run.
 const LONG_FUZZ_SECONDS: u64 = 300;
 
-/// The steps, in order, until one fails. Tests come last, so that their output is at the end.
-const STEPS: &[TestStep] = &[
-    quick("tools that the steps need", install::all),
-    quick("format", || cargo("fmt --all --check")),
-    quick("lints, host", || cargo(&format!("clippy {HOST} --all-targets -- -D warnings"))),
-    quick("lints, host tests of the firmware", || {
-        cargo("clippy -p firmware-stm32 --lib --tests -- -D warnings")
-    }),
-    quick("lints, chip", || {
-        cargo(&format!("clippy -p footprint -p firmware-stm32 --target {CHIP} -- -D warnings"))
-    }),
-    quick("docs/registers.md is up to date", registers_md::check),
-    quick("every decision of docs/protocol.md has tests", decisions::check),
-    quick("the crates in docs/design.md are up to date", crate_graph::check),
-    quick("no cycle between files of a crate", modules::check),
-    quick("the drawings in docs are up to date", drawings::check),
-    quick("licences, versions and sources of dependencies", deny::rules),
-    whole("documentation", || {
-        run("cargo", &format!("doc {HOST} --no-deps"), &[("RUSTDOCFLAGS", "-D warnings")])
-    }),
-    whole("no panic is reachable", no_panic::check),
-    whole("flash, RAM and stack are within their budgets", || footprint::check(false)),
-    whole("start-up of the image", start_up::check),
-    whole("instructions are within their budgets", || count::check(false)),
-    quick("the simulated arm builds for a browser, without an operating system", build_for_browser),
-    quick("the page builds within its budget", web::build),
-    quick("programs under test", || cargo(&format!("build {HOST}"))),
-    whole("the page in a browser", || {
-        run("cargo", "test -p browser-tests", &[("RUST_TEST_THREADS", "1"), ("POSES", "1000")])
-    }),
-    whole("system tests, the image for the arm in an emulator", || {
-        system_tests::run_on(&system_tests::EMULATOR)
-    }),
-    whole("system tests, the controller on this computer with servos behind a USB adapter", || {
-        system_tests::run_on(&system_tests::ADAPTER)
-    }),
-    whole("the Python package", python::check),
-    whole("recorded sessions, natively and in a WebAssembly module", replays::short),
-    whole("worlds with injected faults", torture::short),
-    whole("fuzzing", fuzz::fixed),
-    long("more recorded sessions", replays::long),
-    long("more worlds with injected faults", torture::long),
-    long("the settings' tests in their long form", || {
-        let mut trials = trials::Trials::default();
-        torture::journal(1, &mut trials)?;
-        trials.finish(1)
-    }),
-    long("the linkage between all pairs of whole degrees", || {
-        cargo("test --release -p motion-core --test linkage -- --ignored")
-    }),
-    long("the arm's model in MuJoCo", mujoco::check),
-    long("more fuzzing", || {
-        fuzz::check(&fuzz::FuzzArgs { seconds: LONG_FUZZ_SECONDS, seed: None, fixed: false })
-    }),
-    quick("tests, and the system tests on the simulator", || {
+/// The steps, in order, until one fails. Steps that mostly wait or use one processor run beside each other. Tests come last, so
+/// that their output is at the end.
+const STAGES: &[Stage] = &[
+    &[&[
+        quick("tools that the steps need", install::all),
+        quick("format", || cargo("fmt --all --check")),
+        quick("lints, host", || cargo(&format!("clippy {CHECKED} --all-targets -- -D warnings"))),
+        quick("lints, host tests of the firmware", || {
+            cargo("clippy -p firmware-stm32 --lib --tests -- -D warnings")
+        }),
+        quick("lints, chip", || {
+            cargo(&format!("clippy -p footprint -p firmware-stm32 --target {CHIP} -- -D warnings"))
+        }),
+        quick("docs/registers.md is up to date", registers_md::check),
+        quick("every decision of docs/protocol.md has tests", decisions::check),
+        quick("the crates in docs/design.md are up to date", crate_graph::check),
+        quick("no cycle between files of a crate", modules::check),
+        quick("licences, versions and sources of dependencies", deny::rules),
+        whole("documentation", || {
+            run("cargo", &format!("doc {CHECKED} --no-deps"), &[("RUSTDOCFLAGS", "-D warnings")])
+        }),
+        whole("no panic is reachable", no_panic::check),
+        whole("flash, RAM and stack are within their budgets", || footprint::check(false)),
+        quick("the simulated arm builds for a browser, without an operating system", build_for_browser),
+        quick("the page builds within its budget", web::build),
+        quick("programs and tests", || cargo(&format!("test {TESTED} --no-run"))),
+    ]],
+    &[
+        &[
+            whole("start-up of the image", start_up::check),
+            whole("instructions are within their budgets", || count::check(false)),
+            whole("system tests, the image for the arm in an emulator", || {
+                system_tests::run_on(&system_tests::EMULATOR)
+            }),
+            whole("system tests, the controller on this computer with servos behind a USB adapter", || {
+                system_tests::run_on(&system_tests::ADAPTER)
+            }),
+            whole("the Python package", python::check),
+        ],
+        &[
+            whole("the page in a browser", || {
+                let variables = [("RUST_TEST_THREADS", "1"), ("POSES", "1000")];
+                run("cargo", &format!("test {TESTED} --test browser"), &variables)
+            }),
+            whole("recorded sessions, natively and in a WebAssembly module", replays::short),
+            whole("worlds with injected faults", torture::short),
+            whole("fuzzing", fuzz::fixed),
+        ],
+    ],
+    &[&[
+        long("more recorded sessions", replays::long),
+        long("more worlds with injected faults", torture::long),
+        long("the settings' tests in their long form", || {
+            let mut trials = trials::Trials::default();
+            torture::journal(1, &mut trials)?;
+            trials.finish(1)
+        }),
+        long("the linkage between all pairs of whole degrees", || {
+            cargo("test --release -p motion-core --test linkage -- --ignored")
+        }),
+        long("the arm's model in MuJoCo", mujoco::check),
+        long("more fuzzing", || {
+            fuzz::check(&fuzz::FuzzArgs { seconds: LONG_FUZZ_SECONDS, seed: None, fixed: false })
+        }),
+        quick("tests of the tasks", || cargo("test --package xtask")),
+    ]],
+    &[&[quick("tests, and the system tests on the simulator", || {
         // More threads than processors, because most system tests wait for an arm.
-        let threads = [("RUST_TEST_THREADS", "8")];
-        run("cargo", "test --workspace --exclude footprint --exclude browser-tests", &threads)
-    }),
+        run("cargo", &format!("test {TESTED}"), &[("RUST_TEST_THREADS", "8")])
+    })]],
 ];
 
-/// Runs the steps.
+/// Runs the steps, or does the work of one of them.
 pub(crate) fn run_steps(options: &TestArgs) -> TaskResult {
-    steps::run(STEPS, options.scope())
+    match &options.step {
+        Some(heading) => steps::act_of(STAGES, heading),
+        None => steps::run(STAGES, options.scope(), steps::execute),
+    }
 }

@@ -59,9 +59,10 @@ impl Package {
         Ok(folder.strip_prefix(root())?.to_owned())
     }
 
-    /// The root files of its library and programs.
+    /// The root files of its library, of whatever kind, and of its programs.
     pub(crate) fn roots(&self) -> Vec<PathBuf> {
-        let is_root = |target: &&CrateTarget| target.kind.iter().any(|kind| kind == "lib" || kind == "bin");
+        let is_other = |kind: &String| ["bench", "custom-build", "example", "test"].contains(&kind.as_str());
+        let is_root = |target: &&CrateTarget| !target.kind.iter().any(is_other);
         self.targets.iter().filter(is_root).map(|target| target.src_path.clone()).collect()
     }
 

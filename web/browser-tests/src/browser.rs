@@ -1,82 +1,94 @@
 //! Debian's Chromium, with software rendering and no way to other computers.
 
-use std::future::Future;
+use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use chromiumoxide::browser::{Browser, BrowserConfig};
-use futures::StreamExt;
-use system_tests::wait::TIMEOUT;
+use serde_json::{Value, json};
+use system_tests::process;
 use tempfile::TempDir;
-use tokio::runtime::{Builder, Runtime};
 
-/// Beside the options that the library sets.
+use crate::connection::{Connection, line_after};
+
+/// Software rendering at full speed, also of a window that nobody sees, and nothing that asks or goes to other computers.
 const OPTIONS: &[&str] = &[
-    "use-angle=swiftshader",
-    "enable-unsafe-swiftshader",
-    "disable-quic",
-    "disable-component-update",
-    "hide-scrollbars",
+    "--headless=new",
+    "--remote-debugging-port=0",
+    // Tests often run as root, who has no sandbox.
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+    "--enable-automation",
+    "--no-first-run",
+    "--password-store=basic",
+    "--lang=en_US",
+    "--force-color-profile=srgb",
+    "--hide-scrollbars",
+    "--mute-audio",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-timer-throttling",
+    "--disable-backgrounding-occluded-windows",
+    "--disable-renderer-backgrounding",
+    "--disable-ipc-flooding-protection",
+    "--disable-hang-monitor",
+    "--disable-breakpad",
+    "--disable-extensions",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-default-apps",
+    "--disable-quic",
+    "--disable-sync",
+    "--metrics-recording-only",
     // The heap of a page can be measured exactly.
-    "enable-precise-memory-info",
+    "--enable-precise-memory-info",
     // Names are not looked up: a request to another computer fails at once, and is in the list of requests.
-    "host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+];
+
+/// Events of these methods are kept. A served arm sends a thousand others.
+const KEPT: [&str; 5] = [
+    "Network.requestWillBeSent",
+    "Network.webSocketCreated",
+    "Runtime.exceptionThrown",
+    "Runtime.consoleAPICalled",
+    "Log.entryAdded",
 ];
 
 /// One browser at a time: it renders in software, and uses all processors.
 static TURN: Mutex<()> = Mutex::new(());
 
-/// A running browser with a profile of its own.
+/// A running browser with a profile of its own, and one page.
 #[derive(Debug)]
 pub struct Chromium {
-    browser: Browser,
-    runtime: Runtime,
+    /// The connection to the page.
+    pub page: Connection,
+    process: Child,
     _profile: TempDir,
     _turn: MutexGuard<'static, ()>,
 }
 
 impl Chromium {
-    /// Starts a browser.
+    /// Starts a browser with an empty page.
     #[must_use]
     pub fn start() -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let profile = tempfile::tempdir().expect("a temporary folder");
-        // Tests often run as root, who has no sandbox.
-        let config = BrowserConfig::builder()
-            .no_sandbox()
-            .new_headless_mode()
-            .viewport(None)
-            .launch_timeout(TIMEOUT)
-            .request_timeout(TIMEOUT)
-            .user_data_dir(profile.path())
-            .args(OPTIONS.iter().copied())
-            .build()
-            .expect("`cargo xtask test` installs chromium");
-        let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("a thread");
-        let (browser, mut messages) = runtime.block_on(Browser::launch(config)).expect("the browser starts");
-        runtime.spawn(async move { while messages.next().await.is_some() {} });
-        Self { browser, runtime, _profile: profile, _turn: turn }
-    }
-
-    /// An empty page.
-    #[must_use]
-    pub fn new_page(&self) -> chromiumoxide::Page {
-        self.wait(self.browser.new_page("about:blank")).expect("a page")
-    }
-
-    /// Waits for an answer of the browser.
-    pub fn wait<T>(&self, answer: impl Future<Output = T>) -> T {
-        self.runtime.block_on(answer)
-    }
-
-    /// Lets something run beside the test.
-    pub fn run_beside(&self, task: impl Future<Output = ()> + Send + 'static) {
-        self.runtime.spawn(task);
+        let mut command = Command::new("chromium");
+        command.args(OPTIONS).arg(format!("--user-data-dir={}", profile.path().display()));
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut process = command.spawn().expect("`cargo xtask test` installs chromium");
+        let address = line_after("DevTools listening on ws://", process.stderr.take());
+        let is_kept = |event: &Value| KEPT.iter().any(|method| event["method"] == *method);
+        let mut page = Connection::open(&address, is_kept);
+        let target = page.call("Target.createTarget", json!({ "url": "about:blank" }));
+        let attach = json!({ "targetId": target["targetId"], "flatten": true });
+        let session = page.call("Target.attachToTarget", attach);
+        page.session = session["sessionId"].as_str().map(str::to_owned);
+        Self { page, process, _profile: profile, _turn: turn }
     }
 }
 
 impl Drop for Chromium {
     fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.runtime.block_on(self.browser.kill());
+        process::kill(&mut self.process);
     }
 }

@@ -3,18 +3,16 @@
 //! Without a screen this Firefox has no WebGL, so it gets one that no monitor shows: `Xvfb`, with OpenGL in software.
 
 use std::fs;
-use std::io::Read;
-use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use system_tests::process;
-use system_tests::wait::{TIMEOUT, wait_for};
+use system_tests::wait::wait_for;
 use tempfile::TempDir;
-use tungstenite::{Message, WebSocket};
 
+use crate::connection::{Connection, line_after};
 use crate::picture::Picture;
 
 /// WebGL in software, and no reports to the makers of Firefox.
@@ -30,12 +28,10 @@ pub struct Firefox {
     _browser: Running,
     _screen: Running,
     _profile: TempDir,
-    socket: WebSocket<TcpStream>,
-    last_id: u64,
+    /// It keeps all events: what the page logged and requested.
+    session: Connection,
     /// The identifier of the page.
     context: Value,
-    /// What the page logged and requested.
-    events: Vec<Value>,
 }
 
 /// A process that ends with its owner.
@@ -66,44 +62,14 @@ impl Firefox {
         let mut browser = Running::start(browser.stdout(Stdio::null()).stderr(Stdio::piped()));
         let address = line_after("WebDriver BiDi listening on ws://", browser.0.stderr.take());
 
-        let stream = TcpStream::connect(&address).expect("a connection");
-        stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
-        let (socket, _) =
-            tungstenite::client(format!("ws://{address}/session"), stream).expect("a WebSocket");
-        let mut firefox = Self {
-            _browser: browser,
-            _screen: screen,
-            _profile: profile,
-            socket,
-            last_id: 0,
-            context: Value::Null,
-            events: Vec::new(),
-        };
-        firefox.call("session.new", json!({ "capabilities": {} }));
-        firefox.context =
-            firefox.call("browsingContext.getTree", json!({}))["contexts"][0]["context"].clone();
+        let mut session = Connection::open(&format!("{address}/session"), |_| true);
+        session.call("session.new", json!({ "capabilities": {} }));
+        let context = session.call("browsingContext.getTree", json!({}))["contexts"][0]["context"].clone();
         let events = ["log.entryAdded", "network.beforeRequestSent"];
-        firefox.call("session.subscribe", json!({ "events": events, "contexts": [firefox.context] }));
-        let page = json!({ "context": firefox.context, "url": url, "wait": "complete" });
-        firefox.call("browsingContext.navigate", page);
-        firefox
-    }
-
-    /// Calls a method of the protocol.
-    #[track_caller]
-    fn call(&mut self, method: &str, parameters: Value) -> Value {
-        self.last_id += 1;
-        let request = json!({ "id": self.last_id, "method": method, "params": parameters });
-        self.socket.send(Message::text(request.to_string())).expect("the browser listens");
-        loop {
-            let message = self.socket.read().expect("the browser answers");
-            let mut message: Value = serde_json::from_slice(&message.into_data()).expect("JSON");
-            if message["id"] == self.last_id {
-                assert_eq!(message["type"], "success", "{method}: {message}");
-                return message["result"].take();
-            }
-            self.events.push(message);
-        }
+        session.call("session.subscribe", json!({ "events": events, "contexts": [context] }));
+        session
+            .call("browsingContext.navigate", json!({ "context": context, "url": url, "wait": "complete" }));
+        Self { _browser: browser, _screen: screen, _profile: profile, session, context }
     }
 
     /// The value of a JavaScript expression, which may wait.
@@ -114,7 +80,7 @@ impl Firefox {
             "target": { "context": self.context },
             "awaitPromise": true,
         });
-        let answer = self.call("script.evaluate", parameters);
+        let answer = self.session.call("script.evaluate", parameters);
         assert_eq!(answer["type"], "success", "{expression}: {answer}");
         answer["result"]["value"]
             .as_str()
@@ -126,7 +92,7 @@ impl Firefox {
     pub fn wait_for(&mut self, event: &str, expression: &str, holds: impl Fn(&Value) -> bool) -> Value {
         wait_for(event, || {
             let value = self.evaluate(expression);
-            if holds(&value) { Ok(value) } else { Err(format!("{value}; {:?}", self.events)) }
+            if holds(&value) { Ok(value) } else { Err(format!("{value}; {:?}", self.session.events)) }
         })
     }
 
@@ -135,25 +101,26 @@ impl Firefox {
         let press = ["keyDown", "keyUp"].map(|kind| json!({ "type": kind, "value": key }));
         let actions: Vec<_> = press.iter().cycle().take(2 * times).collect();
         let keyboard = json!({ "type": "key", "id": "keyboard", "actions": actions });
-        self.call("input.performActions", json!({ "context": self.context, "actions": [keyboard] }));
+        self.session.call("input.performActions", json!({ "context": self.context, "actions": [keyboard] }));
     }
 
     /// The pixels of the window.
     pub fn picture(&mut self) -> Picture {
-        let picture = self.call("browsingContext.captureScreenshot", json!({ "context": self.context }));
+        let picture =
+            self.session.call("browsingContext.captureScreenshot", json!({ "context": self.context }));
         let png = STANDARD.decode(picture["data"].as_str().expect("base64")).expect("base64");
         Picture::decode(&png)
     }
 
     /// Exceptions of the page, and its errors in the console.
     pub fn errors(&self) -> impl Iterator<Item = &str> {
-        let errors = self.events.iter().filter(|event| event["params"]["level"] == "error");
+        let errors = self.session.events.iter().filter(|event| event["params"]["level"] == "error");
         errors.filter_map(|event| event["params"]["text"].as_str())
     }
 
     /// The addresses of all requests.
     pub fn requests(&self) -> impl Iterator<Item = &str> {
-        self.events.iter().filter_map(|event| event["params"]["request"]["url"].as_str())
+        self.session.events.iter().filter_map(|event| event["params"]["request"]["url"].as_str())
     }
 }
 
@@ -162,17 +129,5 @@ impl Running {
         Self(command.spawn().unwrap_or_else(|error| {
             panic!("{}: {error}; `cargo xtask test` installs it", command.get_program().display())
         }))
-    }
-}
-
-/// The rest of the first line of a process that begins like this.
-#[track_caller]
-fn line_after(beginning: &str, output: Option<impl Read + Send + 'static>) -> String {
-    let lines = process::lines(output.expect("a pipe"));
-    loop {
-        let line = lines.recv_timeout(TIMEOUT).expect("a line");
-        if let Some(rest) = line.strip_prefix(beginning) {
-            return rest.to_owned();
-        }
     }
 }

@@ -2,41 +2,12 @@
 
 use std::path::Path;
 
-use chromiumoxide::cdp::browser_protocol::browser::{SetDownloadBehaviorBehavior, SetDownloadBehaviorParams};
-use chromiumoxide::cdp::browser_protocol::dom::{
-    GetDocumentParams, QuerySelectorParams, SetFileInputFilesParams,
-};
-use chromiumoxide::cdp::browser_protocol::input::{
-    DispatchKeyEventParams, DispatchKeyEventType, DispatchMouseEventParams, DispatchMouseEventType,
-    DispatchTouchEventParams, DispatchTouchEventReturns, DispatchTouchEventType, MouseButton, TouchPoint,
-};
-
-use chromiumoxide::types::{Command, Method, MethodId};
-use serde::Serialize;
+use serde_json::json;
 
 use crate::page::Page;
 
 /// How many events a drag has between its ends.
 const DRAG_STEPS: u32 = 20;
-
-/// The finger goes up. The library's own command leaves an empty list out, which the browser refuses.
-#[derive(Debug, Serialize)]
-struct TouchEnd {
-    #[serde(rename = "type")]
-    kind: &'static str,
-    #[serde(rename = "touchPoints")]
-    touch_points: [u8; 0],
-}
-
-impl Method for TouchEnd {
-    fn identifier(&self) -> MethodId {
-        "Input.dispatchTouchEvent".into()
-    }
-}
-
-impl Command for TouchEnd {
-    type Response = DispatchTouchEventReturns;
-}
 
 impl Page {
     /// The centre of an element in CSS pixels, scrolled into view.
@@ -62,9 +33,10 @@ impl Page {
     #[track_caller]
     pub fn tap(&mut self, selector: &str) {
         let [x, y] = self.centre(selector);
-        let finger = vec![TouchPoint::new(x, y)];
-        self.call(DispatchTouchEventParams::new(DispatchTouchEventType::TouchStart, finger));
-        self.call(TouchEnd { kind: "touchEnd", touch_points: [] });
+        let fingers = [("touchStart", json!([{ "x": x, "y": y }])), ("touchEnd", json!([]))];
+        for (kind, points) in fingers {
+            self.call("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points }));
+        }
     }
 
     /// Drags the mouse from one place to another, and lets go.
@@ -75,36 +47,35 @@ impl Page {
 
     /// Drags the mouse from one place to another, and keeps its button down.
     pub fn drag_and_hold(&mut self, from: [f64; 2], to: [f64; 2]) {
-        self.mouse(DispatchMouseEventType::MouseMoved, from, 0);
+        self.mouse("mouseMoved", from, 0);
         self.press(from);
         for step in 1..=DRAG_STEPS {
             let share = f64::from(step) / f64::from(DRAG_STEPS);
             let at = |axis: usize| from[axis] + share * (to[axis] - from[axis]);
-            self.mouse(DispatchMouseEventType::MouseMoved, [at(0), at(1)], 1);
+            self.mouse("mouseMoved", [at(0), at(1)], 1);
         }
     }
 
     /// Presses the button of the mouse.
     pub fn press(&mut self, at: [f64; 2]) {
-        self.mouse(DispatchMouseEventType::MousePressed, at, 1);
+        self.mouse("mousePressed", at, 1);
     }
 
     /// Releases the button of the mouse.
     pub fn release(&mut self, at: [f64; 2]) {
-        self.mouse(DispatchMouseEventType::MouseReleased, at, 0);
+        self.mouse("mouseReleased", at, 0);
     }
 
-    fn mouse(&mut self, kind: DispatchMouseEventType, [x, y]: [f64; 2], pressed: i64) {
+    fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], pressed: u32) {
         // A move with no button would end the pointer's capture by the page.
-        let is_hover = kind == DispatchMouseEventType::MouseMoved && pressed == 0;
-        let button = if is_hover { MouseButton::None } else { MouseButton::Left };
-        let mut event = DispatchMouseEventParams::new(kind, x, y);
-        (event.button, event.buttons, event.click_count) = (Some(button), Some(pressed), Some(1));
-        self.call(event);
+        let button = if kind == "mouseMoved" && pressed == 0 { "none" } else { "left" };
+        let event =
+            json!({ "type": kind, "x": x, "y": y, "button": button, "buttons": pressed, "clickCount": 1 });
+        self.call("Input.dispatchMouseEvent", event);
     }
 
     /// Presses a key such as `Tab`, `ArrowUp` or a space, as often as asked.
-    pub fn keys(&mut self, key: &str, times: u32) {
+    pub fn keys(&mut self, key: &str, times: usize) {
         let (code, number, text) = match key {
             " " => ("Space", 32, " "),
             "Enter" => ("Enter", 13, "\r"),
@@ -118,15 +89,10 @@ impl Page {
             "End" => ("End", 35, ""),
             _ => panic!("no key {key}"),
         };
-        let down =
-            if text.is_empty() { DispatchKeyEventType::RawKeyDown } else { DispatchKeyEventType::KeyDown };
-        for _ in 0..times {
-            for kind in [down.clone(), DispatchKeyEventType::KeyUp] {
-                let mut event = DispatchKeyEventParams::new(kind);
-                (event.key, event.code) = (Some(key.to_owned()), Some(code.to_owned()));
-                (event.windows_virtual_key_code, event.text) = (Some(number), Some(text.to_owned()));
-                self.call(event);
-            }
+        let down = if text.is_empty() { "rawKeyDown" } else { "keyDown" };
+        for kind in [down, "keyUp"].into_iter().cycle().take(2 * times) {
+            let event = json!({ "type": kind, "key": key, "code": code, "windowsVirtualKeyCode": number, "text": text });
+            self.call("Input.dispatchKeyEvent", event);
         }
     }
 
@@ -146,18 +112,16 @@ impl Page {
 
     /// Lets downloads go to a folder.
     pub fn download_to(&mut self, folder: &Path) {
-        let mut parameters = SetDownloadBehaviorParams::new(SetDownloadBehaviorBehavior::Allow);
-        parameters.download_path = Some(folder.display().to_string());
-        self.call(parameters);
+        let behaviour = json!({ "behavior": "allow", "downloadPath": folder });
+        self.call("Browser.setDownloadBehavior", behaviour);
     }
 
     /// Chooses a file.
     #[track_caller]
     pub fn choose_file(&mut self, selector: &str, file: &Path) {
-        let root = self.call(GetDocumentParams::default()).root.node_id;
-        let node = self.call(QuerySelectorParams::new(root, selector)).node_id;
-        let mut parameters = SetFileInputFilesParams::new(vec![file.display().to_string()]);
-        parameters.node_id = Some(node);
-        self.call(parameters);
+        let root = &self.call("DOM.getDocument", json!({}))["root"]["nodeId"];
+        let node = self.call("DOM.querySelector", json!({ "nodeId": root, "selector": selector }));
+        let choice = json!({ "files": [file], "nodeId": node["nodeId"] });
+        self.call("DOM.setFileInputFiles", choice);
     }
 }

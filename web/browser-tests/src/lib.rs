@@ -8,6 +8,7 @@
 //! the accessibility tree, and compares with the numbers that the page's module exports. Firefox has one test of its own.
 
 pub mod browser;
+pub mod connection;
 pub mod firefox;
 pub mod input;
 pub mod page;

@@ -1,21 +1,8 @@
 //! A page in the browser: its values, its pictures, its faults and what it requested.
 
-use std::sync::{Arc, Mutex, PoisonError};
-
-use chromiumoxide::cdp::browser_protocol::accessibility::{AxValue, GetFullAxTreeParams};
-use chromiumoxide::cdp::browser_protocol::emulation::{
-    MediaFeature, SetDeviceMetricsOverrideParams, SetEmulatedMediaParams, SetTouchEmulationEnabledParams,
-};
-use chromiumoxide::cdp::browser_protocol::log::{EventEntryAdded, LogEntryLevel};
-use chromiumoxide::cdp::browser_protocol::network::{EventRequestWillBeSent, EventWebSocketCreated};
-use chromiumoxide::cdp::browser_protocol::page::{CaptureScreenshotParams, Viewport};
-use chromiumoxide::cdp::js_protocol::runtime::{
-    ConsoleApiCalledType, EvaluateParams, EventConsoleApiCalled, EventExceptionThrown,
-};
-use chromiumoxide::cdp::{IntoEventKind, browser_protocol::log};
-use chromiumoxide::types::Command;
-use futures::StreamExt;
-use serde_json::Value;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
 use system_tests::wait::wait_for;
 
 use crate::browser::Chromium;
@@ -24,15 +11,8 @@ use crate::picture::Picture;
 /// An open page.
 #[derive(Debug)]
 pub struct Page {
-    page: chromiumoxide::Page,
     browser: Chromium,
-    /// Exceptions, errors in the console, and violations of the content security policy.
-    errors: List,
-    /// The addresses of all requests.
-    requests: List,
 }
-
-type List = Arc<Mutex<Vec<String>>>;
 
 /// How the page is shown.
 #[derive(Clone, Copy, Debug)]
@@ -64,16 +44,13 @@ impl Page {
     /// The same, after a script that runs before those of the page.
     #[must_use]
     pub fn open_after(url: &str, script: &str) -> Self {
-        let browser = Chromium::start();
-        let page = browser.new_page();
-        let mut page = Self { page, browser, errors: List::default(), requests: List::default() };
-        page.call(log::EnableParams::default());
-        page.listen();
-        page.show_on(DESKTOP);
-        if !script.is_empty() {
-            page.browser.wait(page.page.evaluate_on_new_document(script)).expect("a script");
+        let mut page = Self { browser: Chromium::start() };
+        for domain in ["Page", "Log", "Network", "Runtime"] {
+            page.call(&format!("{domain}.enable"), json!({}));
         }
-        page.browser.wait(page.page.goto(url)).expect("an answer");
+        page.show_on(DESKTOP);
+        page.call("Page.addScriptToEvaluateOnNewDocument", json!({ "source": script }));
+        page.call("Page.navigate", json!({ "url": url }));
         wait_for("the page draws", || {
             let frames = page.try_evaluate("window.sevenbot.frame_count()");
             frames
@@ -85,66 +62,37 @@ impl Page {
         page
     }
 
-    fn listen(&self) {
-        self.keep(&self.requests, |event: &EventRequestWillBeSent| Some(event.request.url.clone()));
-        self.keep(&self.requests, |event: &EventWebSocketCreated| Some(event.url.clone()));
-        self.keep(&self.errors, |event: &EventExceptionThrown| {
-            Some(format!("{:?}", event.exception_details))
-        });
-        self.keep(&self.errors, |event: &EventEntryAdded| {
-            (event.entry.level == LogEntryLevel::Error).then(|| format!("{:?}", event.entry))
-        });
-        self.keep(&self.errors, |event: &EventConsoleApiCalled| {
-            (event.r#type == ConsoleApiCalledType::Error).then(|| format!("{:?}", event.args))
-        });
-    }
-
-    /// Adds what `text` says of each event to a list.
-    fn keep<E: IntoEventKind + Send + Sync + Unpin>(
-        &self,
-        list: &List,
-        text: impl Fn(&E) -> Option<String> + Send + 'static,
-    ) {
-        let mut events = self.browser.wait(self.page.event_listener::<E>()).expect("events");
-        let list = Arc::clone(list);
-        self.browser.run_beside(async move {
-            while let Some(event) = events.next().await {
-                list.lock().unwrap_or_else(PoisonError::into_inner).extend(text(&event));
-            }
-        });
-    }
-
     /// Changes the screen.
     pub fn show_on(&mut self, screen: Screen) {
         let Screen { width, height, is_dark, is_phone } = screen;
-        self.call(SetDeviceMetricsOverrideParams::new(i64::from(width), i64::from(height), 1.0, is_phone));
+        let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": is_phone });
+        self.call("Emulation.setDeviceMetricsOverride", size);
         let scheme = if is_dark { "dark" } else { "light" };
-        let feature = MediaFeature::new("prefers-color-scheme", scheme);
-        self.call(SetEmulatedMediaParams::builder().feature(feature).build());
-        self.call(SetTouchEmulationEnabledParams::new(is_phone));
+        let feature = json!({ "name": "prefers-color-scheme", "value": scheme });
+        self.call("Emulation.setEmulatedMedia", json!({ "features": [feature] }));
+        self.call("Emulation.setTouchEmulationEnabled", json!({ "enabled": is_phone }));
     }
 
     /// Calls a method of the DevTools protocol.
     #[track_caller]
-    pub fn call<C: Command>(&mut self, command: C) -> C::Response {
-        self.browser.wait(self.page.execute(command)).expect("the browser does it").result
+    pub fn call(&mut self, method: &str, parameters: Value) -> Value {
+        self.browser.page.call(method, parameters)
     }
 
     /// The value of a JavaScript expression, which may wait.
     ///
     /// # Errors
-    /// The exception.
+    /// The exception, or the answer of a browser that left the page meanwhile.
     pub fn try_evaluate(&mut self, expression: &str) -> Result<Value, String> {
-        let parameters = EvaluateParams::builder()
-            .expression(format!("(async () => ({expression}))()"))
-            .await_promise(true)
-            .return_by_value(true)
-            .build()
-            .expect("an expression");
-        let answer = self.call(parameters);
-        match answer.exception_details {
-            Some(exception) => Err(format!("{exception:?}")),
-            None => Ok(answer.result.value.unwrap_or_default()),
+        let parameters = json!({
+            "expression": format!("(async () => ({expression}))()"),
+            "awaitPromise": true,
+            "returnByValue": true,
+        });
+        let mut answer = self.browser.page.try_call("Runtime.evaluate", parameters)?;
+        match answer.get("exceptionDetails") {
+            Some(exception) => Err(exception.to_string()),
+            None => Ok(answer["result"]["value"].take()),
         }
     }
 
@@ -230,9 +178,12 @@ impl Page {
 
     /// A picture of the window as a PNG file.
     pub fn screenshot(&mut self) -> Vec<u8> {
-        self.browser
-            .wait(self.page.screenshot(chromiumoxide::page::ScreenshotParams::default()))
-            .expect("a picture")
+        self.capture(json!({}))
+    }
+
+    fn capture(&mut self, parameters: Value) -> Vec<u8> {
+        let answer = self.call("Page.captureScreenshot", parameters);
+        STANDARD.decode(answer["data"].as_str().expect("base64")).expect("base64")
     }
 
     /// The pixels of the window.
@@ -242,42 +193,57 @@ impl Page {
 
     /// The pixels of a part of the window that begins at whole CSS pixels.
     pub fn picture_of(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2]) -> Picture {
-        let clip = Viewport { x, y, width, height, scale: 1.0 };
-        let parameters = CaptureScreenshotParams::builder().clip(clip).build();
-        let picture = self.browser.wait(self.page.screenshot(parameters)).expect("a picture");
-        Picture::decode(&picture)
+        let clip = json!({ "x": x, "y": y, "width": width, "height": height, "scale": 1 });
+        Picture::decode(&self.capture(json!({ "clip": clip })))
     }
 
     /// Exceptions, errors in the console, and violations of the content security policy.
     pub fn errors(&mut self) -> Vec<String> {
-        self.settled(&Arc::clone(&self.errors))
+        self.settle();
+        self.errors_so_far().map(Value::to_string).collect()
+    }
+
+    fn errors_so_far(&self) -> impl Iterator<Item = &Value> {
+        self.browser.page.events.iter().filter_map(|event| {
+            let details = &event["params"];
+            match event["method"].as_str()? {
+                "Runtime.exceptionThrown" => Some(details),
+                "Runtime.consoleAPICalled" if details["type"] == "error" => Some(details),
+                "Log.entryAdded" if details["entry"]["level"] == "error" => Some(details),
+                _ => None,
+            }
+        })
     }
 
     /// The addresses of all requests.
     pub fn requests(&mut self) -> Vec<String> {
-        self.settled(&Arc::clone(&self.requests))
+        self.settle();
+        let url = |event: &Value| match event["method"].as_str()? {
+            "Network.requestWillBeSent" => event["params"]["request"]["url"].as_str().map(str::to_owned),
+            "Network.webSocketCreated" => event["params"]["url"].as_str().map(str::to_owned),
+            _ => None,
+        };
+        self.browser.page.events.iter().filter_map(url).collect()
     }
 
-    /// A list, with the events that came before this call.
-    fn settled(&mut self, list: &List) -> Vec<String> {
+    /// Waits for the events of all that has happened.
+    fn settle(&mut self) {
         // The answer comes behind the events.
         self.evaluate("new Promise(done => setTimeout(done, 100))");
-        list.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// The nodes of the accessibility tree that a screen reader sees, each with its role and name.
     pub fn accessible(&mut self) -> Vec<(String, String)> {
-        let tree = self.call(GetFullAxTreeParams::default());
-        let text = |value: &Option<AxValue>| {
-            let value = value.as_ref().and_then(|value| value.value.as_ref()?.as_str());
-            value.unwrap_or_default().trim().to_owned()
-        };
-        let seen = tree.nodes.iter().filter(|node| !node.ignored);
-        seen.map(|node| (text(&node.role), text(&node.name))).collect()
+        let tree = self.call("Accessibility.getFullAXTree", json!({}));
+        let text = |value: &Value| value["value"].as_str().unwrap_or_default().trim().to_owned();
+        let nodes = tree["nodes"].as_array().expect("a tree").iter();
+        let seen = nodes.filter(|node| node["ignored"] == false);
+        seen.map(|node| (text(&node["role"]), text(&node["name"]))).collect()
     }
 
     /// Errors of the page, for the message of a failed test.
     fn report(&self) -> String {
-        format!("errors of the page: {:?}", self.errors.lock().unwrap_or_else(PoisonError::into_inner))
+        let errors: Vec<_> = self.errors_so_far().collect();
+        format!("errors of the page: {errors:?}")
     }
 }

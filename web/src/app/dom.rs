@@ -91,6 +91,24 @@ impl Dom {
         }
     }
 
+    /// Says something that a person should know now.
+    pub(super) fn notice(&self, text: &str) {
+        self.set_text("notice", text);
+        self.set_hidden("notice", false);
+    }
+
+    /// Says why there is no picture of the arm. The rest of the page works.
+    pub(super) fn no_picture(&self, language: Language, reason: &JsValue) {
+        let reason = reason.as_string().unwrap_or_else(|| format!("{reason:?}"));
+        self.notice(&format!("{} {reason}", language.text("no-picture")));
+    }
+
+    /// Takes the last notice back.
+    pub(super) fn end_notice(&self) {
+        self.set_hidden("notice", true);
+        self.set_text("notice", "");
+    }
+
     /// Is this element the one with the keyboard's focus?
     pub(super) fn has_focus(&self, element: &Element) -> bool {
         self.0.active_element().is_some_and(|active| active == *element)

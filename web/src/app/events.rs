@@ -6,7 +6,6 @@ use protocol_core::time::Instant;
 use sevenbot::map::{MOTOR_STATE, motor_state};
 use sevenbot::recording::{Recording, RecordingError};
 use sevenbot::{Span, register_values};
-use wasm_bindgen::prelude::Closure;
 use wasm_bindgen::{JsCast, JsValue};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
 use web_sys::{
@@ -14,7 +13,8 @@ use web_sys::{
 };
 
 use super::dom::{Dom, number};
-use super::{App, Line, hand, panels, with_app};
+use super::hand;
+use super::page::{App, Line, on, with_app};
 use crate::arm_state::target_frame;
 use crate::movement::{self, PlayRefusal, Player, Recorder};
 use crate::park::{Park, ParkProgress};
@@ -26,22 +26,6 @@ use crate::source::socket::SocketSource;
 const LONGEST_APPROACH: f32 = 60.0;
 /// The texts of the tour, in their order. The last one is for a real arm.
 const TOUR: [&str; 5] = ["tour-1", "tour-2", "tour-3", "tour-4", "tour-5"];
-
-/// Calls `act` for each event of this kind on an element, as long as the page lives.
-pub(super) fn on<E: JsCast>(
-    target: &Element,
-    kind: &str,
-    mut act: impl FnMut(&mut App, &E, &Event) + 'static,
-) -> Result<(), JsValue> {
-    let handler = Closure::<dyn FnMut(Event)>::new(move |event: Event| {
-        if let Some(specific) = event.dyn_ref::<E>() {
-            with_app(|app| act(app, specific, &event));
-        }
-    });
-    target.add_event_listener_with_callback(kind, handler.as_ref().unchecked_ref())?;
-    handler.forget();
-    Ok(())
-}
 
 /// Listens to everything that a person can do.
 pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
@@ -111,7 +95,7 @@ impl App {
         self.player = None;
         self.park = Park::new(&self.client.state(), &self.client);
         let text = if self.park.is_some() { "parking" } else { "park-failed" };
-        panels::notice(&self.dom, self.language.text(text));
+        self.dom.notice(self.language.text(text));
     }
 
     /// Goes on with parking.
@@ -125,7 +109,7 @@ impl App {
             ParkProgress::Parked => "parked",
             ParkProgress::Failed => "park-failed",
         };
-        panels::notice(&self.dom, self.language.text(text));
+        self.dom.notice(self.language.text(text));
     }
 
     fn stop(&mut self) {
@@ -204,7 +188,7 @@ impl App {
             None => {
                 self.dom.choose("source", "simulator");
                 self.set_line(Line::Simulated(Box::default()));
-                panels::notice(&self.dom, self.language.text("no-serial"));
+                self.dom.notice(self.language.text("no-serial"));
             }
         }
     }
@@ -221,7 +205,7 @@ impl App {
             );
         match bytes {
             Ok(bytes) => self.write(address, &bytes),
-            Err(why) => panels::notice(&self.dom, &format!("{} {why}", self.language.text("bad-value"))),
+            Err(why) => self.dom.notice(&format!("{} {why}", self.language.text("bad-value"))),
         }
         // Shows the value of the arm again.
         let _ = input.blur();
@@ -261,7 +245,7 @@ impl App {
         match Player::new(recording, self.client.registers(), approach, self.now()) {
             Ok(player) => {
                 self.player = Some(player);
-                panels::end_notice(&self.dom);
+                self.dom.end_notice();
             }
             Err(PlayRefusal::NoRecording(why)) => self.refuse_file(&why),
             Err(PlayRefusal::TooFar(far)) => {
@@ -270,13 +254,13 @@ impl App {
                     .iter()
                     .map(|(joint, here, first)| format!("{}: {here:.1}° → {first:.1}°", joint.number()));
                 let joints = joints.collect::<Vec<_>>().join(", ");
-                panels::notice(&self.dom, &format!("{} {joints}", self.language.text("too-far")));
+                self.dom.notice(&format!("{} {joints}", self.language.text("too-far")));
             }
         }
     }
 
     fn refuse_file(&self, why: &RecordingError) {
-        panels::notice(&self.dom, &format!("{} {why}", self.language.text("bad-file")));
+        self.dom.notice(&format!("{} {why}", self.language.text("bad-file")));
     }
 
     fn download(&self) {
@@ -329,7 +313,7 @@ fn upload(element: &Element) {
         with_app(|app| match Recording::parse(&text) {
             Ok(_) => {
                 app.recording = Some(text.clone());
-                panels::end_notice(&app.dom);
+                app.dom.end_notice();
             }
             Err(why) => app.refuse_file(&why),
         });

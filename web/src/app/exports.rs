@@ -3,8 +3,8 @@
 use glam::Vec3;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::picture::tip;
-use super::with_app;
+use super::page::with_app;
+use super::panels::tip;
 
 /// What the page shows: angles and targets in degrees, the tip in mm.
 #[wasm_bindgen]

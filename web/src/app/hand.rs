@@ -8,8 +8,7 @@ use wasm_bindgen::JsValue;
 use web_sys::{Element, PointerEvent, WheelEvent};
 
 use super::dom::Dom;
-use super::events::on;
-use super::{App, Line};
+use super::page::{App, Line, on};
 use crate::arm_state::{breach_on_way, breach_text, has_extended_block};
 use crate::scene::{Button, Refusal, Scene, SceneEvent, Unreachable};
 

@@ -1,13 +1,13 @@
 //! What the page shows beside the picture of the arm.
 
+use kinematics::forward;
 use sevenbot::map::{EXTENDED_VERSION, SERVO_TEMPERATURE};
 use sevenbot::{Span, register_text};
 use wasm_bindgen::JsValue;
 use web_sys::{Element, HtmlInputElement};
 
 use super::dom::{Dom, set_attribute, set_text};
-use super::picture::tip;
-use super::{App, Line};
+use super::page::{App, Line};
 use crate::arm_state::{ArmState, breach, breach_text, has_extended_block};
 use crate::source::LineState;
 use crate::texts::Language;
@@ -94,7 +94,7 @@ fn show_line(app: &mut App, state: &ArmState) {
     }
     if let LineState::Closed(reason) = app.line_state() {
         let text = if app.client.rounds() > 0 { "closed" } else { "no-server" };
-        notice(&app.dom, &format!("{} {reason}", app.language.text(text)));
+        app.dom.notice(&format!("{} {reason}", app.language.text(text)));
     }
 }
 
@@ -212,22 +212,11 @@ fn is_writable(address: u8) -> bool {
     sevenbot::map::find(address).is_some_and(|row| row.access == Access::ReadWrite)
 }
 
-/// Says something that a person should know now.
-pub(super) fn notice(dom: &Dom, text: &str) {
-    dom.set_text("notice", text);
-    dom.set_hidden("notice", false);
-}
-
-/// Says why there is no picture of the arm. The rest of the page works.
-pub(super) fn no_picture(dom: &Dom, language: Language, reason: &JsValue) {
-    let reason = reason.as_string().unwrap_or_else(|| format!("{reason:?}"));
-    notice(dom, &format!("{} {reason}", language.text("no-picture")));
-}
-
-/// Takes the last notice back.
-pub(super) fn end_notice(dom: &Dom) {
-    dom.set_hidden("notice", true);
-    dom.set_text("notice", "");
+/// The tip of the arm in mm.
+pub(super) fn tip(angles: [f32; 7]) -> [f64; 3] {
+    let [one, two, three, four, five, six, _] = angles.map(f64::from);
+    let tip = forward([one, two, three, four, five, six]).hand.tip;
+    [tip.x, tip.y, tip.z]
 }
 
 fn is_open(dom: &Dom, id: &str) -> bool {

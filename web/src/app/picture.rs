@@ -1,9 +1,9 @@
 //! The arm in 3D and the plot, before each picture of the browser.
 
-use kinematics::forward;
 use sevenbot::map::{fault, motor_state};
 
-use super::{App, panels, whole};
+use super::page::{App, whole};
+use super::panels;
 use crate::arm_state::ArmState;
 use crate::plots::{Plot, Quantity, draw};
 use crate::scene::{Rgb, Theme, View};
@@ -31,7 +31,7 @@ impl App {
         if let Some(scene) = &mut self.scene
             && let Err(reason) = scene.draw(&view)
         {
-            panels::no_picture(&self.dom, self.language, &reason);
+            self.dom.no_picture(self.language, &reason);
         }
         // A plot is read at leisure, and costs as much time as the arm.
         if self.frames.is_multiple_of(PLOT_PERIOD) {
@@ -79,11 +79,4 @@ fn colours(state: &ArmState, theme: Theme) -> [Rgb; 7] {
             palette.joint_ok
         }
     })
-}
-
-/// The tip of the arm in mm.
-pub(super) fn tip(angles: [f32; 7]) -> [f64; 3] {
-    let [one, two, three, four, five, six, _] = angles.map(f64::from);
-    let tip = forward([one, two, three, four, five, six]).hand.tip;
-    [tip.x, tip.y, tip.z]
 }

@@ -16,7 +16,7 @@ pub(crate) use machine::frame;
 
 use crate::budget::{self, Figure};
 use crate::emulate;
-use crate::run::{ChipProgram, FAST, SMALL, TaskResult, build_footprint, build_image, cargo};
+use crate::run::{ChipProgram, FAST, SMALL, TaskResult, build_footprint, build_host_sim, build_image};
 
 /// Programs with budgets that count their own instructions.
 const OURS: &[&str] = &["count_ours", "count_arm", "count_kinematics"];
@@ -27,7 +27,7 @@ pub(crate) const PROFILES: &[(&str, &str)] = &[(SMALL, "opt-level s"), (FAST, "o
 pub(crate) fn check(accept: bool) -> TaskResult {
     emulate::need_qemu()?;
     build_image()?;
-    cargo("build --quiet --package host-sim")?;
+    build_host_sim()?;
     let mut figures = image::figures()?;
     figures.push(load::figure()?);
     for &(profile, words) in PROFILES {

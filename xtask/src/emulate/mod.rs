@@ -20,7 +20,7 @@ use host_sim::signals::{SignalAction, Signals};
 use tempfile::TempDir;
 use tty_ports::symlink::Symlink;
 
-use crate::run::{self, ChildProcess, ChipProgram, TaskResult, cargo, root};
+use crate::run::{self, ChildProcess, ChipProgram, TaskResult, root};
 
 mod debugger;
 pub(crate) mod lockstep;
@@ -71,7 +71,7 @@ pub(crate) fn run(options: &EmulateArgs) -> TaskResult {
     need_qemu()?;
     if !options.no_build {
         run::build_image()?;
-        cargo("build --quiet --package host-sim")?;
+        run::build_host_sim()?;
     }
     let mut signals = Signals::catch()?;
     let folder = tempfile::tempdir()?;

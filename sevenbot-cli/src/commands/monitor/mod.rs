@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!              ┌─ screen: draws, takes keys ──┐
-//!   terminal ──┤     │ commands    ▲ events   ├── View ── draw ── picture (SVG)
+//!   terminal ──┤     │ commands    ▲ events   ├── View ── draw
 //!              └─ arm_thread: owns the arm ───┘
 //!   otherwise ── lines: columns, CSV, JSON
 //! ```
@@ -11,13 +11,11 @@ mod arm_thread;
 mod draw;
 mod keys;
 mod lines;
-mod picture;
 mod plot_kind;
 mod sample;
 mod screen;
 mod view;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -28,7 +26,6 @@ use sevenbot::Arm;
 use self::lines::{LineFormat, SampleJson};
 use self::plot_kind::PlotKind;
 use self::sample::Sample;
-use self::view::{ArmEvent, PLOT_SPAN, View};
 use crate::command_error::CommandError;
 use crate::guard_args::GuardArgs;
 use crate::line_file::LineFile;
@@ -67,9 +64,6 @@ pub(crate) struct MonitorArgs {
     plot: PlotKind,
     #[command(flatten)]
     guard: GuardArgs,
-    /// Write the last screen to FILE, as SVG.
-    #[arg(long, value_name = "FILE", hide = true, conflicts_with_all = ["csv", "json"])]
-    picture: Option<PathBuf>,
 }
 
 impl MonitorArgs {
@@ -79,16 +73,11 @@ impl MonitorArgs {
 }
 
 pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandError> {
-    let show_screen = |session: &Session| screen::run(session, args.period(), args.plot, args.guard.guard());
     let on_screen = session.printer.is_terminal() && args.csv.is_none() && args.samples.is_none();
-    match (&args.picture, &args.csv) {
-        (Some(path), _) => {
-            let view = if on_screen { show_screen(session)? } else { view_without_screen(session, args)? };
-            fs::write(path, picture::picture(&view)).map_err(|error| CommandError::file(path, error))
-        }
-        (None, Some(path)) => write_csv(session, args, path),
-        (None, None) if on_screen => show_screen(session).map(drop),
-        (None, None) => show_lines(session, args),
+    match &args.csv {
+        Some(path) => write_csv(session, args, path),
+        None if on_screen => screen::run(session, args.period(), args.plot, args.guard.guard()),
+        None => show_lines(session, args),
     }
 }
 
@@ -133,18 +122,4 @@ fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), C
     each_sample(&mut arm, args, args.samples.unwrap_or(u64::MAX), |sample| {
         write(LineFormat::Csv.line(&sample))
     })
-}
-
-/// A view without a screen, after the requested number of samples, or enough for a full plot.
-fn view_without_screen(session: &Session, args: &MonitorArgs) -> Result<View, CommandError> {
-    let mut arm = session.connect()?;
-    let mut view = View::new(arm.port(), args.plot);
-    view.update(ArmEvent::Found { port: arm.port().to_owned(), firmware: arm.identity().version() });
-    let count = args.samples.unwrap_or(PLOT_SPAN.as_secs() * u64::from(args.hz));
-    each_sample(&mut arm, args, count, |sample| {
-        view.tick(sample.time);
-        view.update(ArmEvent::Sample(sample));
-        Ok(())
-    })?;
-    Ok(view)
 }

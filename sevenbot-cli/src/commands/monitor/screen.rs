@@ -22,13 +22,13 @@ use crate::session::Session;
 /// Time between two frames on the screen, and the longest reaction time to a key.
 const FRAME: Duration = Duration::from_millis(40);
 
-/// Shows the arm until the user quits. Returns the last view.
+/// Shows the arm until the user quits.
 pub(crate) fn run(
     session: &Session,
     period: Duration,
     plot: PlotKind,
     guard: Option<Guard>,
-) -> Result<View, CommandError> {
+) -> Result<(), CommandError> {
     // Without a port there is an error. A port without an answer is tried again.
     let port = session.port_name()?;
     let start = Instant::now();
@@ -60,7 +60,7 @@ pub(crate) fn run(
         None if Interrupt::is_requested() => warn("the arm is lost: it could not be made to hold"),
         None => {}
     }
-    Ok(view)
+    Ok(())
 }
 
 /// Runs `work` on the whole screen, and restores the terminal, also after a failure.

@@ -4,18 +4,18 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use protocol_core::registers::JOINTS;
 use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION};
 use protocol_core::request::Request;
+use protocol_core::wire::FrameBuffer;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::OFlags;
 
-use crate::count::frame;
-use crate::run::{ChildProcess, TaskResult};
+use crate::Outcome;
 
 /// The time of a measurement.
 const WATCH_TIME: Duration = Duration::from_secs(5);
@@ -32,31 +32,38 @@ const REPLY_BYTES: usize = 14;
 
 /// A running simulator.
 pub(crate) struct Simulator {
-    process: ChildProcess,
+    process: Child,
     ports: Vec<PathBuf>,
+}
+
+impl Drop for Simulator {
+    fn drop(&mut self) {
+        // An error means that it has ended.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
 }
 
 impl Simulator {
     /// Starts a simulator with this many arms, and waits until they have started.
-    pub(crate) fn start(program: &Path, arms: usize, options: &[&str]) -> TaskResult<Self> {
-        let child = Command::new(program)
+    pub(crate) fn start(program: &Path, arms: usize, options: &[&str]) -> Outcome<Self> {
+        let mut process = Command::new(program)
             .args(["--quiet", "--arms", &arms.to_string()])
             .args(options)
             .stdout(Stdio::piped())
             .spawn()?;
-        let mut process = ChildProcess(child);
-        let lines = BufReader::new(process.0.stdout.take().ok_or("no output")?).lines();
+        let lines = BufReader::new(process.stdout.take().ok_or("no output")?).lines();
         let ports = lines.take(arms).map(|line| {
             let line = line?;
             Ok(PathBuf::from(line.strip_prefix("ready ").ok_or("no port")?))
         });
-        let ports = ports.collect::<TaskResult<Vec<_>>>()?;
+        let ports = ports.collect::<Outcome<Vec<_>>>()?;
         sleep(START_TIME);
         Ok(Self { process, ports })
     }
 
     /// Opens the ports like a serial client. Reads do not block.
-    pub(crate) fn open(&self) -> TaskResult<Vec<File>> {
+    pub(crate) fn open(&self) -> Outcome<Vec<File>> {
         let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits();
         let flags = i32::try_from(flags)?;
         let open = |port: &PathBuf| OpenOptions::new().read(true).write(true).custom_flags(flags).open(port);
@@ -69,21 +76,21 @@ impl Simulator {
     }
 
     /// The processor time of its only thread.
-    fn time_on_core(&self) -> TaskResult<Duration> {
-        let text = fs::read_to_string(format!("/proc/{}/schedstat", self.process.0.id()))?;
+    fn time_on_core(&self) -> Outcome<Duration> {
+        let text = fs::read_to_string(format!("/proc/{}/schedstat", self.process.id()))?;
         let nanos = text.split_whitespace().next().ok_or("no time in schedstat")?;
         Ok(Duration::from_nanos(nanos.parse()?))
     }
 
     /// Its anonymous memory in KiB.
-    pub(crate) fn memory(&self) -> TaskResult<u64> {
-        let text = fs::read_to_string(format!("/proc/{}/smaps_rollup", self.process.0.id()))?;
+    pub(crate) fn memory(&self) -> Outcome<u64> {
+        let text = fs::read_to_string(format!("/proc/{}/smaps_rollup", self.process.id()))?;
         let line = text.lines().find_map(|line| line.strip_prefix("Anonymous:")).ok_or("no memory")?;
         Ok(line.trim().trim_end_matches(" kB").parse()?)
     }
 
     /// The share of a core that the idle simulator takes.
-    pub(crate) fn share_idle(&self) -> TaskResult<f64> {
+    pub(crate) fn share_idle(&self) -> Outcome<f64> {
         self.share_during(|| {
             sleep(WATCH_TIME);
             Ok(())
@@ -92,7 +99,7 @@ impl Simulator {
 
     /// The share of a core while all joints move and each arm is polled for its positions, up to a hundred times a second.
     /// Also returns the rate in Hz.
-    pub(crate) fn share_polled(&self) -> TaskResult<(f64, f64)> {
+    pub(crate) fn share_polled(&self) -> Outcome<(f64, f64)> {
         let mut ports = self.open()?;
         for port in &mut ports {
             port.write_all(&frame(Request::Write { address: SPEED.address, values: &[1; JOINTS] }))?;
@@ -111,7 +118,7 @@ impl Simulator {
         Ok((share, f64::from(rounds) / start.elapsed().as_secs_f64()))
     }
 
-    fn share_during(&self, act: impl FnOnce() -> TaskResult) -> TaskResult<f64> {
+    fn share_during(&self, act: impl FnOnce() -> Outcome) -> Outcome<f64> {
         let (start, before) = (Instant::now(), self.time_on_core()?);
         act()?;
         let used = self.time_on_core()?.saturating_sub(before);
@@ -120,7 +127,7 @@ impl Simulator {
 }
 
 /// Polls every arm, and receives the replies a period later, for this time. Returns the number of rounds.
-fn poll_arms(ports: &mut [File], time: Duration) -> TaskResult<u32> {
+fn poll_arms(ports: &mut [File], time: Duration) -> Outcome<u32> {
     let question = frame(Request::Read { address: PRESENT_POSITION.address, count: PRESENT_POSITION.count });
     let period = PERIOD.max(PERIOD_PER_ARM * u32::try_from(ports.len())?);
     let start = Instant::now();
@@ -135,7 +142,7 @@ fn poll_arms(ports: &mut [File], time: Duration) -> TaskResult<u32> {
 }
 
 /// Receives and checks a reply.
-pub(crate) fn receive_reply(port: &mut File) -> TaskResult {
+pub(crate) fn receive_reply(port: &mut File) -> Outcome {
     let mut reply = [0; REPLY_BYTES];
     let mut filled = 0;
     while let Some(room) = reply.get_mut(filled..).filter(|room| !room.is_empty()) {
@@ -149,9 +156,16 @@ pub(crate) fn receive_reply(port: &mut File) -> TaskResult {
     if reply.starts_with(&head) { Ok(()) } else { Err("an arm sent another reply")? }
 }
 
-fn wait_for_bytes(port: &File) -> TaskResult {
+fn wait_for_bytes(port: &File) -> Outcome {
     match poll(&mut [PollFd::new(port, PollFlags::IN)], Some(&TIMEOUT))? {
         0 => Err("an arm does not reply")?,
         _ => Ok(()),
     }
+}
+
+/// The frame of a request.
+pub(crate) fn frame(request: Request<'_>) -> Vec<u8> {
+    let mut buffer = FrameBuffer::new();
+    request.encode(&mut buffer);
+    buffer.to_vec()
 }

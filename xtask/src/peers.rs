@@ -1,4 +1,5 @@
-//! Compares the parse-and-reply path with its peers: time on this machine; instructions and bytes on the chip.
+//! `cargo xtask bench`: compares the parse-and-reply path with its peers: time on this machine; instructions and bytes on the
+//! chip. Other measurements are programs of `benchmarks/bench`. None has budgets; `count` and `size` have.
 
 use crate::count::{self, NamedCount};
 use crate::run::{ChipProgram, TaskResult, build_footprint, cargo};
@@ -15,8 +16,36 @@ const SERVERS: &[(&str, &str)] = &[
     ("mavlink", "count_mavlink"),
 ];
 
-/// Prints both comparisons.
-pub(crate) fn compare() -> TaskResult {
+/// Arguments of `cargo xtask bench`.
+#[derive(clap::Args)]
+pub(crate) struct BenchArgs {
+    /// Measure the host programs instead: their size, start and round trip, and the load of 1, 10, 100 and 1000 simulated
+    /// arms in one process
+    #[arg(long)]
+    programs: bool,
+    /// Measure simulated arms in virtual time instead: 1, 10, 100 and 1000 of them, on one and two threads
+    #[arg(long, conflicts_with = "programs")]
+    simulation: bool,
+    /// Print how evenly and how late set-points follow streams of points with jitter, losses and pauses, beside other methods
+    #[arg(long, conflicts_with_all = ["programs", "simulation"])]
+    streams: bool,
+}
+
+/// Measures and prints.
+pub(crate) fn run(args: &BenchArgs) -> TaskResult {
+    let bench = |program: &str| cargo(&format!("run --quiet --release --package bench --bin {program}"));
+    match args {
+        BenchArgs { programs: true, .. } => {
+            cargo("build --quiet --release --package host-sim --package sevenbot-cli")?;
+            bench("programs")
+        }
+        BenchArgs { simulation: true, .. } => bench("simulation"),
+        BenchArgs { streams: true, .. } => bench("streams"),
+        _ => compare(),
+    }
+}
+
+fn compare() -> TaskResult {
     emulate::need_qemu()?;
     cargo("run --quiet --release --package bench")?;
     for &(profile, words) in count::PROFILES {

@@ -1,20 +1,24 @@
-//! Measures the host programs: size, start, round trip, and the load of many arms in one simulator.
+//! `cargo xtask bench --programs`: size, start and round trip of the host programs, and the load of many arms in one simulator.
+//!
+//! The programs are those beside this one, of the same build.
 
-use std::fs;
+mod simulator;
+
+use std::error::Error;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
+use std::{env, fs};
 
 use protocol_core::registers::map::PRESENT_POSITION;
 use protocol_core::request::Request;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-use super::simulator::{Simulator, receive_reply};
-use crate::count::frame;
-use crate::run::{TaskResult, cargo, target_directory};
-use torture::text_table::Column::Right;
-use torture::text_table::TextTable;
+use simulator::{Simulator, frame, receive_reply};
+
+/// A result whose error is printed.
+type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
 /// Number of starts of a program.
 const STARTS: usize = 51;
@@ -23,13 +27,11 @@ const ROUND_TRIPS: usize = 5_001;
 /// Numbers of arms in one simulator.
 const SIZES: [usize; 4] = [1, 10, 100, 1_000];
 
-/// Measures and prints.
-pub(crate) fn measure() -> TaskResult {
-    cargo("build --quiet --release --package host-sim --package sevenbot-cli")?;
+fn main() -> Outcome {
     // Each arm needs an open port: more files than a process may open by default.
     let limit = getrlimit(Resource::Nofile);
     setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit })?;
-    let (host_sim, sevenbot) = (release("host-sim"), release("sevenbot"));
+    let (host_sim, sevenbot) = (beside_this("host-sim")?, beside_this("sevenbot")?);
     for program in [&host_sim, &sevenbot] {
         println!("{:10} bytes: {}", fs::metadata(program)?.len(), program.display());
     }
@@ -45,12 +47,13 @@ pub(crate) fn measure() -> TaskResult {
     print_arms(&host_sim)
 }
 
-fn release(program: &str) -> PathBuf {
-    target_directory().join("release").join(program)
+/// The path of a program in the folder of this one.
+fn beside_this(program: &str) -> Outcome<PathBuf> {
+    Ok(env::current_exe()?.with_file_name(program))
 }
 
 /// The run times of a program.
-fn starts(program: &Path, arguments: &[&str]) -> TaskResult<Vec<Duration>> {
+fn starts(program: &Path, arguments: &[&str]) -> Outcome<Vec<Duration>> {
     let run = || {
         let start = Instant::now();
         let status = Command::new(program).args(arguments).stdout(Stdio::null()).status()?;
@@ -60,7 +63,7 @@ fn starts(program: &Path, arguments: &[&str]) -> TaskResult<Vec<Duration>> {
     (0..STARTS).map(|_| run()).collect()
 }
 
-fn round_trips(arm: &Simulator) -> TaskResult<Vec<Duration>> {
+fn round_trips(arm: &Simulator) -> Outcome<Vec<Duration>> {
     let mut ports = arm.open()?;
     let port = ports.first_mut().ok_or("no port")?;
     let question = frame(Request::Read { address: PRESENT_POSITION.address, count: PRESENT_POSITION.count });
@@ -83,7 +86,7 @@ fn print_percentiles(what: &str, mut times: Vec<Duration>) {
 
 /// Prints the load of idle arms, and of arms with a host at 100 Hz each. The latter is computed from the cost of a reply,
 /// which hardly depends on the rate.
-fn print_arms(program: &Path) -> TaskResult {
+fn print_arms(program: &Path) -> Outcome {
     println!(
         "\nArms in one process, each with its settings in a file and its bytes paced at 115200 baud. Shares of a core;"
     );
@@ -99,7 +102,7 @@ fn print_arms(program: &Path) -> TaskResult {
         "arms per core",
         "memory",
     ];
-    let mut table = TextTable::new(columns.map(Right));
+    print_row(columns.map(str::to_owned));
     let mut memory = Vec::new();
     for size in SIZES {
         let folder = tempfile::tempdir()?;
@@ -111,7 +114,7 @@ fn print_arms(program: &Path) -> TaskResult {
         let reply = (busy - idle).max(0.0) / (rate * size as f64);
         let each = idle / size as f64;
         let at_100_hz = each + 100.0 * reply;
-        table.add([
+        print_row([
             size.to_string(),
             format!("{:.2} %", 100.0 * idle),
             format!("{:.3} %", 100.0 * each),
@@ -124,10 +127,13 @@ fn print_arms(program: &Path) -> TaskResult {
         ]);
         memory.push((size, kibibytes));
     }
-    print!("{table}");
     if let ([(1, one), ..], [.., (most, all)]) = (memory.as_slice(), memory.as_slice()) {
         let more = all.saturating_sub(*one) as f64 / (most - 1) as f64;
         println!("each further arm takes {more:.1} KiB");
     }
     Ok(())
+}
+
+fn print_row(cells: [String; 9]) {
+    println!("{}", cells.map(|cell| format!("{cell:>18}")).concat());
 }

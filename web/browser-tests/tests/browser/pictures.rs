@@ -1,4 +1,4 @@
-//! The pictures of the documents: `cargo test -p browser-tests --test pictures -- --ignored`.
+//! The pictures of the documents: `cargo test -p browser-tests --test browser -- pictures --ignored`.
 
 use std::path::Path;
 

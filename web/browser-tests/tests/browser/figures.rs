@@ -1,4 +1,4 @@
-//! The figures of docs/web.md: `taskset -c 0 cargo test -p browser-tests --test figures -- --ignored --nocapture` on one core.
+//! The figures of docs/web.md: `taskset -c 0 cargo test -p browser-tests --test browser -- figures --ignored --nocapture` on one core.
 
 use browser_tests::{Page, Viewed};
 use system_tests::wait::wait_for;

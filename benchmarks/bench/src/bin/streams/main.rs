@@ -1,4 +1,5 @@
-//! Set-points from streams of points (D23): how evenly, how late, with this project's method and with others.
+//! `cargo xtask bench --streams`: set-points from streams of points (D23): how evenly, how late, with this project's method and
+//! with others.
 //!
 //! A joint moves at a constant velocity, and its points come in frames with jitter, losses and a pause. All methods get
 //! the same frames. The seeds are fixed, so the figures are the same on every machine.
@@ -6,26 +7,16 @@
 mod methods;
 mod sine;
 
-use std::fs;
-
 use fastrand::Rng;
 
-use crate::emulate;
-use crate::run::{TaskResult, build_image, root};
-use sine::{Recording, Targets};
-
 use methods::{CYCLE, METHODS, Method, OURS, SetPoints};
+use sine::Targets;
 
 /// Degrees per second. Ten minutes stay below the largest angle of motion-core.
 const VELOCITY: f64 = 3.0;
 /// Runs of each scenario, each with its own seed and phase of the control cycles.
 const RUNS: u64 = 20;
 const PERIODS: [f64; 5] = [0.005, 0.01, 0.02, 0.05, 0.1];
-/// The drawings of the sine: on the simulated arm, and on the emulated image.
-const DRAWING: &str = "docs/stream.svg";
-const IMAGE_DRAWING: &str = "docs/stream-image.svg";
-/// The title of the panel of fine targets.
-const FINE_TITLE: &str = "fine targets, period 20 ms";
 /// After so many points a method has settled.
 const SETTLING_POINTS: usize = 40;
 
@@ -90,8 +81,7 @@ impl Figures {
     }
 }
 
-/// Prints the figures.
-pub(crate) fn measure() -> TaskResult {
+fn main() {
     let columns = "largest ripple % | rms ripple % | delay P | stopped % | overshoot %";
     println!("Set-points of this firmware; the worst of {RUNS} runs.\n");
     println!("| frames | P ms | {columns} |\n| --- | --- | --- | --- | --- | --- | --- |");
@@ -105,44 +95,20 @@ pub(crate) fn measure() -> TaskResult {
     {
         println!("| {} | {} | {} |", scenario.name, method.name, worst(method, scenario, 0.02).cells());
     }
-    measure_sine()
+    print_sine();
 }
 
-/// Prints how the simulated arm follows a sine, and draws it.
-fn measure_sine() -> TaskResult {
-    let (fine, whole) = (sine::record(Targets::Fine), sine::record(Targets::WholeDegrees));
-    print_sine(&[("fine, with a period", &fine), ("whole degrees", &whole)]);
-    let panels = [(FINE_TITLE, &fine), ("whole degrees", &whole)];
-    draw(DRAWING, &sine::svg(&panels))
-}
-
-/// Prints how the emulated image and the simulated arm follow a sine, and draws both.
-pub(crate) fn measure_image() -> TaskResult {
-    emulate::need_qemu()?;
-    build_image()?;
-    let (image, simulated) = (sine::record_image()?, sine::record(Targets::Fine));
-    print_sine(&[("emulated image", &image), ("simulated arm", &simulated)]);
-    let panels = [
-        ("the image in the emulator, period 20 ms", &image),
-        ("the simulated arm, period 20 ms", &simulated),
-    ];
-    draw(IMAGE_DRAWING, &sine::svg(&panels))
-}
-
-fn print_sine(recordings: &[(&str, &Recording)]) {
+/// Prints how the simulated arm follows a sine.
+fn print_sine() {
     println!("\nA sine of 30 degrees at 0.2 Hz, 50 points a second with 25 % jitter; joint 1.\n");
     println!("| targets | delay ms | rms error degrees | largest change of velocity, degrees/s | rms |");
     println!("| --- | --- | --- | --- | --- |");
-    for (name, recording) in recordings {
-        let ((delay, error), (largest, rms)) = (sine::tracking(recording), sine::roughness(recording));
+    for (name, targets) in [("fine, with a period", Targets::Fine), ("whole degrees", Targets::WholeDegrees)]
+    {
+        let measured = sine::record(targets);
+        let ((delay, error), (largest, rms)) = (sine::tracking(&measured), sine::roughness(&measured));
         println!("| {name} | {delay:.0} | {error:.3} | {largest:.1} | {rms:.1} |");
     }
-}
-
-fn draw(path: &str, drawing: &str) -> TaskResult {
-    fs::write(root().join(path), drawing)?;
-    println!("\ndrawn: {path}");
-    Ok(())
 }
 
 fn worst(method: &Method, scenario: &Scenario, period: f64) -> Figures {

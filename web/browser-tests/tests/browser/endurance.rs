@@ -1,7 +1,7 @@
 //! The page after ten minutes.
 
 use browser_tests::Viewed;
-use chromiumoxide::cdp::js_protocol::heap_profiler::CollectGarbageParams;
+use serde_json::json;
 
 /// How much the memory may grow, in bytes: less than one picture of the arm.
 const GROWTH: f64 = 3e6;
@@ -19,7 +19,7 @@ fn ten_minutes_of_the_arm_need_no_more_memory_than_one() {
             page.key(key);
             page.pass(30.0);
         }
-        page.call(CollectGarbageParams::default());
+        page.call("HeapProfiler.collectGarbage", json!({}));
         page.number("performance.memory.usedJSHeapSize + (await import('/sevenbot_web.js')).memory_size()")
     };
     let first = memory();

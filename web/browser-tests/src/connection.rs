@@ -1,0 +1,80 @@
+//! A connection to a browser: calls in JSON on a WebSocket, and the events between their answers.
+//!
+//! The DevTools protocol of Chromium and WebDriver BiDi share this form.
+
+use std::net::TcpStream;
+
+use serde_json::{Value, json};
+use system_tests::process;
+use system_tests::wait::TIMEOUT;
+use tungstenite::{Message, WebSocket};
+
+/// An open connection.
+#[derive(Debug)]
+pub struct Connection {
+    socket: WebSocket<TcpStream>,
+    last_id: u64,
+    /// The session of the DevTools protocol that calls belong to, once there is one.
+    pub session: Option<String>,
+    /// The events that are kept, in order.
+    pub events: Vec<Value>,
+    is_kept: fn(&Value) -> bool,
+}
+
+impl Connection {
+    /// Connects to an address without its `ws://`, and keeps these events.
+    #[must_use]
+    pub fn open(address: &str, is_kept: fn(&Value) -> bool) -> Self {
+        let host = address.split('/').next().unwrap_or_default();
+        let stream = TcpStream::connect(host).expect("a connection");
+        stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
+        let (socket, _) = tungstenite::client(format!("ws://{address}"), stream).expect("a WebSocket");
+        Self { socket, last_id: 0, session: None, events: Vec::new(), is_kept }
+    }
+
+    /// Calls a method of the protocol.
+    ///
+    /// # Errors
+    /// The answer of the browser, if it reports an error.
+    pub fn try_call(&mut self, method: &str, parameters: Value) -> Result<Value, String> {
+        self.last_id += 1;
+        let mut request = json!({ "id": self.last_id, "method": method, "params": parameters });
+        if let Some(session) = &self.session {
+            request["sessionId"] = json!(session);
+        }
+        self.socket.send(Message::text(request.to_string())).expect("the browser listens");
+        loop {
+            let message = self.socket.read().expect("the browser answers");
+            let mut message: Value = serde_json::from_slice(&message.into_data()).expect("JSON");
+            if message["id"] == self.last_id {
+                let is_error = message.get("error").is_some();
+                return if is_error {
+                    Err(format!("{method}: {message}"))
+                } else {
+                    Ok(message["result"].take())
+                };
+            }
+            if (self.is_kept)(&message) {
+                self.events.push(message);
+            }
+        }
+    }
+
+    /// Calls a method that succeeds.
+    #[track_caller]
+    pub fn call(&mut self, method: &str, parameters: Value) -> Value {
+        self.try_call(method, parameters).unwrap_or_else(|error| panic!("{error}"))
+    }
+}
+
+/// The rest of the first line of a process that begins like this.
+#[track_caller]
+pub(crate) fn line_after(beginning: &str, output: Option<impl std::io::Read + Send + 'static>) -> String {
+    let lines = process::lines(output.expect("a pipe"));
+    loop {
+        let line = lines.recv_timeout(TIMEOUT).expect("a line");
+        if let Some(rest) = line.strip_prefix(beginning) {
+            return rest.to_owned();
+        }
+    }
+}

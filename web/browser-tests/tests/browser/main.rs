@@ -1,0 +1,12 @@
+//! The page in real browsers: one program, which `cargo xtask test` runs by its name.
+
+mod endurance;
+mod faults;
+mod figures;
+mod firefox;
+mod moving;
+mod page;
+mod pictures;
+mod pixels;
+mod recording;
+mod served_arm;

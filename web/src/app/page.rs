@@ -1,0 +1,259 @@
+//! The page as a value: the arm that it has, and what passes between them.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use glam::Vec3;
+use protocol_core::time::Instant;
+use sevenbot::map::VACUUM_PUMP;
+use wasm_bindgen::prelude::Closure;
+use wasm_bindgen::{JsCast, JsValue};
+use web_sys::{CanvasRenderingContext2d, Element, Event};
+
+use super::dom::Dom;
+use crate::client::Client;
+use crate::movement::{Player, Recorder};
+use crate::park::Park;
+use crate::plots::{History, Quantity, Sample};
+use crate::scene::{Part, Scene};
+use crate::source::simulator::SimulatedSource;
+use crate::source::{LineState, Source};
+use crate::texts::Language;
+
+/// Longer pauses of the browser, as in a tab in the background, let no more virtual time pass: 100 ms.
+const LONGEST_FRAME_MS: f64 = 100.0;
+/// At high speed the client takes part this often, in milliseconds of virtual time: well within the watchdog of a movement that is
+/// played.
+const STEP_MS: f64 = 20.0;
+/// How long the simulation may compute in each frame, in milliseconds, so that 30 pictures a second remain.
+const FRAME_BUDGET_MS: f64 = 24.0;
+/// How long plots reach back, in seconds.
+const PLOT_SECONDS: f64 = 10.0;
+
+/// Where the arm is.
+pub(super) enum Line {
+    Simulated(Box<SimulatedSource>),
+    Remote(Box<dyn Source>),
+}
+
+impl Line {
+    fn source(&mut self) -> &mut dyn Source {
+        match self {
+            Self::Simulated(source) => source.as_mut(),
+            Self::Remote(source) => source.as_mut(),
+        }
+    }
+}
+
+/// The page.
+pub(super) struct App {
+    pub(super) dom: Dom,
+    pub(super) line: Line,
+    pub(super) client: Client,
+    /// `None` where the browser has no WebGL2.
+    pub(super) scene: Option<Scene>,
+    pub(super) plot: CanvasRenderingContext2d,
+    pub(super) history: History,
+    pub(super) quantity: Quantity,
+    pub(super) language: Language,
+    /// Of virtual time; 0 is a pause.
+    pub(super) speed: f64,
+    /// The time of the last frame, in the browser's milliseconds.
+    pub(super) last_frame: f64,
+    pub(super) shown_round: u64,
+    /// Before this round the arm may not have taken what a slider was set to.
+    pub(super) slid_round: u64,
+    pub(super) frames: u32,
+    pub(super) hovered: Option<Part>,
+    /// Where the pointer wants the tip although it cannot go there, and the name of the text that says why.
+    pub(super) unreachable: Option<(Vec3, &'static str)>,
+    /// A joint of a limp arm that the pointer holds.
+    pub(super) hand: Option<u8>,
+    pub(super) recorder: Option<Recorder>,
+    pub(super) park: Option<Park>,
+    pub(super) player: Option<Player>,
+    pub(super) recording: Option<String>,
+    pub(super) tour_step: usize,
+}
+
+thread_local! {
+    /// The page is a single one. Handlers of the browser need it after `start` has returned.
+    static APP: RefCell<Option<Rc<RefCell<App>>>> = const { RefCell::new(None) };
+}
+
+/// Does something with the page, unless it is busy: a handler never runs inside another.
+pub(super) fn with_app<T>(act: impl FnOnce(&mut App) -> T) -> Option<T> {
+    let app = APP.with_borrow(Clone::clone)?;
+    let mut app = app.try_borrow_mut().ok()?;
+    Some(act(&mut app))
+}
+
+/// Calls `act` for each event of this kind on an element, as long as the page lives.
+pub(super) fn on<E: JsCast>(
+    target: &Element,
+    kind: &str,
+    mut act: impl FnMut(&mut App, &E, &Event) + 'static,
+) -> Result<(), JsValue> {
+    let handler = Closure::<dyn FnMut(Event)>::new(move |event: Event| {
+        if let Some(specific) = event.dyn_ref::<E>() {
+            with_app(|app| act(app, specific, &event));
+        }
+    });
+    target.add_event_listener_with_callback(kind, handler.as_ref().unchecked_ref())?;
+    handler.forget();
+    Ok(())
+}
+
+/// The plot is drawn by the processor: a software renderer of the graphics processor takes seconds for it while the page scrolls.
+fn plot_context(dom: &Dom) -> Result<CanvasRenderingContext2d, JsValue> {
+    let options = js_sys::Object::new();
+    js_sys::Reflect::set(&options, &"willReadFrequently".into(), &true.into())?;
+    let context = dom.canvas("plot")?.get_context_with_context_options("2d", &options)?;
+    Ok(context.ok_or("no 2D canvas")?.unchecked_into())
+}
+
+/// The browser's clock, in milliseconds.
+fn browser_now() -> f64 {
+    web_sys::window().and_then(|window| window.performance()).map_or(0.0, |clock| clock.now())
+}
+
+impl App {
+    /// Makes the page, for [`with_app`].
+    pub(super) fn start(dom: Dom) -> Result<(), JsValue> {
+        let app = Self::new(dom)?;
+        APP.set(Some(Rc::new(RefCell::new(app))));
+        Ok(())
+    }
+
+    fn new(dom: Dom) -> Result<Self, JsValue> {
+        let tag = web_sys::window().and_then(|window| window.navigator().language());
+        let language = Language::of_tag(&tag.unwrap_or_default());
+        let scene = Scene::new(dom.canvas("scene")?);
+        if let Err(reason) = &scene {
+            dom.no_picture(language, reason);
+        }
+        let plot = plot_context(&dom)?;
+        Ok(Self {
+            dom,
+            line: Line::Simulated(Box::default()),
+            client: Client::default(),
+            scene: scene.ok(),
+            plot,
+            history: History::new(PLOT_SECONDS),
+            quantity: Quantity::Angle,
+            language,
+            speed: 1.0,
+            last_frame: browser_now(),
+            shown_round: 0,
+            slid_round: 0,
+            frames: 0,
+            hovered: None,
+            unreachable: None,
+            hand: None,
+            recorder: None,
+            park: None,
+            player: None,
+            recording: None,
+            tour_step: 0,
+        })
+    }
+
+    /// The clock of the arm: virtual for a simulated one.
+    pub(super) fn now(&self) -> Instant {
+        match &self.line {
+            Line::Simulated(source) => source.now(),
+            Line::Remote(_) => Instant::from_micros(whole(browser_now() * 1e3)),
+        }
+    }
+
+    /// Before each picture: bytes, time, then the picture.
+    pub(super) fn frame(&mut self, time: f64) {
+        let elapsed = (time - self.last_frame).clamp(0.0, LONGEST_FRAME_MS);
+        self.last_frame = time;
+        let until = browser_now() + FRAME_BUDGET_MS;
+        // A reply that came since the last picture is not late, however slow the pictures are.
+        self.receive();
+        let mut rest = if matches!(self.line, Line::Simulated(_)) { elapsed * self.speed } else { 0.0 };
+        loop {
+            let step = rest.min(STEP_MS);
+            self.exchange(step, until);
+            rest -= step;
+            if rest <= 0.0 || browser_now() >= until {
+                break;
+            }
+        }
+        self.show();
+        self.frames = self.frames.wrapping_add(1);
+    }
+
+    /// Sends what is due, lets virtual time pass, and takes what the arm has sent.
+    fn exchange(&mut self, virtual_ms: f64, until: f64) {
+        let now = self.now();
+        self.play(now);
+        let bytes = self.client.poll(now);
+        self.line.source().send(&bytes);
+        if let Line::Simulated(source) = &mut self.line {
+            source.advance(virtual_ms * 1e3, || browser_now() < until);
+        }
+        self.receive();
+    }
+
+    fn receive(&mut self) {
+        let bytes = self.line.source().receive();
+        let now = self.now();
+        self.client.receive(now, &bytes);
+        if self.client.rounds() != self.shown_round {
+            self.shown_round = self.client.rounds();
+            self.new_state(now);
+        }
+    }
+
+    fn play(&mut self, now: Instant) {
+        self.park_on(now);
+        let Some(mut player) = self.player.take() else { return };
+        if player.poll(now, &mut self.client) {
+            self.player = Some(player);
+        }
+    }
+
+    /// The registers are new.
+    #[expect(clippy::cast_precision_loss, reason = "times of years are exact enough")]
+    fn new_state(&mut self, now: Instant) {
+        let state = self.client.state();
+        let vacuum = self.client.registers().byte(&VACUUM_PUMP) != 0;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.add(now, &state, vacuum);
+        }
+        let time = now.as_micros() as f64 / 1e6;
+        let (angles, loads, velocities) = (state.angles(), state.loads, state.velocities);
+        self.history.push(Sample { time, angles, loads, velocities });
+    }
+
+    pub(super) fn set_language(&mut self, language: Language) {
+        self.language = language;
+        self.dom.translate(language);
+        self.show_tour();
+    }
+
+    /// Changes to another arm: everything that belonged to the last one ends.
+    pub(super) fn set_line(&mut self, line: Line) {
+        (self.line, self.client) = (line, Client::default());
+        (self.shown_round, self.slid_round) = (0, 0);
+        (self.hand, self.unreachable) = (None, None);
+        (self.recorder, self.player, self.park) = (None, None, None);
+        self.history = History::new(PLOT_SECONDS);
+        let is_simulated = matches!(self.line, Line::Simulated(_));
+        self.dom.set_hidden("simulator", !is_simulated);
+        self.dom.end_notice();
+    }
+
+    pub(super) fn line_state(&mut self) -> LineState {
+        self.line.source().state()
+    }
+}
+
+/// Not negative, and far below the limit.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+pub(super) const fn whole(number: f64) -> u64 {
+    number as u64
+}
