@@ -18,8 +18,8 @@ use crate::goal_check::GoalCheck;
 use crate::let_go::LetGo;
 use crate::obstacle::Obstacle;
 use crate::position_filter::{FilterOutcome, PositionFilter};
-use crate::push_limiter::{PushLimit, PushSample};
-use crate::servo_bus::{Answer, Torque};
+use crate::push_limiter::{FULL_LOAD, PushLimit, PushSample};
+use crate::servo_bus::{Answer, Reading, Torque};
 use crate::torque_check::{TorqueCheck, TorqueFound};
 
 /// The effect of a reading.
@@ -226,9 +226,10 @@ impl JointState {
             return Protected::Freed;
         }
         if self.drive.is_engaged() && registers.get(PROTECTION.address) != 0 {
-            let push = push_from_servo(self.joint, answer.reading.load, answer.reading.speed);
-            let limit = self.push_limit(registers);
-            self.obstacle.measured(now, PushSample { angle, push }, set_point, limit);
+            let Reading { load, speed, .. } = answer.reading;
+            let push = push_from_servo(self.joint, load, speed);
+            let sample = PushSample { angle, push, is_saturated: load.saturating_abs() >= FULL_LOAD };
+            self.obstacle.measured(now, sample, set_point, self.push_limit(registers));
         }
         Protected::Holds
     }
@@ -331,7 +332,7 @@ impl JointState {
             self.is_first_engagement = false;
         }
         self.torque.refreshed();
-        if self.let_go.needs_torque_off(is_protected) {
+        if self.position.is_known() && self.let_go.needs_torque_off(is_protected) {
             self.let_go.torque_off_is_sent();
             Some(Torque::Damping)
         } else {

@@ -62,6 +62,8 @@ enum State {
         alarm_at: Instant,
         /// The last answer at which the joint was not at rest.
         moved_at: Instant,
+        /// According to its last answer, an alarm keeps the servo from holding. When heat ends, a servo holds by itself.
+        is_freed: bool,
         /// Torque-off was sent: without it a latched overload would not end.
         has_torque_off: bool,
     },
@@ -77,10 +79,10 @@ impl LetGo {
         matches!(self.state, State::LetGo { .. })
     }
 
-    /// Did an alarm free the joint? Then its servo gets torque-off, which frees nothing and ends a latched overload. Without
-    /// protection only the host can order that.
+    /// Does an alarm keep the servo from holding the joint? Then it gets torque-off, which frees nothing and ends a latched
+    /// overload. Without protection only the host can order that.
     pub(crate) const fn needs_torque_off(&self, is_protected: bool) -> bool {
-        matches!(self.state, State::LetGo { alarms: 1.., .. }) && (is_protected || self.is_ordered)
+        matches!(self.state, State::LetGo { is_freed: true, .. }) && (is_protected || self.is_ordered)
     }
 
     /// Torque-off is sent because of [`LetGo::needs_torque_off`].
@@ -125,14 +127,23 @@ impl LetGo {
 
     /// The joint is let go from now on.
     pub(crate) fn let_go(&mut self, now: Instant) {
-        self.state =
-            State::LetGo { alarms: 0, hot_at: 0, alarm_at: now, moved_at: now, has_torque_off: false };
+        self.state = State::LetGo {
+            alarms: 0,
+            hot_at: 0,
+            alarm_at: now,
+            moved_at: now,
+            is_freed: false,
+            has_torque_off: false,
+        };
         self.is_ordered = false;
     }
 
     /// Takes an answer of the servo of a joint that is let go.
     pub(crate) fn follow(&mut self, now: Instant, answer: &Answer) {
-        let State::LetGo { alarms, hot_at, alarm_at, moved_at, .. } = &mut self.state else { return };
+        let State::LetGo { alarms, hot_at, alarm_at, moved_at, is_freed, .. } = &mut self.state else {
+            return;
+        };
+        *is_freed = answer.alarms != 0 && answer.reading.load == 0;
         if answer.alarms & !*alarms & OVERHEAT != 0 {
             *hot_at = answer.reading.temperature_celsius;
         }
@@ -147,10 +158,10 @@ impl LetGo {
 
     /// May the joint engage now, at this temperature of its servo in degrees Celsius? By itself only if `is_protected`.
     pub(crate) fn may_engage(&mut self, now: Instant, temperature: u8, is_protected: bool) -> bool {
-        let State::LetGo { alarms, hot_at, alarm_at, moved_at, has_torque_off } = self.state else {
+        let State::LetGo { alarms, hot_at, alarm_at, moved_at, is_freed, has_torque_off } = self.state else {
             return true;
         };
-        let is_calm = (alarms == 0 || has_torque_off)
+        let is_calm = (!is_freed || has_torque_off)
             && (alarms & !OVERLOAD == 0 || now - alarm_at >= CALM_FOR)
             && (alarms & OVERLOAD == 0 || now - moved_at >= CALM_FOR)
             && (alarms & OVERHEAT == 0 || temperature.saturating_add(COOLER_BY) <= hot_at);

@@ -9,8 +9,9 @@
 //!
 //! A servo pushes in proportion to the distance of its goal. So a limited joint keeps its set-point within a distance of
 //! the measured position, and this distance is scaled by limit / push until the push is the limit. The stiffness of the
-//! servo need not be known. Push is in 0.1 % of the stall torque, positive towards greater angles. This file does not know
-//! registers, targets or the bus.
+//! servo need not be known. A servo at full load is the exception: its push does not depend on the distance, so an assumed
+//! stiffness bounds the distance first. Push is in 0.1 % of the stall torque, positive towards greater angles. This file
+//! does not know registers, targets or the bus.
 
 use protocol_core::time::{Duration, Instant};
 
@@ -42,10 +43,11 @@ impl PushLimit {
 
 /// A joint that turns by at most one count is at a standstill: 0.29 degrees of joints 5 to 7.
 const STANDSTILL: u32 = 300_000;
-/// The first guess for the distance at which a servo pushes with its stall torque, until its push is measured.
-const STALL_DISTANCE: i32 = 4_300_000;
-/// From this load on a servo may give all it has, so its push does not tell the distance any more.
-const SATURATED: i16 = 950;
+/// The assumed distance of the goal at which a servo just gives its full load. It bounds the distance as long as the servo is
+/// at full load: 4.3 degrees, as arm-sim assumes.
+const FULL_LOAD_DISTANCE: i32 = 4_300_000;
+/// From this load on a servo may give all it has, in 0.1 %.
+pub(crate) const FULL_LOAD: i16 = 950;
 /// How far the push may exceed the limit while a joint sinks slowly (D27).
 const TOLERANCE: i16 = 50;
 /// The largest speed at which a joint with a push up to the tolerance sinks: 10 degrees/s (D27), in
@@ -65,6 +67,8 @@ pub struct PushSample {
     pub angle: MicroDegrees,
     /// The load less what the speed needs, in 0.1 % of the stall torque.
     pub push: i16,
+    /// The servo may give all it has, so its load does not tell how far away its goal is.
+    pub is_saturated: bool,
 }
 
 /// The push limiter of one joint.
@@ -97,6 +101,8 @@ struct Bound {
     /// The sum and the number of the pushes in the present average.
     sum: i32,
     samples: i16,
+    /// A servo at full load gave one of these pushes.
+    any_saturated: bool,
     /// The push is over the tolerance, so the bound follows the measured position at once.
     is_urgent: bool,
     /// The set-point of the last control cycle was beyond the bound.
@@ -160,18 +166,15 @@ impl Bound {
         let is_positive = sample.push > 0;
         let error = directed_angle(set_point.0.saturating_sub(sample.angle.0), is_positive).max(0);
         let push = sample.push.saturating_abs();
-        let distance = if push < SATURATED {
-            scaled(error, limit, push)
-        } else {
-            error.min(STALL_DISTANCE / 1_000 * i32::from(limit))
-        };
+        let distance = scaled(error, limit, push);
         let mut bound = Self {
             is_positive,
-            distance,
+            distance: if sample.is_saturated { distance.min(distance_at(limit)) } else { distance },
             set_point,
             measured_at: now,
             sum: 0,
             samples: 0,
+            any_saturated: false,
             is_urgent: push > limit + TOLERANCE,
             is_holding_back: true,
         };
@@ -183,9 +186,11 @@ impl Bound {
     fn measured(&mut self, now: Instant, sample: PushSample, limit: i16) -> bool {
         self.sum += i32::from(directed(sample.push, self.is_positive));
         self.samples += 1;
+        self.any_saturated |= sample.is_saturated;
         if self.samples == AVERAGED {
             let average = i16::try_from(self.sum / i32::from(AVERAGED)).unwrap_or(i16::MAX);
             (self.sum, self.samples) = (0, 0);
+            let was_saturated = core::mem::take(&mut self.any_saturated);
             self.is_urgent = average > limit + TOLERANCE;
             let is_low = average < limit - SLACK.min(limit / 2);
             if is_low && !self.is_holding_back {
@@ -195,6 +200,9 @@ impl Bound {
                 self.distance = scaled(self.distance, limit, average);
             } else if is_low {
                 self.distance = self.distance.saturating_add(GROWTH);
+            }
+            if was_saturated {
+                self.distance = self.distance.min(distance_at(limit));
             }
         }
         self.follow(now, sample.angle);
@@ -210,6 +218,11 @@ impl Bound {
         self.set_point.0 += directed_angle(ahead.max(least), self.is_positive);
         self.measured_at = now;
     }
+}
+
+/// The distance at which a servo with the assumed stiffness pushes as hard as the limit.
+fn distance_at(limit: i16) -> i32 {
+    FULL_LOAD_DISTANCE / 1_000 * i32::from(limit)
 }
 
 /// `distance` × limit / push, for a push over the limit.

@@ -189,6 +189,39 @@ fn d27_a_joint_gives_way_also_out_of_the_linkage() {
     assert_eq!((rig.get(BLOCKED), rig.get(ALARMS), rig.get(LET_GO)), (bit(2), 0, 0));
 }
 
+/// Puts a joint somewhere by hand, while the arm is forceless.
+fn put(rig: &mut Rig, number: u8, degrees: u8) {
+    rig.hand(number, counts_from_angle(joint(number), MicroDegrees::from_degrees(degrees), 0));
+}
+
+#[test]
+fn d27_a_lift_at_full_load_keeps_its_limit_while_the_target_is_far_away() {
+    for (speed, payload) in [(0, 475), (100, 475), (0, 500), (100, 500), (60, 500)] {
+        let (mut rig, pitch) = (Rig::started(), joint(5));
+        rig.write(193, &[75]);
+        rig.write(36, &[speed]);
+        rig.write(29, &[2]);
+        rig.run_ms(500);
+        put(&mut rig, 3, 125);
+        put(&mut rig, 5, 180);
+        rig.plant.set_load(payload);
+        rig.run_ms(300);
+        rig.write(29, &[1]);
+        rig.run_ms(100);
+        [3, 5].into_iter().for_each(|number| rig.plant.let_go(joint(number)));
+        // The joint turns, but so slowly that its push is over the limit. Its servo gives all it has.
+        rig.write(50, &[0]);
+        let (mut over, mut longest) = (0, 0);
+        for _ in 0..4_000 {
+            rig.run_ms(1);
+            over = if rig.plant.motor_torque(pitch).abs() > 800 { over + 1 } else { 0 };
+            longest = longest.max(over);
+        }
+        assert!((1..=300).contains(&longest), "over the limit for {longest} ms, speed {speed}, {payload} g");
+        assert_eq!((rig.get(ALARMS), rig.get(LET_GO)), (0, 0));
+    }
+}
+
 /// Runs a stream of points of a joint, one each 20 ms, in hundredths of a degree.
 fn stream(rig: &mut Rig, number: u8, points: impl Iterator<Item = u16>) {
     for point in points {
@@ -400,6 +433,31 @@ fn d28_a_latched_overload_gets_torque_off_before_torque() {
             let told: Vec<u8> = rig.torques().filter_map(|torques| torques[2]).collect();
             assert!(told.first().is_some_and(|code| *code != 1), "{told:?}");
         }
+    }
+}
+
+#[test]
+fn d28_a_servo_that_holds_again_by_itself_is_not_freed() {
+    for (register, value) in [(192, 1), (29, 1)] {
+        let mut rig = Rig::started();
+        rig.write(192, &[0]);
+        rig.plant.trip(joint(3), Trip::Heat);
+        rig.run_ms(2_000);
+        assert_eq!((rig.get(LET_GO), rig.get(ALARMS)), (bit(3), 4));
+        while rig.get(ALARMS) != 0 {
+            rig.run_ms(1_000);
+        }
+        rig.run_ms(2_000);
+        let held = rig.plant.angle(joint(3));
+        rig.forget();
+        rig.write(register, &[value]);
+        for _ in 0..300 {
+            rig.run_ms(1_000);
+            let moved = (rig.plant.angle(joint(3)) - held).abs();
+            assert!(moved < 2_000, "register {register}: it sinks by {moved}");
+        }
+        assert!(rig.torques().all(|torques| matches!(torques[2], None | Some(1))), "no torque-off");
+        assert_eq!((rig.get(LET_GO), rig.plant.torque(joint(3))), (0, Some(Torque::On)), "it engaged");
     }
 }
 

@@ -65,8 +65,9 @@ pub(super) struct CommandChecker {
     replies: ServoReplies,
     wire_free_at: Instant,
     linkage: LinkageGoals,
-    /// When each joint was last given torque, and when the host last wrote its target.
+    /// When each joint was last given torque, when its servo was last lost, and when the host last wrote its target.
     engaged_at: PerJoint<Option<Instant>>,
+    servo_lost_at: PerJoint<Option<Instant>>,
     target_written_at: PerJoint<Option<Instant>>,
     /// How often each joint was given torque since register 29 was written.
     attempts: PerJoint<EngagementAttempts>,
@@ -102,6 +103,7 @@ impl CommandChecker {
             wire_free_at: now,
             linkage: LinkageGoals::default(),
             engaged_at: PerJoint::all(None),
+            servo_lost_at: PerJoint::all(None),
             target_written_at: PerJoint::all(None),
             attempts: PerJoint::default(),
             count: 0,
@@ -177,8 +179,9 @@ impl CommandChecker {
     }
 
     /// The joint's servo was lost. It may hold its last goal.
-    pub(super) fn servo_lost(&mut self, joint: Joint) {
+    pub(super) fn servo_lost(&mut self, now: Instant, joint: Joint) {
         self.linkage.reset();
+        self.servo_lost_at[joint] = Some(now);
         self.kept_goals[joint] = self.goal(joint).map(|goal| (goal, self.ahead)).or(self.kept_goals[joint]);
         (self.ranges[joint], self.paused[joint]) = (None, None);
         self.is_on[joint] = false;
@@ -305,7 +308,10 @@ impl CommandChecker {
         let Some((lost_at, engaged_at)) = bus.truth(joint).lost_at().zip(self.engaged_at[joint]) else {
             return Ok(());
         };
-        let is_written = self.target_written_at[joint].is_some_and(|at| at >= lost_at);
+        // Before it lost its torque, the servo may have been silent: a target that came then is taken, too (D12).
+        let silent_at = self.servo_lost_at[joint].filter(|at| *at > engaged_at);
+        let since = silent_at.map_or(lost_at, |at| at.min(lost_at));
+        let is_written = self.target_written_at[joint].is_some_and(|at| at >= since);
         let is_known = bus.is_undisturbed(context.now) && !bus.may_be_misread(joint, context.now);
         let target = context.registers.get(TARGET_POSITION.of(joint));
         if lost_at < engaged_at || is_written || !is_known || matches!(target, 0 | 180) {
@@ -392,8 +398,7 @@ impl CommandChecker {
 
     fn check_goal(&mut self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
         let speed = context.registers.get(SPEED.of(joint));
-        let since_trusted = context.now - self.replies.trusted_at(joint);
-        let ahead = Duration::from_micros(self.ahead_time.as_micros() + since_trusted.as_micros());
+        let ahead = self.replies.take_trusted_time(joint, context.now, self.ahead_time);
         let paused = self.paused[joint].take().map(|range| range.resumed(context.now, ahead));
         let before = self.ranges[joint].or(paused);
         let reached = before.and_then(|range| range.after(joint, goal, speed, context.now));

@@ -92,7 +92,7 @@ impl TortureWorld {
         for joint in Joint::ALL {
             if lost & joint.bit() != 0 {
                 arm.model.forget_target(joint);
-                arm.command_checker.servo_lost(joint);
+                arm.command_checker.servo_lost(self.now, joint);
             }
         }
         if found != 0 {

@@ -37,8 +37,9 @@ struct Known {
     is_read_on: bool,
     /// Its torque was read off last.
     is_read_off: bool,
-    /// When its torque was read after that.
+    /// When its torque was read after that, and how often that happened since its last goal.
     trusted_at: Instant,
+    ended_doubts: u64,
     /// The goal that it held with torque when its torque was read last, in counts.
     held_goal: Option<u16>,
     /// In counts.
@@ -114,9 +115,18 @@ impl ServoReplies {
         self.servos[joint].is_doubtful
     }
 
-    /// When the last doubt about a servo's torque ended. From then on its set-point may move.
-    pub(super) fn trusted_at(&self, joint: Joint) -> Instant {
-        self.servos[joint].trusted_at
+    /// For how long the set-point of a joint may have moved since the last goal of its servo. It moves from that goal and
+    /// from the end of each doubt until a question fails, which takes at most `until_doubt`. Call it for each goal.
+    pub(super) fn take_trusted_time(
+        &mut self,
+        joint: Joint,
+        now: Instant,
+        until_doubt: Duration,
+    ) -> Duration {
+        let servo = &mut self.servos[joint];
+        let phases = std::mem::take(&mut servo.ended_doubts).max(1);
+        let last = now - servo.trusted_at;
+        Duration::from_micros(phases * until_doubt.as_micros() + last.as_micros())
     }
 
     /// The joint is given torque where it was measured, or is not driven any more.
@@ -161,10 +171,59 @@ impl Known {
         if let Some(code) = torque_switch(params) {
             if self.is_doubtful {
                 (self.is_doubtful, self.trusted_at) = (false, now);
+                self.ended_doubts += 1;
             }
             self.is_read_on = code == on;
             self.is_read_off = code != on;
             self.held_goal = goal(params).filter(|_| code == on);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motion_core::servo_bus::frame::{self, ServoFrameBuffer};
+
+    use super::*;
+
+    const JOINT: Joint = Joint::ALL[5];
+    const UNTIL_DOUBT: Duration = Duration::from_millis(70);
+
+    fn at_ms(millis: u64) -> Instant {
+        Instant::from_micros(millis * 1_000)
+    }
+
+    /// The servo is asked, and does not answer.
+    fn fails(replies: &mut ServoReplies, millis: u64) {
+        replies.asked(at_ms(millis), JOINT, 10, true);
+    }
+
+    /// The servo is asked, and answers that its torque is on.
+    fn is_on(replies: &mut ServoReplies, millis: u64) {
+        replies.asked(at_ms(millis), JOINT, 24, true);
+        let mut params = [0; 24];
+        params[0] = TorqueCodes::default().code(Torque::On);
+        let mut answer = ServoFrameBuffer::new();
+        frame::status(&mut answer, JOINT.index(), 0, &params);
+        replies.received(at_ms(millis + 1), &answer);
+    }
+
+    #[test]
+    fn a_set_point_may_move_between_all_doubts_since_the_last_goal() {
+        let mut replies = ServoReplies::new(TorqueCodes::default());
+        let ahead = |replies: &mut ServoReplies, millis| {
+            replies.take_trusted_time(JOINT, at_ms(millis), UNTIL_DOUBT).as_micros() / 1_000
+        };
+        is_on(&mut replies, 0);
+        assert_eq!(ahead(&mut replies, 3), 70 + 3);
+        fails(&mut replies, 10);
+        is_on(&mut replies, 80);
+        assert_eq!(ahead(&mut replies, 85), 70 + 4, "one doubt");
+        fails(&mut replies, 90);
+        is_on(&mut replies, 160);
+        fails(&mut replies, 170);
+        is_on(&mut replies, 240);
+        assert_eq!(ahead(&mut replies, 245), 2 * 70 + 4, "two doubts without a goal between them");
+        assert_eq!(ahead(&mut replies, 255), 70 + 14);
     }
 }
