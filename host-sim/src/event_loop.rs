@@ -158,7 +158,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         for action in signals.actions() {
             match action {
                 SignalAction::End => return true,
-                SignalAction::Unplug => {}
+                SignalAction::Unplug => Signals::warn_of_unplug(),
                 SignalAction::PowerCycle => self.for_each_arm(now, PtyArm::power_cycle),
                 SignalAction::RestartController => self.for_each_arm(now, PtyArm::restart_controller),
             }

@@ -140,8 +140,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         let _ = writeln!(io::stdout(), "{}: {lines} lines replayed, all equal", path.display());
         return Ok(());
     }
-    let catch = if options.servos_only { Signals::catch_with_unplug } else { Signals::catch };
-    let mut signals = catch().map_err(Failure::Signals)?;
+    let mut signals = Signals::catch().map_err(Failure::Signals)?;
     let mut clock = Clock::default();
     match (&options.servo_socket, &options.servos) {
         (Some(path), _) => run_servo_socket(options, path, &mut clock, &mut signals),
@@ -209,7 +208,6 @@ fn run_real_servos(
     let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
     let pty = Pty::open(clients.as_mut()).map_err(Failure::Port)?;
     let path = pty.path().to_owned();
-    let _symlink = options.link.as_ref().map(|link| Symlink::new(link, &path)).transpose()?;
     let line = BusLine::new(options.servo_baud, Duration::from_millis(options.usb_timeout.into()));
     let arm = arm::<_, Controller>(options, None, pty, flash(options, None)?, clock.now(), line);
     let config = real_servos::BusConfig {
@@ -219,6 +217,7 @@ fn run_real_servos(
         holds_on_exit: options.hold_on_exit,
     };
     let servos = RealServos::new(clock.now(), config, arm, clients, serial);
+    let _symlink = options.link.as_ref().map(|link| Symlink::new(link, &path)).transpose()?;
     print_ready(&[path]);
     servos.run(clock, signals).map_err(Failure::Running)
 }
@@ -234,40 +233,62 @@ fn run_arms<C: ArmController>(options: &Options, signals: &mut Signals) -> Resul
         allow_as_many_files_as_possible();
     }
     let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
-    let mut arms = Vec::with_capacity(numbers.len());
     let mut ports = Vec::with_capacity(numbers.len());
-    // They exist as long as the loop runs.
-    let mut symlinks = Vec::new();
     for &number in &numbers {
-        let pty = Pty::open(clients.as_mut()).map_err(Failure::Port)?;
-        let port = pty.path().to_owned();
-        if let Some(link) = &options.link {
-            symlinks.push(Symlink::new(&per_arm::path(link, number), &port)?);
-        }
-        ports.push(port);
-        let seed = options.seed.wrapping_add(number.unwrap_or(0).into());
-        let servos = ServoConfig { torque_codes: options.torque_codes, ..ServoConfig::default() };
-        let plant = Plant::with_config(Instant::ZERO, servos);
-        let mut flash = flash(options, number)?;
-        let settings = flash.cells_mut().copy();
-        let mut arm = arm::<_, C>(options, number, pty, flash, Instant::ZERO, plant);
-        arm.set_seed(seed);
-        if clock.is_in_lockstep() {
-            arm.simulation_mut().set_bytewise_line();
-        }
-        if let Some(path) = &options.record {
-            let header = session_file::header(options, number, seed, &settings);
-            let file = SessionFile::create(&per_arm::path(path, number), &header)?;
-            arm.simulation_mut().set_recorder(file);
-        }
-        options.faults.iter().for_each(|&fault| arm.set_fault(Instant::ZERO, fault));
-        arm.simulation_mut().advance(clock.now(), true);
-        arms.push(arm);
+        ports.push((Pty::open(clients.as_mut()).map_err(Failure::Port)?, flash(options, number)?));
     }
-    let mut event_loop = EventLoop::new(arms, clients).map_err(Failure::Running)?;
-    event_loop.add_controls(control_sockets(options, &numbers)?).map_err(Failure::Running)?;
-    print_ready(&ports);
+    let paths: Vec<PathBuf> = ports.iter().map(|(pty, _)| pty.path().to_owned()).collect();
+    // They exist as long as the loop runs.
+    let _symlinks = symlinks(options, &numbers, &paths)?;
+    let controls = control_sockets(options, &numbers)?;
+    let arms = numbers.iter().zip(ports);
+    let arms = arms.map(|(&number, (pty, flash))| simulated_arm::<C>(options, number, pty, flash, &clock));
+    let mut event_loop =
+        EventLoop::new(arms.collect::<Result<_, _>>()?, clients).map_err(Failure::Running)?;
+    event_loop.add_controls(controls).map_err(Failure::Running)?;
+    print_ready(&paths);
     event_loop.run(&mut clock, signals).map_err(Failure::Running)
+}
+
+/// An arm with simulated servos, and its recorder.
+fn simulated_arm<C: ArmController>(
+    options: &Options,
+    number: Option<u16>,
+    pty: Pty,
+    mut flash: Flash<ImageFile>,
+    clock: &VirtualClock,
+) -> Result<PtyArm<Flash<ImageFile>, Plant, C>, Failure> {
+    let seed = options.seed.wrapping_add(number.unwrap_or(0).into());
+    let servos = ServoConfig { torque_codes: options.torque_codes, ..ServoConfig::default() };
+    let plant = Plant::with_config(Instant::ZERO, servos);
+    let settings = flash.cells_mut().copy();
+    let mut arm = arm::<_, C>(options, number, pty, flash, Instant::ZERO, plant);
+    arm.set_seed(seed);
+    if clock.is_in_lockstep() {
+        arm.simulation_mut().set_bytewise_line();
+    }
+    if let Some(path) = &options.record {
+        let header = session_file::header(options, number, seed, &settings);
+        let file = SessionFile::create(&per_arm::path(path, number), &header, options.force)?;
+        arm.simulation_mut().set_recorder(file);
+    }
+    options.faults.iter().for_each(|&fault| arm.set_fault(Instant::ZERO, fault));
+    arm.simulation_mut().advance(clock.now(), true);
+    Ok(arm)
+}
+
+/// The links to the ports of the arms.
+fn symlinks(
+    options: &Options,
+    numbers: &[Option<u16>],
+    ports: &[PathBuf],
+) -> Result<Vec<Symlink>, SymlinkError> {
+    let Some(link) = &options.link else { return Ok(Vec::new()) };
+    numbers
+        .iter()
+        .zip(ports)
+        .map(|(&number, port)| Symlink::new(&per_arm::path(link, number), port))
+        .collect()
 }
 
 /// The control sockets of the arms. If the default one cannot be created, the arm has none.

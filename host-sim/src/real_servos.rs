@@ -116,7 +116,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
                     // This program cannot switch the supply of the servos.
                     SignalAction::PowerCycle => self.arm.power_cycle(now),
                     SignalAction::RestartController => self.arm.restart_controller(now),
-                    SignalAction::Unplug => {}
+                    SignalAction::Unplug => Signals::warn_of_unplug(),
                 }
             }
             self.read_bus(now);

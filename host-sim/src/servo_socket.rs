@@ -43,7 +43,7 @@ impl ServoSocket {
             for action in signals.actions() {
                 match action {
                     SignalAction::End => return Ok(()),
-                    SignalAction::Unplug => {}
+                    SignalAction::Unplug => Signals::warn_of_unplug(),
                     SignalAction::PowerCycle => {
                         info!("power cycle");
                         plant.power_cycle(now);

@@ -28,6 +28,9 @@ pub enum SessionFileError {
         /// The reason of the system.
         cause: io::Error,
     },
+    /// The file to record exists.
+    #[error("--record {}: the file exists: choose another name, or replace it with --force", .0.display())]
+    Exists(PathBuf),
     /// The file is no session.
     #[error("{}: {reason}", path.display())]
     NoSession {
@@ -105,12 +108,16 @@ pub struct SessionFile {
 }
 
 impl SessionFile {
-    /// Creates the file, or replaces it, and writes its first lines.
+    /// Creates the file and writes its first lines. Only with `may_replace` replaces one that exists.
     ///
     /// # Errors
-    /// The file cannot be created or written.
-    pub fn create(path: &Path, header: &SessionHeader) -> Result<Self, SessionFileError> {
+    /// The file exists, or cannot be created or written.
+    pub fn create(path: &Path, header: &SessionHeader, may_replace: bool) -> Result<Self, SessionFileError> {
         let failed = |cause| SessionFileError::File { verb: "write", path: path.to_owned(), cause };
+        // A pipe or a device loses nothing.
+        if !may_replace && path.is_file() {
+            return Err(SessionFileError::Exists(path.to_owned()));
+        }
         let mut file = File::create(path).map_err(failed)?;
         writeln!(file, "{header}").map_err(failed)?;
         Ok(Self { path: path.to_owned(), file: Some(file) })

@@ -7,13 +7,14 @@ use std::os::unix::net::UnixStream;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGUSR2};
 use signal_hook::iterator::backend::SignalDelivery;
 use signal_hook::iterator::exfiltrator::SignalOnly;
+use tracing::warn;
 
 /// The action that a signal requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SignalAction {
     /// SIGHUP: switch the arm off and on.
     PowerCycle,
-    /// SIGUSR1, where it is caught: unplug the adapter, or plug it in again.
+    /// SIGUSR1: unplug the adapter, or plug it in again. Without an adapter of its own the program ignores it.
     Unplug,
     /// SIGUSR2: restart the controller, with the servos under power.
     RestartController,
@@ -26,25 +27,19 @@ pub enum SignalAction {
 pub struct Signals(SignalDelivery<UnixStream, SignalOnly>);
 
 impl Signals {
-    /// Catches SIGHUP, SIGINT, SIGTERM and SIGUSR2 from now on.
+    /// Catches SIGHUP, SIGINT, SIGTERM, SIGUSR1 and SIGUSR2 from now on.
     ///
     /// # Errors
     /// The system refuses.
     pub fn catch() -> io::Result<Self> {
-        Self::catch_these(&[SIGHUP, SIGUSR2, SIGINT, SIGTERM])
-    }
-
-    /// Likewise, and SIGUSR1 as well.
-    ///
-    /// # Errors
-    /// The system refuses.
-    pub fn catch_with_unplug() -> io::Result<Self> {
-        Self::catch_these(&[SIGHUP, SIGUSR1, SIGUSR2, SIGINT, SIGTERM])
-    }
-
-    fn catch_these(signals: &[i32]) -> io::Result<Self> {
         let (read, write) = UnixStream::pair()?;
+        let signals = [SIGHUP, SIGUSR1, SIGUSR2, SIGINT, SIGTERM];
         Ok(Self(SignalDelivery::with_pipe(read, write, SignalOnly, signals)?))
+    }
+
+    /// Says that [`SignalAction::Unplug`] has no effect here.
+    pub fn warn_of_unplug() {
+        warn!("SIGUSR1 is ignored: only with --servos-only there is an adapter to unplug");
     }
 
     /// The actions since the last call, each at most once. [`SignalAction::End`] is the last.

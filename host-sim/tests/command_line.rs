@@ -52,6 +52,49 @@ fn a_file_at_the_path_of_the_link_is_not_changed() {
 }
 
 #[test]
+fn a_second_simulator_leaves_the_link_of_the_first() {
+    let state = tempfile::tempdir().unwrap();
+    let link = state.path().join("link");
+    let arguments = ["--link", link.to_str().unwrap()];
+    let mut first = Sim::start_in(state.path(), &arguments);
+    let line = complaint(&mut sim::command(state.path(), &arguments));
+    assert!(line.contains("in use"), "{line}");
+    for kind in [&["--eeprom", "none"][..], &["--servos-only"]] {
+        let line = refused(&[kind, &arguments].concat());
+        assert!(line.contains("leads to /dev/pts/") && line.contains("choose another path"), "{line}");
+    }
+    assert_eq!(fs::read_link(&link).unwrap(), first.port());
+    Client::open(&link).read(PRESENT_POSITION.address, 7);
+    assert_eq!(first.end_with(Signal::TERM), Some(0));
+    assert!(!link.is_symlink());
+}
+
+#[test]
+fn the_link_of_a_killed_simulator_is_replaced() {
+    let directory = tempfile::tempdir().unwrap();
+    let link = directory.path().join("7bot");
+    let arguments = ["--eeprom", "none", "--link", link.to_str().unwrap()];
+    assert_eq!(Sim::start(&arguments).end_with(Signal::KILL), None);
+    // Another process may have a terminal of the old number meanwhile, and then the link is refused.
+    if fs::metadata(&link).is_err() {
+        let next = Sim::start(&arguments);
+        assert_eq!(fs::read_link(&link).unwrap(), next.port());
+    }
+}
+
+#[test]
+fn a_link_of_the_user_and_an_error_at_the_start_change_nothing() {
+    let directory = tempfile::tempdir().unwrap();
+    let (own, new) = (directory.path().join("own"), directory.path().join("new"));
+    std::os::unix::fs::symlink("/dev/ttyUSB-unplugged", &own).unwrap();
+    let line = refused(&["--eeprom", "none", "--link", own.to_str().unwrap()]);
+    assert!(line.contains("is not replaced"), "{line}");
+    assert_eq!(fs::read_link(&own).unwrap(), std::path::Path::new("/dev/ttyUSB-unplugged"));
+    refused(&["--eeprom", "none", "--link", new.to_str().unwrap(), "--control", "/nowhere/control"]);
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+}
+
+#[test]
 fn only_one_simulator_can_use_an_image() {
     let directory = tempfile::tempdir().unwrap();
     let image = directory.path().join("arm.bin");
@@ -136,6 +179,18 @@ fn sighup_is_a_power_cycle_and_the_port_stays() {
     client.read_until(SPEED.address, &[60]);
     assert_eq!(client.read(DEVICE_ID.address, 1), [42], "settings are kept");
     assert_eq!(client.read(EEPROM_LOCK.address, 1), [1], "and protected again");
+}
+
+#[test]
+fn sigusr1_has_no_effect_without_an_adapter() {
+    let directory = tempfile::tempdir().unwrap();
+    let link = directory.path().join("7bot");
+    let mut sim = Sim::start(&["--eeprom", "none", "--link", link.to_str().unwrap()]);
+    sim.signal(Signal::USR1);
+    Client::open(&link).read(PRESENT_POSITION.address, 7);
+    assert_eq!(sim.end_with(Signal::TERM), Some(0));
+    let told = sim.rest_of_stderr();
+    assert!(told.contains("SIGUSR1 is ignored"), "{told}");
 }
 
 #[test]

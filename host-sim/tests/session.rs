@@ -83,6 +83,20 @@ fn a_replay_that_differs_says_where_in_words() {
 }
 
 #[test]
+fn a_recording_is_replaced_only_on_request() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("session");
+    fs::write(&file, "years").unwrap();
+    let arguments = ["--quiet", "--eeprom", "none", "--record", file.to_str().unwrap()];
+    let errors = sim::refused(&arguments);
+    assert!(errors.contains("the file exists") && errors.contains("--force"), "{errors}");
+    assert_eq!(fs::read(&file).unwrap(), b"years");
+    let mut sim = Sim::start(&[&arguments[..], &["--force"]].concat());
+    assert_eq!(sim.end_with(Signal::TERM), Some(0));
+    assert!(fs::read_to_string(&file).unwrap().starts_with("7bot-session"));
+}
+
+#[test]
 fn what_cannot_be_replayed_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let missing = folder.path().join("missing");

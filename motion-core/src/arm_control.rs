@@ -112,7 +112,8 @@ impl ArmControl {
             Measured::Rejected => return,
             Measured::FellSilent => return self.show_servos(),
             Measured::Accepted | Measured::ServoChanged | Measured::TorqueLost => {}
-            Measured::Engaged => self.bus.joint_engaged(),
+            Measured::Engaged => self.bus.joint_engaged(joint),
+            Measured::TorqueDue { goals } => self.bus.torque_due_after(goals),
             Measured::Freed => self.bus.torque_changed(),
             Measured::SupplyLost => {
                 self.registers.set(SUPPLY_LOST.address, 1);

@@ -2,9 +2,11 @@
 //!
 //! ```text
 //!   one cycle of 10 ms:   goals of all driven joints │ torque, if it is due │ one read of each servo
+//!   a joint that engages:      goals, a read of its servo, torque
 //! ```
 //!
-//! Goals are sent before torque, so that no servo gets torque with an old goal. During start-up only reads are sent.
+//! Goals are sent before torque, and read back, so that no servo gets torque with an old goal. During start-up only reads
+//! are sent.
 //! This file does not know angles.
 
 use protocol_core::registers::map::PROTECTION;
@@ -32,7 +34,10 @@ pub(crate) struct BusScheduler {
     /// When start-up ends at the latest; `None` once it is over.
     starting_until: Option<Instant>,
     next_cycle: Instant,
-    goals_due: bool,
+    /// How often the goals are still to be sent.
+    goals_due: u8,
+    /// A joint engaged, and its goal was not sent yet.
+    has_new_goal: bool,
     torque_due: bool,
     torque_refresh_in: u8,
     next_to_read: Joint,
@@ -47,7 +52,8 @@ impl BusScheduler {
             bus: Bus::new(config.servo_baud, config.servo_timeout, config.guard_time, config.torque_codes),
             starting_until: Some(now + START_UP_TIME),
             next_cycle: now,
-            goals_due: false,
+            goals_due: 0,
+            has_new_goal: false,
             torque_due: false,
             torque_refresh_in: TORQUE_REFRESH_CYCLES,
             next_to_read: Joint::ALL[0],
@@ -99,9 +105,17 @@ impl BusScheduler {
         is_over
     }
 
-    /// Schedules goals, then torque, because a joint engaged.
-    pub(crate) const fn joint_engaged(&mut self) {
-        self.goals_due = true;
+    /// Schedules goals, then a read of this joint's servo, because the joint engaged.
+    pub(crate) fn joint_engaged(&mut self, joint: Joint) {
+        self.goals_changed();
+        self.has_new_goal = true;
+        self.next_to_read = joint;
+        self.left_to_read += 1;
+    }
+
+    /// Schedules goals, this often, then torque.
+    pub(crate) fn torque_due_after(&mut self, goals: u8) {
+        self.goals_due = self.goals_due.max(goals);
         self.torque_due = true;
     }
 
@@ -125,8 +139,8 @@ impl BusScheduler {
     }
 
     /// Schedules goals, because the set-points have advanced.
-    pub(crate) const fn goals_changed(&mut self) {
-        self.goals_due = true;
+    pub(crate) fn goals_changed(&mut self) {
+        self.goals_due = self.goals_due.max(1);
     }
 
     /// Prepares the next frame if one is due and the bus is free. Returns whether there is a frame to send.
@@ -136,7 +150,7 @@ impl BusScheduler {
         joints: &mut Joints,
         registers: &RegisterFile,
     ) -> bool {
-        if self.torque_due {
+        if self.torque_due || self.has_new_goal {
             joints.expire_pending(now);
         }
         self.bus.is_free(now)
@@ -146,7 +160,12 @@ impl BusScheduler {
     }
 
     fn prepare_goals(&mut self, now: Instant, joints: &Joints, registers: &RegisterFile) -> bool {
-        let any = core::mem::take(&mut self.goals_due) && joints.goals(registers).next().is_some();
+        if self.goals_due == 0 {
+            return false;
+        }
+        self.goals_due -= 1;
+        self.has_new_goal = false;
+        let any = joints.goals(registers).next().is_some();
         if any {
             self.bus.set_goals(now, joints.goals(registers));
         }

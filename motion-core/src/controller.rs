@@ -92,12 +92,11 @@ impl Controller {
         // Before the control cycle, so that targets go out with its goals if no read waits before them.
         self.execute_requests(now, host_room);
         self.arm.advance(now);
-        if self.arm.prepare_servo_frame(now) {
+        // What the watchdog does to the servos is sent at once.
+        if self.arm.prepare_servo_frame(now)
+            || (self.arm.watchdog_is_due && self.arm.poll_watchdog(now) && self.arm.prepare_servo_frame(now))
+        {
             return Output::ToServos(self.arm.bus.frame());
-        }
-        if self.arm.watchdog_is_due && self.arm.poll_watchdog(now) {
-            // Its effect on the servos is due now.
-            return Output::Wait(now);
         }
         if let Some(alarm) = self.arm.alarm.take() {
             return Output::ToHost(self.host.alarm(alarm));

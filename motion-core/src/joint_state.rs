@@ -11,9 +11,10 @@ use protocol_core::registers::{Joint, Register, RegisterFile};
 use protocol_core::time::{Duration, Instant};
 
 use crate::calibration::{
-    MicroDegrees, angle_from_counts, load_from_servo, push_from_servo, velocity_from_servo,
+    MicroDegrees, angle_from_counts, counts_from_angle, load_from_servo, push_from_servo, velocity_from_servo,
 };
 use crate::drive::{Drive, Target, is_near};
+use crate::goal_check::GoalCheck;
 use crate::let_go::LetGo;
 use crate::obstacle::Obstacle;
 use crate::position_filter::{FilterOutcome, PositionFilter};
@@ -32,8 +33,10 @@ pub(crate) enum Measured {
     Accepted,
     /// The filter accepted the reading. The servo was silent, or its error bits or its temperature changed.
     ServoChanged,
-    /// The filter accepted the reading, and the joint engaged: it needs its goal, then torque.
+    /// The filter accepted the reading, and the joint engaged: its servo needs its goal, then a question about it.
     Engaged,
+    /// The joint needs torque, after its goal was sent this often.
+    TorqueDue { goals: u8 },
     /// An alarm has freed the joint: its servo needs torque-off, which frees nothing and ends a latched overload (D28).
     Freed,
     /// The servo of a driven joint has no torque. [`Joints`](crate::joints::Joints) decides what that means (D29).
@@ -66,6 +69,7 @@ pub(crate) struct JointState {
     obstacle: Obstacle,
     let_go: LetGo,
     torque: TorqueCheck,
+    goal: GoalCheck,
     /// The joint has not engaged since power-up, so its servo may hold it.
     is_first_engagement: bool,
     /// The last question to the servo was not answered.
@@ -90,6 +94,7 @@ impl JointState {
             obstacle: Obstacle::NONE,
             let_go: LetGo::NO,
             torque: TorqueCheck::ORDERED,
+            goal: GoalCheck::NEW,
             is_first_engagement: true,
             is_unanswered: false,
             alarms: 0,
@@ -141,6 +146,11 @@ impl JointState {
         registers.set(PRESENT_POSITION.of(self.joint), angle.nearest_degree());
         registers.set(PRESENT_ANGLE.of(self.joint), angle.nearest_degree());
         registers.set(PRESENT_LOAD.of(self.joint), shown_load(self.load));
+        let accepted = if is_unchanged { Measured::Accepted } else { Measured::ServoChanged };
+        if self.drive.is_torque_pending() {
+            let due = self.check_goal(now, answer, may_engage, registers);
+            return due.map_or(accepted, |goals| Measured::TorqueDue { goals });
+        }
         if self.drive.has_set_point() {
             match self.protect(now, answer, angle, registers) {
                 Protected::Holds => {}
@@ -156,10 +166,44 @@ impl JointState {
         {
             return Measured::Engaged;
         }
-        if is_unchanged { Measured::Accepted } else { Measured::ServoChanged }
+        accepted
     }
 
-    /// Checks the torque and the push of a joint that has a set-point.
+    /// Checks the goal that the servo of a joint shows whose torque is pending (D12). Returns how often the goal has to be
+    /// sent before torque; `None` if it is not known that the servo has it. Then the joint waits for its next answer.
+    fn check_goal(
+        &mut self,
+        now: Instant,
+        answer: &Answer,
+        may_engage: bool,
+        registers: &mut RegisterFile,
+    ) -> Option<u8> {
+        let held = answer.torque?;
+        let goal = counts_from_angle(self.joint, self.drive.set_point(), registers.offset(self.joint));
+        let is_there = |counts: u16| counts.abs_diff(goal) <= 1;
+        let repeats = if held.is_on || is_there(held.goal_counts) {
+            self.goal.shown();
+            Some(0)
+        } else {
+            self.goal.hidden()
+        };
+        let stays = may_engage && self.position.is_steady();
+        let has_goal = stays && repeats == Some(0) && is_there(answer.reading.position_counts);
+        // A servo with torque follows its goal already.
+        if held.is_on || has_goal {
+            self.torque = TorqueCheck::ORDERED;
+            return repeats;
+        }
+        // It engages anew where it is now, with the next answer or with this one.
+        self.drive.lose_torque(true);
+        let repeats = repeats.filter(|_| stays)?;
+        let angle = self.known_angle()?;
+        let engages = self.engages(now, angle, registers);
+        self.goal.done();
+        engages.then_some(repeats.max(1))
+    }
+
+    /// Checks the torque and the push of a joint that is engaged or silent.
     fn protect(
         &mut self,
         now: Instant,
@@ -168,20 +212,18 @@ impl JointState {
         registers: &RegisterFile,
     ) -> Protected {
         let set_point = self.drive.set_point();
-        if !self.drive.is_torque_pending() {
-            match self.torque.answered(answer.torque.map(|held| held.is_on)) {
-                TorqueFound::AsBefore => {}
-                TorqueFound::OrderLost => {
-                    self.drive.lose_torque(true);
-                    return Protected::Holds;
-                }
-                TorqueFound::Lost => return Protected::TorqueLost,
+        match self.torque.answered(answer.torque.map(|held| held.is_on)) {
+            TorqueFound::AsBefore => {}
+            TorqueFound::OrderLost => {
+                self.drive.lose_torque(true);
+                return Protected::Holds;
             }
-            if self.let_go.is_freed(now, answer, angle, set_point) {
-                self.lose_torque(now);
-                self.let_go.follow(now, answer);
-                return Protected::Freed;
-            }
+            TorqueFound::Lost => return Protected::TorqueLost,
+        }
+        if self.let_go.is_freed(now, answer, angle, set_point) {
+            self.lose_torque(now);
+            self.let_go.follow(now, answer);
+            return Protected::Freed;
         }
         if self.drive.is_engaged() && registers.get(PROTECTION.address) != 0 {
             let push = push_from_servo(self.joint, answer.reading.load, answer.reading.speed);
@@ -231,8 +273,8 @@ impl JointState {
         let Some(target) = self.drive.engage(angle) else { return false };
         self.let_go.engaged(now);
         self.torque = TorqueCheck::ORDERED;
+        self.goal.begin();
         self.obstacle = Obstacle::NONE;
-        self.is_first_engagement = false;
         if target == Target::Measured {
             self.set_target(angle, registers);
         }
@@ -249,9 +291,7 @@ impl JointState {
     /// The servo did not answer. Returns whether it counts as silent from now on.
     pub(crate) fn failed(&mut self, now: Instant) -> bool {
         self.is_unanswered = true;
-        if self.drive.is_torque_pending() {
-            self.drive.mark_silent();
-        } else if self.drive.has_set_point() {
+        if self.drive.has_set_point() {
             self.torque.unanswered();
         }
         let fell_silent = self.position.failed(now);
@@ -268,7 +308,7 @@ impl JointState {
 
     /// Is the joint sent goals? Not while it is doubtful whether its servo has restarted (D29).
     pub(crate) fn takes_goals(&self) -> bool {
-        self.drive.is_torque_pending() || (self.drive.is_engaged() && self.torque.is_trusted())
+        self.drive.is_driven() && self.torque.is_trusted()
     }
 
     /// Has the next question to ask for the torque switch? `is_refresh_near` tells that torque is refreshed soon.
@@ -281,8 +321,15 @@ impl JointState {
     /// The torque for the servo in the servo state; `None` leaves its switch unchanged. A servo is refreshed only if its
     /// torque was read on since the last time, so that none is switched on that has let go.
     pub(crate) fn take_torque(&mut self, is_protected: bool) -> Option<Torque> {
-        let is_on = self.drive.is_torque_pending() || (self.takes_goals() && self.torque.is_fresh());
-        self.drive.torque_is_on();
+        let is_on = if self.drive.is_torque_pending() {
+            self.goal.is_done()
+        } else {
+            self.takes_goals() && self.torque.is_fresh()
+        };
+        if is_on {
+            self.drive.torque_is_on();
+            self.is_first_engagement = false;
+        }
         self.torque.refreshed();
         if self.let_go.needs_torque_off(is_protected) {
             self.let_go.torque_off_is_sent();

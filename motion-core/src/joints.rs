@@ -23,7 +23,7 @@ use crate::limits::linkage_step;
 use crate::motor_state::MotorState;
 use crate::reach::Reached;
 use crate::servo_bus::{Answer, Question, Torque};
-use crate::supply_watch::{SupplyWatch, Verdict};
+use crate::supply_watch::SupplyWatch;
 
 /// A servo that restarts executes nothing for about 200 ms. Within less than this after an answer it is the same servo.
 const RESTART_TIME: Duration = Duration::from_millis(180);
@@ -91,6 +91,7 @@ impl Joints {
     /// The host wrote the motor state, perhaps the present one: joints that are let go may engage again (D28). Returns
     /// whether there is one.
     pub(crate) fn order(&mut self) -> bool {
+        self.supply.ordered();
         self.joints.iter_mut().for_each(JointState::order);
         self.joints.iter().any(JointState::is_let_go)
     }
@@ -160,31 +161,26 @@ impl Joints {
         may_engage: bool,
         registers: &mut RegisterFile,
     ) -> Measured {
+        if answer.torque.is_some_and(|held| held.is_on) {
+            self.supply.has_torque();
+        }
+        let may_engage = may_engage && !self.supply.is_undecided(now);
         let Some(state) = self.joint_mut(joint) else { return Measured::Rejected };
         let outcome = state.read(now, answer, may_engage, registers);
         if state.drive.has_set_point() {
             self.supply.answered(now);
         }
-        if outcome == Measured::TorqueLost {
-            return self.torque_lost(now, joint);
-        }
-        if answer.torque.is_some_and(|held| held.is_on) {
-            self.supply.has_torque();
-        }
-        outcome
+        if outcome == Measured::TorqueLost { self.torque_lost(now, joint) } else { outcome }
     }
 
     /// Decides what it means that the servo of a driven joint has no torque (D28, D29).
     fn torque_lost(&mut self, now: Instant, joint: Joint) -> Measured {
         let driven = self.set_of(|state| state.drive.has_set_point());
-        match self.supply.has_no_torque(now, joint.bit(), driven) {
-            Verdict::Undecided => Measured::Accepted,
-            Verdict::SupplyLost => Measured::SupplyLost,
-            Verdict::Restarted => {
-                self.joint_mut(joint).into_iter().for_each(|state| state.lose_torque(now));
-                Measured::ServoChanged
-            }
+        if self.supply.is_lost(driven & !joint.bit() != 0) {
+            return Measured::SupplyLost;
         }
+        self.joint_mut(joint).into_iter().for_each(|state| state.lose_torque(now));
+        Measured::ServoChanged
     }
 
     /// Records that a servo did not answer. Returns whether it counts as silent from now on.
@@ -341,7 +337,7 @@ impl Joints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::servo_bus::Reading;
+    use crate::servo_bus::{HeldGoal, Reading};
     use protocol_core::registers::map::PRESENT_POSITION;
 
     const J1: Joint = Joint::ALL[0];
@@ -356,12 +352,14 @@ mod tests {
         Answer { reading, alarms: 4, torque: None }
     }
 
-    /// Joints of which joint 1 was measured twice at 90 degrees.
+    /// Joints of which joint 1 was measured at 90 degrees. In the servo state its servo has shown its goal.
     fn measured(state: MotorState) -> (Joints, RegisterFile) {
         let mut registers = RegisterFile::new([0; 6], None);
         let mut joints = Joints::new(state);
         joints.measured(at_ms(0), J1, &answer(511), true, &mut registers);
         joints.measured(at_ms(10), J1, &answer(511), true, &mut registers);
+        let torque = Some(HeldGoal { is_on: false, goal_counts: 511 });
+        joints.measured(at_ms(10), J1, &Answer { torque, ..answer(511) }, true, &mut registers);
         (joints, registers)
     }
 

@@ -21,6 +21,7 @@ pub mod calibration;
 mod config;
 pub mod controller;
 pub mod drive;
+mod goal_check;
 mod host_port;
 mod host_watchdog;
 mod joint_state;

@@ -1,74 +1,66 @@
 //! Finds out that the servos lost their supply: an emergency stop (D29).
 //!
 //! ```text
-//!   all driven servos silent for 1 s ──▶ they answer ──▶ none has torque: the supply was lost
-//!                                                   └──▶ one has torque: a cable or an adapter was gone
+//!   all driven servos silent for 1 s ──▶ undecided: no joint engages ──▶ one answers with torque: a cable was gone
+//!                                                                   ├──▶ all have answered without: the supply was lost
+//!                                                                   └──▶ the host writes the motor state
 //! ```
 //!
-//! This file does not know registers or the bus.
+//! A servo that has not answered yet may still hold its joint, so the arm is not damped before all have answered. This file
+//! does not know registers or the bus.
 
 use protocol_core::time::{Duration, Instant};
 
 /// A shorter silence is a dip: each joint engages where it is measured.
 const LOST_AFTER: Duration = Duration::from_millis(1_000);
-/// The servos start together. After the first of them has answered, the others get this time.
-const DECIDE_AFTER: Duration = Duration::from_millis(300);
-
-/// What follows from the torque switch of a servo that was silent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Verdict {
-    /// The other servos decide.
-    Undecided,
-    /// This servo alone has restarted.
-    Restarted,
-    /// The supply of all servos was lost.
-    SupplyLost,
-}
 
 /// Watches the supply of the servos.
 #[derive(Clone, Debug)]
 pub(crate) struct SupplyWatch {
     all_silent_since: Option<Instant>,
-    /// All driven servos were silent for long enough.
+    /// All driven servos were silent for long enough, and since then none answered with torque.
     was_outage: bool,
-    /// The servos that have restarted, and when the first was found: bit n-1 for joint n.
-    restarted: Option<(Instant, u8)>,
 }
 
 impl SupplyWatch {
     /// No servo is silent.
-    pub(crate) const NEW: Self = Self { all_silent_since: None, was_outage: false, restarted: None };
+    pub(crate) const NEW: Self = Self { all_silent_since: None, was_outage: false };
 
     /// A question was not answered at `now`. `are_all_silent` tells about the driven servos.
     pub(crate) fn unanswered(&mut self, now: Instant, are_all_silent: bool) {
-        if are_all_silent && self.restarted.is_none() {
+        if are_all_silent && !self.was_outage {
             self.all_silent_since.get_or_insert(now);
         }
     }
 
     /// A driven servo answered at `now`.
     pub(crate) fn answered(&mut self, now: Instant) {
-        if let Some(since) = self.all_silent_since.take() {
-            self.was_outage |= now - since >= LOST_AFTER;
-        }
+        self.was_outage = self.is_undecided(now);
+        self.all_silent_since = None;
     }
 
-    /// A driven servo that was silent has kept its torque.
+    /// A servo has kept its torque.
     pub(crate) const fn has_torque(&mut self) {
         *self = Self::NEW;
     }
 
-    /// A driven servo was found without torque. `joint` is its bit, `driven` has the bits of all driven joints.
-    pub(crate) fn has_no_torque(&mut self, now: Instant, joint: u8, driven: u8) -> Verdict {
-        if !self.was_outage {
-            return Verdict::Restarted;
-        }
-        let (first_at, joints) = self.restarted.unwrap_or((now, 0));
-        self.restarted = Some((first_at, joints | joint));
-        if (joints | joint) & driven == driven || now - first_at >= DECIDE_AFTER {
+    /// The host wrote the motor state. An outage that lasts goes on.
+    pub(crate) const fn ordered(&mut self) {
+        self.was_outage = false;
+    }
+
+    /// Was the supply perhaps lost? Then no joint may engage.
+    pub(crate) fn is_undecided(&self, now: Instant) -> bool {
+        self.was_outage || self.all_silent_since.is_some_and(|since| now - since >= LOST_AFTER)
+    }
+
+    /// The servo of a driven joint was found without torque. Returns whether the supply was lost. `are_others_driven` tells
+    /// whether other driven joints were not found without torque yet.
+    pub(crate) const fn is_lost(&mut self, are_others_driven: bool) -> bool {
+        let is_lost = self.was_outage && !are_others_driven;
+        if is_lost {
             *self = Self::NEW;
-            return Verdict::SupplyLost;
         }
-        Verdict::Undecided
+        is_lost
     }
 }

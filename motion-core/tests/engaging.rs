@@ -6,8 +6,10 @@ mod rig;
 
 use arm_sim::servo::ServoFault;
 use protocol_core::registers::Joint;
-use protocol_core::time::Duration;
+use protocol_core::time::{Duration, Instant};
 use rig::{Rig, STANDARD_COUNTS, ToServos, write};
+
+const ELBOW: Joint = Joint::ALL[2];
 
 #[test]
 fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
@@ -22,7 +24,8 @@ fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
         for (joint, counts) in (1..).zip(STANDARD_COUNTS) {
             rig.hand(joint, counts);
         }
-        let late = ServoFault::Late(Duration::from_micros(phase * 25));
+        // The answer with the goal takes 0.55 ms, and has to end within 3 ms: later than that, no torque switch is ever read.
+        let late = ServoFault::Late(Duration::from_micros(phase * 24));
         for (fault, joint) in
             [late, ServoFault::Garbled(2), ServoFault::Garbled(2)].into_iter().zip(Joint::ALL)
         {
@@ -70,4 +73,112 @@ fn goals_at_torque(rig: &Rig) -> [Option<u16>; 7] {
         }
     }
     at_torque
+}
+
+/// Checks that each servo was given torque only when its goal had reached it.
+fn assert_goals_came_first(rig: &Rig, why: &str) {
+    assert!(rig.given_torque.iter().any(|&(id, ..)| id == ELBOW.index()), "{why}: the elbow got torque");
+    for &(id, goal, position) in &rig.given_torque {
+        assert!(
+            goal.is_some_and(|goal| goal.abs_diff(position) <= 2),
+            "{why}: servo {id} {goal:?} {position}"
+        );
+    }
+    let torque = Joint::ALL.map(|joint| rig.plant.has_torque(joint));
+    assert_eq!(torque, [true; 7], "{why}");
+}
+
+/// Loses goals of the elbow at power-up.
+fn power_up(lost: usize, hides_goals: bool) -> Rig {
+    let mut rig = Rig::new();
+    (rig.lost_goals, rig.hides_goals) = ((ELBOW.index(), lost), hides_goals);
+    rig.run_ms(400);
+    rig
+}
+
+/// Loses goals of the elbow when a hand has moved it and the host enters the servo state.
+fn servo_state(lost: usize, hides_goals: bool) -> Rig {
+    let mut rig = Rig::started();
+    rig.write(29, &[0]);
+    rig.run_ms(50);
+    rig.hand(3, STANDARD_COUNTS[2] - 100);
+    rig.run_ms(50);
+    (rig.lost_goals, rig.hides_goals) = ((ELBOW.index(), lost), hides_goals);
+    rig.given_torque.clear();
+    rig.write(29, &[1]);
+    rig.run_ms(200);
+    rig
+}
+
+/// Loses goals of the elbow when its servo restarts and sinks meanwhile.
+fn restart(lost: usize, hides_goals: bool) -> Rig {
+    let mut rig = Rig::started();
+    (rig.lost_goals, rig.hides_goals) = ((ELBOW.index(), 0), hides_goals);
+    rig.given_torque.clear();
+    rig.plant.restart_servo(Instant::from_micros(rig.now_us), ELBOW);
+    rig.run_ms(100);
+    rig.lost_goals = (ELBOW.index(), lost);
+    rig.run_ms(1_500);
+    rig
+}
+
+/// Loses up to five goals in a row, also where servos do not show theirs.
+fn assert_goals_arrive(engage: impl Fn(usize, bool) -> Rig) {
+    for lost in 0..=5 {
+        for hides_goals in [false, true] {
+            let rig = engage(lost, hides_goals);
+            assert_goals_came_first(&rig, &format!("{lost} frames lost, hidden: {hides_goals}"));
+        }
+    }
+}
+
+#[test]
+fn d12_a_goal_that_was_lost_at_power_up_is_sent_again_before_torque() {
+    assert_goals_arrive(power_up);
+}
+
+#[test]
+fn d12_a_goal_that_was_lost_in_entering_the_servo_state_is_sent_again_before_torque() {
+    assert_goals_arrive(servo_state);
+}
+
+#[test]
+fn d12_a_goal_that_was_lost_after_a_restart_of_the_servo_is_sent_again_before_torque() {
+    assert_goals_arrive(restart);
+}
+
+#[test]
+fn d12_a_joint_that_engages_costs_one_question() {
+    let rig = power_up(0, false);
+    let is_order = |(_, told): &&(u64, ToServos)| !matches!(told, ToServos::Ask(_));
+    let first = rig.to_servos.iter().position(|sent| is_order(&sent)).expect("an order");
+    let told: Vec<_> = rig.to_servos[first..].iter().map(|(_, told)| told.clone()).collect();
+    let engaged = |goals: &ToServos| match goals {
+        ToServos::Goals(goals) => goals.iter().map(|&(id, _)| id).collect(),
+        _ => Vec::new(),
+    };
+    assert_eq!(engaged(&told[0]).len(), 1, "one joint engages at a time: {told:?}");
+    let id = engaged(&told[0])[0];
+    let torque = std::array::from_fn(|joint| (joint == usize::from(id)).then_some(1));
+    assert_eq!(told[1..3], [ToServos::Ask(id), ToServos::Torque(torque)]);
+    assert_eq!(told[3], ToServos::Ask((id + 1) % 7), "and the next servo is read");
+}
+
+#[test]
+fn d12_a_servo_that_hides_its_goal_gets_torque_after_three_cycles() {
+    for (hides_goals, most_ms) in [(false, 20), (true, 60)] {
+        let rig = power_up(0, hides_goals);
+        let order =
+            rig.to_servos.iter().find(|(_, told)| !matches!(told, ToServos::Ask(_))).expect("an order").0;
+        let last = |id: usize| {
+            let first = rig
+                .to_servos
+                .iter()
+                .find(|(_, told)| matches!(told, ToServos::Torque(codes) if codes[id].is_some()));
+            first.expect("torque").0
+        };
+        let taken = (0..7).map(|id| last(id) - order).max().expect("seven joints");
+        println!("hidden {hides_goals}: {taken} us from the first goal to the last torque");
+        assert!(taken <= most_ms * 1_000, "{taken} us, hidden: {hides_goals}");
+    }
 }

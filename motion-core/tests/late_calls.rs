@@ -5,6 +5,7 @@
 mod rig;
 
 use arm_sim::servo::ServoFault;
+use motion_core::Vacuum;
 use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 use rig::{Rig, STANDARD_POSE};
@@ -79,4 +80,24 @@ fn a_servo_whose_positions_jump_counts_as_missing() {
         rig.run_ms(10);
     }
     assert_eq!(rig.get(242), 1);
+}
+
+#[test]
+fn d20_the_valve_closes_before_a_wait_also_when_the_watchdog_acts() {
+    for action in [0, 1] {
+        let mut rig = Rig::started();
+        rig.write(31, &[1]);
+        rig.write(187, &[action]);
+        rig.write(186, &[20]);
+        rig.write(31, &[0]);
+        rig.now_us += 1_000_000;
+        // Until the controller waits.
+        rig.run_us(0);
+        assert_eq!(
+            rig.vacuum.last(),
+            Some(&(rig.now_us, Vacuum { pump: false, valve: false })),
+            "action {action}"
+        );
+        assert_eq!(rig.get(241), 0b100_0000, "the watchdog acted");
+    }
 }

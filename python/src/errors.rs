@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::type_object::PyTypeInfo;
 use pyo3::types::PyTuple;
 use sevenbot::cartesian::{StraightLineError, StraightLineFault, TipRefusal};
-use sevenbot::checked_write::{MismatchCause, WriteMismatch, reasons};
+use sevenbot::checked_write::WriteError;
 use sevenbot::health::{remedies, sentences};
 use sevenbot::hold::HoldError;
 use sevenbot::moves::{GuardedMoveError, LineStartError, MoveError, ParkError};
@@ -112,13 +112,22 @@ pub(crate) fn not_opened(py: Python<'_>, port: &str, why: &OpenError) -> PyErr {
     }
 }
 
-/// Registers that did not take their values.
-pub(crate) fn not_taken(py: Python<'_>, unchanged: &[WriteMismatch]) -> PyErr {
-    let is_locked = unchanged.iter().any(|register| register.cause == MismatchCause::Locked);
-    let hint =
-        "settings are protected by the EEPROM lock, register 28: `unlock=True` opens it for this write";
-    let hints = if is_locked { vec![hint.to_owned()] } else { Vec::new() };
-    error::<NotTaken>(py, &reasons(unchanged), &hints)
+impl Raise for sevenbot::checked_write::NotTaken {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        let hint =
+            "settings are protected by the EEPROM lock, register 28: `unlock=True` opens it for this write";
+        let hints = if self.is_locked() { vec![hint.to_owned()] } else { Vec::new() };
+        error::<NotTaken>(py, &self.to_string(), &hints)
+    }
+}
+
+impl Raise for WriteError {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::NotTaken(not_taken) => not_taken.raise(py),
+            Self::Exchange(error) => error.raise(py),
+        }
+    }
 }
 
 /// Problems that end a move, with the joints and what to do.
@@ -155,7 +164,7 @@ impl Raise for MoveError {
         match self {
             Self::Exchange(error) => error.raise(py),
             Self::Problems(problems) => arm_problem(py, problems),
-            Self::NotTaken(unchanged) => not_taken(py, unchanged),
+            Self::NotTaken(not_taken) => not_taken.raise(py),
             Self::Stream(error) => error.raise(py),
             Self::Interrupted => error::<Interrupted>(py, &message, &[]),
             Self::NotDriven { .. } => error::<NotDriven>(py, &message, &driven),
@@ -175,7 +184,7 @@ impl Raise for MoveError {
 
 impl Raise for HoldError {
     fn raise(&self, py: Python<'_>) -> PyErr {
-        MoveError::MayMove(self.to_string()).raise(py)
+        MoveError::from(self.clone()).raise(py)
     }
 }
 
@@ -183,7 +192,7 @@ impl Raise for StreamError {
     fn raise(&self, py: Python<'_>) -> PyErr {
         match self {
             Self::NoExtendedBlock => error::<NotServed>(py, &self.to_string(), &[]),
-            Self::NotTaken(unchanged) => not_taken(py, unchanged),
+            Self::NotTaken(not_taken) => not_taken.raise(py),
             Self::Exchange(error) => error.raise(py),
         }
     }

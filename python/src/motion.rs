@@ -58,10 +58,6 @@ pub(crate) fn finish(arm: &mut Arm, sent: &JointMove, watch: &mut Watch) -> Resu
     Ok(angles(arm)?)
 }
 
-fn all_taken(unchanged: Vec<sevenbot::checked_write::WriteMismatch>) -> Result<(), MoveError> {
-    if unchanged.is_empty() { Ok(()) } else { Err(MoveError::NotTaken(unchanged)) }
-}
-
 /// Parks the arm in this pose, or in the kept one, or in the standard one. The inner error is that of the file of kept poses.
 pub(crate) fn park(
     arm: &mut Arm,
@@ -175,13 +171,13 @@ pub(crate) struct RecordOptions {
 pub(crate) fn record(arm: &mut Arm, options: RecordOptions, watch: &mut Watch) -> Result<String, MoveError> {
     let RecordOptions { hz, is_guided, .. } = options;
     if is_guided {
-        all_taken(arm.write_checked(MOTOR_STATE.address, &[motor_state::FORCELESS])?)?;
+        arm.write_motion(MOTOR_STATE.address, &[motor_state::FORCELESS])?;
     }
     let content = arm.exact_positions()?;
     let recorded = arm.with_reports(hz, content, |arm| record_reports(arm, options, content, watch));
     if is_guided {
         // The targets become the measured positions (D13).
-        all_taken(arm.write_checked(MOTOR_STATE.address, &[motor_state::SERVO])?)?;
+        arm.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
     }
     recorded
 }

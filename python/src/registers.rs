@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use sevenbot::map::{EEPROM_LOCK, FINE_TARGET, TARGET_POSITION};
+use sevenbot::map::{FINE_TARGET, TARGET_POSITION};
 use sevenbot::names::{name_of, parse};
 use sevenbot::register_text::{RegisterEntry, entries};
 use sevenbot::register_values::bytes;
 use sevenbot::table::{access, range, rows};
 use sevenbot::{Register, Span};
 
-use crate::errors::{NotServed, error, not_taken, raised};
+use crate::errors::{NotServed, error, raised};
 use crate::worker::Worker;
 
 /// A number, or one for each register.
@@ -73,19 +73,10 @@ pub(crate) fn set(
         if span.addresses().any(|address| TARGET_POSITION.holds(address) || FINE_TARGET.holds(address)) {
             arm.end_abandoned_stream()?;
         }
-        let mut unchanged = Vec::new();
-        if unlock {
-            unchanged.extend(arm.write_checked(EEPROM_LOCK.address, &[0])?);
-        }
-        let written = arm.write_checked(span.address(), &bytes);
-        if unlock {
-            unchanged.extend(arm.write_checked(EEPROM_LOCK.address, &[1])?);
-        }
-        unchanged.extend(written?);
-        Ok::<_, sevenbot::Error>(unchanged)
+        let write = |arm: &mut sevenbot::Arm| arm.write_checked(span.address(), &bytes);
+        if unlock { arm.with_open_lock(write) } else { write(arm) }
     })?;
-    let unchanged = raised(py, written)?;
-    if unchanged.is_empty() { Ok(()) } else { Err(not_taken(py, &unchanged)) }
+    raised(py, written)
 }
 
 /// The registers of an arm as a mapping from names to numbers: `arm.registers["speed.1"]`.

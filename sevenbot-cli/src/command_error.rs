@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use sevenbot::approach::StartTooFar;
+use sevenbot::checked_write::{NotTaken, WriteError};
 use sevenbot::health::{MoveCheckError, Problem, ProblemKind, remedies, sentences};
 use sevenbot::moves::{ConnectionLost, LineStartError, MoveError};
 use sevenbot::register_text::motor_state_name;
@@ -30,10 +31,12 @@ const SAFETY: [&str; 3] = [
 pub(crate) enum CommandError {
     /// The arm did not do what was asked.
     Arm(String),
+    /// Registers did not take their values.
+    NotTaken(NotTaken),
     /// The arm does not carry out the command, for these reasons.
     Problems(Vec<Problem>),
     /// The arm may be moving, for this reason.
-    MayMove(String),
+    MayMove(WriteError),
     /// The arguments do not fit the register, or an answer from the user is missing.
     Usage(String),
     /// No port was given, and none leads to an arm. The ports tried, with the reasons.
@@ -74,6 +77,12 @@ impl From<Error> for CommandError {
     }
 }
 
+impl From<WriteError> for CommandError {
+    fn from(error: WriteError) -> Self {
+        MoveError::from(error).into()
+    }
+}
+
 impl From<StreamError> for CommandError {
     fn from(error: StreamError) -> Self {
         match error {
@@ -96,6 +105,7 @@ impl From<MoveError> for CommandError {
             MoveError::Exchange(error) => Self::Exchange(error),
             MoveError::Stream(error) => error.into(),
             MoveError::MayMove(reason) => Self::MayMove(reason),
+            MoveError::NotTaken(not_taken) => Self::NotTaken(not_taken),
             MoveError::StartTooFar(far) => too_far(&far),
             MoveError::Problems(problems) => Self::Problems(problems),
             MoveError::NotDriven { state } => Self::Arm(format!(
@@ -150,7 +160,8 @@ impl CommandError {
         ExitCode::from(match self {
             // The reader of the pipe, such as `head`, has ended.
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
-            Self::Arm(_) | Self::Problems(_) | Self::MayMove(_) | Self::File { .. } | Self::Output(_) => 1,
+            Self::Arm(_) | Self::NotTaken(_) | Self::Problems(_) | Self::MayMove(_) => 1,
+            Self::File { .. } | Self::Output(_) => 1,
             Self::Usage(_) => 2,
             Self::NoArm { .. } | Self::SeveralArms { .. } => 3,
             Self::Open { .. } | Self::NoRate { .. } | Self::Exchange(_) => 3,
@@ -179,6 +190,7 @@ impl CommandError {
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => None,
             Self::Output(error) => Some(format!("cannot write the output: {error}")),
             Self::Arm(message) | Self::Usage(message) => Some(message.clone()),
+            Self::NotTaken(not_taken) => Some(not_taken.to_string()),
             Self::Problems(problems) => Some(sentences(problems)),
             Self::MayMove(reason) => Some(format!("the arm may still be moving: {reason}")),
             Self::NoArm { tried } if tried.is_empty() => {

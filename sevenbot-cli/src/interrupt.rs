@@ -6,6 +6,7 @@ use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use sevenbot::Arm;
+use sevenbot::hold::HoldError;
 use sevenbot::joints::JointSnapshot;
 use sevenbot::register_text::{self, motor_state_name};
 
@@ -78,7 +79,7 @@ pub(crate) fn hold_on_interrupt<T>(
 
 /// Makes the arm hold its position, and verifies it.
 pub(crate) fn hold(arm: &mut Arm) -> Result<JointSnapshot, CommandError> {
-    arm.hold().map_err(|reason| CommandError::MayMove(reason.to_string()))
+    arm.hold().map_err(|HoldError(error)| CommandError::MayMove(error))
 }
 
 /// Tells the user how the arm holds.

@@ -1,27 +1,9 @@
-//! The result of a checked write as the result of a command.
+//! What a user has to know of new settings.
 
-use sevenbot::checked_write::{WriteMismatch, reasons};
 use sevenbot::map::{BAUD_RATE, OFFSET};
-use sevenbot::{Arm, Error, Firmware};
+use sevenbot::{Arm, Firmware};
 
-use crate::command_error::CommandError;
 use crate::printer::note;
-
-/// Fails with the reasons if any register did not take its value.
-pub(crate) fn all_taken(unchanged: &[WriteMismatch]) -> Result<(), CommandError> {
-    if unchanged.is_empty() { Ok(()) } else { Err(CommandError::Arm(reasons(unchanged))) }
-}
-
-/// As [`all_taken`], for registers that move the arm. If the result of the write is unknown the arm may be moving.
-pub(crate) fn motors_obey(written: Result<Vec<WriteMismatch>, Error>) -> Result<(), CommandError> {
-    match written {
-        Ok(unchanged) if unchanged.iter().any(|register| register.cause.is_transient()) => {
-            Err(CommandError::MayMove(reasons(&unchanged)))
-        }
-        Ok(unchanged) => all_taken(&unchanged),
-        Err(error) => Err(CommandError::MayMove(error.to_string())),
-    }
-}
 
 /// Says which of these new settings act only after a restart of the arm.
 pub(crate) fn note_restart(arm: &Arm, mut changed: impl Iterator<Item = u8> + Clone) {

@@ -41,38 +41,116 @@ pub struct WriteMismatch {
     pub cause: MismatchCause,
 }
 
+/// Registers that do not hold what was written to them: at least one.
+///
+/// ```
+/// use sevenbot::checked_write::{MismatchCause, NotTaken, WriteMismatch};
+///
+/// let locked = WriteMismatch { address: 11, wanted: 42, found: 0, cause: MismatchCause::Locked };
+/// let error = NotTaken::check(vec![locked]).expect_err("one register differs");
+/// assert_eq!(error.to_string(), "device-id is 0, not 42: it is protected by the EEPROM lock");
+/// assert_eq!(NotTaken::check(Vec::new()), Ok(()));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", reasons(.0))]
+pub struct NotTaken(Vec<WriteMismatch>);
+
+impl NotTaken {
+    /// Fails if there is a register that differs.
+    ///
+    /// # Errors
+    /// All these registers.
+    pub fn check(differing: Vec<WriteMismatch>) -> Result<(), Self> {
+        if differing.is_empty() { Ok(()) } else { Err(Self(differing)) }
+    }
+
+    /// The registers, in the order of the writes.
+    #[must_use]
+    pub fn registers(&self) -> &[WriteMismatch] {
+        &self.0
+    }
+
+    /// Is a register protected by the EEPROM lock?
+    #[must_use]
+    pub fn is_locked(&self) -> bool {
+        self.0.iter().any(|register| register.cause == MismatchCause::Locked)
+    }
+}
+
+/// Why a verified write failed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum WriteError {
+    /// These registers did not take their values.
+    #[error(transparent)]
+    NotTaken(#[from] NotTaken),
+    /// An exchange with the arm failed. The arm may have taken some of the values.
+    #[error(transparent)]
+    Exchange(#[from] Error),
+}
+
+impl WriteError {
+    /// Is it unknown whether the arm carries out the write?
+    #[must_use]
+    pub fn is_uncertain(&self) -> bool {
+        match self {
+            Self::NotTaken(not_taken) => {
+                not_taken.registers().iter().any(|register| register.cause.is_transient())
+            }
+            Self::Exchange(_) => true,
+        }
+    }
+}
+
 /// A frame is sent this many times before its loss is an error.
 const WRITE_ATTEMPTS: u32 = 5;
 
 impl Arm {
-    /// Writes registers, reads them back, and returns those that differ. A frame that seems to be lost is sent again,
-    /// up to four times.
+    /// Writes registers, and reads them back. A frame that seems to be lost is sent again, up to four times.
     ///
-    /// ```no_run
+    /// ```
+    /// use sevenbot::checked_write::WriteError;
+    /// use sevenbot::simulated::{self, SimulationConfig};
+    ///
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// let mut arm = sevenbot::Arm::open("/dev/ttyUSB0", 115_200)?;
-    /// for unchanged in arm.write_checked(sevenbot::map::DEVICE_ID.address, &[42])? {
-    ///     println!("{unchanged}"); // device-id is 0, not 42: it is protected by the EEPROM lock
-    /// }
+    /// let (mut arm, _) = simulated::arm(SimulationConfig::default())?;
+    /// let refused = arm.write_checked(sevenbot::map::DEVICE_ID.address, &[42]);
+    /// assert!(matches!(refused, Err(WriteError::NotTaken(locked)) if locked.is_locked()));
     /// # Ok(())
     /// # }
     /// ```
     ///
     /// # Errors
-    /// As [`Arm::read`] and [`Arm::write`]. The arm may have taken the values.
-    pub fn write_checked(&mut self, address: u8, values: &[u8]) -> Result<Vec<WriteMismatch>, Error> {
+    /// [`WriteError::NotTaken`] with each register that differs, and why. Or the errors of [`Arm::read`] and
+    /// [`Arm::write`].
+    pub fn write_checked(&mut self, address: u8, values: &[u8]) -> Result<(), WriteError> {
         self.write_all_checked(&[(address, values.to_vec())])
     }
 
     /// As [`Arm::write_checked`], for several frames, sent one after the other. Each is a first address and its values.
     ///
     /// # Errors
-    /// As [`Arm::read`] and [`Arm::write`]. The arm may have taken some of the values.
-    pub fn write_all_checked(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<WriteMismatch>, Error> {
+    /// As [`Arm::write_checked`]. The arm may have taken some of the values.
+    pub fn write_all_checked(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<(), WriteError> {
         self.with_min_attempts(|arm| arm.write_until_taken(writes))
     }
 
-    fn write_until_taken(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<Vec<WriteMismatch>, Error> {
+    /// Runs `work` with the EEPROM lock open. Closes the lock afterwards, also after a failure.
+    ///
+    /// # Errors
+    /// Those of `work`, or the lock did not open or close: as [`Arm::write_checked`].
+    pub fn with_open_lock<T>(
+        &mut self,
+        work: impl FnOnce(&mut Self) -> Result<T, WriteError>,
+    ) -> Result<T, WriteError> {
+        self.write_checked(EEPROM_LOCK.address, &[0])?;
+        let done = work(self);
+        let closed = self.write_checked(EEPROM_LOCK.address, &[1]);
+        let done = done?;
+        closed?;
+        Ok(done)
+    }
+
+    fn write_until_taken(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<(), WriteError> {
         let now = self.read_span(Span::between(&EEPROM_LOCK, &FEEDBACK_FREQUENCY))?;
         let locked = now.byte(&EEPROM_LOCK) != 0;
         let reports = self.report_write(writes, now.byte(&FEEDBACK_FREQUENCY));
@@ -106,7 +184,7 @@ impl Arm {
             }
             (before, sending) = (after, lost);
         }
-        Ok(unchanged)
+        Ok(NotTaken::check(unchanged)?)
     }
 
     /// The write that starts the reports of map 2.2 again, if these writes end them.

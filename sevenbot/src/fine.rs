@@ -5,7 +5,7 @@ use protocol_core::registers::map::{EXTENDED_VERSION, FINE_POSITION, FINE_TARGET
 use protocol_core::registers::map21::Map;
 
 use crate::arm::Arm;
-use crate::checked_write::WriteMismatch;
+use crate::checked_write::WriteError;
 use crate::error::Error;
 use crate::fine_angle::FineAngle;
 pub use crate::fine_state::{FineState, FineTargets};
@@ -65,17 +65,26 @@ impl Arm {
     ///
     /// # Errors
     /// As [`Arm::write_checked`].
-    pub fn set_fine_targets_checked(&mut self, targets: &FineTargets) -> Result<Vec<WriteMismatch>, Error> {
+    pub fn set_fine_targets_checked(&mut self, targets: &FineTargets) -> Result<(), WriteError> {
+        self.without_set_point_period(|arm| arm.write_all_checked(&fine_frames(targets)))
+    }
+
+    /// Runs `work` while fine targets are no points of a stream (D23), and restores the set-point period, also after a
+    /// failure. Only for an arm with the extended block.
+    pub(crate) fn without_set_point_period<T>(
+        &mut self,
+        work: impl FnOnce(&mut Self) -> Result<T, WriteError>,
+    ) -> Result<T, WriteError> {
         let period = self.read_span(Span::of(&SET_POINT_PERIOD))?;
-        let is_streaming = period.word(SET_POINT_PERIOD.address) != 0;
-        if is_streaming {
-            self.write(SET_POINT_PERIOD.address, &[0, 0])?;
+        if period.word(SET_POINT_PERIOD.address) == 0 {
+            return work(self);
         }
-        let unchanged = self.write_all_checked(&fine_frames(targets))?;
-        if is_streaming {
-            self.write(SET_POINT_PERIOD.address, &period.values)?;
-        }
-        Ok(unchanged)
+        self.write(SET_POINT_PERIOD.address, &[0, 0])?;
+        let done = work(self);
+        let restored = self.write_checked(SET_POINT_PERIOD.address, &period.values);
+        let done = done?;
+        restored?;
+        Ok(done)
     }
 }
 

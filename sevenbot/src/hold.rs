@@ -7,11 +7,11 @@
 //! On an arm with the extended block, targets are the measured positions in hundredths of a degree, so that a stop moves no
 //! joint. On other arms they are whole degrees. [`crate::joints`] interprets the registers of each joint.
 
-use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, SET_POINT_PERIOD, TARGET_POSITION};
+use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, TARGET_POSITION};
 use protocol_core::registers::{Joint, Register};
 
 use crate::arm::Arm;
-use crate::checked_write::{MismatchCause, WriteMismatch, cause_from_counters};
+use crate::checked_write::{MismatchCause, NotTaken, WriteError, WriteMismatch, cause_from_counters};
 use crate::error::Error;
 use crate::fine::fine_frames;
 use crate::fine_angle::FineAngle;
@@ -22,27 +22,10 @@ use crate::span::Span;
 /// Targets are written this many times before their loss is an error.
 const HOLD_ATTEMPTS: u32 = 5;
 
-/// Why the arm may not hold.
-///
-/// ```
-/// use sevenbot::hold::HoldError;
-///
-/// let reason = HoldError::NotTaken(Vec::new());
-/// assert!(reason.to_string().contains("did not take"));
-/// ```
+/// Why the arm may not hold: it may still be moving.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum HoldError {
-    /// An exchange with the arm failed.
-    #[error(transparent)]
-    Exchange(#[from] Error),
-    /// These targets differ from what was written several times.
-    #[error("the arm did not take the targets that hold it{}", first_of(.0))]
-    NotTaken(Vec<WriteMismatch>),
-}
-
-fn first_of(unchanged: &[WriteMismatch]) -> String {
-    unchanged.first().map_or(String::new(), |first| format!(": {first}"))
-}
+#[error("the arm may not hold: {0}")]
+pub struct HoldError(#[from] pub WriteError);
 
 /// A target that was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,31 +48,21 @@ impl Arm {
     /// # Errors
     /// No answer, or the arm does not take the targets: it may be moving.
     pub fn hold(&mut self) -> Result<JointSnapshot, HoldError> {
-        self.with_min_attempts(|arm| {
-            let has_extended_block = arm.has_extended_block()?;
-            if !has_extended_block {
-                return arm.hold_until_verified(false);
-            }
-            let period = arm.read_span(Span::of(&SET_POINT_PERIOD))?;
-            if period.word(SET_POINT_PERIOD.address) == 0 {
-                return arm.hold_until_verified(true);
-            }
-            // With a period, a target would be one more point of the stream.
-            arm.write(SET_POINT_PERIOD.address, &[0, 0])?;
-            let joints = arm.hold_until_verified(true);
-            arm.write(SET_POINT_PERIOD.address, &period.values)?;
-            joints
-        })
+        let held = self.with_min_attempts(|arm| match arm.has_extended_block()? {
+            true => arm.without_set_point_period(|arm| arm.hold_until_verified(true)),
+            false => arm.hold_until_verified(false),
+        });
+        Ok(held?)
     }
 
-    fn hold_until_verified(&mut self, is_fine: bool) -> Result<JointSnapshot, HoldError> {
+    fn hold_until_verified(&mut self, is_fine: bool) -> Result<JointSnapshot, WriteError> {
         let start = self.now();
         let mut hold = Hold::default();
         loop {
             let now = self.held_joints(is_fine)?;
             match hold.step(&now, self.now() >= start + START_UP_TIME) {
                 HoldStep::Holds | HoldStep::NotDriven => return Ok(now.joints),
-                HoldStep::NotTaken(lost) => return Err(HoldError::NotTaken(lost)),
+                HoldStep::NotTaken(lost) => return Err(lost.into()),
                 HoldStep::Wait => self.sleep(POLL_PERIOD),
                 HoldStep::Write(frames) => {
                     for (address, values) in frames {
@@ -127,7 +100,7 @@ pub enum HoldStep {
     /// The motors do not drive the joints: there is nothing to stop.
     NotDriven,
     /// The arm does not take these targets. It may be moving.
-    NotTaken(Vec<WriteMismatch>),
+    NotTaken(NotTaken),
 }
 
 impl Hold {
@@ -138,10 +111,11 @@ impl Hold {
             return HoldStep::NotDriven;
         }
         let before = self.before.get_or_insert_with(|| now.joints.clone());
-        let lost = now.lost_targets(&self.sent, before);
-        self.losses += u32::from(!lost.is_empty());
-        if self.losses >= HOLD_ATTEMPTS {
-            return HoldStep::NotTaken(lost);
+        if let Err(lost) = NotTaken::check(now.lost_targets(&self.sent, before)) {
+            self.losses += 1;
+            if self.losses >= HOLD_ATTEMPTS {
+                return HoldStep::NotTaken(lost);
+            }
         }
         let targets = now.targets_to_write(&self.sent, is_past_start_up);
         for ((sent, target), joint) in self.sent.iter_mut().zip(targets).zip(Joint::ALL) {

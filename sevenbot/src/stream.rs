@@ -14,7 +14,7 @@ use protocol_core::registers::Joint;
 use protocol_core::registers::map::{FINE_TARGET, SET_POINT_PERIOD, WATCHDOG_ACTION, fault};
 
 use crate::arm::Arm;
-use crate::checked_write::WriteMismatch;
+use crate::checked_write::{NotTaken, WriteError};
 use crate::error::Error;
 use crate::fine::fine_frames;
 use crate::fine_state::FineTargets;
@@ -104,11 +104,20 @@ pub enum StreamError {
     #[error("the arm's firmware takes no stream of set-points: it has whole degrees only")]
     NoExtendedBlock,
     /// These registers did not take their values.
-    #[error("the arm did not take the stream's registers{}", .0.first().map_or(String::new(), |first| format!(": {first}")))]
-    NotTaken(Vec<WriteMismatch>),
+    #[error("the arm did not take the stream's registers: {0}")]
+    NotTaken(#[source] NotTaken),
     /// An exchange with the arm failed.
     #[error(transparent)]
     Exchange(#[from] Error),
+}
+
+impl From<WriteError> for StreamError {
+    fn from(error: WriteError) -> Self {
+        match error {
+            WriteError::NotTaken(not_taken) => Self::NotTaken(not_taken),
+            WriteError::Exchange(error) => Self::Exchange(error),
+        }
+    }
 }
 
 /// An open stream. While it lives, the arm takes fine targets as points of a stream, and its watchdog runs.
@@ -157,9 +166,9 @@ impl<'a> SetPointStream<'a> {
         let last_sent = arm.now();
         let check = MoveCheck::idle(arm).with_period(options.period_ms);
         let mut stream = Self { arm, options, before: Some(before), last_sent, check };
-        let unchanged = stream.arm.write_checked(STREAM_REGISTERS.address(), &options.registers())?;
+        stream.arm.write_checked(STREAM_REGISTERS.address(), &options.registers())?;
         stream.last_sent = stream.arm.now();
-        if unchanged.is_empty() { Ok(stream) } else { Err(StreamError::NotTaken(unchanged)) }
+        Ok(stream)
     }
 
     /// Sends a point at once. A joint without an angle gets no point.
@@ -228,8 +237,7 @@ impl<'a> SetPointStream<'a> {
     /// An exchange failed, or the arm does not take the values.
     pub fn close(mut self) -> Result<(), StreamError> {
         let Some(before) = self.before.take() else { return Ok(()) };
-        let unchanged = self.arm.write_checked(STREAM_REGISTERS.address(), &before)?;
-        if unchanged.is_empty() { Ok(()) } else { Err(StreamError::NotTaken(unchanged)) }
+        Ok(self.arm.write_checked(STREAM_REGISTERS.address(), &before)?)
     }
 }
 
@@ -248,8 +256,8 @@ impl Arm {
     /// there was such a stream.
     ///
     /// # Errors
-    /// As [`Arm::write_checked`].
-    pub fn end_abandoned_stream(&mut self) -> Result<bool, Error> {
+    /// As [`Arm::write_checked`]: the period or the watchdog may still be on.
+    pub fn end_abandoned_stream(&mut self) -> Result<bool, WriteError> {
         let is_abandoned = is_left_behind(self)? && self.has_extended_block()?;
         if is_abandoned {
             self.write_checked(STREAM_REGISTERS.address(), &SWITCHED_OFF)?;

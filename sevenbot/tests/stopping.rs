@@ -12,6 +12,7 @@ use fake::{
     reply, scripted_arm,
 };
 use protocol_core::request::Request;
+use sevenbot::checked_write::WriteError;
 use sevenbot::hold::HoldError;
 use sevenbot::{Arm, ArmOptions, Error};
 
@@ -40,7 +41,7 @@ fn a_checked_write_succeeds_despite_one_lost_frame() {
             let registers = moving_registers();
             let (name, _port) = arm_on_faulty_line(&registers, faulty_frame, fault);
             let mut arm = Arm::open_with(&name, OPTIONS).unwrap();
-            assert_eq!(arm.write_checked(29, &[0]), Ok(vec![]), "{fault:?} {faulty_frame}");
+            assert_eq!(arm.write_checked(29, &[0]), Ok(()), "{fault:?} {faulty_frame}");
             assert_eq!(registers.lock().unwrap()[29], 0, "{fault:?} {faulty_frame}");
         }
     }
@@ -95,7 +96,9 @@ fn ranges_past_the_last_register_are_not_sent() {
 fn a_stop_that_the_arm_does_not_take_is_an_error() {
     let (name, _port, writes) = arm_that_loses_writes_after(0);
     let mut arm = Arm::open_with(&name, OPTIONS).unwrap();
-    assert!(matches!(arm.hold(), Err(HoldError::NotTaken(targets)) if targets.len() == 2));
+    assert!(
+        matches!(arm.hold(), Err(HoldError(WriteError::NotTaken(targets))) if targets.registers().len() == 2)
+    );
     assert_eq!(
         writes.try_iter().count(),
         1 + 4 * 2,

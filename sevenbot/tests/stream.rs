@@ -9,10 +9,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 
 use fake::{execute, moving_registers, scripted_arm};
+use protocol_core::request::Request;
 use serialport::TTYPort;
-use sevenbot::checked_write::MismatchCause;
+use sevenbot::checked_write::{MismatchCause, WriteError};
 use sevenbot::stream::{SetPointStream, StreamError, StreamOptions, WatchdogAction};
-use sevenbot::{Arm, FineAngle};
+use sevenbot::{Arm, Error, FineAngle};
 
 type Registers = Arc<Mutex<[u8; 256]>>;
 
@@ -94,6 +95,40 @@ fn d22_registers_that_are_not_taken_are_told_whole() {
     let mut arm = Arm::open(&port, 115_200).unwrap();
     let error = SetPointStream::open(&mut arm, options()).unwrap_err();
     let StreamError::NotTaken(unchanged) = error else { panic!("{error}") };
-    let [only] = unchanged.as_slice() else { panic!("{unchanged:?}") };
+    let [only] = unchanged.registers() else { panic!("{unchanged:?}") };
     assert_eq!((only.address, only.wanted, only.found, only.cause), (184, 20, 300, MismatchCause::Unknown));
+}
+
+#[test]
+fn a_stream_that_does_not_end_is_an_error() {
+    let registers = moving_registers();
+    (registers.lock().unwrap()[191], registers.lock().unwrap()[241]) = (1, 1 << 6);
+    let (port, _held) = scripted_arm(move |_, request| {
+        let mut registers = registers.lock().unwrap();
+        let reply = execute(&mut registers, request);
+        registers[184..188].copy_from_slice(&[20, 0, 30, 0]);
+        reply
+    });
+    let mut arm = Arm::open(&port, 115_200).unwrap();
+    let error = arm.end_abandoned_stream().unwrap_err();
+    let WriteError::NotTaken(not_taken) = error else { panic!("{error}") };
+    let addresses: Vec<u8> = not_taken.registers().iter().map(|register| register.address).collect();
+    assert_eq!(addresses, [184, 186]);
+}
+
+#[test]
+fn the_period_of_another_program_is_put_back_after_a_failure() {
+    let registers = moving_registers();
+    registers.lock().unwrap()[191] = 1;
+    registers.lock().unwrap()[184..186].copy_from_slice(&[20, 0]);
+    let shown = Arc::clone(&registers);
+    let (port, _held) = scripted_arm(move |_, request| match request {
+        Request::Read { address: 128, .. } => Vec::new(),
+        _ => execute(&mut registers.lock().unwrap(), request),
+    });
+    let mut arm = Arm::open(&port, 115_200).unwrap();
+    let targets = [FineAngle::from_hundredths(9_025); 7];
+    let error = arm.set_fine_targets_checked(&targets).unwrap_err();
+    assert!(matches!(error, WriteError::Exchange(Error::NoAnswer { .. })), "{error}");
+    assert_eq!(shown.lock().unwrap()[184..186], [20, 0]);
 }

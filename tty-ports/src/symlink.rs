@@ -1,8 +1,19 @@
 //! A stable name for the port: a symbolic link that exists while the program runs.
+//!
+//! A program that was killed leaves its link. The next program may replace that, but never the link of a program that runs, nor
+//! one that the user made. The number of a pseudo-terminal is used again, so its existence alone does not tell. Two things do: a
+//! lock that the kernel frees with its process, and whether the pseudo-terminal is younger than the link.
 
-use std::fs;
+use std::fs::{self, Metadata};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::fs::MetadataExt;
+use std::os::unix::net::{SocketAddr, UnixListener};
 use std::path::{Path, PathBuf};
+
+/// Where the system keeps its pseudo-terminals. A link to one that is gone was left by a program that was killed.
+const TERMINALS: &str = "/dev/pts";
 
 /// Why the link was not created. Each message says what to do.
 #[derive(Debug, thiserror::Error)]
@@ -10,6 +21,29 @@ pub enum SymlinkError {
     /// The path exists and is not a symbolic link.
     #[error("{}: that is no symbolic link, so it is not replaced: remove it, or choose another path", .0.display())]
     Taken(PathBuf),
+    /// The path is a symbolic link to something that exists: perhaps to the port of another program.
+    #[error(
+        "{}: that link leads to {}, which exists, so it is not replaced: end the program that serves this port, remove \
+         the link, or choose another path",
+        path.display(), target.display()
+    )]
+    InUse {
+        /// The path.
+        path: PathBuf,
+        /// Where the link leads.
+        target: PathBuf,
+    },
+    /// The path is a symbolic link that leads nowhere, but not to a pseudo-terminal: no program of this kind made it.
+    #[error(
+        "{}: that link to {} is not one to a port of a simulator, so it is not replaced: remove it, or choose another path",
+        path.display(), target.display()
+    )]
+    Foreign {
+        /// The path.
+        path: PathBuf,
+        /// Where the link leads.
+        target: PathBuf,
+    },
     /// The operating system refused.
     #[error("{}: {cause}: choose a path in a directory that exists and that you can write to", path.display())]
     Refused {
@@ -25,32 +59,96 @@ pub enum SymlinkError {
 pub struct Symlink {
     path: PathBuf,
     port: PathBuf,
+    _lock: LinkLock,
+}
+
+/// The lock of a path: an abstract socket, which has no file and which the kernel closes with its process.
+#[derive(Debug)]
+enum LinkLock {
+    /// Another program, or another link of this one, has it.
+    Taken,
+    /// It is ours; `None` if the system gives no such socket.
+    Ours(Option<UnixListener>),
+}
+
+impl LinkLock {
+    fn new(path: &Path) -> Self {
+        match lock_address(path).and_then(|address| UnixListener::bind_addr(&address)) {
+            Err(error) if error.kind() == io::ErrorKind::AddrInUse => Self::Taken,
+            bound => Self::Ours(bound.ok()),
+        }
+    }
+}
+
+/// The name of the lock: the directory, and a hash of the name in it.
+fn lock_address(path: &Path) -> io::Result<SocketAddr> {
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let directory = fs::metadata(parent)?;
+    let mut hasher = DefaultHasher::new();
+    path.file_name().hash(&mut hasher);
+    let name = format!("7bot-link-{:x}-{:x}-{:x}", directory.dev(), directory.ino(), hasher.finish());
+    SocketAddr::from_abstract_name(name)
 }
 
 impl Symlink {
-    /// Creates a link at `path` to `port`. Replaces a symbolic link that an earlier program may have left.
+    /// Creates a link at `path` to `port`, which this program has open. Replaces only a link that a killed program has
+    /// left: one to a pseudo-terminal that is gone, whose number another one has got since, or that has become `port` itself.
     ///
     /// # Errors
     /// See [`SymlinkError`].
     pub fn new(path: &Path, port: &Path) -> Result<Self, SymlinkError> {
         let refused = |cause| SymlinkError::Refused { path: path.to_owned(), cause };
+        let lock = LinkLock::new(path);
         match fs::symlink_metadata(path) {
             Ok(metadata) if !metadata.is_symlink() => return Err(SymlinkError::Taken(path.to_owned())),
-            Ok(_) => replace(path, port).map_err(refused)?,
-            Err(_) => std::os::unix::fs::symlink(port, path).map_err(refused)?,
+            Ok(metadata) => take_away(path, port, &metadata, &lock)?,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(refused(error)),
         }
-        Ok(Self { path: path.to_owned(), port: port.to_owned() })
+        // Fails if another program has created something there in the meantime.
+        std::os::unix::fs::symlink(port, path).map_err(refused)?;
+        Ok(Self { path: path.to_owned(), port: port.to_owned(), _lock: lock })
     }
 }
 
-/// Replaces a link atomically.
-fn replace(path: &Path, port: &Path) -> io::Result<()> {
-    let mut draft = path.as_os_str().to_owned();
-    draft.push(format!(".{}.new", std::process::id()));
-    std::os::unix::fs::symlink(port, &draft)?;
-    fs::rename(&draft, path).inspect_err(|_| {
-        let _ = fs::remove_file(&draft);
-    })
+/// Removes a link that a killed program has left.
+fn take_away(path: &Path, port: &Path, link: &Metadata, lock: &LinkLock) -> Result<(), SymlinkError> {
+    let refused = |cause| SymlinkError::Refused { path: path.to_owned(), cause };
+    let target = fs::read_link(path).map_err(refused)?;
+    if matches!(lock, LinkLock::Taken) {
+        return Err(SymlinkError::InUse { path: path.to_owned(), target });
+    }
+    if target != port {
+        check_left_behind(path, &target, link)?;
+    }
+    // Another program that starts now may replace the link at the same time: look again at what was moved away.
+    let mut aside = path.as_os_str().to_owned();
+    aside.push(format!(".{}.old", std::process::id()));
+    let aside = PathBuf::from(aside);
+    fs::rename(path, &aside).map_err(refused)?;
+    if fs::read_link(&aside).is_ok_and(|moved| moved == target) {
+        return fs::remove_file(&aside).map_err(refused);
+    }
+    let _ = fs::rename(&aside, path);
+    Err(SymlinkError::InUse { path: path.to_owned(), target })
+}
+
+/// Fails unless the link leads to a pseudo-terminal that is gone, or that is younger than the link.
+fn check_left_behind(path: &Path, target: &Path, link: &Metadata) -> Result<(), SymlinkError> {
+    let (path, target) = (path.to_owned(), target.to_owned());
+    let is_terminal = target.starts_with(TERMINALS);
+    match fs::metadata(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound && is_terminal => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Err(SymlinkError::Foreign { path, target }),
+        Ok(terminal) if is_terminal && changed(&terminal) > changed(link) => Ok(()),
+        // A target that cannot be looked at counts as one that exists.
+        _ => Err(SymlinkError::InUse { path, target }),
+    }
+}
+
+/// When a file was created or got its mode.
+fn changed(metadata: &Metadata) -> (i64, i64) {
+    (metadata.ctime(), metadata.ctime_nsec())
 }
 
 impl Drop for Symlink {
@@ -64,6 +162,7 @@ impl Drop for Symlink {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pty::Pty;
 
     #[test]
     fn a_link_exists_as_long_as_its_owner_and_replaces_a_stale_one() {
@@ -76,14 +175,80 @@ mod tests {
         assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 0);
     }
 
-    #[test]
-    fn a_link_that_another_program_took_over_stays() {
+    /// A link at a path in a new directory.
+    fn link_to(target: &Path) -> (tempfile::TempDir, PathBuf) {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("7bot");
-        let first = Symlink::new(&path, Path::new("/dev/pts/5")).unwrap();
-        let _second = Symlink::new(&path, Path::new("/dev/pts/6")).unwrap();
+        std::os::unix::fs::symlink(target, &path).unwrap();
+        (directory, path)
+    }
+
+    #[test]
+    fn a_link_to_a_port_that_exists_is_not_replaced() {
+        let port = Pty::open(None).unwrap();
+        let (directory, path) = link_to(port.path());
+        let error = Symlink::new(&path, Path::new("/dev/pts/ours")).unwrap_err();
+        assert!(matches!(&error, SymlinkError::InUse { target, .. } if target == port.path()), "{error}");
+        assert_eq!(fs::read_link(&path).unwrap(), port.path());
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_link_of_a_program_that_runs_is_not_replaced_even_if_its_port_is_gone() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("7bot");
+        let first = Symlink::new(&path, Path::new("/dev/pts/first")).unwrap();
+        let second = Symlink::new(&path, Path::new("/dev/pts/second"));
+        assert!(matches!(second, Err(SymlinkError::InUse { .. })), "{second:?}");
+        assert_eq!(fs::read_link(&path).unwrap(), Path::new("/dev/pts/first"));
         drop(first);
-        assert_eq!(fs::read_link(&path).unwrap(), Path::new("/dev/pts/6"));
+        Symlink::new(&path, Path::new("/dev/pts/second")).unwrap();
+    }
+
+    #[test]
+    fn a_left_link_whose_number_was_used_again_is_replaced() {
+        let port = Pty::open(None).unwrap();
+        let name = port.path().to_owned();
+        let (_directory, path) = link_to(&name);
+        drop(port);
+        // Another test may get the number, and then this one shows nothing.
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        let next = Pty::open(None).unwrap();
+        if next.path() == name {
+            Symlink::new(&path, Path::new("/dev/pts/ours")).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_left_link_may_lead_to_the_new_port() {
+        let port = Pty::open(None).unwrap();
+        let (directory, path) = link_to(port.path());
+        let link = Symlink::new(&path, port.path()).unwrap();
+        assert_eq!(fs::read_link(&path).unwrap(), port.path());
+        drop(link);
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_link_of_the_user_is_not_replaced() {
+        for target in ["/dev/ttyUSB-unplugged", "notes.txt"] {
+            let (directory, path) = link_to(Path::new(target));
+            let error = Symlink::new(&path, Path::new("/dev/pts/ours")).unwrap_err();
+            assert!(matches!(error, SymlinkError::Foreign { .. }), "{error}");
+            fs::write(directory.path().join("notes.txt"), "years").unwrap();
+            assert_eq!(fs::read_link(&path).unwrap(), Path::new(target));
+        }
+    }
+
+    #[test]
+    fn a_link_that_was_replaced_stays_at_the_end() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("7bot");
+        let first = Symlink::new(&path, Path::new("/dev/pts/gone")).unwrap();
+        fs::remove_file(&path).unwrap();
+        std::os::unix::fs::symlink("/dev/pts/other", &path).unwrap();
+        drop(first);
+        assert_eq!(fs::read_link(&path).unwrap(), Path::new("/dev/pts/other"));
     }
 
     #[test]

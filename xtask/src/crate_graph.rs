@@ -26,6 +26,7 @@ const GROUPS: [Group; 3] = [
             "arm-sim",
             "firmware-stm32",
             "tty-ports",
+            "host-link",
             "host-sim",
             "sevenbot",
             "sevenbot-cli",

@@ -17,6 +17,7 @@ mod install;
 mod modules;
 mod mujoco;
 mod no_panic;
+mod obstacles;
 mod peers;
 mod python;
 mod registers_md;
@@ -104,6 +105,8 @@ enum Task {
     Emulate(emulator::EmulateArgs),
     /// Measure how far the emulated arm sags during restarts, a panic, noise and a silent servo
     Sag,
+    /// Measure what becomes of the emulated arm at walls, after emergency stops, and with a thing in its gripper (ten minutes)
+    Obstacles,
 }
 
 /// What to do with the figures.
@@ -158,6 +161,7 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Coverage => coverage::check(),
         Task::Emulate(options) => emulate(options),
         Task::Sag => sag::measure(),
+        Task::Obstacles => obstacles::measure(),
         Task::Bench(options) => peers::run(options),
     }
 }

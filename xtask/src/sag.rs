@@ -9,7 +9,7 @@
 //!
 //! The failures and the table are those of `torture sag`. It measures in real time, so a busy machine increases the figures.
 
-use std::io::{BufReader, Read, Write};
+use std::io::{BufReader, ErrorKind, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::thread::sleep;
 use std::time::Duration as RealTime;
@@ -37,6 +37,10 @@ use emulator::{HOST_LINK_CONTROL, RECEIVER_ON, need_qemu, servo_socket, start_ma
 
 /// The period of the servo bus and of the samples.
 const SAMPLE_PERIOD: RealTime = RealTime::from_micros(200);
+/// A step of an experiment with the arm.
+pub(crate) const STEP: Duration = Duration::from_millis(1);
+/// The longest wait for a reply, on a busy machine.
+const REPLY_TIMEOUT: Duration = Duration::from_millis(5_000);
 /// The period of the noise.
 const NOISE_PERIOD: Duration = Duration::from_millis(1);
 /// The symbol of the panic handler.
@@ -53,49 +57,89 @@ pub(crate) fn measure() -> TaskResult {
 }
 
 fn sag_over(cause: SagCause) -> TaskResult<Sag> {
-    let mut arm = EmulatedArm::new()?;
+    let mut arm = EmulatedArm::in_pose()?;
     arm.inject(cause)?;
     arm.run(SETTLE_TIME)?;
     Ok(arm.sag)
 }
 
-/// An emulated arm that holds [`POSE`].
-struct EmulatedArm {
+/// An emulated arm.
+pub(crate) struct EmulatedArm {
     _machine: ChildProcess,
     folder: TempDir,
     monitor: Monitor,
+    host: UnixStream,
     servos: UnixStream,
-    plant: Plant,
+    pub(crate) plant: Plant,
     clock: Clock,
+    /// The time of the servos.
+    pub(crate) now: Instant,
     rest: [i32; JOINTS],
     sag: Sag,
 }
 
 impl EmulatedArm {
-    fn new() -> TaskResult<Self> {
+    /// Switches an arm on.
+    pub(crate) fn start() -> TaskResult<Self> {
         let folder = tempfile::tempdir()?;
         let listen = |name| UnixListener::bind(folder.path().join(name));
         let (host, commands, servos) = (listen("host")?, listen("monitor")?, listen("servos")?);
         let debugger = format!("unix:{},server=on,wait=off", folder.path().join("debugger").display());
         let machine = start_machine(&run::IMAGE, &folder, &servo_socket(&folder), &["-gdb", &debugger])?;
-        let (mut host, servos) = (monitor::accept(&host)?, monitor::accept(&servos)?);
+        let (host, servos) = (monitor::accept(&host)?, monitor::accept(&servos)?);
+        host.set_nonblocking(true)?;
         servos.set_nonblocking(true)?;
         let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
         monitor.wait_for_bits(HOST_LINK_CONTROL, RECEIVER_ON)?;
         let mut clock = Clock::default();
-        let mut plant = Plant::new(clock.now());
+        let now = clock.now();
+        let mut plant = Plant::new(now);
         plant.ignore_collisions();
         let (rest, sag) = ([0; JOINTS], Sag::default());
-        let mut arm = Self { _machine: machine, folder, monitor, servos, plant, clock, rest, sag };
+        Ok(Self { _machine: machine, folder, monitor, host, servos, plant, clock, now, rest, sag })
+    }
+
+    /// An arm that holds [`POSE`].
+    fn in_pose() -> TaskResult<Self> {
+        let mut arm = Self::start()?;
         arm.run(SETTLE_TIME)?;
-        let mut frame = FrameBuffer::new();
-        Request::Write { address: TARGET_POSITION.address, values: &POSE }.encode(&mut frame);
-        host.write_all(&frame)?;
+        arm.request(Request::Write { address: TARGET_POSITION.address, values: &POSE })?;
         arm.run(SETTLE_TIME)?;
         arm.rest = arm.angles();
         arm.sag = Sag::default();
         arm.check_pose()?;
         Ok(arm)
+    }
+
+    /// Sends a request.
+    pub(crate) fn request(&mut self, request: Request<'_>) -> TaskResult {
+        let mut frame = FrameBuffer::new();
+        request.encode(&mut frame);
+        Ok(self.host.write_all(&frame)?)
+    }
+
+    /// Reads a register.
+    pub(crate) fn register(&mut self, address: u8) -> TaskResult<u8> {
+        self.request(Request::Read { address, count: 1 })?;
+        let mut received = Vec::new();
+        let until = self.now + REPLY_TIMEOUT;
+        while self.now < until {
+            self.run(STEP)?;
+            let mut bytes = [0; 64];
+            match self.host.read(&mut bytes) {
+                Ok(0) => Err("the emulator has ended")?,
+                Ok(count) => received.extend(bytes.iter().take(count)),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                Err(error) => Err(error)?,
+            }
+            // Header, function, address, count, value, checksum: the reply to a read of one register.
+            if let [.., 0xAA, 0x77, 3, at, 1, value, _, _] = *received
+                && at == address
+            {
+                return Ok(value);
+            }
+        }
+        Err(format!("no reply to a read of register {address}"))?
     }
 
     /// Fails if the arm is not in its pose.
@@ -112,15 +156,15 @@ impl EmulatedArm {
     }
 
     /// Runs the servos and samples the angles for this time. Returns the time at its end.
-    fn run(&mut self, time: Duration) -> TaskResult<Instant> {
+    pub(crate) fn run(&mut self, time: Duration) -> TaskResult<Instant> {
         let until = self.clock.now() + time;
         loop {
-            let now = self.clock.now();
-            exchange(&mut self.servos, &mut self.plant, now)?;
+            self.now = self.clock.now();
+            exchange(&mut self.servos, &mut self.plant, self.now)?;
             let angles = self.angles();
             self.sag.sample(&self.rest, angles);
-            if now >= until {
-                return Ok(now);
+            if self.now >= until {
+                return Ok(self.now);
             }
             sleep(SAMPLE_PERIOD);
         }

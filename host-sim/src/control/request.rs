@@ -93,7 +93,7 @@ pub enum Alarm {
 
 /// What a hand does with a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "the hand takes an angle in degrees, \"hold\" or \"let-go\"")]
 pub enum HandAction {
     /// Turns it to this angle in degrees, and holds it there.
     Degrees(f64),
@@ -103,7 +103,7 @@ pub enum HandAction {
 
 /// The speed of virtual time.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "the speed is a factor from 0.001 to 1000, or \"max\"")]
 pub enum SpeedFactor {
     /// Times real time.
     Times(f64),
@@ -222,6 +222,13 @@ mod tests {
             assert!(parse(wrong.as_bytes()).is_err(), "{wrong}");
         }
         assert!(parse(b"\xFF\xFE").is_err());
+        for (line, says) in [
+            (r#"{"do":"speed","factor":null}"#, "a factor from 0.001 to 1000"),
+            (r#"{"do":"hand","joint":2,"to":null}"#, "an angle in degrees"),
+        ] {
+            let refusal = parse(line.as_bytes()).unwrap_err();
+            assert!(refusal.error.contains(says) && !refusal.error.contains("enum"), "{refusal:?}");
+        }
     }
 
     #[test]

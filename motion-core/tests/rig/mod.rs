@@ -35,6 +35,14 @@ pub struct Rig {
     pub saved: Vec<Image>,
     /// What becomes of the next save.
     pub storage: Storage,
+    /// The frames of goals that name this servo do not reach the servos, this often.
+    pub lost_goals: (u8, usize),
+    /// A servo without torque does not show its goal.
+    pub hides_goals: bool,
+    /// The goals that reached the servos.
+    servo_goals: [Option<u16>; 7],
+    /// Each servo that was given torque, with the goal that had reached it and its position.
+    pub given_torque: Vec<(u8, Option<u16>, u16)>,
 }
 
 pub fn config() -> Config {
@@ -65,6 +73,10 @@ impl Rig {
             vacuum: Vec::new(),
             saved: Vec::new(),
             storage: Storage::Ready,
+            lost_goals: (0, 0),
+            hides_goals: false,
+            servo_goals: [None; 7],
+            given_torque: Vec::new(),
         }
     }
 
@@ -124,14 +136,20 @@ impl Rig {
     fn turn(&mut self) -> u64 {
         let now = self.now();
         self.controller.host_bytes(now, &[]);
-        let answer = self.plant.poll(now);
+        let mut answer = self.plant.poll(now);
+        if self.hides_goals {
+            hide_goal(&mut answer);
+        }
         self.controller.servo_bytes(now, &answer);
         loop {
             match self.controller.poll(now, self.room) {
                 Output::ToHost(bytes) => self.to_host.push((self.now_us, bytes.to_vec())),
                 Output::ToServos(bytes) => {
-                    self.plant.bytes(now, bytes);
                     let told = decode(bytes);
+                    let bytes = bytes.to_vec();
+                    if self.arrives(&told) {
+                        self.plant.bytes(now, &bytes);
+                    }
                     self.to_servos.push((self.now_us, told));
                 }
                 Output::Vacuum(vacuum) => self.vacuum.push((self.now_us, vacuum)),
@@ -145,6 +163,30 @@ impl Rig {
                 }
             }
         }
+    }
+
+    /// Does a frame reach the servos? Records what it does to them.
+    fn arrives(&mut self, told: &ToServos) -> bool {
+        match told {
+            ToServos::Goals(goals) => {
+                let (lost_id, left) = &mut self.lost_goals;
+                if *left > 0 && goals.iter().any(|(id, _)| id == lost_id) {
+                    *left -= 1;
+                    return false;
+                }
+                goals.iter().for_each(|&(id, counts)| self.servo_goals[usize::from(id)] = Some(counts));
+            }
+            ToServos::Torque(codes) => {
+                for (joint, code) in Joint::ALL.into_iter().zip(codes) {
+                    if *code == Some(1) && !self.plant.has_torque(joint) {
+                        let goal = self.servo_goals[usize::from(joint.index())];
+                        self.given_torque.push((joint.index(), goal, self.plant.position_counts(joint)));
+                    }
+                }
+            }
+            ToServos::Ask(_) => {}
+        }
+        true
     }
 
     /// Hands bytes to the controller and lets it act on them without time passing.
@@ -238,6 +280,17 @@ pub fn write(address: u8, values: &[u8]) -> Vec<u8> {
 
 pub fn reply(address: u8, values: &[u8]) -> Vec<u8> {
     frame(3, address, u8::try_from(values.len()).expect("at most 255"), values)
+}
+
+/// Replaces the goal in an answer from the torque switch on by 0, if torque is off.
+fn hide_goal(answer: &mut [u8]) {
+    if let [_, _, _, length, _, torque, _, high, low, .., checksum] = answer
+        && *length >= 24
+        && *torque != 1
+    {
+        *checksum = checksum.wrapping_add(*high).wrapping_add(*low);
+        (*high, *low) = (0, 0);
+    }
 }
 
 fn decode(bytes: &[u8]) -> ToServos {

@@ -12,14 +12,13 @@ use sevenbot::names::{name_of, name_of_register};
 use sevenbot::register_text::meaning;
 use sevenbot::{Arm, Register, Snapshot};
 
-use super::set::unlocked;
 use crate::command_error::CommandError;
 use crate::confirm::confirm;
 use crate::interrupt::hold_on_interrupt;
 use crate::printer::{Printable, note, warn};
 use crate::session::Session;
 use crate::settings_file::{SettingsFile, span};
-use crate::write_result::{all_taken, note_restart};
+use crate::write_result::note_restart;
 
 /// Write the settings of the arm to a file.
 #[derive(Debug, Args)]
@@ -132,7 +131,7 @@ fn changed_registers(changes: &[Change], wanted: &Snapshot) -> Snapshot {
 fn write(arm: &mut Arm, wanted: &Snapshot) -> Result<(), CommandError> {
     // New offsets move the arm a little.
     let write = |arm: &mut Arm| arm.write_checked(wanted.address, &wanted.values);
-    all_taken(&hold_on_interrupt(arm, |arm, _| unlocked(arm, write))?)
+    hold_on_interrupt(arm, |arm, _| Ok(arm.with_open_lock(write)?))
 }
 
 #[derive(Debug, Serialize)]

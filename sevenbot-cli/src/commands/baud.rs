@@ -7,12 +7,10 @@ use serde::Serialize;
 use sevenbot::map::{BAUD_RATE, BAUD_RATES, baud_rate};
 use sevenbot::{Arm, Map, OpenError, Span, ports};
 
-use super::set::unlocked;
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
 use crate::printer::{Printable, note};
 use crate::session::Session;
-use crate::write_result::all_taken;
 
 /// Show, change or find the baud rate of the arm.
 #[derive(Debug, Args)]
@@ -65,7 +63,7 @@ pub(crate) fn run(session: &mut Session, args: &BaudArgs) -> Result<(), CommandE
         })?;
         let write = |arm: &mut Arm| arm.write_checked(BAUD_RATE.address, &[code]);
         // Ctrl-C must not leave the EEPROM lock open.
-        all_taken(&hold_on_interrupt(&mut arm, |arm, _| unlocked(arm, write))?)?;
+        hold_on_interrupt(&mut arm, |arm, _| Ok(arm.with_open_lock(write)?))?;
     }
     let code = arm.read_span(Span::of(&BAUD_RATE))?.byte(&BAUD_RATE);
     let baud_after_restart = baud_rate(if has_baud_code(&arm, code) { code } else { 0 });

@@ -8,7 +8,6 @@ use sevenbot::{Register, Span};
 use super::get::RegisterList;
 use crate::command_error::CommandError;
 use crate::session::Session;
-use crate::write_result::all_taken;
 
 /// Show or switch the vacuum pump.
 #[derive(Debug, Args)]
@@ -55,7 +54,7 @@ pub(crate) fn effector(session: &mut Session, args: &EffectorArgs) -> Result<(),
 fn show_or_set(session: &mut Session, row: &Register, value: Option<u8>) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     if let Some(value) = value {
-        all_taken(&arm.write_checked(row.address, &[value])?)?;
+        arm.write_checked(row.address, &[value])?;
     }
     session.printer.print(&RegisterList::from(entries(&arm.read_span(Span::of(row))?)))
 }

@@ -19,7 +19,6 @@ use crate::confirm::confirm;
 use crate::interrupt::hold;
 use crate::printer::{Printable, note, warn};
 use crate::session::Session;
-use crate::write_result::motors_obey;
 
 /// Bring the arm back after an obstacle, an alarm or a lost supply, step by step.
 ///
@@ -132,10 +131,10 @@ fn recover(arm: &mut Arm, before: &Health, yes: bool) -> Result<(), CommandError
             "This firmware ends an overload only with the motors off for a moment: the arm falls. Do you hold it?",
             yes,
         )?;
-        motors_obey(arm.write_checked(MOTOR_STATE.address, &[motor_state::FORCELESS]))?;
+        arm.write_motion(MOTOR_STATE.address, &[motor_state::FORCELESS])?;
         arm.sleep(OFF_TIME);
     }
-    motors_obey(arm.write_checked(MOTOR_STATE.address, &[motor_state::SERVO]))?;
+    arm.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
     hold(arm).map(drop)
 }
 

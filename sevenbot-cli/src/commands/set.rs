@@ -1,19 +1,18 @@
 //! `set`: writes registers in one frame, reads them back, and reports those that differ.
 
 use clap::Args;
-use sevenbot::checked_write::{MismatchCause, WriteMismatch};
-use sevenbot::map::{BAUD_RATE, EEPROM_LOCK, FINE_TARGET, TARGET_POSITION};
+use sevenbot::map::{BAUD_RATE, FINE_TARGET, TARGET_POSITION};
 use sevenbot::names;
 use sevenbot::register_text::entries;
 use sevenbot::register_values::{self, ValueError};
-use sevenbot::{Arm, Error, Span};
+use sevenbot::{Arm, Span};
 
 use super::get::{NAMES, RegisterList, not_served};
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
 use crate::printer::note;
 use crate::session::Session;
-use crate::write_result::{all_taken, note_restart};
+use crate::write_result::note_restart;
 
 /// Write registers, read them back, and report those that differ.
 #[derive(Debug, Args)]
@@ -66,38 +65,25 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandEr
         return Err(not_served(&arm, address));
     }
     // Targets, offsets and the motor state move the arm.
-    let unchanged = hold_on_interrupt(&mut arm, |arm, _| {
+    let written = hold_on_interrupt(&mut arm, |arm, _| {
         let is_target = |address| TARGET_POSITION.holds(address) || FINE_TARGET.holds(address);
         if span.addresses().any(is_target) {
             arm.end_abandoned_stream()?;
         }
         let write = |arm: &mut Arm| arm.write_checked(span.address(), &bytes);
-        if args.unlock { unlocked(arm, write) } else { Ok(write(arm)?) }
-    })?;
-    session.printer.print(&RegisterList::from(entries(&arm.read_span(span)?)))?;
-    note_causes(&arm, span, args, &unchanged);
-    all_taken(&unchanged)
-}
-
-/// Runs `work` with the EEPROM lock open. Closes the lock afterwards, also after a failure.
-pub(crate) fn unlocked<T>(
-    arm: &mut Arm,
-    work: impl FnOnce(&mut Arm) -> Result<T, Error>,
-) -> Result<T, CommandError> {
-    all_taken(&arm.write_checked(EEPROM_LOCK.address, &[0])?)?;
-    let done = work(arm);
-    let closed = arm.write_checked(EEPROM_LOCK.address, &[1]);
-    let done = done?;
-    all_taken(&closed?)?;
-    Ok(done)
-}
-
-fn note_causes(arm: &Arm, span: Span, args: &SetArgs, unchanged: &[WriteMismatch]) {
-    if unchanged.iter().any(|register| register.cause == MismatchCause::Locked) && !args.unlock {
-        note("settings are protected by the EEPROM lock, register 28: --unlock opens it for this write");
-    } else if unchanged.is_empty() {
-        note_restart(arm, span.addresses());
+        Ok(if args.unlock { arm.with_open_lock(write) } else { write(arm) }?)
+    });
+    if matches!(written, Ok(()) | Err(CommandError::NotTaken(_))) {
+        session.printer.print(&RegisterList::from(entries(&arm.read_span(span)?)))?;
     }
+    match &written {
+        Ok(()) => note_restart(&arm, span.addresses()),
+        Err(CommandError::NotTaken(not_taken)) if not_taken.is_locked() && !args.unlock => {
+            note("settings are protected by the EEPROM lock, register 28: --unlock opens it for this write");
+        }
+        Err(_) => {}
+    }
+    written
 }
 
 /// The bytes for a span: one value per register, or one for all. A register of two bytes takes one value.

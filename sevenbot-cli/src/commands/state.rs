@@ -10,7 +10,6 @@ use crate::command_error::CommandError;
 use crate::confirm::confirm;
 use crate::interrupt::hold_on_interrupt;
 use crate::session::Session;
-use crate::write_result::motors_obey;
 
 /// Show or change the motor state.
 #[derive(Debug, Args)]
@@ -63,5 +62,5 @@ fn change(arm: &mut Arm, wanted: MotorStateArg, yes: bool) -> Result<(), Command
         let how = if matches!(wanted, MotorStateArg::Damping) { "sink" } else { "fall" };
         confirm(&format!("The arm will {how} unless you hold it. Go on?"), yes)?;
     }
-    hold_on_interrupt(arm, |arm, _| motors_obey(arm.write_checked(MOTOR_STATE.address, &[wanted.code()])))
+    hold_on_interrupt(arm, |arm, _| Ok(arm.write_motion(MOTOR_STATE.address, &[wanted.code()])?))
 }

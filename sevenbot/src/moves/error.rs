@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use crate::approach::StartTooFar;
-use crate::checked_write::{WriteMismatch, reasons};
+use crate::arm::Arm;
+use crate::checked_write::{NotTaken, WriteError};
 use crate::error::Error;
 use crate::health::{MoveCheckError, Problem, sentences};
 use crate::hold::HoldError;
@@ -30,11 +31,11 @@ pub enum MoveError {
     #[error("{}", sentences(.0))]
     Problems(Vec<Problem>),
     /// The arm did not take these values.
-    #[error("{}", reasons(.0))]
-    NotTaken(Vec<WriteMismatch>),
+    #[error(transparent)]
+    NotTaken(#[from] NotTaken),
     /// It is unknown whether the arm took the values, so it may be moving, for this reason.
     #[error("the arm may still be moving: {0}")]
-    MayMove(String),
+    MayMove(#[source] WriteError),
     /// The set-points of these joints still move.
     #[error("still moving after {} s: {}", after.as_secs(), joints(*bits))]
     StillMoving {
@@ -69,7 +70,7 @@ impl From<StreamError> for MoveError {
     fn from(error: StreamError) -> Self {
         match error {
             StreamError::Exchange(error) => Self::Exchange(error),
-            StreamError::NotTaken(unchanged) => Self::NotTaken(unchanged),
+            StreamError::NotTaken(not_taken) => Self::NotTaken(not_taken),
             other @ StreamError::NoExtendedBlock => Self::Stream(other),
         }
     }
@@ -86,8 +87,34 @@ impl From<MoveCheckError> for MoveError {
 }
 
 impl From<HoldError> for MoveError {
-    fn from(error: HoldError) -> Self {
-        Self::MayMove(error.to_string())
+    fn from(HoldError(error): HoldError) -> Self {
+        Self::MayMove(error)
+    }
+}
+
+impl From<WriteError> for MoveError {
+    fn from(error: WriteError) -> Self {
+        match error {
+            WriteError::NotTaken(not_taken) => Self::NotTaken(not_taken),
+            WriteError::Exchange(error) => Self::Exchange(error),
+        }
+    }
+}
+
+impl MoveError {
+    /// The failure of a write to registers that move the arm.
+    pub(super) fn of_motion(error: WriteError) -> Self {
+        if error.is_uncertain() { Self::MayMove(error) } else { error.into() }
+    }
+}
+
+impl Arm {
+    /// As [`Arm::write_checked`], for registers that move the arm or let it go.
+    ///
+    /// # Errors
+    /// [`MoveError::NotTaken`] if the arm refused the values. [`MoveError::MayMove`] if it is unknown whether it took them.
+    pub fn write_motion(&mut self, address: u8, values: &[u8]) -> Result<(), MoveError> {
+        self.write_checked(address, values).map_err(MoveError::of_motion)
     }
 }
 
@@ -100,22 +127,6 @@ pub trait ConnectionLost {
 impl ConnectionLost for MoveError {
     fn is_connection_lost(&self) -> bool {
         matches!(self, Self::Exchange(_) | Self::MayMove(_))
-    }
-}
-
-/// Fails if any register did not take its value.
-pub(super) fn all_taken(unchanged: Vec<WriteMismatch>) -> Result<(), MoveError> {
-    if unchanged.is_empty() { Ok(()) } else { Err(MoveError::NotTaken(unchanged)) }
-}
-
-/// As [`all_taken`], for registers that move the arm.
-pub(super) fn motors_obey(written: Result<Vec<WriteMismatch>, Error>) -> Result<(), MoveError> {
-    match written {
-        Ok(unchanged) if unchanged.iter().any(|register| register.cause.is_transient()) => {
-            Err(MoveError::MayMove(reasons(&unchanged)))
-        }
-        Ok(unchanged) => all_taken(unchanged),
-        Err(error) => Err(MoveError::MayMove(error.to_string())),
     }
 }
 

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TIME};
 
-use super::error::{MoveError, motors_obey};
+use super::error::MoveError;
 use super::observer::{Observer, Stage};
 use crate::arm::Arm;
 use crate::error::Error;
@@ -90,7 +90,7 @@ impl JointMove {
     pub fn begin(arm: &mut Arm, targets: Targets) -> Result<Self, MoveError> {
         let check = MoveCheck::begin(arm, joints_of(&targets))?;
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
-        motors_obey(arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets)))?;
+        arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets)).map_err(MoveError::of_motion)?;
         Ok(Self { targets, is_rounded: false, arrived: ARRIVED_DEGREES, plan, check, start: arm.now() })
     }
 
@@ -108,7 +108,7 @@ impl JointMove {
         }
         let check = MoveCheck::begin(arm, joints_of(&whole))?;
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
-        motors_obey(arm.set_fine_targets_checked(&targets))?;
+        arm.set_fine_targets_checked(&targets).map_err(MoveError::of_motion)?;
         Ok(Self { targets: whole, is_rounded: false, arrived: 0, plan, check, start: arm.now() })
     }
 

@@ -12,7 +12,7 @@ use std::time::Duration;
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{MOTOR_STATE, PRESENT_POSITION, SPEED, TIME, motor_state};
 
-use super::error::{MoveError, motors_obey};
+use super::error::MoveError;
 use super::joint_move::JointMove;
 use super::observer::Observer;
 use super::pace::Pace;
@@ -77,7 +77,7 @@ impl Arm {
         let moved = self.go_to_park_pose(pose, observer);
         let restored = self.write_checked(before.address, &before.values);
         moved?;
-        restored?;
+        restored.map_err(MoveError::from)?;
         self.let_go_and_watch()
     }
 
@@ -96,12 +96,12 @@ impl Arm {
 
     fn let_go_and_watch(&mut self) -> Result<[FineAngle; 7], ParkError> {
         let start = self.park_positions()?;
-        motors_obey(self.write_checked(MOTOR_STATE.address, &[motor_state::DAMPING]))?;
+        self.write_motion(MOTOR_STATE.address, &[motor_state::DAMPING])?;
         let deadline = self.now() + WATCH_TIME;
         loop {
             let now = self.park_positions()?;
             if let Some(joint) = moved_joint(&start, &now) {
-                motors_obey(self.write_checked(MOTOR_STATE.address, &[motor_state::SERVO]))?;
+                self.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
                 return Err(ParkError::Sinks { joint });
             }
             if self.now() >= deadline {

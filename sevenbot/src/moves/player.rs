@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use protocol_core::registers::map::{SPEED, TIME, VACUUM_PUMP};
 
-use super::error::{ConnectionLost, MoveError, all_taken};
+use super::error::{ConnectionLost, MoveError};
 use super::joint_move::JointMove;
 use super::observer::{Observer, Stage};
 use crate::approach::{Approach, ApproachRule, Standing, StartTooFar};
@@ -124,7 +124,7 @@ impl Player {
             return done;
         }
         let restored = arm.write_checked(before.address, &before.values);
-        done.and(all_taken(restored?))
+        done.and(restored.map_err(MoveError::from))
     }
 
     fn play_times(
@@ -165,7 +165,7 @@ impl Player {
         let step = playback::approach(arm.positions()?, *first);
         let pace = step.registers();
         let pace = pace.get(..pace.len().saturating_sub(step.targets.len())).unwrap_or_default();
-        all_taken(arm.write_checked(VACUUM_PUMP.address, pace)?)?;
+        arm.write_checked(VACUUM_PUMP.address, pace)?;
         move_to(arm, first.pose, observer)
     }
 
@@ -173,7 +173,7 @@ impl Player {
     fn blend(&self, first: &Moment, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
         let standing = Standing { speeds: self.speeds, ..arm.standing()? };
         let way = Approach::plan(&standing, &first.pose.map(Some), self.rule)?;
-        all_taken(arm.write_checked(VACUUM_PUMP.address, &[u8::from(first.vacuum)])?)?;
+        arm.write_checked(VACUUM_PUMP.address, &[u8::from(first.vacuum)])?;
         if arm.has_extended_block()? {
             let options = StreamOptions::new(PERIOD_MS).ok_or(StreamError::NoExtendedBlock)?;
             let mut stream = SetPointStream::open(arm, options)?;
@@ -220,7 +220,7 @@ impl Player {
     fn stream(&self, run: &mut Run, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
         let options = StreamOptions::new(PERIOD_MS).ok_or(StreamError::NoExtendedBlock)?;
         // The points tell the speed. The recording was checked, and the arm is at its first pose.
-        all_taken(arm.write_checked(SPEED.address, &[Speed::MAXIMUM.steps(); 7])?)?;
+        arm.write_checked(SPEED.address, &[Speed::MAXIMUM.steps(); 7])?;
         let mut stream = SetPointStream::open(arm, options)?;
         let (mut path, period) = (self.path.clone(), options.period());
         let points = path.duration().as_millis().div_ceil(period.as_millis().max(1));

@@ -2,7 +2,7 @@
 
 use protocol_core::registers::map::{FEEDBACK_FREQUENCY, REPORT_CONTENT, report_content};
 
-use super::error::{ConnectionLost, MoveError, all_taken};
+use super::error::{ConnectionLost, MoveError};
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::span::Span;
@@ -35,7 +35,7 @@ impl Arm {
         }
         let restored = self.write_all_checked(&before);
         let done = done?;
-        all_taken(restored.map_err(MoveError::from)?)?;
+        restored.map_err(MoveError::from)?;
         Ok(done)
     }
 
@@ -51,7 +51,7 @@ impl Arm {
             before.push((row.address, vec![self.read_span(Span::of(row))?.byte(row)]));
         }
         let wanted: Vec<_> = rows.iter().map(|(row, value)| (row.address, vec![*value])).collect();
-        all_taken(self.write_all_checked(&wanted)?)?;
+        self.write_all_checked(&wanted)?;
         Ok(before)
     }
 }

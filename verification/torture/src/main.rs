@@ -8,8 +8,9 @@ use clap::Parser;
 use torture::campaign::{self, CampaignPlan, CampaignResult};
 use torture::cli::{CampaignArgs, TortureCommand};
 use torture::load;
+use torture::obstacles::{Experiments, SimulatedObstacleArm};
 use torture::result_table::{ResultTable, days};
-use torture::{obstacles, sag};
+use torture::sag;
 
 fn main() -> ExitCode {
     let args = CampaignArgs::parse();
@@ -58,7 +59,8 @@ fn measure_sag() -> ExitCode {
 }
 
 fn measure_obstacles() -> ExitCode {
-    print_line(&obstacles::ObstacleTables::measure().to_string());
+    let Ok(tables) = Experiments::all().measure::<SimulatedObstacleArm>();
+    print_line(&tables);
     ExitCode::SUCCESS
 }
 

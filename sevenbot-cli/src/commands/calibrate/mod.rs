@@ -18,7 +18,6 @@ use sevenbot::map::{OFFSET, PRESENT_POSITION};
 use sevenbot::{Angle, Arm, Joint, Span};
 
 use self::offsets::{Grade, OffsetTable, Offsets, corrected};
-use super::set::unlocked;
 use crate::command_error::CommandError;
 use crate::confirm::confirm;
 use crate::interrupt::hold_on_interrupt;
@@ -26,7 +25,7 @@ use crate::printer::{Printable, note, warn};
 use crate::session::Session;
 use crate::step_target::step_target;
 use crate::watch::Watch;
-use crate::write_result::{all_taken, uses_offsets_after_restart};
+use crate::write_result::uses_offsets_after_restart;
 use sevenbot::moves::JointMove;
 
 /// Find the offsets of the joints, and store them.
@@ -98,7 +97,7 @@ fn store(
             if is_late { "The arm uses them after its next restart." } else { "The arm moves a little." };
         confirm(&format!("Write these offsets? {effect}"), args.yes)?;
         let write = |arm: &mut Arm| arm.write_checked(OFFSET.address, &wanted.bytes());
-        all_taken(&hold_on_interrupt(&mut arm, |arm, _| unlocked(arm, write))?)?;
+        hold_on_interrupt(&mut arm, |arm, _| Ok(arm.with_open_lock(write)?))?;
         if !args.yes {
             restart(session, arm, wanted)?;
         }

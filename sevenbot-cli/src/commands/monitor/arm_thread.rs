@@ -15,7 +15,6 @@ use super::view::{ArmEvent, UiCommand};
 use crate::command_error::CommandError;
 use crate::interrupt::{Interrupt, hold};
 use crate::step_target::step_target;
-use crate::write_result::{all_taken, motors_obey};
 
 /// Time between two attempts to connect.
 const RECONNECT_PERIOD: Duration = Duration::from_millis(500);
@@ -150,7 +149,7 @@ impl ArmThread {
             Ok(Some(warning)) => {
                 return self.tell(ArmEvent::Warned(warning)).map_err(|ChannelClosed| WatchEnd::Quit);
             }
-            Err(CommandError::Exchange(error)) => (CommandError::MayMove(error.to_string()), Some(error)),
+            Err(CommandError::Exchange(error)) => (CommandError::MayMove(error.into()), Some(error)),
             Err(failure) => (failure, None),
         };
         let refusal = refusal.message().unwrap_or_default();
@@ -170,11 +169,11 @@ impl ArmThread {
             UiCommand::SpeedChange { joint, change } => {
                 let joints = arm.read(SPEED.of(joint), 1)?;
                 let steps = joints.first().copied().unwrap_or(0);
-                all_taken(&arm.write_checked(SPEED.address, &[change.after(steps); 7])?)?;
+                arm.write_checked(SPEED.address, &[change.after(steps); 7])?;
             }
             // Writing state 1 again does not stop an arm in state 1.
             UiCommand::State(motor_state::SERVO) if arm.joints()?.is_driven() => hold(arm).map(drop)?,
-            UiCommand::State(state) => motors_obey(arm.write_checked(MOTOR_STATE.address, &[state]))?,
+            UiCommand::State(state) => arm.write_motion(MOTOR_STATE.address, &[state])?,
         }
         Ok(None)
     }
@@ -207,7 +206,7 @@ fn nudge(
     let joints = arm.wait_until_settled()?;
     let wanted = step_target(&joints, joint, degrees)?.max(0);
     let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
-    motors_obey(arm.write_checked(TARGET_POSITION.of(joint), &[wanted]))?;
+    arm.write_motion(TARGET_POSITION.of(joint), &[wanted])?;
     let mut targets = joints.targets();
     for (target, _) in targets.iter_mut().zip(Joint::ALL).filter(|(_, other)| *other == joint) {
         *target = wanted;
@@ -234,7 +233,7 @@ fn jog_tip(
     let [x, y, z] = millimetres.map(f64::from);
     let next = Jog::step(*jog, targets, axes, Vector::new(x, y, z), guard);
     let next = next.map_err(|reason| CommandError::Arm(format!("no step: {reason}")))?;
-    motors_obey(arm.write_checked(TARGET_POSITION.address, &next.targets.map(Angle::degrees)))?;
+    arm.write_motion(TARGET_POSITION.address, &next.targets.map(Angle::degrees))?;
     *jog = Some(next);
     Ok(())
 }

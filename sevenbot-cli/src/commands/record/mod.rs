@@ -27,7 +27,6 @@ use crate::interrupt::{Interrupt, hold, report_hold};
 use crate::line_file::LineFile;
 use crate::printer::{Printable, note};
 use crate::session::Session;
-use crate::write_result::motors_obey;
 
 /// Record a movement: guide the arm by hand, or let it move.
 ///
@@ -113,7 +112,7 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
 /// Switches the motors off if the user guides the arm.
 fn set_motors(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
     let state = if args.driven { motor_state::SERVO } else { motor_state::FORCELESS };
-    motors_obey(arm.write_checked(MOTOR_STATE.address, &[state]))
+    Ok(arm.write_motion(MOTOR_STATE.address, &[state])?)
 }
 
 /// Makes a guided arm hold its pose. A driven arm finishes its move, but holds after Ctrl-C.
@@ -125,7 +124,7 @@ fn hold_at_end(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
         return Ok(());
     }
     // The targets become the measured positions (D13).
-    motors_obey(arm.write_checked(MOTOR_STATE.address, &[motor_state::SERVO]))?;
+    arm.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
     note("the arm holds where it is");
     Ok(())
 }

@@ -12,7 +12,6 @@ use sevenbot::{Angle, Arm, Joint};
 use crate::command_error::CommandError;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
-use crate::write_result::{all_taken, motors_obey};
 
 /// Keys and progress line of a recording.
 pub(crate) struct TeachPendant {
@@ -83,7 +82,7 @@ impl TeachPendant {
 
     fn switch_pump(&mut self, arm: &mut Arm) -> Result<(), CommandError> {
         self.vacuum = !self.vacuum;
-        all_taken(&arm.write_checked(VACUUM_PUMP.address, &[u8::from(self.vacuum)])?)
+        Ok(arm.write_checked(VACUUM_PUMP.address, &[u8::from(self.vacuum)])?)
     }
 
     fn nudge(&mut self, arm: &mut Arm, degrees: i16) -> Result<(), CommandError> {
@@ -92,7 +91,7 @@ impl TeachPendant {
             let wanted = i16::from(target.degrees()) + degrees;
             let wanted = u8::try_from(wanted.max(0)).unwrap_or(Angle::MAX_DEGREES);
             *target = Angle::from_register(wanted);
-            motors_obey(arm.write_checked(TARGET_POSITION.of(joint), &[target.degrees()]))?;
+            arm.write_motion(TARGET_POSITION.of(joint), &[target.degrees()])?;
         }
         Ok(())
     }

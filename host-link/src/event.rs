@@ -1,0 +1,43 @@
+//! What a link tells its shell.
+
+use protocol_core::registers::Map;
+use protocol_core::request::Alarm;
+use protocol_core::time::Instant;
+use protocol_core::wire::Function;
+use protocol_core::wire::frame::Defect;
+
+use crate::snapshot::Snapshot;
+use crate::span::Span;
+
+/// A read of one link.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct RequestId(u64);
+
+impl RequestId {
+    /// The id of the read after this one.
+    pub(crate) const fn next(self) -> Self {
+        Self(self.0.wrapping_add(1))
+    }
+}
+
+/// What a link tells its shell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HostEvent {
+    /// Send these bytes to the arm: one frame.
+    Send(Vec<u8>),
+    /// The reply to a read: the registers that were wanted.
+    Reply(RequestId, Snapshot),
+    /// No reply comes to the read of these registers: it was lost or damaged, or the arm does not answer.
+    NoReply(RequestId, Span),
+    /// A report of the arm (D14, M4). The map tells its form.
+    Report(Map, Snapshot),
+    /// An alarm of the arm (M8).
+    Alarm(Alarm),
+    /// A good frame that answers no open read: a late reply, or the echo of a request on a one-wire line. An echo of a
+    /// read holds no values.
+    Unmatched(Function, Snapshot),
+    /// A frame was damaged.
+    Damaged(Defect),
+    /// Nothing happens before this time, unless bytes come. Hand over at that time what came, if only an empty slice.
+    Wait(Instant),
+}

@@ -1,0 +1,265 @@
+//! The link: requests and bytes in, events out. See the crate's documentation.
+
+use std::collections::VecDeque;
+
+use protocol_core::registers::Map;
+use protocol_core::request::{Alarm, Request};
+use protocol_core::time::Instant;
+use protocol_core::wire::deframer::gap;
+use protocol_core::wire::frame::MIN_LENGTH;
+use protocol_core::wire::{Deframer, Frame, FrameBuffer, Function, ToHost};
+
+use crate::event::{HostEvent, RequestId};
+use crate::line_time::LineTime;
+use crate::open_reads::{OpenRead, OpenReads, Overdue, Patience};
+use crate::pending_reads::{Matched, PendingReads};
+use crate::snapshot::Snapshot;
+use crate::span::Span;
+
+/// The line, and what the arm may send without a request.
+#[derive(Clone, Copy, Debug)]
+pub struct LinkOptions {
+    /// Baud rate of the line to the arm.
+    pub baud: u32,
+    /// The registers that a report of map 2.2 may have (D26). A report looks like the reply to a read of these, so no read asks
+    /// for exactly these.
+    pub reports: &'static [Span],
+}
+
+/// A request that was not sent yet.
+#[derive(Clone, Debug)]
+enum Queued {
+    Read(OpenRead),
+    Write(Vec<u8>),
+}
+
+/// The host's end of the link to one arm.
+#[derive(Clone, Debug)]
+pub struct HostLink {
+    options: LinkOptions,
+    deframer: Deframer<ToHost>,
+    line: LineTime,
+    queue: VecDeque<Queued>,
+    open: OpenReads,
+    pending: PendingReads,
+    events: VecDeque<HostEvent>,
+    last_id: RequestId,
+    /// Writes that were sent.
+    writes: u64,
+    /// All bytes that came until this time were handed over.
+    heard_until: Instant,
+}
+
+impl HostLink {
+    /// A link on which nothing was sent.
+    #[must_use]
+    pub fn new(options: LinkOptions) -> Self {
+        Self {
+            options,
+            deframer: Deframer::new(gap(options.baud)),
+            line: LineTime::new(options.baud),
+            queue: VecDeque::new(),
+            open: OpenReads::default(),
+            pending: PendingReads::default(),
+            events: VecDeque::new(),
+            last_id: RequestId::default(),
+            writes: 0,
+            heard_until: Instant::ZERO,
+        }
+    }
+
+    /// From now on reports may have these registers: [`LinkOptions::reports`].
+    pub const fn set_reports(&mut self, reports: &'static [Span]) {
+        self.options.reports = reports;
+    }
+
+    /// Reads registers. A [`HostEvent::Reply`] or a [`HostEvent::NoReply`] follows, unless the read is cancelled.
+    pub fn read(&mut self, wanted: Span, patience: Patience) -> RequestId {
+        self.last_id = self.last_id.next();
+        self.queue.push_back(Queued::Read(OpenRead::new(self.last_id, wanted, patience)));
+        self.last_id
+    }
+
+    /// Writes registers, at most 255, by the function of a map (M1). A write has no reply (D6). It is sent behind the reads
+    /// before it, and none of these is repeated behind it.
+    pub fn write(&mut self, map: Map, address: u8, values: &[u8]) {
+        let request = match map {
+            Map::V22 => Request::Write { address, values },
+            Map::V21 => Request::WriteMap21 { address, values },
+        };
+        self.queue.push_back(Queued::Write(encoded(&request)));
+    }
+
+    /// Gives a read up. Its reply may still come, and is [`HostEvent::Unmatched`] then.
+    pub fn cancel(&mut self, id: RequestId) {
+        self.queue.retain(|queued| !matches!(queued, Queued::Read(read) if read.id == id));
+        self.open.take(id);
+        self.pending.give_up(id);
+    }
+
+    /// The line was opened or closed: all reads end without a reply, and all bytes are forgotten.
+    pub fn reset(&mut self) {
+        let queued = std::mem::take(&mut self.queue).into_iter().filter_map(|queued| match queued {
+            Queued::Read(read) => Some(read),
+            Queued::Write(_) => None,
+        });
+        let events = self.open.take_all().chain(queued).map(no_reply).collect();
+        let (line, last_id) = (self.line, self.last_id);
+        *self = Self { line, last_id, events, ..Self::new(self.options) };
+    }
+
+    /// Takes bytes of the arm that were there at `now`. An empty slice states that the line is silent at `now`. Timeouts act
+    /// only when this was called at their time or later: a host that was suspended takes first what came meanwhile.
+    pub fn bytes(&mut self, now: Instant, bytes: &[u8]) {
+        self.heard_until = self.heard_until.max(now);
+        let mut rest = bytes;
+        loop {
+            let taken = self.deframer.push(now, rest);
+            self.pull_frames();
+            rest = rest.get(taken..).unwrap_or_default();
+            if rest.is_empty() {
+                return;
+            }
+        }
+    }
+
+    /// The next event. Call it until it returns [`HostEvent::Wait`].
+    pub fn poll(&mut self, now: Instant) -> HostEvent {
+        while self.events.is_empty()
+            && let Some(overdue) = self.open.take_overdue(self.heard_until, self.writes)
+        {
+            self.end_attempt(overdue);
+        }
+        let event = self.events.pop_front().or_else(|| self.next_frame(now));
+        event.unwrap_or_else(|| HostEvent::Wait(self.deadline()))
+    }
+
+    /// When the last byte leaves the host, or has left, at the baud rate of the line.
+    #[must_use]
+    pub const fn busy_until(&self) -> Instant {
+        self.line.busy_until()
+    }
+
+    /// The bytes of the replies that are on their way.
+    #[must_use]
+    pub fn awaited_bytes(&self) -> usize {
+        self.pending.awaited().map(|span| MIN_LENGTH + usize::from(span.count())).sum()
+    }
+
+    /// When [`HostEvent::Wait`] ends, if no bytes come.
+    #[must_use]
+    pub fn deadline(&self) -> Instant {
+        self.open.due().min(self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE))
+    }
+
+    /// The next queued frame that may be sent. A read waits while another one on its way has the only possible range.
+    fn next_frame(&mut self, now: Instant) -> Option<HostEvent> {
+        let frame = match self.queue.pop_front()? {
+            Queued::Write(frame) => {
+                self.writes = self.writes.wrapping_add(1);
+                self.line.send(now, frame.len());
+                frame
+            }
+            Queued::Read(read) => match self.pending.range_for(read.id, read.wanted, self.options.reports) {
+                Some(asked) => self.send_read(now, read, asked),
+                None => {
+                    self.queue.push_front(Queued::Read(read));
+                    return None;
+                }
+            },
+        };
+        Some(HostEvent::Send(frame))
+    }
+
+    fn send_read(&mut self, now: Instant, mut read: OpenRead, asked: Span) -> Vec<u8> {
+        let frame = encoded(&Request::Read { address: asked.address(), count: asked.count() });
+        self.line.send(now, frame.len());
+        self.pending.add(read.id, asked);
+        read.note_sent(self.line.reply_due(now, self.awaited_bytes()), self.writes);
+        self.open.push(read);
+        frame
+    }
+
+    fn end_attempt(&mut self, overdue: Overdue) {
+        match overdue {
+            // Before the writes that wait.
+            Overdue::Repeat(read) => self.queue.push_front(Queued::Read(read)),
+            Overdue::GiveUp(read) => {
+                self.pending.give_up(read.id);
+                self.events.push_back(no_reply(read));
+            }
+        }
+    }
+
+    fn pull_frames(&mut self) {
+        while let Some(found) = self.deframer.pull() {
+            match found.map(Message::from) {
+                Ok(Message::Reply(values)) => self.take_reply(values),
+                Ok(Message::Other(event)) => self.events.push_back(event),
+                Err(defect) => self.events.push_back(HostEvent::Damaged(defect)),
+            }
+        }
+    }
+
+    fn take_reply(&mut self, values: Snapshot) {
+        let range = values.span();
+        let Some(Matched { id, lost }) = self.pending.take(range) else {
+            let is_report = self.options.reports.contains(&range);
+            return self.events.push_back(match is_report {
+                true => HostEvent::Report(Map::V22, values),
+                false => HostEvent::Unmatched(Function::Read, values),
+            });
+        };
+        for lost in lost.into_iter().filter(|&lost| Some(lost) != id) {
+            self.lose(lost);
+        }
+        let read = id.and_then(|id| self.open.take(id));
+        self.events.push_back(match read {
+            Some(read) => {
+                self.pending.give_up(read.id);
+                HostEvent::Reply(read.id, values.part(read.wanted))
+            }
+            None => HostEvent::Unmatched(Function::Read, values),
+        });
+    }
+
+    /// The reply to a later read came first, so this one is lost (D5). It is repeated at once, if it may be and was not.
+    fn lose(&mut self, id: RequestId) {
+        if self.pending.awaits(id) {
+            return;
+        }
+        let Some(read) = self.open.take(id) else { return };
+        let overdue =
+            if read.may_repeat(self.writes) { Overdue::Repeat(read) } else { Overdue::GiveUp(read) };
+        self.end_attempt(overdue);
+    }
+}
+
+/// The content of a frame.
+enum Message {
+    /// The reply to a read, or a report of map 2.2.
+    Reply(Snapshot),
+    Other(HostEvent),
+}
+
+impl From<Frame<'_>> for Message {
+    fn from(frame: Frame<'_>) -> Self {
+        let values = Snapshot { address: frame.address, values: frame.data.to_vec() };
+        match (frame.function, Alarm::from_frame(frame)) {
+            (_, Some(alarm)) => Self::Other(HostEvent::Alarm(alarm)),
+            (Function::Read, _) => Self::Reply(values),
+            (Function::Report, _) => Self::Other(HostEvent::Report(Map::V21, values)),
+            (other, _) => Self::Other(HostEvent::Unmatched(other, values)),
+        }
+    }
+}
+
+const fn no_reply(read: OpenRead) -> HostEvent {
+    HostEvent::NoReply(read.id, read.wanted)
+}
+
+fn encoded(request: &Request<'_>) -> Vec<u8> {
+    let mut frame = FrameBuffer::new();
+    request.encode(&mut frame);
+    frame.to_vec()
+}

@@ -1,0 +1,122 @@
+//! The reads that still want a reply, and when each is repeated or given up.
+
+use std::collections::VecDeque;
+
+use protocol_core::time::{Duration, Instant};
+
+use crate::event::RequestId;
+use crate::line_time::ROUND_TRIP;
+use crate::span::Span;
+
+/// How often a read is sent, and how long its reply is waited for.
+///
+/// A read is repeated as soon as its reply is overdue by [`ROUND_TRIP`], and then after twice the time each: a read changes
+/// nothing, so a needless one does no harm. It is given up after `timeout` for each attempt, counted from the time when its
+/// reply was due. So a lost reply costs little, and a slow arm gets all of the time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// How often it is sent, at least once.
+    pub attempts: u32,
+    /// The longest wait for one attempt, in addition to the time on the line.
+    pub timeout: Duration,
+}
+
+impl Patience {
+    /// The time until the read is given up.
+    fn total(self) -> Duration {
+        Duration::from_micros(self.timeout.as_micros().saturating_mul(self.attempts.max(1).into()))
+    }
+
+    /// The time between attempt number `sent`, from 1, and the next one.
+    fn before_repeat(self, sent: u32) -> Duration {
+        let doubled = ROUND_TRIP.as_micros().checked_shl(sent.saturating_sub(1)).unwrap_or(u64::MAX);
+        self.timeout.min(Duration::from_micros(doubled))
+    }
+}
+
+/// A read that still wants a reply.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OpenRead {
+    pub(crate) id: RequestId,
+    pub(crate) wanted: Span,
+    pub(crate) patience: Patience,
+    /// How often it was sent.
+    sent: u32,
+    /// How many writes were sent before it.
+    writes_before: u64,
+    /// When it is repeated or given up.
+    due: Instant,
+    give_up_at: Option<Instant>,
+}
+
+impl OpenRead {
+    pub(crate) const fn new(id: RequestId, wanted: Span, patience: Patience) -> Self {
+        Self { id, wanted, patience, sent: 0, writes_before: 0, due: Instant::FAR_FUTURE, give_up_at: None }
+    }
+
+    /// It is sent, after so many writes. Its reply is due at this time.
+    pub(crate) fn note_sent(&mut self, reply_due: Instant, writes: u64) {
+        self.sent = self.sent.saturating_add(1);
+        self.writes_before = writes;
+        let give_up_at = *self.give_up_at.get_or_insert(reply_due + self.patience.total());
+        let is_last = self.sent >= self.patience.attempts;
+        let repeat_at = reply_due + self.patience.before_repeat(self.sent);
+        self.due = if is_last { give_up_at } else { repeat_at.min(give_up_at) };
+    }
+
+    /// May it be sent again after so many writes? Behind a write it would read what the write changed.
+    pub(crate) const fn may_repeat(&self, writes: u64) -> bool {
+        self.sent < self.patience.attempts && self.writes_before == writes
+    }
+
+    /// Repeating makes no sense, or not yet: wait until it is given up.
+    fn wait_to_the_end(&mut self) {
+        self.due = self.give_up_at.unwrap_or(self.due);
+    }
+}
+
+/// What is to be done with a read whose time has come.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Overdue {
+    Repeat(OpenRead),
+    GiveUp(OpenRead),
+}
+
+/// The reads that still want a reply, in the order in which they were sent first.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct OpenReads(VecDeque<OpenRead>);
+
+impl OpenReads {
+    pub(crate) fn push(&mut self, read: OpenRead) {
+        self.0.push_back(read);
+    }
+
+    pub(crate) fn take(&mut self, id: RequestId) -> Option<OpenRead> {
+        let index = self.0.iter().position(|read| read.id == id)?;
+        self.0.remove(index)
+    }
+
+    pub(crate) fn take_all(&mut self) -> impl Iterator<Item = OpenRead> {
+        self.0.drain(..)
+    }
+
+    /// A read whose time has come at `now`, after so many writes. It is taken out.
+    pub(crate) fn take_overdue(&mut self, now: Instant, writes: u64) -> Option<Overdue> {
+        while let Some(index) = self.0.iter().position(|read| read.due <= now) {
+            let read = self.0.get_mut(index)?;
+            if read.may_repeat(writes) && read.give_up_at.is_some_and(|at| now < at) {
+                return self.0.remove(index).map(Overdue::Repeat);
+            }
+            read.wait_to_the_end();
+            if read.due <= now {
+                return self.0.remove(index).map(Overdue::GiveUp);
+            }
+        }
+        None
+    }
+
+    /// When the next read is repeated or given up.
+    pub(crate) fn due(&self) -> Instant {
+        self.0.iter().map(|read| read.due).min().unwrap_or(Instant::FAR_FUTURE)
+    }
+}

@@ -1,0 +1,166 @@
+//! Which read a reply answers.
+//!
+//! The arm replies in the order of the requests (D5), and a reply names its registers only. So:
+//!
+//! * A reply belongs to the oldest read that was sent with its range. The reads before that one have lost their replies.
+//! * No two reads on their way have the same range: the second asks for a few registers more. This also keeps a read of the
+//!   present positions apart from a report (D14).
+//! * A read that was given up stays in the list, so that its late reply is recognised.
+
+use std::collections::VecDeque;
+
+use crate::event::RequestId;
+use crate::span::Span;
+
+/// At most this many reads that were given up are remembered: those of some ten seconds without a reply. No reply is later.
+const REMEMBERED: usize = 64;
+
+/// A read that was sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct SentRead {
+    /// `None` once it was given up.
+    id: Option<RequestId>,
+    asked: Span,
+}
+
+/// The reads without a reply, oldest first. A read that was repeated is there several times.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PendingReads(VecDeque<SentRead>);
+
+/// Whose reply came.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Matched {
+    /// The read that it answers; `None` if that was given up.
+    pub(crate) id: Option<RequestId>,
+    /// Reads that were sent before that one, oldest first: these replies are lost.
+    pub(crate) lost: Vec<RequestId>,
+}
+
+impl PendingReads {
+    /// The range to ask for: one that holds `wanted`, and that neither a pending read nor one of `reports` has. Where no range
+    /// is left, it is that of an earlier attempt of the same read, or of a read that was given up: the first reply then counts
+    /// as that of the earlier one. `None` while another read has the only range.
+    pub(crate) fn range_for(&self, id: RequestId, wanted: Span, reports: &[Span]) -> Option<Span> {
+        let is_free = |span: &Span| !reports.contains(span) && !self.has(span, |_| true);
+        let wider = (0..=u8::MAX).map_while(|by| wanted.widened(by)).find(is_free);
+        let is_of_another = |read: &SentRead| read.id.is_some_and(|other| other != id);
+        wider.or_else(|| (!self.has(&wanted, is_of_another)).then_some(wanted))
+    }
+
+    /// A read was sent.
+    pub(crate) fn add(&mut self, id: RequestId, asked: Span) {
+        self.0.push_back(SentRead { id: Some(id), asked });
+    }
+
+    /// The read is given up, or answered.
+    pub(crate) fn give_up(&mut self, id: RequestId) {
+        for read in self.0.iter_mut().filter(|read| read.id == Some(id)) {
+            read.id = None;
+        }
+        let given_up = self.0.iter().filter(|read| read.id.is_none()).count();
+        let mut surplus = given_up.saturating_sub(REMEMBERED);
+        self.0.retain(|read| {
+            let is_kept = read.id.is_some() || surplus == 0;
+            surplus -= usize::from(!is_kept);
+            is_kept
+        });
+    }
+
+    /// Takes the read that a reply with these registers answers, and those before it; `None` if it answers none.
+    pub(crate) fn take(&mut self, range: Span) -> Option<Matched> {
+        let index = self.0.iter().position(|read| read.asked == range)?;
+        let lost = self.0.drain(..index).filter_map(|read| read.id).collect();
+        let id = self.0.pop_front().and_then(|read| read.id);
+        Some(Matched { id, lost })
+    }
+
+    /// Is a reply to this read still possible?
+    pub(crate) fn awaits(&self, id: RequestId) -> bool {
+        self.0.iter().any(|read| read.id == Some(id))
+    }
+
+    /// The ranges of the reads that were not given up.
+    pub(crate) fn awaited(&self) -> impl Iterator<Item = Span> {
+        self.0.iter().filter(|read| read.id.is_some()).map(|read| read.asked)
+    }
+
+    fn has(&self, span: &Span, test: impl Fn(&SentRead) -> bool) -> bool {
+        self.0.iter().any(|read| read.asked == *span && test(read))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The present positions, as in a report.
+    const REPORT: &[Span] = &[Span::of(&protocol_core::registers::map::PRESENT_POSITION)];
+
+    fn span(address: u8, count: u8) -> Span {
+        Span::new(address, count).expect("a span")
+    }
+
+    fn ids(count: usize) -> Vec<RequestId> {
+        std::iter::successors(Some(RequestId::default()), |id| Some(id.next())).take(count).collect()
+    }
+
+    fn add(pending: &mut PendingReads, id: RequestId, wanted: Span) -> Span {
+        let asked = pending.range_for(id, wanted, REPORT).expect("a range");
+        pending.add(id, asked);
+        asked
+    }
+
+    #[test]
+    fn a_repeated_read_requests_another_range() {
+        let (mut pending, ids) = (PendingReads::default(), ids(5));
+        assert_eq!(add(&mut pending, ids[0], span(29, 3)), span(29, 3));
+        assert_eq!(add(&mut pending, ids[1], span(29, 3)), span(29, 4));
+        assert_eq!(add(&mut pending, ids[2], span(29, 4)), span(29, 5), "taken by the second");
+        let matched = pending.take(span(29, 4));
+        assert_eq!(matched, Some(Matched { id: Some(ids[1]), lost: vec![ids[0]] }), "the first is lost");
+        assert_eq!(add(&mut pending, ids[3], span(29, 3)), span(29, 3));
+        assert_eq!(add(&mut pending, ids[4], span(29, 5)), span(29, 6), "the third still waits");
+        assert_eq!(pending.take(span(29, 9)), None);
+    }
+
+    #[test]
+    fn a_read_of_the_positions_differs_from_a_report() {
+        assert_eq!(
+            PendingReads::default().range_for(RequestId::default(), REPORT[0], REPORT),
+            Some(span(54, 8))
+        );
+    }
+
+    #[test]
+    fn a_late_reply_is_recognised() {
+        let (mut pending, ids) = (PendingReads::default(), ids(2));
+        add(&mut pending, ids[0], span(10, 4));
+        pending.give_up(ids[0]);
+        assert_eq!(add(&mut pending, ids[1], span(10, 4)), span(10, 5));
+        assert_eq!(pending.take(span(10, 4)), Some(Matched { id: None, lost: vec![] }));
+        assert!(pending.awaits(ids[1]) && !pending.awaits(ids[0]));
+    }
+
+    #[test]
+    fn a_range_without_a_wider_one_waits_for_the_read_before() {
+        let (mut pending, ids) = (PendingReads::default(), ids(2));
+        add(&mut pending, ids[0], span(0, 255));
+        assert_eq!(pending.range_for(ids[1], span(0, 255), &[]), None);
+        assert_eq!(pending.range_for(ids[0], span(0, 255), &[]), Some(span(0, 255)), "another attempt");
+        pending.give_up(ids[0]);
+        assert_eq!(add(&mut pending, ids[1], span(0, 255)), span(0, 255));
+        assert_eq!(pending.take(span(0, 255)), Some(Matched { id: None, lost: vec![] }), "the late one");
+        assert_eq!(pending.take(span(0, 255)), Some(Matched { id: Some(ids[1]), lost: vec![] }));
+    }
+
+    #[test]
+    fn the_number_of_reads_that_were_given_up_is_bounded() {
+        let mut pending = PendingReads::default();
+        for id in ids(1_000) {
+            let asked = add(&mut pending, id, span(200, 16));
+            assert!(usize::from(asked.count()) <= 16 + REMEMBERED);
+            pending.give_up(id);
+        }
+        assert_eq!(pending.0.len(), REMEMBERED);
+    }
+}

@@ -1,0 +1,95 @@
+//! The values of consecutive registers at one instant, from one read.
+
+use protocol_core::registers::{Joint, Register};
+
+use crate::span::Span;
+
+/// The values of consecutive registers at one instant.
+///
+/// ```
+/// use host_link::Snapshot;
+/// use protocol_core::registers::map::{SPEED, TARGET_POSITION};
+///
+/// let snapshot = Snapshot { address: SPEED.address, values: (0..21).collect() };
+/// assert_eq!(snapshot.joints(&TARGET_POSITION), [14, 15, 16, 17, 18, 19, 20]);
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Snapshot {
+    /// The first register.
+    pub address: u8,
+    /// One value for each register.
+    pub values: Vec<u8>,
+}
+
+impl Snapshot {
+    /// The value of the register at `address`; 0 if the read did not include it. The arm also answers 0 where the table
+    /// has no register.
+    #[must_use]
+    pub fn at(&self, address: u8) -> u8 {
+        let offset = address.checked_sub(self.address).map(usize::from);
+        offset.and_then(|offset| self.values.get(offset)).copied().unwrap_or(0)
+    }
+
+    /// The value of a row that has one register.
+    #[must_use]
+    pub fn byte(&self, row: &Register) -> u8 {
+        self.at(row.address)
+    }
+
+    /// The value of a counter of two registers, low byte first.
+    #[must_use]
+    pub fn counter(&self, row: &Register) -> u16 {
+        u16::from_le_bytes([self.at(row.address), self.at(row.address.wrapping_add(1))])
+    }
+
+    /// The values of a per-joint row, joint 1 first.
+    #[must_use]
+    pub fn joints(&self, row: &Register) -> [u8; 7] {
+        Joint::ALL.map(|joint| self.at(row.of(joint)))
+    }
+
+    /// The raw two-byte value whose low byte is at `address`; bytes outside the snapshot are 0.
+    #[must_use]
+    pub fn word(&self, address: u8) -> u16 {
+        u16::from_le_bytes([self.at(address), self.at(address.wrapping_add(1))])
+    }
+
+    /// The raw values of a per-joint row of two-byte registers, joint 1 first.
+    #[must_use]
+    pub fn words(&self, row: &Register) -> [u16; 7] {
+        Joint::ALL.map(|joint| self.word(row.of(joint)))
+    }
+
+    /// Takes the values of another snapshot, as far as this one holds their registers.
+    pub fn put(&mut self, other: &Self) {
+        let first = usize::from(other.address).checked_sub(usize::from(self.address));
+        let held = first.and_then(|first| self.values.get_mut(first..)).unwrap_or_default();
+        held.iter_mut().zip(&other.values).for_each(|(held, value)| *held = *value);
+    }
+
+    /// The values of some registers; 0 where this snapshot does not hold them.
+    #[must_use]
+    pub fn part(&self, span: Span) -> Self {
+        Self { address: span.address(), values: span.addresses().map(|address| self.at(address)).collect() }
+    }
+
+    /// The registers; none if they would reach past 255.
+    #[must_use]
+    pub fn span(&self) -> Span {
+        Span::of_values(self.address, &self.values).unwrap_or(Span::NONE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol_core::registers::map::FRAMES_ACCEPTED;
+
+    #[test]
+    fn values_are_found_by_their_rows() {
+        let snapshot = Snapshot { address: 245, values: vec![9, 0x34, 0x12] };
+        assert_eq!(snapshot.counter(&FRAMES_ACCEPTED), 0x1234);
+        assert_eq!(snapshot.at(245), 9);
+        assert_eq!((snapshot.at(244), snapshot.at(248)), (0, 0), "beyond what was read");
+    }
+}

@@ -1,0 +1,192 @@
+//! A link in front of a line that is lost, damaged or late, in virtual time.
+
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic)] // A panic is a failed test.
+
+use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId, Snapshot, Span};
+use protocol_core::registers::Map;
+use protocol_core::request::Reply;
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::FrameBuffer;
+
+const PATIENCE: Patience = Patience { attempts: 3, timeout: Duration::from_millis(500) };
+const POSITIONS: Span = Span::of(&protocol_core::registers::map::PRESENT_POSITION);
+
+fn link(baud: u32) -> HostLink {
+    HostLink::new(LinkOptions { baud, reports: &[POSITIONS] })
+}
+
+fn at_ms(millis: u64) -> Instant {
+    Instant::from_micros(millis * 1_000)
+}
+
+fn span(address: u8, count: u8) -> Span {
+    Span::new(address, count).expect("a span")
+}
+
+fn reply(address: u8, values: &[u8]) -> Vec<u8> {
+    let mut frame = FrameBuffer::new();
+    Reply { address, values }.encode(&mut frame);
+    frame.to_vec()
+}
+
+/// The events until the link waits, and until when.
+fn events(link: &mut HostLink, now: Instant) -> (Vec<HostEvent>, Instant) {
+    let mut events = Vec::new();
+    loop {
+        match link.poll(now) {
+            HostEvent::Wait(until) => return (events, until),
+            event => events.push(event),
+        }
+    }
+}
+
+/// The address and the count in the only frame that is sent now.
+fn sent(link: &mut HostLink, now: Instant) -> (u8, u8) {
+    match events(link, now).0.as_slice() {
+        [HostEvent::Send(frame)] => (frame[3], frame[4]),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Lets the line be silent until the link does something.
+fn next_after_silence(link: &mut HostLink, now: Instant) -> (Vec<HostEvent>, Instant) {
+    let (events_now, until) = events(link, now);
+    assert_eq!(events_now, []);
+    link.bytes(until, &[]);
+    (events(link, until).0, until)
+}
+
+fn replied(id: RequestId, address: u8, values: &[u8]) -> HostEvent {
+    HostEvent::Reply(id, Snapshot { address, values: values.to_vec() })
+}
+
+#[test]
+fn a_damaged_reply_costs_a_round_trip() {
+    let mut link = link(115_200);
+    let id = link.read(span(29, 3), PATIENCE);
+    assert_eq!(sent(&mut link, at_ms(0)), (29, 3));
+    let mut damaged = reply(29, &[1, 2, 3]);
+    damaged[6] ^= 1;
+    link.bytes(at_ms(2), &damaged);
+    assert!(matches!(events(&mut link, at_ms(2)).0.as_slice(), [HostEvent::Damaged(_)]));
+    let (repeated, when) = next_after_silence(&mut link, at_ms(2));
+    assert!(
+        matches!(repeated.as_slice(), [HostEvent::Send(frame)] if frame[3..5] == [29, 4]),
+        "{repeated:?}"
+    );
+    assert!((100..105).contains(&(when.as_micros() / 1_000)), "{when:?}");
+    link.bytes(when, &reply(29, &[1, 2, 3, 4]));
+    assert_eq!(events(&mut link, when).0, [replied(id, 29, &[1, 2, 3])]);
+}
+
+#[test]
+fn a_silent_arm_gets_all_attempts_and_all_the_time() {
+    let mut link = link(115_200);
+    let id = link.read(span(29, 3), PATIENCE);
+    sent(&mut link, at_ms(0));
+    let (mut now, mut times) = (at_ms(0), Vec::new());
+    let end = loop {
+        let (happened, when) = next_after_silence(&mut link, now);
+        now = when;
+        times.push(when.as_micros() / 1_000);
+        if let [HostEvent::NoReply(lost, range)] = happened.as_slice() {
+            break (*lost, *range);
+        }
+    };
+    assert_eq!(end, (id, span(29, 3)));
+    let [second, third, end] = times[..] else { panic!("{times:?}") };
+    assert!((100..110).contains(&second) && (300..310).contains(&third) && (1_500..1_510).contains(&end));
+}
+
+#[test]
+fn timeouts_follow_the_baud_rate() {
+    let whole = |baud| {
+        let mut link = link(baud);
+        link.read(span(0, 255), Patience { attempts: 2, timeout: Duration::from_millis(500) });
+        sent(&mut link, at_ms(0));
+        events(&mut link, at_ms(0)).1.as_micros() / 1_000
+    };
+    assert_eq!(
+        (whole(1_000_000), whole(9_600)),
+        (105, 653),
+        "262 bytes take 2.6 and 273 ms, reports as much"
+    );
+}
+
+#[test]
+fn a_suspended_host_takes_the_reply_that_waited() {
+    let mut link = link(115_200);
+    let id = link.read(span(29, 3), PATIENCE);
+    sent(&mut link, at_ms(0));
+    let woken = at_ms(60_000);
+    assert!(matches!(link.poll(woken), HostEvent::Wait(until) if until < woken));
+    link.bytes(woken, &reply(29, &[1, 2, 3]));
+    assert_eq!(events(&mut link, woken).0, [replied(id, 29, &[1, 2, 3])]);
+}
+
+#[test]
+fn d5_a_reply_of_a_later_read_repeats_the_earlier_one_at_once() {
+    let mut link = link(115_200);
+    let (first, second) = (link.read(span(0, 8), PATIENCE), link.read(span(240, 16), PATIENCE));
+    assert_eq!(events(&mut link, at_ms(0)).0.len(), 2);
+    link.bytes(at_ms(5), &reply(240, &[9; 16]));
+    let (happened, _) = events(&mut link, at_ms(5));
+    let [reply_of_second, HostEvent::Send(frame)] = happened.as_slice() else { panic!("{happened:?}") };
+    assert_eq!((reply_of_second, &frame[3..5]), (&replied(second, 240, &[9; 16]), &[0, 8][..]));
+    link.bytes(at_ms(9), &reply(0, &[7; 8]));
+    assert_eq!(events(&mut link, at_ms(9)).0, [replied(first, 0, &[7; 8])]);
+}
+
+#[test]
+fn a_read_is_not_repeated_behind_a_write() {
+    let mut link = link(115_200);
+    let id = link.read(span(29, 3), PATIENCE);
+    link.write(Map::V22, 29, &[2]);
+    link.read(span(240, 16), PATIENCE);
+    let sent: Vec<u8> = events(&mut link, at_ms(0))
+        .0
+        .iter()
+        .map(|event| match event {
+            HostEvent::Send(frame) => frame[2],
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(sent, [3, 6, 3]);
+    link.bytes(at_ms(5), &reply(240, &[9; 16]));
+    let (happened, _) = events(&mut link, at_ms(5));
+    assert_eq!(happened[0], HostEvent::NoReply(id, span(29, 3)));
+}
+
+#[test]
+fn a_reply_to_a_read_that_was_given_up_is_no_reply_to_the_next() {
+    let mut link = link(115_200);
+    let given_up = link.read(span(10, 4), PATIENCE);
+    assert_eq!(sent(&mut link, at_ms(0)), (10, 4));
+    link.cancel(given_up);
+    let next = link.read(span(10, 4), PATIENCE);
+    assert_eq!(sent(&mut link, at_ms(1)), (10, 5));
+    link.bytes(at_ms(2), &reply(10, &[1; 4]));
+    assert!(matches!(events(&mut link, at_ms(2)).0.as_slice(), [HostEvent::Unmatched(..)]));
+    link.bytes(at_ms(3), &reply(10, &[2; 5]));
+    assert_eq!(events(&mut link, at_ms(3)).0, [replied(next, 10, &[2; 4])]);
+}
+
+#[test]
+fn a_report_is_no_reply_to_a_read_of_the_positions() {
+    let mut link = link(115_200);
+    let id = link.read(POSITIONS, PATIENCE);
+    assert_eq!(sent(&mut link, at_ms(0)), (54, 8));
+    link.bytes(at_ms(1), &[reply(54, &[9; 7]), reply(54, &[1; 8])].concat());
+    let report = HostEvent::Report(Map::V22, Snapshot { address: 54, values: vec![9; 7] });
+    assert_eq!(events(&mut link, at_ms(1)).0, [report, replied(id, 54, &[1; 7])]);
+}
+
+#[test]
+fn a_line_that_was_opened_again_ends_all_reads() {
+    let mut link = link(115_200);
+    let (first, second) = (link.read(span(0, 255), PATIENCE), link.read(span(0, 255), PATIENCE));
+    assert_eq!(sent(&mut link, at_ms(0)), (0, 255), "the second waits: no other range holds its registers");
+    link.reset();
+    let ended = [first, second].map(|id| HostEvent::NoReply(id, span(0, 255)));
+    assert_eq!(events(&mut link, at_ms(1)), (ended.to_vec(), Instant::FAR_FUTURE));
+}

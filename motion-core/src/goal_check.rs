@@ -1,0 +1,59 @@
+//! Does the servo of a joint that engages show the goal that was sent to it (D12)?
+//!
+//! ```text
+//!   goal sent ──▶ question ──▶ it shows the goal ──────────────────────────▶ torque
+//!       ▲                 └──▶ it shows another: the frame was lost
+//!       │                             │      └─ for the third time ─▶ the goal three times more, then torque
+//!       └── measured again, 10 ms later
+//! ```
+//!
+//! A frame of goals may be lost and the frame of torque behind it arrive: then the servo goes to an old goal. Some servos
+//! may not show a new goal while their torque is off. So a servo that shows another goal three times gets the goal three
+//! times more directly before torque: a servo that does show its goal goes to an old one only if six frames in a row are
+//! lost, three of them at least 10 ms apart. This file does not know goals.
+
+/// A servo that has shown another goal this often does not show goals.
+const HIDDEN_AFTER: u8 = 3;
+/// How often a goal is sent before torque to a servo that does not show it.
+const REPEATS: u8 = 3;
+
+/// What is known of the goal at one servo.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GoalCheck {
+    /// Successive answers that showed another goal, also of earlier engagements.
+    misses: u8,
+    /// The joint may get torque.
+    is_done: bool,
+}
+
+impl GoalCheck {
+    /// No goal was sent.
+    pub(crate) const NEW: Self = Self { misses: 0, is_done: false };
+
+    /// A goal is to be sent.
+    pub(crate) const fn begin(&mut self) {
+        self.is_done = false;
+    }
+
+    /// The joint may get torque: its servo shows the goal, or follows it already.
+    pub(crate) const fn shown(&mut self) {
+        *self = Self { misses: 0, is_done: true };
+    }
+
+    /// The servo shows another goal. Returns how often the goal has to be sent directly before torque; `None` if it has to
+    /// be asked for again.
+    pub(crate) fn hidden(&mut self) -> Option<u8> {
+        self.misses = self.misses.saturating_add(1).min(HIDDEN_AFTER);
+        (self.misses == HIDDEN_AFTER).then_some(REPEATS)
+    }
+
+    /// The joint may get torque after its goal was sent again.
+    pub(crate) const fn done(&mut self) {
+        self.is_done = true;
+    }
+
+    /// May the joint get torque?
+    pub(crate) const fn is_done(self) -> bool {
+        self.is_done
+    }
+}

@@ -1,0 +1,54 @@
+//! The simulated arm in front of an obstacle, in virtual time.
+
+use std::convert::Infallible;
+
+use arm_sim::flash::Flash;
+use arm_sim::plant::Plant;
+use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
+use motion_core::TorqueCodes;
+use protocol_core::request::Request;
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::FrameBuffer;
+
+use super::ObstacleArm;
+
+/// A simulated arm.
+pub struct SimulatedObstacleArm {
+    world: SimulatedArm<Flash>,
+    now: Instant,
+}
+
+impl ObstacleArm for SimulatedObstacleArm {
+    type Error = Infallible;
+
+    fn start() -> Result<Self, Infallible> {
+        let now = Instant::ZERO;
+        let setup = ArmConfig { chip_id: [0; 6], is_paced: false, torque_codes: TorqueCodes::default() };
+        Ok(Self { world: SimulatedArm::new(now, setup, Flash::in_memory(), Plant::new(now)), now })
+    }
+
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn plant(&mut self) -> &mut Plant {
+        self.world.plant_mut()
+    }
+
+    fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Infallible> {
+        let mut frame = FrameBuffer::new();
+        Request::Write { address, values }.encode(&mut frame);
+        self.world.host_send(self.now, &frame);
+        Ok(())
+    }
+
+    fn read(&mut self, address: u8) -> Result<u8, Infallible> {
+        Ok(self.world.controller().registers().get(address))
+    }
+
+    fn step(&mut self) -> Result<(), Infallible> {
+        self.now = self.now + Duration::from_millis(1);
+        self.world.advance(self.now, true);
+        Ok(())
+    }
+}
