@@ -19,11 +19,15 @@ impl Arm {
     pub(super) fn of(arm: sevenbot::Arm, simulation: Option<SharedSimulation>) -> Self {
         let (port, map) = (arm.port().to_owned(), arm.map().version());
         let (firmware, chip) = (arm.identity().version(), arm.identity().chip_name());
-        Self { worker: Worker::start(arm), simulation, sent: Mutex::new(None), port, firmware, chip, map }
-    }
-
-    pub(crate) const fn worker(&self) -> &Worker {
-        &self.worker
+        Self {
+            worker: Arc::new(Worker::start(arm)),
+            simulation,
+            sent: Mutex::new(None),
+            port,
+            firmware,
+            chip,
+            map,
+        }
     }
 
     /// Starts a move, and waits for it.
