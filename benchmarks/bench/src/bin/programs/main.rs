@@ -4,7 +4,6 @@
 
 mod simulator;
 
-use std::error::Error;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -15,10 +14,7 @@ use protocol_core::registers::map::PRESENT_POSITION;
 use protocol_core::request::Request;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-use simulator::{Simulator, frame, receive_reply};
-
-/// A result whose error is printed.
-type Outcome<T = ()> = Result<T, Box<dyn Error>>;
+use simulator::{Outcome, Simulator, frame, receive_reply};
 
 /// Number of starts of a program.
 const STARTS: usize = 51;

@@ -1,5 +1,6 @@
 //! A measured simulator: its processor time and memory, and hosts that poll all of its arms.
 
+use std::error::Error;
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::os::unix::fs::OpenOptionsExt;
@@ -15,7 +16,8 @@ use protocol_core::wire::FrameBuffer;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::OFlags;
 
-use crate::Outcome;
+/// A result whose error is printed.
+pub(crate) type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
 /// The time of a measurement.
 const WATCH_TIME: Duration = Duration::from_secs(5);
