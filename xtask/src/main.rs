@@ -105,7 +105,7 @@ enum Task {
     Emulate(emulator::EmulateArgs),
     /// Measure how far the emulated arm sags during restarts, a panic, noise and a silent servo
     Sag,
-    /// Measure what becomes of the emulated arm at walls, after emergency stops, and with a thing in its gripper (ten minutes)
+    /// Measure what becomes of the emulated arm at walls, after emergency stops, and with a thing in its gripper (seven minutes)
     Obstacles,
 }
 

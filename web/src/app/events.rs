@@ -63,9 +63,17 @@ impl App {
                 self.dom.press("speed", value);
             }
             "break" => {
-                let fault = format!("{}={}", self.dom.choice("fault-joint"), self.dom.choice("fault-kind"));
-                self.act("fault", &fault);
+                let (joint, kind) = (self.dom.choice("fault-joint"), self.dom.choice("fault-kind"));
+                match kind.strip_prefix("trip") {
+                    Some(alarm) => self.act_on_simulation(&format!("trip {joint}{alarm}")),
+                    None => self.act("fault", &format!("{joint}={kind}")),
+                }
             }
+            "thing" => {
+                self.act_on_simulation(&format!("weight {}", self.dom.choice("payload")));
+                self.act("fault", "7=thing=30");
+            }
+            "drop" => self.act_on_simulation("drop"),
             "fault" => self.act_on_simulation(&format!("fault {value}")),
             "repair" => self.act_on_simulation("clear"),
             "power" => self.act_on_simulation("power-cycle"),

@@ -10,8 +10,8 @@ use protocol_core::time::Duration;
 use super::{ObstacleArm, percent, start};
 
 const CLAW: Joint = Joint::ALL[6];
-/// The time in which the peak is searched for.
-const MINUTE: Duration = Duration::from_millis(60_000);
+/// The time in which the peak is searched for, in seconds.
+const SETTLED_S: u64 = 30;
 /// Where the thing is, and where the claw is sent, in degrees.
 const THING_AT: i32 = 60;
 const TARGET: u8 = 20;
@@ -19,9 +19,9 @@ const TARGET: u8 = 20;
 /// A soft thing at the lowest grip limit, and a hard one at the default.
 pub(super) fn table<A: ObstacleArm>(time: Duration) -> Result<String, A::Error> {
     let mut table = format!(
-        "| between the claws | grip limit | peak push | push after a minute | after {} minutes | temperature | alarms |\n\
+        "| between the claws | grip limit | peak push | push after {SETTLED_S} s | after {} min | temperature | alarms |\n\
          | --- | --: | --: | --: | --: | --: | --: |\n",
-        time.as_micros() / MINUTE.as_micros()
+        time.as_micros() / 60_000_000
     );
     for (name, limit, stiffness) in [("egg", 10, Some(100)), ("brick", 40, None)] {
         let thing = Thing { millidegrees: THING_AT * 1_000, stiffness };
@@ -39,16 +39,16 @@ fn cells<A: ObstacleArm>(thing: Thing, limit: u8, time: Duration) -> Result<Stri
     arm.write(TARGET_POSITION.of(CLAW), &[TARGET])?;
     let begun = arm.now();
     let mut peak = 0;
-    while arm.now() - begun < MINUTE {
+    while arm.now() - begun < Duration::from_millis(SETTLED_S * 1_000) {
         arm.step()?;
         peak = peak.max(push(&mut arm));
     }
-    let minute = push(&mut arm);
+    let settled = push(&mut arm);
     let rest = begun + time - arm.now();
     arm.run(rest)?;
     let last = push(&mut arm);
     let (heat, alarms) = (arm.read(SERVO_TEMPERATURE.address)?, arm.read(SERVO_ALARMS.address)?);
-    Ok(format!("{} | {} | {} | {heat} °C | {alarms}", percent(peak), percent(minute), percent(last)))
+    Ok(format!("{} | {} | {} | {heat} °C | {alarms}", percent(peak), percent(settled), percent(last)))
 }
 
 fn push(arm: &mut impl ObstacleArm) -> u16 {

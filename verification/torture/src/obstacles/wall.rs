@@ -216,7 +216,7 @@ pub(super) fn tables<A: ObstacleArm>(cases: &[WallCase]) -> Result<String, A::Er
         outcomes.push((*case, is_protected, push_against_wall::<A>(case, is_protected)?));
     }
     let by = |name, key: fn(&WallCase) -> String| table(name, &outcomes, key);
-    Ok([
+    let tables = [
         by("joint", |case| case.joint.number().to_string()),
         by("payload", |case| format!("{} g", case.payload_g)),
         by("speed", |case| case.speed.to_string()),
@@ -225,17 +225,20 @@ pub(super) fn tables<A: ObstacleArm>(cases: &[WallCase]) -> Result<String, A::Er
             if case.is_behind { "at a smaller angle" } else { "at a greater angle" }.to_owned()
         }),
         by("pose", |case| format!("{:?}", case.pose)),
-    ]
-    .join("\n"))
+    ];
+    Ok(tables.into_iter().flatten().collect::<Vec<_>>().join("\n"))
 }
 
-/// The worst results of the cases with the same key.
-fn table(name: &str, outcomes: &[Outcome], key: fn(&WallCase) -> String) -> String {
+/// The worst results of the cases with the same key. `None` if all have the same.
+fn table(name: &str, outcomes: &[Outcome], key: fn(&WallCase) -> String) -> Option<String> {
     let mut keys: Vec<String> = Vec::new();
     for key in outcomes.iter().map(|(case, ..)| key(case)) {
         if !keys.contains(&key) {
             keys.push(key);
         }
+    }
+    if keys.len() < 2 {
+        return None;
     }
     let mut table = format!(
         "| {name} | cases | protection | peak push | lasting push | trips | sag |\n{}\n",
@@ -248,7 +251,7 @@ fn table(name: &str, outcomes: &[Outcome], key: fn(&WallCase) -> String) -> Stri
         let protection = if is_protected { "on" } else { "off" };
         table += &format!("| {wanted} | {} | {protection} | {} |\n", results.len(), worst(&results));
     }
-    table
+    Some(table)
 }
 
 /// The cells of the worst of some results.

@@ -81,6 +81,55 @@ fn a_weak_supply_is_said_and_shown() {
 }
 
 #[test]
+fn a_servo_that_protects_itself_is_named() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    page.choose("#fault-joint", "3");
+    page.choose("#fault-kind", "trip");
+    page.click("[data-action=break]");
+    page.wait_for_text("#state", "oint 3 let go");
+    page.wait_for_text("#state", "The arm is ready.");
+    page.choose("#fault-kind", "trip heat");
+    page.click("[data-action=break]");
+    page.wait_for_text("#state", "too hot");
+    assert_eq!(page.errors(), [""; 0]);
+}
+
+#[test]
+fn a_thing_between_the_claws_stops_them_and_its_weight_loads_the_arm_until_it_falls() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    let empty = page.measured()[2];
+    page.choose("#payload", "300");
+    page.click("[data-action=thing]");
+    page.pass(1.0);
+    let loaded = page.measured()[2];
+    assert!((loaded - empty).abs() > 0.5, "joint 3 droops from {empty} to {loaded}");
+    page.focus("#joint-7");
+    page.keys("Home", 1);
+    page.wait_for_text("#state", "oint 7 is blocked");
+    let claw = page.measured()[6];
+    assert!((claw - 30.0).abs() < 1.0, "{claw}");
+    page.click("[data-action=drop]");
+    page.pass(1.0);
+    let dropped = page.measured()[2];
+    assert!((dropped - empty).abs() < (loaded - empty).abs() / 2.0, "{empty}, {loaded}, {dropped}");
+    assert_eq!(page.errors(), [""; 0]);
+}
+
+#[test]
+fn after_an_emergency_stop_the_motors_stay_off_until_they_are_switched_on() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    page.click("[data-value='supply=off 3000000']");
+    page.wait_for_text("#state", "o servo answers");
+    page.wait_for_text("#state", "lost their supply");
+    page.click("[data-action=motors][data-value='1']");
+    page.wait_for_text("#state", "The arm is ready.");
+    assert_eq!(page.errors(), [""; 0]);
+}
+
+#[test]
 fn after_a_power_cut_the_arm_holds_where_it_fell() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();
