@@ -20,13 +20,15 @@ use clap::Args;
 use crate::run::{TaskResult, root, run, target_directory};
 use crate::trials::Trials;
 
-/// The targets, and the number of inputs in the fixed form, for about 15 s of one processor.
+/// The targets, and the number of inputs in the fixed form, for about 15 s of one processor. Measured in its time, inputs per
+/// second: `controller` 4,200, `deframer` 6,200, `host_reply` 3,900, `image_file` 1,900, `journal` 5,000, `register_ops`
+/// 144,000. The rate falls while a target finds new inputs.
 const TARGETS: [(&str, u32); 6] = [
-    ("controller", 100_000),
+    ("controller", 60_000),
     ("deframer", 100_000),
-    ("host_reply", 1_000_000),
-    ("image_file", 40_000),
-    ("journal", 100_000),
+    ("host_reply", 60_000),
+    ("image_file", 28_000),
+    ("journal", 75_000),
     ("register_ops", 2_000_000),
 ];
 /// The seed of the fixed form.
