@@ -160,6 +160,12 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
         self.to_host.clear(baud);
     }
 
+    /// The baud rate of the host link, in bits per second.
+    #[must_use]
+    pub fn baud(&self) -> u32 {
+        self.controller.baud()
+    }
+
     fn paced_baud(&self) -> Option<u32> {
         self.config.is_paced.then(|| self.controller.baud())
     }

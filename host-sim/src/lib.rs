@@ -23,6 +23,7 @@ pub mod clock;
 pub mod control;
 pub mod eeprom;
 pub mod event_loop;
+mod help;
 pub mod image_file;
 pub mod per_arm;
 pub mod private_socket;

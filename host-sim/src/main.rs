@@ -240,12 +240,11 @@ fn run_arms<C: ArmController>(options: &Options, signals: &mut Signals) -> Resul
     let paths: Vec<PathBuf> = ports.iter().map(|(pty, _)| pty.path().to_owned()).collect();
     // They exist as long as the loop runs.
     let _symlinks = symlinks(options, &numbers, &paths)?;
-    let controls = control_sockets(options, &numbers)?;
     let arms = numbers.iter().zip(ports);
     let arms = arms.map(|(&number, (pty, flash))| simulated_arm::<C>(options, number, pty, flash, &clock));
-    let mut event_loop =
-        EventLoop::new(arms.collect::<Result<_, _>>()?, clients).map_err(Failure::Running)?;
-    event_loop.add_controls(controls).map_err(Failure::Running)?;
+    let arms = arms.collect::<Result<_, _>>()?;
+    let mut event_loop = EventLoop::new(arms, clients).map_err(Failure::Running)?;
+    event_loop.add_controls(control_sockets(options, &numbers)?).map_err(Failure::Running)?;
     print_ready(&paths);
     event_loop.run(&mut clock, signals).map_err(Failure::Running)
 }
@@ -264,6 +263,9 @@ fn simulated_arm<C: ArmController>(
     let settings = flash.cells_mut().copy();
     let mut arm = arm::<_, C>(options, number, pty, flash, Instant::ZERO, plant);
     arm.set_seed(seed);
+    if options.strict_baud {
+        arm.set_strict_baud();
+    }
     if clock.is_in_lockstep() {
         arm.simulation_mut().set_bytewise_line();
     }

@@ -32,6 +32,8 @@ pub struct PtyArm<F, B = Plant, C = Controller> {
     pty: Pty,
     /// The client does not read, and the kernel's buffers are full.
     is_blocked: bool,
+    /// Only clients at the arm's baud rate are heard and answered.
+    is_strict: bool,
     /// The span of its log lines.
     span: Span,
     /// The last faults that ended by themselves.
@@ -138,10 +140,21 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
             simulation,
             pty,
             is_blocked: false,
+            is_strict: false,
             span,
             ended_faults: Vec::new(),
             snapshots: Snapshots::new(),
         }
+    }
+
+    /// Hears and answers only clients that have the arm's baud rate, as on a serial line.
+    pub const fn set_strict_baud(&mut self) {
+        self.is_strict = true;
+    }
+
+    /// Do bytes pass between the client and the arm?
+    fn has_clients_rate(&self) -> io::Result<bool> {
+        Ok(!self.is_strict || self.pty.baud()? == self.simulation.baud())
     }
 
     /// Switches it off and on.
@@ -186,7 +199,7 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
         if was_emptied && self.pty.has_client() {
             self.simulation.host_disconnect();
         }
-        if count > 0 {
+        if count > 0 && self.has_clients_rate()? {
             self.simulation.host_send(now, bytes.get(..count).unwrap_or(&[]));
         }
         if was_emptied && !self.pty.has_client() {
@@ -208,7 +221,8 @@ impl<F: NorFlash + Clone, B: ServoBus, C: ArmController> PtyArm<F, B, C> {
         while !self.is_blocked && !self.simulation.host_received().is_empty() {
             let bytes = self.simulation.host_received();
             let offered = bytes.len();
-            let taken = if self.pty.has_client() { self.pty.write(bytes)? } else { offered };
+            let is_heard = self.pty.has_client() && self.has_clients_rate()?;
+            let taken = if is_heard { self.pty.write(bytes)? } else { offered };
             self.simulation.host_take(taken);
             self.is_blocked = taken < offered;
             has_delivered |= taken > 0;

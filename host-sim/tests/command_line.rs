@@ -90,7 +90,7 @@ fn a_link_of_the_user_and_an_error_at_the_start_change_nothing() {
     let line = refused(&["--eeprom", "none", "--link", own.to_str().unwrap()]);
     assert!(line.contains("is not replaced"), "{line}");
     assert_eq!(fs::read_link(&own).unwrap(), std::path::Path::new("/dev/ttyUSB-unplugged"));
-    refused(&["--eeprom", "none", "--link", new.to_str().unwrap(), "--control", "/nowhere/control"]);
+    refused(&["-q", "--eeprom", "none", "--link", new.to_str().unwrap(), "--control", "/nowhere/control"]);
     assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
 }
 

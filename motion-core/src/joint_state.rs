@@ -189,10 +189,11 @@ impl JointState {
         };
         let stays = may_engage && self.position.is_steady();
         let has_goal = stays && repeats == Some(0) && is_there(answer.reading.position_counts);
-        // A servo with torque follows its goal already.
+        // A servo with torque follows its goal already. None was sent since a question was not answered.
         if held.is_on || has_goal {
+            let was_unanswered = !self.torque.is_trusted();
             self.torque = TorqueCheck::ORDERED;
-            return repeats;
+            return Some(was_unanswered.into());
         }
         // It engages anew where it is now, with the next answer or with this one.
         self.drive.lose_torque(true);

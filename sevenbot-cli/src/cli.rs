@@ -25,14 +25,23 @@ Examples:
   sevenbot get present-position --json
   sevenbot monitor
 
-Without --port and SEVENBOT_PORT the only port that leads to an arm is used.
+Without --port and SEVENBOT_PORT the only port that leads to an arm is used, or
+that of the only simulator that runs.
 
 Exit status:
   0    done
-  1    the arm refused or failed, `info` or `status` found a fault, or a file cannot be used
+  1    the arm refused or failed, `info` or `status` found a fault, or a file
+       cannot be used
   2    the arguments are invalid, or a question needs a terminal or --yes
-  3    no connection: the port cannot be opened, no 7Bot V2 answers, or the connection was lost
-  130  interrupted by Ctrl-C; a moving arm then holds its position. A second Ctrl-C ends at once";
+  3    no connection: the port cannot be opened, no 7Bot V2 answers, or the
+       connection was lost; an arm that was moving may go on
+  130  interrupted by Ctrl-C; a moving arm then holds its position. A second
+       Ctrl-C ends at once. Where Ctrl-C is the way to end, it is 0: `monitor`,
+       `record`, `serve`, `view`
+
+With --json, notes, warnings and errors are JSON, too: one object in a line on
+standard error. {\"error\": TEXT, \"advice\": [TEXT, ...], \"status\": NUMBER},
+{\"warning\": TEXT}, {\"note\": TEXT}. Wrong arguments are told as text.";
 
 /// Controls a 7Bot V2 robot arm over its serial port. The arm may be real, simulated, or the firmware in an emulator.
 #[derive(Debug, Parser)]
@@ -48,20 +57,20 @@ pub(crate) struct Cli {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Options of every command")]
 pub(crate) struct Global {
-    /// Serial port of the arm, such as /dev/ttyUSB0, COM3, or the link of the simulator.
+    /// Serial port of the arm: /dev/ttyUSB0, COM3, the link of a simulator.
     #[arg(long, global = true, env = "SEVENBOT_PORT", hide_env_values = true)]
     pub(crate) port: Option<String>,
     /// Baud rate of the port. The arm starts with the rate in its register 12.
     #[arg(long, global = true, default_value_t = 115_200, value_parser = value_parser!(u32).range(1..))]
     pub(crate) baud: u32,
-    /// Timeout for an answer in milliseconds; each question is asked three times.
+    /// Timeout for an answer in milliseconds; a question is sent 3 times.
     #[arg(long, global = true, value_name = "MS", env = "SEVENBOT_TIMEOUT", hide_env_values = true,
           default_value_t = 500, value_parser = value_parser!(u16).range(1..))]
     pub(crate) timeout: u16,
     /// The register map of the arm: 2.1 or 2.2. Without this option the arm's version decides.
     #[arg(long, global = true, value_name = "VERSION", value_parser = map)]
     pub(crate) map: Option<Map>,
-    /// Print results as JSON, one value per line.
+    /// Print results as JSON, one value per line; errors and notes too, on standard error.
     #[arg(long, global = true)]
     pub(crate) json: bool,
     /// Write all bytes to and from the arm, with times, to a new FILE. `sevenbot sniff FILE` shows it as text.
@@ -119,6 +128,11 @@ pub(crate) enum Command {
 
 impl Command {
     pub(crate) fn run(self, session: &mut Session) -> Result<(), CommandError> {
+        if session.log.is_some() && !self.opens_arm() {
+            let reason =
+                "--log writes what a command and an arm say to each other: this command opens no arm itself";
+            return Err(CommandError::Usage(reason.to_owned()));
+        }
         match self {
             Self::Ports(args) => ports::run(session, &args),
             Self::Info(_) => info::run(session),
@@ -160,6 +174,21 @@ impl Command {
     }
 }
 
+impl Command {
+    /// Does it exchange frames with an arm by itself?
+    const fn opens_arm(&self) -> bool {
+        match self {
+            Self::Ports(_) | Self::Plot(_) | Self::Sniff(_) | Self::Servo(_) | Self::Registers(_) => false,
+            Self::Model(_) | Self::Completions(_) | Self::Man(_) => false,
+            #[cfg(target_os = "linux")]
+            Self::Serve(_) | Self::View(_) => false,
+            #[cfg(unix)]
+            Self::Sim(_) => false,
+            _ => true,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,6 +196,19 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    /// clap wraps a line that is too long for the terminal, and leaves the rest of it alone on the next line.
+    #[test]
+    fn the_help_fits_a_terminal_of_80_columns() {
+        fn check(command: &clap::Command) {
+            let text = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            for line in text.lines() {
+                assert!(line.chars().count() <= 80, "{}: {line}", command.get_name());
+            }
+            command.get_subcommands().for_each(check);
+        }
+        check(&Cli::command());
     }
 
     #[test]

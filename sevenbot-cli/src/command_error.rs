@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use serde_json::json;
 use sevenbot::approach::StartTooFar;
 use sevenbot::checked_write::{NotTaken, WriteError};
 use sevenbot::health::{MoveCheckError, Problem, ProblemKind, remedies, sentences};
@@ -157,7 +158,11 @@ impl CommandError {
 
     /// The exit status; `sevenbot --help` lists them.
     pub(crate) fn exit_code(&self) -> ExitCode {
-        ExitCode::from(match self {
+        ExitCode::from(self.status())
+    }
+
+    fn status(&self) -> u8 {
+        match self {
             // The reader of the pipe, such as `head`, has ended.
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             Self::Arm(_) | Self::NotTaken(_) | Self::Problems(_) | Self::MayMove(_) => 1,
@@ -172,12 +177,17 @@ impl CommandError {
             Self::SimulatorRefused { .. } => 1,
             Self::Servo { .. } | Self::NoServo { .. } | Self::HostLink { .. } => 3,
             Self::Interrupted => INTERRUPTED,
-        })
+        }
     }
 
-    /// Prints message and advice. If that fails, the exit status remains.
-    pub(crate) fn report(&self, err: &mut impl Write) {
+    /// Prints message and advice, as text or as JSON. If that fails, the exit status remains.
+    pub(crate) fn report(&self, err: &mut impl Write, is_json: bool) {
         let Some(message) = self.message() else { return };
+        if is_json {
+            let error = json!({ "error": message, "advice": self.advice(), "status": self.status() });
+            let _ = writeln!(err, "{error}");
+            return;
+        }
         let _ = writeln!(err, "{BAD}error:{BAD:#} {message}");
         for line in self.advice() {
             let _ = writeln!(err, "  - {line}");

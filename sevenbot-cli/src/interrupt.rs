@@ -66,6 +66,9 @@ pub(crate) fn hold_on_interrupt<T>(
     let interrupt = Interrupt::catch();
     let done = work(arm, interrupt);
     Interrupt::release();
+    if matches!(done, Err(CommandError::Exchange(_))) {
+        warn("the arm may be moving: switch off the supply of the servos if something is in its way");
+    }
     if !Interrupt::is_requested() {
         return done;
     }

@@ -17,12 +17,15 @@ mod command_error;
 mod commands;
 mod confirm;
 mod guard_args;
+mod input_file;
 mod interrupt;
 mod line_file;
 mod measured_pose;
+mod output_file;
 mod plot;
 mod printer;
 mod progress;
+mod register_parser;
 mod session;
 mod settings_file;
 mod space_plot;
@@ -58,7 +61,7 @@ fn main() -> ExitCode {
     match command.run(&mut session) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            failure.report(&mut anstream::stderr());
+            failure.report(&mut anstream::stderr(), global.json);
             failure.exit_code()
         }
     }

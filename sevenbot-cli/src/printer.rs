@@ -5,15 +5,21 @@
 //!   sevenbot get speed.1 --json    {"registers":[{"address":32,"name":"speed.1",...}]}
 //! ```
 //!
-//! JSON has one value per line. anstream removes the colours if the output is not a terminal, or NO_COLOR is set.
+//! JSON has one value per line, also on standard error. anstream removes the colours if the output is not a terminal, or NO_COLOR is set.
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
+use anstyle::Style;
 use serde::Serialize;
+use serde_json::json;
 
 use crate::command_error::CommandError;
 use crate::style::{BOLD, WARNING};
+
+/// Are notes, warnings and errors JSON? Set once, before the command runs.
+static IS_JSON: AtomicBool = AtomicBool::new(false);
 
 /// The result of a command, as JSON (by serde) or as text.
 pub(crate) trait Printable: Serialize {
@@ -29,6 +35,7 @@ pub(crate) struct Printer {
 
 impl Printer {
     pub(crate) fn stdout(json: bool) -> Self {
+        IS_JSON.store(json, Ordering::Relaxed);
         Self { json, stream: Box::new(anstream::stdout()) }
     }
 
@@ -62,10 +69,18 @@ impl Printer {
 
 /// Prints a note. Ignores a closed standard error.
 pub(crate) fn note(message: impl Display) {
-    let _ = writeln!(anstream::stderr(), "{BOLD}note:{BOLD:#} {message}");
+    tell("note", BOLD, &message);
 }
 
 /// Prints a warning.
 pub(crate) fn warn(message: impl Display) {
-    let _ = writeln!(anstream::stderr(), "{WARNING}warning:{WARNING:#} {message}");
+    tell("warning", WARNING, &message);
+}
+
+fn tell(kind: &str, style: Style, message: &dyn Display) {
+    let mut err = anstream::stderr();
+    let _ = match IS_JSON.load(Ordering::Relaxed) {
+        true => writeln!(err, "{}", json!({ kind: message.to_string() })),
+        false => writeln!(err, "{style}{kind}:{style:#} {message}"),
+    };
 }

@@ -1,6 +1,7 @@
 //! What every command needs: the arm and the printer. Chooses the port.
 
 use std::fs::File;
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use sevenbot::open_port::OpenPort;
@@ -42,24 +43,52 @@ impl Session {
         Ok(arm)
     }
 
+    /// As [`Self::connect`], for a command that moves the arm: [`put_right`].
+    pub(crate) fn connect_to_move(&self) -> Result<Arm, CommandError> {
+        let mut arm = self.connect()?;
+        arm.let_watchdog_act()?;
+        put_right(&mut arm)?;
+        Ok(arm)
+    }
+
     /// Opens a port, with a log if there is to be one. A log that exists already is not overwritten.
     fn open(&self, port: String) -> Result<Arm, CommandError> {
         let failed = |error| CommandError::Open { port: port.clone(), error };
         let Some(path) = &self.log else { return Arm::open_with(&port, self.options).map_err(failed) };
         let line = OpenPort::open(&port, self.options.baud).map_err(failed)?;
-        let file = File::create_new(path).map_err(|error| CommandError::file(path, error))?;
+        let file = File::create_new(path).map_err(|error| match error.kind() {
+            ErrorKind::AlreadyExists => {
+                CommandError::file(path, "the file exists: choose a new name for the log")
+            }
+            _ => CommandError::file(path, error),
+        })?;
         let logged = LoggedLine::new(line, Box::new(file), &port, self.options.baud);
         let line = logged.map_err(|error| CommandError::file(path, error))?;
         Arm::over(Box::new(line), &port, self.options).map_err(failed)
     }
 
-    /// The port from the command line, or the only one that leads to an arm.
+    /// The port from the command line, or the only one that leads to an arm. Without any, that of the only simulator that
+    /// runs: a pseudo-terminal is not in the list of serial ports.
     pub(crate) fn port_name(&self) -> Result<String, CommandError> {
-        match &self.port {
-            Some(port) => Ok(port.clone()),
-            None => the_only(ports::probe(ports::available(), self.options.baud)),
+        if let Some(port) = &self.port {
+            return Ok(port.clone());
+        }
+        match the_only(ports::probe(ports::available(), self.options.baud)) {
+            Err(no_arm @ CommandError::NoArm { .. }) => simulator(running_simulators(), no_arm),
+            found => found,
         }
     }
+}
+
+/// Puts right what a program left in the arm that was killed while it streamed, and says so.
+pub(crate) fn put_right(arm: &mut Arm) -> Result<(), CommandError> {
+    if arm.end_abandoned_stream()? {
+        note(
+            "a program ended while it streamed, and the arm's watchdog acted: its period, watchdog and reports are switched \
+             off, and speeds at the maximum have their default again",
+        );
+    }
+    Ok(())
 }
 
 fn the_only(probed: Vec<ProbeResult>) -> Result<String, CommandError> {
@@ -72,6 +101,28 @@ fn the_only(probed: Vec<ProbeResult>) -> Result<String, CommandError> {
         }
         [] => Err(CommandError::NoArm { tried: others.into_iter().filter_map(reason).collect() }),
         several => Err(CommandError::SeveralArms { ports: names(several) }),
+    }
+}
+
+#[cfg(unix)]
+fn running_simulators() -> Vec<String> {
+    crate::commands::sim::running_ports()
+}
+
+#[cfg(not(unix))]
+const fn running_simulators() -> Vec<String> {
+    Vec::new()
+}
+
+/// The port of the only simulator; without one, the error.
+fn simulator(running: Vec<String>, no_arm: CommandError) -> Result<String, CommandError> {
+    match running.as_slice() {
+        [] => Err(no_arm),
+        [only] => {
+            note(format_args!("using {only}, the port of the only simulator that runs"));
+            Ok(only.clone())
+        }
+        _ => Err(CommandError::SeveralArms { ports: running }),
     }
 }
 
@@ -92,5 +143,16 @@ mod tests {
         let Err(CommandError::NoArm { tried }) = found else { panic!("no arm: {found:?}") };
         assert!(matches!(tried.as_slice(), [(name, OpenError::Busy)] if name == "COM1"));
         assert!(matches!(the_only(Vec::new()), Err(CommandError::NoArm { tried }) if tried.is_empty()));
+    }
+
+    #[test]
+    fn without_an_arm_the_only_simulator_is_used() {
+        let chosen = |running: &[&str]| {
+            let running = running.iter().map(|&port| port.to_owned()).collect();
+            simulator(running, CommandError::NoArm { tried: Vec::new() })
+        };
+        assert!(matches!(chosen(&["/dev/pts/7"]), Ok(port) if port == "/dev/pts/7"));
+        assert!(matches!(chosen(&[]), Err(CommandError::NoArm { .. })));
+        assert!(matches!(chosen(&["a", "b"]), Err(CommandError::SeveralArms { ports }) if ports.len() == 2));
     }
 }

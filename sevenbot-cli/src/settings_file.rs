@@ -14,7 +14,7 @@
 //!
 //! Settings are the writable registers that keep their value without power. An arm of the maker has no options.
 
-use std::fs;
+use std::io::{self, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -25,9 +25,14 @@ use sevenbot::{Arm, Register, Snapshot, Span, register_text};
 use toml::{Table, Value};
 
 use crate::command_error::CommandError;
+use crate::input_file;
+use crate::printer::Printable;
 
 /// The version of the file format. Other versions are refused.
 const FORMAT: u32 = 1;
+
+/// More than any file of settings, in bytes.
+const LONGEST: u64 = 1_000_000;
 
 /// The content of the file.
 #[derive(Debug, Deserialize, Serialize)]
@@ -58,10 +63,8 @@ impl SettingsFile {
     }
 
     /// The text of the file.
-    pub(crate) fn text(&self) -> Result<String, CommandError> {
-        let body = toml::to_string(self);
-        let body =
-            body.map_err(|error| CommandError::Arm(format!("these settings cannot be written: {error}")))?;
+    pub(crate) fn text(&self) -> io::Result<String> {
+        let body = toml::to_string(self).map_err(io::Error::other)?;
         Ok(format!(
             "# Settings of a 7Bot V2. `sevenbot restore FILE` writes them back; missing settings keep their \
              value.\n{body}"
@@ -70,7 +73,7 @@ impl SettingsFile {
 
     /// Reads a file.
     pub(crate) fn read(path: &Path) -> Result<Self, CommandError> {
-        let text = fs::read_to_string(path).map_err(|error| CommandError::file(path, error))?;
+        let text = input_file::short_text(path, LONGEST)?;
         let file: Self = toml::from_str(&text).map_err(|error| CommandError::file(path, error))?;
         if file.format == FORMAT {
             Ok(file)
@@ -103,6 +106,12 @@ impl SettingsFile {
             }
         }
         Ok((wanted, missing))
+    }
+}
+
+impl Printable for SettingsFile {
+    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(self.text()?.as_bytes())
     }
 }
 

@@ -46,7 +46,7 @@ fn the_makers_firmware_is_supported_with_a_warning() {
     let pose = run(&port, &["pose", "100", "_", "_", "_", "_", "_", "90", "--wait"], 0);
     assert!(pose.contains("100 0 0 0 0 0 90"), "only the two joints were sent anywhere: {pose}");
     run(&port, &["stop"], 0);
-    let refused = run(&port, &["set", "speed.1", "101"], 1);
+    let refused = run(&port, &["set", "speed.1", "101"], 2);
     assert!(refused.contains("speed.1 takes 0 to 100; nothing was written"), "{refused}");
 }
 

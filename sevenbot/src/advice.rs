@@ -16,6 +16,7 @@ pub fn opening(error: &OpenError) -> Vec<String> {
         OpenError::Busy => &[
             "close the other program: a terminal, a browser page, a second sevenbot",
             "on Linux, `fuser -v PORT` names it",
+            "`sevenbot serve` shares an arm between programs: start it instead, and give each program a port of it",
         ],
         OpenError::Unusable(_) => {
             &["does this name belong to a serial port, and does it take this baud rate?"]

@@ -1,26 +1,24 @@
 //! An open arm: reads and writes registers, also as typed values, and keeps the reports.
 //!
-//! Knows the register table. `FramePort` knows the line.
+//! Knows the register table. [`HostLink`](host_link::HostLink) knows frames, replies and timeouts.
 
 use std::fmt;
 use std::time::{Duration, Instant};
 
+use host_link::{HostEvent, Patience, RequestId};
 use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, OFFSET, SERVO_TEMPERATURE, STATUS_VERSION};
 use protocol_core::registers::map21::Map;
-use protocol_core::request::Request;
+use protocol_core::time;
 
-use crate::background_read::BackgroundRead;
+use crate::blocking_link::BlockingLink;
 use crate::error::{Error, OpenError};
-use crate::frame_port::{FramePort, Received};
 use crate::host_line::HostLine;
 use crate::identity::{Firmware, Identity};
 use crate::map_view::{MapView, WriteFrame};
 #[cfg(feature = "serial")]
 use crate::open_port::OpenPort;
-use crate::pending::PendingReads;
 use crate::reports::{Report, ReportQueue, report_period};
-use crate::snapshot::Snapshot;
-use crate::span::Span;
+use host_link::{Snapshot, Span};
 
 /// The status block: the last registers of the table.
 pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
@@ -41,7 +39,8 @@ const MIN_ATTEMPTS: u32 = 3;
 pub struct ArmOptions {
     /// Baud rate of the port. The arm starts with the rate in its register 12.
     pub baud: u32,
-    /// The timeout of one attempt.
+    /// The longest wait for one attempt. A read is repeated as soon as its reply is overdue, so a lost reply costs less:
+    /// [`Patience`].
     pub reply_timeout: Duration,
     /// Attempts for a read, at least one. A read changes nothing, so repeating it is safe.
     pub attempts: u32,
@@ -71,14 +70,20 @@ impl Default for ArmOptions {
 /// # }
 /// ```
 pub struct Arm {
-    link: FramePort,
+    link: BlockingLink,
     path: String,
     options: ArmOptions,
     identity: Identity,
     pub(crate) view: MapView,
-    pending: PendingReads,
     background: Option<BackgroundRead>,
     reports: ReportQueue,
+}
+
+/// A read that is not waited for: a stream asks for the arm's health between its points.
+struct BackgroundRead {
+    id: RequestId,
+    wanted: Span,
+    answer: Option<Snapshot>,
 }
 
 impl fmt::Debug for Arm {
@@ -112,17 +117,17 @@ impl Arm {
     /// # Errors
     /// No device answers, or another device answers.
     pub fn over(line: Box<dyn HostLine>, name: &str, options: ArmOptions) -> Result<Self, OpenError> {
-        let link = FramePort::new(line, options.baud);
         let nobody = Identity::from(Snapshot { address: 0, values: Vec::new() });
         let path = name.to_owned();
-        let (pending, reports) = (PendingReads::default(), ReportQueue::default());
         let view = MapView { map: Map::V22, firmware: Firmware::Unknown };
-        let mut arm =
-            Self { link, path, options, identity: nobody, view, pending, background: None, reports };
+        let link = BlockingLink::new(line, options.baud, view.reports());
+        let reports = ReportQueue::default();
+        let mut arm = Self { link, path, options, identity: nobody, view, background: None, reports };
         // Registers 0 to 7 are the same in both maps.
         arm.identity = Identity::from(arm.read_span(Span::between(&DEVICE_CODE, &CHIP_ID))?);
         let map = options.map.unwrap_or_else(|| arm.identity.map());
         arm.view = MapView { map, firmware: arm.identity.firmware() };
+        arm.link.set_reports(arm.view.reports());
         match arm.identity.device_code() {
             code if code == DEVICE_CODE.default_at(DEVICE_CODE.address) => Ok(arm),
             code => Err(OpenError::WrongDevice { code }),
@@ -181,19 +186,23 @@ impl Arm {
     /// # Errors
     /// No attempt is answered, or the port failed.
     pub fn read_span(&mut self, span: Span) -> Result<Snapshot, Error> {
-        self.take_waiting_replies()?;
+        self.take_waiting()?;
         self.link.take_received();
-        self.choose_offset_encoding(span)?;
-        let mut asked = Vec::new();
-        for _ in 0..self.options.attempts.max(1) {
-            let range = self.pending.add(self.view.read_span(span), self.view.reports());
-            asked.push(range);
-            self.link.send(&Request::Read { address: range.address(), count: range.count() })?;
-            if let Some(answer) = self.answer(&asked)? {
-                return Ok(self.view.view(&answer, span));
+        self.choose_offset_encoding(span);
+        let id = self.link.read(self.view.read_span(span), self.patience(self.options.attempts));
+        match self.answer(id) {
+            Ok(Some(answer)) => Ok(self.view.view(&answer, span)),
+            Ok(None) => Err(self.no_answer(span)),
+            Err(error) => {
+                self.link.cancel(id);
+                Err(error)
             }
         }
-        Err(self.no_answer(span))
+    }
+
+    fn patience(&self, attempts: u32) -> Patience {
+        let micros = u64::try_from(self.options.reply_timeout.as_micros()).unwrap_or(u64::MAX);
+        Patience { attempts: attempts.max(1), timeout: time::Duration::from_micros(micros) }
     }
 
     /// Runs `work` with at least three attempts for each read.
@@ -216,35 +225,24 @@ impl Arm {
     pub fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Error> {
         Span::of_values(address, values).ok_or(Error::OutsideMap { address, count: values.len() })?;
         let frames = self.view.writes(address, values);
-        for WriteFrame { map, address, values } in &frames {
-            self.send_write(*map, *address, values)?;
-        }
+        frames.iter().for_each(|frame| self.link.write(frame));
         if frames.last().is_some_and(|last| last.map != self.view.map) {
-            self.claim_offset_encoding()?;
+            self.claim_offset_encoding();
         }
-        Ok(())
-    }
-
-    fn send_write(&mut self, map: Map, address: u8, values: &[u8]) -> Result<(), Error> {
-        let request = match map {
-            Map::V22 => Request::Write { address, values },
-            Map::V21 => Request::WriteMap21 { address, values },
-        };
-        Ok(self.link.send(&request)?)
+        self.flush()
     }
 
     /// Our firmware shows the offsets in the encoding of the map that was written last, maybe by another program (M5). A
     /// write without registers makes it this one.
-    fn claim_offset_encoding(&mut self) -> Result<(), Error> {
-        self.send_write(self.view.map, 0, &[])
+    fn claim_offset_encoding(&mut self) {
+        self.link.write(&WriteFrame { map: self.view.map, address: 0, values: Vec::new() });
     }
 
-    fn choose_offset_encoding(&mut self, span: Span) -> Result<(), Error> {
+    fn choose_offset_encoding(&mut self, span: Span) {
         let has_both = self.identity.firmware() == Firmware::Ours;
         if has_both && span.addresses().any(|address| OFFSET.holds(address)) {
-            self.claim_offset_encoding()?;
+            self.claim_offset_encoding();
         }
-        Ok(())
     }
 
     /// The time now, on the clock of the arm's line.
@@ -270,24 +268,23 @@ impl Arm {
     pub fn next_report(&mut self, timeout: Duration) -> Result<Option<Report>, Error> {
         let deadline = self.now() + timeout;
         loop {
+            self.flush()?;
             let report = self.reports.pop();
             if report.is_some() {
                 return Ok(report);
             }
-            let Some(received) = self.link.receive(deadline)? else { return Ok(None) };
-            self.keep(&received);
+            let Some(event) = self.link.next(Some(deadline))? else { return Ok(None) };
+            self.keep(event);
         }
     }
 
-    /// Waits for a reply to one of these reads. Other replies are late, or reports.
-    fn answer(&mut self, asked: &[Span]) -> Result<Option<Snapshot>, Error> {
-        let deadline = self.now() + self.options.reply_timeout;
-        while let Some(received) = self.link.receive(deadline)? {
-            self.keep(&received);
-            if let Received::Reply(reply) = received
-                && asked.contains(&reply.span())
-            {
-                return Ok(Some(reply));
+    /// Waits for the end of a read; `None` if there is no reply.
+    fn answer(&mut self, id: RequestId) -> Result<Option<Snapshot>, Error> {
+        while let Some(event) = self.link.next(None)? {
+            match event {
+                HostEvent::Reply(replied, values) if replied == id => return Ok(Some(values)),
+                HostEvent::NoReply(lost, _) if lost == id => return Ok(None),
+                other => self.keep(other),
             }
         }
         Ok(None)
@@ -298,15 +295,17 @@ impl Arm {
     /// # Errors
     /// The port failed.
     pub(crate) fn ask_in_background(&mut self, wanted: Span) -> Result<(), Error> {
-        let asked = self.pending.add(self.view.read_span(wanted), self.view.reports());
-        self.link.send(&Request::Read { address: asked.address(), count: asked.count() })?;
-        self.background = Some(BackgroundRead::new(wanted, asked));
-        Ok(())
+        self.forget_background_question();
+        let id = self.link.read(self.view.read_span(wanted), self.patience(1));
+        self.background = Some(BackgroundRead { id, wanted, answer: None });
+        self.flush()
     }
 
     /// Forgets the last background question: its answer tells what was before.
     pub(crate) fn forget_background_question(&mut self) {
-        self.background = None;
+        if let Some(read) = self.background.take() {
+            self.link.cancel(read.id);
+        }
     }
 
     /// Takes the answer to the last background question, if it has arrived.
@@ -314,7 +313,7 @@ impl Arm {
     /// # Errors
     /// The port failed.
     pub(crate) fn take_background_answer(&mut self) -> Result<Option<Snapshot>, Error> {
-        self.take_waiting_replies()?;
+        self.take_waiting()?;
         let Some(read) = self.background.take_if(|read| read.answer.is_some()) else { return Ok(None) };
         Ok(read.answer.map(|answer| self.view.view(&answer, read.wanted)))
     }
@@ -331,22 +330,36 @@ impl Arm {
         Error::NoAnswer { span, attempts: attempts.max(1), waited: reply_timeout, received }
     }
 
-    /// Takes the replies received since the last read: reports, and late replies.
-    fn take_waiting_replies(&mut self) -> Result<(), Error> {
-        while let Some(received) = self.link.receive_waiting()? {
-            self.keep(&received);
+    /// Sends what is queued, and keeps what was received.
+    fn flush(&mut self) -> Result<(), Error> {
+        loop {
+            match self.link.poll()? {
+                HostEvent::Wait(_) => return Ok(()),
+                event => self.keep(event),
+            }
         }
-        Ok(())
     }
 
-    /// Keeps a frame if it is a report or the answer to a background read, and marks the read that it answers.
-    fn keep(&mut self, received: &Received) {
-        self.reports.keep(received, self.view, self.link.now());
-        if let Some(read) = &mut self.background {
-            read.keep(received);
+    /// As [`Self::flush`], with the bytes that wait in the line: reports, and late replies.
+    fn take_waiting(&mut self) -> Result<(), Error> {
+        loop {
+            let has_bytes = self.link.receive(Duration::ZERO)?;
+            self.flush()?;
+            if !has_bytes {
+                return Ok(());
+            }
         }
-        if let Received::Reply(reply) = received {
-            self.pending.replied(reply.span());
+    }
+
+    /// Keeps a report, and the answer to the background question.
+    fn keep(&mut self, event: HostEvent) {
+        match event {
+            HostEvent::Report(map, report) => self.reports.keep(map, &report, self.view, self.link.now()),
+            HostEvent::Reply(id, values) => {
+                let read = self.background.as_mut().filter(|read| read.id == id);
+                read.into_iter().for_each(|read| read.answer = Some(values.clone()));
+            }
+            _ => {}
         }
     }
 }

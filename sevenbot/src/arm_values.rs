@@ -5,8 +5,8 @@ use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION, TI
 
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::span::Span;
 use crate::units::{Angle, MoveTime, Speed};
+use host_link::Span;
 
 impl Arm {
     /// The present positions, joint 1 first.

@@ -12,8 +12,7 @@ use crate::arm::Arm;
 use crate::error::Error;
 use crate::identity::Firmware;
 use crate::names::name_of_register;
-use crate::snapshot::Snapshot;
-use crate::span::Span;
+use host_link::{Snapshot, Span};
 
 mod cause;
 

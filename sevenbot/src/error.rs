@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::time::Duration;
 
-use crate::span::Span;
+use host_link::Span;
 
 /// Why a port cannot be opened, or has no arm.
 ///
@@ -101,8 +101,16 @@ pub enum PortError {
     #[error("the port takes no more bytes: nothing reads at its other end")]
     Stalled,
     /// The port failed: the cable was pulled, or the simulator ended.
-    #[error("the connection is gone: {0}")]
+    #[error("the connection is gone{}", reason(*.0))]
     Lost(io::ErrorKind),
+}
+
+/// The reason of the system, if it has a name.
+fn reason(kind: io::ErrorKind) -> String {
+    match kind.to_string().as_str() {
+        "other error" | "uncategorized error" => String::new(),
+        name => format!(": {name}"),
+    }
 }
 
 impl From<PortError> for OpenError {
@@ -149,6 +157,15 @@ impl fmt::Display for ReceiveCounts {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_lost_port_names_no_reason_without_a_name() {
+        let said = |kind| PortError::Lost(kind).to_string();
+        assert_eq!(said(io::ErrorKind::Other), "the connection is gone");
+        let input_output = io::Error::from_raw_os_error(5);
+        assert_eq!(said(input_output.kind()), "the connection is gone");
+        assert_eq!(said(io::ErrorKind::BrokenPipe), "the connection is gone: broken pipe");
+    }
 
     #[test]
     fn a_missing_answer_reports_the_received_bytes() {

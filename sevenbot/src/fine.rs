@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::fine_angle::FineAngle;
 pub use crate::fine_state::{FineState, FineTargets};
 use crate::identity::Firmware;
-use crate::span::Span;
+use host_link::Span;
 
 /// The layout of the extended block that this library knows.
 const KNOWN_LAYOUT: u8 = 1;

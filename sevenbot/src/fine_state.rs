@@ -4,8 +4,7 @@ use protocol_core::registers::Register;
 use protocol_core::registers::map::{FINE_POSITION, LOAD, VELOCITY};
 
 use crate::fine_angle::FineAngle;
-use crate::snapshot::Snapshot;
-use crate::span::Span;
+use host_link::{Snapshot, Span};
 
 /// Targets in hundredths of a degree, joint 1 first; `None` for joints that keep theirs.
 pub type FineTargets = [Option<FineAngle>; 7];

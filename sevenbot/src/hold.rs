@@ -16,8 +16,7 @@ use crate::error::Error;
 use crate::fine::fine_frames;
 use crate::fine_angle::FineAngle;
 use crate::joints::{JointSnapshot, POLL_PERIOD, START_UP_TIME, frames_for};
-use crate::snapshot::Snapshot;
-use crate::span::Span;
+use host_link::{Snapshot, Span};
 
 /// Targets are written this many times before their loss is an error.
 const HOLD_ATTEMPTS: u32 = 5;

@@ -3,7 +3,7 @@
 use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, FIRMWARE_VERSION};
 use protocol_core::registers::map21::Map;
 
-use crate::snapshot::Snapshot;
+use host_link::Snapshot;
 
 /// The highest firmware version, in tenths, with map 2.1. The maker's 2.2 has map 2.2.
 const LAST_VERSION_WITH_MAP_21: u8 = 21;

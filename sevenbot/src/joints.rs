@@ -19,10 +19,9 @@ use protocol_core::registers::{Joint, Register};
 
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::snapshot::Snapshot;
-use crate::span::Span;
 use crate::status_block::StatusBlock;
 use crate::units::Speed;
+use host_link::{Snapshot, Span};
 
 /// After power-up the arm measures each joint or finds it missing within 500 ms (D12). The rest is for the reply.
 pub const START_UP_TIME: Duration = Duration::from_millis(700);

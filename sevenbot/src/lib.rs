@@ -1,10 +1,10 @@
 //! Connects to a 7Bot V2 arm over its serial port.
 //!
 //! ```text
-//!   Arm ── read, write, typed values ──▶ FramePort ──▶ serial port ──▶ arm, simulator, or emulated firmware
-//!    ▲                                        │
-//!    ├── replies ◀── matched by range ────────┤
-//!    └── reports ◀── sent by the arm (D14) ───┘
+//!   Arm ── read, write, typed values ──▶ HostLink ──▶ serial port ──▶ arm, simulator, or emulated firmware
+//!    ▲                                      │
+//!    ├── replies ◀── matched in order ──────┤
+//!    └── reports ◀── sent by the arm (D14) ─┘
 //! ```
 //!
 //! All calls block, with timeouts. Frames and the register table come from `protocol-core`, which the arm uses too.
@@ -30,14 +30,13 @@ pub mod advice;
 pub mod approach;
 pub mod arm;
 mod arm_values;
-mod background_read;
+mod blocking_link;
 pub mod cartesian;
 pub mod checked_write;
 pub mod error;
 pub mod fine;
 pub mod fine_angle;
 mod fine_state;
-mod frame_port;
 pub mod health;
 pub mod hold;
 pub mod host_line;
@@ -50,7 +49,6 @@ pub mod names;
 #[cfg(feature = "serial")]
 pub mod open_port;
 pub mod park_poses;
-mod pending;
 #[cfg(feature = "serial")]
 mod permission;
 pub mod playback;
@@ -64,8 +62,6 @@ mod reports;
 #[cfg(feature = "serial")]
 pub mod servo_bench;
 pub mod simulated;
-pub mod snapshot;
-mod span;
 pub mod status_block;
 pub mod stream;
 pub mod table;
@@ -78,12 +74,11 @@ pub use arm::{Arm, ArmOptions};
 pub use error::{Error, OpenError, PortError, ReceiveCounts};
 pub use fine_angle::FineAngle;
 pub use health::{Health, Problem, ProblemKind};
+pub use host_link::{Snapshot, Span};
 pub use identity::{Firmware, Identity};
 pub use protocol_core::registers::map21::Map;
 pub use protocol_core::registers::{Joint, Range, Register, map, map21};
 pub use reports::Report;
-pub use snapshot::Snapshot;
-pub use span::Span;
 pub use status_block::StatusBlock;
 pub use units::{Angle, MoveTime, Speed};
 

@@ -22,8 +22,7 @@ use protocol_core::registers::map21::{
 use protocol_core::registers::{Access, Register};
 
 use crate::identity::Firmware;
-use crate::snapshot::Snapshot;
-use crate::span::Span;
+use host_link::{Snapshot, Span};
 
 /// The maker's firmware shows this time until one is written: the low byte of its 1000 ms.
 const STOCK_TIME_AT_START: u8 = 232;

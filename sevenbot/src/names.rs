@@ -1,10 +1,10 @@
-//! Parses register names: `target-position.3`, `SPEED`, `12`, `54..60`. The names come from the register tables. Map 2.2
+//! Parses register names: `target-position.3`, `SPEED`, `12`, `54..60`, `status-version..255`. The names come from the register tables. Map 2.2
 //! goes before map 2.1, as in a read (M3).
 
 use protocol_core::registers::map21::{MAP_21, find_readable};
 use protocol_core::registers::{Joint, MAP, Register};
 
-use crate::span::Span;
+use host_link::Span;
 
 /// Why a text is not the name of registers.
 ///
@@ -34,6 +34,9 @@ pub enum NameError {
     /// The range ends before it starts.
     #[error("the range ends before it begins")]
     EmptyRange,
+    /// The range has all 256 registers, and one frame holds 255.
+    #[error("one frame holds 255 registers, and this range has 256: use 0..254 and 255")]
+    TooLong,
 }
 
 /// The name of a row as users write it: `target-position`.
@@ -55,7 +58,7 @@ pub fn name_of_register(address: u8) -> String {
     }
 }
 
-/// Parses a number (`12`), a range with both ends (`54..60`), or a name.
+/// Parses a number (`12`), a range with both ends (`54..60`), or a name. An end of a range may be a name, too.
 ///
 /// A name may be in any case, with `-` or `_`, and shortened while it is unique. `.3` selects joint 3.
 ///
@@ -63,12 +66,23 @@ pub fn name_of_register(address: u8) -> String {
 /// The text is not the name of registers.
 pub fn parse(text: &str) -> Result<Span, NameError> {
     if let Some((first, last)) = text.split_once("..") {
-        let (first, last) = (address(first)?, address(last)?);
-        let distance = last.checked_sub(first).ok_or(NameError::EmptyRange)?;
-        // One frame cannot read all 256 registers.
-        let span = distance.checked_add(1).and_then(|count| Span::new(first, count));
-        return span.ok_or(NameError::NoAddress);
+        let end = |text: &str| if text.trim().is_empty() { Err(NameError::NoAddress) } else { one_end(text) };
+        return range(end(first)?, end(last)?);
     }
+    one_end(text)
+}
+
+/// The registers from the first of one span to the last of another.
+fn range(first: Span, last: Span) -> Result<Span, NameError> {
+    let last = last.addresses().last().ok_or(NameError::NoAddress)?;
+    let distance = last.checked_sub(first.address()).ok_or(NameError::EmptyRange)?;
+    let count = distance.checked_add(1).ok_or(NameError::TooLong)?;
+    Span::new(first.address(), count).ok_or(NameError::NoAddress)
+}
+
+/// A number or a name.
+fn one_end(text: &str) -> Result<Span, NameError> {
+    let text = text.trim();
     if text.starts_with(|first: char| first.is_ascii_digit()) {
         return Ok(Span::one(address(text)?));
     }
@@ -78,7 +92,7 @@ pub fn parse(text: &str) -> Result<Span, NameError> {
 }
 
 fn address(text: &str) -> Result<u8, NameError> {
-    text.trim().parse().map_err(|_| NameError::NoAddress)
+    text.parse().map_err(|_| NameError::NoAddress)
 }
 
 fn one_joint(row: &'static Register, joint: &str) -> Result<Span, NameError> {
@@ -153,6 +167,8 @@ mod tests {
         assert_eq!(parse("54..60"), span(54, 7));
         assert_eq!(parse("255..255"), span(255, 1));
         assert_eq!(parse("1..255"), span(1, 255));
+        assert_eq!(parse("status-version..255"), span(240, 16));
+        assert_eq!(parse("speed.2..target-position"), span(33, 20), "to the last of the seven");
     }
 
     #[test]
@@ -163,10 +179,12 @@ mod tests {
         assert_eq!(parse("speed.x"), Err(NameError::NoJoint));
         assert!(matches!(parse("device-id.1"), Err(NameError::NotPerJoint(_))));
         assert!(matches!(parse("device"), Err(NameError::Ambiguous(rows)) if rows.len() == 2));
-        for text in ["256", "0..256", "1..", "..", "0..255"] {
+        for text in ["256", "0..256", "1..", ".."] {
             assert_eq!(parse(text), Err(NameError::NoAddress), "{text}");
         }
         assert_eq!(parse("60..54"), Err(NameError::EmptyRange));
+        assert_eq!(parse("speed.9..46"), Err(NameError::NoJoint));
+        assert_eq!(parse("0..255"), Err(NameError::TooLong));
     }
 
     #[test]

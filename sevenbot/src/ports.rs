@@ -9,7 +9,7 @@ use serialport::SerialPortType;
 use crate::arm::{Arm, ArmOptions};
 use crate::error::OpenError;
 use crate::identity::Identity;
-use crate::span::Span;
+use host_link::Span;
 
 /// Eight registers take 2 ms at 115,200 baud and 25 ms at 9,600 baud. USB adapters add up to 16 ms in each direction.
 const PROBE_TIMEOUT: Duration = Duration::from_millis(200);

@@ -14,9 +14,8 @@ use protocol_core::registers::{Access, Joint, Range, Register, Unit};
 use crate::health::{ALARM_BITS, FAULT_BITS};
 use crate::map21_text;
 use crate::names::name_of_register;
-use crate::snapshot::Snapshot;
-use crate::span::Span;
 use crate::units::Speed;
+use host_link::{Snapshot, Span};
 
 /// The text of one value: one register, or several that form one number.
 ///

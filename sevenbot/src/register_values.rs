@@ -4,7 +4,7 @@ use protocol_core::registers::map21::find_readable;
 
 use crate::names::name_of_register;
 use crate::register_text::range;
-use crate::span::Span;
+use host_link::Span;
 
 /// Why numbers are no values of registers. Nothing was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

@@ -9,12 +9,10 @@ use protocol_core::registers::map21::Map;
 
 use crate::fine_angle::FineAngle;
 use crate::fine_state::FineState;
-use crate::frame_port::Received;
 use crate::identity::Firmware;
 use crate::map_view::{MapView, REPORTS};
-use crate::snapshot::Snapshot;
-use crate::span::Span;
 use crate::units::Angle;
+use host_link::{Snapshot, Span};
 
 /// Reports kept until the caller takes them: 20 s at the highest rate (D14). The oldest are dropped first.
 const REPORTS_KEPT: usize = 1_000;
@@ -77,13 +75,9 @@ impl Report {
 pub(crate) struct ReportQueue(VecDeque<Report>);
 
 impl ReportQueue {
-    /// Keeps a frame that arrived at `now` if it is a report.
-    pub(crate) fn keep(&mut self, received: &Received, view: MapView, now: Instant) {
-        let report = match (received, view.map) {
-            (Received::Reply(report), Map::V22) | (Received::Report(report), Map::V21) => report,
-            _ => return,
-        };
-        if !view.reports().contains(&report.span()) {
+    /// Keeps a report that arrived at `now`, if it is one of this arm.
+    pub(crate) fn keep(&mut self, map: Map, report: &Snapshot, view: MapView, now: Instant) {
+        if map != view.map || !view.reports().contains(&report.span()) {
             return;
         }
         if self.0.len() >= REPORTS_KEPT {

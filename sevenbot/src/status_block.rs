@@ -9,7 +9,7 @@ use protocol_core::registers::map::{
 
 use crate::arm::{Arm, STATUS};
 use crate::error::Error;
-use crate::snapshot::Snapshot;
+use host_link::Snapshot;
 
 /// The status block at one instant.
 ///

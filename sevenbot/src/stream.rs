@@ -11,7 +11,10 @@
 use std::time::{Duration, Instant};
 
 use protocol_core::registers::Joint;
-use protocol_core::registers::map::{FINE_TARGET, SET_POINT_PERIOD, WATCHDOG_ACTION, fault};
+use protocol_core::registers::map::{
+    FEEDBACK_FREQUENCY, FINE_TARGET, HOST_WATCHDOG, REPORT_CONTENT, SET_POINT_PERIOD, SPEED, WATCHDOG_ACTION,
+    fault,
+};
 
 use crate::arm::Arm;
 use crate::checked_write::{NotTaken, WriteError};
@@ -19,7 +22,8 @@ use crate::error::Error;
 use crate::fine::fine_frames;
 use crate::fine_state::FineTargets;
 use crate::health::{MoveCheck, MoveCheckError, MoveState};
-use crate::span::Span;
+use crate::units::Speed;
+use host_link::Span;
 
 mod pace;
 
@@ -29,6 +33,10 @@ pub use pace::{PaceCounts, StreamPace};
 const STREAM_REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &WATCHDOG_ACTION);
 /// No stream, no watchdog.
 const SWITCHED_OFF: [u8; 4] = [0; 4];
+/// The unit of the watchdog's time.
+const WATCHDOG_STEP: Duration = Duration::from_millis(10);
+/// The watchdog acts at the control cycle after its time, and a USB adapter delays the last frame.
+const WATCHDOG_MARGIN: Duration = Duration::from_millis(50);
 
 /// What the watchdog of the arm does when the host is silent (D24).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -252,18 +260,49 @@ impl Drop for SetPointStream<'_> {
 
 impl Arm {
     /// Switches off period and watchdog of a stream whose program is gone: the watchdog has acted, and no program has
-    /// written it since. Otherwise it would stop the moves of programs that do not send all the time. Returns whether
-    /// there was such a stream.
+    /// written it since. Otherwise it would stop the moves of programs that do not send all the time. Its reports are
+    /// switched off, too, and speeds that it left at the maximum get their default: without points, the next target would
+    /// be approached at 372 degrees/s. Returns whether there was such a stream.
     ///
     /// # Errors
     /// As [`Arm::write_checked`]: the period or the watchdog may still be on.
     pub fn end_abandoned_stream(&mut self) -> Result<bool, WriteError> {
         let is_abandoned = is_left_behind(self)? && self.has_extended_block()?;
         if is_abandoned {
+            put_speeds_right(self)?;
             self.write_checked(STREAM_REGISTERS.address(), &SWITCHED_OFF)?;
         }
         Ok(is_abandoned)
     }
+
+    /// Sends nothing until a watchdog that is set has acted, if no other program keeps it from that (D24). Then
+    /// [`Arm::end_abandoned_stream`] finds the stream of a program that was killed a moment ago. Without a watchdog it does
+    /// not wait.
+    ///
+    /// # Errors
+    /// As [`Arm::read`].
+    pub fn let_watchdog_act(&mut self) -> Result<(), Error> {
+        if !self.has_extended_block()? || is_left_behind(self)? {
+            return Ok(());
+        }
+        let steps = self.read_span(Span::of(&HOST_WATCHDOG))?.byte(&HOST_WATCHDOG);
+        if steps > 0 {
+            self.sleep(WATCHDOG_STEP * u32::from(steps) + WATCHDOG_MARGIN);
+        }
+        Ok(())
+    }
+}
+
+/// Sets speeds at the maximum to their default, and switches reports off.
+fn put_speeds_right(arm: &mut Arm) -> Result<(), WriteError> {
+    let mut speeds = arm.read_span(Span::of(&SPEED))?.values;
+    for (speed, default) in speeds.iter_mut().zip(SPEED.default_bytes()) {
+        if *speed == Speed::MAXIMUM.steps() {
+            *speed = default;
+        }
+    }
+    let no_reports = [FEEDBACK_FREQUENCY, REPORT_CONTENT].map(|row| (row.address, vec![0]));
+    arm.write_all_checked(&[&[(SPEED.address, speeds)][..], &no_reports].concat())
 }
 
 /// Has the watchdog acted, and was not written since?

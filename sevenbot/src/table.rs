@@ -6,7 +6,7 @@ use protocol_core::registers::map::BAUD_RATES;
 use protocol_core::registers::map21::find_readable;
 use protocol_core::registers::{Access, JOINTS, MAP, MAP_21, Map, Range, Region, Register};
 
-use crate::span::Span;
+use host_link::Span;
 
 /// The rows that are settings: writable, and kept without power. The offsets are those of map 2.2.
 pub fn settings() -> impl Iterator<Item = &'static Register> {

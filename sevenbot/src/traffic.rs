@@ -7,11 +7,10 @@
 //!
 //! A read and its answer start with the same bytes. Both directions are tried; only one has a valid checksum.
 
-use protocol_core::request::Request;
+use host_link::{HostEvent, Snapshot};
+use protocol_core::registers::Map;
 use protocol_core::wire::frame::{self, Defect, Direction, Frame, MAX_LENGTH, ParseOutcome};
 use protocol_core::wire::{Function, ToArm, ToHost};
-
-use crate::snapshot::Snapshot;
 
 /// A frame or noise on the line.
 ///
@@ -90,21 +89,28 @@ impl Traffic {
             Function::Alarm => Self::Alarm { level: address, kind: count },
         }
     }
-}
 
-impl From<&Request<'_>> for Traffic {
-    fn from(request: &Request<'_>) -> Self {
-        match *request {
-            Request::Read { address, count } => Self::Read { address, count },
-            Request::Write { address, values } => Self::Write { address, values: values.to_vec() },
-            Request::WriteMap21 { address, values } => Self::WriteMap21 { address, values: values.to_vec() },
+    /// The request in the bytes that a link sends: one frame.
+    #[must_use]
+    pub fn sent(frame: &[u8]) -> Option<Self> {
+        match frame::parse::<ToArm>(frame) {
+            ParseOutcome::Complete(frame, _) => Some(Self::from_frame::<ToArm>(&frame)),
+            _ => None,
         }
     }
-}
 
-impl From<&Snapshot> for Traffic {
-    fn from(answer: &Snapshot) -> Self {
-        Self::Answer { address: answer.address, values: answer.values.clone() }
+    /// The frame that a link received; `None` for events without a good frame.
+    #[must_use]
+    pub fn received(event: &HostEvent) -> Option<Self> {
+        let (function, Snapshot { address, values }) = match event {
+            HostEvent::Reply(_, values) | HostEvent::Report(Map::V22, values) => (Function::Read, values),
+            HostEvent::Report(Map::V21, values) => (Function::Report, values),
+            HostEvent::Unmatched(function, values) => (*function, values),
+            HostEvent::Alarm(alarm) => return Some(Self::Alarm { level: alarm.level, kind: alarm.kind }),
+            _ => return None,
+        };
+        let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
+        Some(Self::from_frame::<ToHost>(&Frame { function, address: *address, count, data: values }))
     }
 }
 
@@ -200,6 +206,7 @@ fn parse_direction<D: Direction>(bytes: &[u8]) -> LeadingBytes {
 mod tests {
     use super::*;
     use protocol_core::request::Reply;
+    use protocol_core::request::Request;
     use protocol_core::wire::FrameBuffer;
 
     const READ: &[u8] = b"\xaa\x77\x03\x36\x07\x81\xce";

@@ -19,9 +19,8 @@ use protocol_core::registers::{Map, Register};
 use crate::map21_text;
 use crate::names::name_of;
 use crate::register_text::entries;
-use crate::snapshot::Snapshot;
-use crate::span::Span;
 use crate::traffic::Traffic;
+use host_link::{Snapshot, Span};
 
 /// A read of more rows shows only the first and the last.
 const MAX_ROWS_NAMED: usize = 3;

@@ -3,6 +3,8 @@
 mod served;
 
 use std::io::{ErrorKind, Read, Write};
+use std::path::Path;
+use std::process::Output;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -153,6 +155,32 @@ fn the_program_itself_works_through_the_server_and_ctrl_c_removes_the_links() {
     send_signal(&served.server, Signal::INT);
     assert!(wait_for_exit(&mut served.server).success());
     assert!(!path.exists() && !path.is_symlink());
+}
+
+#[test]
+fn a_second_server_leaves_the_link_and_the_arm_to_the_first() {
+    let served = Served::start(1, &[]);
+    let (link, other) = (served.folder.path().join("a"), served.folder.path().join("other"));
+    let target = std::fs::read_link(&link).expect("a link");
+    let serve = |arm: &Path, link: &Path| {
+        let mut tool = tool();
+        tool.arg("--port").arg(arm).args(["serve", "--pty"]).arg(link);
+        let output = tool.output().expect("the tool runs");
+        (output.status.code(), all_of(&output))
+    };
+    let (status, said) = serve(Path::new("./none"), &link);
+    assert_eq!(status, Some(1), "{said}");
+    assert!(said.contains("leads to /dev/pts/") && !said.contains("ready"), "{said}");
+    let (status, said) = serve(&served.folder.path().join("arm"), &other);
+    assert_eq!(status, Some(3), "{said}");
+    assert!(said.contains("another program has this port open") && said.contains("sevenbot serve"), "{said}");
+    assert!(!said.contains("ready") && !other.is_symlink(), "{said}");
+    assert_eq!(std::fs::read_link(&link).expect("a link"), target);
+    assert_eq!(served.open("a").register(DEVICE_CODE), 7);
+}
+
+fn all_of(output: &Output) -> String {
+    [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes)).concat()
 }
 
 #[test]

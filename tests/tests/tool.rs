@@ -50,6 +50,10 @@ fn get_shows_registers_by_name_number_and_range() {
         assert_eq!(lines.len(), 6);
         let raw = succeeded(arm.sevenbot(&["get", "--raw", "28..29"]));
         assert_eq!(words(&raw, "28"), ["28", "eeprom-lock", "0x01"]);
+        let all = succeeded(arm.sevenbot(&["get", "0..255", "--raw"]));
+        assert_eq!((all.lines().count(), words(&all, "255")[0]), (256, "255"));
+        let status = succeeded(arm.sevenbot(&["get", "status-version..255"]));
+        assert_eq!(words(&status, "240")[1], "status-version");
     });
 }
 
@@ -83,7 +87,7 @@ fn set_reports_the_lock_and_opens_it_on_request() {
 fn set_reports_values_out_of_range() {
     with_arm(TestSetup::any(), |arm| {
         let before = arm.read(TARGET_POSITION, 7);
-        let text = failed(&arm.sevenbot(&["set", "target-position.3", "181"]), 1);
+        let text = failed(&arm.sevenbot(&["set", "target-position.3", "181"]), 2);
         assert!(text.contains("target-position.3 takes 0 to 180"), "{text}");
         let pose = ["set", "target", "--raw", "10", "20", "30", "40", "50", "60", "200"];
         let text = failed(&arm.sevenbot(&pose), 1);
@@ -91,6 +95,32 @@ fn set_reports_values_out_of_range() {
         assert_eq!(text.matches("error:").count(), 1, "one error for all seven: {text}");
         assert_eq!(arm.read(TARGET_POSITION, 7), before);
     });
+}
+
+#[test]
+fn set_asks_before_the_arm_falls() {
+    with_arm(TestSetup::any().supported(), |arm| {
+        for register in ["motor-state", "28..29"] {
+            let values: &[&str] = if register == "motor-state" { &["2"] } else { &["1", "0"] };
+            let text = failed(&arm.sevenbot(&[&["set", register], values].concat()), 2);
+            assert!(text.contains("unless you hold it") && text.contains("--yes"), "{text}");
+            assert_eq!(arm.register(MOTOR_STATE), 1);
+        }
+        succeeded(arm.sevenbot(&["set", "motor-state", "2", "--yes"]));
+        assert_eq!(arm.register(MOTOR_STATE), 2);
+        succeeded(arm.sevenbot(&["set", "motor-state", "0"]));
+        succeeded(arm.sevenbot(&["set", "motor-state", "1"]));
+    });
+}
+
+#[test]
+fn errors_with_json_are_json() {
+    let output = run_without_arm(&["--json", "--port", "/dev/no-such-port", "info"]);
+    assert_eq!(output.status.code(), Some(3));
+    let line = String::from_utf8(output.stderr).expect("text");
+    let error: serde_json::Value = serde_json::from_str(&line).expect(&line);
+    assert!(error["error"].as_str().is_some_and(|text| text.contains("no such port")), "{line}");
+    assert!(error["advice"][0].is_string() && error["status"] == 3, "{line}");
 }
 
 #[test]
@@ -125,12 +155,18 @@ fn pose_moves_the_arm_and_waits() {
         );
         let positions: Vec<u8> = text.split_whitespace().map(|word| word.parse().expect("degrees")).collect();
         assert!(near(positions[0], 120), "{positions:?}");
-        assert_eq!(arm.read(SPEED, 7), [100; 7]);
+        assert_eq!(arm.read(SPEED, 7), [60; 7], "put back after the move");
         arm.wait_for_pose(&[120, 90, 65, 90, 90, 90, 80]);
         succeeded(arm.sevenbot(&["pose", "--wait", "--time", "5", "90", "90", "65", "90", "90", "90", "80"]));
-        assert_eq!(arm.read(SPEED, 7), [0; 7], "speed 0, so that the time applies");
-        assert_eq!(arm.read(TIME, 7), [5; 7]);
+        assert_eq!((arm.read(SPEED, 7), arm.read(TIME, 7)), (vec![60; 7], vec![0; 7]));
         arm.wait_for_pose(&STANDARD_POSE);
+        succeeded(arm.sevenbot(&["home", "--time", "0.5s"]));
+        assert_eq!(
+            arm.read(SPEED, 7),
+            [0; 7],
+            "speed 0, so that the time applies; the program ends before the move"
+        );
+        assert_eq!(arm.read(TIME, 7), [5; 7]);
     });
 }
 

@@ -5,6 +5,8 @@ mod tool_output;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
 
 use system_tests::arm_control::ArmControl;
 use system_tests::process::{Signal, send_signal};
@@ -203,6 +205,71 @@ fn an_interrupted_play_holds_the_arm() {
     });
 }
 
+/// Plays a long recording, and kills the program while it streams.
+fn kill_while_playing(arm: &mut TestArm) {
+    let (_folder, recording) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
+    let arguments = ["play", "--verbose", text(&recording)];
+    let mut tool = arm.spawn_sevenbot_until(&arguments, "-> write fine-target");
+    tool.kill().and_then(|()| tool.wait()).expect("its end");
+}
+
+/// Set-point period, watchdog and its action.
+const STREAM_REGISTERS: u8 = 184;
+
+#[test]
+fn what_a_killed_play_left_is_put_right_by_the_next_move() {
+    with_arm(TestSetup::any(), |arm| {
+        for pause in [Duration::ZERO, Duration::from_secs(1)] {
+            kill_while_playing(arm);
+            // The watchdog acts after 0.3 s. A program that starts before that waits for it.
+            sleep(pause);
+            let output = arm.sevenbot(&["home"]);
+            let said = all_output(&output);
+            assert_eq!(output.status.code(), Some(0), "{said}");
+            assert!(said.contains("a program ended while it streamed"), "{said}");
+            assert_eq!(arm.read(SPEED, 7), [60; 7]);
+            assert_eq!((arm.read(STREAM_REGISTERS, 4), arm.register(FEEDBACK_FREQUENCY)), (vec![0; 4], 0));
+            arm.drain();
+            arm.wait_for_pose(&STANDARD_POSE);
+        }
+        let said = all_output(&arm.sevenbot(&["home", "--wait"]));
+        assert!(!said.contains("ended"), "told once: {said}");
+    });
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_refused_before_anything_moves() {
+    with_arm(TestSetup::any(), |arm| {
+        let (folder, recording) = file("wave.txt", WAVE);
+        let drawing = folder.path().join("wave.svg");
+        fs::write(&drawing, "years").expect("a file");
+        let refused = |arm: &mut TestArm, arguments: &[&str], says: &str| {
+            let said = failed(&arm.sevenbot(arguments), 1);
+            assert!(said.contains(says), "{said}");
+        };
+        let play = ["play", text(&recording), "--plot"];
+        arm.write(VACUUM_PUMP, &[0]);
+        refused(arm, &[&play[..], &["/nonexistent/wave.svg"]].concat(), "/nonexistent/wave.svg");
+        refused(arm, &[&play[..], &[text(&drawing)]].concat(), "the file exists; --force replaces it");
+        refused(arm, &[&play[..], &[text(&recording), "--force"]].concat(), "the file that is read");
+        let plot = ["plot", text(&recording), "--out"];
+        refused(arm, &[&plot[..], &[text(&recording), "--force"]].concat(), "the file that is read");
+        refused(arm, &[&plot[..], &[text(&drawing)]].concat(), "the file exists");
+        refused(arm, &["monitor", "--samples", "1", "--csv", text(&drawing)], "the file exists");
+        refused(arm, &["play", "/dev/zero"], "not a recording");
+        refused(arm, &["restore", "/dev/zero"], "is it the right file?");
+        assert_eq!(fs::read_to_string(&drawing).expect("a file"), "years");
+        assert_eq!(fs::read_to_string(&recording).expect("a file"), WAVE);
+        assert_eq!((arm.read(TARGET_POSITION, 7), arm.register(VACUUM_PUMP)), (STANDARD_POSE.to_vec(), 0));
+        let said = failed(&arm.sevenbot(&["record", "-", "--driven"]), 2);
+        assert!(said.contains("- is no name of a file"), "{said}");
+        let said = failed(&arm.sevenbot(&["play", text(&recording), "--loop=0"]), 2);
+        assert!(said.contains("1 or more"), "{said}");
+        succeeded(arm.sevenbot(&[&plot[..], &[text(&drawing), "--force"]].concat()));
+        assert!(fs::read_to_string(&drawing).expect("a file").ends_with("</svg>\n"));
+    });
+}
+
 #[test]
 fn a_recording_is_complete_up_to_a_lost_connection() {
     with_arm(TestSetup::any().needs(Need::Kill), |arm| {
@@ -275,7 +342,7 @@ fn keys_move_the_arm_during_a_recording() {
         let arguments = ["record", text(&recording), "--driven", "--port", port.to_str().expect("UTF-8")];
         let mut terminal = Terminal::run(sevenbot(), &arguments);
         terminal.wait_for("moments");
-        terminal.keys("2\x1b[1;2C\x1b[C ");
+        terminal.keys("2\x1b[1;2C\x1b[Cv");
         terminal.wait_for("pump sucks");
         wait_for_moments(&recording, moments(&recording).len() + 40);
         terminal.keys("q");

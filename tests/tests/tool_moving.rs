@@ -48,7 +48,9 @@ fn a_pose_may_contain_steps_and_omit_joints() {
         arm.write(TIME, &[0; 7]);
         succeeded(arm.sevenbot(&["pose", "+20", "_", "-5", ".", "_", "_", "70", "--speed", "100", "--wait"]));
         assert_eq!(arm.read(TARGET_POSITION, 7), [110, 90, 60, 90, 90, 90, 70]);
-        assert_eq!(arm.read(SPEED, 7), [100, 0, 100, 0, 0, 0, 100], "only the speeds of joints that move");
+        assert_eq!((arm.read(SPEED, 7), arm.read(TIME, 7)), (vec![0; 7], vec![0; 7]), "put back");
+        succeeded(arm.sevenbot(&["pose", "_", "_", "+0", ".", "_", "_", "70", "--speed", "100"]));
+        assert_eq!(arm.read(SPEED, 7), [0, 0, 100, 0, 0, 0, 100], "only the speeds of joints that move");
         succeeded(arm.sevenbot(&["pose", "-10", "_", "_", "_", "_", "_", "_", "--wait"]));
         assert_eq!(arm.register(TARGET_POSITION), 100);
         let text = failed(&arm.sevenbot(&["pose", "+81", "_", "_", "_", "_", "_", "1"]), 1);
@@ -173,6 +175,7 @@ fn a_lost_connection_ends_a_wait_with_an_error() {
         let (text, status) = end(tool);
         assert_eq!(status, Some(3), "{text}");
         assert!(text.contains("the connection is gone") && text.contains("was the cable pulled"), "{text}");
+        assert!(text.contains("the arm may be moving"), "{text}");
         assert!(!text.contains("panicked"), "{text}");
     });
 }

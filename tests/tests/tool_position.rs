@@ -84,6 +84,7 @@ fn reach_is_checked_without_an_arm() {
     };
     let text = succeeded(dry(&["0", "185", "50"]));
     assert!(text.contains("straight down") && text.contains("joints"), "{text}");
+    assert!(text.contains("hundredths of a degree miss the point by 0.0"), "{text}");
     let text = failed(&dry(&["0", "250", "280"]), 1);
     assert!(text.contains("With --tool 0 1"), "a direction that works: {text}");
     let text = failed(&dry(&["0", "-200", "100"]), 1);

@@ -5,6 +5,8 @@ mod tool_output;
 use std::fs;
 
 use system_tests::registers::{BAUD_RATE, DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, OFFSET, VACUUM_PUMP};
+use system_tests::simulator::Simulator;
+use system_tests::wait::wait_for;
 use system_tests::{Need, TestSetup, with_arm};
 use tool_output::{failed, run_without_arm, succeeded, words};
 
@@ -22,6 +24,8 @@ fn settings_are_saved_to_a_file_and_restored() {
         let again = failed(&arm.sevenbot(&["backup", file]), 1);
         assert!(again.contains("the file exists") && again.contains("--force"), "{again}");
         assert_eq!(succeeded(arm.sevenbot(&["backup", "-"])), text);
+        let json = succeeded(arm.sevenbot(&["backup", "-", "--json"]));
+        assert!(json.contains("\"settings\":{") && json.contains("\"device-id\":42"), "{json}");
 
         arm.write_setting(DEVICE_ID, &[0, 0, 0, 0, 0, 0, 0, 0, 16]);
         let prompt = failed(&arm.sevenbot(&["restore", file]), 2);
@@ -57,14 +61,37 @@ fn a_file_with_an_error_changes_nothing() {
             assert!(error.contains(expected), "{error}");
         }
         assert_eq!(arm.register(DEVICE_ID), 0);
-        // A file of another arm is restored with a warning.
+        // A file of another arm is restored only on request.
         fs::write(&path, format!("{head}device-id = 9\n")).expect("a file");
-        let output = arm.sevenbot(&["restore", "--yes", &file]);
-        assert!(String::from_utf8_lossy(&output.stderr).contains("this arm has chip"), "{output:?}");
+        let refused = failed(&arm.sevenbot(&["restore", "--yes", &file]), 2);
+        assert!(refused.contains("this arm has chip") && refused.contains("--other-arm"), "{refused}");
+        assert_eq!(arm.register(DEVICE_ID), 0);
+        succeeded(arm.sevenbot(&["restore", "--yes", "--other-arm", &file]));
         assert_eq!(arm.register(DEVICE_ID), 9);
         let error = failed(&arm.sevenbot(&["restore", "--yes", "no-such-file"]), 1);
         assert!(error.contains("no-such-file"), "{error}");
     });
+}
+
+/// A search for a lost rate can be rehearsed on a simulator that hears only its own.
+#[test]
+fn a_lost_baud_rate_is_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let settings = folder.path().join("arm.bin");
+    let simulator = Simulator::start(&["--strict-baud", "--eeprom", settings.to_str().expect("text")]);
+    let port = simulator.ports[0].to_str().expect("text");
+    let run = |arguments: &[&str]| run_without_arm(&[&["--port", port], arguments].concat());
+    succeeded(run(&["baud", "57600"]));
+    simulator.says(&["power", "cycle"]);
+    let lost = failed(&run(&["--timeout", "100", "info"]), 3);
+    assert!(lost.contains("baud --find"), "{lost}");
+    let found = wait_for("the rate is found", || {
+        let output = run(&["baud", "--find"]);
+        // The tool asks for 0.2 s at each rate, which is short on a busy machine.
+        if output.status.success() { Ok(succeeded(output)) } else { Err(failed(&output, 3)) }
+    });
+    assert!(found.contains("now            57600 baud"), "{found}");
+    succeeded(run(&["--baud", "57600", "info"]));
 }
 
 #[test]

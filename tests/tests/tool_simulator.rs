@@ -108,7 +108,9 @@ fn errors_say_what_to_do() {
     assert!(simulator.refuses(&["fault", "list", "3"], 2).contains("'clear'"));
     assert!(simulator.refuses(&["weight", "2000g"], 1).contains("1000 grams"));
     assert!(simulator.refuses(&["hand", "8", "90"], 1).contains("1 to 7"));
-    assert!(simulator.refuses(&["hand", "2", "200"], 1).contains("180"));
+    assert!(simulator.refuses(&["hand", "2", "200"], 2).contains("180"));
+    assert!(simulator.refuses(&["hand", "2", "NaN"], 2).contains("degrees from 0 to 180"));
+    assert!(simulator.refuses(&["speed", "NaN"], 2).contains("0.001 to 1000"));
     assert!(simulator.refuses(&["--control", "/nowhere", "state"], 3).contains("/nowhere"));
     assert!(simulator.refuses(&["--port", "/dev/null", "state"], 3).contains("/dev/null"));
     let alone = tool()
@@ -119,6 +121,19 @@ fn errors_say_what_to_do() {
         .expect("sevenbot runs");
     let said = String::from_utf8_lossy(&alone.stderr);
     assert!(alone.status.code() == Some(3) && said.contains("cargo sim"), "{said}");
+}
+
+#[test]
+fn a_running_simulator_is_found_without_its_port() {
+    let simulator = Simulator::start(&[]);
+    let mut command = tool();
+    command.env("XDG_RUNTIME_DIR", simulator.folder.path()).env_remove("SEVENBOT_PORT").arg("info");
+    let output = command.output().expect("sevenbot runs");
+    let said =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    let port = simulator.ports[0].to_str().expect("text");
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains(&format!("using {port}, the port of the only simulator")), "{said}");
 }
 
 #[test]
@@ -165,7 +180,7 @@ fn virtual_time_stands_advances_exactly_and_goes_at_full_speed() {
     let said = simulator.says(&["speed", "50"]);
     assert!(said.ends_with(", speed 50.0\n"), "{said}");
     assert_eq!(arm.register(EFFECTOR_TYPE), 0);
-    assert!(simulator.refuses(&["speed", "0"], 1).contains("0.001"));
+    assert!(simulator.refuses(&["speed", "0"], 2).contains("0.001"));
     assert!(simulator.refuses(&["advance", "10"], 2).contains("250ms"));
     simulator.says(&["pause"]);
     simulator.says(&["resume"]);

@@ -64,19 +64,18 @@ pub struct Symlink {
 
 /// The lock of a path: an abstract socket, which has no file and which the kernel closes with its process.
 #[derive(Debug)]
-enum LinkLock {
+struct LinkLock {
     /// Another program, or another link of this one, has it.
-    Taken,
-    /// It is ours; `None` if the system gives no such socket.
-    Ours(Option<UnixListener>),
+    is_taken: bool,
+    /// `None` if it is taken, or if the system gives no such socket.
+    _socket: Option<UnixListener>,
 }
 
 impl LinkLock {
     fn new(path: &Path) -> Self {
-        match lock_address(path).and_then(|address| UnixListener::bind_addr(&address)) {
-            Err(error) if error.kind() == io::ErrorKind::AddrInUse => Self::Taken,
-            bound => Self::Ours(bound.ok()),
-        }
+        let bound = lock_address(path).and_then(|address| UnixListener::bind_addr(&address));
+        let is_taken = bound.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::AddrInUse);
+        Self { is_taken, _socket: bound.ok() }
     }
 }
 
@@ -115,7 +114,7 @@ impl Symlink {
 fn take_away(path: &Path, port: &Path, link: &Metadata, lock: &LinkLock) -> Result<(), SymlinkError> {
     let refused = |cause| SymlinkError::Refused { path: path.to_owned(), cause };
     let target = fs::read_link(path).map_err(refused)?;
-    if matches!(lock, LinkLock::Taken) {
+    if lock.is_taken {
         return Err(SymlinkError::InUse { path: path.to_owned(), target });
     }
     if target != port {

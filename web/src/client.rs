@@ -1,28 +1,29 @@
 //! Speaks with an arm: reads its registers again and again, and writes what a person wants.
 //!
 //! ```text
-//!   write, stop ──▶ ┌────────┐ ──▶ bytes to the arm
-//!                   │ Client │
-//!   registers   ◀── └────────┘ ◀── bytes from the arm
+//!   write, stop ──▶ ┌────────┐ ──▶ ┌──────────┐ ──▶ bytes to the arm
+//!                   │ Client │     │ HostLink │
+//!   registers   ◀── └────────┘ ◀── └──────────┘ ◀── bytes from the arm
 //! ```
 //!
 //! Writes have no reply (D6): the registers that are read again show their effect. This file does no input or output.
 
 use std::collections::VecDeque;
 
-use protocol_core::request::{Reply, Request};
+use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId};
+use protocol_core::registers::Map;
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::deframer::gap;
-use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
-use sevenbot::map::{DEVICE_CODE, FINE_TARGET, PROTECTION_VERSION, SERVO_TEMPERATURE, STATUS_VERSION};
+use sevenbot::map::{
+    DEVICE_CODE, FINE_TARGET, PRESENT_POSITION, PROTECTION_VERSION, SERVO_TEMPERATURE, STATUS_VERSION,
+};
 use sevenbot::traffic::Traffic;
 use sevenbot::{Snapshot, Span};
 
 use crate::arm_state::ArmState;
 use crate::stop::{Stop, StopProgress};
 
-/// A read without a reply is lost after this time. A reply at 115,200 baud, through a server, takes a tenth of it.
-const REPLY_TIMEOUT: Duration = Duration::from_millis(400);
+/// A read without a reply is lost after 400 ms. A reply at 115,200 baud, through a server, takes a tenth of it.
+const PATIENCE: Patience = Patience { attempts: 2, timeout: Duration::from_millis(200) };
 /// An arm is gone after this many rounds in which a reply was lost.
 const LOST_ROUNDS: u32 = 3;
 /// How many writes, and frames that were not asked for, are kept to be shown.
@@ -32,7 +33,7 @@ const BAUD: u32 = 115_200;
 
 /// What each round reads.
 const ROUND: [Span; 3] = [
-    Span::between(&DEVICE_CODE, &sevenbot::map::PRESENT_POSITION),
+    Span::between(&DEVICE_CODE, &PRESENT_POSITION),
     Span::between(&FINE_TARGET, &PROTECTION_VERSION),
     Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE),
 ];
@@ -42,13 +43,14 @@ pub type ShownFrame = (Instant, bool, Traffic);
 
 /// One end of the line to an arm.
 pub struct Client {
-    deframer: Deframer<ToHost>,
+    link: HostLink,
     to_send: Vec<u8>,
     /// The last known value of each register.
     registers: Snapshot,
-    /// Reads of this round without a reply, oldest first.
-    awaited: VecDeque<Span>,
-    asked_at: Instant,
+    /// Reads of this round without an end.
+    awaited: Vec<RequestId>,
+    /// Was a reply of this round lost?
+    is_round_lost: bool,
     rounds: u64,
     lost_rounds: u32,
     stop: Stop,
@@ -58,11 +60,11 @@ pub struct Client {
 impl Default for Client {
     fn default() -> Self {
         Self {
-            deframer: Deframer::new(gap(BAUD)),
+            link: HostLink::new(LinkOptions { baud: BAUD, reports: &[] }),
             to_send: Vec::new(),
             registers: Snapshot { address: 0, values: vec![0; 256] },
-            awaited: VecDeque::new(),
-            asked_at: Instant::ZERO,
+            awaited: Vec::new(),
+            is_round_lost: false,
             rounds: 0,
             lost_rounds: 0,
             stop: Stop::default(),
@@ -112,9 +114,8 @@ impl Client {
         if self.stop.progress() != StopProgress::Verifying {
             self.stop = Stop::default();
         }
-        let request = Request::Write { address, values };
-        self.show(now, true, Traffic::from(&request));
-        self.encode(&request);
+        self.show(now, true, Traffic::Write { address, values: values.to_vec() });
+        self.link.write(Map::V22, address, values);
     }
 
     /// Lets every joint hold where it is. [`Client::stop_progress`] tells whether the arm took it.
@@ -124,35 +125,37 @@ impl Client {
 
     /// Takes bytes of the arm; none if its line is silent at `now`.
     pub fn receive(&mut self, now: Instant, bytes: &[u8]) {
-        let mut rest = bytes;
+        self.link.bytes(now, bytes);
+        self.advance(now);
+    }
+
+    /// Takes what has happened on the link.
+    fn advance(&mut self, now: Instant) {
         loop {
-            let taken = self.deframer.push(now, rest);
-            let is_done = rest.is_empty();
-            while let Some(content) = pull(&mut self.deframer) {
-                self.take(now, content);
-            }
-            rest = rest.get(taken..).unwrap_or_default();
-            if is_done || rest.is_empty() {
-                return;
+            match self.link.poll(now) {
+                HostEvent::Wait(_) => return,
+                HostEvent::Send(frame) => self.to_send.extend(frame),
+                HostEvent::Reply(id, values) => {
+                    self.registers.put(&values);
+                    self.end_read(now, id);
+                }
+                HostEvent::NoReply(id, _) => {
+                    self.is_round_lost = true;
+                    self.end_read(now, id);
+                }
+                other => Traffic::received(&other).into_iter().for_each(|it| self.show(now, false, it)),
             }
         }
     }
 
-    fn take(&mut self, now: Instant, content: Result<Snapshot, Traffic>) {
-        let reply = match content {
-            Ok(reply) => reply,
-            Err(other) => return self.show(now, false, other),
-        };
-        let span = reply.span();
-        let Some(index) = self.awaited.iter().position(|&awaited| awaited == span) else {
-            return self.show(now, false, Traffic::from(&reply));
-        };
-        self.awaited.drain(..=index);
-        let first = usize::from(reply.address);
-        if let Some(known) = self.registers.values.get_mut(first..first + reply.values.len()) {
-            known.copy_from_slice(&reply.values);
+    fn end_read(&mut self, now: Instant, id: RequestId) {
+        self.awaited.retain(|&awaited| awaited != id);
+        if !self.awaited.is_empty() {
+            return;
         }
-        if self.awaited.is_empty() {
+        if self.is_round_lost {
+            self.lost_rounds += 1;
+        } else {
             self.rounds += 1;
             self.lost_rounds = 0;
             self.continue_stop(now);
@@ -169,24 +172,13 @@ impl Client {
 
     /// Begins a new round of reads if the last one is over. Returns the bytes for the arm.
     pub fn poll(&mut self, now: Instant) -> Vec<u8> {
-        if !self.awaited.is_empty() && now >= self.asked_at + REPLY_TIMEOUT {
-            self.awaited.clear();
-            self.lost_rounds += 1;
-        }
+        self.advance(now);
         if self.awaited.is_empty() {
-            self.asked_at = now;
-            for span in ROUND {
-                self.encode(&Request::Read { address: span.address(), count: span.count() });
-                self.awaited.push_back(span);
-            }
+            self.is_round_lost = false;
+            self.awaited = ROUND.map(|span| self.link.read(span, PATIENCE)).to_vec();
+            self.advance(now);
         }
         std::mem::take(&mut self.to_send)
-    }
-
-    fn encode(&mut self, request: &Request<'_>) {
-        let mut frame = FrameBuffer::new();
-        request.encode(&mut frame);
-        self.to_send.extend_from_slice(&frame);
     }
 
     fn show(&mut self, now: Instant, is_to_arm: bool, traffic: Traffic) {
@@ -194,16 +186,5 @@ impl Client {
             self.frames.pop_front();
         }
         self.frames.push_back((now, is_to_arm, traffic));
-    }
-}
-
-/// The next frame that holds something: a reply, or another frame in words.
-fn pull(deframer: &mut Deframer<ToHost>) -> Option<Result<Snapshot, Traffic>> {
-    loop {
-        // A damaged frame is as good as a lost one.
-        let Ok(frame) = deframer.pull()? else { continue };
-        let reply = Reply::from_frame(frame);
-        let reply = reply.map(|it| Snapshot { address: it.address, values: it.values.to_vec() });
-        return Some(reply.ok_or_else(|| Traffic::from_frame::<ToHost>(&frame)));
     }
 }

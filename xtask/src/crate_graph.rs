@@ -35,7 +35,19 @@ const GROUPS: [Group; 3] = [
             "sevenbot-web",
         ],
     ),
-    ("proof", &["browser-tests", "flash-model", "replay", "system-tests", "torture", "xtask"]),
+    (
+        "proof",
+        &[
+            "browser-tests",
+            "emulator",
+            "flash-model",
+            "linked-image",
+            "replay",
+            "system-tests",
+            "torture",
+            "xtask",
+        ],
+    ),
     ("measurement", &["bench", "footprint", "peers"]),
 ];
 

@@ -4,9 +4,9 @@
 use std::fs;
 
 use crate::budget::{self, Figure};
-use crate::elf::Program;
 use crate::run::{ANSWER, CHIP, ChipProgram, IMAGE, SMALL, TaskResult, link, run};
-use crate::stack::{CallGraph, Depth};
+use linked_image::Program;
+use linked_image::{CallGraph, Depth};
 
 /// The start of RAM (RM0090, section 2.3). Flash is below.
 const RAM: u64 = 0x2000_0000;

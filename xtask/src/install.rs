@@ -2,8 +2,8 @@
 
 use std::process::{Command, Stdio};
 
-use crate::emulate::QEMU;
 use crate::run::{BROWSER, CHIP, TaskResult, run};
+use emulator::QEMU;
 
 /// A program that Rust does not include.
 struct Tool {

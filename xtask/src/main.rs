@@ -10,13 +10,10 @@ mod coverage;
 mod crate_graph;
 mod decisions;
 mod deny;
-mod elf;
-mod emulate;
 mod footprint;
 mod fuzz;
 mod generated;
 mod install;
-mod jump_table;
 mod modules;
 mod mujoco;
 mod no_panic;
@@ -28,12 +25,10 @@ mod replays;
 mod run;
 mod sag;
 mod size;
-mod stack;
 mod start_up;
 mod steps;
 mod system_tests;
 mod test;
-mod thumb_decode;
 mod times;
 mod torture;
 mod trials;
@@ -107,7 +102,7 @@ enum Task {
     ///
     /// SIGHUP (`kill -HUP`) switches the arm off and on, SIGUSR2 restarts the chip alone, Ctrl-C ends it. The emulator keeps no
     /// settings: its flash does not change, and the status block reports fault bit 0.
-    Emulate(emulate::EmulateArgs),
+    Emulate(emulator::EmulateArgs),
     /// Measure how far the emulated arm sags during restarts, a panic, noise and a silent servo
     Sag,
     /// Measure what becomes of the emulated arm at walls, after emergency stops, and with a thing in its gripper (ten minutes)
@@ -164,9 +159,19 @@ fn run_task(task: &Task) -> TaskResult {
         Task::StartUp => start_up::check(),
         Task::Count(Accept { accept }) => count::check(*accept),
         Task::Coverage => coverage::check(),
-        Task::Emulate(options) => emulate::run(options),
+        Task::Emulate(options) => emulate(options),
         Task::Sag => sag::measure(),
         Task::Obstacles => obstacles::measure(),
         Task::Bench(options) => peers::run(options),
     }
+}
+
+/// Builds the image and the simulator, and runs them.
+fn emulate(options: &emulator::EmulateArgs) -> TaskResult {
+    if !options.no_build {
+        emulator::need_qemu()?;
+        run::build_image()?;
+        run::build_host_sim()?;
+    }
+    emulator::run(options)
 }

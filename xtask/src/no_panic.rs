@@ -3,8 +3,8 @@
 //! The linker leaves out what nothing refers to. So if the panic handler, or anything of `core` that leads
 //! to it, is in the program, then some line can panic; which one, the debug information says.
 
-use crate::elf::{Program, SourceLine, Symbol};
 use crate::run::{TaskResult, link};
+use linked_image::{Program, SourceLine, Symbol};
 
 /// Packages that may panic. defmt-rtt panics if a log frame begins inside another. This cannot happen, because the logger
 /// runs in a critical section.

@@ -10,9 +10,9 @@ use protocol_core::request::Request;
 use protocol_core::time::Instant;
 use torture::obstacles::{Experiments, ObstacleArm};
 
-use crate::emulate::need_qemu;
 use crate::run::{self, TaskResult};
 use crate::sag::{EmulatedArm, STEP};
+use emulator::need_qemu;
 
 /// Builds the image, makes the experiments and prints their tables.
 pub(crate) fn measure() -> TaskResult {

@@ -2,8 +2,8 @@
 //! chip. Other measurements are programs of `benchmarks/bench`. None has budgets; `count` and `size` have.
 
 use crate::count::{self, NamedCount};
+use crate::footprint;
 use crate::run::{ChipProgram, TaskResult, build_footprint, cargo};
-use crate::{emulate, footprint};
 use torture::text_table::Column::{Left, Right};
 use torture::text_table::TextTable;
 
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &BenchArgs) -> TaskResult {
 }
 
 fn compare() -> TaskResult {
-    emulate::need_qemu()?;
+    emulator::need_qemu()?;
     cargo("run --quiet --release --package bench")?;
     for &(profile, words) in count::PROFILES {
         build_footprint(profile)?;

@@ -15,7 +15,7 @@ const INTRODUCTION: &str = "\
 The maker has two register maps. Function 06 writes map 2.2, function 04 writes map 2.1. Reads are the same for both: an
 address gives the register of map 2.2, or else that of map 2.1. Only 13 to 19 read in the encoding of the last write.
 An address that is in neither table reads 0. One register is one byte. [protocol.md](protocol.md) defines the effect of
-a write, and the decisions D1 to D29 and M1 to M12.
+a write, and the decisions D1 to D30 and M1 to M12.
 
 * **Region**: ROM is fixed for a chip and its firmware. EEPROM survives power cuts and is writable only while
   the EEPROM lock is open. RAM starts from its defaults at every power-up.

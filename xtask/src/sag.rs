@@ -31,9 +31,9 @@ use torture::sag::{
 };
 use torture::seeded_rng::SeededRng;
 
-use crate::emulate::monitor::{self, Monitor};
-use crate::emulate::{HOST_LINK_CONTROL, RECEIVER_ON, need_qemu, servo_socket, start_machine};
 use crate::run::{self, ChildProcess, TaskResult};
+use emulator::monitor::{self, Monitor};
+use emulator::{HOST_LINK_CONTROL, RECEIVER_ON, need_qemu, servo_socket, start_machine};
 
 /// The period of the servo bus and of the samples.
 const SAMPLE_PERIOD: RealTime = RealTime::from_micros(200);

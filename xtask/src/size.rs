@@ -3,8 +3,8 @@
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-use crate::elf::{Program, SourceLine, Symbol};
 use crate::run::{TaskResult, link};
+use linked_image::{Program, SourceLine, Symbol};
 
 /// Functions that the compiler calls to copy, fill and compare more than a few bytes.
 const COPY_FUNCTIONS: &[&str] = &["memcpy", "memmove", "memset", "memclr", "memcmp"];

@@ -7,8 +7,8 @@
 use std::fs;
 use std::process::{Command, Stdio};
 
-use crate::emulate::{QEMU, need_qemu};
 use crate::run::{self, ChildProcess, TaskResult, wait_for};
+use emulator::{QEMU, need_qemu};
 
 /// An access to a register that the emulator lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -98,7 +98,7 @@ pub(crate) fn run(
         execute,
     };
     for (number, stage) in (1..).zip(stages) {
-        let lanes: Vec<_> = stage.iter().map(|lane| selected(lane)).filter(|lane| !lane.is_empty()).collect();
+        let lanes: Vec<_> = stage.iter().map(selected).filter(|lane| !lane.is_empty()).collect();
         if number == stages.len() {
             println!("\n{}", run.table());
         }
@@ -227,7 +227,9 @@ mod tests {
         let ran = Mutex::new(Vec::new());
         let outcome = run(STAGES, scope, |step, output| {
             ran.lock().unwrap().push(step.heading);
-            output.map(|mut output| writeln!(output, "output of {}", step.heading).unwrap());
+            if let Some(mut output) = output {
+                writeln!(output, "output of {}", step.heading).unwrap();
+            }
             (Times { elapsed: Duration::ZERO, processor: None }, (step.act)())
         });
         (outcome.map_err(|why| why.to_string()), ran.into_inner().unwrap())

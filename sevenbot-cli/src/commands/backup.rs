@@ -23,8 +23,9 @@ use crate::write_result::note_restart;
 /// Write the settings of the arm to a file.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Settings keep their value without power: device id, baud rate, offsets, options (register 20; an arm with the
-maker's firmware has none). The file is TOML.
+Settings keep their value without power: device id, baud rate, offsets, options
+(register 20; an arm with the maker's firmware has none). The file is TOML; on
+standard output with --json it is JSON.
 
 Examples:
   sevenbot backup arm-42.toml
@@ -40,8 +41,10 @@ pub(crate) struct BackupArgs {
 /// Write settings from a file to the arm, and verify them.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Shows the changes and asks first. Settings missing in the file keep their value. Settings that the arm's firmware
-lacks are not written, with a warning. Reports of feedback-frequency go on.
+Shows the changes and asks first. A file from another arm, by its chip id, is
+refused without --other-arm: offsets belong to one arm. Settings missing in the
+file keep their value. Settings that the arm's firmware lacks are not written,
+with a warning. Reports of feedback-frequency go on.
 
 Examples:
   sevenbot restore arm-42.toml
@@ -52,14 +55,18 @@ pub(crate) struct RestoreArgs {
     /// Do not ask.
     #[arg(long)]
     yes: bool,
+    /// Write the settings although the file is from another arm.
+    #[arg(long)]
+    other_arm: bool,
 }
 
 pub(crate) fn backup(session: &mut Session, args: &BackupArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let registers = arm.read_span(span())?;
-    let text = SettingsFile::of(&arm, &registers).text()?;
+    let file = SettingsFile::of(&arm, &registers);
+    let text = file.text()?;
     if args.file.as_os_str() == "-" {
-        return session.printer.print_raw(text.as_bytes());
+        return session.printer.print(&file);
     }
     write_whole(&args.file, &text, args.force)?;
     note(format_args!("settings written to {}", args.file.display()));
@@ -96,18 +103,25 @@ pub(crate) fn restore(session: &mut Session, args: &RestoreArgs) -> Result<(), C
     if changes.is_empty() {
         return Ok(());
     }
-    let chip = arm.identity().chip_name();
-    if file.chip_id != chip {
-        warn(format_args!(
-            "the file is from the arm with chip {}, but this arm has chip {chip}",
-            file.chip_id
-        ));
-    }
+    check_chip(&arm, &file, args.other_arm)?;
     confirm("Write these settings?", args.yes)?;
     write(&mut arm, &changed_registers(&changes, &wanted))?;
     note("written and verified");
     note_restart(&arm, changes.iter().map(|change| change.address));
     Ok(())
+}
+
+/// Fails if the file is from another arm, unless that is wanted: offsets belong to one arm.
+fn check_chip(arm: &Arm, file: &SettingsFile, may_differ: bool) -> Result<(), CommandError> {
+    let chip = arm.identity().chip_name();
+    if file.chip_id == chip || may_differ {
+        return Ok(());
+    }
+    Err(CommandError::Usage(format!(
+        "the file is from the arm with chip {}, but this arm has chip {chip}, and offsets belong to one arm: \
+         --other-arm writes them; nothing was written",
+        file.chip_id
+    )))
 }
 
 fn warn_of_missing(arm: &Arm, settings: &[&Register]) {

@@ -18,9 +18,10 @@ use crate::session::Session;
 A new rate applies after the next restart of the arm.
 
 Examples:
-  sevenbot baud                                the rate in use, and the one after a restart
+  sevenbot baud  the rate in use, and the one after a restart
   sevenbot baud 1000000
-  sevenbot --port /dev/ttyUSB0 baud --find     tries all eight rates")]
+  sevenbot --port /dev/ttyUSB0 baud --find
+                 tries all eight rates")]
 pub(crate) struct BaudArgs {
     /// The rate after the next restart.
     #[arg(value_parser = rate)]

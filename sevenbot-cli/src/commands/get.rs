@@ -5,21 +5,24 @@ use std::io::{self, Write};
 use clap::Args;
 use serde::Serialize;
 use serde_json::Value;
-use sevenbot::names::{self, name_of_register};
+use sevenbot::names::{self, NameError, name_of_register};
 use sevenbot::register_text::{RegisterEntry, entries, raw_entries};
 use sevenbot::{Arm, Span};
 
 use crate::command_error::CommandError;
 use crate::printer::Printable;
+use crate::register_parser::RegisterParser;
 use crate::session::Session;
 
 /// Help text about register names.
 pub(crate) const NAMES: &str = "\
-Register names are those of docs/registers.md, in any case, with - or _, and may be shortened while they
-are unique. .3 selects joint 3. A number is an address, A..B a range.
+Register names are those of docs/registers.md, in any case, with - or _, and may
+be shortened while they are unique. .3 selects joint 3. A number is an address,
+A..B a range from one name or number to another.
 
-Registers that only map 2.1 has are options (20), 61 to 66, 68 to 73 and 82 to 97. An arm with the maker's
-firmware 2.2 has none of them, and only this project's firmware has options.";
+Registers that only map 2.1 has are options (20), 61 to 66, 68 to 73 and 82 to
+97. An arm with the maker's firmware 2.2 has none of them, and only this
+project's firmware has options.";
 
 /// Show registers.
 #[derive(Debug, Args)]
@@ -32,17 +35,31 @@ Examples:
   sevenbot get status-version..255 --json"))]
 pub(crate) struct GetArgs {
     /// Names, numbers or ranges of registers.
-    #[arg(required = true, value_name = "REGISTER", value_parser = names::parse)]
-    registers: Vec<Span>,
+    #[arg(required = true, value_name = "REGISTER", value_parser = RegisterParser(spans), hide_possible_values = true)]
+    registers: Vec<Spans>,
     /// Show the bytes as they are.
     #[arg(long)]
     raw: bool,
 }
 
+/// Registers in one read or, for the whole map, in two.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Spans(Vec<Span>);
+
+fn spans(text: &str) -> Result<Spans, NameError> {
+    match names::parse(text) {
+        // One frame cannot read all 256 registers.
+        Err(NameError::TooLong) => {
+            Ok(Spans(Span::new(0, u8::MAX).into_iter().chain([Span::one(u8::MAX)]).collect()))
+        }
+        parsed => parsed.map(|span| Spans(vec![span])),
+    }
+}
+
 pub(crate) fn run(session: &mut Session, args: &GetArgs) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let mut shown = Vec::new();
-    for &span in &args.registers {
+    for &span in args.registers.iter().flat_map(|Spans(spans)| spans) {
         if !args.raw {
             check_served(&arm, span)?;
         }

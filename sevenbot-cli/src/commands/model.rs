@@ -1,12 +1,12 @@
 //! `model`: the arm's model for robotics programs, to standard output or a file.
 
-use std::fs;
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
 use crate::command_error::CommandError;
+use crate::output_file::{ForceArg, OutputFile};
 
 /// Write the arm's model: URDF, MJCF or glTF.
 #[derive(Debug, Args)]
@@ -16,12 +16,14 @@ Examples:
   sevenbot model --format mjcf --out 7bot.xml
   sevenbot model --format glb --out 7bot.glb
 
-Needs no arm. Metres and radians; x forward, y to the left, z up (REP-103). All joints are 0 in the pose 90
-90 65 90 90 90: an angle is (register - zero) degrees. The dimensions are exact, the shapes are symbolic, and
-masses are not measured. Joint 7, the claw, moves no point and is left out.
+Needs no arm. Metres and radians; x forward, y to the left, z up (REP-103). All
+joints are 0 in the pose 90 90 65 90 90 90: an angle is (register - zero)
+degrees. The dimensions are exact, the shapes are symbolic, and masses are not
+measured. Joint 7, the claw, moves no point and is left out.
 
-The arm has a parallelogram. MJCF closes it by an equality constraint. URDF cannot: there, the elbow is computed
-from joint 2 by a mimic joint, and joint 3 turns the forearm from the horizontal, as in the arm. glTF shows the
+The arm has a parallelogram. MJCF closes it by an equality constraint. URDF
+cannot: there, the elbow is computed from joint 2 by a mimic joint, and joint
+3 turns the forearm from the horizontal, as in the arm. glTF shows the
 straight pose.")]
 pub(crate) struct ModelArgs {
     /// The format.
@@ -30,6 +32,8 @@ pub(crate) struct ModelArgs {
     /// The file to write; standard output if not given.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    force: ForceArg,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -55,7 +59,7 @@ impl ModelFormat {
 pub(crate) fn run(args: &ModelArgs) -> Result<(), CommandError> {
     let bytes = args.format.bytes()?;
     if let Some(path) = &args.out {
-        return fs::write(path, bytes).map_err(|error| CommandError::file(path, error));
+        return OutputFile::open(path, None, args.force)?.write(&bytes);
     }
     let mut stdout = io::stdout();
     if args.format == ModelFormat::Glb && stdout.is_terminal() {

@@ -18,19 +18,24 @@ use crate::watch::Watch;
 /// degrees, the motors hold the arm again, and the command fails.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Without angles the arm goes to the pose that was kept for it with --keep, or else to the standard park pose: rear arm upright,
-forearm folded up, tool pointing up (joint 2 at 90, joint 3 at 0, joint 4 at 90, joint 5 at 48 degrees; the others stay). There
-friction holds every joint of an arm with an empty gripper. Make sure that nothing is above and behind the arm.
+Without angles the arm goes to the pose that was kept for it with --keep, or
+else to the standard park pose: rear arm upright, forearm folded up, tool
+pointing up (joint 2 at 90, joint 3 at 0, joint 4 at 90, joint 5 at 48 degrees;
+the others stay). There friction holds every joint of an arm with an empty
+gripper. Make sure that nothing is above and behind the arm.
 
-Damping and not forceless: a joint that is loaded after all sinks slowly, is noticed, and is held again.
+Damping and not forceless: a joint that is loaded after all sinks slowly, is
+noticed, and is held again.
 
-A kept pose belongs to one arm, by its chip id. It is a line in $XDG_CONFIG_HOME/7bot/park-poses, or in
-~/.config/7bot/park-poses; on Windows in %APPDATA%\\7bot\\park-poses.
+A kept pose belongs to one arm, by its chip id. It is a line in
+$XDG_CONFIG_HOME/7bot/park-poses, or in ~/.config/7bot/park-poses; on Windows in
+%APPDATA%\\7bot\\park-poses.
 
 Examples:
   sevenbot park
-  sevenbot park _ 95 20 90 60 _ _ --keep         this arm parks here from now on
-  sevenbot park --standard                       the standard pose, although another one is kept
+  sevenbot park _ 95 20 90 60 _ _ --keep
+                            this arm parks here from now on
+  sevenbot park --standard  the standard pose, although another one is kept
 
 `sevenbot state servo` makes the arm hold again, where it is.
 
@@ -56,7 +61,7 @@ fn angle(text: &str) -> Result<Option<FineAngle>, String> {
 }
 
 pub(crate) fn run(session: &mut Session, args: &ParkArgs) -> Result<(), CommandError> {
-    let mut arm = session.connect()?;
+    let mut arm = session.connect_to_move()?;
     let pose = pose(&arm, args)?;
     let parked =
         hold_on_interrupt(&mut arm, |arm, interrupt| Ok(arm.park(pose, &mut Watch::new(interrupt))?))?;

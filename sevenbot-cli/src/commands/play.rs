@@ -4,12 +4,11 @@
 //!   file ──▶ check ──▶ Player ──▶ measured positions ──▶ plot
 //! ```
 
-use std::fs;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, value_parser};
+use clap::Args;
 use serde::Serialize;
 use sevenbot::Arm;
 use sevenbot::approach::ApproachRule;
@@ -19,7 +18,9 @@ use sevenbot::recording::Recording;
 use crate::approach_args::ApproachArgs;
 use crate::command_error::CommandError;
 use crate::guard_args::{GuardArgs, warn_of};
+use crate::input_file;
 use crate::interrupt::hold_on_interrupt;
+use crate::output_file::{ForceArg, OutputFile};
 use crate::plot::{self, Track};
 use crate::printer::Printable;
 use crate::session::Session;
@@ -33,31 +34,35 @@ use crate::watch::{Watch, note_rounding_of};
 #[command(after_help = "\
 Examples:
   sevenbot play wave.txt
-  sevenbot play wave.txt --approach 3          goes to the first pose in 3 s
-  sevenbot play wave.txt --speed 0.5 --loop=3
-  sevenbot play wave.txt --plot wave.svg       plots targets and measured positions
+  sevenbot play wave.txt --approach 3     goes to the first pose in 3 s
+  sevenbot play wave.txt --speed 0.5x --loop=3
+  sevenbot play wave.txt --plot wave.svg  plots targets and measured positions
 
-An arm with this project's firmware gets a point in hundredths of a degree each 20 ms, and its watchdog makes it
-hold if this program dies. Others get whole degrees and speeds each 50 ms.
+An arm with this project's firmware gets a point in hundredths of a degree each
+20 ms, and its watchdog makes it hold if this program dies. Others get whole
+degrees and speeds each 50 ms.
 
-A first pose within 5 degrees is approached at 30 degrees per second. Further away it is refused with the distance of each
-joint, unless --approach goes there first; with --loop, the same holds for the way from the last pose to the first.
+A first pose within 5 degrees is approached at 30 degrees per second. Further
+away it is refused with the distance of each joint, unless --approach goes there
+first; with --loop, the same holds for the way from the last pose to the first.
 
-A recording that leads below the table or into the base is played with a warning; `sevenbot move-to --help` describes
-this guard.")]
+A recording that leads below the table or into the base is played with a
+warning; `sevenbot move-to --help` describes this guard.")]
 pub(crate) struct PlayArgs {
-    /// A recording of `sevenbot record`, or one written by hand.
+    /// A recording of `sevenbot record`, or one written by hand; - is standard input.
     file: PathBuf,
-    /// Speed factor, 0.1 to 10.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
+    /// Speed as a factor, 0.1x to 10x.
+    #[arg(long, value_name = "FACTOR", default_value = "1x", value_parser = factor)]
     speed: f64,
     /// Repeat without end, or N times in all.
-    #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0",
-          value_parser = value_parser!(u32))]
+    #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true,
+          default_missing_value = ENDLESS, value_parser = times)]
     times: Option<u32>,
     /// Write an SVG plot of the targets and the measured positions of the first run.
     #[arg(long, value_name = "SVG")]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    force: ForceArg,
     #[command(flatten)]
     approach: ApproachArgs,
     #[command(flatten)]
@@ -81,19 +86,20 @@ impl Printable for Played {
 
 pub(crate) fn run(session: &mut Session, args: &PlayArgs) -> Result<(), CommandError> {
     let recording = load(args)?;
+    // Before anything moves.
+    let drawn = args.plot.as_ref().map(|path| OutputFile::open(path, Some(&args.file), args.force));
+    let drawn = drawn.transpose()?;
     if let Some(breach) = args.guard.guard().and_then(|guard| guard.check_recording(&recording).err()) {
         warn_of(&breach);
     }
-    let mut arm = session.connect()?;
+    let mut arm = session.connect_to_move()?;
     arm.driven_joints()?;
     note_rounding_of(&recording, &mut arm)?;
     let mut player = Player::new(&recording, args.speed).with_approach(args.approach.rule());
     let done = play(&mut player, &mut arm, args.times.unwrap_or(1));
-    if let Some(path) = &args.plot {
-        let svg = drawing(&recording, &player, args);
-        fs::write(path, svg).map_err(|error| CommandError::file(path, error))?;
-    }
+    let drawn = drawn.map_or(Ok(()), |file| file.write(drawing(&recording, &player, args).as_bytes()));
     done?;
+    drawn?;
     let seconds = recording.duration().as_secs_f64() / args.speed;
     session.printer.print(&Played { times: player.played(), seconds })
 }
@@ -110,15 +116,30 @@ fn play(player: &mut Player, arm: &mut Arm, times: u32) -> Result<(), CommandErr
 
 /// Reads the recording, and checks that an arm can follow it.
 fn load(args: &PlayArgs) -> Result<Recording, CommandError> {
-    let text = fs::read_to_string(&args.file).map_err(|error| CommandError::file(&args.file, error))?;
-    let recording = Recording::parse(&text);
-    let checked = recording.and_then(|recording| recording.check_speeds(args.speed).map(|()| recording));
-    checked.map_err(|error| CommandError::file(&args.file, error))
+    let recording = input_file::recording(&args.file)?;
+    recording.check_speeds(args.speed).map_err(|error| CommandError::file(&args.file, error))?;
+    Ok(recording)
 }
 
-fn factor(text: &str) -> Result<f64, String> {
-    let factor = text.parse().ok().filter(|factor| (0.1..=10.0).contains(factor));
-    factor.ok_or_else(|| "a number from 0.1 to 10".to_owned())
+/// Parses a factor, as 2x or 2.
+fn factor(text: &str) -> Result<f64, &'static str> {
+    let number = text.strip_suffix('x').unwrap_or(text);
+    let factor = number.parse().ok().filter(|factor| (0.1..=10.0).contains(factor));
+    factor.ok_or("a factor from 0.1 to 10, as 2x or 2")
+}
+
+/// Stands for a loop without a number of times.
+const ENDLESS: &str = "endless";
+
+/// Parses how many times to play; 0 means without end.
+fn times(text: &str) -> Result<u32, &'static str> {
+    if text == ENDLESS {
+        return Ok(0);
+    }
+    text.parse()
+        .ok()
+        .filter(|&times| times > 0)
+        .ok_or("a number of times, 1 or more; without a number, no end")
 }
 
 /// Targets and measured positions as SVG.

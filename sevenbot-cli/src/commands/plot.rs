@@ -1,6 +1,5 @@
 //! `plot`: the way of the tip in a recording, in space.
 
-use std::fs;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -9,6 +8,8 @@ use sevenbot::cartesian::TipPose;
 use sevenbot::recording::{Moment, Recording};
 
 use crate::command_error::CommandError;
+use crate::input_file;
+use crate::output_file::{ForceArg, OutputFile};
 use crate::session::Session;
 use crate::space_plot::{WayPoint, svg};
 
@@ -19,23 +20,25 @@ Examples:
   sevenbot plot move.txt > move.svg
   sevenbot plot move.txt --out move.svg
 
-Needs no arm. Shows the way from above, from the front and from the right side, in millimetres from the middle
-of the base. `sevenbot play --plot` shows the joints over time.")]
+Needs no arm. Shows the way from above, from the front and from the right side,
+in millimetres from the middle of the base. `sevenbot play --plot` shows the
+joints over time.")]
 pub(crate) struct PlotArgs {
-    /// A recording of `sevenbot record`, or one written by hand.
+    /// A recording of `sevenbot record`, or one written by hand; - is standard input.
     file: PathBuf,
     /// The file to write; standard output if not given.
     #[arg(long, value_name = "SVG")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    force: ForceArg,
 }
 
 pub(crate) fn run(session: &mut Session, args: &PlotArgs) -> Result<(), CommandError> {
-    let text = fs::read_to_string(&args.file).map_err(|error| CommandError::file(&args.file, error))?;
-    let recording = Recording::parse(&text).map_err(|error| CommandError::file(&args.file, error))?;
+    let recording = input_file::recording(&args.file)?;
     let name = args.file.file_name().unwrap_or_default().to_string_lossy();
     let drawing = svg(&name, &way(&recording));
     match &args.out {
-        Some(path) => fs::write(path, drawing).map_err(|error| CommandError::file(path, error)),
+        Some(path) => OutputFile::open(path, Some(&args.file), args.force)?.write(drawing.as_bytes()),
         None => session.printer.print_raw(drawing.as_bytes()),
     }
 }

@@ -14,7 +14,8 @@ use crate::style::GOOD;
 /// List serial ports, and the arms behind them.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Opens all ports at the same time and asks each for its device code. Other devices receive 14 bytes.
+Opens all ports at the same time and asks each for its device code. Other
+devices receive 14 bytes.
 
 Examples:
   sevenbot ports

@@ -3,13 +3,13 @@
 use std::io::{self, Write};
 use std::str::FromStr;
 
-use clap::{ArgAction, Args, value_parser};
+use clap::{ArgAction, Args};
 use serde::Serialize;
 use sevenbot::fine::FineTargets;
 use sevenbot::joints::JointSnapshot;
-use sevenbot::map::TARGET_POSITION;
+use sevenbot::map::{SPEED, TARGET_POSITION, TIME};
 use sevenbot::moves::{JointMove, Pace};
-use sevenbot::{Angle, Arm, FineAngle, Joint, MoveTime, Speed};
+use sevenbot::{Angle, Arm, FineAngle, Joint, MoveTime, Span, Speed};
 
 use crate::command_error::CommandError;
 use crate::guard_args::GuardArgs;
@@ -23,23 +23,32 @@ use crate::watch::{Watch, note_rounding};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sevenbot pose 90 90 65 90 90 90 80               the standard pose, also `sevenbot home`
-  sevenbot pose 120 90 65 90 90 90 80 --speed 30   at 57 degrees per second
-  sevenbot pose +10 _ -5 _ _ _ _ --wait            joint 1 up, joint 3 down, the others as they are
-  sevenbot pose 60 90 65 90 90 90 80 --time 20 --wait
-  sevenbot pose 90.25 _ _ _ _ _ +0.5               in hundredths of a degree
+  sevenbot pose 90 90 65 90 90 90 80  the standard pose, also `sevenbot home`
+  sevenbot pose 120 90 65 90 90 90 80 --speed 57deg/s
+  sevenbot pose +10 _ -5 _ _ _ _ --wait
+                                      joint 1 up, joint 3 down, the others as
+                                      they are
+  sevenbot pose 60 90 65 90 90 90 80 --time 2s --wait
+  sevenbot pose 90.25 _ _ _ _ _ +0.5  in hundredths of a degree
 
-Angles take up to two decimals. An arm without hundredths, such as one with the maker's firmware, goes to the
-nearest whole degrees, and a note says so.
+Angles take up to two decimals. An arm without hundredths, such as one with the
+maker's firmware, goes to the nearest whole degrees, and a note says so.
 
-If the joints would take the arm below the table or into its own base, on the way too, a warning says so: joints go where
-they are sent. `sevenbot move-to` refuses that, and its help describes the guard.
+If the joints would take the arm below the table or into its own base, on the
+way too, a warning says so: joints go where they are sent. `sevenbot move-to`
+refuses that, and its help describes the guard.
+
+With --wait the speeds and durations of the joints are put back after the move.
+Without it they stay as this command sets them, because another speed would act
+at once; `sevenbot get speed` shows them.
 
 After Ctrl-C the arm holds its position.
 
-Exit status 1 if the arm did not take the pose, or with --wait did not reach it. If that is unknown, the
-message says that the arm may be moving. A joint that does not answer or has let go takes no pose: nothing
-is sent then, and the message tells what to do. With --wait a joint that is blocked on its way ends the wait.")]
+Exit status 1 if the arm did not take the pose, or with --wait did not reach it.
+If that is unknown, a message says that the arm may be moving; exit status 3 if
+the connection is lost. A joint that does not answer or has let go takes no
+pose: nothing is sent then, and the message tells what to do. With --wait a
+joint that is blocked on its way ends the wait.")]
 pub(crate) struct PoseArgs {
     /// Joints 1 to 7: degrees from 0 to 180, up to two decimals; +N or -N for a step from the present target; _ or . for no change.
     #[arg(value_names = ["A1", "A2", "A3", "A4", "A5", "A6", "A7"], num_args = 7, required = true,
@@ -61,12 +70,14 @@ pub(crate) struct HomeArgs {
 
 #[derive(Debug, Args)]
 struct PaceArgs {
-    /// Speed of these joints in steps of 1.9 degrees per second, 1 to 100; 0 is the motors' maximum.
-    #[arg(long, value_name = "N", value_parser = value_parser!(u8).range(0..=100))]
-    speed: Option<u8>,
-    /// Duration of the move in steps of 100 ms, 0 to 100. Sets the speeds to 0, so that it applies.
-    #[arg(long, value_name = "N", conflicts_with = "speed", value_parser = value_parser!(u8).range(0..=100))]
-    time: Option<u8>,
+    /// Speed of these joints, as the register has it: 1 to 100 steps of 1.9 degrees per second, or 0 for the motors'
+    /// maximum. Or in degrees per second, 2deg/s to 190deg/s.
+    #[arg(long, value_name = "STEPS|DEG/S", value_parser = speed)]
+    speed: Option<Speed>,
+    /// Duration of the move, as the register has it: 0 to 100 steps of 100 ms. Or in seconds, 0.1s to 10s. Sets the speeds to
+    /// 0, so that it applies.
+    #[arg(long, value_name = "STEPS|S", conflicts_with = "speed", value_parser = time)]
+    time: Option<MoveTime>,
     /// Wait until the joints have arrived.
     #[arg(long)]
     wait: bool,
@@ -76,10 +87,43 @@ struct PaceArgs {
 
 impl PaceArgs {
     /// The pace; values out of range are refused before.
-    fn pace(&self) -> Pace {
-        let time = self.time.and_then(MoveTime::from_steps);
-        Pace { speed: self.speed.and_then(Speed::from_steps), time }
+    const fn pace(&self) -> Pace {
+        Pace { speed: self.speed, time: self.time }
     }
+
+    /// Are there a speed or a duration that can be put back after the move?
+    const fn is_for_this_move(&self) -> bool {
+        self.wait && (self.speed.is_some() || self.time.is_some())
+    }
+}
+
+/// Parses a speed, as 30 or 57deg/s: the nearest step.
+fn speed(text: &str) -> Result<Speed, &'static str> {
+    let steps = match text.strip_suffix("deg/s") {
+        None => text.parse().ok(),
+        Some(number) => steps(number, Speed::from_steps(1).map_or(1.0, Speed::degrees_per_second)),
+    };
+    let speed = steps.and_then(Speed::from_steps);
+    speed.ok_or(
+        "a speed from 0 to 100 steps of 1.9 degrees per second, as 30, or in degrees per second, as 57deg/s",
+    )
+}
+
+/// Parses a duration, as 20 or 2s: the nearest step.
+fn time(text: &str) -> Result<MoveTime, &'static str> {
+    let steps = match text.strip_suffix('s') {
+        None => text.parse().ok(),
+        Some(number) => steps(number, 0.1),
+    };
+    let time = steps.and_then(MoveTime::from_steps);
+    time.ok_or("a duration from 0 to 100 steps of 100 ms, as 20, or in seconds, as 2s")
+}
+
+/// The whole steps nearest to a number, 1 to 100.
+fn steps(number: &str, step: f64) -> Option<u8> {
+    let steps = (number.parse::<f64>().ok()? / step).round();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the range")]
+    (1.0..=100.0).contains(&steps).then_some(steps as u8)
 }
 
 /// The argument for one joint.
@@ -149,18 +193,24 @@ pub(crate) fn home(session: &mut Session, args: &HomeArgs) -> Result<(), Command
 }
 
 fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<(), CommandError> {
-    let mut arm = session.connect()?;
+    let mut arm = session.connect_to_move()?;
+    let mut before = None;
     let reached = hold_on_interrupt(&mut arm, |arm, interrupt| {
         let targets = targets(goals, arm)?;
         pace.guard.warn_of_way(arm, &targets, pace.pace())?;
+        before = pace.is_for_this_move().then(|| arm.read_span(Span::between(&SPEED, &TIME))).transpose()?;
         pace.pace().set(arm, &targets)?;
         interrupt.check()?;
         let begun = JointMove::begin_fine(arm, targets)?;
         note_rounding(&begun);
         let reached = pace.wait.then(|| begun.finish(arm, &mut Watch::new(interrupt))).transpose()?;
         reached.map(|whole| measured(arm, goals, whole)).transpose()
-    })?;
-    match reached {
+    });
+    // While a joint may still move, another speed would act at once.
+    if let (Ok(_) | Err(CommandError::Interrupted), Some(before)) = (&reached, before) {
+        arm.write_checked(before.address, &before.values)?;
+    }
+    match reached? {
         None => Ok(()),
         Some(Reached::Degrees(positions_degrees)) => session.printer.print(&Positions { positions_degrees }),
         Some(Reached::Hundredths(positions)) => session.printer.print(&positions),
@@ -231,6 +281,16 @@ impl Printable for FinePositions {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn speeds_and_durations_are_steps_or_have_a_unit() {
+        let steps_of = |text| speed(text).map(Speed::steps).ok();
+        assert_eq!(["30", "57deg/s", "58deg/s", "0"].map(steps_of), [Some(30), Some(30), Some(31), Some(0)]);
+        assert_eq!(["190deg/s", "191deg/s", "0deg/s", "101", "2x", "40mm/s"].map(steps_of)[1..], [None; 5]);
+        let steps_of = |text| time(text).map(MoveTime::steps).ok();
+        assert_eq!(["20", "2s", "0.5s", "10s"].map(steps_of), [Some(20), Some(20), Some(5), Some(100)]);
+        assert_eq!(["101", "11s", "2ms", "s", "NaNs"].map(steps_of), [None; 5]);
+    }
 
     #[test]
     fn pose_arguments_are_absolute_relative_or_empty() {

@@ -21,14 +21,16 @@ Examples:
   sevenbot where
   sevenbot where --json
 
-Positions are millimetres from the point where the axis of the base meets the top plate: x to the right, y
-forward, z up. The tip is the middle of the disc that joint 6 turns; a suction cup or claw on it is not
-included. The tool direction has length 1 and points from the wrist to the tip. The wrist is where the axes
-of joints 4, 5 and 6 meet.
+Positions are millimetres from the point where the axis of the base meets the
+top plate: x to the right, y forward, z up. The tip is the middle of the disc
+that joint 6 turns; a suction cup or claw on it is not included. The tool
+direction has length 1 and points from the wrist to the tip. The wrist is where
+the axes of joints 4, 5 and 6 meet.
 
-An arm with this project's firmware tells its joints to a count of the servos, about a quarter of a degree,
-so the tip is known to a millimetre or two. Others tell whole degrees: some millimetres. The play of the
-joints and a bent arm are not included.")]
+An arm with this project's firmware tells its joints to a count of the servos,
+about a quarter of a degree, so the tip is known to a millimetre or two. Others
+tell whole degrees: some millimetres. The play of the joints and a bent arm are
+not included.")]
 pub(crate) struct WhereArgs {}
 
 pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {

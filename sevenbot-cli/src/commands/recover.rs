@@ -18,7 +18,7 @@ use crate::command_error::CommandError;
 use crate::confirm::confirm;
 use crate::interrupt::hold;
 use crate::printer::{Printable, note, warn};
-use crate::session::Session;
+use crate::session::{Session, put_right};
 
 /// Bring the arm back after an obstacle, an alarm or a lost supply, step by step.
 ///
@@ -28,19 +28,24 @@ use crate::session::Session;
 #[command(after_help = "\
 The steps, as far as they are necessary:
 
-  1. Shows each problem, and what to do: remove an obstacle, close the emergency stop, let a servo cool.
-  2. Asks whether that is done. A servo that holds again may turn a joint by a few degrees: keep clear of the arm.
-  3. Writes motor state 1, so that servos that let go hold again where they are, and sets the targets to the measured
-     positions. It does not do that while no servo answers, or while a servo is too hot or has a wrong supply.
-     Firmware that does not tell which servo was overloaded needs motor state 2 for a moment: the arm falls unless you hold
-     it, and that is asked for separately.
-  4. Waits, looks again for two seconds, and says what is still wrong.
+1. Shows each problem, and what to do: remove an obstacle, close the emergency
+   stop, let a servo cool.
+2. Asks whether that is done. A servo that holds again may turn a joint by a few
+   degrees: keep clear of the arm.
+3. Writes motor state 1, so that servos that let go hold again where they are,
+   and sets the targets to the measured positions. It does not do that while no
+   servo answers, or while a servo is too hot or has a wrong supply. Firmware
+   that does not tell which servo was overloaded needs motor state 2 for a
+   moment: the arm falls unless you hold it, and that is asked for separately.
+4. Waits, looks again for two seconds, and says what is still wrong.
 
 Examples:
   sevenbot recover
-  sevenbot recover --yes                 for a program: the steps by hand are done
+  sevenbot recover --yes
+      for a program: the steps by hand are done
 
-Exit status 1 if something is still wrong. The faults of a restart stay until the controller is switched off and on.")]
+Exit status 1 if something is still wrong. The faults of a restart stay until
+the controller is switched off and on.")]
 pub(crate) struct RecoverArgs {
     /// Do not ask.
     #[arg(long)]
@@ -111,7 +116,7 @@ fn tell(health: &Health) {
 
 /// Steps 2 and 3.
 fn recover(arm: &mut Arm, before: &Health, yes: bool) -> Result<(), CommandError> {
-    arm.end_abandoned_stream()?;
+    put_right(arm)?;
     if before.is_driven() && before.problems().iter().all(|problem| !needs_motors(problem.kind)) {
         return Ok(());
     }

@@ -7,7 +7,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot::ports;
+use sevenbot::open_port::OpenPort;
+use sevenbot::{OpenError, ports};
 use sevenbot_serve::server::{AccessPolicy, ArmLocation, Notice, Server, ServerConfig};
 
 use crate::command_error::CommandError;
@@ -24,24 +25,27 @@ use crate::session::Session;
 /// its chip id.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Pseudo-terminals (--pty) work with every program that opens a serial port. TCP (--tcp) carries the same frames, for
-example to pyserial's `socket://127.0.0.1:7777`. The maker's WebSocket (--ws) works with the maker's Python client; its
-web pages need --maker-pages as well.
+Pseudo-terminals (--pty) work with every program that opens a serial port. TCP
+(--tcp) carries the same frames, for example to pyserial's
+`socket://127.0.0.1:7777`. The maker's WebSocket (--ws) works with the maker's
+Python client; its web pages need --maker-pages as well.
 
-Only programs of this computer can connect. --listen opens the TCP port and the WebSocket to others. Then they need the
-token: over TCP as a first line, with a line feed; over the WebSocket in its address, ws://ADDRESS:8080/ws?token=TOKEN.
+Only programs of this computer can connect. --listen opens the TCP port and the
+WebSocket to others. Then they need the token: over TCP as a first line, with a
+line feed; over the WebSocket in its address, ws://ADDRESS:8080/ws?token=TOKEN.
 The token passes the network unencrypted.
 
-Two programs that write targets at the same time both move the arm: the last target counts. --read-only is for programs
-that only watch.
+Two programs that write targets at the same time both move the arm: the last
+target counts. --read-only is for programs that only watch.
 
 Examples:
   sevenbot --port /dev/ttyUSB0 serve --pty ./a --pty ./b
-  sevenbot --port ./a monitor                     in a second terminal
-  python my_program.py ./b                        in a third
+  sevenbot --port ./a monitor  in a second terminal
+  python my_program.py ./b     in a third
   sevenbot --port /dev/ttyUSB0 serve --tcp 7777
   sevenbot --port /dev/ttyUSB0 serve --ws --maker-pages
-  sevenbot --port /dev/ttyUSB0 serve --tcp 7777 --listen 0.0.0.0 --token \"$(openssl rand -hex 16)\"")]
+  sevenbot --port /dev/ttyUSB0 serve --tcp 7777 --listen 0.0.0.0 \\
+      --token \"$(openssl rand -hex 16)\"")]
 pub(crate) struct ServeArgs {
     /// Offer a pseudo-terminal behind this link. Repeat it for more programs.
     #[arg(long, value_name = "LINK")]
@@ -91,8 +95,10 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
             "--token: use 8 to 128 letters, digits and punctuation marks, without spaces".to_owned(),
         ));
     }
+    let arm = location(session)?;
+    check_not_busy(&arm, session.options.baud)?;
     let config = ServerConfig {
-        arm: Some(location(session)?),
+        arm: Some(arm),
         baud: session.options.baud,
         ptys: args.pty.clone(),
         tcp: args.tcp.map(|port| SocketAddr::new(args.listen, port)),
@@ -122,6 +128,16 @@ pub(super) fn location(session: &Session) -> Result<ArmLocation, CommandError> {
     let first = PathBuf::from(session.port_name()?);
     let list = || ports::available().into_iter().map(|port| port.name.into()).collect();
     Ok(if session.port.is_some() { ArmLocation::Port(first) } else { ArmLocation::Search { first, list } })
+}
+
+/// Fails if another program has the arm's port open. A port that does not exist yet is waited for.
+pub(super) fn check_not_busy(arm: &ArmLocation, baud: u32) -> Result<(), CommandError> {
+    let (ArmLocation::Port(path) | ArmLocation::Search { first: path, .. }) = arm;
+    let port = path.display().to_string();
+    match OpenPort::open(&port, baud) {
+        Err(error @ OpenError::Busy) => Err(CommandError::Open { port, error }),
+        _ => Ok(()),
+    }
 }
 
 /// Becomes readable at Ctrl-C, and at signals that ask a program to end.

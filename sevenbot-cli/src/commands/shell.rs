@@ -14,7 +14,8 @@ use crate::session::Session;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sevenbot completions bash > ~/.local/share/bash-completion/completions/sevenbot
+  sevenbot completions bash \\
+      > ~/.local/share/bash-completion/completions/sevenbot
   sevenbot completions zsh > ~/.zfunc/_sevenbot
   sevenbot completions fish > ~/.config/fish/completions/sevenbot.fish
   sevenbot completions powershell >> $PROFILE")]

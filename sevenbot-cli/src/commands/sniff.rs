@@ -19,13 +19,13 @@ use crate::style::WARNING;
 /// Show the traffic of a line as text, frame by frame.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The port is only read. Connect the receiving pin of an adapter to the line. On the arm's own port only
-reports appear.
+The port is only read. Connect the receiving pin of an adapter to the line. On
+the arm's own port only reports appear.
 
 Examples:
   sevenbot --port /dev/ttyUSB1 sniff
   sevenbot sniff capture.bin
-  sevenbot --log run.log pose 120 90 65 90 90 90 80 --wait; sevenbot sniff run.log
+  sevenbot --log run.log home --wait; sevenbot sniff run.log
   some-program | sevenbot sniff -")]
 pub(crate) struct SniffArgs {
     /// File with the bytes of a line, a log of --log, or a session of `host-sim --record`; - is standard input. Without it, the port.

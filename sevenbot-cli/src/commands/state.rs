@@ -15,9 +15,10 @@ use crate::session::Session;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sevenbot state                     show the state
-  sevenbot state servo               the arm holds its position, and takes targets
-  sevenbot state forceless --yes     the arm can be moved by hand; it falls unless held
+  sevenbot state                  show the state
+  sevenbot state servo            the arm holds its position, and takes targets
+  sevenbot state forceless --yes  the arm can be moved by hand; it falls unless
+                                  held
 
 Exit status 1 if the arm may not have taken the state: it may be moving.")]
 pub(crate) struct StateArgs {
@@ -57,10 +58,16 @@ pub(crate) fn run(session: &mut Session, args: &StateArgs) -> Result<(), Command
 }
 
 fn change(arm: &mut Arm, wanted: MotorStateArg, yes: bool) -> Result<(), CommandError> {
-    let present = arm.read_span(Span::of(&MOTOR_STATE))?.byte(&MOTOR_STATE);
-    if present == motor_state::SERVO && wanted.code() != motor_state::SERVO {
-        let how = if matches!(wanted, MotorStateArg::Damping) { "sink" } else { "fall" };
-        confirm(&format!("The arm will {how} unless you hold it. Go on?"), yes)?;
-    }
+    confirm_state(arm, wanted.code(), yes)?;
     hold_on_interrupt(arm, |arm, _| Ok(arm.write_motion(MOTOR_STATE.address, &[wanted.code()])?))
+}
+
+/// Asks before a driven arm loses its torque.
+pub(super) fn confirm_state(arm: &mut Arm, wanted: u8, yes: bool) -> Result<(), CommandError> {
+    let present = arm.read_span(Span::of(&MOTOR_STATE))?.byte(&MOTOR_STATE);
+    if present != motor_state::SERVO || wanted == motor_state::SERVO {
+        return Ok(());
+    }
+    let how = if wanted == motor_state::DAMPING { "sink" } else { "fall" };
+    confirm(&format!("The arm will {how} unless you hold it. Go on?"), yes)
 }

@@ -16,20 +16,25 @@ use crate::style::{BAD, BOLD, GOOD};
 /// Show each joint, the servos and the supply: what is wrong, and what to do.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A line for each joint: measured position, target, load in percent of the stall torque, velocity, and what the joint does:
+A line for each joint: measured position, target, load in percent of the stall
+torque, velocity, and what the joint does:
 
   moving, at its target, or how far it rests from its target
-  holds something   joint 7 with effector type gripper (`sevenbot effector gripper`)
-  no answer         its servo does not answer; the position is the last one
-  let go            its servo holds no torque although it should
-  blocked           something kept it from its target for a second
+  holds something  joint 7 with effector type gripper (`sevenbot effector
+                   gripper`)
+  no answer        its servo does not answer; the position is the last one
+  let go           its servo holds no torque although it should
+  blocked          something kept it from its target for a second
 
-The servos' temperatures and error bits are not told joint by joint: the line above the table has the highest temperature,
-and the alarms of all servos together. `sevenbot servo info` on an adapter shows those of one servo.
+The servos' temperatures and error bits are not told joint by joint: the line
+above the table has the highest temperature, and the alarms of all servos
+together. `sevenbot servo info` on an adapter shows those of one servo.
 
-With the maker's firmware only positions and targets are known, and a dash stands for the rest.
+With the maker's firmware only positions and targets are known, and a dash
+stands for the rest.
 
-Exit status 1 if anything needs attention; `sevenbot recover` goes through what to do.")]
+Exit status 1 if anything needs attention; `sevenbot recover` goes through what
+to do.")]
 pub(crate) struct StatusArgs {}
 
 pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {

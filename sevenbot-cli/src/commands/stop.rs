@@ -9,10 +9,11 @@ use crate::session::Session;
 /// Stop: make every joint hold its position.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Sets the targets to the measured positions, reads them back, and repeats the write if necessary. Writes
-nothing if the motors are off (state 0 or 2).
+Sets the targets to the measured positions, reads them back, and repeats the
+write if necessary. Writes nothing if the motors are off (state 0 or 2).
 
-Exit status 1 if the arm may not hold: it may still be moving.")]
+Exit status 1 if the arm may not hold, and 3 if it received no stop, because the
+port cannot be opened or no arm answers: it may still be moving.")]
 pub(crate) struct StopArgs {}
 
 pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {

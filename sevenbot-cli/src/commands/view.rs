@@ -9,7 +9,7 @@ use rustix::rand::{GetRandomFlags, getrandom};
 use serde::Serialize;
 use sevenbot_serve::server::{AccessPolicy, ArmLocation, PageConfig, Server, ServerConfig, StartError};
 
-use super::serve::{location, report, stop_signal};
+use super::serve::{check_not_busy, location, report, stop_signal};
 use crate::command_error::CommandError;
 use crate::printer::{Printable, note};
 use crate::session::Session;
@@ -23,17 +23,22 @@ const USUAL_PORT: u16 = 7780;
 /// page and the arm are for programs of this computer only. Nothing is loaded from the internet. Ctrl-C ends the server.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The address contains a token, which is different each time. A page without it can show and move a simulated arm only. So
-do not pass the address on. Keep the page's window in view while the arm moves: the space bar stops the arm.
+The address contains a token, which is different each time. A page without it
+can show and move a simulated arm only. So do not pass the address on. Keep the
+page's window in view while the arm moves: the space bar stops the arm.
 
-Other programs can use the arm at the same time through `sevenbot serve`, and `view --port` accepts a link of `serve`.
+Other programs can use the arm at the same time through `sevenbot serve`, and
+`view --port` accepts a link of `serve`.
 
 Examples:
-  sevenbot view                                   the only port that leads to an arm; without one, a simulated arm
+  sevenbot view             the only port that leads to an arm; without one, a
+                            simulated arm
   sevenbot --port /dev/ttyUSB0 view
-  sevenbot --port /dev/ttyUSB0 view --read-only   the page shows the arm and cannot move it
-  sevenbot view --simulate                        look for no arm
-  sevenbot view --no-open --http 8000             prints the address, and opens no browser")]
+  sevenbot --port /dev/ttyUSB0 view --read-only
+                            the page shows the arm and cannot move it
+  sevenbot view --simulate  look for no arm
+  sevenbot view --no-open --http 8000
+                            prints the address, and opens no browser")]
 pub(crate) struct ViewArgs {
     /// Serve the page on this port; 0: a free one. Without this option 7780, or a free one.
     #[arg(long, value_name = "PORT")]
@@ -75,6 +80,7 @@ pub(crate) fn run(session: &mut Session, args: &ViewArgs) -> Result<(), CommandE
         ));
     }
     let arm = if args.simulate { None } else { find_arm(session)? };
+    arm.iter().try_for_each(|arm| check_not_busy(arm, session.options.baud))?;
     let token = token()?;
     let page = PageConfig {
         address: SocketAddr::from((Ipv4Addr::LOCALHOST, args.http.unwrap_or(USUAL_PORT))),

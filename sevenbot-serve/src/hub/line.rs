@@ -1,28 +1,22 @@
-//! The line to the arm: frames out, replies in, each matched to the read that it answers.
+//! The line to the arm: a shell round the host link that knows whose read each reply answers.
 //!
-//! The arm answers in the order of the requests (D5). A reply belongs to the first read with its address and count; the
-//! reads before it have lost theirs. Frames are written at the baud rate, so that no queue grows in the
-//! kernel, where a later frame could not pass an earlier one.
+//! Frames are written at the baud rate, so that no queue grows in the kernel, where a later frame could not pass an earlier
+//! one.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
+use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId, Snapshot, Span};
 use protocol_core::registers::Map;
-use protocol_core::request::Reply;
 use protocol_core::time::{Duration, Instant};
-use protocol_core::wire::deframer::gap;
-use protocol_core::wire::frame::encode;
-use protocol_core::wire::{Deframer, FrameBuffer, Function, ToHost};
 
 use super::client::{Client, Event};
 use super::client_id::ClientId;
 use super::request::{WholeRequest, reply_bytes};
 use super::stream::Stream;
 
-/// The time for a reply, in addition to its time on the line. USB adapters take 16 ms each way; a busy computer takes
-/// more.
-const REPLY_TIMEOUT: Duration = Duration::from_millis(1_000);
-/// After a timeout, replies are dropped for this time.
-const LATE_REPLIES: Duration = Duration::from_millis(50);
+/// A read is not repeated: its client does that. A reply may take this time in addition to its time on the line: USB adapters
+/// take 16 ms each way, and a busy computer takes more.
+const PATIENCE: Patience = Patience { attempts: 1, timeout: Duration::from_millis(1_000) };
 /// The line may be filled this far ahead, so that it is not idle while the program wakes up.
 const AHEAD: Duration = Duration::from_millis(1);
 /// Bytes of replies that may be on their way. One read is always allowed.
@@ -39,68 +33,54 @@ pub(crate) enum Owner {
     Identity,
 }
 
-/// A read without a reply.
-#[derive(Clone, Copy, Debug)]
-struct Unanswered {
-    owner: Owner,
-    address: u8,
-    count: u8,
-    /// When its reply counts as lost.
-    deadline: Instant,
-}
-
 /// The line.
 #[derive(Debug)]
 pub(crate) struct Line {
-    deframer: Deframer<ToHost>,
+    link: HostLink,
     output: Vec<u8>,
-    unanswered: VecDeque<Unanswered>,
-    /// Reads before the last matched one, whose replies are lost.
-    lost: VecDeque<Unanswered>,
-    /// Bits per second.
-    baud: u32,
-    /// When the bytes sent so far have left.
-    busy_until: Instant,
+    /// The owners of the reads without an end.
+    owners: BTreeMap<RequestId, Owner>,
+    events: VecDeque<(Owner, Event)>,
 }
 
 impl Line {
     pub(crate) fn new(baud: u32) -> Self {
-        Self {
-            deframer: Deframer::new(gap(baud)),
-            output: Vec::new(),
-            unanswered: VecDeque::new(),
-            lost: VecDeque::new(),
-            baud,
-            busy_until: Instant::ZERO,
-        }
+        // The hub switches reports off, and samples the arm itself.
+        let link = HostLink::new(LinkOptions { baud, reports: &[] });
+        Self { link, output: Vec::new(), owners: BTreeMap::new(), events: VecDeque::new() }
     }
 
-    /// Forgets all bytes: the port was opened or closed.
+    /// Forgets all bytes: the port was opened or closed. The reads on their way end without a reply.
     pub(crate) fn reset(&mut self) {
-        *self = Self { busy_until: self.busy_until, ..Self::new(self.baud) };
+        self.link.reset();
+        self.output.clear();
     }
 
-    /// Takes bytes of the arm, and returns how many.
-    pub(crate) fn push(&mut self, now: Instant, bytes: &[u8]) -> usize {
-        self.deframer.push(now, bytes)
+    /// Takes bytes of the arm.
+    pub(crate) fn push(&mut self, now: Instant, bytes: &[u8]) {
+        self.link.bytes(now, bytes);
     }
 
-    /// The next reply and its owner. Drops frames without an owner.
-    pub(crate) fn next_reply(&mut self) -> Option<(Owner, Event)> {
+    /// The end of a read, and its owner.
+    pub(crate) fn next_event(&mut self, now: Instant) -> Option<(Owner, Event)> {
+        self.advance(now);
+        self.events.pop_front()
+    }
+
+    /// Moves frames to the output, and the ends of reads to their owners.
+    fn advance(&mut self, now: Instant) {
         loop {
-            if let Some(Unanswered { owner, address, count, .. }) = self.lost.pop_front() {
-                return Some((owner, Event::NoReply { address, count }));
-            }
-            let Ok(frame) = self.deframer.pull()? else { continue };
-            let Some(Reply { address, values }) = Reply::from_frame(frame) else { continue };
-            let is_reply =
-                |read: &Unanswered| read.address == address && usize::from(read.count) == values.len();
-            let Some(place) = self.unanswered.iter().position(is_reply) else { continue };
-            let values = values.to_vec();
-            self.lost.extend(self.unanswered.drain(..place));
-            if let Some(read) = self.unanswered.pop_front() {
-                return Some((read.owner, Event::Reply { address, values }));
-            }
+            let (id, event) = match self.link.poll(now) {
+                HostEvent::Wait(_) => return,
+                HostEvent::Send(frame) => {
+                    self.output.extend(frame);
+                    continue;
+                }
+                HostEvent::Reply(id, Snapshot { address, values }) => (id, Event::Reply { address, values }),
+                HostEvent::NoReply(id, range) => (id, no_reply(range.address(), range.count())),
+                _ => continue,
+            };
+            self.events.extend(self.owners.remove(&id).map(|owner| (owner, event)));
         }
     }
 
@@ -111,21 +91,21 @@ impl Line {
 
     /// When the line is free for another frame.
     pub(crate) fn free_at(&self, now: Instant) -> Instant {
-        if self.busy_until <= now + AHEAD {
+        if self.link.busy_until() <= now + AHEAD {
             now
         } else {
-            Instant::from_micros(self.busy_until.as_micros() - AHEAD.as_micros())
+            Instant::from_micros(self.link.busy_until().as_micros() - AHEAD.as_micros())
         }
     }
 
     /// When the last byte leaves, or has left.
     pub(crate) const fn idle_since(&self) -> Instant {
-        self.busy_until
+        self.link.busy_until()
     }
 
     /// May reads be sent whose replies have `bytes` bytes?
     pub(crate) fn has_window(&self, bytes: usize) -> bool {
-        let on_their_way: usize = self.unanswered.iter().map(|read| reply_bytes(read.count)).sum();
+        let on_their_way = self.link.awaited_bytes();
         on_their_way == 0 || on_their_way + bytes <= WINDOW
     }
 
@@ -144,33 +124,20 @@ impl Line {
     }
 
     pub(crate) fn send_read(&mut self, now: Instant, owner: Owner, address: u8, count: u8) {
-        self.send(now, Function::Read, address, count, &[]);
-        let line_time = self.time_of(reply_bytes(count) + WINDOW);
-        let deadline = self.busy_until.max(now) + line_time + REPLY_TIMEOUT;
-        self.unanswered.push_back(Unanswered { owner, address, count, deadline });
+        match Span::new(address, count) {
+            Some(range) => {
+                self.owners.insert(self.link.read(range, PATIENCE), owner);
+            }
+            // The arm would not answer (D2).
+            None => self.events.push_back((owner, no_reply(address, count))),
+        }
+        self.advance(now);
     }
 
     /// Sends a write with the function code of its map (M1).
     pub(crate) fn send_write(&mut self, now: Instant, map: Map, address: u8, values: &[u8]) {
-        let function = match map {
-            Map::V22 => Function::Write,
-            Map::V21 => Function::WriteMap21,
-        };
-        let count = u8::try_from(values.len()).unwrap_or(u8::MAX);
-        self.send(now, function, address, count, values);
-    }
-
-    fn send(&mut self, now: Instant, function: Function, address: u8, count: u8, values: &[u8]) {
-        let mut frame = FrameBuffer::new();
-        encode(&mut frame, function, address, count, values);
-        self.output.extend_from_slice(&frame);
-        self.busy_until = self.busy_until.max(now) + self.time_of(frame.len());
-    }
-
-    /// Time that bytes take on the line, each with start and stop bit.
-    fn time_of(&self, bytes: usize) -> Duration {
-        let bits = u64::try_from(bytes).unwrap_or(u64::MAX).saturating_mul(10_000_000);
-        Duration::from_micros(bits.checked_div(self.baud.into()).unwrap_or(0))
+        self.link.write(map, address, values);
+        self.advance(now);
     }
 
     /// Bytes for the arm.
@@ -183,24 +150,12 @@ impl Line {
         self.output.drain(..count.min(self.output.len()));
     }
 
-    /// Has the reply to the oldest read not come in time?
-    pub(crate) fn has_timed_out(&self, now: Instant) -> bool {
-        self.unanswered.front().is_some_and(|read| read.deadline <= now)
-    }
-
-    /// The reads without a reply, which are forgotten.
-    pub(crate) fn take_unanswered(&mut self) -> Vec<(Owner, u8, u8)> {
-        self.unanswered.drain(..).map(|read| (read.owner, read.address, read.count)).collect()
-    }
-
-    /// Sends nothing for a while, so that a late reply is not taken for the reply to a later read.
-    pub(crate) fn discard_late_replies(&mut self, now: Instant) {
-        self.busy_until = self.busy_until.max(now + LATE_REPLIES);
-    }
-
-    /// The next timeout: of a reply, or of an empty line for the deframer.
+    /// The next timeout: of a reply, or of an empty line for the deframer. Now, while the end of a read waits.
     pub(crate) fn deadline(&self) -> Instant {
-        let reply = self.unanswered.front().map_or(Instant::FAR_FUTURE, |read| read.deadline);
-        reply.min(self.deframer.deadline().unwrap_or(Instant::FAR_FUTURE))
+        if self.events.is_empty() { self.link.deadline() } else { Instant::ZERO }
     }
+}
+
+const fn no_reply(address: u8, count: u8) -> Event {
+    Event::NoReply { address, count }
 }

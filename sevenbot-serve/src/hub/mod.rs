@@ -148,8 +148,8 @@ impl Hub {
     /// The port to the arm is closed.
     pub fn close_arm(&mut self) {
         self.arm = ArmState::Absent;
-        self.drop_unanswered();
         self.line.reset();
+        self.deliver_all(Instant::ZERO);
     }
 
     /// Does a 7Bot V2 answer?
@@ -165,25 +165,13 @@ impl Hub {
 
     /// Takes bytes of the arm. An empty slice states that its line is silent at `now`.
     pub fn arm_bytes(&mut self, now: Instant, bytes: &[u8]) {
-        let mut rest = bytes;
-        loop {
-            let taken = self.line.push(now, rest);
-            while let Some((owner, event)) = self.line.next_reply() {
-                self.deliver(now, owner, event);
-            }
-            rest = rest.get(taken..).unwrap_or(&[]);
-            if rest.is_empty() {
-                return;
-            }
-        }
+        self.line.push(now, bytes);
+        self.deliver_all(now);
     }
 
     /// Moves requests to the line, as far as the line is free. The caller sends [`Hub::to_arm`] afterwards.
     pub fn poll(&mut self, now: Instant) {
-        if self.line.has_timed_out(now) {
-            self.drop_unanswered();
-            self.line.discard_late_replies(now);
-        }
+        self.deliver_all(now);
         match self.arm {
             ArmState::Absent => self.drop_waiting(),
             ArmState::Identifying(due) => {
@@ -328,10 +316,10 @@ impl Hub {
         }
     }
 
-    /// No reply comes any more for the reads that were sent.
-    fn drop_unanswered(&mut self) {
-        for (owner, address, count) in self.line.take_unanswered() {
-            self.deliver(Instant::ZERO, owner, Event::NoReply { address, count });
+    /// Delivers the ends of all reads that have ended.
+    fn deliver_all(&mut self, now: Instant) {
+        while let Some((owner, event)) = self.line.next_event(now) {
+            self.deliver(now, owner, event);
         }
     }
 

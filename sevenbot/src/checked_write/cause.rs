@@ -146,7 +146,7 @@ impl fmt::Display for MismatchCause {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::snapshot::Snapshot;
+    use host_link::Snapshot;
     use protocol_core::registers::map::{
         DEVICE_ID, FRAMES_REFUSED, LAST_REFUSAL, LAST_REFUSED_REGISTER, RESERVED_8, STATUS_VERSION,
         TARGET_POSITION,

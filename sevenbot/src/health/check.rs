@@ -20,8 +20,7 @@ use super::told::GRIPPER;
 use super::{Problem, ProblemFlags, ProblemKind};
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::snapshot::Snapshot;
-use crate::span::Span;
+use host_link::{Snapshot, Span};
 
 /// The registers of a check: set-point period, protection block, status block.
 const REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &SERVO_TEMPERATURE);

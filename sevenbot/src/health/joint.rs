@@ -9,8 +9,8 @@ use protocol_core::registers::{Joint, Register};
 use super::problem::ProblemKind;
 use super::told::{CLAW, GRIPPER, ToldBlocks};
 use crate::fine_angle::FineAngle;
-use crate::snapshot::Snapshot;
 use crate::units::Angle;
+use host_link::Snapshot;
 
 /// A joint at rest this near to its target is there: under a load a servo stops a few degrees short.
 const AT_TARGET_DEGREES: f64 = 3.0;

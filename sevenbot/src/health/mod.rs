@@ -22,8 +22,7 @@ use crate::arm::Arm;
 use crate::error::Error;
 use crate::identity::Firmware;
 use crate::joints::JointSnapshot;
-use crate::snapshot::Snapshot;
-use crate::span::Span;
+use host_link::{Snapshot, Span};
 
 use told::{CLAW, GRIPPER, ToldBlocks};
 

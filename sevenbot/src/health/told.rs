@@ -3,7 +3,7 @@
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{EXTENDED_VERSION, PROTECTION_VERSION, STATUS_VERSION, effector};
 
-use crate::snapshot::Snapshot;
+use host_link::Snapshot;
 
 /// The layout of the blocks that this library knows.
 const KNOWN_LAYOUT: u8 = 1;

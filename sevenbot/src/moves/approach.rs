@@ -15,9 +15,9 @@ use crate::approach::{Approach, Standing};
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::fine_angle::FineAngle;
-use crate::span::Span;
 use crate::stream::SetPointStream;
 use crate::units::Speed;
+use host_link::Span;
 
 /// The longest time between two questions to the observer.
 const POLL_PERIOD: Duration = Duration::from_millis(20);

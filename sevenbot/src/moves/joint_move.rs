@@ -15,9 +15,8 @@ use crate::error::Error;
 use crate::fine_state::FineTargets;
 use crate::health::{MoveCheck, MoveState, Problem, ProblemKind};
 use crate::joints::{JointSnapshot, frames_for};
-use crate::snapshot::Snapshot;
-use crate::span::Span;
 use crate::units::{MoveTime, Speed, move_duration};
+use host_link::{Snapshot, Span};
 
 /// Time between two reads of a moving arm.
 const POLL_PERIOD: Duration = Duration::from_millis(50);

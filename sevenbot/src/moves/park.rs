@@ -19,8 +19,8 @@ use super::pace::Pace;
 use crate::arm::Arm;
 use crate::fine_angle::FineAngle;
 use crate::fine_state::FineTargets;
-use crate::span::Span;
 use crate::units::Speed;
+use host_link::Span;
 
 /// The pose in degrees: rear arm upright, forearm folded up and back, tool pointing up. Joints 1, 6 and 7 carry no weight and stay.
 ///

@@ -18,9 +18,9 @@ use crate::fine_angle::FineAngle;
 use crate::playback::{self, Step};
 use crate::point_path::PointPath;
 use crate::recording::{Moment, Recording};
-use crate::span::Span;
 use crate::stream::{SetPointStream, StreamError, StreamOptions, StreamPace};
 use crate::units::Speed;
+use host_link::Span;
 
 /// Frequency of the reports while playing, in Hz.
 const FEEDBACK_HZ: u8 = 30;

@@ -8,7 +8,7 @@ use super::error::MoveError;
 use super::report_clock::ReportClock;
 use crate::arm::Arm;
 use crate::fine_angle::FineAngle;
-use crate::span::Span;
+use host_link::Span;
 
 /// Without a report for this time, the arm has stopped reporting. The lowest rate is 1 Hz.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(3);

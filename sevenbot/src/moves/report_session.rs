@@ -5,7 +5,7 @@ use protocol_core::registers::map::{FEEDBACK_FREQUENCY, REPORT_CONTENT, report_c
 use super::error::{ConnectionLost, MoveError};
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::span::Span;
+use host_link::Span;
 
 impl Arm {
     /// The most exact positions that this arm reports: a value of register 189.

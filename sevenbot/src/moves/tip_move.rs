@@ -17,8 +17,8 @@ use crate::error::Error;
 use crate::fine_angle::FineAngle;
 use crate::fine_state::FineTargets;
 use crate::joints::{JointSnapshot, StepBaseError};
-use crate::span::Span;
 use crate::units::{Angle, MoveTime, Speed};
+use host_link::Span;
 
 /// The targets that bring the tip to a position, as exact as an arm takes them.
 #[derive(Clone, Copy, Debug, PartialEq)]

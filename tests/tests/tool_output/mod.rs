@@ -35,7 +35,9 @@ pub(crate) fn words<'a>(text: &'a str, first: &str) -> Vec<&'a str> {
     line.unwrap_or_else(|| panic!("no line with {first} in:\n{text}")).split_whitespace().collect()
 }
 
-/// Runs the tool without a port, and without a search for one.
+/// Runs the tool without a port, and without the simulators of other tests.
 pub(crate) fn run_without_arm(arguments: &[&str]) -> Output {
-    tool().args(arguments).env_remove("SEVENBOT_PORT").output().expect("sevenbot runs")
+    let mut tool = tool();
+    tool.args(arguments).env_remove("SEVENBOT_PORT").env("XDG_RUNTIME_DIR", "/nonexistent");
+    tool.output().expect("sevenbot runs")
 }

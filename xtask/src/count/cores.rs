@@ -3,7 +3,6 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
-use crate::emulate;
 use crate::run::{ChildProcess, ChipProgram, TaskResult};
 
 /// A name and a number that a program printed.
@@ -11,7 +10,7 @@ pub(crate) type NamedCount = (String, u64);
 
 /// Runs a program in the emulator and returns its counts.
 pub(crate) fn figures(program: &ChipProgram) -> TaskResult<Vec<NamedCount>> {
-    let child = Command::new(emulate::QEMU)
+    let child = Command::new(emulator::QEMU)
         .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-nodefaults"])
         .args(["-chardev", "stdio,id=figures,signal=off", "-serial", "chardev:figures"])
         .args(["-icount", "shift=0,sleep=off"])

@@ -13,9 +13,9 @@ use super::machine::{Machine, frame};
 use super::masked::longest_stretch;
 use super::trace::{self, TraceEvent};
 use crate::budget::Figure;
-use crate::elf::Program;
 use crate::run::{IMAGE, TaskResult};
-use crate::thumb_decode::Effect;
+use linked_image::Effect;
+use linked_image::Program;
 
 /// Data registers of the USARTs of host link and servo bus (RM0090, section 30.6.2).
 const HOST_DATA: u64 = 0x4001_1004;

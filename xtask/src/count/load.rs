@@ -17,8 +17,8 @@ use protocol_core::time::{Duration, Instant};
 use super::machine::frame;
 use super::trace;
 use crate::budget::Figure;
-use crate::emulate::lockstep::Lockstep;
 use crate::run::TaskResult;
+use emulator::lockstep::Lockstep;
 
 /// The time between two frames of targets, in milliseconds; also the set-point period.
 const FRAME_MILLIS: u16 = 5;

@@ -14,9 +14,8 @@ use protocol_core::wire::FrameBuffer;
 use tempfile::TempDir;
 
 use super::trace::{self, TraceEvent};
-use crate::emulate;
-use crate::emulate::monitor::{self, Monitor};
 use crate::run::{ChildProcess, IMAGE, TIMEOUT, TaskResult};
+use emulator::monitor::{self, Monitor};
 
 /// The time after which the arm has processed a request and sleeps.
 const IDLE_TIME: Duration = Duration::from_millis(20);
@@ -36,8 +35,8 @@ impl Machine {
     /// Starts the image with seven servos, and waits until its arm is in its pose.
     pub(crate) fn with_servos() -> TaskResult<Self> {
         let folder = tempfile::tempdir()?;
-        let servos = emulate::start_servos(&folder, &[])?;
-        let bus = emulate::servo_socket(&folder);
+        let servos = emulator::start_servos(&folder, &[])?;
+        let bus = emulator::servo_socket(&folder);
         let mut machine = Self::start(folder, Some(servos), &bus, "shift=0,sleep=on")?;
         // Twice: before their first read, no servos are reported as missing.
         for _ in 0..2 {
@@ -61,11 +60,11 @@ impl Machine {
         let log = folder.path().join("log");
         let log_option = log.display().to_string();
         let options = ["-icount", icount, "-singlestep", "-D", &log_option];
-        let machine = emulate::start_machine(&IMAGE, &folder, bus, &options)?;
+        let machine = emulator::start_machine(&IMAGE, &folder, bus, &options)?;
         let host = monitor::accept(&host)?;
         host.set_read_timeout(Some(TIMEOUT))?;
         let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
-        monitor.wait_for_bits(emulate::HOST_LINK_CONTROL, emulate::RECEIVER_ON)?;
+        monitor.wait_for_bits(emulator::HOST_LINK_CONTROL, emulator::RECEIVER_ON)?;
         Ok(Self { monitor, host, log, _machine: machine, _servos: servos, _folder: folder })
     }
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::trace::TraceEvent;
-use crate::thumb_decode::Effect;
+use linked_image::Effect;
 
 /// The most instructions between the one that masks interrupts and the one that unmasks them. Sleep ends a stretch, because an
 /// interrupt ends sleep.

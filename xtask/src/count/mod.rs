@@ -12,10 +12,8 @@ mod masked;
 mod trace;
 
 pub(crate) use cores::NamedCount;
-pub(crate) use machine::frame;
 
 use crate::budget::{self, Figure};
-use crate::emulate;
 use crate::run::{ChipProgram, FAST, SMALL, TaskResult, build_footprint, build_host_sim, build_image};
 
 /// Programs with budgets that count their own instructions.
@@ -25,7 +23,7 @@ pub(crate) const PROFILES: &[(&str, &str)] = &[(SMALL, "opt-level s"), (FAST, "o
 
 /// Counts, prints, and compares the counts with their budgets.
 pub(crate) fn check(accept: bool) -> TaskResult {
-    emulate::need_qemu()?;
+    emulator::need_qemu()?;
     build_image()?;
     build_host_sim()?;
     let mut figures = image::figures()?;

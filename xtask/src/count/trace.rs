@@ -10,7 +10,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use crate::thumb_decode::Effect;
+use linked_image::Effect;
 
 /// TIM2_CNT (RM0090, section 18.4.21).
 const TIME: u64 = 0x4000_0024;

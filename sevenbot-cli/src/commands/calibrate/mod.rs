@@ -40,13 +40,13 @@ At each joint:
   Enter      keep the offset, go on to the next joint
   q          end, and write nothing
 
-Up to 10 degrees an offset is good, up to 16 acceptable. A larger one is bad and cannot be stored: assemble the
-joint again, one tooth further.
+Up to 10 degrees an offset is good, up to 16 acceptable. A larger one is bad and
+cannot be stored: assemble the joint again, one tooth further.
 
 Examples:
   sevenbot calibrate
   sevenbot calibrate --show
-  sevenbot calibrate --reset                   all offsets 0, as they left the factory")]
+  sevenbot calibrate --reset  all offsets 0, as they left the factory")]
 pub(crate) struct CalibrateArgs {
     /// Show the offsets and their grades, and change nothing.
     #[arg(long, conflicts_with = "reset")]

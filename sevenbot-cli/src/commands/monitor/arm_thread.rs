@@ -171,6 +171,7 @@ impl ArmThread {
                 let steps = joints.first().copied().unwrap_or(0);
                 arm.write_checked(SPEED.address, &[change.after(steps); 7])?;
             }
+            UiCommand::Stop => hold(arm).map(drop)?,
             // Writing state 1 again does not stop an arm in state 1.
             UiCommand::State(motor_state::SERVO) if arm.joints()?.is_driven() => hold(arm).map(drop)?,
             UiCommand::State(state) => arm.write_motion(MOTOR_STATE.address, &[state])?,
@@ -203,6 +204,7 @@ fn nudge(
     joint: Joint,
     degrees: i16,
 ) -> Result<Option<String>, CommandError> {
+    arm.end_abandoned_stream()?;
     let joints = arm.wait_until_settled()?;
     let wanted = step_target(&joints, joint, degrees)?.max(0);
     let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
@@ -224,6 +226,7 @@ fn jog_tip(
     axes: JogAxes,
     millimetres: [i16; 3],
 ) -> Result<(), CommandError> {
+    arm.end_abandoned_stream()?;
     let joints = arm.wait_until_settled()?;
     for joint in Joint::ALL {
         // Fails where it is not known where a joint is.

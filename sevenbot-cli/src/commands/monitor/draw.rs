@@ -18,7 +18,7 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Clear, Dataset, GraphType, Paragraph};
-use sevenbot::cartesian::JogAxes;
+use sevenbot::cartesian::{JogAxes, PointText};
 use sevenbot::map::motor_state;
 use sevenbot::register_text::{faults, joints, motor_state_name};
 use sevenbot::{Angle, Joint};
@@ -225,7 +225,8 @@ fn health(view: &View) -> Line<'static> {
     }
     let volts = status.supply_volts().map_or("unknown".to_owned(), |volts| format!("{volts:.1} V"));
     let celsius = status.hottest_celsius().map_or("unknown".to_owned(), |degrees| format!("{degrees} °C"));
-    spans.push(Span::raw(format!("   supply {volts}   hottest servo {celsius}")));
+    let tip = sample.tip().map_or("unknown".to_owned(), |tip| format!("{} mm", PointText(tip)));
+    spans.push(Span::raw(format!("   supply {volts}   hottest servo {celsius}   tip {tip}")));
     Line::from(spans)
 }
 
@@ -255,7 +256,7 @@ fn last_line(view: &View) -> Line<'_> {
         (_, Some(note)) => Line::styled(format!(" {note}"), BOLD),
         _ if view.jog.is_some() => Line::styled(jog_keys(view.jog), BOLD),
         _ => Line::styled(
-            " ↑↓ joint  ←→ nudge  Shift 10°  +- speed  s state  space freeze  ? help  q quit",
+            " ↑↓ joint  ←→ nudge  Shift 10°  +- speed  s state  space stop  ? help  q quit",
             FAINT,
         ),
     }
@@ -364,6 +365,16 @@ mod tests {
         view.dialog = Some(Dialog::ChooseState);
         for (width, height) in [(1, 1), (10, 3), (49, 12), (300, 100)] {
             screen(&view, width, height);
+        }
+    }
+
+    #[test]
+    fn the_help_shows_the_way_out_on_any_screen() {
+        let mut view = watching();
+        view.dialog = Some(Dialog::Help);
+        let small = screen(&view, 40, 10).to_string();
+        for seen in ["stop the arm", "q  ", "Ctrl-C"] {
+            assert!(small.contains(seen), "{small}");
         }
     }
 

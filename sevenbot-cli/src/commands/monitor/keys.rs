@@ -14,7 +14,11 @@ const BIG_NUDGE: i16 = 10;
 const JOG: i16 = 5;
 const BIG_JOG: i16 = 20;
 /// The help: keys and their effect.
-pub(crate) const HELP: [(&str, &str); 12] = [
+pub(crate) const HELP: [(&str, &str); 13] = [
+    // The first rows are seen on any screen.
+    ("space", "stop the arm where it is"),
+    ("Ctrl-C", "stop the arm where it is, and quit"),
+    ("q", "quit; the arm finishes its move"),
     ("1..7, ↑ ↓", "select a joint"),
     ("← →", "nudge it by 1°"),
     ("Shift ← →, [ ]", "nudge it by 10°"),
@@ -23,10 +27,8 @@ pub(crate) const HELP: [(&str, &str); 12] = [
     ("+ -", "speed of all joints"),
     ("s", "motor state: hold, damping, forceless"),
     ("p", "plot positions, velocities or loads"),
-    ("space", "freeze the screen; the arm continues"),
-    ("?", "this help"),
-    ("q", "quit; the arm finishes its move"),
-    ("Ctrl-C", "stop the arm where it is, and quit"),
+    ("f", "freeze the screen; the arm continues"),
+    ("?", "this help; any key closes it"),
 ];
 
 /// The effect of a key.
@@ -64,7 +66,8 @@ fn press_in_view(view: &mut View, key: KeyEvent) -> KeyAction {
     match key.code {
         KeyCode::Char('q') | KeyCode::Esc => return KeyAction::Quit,
         KeyCode::Char('?' | 'h') | KeyCode::F(1) => view.dialog = Some(Dialog::Help),
-        KeyCode::Char(' ') => view.is_frozen = !view.is_frozen,
+        KeyCode::Char(' ') => return stop(view),
+        KeyCode::Char('f') => view.is_frozen = !view.is_frozen,
         KeyCode::Char('p') => change_plot(view),
         KeyCode::Char('j') => view.jog = next_axes(view.jog),
         KeyCode::Char('s') => view.dialog = Some(Dialog::ChooseState),
@@ -159,6 +162,15 @@ fn drive(view: &mut View, command: UiCommand) -> KeyAction {
     }
 }
 
+fn stop(view: &mut View) -> KeyAction {
+    if view.arm().is_some() {
+        view.show_note("stopped: the arm holds where it is");
+        return KeyAction::Send(UiCommand::Stop);
+    }
+    view.show_note("there is no arm: it received no stop");
+    KeyAction::Redraw
+}
+
 fn change(view: &View, change: SpeedChange) -> KeyAction {
     view.arm().map_or(KeyAction::Redraw, |_| {
         KeyAction::Send(UiCommand::SpeedChange { joint: view.selected, change })
@@ -220,6 +232,16 @@ mod tests {
         assert_eq!(view.dialog, Some(Dialog::Help));
         let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
         assert_eq!(press(&mut view, ctrl_c), KeyAction::Stop);
+    }
+
+    #[test]
+    fn the_space_bar_stops_the_arm() {
+        let mut view = watching();
+        assert_eq!(
+            pressed(&mut view, &[KeyCode::Char('f'), KeyCode::Char(' ')])[1],
+            KeyAction::Send(UiCommand::Stop)
+        );
+        assert!(view.is_frozen, "only the screen is frozen");
     }
 
     #[test]

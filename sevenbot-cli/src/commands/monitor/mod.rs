@@ -29,6 +29,7 @@ use self::sample::Sample;
 use crate::command_error::CommandError;
 use crate::guard_args::GuardArgs;
 use crate::line_file::LineFile;
+use crate::output_file::{ForceArg, check_replaceable};
 use crate::session::Session;
 
 /// Watch the arm: targets, positions, movement, health and link quality.
@@ -40,15 +41,17 @@ use crate::session::Session;
 Examples:
   sevenbot monitor
   sevenbot monitor --plot load
-  sevenbot monitor --csv move.csv                  until Ctrl-C, or the arm goes away
+  sevenbot monitor --csv move.csv  until Ctrl-C, or the arm goes away
   sevenbot monitor --json --hz 2 | jq .positions
   sevenbot monitor --hz 20 --samples 100 > move.txt
 
-The keys that move the tip keep it above the table and out of the base; `sevenbot move-to --help` describes this guard.
-A key that turns a joint only warns.
+The keys that move the tip keep it above the table and out of the base;
+`sevenbot move-to --help` describes this guard. A key that turns a joint
+only warns.
 
-CSV and JSON also have positions in hundredths of a degree, velocities in degrees per second and loads in
-percent of the stall torque, if the arm measures them.")]
+CSV and JSON also have positions in hundredths of a degree, velocities in
+degrees per second and loads in percent of the stall torque, if the arm
+measures them.")]
 pub(crate) struct MonitorArgs {
     /// Samples per second.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = value_parser!(u8).range(1..=50))]
@@ -59,6 +62,8 @@ pub(crate) struct MonitorArgs {
     /// Write all values to FILE, separated by commas.
     #[arg(long, value_name = "FILE", conflicts_with = "json")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    force: ForceArg,
     /// What the plot on the screen shows at first; p changes it.
     #[arg(long, value_enum, default_value_t)]
     plot: PlotKind,
@@ -74,6 +79,11 @@ impl MonitorArgs {
 
 pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandError> {
     let on_screen = session.printer.is_terminal() && args.csv.is_none() && args.samples.is_none();
+    if on_screen && session.log.is_some() {
+        let reason =
+            "--log: a screen opens the arm again after each loss; use --samples N, --csv or a pipe for a log";
+        return Err(CommandError::Usage(reason.to_owned()));
+    }
     match &args.csv {
         Some(path) => write_csv(session, args, path),
         None if on_screen => screen::run(session, args.period(), args.plot, args.guard.guard()),
@@ -115,6 +125,7 @@ fn show_lines(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandEr
 }
 
 fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), CommandError> {
+    check_replaceable(path, args.force)?;
     let mut arm = session.connect()?;
     let mut file = LineFile::create(path)?;
     let mut write = |line: String| file.add(&format!("{line}\n"));

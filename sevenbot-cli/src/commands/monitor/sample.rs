@@ -2,10 +2,11 @@
 
 use std::time::{Duration, Instant};
 
+use sevenbot::cartesian::{TipPose, Vector};
 use sevenbot::fine::FineState;
 use sevenbot::joints::JointSnapshot;
 use sevenbot::map::EXTENDED_VERSION;
-use sevenbot::{Arm, Error, Health, StatusBlock};
+use sevenbot::{Angle, Arm, Error, Health, Joint, StatusBlock};
 
 /// The state of an arm at one time.
 #[derive(Clone, Debug)]
@@ -39,5 +40,17 @@ impl Sample {
             health,
             round_trip,
         })
+    }
+
+    /// The position of the tip, as exact as the arm measures it; `None` if a joint before it does not answer.
+    pub(super) fn tip(&self) -> Option<Vector> {
+        if Joint::ALL.into_iter().take(6).any(|joint| self.joints.is_missing(joint)) {
+            return None;
+        }
+        let mut pose = self.joints.positions().map(|degrees| Angle::from_register(degrees).into());
+        for (angle, fine) in pose.iter_mut().zip(self.fine.map_or([None; 7], |fine| fine.positions)) {
+            *angle = fine.unwrap_or(*angle);
+        }
+        Some(TipPose::of_fine(pose).tip)
     }
 }

@@ -52,6 +52,8 @@ pub(crate) enum UiCommand {
     SpeedChange { joint: Joint, change: SpeedChange },
     /// Change the motor state.
     State(u8),
+    /// Make the arm hold where it is.
+    Stop,
 }
 
 /// Direction of a change of speed.

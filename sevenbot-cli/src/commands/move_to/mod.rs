@@ -13,6 +13,7 @@ use sevenbot::moves::{JointMove, TipMove};
 use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
 use crate::measured_pose::MeasuredPose;
+use crate::printer::note;
 use crate::session::Session;
 use crate::watch::{Watch, note_rounding};
 
@@ -29,15 +30,20 @@ pub(crate) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
         return straight::run(session, args);
     }
     let Some(tool) = args.tool() else {
-        let mut arm = session.connect()?;
+        let mut arm = connect(session, args)?;
         let tool = present_tool(&mut arm)?;
         let target = target(args, tool)?;
         return take(session, Some(arm), args, &target, tool);
     };
     // Check the point before opening the arm.
     let target = target(args, tool)?;
-    let arm = if args.dry_run { None } else { Some(session.connect()?) };
+    let arm = if args.dry_run { None } else { Some(session.connect_to_move()?) };
     take(session, arm, args, &target, tool)
+}
+
+/// Opens the arm; for a move, unless nothing moves.
+fn connect(session: &Session, args: &MoveToArgs) -> Result<Arm, CommandError> {
+    if args.dry_run { session.connect() } else { session.connect_to_move() }
 }
 
 /// Shows the move and, without --dry-run, makes it.
@@ -49,7 +55,7 @@ fn take(
     tool: Vector,
 ) -> Result<(), CommandError> {
     let arrival = TipArrival::planned(args.tip(), target, tool);
-    let Some(mut arm) = arm else { return session.printer.print(&arrival) };
+    let Some(mut arm) = arm else { return print_without_arm(session, args, target, tool) };
     let TipMove { targets, fine } = TipMove::of(&mut arm, target, args.tip(), tool)?;
     let arrival = fine.iter().fold(arrival, TipArrival::in_hundredths);
     if args.dry_run {
@@ -58,6 +64,19 @@ fn take(
     }
     let measured = move_to(&mut arm, targets, args)?;
     session.printer.print(&arrival.with_measured(measured))
+}
+
+/// Shows the move of an arm with this project's firmware, which takes hundredths of a degree.
+fn print_without_arm(
+    session: &mut Session,
+    args: &MoveToArgs,
+    target: &TipTarget,
+    tool: Vector,
+) -> Result<(), CommandError> {
+    let arrival = TipArrival::planned(args.tip(), target, tool);
+    let Some(fine) = target.in_hundredths(args.tip(), tool) else { return session.printer.print(&arrival) };
+    note(format_args!("an arm that takes whole degrees misses the point by {:.1} mm", target.miss_mm));
+    session.printer.print(&arrival.in_hundredths(&fine))
 }
 
 /// The present direction of the tool.

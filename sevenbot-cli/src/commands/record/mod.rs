@@ -31,17 +31,21 @@ use crate::session::Session;
 /// Record a movement: guide the arm by hand, or let it move.
 ///
 /// The motors go off so that you can guide the arm, and its positions go to FILE. Ctrl-C ends the recording, and the
-/// arm holds its pose, also with --driven. On a terminal the space bar switches the vacuum pump.
+/// arm holds its pose, also with --driven. On a terminal v switches the vacuum pump, and the space bar ends
+/// the recording as Ctrl-C does.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sevenbot record wave.txt                     hold the arm, answer y, guide it; Ctrl-C ends
-  sevenbot record wave.txt --driven            the motors stay on, the arrow keys move the arm
+  sevenbot record wave.txt  hold the arm, answer y, guide it; Ctrl-C ends
+  sevenbot record wave.txt --driven
+                            the motors stay on, the arrow keys move the arm
   sevenbot pose 150 60 90 90 90 90 80 --speed 10
-  sevenbot record move.txt --driven --seconds 5    records a move
+  sevenbot record move.txt --driven --seconds 5
+                            records a move
 
-The file is text, one line per moment: seconds, seven angles in degrees, vacuum. Angles have two decimals if
-the arm measures them. `sevenbot play` plays it, and also a file written by hand.")]
+The file is text, one line per moment: seconds, seven angles in degrees, vacuum.
+Angles have two decimals if the arm measures them. `sevenbot play` plays it, and
+also a file written by hand.")]
 pub(crate) struct RecordArgs {
     /// The file for the recording.
     file: PathBuf,
@@ -77,9 +81,12 @@ impl Printable for Recorded {
 }
 
 pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), CommandError> {
-    let mut arm = session.connect()?;
-    let replaced = args.file.exists();
-    if replaced {
+    if args.file.as_os_str() == "-" {
+        let reason = "- is no name of a file: to record to standard output, use /dev/stdout";
+        return Err(CommandError::Usage(reason.to_owned()));
+    }
+    let mut arm = session.connect_to_move()?;
+    if args.file.is_file() {
         confirm(&format!("{} exists. Replace it?", args.file.display()), args.yes)?;
     }
     if args.driven {

@@ -57,7 +57,8 @@ impl TeachPendant {
             true => format!("  1-7 ← → Shift: nudge (joint {})", self.selected.number()),
             false => String::new(),
         };
-        let keys = if self.has_keys { format!("   space: pump{nudge}  q: end") } else { String::new() };
+        let keys =
+            if self.has_keys { format!("   v: pump{nudge}  space: stop  q: end") } else { String::new() };
         self.progress.say(&format!("{seconds:.1} s  pump {pump}{keys}"));
     }
 
@@ -116,7 +117,8 @@ fn command(key: KeyEvent, selected: Joint) -> Option<KeyCommand> {
     match key.code {
         KeyCode::Char('c') if is_control => Some(KeyCommand::Stop),
         KeyCode::Char('q') | KeyCode::Esc | KeyCode::Enter => Some(KeyCommand::End),
-        KeyCode::Char(' ') => Some(KeyCommand::SwitchPump),
+        KeyCode::Char(' ') => Some(KeyCommand::Stop),
+        KeyCode::Char('v') => Some(KeyCommand::SwitchPump),
         KeyCode::Char(digit) => select(u8::try_from(digit.to_digit(10)?).ok()?),
         KeyCode::Up => select(selected.number().saturating_sub(1)),
         KeyCode::Down => select(selected.number().saturating_add(1)),
@@ -134,7 +136,8 @@ mod tests {
     fn keys_give_the_commands_in_the_help_line() {
         let first = Joint::ALL[0];
         let plain = |code| command(KeyEvent::from(code), first);
-        assert_eq!(plain(KeyCode::Char(' ')), Some(KeyCommand::SwitchPump));
+        assert_eq!(plain(KeyCode::Char(' ')), Some(KeyCommand::Stop));
+        assert_eq!(plain(KeyCode::Char('v')), Some(KeyCommand::SwitchPump));
         assert_eq!(plain(KeyCode::Char('q')), Some(KeyCommand::End));
         assert_eq!(plain(KeyCode::Char('7')), Some(KeyCommand::Select(Joint::ALL[6])));
         assert_eq!(plain(KeyCode::Char('8')), None);

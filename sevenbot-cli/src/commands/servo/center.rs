@@ -22,7 +22,8 @@ use crate::session::Session;
 /// middle with torque on, so that a horn or a gear can be fitted.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Best with a single servo on the bench. In an arm, support the arm: a stopped servo has no torque.
+Best with a single servo on the bench. In an arm, support the arm: a stopped
+servo has no torque.
 
 Examples:
   sevenbot servo center 3

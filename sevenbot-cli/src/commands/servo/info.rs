@@ -17,8 +17,8 @@ use crate::style::{BAD, BOLD, GOOD};
 /// Only reads: the servo does not move.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The degrees are those of the joint that an id from 0 to 6 belongs to, without the joint's offset: offsets are stored
-in the arm's controller.
+The degrees are those of the joint that an id from 0 to 6 belongs to, without
+the joint's offset: offsets are stored in the arm's controller.
 
 Exit status 1 when the servo reports an error.
 

@@ -20,19 +20,25 @@ use crate::session::Session;
 /// the arm's controller from the bus first, because two masters disturb each other.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The rate of the servo bus is --rate, or --rates of a scan; --baud is that of an arm's host link.
+The rate of the servo bus is --rate, or --rates of a scan; --baud is that of an
+arm's host link.
 
-Each joint's servo has its own id: joint 1 has id 0, joint 7 has id 6. A new servo usually has id 1 or 0.
+Each joint's servo has its own id: joint 1 has id 0, joint 7 has id 6. A new
+servo usually has id 1 or 0.
 
 Examples:
-  export SEVENBOT_PORT=/dev/ttyUSB0            the adapter
-  sevenbot servo scan                          which servos are there, and at which baud rate?
-  sevenbot servo info 3                        the servo of joint 4: position, supply, limits
-  sevenbot servo dump 3                        all its registers, by name
-  sevenbot servo set 3 max-torque 800          writes one, with a check of its range
-  sevenbot servo set-id 1 3                    gives a new servo, alone on the bus, the id of joint 4
-  sevenbot servo center 3                      turns it to its middle, before its horn goes on
-  sevenbot servo torque-codes                  which of the two tables of register 40 do they have?
+  export SEVENBOT_PORT=/dev/ttyUSB0
+                               the adapter
+  sevenbot servo scan          which servos are there, and at which baud rate?
+  sevenbot servo info 3        the servo of joint 4: position, supply, limits
+  sevenbot servo dump 3        all its registers, by name
+  sevenbot servo set 3 max-torque 800
+                               writes one, with a check of its range
+  sevenbot servo set-id 1 3    gives a new servo, alone on the bus, the id of
+                               joint 4
+  sevenbot servo center 3      turns it to its middle, before its horn goes on
+  sevenbot servo torque-codes  which of the two tables of register 40 do they
+                               have?
 
 A simulated bus: `host-sim --servos-only --link ./bus`, then --port ./bus")]
 pub(crate) struct ServoArgs {

@@ -39,7 +39,8 @@ pub(super) fn open(session: &Session, baud: u32) -> Result<BusMaster, CommandErr
     BusMaster::open(&port, baud, options).map_err(|error| CommandError::Open { port, error })
 }
 
-/// The error of a failed exchange. If no servo answered, checks whether the port is an arm's host link.
+/// The error of a failed exchange. If no servo answered, checks whether the port is an arm's host link, at the baud rate of
+/// this command: all rates would take seconds.
 pub(super) fn exchange_error(session: &Session, bus: BusMaster, error: ServoError) -> CommandError {
     let is_silent = matches!(
         error,
@@ -47,15 +48,20 @@ pub(super) fn exchange_error(session: &Session, bus: BusMaster, error: ServoErro
     );
     match port(session) {
         Err(failure) => failure,
-        Ok(port) if is_silent && leads_to_arm(session, bus, &port) => CommandError::HostLink { port },
+        Ok(port) if is_silent && is_host_link(session, bus, &port) => CommandError::HostLink { port },
         Ok(port) => CommandError::Servo { port, error },
     }
 }
 
 /// Does the controller of an arm answer on this port, at any baud rate?
 pub(super) fn leads_to_arm(session: &Session, bus: BusMaster, port: &str) -> bool {
+    is_host_link(session, bus, port) || ports::find_baud(port, |_| ()).is_ok()
+}
+
+/// Does the controller of an arm answer on this port, at the baud rate of this command?
+fn is_host_link(session: &Session, bus: BusMaster, port: &str) -> bool {
     // The port can be opened only once.
     drop(bus);
     let patient = ArmOptions { attempts: 1, ..session.options };
-    Arm::open_with(port, patient).is_ok() || ports::find_baud(port, |_| ()).is_ok()
+    Arm::open_with(port, patient).is_ok()
 }

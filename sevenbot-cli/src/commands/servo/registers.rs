@@ -42,14 +42,17 @@ pub(super) struct GetRegistersArgs {
 /// A setting in the servo's EEPROM is kept without power. The EEPROM is opened for it, and locked again.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A value out of range, and a register that cannot be written, are refused before anything is sent. `sevenbot servo set-id`
-gives a servo another id. After a new baud rate the servo answers at that rate only: use --rate from then on.
+A value out of range, and a register that cannot be written, are refused before
+anything is sent. `sevenbot servo set-id` gives a servo another id. After a new
+baud rate the servo answers at that rate only: use --rate from then on.
 
-Asks before a write that may turn the motor: torque switch, goals, position limits.
+Asks before a write that may turn the motor: torque switch, goals,
+position limits.
 
 Examples:
   sevenbot servo set 1 max-torque 800
-  sevenbot servo set 1 unload-conditions 37        voltage, heat and overload switch its torque off
+  sevenbot servo set 1 unload-conditions 37
+        voltage, heat and overload switch its torque off
   sevenbot servo set 1 goal-position 511 --yes")]
 pub(super) struct SetRegisterArgs {
     /// The servo's id.
@@ -73,7 +76,8 @@ pub(super) struct SetRegisterArgs {
 /// Only reads: the servo does not move.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Registers whose source is \"SCS memory table\" may be missing in servos with older firmware, and then read 0.
+Registers whose source is \"SCS memory table\" may be missing in servos with
+older firmware, and then read 0.
 
 Examples:
   sevenbot servo dump 1

@@ -22,15 +22,18 @@ use crate::style::WARNING;
 /// Only reads: no servo moves.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The first pass asks each id with a short timeout, the second each found id with the full one. All 254 ids take
-about 1.4 s at 1000000 baud and 17 s at all eight rates. \"several servos\" or \"damaged answers\" usually means
-that two servos have the same id.
+The first pass asks each id with a short timeout, the second each found id with
+the full one. All 254 ids take about 1.4 s at 1000000 baud and 17 s at all eight
+rates. \"several servos\" or \"damaged answers\" usually means that two servos
+have the same id.
 
-Exit status 1 when an id does not answer as one servo does, 3 when no servo answers.
+Exit status 1 when an id does not answer as one servo does, 3 when no
+servo answers.
 
 Examples:
   sevenbot servo scan
-  sevenbot servo scan --rates 1000000 --ids 0-6     the servos of an arm, as its controller asks them
+  sevenbot servo scan --rates 1000000 --ids 0-6
+        the servos of an arm, as its controller asks them
   sevenbot servo scan --json")]
 pub(super) struct ScanArgs {
     /// Try only these baud rates.

@@ -24,7 +24,7 @@ use crate::session::Session;
 Joint 1 has id 0, joint 7 has id 6.
 
 Examples:
-  sevenbot servo set-id 1 3                    a new servo with id 1 becomes that of joint 4
+  sevenbot servo set-id 1 3  a new servo with id 1 becomes that of joint 4
   sevenbot servo set-id 1 3 --rate 500000")]
 pub(super) struct SetIdArgs {
     /// The present id.

@@ -2,6 +2,7 @@
 
 mod socket;
 mod text;
+mod values;
 
 use std::path::PathBuf;
 
@@ -13,6 +14,8 @@ use crate::command_error::CommandError;
 use crate::printer::Printable;
 use crate::session::Session;
 use socket::Connection;
+pub(crate) use socket::running_ports;
+use values::{factor, grams, hand, millis};
 
 /// Control a running simulator: faults, obstacles, a hand, a weight, power, virtual time.
 ///
@@ -21,21 +24,27 @@ use socket::Connection;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  host-sim --link ./7bot                       in another terminal; in the source tree: cargo sim -- --link ./7bot
-  sevenbot sim fault 3=missing --for 2s        joint 3 does not answer for two seconds
-  sevenbot sim fault line=loss=1%              the host line loses a byte in a hundred, until it is cleared
-  sevenbot sim fault list                      the faults, and how often each took effect
-  sevenbot sim hand 2 120                      a hand turns joint 2 to 120 degrees, and holds it there
-  sevenbot sim weight 150g                     a weight in the gripper
-  sevenbot sim fault 2=wall=60                 a wall at 60 degrees, in the way of joint 2
-  sevenbot sim trip 2                          the servo of joint 2 latches an overload
-  sevenbot sim power cycle                     off and on
-  sevenbot sim speed 50                        virtual time; also max, pause, resume, advance 250ms
-  sevenbot sim snapshot before                 keeps a copy of the arm; `restore before` returns to it
-  sevenbot sim state                           the true angles, whatever the arm says
+  host-sim --link ./7bot           in another terminal; in the source tree:
+                                   cargo sim -- --link ./7bot
+  sevenbot sim fault 3=missing --for 2s
+                                   joint 3 does not answer for two seconds
+  sevenbot sim fault line=loss=1%  the host line loses a byte in a hundred,
+                                   until it is cleared
+  sevenbot sim fault list          the faults, and how often each took effect
+  sevenbot sim hand 2 120          a hand turns joint 2 to 120 degrees, and
+                                   holds it there
+  sevenbot sim weight 150g         a weight in the gripper
+  sevenbot sim fault 2=wall=60     a wall at 60 degrees, in the way of joint 2
+  sevenbot sim trip 2              the servo of joint 2 latches an overload
+  sevenbot sim power cycle         off and on
+  sevenbot sim speed 50x           virtual time; also max, pause, resume,
+                                   advance 250ms
+  sevenbot sim snapshot before     keeps a copy of the arm; `restore before`
+                                   returns to it
+  sevenbot sim state               the true angles, whatever the arm says
 
-Without --control the only simulator that is running is used, or the one whose port is --port. host-sim
-prints the path of its socket when it starts.
+Without --control the only simulator that is running is used, or the one whose
+port is --port. host-sim prints the path of its socket when it starts.
 
 Exit status: 1 if the simulator refused, 3 if none was found.")]
 pub(crate) struct SimArgs {
@@ -81,32 +90,45 @@ enum SimCommand {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Faults:
-  3=missing                  the servo of joint 3 has no power
-  3=late, 3=late=MS          its answers are 30 ms late, or MS
-  3=garbled, 3=garbled=N     each answer has a wrong checksum, or each Nth one
-  3=stuck                    something keeps it from turning
-  3=restarting=MS            it restarts each MS, and loses its torque
-  2=wall=60                  a wall at 60 degrees stops joint 2, from where the joint is now
-  2=wall=60/500              a soft one: it pushes back with 500 mN m for each degree
-  2=push=-300                a hand pushes joint 2 with 300 mN m, towards smaller angles
-  7=thing=30, 7=thing=30/100 a thing between the claws: they cannot close below 30 degrees of joint 7
-  bus=echo                   the controller receives its own bytes
-  supply=volts=V             the supply has V volts instead of 7.4; a servo restarts below 4.5
-  supply=dips=MS             each MS it falls to 3 V for 20 ms
-  supply=off                 the servos have no supply; the controller has its own
-  flash=fails, flash=full    no settings can be stored
-  line=loss=P%, line=corruption=P%, line=delay=MS      of the bytes on the host line
-  arm=supported              no fault: a stand supports the arm, and it does not fall
-  arm=goal-starts-torque     in a servo that restarted, a goal switches torque on
+  3=missing                the servo of joint 3 has no power
+  3=late, 3=late=MS        its answers are 30 ms late, or MS
+  3=garbled, 3=garbled=N   each answer has a wrong checksum, or each Nth one
+  3=stuck                  something keeps it from turning
+  3=restarting=MS          it restarts each MS, and loses its torque
+  2=wall=60                a wall at 60 degrees stops joint 2, from where the
+                           joint is now
+  2=wall=60/500            a soft one: it pushes back with 500 mN m for each
+                           degree
+  2=push=-300              a hand pushes joint 2 with 300 mN m, towards smaller
+                           angles
+  7=thing=30, 7=thing=30/100
+                           a thing between the claws: they cannot close below
+                           30 degrees of joint 7
+  bus=echo                 the controller receives its own bytes
+  supply=volts=V           the supply has V volts instead of 7.4; a servo
+                           restarts below 4.5
+  supply=dips=MS           each MS it falls to 3 V for 20 ms
+  supply=off               the servos have no supply; the controller has its own
+  flash=fails, flash=full  no settings can be stored
+  line=loss=P%, line=corruption=P%, line=delay=MS
+                           of the bytes on the host line
+  arm=supported            no fault: a stand supports the arm, and it does not
+                           fall
+  arm=goal-starts-torque   in a servo that restarted, a goal switches torque on
 
 Examples:
-  sevenbot sim fault 3=garbled=10              until it is cleared
-  sevenbot sim fault supply=off --for 500ms    by itself over after half a second of virtual time
-  sevenbot sim fault list                      active faults, and those that ended by themselves
-  sevenbot sim fault clear 3                   those of joint 3; also line, supply, flash, bus, arm
-  sevenbot sim fault clear                     all
+  sevenbot sim fault 3=garbled=10  until it is cleared
+  sevenbot sim fault supply=off --for 500ms
+                                   by itself over after half a second of virtual
+                                   time
+  sevenbot sim fault list          active faults, and those that ended by
+                                   themselves
+  sevenbot sim fault clear 3       those of joint 3; also line, supply, flash,
+                                   bus, arm
+  sevenbot sim fault clear         all
 
-A fault that never took effect is marked: a test with such a fault proves nothing.")]
+A fault that never took effect is marked: a test with such a fault
+proves nothing.")]
 struct FaultArgs {
     /// The fault, 'list' or 'clear'.
     #[arg(value_name = "FAULT|list|clear")]
@@ -122,11 +144,12 @@ struct FaultArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sevenbot sim hand 2 120                      turns joint 2 to 120 degrees, and holds it there
-  sevenbot sim hand 2 hold                     holds it where it is, until it has torque
-  sevenbot sim hand 2 let-go                   without torque, a loaded joint falls
+  sevenbot sim hand 2 120     turns joint 2 to 120 degrees, and holds it there
+  sevenbot sim hand 2 hold    holds it where it is, until it has torque
+  sevenbot sim hand 2 let-go  without torque, a loaded joint falls
 
-A motor with torque is stronger: it turns the joint back. The fault 2=stuck keeps it from turning.")]
+A motor with torque is stronger: it turns the joint back. The fault 2=stuck
+keeps it from turning.")]
 struct HandArgs {
     /// The joint, 1 to 7.
     joint: u8,
@@ -147,11 +170,14 @@ struct WeightArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sevenbot sim trip 2                          an overload: free until its torque is switched off and on
-  sevenbot sim trip 2 heat                     5 degrees C too hot: free until it has cooled down, then its
-                                               torque comes back by itself, towards the goal it holds
+  sevenbot sim trip 2       an overload: free until its torque is switched off
+                            and on
+  sevenbot sim trip 2 heat  5 degrees C too hot: free until it has cooled down,
+                            then its torque comes back by itself, towards the
+                            goal it holds
 
-A loaded joint falls. A wall in its way trips a servo by itself: `sevenbot sim fault 2=wall=60`.")]
+A loaded joint falls. A wall in its way trips a servo by itself: `sevenbot sim
+fault 2=wall=60`.")]
 struct TripArgs {
     /// The joint, 1 to 7.
     joint: u8,
@@ -176,14 +202,15 @@ struct AdvanceArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  sevenbot sim speed 50                        a minute takes 1.2 seconds
+  sevenbot sim speed 50x                       a minute takes 1.2 seconds
   sevenbot sim speed max                       as fast as the computer can
-  sevenbot sim speed 1                         real time
+  sevenbot sim speed 1x                        real time
 
-The baud rate counts in virtual time, but a client thinks in real time: at a high speed much virtual time
-passes between its requests. host-sim --lockstep avoids that.")]
+The baud rate counts in virtual time, but a client thinks in real time: at a
+high speed much virtual time passes between its requests. host-sim --lockstep
+avoids that.")]
 struct SpeedArgs {
-    /// The factor from 0.001 to 1000, or 'max'.
+    /// The factor from 0.001x to 1000x, or 'max'.
     #[arg(value_name = "FACTOR|max", value_parser = factor)]
     factor: Value,
 }
@@ -209,48 +236,6 @@ enum PowerState {
     On,
     Off,
     Cycle,
-}
-
-/// Parses a duration into milliseconds: 250ms, 2s, 1.5s or 3min.
-fn millis(text: &str) -> Result<u64, &'static str> {
-    const WANTED: &str = "use a time of 1 ms or more with its unit, as 250ms, 2s or 3min";
-    let digits = text.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
-    let factor = match text.get(digits.len()..) {
-        Some("ms") => 1.0,
-        Some("s") => 1_000.0,
-        Some("min") => 60_000.0,
-        _ => return Err(WANTED),
-    };
-    let millis = digits.parse::<f64>().map_err(|_| WANTED)? * factor;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the range")]
-    if (1.0..=1e12).contains(&millis) { Ok(millis.round() as u64) } else { Err(WANTED) }
-}
-
-/// Parses a weight in grams.
-fn grams(text: &str) -> Result<u16, &'static str> {
-    text.strip_suffix('g').unwrap_or(text).parse().map_err(|_| "use grams from 0 to 1000, as 150g")
-}
-
-/// Parses a speed.
-fn factor(text: &str) -> Result<Value, &'static str> {
-    match text {
-        "max" => Ok(json!(text)),
-        factor => factor
-            .parse::<f64>()
-            .map(|factor| json!(factor))
-            .map_err(|_| "use a factor, as 50 or 0.5, or max"),
-    }
-}
-
-/// Parses what a hand does.
-fn hand(text: &str) -> Result<Value, &'static str> {
-    match text {
-        "hold" | "let-go" => Ok(json!(text)),
-        degrees => degrees
-            .parse::<f64>()
-            .map(|degrees| json!(degrees))
-            .map_err(|_| "use an angle in degrees from 0 to 180, hold or let-go"),
-    }
 }
 
 /// An answer of the simulator.
@@ -336,24 +321,6 @@ fn fault_request(args: &FaultArgs) -> Result<Value, CommandError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn durations_have_a_unit() {
-        for (text, value) in
-            [("250ms", 250), ("2s", 2_000), ("1.5s", 1_500), ("3min", 180_000), ("0.0014s", 1)]
-        {
-            assert_eq!(millis(text), Ok(value), "{text}");
-        }
-        for wrong in ["250", "0ms", "-1s", "s", "", "2h", "infs", "nans", "1e99s"] {
-            assert!(millis(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn weights_are_grams() {
-        assert_eq!((grams("150g"), grams("0")), (Ok(150), Ok(0)));
-        assert!(grams("1kg").is_err() && grams("-1").is_err());
-    }
 
     #[test]
     fn a_location_follows_only_clear() {

@@ -106,6 +106,12 @@ impl Connection {
     }
 }
 
+/// The ports of the simulators that run.
+pub(crate) fn running_ports() -> Vec<String> {
+    let mut found: Vec<_> = sockets().iter().filter_map(|path| Connection::connect(path).ok()).collect();
+    found.iter_mut().filter_map(Connection::port).collect()
+}
+
 /// The default sockets, also of simulators that were killed.
 fn sockets() -> Vec<PathBuf> {
     let is_control = |path: &PathBuf| {

@@ -14,6 +14,9 @@ const LINES_AHEAD: usize = 1_024;
 /// Later times are refused, so that the arithmetic cannot overflow.
 const LONGEST: Duration = Duration::from_secs(24 * 60 * 60);
 
+/// Fields of a line: the time and seven angles.
+const FIELDS: usize = 8;
+
 /// A set-point and its time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TimedPoint {
@@ -55,12 +58,12 @@ struct Lines {
 }
 
 impl Lines {
-    /// The set-point in the next line; `None` for an empty line and for the heading of a table.
+    /// The set-point in the next line; `None` for an empty line and for the heading of a table: a first line with eight
+    /// words.
     fn next(&mut self, line: &str) -> Result<Option<TimedPoint>, String> {
         self.number += 1;
         let line = line.trim_start_matches('\u{feff}').trim();
-        let is_heading = self.number == 1 && line.starts_with(|first: char| first.is_ascii_alphabetic());
-        if line.is_empty() || is_heading {
+        if line.is_empty() || (self.number == 1 && is_heading(line)) {
             return Ok(None);
         }
         let point = if line.starts_with('{') { json(line) } else { table(line) };
@@ -71,6 +74,11 @@ impl Lines {
         self.last = Some(point.time);
         Ok(Some(point))
     }
+}
+
+fn is_heading(line: &str) -> bool {
+    let is_word = |field: &str| !field.trim().is_empty() && field.trim().parse::<f64>().is_err();
+    line.split(',').count() == FIELDS && line.split(',').all(is_word)
 }
 
 fn json(line: &str) -> Result<TimedPoint, String> {
@@ -140,6 +148,19 @@ mod tests {
     }
 
     #[test]
+    fn a_bad_first_line_is_no_heading() {
+        for (line, says) in [
+            ("abc", "line 1: 1 fields instead of 8"),
+            ("t,j1", "line 1: 2 fields instead of 8"),
+            ("NaN,90,90,65,90,90,90,80", "line 1: NaN is not a time"),
+            ("t,90,90,65,90,90,90,80", "line 1: `t` is not a number"),
+        ] {
+            let refused = parsed(line).expect_err(line);
+            assert!(refused.starts_with(says), "{refused}");
+        }
+    }
+
+    #[test]
     fn a_bad_line_is_told_with_its_number() {
         let good = "0,90,90,65,90,90,90,80\n";
         let refused = |line: &str| parsed(&format!("{good}{line}\n")).expect_err("it is wrong");
@@ -154,6 +175,6 @@ mod tests {
         assert!(refused("NaN,90,90,65,90,90,90,80").contains("is not a time"));
         assert!(refused("{\"t\": 1, \"joints\": [1, 2]}").starts_with("line 2: invalid length 2"));
         assert!(refused("{\"t\": 1}").contains("missing field `joints`"));
-        assert!(refused("t,j1").contains("2 fields"), "a heading is the first line");
+        assert!(refused("t,j1,j2,j3,j4,j5,j6,j7").contains("not a number"), "a heading is the first line");
     }
 }

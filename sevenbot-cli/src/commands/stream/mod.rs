@@ -42,36 +42,46 @@ Examples:
   policy.py | sevenbot stream
   sevenbot stream --period 10 < move.csv
   printf '0,90,90,65,90,90,90,80\\n2,95.5,90,65,90,90,90,80\\n' | sevenbot stream
-  policy.py | sevenbot stream --approach 3         goes to the first point in 3 s
+  policy.py | sevenbot stream --approach 3
+        goes to the first point in 3 s
 
-One set-point per line, with its time in seconds and the seven joints in degrees, 0 to 180:
+One set-point per line, with its time in seconds and the seven joints in
+degrees, 0 to 180:
 
-  {\"t\": 0.02, \"joints\": [90.25, 88, 65, 90, 90, 90, null]}      as JSON; null: this joint gets no point
-  0.02, 90.25, 88, 65, 90, 90, 90,                             or separated by commas; empty: no point
+  {\"t\": 0.02, \"joints\": [90.25, 88, 65, 90, 90, 90, null]}
+                                    as JSON; null: this joint gets no point
+  0.02, 90.25, 88, 65, 90, 90, 90,  or separated by commas; empty: no point
 
-The first point has to be within 5 degrees of where each joint stands, and is approached at up to 30 degrees per second.
-Further away it is refused with the distance of each joint, unless --approach goes there first. A joint whose first
+The first point has to be within 5 degrees of where each joint stands, and is
+approached at up to 30 degrees per second. Further away it is refused with the
+distance of each joint, unless --approach goes there first. A joint whose first
 angle comes in a later line is treated alike.
 
-Times ascend. The first line is due at once. Between two lines the joints move in straight lines. A line that
-comes late delays what follows: nothing is speeded up. The arm lags one and a half periods behind the points.
-No joint goes faster than its speed (`sevenbot get speed`), also on the way to the first point. A point that takes the arm
-below the table or into the base is sent with a warning; `sevenbot move-to --help` describes this guard.
+Times ascend. The first line is due at once. Between two lines the joints move
+in straight lines. A line that comes late delays what follows: nothing is
+speeded up. The arm lags one and a half periods behind the points. No joint goes
+faster than its speed (`sevenbot get speed`), also on the way to the first
+point. A point that takes the arm below the table or into the base is sent with
+a warning; `sevenbot move-to --help` describes this guard.
 
-A bad line ends the stream with its number. The lines before it are sent, and the arm holds at the last of
-them. Ctrl-C also makes it hold. At the end the registers of the period and of the watchdog have their old
-values again, and the summary shows:
+A bad line ends the stream with its number. The lines before it are sent, and
+the arm holds at the last of them. Ctrl-C also makes it hold. At the end the
+registers of the period and of the watchdog have their old values again, and the
+summary shows:
 
-  late      points sent more than a quarter of the period late, points passed over, and pauses of the input
+  late      points sent more than a quarter of the period late, points passed
+            over, and pauses of the input
   gap       the longest time between two points
   jitter    the standard deviation of the sending times
   tracking  the distance of the measured positions from the points that were due
 
-Only for arms with this project's firmware: others take whole degrees and no stream.
+Only for arms with this project's firmware: others take whole degrees and
+no stream.
 
-Exit status 1 after a bad line, if the first point is refused, if the arm takes no stream, and if it does not follow:
-a joint of the stream is blocked, let go or silent, the servos have no supply, or the controller restarted. The message
-tells what to do.")]
+Exit status 1 after a bad line, if the first point is refused, if the arm takes
+no stream, and if it does not follow:
+a joint of the stream is blocked, let go or silent, the servos have no supply,
+or the controller restarted. The message tells what to do.")]
 pub(crate) struct StreamArgs {
     /// Time between two points in milliseconds, 5 to 1000.
     #[arg(long, value_name = "MS", default_value_t = 20, value_parser = value_parser!(u16).range(5..=1_000))]
@@ -128,7 +138,7 @@ impl StreamArgs {
 
 pub(crate) fn run(session: &mut Session, args: &StreamArgs) -> Result<(), CommandError> {
     let options = args.options()?;
-    let mut arm = session.connect()?;
+    let mut arm = session.connect_to_move()?;
     if !arm.has_extended_block()? {
         return Err(StreamError::NoExtendedBlock.into());
     }

@@ -45,7 +45,8 @@ pub(super) enum Targets {
 pub(super) fn record(targets: Targets) -> Curve {
     let config = ArmConfig { chip_id: [0; 6], is_paced: true, torque_codes: Default::default() };
     let plant = Plant::new(Instant::ZERO);
-    let mut arm = SimulatedArm::power_up(Instant::ZERO, config, Flash::in_memory(), plant);
+    let mut arm: SimulatedArm<Flash, Plant> =
+        SimulatedArm::power_up(Instant::ZERO, config, Flash::in_memory(), plant);
     let mut measured = Curve::new();
     let mut frames = frames(targets).into_iter().peekable();
     let mut time = 0.0;

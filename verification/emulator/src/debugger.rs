@@ -8,17 +8,17 @@ use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 
-use crate::run::{TIMEOUT, TaskResult, wait_for};
+use crate::process::{TIMEOUT, TaskResult, wait_for};
 
 /// A connection to an emulator that is stopped.
-pub(super) struct Debugger {
+pub(crate) struct Debugger {
     stream: UnixStream,
     received: Vec<u8>,
 }
 
 impl Debugger {
     /// Connects to the socket of an emulator that waits for its debugger.
-    pub(super) fn connect(socket: &Path) -> TaskResult<Self> {
+    pub(crate) fn connect(socket: &Path) -> TaskResult<Self> {
         let stream =
             wait_for("the emulator opens its debugger socket", || Ok(UnixStream::connect(socket).ok()))?;
         stream.set_read_timeout(Some(TIMEOUT))?;
@@ -26,7 +26,7 @@ impl Debugger {
     }
 
     /// Sets a breakpoint at an instruction.
-    pub(super) fn break_at(&mut self, address: u64) -> TaskResult {
+    pub(crate) fn break_at(&mut self, address: u64) -> TaskResult {
         match self.execute(&format!("Z0,{address:x},2"))?.as_str() {
             "OK" => Ok(()),
             other => Err(format!("the emulator refuses a breakpoint: {other}"))?,
@@ -34,17 +34,17 @@ impl Debugger {
     }
 
     /// Executes the instruction at which the chip is stopped.
-    pub(super) fn step(&mut self) -> TaskResult {
+    pub(crate) fn step(&mut self) -> TaskResult {
         self.execute("s").map(|_| ())
     }
 
     /// Runs until a breakpoint. A chip that is stopped at one has to step first.
-    pub(super) fn run(&mut self) -> TaskResult {
+    pub(crate) fn run(&mut self) -> TaskResult {
         self.execute("c").map(|_| ())
     }
 
     /// A word of the chip's memory or of a peripheral.
-    pub(super) fn word(&mut self, address: u32) -> TaskResult<u32> {
+    pub(crate) fn word(&mut self, address: u32) -> TaskResult<u32> {
         let reply = self.execute(&format!("m{address:x},4"))?;
         let word = u32::from_str_radix(&reply, 16)?;
         Ok(word.swap_bytes())

@@ -19,11 +19,12 @@ use arm_sim::servo_bus::ServoBus;
 use protocol_core::time::Instant;
 use tempfile::TempDir;
 
-use super::debugger::Debugger;
-use super::monitor::{self, Monitor};
-use crate::elf::Program;
-use crate::run::{ChildProcess, IMAGE, TaskResult};
-use crate::thumb_decode::Effect;
+use crate::chip_program::IMAGE;
+use crate::debugger::Debugger;
+use crate::monitor::{self, Monitor};
+use crate::process::{ChildProcess, TaskResult};
+use linked_image::Effect;
+use linked_image::Program;
 
 /// The count of TIM2, the clock of the image, in microseconds.
 const CLOCK: u32 = 0x4000_0024;
@@ -34,9 +35,9 @@ const SERVO_STATUS: u32 = 0x4000_4400;
 const RXNE: u32 = 1 << 5;
 
 /// The image, its lines and its servos.
-pub(crate) struct Lockstep<B> {
+pub struct Lockstep<B> {
     /// The servo bus.
-    pub(crate) bus: B,
+    pub bus: B,
     debugger: Debugger,
     monitor: Monitor,
     log: PathBuf,
@@ -50,11 +51,11 @@ pub(crate) struct Lockstep<B> {
 }
 
 /// Numbers of bytes that the image has sent.
-pub(crate) struct Sent {
+pub struct Sent {
     /// On the host link.
-    pub(crate) to_host: usize,
+    pub to_host: usize,
     /// On the servo bus.
-    pub(crate) to_servos: usize,
+    pub to_servos: usize,
 }
 
 /// One serial line of the image.
@@ -66,7 +67,7 @@ struct Line {
 
 impl<B: ServoBus> Lockstep<B> {
     /// Starts the image with `bus`, and runs it until it sleeps for the first time.
-    pub(crate) fn start(bus: B) -> TaskResult<Self> {
+    pub fn start(bus: B) -> TaskResult<Self> {
         let folder = tempfile::tempdir()?;
         let listen = |name: &str| UnixListener::bind(folder.path().join(name));
         let (host, servos) = (listen("host")?, listen("servos")?);
@@ -77,7 +78,7 @@ impl<B: ServoBus> Lockstep<B> {
         let log_option = log.display().to_string();
         let options = ["-S", "-icount", "shift=3,sleep=on", "-singlestep", "-D", &log_option];
         let options = [&options[..], &["-chardev", &chardev, "-gdb", "chardev:debugger"]].concat();
-        let machine = super::start_machine(&IMAGE, &folder, &super::servo_socket(&folder), &options)?;
+        let machine = crate::start_machine(&IMAGE, &folder, &crate::servo_socket(&folder), &options)?;
         let line = |listener, status| Line::accept(listener, status);
         let (host, servos) = (line(&host, HOST_STATUS)?, line(&servos, SERVO_STATUS)?);
         let monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
@@ -106,18 +107,18 @@ impl<B: ServoBus> Lockstep<B> {
     }
 
     /// Sends bytes to the host link of the image, from its next stop on.
-    pub(crate) fn host_send(&mut self, bytes: &[u8]) {
+    pub fn host_send(&mut self, bytes: &[u8]) {
         self.host.to_image.extend(bytes);
     }
 
     /// How many bytes the image has sent since the last call.
-    pub(crate) fn take_sent(&mut self) -> TaskResult<Sent> {
+    pub fn take_sent(&mut self) -> TaskResult<Sent> {
         let to_host = self.host.received()?.len();
         Ok(Sent { to_host, to_servos: std::mem::take(&mut self.sent_to_servos) })
     }
 
     /// Runs the image until it sleeps at `until` or later, and returns the emulator's log of its instructions.
-    pub(crate) fn log_until(&mut self, until: Instant) -> TaskResult<String> {
+    pub fn log_until(&mut self, until: Instant) -> TaskResult<String> {
         let before = fs::metadata(&self.log).map_or(0, |log| log.len());
         self.monitor.human("log exec,nochain")?;
         let advanced = self.advance(until);
@@ -133,7 +134,7 @@ impl<B: ServoBus> Lockstep<B> {
     }
 
     /// Runs the image until it sleeps at `until` or later.
-    pub(crate) fn advance(&mut self, until: Instant) -> TaskResult {
+    pub fn advance(&mut self, until: Instant) -> TaskResult {
         while self.now < until {
             self.host.give_byte(&mut self.debugger)?;
             self.servos.give_byte(&mut self.debugger)?;

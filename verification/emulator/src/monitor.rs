@@ -5,10 +5,10 @@ use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 
-use crate::run::{TIMEOUT, TaskResult, wait_for};
+use crate::process::{TIMEOUT, TaskResult, wait_for};
 
 /// Waits until the emulator connects.
-pub(crate) fn accept(listener: &UnixListener) -> TaskResult<UnixStream> {
+pub fn accept(listener: &UnixListener) -> TaskResult<UnixStream> {
     listener.set_nonblocking(true)?;
     let (stream, _) = wait_for("the emulator connects", || Ok(listener.accept().ok()))?;
     stream.set_nonblocking(false)?;
@@ -16,7 +16,7 @@ pub(crate) fn accept(listener: &UnixListener) -> TaskResult<UnixStream> {
 }
 
 /// A connection to the monitor.
-pub(crate) struct Monitor {
+pub struct Monitor {
     stream: BufReader<UnixStream>,
     /// The file for the transfer of memory.
     scratch: PathBuf,
@@ -24,7 +24,7 @@ pub(crate) struct Monitor {
 
 impl Monitor {
     /// Opens the monitor on `stream`, with a file in `folder`.
-    pub(crate) fn new(stream: UnixStream, folder: &Path) -> TaskResult<Self> {
+    pub fn new(stream: UnixStream, folder: &Path) -> TaskResult<Self> {
         stream.set_read_timeout(Some(TIMEOUT))?;
         let mut monitor = Self { stream: BufReader::new(stream), scratch: folder.join("memory") };
         monitor.execute("qmp_capabilities", "")?;
@@ -32,7 +32,7 @@ impl Monitor {
     }
 
     /// Executes a command; `arguments` are the members of a JSON object, without its braces.
-    pub(crate) fn execute(&mut self, command: &str, arguments: &str) -> TaskResult {
+    pub fn execute(&mut self, command: &str, arguments: &str) -> TaskResult {
         writeln!(self.stream.get_mut(), r#"{{"execute":"{command}","arguments":{{{arguments}}}}}"#)?;
         loop {
             let mut line = String::new();
@@ -49,19 +49,19 @@ impl Monitor {
     }
 
     /// Executes a command of the monitor for people.
-    pub(crate) fn human(&mut self, line: &str) -> TaskResult {
+    pub fn human(&mut self, line: &str) -> TaskResult {
         self.execute("human-monitor-command", &format!(r#""command-line":"{line}""#))
     }
 
     /// `length` bytes of the chip's memory from `address` on.
-    pub(crate) fn memory(&mut self, address: u32, length: u32) -> TaskResult<Vec<u8>> {
+    pub fn memory(&mut self, address: u32, length: u32) -> TaskResult<Vec<u8>> {
         let file = self.scratch.display().to_string();
         self.execute("pmemsave", &format!(r#""val":{address},"size":{length},"filename":"{file}""#))?;
         Ok(fs::read(&self.scratch)?)
     }
 
     /// Waits until the bits of `mask` are set in the register at `address`.
-    pub(crate) fn wait_for_bits(&mut self, address: u32, mask: u32) -> TaskResult {
+    pub fn wait_for_bits(&mut self, address: u32, mask: u32) -> TaskResult {
         wait_for("the firmware opens its host link", || {
             let bytes = self.memory(address, 4)?;
             let is_set = bytes.try_into().map(u32::from_le_bytes).is_ok_and(|value| value & mask == mask);

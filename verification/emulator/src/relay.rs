@@ -11,7 +11,7 @@ use rustix::io::Errno;
 use tty_ports::clients::Clients;
 use tty_ports::pty::Pty;
 
-use crate::run::TaskResult;
+use crate::process::TaskResult;
 
 /// The most bytes that wait for the emulator. With this many, the port is not read.
 const CAPACITY: usize = 4_096;
@@ -19,7 +19,7 @@ const CAPACITY: usize = 4_096;
 const POLL_PERIOD: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
 /// A port and the socket behind it.
-pub(super) struct Relay {
+pub(crate) struct Relay {
     clients: Option<Clients>,
     port: Pty,
     socket: UnixStream,
@@ -29,7 +29,7 @@ pub(super) struct Relay {
 
 impl Relay {
     /// Opens a port for the other end of the socket.
-    pub(super) fn new(socket: UnixStream) -> io::Result<Self> {
+    pub(crate) fn new(socket: UnixStream) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         let mut clients = Clients::new().inspect_err(Pty::warn_of).ok();
         let port = Pty::open(clients.as_mut())?;
@@ -37,12 +37,12 @@ impl Relay {
     }
 
     /// The path of the port.
-    pub(super) fn port(&self) -> &Path {
+    pub(crate) fn port(&self) -> &Path {
         self.port.path()
     }
 
     /// Transfers the available bytes.
-    pub(super) fn transfer(&mut self) -> TaskResult {
+    pub(crate) fn transfer(&mut self) -> TaskResult {
         let mut bytes = [0; CAPACITY];
         if self.to_arm.is_empty() {
             let count = self.port.read(&mut bytes)?;
@@ -70,7 +70,7 @@ impl Relay {
     }
 
     /// Sleeps until there are bytes, a client or a signal, or for the poll period if `polls`.
-    pub(super) fn sleep(&self, signals: &Signals, polls: bool) -> io::Result<()> {
+    pub(crate) fn sleep(&self, signals: &Signals, polls: bool) -> io::Result<()> {
         let if_empty = |bytes: &[u8], flags| if bytes.is_empty() { flags } else { PollFlags::empty() };
         let if_waiting = |bytes: &[u8], flags| if bytes.is_empty() { PollFlags::empty() } else { flags };
         let port = if_empty(&self.to_arm, PollFlags::IN) | if_waiting(&self.to_host, PollFlags::OUT);

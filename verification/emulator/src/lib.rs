@@ -1,5 +1,5 @@
-//! `cargo xtask emulate`: the unmodified image for the arm in an emulator, with simulated servos, and a port for any serial
-//! client.
+//! The unmodified image for the arm in an emulator, with simulated servos, and a port for any serial
+//! client. `cargo xtask emulate` builds it and runs it here.
 //!
 //! ```text
 //!   client ══ port ══ Relay ── socket ── USART1 ┌──────────┐ USART2 ── socket ── host-sim --servo-socket
@@ -20,32 +20,34 @@ use host_sim::signals::{SignalAction, Signals};
 use tempfile::TempDir;
 use tty_ports::symlink::Symlink;
 
-use crate::run::{self, ChildProcess, ChipProgram, TaskResult, root};
-
+pub mod chip_program;
 mod debugger;
-pub(crate) mod lockstep;
+pub mod lockstep;
 mod log;
-pub(crate) mod monitor;
+pub mod monitor;
+pub mod process;
 mod relay;
 
+use chip_program::{ChipProgram, IMAGE, SELF_TEST, root, target_directory};
 use log::Log;
 use monitor::Monitor;
+use process::{ChildProcess, TaskResult};
 use relay::Relay;
 
 /// The emulator, and its package.
-pub(crate) const QEMU: &str = "qemu-system-arm";
+pub const QEMU: &str = "qemu-system-arm";
 
 /// Instructions for the installation.
 const HOW_TO_GET_QEMU: &str =
     "`sudo apt-get install qemu-system-arm` installs it on Debian and Ubuntu, `brew install qemu` on a Mac";
 /// USART1's first control register (RM0090, section 30.6). Bytes before its setup are lost.
-pub(crate) const HOST_LINK_CONTROL: u32 = 0x4001_100C;
+pub const HOST_LINK_CONTROL: u32 = 0x4001_100C;
 /// The bits UE and RE of this register.
-pub(crate) const RECEIVER_ON: u32 = 1 << 13 | 1 << 2;
+pub const RECEIVER_ON: u32 = 1 << 13 | 1 << 2;
 
 /// The setup of the emulated arm.
 #[derive(Args)]
-pub(crate) struct EmulateArgs {
+pub struct EmulateArgs {
     /// Make this symbolic link to the port while the emulator runs
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
@@ -63,22 +65,18 @@ pub(crate) struct EmulateArgs {
     servo_line: Option<PathBuf>,
     /// Use the image and the simulator of the last build
     #[arg(long)]
-    no_build: bool,
+    pub no_build: bool,
 }
 
 /// Runs the image until a signal ends it. SIGHUP switches the arm off and on, SIGUSR2 resets the chip alone.
-pub(crate) fn run(options: &EmulateArgs) -> TaskResult {
+pub fn run(options: &EmulateArgs) -> TaskResult {
     need_qemu()?;
-    if !options.no_build {
-        run::build_image()?;
-        run::build_host_sim()?;
-    }
     let mut signals = Signals::catch()?;
     let folder = tempfile::tempdir()?;
     let servos = start_servos(&folder, &options.fault)?;
     let host = UnixListener::bind(folder.path().join("host"))?;
     let commands = UnixListener::bind(folder.path().join("monitor"))?;
-    let image = if options.self_test { &run::SELF_TEST } else { &run::IMAGE };
+    let image = if options.self_test { &SELF_TEST } else { &IMAGE };
     let mut servo_line = servo_socket(&folder);
     if let Some(path) = &options.servo_line {
         servo_line = format!("{servo_line},logfile={}", std::path::absolute(path)?.display());
@@ -115,7 +113,11 @@ fn has_qemu() -> bool {
     Command::new(QEMU).arg("--version").stdout(Stdio::null()).status().is_ok_and(|status| status.success())
 }
 
-pub(crate) fn need_qemu() -> TaskResult {
+/// Fails with instructions if the emulator is not installed.
+///
+/// # Errors
+/// What installs it.
+pub fn need_qemu() -> TaskResult {
     if has_qemu() {
         return Ok(());
     }
@@ -123,8 +125,8 @@ pub(crate) fn need_qemu() -> TaskResult {
 }
 
 /// Starts the seven servos on a socket.
-pub(crate) fn start_servos(folder: &TempDir, faults: &[String]) -> TaskResult<ChildProcess> {
-    let mut command = Command::new(run::target_directory().join("debug").join("host-sim"));
+pub fn start_servos(folder: &TempDir, faults: &[String]) -> TaskResult<ChildProcess> {
+    let mut command = Command::new(target_directory().join("debug").join("host-sim"));
     command.arg("--quiet").arg("--servo-socket").arg(folder.path().join("servos"));
     faults.iter().for_each(|fault| {
         command.arg("--fault").arg(fault);
@@ -138,13 +140,13 @@ pub(crate) fn start_servos(folder: &TempDir, faults: &[String]) -> TaskResult<Ch
 }
 
 /// The socket of the servos, as an option of the emulator.
-pub(crate) fn servo_socket(folder: &TempDir) -> String {
+pub fn servo_socket(folder: &TempDir) -> String {
     format!("socket,path={}", folder.path().join("servos").display())
 }
 
 /// Starts the emulator with an image. It connects to the sockets in `folder` before it starts. `servos` is the character
 /// device of the servo bus, and `options` are further options of the emulator.
-pub(crate) fn start_machine(
+pub fn start_machine(
     image: &ChipProgram,
     folder: &TempDir,
     servos: &str,

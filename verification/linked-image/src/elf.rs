@@ -10,18 +10,18 @@ use object::read::elf::ElfFile32;
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use rustc_demangle::demangle;
 
+use crate::ReadResult;
 use crate::jump_table::FunctionCode;
-use crate::run::{TaskResult, root};
 use crate::thumb_decode::{self, Effect, halfword};
 
 type Lines<'data> = addr2line::Context<EndianSlice<'data, LittleEndian>>;
 
 /// A linked program.
-pub(crate) struct Program<'data> {
+pub struct Program<'data> {
     /// Functions and data with a name and a size.
-    pub(crate) symbols: Vec<Symbol>,
+    pub symbols: Vec<Symbol>,
     /// The sections in the chip's memory.
-    pub(crate) sections: Vec<Section>,
+    pub sections: Vec<Section>,
     code: Vec<CodeSection<'data>>,
     /// The effect of the instruction at each address.
     instructions: BTreeMap<u64, Effect>,
@@ -31,33 +31,33 @@ pub(crate) struct Program<'data> {
 }
 
 /// A function or a piece of data.
-pub(crate) struct Symbol {
+pub struct Symbol {
     /// Its name in the source.
-    pub(crate) name: String,
+    pub name: String,
     /// Its address.
-    pub(crate) address: u64,
+    pub address: u64,
     /// Its length in bytes.
-    pub(crate) size: u64,
+    pub size: u64,
     /// True for a function.
-    pub(crate) is_function: bool,
+    pub is_function: bool,
 }
 
 /// A section in the chip's memory.
-pub(crate) struct Section {
+pub struct Section {
     /// Its name: `.text`.
-    pub(crate) name: String,
+    pub name: String,
     /// Its address.
-    pub(crate) address: u64,
+    pub address: u64,
     /// Its length in bytes.
-    pub(crate) size: u64,
+    pub size: u64,
 }
 
 /// A line of source.
-pub(crate) struct SourceLine {
+pub struct SourceLine {
     /// The file: its path in the workspace, or in its package.
-    pub(crate) file: String,
+    pub file: String,
     /// True for a file of this workspace.
-    pub(crate) is_ours: bool,
+    pub is_ours: bool,
     /// The number of the line.
     line: u32,
 }
@@ -71,7 +71,7 @@ struct CodeSection<'data> {
 
 impl<'data> Program<'data> {
     /// Reads a linked ELF file.
-    pub(crate) fn read(file: &'data [u8]) -> TaskResult<Self> {
+    pub fn read(file: &'data [u8]) -> ReadResult<Self> {
         let elf: ElfFile32<'_> = ElfFile32::parse(file)?;
         let code = code(&elf)?;
         Ok(Self {
@@ -85,24 +85,24 @@ impl<'data> Program<'data> {
     }
 
     /// The addresses of the calls and jumps to `target`.
-    pub(crate) fn calls_to(&self, target: u64) -> Vec<u64> {
+    pub fn calls_to(&self, target: u64) -> Vec<u64> {
         let leads_there = |effect| matches!(effect, Effect::Call(to) | Effect::Jump(to) if to == target);
         let calls = self.instructions.iter().filter(|&(_, &effect)| leads_there(effect));
         calls.map(|(&at, _)| at).collect()
     }
 
     /// The functions, each once, even with several names.
-    pub(crate) fn functions(&self) -> impl Iterator<Item = &Symbol> {
+    pub fn functions(&self) -> impl Iterator<Item = &Symbol> {
         self.symbols.iter().filter(|symbol| symbol.is_function && symbol.size > 0)
     }
 
     /// The instructions of a function: address and effect.
-    pub(crate) fn instructions_of(&self, function: &Symbol) -> impl Iterator<Item = (u64, Effect)> {
+    pub fn instructions_of(&self, function: &Symbol) -> impl Iterator<Item = (u64, Effect)> {
         self.instructions.range(function.range()).map(|(&at, &effect)| (at, effect))
     }
 
     /// The targets of the indirect jump at `at` in a function; `None` if they cannot be read from the image.
-    pub(crate) fn jump_targets(&self, function: &Symbol, at: u64) -> Option<Vec<u64>> {
+    pub fn jump_targets(&self, function: &Symbol, at: u64) -> Option<Vec<u64>> {
         let code = self.code.iter().find(|code| function.address >= code.start)?;
         let first = usize::try_from(function.address - code.start).ok()?;
         let bytes = code.bytes.get(first..)?.get(..usize::try_from(function.size).ok()?)?;
@@ -111,38 +111,38 @@ impl<'data> Program<'data> {
     }
 
     /// The addresses of the instructions with this effect.
-    pub(crate) fn addresses_of(&self, effect: Effect) -> Vec<u64> {
+    pub fn addresses_of(&self, effect: Effect) -> Vec<u64> {
         self.instructions.iter().filter(|&(_, &other)| other == effect).map(|(&at, _)| at).collect()
     }
 
     /// The address of the instruction that precedes the one at `address`.
-    pub(crate) fn instruction_before(&self, address: u64) -> Option<u64> {
+    pub fn instruction_before(&self, address: u64) -> Option<u64> {
         self.instructions.range(..address).next_back().map(|(&at, _)| at)
     }
 
     /// The effect of the instruction at each address.
-    pub(crate) fn effects(&self) -> HashMap<u64, Effect> {
+    pub fn effects(&self) -> HashMap<u64, Effect> {
         self.instructions.iter().map(|(&at, &effect)| (at, effect)).collect()
     }
 
     /// The address of the function with this name.
-    pub(crate) fn address_of(&self, name: &str) -> TaskResult<u64> {
+    pub fn address_of(&self, name: &str) -> ReadResult<u64> {
         let symbol = self.functions().find(|symbol| symbol.name == name);
         Ok(symbol.ok_or_else(|| format!("no function is called {name}"))?.address)
     }
 
     /// The addresses of the exception handlers, reset first, each handler once.
-    pub(crate) fn handlers(&self) -> &[u64] {
+    pub fn handlers(&self) -> &[u64] {
         &self.handlers
     }
 
     /// The function that contains `address`.
-    pub(crate) fn function_at(&self, address: u64) -> Option<&Symbol> {
+    pub fn function_at(&self, address: u64) -> Option<&Symbol> {
         self.symbols.iter().find(|symbol| symbol.is_function && symbol.holds(address))
     }
 
     /// The lines of source for `address`, innermost first. There are several for inlined functions.
-    pub(crate) fn source_of(&self, address: u64) -> TaskResult<Vec<SourceLine>> {
+    pub fn source_of(&self, address: u64) -> ReadResult<Vec<SourceLine>> {
         let mut places = Vec::new();
         let mut frames = self.lines.find_frames(address).skip_all_loads()?;
         while let Some(frame) = frames.next()? {
@@ -154,7 +154,7 @@ impl<'data> Program<'data> {
     }
 
     /// Ranges of code from one line of source: address and length in bytes.
-    pub(crate) fn line_ranges(&self) -> TaskResult<Vec<(u64, u64)>> {
+    pub fn line_ranges(&self) -> ReadResult<Vec<(u64, u64)>> {
         let mut line_ranges = Vec::new();
         for code in &self.code {
             let end = code.start + code.bytes.len() as u64;
@@ -167,7 +167,9 @@ impl<'data> Program<'data> {
 
 impl SourceLine {
     fn new(path: &str, line: u32) -> Self {
-        let ours = Path::new(path).strip_prefix(root()).ok().and_then(Path::to_str);
+        // The workspace of this crate is that of the program.
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap_or(Path::new("/"));
+        let ours = Path::new(path).strip_prefix(root).ok().and_then(Path::to_str);
         let theirs = path.split_once("/library/").or_else(|| path.split_once("/registry/src/index."));
         let file = ours.or(theirs.map(|(_, file)| file)).unwrap_or(path).to_owned();
         Self { file, is_ours: ours.is_some(), line }
@@ -193,7 +195,7 @@ impl Symbol {
 
 impl Symbol {
     /// True if this function or data contains `address`.
-    pub(crate) fn holds(&self, address: u64) -> bool {
+    pub fn holds(&self, address: u64) -> bool {
         self.range().contains(&address)
     }
 
@@ -231,7 +233,7 @@ impl CodeSection<'_> {
     }
 }
 
-fn code<'data>(elf: &ElfFile32<'data>) -> TaskResult<Vec<CodeSection<'data>>> {
+fn code<'data>(elf: &ElfFile32<'data>) -> ReadResult<Vec<CodeSection<'data>>> {
     let marks = marks(elf);
     let sections = elf.sections().filter(|section| section.kind() == object::SectionKind::Text);
     sections
@@ -263,7 +265,7 @@ fn marks(elf: &ElfFile32<'_>) -> Vec<(u64, bool)> {
 }
 
 /// The vector table without the stack pointer and unused entries.
-fn handlers(elf: &ElfFile32<'_>) -> TaskResult<Vec<u64>> {
+fn handlers(elf: &ElfFile32<'_>) -> ReadResult<Vec<u64>> {
     let table = elf.section_by_name(".vector_table").ok_or("no vector table")?.data()?;
     let mut handlers = Vec::new();
     for word in table.as_chunks().0.iter().skip(1) {
@@ -275,8 +277,8 @@ fn handlers(elf: &ElfFile32<'_>) -> TaskResult<Vec<u64>> {
     Ok(handlers)
 }
 
-fn lines<'data>(elf: &ElfFile32<'data>) -> TaskResult<Lines<'data>> {
-    let section = |id: gimli::SectionId| -> TaskResult<_> {
+fn lines<'data>(elf: &ElfFile32<'data>) -> ReadResult<Lines<'data>> {
+    let section = |id: gimli::SectionId| -> ReadResult<_> {
         let section = elf.section_by_name(id.name());
         let bytes = section.map_or(Ok([].as_slice()), |section| section.data())?;
         Ok(EndianSlice::new(bytes, LittleEndian))

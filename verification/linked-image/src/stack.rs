@@ -5,8 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::ReadResult;
 use crate::elf::{Program, Symbol};
-use crate::run::TaskResult;
 use crate::thumb_decode::Effect;
 
 /// Bytes that the core pushes for an exception: 26 words with floating point, and one for alignment (ARMv7-M reference
@@ -21,11 +21,11 @@ const GUARDS: (&[&str], &str) = (&["_defmt_acquire", "_defmt_release"], "core::p
 
 /// The stack of a function and its callees.
 #[derive(Clone, Default)]
-pub(crate) struct Depth {
+pub struct Depth {
     /// Its size in bytes.
-    pub(crate) bytes: u64,
+    pub bytes: u64,
     /// The functions of the deepest path, outermost first, with the bytes of each.
-    pub(crate) path: Vec<(String, u64)>,
+    pub path: Vec<(String, u64)>,
 }
 
 /// The stack use of a function.
@@ -37,11 +37,11 @@ struct StackFunction<'a> {
 }
 
 /// All functions of a program, by their addresses.
-pub(crate) struct CallGraph<'a>(BTreeMap<u64, StackFunction<'a>>);
+pub struct CallGraph<'a>(BTreeMap<u64, StackFunction<'a>>);
 
 impl<'a> CallGraph<'a> {
     /// Reads the functions of a program.
-    pub(crate) fn of(program: &'a Program<'_>) -> TaskResult<Self> {
+    pub fn of(program: &'a Program<'_>) -> ReadResult<Self> {
         let mut graph = BTreeMap::new();
         let (guards, panic) = GUARDS;
         let panic = program.address_of(panic).ok();
@@ -59,7 +59,7 @@ impl<'a> CallGraph<'a> {
         Ok(graph)
     }
 
-    fn check_calls(&self, function: &StackFunction<'_>) -> TaskResult {
+    fn check_calls(&self, function: &StackFunction<'_>) -> ReadResult<()> {
         match function.calls.iter().find(|to| !self.0.contains_key(to)) {
             Some(to) => Err(format!("{} continues at {to:#x}, where no function is known", function.name()))?,
             None => Ok(()),
@@ -67,7 +67,7 @@ impl<'a> CallGraph<'a> {
     }
 
     /// The stack of the function at `address`.
-    pub(crate) fn depth(&self, address: u64) -> TaskResult<Depth> {
+    pub fn depth(&self, address: u64) -> ReadResult<Depth> {
         self.depth_from(address, &mut Vec::new(), &mut BTreeMap::new())
     }
 
@@ -76,7 +76,7 @@ impl<'a> CallGraph<'a> {
         at: u64,
         callers: &mut Vec<u64>,
         depths: &mut BTreeMap<u64, Depth>,
-    ) -> TaskResult<Depth> {
+    ) -> ReadResult<Depth> {
         if let Some(depth) = depths.get(&at) {
             return Ok(depth.clone());
         }
@@ -99,7 +99,7 @@ impl<'a> CallGraph<'a> {
 
     /// The stack of the whole program: from reset, with every other exception once, at the worst moment of the one before.
     /// Priorities allow less than that. A hard fault starts a new stack.
-    pub(crate) fn worst(&self, program: &Program<'_>) -> TaskResult<Depth> {
+    pub fn worst(&self, program: &Program<'_>) -> ReadResult<Depth> {
         let [reset, handlers @ ..] = program.handlers() else { Err("no vector table")? };
         let mut whole = self.depth(*reset)?;
         for &handler in handlers {
@@ -123,7 +123,7 @@ impl<'a> CallGraph<'a> {
 }
 
 impl<'a> StackFunction<'a> {
-    fn of(symbol: &'a Symbol, program: &Program<'_>) -> TaskResult<Self> {
+    fn of(symbol: &'a Symbol, program: &Program<'_>) -> ReadResult<Self> {
         let mut function = Self { symbol, pushed: 0, calls: Vec::new() };
         let (mut pushes, mut loops) = (Vec::new(), Vec::new());
         for (at, effect) in program.instructions_of(symbol) {
@@ -158,7 +158,7 @@ impl<'a> StackFunction<'a> {
         &self.symbol.name
     }
 
-    fn refuse(&self, at: u64, what: &str) -> TaskResult {
+    fn refuse(&self, at: u64, what: &str) -> ReadResult<()> {
         Err(format!("{} {what}, at {at:#x}: no bound of the stack is known", self.name()))?
     }
 }

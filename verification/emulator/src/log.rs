@@ -14,14 +14,14 @@ use std::process::{ChildStdin, Command, Stdio};
 use object::read::elf::ElfFile32;
 use object::{Object, ObjectSymbol};
 
-use super::monitor::Monitor;
-use crate::run::{ChildProcess, TaskResult};
+use crate::monitor::Monitor;
+use crate::process::{ChildProcess, TaskResult};
 
 /// Bytes of the control block with its first channel.
 const CONTROL_BLOCK: u32 = 48;
 
 /// The reader of the log.
-pub(super) struct Log {
+pub(crate) struct Log {
     control_block: u32,
     printed_to: usize,
     /// In this order: the printer ends when its input is closed.
@@ -30,7 +30,7 @@ pub(super) struct Log {
 }
 
 impl Log {
-    pub(super) fn open(image: &Path) -> TaskResult<Self> {
+    pub(crate) fn open(image: &Path) -> TaskResult<Self> {
         let printer = Command::new("defmt-print")
             .arg("-e")
             .arg(image)
@@ -46,7 +46,7 @@ impl Log {
     }
 
     /// Prints the new part of the log.
-    pub(super) fn print_new(&mut self, monitor: &mut Monitor) -> TaskResult {
+    pub(crate) fn print_new(&mut self, monitor: &mut Monitor) -> TaskResult {
         let block = monitor.memory(self.control_block, CONTROL_BLOCK)?;
         let field = |at: usize| {
             let bytes = block.get(at..).and_then(|rest| rest.first_chunk()).copied();

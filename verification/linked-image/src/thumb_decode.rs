@@ -9,7 +9,7 @@ use yaxpeax_arm::armv7::{ConditionCode, InstDecoder, Instruction, Opcode, Operan
 
 /// The effect of one instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Effect {
+pub enum Effect {
     /// Calls the function at this address.
     Call(u64),
     /// Jumps to this address, always or on a condition.

@@ -1,0 +1,108 @@
+//! A file for a result: opened before the work, written at its end.
+//!
+//! So a path that cannot be written is refused before anything moves, and an existing file keeps its content until the
+//! result is there.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use crate::command_error::CommandError;
+
+/// May an existing file be replaced?
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub(crate) struct ForceArg {
+    /// Replace an existing file.
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+/// A file for a result.
+#[derive(Debug)]
+pub(crate) struct OutputFile {
+    path: PathBuf,
+    file: File,
+    /// It did not exist before, and is removed if nothing is written.
+    is_new: bool,
+}
+
+impl OutputFile {
+    /// Opens the file. `source` is read by the same command, and is never replaced.
+    pub(crate) fn open(path: &Path, source: Option<&Path>, force: ForceArg) -> Result<Self, CommandError> {
+        if source.is_some_and(|source| is_same(path, source)) {
+            return Err(CommandError::file(path, "this is the file that is read: choose another name"));
+        }
+        check_replaceable(path, force)?;
+        let is_new = !path.exists();
+        let opened = File::options().write(true).create(true).truncate(false).open(path);
+        let file = opened.map_err(|error| CommandError::file(path, error))?;
+        Ok(Self { path: path.to_owned(), file, is_new })
+    }
+
+    /// Writes the content, in the place of an old one.
+    pub(crate) fn write(mut self, content: &[u8]) -> Result<(), CommandError> {
+        self.is_new = false;
+        self.replace(content).map_err(|error| CommandError::file(&self.path, error))
+    }
+
+    fn replace(&mut self, content: &[u8]) -> io::Result<()> {
+        if self.file.metadata()?.is_file() {
+            self.file.set_len(0)?;
+        }
+        self.file.write_all(content)
+    }
+}
+
+impl Drop for OutputFile {
+    fn drop(&mut self) {
+        if self.is_new {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Fails if there is a file at the path that may not be replaced. A pipe or a device loses nothing.
+pub(crate) fn check_replaceable(path: &Path, force: ForceArg) -> Result<(), CommandError> {
+    if path.is_file() && !force.force {
+        return Err(CommandError::file(path, "the file exists; --force replaces it"));
+    }
+    Ok(())
+}
+
+fn is_same(one: &Path, other: &Path) -> bool {
+    fs::canonicalize(one).is_ok_and(|one| fs::canonicalize(other).is_ok_and(|other| one == other))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FORCE: ForceArg = ForceArg { force: true };
+
+    #[test]
+    fn a_file_is_replaced_only_on_request_and_only_by_a_result() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("drawing.svg");
+        drop(OutputFile::open(&path, None, ForceArg::default()).expect("a new file"));
+        assert!(!path.exists(), "nothing was written");
+        OutputFile::open(&path, None, ForceArg::default())
+            .and_then(|file| file.write(b"long"))
+            .expect("a file");
+        let refused = OutputFile::open(&path, None, ForceArg::default()).expect_err("it exists");
+        assert!(refused.message().is_some_and(|said| said.contains("--force")), "{refused:?}");
+        drop(OutputFile::open(&path, None, FORCE).expect("the file"));
+        assert_eq!(fs::read(&path).expect("a file"), b"long");
+        OutputFile::open(&path, None, FORCE).and_then(|file| file.write(b"new")).expect("a file");
+        assert_eq!(fs::read(&path).expect("a file"), b"new");
+    }
+
+    #[test]
+    fn the_source_is_never_replaced() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("move.txt");
+        fs::write(&path, "years").expect("a file");
+        let other_name = folder.path().join(".").join("move.txt");
+        assert!(OutputFile::open(&other_name, Some(&path), FORCE).is_err());
+        assert_eq!(fs::read(&path).expect("a file"), b"years");
+    }
+}

@@ -1,0 +1,127 @@
+//! A blocking shell round the host link: a line, its clock, and counts of what was received.
+
+use std::time::{Duration, Instant};
+
+use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId, Span};
+use protocol_core::time;
+use tracing::{debug, trace};
+
+use crate::error::{PortError, ReceiveCounts};
+use crate::host_line::HostLine;
+use crate::map_view::WriteFrame;
+use crate::traffic::Traffic;
+
+/// A line to an arm, and the host's end of the link on it.
+pub(crate) struct BlockingLink {
+    line: Box<dyn HostLine>,
+    link: HostLink,
+    received: ReceiveCounts,
+    start: Instant,
+}
+
+impl BlockingLink {
+    /// `reports`: the registers that reports may have.
+    pub(crate) fn new(line: Box<dyn HostLine>, baud: u32, reports: &'static [Span]) -> Self {
+        let start = line.now();
+        let link = HostLink::new(LinkOptions { baud, reports });
+        Self { line, link, received: ReceiveCounts::default(), start }
+    }
+
+    pub(crate) const fn set_reports(&mut self, reports: &'static [Span]) {
+        self.link.set_reports(reports);
+    }
+
+    /// Queues a read. [`Self::poll`] sends it.
+    pub(crate) fn read(&mut self, wanted: Span, patience: Patience) -> RequestId {
+        self.link.read(wanted, patience)
+    }
+
+    /// Queues a write. [`Self::poll`] sends it.
+    pub(crate) fn write(&mut self, frame: &WriteFrame) {
+        self.link.write(frame.map, frame.address, &frame.values);
+    }
+
+    /// Gives a read up.
+    pub(crate) fn cancel(&mut self, id: RequestId) {
+        self.link.cancel(id);
+    }
+
+    /// Sends what is queued. Returns the next event, without waiting.
+    pub(crate) fn poll(&mut self) -> Result<HostEvent, PortError> {
+        loop {
+            match self.link.poll(self.time_at(self.line.now())) {
+                HostEvent::Send(frame) => self.send(&frame)?,
+                HostEvent::Damaged(defect) => {
+                    self.received.damaged_frames += 1;
+                    debug!("<- a damaged frame: {defect:?}");
+                }
+                event => {
+                    self.count(&event);
+                    return Ok(event);
+                }
+            }
+        }
+    }
+
+    /// The next event but [`HostEvent::Wait`]; `None` if none comes before `deadline`.
+    pub(crate) fn next(&mut self, deadline: Option<Instant>) -> Result<Option<HostEvent>, PortError> {
+        loop {
+            let until = match self.poll()? {
+                HostEvent::Wait(until) => until,
+                event => return Ok(Some(event)),
+            };
+            let now = self.line.now();
+            let left = deadline.map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(now));
+            if left.is_zero() {
+                return Ok(None);
+            }
+            let wait = Duration::from_micros((until - self.time_at(now)).as_micros());
+            self.receive(wait.min(left))?;
+        }
+    }
+
+    /// Hands over the bytes that have arrived, or arrive within `timeout`. `false` if there are none.
+    pub(crate) fn receive(&mut self, timeout: Duration) -> Result<bool, PortError> {
+        // The planned end of the wait: after a suspension the actual end is later, and bytes may wait in the line.
+        let end = self.time_at(self.line.now() + timeout);
+        let bytes = self.line.receive(timeout)?;
+        self.received.bytes += bytes.len();
+        let now = if bytes.is_empty() { end } else { self.time_at(self.line.now()) };
+        self.link.bytes(now, &bytes);
+        Ok(!bytes.is_empty())
+    }
+
+    /// The clock of the line.
+    pub(crate) fn now(&self) -> Instant {
+        self.line.now()
+    }
+
+    /// Waits on the clock of the line.
+    pub(crate) fn sleep(&mut self, duration: Duration) {
+        self.line.sleep(duration);
+    }
+
+    /// The counts since the last call.
+    pub(crate) fn take_received(&mut self) -> ReceiveCounts {
+        std::mem::take(&mut self.received)
+    }
+
+    fn send(&mut self, frame: &[u8]) -> Result<(), PortError> {
+        if let Some(request) = Traffic::sent(frame) {
+            trace!("-> {request}");
+        }
+        self.line.send(frame)
+    }
+
+    fn count(&mut self, event: &HostEvent) {
+        if let Some(traffic) = Traffic::received(event) {
+            trace!("<- {traffic}");
+            self.received.other_frames += 1;
+        }
+    }
+
+    fn time_at(&self, at: Instant) -> time::Instant {
+        let micros = at.saturating_duration_since(self.start).as_micros();
+        time::Instant::from_micros(u64::try_from(micros).unwrap_or(u64::MAX))
+    }
+}

@@ -1,0 +1,39 @@
+//! Processes and waits of a task.
+
+use std::error::Error;
+use std::process::Child;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// The result of a task. An error tells what to do.
+pub type TaskResult<T = ()> = Result<T, Box<dyn Error>>;
+
+/// The timeout of all waits. It is long, because the machine may be busy.
+pub const TIMEOUT: Duration = Duration::from_secs(60);
+
+/// Polls until there is a value.
+///
+/// # Errors
+/// A timeout, or the error of a poll.
+pub fn wait_for<T>(event: &str, mut poll: impl FnMut() -> TaskResult<Option<T>>) -> TaskResult<T> {
+    let deadline = Instant::now() + TIMEOUT;
+    while Instant::now() < deadline {
+        if let Some(value) = poll()? {
+            return Ok(value);
+        }
+        sleep(Duration::from_millis(5));
+    }
+    Err(format!("timeout: {event}"))?
+}
+
+/// A child process that is killed when it is dropped.
+#[derive(Debug)]
+pub struct ChildProcess(pub Child);
+
+impl Drop for ChildProcess {
+    fn drop(&mut self) {
+        // An error means that it has ended.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}

@@ -1,0 +1,23 @@
+//! A linked program for the chip, read from its ELF file.
+//!
+//! ```text
+//!   thumb_decode.rs ──▶ jump_table.rs ──▶ elf.rs ──▶ stack.rs
+//!   (effect of an       (targets of       (symbols,   (deepest
+//!    instruction)        a jump)           lines)      stack)
+//! ```
+//!
+//! It knows nothing of this project's programs: `xtask` names them, and compares the figures with budgets.
+
+use std::error::Error;
+
+mod elf;
+mod jump_table;
+mod stack;
+mod thumb_decode;
+
+pub use elf::{Program, Section, SourceLine, Symbol};
+pub use stack::{CallGraph, Depth};
+pub use thumb_decode::Effect;
+
+/// The result of reading a program. An error says what the program lacks.
+pub type ReadResult<T> = Result<T, Box<dyn Error>>;
