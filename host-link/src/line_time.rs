@@ -8,6 +8,8 @@ use protocol_core::time::{Duration, Instant};
 pub const ROUND_TRIP: Duration = Duration::from_millis(100);
 /// Microseconds of ten bits, a byte with start and stop bit, at 1 bit/s.
 const BYTE: u64 = 10_000_000;
+/// With each reply in time, this part of the allowance is forgotten.
+const FORGETTING: u64 = 8;
 /// Reports take up to half of the line (D14), so that a reply may take twice its own time.
 const REPORT_SHARE: u64 = 2;
 
@@ -23,11 +25,13 @@ pub fn time_on_line(baud: u32, bytes: usize) -> Duration {
 pub(crate) struct LineTime {
     baud: u32,
     busy_until: Instant,
+    /// Replies may be this much later than due.
+    allowance: Duration,
 }
 
 impl LineTime {
     pub(crate) const fn new(baud: u32) -> Self {
-        Self { baud, busy_until: Instant::ZERO }
+        Self { baud, busy_until: Instant::ZERO, allowance: ROUND_TRIP }
     }
 
     /// Notes that these bytes are sent at `now`, behind those before.
@@ -40,6 +44,20 @@ impl LineTime {
         self.busy_until
     }
 
+    /// How much later than due replies may be: twice as much as of late, and [`ROUND_TRIP`] at least. So a slow server is not asked
+    /// more often the slower it gets.
+    pub(crate) const fn allowance(&self) -> Duration {
+        self.allowance
+    }
+
+    /// A reply came that was due at this time. A greater lateness counts at once, and is forgotten over some ten replies.
+    pub(crate) fn note_reply(&mut self, due: Instant, now: Instant) {
+        let forgotten = self.allowance.as_micros() / FORGETTING;
+        let allowance = self.allowance.as_micros().saturating_sub(forgotten);
+        let late = (now - due).as_micros().saturating_mul(2);
+        self.allowance = Duration::from_micros(allowance.max(late).max(ROUND_TRIP.as_micros()));
+    }
+
     /// When the last byte of the replies on their way has arrived, if the arm answers at once.
     pub(crate) fn reply_due(&self, now: Instant, awaited_bytes: usize) -> Instant {
         let replies = time_on_line(self.baud, awaited_bytes).as_micros().saturating_mul(REPORT_SHARE);
@@ -50,6 +68,17 @@ impl LineTime {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn late_replies_are_learned_and_forgotten() {
+        let (mut line, due) = (LineTime::new(115_200), Instant::from_micros(1_000_000));
+        line.note_reply(due, due + Duration::from_millis(300));
+        assert_eq!(line.allowance(), Duration::from_millis(600));
+        line.note_reply(due, due);
+        assert_eq!(line.allowance(), Duration::from_millis(525));
+        (0..20).for_each(|_| line.note_reply(due, due));
+        assert_eq!(line.allowance(), ROUND_TRIP);
+    }
 
     #[test]
     fn a_reply_is_due_when_request_and_replies_have_passed_the_line() {

@@ -174,8 +174,10 @@ impl HostLink {
     fn send_read(&mut self, now: Instant, mut read: OpenRead, asked: Span) -> Vec<u8> {
         let frame = encoded(&Request::Read { address: asked.address(), count: asked.count() });
         self.line.send(now, frame.len());
-        self.pending.add(read.id, asked);
-        read.note_sent(self.line.reply_due(now, self.awaited_bytes()), self.writes);
+        let awaited = self.awaited_bytes() + MIN_LENGTH + usize::from(asked.count());
+        let due = self.line.reply_due(now, awaited);
+        self.pending.add(read.id, asked, due);
+        read.note_sent(due, self.line.allowance(), self.writes);
         self.open.push(read);
         frame
     }
@@ -203,13 +205,14 @@ impl HostLink {
 
     fn take_reply(&mut self, values: Snapshot) {
         let range = values.span();
-        let Some(Matched { id, lost }) = self.pending.take(range) else {
+        let Some(Matched { id, due, lost }) = self.pending.take(range) else {
             let is_report = self.options.reports.contains(&range);
             return self.events.push_back(match is_report {
                 true => HostEvent::Report(Map::V22, values),
                 false => HostEvent::Unmatched(Function::Read, values),
             });
         };
+        self.line.note_reply(due, self.heard_until);
         for lost in lost.into_iter().filter(|&lost| Some(lost) != id) {
             self.lose(lost);
         }

@@ -5,12 +5,12 @@ use std::collections::VecDeque;
 use protocol_core::time::{Duration, Instant};
 
 use crate::event::RequestId;
-use crate::line_time::ROUND_TRIP;
 use crate::span::Span;
 
 /// How often a read is sent, and how long its reply is waited for.
 ///
-/// A read is repeated as soon as its reply is overdue by [`ROUND_TRIP`], and then after twice the time each: a read changes
+/// A read is repeated as soon as its reply is overdue by [`ROUND_TRIP`](crate::ROUND_TRIP), or more if the replies before were
+/// late, and then after twice the time each: a read changes
 /// nothing, so a needless one does no harm. It is given up after `timeout` for each attempt, counted from the time when its
 /// reply was due. So a lost reply costs little, and a slow arm gets all of the time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,8 +28,8 @@ impl Patience {
     }
 
     /// The time between attempt number `sent`, from 1, and the next one.
-    fn before_repeat(self, sent: u32) -> Duration {
-        let doubled = ROUND_TRIP.as_micros().checked_shl(sent.saturating_sub(1)).unwrap_or(u64::MAX);
+    fn before_repeat(self, sent: u32, allowance: Duration) -> Duration {
+        let doubled = allowance.as_micros().checked_shl(sent.saturating_sub(1)).unwrap_or(u64::MAX);
         self.timeout.min(Duration::from_micros(doubled))
     }
 }
@@ -54,13 +54,13 @@ impl OpenRead {
         Self { id, wanted, patience, sent: 0, writes_before: 0, due: Instant::FAR_FUTURE, give_up_at: None }
     }
 
-    /// It is sent, after so many writes. Its reply is due at this time.
-    pub(crate) fn note_sent(&mut self, reply_due: Instant, writes: u64) {
+    /// It is sent, after so many writes. Its reply is due at this time, and may be later by the allowance.
+    pub(crate) fn note_sent(&mut self, reply_due: Instant, allowance: Duration, writes: u64) {
         self.sent = self.sent.saturating_add(1);
         self.writes_before = writes;
         let give_up_at = *self.give_up_at.get_or_insert(reply_due + self.patience.total());
         let is_last = self.sent >= self.patience.attempts;
-        let repeat_at = reply_due + self.patience.before_repeat(self.sent);
+        let repeat_at = reply_due + self.patience.before_repeat(self.sent, allowance);
         self.due = if is_last { give_up_at } else { repeat_at.min(give_up_at) };
     }
 

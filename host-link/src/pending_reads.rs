@@ -9,6 +9,8 @@
 
 use std::collections::VecDeque;
 
+use protocol_core::time::Instant;
+
 use crate::event::RequestId;
 use crate::span::Span;
 
@@ -21,6 +23,8 @@ struct SentRead {
     /// `None` once it was given up.
     id: Option<RequestId>,
     asked: Span,
+    /// When its reply is there, if the arm answers at once.
+    due: Instant,
 }
 
 /// The reads without a reply, oldest first. A read that was repeated is there several times.
@@ -32,6 +36,8 @@ pub(crate) struct PendingReads(VecDeque<SentRead>);
 pub(crate) struct Matched {
     /// The read that it answers; `None` if that was given up.
     pub(crate) id: Option<RequestId>,
+    /// When the reply was due.
+    pub(crate) due: Instant,
     /// Reads that were sent before that one, oldest first: these replies are lost.
     pub(crate) lost: Vec<RequestId>,
 }
@@ -47,9 +53,9 @@ impl PendingReads {
         wider.or_else(|| (!self.has(&wanted, is_of_another)).then_some(wanted))
     }
 
-    /// A read was sent.
-    pub(crate) fn add(&mut self, id: RequestId, asked: Span) {
-        self.0.push_back(SentRead { id: Some(id), asked });
+    /// A read was sent. Its reply is due at this time.
+    pub(crate) fn add(&mut self, id: RequestId, asked: Span, due: Instant) {
+        self.0.push_back(SentRead { id: Some(id), asked, due });
     }
 
     /// The read is given up, or answered.
@@ -70,8 +76,8 @@ impl PendingReads {
     pub(crate) fn take(&mut self, range: Span) -> Option<Matched> {
         let index = self.0.iter().position(|read| read.asked == range)?;
         let lost = self.0.drain(..index).filter_map(|read| read.id).collect();
-        let id = self.0.pop_front().and_then(|read| read.id);
-        Some(Matched { id, lost })
+        let SentRead { id, due, .. } = self.0.pop_front()?;
+        Some(Matched { id, due, lost })
     }
 
     /// Is a reply to this read still possible?
@@ -104,9 +110,13 @@ mod tests {
         std::iter::successors(Some(RequestId::default()), |id| Some(id.next())).take(count).collect()
     }
 
+    fn matched(id: Option<RequestId>, lost: Vec<RequestId>) -> Matched {
+        Matched { id, due: Instant::ZERO, lost }
+    }
+
     fn add(pending: &mut PendingReads, id: RequestId, wanted: Span) -> Span {
         let asked = pending.range_for(id, wanted, REPORT).expect("a range");
-        pending.add(id, asked);
+        pending.add(id, asked, Instant::ZERO);
         asked
     }
 
@@ -116,8 +126,7 @@ mod tests {
         assert_eq!(add(&mut pending, ids[0], span(29, 3)), span(29, 3));
         assert_eq!(add(&mut pending, ids[1], span(29, 3)), span(29, 4));
         assert_eq!(add(&mut pending, ids[2], span(29, 4)), span(29, 5), "taken by the second");
-        let matched = pending.take(span(29, 4));
-        assert_eq!(matched, Some(Matched { id: Some(ids[1]), lost: vec![ids[0]] }), "the first is lost");
+        assert_eq!(pending.take(span(29, 4)), Some(matched(Some(ids[1]), vec![ids[0]])), "the first is lost");
         assert_eq!(add(&mut pending, ids[3], span(29, 3)), span(29, 3));
         assert_eq!(add(&mut pending, ids[4], span(29, 5)), span(29, 6), "the third still waits");
         assert_eq!(pending.take(span(29, 9)), None);
@@ -137,7 +146,7 @@ mod tests {
         add(&mut pending, ids[0], span(10, 4));
         pending.give_up(ids[0]);
         assert_eq!(add(&mut pending, ids[1], span(10, 4)), span(10, 5));
-        assert_eq!(pending.take(span(10, 4)), Some(Matched { id: None, lost: vec![] }));
+        assert_eq!(pending.take(span(10, 4)), Some(matched(None, vec![])));
         assert!(pending.awaits(ids[1]) && !pending.awaits(ids[0]));
     }
 
@@ -149,8 +158,8 @@ mod tests {
         assert_eq!(pending.range_for(ids[0], span(0, 255), &[]), Some(span(0, 255)), "another attempt");
         pending.give_up(ids[0]);
         assert_eq!(add(&mut pending, ids[1], span(0, 255)), span(0, 255));
-        assert_eq!(pending.take(span(0, 255)), Some(Matched { id: None, lost: vec![] }), "the late one");
-        assert_eq!(pending.take(span(0, 255)), Some(Matched { id: Some(ids[1]), lost: vec![] }));
+        assert_eq!(pending.take(span(0, 255)), Some(matched(None, vec![])), "the late one");
+        assert_eq!(pending.take(span(0, 255)), Some(matched(Some(ids[1]), vec![])));
     }
 
     #[test]
