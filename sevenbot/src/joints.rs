@@ -21,7 +21,7 @@ use crate::arm::Arm;
 use crate::error::Error;
 use crate::snapshot::Snapshot;
 use crate::span::Span;
-use crate::status_block::StatusBlock;
+use crate::status_block::{StatusBlock, has_restarted};
 use crate::units::Speed;
 
 /// After power-up the arm measures each joint or finds it missing within 500 ms (D12). The rest is for the reply.
@@ -170,6 +170,14 @@ impl JointSnapshot {
     #[must_use]
     pub fn is_moving(&self, joint: Joint) -> bool {
         self.status.as_ref().is_some_and(|status| status.is_moving(joint))
+    }
+
+    /// Has the controller restarted since this earlier instant? `false` without a status block.
+    #[must_use]
+    pub fn has_restarted_since(&self, before: &Self) -> bool {
+        let counters = before.status.as_ref().zip(self.status.as_ref());
+        counters
+            .is_some_and(|(before, after)| has_restarted(before.frames_accepted(), after.frames_accepted()))
     }
 
     /// The base of a relative step of this joint: its target, in degrees.

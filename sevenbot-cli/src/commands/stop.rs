@@ -9,10 +9,11 @@ use crate::session::Session;
 /// Stop: make every joint hold its position.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Sets the targets to the measured positions, reads them back, and repeats the write if necessary. Writes
-nothing if the motors are off (state 0 or 2).
+Sets the targets to the measured positions, reads them back, and repeats the write if necessary. Then watches for half a
+second whether the joints hold. Writes nothing if the motors are off (state 0 or 2).
 
-Exit status 1 if the arm may not hold: it may still be moving.")]
+Exit status 1 if the arm may not hold: it may still be moving, a joint does not answer or has let go, or another program
+sends it elsewhere.")]
 pub(crate) struct StopArgs {}
 
 pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
