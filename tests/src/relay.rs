@@ -227,7 +227,7 @@ fn disturb(frame: &mut [u8], number: u32, each: u32) {
 
 /// Is the frame of the arm a report, and probably no answer?
 fn is_report(frame: &[u8]) -> bool {
-    matches!(frame, [_, _, 0x03, 54, 7, ..] | [_, _, 0x03, 142, 14 | 42, ..])
+    matches!(frame, [_, _, 0x03, 142, 14 | 42, ..])
 }
 
 /// Does the frame write a target?

@@ -111,7 +111,9 @@ fn table(cells: &[(String, Cell)]) -> String {
         let _ = writeln!(text, "{}", command.arguments);
         for (fault, (_, cell)) in FAULTS.iter().zip(row) {
             let status = cell.status_text();
-            let done = match cell.is_done {
+            // After a failure it depends on the moment of the fault.
+            let is_success = cell.status == Some(0);
+            let done = match cell.is_done.filter(|_| is_success) {
                 None => "",
                 Some(true) => "done",
                 Some(false) => "not done",
