@@ -83,12 +83,12 @@ const fn moving(arguments: &'static str, moment: Moment, asked: Asked) -> Comman
 
 impl Command {
     /// With joints 1 and 2 away from the standard pose.
-    const fn from_away(self) -> Self {
+    const fn begins_away(self) -> Self {
         Self { before: &[(TARGET_POSITION, &[110, 105]), SLOW], pauses: (2_000, 1_500), ..self }
     }
 
     /// With the tool straight down at 0 185 50.
-    const fn from_tool_down(self) -> Self {
+    const fn begins_tool_down(self) -> Self {
         Self {
             before: &[(TARGET_POSITION, &[90, 91, 110, 90, 135]), SLOW],
             pauses: (2_000, 1_500),
@@ -134,14 +134,15 @@ pub(crate) const COMMANDS: [Command; 37] = [
     moving("pose 110 105 65 90 90 90 80 --wait", Moment::AfterTarget(8), Asked::Reach(GOAL)),
     moving("pose 110.25 105.25 _ _ _ _ _ --wait", Moment::AfterTarget(8), Asked::Reach(GOAL)),
     moving("pose +20 +15 _ _ _ _ _ --time 8 --wait", Moment::AfterTarget(8), Asked::Reach(GOAL)),
-    moving("home", Moment::AfterTarget(1), Asked::Targets(&[(1, 90), (2, 90)])).from_away(),
-    moving("home --wait", Moment::AfterTarget(8), Asked::Reach(&[(1, 90.0), (2, 90.0)])).from_away(),
-    moving("move-to 80 250 30", Moment::AfterTarget(1), Asked::Targets(&[(1, 72), (2, 53)])).from_tool_down(),
-    moving("move-to 80 250 30 --wait", Moment::AfterTarget(8), Asked::Reach(TIP)).from_tool_down(),
-    moving("move-to 80 250 30 --straight", Moment::AfterTarget(60), Asked::Reach(TIP)).from_tool_down(),
+    moving("home", Moment::AfterTarget(1), Asked::Targets(&[(1, 90), (2, 90)])).begins_away(),
+    moving("home --wait", Moment::AfterTarget(8), Asked::Reach(&[(1, 90.0), (2, 90.0)])).begins_away(),
+    moving("move-to 80 250 30", Moment::AfterTarget(1), Asked::Targets(&[(1, 72), (2, 53)]))
+        .begins_tool_down(),
+    moving("move-to 80 250 30 --wait", Moment::AfterTarget(8), Asked::Reach(TIP)).begins_tool_down(),
+    moving("move-to 80 250 30 --straight", Moment::AfterTarget(60), Asked::Reach(TIP)).begins_tool_down(),
     still("stop", Moment::AfterTarget(1), Asked::Stop).during_a_move(),
     moving("park", Moment::AfterTarget(8), Asked::Park(&[(2, 90.0), (3, 0.0), (4, 90.0), (5, 48.0)]))
-        .from_away(),
+        .begins_away(),
     still("state", Moment::Request(2), Asked::Words),
     still("state servo", Moment::Request(5), Asked::Hold).in_state(&[(MOTOR_STATE, &[0])]),
     still("state damping --yes", Moment::Request(5), Asked::Register(MOTOR_STATE, 0)),
