@@ -168,7 +168,7 @@ impl Raise for MoveError {
             Self::Stream(error) => error.raise(py),
             Self::Interrupted => error::<Interrupted>(py, &message, &[]),
             Self::NotDriven { .. } => error::<NotDriven>(py, &message, &driven),
-            Self::MayMove(_) => {
+            Self::MayMove(_) | Self::OtherTargets => {
                 let hint = "`arm.stop()`, or switch off the supply of the servos".to_owned();
                 error::<MayMove>(py, &message, &[hint])
             }

@@ -177,7 +177,8 @@ pub(crate) fn record(arm: &mut Arm, options: RecordOptions, watch: &mut Watch) -
     let recorded = arm.with_reports(hz, content, |arm| record_reports(arm, options, content, watch));
     if is_guided {
         // The targets become the measured positions (D13).
-        arm.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
+        let held = arm.engage_and_watch();
+        return recorded.and_then(|recorded| held.map(|()| recorded));
     }
     recorded
 }

@@ -6,7 +6,6 @@ use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use sevenbot::Arm;
-use sevenbot::hold::HoldError;
 use sevenbot::joints::JointSnapshot;
 use sevenbot::register_text::{self, motor_state_name};
 
@@ -80,9 +79,15 @@ pub(crate) fn hold_on_interrupt<T>(
     done
 }
 
-/// Makes the arm hold its position, and verifies it.
+/// Makes the arm hold its position, and watches whether it does. Warns about joints that may not.
 pub(crate) fn hold(arm: &mut Arm) -> Result<JointSnapshot, CommandError> {
-    arm.hold().map_err(|HoldError(error)| CommandError::MayMove(error))
+    let held = arm.hold_and_watch().map_err(CommandError::from);
+    if let Err(CommandError::Problems(_)) = &held
+        && let Ok(joints) = arm.joints()
+    {
+        warn_about_unheld_joints(&joints);
+    }
+    held
 }
 
 /// Tells the user how the arm holds.

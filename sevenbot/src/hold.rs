@@ -47,6 +47,11 @@ impl Arm {
     /// # Errors
     /// No answer, or the arm does not take the targets: it may be moving.
     pub fn hold(&mut self) -> Result<JointSnapshot, HoldError> {
+        self.hold_through_restarts().map(|(joints, _)| joints)
+    }
+
+    /// As [`Arm::hold`]. Also tells whether the controller restarted meanwhile.
+    pub(crate) fn hold_through_restarts(&mut self) -> Result<(JointSnapshot, bool), HoldError> {
         let held = self.with_min_attempts(|arm| match arm.has_extended_block()? {
             true => arm.without_set_point_period(|arm| arm.hold_until_verified(true)),
             false => arm.hold_until_verified(false),
@@ -54,13 +59,13 @@ impl Arm {
         Ok(held?)
     }
 
-    fn hold_until_verified(&mut self, is_fine: bool) -> Result<JointSnapshot, WriteError> {
+    fn hold_until_verified(&mut self, is_fine: bool) -> Result<(JointSnapshot, bool), WriteError> {
         let start = self.now();
         let mut hold = Hold::default();
         loop {
             let now = self.held_joints(is_fine)?;
             match hold.step(&now, self.now() >= start + START_UP_TIME) {
-                HoldStep::Holds | HoldStep::NotDriven => return Ok(now.joints),
+                HoldStep::Holds | HoldStep::NotDriven => return Ok((now.joints, hold.has_restarted)),
                 HoldStep::NotTaken(lost) => return Err(lost.into()),
                 HoldStep::Wait => self.sleep(POLL_PERIOD),
                 HoldStep::Write(frames) => {
@@ -85,6 +90,7 @@ pub struct Hold {
     before: Option<JointSnapshot>,
     sent: [Option<SentTarget>; 7],
     losses: u32,
+    has_restarted: bool,
 }
 
 /// What a stop has to do next.
@@ -108,6 +114,10 @@ impl Hold {
     pub fn step(&mut self, now: &HeldJoints, is_past_start_up: bool) -> HoldStep {
         if !now.joints.is_driven() {
             return HoldStep::NotDriven;
+        }
+        if self.before.as_ref().is_some_and(|before| now.joints.has_restarted_since(before)) {
+            // What was sent is lost. The arm holds by itself, and measures its joints anew (D12).
+            *self = Self { has_restarted: true, ..Self::default() };
         }
         let before = self.before.get_or_insert_with(|| now.joints.clone());
         if let Err(lost) = NotTaken::check(now.lost_targets(&self.sent, before)) {

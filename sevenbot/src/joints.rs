@@ -19,7 +19,7 @@ use protocol_core::registers::{Joint, Register};
 
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::status_block::StatusBlock;
+use crate::status_block::{StatusBlock, has_restarted};
 use crate::units::Speed;
 use host_link::{Snapshot, Span};
 
@@ -169,6 +169,14 @@ impl JointSnapshot {
     #[must_use]
     pub fn is_moving(&self, joint: Joint) -> bool {
         self.status.as_ref().is_some_and(|status| status.is_moving(joint))
+    }
+
+    /// Has the controller restarted since this earlier instant? `false` without a status block.
+    #[must_use]
+    pub fn has_restarted_since(&self, before: &Self) -> bool {
+        let counters = before.status.as_ref().zip(self.status.as_ref());
+        counters
+            .is_some_and(|(before, after)| has_restarted(before.frames_accepted(), after.frames_accepted()))
     }
 
     /// The base of a relative step of this joint: its target, in degrees.

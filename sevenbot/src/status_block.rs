@@ -42,6 +42,15 @@ impl Arm {
     }
 }
 
+/// A counter of frames that seems to have gone back by less than half its range was reset.
+const HALF_COUNTER: u16 = u16::MAX / 2;
+
+/// Has the controller restarted between two readings of its counter of frames? A restart sets it to 0.
+pub(crate) const fn has_restarted(before: u16, after: u16) -> bool {
+    let went_back = before.wrapping_sub(after);
+    went_back != 0 && went_back <= HALF_COUNTER
+}
+
 impl From<Snapshot> for StatusBlock {
     /// From a read that holds [`STATUS`].
     fn from(registers: Snapshot) -> Self {

@@ -16,10 +16,12 @@
 
 pub mod arm_client;
 pub mod arm_control;
+pub mod control;
 pub mod frames;
 pub mod process;
 pub mod programs;
 pub mod registers;
+pub mod relay;
 pub mod simulator;
 pub mod started_arm;
 pub mod terminal;

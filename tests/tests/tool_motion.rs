@@ -331,7 +331,8 @@ fn a_restart_of_the_arm_ends_a_recording() {
     wait_for_moments(&recording, 3);
     arm.power_cycle();
     let text = failed(&end(tool.expect("sevenbot runs")), 1);
-    assert!(text.contains("switched off and on"), "{text}");
+    // The counter of frames tells a restart, unless the arm had received hardly any: then its reports are missed.
+    assert!(text.contains("the controller restarted") || text.contains("switched off and on"), "{text}");
 }
 
 #[test]

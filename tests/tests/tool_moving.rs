@@ -83,7 +83,8 @@ fn stop_holds_the_position_of_the_arm() {
 fn stop_does_not_move_a_joint_without_a_servo() {
     with_arm(TestSetup::any().fault("3=missing"), |arm| {
         arm.wait_until("the missing servo is reported", |arm| arm.register(242) == 0b100);
-        succeeded(arm.sevenbot(&["stop"]));
+        let text = failed(&arm.sevenbot(&["stop"]), 1);
+        assert!(text.contains("joint 3 does not answer") && text.contains("before you reach"), "{text}");
         // The position was never measured, so its 0 must not become the target.
         assert_eq!(arm.register(PRESENT_POSITION + 2), 0);
         assert_eq!(arm.register(TARGET_POSITION + 2), STANDARD_POSE[2]);

@@ -1,13 +1,13 @@
 //! `sevenbot sim`: faults, a hand, a weight and power of a running simulator, and clients that behave badly.
 
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
-use std::path::Path;
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use system_tests::control::Control;
 use system_tests::process::{self, Signal};
 use system_tests::programs::tool;
 use system_tests::registers::{
@@ -15,30 +15,6 @@ use system_tests::registers::{
 };
 use system_tests::simulator::Simulator;
 use system_tests::wait;
-
-/// A client of a control socket.
-struct Control(BufReader<UnixStream>);
-
-impl Control {
-    fn connect(path: &Path) -> Self {
-        Self(BufReader::new(UnixStream::connect(path).expect("a control socket")))
-    }
-
-    fn send(&mut self, bytes: &[u8]) {
-        self.0.get_mut().write_all(bytes).expect("it accepts bytes");
-    }
-
-    fn answer(&mut self) -> Value {
-        let mut line = String::new();
-        self.0.read_line(&mut line).expect("an answer");
-        serde_json::from_str(&line).expect("JSON")
-    }
-
-    fn ask(&mut self, request: &Value) -> Value {
-        self.send(format!("{request}\n").as_bytes());
-        self.answer()
-    }
-}
 
 #[test]
 fn a_fault_begins_and_ends_while_the_arm_runs_and_tells_its_effects() {

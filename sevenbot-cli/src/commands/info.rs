@@ -32,7 +32,10 @@ pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
         settings: ArmSettings::from(&settings),
         health: status.as_ref().map(Health::from),
     })?;
-    status.as_ref().map_or(Ok(()), healthy)
+    match arm.health()?.problems() {
+        problems if problems.is_empty() => Ok(()),
+        problems => Err(CommandError::Problems(problems)),
+    }
 }
 
 #[derive(Serialize)]
@@ -202,18 +205,5 @@ impl Health {
         line(out, "frames refused", &self.frames_refused.to_string())?;
         line(out, "last refusal", self.last_refusal.as_deref().unwrap_or("none"))?;
         line(out, "servo bus errors", &self.servo_bus_errors.to_string())
-    }
-}
-
-fn healthy(status: &StatusBlock) -> Result<(), CommandError> {
-    let faulty = faults(status.faults());
-    match (status.faults(), status.missing()) {
-        (0, 0) => Ok(()),
-        (0, missing) => Err(CommandError::Arm(format!("no answer from the servos of {}", joints(missing)))),
-        (_, 0) => Err(CommandError::Arm(format!("the arm reports a fault: {faulty}"))),
-        (_, missing) => {
-            let missing = joints(missing);
-            Err(CommandError::Arm(format!("the arm reports a fault: {faulty}; no answer from {missing}")))
-        }
     }
 }

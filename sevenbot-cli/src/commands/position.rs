@@ -4,14 +4,12 @@ use std::io::{self, Write};
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot::Joint;
 use sevenbot::cartesian::{DirectionText, PointText, TipPose, Vector};
-use sevenbot::joints::JointSnapshot;
-use sevenbot::register_text::joints;
+use sevenbot::{Health, Joint, Problem};
 
 use crate::command_error::CommandError;
 use crate::measured_pose::{MeasuredPose, PositionDegrees};
-use crate::printer::{Printable, warn};
+use crate::printer::Printable;
 use crate::session::Session;
 
 /// Show the position of the tip in millimetres.
@@ -30,27 +28,24 @@ the axes of joints 4, 5 and 6 meet.
 An arm with this project's firmware tells its joints to a count of the servos,
 about a quarter of a degree, so the tip is known to a millimetre or two. Others
 tell whole degrees: some millimetres. The play of the joints and a bent arm are
-not included.")]
+not included.
+
+Exit status 1 if a servo does not answer, because the position is unknown then.")]
 pub(crate) struct WhereArgs {}
 
 pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
     let mut arm = session.connect()?;
     let joints = arm.wait_until_settled()?;
-    warn_of_silent(&joints);
+    all_known(&arm.health()?)?;
     session.printer.print(&TipPosition::of(&MeasuredPose::read(&mut arm, joints.positions())?))
 }
 
-/// Warns about joints with an unknown position.
-fn warn_of_silent(snapshot: &JointSnapshot) {
-    let moves_tip = |joint: &Joint| joint.number() <= 6;
-    let moving = Joint::ALL.iter().filter(|joint| moves_tip(joint)).fold(0, |bits, joint| bits | joint.bit());
-    let silent = snapshot.missing() & moving;
-    if silent != 0 {
-        let silent = joints(silent);
-        warn(format_args!(
-            "no answer from the servos of {silent}: the position is computed from their last angles"
-        ));
-    }
+/// Fails if the position of a joint that moves the tip is unknown.
+fn all_known(health: &Health) -> Result<(), CommandError> {
+    let moves_tip = |joint: Joint| joint.number() <= 6;
+    let hides = |problem: &Problem| problem.kind.hides_positions() && problem.joint.is_none_or(moves_tip);
+    let unknown: Vec<Problem> = health.problems().into_iter().filter(hides).collect();
+    if unknown.is_empty() { Ok(()) } else { Err(CommandError::Problems(unknown)) }
 }
 
 /// The position of an arm.

@@ -11,12 +11,12 @@ use clap::Args;
 use serde::Serialize;
 use sevenbot::health::{ProblemKind, sentences};
 use sevenbot::map::{MOTOR_STATE, motor_state};
+use sevenbot::moves::MoveError;
 use sevenbot::{Arm, Health, Problem};
 
 use super::status::ArmStatus;
 use crate::command_error::CommandError;
 use crate::confirm::confirm;
-use crate::interrupt::hold;
 use crate::printer::{Printable, note, warn};
 use crate::session::{Session, put_right};
 
@@ -140,16 +140,13 @@ fn recover(arm: &mut Arm, before: &Health, yes: bool) -> Result<(), CommandError
         arm.sleep(OFF_TIME);
     }
     arm.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
-    hold(arm).map(drop)
+    // The joints may need some time: step 4 watches them.
+    arm.hold().map(drop).map_err(|error| MoveError::from(error).into())
 }
 
 /// Does the problem end only when the motor state or a target is written?
 const fn needs_motors(kind: ProblemKind) -> bool {
-    kind.ends_moves()
-        || matches!(
-            kind,
-            ProblemKind::Overload | ProblemKind::Overheat | ProblemKind::Voltage | ProblemKind::ServoBus
-        )
+    kind.ends_moves() || kind.is_alarm() || matches!(kind, ProblemKind::ServoBus)
 }
 
 /// Is it useless or harmful to switch the motors on?

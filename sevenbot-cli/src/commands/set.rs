@@ -1,11 +1,12 @@
 //! `set`: writes registers in one frame, reads them back, and reports those that differ.
 
 use clap::Args;
+use sevenbot::health::MoveCheck;
 use sevenbot::map::{BAUD_RATE, FINE_TARGET, MOTOR_STATE, SPEED, TARGET_POSITION, motor_state};
 use sevenbot::names;
 use sevenbot::register_text::entries;
 use sevenbot::register_values::{self, ValueError};
-use sevenbot::{Arm, Span};
+use sevenbot::{Arm, Joint, Span};
 
 use super::get::{NAMES, RegisterList, not_served};
 use super::state::confirm_state;
@@ -35,10 +36,13 @@ one first. Registers that only map 2.1 has are written by function 04. Reports
 of feedback-frequency go on, unless other reports (82, 90) are switched on.
 Offsets then read as in map 2.2, as after any write of this program.
 
-A motor state without torque (29) asks first: the arm may fall.
+A target of a joint that is driven is a move, as with `sevenbot pose`: it is not
+written while the joint does not answer or has let go. --raw writes it all the
+same. `motor-state 1` is as `sevenbot state servo`. A motor state without torque
+asks first: the arm may fall.
 
-Exit status 1 when a register did not take its value, 2 when the table does not
-allow the value."))]
+Exit status 1 when a register did not take its value or the joints do not obey,
+2 when the table does not allow the value."))]
 pub(crate) struct SetArgs {
     /// Name, number or range of registers.
     #[arg(value_name = "REGISTER", value_parser = RegisterParser(names::parse), hide_possible_values = true)]
@@ -79,12 +83,19 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandEr
     confirm_release(&mut arm, span, &bytes, args.yes)?;
     // Targets, offsets and the motor state move the arm.
     let written = hold_on_interrupt(&mut arm, |arm, _| {
-        let moves = |address| [TARGET_POSITION, FINE_TARGET, SPEED].iter().any(|row| row.holds(address));
-        if span.addresses().any(moves) {
+        let joints = joints_with_target(span);
+        if joints != 0 || span.addresses().any(|address| SPEED.holds(address)) {
             put_right(arm)?;
         }
+        let is_move = joints != 0 && !args.raw && arm.joints()?.is_driven();
+        let mut check = is_move.then(|| MoveCheck::begin(arm, joints)).transpose()?;
+        if span == Span::of(&MOTOR_STATE) && bytes == [motor_state::SERVO] {
+            return Ok(arm.engage_and_watch()?);
+        }
         let write = |arm: &mut Arm| arm.write_checked(span.address(), &bytes);
-        Ok(if args.unlock { arm.with_open_lock(write) } else { write(arm) }?)
+        if args.unlock { arm.with_open_lock(write) } else { write(arm) }?;
+        check.as_mut().map(|check| check.check(arm)).transpose()?;
+        Ok(())
     });
     if matches!(written, Ok(()) | Err(CommandError::NotTaken(_))) {
         session.printer.print(&RegisterList::from(entries(&arm.read_span(span)?)))?;
@@ -106,6 +117,14 @@ fn confirm_release(arm: &mut Arm, span: Span, bytes: &[u8], yes: bool) -> Result
         Some((_, &state)) if state <= motor_state::FORCELESS => confirm_state(arm, state, yes),
         _ => Ok(()),
     }
+}
+
+/// The joints whose targets are in the span, as [`Joint::bit`]s.
+fn joints_with_target(span: Span) -> u8 {
+    let holds =
+        |first: u8, count: u8| span.addresses().any(|address| (first..first + count).contains(&address));
+    let is_target = |joint: &Joint| holds(TARGET_POSITION.of(*joint), 1) || holds(FINE_TARGET.of(*joint), 2);
+    Joint::ALL.into_iter().filter(is_target).fold(0, |bits, joint| bits | joint.bit())
 }
 
 /// The bytes for a span: one value per register, or one for all. A register of two bytes takes one value.
@@ -132,6 +151,14 @@ mod tests {
         assert_eq!(number("0x85"), Ok(0x85));
         assert!(number("0x100").is_err());
         assert!(number("five").is_err());
+    }
+
+    #[test]
+    fn the_joints_of_a_span_are_those_with_a_target_in_it() {
+        let joints = |address, count| joints_with_target(Span::new(address, count).expect("a span"));
+        assert_eq!(joints_with_target(Span::of(&TARGET_POSITION)), 0x7F);
+        assert_eq!((joints(29, 18), joints(52, 3), joints(53, 7)), (1, 0x40, 0));
+        assert_eq!((joints(130, 2), joints(131, 2), joints(142, 4)), (0b10, 0b110, 0));
     }
 
     #[test]

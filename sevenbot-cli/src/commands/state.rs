@@ -2,13 +2,14 @@
 
 use clap::{Args, ValueEnum};
 use sevenbot::map::{MOTOR_STATE, motor_state};
-use sevenbot::register_text::entries;
+use sevenbot::register_text::{entries, joints};
 use sevenbot::{Arm, Span};
 
 use super::get::RegisterList;
 use crate::command_error::CommandError;
 use crate::confirm::confirm;
 use crate::interrupt::hold_on_interrupt;
+use crate::printer::warn;
 use crate::session::Session;
 
 /// Show or change the motor state.
@@ -20,7 +21,10 @@ Examples:
   sevenbot state forceless --yes  the arm can be moved by hand; it falls unless
                                   held
 
-Exit status 1 if the arm may not have taken the state: it may be moving.")]
+`state servo` watches for half a second whether the joints hold.
+
+Exit status 1 if the arm may not have taken the state: it may be moving. Also if
+a joint does not hold in state servo: it does not answer or has let go.")]
 pub(crate) struct StateArgs {
     /// The new state.
     state: Option<MotorStateArg>,
@@ -59,7 +63,23 @@ pub(crate) fn run(session: &mut Session, args: &StateArgs) -> Result<(), Command
 
 fn change(arm: &mut Arm, wanted: MotorStateArg, yes: bool) -> Result<(), CommandError> {
     confirm_state(arm, wanted.code(), yes)?;
-    hold_on_interrupt(arm, |arm, _| Ok(arm.write_motion(MOTOR_STATE.address, &[wanted.code()])?))
+    hold_on_interrupt(arm, |arm, _| {
+        if let MotorStateArg::Servo = wanted {
+            return Ok(arm.engage_and_watch()?);
+        }
+        arm.write_motion(MOTOR_STATE.address, &[wanted.code()])?;
+        warn_about_silent_joints(arm)
+    })
+}
+
+/// Without an answer it is unknown whether a motor is off.
+fn warn_about_silent_joints(arm: &mut Arm) -> Result<(), CommandError> {
+    let silent = arm.joints()?.missing();
+    if silent != 0 {
+        let silent = joints(silent);
+        warn(format_args!("no answer from the servos of {silent}: it is unknown whether they still hold"));
+    }
+    Ok(())
 }
 
 /// Asks before a driven arm loses its torque.

@@ -10,10 +10,12 @@ use crate::session::Session;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sets the targets to the measured positions, reads them back, and repeats the
-write if necessary. Writes nothing if the motors are off (state 0 or 2).
+write if necessary. Then watches for half a second whether the joints hold.
+Writes nothing if the motors are off (state 0 or 2).
 
-Exit status 1 if the arm may not hold, and 3 if it received no stop, because the
-port cannot be opened or no arm answers: it may still be moving.")]
+Exit status 1 if the arm may not hold: it may still be moving, a joint does not
+answer or has let go, or another program sends it elsewhere. 3 if it received no
+stop, because the port cannot be opened or no arm answers.")]
 pub(crate) struct StopArgs {}
 
 pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {

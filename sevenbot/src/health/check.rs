@@ -17,9 +17,10 @@ use protocol_core::registers::map::{
 
 use super::problem::sentences;
 use super::told::GRIPPER;
-use super::{Problem, ProblemFlags, ProblemKind};
+use super::{ALL_JOINTS, Problem, ProblemFlags, ProblemKind};
 use crate::arm::Arm;
 use crate::error::Error;
+use crate::status_block::has_restarted;
 use host_link::{Snapshot, Span};
 
 /// The registers of a check: set-point period, protection block, status block.
@@ -38,8 +39,6 @@ const SILENCE: Duration = Duration::from_millis(1_500);
 const UNANSWERED_QUESTIONS: u32 = 3;
 /// A joint that was blocked before the move has this time to get free: a point of a stream clears the flag only then (D27).
 const TIME_TO_GET_FREE: Duration = Duration::from_secs(2);
-/// A counter of frames that seems to have gone back by less than half its range was reset.
-const HALF_COUNTER: u16 = u16::MAX / 2;
 
 /// Why an arm does not carry out a move.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -81,6 +80,8 @@ pub enum MoveCheckError {
 pub struct MoveCheck {
     /// The driven joints, as [`Joint::bit`](crate::Joint::bit)s.
     joints: u8,
+    /// Do the motors have to drive the joints? If not, they have to be measured only.
+    needs_motors: bool,
     /// Blocked since before the move.
     blocked_before: u8,
     /// Is the effector a gripper? Then an obstacle of joint 7 is what it holds.
@@ -126,6 +127,7 @@ impl MoveCheck {
         let now = arm.now();
         Self {
             joints: 0,
+            needs_motors: true,
             blocked_before: u8::MAX,
             is_gripper: true,
             begun: now,
@@ -142,6 +144,13 @@ impl MoveCheck {
     #[must_use]
     pub const fn with_period(mut self, milliseconds: u16) -> Self {
         self.period_ms = Some(milliseconds);
+        self
+    }
+
+    /// For a recording of all joints: only what makes the positions wrong ends it, and the motors may be off.
+    pub(crate) const fn of_positions(mut self) -> Self {
+        self.joints = ALL_JOINTS;
+        self.needs_motors = false;
         self
     }
 
@@ -194,7 +203,7 @@ impl MoveCheck {
         if now >= self.next_question {
             self.next_question = now + poll_period(arm);
             self.unanswered = self.unanswered.saturating_add(1);
-            let span = if self.is_state_next { STATE_REGISTERS } else { REGISTERS };
+            let span = if self.is_state_next && self.needs_motors { STATE_REGISTERS } else { REGISTERS };
             self.is_state_next = !self.is_state_next;
             arm.ask_in_background(span)?;
         }
@@ -220,7 +229,7 @@ impl MoveCheck {
         if registers.span() == STATE_REGISTERS {
             self.is_gripper = registers.byte(&EFFECTOR_TYPE) == GRIPPER;
             let state = registers.byte(&MOTOR_STATE);
-            return if state == motor_state::SERVO {
+            return if state == motor_state::SERVO || !self.needs_motors {
                 Ok(())
             } else {
                 Err(MoveCheckError::NotDriven { state })
@@ -237,7 +246,8 @@ impl MoveCheck {
             flags.blocked &= !self.blocked_before;
         }
         let restarted = self.has_restarted(registers).then_some(Problem::of_arm(ProblemKind::Restarted));
-        restarted.into_iter().chain(flags.problems(self.joints)).collect()
+        let all = restarted.into_iter().chain(flags.problems(self.joints));
+        all.filter(|problem| self.needs_motors || problem.kind.hides_positions()).collect()
     }
 
     /// Has the controller restarted since the last answer? Then its counter of frames begins again, and its stream is off.
@@ -247,10 +257,9 @@ impl MoveCheck {
         }
         let accepted = registers.counter(&FRAMES_ACCEPTED);
         let before = self.accepted.replace(accepted).unwrap_or(accepted);
-        let went_back = before.wrapping_sub(accepted);
         let has_other_period =
             self.period_ms.is_some_and(|period| registers.word(SET_POINT_PERIOD.address) != period);
-        has_other_period || (went_back != 0 && went_back <= HALF_COUNTER)
+        has_other_period || has_restarted(before, accepted)
     }
 }
 

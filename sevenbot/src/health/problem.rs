@@ -234,6 +234,18 @@ impl ProblemKind {
         )
     }
 
+    /// Are positions unknown while the arm, or a joint, has this problem?
+    #[must_use]
+    pub const fn hides_positions(self) -> bool {
+        matches!(self, Self::Restarted | Self::NoServoAnswers | Self::NoAnswer)
+    }
+
+    /// Does a servo tell it, and may it have switched itself off?
+    #[must_use]
+    pub const fn is_alarm(self) -> bool {
+        matches!(self, Self::Voltage | Self::Overload | Self::Overheat)
+    }
+
     fn texts(self) -> Option<&'static ProblemTexts> {
         TABLE.iter().find(|texts| texts.kind == self)
     }

@@ -52,6 +52,9 @@ pub enum MoveError {
         /// The joints whose servo does not answer; bit 0 is joint 1.
         missing: u8,
     },
+    /// The arm was told to hold, and has other targets since.
+    #[error("the arm does not hold: another program has sent it elsewhere")]
+    OtherTargets,
     /// The arm answers, but its reports have ended.
     #[error("the arm has stopped reporting its positions: was it switched off and on?")]
     ReportsStopped,

@@ -13,7 +13,7 @@ use super::observer::{Observer, Stage};
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::fine_state::FineTargets;
-use crate::health::{MoveCheck, MoveState, Problem, ProblemKind};
+use crate::health::{MoveCheck, MoveCheckError, MoveState, Problem, ProblemKind};
 use crate::joints::{JointSnapshot, frames_for};
 use crate::units::{MoveTime, Speed, move_duration};
 use host_link::{Snapshot, Span};
@@ -30,6 +30,8 @@ const SETTLE_TIMEOUT: Duration = Duration::from_secs(2);
 const ARRIVED_DEGREES: u8 = 1;
 /// A joint that settled this near to its target has reached it: servos have play.
 const TOLERANCE_DEGREES: u8 = 2;
+
+const RESTARTED: Problem = Problem::of_arm(ProblemKind::Restarted);
 
 /// Targets in degrees, joint 1 first; `None` for joints that stay.
 pub type Targets = [Option<u8>; 7];
@@ -90,7 +92,7 @@ impl JointMove {
         let check = MoveCheck::begin(arm, joints_of(&targets))?;
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         arm.write_all_checked(&frames_for(&TARGET_POSITION, &targets)).map_err(MoveError::of_motion)?;
-        Ok(Self { targets, is_rounded: false, arrived: ARRIVED_DEGREES, plan, check, start: arm.now() })
+        Self::sent(arm, targets, ARRIVED_DEGREES, plan, check)
     }
 
     /// As [`Self::begin`], in hundredths of a degree. An arm without the extended block takes the nearest whole degrees.
@@ -108,7 +110,26 @@ impl JointMove {
         let check = MoveCheck::begin(arm, joints_of(&whole))?;
         let plan = arm.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
         arm.set_fine_targets_checked(&targets).map_err(MoveError::of_motion)?;
-        Ok(Self { targets: whole, is_rounded: false, arrived: 0, plan, check, start: arm.now() })
+        Self::sent(arm, whole, 0, plan, check)
+    }
+
+    /// A move whose targets were sent. A controller that restarted meanwhile has other speeds, so the arm is made to hold.
+    fn sent(
+        arm: &mut Arm,
+        targets: Targets,
+        arrived: u8,
+        plan: Snapshot,
+        mut check: MoveCheck,
+    ) -> Result<Self, MoveError> {
+        let start = arm.now();
+        match check.check(arm) {
+            Ok(_) => Ok(Self { targets, is_rounded: false, arrived, plan, check, start }),
+            Err(MoveCheckError::Problems(problems)) if problems.contains(&RESTARTED) => {
+                arm.hold()?;
+                Err(MoveError::Problems(problems))
+            }
+            Err(error) => Err(error.into()),
+        }
     }
 
     /// Did the arm get whole degrees because it has no finer ones?

@@ -10,6 +10,7 @@
 
 mod approach;
 mod error;
+mod hold_watch;
 mod joint_move;
 mod observer;
 mod pace;

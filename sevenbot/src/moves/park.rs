@@ -19,6 +19,7 @@ use super::pace::Pace;
 use crate::arm::Arm;
 use crate::fine_angle::FineAngle;
 use crate::fine_state::FineTargets;
+use crate::health::MoveCheck;
 use crate::units::Speed;
 use host_link::Span;
 
@@ -86,9 +87,12 @@ impl Arm {
         pose: Option<FineTargets>,
         observer: &mut dyn Observer,
     ) -> Result<(), MoveError> {
+        // Between two moves: a controller that restarted has other speeds.
+        let mut check = MoveCheck::begin(self, 0)?;
         let slowly = Pace { speed: Speed::from_steps(SPEED_STEPS), time: None };
         for targets in park_way(pose, self.park_positions()?) {
             slowly.set(self, &targets)?;
+            check.check(self)?;
             JointMove::begin_fine(self, targets)?.finish(self, observer)?;
         }
         Ok(())

@@ -15,6 +15,7 @@ use super::observer::{Observer, Stage};
 use crate::approach::{Approach, ApproachRule, Standing, StartTooFar};
 use crate::arm::Arm;
 use crate::fine_angle::FineAngle;
+use crate::health::MoveCheck;
 use crate::playback::{self, Step};
 use crate::point_path::PointPath;
 use crate::recording::{Moment, Recording};
@@ -133,9 +134,13 @@ impl Player {
         times: u32,
         observer: &mut dyn Observer,
     ) -> Result<(), MoveError> {
+        // Between the moves, each of which has a check of its own.
+        let mut check = MoveCheck::begin(arm, 0)?;
         while times == 0 || self.played < times {
             self.approach(arm, observer)?;
+            check.check(arm)?;
             self.play_once(arm, observer)?;
+            check.check(arm)?;
             self.played = self.played.saturating_add(1);
         }
         Ok(())

@@ -8,6 +8,7 @@ use super::error::MoveError;
 use super::report_clock::ReportClock;
 use crate::arm::Arm;
 use crate::fine_angle::FineAngle;
+use crate::health::MoveCheck;
 use host_link::Span;
 
 /// Without a report for this time, the arm has stopped reporting. The lowest rate is 1 Hz.
@@ -45,20 +46,24 @@ pub struct RecordedPose {
 pub struct Recorder {
     clock: ReportClock,
     last_report: Instant,
+    check: MoveCheck,
 }
 
 impl Recorder {
     /// For the reports of [`Arm::with_reports`] with the same arguments.
     #[must_use]
-    pub fn new(arm: &Arm, hz: u8, content: u8) -> Self {
-        Self { clock: ReportClock::new(arm.report_period(hz, content)), last_report: arm.now() }
+    pub fn new(arm: &mut Arm, hz: u8, content: u8) -> Self {
+        let check = MoveCheck::idle(arm).of_positions();
+        Self { clock: ReportClock::new(arm.report_period(hz, content)), last_report: arm.now(), check }
     }
 
     /// The next pose; `None` if none arrives within `timeout`.
     ///
     /// # Errors
-    /// The port failed, or no report has arrived for three seconds.
+    /// A servo does not answer, so that its position is unknown, or the controller restarted: [`MoveError::Problems`]. The port
+    /// failed, or no report has arrived for three seconds.
     pub fn next(&mut self, arm: &mut Arm, timeout: Duration) -> Result<Option<RecordedPose>, MoveError> {
+        self.check.poll(arm)?;
         if let Some(report) = arm.next_report(timeout)? {
             self.last_report = report.received;
             return Ok(Some(RecordedPose { time: self.clock.time_of(report.received), pose: report.pose() }));

@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use sevenbot::cartesian::{Guard, Jog, JogAxes, Vector};
 use sevenbot::joints::JointSnapshot;
-use sevenbot::map::{MOTOR_STATE, SPEED, TARGET_POSITION, motor_state};
+use sevenbot::map::{MOTOR_STATE, SPEED, motor_state};
+use sevenbot::moves::JointMove;
 use sevenbot::{Angle, Arm, ArmOptions, Error, Joint, ports};
 
 use super::sample::Sample;
@@ -174,6 +175,7 @@ impl ArmThread {
             UiCommand::Stop => hold(arm).map(drop)?,
             // Writing state 1 again does not stop an arm in state 1.
             UiCommand::State(motor_state::SERVO) if arm.joints()?.is_driven() => hold(arm).map(drop)?,
+            UiCommand::State(motor_state::SERVO) => arm.engage_and_watch()?,
             UiCommand::State(state) => arm.write_motion(MOTOR_STATE.address, &[state])?,
         }
         Ok(None)
@@ -208,7 +210,7 @@ fn nudge(
     let joints = arm.wait_until_settled()?;
     let wanted = step_target(&joints, joint, degrees)?.max(0);
     let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
-    arm.write_motion(TARGET_POSITION.of(joint), &[wanted])?;
+    JointMove::begin(arm, Joint::ALL.map(|other| (other == joint).then_some(wanted)))?;
     let mut targets = joints.targets();
     for (target, _) in targets.iter_mut().zip(Joint::ALL).filter(|(_, other)| *other == joint) {
         *target = wanted;
@@ -236,7 +238,7 @@ fn jog_tip(
     let [x, y, z] = millimetres.map(f64::from);
     let next = Jog::step(*jog, targets, axes, Vector::new(x, y, z), guard);
     let next = next.map_err(|reason| CommandError::Arm(format!("no step: {reason}")))?;
-    arm.write_motion(TARGET_POSITION.address, &next.targets.map(Angle::degrees))?;
+    JointMove::begin(arm, next.targets.map(|target| Some(target.degrees())))?;
     *jog = Some(next);
     Ok(())
 }

@@ -21,7 +21,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::{Args, value_parser};
-use sevenbot::Arm;
+use sevenbot::{Arm, Health, Problem};
 
 use self::lines::{LineFormat, SampleJson};
 use self::plot_kind::PlotKind;
@@ -30,6 +30,7 @@ use crate::command_error::CommandError;
 use crate::guard_args::GuardArgs;
 use crate::line_file::LineFile;
 use crate::output_file::{ForceArg, check_replaceable};
+use crate::printer::warn;
 use crate::session::Session;
 
 /// Watch the arm: targets, positions, movement, health and link quality.
@@ -99,14 +100,23 @@ fn each_sample(
     mut take: impl FnMut(Sample) -> Result<(), CommandError>,
 ) -> Result<(), CommandError> {
     let start = Instant::now();
-    let mut due = start;
+    let (mut due, mut told) = (start, Vec::new());
     for _ in 0..count {
         sleep(due.saturating_duration_since(Instant::now()));
         // A late sample is not made up for.
         due = (due + args.period()).max(Instant::now());
-        take(Sample::take(arm, start)?)?;
+        let sample = Sample::take(arm, start)?;
+        warn_of_problems(&sample.health, &mut told);
+        take(sample)?;
     }
     Ok(())
+}
+
+/// Warns of problems that were not told yet: lines have no room for them.
+fn warn_of_problems(health: &Health, told: &mut Vec<Problem>) {
+    let problems = health.problems();
+    problems.iter().filter(|problem| !told.contains(problem)).for_each(warn);
+    *told = problems;
 }
 
 fn show_lines(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandError> {

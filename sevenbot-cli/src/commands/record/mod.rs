@@ -15,10 +15,11 @@ use std::time::Duration;
 
 use clap::{Args, value_parser};
 use serde::Serialize;
+use sevenbot::health::ProblemKind;
 use sevenbot::map::{MOTOR_STATE, VACUUM_PUMP, motor_state, report_content};
 use sevenbot::moves::{ConnectionLost, RecordedPose, Recorder};
 use sevenbot::recording::{self, FileVersion, Moment};
-use sevenbot::{Arm, Span};
+use sevenbot::{Arm, Problem, Span};
 
 use self::teach_pendant::TeachPendant;
 use crate::command_error::CommandError;
@@ -45,7 +46,11 @@ Examples:
 
 The file is text, one line per moment: seconds, seven angles in degrees, vacuum.
 Angles have two decimals if the arm measures them. `sevenbot play` plays it, and
-also a file written by hand.")]
+also a file written by hand.
+
+Exit status 1 if a servo does not answer, because the joint's position is
+unknown then, or if the controller restarts. The file has what was recorded
+before.")]
 pub(crate) struct RecordArgs {
     /// The file for the recording.
     file: PathBuf,
@@ -101,8 +106,15 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     };
     let mut recording = RecordingFile::create(&args.file, version)?;
     Interrupt::catch();
+    let before = arm.joints()?;
     let done = set_motors(&mut arm, args).and_then(|()| {
-        arm.with_reports(args.hz, content, |arm| record_reports(arm, args, content, &mut recording))
+        arm.with_reports(args.hz, content, |arm| {
+            // A restart would drive the joints of an arm that is to be guided.
+            if arm.joints()?.has_restarted_since(&before) {
+                return Err(CommandError::Problems(vec![Problem::of_arm(ProblemKind::Restarted)]));
+            }
+            record_reports(arm, args, content, &mut recording)
+        })
     });
     // Without a connection the arm cannot be made to hold.
     let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
@@ -131,7 +143,7 @@ fn hold_at_end(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
         return Ok(());
     }
     // The targets become the measured positions (D13).
-    arm.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
+    arm.engage_and_watch()?;
     note("the arm holds where it is");
     Ok(())
 }

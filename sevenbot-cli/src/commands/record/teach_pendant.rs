@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::crossterm::terminal::{disable_raw_mode, enable_raw_mode};
-use sevenbot::map::{TARGET_POSITION, VACUUM_PUMP};
+use sevenbot::map::VACUUM_PUMP;
+use sevenbot::moves::JointMove;
 use sevenbot::{Angle, Arm, Joint};
 
 use crate::command_error::CommandError;
@@ -92,7 +93,8 @@ impl TeachPendant {
             let wanted = i16::from(target.degrees()) + degrees;
             let wanted = u8::try_from(wanted.max(0)).unwrap_or(Angle::MAX_DEGREES);
             *target = Angle::from_register(wanted);
-            arm.write_motion(TARGET_POSITION.of(joint), &[target.degrees()])?;
+            let wanted = target.degrees();
+            JointMove::begin(arm, Joint::ALL.map(|other| (other == joint).then_some(wanted)))?;
         }
         Ok(())
     }

@@ -1,0 +1,316 @@
+//! A port between a program and a simulator. A test acts on the arm at an exact frame, disturbs frames, or unplugs the port.
+//!
+//! ```text
+//!   program ◀──▶ pseudo-terminal ◀── Relay ──▶ port of the simulator
+//!                                      └── before a certain frame: the action of the test
+//! ```
+//!
+//! What the test does at a frame does not depend on how fast the machine is.
+
+use std::ffi::OsStr;
+use std::os::fd::OwnedFd;
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{Mode, OFlags, open};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+
+use crate::registers::TARGET_POSITION;
+use crate::wait::wait_for;
+
+/// The longest time until the relay notices its end, in nanoseconds.
+const POLL_NANOS: i64 = 20_000_000;
+/// First and last register of the fine targets.
+const FINE_TARGETS: (u8, u8) = (128, 141);
+
+/// A frame on the line. The action comes before the frame is passed on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// The Nth frame of the program.
+    Request(u32),
+    /// The Nth frame of the program after the first one that writes a target.
+    AfterTarget(u32),
+    /// The Nth frame of the arm.
+    Reply(u32),
+}
+
+/// What the action of the test does to the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineAction {
+    /// Nothing.
+    Nothing,
+    /// It is unplugged.
+    Unplug,
+}
+
+/// What happens on the line.
+pub struct RelayPlan {
+    /// When the action takes place.
+    pub moment: Moment,
+    /// The action.
+    pub action: Box<dyn FnMut() -> LineAction + Send>,
+    /// Do about a tenth of the frames of each direction have a wrong checksum? Never three questions or answers in a row.
+    pub is_noisy: bool,
+}
+
+/// A port for a program, as long as it lives.
+pub struct Relay {
+    path: PathBuf,
+    /// Keeps the raw mode while no program has the port open.
+    _terminal: OwnedFd,
+    is_over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<bool>>,
+}
+
+impl Relay {
+    /// Opens a port that leads to the arm at `port`.
+    #[must_use]
+    pub fn open(port: &Path, plan: RelayPlan) -> Self {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).expect("a port");
+        grantpt(&master).and_then(|()| unlockpt(&master)).expect("a port");
+        let name = ptsname(&master, Vec::new()).expect("a name");
+        let path = PathBuf::from(OsStr::from_bytes(name.to_bytes()));
+        let terminal =
+            open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty()).expect("a port");
+        let mut mode = tcgetattr(&terminal).expect("a mode");
+        mode.make_raw();
+        tcsetattr(&terminal, OptionalActions::Now, &mode).expect("raw mode");
+        let is_over = Arc::new(AtomicBool::new(false));
+        let line = Line {
+            program: master,
+            arm: open_arm(port),
+            is_over: Arc::clone(&is_over),
+            requests: FrameSplitter::new(false),
+            replies: FrameSplitter::new(true),
+            after_target: None,
+            plan,
+            has_acted: false,
+            reports: 0,
+            answers: 0,
+        };
+        let thread = Some(thread::spawn(move || line.run()));
+        Self { path, _terminal: terminal, is_over, thread }
+    }
+
+    /// The path of the port.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Ends the relay. Returns whether the action took place.
+    #[must_use]
+    pub fn end(mut self) -> bool {
+        self.stop()
+    }
+
+    fn stop(&mut self) -> bool {
+        self.is_over.store(true, Ordering::SeqCst);
+        self.thread.take().is_some_and(|thread| thread.join().expect("the relay"))
+    }
+}
+
+impl Drop for Relay {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+/// Opens the port of the arm. Another program may have it open for a moment.
+fn open_arm(port: &Path) -> OwnedFd {
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+    wait_for("the port of the arm", || open(port, flags, Mode::empty()).map_err(|error| error.to_string()))
+}
+
+/// Both ends, and the frames between them.
+struct Line {
+    program: OwnedFd,
+    arm: OwnedFd,
+    is_over: Arc<AtomicBool>,
+    requests: FrameSplitter,
+    replies: FrameSplitter,
+    /// Frames of the program since the first target.
+    after_target: Option<u32>,
+    plan: RelayPlan,
+    has_acted: bool,
+    /// Reports and other frames of the arm on a noisy line.
+    reports: u32,
+    answers: u32,
+}
+
+impl Line {
+    /// Passes bytes on until the test ends it or the action unplugs it. Returns whether the action took place.
+    fn run(mut self) -> bool {
+        while !self.is_over.load(Ordering::SeqCst) && self.pass_bytes() == LineAction::Nothing {}
+        self.has_acted
+    }
+
+    fn pass_bytes(&mut self) -> LineAction {
+        let mut ends = [PollFd::new(&self.program, PollFlags::IN), PollFd::new(&self.arm, PollFlags::IN)];
+        let timeout = Timespec { tv_sec: 0, tv_nsec: POLL_NANOS };
+        // A signal ends the wait, too.
+        let _ = poll(&mut ends, Some(&timeout));
+        let [has_requests, has_replies] = ends.map(|end| end.revents().contains(PollFlags::IN));
+        if has_requests {
+            self.requests.read(&self.program);
+        }
+        while let Some(frame) = self.requests.next() {
+            if self.pass_request(frame) == LineAction::Unplug {
+                return LineAction::Unplug;
+            }
+        }
+        if has_replies {
+            self.replies.read(&self.arm);
+        }
+        while let Some(frame) = self.replies.next() {
+            if self.pass_reply(frame) == LineAction::Unplug {
+                return LineAction::Unplug;
+            }
+        }
+        LineAction::Nothing
+    }
+
+    fn pass_request(&mut self, mut frame: Vec<u8>) -> LineAction {
+        self.after_target = self.after_target.map(|count| count + 1);
+        let moment = self.plan.moment;
+        let is_due = moment == Moment::Request(self.requests.count)
+            || self.after_target.is_some_and(|count| moment == Moment::AfterTarget(count));
+        if is_target(&frame) {
+            self.after_target.get_or_insert(0);
+        }
+        if is_due && self.act() == LineAction::Unplug {
+            return LineAction::Unplug;
+        }
+        if self.plan.is_noisy {
+            disturb(&mut frame, self.requests.count, 9);
+        }
+        // An arm that reads no more is a fault that a test wants.
+        let _ = rustix::io::write(&self.arm, &frame);
+        LineAction::Nothing
+    }
+
+    fn pass_reply(&mut self, mut frame: Vec<u8>) -> LineAction {
+        if self.plan.moment == Moment::Reply(self.replies.count) && self.act() == LineAction::Unplug {
+            return LineAction::Unplug;
+        }
+        if self.plan.is_noisy {
+            // Reports come so regularly that they would shield the answers, or have them hit each time.
+            let (count, each) =
+                if is_report(&frame) { (&mut self.reports, 9) } else { (&mut self.answers, 7) };
+            *count += 1;
+            disturb(&mut frame, *count, each);
+        }
+        let _ = rustix::io::write(&self.program, &frame);
+        LineAction::Nothing
+    }
+
+    /// Acts, once.
+    fn act(&mut self) -> LineAction {
+        let is_first = !std::mem::replace(&mut self.has_acted, true);
+        if is_first { (self.plan.action)() } else { LineAction::Nothing }
+    }
+}
+
+/// Makes the checksum of each Nth frame wrong.
+fn disturb(frame: &mut [u8], number: u32, each: u32) {
+    if let Some(last) = frame.last_mut()
+        && number.is_multiple_of(each)
+    {
+        *last ^= 0x55;
+    }
+}
+
+/// Is the frame of the arm a report, and probably no answer?
+fn is_report(frame: &[u8]) -> bool {
+    matches!(frame, [_, _, 0x03, 142, 14 | 42, ..])
+}
+
+/// Does the frame write a target?
+fn is_target(frame: &[u8]) -> bool {
+    let &[_, _, 0x06, address, count, ..] = frame else { return false };
+    let Some(last) = count.checked_sub(1).map(|more| address.saturating_add(more)) else { return false };
+    let holds = |(from, to): (u8, u8)| address <= to && last >= from;
+    holds((TARGET_POSITION, TARGET_POSITION + 6)) || holds(FINE_TARGETS)
+}
+
+/// Cuts bytes into frames. Bytes outside frames are passed on as they are.
+struct FrameSplitter {
+    bytes: Vec<u8>,
+    is_of_arm: bool,
+    /// Frames so far.
+    count: u32,
+}
+
+impl FrameSplitter {
+    const fn new(is_of_arm: bool) -> Self {
+        Self { bytes: Vec::new(), is_of_arm, count: 0 }
+    }
+
+    /// Takes the bytes that have come.
+    fn read(&mut self, source: &OwnedFd) {
+        let mut chunk = [0; 4096];
+        let length = rustix::io::read(source, &mut chunk).unwrap_or(0);
+        self.bytes.extend(&chunk[..length]);
+    }
+
+    /// The next frame, or bytes outside of one. `None` if there is no whole frame.
+    fn next(&mut self) -> Option<Vec<u8>> {
+        let length = match self.bytes.as_slice() {
+            [0xAA, 0x77, function, _, count, ..] => {
+                self.count += u32::from(self.bytes.len() >= self.length(*function, *count));
+                self.length(*function, *count)
+            }
+            [] | [0xAA] | [0xAA, 0x77, ..] => return None,
+            [0xAA, ..] => 1,
+            other => other.iter().position(|&byte| byte == 0xAA).unwrap_or(other.len()),
+        };
+        (self.bytes.len() >= length).then(|| self.bytes.drain(..length).collect())
+    }
+
+    /// The length of a frame, with its checksum.
+    fn length(&self, function: u8, count: u8) -> usize {
+        let has_values = match function {
+            0x03 | 0x05 => self.is_of_arm,
+            // An alarm has no count.
+            0x08 => false,
+            _ => true,
+        };
+        7 + if has_values { usize::from(count) } else { 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::{read_request, reply, write_request};
+
+    fn frames(is_of_arm: bool, bytes: &[u8]) -> (Vec<Vec<u8>>, u32) {
+        let mut splitter = FrameSplitter::new(is_of_arm);
+        let mut found = Vec::new();
+        for &byte in bytes {
+            splitter.bytes.push(byte);
+            found.extend(splitter.next());
+        }
+        (found, splitter.count)
+    }
+
+    #[test]
+    fn frames_are_cut_and_counted() {
+        let requests = [read_request(54, 7), write_request(46, &[90; 7]), read_request(0, 8)];
+        assert_eq!(frames(false, &requests.concat()), (requests.to_vec(), 3));
+        let replies = [reply(54, &[90; 7]), vec![0x20], reply(0, &[7; 8])];
+        assert_eq!(frames(true, &replies.concat()), (replies.to_vec(), 2), "text between frames");
+    }
+
+    #[test]
+    fn a_target_is_seen_in_any_write_that_holds_one() {
+        assert!(is_target(&write_request(46, &[1])) && is_target(&write_request(29, &[1; 30])));
+        assert!(is_target(&write_request(140, &[1, 0])) && !is_target(&write_request(128, &[])));
+        assert!(!is_target(&write_request(32, &[1; 7])) && !is_target(&read_request(46, 7)));
+    }
+}
