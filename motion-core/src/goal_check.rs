@@ -24,20 +24,29 @@ pub(crate) struct GoalCheck {
     misses: u8,
     /// The joint may get torque.
     is_done: bool,
+    /// The servo had torque when its joint engaged.
+    had_torque: bool,
 }
 
 impl GoalCheck {
     /// No goal was sent.
-    pub(crate) const NEW: Self = Self { misses: 0, is_done: false };
+    pub(crate) const NEW: Self = Self { misses: 0, is_done: false, had_torque: false };
 
-    /// A goal is to be sent.
-    pub(crate) const fn begin(&mut self) {
+    /// A goal is to be sent, to a servo that is known to have torque or not.
+    pub(crate) const fn begin(&mut self, had_torque: bool) {
         self.is_done = false;
+        self.had_torque = had_torque;
+    }
+
+    /// Did the servo have torque when its joint engaged?
+    pub(crate) const fn had_torque(self) -> bool {
+        self.had_torque
     }
 
     /// The joint may get torque: its servo shows the goal, or follows it already.
     pub(crate) const fn shown(&mut self) {
-        *self = Self { misses: 0, is_done: true };
+        self.misses = 0;
+        self.is_done = true;
     }
 
     /// The servo shows another goal. Returns how often the goal has to be sent directly before torque; `None` if it has to

@@ -179,6 +179,11 @@ impl JointState {
         registers: &mut RegisterFile,
     ) -> Option<u8> {
         let held = answer.torque?;
+        if !held.is_on && self.goal.had_torque() {
+            // The servo restarted since it was read on (D29).
+            self.lose_torque(now);
+            return None;
+        }
         let goal = counts_from_angle(self.joint, self.drive.set_point(), registers.offset(self.joint));
         let is_there = |counts: u16| counts.abs_diff(goal) <= 1;
         let repeats = if held.is_on || is_there(held.goal_counts) {
@@ -272,10 +277,11 @@ impl JointState {
         if !self.let_go.may_engage(now, self.temperature, is_protected) {
             return false;
         }
+        let was_silent = self.drive.is_silent();
         let Some(target) = self.drive.engage(angle) else { return false };
         self.let_go.engaged(now);
         self.torque = TorqueCheck::ORDERED;
-        self.goal.begin();
+        self.goal.begin(was_silent);
         self.obstacle = Obstacle::NONE;
         if target == Target::Measured {
             self.set_target(angle, registers);

@@ -403,7 +403,9 @@ impl CommandChecker {
         let before = self.ranges[joint].or(paused);
         let reached = before.and_then(|range| range.after(joint, goal, speed, context.now));
         let new = ReachableRange::at(joint, goal, speed, context.now);
-        self.ranges[joint] = reached.filter(|_| paused.is_none()).or(Some(new));
+        // A joint without torque that engages anew where it is did not move there.
+        let is_engaging = !self.is_on[joint] || self.replies.was_read_off(joint);
+        self.ranges[joint] = reached.filter(|_| paused.is_none() && !is_engaging).or(Some(new));
         self.check_doubt(joint, goal, context)?;
         match before {
             _ if reached.is_some() => check_arrival(joint, goal, context),
