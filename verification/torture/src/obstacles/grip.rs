@@ -7,7 +7,7 @@ use protocol_core::registers::map::{
 };
 use protocol_core::time::Duration;
 
-use super::{ObstacleArm, percent, start};
+use super::arm::{ObstacleArm, percent, start};
 
 const CLAW: Joint = Joint::ALL[6];
 /// The time in which the peak is searched for, in seconds.

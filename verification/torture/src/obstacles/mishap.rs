@@ -6,7 +6,7 @@ use protocol_core::registers::Joint;
 use protocol_core::registers::map::{FINE_TARGET, MOTOR_STATE, SET_POINT_PERIOD};
 use protocol_core::time::Duration;
 
-use super::{ObstacleArm, PERIOD_MS, SETTLE_TIME, degrees, start};
+use super::arm::{ObstacleArm, PERIOD_MS, SETTLE_TIME, degrees, start};
 
 const PAYLOAD_G: u16 = 100;
 /// The point that is streamed, in hundredths of a degree: 40 degrees from where joint 1 stands.

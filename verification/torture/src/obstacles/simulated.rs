@@ -10,7 +10,7 @@ use protocol_core::request::Request;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::FrameBuffer;
 
-use super::ObstacleArm;
+use super::arm::ObstacleArm;
 
 /// A simulated arm.
 pub struct SimulatedObstacleArm {

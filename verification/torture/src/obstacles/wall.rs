@@ -7,7 +7,7 @@ use protocol_core::registers::Joint;
 use protocol_core::registers::map::{FINE_TARGET, SET_POINT_PERIOD, SPEED, TARGET_POSITION};
 use protocol_core::time::{Duration, Instant};
 
-use super::{ObstacleArm, PERIOD_MS, SETTLE_TIME, degrees, percent, start};
+use super::arm::{ObstacleArm, PERIOD_MS, SETTLE_TIME, degrees, percent, start};
 
 /// The poses: angles of joints 1 to 6 in degrees, within the linkage.
 const POSES: [[u8; 6]; 8] = [
@@ -266,7 +266,7 @@ fn worst(results: &[WallResult]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::obstacles::SimulatedObstacleArm;
+    use crate::obstacles::simulated::SimulatedObstacleArm;
 
     #[test]
     fn d27_a_wall_trips_a_servo_only_without_protection() {

@@ -1,0 +1,77 @@
+//! An arm in front of an obstacle, and what all experiments share.
+
+use arm_sim::plant::Plant;
+use protocol_core::registers::map::PROTECTION;
+use protocol_core::time::{Duration, Instant};
+
+/// The time for the start, and for a pose.
+pub(super) const SETTLE_TIME: Duration = Duration::from_millis(3_000);
+/// The time between two points of a stream, in milliseconds.
+pub(super) const PERIOD_MS: u8 = 20;
+
+/// An arm in front of an obstacle: a controller with simulated servos.
+pub trait ObstacleArm: Sized {
+    /// Why an experiment cannot go on.
+    type Error;
+
+    /// Switches a new arm on.
+    ///
+    /// # Errors
+    /// It does not start.
+    fn start() -> Result<Self, Self::Error>;
+
+    /// The time of the servos.
+    fn now(&self) -> Instant;
+
+    /// The servos and what is around them.
+    fn plant(&mut self) -> &mut Plant;
+
+    /// Writes registers.
+    ///
+    /// # Errors
+    /// The controller is gone.
+    fn write(&mut self, address: u8, values: &[u8]) -> Result<(), Self::Error>;
+
+    /// Reads a register.
+    ///
+    /// # Errors
+    /// The controller is gone, or does not reply.
+    fn read(&mut self, address: u8) -> Result<u8, Self::Error>;
+
+    /// Lets a millisecond pass, or a little more.
+    ///
+    /// # Errors
+    /// The controller is gone.
+    fn step(&mut self) -> Result<(), Self::Error>;
+
+    /// Lets this time pass.
+    ///
+    /// # Errors
+    /// The controller is gone.
+    fn run(&mut self, time: Duration) -> Result<(), Self::Error> {
+        let end = self.now() + time;
+        while self.now() < end {
+            self.step()?;
+        }
+        Ok(())
+    }
+}
+
+/// A new arm with or without protection.
+pub(super) fn start<A: ObstacleArm>(is_protected: bool) -> Result<A, A::Error> {
+    let mut arm = A::start()?;
+    arm.run(SETTLE_TIME)?;
+    arm.write(PROTECTION.address, &[u8::from(is_protected)])?;
+    Ok(arm)
+}
+
+/// Percent with one decimal.
+pub(super) fn percent(permille: u16) -> String {
+    format!("{}.{} %", permille / 10, permille % 10)
+}
+
+/// Degrees with one decimal, rounded up.
+pub(super) fn degrees(millidegrees: u32) -> String {
+    let tenths = millidegrees.div_ceil(100);
+    format!("{}.{}°", tenths / 10, tenths % 10)
+}
