@@ -150,7 +150,7 @@ pub(crate) const COMMANDS: [Command; 37] = [
     still("vacuum on", Moment::Request(4), Asked::Register(VACUUM_PUMP, 1)),
     still("effector gripper", Moment::Request(4), Asked::Register(EFFECTOR_TYPE, 1)),
     moving("set target-position.2 105", Moment::AfterTarget(1), Asked::Targets(&[(2, 105)])),
-    still("set speed 30", Moment::Request(5), Asked::Register(SPEED, 30)),
+    still("set speed 30", Moment::Request(6), Asked::Register(SPEED, 30)),
     still("set --unlock device-id 7", Moment::Request(8), Asked::Register(11, 7)),
     still("set motor-state 1", Moment::Request(5), Asked::Hold).in_state(&[(MOTOR_STATE, &[0])]),
     still("restore --yes FOLDER/settings.toml", Moment::Request(8), Asked::Register(11, 7)),
