@@ -9,8 +9,8 @@ use crate::command_error::CommandError;
 #[cfg(unix)]
 use crate::commands::sim;
 use crate::commands::{
-    backup, baud, calibrate, effector, get, info, model, monitor, move_to, park, play, plot, ports, pose,
-    position, record, recover, registers, servo, set, shell, sniff, state, status, stop, stream,
+    backup, baud, calibrate, effector, get, info, log, model, monitor, move_to, park, play, plot, ports,
+    pose, position, record, recover, registers, servo, set, shell, sniff, state, status, stop, stream,
 };
 #[cfg(target_os = "linux")]
 use crate::commands::{serve, view};
@@ -37,7 +37,7 @@ Exit status:
        connection was lost; an arm that was moving may go on
   130  interrupted by Ctrl-C; a moving arm then holds its position. A second
        Ctrl-C ends at once. Where Ctrl-C is the way to end, it is 0: `monitor`,
-       `record`, `serve`, `view`
+       `log`, `record`, `serve`, `view`
 
 With --json, notes, warnings and errors are JSON, too: one object in a line on
 standard error. {\"error\": TEXT, \"advice\": [TEXT, ...], \"status\": NUMBER},
@@ -104,6 +104,7 @@ pub(crate) enum Command {
     Vacuum(effector::VacuumArgs),
     Effector(effector::EffectorArgs),
     Monitor(monitor::MonitorArgs),
+    Log(log::LogArgs),
     Record(record::RecordArgs),
     Play(play::PlayArgs),
     Stream(stream::StreamArgs),
@@ -150,6 +151,7 @@ impl Command {
             Self::Vacuum(args) => effector::vacuum(session, &args),
             Self::Effector(args) => effector::effector(session, &args),
             Self::Monitor(args) => monitor::run(session, &args),
+            Self::Log(args) => log::run(session, &args),
             Self::Record(args) => record::run(session, &args),
             Self::Play(args) => play::run(session, &args),
             Self::Stream(args) => stream::run(session, &args),

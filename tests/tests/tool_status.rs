@@ -131,3 +131,15 @@ fn a_log_holds_the_bytes_of_a_command_and_sniff_shows_them() {
     assert!(text.contains("read device-code") && text.contains("  write target-position"), "{text}");
     failed(&rig.run(&["--log", path, "status"]), 1);
 }
+
+#[test]
+fn the_log_of_an_arm_moves_nothing_and_is_not_overwritten() {
+    let rig = Rig::start();
+    let path = rig.0.folder.path().join("day.log");
+    let path = path.to_str().expect("UTF-8");
+    succeeded(rig.run(&["log", path, "--hz", "50", "--seconds", "1"]));
+    let text = succeeded(tool().args(["sniff", path]).output().expect("sevenbot runs"));
+    assert!(text.matches("read ").count() >= 50 && !text.contains("write target"), "{text}");
+    failed(&rig.run(&["log", path]), 1);
+    failed(&rig.run(&["--log", "other.log", "log", "new.log"]), 2);
+}

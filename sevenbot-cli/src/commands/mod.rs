@@ -6,6 +6,7 @@ pub(crate) mod calibrate;
 pub(crate) mod effector;
 pub(crate) mod get;
 pub(crate) mod info;
+pub(crate) mod log;
 pub(crate) mod model;
 pub(crate) mod monitor;
 pub(crate) mod move_to;

@@ -12,7 +12,7 @@ mod draw;
 mod keys;
 mod lines;
 mod plot_kind;
-mod sample;
+pub(super) mod sample;
 mod screen;
 mod view;
 
@@ -74,7 +74,7 @@ pub(crate) struct MonitorArgs {
 
 impl MonitorArgs {
     fn period(&self) -> Duration {
-        Duration::from_secs(1) / u32::from(self.hz)
+        period(self.hz)
     }
 }
 
@@ -92,10 +92,15 @@ pub(crate) fn run(session: &mut Session, args: &MonitorArgs) -> Result<(), Comma
     }
 }
 
+/// The time between two samples.
+pub(super) fn period(hz: u8) -> Duration {
+    Duration::from_secs(1) / u32::from(hz)
+}
+
 /// Takes `count` samples, one per period.
-fn each_sample(
+pub(super) fn each_sample(
     arm: &mut Arm,
-    args: &MonitorArgs,
+    period: Duration,
     count: u64,
     mut take: impl FnMut(Sample) -> Result<(), CommandError>,
 ) -> Result<(), CommandError> {
@@ -104,7 +109,7 @@ fn each_sample(
     for _ in 0..count {
         sleep(due.saturating_duration_since(Instant::now()));
         // A late sample is not made up for.
-        due = (due + args.period()).max(Instant::now());
+        due = (due + period).max(Instant::now());
         let sample = Sample::take(arm, start)?;
         warn_of_problems(&sample.health, &mut told);
         take(sample)?;
@@ -125,7 +130,7 @@ fn show_lines(session: &mut Session, args: &MonitorArgs) -> Result<(), CommandEr
     if !printer.is_json() {
         printer.print_raw(format!("{}\n", LineFormat::Columns.head()).as_bytes())?;
     }
-    each_sample(&mut arm, args, args.samples.unwrap_or(u64::MAX), |sample| {
+    each_sample(&mut arm, args.period(), args.samples.unwrap_or(u64::MAX), |sample| {
         if printer.is_json() {
             printer.print(&SampleJson::from(&sample))
         } else {
@@ -140,7 +145,7 @@ fn write_csv(session: &Session, args: &MonitorArgs, path: &Path) -> Result<(), C
     let mut file = LineFile::create(path)?;
     let mut write = |line: String| file.add(&format!("{line}\n"));
     write(LineFormat::Csv.head())?;
-    each_sample(&mut arm, args, args.samples.unwrap_or(u64::MAX), |sample| {
+    each_sample(&mut arm, args.period(), args.samples.unwrap_or(u64::MAX), |sample| {
         write(LineFormat::Csv.line(&sample))
     })
 }
