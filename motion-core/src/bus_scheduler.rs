@@ -165,9 +165,9 @@ impl BusScheduler {
         }
         self.goals_due -= 1;
         self.has_new_goal = false;
-        let any = joints.goals(registers).next().is_some();
+        let any = joints.goals(now, registers).next().is_some();
         if any {
-            self.bus.set_goals(now, joints.goals(registers));
+            self.bus.set_goals(now, joints.goals(now, registers));
         }
         any
     }

@@ -27,8 +27,9 @@ enum Engagement {
     Released,
     /// The joint will engage at the next measurement. The trajectory keeps a target that the host writes meanwhile.
     Waiting { has_target: bool },
-    /// The joint has its measured position as its goal. Its torque is not on yet.
-    TorquePending,
+    /// The joint has its measured position as its goal, or its set-point if it was silent. Its torque is not on yet, unless
+    /// its servo was silent only.
+    TorquePending { was_silent: bool, has_new_target: bool },
     /// The joint has torque and follows its set-point.
     Engaged,
     /// The servo of a driven joint does not answer. The set-point does not move.
@@ -67,11 +68,16 @@ impl Drive {
     }
 
     /// Marks the servo as silent. An engaged joint keeps its set-point until the servo answers again. A joint whose
-    /// torque is pending waits again.
+    /// torque is pending waits again, or is silent again.
     pub fn mark_silent(&mut self) {
         self.engagement = match self.engagement {
             Engagement::Engaged => Engagement::Silent { has_new_target: false },
-            Engagement::TorquePending => Engagement::Waiting { has_target: self.trajectory.is_moving() },
+            Engagement::TorquePending { was_silent: true, has_new_target } => {
+                Engagement::Silent { has_new_target }
+            }
+            Engagement::TorquePending { .. } => {
+                Engagement::Waiting { has_target: self.trajectory.is_moving() }
+            }
             other => other,
         };
     }
@@ -94,18 +100,19 @@ impl Drive {
     fn take_target(&mut self) -> Option<&mut Trajectory> {
         match &mut self.engagement {
             Engagement::Released => return None,
-            Engagement::Waiting { has_target: is_new } | Engagement::Silent { has_new_target: is_new } => {
-                *is_new = true;
-            }
-            Engagement::TorquePending | Engagement::Engaged => {}
+            Engagement::Waiting { has_target: is_new }
+            | Engagement::Silent { has_new_target: is_new }
+            | Engagement::TorquePending { has_new_target: is_new, .. } => *is_new = true,
+            Engagement::Engaged => {}
         }
         Some(&mut self.trajectory)
     }
 
     /// Lets the joint hold at its set-point, and forgets a target that the host wrote before.
     pub fn hold(&mut self) {
-        if let Engagement::Waiting { has_target: is_new } | Engagement::Silent { has_new_target: is_new } =
-            &mut self.engagement
+        if let Engagement::Waiting { has_target: is_new }
+        | Engagement::Silent { has_new_target: is_new }
+        | Engagement::TorquePending { has_new_target: is_new, .. } = &mut self.engagement
         {
             *is_new = false;
         }
@@ -120,14 +127,15 @@ impl Drive {
         else {
             return None;
         };
-        let continues = self.is_silent() && is_near(self.set_point(), angle);
+        let was_silent = self.is_silent();
+        let continues = was_silent && is_near(self.set_point(), angle);
         let target = if continues || has_target { Target::FromHost } else { Target::Measured };
         if target == Target::Measured {
             self.trajectory = Trajectory::holding(angle);
         } else if !continues {
             self.trajectory.rebase(angle);
         }
-        self.engagement = Engagement::TorquePending;
+        self.engagement = Engagement::TorquePending { was_silent, has_new_target: has_target };
         Some(target)
     }
 
@@ -135,7 +143,7 @@ impl Drive {
     /// host that came before is forgotten.
     pub fn lose_torque(&mut self, keeps_target: bool) {
         self.engagement = match self.engagement {
-            Engagement::Engaged | Engagement::TorquePending => {
+            Engagement::Engaged | Engagement::TorquePending { .. } => {
                 Engagement::Waiting { has_target: keeps_target && self.trajectory.is_moving() }
             }
             Engagement::Silent { has_new_target } => Engagement::Waiting { has_target: has_new_target },
@@ -157,7 +165,7 @@ impl Drive {
 
     /// Records that the joint has torque. From now on its set-point may move.
     pub fn torque_is_on(&mut self) {
-        if self.engagement == Engagement::TorquePending {
+        if self.is_torque_pending() {
             self.engagement = Engagement::Engaged;
         }
     }
@@ -191,13 +199,13 @@ impl Drive {
     /// Is the joint engaged, or is its torque pending? Only such a joint is sent goals.
     #[must_use]
     pub fn is_driven(&self) -> bool {
-        matches!(self.engagement, Engagement::TorquePending | Engagement::Engaged)
+        matches!(self.engagement, Engagement::TorquePending { .. } | Engagement::Engaged)
     }
 
     /// Is the joint waiting for its torque?
     #[must_use]
     pub fn is_torque_pending(&self) -> bool {
-        self.engagement == Engagement::TorquePending
+        matches!(self.engagement, Engagement::TorquePending { .. })
     }
 
     /// Has the set-point not reached the target, or is a target waiting?
@@ -206,7 +214,7 @@ impl Drive {
         match self.engagement {
             Engagement::Released => false,
             Engagement::Waiting { has_target } => has_target,
-            Engagement::TorquePending | Engagement::Engaged | Engagement::Silent { .. } => {
+            Engagement::TorquePending { .. } | Engagement::Engaged | Engagement::Silent { .. } => {
                 self.trajectory.is_moving()
             }
         }
@@ -337,6 +345,18 @@ mod tests {
         drive.mark_silent();
         assert_eq!(drive.engage(degrees(42)), Some(Target::FromHost), "the target is kept");
         assert_eq!(drive.set_point(), degrees(42));
+    }
+
+    #[test]
+    fn d12_a_joint_that_falls_silent_again_before_its_torque_was_read_is_driven_on() {
+        let mut drive = silent();
+        drive.engage(degrees(43));
+        drive.mark_silent();
+        assert!(drive.is_silent());
+        assert_eq!(drive.engage(degrees(43)), Some(Target::FromHost));
+        drive.torque_is_on();
+        drive.advance(Instant::ZERO, 100);
+        assert_eq!(drive.set_point(), MicroDegrees(43_800_000), "from its set-point");
     }
 
     #[test]

@@ -319,6 +319,12 @@ impl JointState {
         self.drive.is_driven() && self.torque.is_trusted()
     }
 
+    /// Is the joint sent a goal at `now`? One without torque only while it is known where it is: some servos take a goal as an
+    /// order to switch torque on.
+    pub(crate) fn takes_goal_at(&self, now: Instant) -> bool {
+        self.takes_goals() && (!self.drive.is_torque_pending() || self.position.is_fresh(now))
+    }
+
     /// Has the next question to ask for the torque switch? `is_refresh_near` tells that torque is refreshed soon.
     pub(crate) fn wants_torque_read(&self, is_refresh_near: bool) -> bool {
         let is_driven = self.drive.has_set_point();

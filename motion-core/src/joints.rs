@@ -164,6 +164,9 @@ impl Joints {
         if answer.torque.is_some_and(|held| held.is_on) {
             self.supply.has_torque();
         }
+        if self.supply.is_undecided(now) && self.set_of(|state| state.drive.has_set_point()) == 0 {
+            self.supply.none_driven();
+        }
         let may_engage = may_engage && !self.supply.is_undecided(now);
         let Some(state) = self.joint_mut(joint) else { return Measured::Rejected };
         let outcome = state.read(now, answer, may_engage, registers);
@@ -289,9 +292,9 @@ impl Joints {
         registers.set(SERVO_ALARMS.address, alarms);
     }
 
-    /// The goals of the driven joints, in servo counts.
-    pub(crate) fn goals(&self, registers: &RegisterFile) -> impl Iterator<Item = (Joint, u16)> {
-        self.each().filter(|(_, state)| state.takes_goals()).map(|(joint, state)| {
+    /// The goals of the driven joints at `now`, in servo counts.
+    pub(crate) fn goals(&self, now: Instant, registers: &RegisterFile) -> impl Iterator<Item = (Joint, u16)> {
+        self.each().filter(move |(_, state)| state.takes_goal_at(now)).map(|(joint, state)| {
             (joint, counts_from_angle(joint, state.drive.set_point(), registers.offset(joint)))
         })
     }
@@ -367,7 +370,7 @@ mod tests {
     fn d12_a_joint_engages_at_the_second_reading_and_the_others_are_left_as_they_are() {
         let (mut joints, registers) = measured(MotorState::Servo);
         assert_eq!((registers.get(PRESENT_POSITION.of(J1)), registers.get(TARGET_POSITION.of(J1))), (90, 90));
-        assert_eq!(joints.goals(&registers).collect::<Vec<_>>(), [(J1, 511)]);
+        assert_eq!(joints.goals(at_ms(10), &registers).collect::<Vec<_>>(), [(J1, 511)]);
         let torque = joints.take_torque(true);
         assert_eq!((torque[0], &torque[1..]), (Some(Torque::On), [None; 6].as_slice()));
         assert_eq!((joints.silent(), joints.hottest(), joints.any_alarm()), (0b111_1110, 31, true));
@@ -395,7 +398,7 @@ mod tests {
         let (mut joints, registers) = measured(MotorState::Servo);
         joints.take_torque(true);
         assert_eq!([2, 3, 4].map(|cycle| joints.failed(at_ms(cycle * 10), J1)), [false, false, true]);
-        assert_eq!(joints.goals(&registers).count(), 0);
+        assert_eq!(joints.goals(at_ms(40), &registers).count(), 0);
         assert_eq!(joints.take_torque(true), [None; JOINTS]);
         assert_eq!((joints.silent(), joints.hottest(), joints.any_alarm()), (0x7F, 0, false));
     }
@@ -404,10 +407,22 @@ mod tests {
     fn d12_a_joint_is_not_given_torque_where_it_was_measured_long_ago() {
         let (mut joints, registers) = measured(MotorState::Servo);
         joints.expire_pending(at_ms(30));
-        assert_eq!(joints.goals(&registers).count(), 1);
+        assert_eq!(
+            [30, 31].map(|millis| joints.goals(at_ms(millis), &registers).count()),
+            [1, 0],
+            "no old goal"
+        );
         joints.expire_pending(at_ms(31));
-        assert_eq!(joints.goals(&registers).count(), 0);
+        assert_eq!(joints.goals(at_ms(30), &registers).count(), 0);
         assert_eq!(joints.take_torque(true), [None; JOINTS]);
+    }
+
+    #[test]
+    fn d29_a_joint_that_was_silent_before_it_had_torque_engages_after_any_time() {
+        let (mut joints, mut registers) = measured(MotorState::Servo);
+        assert_eq!([20, 30, 40].map(|millis| joints.failed(at_ms(millis), J1)), [false, false, true]);
+        let mut measure = |millis| joints.measured(at_ms(millis), J1, &answer(511), true, &mut registers);
+        assert_eq!([3_000, 3_010].map(&mut measure), [Measured::Rejected, Measured::Engaged]);
     }
 
     #[test]
@@ -418,7 +433,7 @@ mod tests {
             assert!(joints.set_state(state, &mut registers));
             assert!(!joints.set_state(state, &mut registers), "the state did not change");
             assert_eq!(joints.take_torque(true), [Some(torque); JOINTS]);
-            assert_eq!(joints.goals(&registers).count(), 0);
+            assert_eq!(joints.goals(at_ms(10), &registers).count(), 0);
             assert!(!joints.advance(at_ms(0), at_ms(0), &mut registers));
         }
     }

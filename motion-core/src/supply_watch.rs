@@ -33,6 +33,11 @@ impl SupplyWatch {
         }
     }
 
+    /// No joint is driven any more: a silence of servos without torque tells nothing of the supply.
+    pub(crate) const fn none_driven(&mut self) {
+        self.all_silent_since = None;
+    }
+
     /// A driven servo answered at `now`.
     pub(crate) fn answered(&mut self, now: Instant) {
         self.was_outage = self.is_undecided(now);

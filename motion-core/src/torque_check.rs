@@ -48,9 +48,9 @@ impl TorqueCheck {
     /// Torque is to be switched on.
     pub(crate) const ORDERED: Self = Self { known: Known::Ordered, offs: 0, is_fresh: false };
 
-    /// A question was not answered.
+    /// A question was not answered. Answers before and after it count together: some servos answer every second time.
     pub(crate) const fn unanswered(&mut self) {
-        *self = Self { known: Known::Doubtful, offs: 0, is_fresh: false };
+        self.doubt();
     }
 
     /// It is not known any more whether the switch is on, although no question was lost.
