@@ -37,6 +37,9 @@ const ANSWERS_AFTER: Duration = Duration::from_millis(3_000);
 /// A joint that had no goal for this long is let go, unless it is silent: an alarm freed it. It is not driven any more.
 const LET_GO_TIME: Duration = Duration::from_millis(10_000);
 
+/// A joint that had no goal for this long is not driven at present.
+const FOLLOWED_TIME: Duration = Duration::from_millis(1_000);
+
 /// Counts of one control cycle at 372 degrees/s. A set-point may be ahead of the last goal by one cycle, and by one more
 /// for each cycle in which a read delays the goals.
 const ONE_CYCLE: u16 = 19;
@@ -236,8 +239,9 @@ impl CommandChecker {
             _ if !is_whole => Err(invalid_frame(frame)),
             [2, 56, count @ 8..=11] | [2, 40, count @ 24..=27] if *id < 7 => {
                 let joint = Joint::from_index(*id).ok_or_else(|| invalid_frame(frame))?;
-                let has_goals = context.now - self.goal_at[joint] < LET_GO_TIME;
-                self.replies.asked(context.now, joint, *count, self.is_driven(joint) && has_goals);
+                let has_goals = context.now - self.goal_at[joint] < FOLLOWED_TIME;
+                let is_driven = self.is_driven(joint) && (has_goals || self.kept_goals[joint].is_some());
+                self.replies.asked(context.now, joint, *count, is_driven);
                 Ok(())
             }
             _ if self.is_starting(context.now) => {
