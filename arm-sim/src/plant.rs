@@ -278,6 +278,12 @@ impl Plant {
         self.servo(joint).map_or(0, Servo::position_counts)
     }
 
+    /// The goal that a joint's servo holds, in counts.
+    #[must_use]
+    pub fn goal_counts(&self, joint: Joint) -> u16 {
+        self.servo(joint).map_or(0, Servo::goal_counts)
+    }
+
     /// The torque of a joint's motor in 0.1 % of its stall torque: its load less what its speed needs. Positive values
     /// are towards more counts.
     #[must_use]

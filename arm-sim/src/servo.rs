@@ -237,6 +237,12 @@ impl Servo {
         self.motor.stopping_distance()
     }
 
+    /// The goal that it holds, in counts.
+    #[must_use]
+    pub fn goal_counts(&self) -> u16 {
+        self.registers.goal().position_counts
+    }
+
     /// The position in counts, 0 to 1023.
     #[must_use]
     pub fn position_counts(&self) -> u16 {

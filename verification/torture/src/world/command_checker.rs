@@ -34,6 +34,12 @@ const MAX_UNANSWERED: u8 = 4;
 /// A servo that has responded for this long has shown its torque.
 const ANSWERS_AFTER: Duration = Duration::from_millis(3_000);
 
+/// A joint that had no goal for this long is let go, unless it is silent: an alarm freed it. It is not driven any more.
+const LET_GO_TIME: Duration = Duration::from_millis(10_000);
+
+/// A joint that had no goal for this long is not driven at present.
+const FOLLOWED_TIME: Duration = Duration::from_millis(1_000);
+
 /// Counts of one control cycle at 372 degrees/s. A set-point may be ahead of the last goal by one cycle, and by one more
 /// for each cycle in which a read delays the goals.
 const ONE_CYCLE: u16 = 19;
@@ -153,6 +159,11 @@ impl CommandChecker {
         self.ranges[joint].or(self.paused[joint]).map(|range| range.last_goal)
     }
 
+    /// True if the joint was given torque, or was silent since then.
+    fn is_driven(&self, joint: Joint) -> bool {
+        (self.is_on[joint] && !self.is_released[joint]) || self.kept_goals[joint].is_some()
+    }
+
     /// True if the joint was given torque so often that only a write of register 29 gives it torque again (D28).
     pub(super) fn is_exhausted(&self, joint: Joint) -> bool {
         self.attempts[joint].is_exhausted
@@ -166,6 +177,13 @@ impl CommandChecker {
     /// Register 29 was written: the attempts count anew (D28).
     pub(super) fn state_written(&mut self) {
         self.attempts = PerJoint::default();
+        self.replies.forget_outage();
+    }
+
+    /// True if the controller may not know yet whether the supply was lost (D29). While a servo does not answer, no joint
+    /// gets torque then.
+    pub(super) fn is_undecided(&self) -> bool {
+        self.replies.was_outage()
     }
 
     /// The joint is no longer driven. Its next goal need not be near the last one.
@@ -182,7 +200,10 @@ impl CommandChecker {
     pub(super) fn servo_lost(&mut self, now: Instant, joint: Joint) {
         self.linkage.reset();
         self.servo_lost_at[joint] = Some(now);
-        self.kept_goals[joint] = self.goal(joint).map(|goal| (goal, self.ahead)).or(self.kept_goals[joint]);
+        // A joint that has only its goal has no torque to keep: it engages anew where it is.
+        let had_torque = self.is_driven(joint) && now - self.goal_at[joint] < LET_GO_TIME;
+        let goal = self.goal(joint).map(|goal| (goal, self.ahead)).or(self.kept_goals[joint]);
+        self.kept_goals[joint] = goal.filter(|_| had_torque);
         (self.ranges[joint], self.paused[joint]) = (None, None);
         self.is_on[joint] = false;
     }
@@ -196,9 +217,11 @@ impl CommandChecker {
         }
     }
 
-    /// Offsets changed: the controller computes its set-points again, from whole counts.
-    pub(super) fn offsets_changed(&mut self) {
+    /// Offsets changed: the controller computes its set-points again, from whole counts. Its targets stay in degrees, so
+    /// that they are elsewhere in counts, as after a write.
+    pub(super) fn offsets_changed(&mut self, now: Instant) {
         self.linkage.reset();
+        self.target_written_at = PerJoint::all(Some(now));
         self.ranges.0.iter_mut().flatten().for_each(ReachableRange::widen);
         self.paused.0.iter_mut().flatten().for_each(ReachableRange::widen);
         self.kept_goals.0.iter_mut().flatten().for_each(|(_, tolerance)| *tolerance += 1);
@@ -216,8 +239,8 @@ impl CommandChecker {
             _ if !is_whole => Err(invalid_frame(frame)),
             [2, 56, count @ 8..=11] | [2, 40, count @ 24..=27] if *id < 7 => {
                 let joint = Joint::from_index(*id).ok_or_else(|| invalid_frame(frame))?;
-                let is_driven =
-                    (self.is_on[joint] && !self.is_released[joint]) || self.kept_goals[joint].is_some();
+                let has_goals = context.now - self.goal_at[joint] < FOLLOWED_TIME;
+                let is_driven = self.is_driven(joint) && (has_goals || self.kept_goals[joint].is_some());
                 self.replies.asked(context.now, joint, *count, is_driven);
                 Ok(())
             }
@@ -288,9 +311,12 @@ impl CommandChecker {
                 format!("the torque of joint {number} is refreshed, but was not read on since the last time")
             });
         }
+        // The goal may be missing in the last frame of goals. What counts is that its servo has it.
         let range = self.ranges[joint]
+            .or(self.paused[joint])
             .ok_or_else(|| Violation(format!("joint {number} is given torque without a goal")))?;
         self.check_position(joint, range.last_goal, "is given torque", context)?;
+        self.check_servo_goal(joint, range.last_goal, context)?;
         self.kept_goals[joint] = None;
         self.is_first[joint] = false;
         self.replies.forget_doubt(joint);
@@ -299,6 +325,16 @@ impl CommandChecker {
         self.attempts[joint].add(context.now);
         self.engagements += 1;
         Ok(())
+    }
+
+    /// A servo without torque holds the goal that was sent to it, so that it does not go to an older one with its torque.
+    fn check_servo_goal(&self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
+        let bus = context.bus;
+        let held = bus.servo_goal(joint);
+        let is_known = bus.is_undisturbed(context.now) && !bus.may_be_misread(joint, context.now);
+        ensure(!is_known || !bus.is_free(joint) || held.abs_diff(goal) <= 1, || {
+            format!("joint {} is given torque with the goal {held} instead of {goal}", joint.number())
+        })
     }
 
     /// The target of a joint that lost its torque since it was last given torque is where it gets torque again, unless the

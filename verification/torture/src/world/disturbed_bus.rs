@@ -135,6 +135,11 @@ impl DisturbedBus {
         self.plant.position_counts(joint)
     }
 
+    /// The goal that the servo of a joint truly holds, in counts.
+    pub(super) fn servo_goal(&self, joint: Joint) -> u16 {
+        self.plant.goal_counts(joint)
+    }
+
     pub(super) fn last_status(&self, joint: Joint) -> StatusFields {
         self.last_status[joint]
     }

@@ -36,6 +36,11 @@ impl HostRequest {
         usize::from(address) + count <= 256
     }
 
+    /// True for a read.
+    pub(super) const fn is_read(&self) -> bool {
+        matches!(self, Self::Read { .. })
+    }
+
     /// The length of the reply in bytes; 0 if there is no reply.
     pub(super) fn reply_length(&self) -> usize {
         match self {

@@ -34,7 +34,7 @@ impl TortureWorld {
         self.allow_own_targets(arm);
         let verdicts = arm.find_verdicts(count, room);
         let mut choices = verdicts.choices.into_iter();
-        let (mut last, mut is_heard) = (arm.owed.take(), false);
+        let mut last = arm.owed.take();
         for _ in 0..count {
             let has_arrived = arm.pending.front().is_some_and(|first| first.arrived_at <= self.now);
             let request = arm.pending.pop_front().filter(|_| has_arrived).map(|pending| pending.request);
@@ -43,16 +43,16 @@ impl TortureWorld {
             let has_output = !matches!(last, None | Some(RequestEffect::NoReply { .. }));
             ensure(!has_output, || format!("the output of {last:?} is missing before {request:?}"))?;
             arm.model.choice = choices.next().unwrap_or(0);
-            is_heard |= request.is_well_formed();
+            // In a poll, writes have their turn before the watchdog, and a read has it after.
+            if request.is_read() {
+                self.let_watchdog_act(arm);
+            }
             last = Some(self.apply_request(arm, &request, room));
         }
         for joint in Joint::ALL.into_iter().filter(|joint| verdicts.unclear & joint.bit() != 0) {
             arm.model.targets[joint] = None;
         }
-        // A request that is heard in a poll has its turn before the watchdog.
-        if !is_heard && arm.watchdog.may_act(self.now) {
-            self.record_watchdog(arm);
-        }
+        self.let_watchdog_act(arm);
         let registers = arm.controller.registers();
         arm.watchdog.check_fault(registers)?;
         if count > 0 {
@@ -144,8 +144,11 @@ impl TortureWorld {
         self.bus.exempt_all_by_state(self.now);
     }
 
-    /// The watchdog may have acted in this poll (D24): the model takes over its effect.
-    fn record_watchdog(&mut self, arm: &mut PoweredArm) {
+    /// If the watchdog may have acted in this poll (D24), the model takes over its effect.
+    fn let_watchdog_act(&mut self, arm: &mut PoweredArm) {
+        if !arm.watchdog.may_act(self.now) {
+            return;
+        }
         let registers = arm.controller.registers();
         if arm.model.get(WATCHDOG_ACTION) == 0 {
             for joint in Joint::ALL {
@@ -193,7 +196,7 @@ impl TortureWorld {
             arm.command_checker.speed_written(&arm.model);
         }
         if includes_any(&OFFSET) && matches!(effect, RequestEffect::Save(_)) {
-            arm.command_checker.offsets_changed();
+            arm.command_checker.offsets_changed(self.now);
             arm.status_checker.offsets_changed(self.now);
         }
         if affects_motion(*address, values.len()) {

@@ -33,6 +33,8 @@ struct Known {
     silence: (Instant, Instant),
     /// A driven servo left a question unanswered, and its torque was not read since then.
     is_doubtful: bool,
+    /// It was driven when it was asked and answered last, or before its silence.
+    is_driven: bool,
     /// Its torque was read on since it was last switched on.
     is_read_on: bool,
     /// Its torque was read off last.
@@ -53,11 +55,13 @@ pub(super) struct ServoReplies {
     /// Decodes the bytes that the controller receives.
     decoder: Decoder,
     servos: PerJoint<Known>,
+    /// All driven servos were silent at once for a second, and none was read with torque since then.
+    was_outage: bool,
 }
 
 impl ServoReplies {
     pub(super) fn new(codes: TorqueCodes) -> Self {
-        Self { codes, decoder: Decoder::new(), servos: PerJoint::default() }
+        Self { codes, decoder: Decoder::new(), servos: PerJoint::default(), was_outage: false }
     }
 
     /// The controller reads a servo.
@@ -65,12 +69,16 @@ impl ServoReplies {
         let servo = &mut self.servos[joint];
         if servo.unanswered > 0 {
             servo.silent_since.get_or_insert(servo.asked_at);
-            servo.is_doubtful |= is_driven && !servo.is_read_off;
+            servo.is_doubtful |= servo.is_driven;
             servo.is_read_on = false;
+        } else {
+            servo.is_driven = is_driven && !servo.is_read_off;
         }
         servo.unanswered = servo.unanswered.saturating_add(1);
         servo.asked_at = now;
         servo.asked_count = count;
+        let mut driven = self.servos.0.iter().filter(|servo| servo.is_driven).peekable();
+        self.was_outage |= driven.peek().is_some() && driven.all(|servo| servo.is_lost(now));
         // The controller does the same: bytes from before a read are not its reply.
         self.decoder.clear();
     }
@@ -85,7 +93,8 @@ impl ServoReplies {
                 if frame.params.len() != usize::from(self.servos[joint].asked_count) {
                     continue;
                 }
-                self.servos[joint].answered(now, frame.params, self.codes.code(Torque::On));
+                let has_torque = self.servos[joint].answered(now, frame.params, self.codes.code(Torque::On));
+                self.was_outage &= !has_torque;
             }
         }
     }
@@ -133,6 +142,7 @@ impl ServoReplies {
     pub(super) fn forget_doubt(&mut self, joint: Joint) {
         let servo = &mut self.servos[joint];
         (servo.is_doubtful, servo.is_read_on, servo.is_read_off) = (false, false, false);
+        servo.is_driven = false;
     }
 
     /// True if the torque was read on since the last call.
@@ -151,6 +161,16 @@ impl ServoReplies {
         end - start >= LOST_AFTER && now - end < NOTICE_TIME
     }
 
+    /// True if all driven servos were silent at once for a second, and none was read with torque since then.
+    pub(super) const fn was_outage(&self) -> bool {
+        self.was_outage
+    }
+
+    /// The host wrote the motor state: what happened before does not matter any more.
+    pub(super) const fn forget_outage(&mut self) {
+        self.was_outage = false;
+    }
+
     /// True if the servo has answered for a while.
     pub(super) fn is_steady(&self, joint: Joint, now: Instant) -> bool {
         let servo = &self.servos[joint];
@@ -159,7 +179,13 @@ impl ServoReplies {
 }
 
 impl Known {
-    fn answered(&mut self, now: Instant, params: &[u8], on: u8) {
+    /// True if the servo is silent for so long that it may have lost its supply.
+    fn is_lost(&self, now: Instant) -> bool {
+        self.silent_since.is_some_and(|since| now - since >= LOST_AFTER)
+    }
+
+    /// Takes an answer. Returns whether it shows torque.
+    fn answered(&mut self, now: Instant, params: &[u8], on: u8) -> bool {
         self.replies = self.replies.saturating_add(1);
         self.unanswered = 0;
         if let Some(since) = self.silent_since.take() {
@@ -177,6 +203,7 @@ impl Known {
             self.is_read_off = code != on;
             self.held_goal = goal(params).filter(|_| code == on);
         }
+        torque_switch(params) == Some(on)
     }
 }
 

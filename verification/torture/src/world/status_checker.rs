@@ -283,8 +283,10 @@ impl StatusChecker {
         let is_due =
             context.model.is_servo() && self.settled_time(context.now, self.state_at) > DETECTION_TIME;
         let is_on = context.command_checker.is_on(joint);
+        let all_respond = || Joint::ALL.into_iter().all(|other| self.is_responding(other, context));
         let may_wait = context.bus.truth(joint).may_wait_for_torque(context.now)
             || context.command_checker.is_exhausted(joint)
+            || (context.command_checker.is_undecided() && !all_respond())
             || context.bus.may_be_misread(joint, context.now)
             || context.bus.last_status(joint).alarms != 0
             || context.bus.last_status(joint).celsius > COOL
