@@ -144,6 +144,11 @@ impl CommandChecker {
         })
     }
 
+    /// The last position that the controller has read, in counts.
+    pub(super) fn measured(&self, joint: Joint) -> Option<u16> {
+        self.replies.position(joint)
+    }
+
     pub(super) fn is_on(&self, joint: Joint) -> bool {
         self.is_on[joint]
     }

@@ -160,6 +160,8 @@ impl TortureWorld {
             self.log.event(self.now, "the watchdog damps the arm".to_owned());
             arm.model.damp();
             self.record_damping(arm);
+            // The arm is in state 0 already, whatever becomes of its supply.
+            self.supply_rule.forget();
         }
     }
 
