@@ -1,10 +1,12 @@
 //! The arguments of `move-to`, and the check of the point.
 
 use clap::Args;
+use sevenbot::Arm;
 use sevenbot::cartesian::{DOWN, TipTarget, Vector};
 
 use crate::command_error::CommandError;
 use crate::guard_args::{GuardArgs, millimetres, refused};
+use crate::session::Session;
 
 /// Move the tip to a point, in millimetres.
 ///
@@ -101,6 +103,11 @@ fn speed(text: &str) -> Result<f64, &'static str> {
 }
 
 impl MoveToArgs {
+    /// Opens the arm; for a move, unless nothing moves.
+    pub(super) fn connect(&self, session: &Session) -> Result<Arm, CommandError> {
+        if self.dry_run { session.connect() } else { session.connect_to_move() }
+    }
+
     pub(super) const fn tip(&self) -> Vector {
         Vector::new(self.x, self.y, self.z)
     }

@@ -30,7 +30,7 @@ pub(crate) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
         return straight::run(session, args);
     }
     let Some(tool) = args.tool() else {
-        let mut arm = connect(session, args)?;
+        let mut arm = args.connect(session)?;
         let tool = present_tool(&mut arm)?;
         let target = target(args, tool)?;
         return take(session, Some(arm), args, &target, tool);
@@ -39,11 +39,6 @@ pub(crate) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), Comman
     let target = target(args, tool)?;
     let arm = if args.dry_run { None } else { Some(session.connect_to_move()?) };
     take(session, arm, args, &target, tool)
-}
-
-/// Opens the arm; for a move, unless nothing moves.
-fn connect(session: &Session, args: &MoveToArgs) -> Result<Arm, CommandError> {
-    if args.dry_run { session.connect() } else { session.connect_to_move() }
 }
 
 /// Shows the move and, without --dry-run, makes it.

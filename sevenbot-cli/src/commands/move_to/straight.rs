@@ -12,7 +12,6 @@ use sevenbot::{Angle, FineAngle};
 use super::super::play::follow;
 use super::super::position::components;
 use super::args::{MoveToArgs, target};
-use super::connect;
 use super::facts::{MeasuredTip, rounded};
 use crate::command_error::CommandError;
 use crate::guard_args::refused_line;
@@ -22,7 +21,7 @@ use crate::session::Session;
 
 /// Moves the tip on a straight line, starting at the present targets.
 pub(super) fn run(session: &mut Session, args: &MoveToArgs) -> Result<(), CommandError> {
-    let mut arm = connect(session, args)?;
+    let mut arm = args.connect(session)?;
     let joints = if args.dry_run { arm.wait_until_settled()? } else { arm.driven_joints()? };
     let start = LineStart::of(&mut arm, &joints)?;
     let tool = args.tool().unwrap_or_else(|| TipPose::of_fine(start.targets).tool);
