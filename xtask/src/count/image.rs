@@ -1,6 +1,7 @@
 //! Counts instructions of the image for the arm, from one event on its lines to another.
 
 use std::collections::HashMap;
+use std::iter::repeat_n;
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -210,8 +211,9 @@ impl ImageAddresses {
         // The pattern repeats in virtual time, which runs fast.
         sleep(SILENCE);
         let (mut log_lines, mut masked) = (0, 0);
-        for _ in 0..MAX_WATCHES {
-            let events = watch_for(&mut machine, SILENCE)?;
+        // A busy machine shows less in the same time.
+        for times in (1..=5).chain(repeat_n(5, MAX_WATCHES)) {
+            let events = watch_for(&mut machine, SILENCE * times)?;
             log_lines += events.iter().filter(|event| trace::is_step_at(event, self.log_line)).count();
             masked = masked.max(longest_stretch(&events, &self.effects));
             let ticks = trace::between(&events, |event| trace::is_step_at(event, self.wake_up));
