@@ -165,7 +165,7 @@ impl BusScheduler {
         }
         self.goals_due -= 1;
         self.has_new_goal = false;
-        let any = joints.goals(now, registers).next().is_some();
+        let any = joints.any_goal(now);
         if any {
             self.bus.set_goals(now, joints.goals(now, registers));
         }

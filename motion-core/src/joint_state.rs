@@ -161,6 +161,7 @@ impl JointState {
             self.follow(now, answer, angle, registers);
         }
         if may_engage
+            && !self.drive.is_driven()
             && self.position.is_steady()
             && self.engages(now, self.place(answer, angle, registers), registers)
         {
@@ -321,8 +322,9 @@ impl JointState {
 
     /// Is the joint sent a goal at `now`? One without torque only while it is known where it is: some servos take a goal as an
     /// order to switch torque on.
+    #[inline]
     pub(crate) fn takes_goal_at(&self, now: Instant) -> bool {
-        self.takes_goals() && (!self.drive.is_torque_pending() || self.position.is_fresh(now))
+        self.takes_goals() && (self.drive.is_engaged() || self.position.is_fresh(now))
     }
 
     /// Has the next question to ask for the torque switch? `is_refresh_near` tells that torque is refreshed soon.

@@ -292,6 +292,11 @@ impl Joints {
         registers.set(SERVO_ALARMS.address, alarms);
     }
 
+    /// Is there a goal at `now`?
+    pub(crate) fn any_goal(&self, now: Instant) -> bool {
+        self.joints.iter().any(|state| state.takes_goal_at(now))
+    }
+
     /// The goals of the driven joints at `now`, in servo counts.
     pub(crate) fn goals(&self, now: Instant, registers: &RegisterFile) -> impl Iterator<Item = (Joint, u16)> {
         self.each().filter(move |(_, state)| state.takes_goal_at(now)).map(|(joint, state)| {

@@ -53,7 +53,10 @@ impl Accepted<'_> {
     /// The new value of the two-byte register at `address`; `None` if the write does not include it.
     #[must_use]
     pub fn word_at(&self, address: u8) -> Option<u16> {
-        self.values_at(address).map(u16::from_le_bytes)
+        let low = self.value_at(address)?;
+        // Both bytes of a register have the same rule.
+        let high = *self.values.get(usize::from(address.checked_sub(self.start)?) + 1)?;
+        Some(u16::from_le_bytes([low, high]))
     }
 
     /// Does the write reach the extended block? The registers before it have one byte, and no minimum.

@@ -24,7 +24,9 @@ const SLOW_MOVE: [u8; 28] = *b"\xaa\x77\x06\x20\x15\x0a\x0a\x0a\x0a\x0a\x0a\x0a\
 /// Time for the start-up of the controller, in milliseconds.
 const START_MILLIS: u64 = 1_000;
 /// Number of control cycles that are counted.
-const CYCLES: u64 = 100;
+const CYCLES: u64 = 300;
+/// Control cycles from one write to the next. Torque is refreshed every 25 cycles, so writes meet each part of that period.
+const CYCLES_OF_WRITE: u64 = 11;
 /// Milliseconds of a control cycle. The controller is polled once per millisecond.
 const CYCLE_MILLIS: u64 = 10;
 
@@ -59,10 +61,12 @@ fn main() -> ! {
         longest_call: 0,
     };
     (0..START_MILLIS).for_each(|millis| _ = rig.step(millis));
-    rig.controller.host_bytes(now(START_MILLIS), opaque(&SLOW_MOVE));
     let mut longest_cycle = 0;
     for cycle in 0..CYCLES {
         let start = START_MILLIS + cycle * CYCLE_MILLIS;
+        if cycle % CYCLES_OF_WRITE == 0 {
+            rig.controller.host_bytes(now(start), opaque(&SLOW_MOVE));
+        }
         longest_cycle = longest_cycle.max((start..start + CYCLE_MILLIS).map(|millis| rig.step(millis)).sum());
     }
     rig.meter.print("joints moving", u32::from(rig.controller.registers().get(MOVING_JOINTS.address)));
