@@ -157,6 +157,11 @@ impl Drive {
         self.engagement == Engagement::Engaged
     }
 
+    /// Does the joint wait to be measured?
+    pub(crate) fn is_waiting(&self) -> bool {
+        matches!(self.engagement, Engagement::Waiting { .. })
+    }
+
     /// Has the servo of a driven joint fallen silent?
     #[must_use]
     pub fn is_silent(&self) -> bool {

@@ -327,11 +327,12 @@ impl JointState {
         self.takes_goals() && (self.drive.is_engaged() || self.position.is_fresh(now))
     }
 
-    /// Has the next question to ask for the torque switch? `is_refresh_near` tells that torque is refreshed soon.
+    /// Has the next question to ask for the torque switch? `is_refresh_near` tells that torque is refreshed soon. A waiting
+    /// joint is always asked: it may have been silent, and its goal follows the answer at once (D29).
     pub(crate) fn wants_torque_read(&self, is_refresh_near: bool) -> bool {
-        let is_driven = self.drive.has_set_point();
-        (!is_driven && self.is_first_engagement)
-            || (is_driven && (self.torque.is_urgent() || (is_refresh_near && !self.torque.is_fresh())))
+        self.drive.is_waiting()
+            || (self.drive.has_set_point()
+                && (self.torque.is_urgent() || (is_refresh_near && !self.torque.is_fresh())))
     }
 
     /// The torque for the servo in the servo state; `None` leaves its switch unchanged. A servo is refreshed only if its

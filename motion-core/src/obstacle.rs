@@ -9,6 +9,8 @@ use crate::push_limiter::{PushLimit, PushLimiter, PushSample};
 
 /// A joint that is held back for this long, and comes no nearer to its target, is blocked.
 const BLOCKED_AFTER: Duration = Duration::from_millis(1_000);
+/// The same in control cycles.
+const BLOCKED_AFTER_CYCLES: u8 = 100;
 /// A joint that came nearer by more than a count has moved: 0.29 degrees of joints 5 to 7.
 const NEARER_BY: u32 = 300_000;
 
@@ -24,8 +26,9 @@ pub(crate) struct HeldBack {
 #[derive(Clone, Debug)]
 pub(crate) struct Obstacle {
     limiter: PushLimiter,
-    /// Since when the joint is held back and came no nearer than this distance to its target.
-    held: Option<(Instant, u32)>,
+    /// For how many control cycles the joint is held back and came no nearer than this distance to its target. The time of a
+    /// late call does not count: the joint was neither measured nor driven meanwhile.
+    held: Option<(u8, u32)>,
     is_blocked: bool,
     /// When the last point of a stream came, if the joint is blocked and tries to reach it.
     retrying_since: Option<Instant>,
@@ -84,11 +87,13 @@ impl Obstacle {
             return None;
         };
         let distance = target.0.abs_diff(angle.0);
-        let (since, nearest) = *self.held.get_or_insert((end, distance));
-        if distance.saturating_add(NEARER_BY) < nearest {
-            self.held = Some((end, distance));
-        } else if end - since >= BLOCKED_AFTER {
+        let (cycles, nearest) = self.held.get_or_insert((0, distance));
+        if distance.saturating_add(NEARER_BY) < *nearest {
+            (*cycles, *nearest) = (0, distance);
+        } else if *cycles >= BLOCKED_AFTER_CYCLES {
             self.is_blocked = true;
+        } else {
+            *cycles += 1;
         }
         let is_trying = self.retrying_since.is_some_and(|since| end - since < BLOCKED_AFTER);
         Some(HeldBack { set_point, ends_move: self.is_blocked && !is_trying })

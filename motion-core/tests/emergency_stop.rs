@@ -119,3 +119,26 @@ fn d29_a_joint_that_was_let_go_before_the_stop_does_not_engage_after_it() {
     rig.run_ms(1_000);
     assert_eq!((rig.get(29), rig.get(SUPPLY_LOST)), (0, 1));
 }
+
+#[test]
+fn d29_the_torque_of_a_joint_that_is_let_go_is_read_after_a_silence_too() {
+    let joint = Joint::ALL[4];
+    let mut rig = Rig::started();
+    // Without protection nothing engages by itself.
+    rig.write(192, &[0]);
+    for _ in 0..2 {
+        rig.plant.set_fault(joint, Some(ServoFault::Missing));
+        rig.run_ms(300);
+        rig.plant.set_fault(joint, None);
+        rig.run_ms(500);
+        assert_eq!(rig.get(LET_GO), 1 << joint.index());
+    }
+    rig.forget();
+    rig.write(29, &[1]);
+    rig.run_ms(100);
+    let is_named = |goals: &[(u8, u16)]| goals.iter().any(|(id, _)| *id == joint.index());
+    let goal_at = rig.goals().find(|(_, goals)| is_named(goals)).expect("it engages").0;
+    let was_read = rig.torque_questions.iter().any(|(at, id)| *id == joint.index() && *at < goal_at);
+    assert!(was_read, "a goal without a question about torque");
+    assert!(rig.plant.has_torque(joint));
+}

@@ -4,6 +4,7 @@
 
 mod rig;
 
+use arm_sim::plant::Wall;
 use arm_sim::servo::ServoFault;
 use motion_core::Vacuum;
 use protocol_core::registers::Joint;
@@ -69,6 +70,23 @@ fn d29_after_a_late_call_a_servo_that_restarted_meanwhile_gets_no_old_goal() {
     assert_eq!(rig.get(196), 0, "it is driven again");
     let moved = (rig.plant.angle(joint) - before).abs();
     assert!(moved < 1_000, "it moved by {moved} without an order");
+}
+
+#[test]
+fn d27_the_time_of_a_late_call_does_not_make_a_joint_blocked() {
+    let mut rig = Rig::started();
+    rig.plant.set_wall(Joint::ALL[0], Some(Wall { millidegrees: 100_000, stiffness: None }));
+    rig.write(46, &[130]);
+    rig.run_ms(800);
+    rig.now_us += 1_000_000;
+    rig.run_ms(50);
+    assert_eq!(
+        (rig.get(195), rig.targets()[0]),
+        (0, 130),
+        "held back for less than a second of control cycles"
+    );
+    rig.run_ms(800);
+    assert_eq!(rig.get(195), 1);
 }
 
 #[test]

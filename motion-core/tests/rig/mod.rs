@@ -31,6 +31,8 @@ pub struct Rig {
     pub room: usize,
     pub to_host: Vec<(u64, Vec<u8>)>,
     pub to_servos: Vec<(u64, ToServos)>,
+    /// The questions about the torque of a servo.
+    pub torque_questions: Vec<(u64, u8)>,
     pub vacuum: Vec<(u64, Vacuum)>,
     pub saved: Vec<Image>,
     /// What becomes of the next save.
@@ -70,6 +72,7 @@ impl Rig {
             room: 4_096,
             to_host: Vec::new(),
             to_servos: Vec::new(),
+            torque_questions: Vec::new(),
             vacuum: Vec::new(),
             saved: Vec::new(),
             storage: Storage::Ready,
@@ -108,6 +111,7 @@ impl Rig {
     pub fn forget(&mut self) {
         self.to_host.clear();
         self.to_servos.clear();
+        self.torque_questions.clear();
         self.vacuum.clear();
     }
 
@@ -147,6 +151,9 @@ impl Rig {
                 Output::ToServos(bytes) => {
                     let told = decode(bytes);
                     let bytes = bytes.to_vec();
+                    if let (ToServos::Ask(id), Some(&register::TORQUE_SWITCH)) = (&told, bytes.get(5)) {
+                        self.torque_questions.push((self.now_us, *id));
+                    }
                     if self.arrives(&told) {
                         self.plant.bytes(now, &bytes);
                     }
