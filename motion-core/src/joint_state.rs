@@ -1,6 +1,15 @@
 //! One joint: its drive, its target, what its servo measured, and what protects it (D12, D21, D27, D28).
 //!
+//! ```text
+//!   answers of the servo ──▶ this file ───▶ what protects the joint
+//!                              └─▶ engaging.rs ──▶ first goal, torque
+//!   targets of the host ──────▶ targets.rs ──────▶ set-point
+//! ```
+//!
 //! This file does not know the other joints.
+
+mod engaging;
+mod targets;
 
 use protocol_core::registers::map::{
     EFFECTOR_TYPE, FINE_POSITION, FINE_TARGET, GRIP_LIMIT, LOAD, PRESENT_POSITION, PROTECTION, PUSH_LIMIT,
@@ -8,12 +17,12 @@ use protocol_core::registers::map::{
 };
 use protocol_core::registers::map21::{PRESENT_ANGLE, PRESENT_LOAD};
 use protocol_core::registers::{Joint, Register, RegisterFile};
-use protocol_core::time::{Duration, Instant};
+use protocol_core::time::Instant;
 
 use crate::calibration::{
-    MicroDegrees, angle_from_counts, counts_from_angle, load_from_servo, push_from_servo, velocity_from_servo,
+    MicroDegrees, angle_from_counts, load_from_servo, push_from_servo, velocity_from_servo,
 };
-use crate::drive::{Drive, Target, is_near};
+use crate::drive::Drive;
 use crate::goal_check::GoalCheck;
 use crate::let_go::LetGo;
 use crate::obstacle::Obstacle;
@@ -170,46 +179,6 @@ impl JointState {
         accepted
     }
 
-    /// Checks the goal that the servo of a joint shows whose torque is pending (D12). Returns how often the goal has to be
-    /// sent before torque; `None` if it is not known that the servo has it. Then the joint waits for its next answer.
-    fn check_goal(
-        &mut self,
-        now: Instant,
-        answer: &Answer,
-        may_engage: bool,
-        registers: &mut RegisterFile,
-    ) -> Option<u8> {
-        let held = answer.torque?;
-        if !held.is_on && self.goal.had_torque() {
-            // The servo restarted since it was read on (D29).
-            self.lose_torque(now);
-            return None;
-        }
-        let goal = counts_from_angle(self.joint, self.drive.set_point(), registers.offset(self.joint));
-        let is_there = |counts: u16| counts.abs_diff(goal) <= 1;
-        let repeats = if held.is_on || is_there(held.goal_counts) {
-            self.goal.shown();
-            Some(0)
-        } else {
-            self.goal.hidden()
-        };
-        let stays = may_engage && self.position.is_steady();
-        let has_goal = stays && repeats == Some(0) && is_there(answer.reading.position_counts);
-        // A servo with torque follows its goal already. None was sent since a question was not answered.
-        if held.is_on || has_goal {
-            let was_unanswered = !self.torque.is_trusted();
-            self.torque = TorqueCheck::ORDERED;
-            return Some(was_unanswered.into());
-        }
-        // It engages anew where it is now, with the next answer or with this one.
-        self.drive.lose_torque(true);
-        let repeats = repeats.filter(|_| stays)?;
-        let angle = self.known_angle()?;
-        let engages = self.engages(now, angle, registers);
-        self.goal.done();
-        engages.then_some(repeats.max(1))
-    }
-
     /// Checks the torque and the push of a joint that is engaged or silent.
     fn protect(
         &mut self,
@@ -257,37 +226,6 @@ impl JointState {
         if registers.get(PROTECTION.address) != 0 && !self.drive.is_moving() {
             self.set_target(angle, registers);
         }
-    }
-
-    /// Where a joint that was measured at `angle` engages. After a restart of the controller alone its servo may hold a
-    /// goal: at another one the joint would sag by the distance at which the servo carries its load.
-    fn place(&self, answer: &Answer, angle: MicroDegrees, registers: &RegisterFile) -> MicroDegrees {
-        let held = answer.torque.filter(|held| self.is_first_engagement && held.is_on);
-        let goal =
-            held.map(|held| angle_from_counts(self.joint, held.goal_counts, registers.offset(self.joint)));
-        goal.filter(|goal| is_near(*goal, angle)).unwrap_or(angle)
-    }
-
-    /// Engages a waiting joint at `angle`, and returns whether it did.
-    fn engages(&mut self, now: Instant, angle: MicroDegrees, registers: &mut RegisterFile) -> bool {
-        // It is not known yet whether a silent servo has restarted.
-        if self.drive.is_silent() && !self.torque.is_trusted() {
-            return false;
-        }
-        let is_protected = registers.get(PROTECTION.address) != 0;
-        if !self.let_go.may_engage(now, self.temperature, is_protected) {
-            return false;
-        }
-        let was_silent = self.drive.is_silent();
-        let Some(target) = self.drive.engage(angle) else { return false };
-        self.let_go.engaged(now);
-        self.torque = TorqueCheck::ORDERED;
-        self.goal.begin(was_silent);
-        self.obstacle = Obstacle::NONE;
-        if target == Target::Measured {
-            self.set_target(angle, registers);
-        }
-        true
     }
 
     /// The servo holds no torque: the joint is let go (D28).
@@ -356,19 +294,6 @@ impl JointState {
         }
     }
 
-    /// Advances the set-point by the control cycle that ends at `end`, as far as an obstacle allows (D27).
-    pub(crate) fn advance(&mut self, end: Instant, speed: u8, registers: &mut RegisterFile) {
-        self.drive.advance(end, speed);
-        let Some(angle) = self.measured else { return };
-        let (set_point, target) = (self.drive.set_point(), self.drive.target());
-        if let Some(held) = self.obstacle.hold_back(end, set_point, target, angle) {
-            self.drive.hold_back(held.set_point);
-            if held.ends_move {
-                self.hold(registers);
-            }
-        }
-    }
-
     fn fall_silent(&mut self) {
         self.drive.mark_silent();
         self.obstacle = Obstacle::NONE;
@@ -407,49 +332,6 @@ impl JointState {
     /// Is the joint let go (D28)?
     pub(crate) const fn is_let_go(&self) -> bool {
         self.let_go.is_let_go()
-    }
-
-    /// Moves to a target that the register shows already.
-    pub(crate) fn move_to(&mut self, degrees: u8, time: u8) {
-        self.target = MicroDegrees::from_degrees(degrees);
-        self.obstacle.target_written();
-        self.drive.set_target(self.target, time);
-    }
-
-    /// Moves to the next point of a stream, whose frame came at `now`. A joint that is let go takes none (D28).
-    pub(crate) fn stream_to(
-        &mut self,
-        now: Instant,
-        angle: MicroDegrees,
-        period: Duration,
-        registers: &mut RegisterFile,
-    ) {
-        if !self.let_go.is_let_go() {
-            self.set_target(angle, registers);
-            self.obstacle.point_written(now);
-            self.drive.stream_to(angle, now, period);
-        }
-    }
-
-    /// Moves to a target.
-    pub(crate) fn approach(&mut self, angle: MicroDegrees, time: u8, registers: &mut RegisterFile) {
-        self.set_target(angle, registers);
-        self.obstacle.target_written();
-        self.drive.set_target(angle, time);
-    }
-
-    /// Sets the target, without a move.
-    pub(crate) fn set_target(&mut self, target: MicroDegrees, registers: &mut RegisterFile) {
-        self.target = target;
-        registers.set(TARGET_POSITION.of(self.joint), target.nearest_degree());
-    }
-
-    /// Holds at the set-point, which becomes the target. A joint without a set-point keeps its target.
-    pub(crate) fn hold(&mut self, registers: &mut RegisterFile) {
-        self.drive.hold();
-        if self.drive.has_set_point() {
-            self.set_target(self.drive.set_point(), registers);
-        }
     }
 
     /// Shows target, position, velocity and load in the extended block (D21).

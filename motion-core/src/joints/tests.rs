@@ -1,0 +1,101 @@
+use super::*;
+use crate::servo_bus::{HeldGoal, Reading};
+use protocol_core::registers::map::PRESENT_POSITION;
+
+const J1: Joint = Joint::ALL[0];
+
+fn at_ms(millis: u64) -> Instant {
+    Instant::from_micros(millis * 1_000)
+}
+
+fn answer(position_counts: u16) -> Answer {
+    let reading =
+        Reading { position_counts, speed: 0, load: 0, voltage_decivolts: 74, temperature_celsius: 31 };
+    Answer { reading, alarms: 4, torque: None }
+}
+
+/// Joints of which joint 1 was measured at 90 degrees. In the servo state its servo has shown its goal.
+fn measured(state: MotorState) -> (Joints, RegisterFile) {
+    let mut registers = RegisterFile::new([0; 6], None);
+    let mut joints = Joints::new(state);
+    joints.measured(at_ms(0), J1, &answer(511), true, &mut registers);
+    joints.measured(at_ms(10), J1, &answer(511), true, &mut registers);
+    let torque = Some(HeldGoal { is_on: false, goal_counts: 511 });
+    joints.measured(at_ms(10), J1, &Answer { torque, ..answer(511) }, true, &mut registers);
+    (joints, registers)
+}
+
+#[test]
+fn d12_a_joint_engages_at_the_second_reading_and_the_others_are_left_as_they_are() {
+    let (mut joints, registers) = measured(MotorState::Servo);
+    assert_eq!((registers.get(PRESENT_POSITION.of(J1)), registers.get(TARGET_POSITION.of(J1))), (90, 90));
+    assert_eq!(joints.goals(at_ms(10), &registers).collect::<Vec<_>>(), [(J1, 511)]);
+    let torque = joints.take_torque(true);
+    assert_eq!((torque[0], &torque[1..]), (Some(Torque::On), [None; 6].as_slice()));
+    assert_eq!((joints.silent(), joints.hottest(), joints.any_alarm()), (0b111_1110, 31, true));
+}
+
+#[test]
+fn a_reading_tells_whether_anything_changed_beside_position_velocity_and_load() {
+    let (mut joints, mut registers) = (Joints::new(MotorState::Forceless), RegisterFile::new([0; 6], None));
+    let mut measure = |millis, alarms, temperature_celsius| {
+        let reading = Reading { temperature_celsius, ..answer(511).reading };
+        let answer = Answer { reading, alarms, torque: None };
+        joints.measured(at_ms(millis), J1, &answer, true, &mut registers)
+    };
+    assert_eq!(measure(0, 0, 0), Measured::Rejected, "nothing to compare it with");
+    assert_eq!(measure(10, 0, 0), Measured::ServoChanged, "it answers, at 0 degrees Celsius");
+    assert_eq!(measure(20, 0, 0), Measured::Accepted);
+    assert_eq!(measure(30, 0, 1), Measured::ServoChanged);
+    assert_eq!(measure(40, 4, 1), Measured::ServoChanged);
+    assert_eq!(measure(50, 4, 1), Measured::Accepted);
+}
+
+#[test]
+fn d12_a_silent_joint_is_told_nothing() {
+    let (mut joints, registers) = measured(MotorState::Servo);
+    joints.take_torque(true);
+    assert_eq!([2, 3, 4].map(|cycle| joints.failed(at_ms(cycle * 10), J1)), [false, false, true]);
+    assert_eq!(joints.goals(at_ms(40), &registers).count(), 0);
+    assert_eq!(joints.take_torque(true), [None; JOINTS]);
+    assert_eq!((joints.silent(), joints.hottest(), joints.any_alarm()), (0x7F, 0, false));
+}
+
+#[test]
+fn d12_a_joint_is_not_given_torque_where_it_was_measured_long_ago() {
+    let (mut joints, registers) = measured(MotorState::Servo);
+    joints.expire_pending(at_ms(30));
+    assert_eq!([30, 31].map(|millis| joints.goals(at_ms(millis), &registers).count()), [1, 0], "no old goal");
+    joints.expire_pending(at_ms(31));
+    assert_eq!(joints.goals(at_ms(30), &registers).count(), 0);
+    assert_eq!(joints.take_torque(true), [None; JOINTS]);
+}
+
+#[test]
+fn d29_a_joint_that_was_silent_before_it_had_torque_engages_after_any_time() {
+    let (mut joints, mut registers) = measured(MotorState::Servo);
+    assert_eq!([20, 30, 40].map(|millis| joints.failed(at_ms(millis), J1)), [false, false, true]);
+    let mut measure = |millis| joints.measured(at_ms(millis), J1, &answer(511), true, &mut registers);
+    assert_eq!([3_000, 3_010].map(&mut measure), [Measured::Rejected, Measured::Engaged]);
+}
+
+#[test]
+fn d13_the_other_states_set_every_switch_and_drive_nothing() {
+    for (state, torque) in [(MotorState::Damping, Torque::Damping), (MotorState::Forceless, Torque::Free)] {
+        let (mut joints, mut registers) = measured(MotorState::Servo);
+        assert!(joints.set_state(state, &mut registers));
+        assert!(!joints.set_state(state, &mut registers), "the state did not change");
+        assert_eq!(joints.take_torque(true), [Some(torque); JOINTS]);
+        assert_eq!(joints.goals(at_ms(10), &registers).count(), 0);
+        assert!(!joints.advance(at_ms(0), at_ms(0), &mut registers));
+    }
+}
+
+#[test]
+fn d13_entering_the_servo_state_makes_the_measured_positions_the_targets() {
+    let (mut joints, mut registers) = measured(MotorState::Forceless);
+    registers.set(TARGET_POSITION.of(J1), 10);
+    joints.set_state(MotorState::Servo, &mut registers);
+    assert_eq!(registers.get(TARGET_POSITION.of(J1)), 90);
+    assert_eq!(registers.get(TARGET_POSITION.of(Joint::ALL[2])), 65, "this joint was not measured");
+}
