@@ -104,7 +104,7 @@ const TABLE: [ProblemTexts; 16] = [
         ProblemKind::Blocked,
         "blocked",
         "is blocked: something keeps it from its target",
-        "remove what is in its way; the next target for it tries again (a gripper may hold things with effector type 1)",
+        "remove what is in its way, or take weight off; the next target for it tries again (a gripper may hold things with effector type 1)",
     ),
     ProblemTexts::of(
         ProblemKind::Overload,
