@@ -16,9 +16,8 @@ use rustix::event::epoll::{self, CreateFlags, Event, EventData, EventFlags};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
-use crate::control::execute::{Outcome, execute};
-use crate::control::request;
-use crate::control::socket::{ControlSocket, Reply};
+use crate::control::execute::execute;
+use crate::control::socket::ControlSocket;
 use crate::pty_arm::PtyArm;
 use crate::signals::{SignalAction, Signals};
 use crate::virtual_clock::VirtualClock;
@@ -191,11 +190,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         let execute = |line: &[u8]| {
             arm.simulation_mut().advance(clock.now(), false);
             arm.log_ended_faults();
-            match request::parse(line).and_then(|request| execute(arm, clock, request)) {
-                Ok(Outcome::Done(result)) => Reply::Line(request::line(Ok(result))),
-                Ok(Outcome::At(end)) => Reply::At(end),
-                Err(refusal) => Reply::Line(request::line(Err(refusal))),
-            }
+            execute(arm, clock, line)
         };
         if control.poll(&self.epoll, data, now, execute)? {
             *due = clock.now();
