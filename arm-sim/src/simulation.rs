@@ -212,11 +212,6 @@ impl<C: ArmController> Simulation<C> {
         self.arm.plant_mut()
     }
 
-    /// The cells of the flash with the settings.
-    pub fn settings_mut(&mut self) -> &mut Memory {
-        self.arm.flash_mut().cells_mut()
-    }
-
     /// Switches the arm off and on. RAM and the bytes on the host line are lost; the settings stay.
     pub fn power_cycle(&mut self) {
         self.to_send.clear();
