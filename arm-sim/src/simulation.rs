@@ -53,7 +53,7 @@ const TAKE_PERIOD: Duration = Duration::from_millis(10);
 /// What differs from one simulation to another.
 #[derive(Clone, Debug)]
 pub struct SimulationConfig {
-    /// The chip id, most significant byte first (D8).
+    /// The chip id, most significant byte first ([D8](protocol_core::decisions#d8)).
     pub chip_id: [u8; 6],
     /// Bytes on the host line take the time that the baud rate requires. Otherwise they arrive at once.
     pub is_paced: bool,
@@ -230,7 +230,8 @@ impl<C: ArmController> Simulation<C> {
         self.arm.halt_controller(self.now);
     }
 
-    /// The host closes its port: bytes on the line to it are lost, and reports end (M12).
+    /// The host closes its port: bytes on the line to it are lost, and reports end
+    /// ([M12](protocol_core::decisions#m12)).
     pub fn disconnect(&mut self) {
         self.arm.host_disconnect();
     }
