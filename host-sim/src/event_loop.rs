@@ -37,7 +37,7 @@ const CONTROL: u64 = 1 << 32;
 /// The arms of a process.
 #[derive(Debug)]
 pub struct EventLoop<F, C = Controller> {
-    arms: Vec<Entry<F, C>>,
+    arms: Vec<ArmEntry<F, C>>,
     /// `None` if the system does not report clients.
     clients: Option<Clients>,
     epoll: OwnedFd,
@@ -45,7 +45,7 @@ pub struct EventLoop<F, C = Controller> {
 
 /// An arm, and when to poll it.
 #[derive(Debug)]
-struct Entry<F, C> {
+struct ArmEntry<F, C> {
     arm: PtyArm<F, Plant, C>,
     control: Option<ControlSocket>,
     due: Instant,
@@ -68,7 +68,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         if let Some(clients) = &clients {
             epoll::add(&epoll, clients, EventData::new_u64(CLIENTS), EventFlags::IN)?;
         }
-        let entry = |arm: PtyArm<F, Plant, C>| Entry {
+        let entry = |arm: PtyArm<F, Plant, C>| ArmEntry {
             interest: arm.interest(),
             arm,
             control: None,
@@ -184,7 +184,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
     /// Polls the control socket of an arm.
     fn poll_control(&mut self, number: usize, clock: &mut VirtualClock) -> io::Result<()> {
         let Some(entry) = self.arms.get_mut(number).filter(|entry| !entry.has_failed) else { return Ok(()) };
-        let Entry { arm, control: Some(control), due, .. } = entry else { return Ok(()) };
+        let ArmEntry { arm, control: Some(control), due, .. } = entry else { return Ok(()) };
         let now = clock.now();
         let data = EventData::new_u64(CONTROL + u64::try_from(number).unwrap_or(u64::MAX));
         let execute = |line: &[u8]| {
@@ -207,7 +207,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
     }
 }
 
-impl<F: NorFlash + Clone, C: ArmController> Entry<F, C> {
+impl<F: NorFlash + Clone, C: ArmController> ArmEntry<F, C> {
     fn poll(
         &mut self,
         number: usize,

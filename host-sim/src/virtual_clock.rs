@@ -12,7 +12,7 @@
 use protocol_core::time::{Duration, Instant};
 use rustix::event::Timespec;
 
-use crate::clock::{Clock, sleep_until};
+use crate::clock::{RealClock, sleep_until};
 
 /// Virtual time never goes on by more than this at once, so that the port is served in between.
 const LONGEST_STEP: Duration = Duration::from_millis(1_000);
@@ -33,7 +33,7 @@ pub enum TimeSpeed {
 /// The clock of the arms.
 #[derive(Debug)]
 pub struct VirtualClock {
-    real: Clock,
+    real: RealClock,
     /// Real time at the last call of [`VirtualClock::tick`].
     real_now: Instant,
     now: Instant,
@@ -43,13 +43,13 @@ pub struct VirtualClock {
     is_paused: bool,
     /// Virtual time goes from event to event until then.
     advance_until: Instant,
-    lockstep: Option<Lockstep>,
+    lockstep: Option<ClientLockstep>,
     /// Several arms have this time.
     is_shared: bool,
 }
 
 #[derive(Debug)]
-struct Lockstep {
+struct ClientLockstep {
     timeout: Duration,
     /// The real time of the last byte on the host line, or of the last time-out.
     since: Instant,
@@ -58,7 +58,7 @@ struct Lockstep {
 impl Default for VirtualClock {
     fn default() -> Self {
         Self {
-            real: Clock::default(),
+            real: RealClock::default(),
             real_now: Instant::ZERO,
             now: Instant::ZERO,
             rest_nanos: 0,
@@ -75,7 +75,7 @@ impl VirtualClock {
     /// A clock in lockstep with the client, which starts at `start`. `timeout` is real time.
     #[must_use]
     pub fn in_lockstep(start: Instant, timeout: Duration) -> Self {
-        let lockstep = Some(Lockstep { timeout, since: Instant::ZERO });
+        let lockstep = Some(ClientLockstep { timeout, since: Instant::ZERO });
         Self { now: start, lockstep, ..Self::default() }
     }
 
@@ -204,7 +204,7 @@ impl VirtualClock {
     }
 }
 
-impl Lockstep {
+impl ClientLockstep {
     /// The virtual time. `next_event` is set if a byte is on the host line.
     fn tick(&mut self, real: Instant, now: Instant, next_event: Option<Instant>) -> Instant {
         match next_event {

@@ -16,7 +16,7 @@ use std::time::Duration as RealTime;
 
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoFault;
-use host_sim::clock::Clock;
+use host_sim::clock::RealClock;
 use host_sim::servo_socket::exchange;
 use linked_image::Program;
 use protocol_core::registers::map::TARGET_POSITION;
@@ -71,7 +71,7 @@ pub(crate) struct EmulatedArm {
     host: UnixStream,
     servos: UnixStream,
     pub(crate) plant: Plant,
-    clock: Clock,
+    clock: RealClock,
     /// The time of the servos.
     pub(crate) now: Instant,
     rest: [i32; JOINTS],
@@ -91,7 +91,7 @@ impl EmulatedArm {
         servos.set_nonblocking(true)?;
         let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
         monitor.wait_for_bits(HOST_LINK_CONTROL, RECEIVER_ON)?;
-        let mut clock = Clock::default();
+        let mut clock = RealClock::default();
         let now = clock.now();
         let mut plant = Plant::new(now);
         plant.ignore_collisions();

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use crate::command_error::CommandError;
 use crate::printer::Printable;
 use crate::session::Session;
-use socket::Connection;
+use socket::SimulatorConnection;
 pub(crate) use socket::running_ports;
 use values::{factor, grams, hand, millis};
 
@@ -67,7 +67,7 @@ enum SimCommand {
     /// Switch the power of the arm.
     Power {
         /// 'off' loses what is in RAM, and loaded joints fall; 'cycle' is off and on.
-        to: PowerState,
+        to: Power,
     },
     /// Restart the controller, as its watchdog does. The servos keep power, torque and goals.
     Restart,
@@ -209,25 +209,25 @@ enum Alarm {
 
 #[derive(Clone, Copy, Debug, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-enum PowerState {
+enum Power {
     On,
     Off,
     Cycle,
 }
 
 /// An answer of the simulator.
-struct Answer<'a> {
+struct SimulatorAnswer<'a> {
     command: &'a SimCommand,
     value: Value,
 }
 
-impl Serialize for Answer<'_> {
+impl Serialize for SimulatorAnswer<'_> {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.value.serialize(serializer)
     }
 }
 
-impl Printable for Answer<'_> {
+impl Printable for SimulatorAnswer<'_> {
     fn write_text(&self, out: &mut dyn std::io::Write) -> std::io::Result<()> {
         match self.command {
             SimCommand::Fault(args) => text::faults(out, &args.action, &self.value),
@@ -249,12 +249,12 @@ impl Printable for Answer<'_> {
 
 pub(crate) fn run(session: &mut Session, args: &SimArgs) -> Result<(), CommandError> {
     let request = request(&args.command)?;
-    let mut connection = Connection::open(args.control.as_deref(), session.port.as_deref())?;
+    let mut connection = SimulatorConnection::open(args.control.as_deref(), session.port.as_deref())?;
     if matches!(args.command, SimCommand::Advance(_)) {
         connection.wait_forever()?;
     }
     let value = connection.ask(&request)?;
-    session.printer.print(&Answer { command: &args.command, value })
+    session.printer.print(&SimulatorAnswer { command: &args.command, value })
 }
 
 /// The request of a command.
