@@ -14,6 +14,12 @@
 //! Shapes of URDF and MJCF are cylinders along the axes of the parts; those of glTF are the meshes of [`Body`]. They show
 //! the arm; what the kinematics does not name is not measured. Joint 7, the claw, moves no point, and the three models
 //! have none.
+//!
+//! ```
+//! let urdf = arm_model::urdf()?;
+//! assert!(urdf.contains("joint_1") && urdf.contains(arm_model::TIP));
+//! # Ok::<(), std::io::Error>(())
+//! ```
 
 #![forbid(unsafe_code)]
 

@@ -22,9 +22,11 @@ use crate::host_line::{LineFault, UnknownLineFault};
 use crate::plant::{Plant, SupplyFault, UnknownSupplyFault};
 use crate::servo::{ServoFault, UnknownFault};
 
+mod help;
 pub(crate) mod list;
 mod obstacle;
 
+pub use help::FAULTS_HELP;
 pub use obstacle::{Obstacle, UnknownObstacle};
 
 /// A fault of the simulated arm.

@@ -12,7 +12,7 @@ use crate::fault_count::FaultCount;
 pub enum FlashFault {
     /// The flash refuses every write and erase.
     Fails,
-    /// The journal has no room: the arm refuses writes that change a setting (D19).
+    /// The journal has no room: the arm refuses writes that change a setting ([D19](protocol_core::decisions#d19)).
     Full,
 }
 

@@ -13,6 +13,19 @@
 //!
 //! The crate is `no_std`: it has no clock, file or thread, and it runs in a browser. The same calls give the same bytes
 //! on every machine.
+//!
+//! ```
+//! use arm_sim::request::Request;
+//! use arm_sim::{Duration, Joint, Simulation};
+//!
+//! let mut arm = Simulation::default();
+//! arm.advance(Duration::from_millis(500));
+//! // Register 46 is the target of joint 1, in degrees.
+//! arm.send_request(&Request::Write { address: 46, values: &[120] });
+//! arm.advance(Duration::from_millis(3_000));
+//! let millidegrees = arm.plant().angle(Joint::ALL[0]);
+//! assert!(millidegrees.abs_diff(120_000) < 1_500, "{millidegrees}");
+//! ```
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -32,7 +32,7 @@ use crate::fault_count::FaultCount;
 use crate::servo::units::STEP;
 use crate::servo::{Servo, ServoConfig, ServoFault};
 pub use obstacles::{HIGHEST_STIFFNESS, STRONGEST_PUSH, Thing, Wall};
-use pose::{AngleScale, Pose};
+use pose::{AngleScale, JointSines};
 use supply::Supply;
 pub use supply::{SupplyFault, UnknownSupplyFault};
 pub use weight::HEAVIEST_LOAD_G;
@@ -227,7 +227,7 @@ impl Plant {
         for ((angle, servo), scale) in angles.iter_mut().zip(&self.servos).zip(self.scales) {
             *angle = scale.angle(servo.position());
         }
-        let pose = Pose::of(angles);
+        let pose = JointSines::of(angles);
         let torques = weight::torques(pose, self.load_g.into());
         let inertias = inertia::inertias(pose, self.load_g.into());
         let (arm, scales) = (torques.into_iter().zip(inertias), self.scales);

@@ -39,7 +39,7 @@ use temperature::Temperature;
 
 /// An answer of a servo.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Answer {
+pub struct ServoAnswer {
     /// The answer is sent this much later than [`ServoConfig::return_delay`] requires.
     pub delay: Duration,
     /// The frame.
@@ -152,7 +152,7 @@ impl Servo {
     }
 
     /// Executes a frame that ends at `now`, and returns the answer if there is one.
-    pub fn handle_frame(&mut self, now: Instant, frame: &ServoFrame<'_>) -> Option<Answer> {
+    pub fn handle_frame(&mut self, now: Instant, frame: &ServoFrame<'_>) -> Option<ServoAnswer> {
         if !self.registers.is_addressed_by(frame) {
             return None;
         }
@@ -162,7 +162,7 @@ impl Servo {
         }
         let answer = self.registers.handle_frame(frame);
         self.apply_registers();
-        answer.map(|mut bytes| Answer { delay: self.fault.inject(&mut bytes), bytes })
+        answer.map(|mut bytes| ServoAnswer { delay: self.fault.inject(&mut bytes), bytes })
     }
 
     fn apply_registers(&mut self) {

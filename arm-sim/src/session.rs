@@ -1,4 +1,5 @@
-//! A recorded session: everything that was done to an arm from outside, and every byte that it sent, with virtual times.
+//! A recorded session: everything that was done to an arm from outside, and every byte that it sent, with virtual
+//! times.
 //!
 //! ```text
 //!   7bot-session 1 program=3.0.0 controller=sevenbot seed=1 chip-id=53494d000001 paced=true ...
@@ -11,8 +12,8 @@
 //! ```
 //!
 //! Times are microseconds since power-up. Every call that lets time pass is recorded, because an idle host line has a
-//! meaning (D4). A [`Replay`](crate::replay::Replay) does the same to a new arm and compares what it sends. Where the arm
-//! starts to differ, it says what differs.
+//! meaning ([D4](protocol_core::decisions#d4)). A [`Replay`](crate::replay::Replay) does the same to a new arm and
+//! compares what it sends. Where the arm starts to differ, it says what differs.
 
 use alloc::vec::Vec;
 use core::fmt::{self, Debug, Display, Formatter};

@@ -30,7 +30,7 @@ use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
 use crate::session::Recorder;
 use crate::settings_log;
-use crate::tap::{Slot, Tap};
+use crate::tap::{Tap, Watcher};
 
 mod act;
 mod deadlines;
@@ -46,7 +46,7 @@ const GUARD_TIME: Duration = Duration::from_micros(100);
 /// What differs from one simulated arm to another.
 #[derive(Clone, Copy, Debug)]
 pub struct ArmConfig {
-    /// The chip id, most significant byte first (D8).
+    /// The chip id, most significant byte first ([D8](protocol_core::decisions#d8)).
     pub chip_id: [u8; 6],
     /// Bytes on the host line take the time that the baud rate requires. Otherwise they arrive at once.
     pub is_paced: bool,
@@ -63,8 +63,8 @@ pub struct SimulatedArm<F, B = Plant, C = Controller> {
     bus: B,
     to_arm: LineDirection,
     to_host: LineDirection,
-    tap: Slot<dyn Tap>,
-    recorder: Slot<dyn Recorder>,
+    tap: Watcher<dyn Tap>,
+    recorder: Watcher<dyn Recorder>,
     now: Instant,
     /// When the controller has to be polled again.
     controller_due: Instant,
@@ -119,8 +119,8 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
             bus,
             to_arm,
             to_host,
-            tap: Slot::default(),
-            recorder: Slot::default(),
+            tap: Watcher::default(),
+            recorder: Watcher::default(),
             now,
             controller_due: now,
             is_halted: false,
@@ -173,7 +173,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     /// Copies the bytes on the host line to `tap` from now on.
     pub fn set_tap(&mut self, mut tap: impl Tap + 'static) {
         tap.restart(gap(self.controller.baud()));
-        self.tap = Slot::holding(Box::new(tap));
+        self.tap = Watcher::holding(Box::new(tap));
     }
 
     /// The time of the last call.
@@ -198,7 +198,8 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     }
 
     /// The first bytes that have arrived at the host, possibly not all of them. They fill the line until
-    /// [`SimulatedArm::host_take`], and the arm holds back answers while the line is full (D5).
+    /// [`SimulatedArm::host_take`], and the arm holds back answers while the line is full
+    /// ([D5](protocol_core::decisions#d5)).
     #[must_use]
     pub fn host_received(&self) -> &[u8] {
         self.to_host.arrived()
@@ -213,7 +214,7 @@ impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
     }
 
     /// The last host disconnects: the bytes on the line to it are lost. The arm executes what the host sent before, and
-    /// sends nothing for it. Then its reports end (M12).
+    /// sends nothing for it. Then its reports end ([M12](protocol_core::decisions#m12)).
     pub fn host_disconnect(&mut self) {
         self.record_action(self.now, Action::Disconnect);
         self.to_host.clear(self.paced_baud());

@@ -53,7 +53,7 @@ const TAKE_PERIOD: Duration = Duration::from_millis(10);
 /// What differs from one simulation to another.
 #[derive(Clone, Debug)]
 pub struct SimulationConfig {
-    /// The chip id, most significant byte first (D8).
+    /// The chip id, most significant byte first ([D8](protocol_core::decisions#d8)).
     pub chip_id: [u8; 6],
     /// Bytes on the host line take the time that the baud rate requires. Otherwise they arrive at once.
     pub is_paced: bool,
@@ -212,11 +212,6 @@ impl<C: ArmController> Simulation<C> {
         self.arm.plant_mut()
     }
 
-    /// The cells of the flash with the settings.
-    pub fn settings_mut(&mut self) -> &mut Memory {
-        self.arm.flash_mut().cells_mut()
-    }
-
     /// Switches the arm off and on. RAM and the bytes on the host line are lost; the settings stay.
     pub fn power_cycle(&mut self) {
         self.to_send.clear();
@@ -235,7 +230,8 @@ impl<C: ArmController> Simulation<C> {
         self.arm.halt_controller(self.now);
     }
 
-    /// The host closes its port: bytes on the line to it are lost, and reports end (M12).
+    /// The host closes its port: bytes on the line to it are lost, and reports end
+    /// ([M12](protocol_core::decisions#m12)).
     pub fn disconnect(&mut self) {
         self.arm.host_disconnect();
     }

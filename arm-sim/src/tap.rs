@@ -17,9 +17,9 @@ pub trait Tap: Debug + Send {
 
 /// A place for something that watches an arm. A copy of the arm has none.
 #[derive(Debug)]
-pub(crate) struct Slot<T: ?Sized>(Option<Box<T>>);
+pub(crate) struct Watcher<T: ?Sized>(Option<Box<T>>);
 
-impl<T: ?Sized> Slot<T> {
+impl<T: ?Sized> Watcher<T> {
     pub(crate) const fn holding(watcher: Box<T>) -> Self {
         Self(Some(watcher))
     }
@@ -33,13 +33,13 @@ impl<T: ?Sized> Slot<T> {
     }
 }
 
-impl<T: ?Sized> Default for Slot<T> {
+impl<T: ?Sized> Default for Watcher<T> {
     fn default() -> Self {
         Self(None)
     }
 }
 
-impl<T: ?Sized> Clone for Slot<T> {
+impl<T: ?Sized> Clone for Watcher<T> {
     fn clone(&self) -> Self {
         Self::default()
     }

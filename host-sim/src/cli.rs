@@ -8,7 +8,7 @@ use protocol_core::registers::JOINTS;
 use tracing::level_filters::LevelFilter;
 
 use crate::eeprom::Eeprom;
-use crate::help::LESSON;
+use crate::help::lesson;
 use arm_sim::faults::ArmFault;
 use arm_sim::usb_adapter::Latency;
 
@@ -20,7 +20,7 @@ pub type Ids = Vec<u8>;
 
 /// A simulated 7Bot V2 arm on a port that any serial client can open.
 #[derive(Clone, Debug, Parser)]
-#[command(version, about, after_help = LESSON)]
+#[command(version, about, after_help = lesson())]
 #[command(group = ArgGroup::new("adapter").args(["servos", "servos_only"]))]
 pub struct Options {
     /// Keep a symbolic link to the port at PATH while running

@@ -11,19 +11,19 @@ const LONGEST_ABSENCE: Duration = Duration::from_millis(1_000);
 
 /// Microseconds since its creation.
 #[derive(Debug)]
-pub struct Clock {
+pub struct RealClock {
     start: SystemInstant,
     last: Instant,
     stopped: Duration,
 }
 
-impl Default for Clock {
+impl Default for RealClock {
     fn default() -> Self {
         Self { start: SystemInstant::now(), last: Instant::ZERO, stopped: Duration::ZERO }
     }
 }
 
-impl Clock {
+impl RealClock {
     /// The time now. Must be called at least once a second: a longer pause counts as a stop.
     pub fn now(&mut self) -> Instant {
         let micros = u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX);
@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn the_clock_catches_up_after_a_delay_but_not_after_a_stop() {
-        let mut clock = Clock::default();
+        let mut clock = RealClock::default();
         assert_eq!(clock.at(Instant::from_micros(900_000)).as_micros(), 900_000);
         assert_eq!(clock.at(Instant::from_micros(60_000_000)).as_micros(), 1_900_000);
         assert_eq!(clock.at(Instant::from_micros(60_000_010)).as_micros(), 1_900_010);

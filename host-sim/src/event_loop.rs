@@ -16,9 +16,8 @@ use rustix::event::epoll::{self, CreateFlags, Event, EventData, EventFlags};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
-use crate::control::execute::{Outcome, execute};
-use crate::control::request;
-use crate::control::socket::{ControlSocket, Reply};
+use crate::control::execute::execute;
+use crate::control::socket::ControlSocket;
 use crate::pty_arm::PtyArm;
 use crate::signals::{SignalAction, Signals};
 use crate::virtual_clock::VirtualClock;
@@ -38,7 +37,7 @@ const CONTROL: u64 = 1 << 32;
 /// The arms of a process.
 #[derive(Debug)]
 pub struct EventLoop<F, C = Controller> {
-    arms: Vec<Entry<F, C>>,
+    arms: Vec<ArmEntry<F, C>>,
     /// `None` if the system does not report clients.
     clients: Option<Clients>,
     epoll: OwnedFd,
@@ -46,7 +45,7 @@ pub struct EventLoop<F, C = Controller> {
 
 /// An arm, and when to poll it.
 #[derive(Debug)]
-struct Entry<F, C> {
+struct ArmEntry<F, C> {
     arm: PtyArm<F, Plant, C>,
     control: Option<ControlSocket>,
     due: Instant,
@@ -69,7 +68,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
         if let Some(clients) = &clients {
             epoll::add(&epoll, clients, EventData::new_u64(CLIENTS), EventFlags::IN)?;
         }
-        let entry = |arm: PtyArm<F, Plant, C>| Entry {
+        let entry = |arm: PtyArm<F, Plant, C>| ArmEntry {
             interest: arm.interest(),
             arm,
             control: None,
@@ -185,17 +184,13 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
     /// Polls the control socket of an arm.
     fn poll_control(&mut self, number: usize, clock: &mut VirtualClock) -> io::Result<()> {
         let Some(entry) = self.arms.get_mut(number).filter(|entry| !entry.has_failed) else { return Ok(()) };
-        let Entry { arm, control: Some(control), due, .. } = entry else { return Ok(()) };
+        let ArmEntry { arm, control: Some(control), due, .. } = entry else { return Ok(()) };
         let now = clock.now();
         let data = EventData::new_u64(CONTROL + u64::try_from(number).unwrap_or(u64::MAX));
         let execute = |line: &[u8]| {
             arm.simulation_mut().advance(clock.now(), false);
             arm.log_ended_faults();
-            match request::parse(line).and_then(|request| execute(arm, clock, request)) {
-                Ok(Outcome::Done(result)) => Reply::Line(request::line(Ok(result))),
-                Ok(Outcome::At(end)) => Reply::At(end),
-                Err(refusal) => Reply::Line(request::line(Err(refusal))),
-            }
+            execute(arm, clock, line)
         };
         if control.poll(&self.epoll, data, now, execute)? {
             *due = clock.now();
@@ -212,7 +207,7 @@ impl<F: NorFlash + Clone, C: ArmController> EventLoop<F, C> {
     }
 }
 
-impl<F: NorFlash + Clone, C: ArmController> Entry<F, C> {
+impl<F: NorFlash + Clone, C: ArmController> ArmEntry<F, C> {
     fn poll(
         &mut self,
         number: usize,

@@ -13,6 +13,14 @@
 //! `--servo-socket` run the simulated servos without a controller.
 //!
 //! The crate runs on Linux only, because inotify reports when clients open and close a pseudo-terminal.
+//!
+//! ```
+//! use host_sim::control::request::{ControlRequest, parse};
+//!
+//! // A line of the control socket.
+//! assert_eq!(parse(br#"{"do":"advance","ms":250}"#), Ok(ControlRequest::Advance { ms: 250 }));
+//! assert!(parse(b"advance 250").is_err());
+//! ```
 
 #![deny(unsafe_code)]
 

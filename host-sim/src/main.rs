@@ -16,7 +16,7 @@ use arm_sim::stock_controller::StockController;
 use clap::Parser;
 use host_sim::bus_line::BusLine;
 use host_sim::cli::{Options, in_one_line};
-use host_sim::clock::Clock;
+use host_sim::clock::RealClock;
 use host_sim::control::{self, socket::ControlSocket};
 use host_sim::eeprom::{Eeprom, ImageError};
 use host_sim::event_loop::EventLoop;
@@ -141,7 +141,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         return Ok(());
     }
     let mut signals = Signals::catch().map_err(Failure::Signals)?;
-    let mut clock = Clock::default();
+    let mut clock = RealClock::default();
     match (&options.servo_socket, &options.servos) {
         (Some(path), _) => run_servo_socket(options, path, &mut clock, &mut signals),
         (None, Some(port)) => run_real_servos(options, port, &mut clock, &mut signals),
@@ -152,7 +152,7 @@ fn run(options: &Options) -> Result<(), Failure> {
 }
 
 /// The simulated servos without a controller.
-fn plant_alone(options: &Options, clock: &mut Clock) -> Result<Plant, Failure> {
+fn plant_alone(options: &Options, clock: &mut RealClock) -> Result<Plant, Failure> {
     match options.faults.iter().find(|fault| !fault.is_of_plant()) {
         Some(&fault) => Err(Failure::FaultOfController(fault)),
         None => Ok(plant(options, clock.now())),
@@ -170,7 +170,7 @@ fn plant(options: &Options, now: Instant) -> Plant {
 fn run_servo_socket(
     options: &Options,
     path: &Path,
-    clock: &mut Clock,
+    clock: &mut RealClock,
     signals: &mut Signals,
 ) -> Result<(), Failure> {
     let plant = plant_alone(options, clock)?;
@@ -179,7 +179,7 @@ fn run_servo_socket(
     socket.serve(plant, clock, signals).map_err(Failure::Running)
 }
 
-fn run_servos_only(options: &Options, clock: &mut Clock, signals: &mut Signals) -> Result<(), Failure> {
+fn run_servos_only(options: &Options, clock: &mut RealClock, signals: &mut Signals) -> Result<(), Failure> {
     let mut plant = plant_alone(options, clock)?;
     if let Some(ids) = &options.ids {
         plant.set_ids(ids);
@@ -201,7 +201,7 @@ fn run_servos_only(options: &Options, clock: &mut Clock, signals: &mut Signals) 
 fn run_real_servos(
     options: &Options,
     port: &Path,
-    clock: &mut Clock,
+    clock: &mut RealClock,
     signals: &mut Signals,
 ) -> Result<(), Failure> {
     let serial = Serial::open(port, options.servo_baud)?;

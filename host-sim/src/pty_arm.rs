@@ -39,12 +39,12 @@ pub struct PtyArm<F, B = Plant, C = Controller> {
     /// The last faults that ended by themselves.
     ended_faults: Vec<FaultReport>,
     /// Copies of the arm, by name.
-    snapshots: Snapshots<Snapshot<F, B, C>>,
+    snapshots: Snapshots<ArmSnapshot<F, B, C>>,
 }
 
 /// A copy of an arm.
 #[derive(Debug)]
-struct Snapshot<F, B, C> {
+struct ArmSnapshot<F, B, C> {
     simulation: SimulatedArm<F, B, C>,
     ended_faults: Vec<FaultReport>,
 }
@@ -110,7 +110,7 @@ impl<F: NorFlash + Clone, C: ArmController> PtyArm<F, Plant, C> {
     /// The name is wrong, or there are too many others.
     pub fn keep_snapshot(&mut self, name: String) -> Result<(), SnapshotError> {
         let (simulation, ended_faults) = (self.simulation.clone(), self.ended_faults.clone());
-        self.snapshots.keep(name, Snapshot { simulation, ended_faults })
+        self.snapshots.keep(name, ArmSnapshot { simulation, ended_faults })
     }
 
     /// Sets the arm back to a copy. Returns the time of the copy.

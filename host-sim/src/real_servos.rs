@@ -24,7 +24,7 @@ use tracing::{info, warn};
 
 use crate::bus_line::BusLine;
 use crate::bus_statistics::{BusStatistics, Figures};
-use crate::clock::{Clock, sleep_until};
+use crate::clock::{RealClock, sleep_until};
 use crate::pty_arm::PtyArm;
 use crate::signals::{SignalAction, Signals};
 use tty_ports::clients::Clients;
@@ -101,13 +101,13 @@ impl<F: NorFlash + Clone> RealServos<F> {
     ///
     /// # Errors
     /// The operating system fails: the host's port, or poll(2).
-    pub fn run(mut self, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
+    pub fn run(mut self, clock: &mut RealClock, signals: &mut Signals) -> io::Result<()> {
         let result = self.run_loop(clock, signals);
         self.damp_servos();
         result
     }
 
-    fn run_loop(&mut self, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
+    fn run_loop(&mut self, clock: &mut RealClock, signals: &mut Signals) -> io::Result<()> {
         loop {
             let now = clock.now();
             for action in signals.actions() {
@@ -225,7 +225,7 @@ impl<F: NorFlash + Clone> RealServos<F> {
     }
 
     /// Sleeps until bytes arrive, a client comes or goes, a signal comes, or a deadline.
-    fn sleep(&self, clock: &mut Clock, due: Instant, signals: &Signals) -> io::Result<()> {
+    fn sleep(&self, clock: &mut RealClock, due: Instant, signals: &Signals) -> io::Result<()> {
         let time = sleep_until(clock.now(), due);
         let signals = signals.as_fd();
         let serial = self.serial.as_ref().map_or(signals, AsFd::as_fd);

@@ -13,7 +13,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use tracing::{debug, info};
 
-use crate::clock::{Clock, sleep_until};
+use crate::clock::{RealClock, sleep_until};
 use crate::private_socket::{PrivateSocket, SocketError, is_temporary};
 use crate::signals::{SignalAction, Signals};
 use arm_sim::plant::Plant;
@@ -35,7 +35,7 @@ impl ServoSocket {
     ///
     /// # Errors
     /// The operating system fails: poll(2), or accepting a connection.
-    pub fn serve(self, mut plant: Plant, clock: &mut Clock, signals: &mut Signals) -> io::Result<()> {
+    pub fn serve(self, mut plant: Plant, clock: &mut RealClock, signals: &mut Signals) -> io::Result<()> {
         let mut controller: Option<UnixStream> = None;
         plant.ignore_collisions();
         loop {

@@ -17,7 +17,7 @@ use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 use tracing::{debug, info};
 
-use crate::clock::{Clock, sleep_until};
+use crate::clock::{RealClock, sleep_until};
 use crate::signals::{SignalAction, Signals};
 use arm_sim::plant::Plant;
 use arm_sim::usb_adapter::{Latency, UsbAdapter};
@@ -111,7 +111,7 @@ impl ServosOnly {
     ///
     /// # Errors
     /// The operating system fails.
-    pub fn serve(mut self, clock: &mut Clock, signals: &mut Signals) -> Result<(), ServosOnlyError> {
+    pub fn serve(mut self, clock: &mut RealClock, signals: &mut Signals) -> Result<(), ServosOnlyError> {
         loop {
             let now = clock.now();
             for action in signals.actions() {
@@ -198,7 +198,7 @@ impl ServosOnly {
     }
 
     /// Sleeps until the client sends, comes or goes, until a deadline of the servos or the adapter, or until a signal.
-    fn sleep(&self, clock: &mut Clock, signals: &Signals) -> io::Result<()> {
+    fn sleep(&self, clock: &mut RealClock, signals: &Signals) -> io::Result<()> {
         let due = [self.plant.deadline(), self.adapter.deadline()].into_iter().flatten().min();
         let time = sleep_until(clock.now(), due.unwrap_or(Instant::FAR_FUTURE));
         let signals = signals.as_fd();

@@ -12,7 +12,7 @@
 use protocol_core::time::{Duration, Instant};
 use rustix::event::Timespec;
 
-use crate::clock::{Clock, sleep_until};
+use crate::clock::{RealClock, sleep_until};
 
 /// Virtual time never goes on by more than this at once, so that the port is served in between.
 const LONGEST_STEP: Duration = Duration::from_millis(1_000);
@@ -23,7 +23,7 @@ const FACTORS: core::ops::RangeInclusive<u32> = 1..=1_000_000;
 
 /// The speed of virtual time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Speed {
+pub enum TimeSpeed {
     /// This many thousandths of the speed of real time.
     Thousandths(u32),
     /// As fast as possible.
@@ -33,23 +33,23 @@ pub enum Speed {
 /// The clock of the arms.
 #[derive(Debug)]
 pub struct VirtualClock {
-    real: Clock,
+    real: RealClock,
     /// Real time at the last call of [`VirtualClock::tick`].
     real_now: Instant,
     now: Instant,
     /// Virtual time that is not part of `now` yet, in nanoseconds.
     rest_nanos: u64,
-    speed: Speed,
+    speed: TimeSpeed,
     is_paused: bool,
     /// Virtual time goes from event to event until then.
     advance_until: Instant,
-    lockstep: Option<Lockstep>,
+    lockstep: Option<ClientLockstep>,
     /// Several arms have this time.
     is_shared: bool,
 }
 
 #[derive(Debug)]
-struct Lockstep {
+struct ClientLockstep {
     timeout: Duration,
     /// The real time of the last byte on the host line, or of the last time-out.
     since: Instant,
@@ -58,11 +58,11 @@ struct Lockstep {
 impl Default for VirtualClock {
     fn default() -> Self {
         Self {
-            real: Clock::default(),
+            real: RealClock::default(),
             real_now: Instant::ZERO,
             now: Instant::ZERO,
             rest_nanos: 0,
-            speed: Speed::Thousandths(1_000),
+            speed: TimeSpeed::Thousandths(1_000),
             is_paused: false,
             advance_until: Instant::ZERO,
             lockstep: None,
@@ -75,7 +75,7 @@ impl VirtualClock {
     /// A clock in lockstep with the client, which starts at `start`. `timeout` is real time.
     #[must_use]
     pub fn in_lockstep(start: Instant, timeout: Duration) -> Self {
-        let lockstep = Some(Lockstep { timeout, since: Instant::ZERO });
+        let lockstep = Some(ClientLockstep { timeout, since: Instant::ZERO });
         Self { now: start, lockstep, ..Self::default() }
     }
 
@@ -104,8 +104,8 @@ impl VirtualClock {
             lockstep.tick(real, self.now, is_busy.then_some(next_event))
         } else {
             match self.speed {
-                Speed::Max => next_event,
-                Speed::Thousandths(factor) => self.after(elapsed, factor),
+                TimeSpeed::Max => next_event,
+                TimeSpeed::Thousandths(factor) => self.after(elapsed, factor),
             }
         };
         self.now
@@ -129,8 +129,8 @@ impl VirtualClock {
             if is_busy { Duration::ZERO } else { lockstep.since + lockstep.timeout - self.real_now }
         } else {
             match self.speed {
-                Speed::Max => Duration::ZERO,
-                Speed::Thousandths(factor) => {
+                TimeSpeed::Max => Duration::ZERO,
+                TimeSpeed::Thousandths(factor) => {
                     let virtual_time = (due - self.now).min(LONGEST_STEP).as_micros();
                     Duration::from_micros((virtual_time * 1_000).div_ceil(u64::from(factor.max(1))))
                 }
@@ -153,7 +153,7 @@ impl VirtualClock {
     ///
     /// # Errors
     /// Virtual time follows the client.
-    pub fn set_speed(&mut self, speed: Speed) -> Result<(), FollowsClient> {
+    pub fn set_speed(&mut self, speed: TimeSpeed) -> Result<(), FollowsClient> {
         self.check()?;
         self.speed = speed;
         self.is_paused = false;
@@ -193,7 +193,7 @@ impl VirtualClock {
 
     /// The speed; `None` if virtual time stands.
     #[must_use]
-    pub const fn speed(&self) -> Option<Speed> {
+    pub const fn speed(&self) -> Option<TimeSpeed> {
         if self.is_paused { None } else { Some(self.speed) }
     }
 
@@ -204,7 +204,7 @@ impl VirtualClock {
     }
 }
 
-impl Lockstep {
+impl ClientLockstep {
     /// The virtual time. `next_event` is set if a byte is on the host line.
     fn tick(&mut self, real: Instant, now: Instant, next_event: Option<Instant>) -> Instant {
         match next_event {
@@ -221,7 +221,7 @@ impl Lockstep {
     }
 }
 
-impl Speed {
+impl TimeSpeed {
     /// The speed of real time, times this factor from 0.001 to 1000. `None` for another factor.
     #[must_use]
     pub fn times(factor: f64) -> Option<Self> {
@@ -254,23 +254,23 @@ mod tests {
     fn a_factor_scales_time_and_the_sleep() {
         let mut clock = VirtualClock::default();
         assert_eq!(clock.tick_at(at(10), at(50), false), at(10));
-        clock.set_speed(Speed::times(50.0).unwrap()).unwrap();
+        clock.set_speed(TimeSpeed::times(50.0).unwrap()).unwrap();
         assert_eq!(clock.tick_at(at(12), at(500), false), at(110));
         assert_eq!(sleep_micros(&clock, at(210), false), 2_000);
         assert_eq!(clock.tick_at(at(1_012), at(500), false), at(1_110), "a second at most");
-        clock.set_speed(Speed::times(0.001).unwrap()).unwrap();
+        clock.set_speed(TimeSpeed::times(0.001).unwrap()).unwrap();
         for real in 1_013..=1_112 {
             clock.tick_at(at(real), at(9_999), false);
         }
         assert_eq!(clock.now().as_micros(), 1_110_100, "no rounding error adds up");
-        assert_eq!(Speed::times(1_001.0), None);
-        assert_eq!([0.0, -1.0, f64::NAN].map(Speed::times), [None; 3]);
+        assert_eq!(TimeSpeed::times(1_001.0), None);
+        assert_eq!([0.0, -1.0, f64::NAN].map(TimeSpeed::times), [None; 3]);
     }
 
     #[test]
     fn at_full_speed_time_goes_from_event_to_event() {
         let mut clock = VirtualClock::default();
-        clock.set_speed(Speed::Max).unwrap();
+        clock.set_speed(TimeSpeed::Max).unwrap();
         assert_eq!(clock.tick_at(at(0), at(50), false), at(50));
         assert_eq!(sleep_micros(&clock, at(100), false), 0);
         assert_eq!(clock.tick_at(at(0), at(60), false), at(60));
@@ -316,7 +316,7 @@ mod tests {
         assert_eq!(clock.tick_at(at(159), at(1_010), false), at(1_002));
         assert_eq!(clock.tick_at(at(160), at(1_010), false), at(1_003), "the time-out");
         assert_eq!(clock.tick_at(at(161), at(1_010), false), at(1_003));
-        assert_eq!(clock.set_speed(Speed::Max), Err(FollowsClient));
+        assert_eq!(clock.set_speed(TimeSpeed::Max), Err(FollowsClient));
         clock.advance(Duration::from_millis(5));
         assert_eq!(clock.tick_at(at(162), at(1_010), false), at(1_008));
     }

@@ -17,6 +17,19 @@
 //! The functions are generic over `f32` for the chip and `f64` for the host, but for those of [`workspace`], which only
 //! hosts need. They use only exact operations and `libm`,
 //! so all machines get the same bits. The crate uses no heap. It has no unsafe code and no path to a panic.
+//!
+//! ```
+//! use kinematics::{NoSolution, Vector, forward, ik6};
+//!
+//! let angles = [120.0, 80.0, 60.0, 90.0, 100.0, 90.0];
+//! let hand = forward(angles).hand;
+//! let found = ik6(hand.tip, hand.tool)?;
+//! assert!(found.iter().zip(angles).all(|(found, angle): (&f64, f64)| (found - angle).abs() < 1e-9));
+//!
+//! let far = ik6(Vector::new(0.0, 900.0, 0.0), hand.tool);
+//! assert!(far.is_err());
+//! # Ok::<(), NoSolution>(())
+//! ```
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -1,4 +1,5 @@
-//! The chip id: reduces the 96-bit unique id of an STM32 to the six bytes of the register map (D8).
+//! The chip id: reduces the 96-bit unique id of an STM32 to the six bytes of the register map
+//! ([D8](crate::decisions#d8)).
 
 /// Low bits of x^48 + x^47 + x^21 + x^20 + 1, a primitive polynomial.
 const POLYNOMIAL: u64 = (1 << 47) | (1 << 21) | (1 << 20) | 1;

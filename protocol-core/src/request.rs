@@ -29,7 +29,7 @@ pub enum Request<'a> {
         /// One byte per register, at most 255.
         values: &'a [u8],
     },
-    /// Writes the registers of map 2.1 from `address` on (M1).
+    /// Writes the registers of map 2.1 from `address` on ([M1](crate::decisions#m1)).
     WriteMap21 {
         /// The first register.
         address: u8,
@@ -64,7 +64,7 @@ impl<'a> Request<'a> {
     }
 }
 
-/// The reply of the arm to a read. A report of register 53 has the same form (D14).
+/// The reply of the arm to a read. A report of register 53 has the same form ([D14](crate::decisions#d14)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reply<'a> {
@@ -90,7 +90,7 @@ impl<'a> Reply<'a> {
     }
 }
 
-/// A report in map 2.1, which the arm sends without a request (M4).
+/// A report in map 2.1, which the arm sends without a request ([M4](crate::decisions#m4)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Report<'a> {
@@ -116,7 +116,8 @@ impl<'a> Report<'a> {
     }
 }
 
-/// An alarm, which the arm sends without a request, if register 20 allows it (M6, M8).
+/// An alarm, which the arm sends without a request, if register 20 allows it ([M6](crate::decisions#m6),
+/// [M8](crate::decisions#m8)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Alarm {

@@ -11,7 +11,8 @@ use crate::registers::Image;
 pub enum Storage {
     /// The storage takes another image.
     Ready,
-    /// The storage is full until the next restart. Writes that change a setting are refused (D19).
+    /// The storage is full until the next restart. Writes that change a setting are refused
+    /// ([D19](crate::decisions#d19)).
     Full,
     /// The storage does not keep data. Settings live in RAM only.
     Broken,

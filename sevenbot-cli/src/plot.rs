@@ -11,15 +11,15 @@
 use std::fmt::Write;
 
 /// Seconds and degrees.
-pub(crate) type Point = (f64, f64);
+pub(crate) type PlotPoint = (f64, f64);
 
 /// The curves of one joint.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Track {
+pub(crate) struct JointTrack {
     /// The target over time.
-    pub(crate) target: Vec<Point>,
+    pub(crate) target: Vec<PlotPoint>,
     /// The measured position over time.
-    pub(crate) measured: Vec<Point>,
+    pub(crate) measured: Vec<PlotPoint>,
 }
 
 // All lengths are in pixels.
@@ -42,7 +42,7 @@ text { font: 12px sans-serif; fill: #444 } .title { font-size: 15px; fill: #111 
 .target { stroke: #f2b56b; stroke-width: 5 } .measured { stroke: #1b5e9e; stroke-width: 1.5 }";
 
 /// The plot of seven joints.
-pub(crate) fn svg(title: &str, tracks: &[Track; 7]) -> String {
+pub(crate) fn svg(title: &str, tracks: &[JointTrack; 7]) -> String {
     let seconds = AxisScale::of_time(tracks);
     let height = TOP + 7.0 * (PANEL + GAP) - GAP + BOTTOM;
     let mut out = format!(
@@ -71,7 +71,7 @@ fn heading(out: &mut String, title: &str) {
     }
 }
 
-fn panel(out: &mut String, number: u8, track: &Track, top: f64, seconds: &AxisScale) {
+fn panel(out: &mut String, number: u8, track: &JointTrack, top: f64, seconds: &AxisScale) {
     let degrees = AxisScale::of_degrees(track, top);
     let width = WIDTH - LEFT - RIGHT;
     let _ = writeln!(
@@ -85,7 +85,7 @@ fn panel(out: &mut String, number: u8, track: &Track, top: f64, seconds: &AxisSc
         text(out, "end", LEFT - 6.0, y + 4.0, &format!("{tick}°"));
     }
     for (class, points) in [("target", &track.target), ("measured", &track.measured)] {
-        let points: Vec<Point> = points.iter().map(|&(x, y)| (seconds.at(x), degrees.at(y))).collect();
+        let points: Vec<PlotPoint> = points.iter().map(|&(x, y)| (seconds.at(x), degrees.at(y))).collect();
         line(out, class, &points);
     }
 }
@@ -101,7 +101,7 @@ fn text(out: &mut String, class: &str, x: f64, y: f64, text: &str) {
     let _ = writeln!(out, "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\">{text}</text>");
 }
 
-fn line(out: &mut String, class: &str, points: &[Point]) {
+fn line(out: &mut String, class: &str, points: &[PlotPoint]) {
     let points: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
     let _ = writeln!(out, "<polyline class=\"{class}\" points=\"{}\"/>", points.join(" "));
 }
@@ -122,14 +122,14 @@ struct AxisScale {
 }
 
 impl AxisScale {
-    fn of_time(tracks: &[Track; 7]) -> Self {
+    fn of_time(tracks: &[JointTrack; 7]) -> Self {
         let times = tracks.iter().flat_map(|track| track.target.iter().chain(&track.measured));
         let high = times.map(|point| point.0).fold(0.1, f64::max);
         Self { low: 0.0, high, from: LEFT, to: WIDTH - RIGHT }
     }
 
     /// An axis for the track, with padding.
-    fn of_degrees(track: &Track, top: f64) -> Self {
+    fn of_degrees(track: &JointTrack, top: f64) -> Self {
         let all = || track.target.iter().chain(&track.measured).map(|point| point.1);
         let (low, high) = (all().fold(180.0, f64::min), all().fold(0.0, f64::max));
         let (low, high) = if low > high { (0.0, 180.0) } else { (low, high) };
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn every_joint_has_a_panel_with_both_lines() {
-        let track = Track { target: vec![(0.0, 90.0), (1.0, 120.0)], measured: vec![(0.0, 90.0)] };
+        let track = JointTrack { target: vec![(0.0, 90.0), (1.0, 120.0)], measured: vec![(0.0, 90.0)] };
         let tracks = std::array::from_fn(|_| track.clone());
         let drawing = svg("a < b & c", &tracks);
         assert!(drawing.contains("a &lt; b &amp; c"));

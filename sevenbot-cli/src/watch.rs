@@ -12,18 +12,18 @@ use crate::progress::Progress;
 const ROUNDING: &str = "this arm takes whole degrees: each joint goes to the nearest one";
 
 /// Shows a bar for each stage of a call, and ends the call after Ctrl-C.
-pub(crate) struct Watch {
+pub(crate) struct ProgressWatch {
     bar: Option<(&'static str, Progress)>,
 }
 
-impl Watch {
+impl ProgressWatch {
     /// While [`Interrupt`] catches Ctrl-C.
     pub(crate) const fn new(_: Interrupt) -> Self {
         Self { bar: None }
     }
 }
 
-impl Observer for Watch {
+impl Observer for ProgressWatch {
     fn goes_on(&mut self) -> bool {
         !Interrupt::is_requested()
     }

@@ -214,11 +214,12 @@ impl Arm {
         done
     }
 
-    /// Writes the registers from `address` on in one frame: all of them or none (D16, D17).
-    /// The arm does not answer a write. [`Arm::write_checked`] reads the registers back.
+    /// Writes the registers from `address` on in one frame: all of them or none ([D16](protocol_core::decisions#d16),
+    /// [D17](protocol_core::decisions#d17)). The arm does not answer a write. [`Arm::write_checked`] reads the
+    /// registers back.
     ///
-    /// If both maps are necessary, there are several frames. A write to a register that only map 2.1 has ends the reports
-    /// of map 2.2 (M4). [`Arm::write_checked`] starts them again.
+    /// If both maps are necessary, there are several frames. A write to a register that only map 2.1 has ends the
+    /// reports of map 2.2 ([M4](protocol_core::decisions#m4)). [`Arm::write_checked`] starts them again.
     ///
     /// # Errors
     /// The registers reach past 255 (then nothing is sent), or the port failed.

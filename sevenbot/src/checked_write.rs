@@ -1,7 +1,7 @@
 //! Writes that are verified: which registers did not take the value, and why.
 //!
-//! The arm does not answer a write (D6). So the registers are read back. The register table and the status block
-//! give the reason for a difference.
+//! The arm does not answer a write ([D6](protocol_core::decisions#d6)). So the registers are read back. The register
+//! table and the status block give the reason for a difference.
 
 use std::fmt;
 

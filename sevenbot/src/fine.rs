@@ -1,6 +1,6 @@
-//! Typed access to the extended block, registers 128 to 191: hundredths of a degree, velocities, loads (D21 to D26).
+//! Typed access to the extended block, registers 128 to 191: hundredths of a degree, velocities, loads
+//! ([D21](protocol_core::decisions#d21) to [D26](protocol_core::decisions#d26)).
 
-use protocol_core::registers::Joint;
 use protocol_core::registers::map::{EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, SET_POINT_PERIOD};
 use protocol_core::registers::map21::Map;
 
@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::fine_angle::FineAngle;
 pub use crate::fine_state::{FineState, FineTargets};
 use crate::identity::Firmware;
+use crate::joints::frames_of;
 use host_link::Span;
 
 /// The layout of the extended block that this library knows.
@@ -61,7 +62,8 @@ impl Arm {
     }
 
     /// Sets targets and reads them back. They are approached by speed or time, as whole degrees are: a set-point period
-    /// that another program left is switched off for these frames (D23). Only for an arm with the extended block.
+    /// that another program left is switched off for these frames ([D23](protocol_core::decisions#d23)). Only for an
+    /// arm with the extended block.
     ///
     /// # Errors
     /// As [`Arm::write_checked`].
@@ -91,18 +93,7 @@ impl Arm {
 /// One write for each run of neighbouring joints with a target, joint 1 first: address and values.
 #[must_use]
 pub fn fine_frames(targets: &FineTargets) -> Vec<(u8, Vec<u8>)> {
-    let mut frames: Vec<(u8, Vec<u8>)> = Vec::new();
-    let pairs = Joint::ALL.into_iter().zip(targets).filter_map(|(joint, target)| Some((joint, (*target)?)));
-    for (joint, target) in pairs {
-        let (address, bytes) = (FINE_TARGET.of(joint), target.hundredths().to_le_bytes());
-        match frames.last_mut() {
-            Some((first, values)) if usize::from(*first) + values.len() == usize::from(address) => {
-                values.extend(bytes);
-            }
-            _ => frames.push((address, bytes.to_vec())),
-        }
-    }
-    frames
+    frames_of(&FINE_TARGET, &targets.map(|target| target.map(|angle| angle.hundredths().to_le_bytes())))
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ impl Arm {
     /// - A joint whose servo does not answer gets its last measured position as its target, and none if it was never
     ///   measured.
     /// - After power-up waits up to 0.7 s for the joints that are not measured yet. The other joints hold at once.
-    /// - A stream of another program ends at each joint. Its set-point period stays as it was (D23).
+    /// - A stream of another program ends at each joint. Its set-point period stays as it was ([D23](protocol_core::decisions#d23)).
     ///
     /// # Errors
     /// No answer, or the arm does not take the targets: it may be moving.

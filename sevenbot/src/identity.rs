@@ -20,7 +20,7 @@ const LAST_VERSION_WITH_MAP_21: u8 = 21;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity(Snapshot);
 
-/// Which firmware an arm runs, by its version in register 1 (D7).
+/// Which firmware an arm runs, by its version in register 1 ([D7](protocol_core::decisions#d7)).
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -82,7 +82,7 @@ impl Identity {
         self.firmware() == Firmware::Ours
     }
 
-    /// The chip's unique number, most significant byte first (D8).
+    /// The chip's unique number, most significant byte first ([D8](protocol_core::decisions#d8)).
     #[must_use]
     pub fn chip_id(&self) -> [u8; 6] {
         [0, 1, 2, 3, 4, 5].map(|offset| self.0.at(CHIP_ID.address + offset))

@@ -23,7 +23,8 @@ use crate::status_block::{StatusBlock, has_restarted};
 use crate::units::Speed;
 use host_link::{Snapshot, Span};
 
-/// After power-up the arm measures each joint or finds it missing within 500 ms (D12). The rest is for the reply.
+/// After power-up the arm measures each joint or finds it missing within 500 ms ([D12](protocol_core::decisions#d12)).
+/// The rest is for the reply.
 pub const START_UP_TIME: Duration = Duration::from_millis(700);
 /// Time between two reads during start-up.
 pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(20);
@@ -61,7 +62,7 @@ impl Arm {
     }
 
     /// Waits up to 0.7 s until no joint has the default target of power-up. The arm replaces these targets within half
-    /// a second (D12). Returns the joints at that time.
+    /// a second ([D12](protocol_core::decisions#d12)). Returns the joints at that time.
     ///
     /// # Errors
     /// As [`Arm::read`].
@@ -217,10 +218,15 @@ impl JointSnapshot {
 /// One write for each run of neighbouring joints with a value, joint 1 first: address and values.
 #[must_use]
 pub fn frames_for(row: &Register, values: &[Option<u8>; 7]) -> Vec<(u8, Vec<u8>)> {
+    frames_of(row, &values.map(|value| value.map(|byte| [byte])))
+}
+
+/// As [`frames_for`], with values of `N` bytes.
+pub(crate) fn frames_of<const N: usize>(row: &Register, values: &[Option<[u8; N]>; 7]) -> Vec<(u8, Vec<u8>)> {
     let pairs: Vec<_> = Joint::ALL.into_iter().zip(values).collect();
     let runs = pairs.chunk_by(|one, next| one.1.is_some() == next.1.is_some());
-    let frame = |run: &[(Joint, &Option<u8>)]| {
-        let values: Vec<u8> = run.iter().filter_map(|(_, value)| **value).collect();
+    let frame = |run: &[(Joint, &Option<[u8; N]>)]| {
+        let values: Vec<u8> = run.iter().filter_map(|(_, value)| **value).flatten().collect();
         let (first, _) = run.first()?;
         (!values.is_empty()).then(|| (row.of(*first), values))
     };

@@ -1,5 +1,5 @@
-//! Parses register names: `target-position.3`, `SPEED`, `12`, `54..60`, `status-version..255`. The names come from the register tables. Map 2.2
-//! goes before map 2.1, as in a read (M3).
+//! Parses register names: `target-position.3`, `SPEED`, `12`, `54..60`, `status-version..255`. The names come from the
+//! register tables. Map 2.2 goes before map 2.1, as in a read ([M3](protocol_core::decisions#m3)).
 
 use protocol_core::registers::map21::{MAP_21, find_readable};
 use protocol_core::registers::{Joint, MAP, Register};

@@ -24,7 +24,6 @@ const TRY_AGAIN: Duration = Duration::from_millis(20);
 /// An open serial port.
 pub struct OpenPort {
     port: Box<dyn SerialPort>,
-    opened: Instant,
 }
 
 impl fmt::Debug for OpenPort {
@@ -43,16 +42,19 @@ impl OpenPort {
         loop {
             match open_once(name, baud).map_err(|error| open_error(name, &error)) {
                 Err(OpenError::Busy) if Instant::now() < deadline => sleep(TRY_AGAIN),
-                opened => return opened.map(|port| Self { port, opened: Instant::now() }),
+                opened => return opened.map(|port| Self { port }),
             }
         }
     }
 
-    /// Sends bytes.
-    ///
-    /// # Errors
-    /// The port failed, or takes no more bytes.
-    pub fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+    /// Changes the baud rate; `false` if the port does not support it.
+    pub(crate) fn set_baud(&mut self, baud: u32) -> bool {
+        self.port.set_baud_rate(baud).is_ok()
+    }
+}
+
+impl HostLine for OpenPort {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.port.set_timeout(WRITE_TIMEOUT).map_err(lost)?;
         self.port.write_all(bytes).map_err(|error| match error.kind() {
             ErrorKind::TimedOut => PortError::Stalled,
@@ -60,11 +62,7 @@ impl OpenPort {
         })
     }
 
-    /// The bytes already received, or the first ones within `timeout`. Empty if none arrive.
-    ///
-    /// # Errors
-    /// The port failed.
-    pub fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
+    fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
         if timeout.is_zero() && self.port.bytes_to_read().map_err(lost)? == 0 {
             return Ok(Vec::new());
         }
@@ -79,26 +77,6 @@ impl OpenPort {
                 Err(error) => return Err(PortError::Lost(error.kind())),
             }
         }
-    }
-
-    /// Changes the baud rate; `false` if the port does not support it.
-    pub(crate) fn set_baud(&mut self, baud: u32) -> bool {
-        self.port.set_baud_rate(baud).is_ok()
-    }
-
-    /// The time since the port was opened.
-    pub(crate) fn now(&self) -> Duration {
-        self.opened.elapsed()
-    }
-}
-
-impl HostLine for OpenPort {
-    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        self.send(bytes)
-    }
-
-    fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
-        self.receive(timeout)
     }
 }
 

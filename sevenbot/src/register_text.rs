@@ -194,7 +194,7 @@ pub fn faults(bits: u8) -> String {
     set_words(bits, &FAULT_BITS.map(|(bit, problem)| (bit, problem.name())))
 }
 
-/// The alarms of servos in these bits of register 197 (D28).
+/// The alarms of servos in these bits of register 197 ([D28](protocol_core::decisions#d28)).
 #[must_use]
 pub fn servo_alarms(bits: u8) -> String {
     set_words(bits, &ALARM_BITS.map(|(bit, problem)| (bit, problem.name())))

@@ -17,7 +17,7 @@ pub enum ValueError {
         /// The number of registers.
         registers: usize,
     },
-    /// The span holds half of a two-byte register (D22).
+    /// The span holds half of a two-byte register ([D22](protocol_core::decisions#d22)).
     #[error("{} has two bytes, and {half} is one of them: use the name", name_of_register(*first))]
     HalfAWord {
         /// The register's low byte.

@@ -21,7 +21,8 @@ const REPORTS_KEPT: usize = 1_000;
 const REPORT_OVERHEAD: u32 = 7;
 const BITS_PER_BYTE: u32 = 2 * 10;
 
-/// The present positions, and what else register 189 asks for. The arm sends them without a request (D14, D26).
+/// The present positions, and what else register 189 asks for. The arm sends them without a request
+/// ([D14](protocol_core::decisions#d14), [D26](protocol_core::decisions#d26)).
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -43,28 +43,28 @@ pub enum Traffic {
         /// One byte for each register.
         values: Vec<u8>,
     },
-    /// A request to write in map 2.1 (M1).
+    /// A request to write in map 2.1 ([M1](protocol_core::decisions#m1)).
     WriteMap21 {
         /// The first register.
         address: u8,
         /// One byte for each register.
         values: Vec<u8>,
     },
-    /// A report in map 2.1 (M4).
+    /// A report in map 2.1 ([M4](protocol_core::decisions#m4)).
     Report {
         /// The first register.
         address: u8,
         /// One byte for each register.
         values: Vec<u8>,
     },
-    /// An alarm (M8).
+    /// An alarm ([M8](protocol_core::decisions#m8)).
     Alarm {
         /// 0: message. 1: warning. 2: fatal.
         level: u8,
         /// 5: IK5 has no solution. 6: IK6. 7: IK7.
         kind: u8,
     },
-    /// A frame with a valid checksum that reaches past register 255 (D2).
+    /// A frame with a valid checksum that reaches past register 255 ([D2](protocol_core::decisions#d2)).
     TooFar {
         /// The first register.
         address: u8,

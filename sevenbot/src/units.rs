@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-/// Angle of a joint in whole degrees, 0 to 180, as in the registers (D18).
+/// Angle of a joint in whole degrees, 0 to 180, as in the registers ([D18](protocol_core::decisions#d18)).
 ///
 /// ```
 /// use sevenbot::Angle;
@@ -43,7 +43,7 @@ impl fmt::Display for Angle {
     }
 }
 
-/// Speed of a joint's moves, in the register's steps of 1.9 degrees/s (D10).
+/// Speed of a joint's moves, in the register's steps of 1.9 degrees/s ([D10](protocol_core::decisions#d10)).
 ///
 /// ```
 /// use sevenbot::Speed;
@@ -55,7 +55,7 @@ impl fmt::Display for Angle {
 pub struct Speed(u8);
 
 impl Speed {
-    /// The motor's maximum, 62 rpm. With it [`MoveTime`] applies (D11).
+    /// The motor's maximum, 62 rpm. With it [`MoveTime`] applies ([D11](protocol_core::decisions#d11)).
     pub const MAXIMUM: Self = Self(0);
     /// 62 rpm in degrees/s.
     const MAXIMUM_DEGREES_PER_SECOND: f64 = 372.0;
@@ -84,7 +84,8 @@ impl Speed {
     }
 }
 
-/// Duration of a joint's moves, in the register's steps of 100 ms. It applies where the speed is 0 (D11).
+/// Duration of a joint's moves, in the register's steps of 100 ms. It applies where the speed is 0
+/// ([D11](protocol_core::decisions#d11)).
 ///
 /// ```
 /// use sevenbot::MoveTime;
@@ -119,7 +120,7 @@ impl MoveTime {
     }
 }
 
-/// How long a joint needs for `degrees` with this speed and duration (D11).
+/// How long a joint needs for `degrees` with this speed and duration ([D11](protocol_core::decisions#d11)).
 #[must_use]
 pub fn move_duration(degrees: u8, speed: Speed, time: MoveTime) -> Duration {
     let at_speed = Duration::from_secs_f64(f64::from(degrees) / speed.degrees_per_second());

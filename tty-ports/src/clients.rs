@@ -36,7 +36,7 @@ pub struct Clients {
 
 /// A port whose clients are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Watch(i32);
+pub struct ClientWatch(i32);
 
 /// The clients of one port.
 #[derive(Debug)]
@@ -74,7 +74,7 @@ impl Clients {
     ///
     /// # Errors
     /// inotify refuses.
-    pub fn watch(&mut self, terminal: &Path) -> io::Result<Watch> {
+    pub fn watch(&mut self, terminal: &Path) -> io::Result<ClientWatch> {
         let events = WatchFlags::OPEN | WatchFlags::CLOSE_WRITE | WatchFlags::CLOSE_NOWRITE;
         if let Some(directory) = terminal.parent() {
             inotify::add_watch(&self.inotify, directory, events)?;
@@ -89,23 +89,23 @@ impl Clients {
             news: PortNews::default(),
         };
         self.ports.insert(watch, presence);
-        Ok(Watch(watch))
+        Ok(ClientWatch(watch))
     }
 
     /// Number of clients that have a port open.
     #[must_use]
-    pub fn count(&self, port: Watch) -> usize {
+    pub fn count(&self, port: ClientWatch) -> usize {
         self.ports.get(&port.0).map_or(0, |port| port.count)
     }
 
     /// What happened at a port since the last call, as of the last [`Clients::update`].
-    pub fn take_news(&mut self, port: Watch) -> PortNews {
+    pub fn take_news(&mut self, port: ClientWatch) -> PortNews {
         self.ports.get_mut(&port.0).map(|port| take(&mut port.news)).unwrap_or_default()
     }
 
     /// Would [`Clients::take_news`] return something?
     #[must_use]
-    pub fn has_news(&self, port: Watch) -> bool {
+    pub fn has_news(&self, port: ClientWatch) -> bool {
         self.ports.get(&port.0).is_some_and(|port| port.news != PortNews::default())
     }
 

@@ -1,6 +1,16 @@
 //! Terminals without blocking: pseudo-terminals that a program offers to others, and serial ports that it opens.
 //!
 //! Linux only, because inotify reports when clients open and close a pseudo-terminal.
+//!
+//! ```
+//! use tty_ports::pty::Pty;
+//!
+//! let port = Pty::open(None)?;
+//! println!("a program can open {}", port.path().display());
+//! let mut bytes = [0; 64];
+//! assert_eq!(port.read(&mut bytes)?, 0, "nothing was sent yet, and the call does not wait");
+//! # Ok::<(), std::io::Error>(())
+//! ```
 
 #![deny(unsafe_code)]
 

@@ -23,7 +23,7 @@ use rustix::termios::{
 };
 use tracing::{debug, info, warn};
 
-use crate::clients::{Clients, Watch};
+use crate::clients::{ClientWatch, Clients};
 
 /// A pseudo-terminal, both ends open.
 #[derive(Debug)]
@@ -32,7 +32,7 @@ pub struct Pty {
     terminal: OwnedFd,
     path: PathBuf,
     /// `None` if the system does not report clients: then one client is assumed at all times.
-    watch: Option<Watch>,
+    watch: Option<ClientWatch>,
     client_count: usize,
 }
 

@@ -9,17 +9,16 @@
 //!
 //! The failures and the table are those of `torture sag`. It measures in real time, so a busy machine increases the figures.
 
-use std::io::{BufReader, ErrorKind, Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::thread::sleep;
 use std::time::Duration as RealTime;
 
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoFault;
-use host_sim::clock::Clock;
+use host_sim::clock::RealClock;
 use host_sim::servo_socket::exchange;
-use object::read::elf::ElfFile32;
-use object::{Object, ObjectSymbol};
+use linked_image::Program;
 use protocol_core::registers::map::TARGET_POSITION;
 use protocol_core::registers::{JOINTS, Joint};
 use protocol_core::request::Request;
@@ -32,6 +31,7 @@ use torture::sag::{
 use torture::seeded_rng::SeededRng;
 
 use crate::run::{self, ChildProcess, TaskResult};
+use emulator::debugger::Debugger;
 use emulator::monitor::{self, Monitor};
 use emulator::{HOST_LINK_CONTROL, RECEIVER_ON, need_qemu, servo_socket, start_machine};
 
@@ -71,7 +71,7 @@ pub(crate) struct EmulatedArm {
     host: UnixStream,
     servos: UnixStream,
     pub(crate) plant: Plant,
-    clock: Clock,
+    clock: RealClock,
     /// The time of the servos.
     pub(crate) now: Instant,
     rest: [i32; JOINTS],
@@ -91,7 +91,7 @@ impl EmulatedArm {
         servos.set_nonblocking(true)?;
         let mut monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
         monitor.wait_for_bits(HOST_LINK_CONTROL, RECEIVER_ON)?;
-        let mut clock = Clock::default();
+        let mut clock = RealClock::default();
         let now = clock.now();
         let mut plant = Plant::new(now);
         plant.ignore_collisions();
@@ -179,7 +179,9 @@ impl EmulatedArm {
                 self.monitor.execute("system_reset", "")?;
                 self.monitor.execute("cont", "")
             }
-            SagCause::Panic => Debugger::attach(&self.folder)?.continue_at(panic_handler()?),
+            SagCause::Panic => {
+                Debugger::connect(&self.folder.path().join("debugger"))?.continue_at(panic_handler()?)
+            }
             SagCause::Noise => self.noise(),
             SagCause::SilentServo => {
                 // No reply arrives before the end of the measurement.
@@ -209,62 +211,10 @@ impl EmulatedArm {
     }
 }
 
-/// The emulator's debugger port (GDB remote serial protocol). The chip is stopped while it is attached.
-struct Debugger(BufReader<UnixStream>);
-
-impl Debugger {
-    fn attach(folder: &TempDir) -> TaskResult<Self> {
-        let stream = UnixStream::connect(folder.path().join("debugger"))?;
-        stream.set_read_timeout(Some(RealTime::from_secs(60)))?;
-        Ok(Self(BufReader::new(stream)))
-    }
-
-    /// Continues at `address`, and detaches.
-    fn continue_at(mut self, address: u32) -> TaskResult {
-        // The emulator accepts single registers only after a read of their description.
-        self.command("qSupported")?;
-        self.command("qXfer:features:read:target.xml:0,40")?;
-        // Register 15 is the program counter, in the byte order of the chip's memory.
-        let reply = self.command(&format!("Pf={:08x}", address.swap_bytes()))?;
-        if reply != "OK" {
-            Err(format!("the emulator does not set the program counter: {reply}"))?;
-        }
-        self.command("D").map(drop)
-    }
-
-    fn command(&mut self, words: &str) -> TaskResult<String> {
-        let sum = words.bytes().fold(0, u8::wrapping_add);
-        write!(self.0.get_mut(), "${words}#{sum:02x}")?;
-        loop {
-            let reply = self.reply()?;
-            // The emulator may first report that the chip is stopped.
-            if !reply.starts_with('T') {
-                return Ok(reply);
-            }
-        }
-    }
-
-    fn reply(&mut self) -> TaskResult<String> {
-        let mut reply = Vec::new();
-        // Acknowledgement, `$`, reply, `#`, two digits.
-        while !reply.ends_with(b"#") {
-            let mut byte = [0];
-            self.0.read_exact(&mut byte)?;
-            reply.extend(byte);
-        }
-        self.0.read_exact(&mut [0; 2])?;
-        self.0.get_mut().write_all(b"+")?;
-        let reply = String::from_utf8_lossy(&reply).into_owned();
-        Ok(reply.trim_start_matches(['+', '$']).trim_end_matches('#').to_owned())
-    }
-}
-
 /// The address of the panic handler.
 fn panic_handler() -> TaskResult<u32> {
     let file = run::IMAGE.read()?;
-    let elf: ElfFile32<'_> = ElfFile32::parse(file.as_slice())?;
-    let symbol = elf.symbols().find(|symbol| symbol.name().is_ok_and(|name| name.contains(PANIC_HANDLER)));
-    let address = symbol.ok_or("the image has no panic handler")?.address();
-    // Bit 0 marks Thumb code.
-    Ok(u32::try_from(address)? & !1)
+    let program = Program::read(&file)?;
+    let handler = program.functions().find(|function| function.name.contains(PANIC_HANDLER));
+    Ok(u32::try_from(handler.ok_or("the image has no panic handler")?.address)?)
 }

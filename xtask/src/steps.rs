@@ -91,7 +91,7 @@ pub(crate) fn run(
     let selected = |lane: &&'static [TestStep]| -> Vec<&'static TestStep> {
         lane.iter().filter(|step| step.scope <= scope).collect()
     };
-    let run = Run {
+    let run = StepRun {
         completed: Mutex::default(),
         has_failed: AtomicBool::new(false),
         start: Instant::now(),
@@ -121,14 +121,14 @@ pub(crate) fn run(
 }
 
 /// A run of the steps.
-struct Run<E> {
+struct StepRun<E> {
     completed: Mutex<Vec<(&'static str, Times)>>,
     has_failed: AtomicBool,
     start: Instant,
     execute: E,
 }
 
-impl<E: Fn(&TestStep, Option<File>) -> (Times, TaskResult)> Run<E> {
+impl<E: Fn(&TestStep, Option<File>) -> (Times, TaskResult)> StepRun<E> {
     /// Runs the steps of a lane, until one of any lane fails.
     fn lane(&self, steps: &[&'static TestStep], is_beside_others: bool) -> TaskResult {
         for step in steps {

@@ -5,7 +5,7 @@
 
 use protocol_core::registers::JOINTS;
 
-use super::pose::Pose;
+use super::pose::JointSines;
 use super::sine::ONE;
 use crate::parameters::{
     ELBOW_OFFSET_MM, FOREARM_CENTI_MM, FOREARM_CENTRE_MM, FOREARM_G, GRIP_MM, REAR_ARM_CENTRE_MM, REAR_ARM_G,
@@ -22,8 +22,8 @@ struct Mass {
 
 /// The inertia of the arm about each joint, without its servo, in gram square millimetres, with this weight in the
 /// gripper in grams.
-pub(crate) fn inertias(pose: Pose, load_g: i64) -> [i64; JOINTS] {
-    let Pose { rear, drop, roll, pitch } = pose;
+pub(crate) fn inertias(pose: JointSines, load_g: i64) -> [i64; JOINTS] {
+    let JointSines { rear, drop, roll, pitch } = pose;
     let at_tool = |grams, distance| Mass {
         grams,
         along: FOREARM_CENTI_MM / 100 + distance * pitch.sin / ONE,
@@ -51,8 +51,8 @@ pub(crate) fn inertias(pose: Pose, load_g: i64) -> [i64; JOINTS] {
 mod tests {
     use super::*;
 
-    const fn pose(rear: i64, forearm: i64, roll: i64, pitch: i64) -> Pose {
-        Pose::of([90_000, rear * 1_000, forearm * 1_000, roll * 1_000, pitch * 1_000, 90_000, 80_000])
+    const fn pose(rear: i64, forearm: i64, roll: i64, pitch: i64) -> JointSines {
+        JointSines::of([90_000, rear * 1_000, forearm * 1_000, roll * 1_000, pitch * 1_000, 90_000, 80_000])
     }
 
     #[test]

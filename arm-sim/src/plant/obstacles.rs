@@ -7,7 +7,7 @@ use protocol_core::registers::Joint;
 use super::Plant;
 use super::pose::AngleScale;
 use crate::fault_count::FaultCount;
-use crate::servo::surroundings::{Obstacle, Side};
+use crate::servo::surroundings::{Side, Surface};
 use crate::servo::{Servo, Trip};
 
 /// The highest stiffness of a soft obstacle, in millinewton metres per degree.
@@ -132,9 +132,9 @@ impl Plant {
     }
 }
 
-fn obstacle(joint: Joint, side: Side, position: i64, stiffness: Option<u16>) -> Obstacle {
+fn obstacle(joint: Joint, side: Side, position: i64, stiffness: Option<u16>) -> Surface {
     let stiffness = stiffness.map(|stiffness| {
         AngleScale::of(joint).torque_per_count(i64::from(stiffness.clamp(1, HIGHEST_STIFFNESS)))
     });
-    Obstacle { side, position, stiffness }
+    Surface { side, position, stiffness }
 }

@@ -48,12 +48,12 @@ impl AngleScale {
 
 /// The sine and the cosine of an angle, in millionths.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Direction {
+pub(crate) struct SineAndCosine {
     pub(crate) sin: i64,
     pub(crate) cos: i64,
 }
 
-impl Direction {
+impl SineAndCosine {
     const fn of(millidegrees: i64) -> Self {
         Self { sin: sine(millidegrees), cos: cosine(millidegrees) }
     }
@@ -61,28 +61,28 @@ impl Direction {
 
 /// The directions of the parts of the arm that have weight.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pose {
+pub(crate) struct JointSines {
     /// The rear arm above the horizontal.
-    pub(crate) rear: Direction,
+    pub(crate) rear: SineAndCosine,
     /// The forearm below the horizontal.
-    pub(crate) drop: Direction,
+    pub(crate) drop: SineAndCosine,
     /// Joint 4.
-    pub(crate) roll: Direction,
+    pub(crate) roll: SineAndCosine,
     /// Joint 5.
-    pub(crate) pitch: Direction,
+    pub(crate) pitch: SineAndCosine,
 }
 
 /// The angle of joint 3 at which the forearm is level, in thousandths of a degree.
 const LEVEL: i64 = 65_000;
 
-impl Pose {
+impl JointSines {
     /// Of the angles of the joints in thousandths of a degree.
     pub(crate) const fn of([_, rear, forearm, roll, pitch, _, _]: [i64; JOINTS]) -> Self {
         Self {
-            rear: Direction::of(rear),
-            drop: Direction::of(forearm - LEVEL),
-            roll: Direction::of(roll),
-            pitch: Direction::of(pitch),
+            rear: SineAndCosine::of(rear),
+            drop: SineAndCosine::of(forearm - LEVEL),
+            roll: SineAndCosine::of(roll),
+            pitch: SineAndCosine::of(pitch),
         }
     }
 }

@@ -14,7 +14,7 @@
 
 use protocol_core::registers::JOINTS;
 
-use super::pose::Pose;
+use super::pose::JointSines;
 use super::sine::ONE;
 use crate::parameters::{
     ELBOW_OFFSET_MM, FOREARM_CENTI_MM, FOREARM_CENTRE_MM, FOREARM_G, GRIP_MM, REAR_ARM_CENTRE_MM, REAR_ARM_G,
@@ -37,8 +37,8 @@ const ELBOW: i64 = (FOREARM_G + TOOL_G) * ELBOW_OFFSET_MM;
 const TOOL: i64 = TOOL_G * TOOL_CENTRE_MM;
 /// The torque of gravity on each joint, in micronewton metres, towards greater angles, with this weight in the gripper in
 /// grams.
-pub(crate) fn torques(pose: Pose, load_g: i64) -> [i64; JOINTS] {
-    let Pose { rear, drop, roll, pitch } = pose;
+pub(crate) fn torques(pose: JointSines, load_g: i64) -> [i64; JOINTS] {
+    let JointSines { rear, drop, roll, pitch } = pose;
     let shoulder = SHOULDER + load_g * REAR_ARM_MM;
     let forearm = FOREARM + load_g * FOREARM_CENTI_MM / 100;
     let elbow = ELBOW + load_g * ELBOW_OFFSET_MM;
@@ -103,7 +103,7 @@ mod tests {
                     energy(shifted, f64::from(load_g) / 1_000.0)
                 };
                 let slope = (shifted(-500) - shifted(500)) / 1_f64.to_radians();
-                let torque = torques(Pose::of(at), load_g.into())[joint] as f64 / 1e6;
+                let torque = torques(JointSines::of(at), load_g.into())[joint] as f64 / 1e6;
                 assert!((torque - slope).abs() < 0.001, "joint {}: {torque} N m, not {slope}", joint + 1);
             }
         }
@@ -118,7 +118,7 @@ mod tests {
                 continue;
             }
             for (roll, pitch) in grid().flat_map(|roll| grid().map(move |pitch| (roll, pitch))) {
-                let torques = torques(Pose::of(pose(rear, forearm, roll, pitch)), 300);
+                let torques = torques(JointSines::of(pose(rear, forearm, roll, pitch)), 300);
                 for ((highest, torque), joint) in highest.iter_mut().zip(torques).zip(Joint::ALL) {
                     let servo = ServoParameters::of(joint);
                     let friction = servo.sliding_friction + torque.abs() * LOAD_FRICTION_PERCENT / 100;
@@ -131,14 +131,18 @@ mod tests {
 
     #[test]
     fn the_level_forearm_has_weight_and_the_upright_rear_arm_has_none() {
-        let [base, rear, forearm, roll, pitch, wrist, claw] = torques(Pose::of(pose(90, 65, 90, 90)), 0);
+        let [base, rear, forearm, roll, pitch, wrist, claw] =
+            torques(JointSines::of(pose(90, 65, 90, 90)), 0);
         assert_eq!([base, rear, roll, wrist, claw], [0; 5]);
         assert_eq!([forearm, pitch], [459_457, 49_035], "towards greater angles: down");
         assert_eq!(
-            torques(Pose::of(pose(0, 65, 90, 90)), 0)[1],
+            torques(JointSines::of(pose(0, 65, 90, 90)), 0)[1],
             -423_662,
             "a rear arm that leans to the front falls to the front"
         );
-        assert!(torques(Pose::of(pose(120, 65, 90, 90)), 0)[1] > 0, "a rear arm that leans back falls back");
+        assert!(
+            torques(JointSines::of(pose(120, 65, 90, 90)), 0)[1] > 0,
+            "a rear arm that leans back falls back"
+        );
     }
 }

@@ -19,7 +19,7 @@ const DAMAGE: u8 = 0x55;
 
 /// Bytes without a pause between them.
 #[derive(Clone, Debug)]
-struct Transmission {
+struct FrameOnWire {
     /// The start of the first byte, if the wire is free by then.
     start: Instant,
     bytes: VecDeque<u8>,
@@ -34,7 +34,7 @@ pub(crate) struct Wire {
     baud: u32,
     byte_time: ByteTime,
     /// In the order of the starts.
-    queue: VecDeque<Transmission>,
+    queue: VecDeque<FrameOnWire>,
     /// The end of the last byte to the master.
     free_at: Instant,
     /// The end of the last byte from the master.
@@ -89,17 +89,17 @@ impl Wire {
 
     /// Lets a servo send bytes from `start` on.
     pub(crate) fn send(&mut self, start: Instant, bytes: &[u8]) {
-        self.insert(Transmission { start, bytes: bytes.to_vec().into(), is_from_servo: true });
+        self.insert(FrameOnWire { start, bytes: bytes.to_vec().into(), is_from_servo: true });
     }
 
     /// Lets the master receive its own bytes, from `start` on; damaged if they collided.
     pub(crate) fn echo(&mut self, start: Instant, bytes: &[u8], has_collided: bool) {
         let damage = if has_collided { DAMAGE } else { 0 };
         let bytes = bytes.iter().map(|byte| byte ^ damage).collect();
-        self.insert(Transmission { start, bytes, is_from_servo: false });
+        self.insert(FrameOnWire { start, bytes, is_from_servo: false });
     }
 
-    fn insert(&mut self, transmission: Transmission) {
+    fn insert(&mut self, transmission: FrameOnWire) {
         let index = self.queue.partition_point(|earlier| earlier.start <= transmission.start);
         self.queue.insert(index, transmission);
     }

@@ -1,7 +1,7 @@
 //! What a joint meets outside its servo, and alarms that are forced on it.
 
 use super::Servo;
-use super::surroundings::{Obstacle, Side};
+use super::surroundings::{Side, Surface};
 use crate::fault_count::FaultCount;
 
 /// An alarm that is forced on a servo.
@@ -24,13 +24,13 @@ impl Servo {
     }
 
     /// Sets or takes away the wall. A wall counts the milliseconds in which the joint touches it.
-    pub(crate) fn set_wall(&mut self, wall: Option<Obstacle>) {
+    pub(crate) fn set_wall(&mut self, wall: Option<Surface>) {
         self.motor.surroundings.wall = wall;
         self.wall_count = FaultCount::default();
     }
 
     /// Sets or takes away what is between the claws.
-    pub(crate) fn set_thing(&mut self, thing: Option<Obstacle>) {
+    pub(crate) fn set_thing(&mut self, thing: Option<Surface>) {
         self.motor.surroundings.thing = thing;
         if thing.is_some() {
             self.thing_count = FaultCount::default();
@@ -38,7 +38,7 @@ impl Servo {
     }
 
     /// What is between the claws.
-    pub(crate) const fn thing(&self) -> Option<Obstacle> {
+    pub(crate) const fn thing(&self) -> Option<Surface> {
         self.motor.surroundings.thing
     }
 

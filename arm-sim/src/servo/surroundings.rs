@@ -16,7 +16,7 @@ pub(crate) enum Side {
 
 /// An obstacle in the way of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Obstacle {
+pub(crate) struct Surface {
     pub(crate) side: Side,
     /// Where the joint touches it.
     pub(crate) position: i64,
@@ -24,7 +24,7 @@ pub(crate) struct Obstacle {
     pub(crate) stiffness: Option<i64>,
 }
 
-impl Obstacle {
+impl Surface {
     /// How far a joint at this position presses into it. Not positive: the joint does not touch it.
     const fn depth(&self, position: i64) -> i64 {
         match self.side {
@@ -67,13 +67,13 @@ pub(crate) struct Surroundings {
     pub(crate) inertia: i64,
     /// The torque of a hand.
     pub(crate) push: i64,
-    pub(crate) wall: Option<Obstacle>,
+    pub(crate) wall: Option<Surface>,
     /// What is between the claws. Only joint 7 has it.
-    pub(crate) thing: Option<Obstacle>,
+    pub(crate) thing: Option<Surface>,
 }
 
 impl Surroundings {
-    fn obstacles(&self) -> impl Iterator<Item = &Obstacle> {
+    fn obstacles(&self) -> impl Iterator<Item = &Surface> {
         [&self.wall, &self.thing].into_iter().flatten()
     }
 
@@ -96,7 +96,7 @@ mod tests {
     const ALL: (i64, i64) = (0, 1_000);
 
     const fn wall(side: Side, stiffness: Option<i64>) -> Surroundings {
-        let wall = Some(Obstacle { side, position: 500, stiffness });
+        let wall = Some(Surface { side, position: 500, stiffness });
         Surroundings { weight: 0, inertia: 0, push: 0, wall, thing: None }
     }
 
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn weight_hand_and_thing_add_up() {
-        let thing = Some(Obstacle { side: Side::FewerCounts, position: 100, stiffness: Some(COUNT) });
+        let thing = Some(Surface { side: Side::FewerCounts, position: 100, stiffness: Some(COUNT) });
         let all = Surroundings { weight: 5, push: -7, thing, ..wall(Side::MoreCounts, Some(COUNT)) };
         assert_eq!(all.torque(90), 5 - 7 + 10);
         assert_eq!(all.torque(510), 5 - 7 - 10);

@@ -7,13 +7,13 @@ use protocol_core::time::Instant;
 use super::SimulatedArm;
 use crate::action::Action;
 use crate::session::{Entry, Recorder, SessionEvent};
-use crate::tap::Slot;
+use crate::tap::Watcher;
 
 impl<F, B, C> SimulatedArm<F, B, C> {
     /// Passes everything that is done to the arm from outside, and the bytes that the host takes, to `recorder` from now
     /// on. What is done to the plant by [`SimulatedArm::plant_mut`] is not recorded: use [`SimulatedArm::act`].
     pub fn set_recorder(&mut self, recorder: impl Recorder + 'static) {
-        self.recorder = Slot::holding(Box::new(recorder));
+        self.recorder = Watcher::holding(Box::new(recorder));
     }
 
     pub(super) fn record_advance(&mut self, now: Instant, host_is_idle: bool) {

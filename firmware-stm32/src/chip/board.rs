@@ -77,7 +77,7 @@ pub const SAVE_TIMEOUT_MICROS: u32 = 5_000;
 /// The chip id in the emulator.
 pub const CHIP_ID_EMULATED: [u8; 6] = *b"\x7B\x07\x00\x00\x00\x01";
 
-/// The id of this chip (D8).
+/// The id of this chip ([D8](protocol_core::decisions#d8)).
 pub fn chip_id(source: ClockSource) -> [u8; 6] {
     match source {
         ClockSource::Emulated => CHIP_ID_EMULATED,

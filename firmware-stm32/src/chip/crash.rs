@@ -1,5 +1,5 @@
 //! The crash handler: pump off, servos damped, one log line, restart. After the restart the controller sends only
-//! questions until the servos are measured (D12), so they stay damped.
+//! questions until the servos are measured ([D12](protocol_core::decisions#d12)), so they stay damped.
 //!
 //! This file needs no heap, no lock, no interrupt and no intact stack, and each of its loops has a limit. It stores the
 //! cause in RAM that a restart does not clear; after the restart the status block reports it.

@@ -60,9 +60,9 @@ impl Usart for pac::USART2 {
 }
 
 /// The registers of the USART `U`, as its line uses them.
-struct Registers<U>(PhantomData<U>);
+struct RegistersOf<U>(PhantomData<U>);
 
-impl<U: Usart> UsartRegisters for Registers<U> {
+impl<U: Usart> UsartRegisters for RegistersOf<U> {
     fn status(&self) -> u16 {
         U::registers().sr().read().bits()
     }
@@ -85,7 +85,7 @@ impl<U: Usart> UsartRegisters for Registers<U> {
 
 /// A line that interrupt and loop share.
 pub struct SharedUart<U, D, const RECEIVE: usize, const TRANSMIT: usize>(
-    Mutex<RefCell<SerialLine<Registers<U>, D, RECEIVE, TRANSMIT>>>,
+    Mutex<RefCell<SerialLine<RegistersOf<U>, D, RECEIVE, TRANSMIT>>>,
 );
 
 /// Configuration of a line. The format is always 8N1.
@@ -103,7 +103,7 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize>
 {
     /// A closed line.
     pub const fn new(direction: D) -> Self {
-        Self(Mutex::new(RefCell::new(SerialLine::new(Registers(PhantomData), direction))))
+        Self(Mutex::new(RefCell::new(SerialLine::new(RegistersOf(PhantomData), direction))))
     }
 
     /// Opens the line. All other USART settings keep their reset values. It takes the USART, so no other code uses it.
@@ -137,7 +137,7 @@ impl<U: Usart, D: BusDirection, const RECEIVE: usize, const TRANSMIT: usize>
 
     fn with<T: Default>(
         &self,
-        act: impl FnOnce(&mut SerialLine<Registers<U>, D, RECEIVE, TRANSMIT>) -> T,
+        act: impl FnOnce(&mut SerialLine<RegistersOf<U>, D, RECEIVE, TRANSMIT>) -> T,
     ) -> T {
         critical_section::with(|cs| {
             // The borrow cannot fail: `act` never calls this function.

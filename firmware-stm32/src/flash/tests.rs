@@ -3,7 +3,7 @@
 mod chip_model;
 
 use chip_model::*;
-use flash_model::Supply;
+use flash_model::FlashSupply;
 use protocol_core::journal::{Journal, Opened};
 use protocol_core::registers::Image;
 
@@ -78,7 +78,7 @@ fn nothing_is_changed_without_brown_out_level_3() {
 
 #[test]
 fn the_first_operation_already_refuses_a_low_supply() {
-    let mut flash = Flash::new(ChipModel::supplied(Supply::steady(2_750)));
+    let mut flash = Flash::new(ChipModel::supplied(FlashSupply::steady(2_750)));
     assert_eq!(flash.erase(0, END), Err(Error::Supply));
     assert_eq!(flash.write(0, b"word"), Err(Error::Supply));
     assert!(flash.0.erased.is_empty() && flash.0.is_locked());
@@ -87,14 +87,14 @@ fn the_first_operation_already_refuses_a_low_supply() {
 #[test]
 fn a_supply_of_3v3_less_5_percent_is_good() {
     let lowest = 3_300 - 3_300 * 5 / 100;
-    let mut flash = Flash::new(ChipModel::supplied(Supply::steady(lowest)));
+    let mut flash = Flash::new(ChipModel::supplied(FlashSupply::steady(lowest)));
     assert_eq!(flash.erase(0, END), Ok(()));
 }
 
 #[test]
 fn a_sag_stops_a_write_before_the_supply_is_too_low_for_a_word() {
     // The erase of both sectors takes 0.5 s. Then the supply falls by 1 mV per 10 us, stays at 2.5 V for 1 ms, and rises.
-    let sag = Supply::steady(3_300).then(600_000, 3_300).then(608_000, 2_500);
+    let sag = FlashSupply::steady(3_300).then(600_000, 3_300).then(608_000, 2_500);
     let sag = sag.then(609_000, 2_500).then(617_000, 3_300);
     let mut flash = Flash::new(ChipModel::supplied(sag));
     flash.erase(0, END).unwrap();

@@ -5,8 +5,13 @@ use serde_json::{Value, json};
 
 /// A request.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Request {
+#[serde(
+    tag = "do",
+    rename_all = "kebab-case",
+    deny_unknown_fields,
+    expecting = "a request is an object with a member \"do\""
+)]
+pub enum ControlRequest {
     /// Gives the arm a fault, for a time or until it is taken back.
     Fault {
         /// The fault, as in `--fault`.
@@ -162,7 +167,7 @@ impl Refusal {
 ///
 /// # Errors
 /// It is no request.
-pub fn parse(line: &[u8]) -> Result<Request, Refusal> {
+pub fn parse(line: &[u8]) -> Result<ControlRequest, Refusal> {
     serde_json::from_slice(line).map_err(|error| {
         Refusal::new(
             error,
@@ -188,24 +193,27 @@ mod tests {
     #[test]
     fn requests_are_json_objects() {
         for (line, request) in [
-            (r#"{"do":"faults"}"#, Request::Faults),
-            (r#"{"do":"clear"}"#, Request::Clear { at: None }),
+            (r#"{"do":"faults"}"#, ControlRequest::Faults),
+            (r#"{"do":"clear"}"#, ControlRequest::Clear { at: None }),
             (
                 r#"{"do":"hand","joint":2,"to":120}"#,
-                Request::Hand { joint: 2, to: HandAction::Degrees(120.0) },
+                ControlRequest::Hand { joint: 2, to: HandAction::Degrees(120.0) },
             ),
             (
                 r#"{"do":"hand","joint":2,"to":"let-go"}"#,
-                Request::Hand { joint: 2, to: HandAction::Grip(Grip::LetGo) },
+                ControlRequest::Hand { joint: 2, to: HandAction::Grip(Grip::LetGo) },
             ),
-            (r#"{"do":"advance","ms":250}"#, Request::Advance { ms: 250 }),
-            (r#"{"do":"speed","factor":50}"#, Request::Speed { factor: SpeedFactor::Times(50.0) }),
-            (r#"{"do":"speed","factor":"max"}"#, Request::Speed { factor: SpeedFactor::Max(MaxSpeed::Max) }),
-            (r#"{"do":"restore","name":"a b"}"#, Request::Restore { name: "a b".to_owned() }),
-            (r#"{"do":"power","to":"cycle"}"#, Request::Power { to: Power::Cycle }),
+            (r#"{"do":"advance","ms":250}"#, ControlRequest::Advance { ms: 250 }),
+            (r#"{"do":"speed","factor":50}"#, ControlRequest::Speed { factor: SpeedFactor::Times(50.0) }),
+            (
+                r#"{"do":"speed","factor":"max"}"#,
+                ControlRequest::Speed { factor: SpeedFactor::Max(MaxSpeed::Max) },
+            ),
+            (r#"{"do":"restore","name":"a b"}"#, ControlRequest::Restore { name: "a b".to_owned() }),
+            (r#"{"do":"power","to":"cycle"}"#, ControlRequest::Power { to: Power::Cycle }),
             (
                 r#" {"do":"fault","fault":"3=missing","for_ms":2000} "#,
-                Request::Fault { fault: "3=missing".to_owned(), for_ms: Some(2_000) },
+                ControlRequest::Fault { fault: "3=missing".to_owned(), for_ms: Some(2_000) },
             ),
         ] {
             assert_eq!(parse(line.as_bytes()), Ok(request));

@@ -25,7 +25,7 @@ const CLIENTS: usize = 16;
 
 /// How a request is answered.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Reply {
+pub enum ControlReply {
     /// At once, with this line.
     Line(String),
     /// At this virtual time, with the time. The client's next requests wait.
@@ -36,11 +36,11 @@ pub enum Reply {
 #[derive(Debug)]
 pub struct ControlSocket {
     socket: PrivateSocket,
-    clients: Vec<Client>,
+    clients: Vec<ControlClient>,
 }
 
 #[derive(Debug)]
-struct Client {
+struct ControlClient {
     stream: UnixStream,
     input: Vec<u8>,
     output: Vec<u8>,
@@ -92,7 +92,7 @@ impl ControlSocket {
         epoll: &OwnedFd,
         data: EventData,
         now: Instant,
-        mut execute: impl FnMut(&[u8]) -> Reply,
+        mut execute: impl FnMut(&[u8]) -> ControlReply,
     ) -> io::Result<bool> {
         self.accept(epoll, data)?;
         let mut has_executed = false;
@@ -110,7 +110,7 @@ impl ControlSocket {
 
     fn accept(&mut self, epoll: &OwnedFd, data: EventData) -> io::Result<()> {
         while let Some(stream) = self.socket.accept()? {
-            let mut client = Client::new(stream);
+            let mut client = ControlClient::new(stream);
             if self.clients.len() >= CLIENTS {
                 client.refuse(&Refusal::new("16 clients are connected", "close one of them"));
                 client.send();
@@ -123,7 +123,7 @@ impl ControlSocket {
     }
 }
 
-impl Client {
+impl ControlClient {
     const fn new(stream: UnixStream) -> Self {
         let interest = EventFlags::IN;
         Self {
@@ -151,7 +151,7 @@ impl Client {
     }
 
     /// Executes the whole lines. Returns whether there was one.
-    fn execute(&mut self, execute: &mut impl FnMut(&[u8]) -> Reply) -> bool {
+    fn execute(&mut self, execute: &mut impl FnMut(&[u8]) -> ControlReply) -> bool {
         let mut has_executed = false;
         while self.output.len() < LONGEST_BACKLOG
             && self.waits_until.is_none()
@@ -161,8 +161,8 @@ impl Client {
             let request = mem::replace(&mut self.input, rest);
             if !request.trim_ascii().is_empty() {
                 match execute(request.trim_ascii()) {
-                    Reply::Line(line) => self.output.extend_from_slice(line.as_bytes()),
-                    Reply::At(end) => self.waits_until = Some(end),
+                    ControlReply::Line(line) => self.output.extend_from_slice(line.as_bytes()),
+                    ControlReply::At(end) => self.waits_until = Some(end),
                 }
                 has_executed = true;
             }
@@ -250,10 +250,10 @@ mod tests {
 
         /// Polls, with requests that are answered with their own length.
         fn poll(&mut self) {
-            self.poll_with(Instant::ZERO, |request| Reply::Line(format!("{}\n", request.len())));
+            self.poll_with(Instant::ZERO, |request| ControlReply::Line(format!("{}\n", request.len())));
         }
 
-        fn poll_with(&mut self, now: Instant, answer: impl FnMut(&[u8]) -> Reply) {
+        fn poll_with(&mut self, now: Instant, answer: impl FnMut(&[u8]) -> ControlReply) {
             self.socket.poll(&self.epoll, EventData::new_u64(0), now, answer).unwrap();
         }
 
@@ -302,7 +302,7 @@ mod tests {
         let mut sent = 0;
         for _ in 0..1_000 {
             sent += client.write(&[b"x\n".as_slice(); 2_000].concat()).unwrap_or(0);
-            rig.poll_with(Instant::ZERO, |_| Reply::Line(format!("{}\n", "y".repeat(1_000))));
+            rig.poll_with(Instant::ZERO, |_| ControlReply::Line(format!("{}\n", "y".repeat(1_000))));
         }
         let [client] = rig.socket.clients.as_slice() else { panic!("one client") };
         assert!(client.output.len() < LONGEST_BACKLOG + 2_000 && client.input.len() <= LONGEST_LINE);
@@ -317,10 +317,10 @@ mod tests {
         client.write_all(b"wait\nnext\n").unwrap();
         client.shutdown(std::net::Shutdown::Write).unwrap();
         for now in [0, 499] {
-            rig.poll_with(Instant::from_micros(now), |_| Reply::At(end));
+            rig.poll_with(Instant::from_micros(now), |_| ControlReply::At(end));
             assert_eq!(rig.socket.due(), Some(end));
         }
-        rig.poll_with(end, |request| Reply::Line(format!("{}\n", request.len())));
+        rig.poll_with(end, |request| ControlReply::Line(format!("{}\n", request.len())));
         assert_eq!(rig.lines(&client), ["{\"ok\":{\"time_us\":500}}", "4"]);
         assert!(rig.socket.due().is_none() && rig.socket.clients.is_empty());
     }

@@ -1,5 +1,5 @@
-//! The settings on two sectors of NOR flash. After a power cut at any instant the settings are those before or after the
-//! interrupted save (D19).
+//! The settings on two sectors of NOR flash. After a power cut at any instant the settings are those before or after
+//! the interrupted save ([D19](crate::decisions#d19)).
 //!
 //! ```text
 //!    home: the sector in use               spare: the other sector
@@ -46,9 +46,9 @@
 //! - **A sector that is not blank after an erase is not used.** In an emulator, for example, flash does not change and
 //!   reads 0.
 //!
-//! No word is programmed with two different values. A save programs eight words. A start erases two sectors and programs
-//! 18 words at most: a record appended again, a mark, a record moved, a mark. A cell that does not take its bit costs a
-//! second attempt in the next slot. This module does not know registers: an image is 20 bytes.
+//! No word is programmed with two different values. A save programs eight words. A start erases two sectors and
+//! programs 18 words at most: a record appended again, a mark, a record moved, a mark. A cell that does not take its
+//! bit costs a second attempt in the next slot. This module does not know registers: an image is 20 bytes.
 
 mod sectors;
 mod slot;

@@ -9,7 +9,7 @@ use crate::registers::Image;
 
 /// The flash refused an operation, or the verification failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Refused;
+pub(super) struct FlashRefused;
 
 /// The address of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,14 +71,14 @@ impl<F: NorFlash> Sectors<F> {
         (address.sector * Self::SLOTS + address.slot) * slot::LENGTH
     }
 
-    fn read(&mut self, address: SlotAddress) -> Result<Slot, Refused> {
+    fn read(&mut self, address: SlotAddress) -> Result<Slot, FlashRefused> {
         let mut slot = BLANK;
-        self.0.read(Self::offset(address), slot.as_flattened_mut()).map_err(|_| Refused)?;
+        self.0.read(Self::offset(address), slot.as_flattened_mut()).map_err(|_| FlashRefused)?;
         Ok(slot)
     }
 
     /// Reads a sector backwards from its end to the last valid record.
-    pub(super) fn survey(&mut self, sector: u32) -> Result<Survey, Refused> {
+    pub(super) fn survey(&mut self, sector: u32) -> Result<Survey, FlashRefused> {
         let [mark, behind @ ..] = self.read(SlotAddress { sector, slot: 0 })?;
         let revoked = behind.iter().fold(0, |count, word| count + u32::from(*word != BLANK[0]));
         let mut survey = Survey { sector, mark, revoked, end: 1, newest: None };
@@ -98,18 +98,18 @@ impl<F: NorFlash> Sectors<F> {
     }
 
     /// Programs words in ascending order, then verifies all of them.
-    fn program(&mut self, offset: u32, words: &[Word]) -> Result<(), Refused> {
+    fn program(&mut self, offset: u32, words: &[Word]) -> Result<(), FlashRefused> {
         let mut to = offset;
         for word in words {
-            self.0.write(to, word).map_err(|_| Refused)?;
+            self.0.write(to, word).map_err(|_| FlashRefused)?;
             to += 4;
         }
         let mut from = offset;
         for word in words {
             let mut kept = [0; 4];
-            self.0.read(from, &mut kept).map_err(|_| Refused)?;
+            self.0.read(from, &mut kept).map_err(|_| FlashRefused)?;
             if kept != *word {
-                return Err(Refused);
+                return Err(FlashRefused);
             }
             from += 4;
         }
@@ -122,7 +122,7 @@ impl<F: NorFlash> Sectors<F> {
         address: SlotAddress,
         generation: u32,
         image: &Image,
-    ) -> Result<(), Refused> {
+    ) -> Result<(), FlashRefused> {
         let [body @ .., seal] = slot::encode(generation, image);
         let offset = Self::offset(address);
         self.program(offset, &body)?;
@@ -130,20 +130,20 @@ impl<F: NorFlash> Sectors<F> {
     }
 
     /// Erases a sector, verifies that it is blank, and programs the mark of `generation`.
-    pub(super) fn prepare(&mut self, sector: u32, generation: u32) -> Result<(), Refused> {
+    pub(super) fn prepare(&mut self, sector: u32, generation: u32) -> Result<(), FlashRefused> {
         let start = Self::offset(SlotAddress { sector, slot: 0 });
         let end = start + Self::SLOTS * slot::LENGTH;
-        self.0.erase(start, end).map_err(|_| Refused)?;
+        self.0.erase(start, end).map_err(|_| FlashRefused)?;
         for slot in 0..Self::SLOTS {
             if self.read(SlotAddress { sector, slot })? != BLANK {
-                return Err(Refused);
+                return Err(FlashRefused);
             }
         }
         self.program(start, &[slot::mark(generation)])
     }
 
     /// Programs the `count`-th revocation in `sector`: the other sector is to be prepared for `generation` now.
-    pub(super) fn revoke(&mut self, sector: u32, count: u32, generation: u32) -> Result<(), Refused> {
+    pub(super) fn revoke(&mut self, sector: u32, count: u32, generation: u32) -> Result<(), FlashRefused> {
         let at = Self::offset(SlotAddress { sector, slot: 0 }) + 4 * count;
         self.program(at, &[slot::mark(generation)])
     }

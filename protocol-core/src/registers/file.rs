@@ -1,15 +1,16 @@
 //! The current value of every register, and the rules for writes of a host.
 //!
-//! A write is checked completely, then applied completely (D15 to D17). [`RegisterFile::check`] returns an [`Accepted`]
-//! write, which the arm can inspect before [`RegisterFile::apply`]. This file does not know frames or the effect of a
-//! value.
+//! A write is checked completely, then applied completely ([D15](crate::decisions#d15) to [D17](crate::decisions#d17)).
+//! [`RegisterFile::check`] returns an [`Accepted`] write, which the arm can inspect before [`RegisterFile::apply`].
+//! This file does not know frames or the effect of a value.
 
+use super::accepted::{Accepted, from_map21};
 use super::joint::{JOINTS, Joint};
 use super::map::{CHIP_ID, EEPROM_LOCK, OFFSET, refusal};
 use super::map21::{self, Map, OPTIONS, option};
 use super::rules::{
-    DEFAULTS, EEPROM_END, EEPROM_START, EXTENDED_START, Refused, first_refused_value, keeps_bytes_of_21,
-    rule, rule_21, rules_21_from, rules_from,
+    DEFAULTS, EEPROM_END, EEPROM_START, Refused, first_refused_value, keeps_bytes_of_21, rule, rule_21,
+    rules_21_from, rules_from,
 };
 use super::spec::Register;
 
@@ -23,59 +24,6 @@ impl Image {
     pub const LENGTH: usize = (EEPROM_END - EEPROM_START) as usize;
 }
 
-/// A write that was checked and may be applied.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Accepted<'a> {
-    map: Map,
-    /// The first address of the write that can have an effect: from the EEPROM region on, or from its end while locked.
-    start: u8,
-    values: &'a [u8],
-}
-
-impl Accepted<'_> {
-    /// The map that the write is in.
-    #[must_use]
-    pub const fn map(&self) -> Map {
-        self.map
-    }
-
-    /// The new value of the register at `address`, an offset in sign and magnitude; `None` if the write does not include
-    /// it or has no effect on it (D15).
-    #[must_use]
-    pub fn value_at(&self, address: u8) -> Option<u8> {
-        let value = *self.values.get(usize::from(address.checked_sub(self.start)?))?;
-        match self.map {
-            Map::V22 => rule(address).is_open().then_some(value),
-            Map::V21 => rule_21(address).is_open().then(|| from_map21(address, value)),
-        }
-    }
-
-    /// The new value of the two-byte register at `address`; `None` if the write does not include it.
-    #[must_use]
-    pub fn word_at(&self, address: u8) -> Option<u16> {
-        let low = self.value_at(address)?;
-        // Both bytes of a register have the same rule.
-        let high = *self.values.get(usize::from(address.checked_sub(self.start)?) + 1)?;
-        Some(u16::from_le_bytes([low, high]))
-    }
-
-    /// Does the write reach the extended block? The registers before it have one byte, and no minimum.
-    #[must_use]
-    pub fn is_extended(&self) -> bool {
-        usize::from(self.start) + self.values.len() > usize::from(EXTENDED_START)
-    }
-
-    /// The bytes for `N` registers from `address` on; `None` unless the write has an effect on all of them.
-    #[must_use]
-    pub fn values_at<const N: usize>(&self, address: u8) -> Option<[u8; N]> {
-        let mut values = [0; N];
-        for (value, address) in values.iter_mut().zip(address..=u8::MAX) {
-            *value = self.value_at(address)?;
-        }
-        Some(values)
-    }
-}
-
 /// The values of all 256 registers.
 #[derive(Clone, Debug)]
 pub struct RegisterFile {
@@ -86,7 +34,7 @@ pub struct RegisterFile {
 
 impl RegisterFile {
     /// The registers after power-up: defaults, the chip id (most significant byte first) and the stored settings. A
-    /// stored value that is out of range is replaced by the default (D19).
+    /// stored value that is out of range is replaced by the default ([D19](crate::decisions#d19)).
     #[must_use]
     pub fn new(chip_id: [u8; CHIP_ID.count as usize], stored: Option<&Image>) -> Self {
         let mut file = Self { values: DEFAULTS, offsets: None };
@@ -105,7 +53,7 @@ impl RegisterFile {
         file
     }
 
-    /// Shows the offsets as before the first write (M5, M12).
+    /// Shows the offsets as before the first write ([M5](crate::decisions#m5), [M12](crate::decisions#m12)).
     pub fn forget_last_write(&mut self) {
         let is_biased = self.get(OPTIONS.address) & option::BIASED_OFFSETS != 0;
         self.show_offsets(if is_biased { Map::V21 } else { Map::V22 });
@@ -181,8 +129,8 @@ impl RegisterFile {
         }
     }
 
-    /// The values of `count` registers from `address` on; empty if the range ends beyond address 255, which the frame parser
-    /// rejects (D2).
+    /// The values of `count` registers from `address` on; empty if the range ends beyond address 255, which the frame
+    /// parser rejects ([D2](crate::decisions#d2)).
     #[must_use]
     pub fn read(&self, address: u8, count: u8) -> &[u8] {
         let start = usize::from(address);
@@ -268,15 +216,6 @@ impl RegisterFile {
         let is_change =
             |address: &u8| accepted.value_at(*address).is_some_and(|new| new != self.setting(*address));
         (accepted.start..EEPROM_END).find(is_change)
-    }
-}
-
-/// A byte that function 04 writes, with an offset in sign and magnitude.
-fn from_map21(address: u8, byte: u8) -> u8 {
-    if map21::OFFSET.holds(address) {
-        OFFSET.range.encode_byte(map21::OFFSET.range.decode_byte(byte)).unwrap_or(0)
-    } else {
-        byte
     }
 }
 

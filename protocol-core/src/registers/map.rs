@@ -3,7 +3,8 @@
 //! No other file holds a register address as a number.
 
 use super::range::Range;
-use super::spec::{Register, Unit, eeprom, ram, rom, well_formed};
+use super::spec::{Register, eeprom, ram, rom, well_formed};
+use super::unit::Unit;
 
 /// Turns rows into named constants with their doc comments, and into [`MAP`] in the same order.
 macro_rules! register_map {
@@ -141,7 +142,7 @@ pub fn find(address: u8) -> Option<&'static Register> {
 
 /// The bits of [`FAULTS`].
 pub mod fault {
-    /// Settings cannot be stored, or not before the next restart (D19).
+    /// Settings cannot be stored, or not before the next restart ([D19](crate::decisions#d19)).
     pub const SETTINGS_STORAGE: u8 = 1 << 0;
     /// A servo is missing or reports an error.
     pub const SERVO_BUS: u8 = 1 << 1;
@@ -154,7 +155,7 @@ pub mod fault {
     pub const CRYSTAL_FAILED: u8 = 1 << 4;
     /// Bytes from the host were lost, because the receive buffer was full.
     pub const RECEIVE_OVERRUN: u8 = 1 << 5;
-    /// The watchdog of the host acted, and register 186 was not written since (D24).
+    /// The watchdog of the host acted, and register 186 was not written since ([D24](crate::decisions#d24)).
     pub const HOST_SILENT: u8 = 1 << 6;
 }
 
@@ -172,17 +173,17 @@ pub mod servo_alarm {
 pub mod refusal {
     /// Nothing was refused yet.
     pub const NONE: u8 = 0;
-    /// The frame reached past address 255 (D2).
+    /// The frame reached past address 255 ([D2](crate::decisions#d2)).
     pub const MALFORMED_RANGE: u8 = 1;
-    /// A value was outside its register's range (D16).
+    /// A value was outside its register's range ([D16](crate::decisions#d16)).
     pub const OUT_OF_RANGE: u8 = 2;
-    /// The settings storage is full until the next restart (D19).
+    /// The settings storage is full until the next restart ([D19](crate::decisions#d19)).
     pub const STORAGE_FULL: u8 = 3;
-    /// The frame would write one byte of a two-byte register (D22).
+    /// The frame would write one byte of a two-byte register ([D22](crate::decisions#d22)).
     pub const HALF_A_WORD: u8 = 4;
-    /// A target, or a set-point, is against a limit that is switched on (D25).
+    /// A target, or a set-point, is against a limit that is switched on ([D25](crate::decisions#d25)).
     pub const AGAINST_A_LIMIT: u8 = 5;
-    /// No joint angles reach the position in a write of map 2.1 (M7).
+    /// No joint angles reach the position in a write of map 2.1 ([M7](crate::decisions#m7)).
     pub const OUT_OF_REACH: u8 = 6;
 }
 
@@ -225,7 +226,8 @@ pub mod report_content {
 /// The baud rates for the codes of [`BAUD_RATE`], in baud.
 pub const BAUD_RATES: [u32; 8] = [115_200, 250_000, 500_000, 1_000_000, 57_600, 38_400, 19_200, 9_600];
 
-/// The baud rate for a code. An unknown code counts as the default, so that no stored byte can lock a user out (D19).
+/// The baud rate for a code. An unknown code counts as the default, so that no stored byte can lock a user out
+/// ([D19](crate::decisions#d19)).
 #[must_use]
 pub fn baud_rate(code: u8) -> u32 {
     BAUD_RATES.get(usize::from(code)).copied().unwrap_or(115_200)

@@ -3,7 +3,8 @@
 //! Rows that mean the same in map 2.2 come from there. A write of function 04 obeys this table.
 
 use super::map::{self, find};
-use super::spec::{Register, Unit, eeprom, ram, well_formed};
+use super::spec::{Register, eeprom, ram, well_formed};
+use super::unit::Unit;
 
 /// Turns rows into named constants with their doc comments.
 macro_rules! rows {
@@ -86,9 +87,9 @@ pub const DIRECTION_ZERO: u8 = 128;
 
 /// The bits of [`OPTIONS`].
 pub mod option {
-    /// Before the first write, offsets read as 128 + offset (M5).
+    /// Before the first write, offsets read as 128 + offset ([M5](crate::decisions#m5)).
     pub const BIASED_OFFSETS: u8 = 1 << 0;
-    /// Alarm frames are sent (M8).
+    /// Alarm frames are sent ([M8](crate::decisions#m8)).
     pub const ALARMS: u8 = 1 << 1;
 }
 
@@ -130,8 +131,8 @@ impl Map {
     }
 }
 
-/// The row whose value a read of `address` gives: that of map 2.2, or else that of map 2.1 (M3). `None` if neither has
-/// one.
+/// The row whose value a read of `address` gives: that of map 2.2, or else that of map 2.1 ([M3](crate::decisions#m3)).
+/// `None` if neither has one.
 #[must_use]
 pub fn find_readable(address: u8) -> Option<&'static Register> {
     let open = |row: &&Register| row.access != super::Access::Reserved;

@@ -7,10 +7,11 @@ pub enum Range {
     UpTo(u8),
     /// Every byte from the first one to the second.
     Between(u8, u8),
-    /// Bit 7 is the sign, the rest a magnitude up to and including this one; 0x80 is a zero (D9).
+    /// Bit 7 is the sign, the rest a magnitude up to and including this one; 0x80 is a zero
+    /// ([D9](crate::decisions#d9)).
     SignMagnitude(u8),
     /// A number from minus this one to this one, at most 56, in any of three encodings: 128 more than the number, the
-    /// number itself, or 256 more than a negative number (M5). The three do not overlap.
+    /// number itself, or 256 more than a negative number ([M5](crate::decisions#m5)). The three do not overlap.
     Biased(u8),
     /// Two bytes: every number up to and including this one.
     WordUpTo(u16),

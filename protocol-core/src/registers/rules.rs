@@ -49,7 +49,7 @@ pub(super) const fn keeps_bytes_of_21(address: u8) -> bool {
     !PRESENT_POSITION.holds(address)
 }
 
-/// The reason why a write has no effect (D16, D22).
+/// The reason why a write has no effect ([D16](crate::decisions#d16), [D22](crate::decisions#d22)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Refused {

@@ -4,6 +4,7 @@
 
 use super::joint::{JOINTS, Joint};
 use super::range::Range;
+use super::unit::Unit;
 
 /// The memory region of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,64 +28,9 @@ pub enum Access {
     Reserved,
 }
 
-/// The unit of a register's value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unit {
-    /// A plain number, a code, or bits.
-    None,
-    /// Degrees of a joint.
-    Degree,
-    /// Hundredths of a degree.
-    Centidegree,
-    /// Tenths of a degree per second.
-    DecidegreePerSecond,
-    /// Tenths of a percent of the stall torque.
-    PermilleOfStall,
-    /// Percent of the stall torque.
-    PercentOfStall,
-    /// Milliseconds.
-    Millisecond,
-    /// Hundredths of a second.
-    Centisecond,
-    /// 1.9 degrees per second (docs/protocol.md, D10).
-    SpeedStep,
-    /// Tenths of a second.
-    Decisecond,
-    /// Hertz.
-    Hertz,
-    /// Tenths of a volt.
-    Decivolt,
-    /// Degrees Celsius.
-    Celsius,
-    /// Tenths of a firmware version: 30 is 3.0.
-    VersionTenths,
-}
-
-impl Unit {
-    /// The symbol of the unit; empty for [`Unit::None`].
-    #[must_use]
-    pub const fn symbol(self) -> &'static str {
-        match self {
-            Self::None => "",
-            Self::Degree => "°",
-            Self::Centidegree => "× 0.01 °",
-            Self::DecidegreePerSecond => "× 0.1 °/s",
-            Self::PermilleOfStall => "× 0.1 %",
-            Self::PercentOfStall => "%",
-            Self::Millisecond => "ms",
-            Self::Centisecond => "× 10 ms",
-            Self::SpeedStep => "× 1.9 °/s",
-            Self::Decisecond => "× 100 ms",
-            Self::Hertz => "Hz",
-            Self::Decivolt => "× 0.1 V",
-            Self::Celsius => "°C",
-            Self::VersionTenths => "× 0.1",
-        }
-    }
-}
-
-/// One row of the table: a register, or a run of registers that mean the same (one per joint, or the
-/// bytes of one longer value). The range tells whether a value has one byte or two, the low byte first (D22).
+/// One row of the table: a register, or a run of registers that mean the same (one per joint, or the bytes of one
+/// longer value). The range tells whether a value has one byte or two, the low byte first
+/// ([D22](crate::decisions#d22)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
     /// The name of the constant: `TARGET_POSITION`.
@@ -350,16 +296,5 @@ mod tests {
         let row = ram(254).read_only().default(3);
         assert_eq!((row.region, row.access, row.default_at(254)), (Region::Ram, Access::ReadOnly, 3));
         assert_eq!(ram(46).each_joint().default(90).default_at(53), 0, "it does not hold this one");
-    }
-
-    #[test]
-    fn units_have_their_usual_symbols() {
-        let symbols = [Unit::None, Unit::SpeedStep, Unit::Decisecond, Unit::Hertz].map(Unit::symbol);
-        assert_eq!(symbols, ["", "× 1.9 °/s", "× 100 ms", "Hz"]);
-        let symbols = [Unit::Decivolt, Unit::Celsius, Unit::VersionTenths].map(Unit::symbol);
-        assert_eq!(symbols, ["× 0.1 V", "°C", "× 0.1"]);
-        let symbols = [Unit::Centidegree, Unit::DecidegreePerSecond, Unit::PermilleOfStall].map(Unit::symbol);
-        assert_eq!(symbols, ["× 0.01 °", "× 0.1 °/s", "× 0.1 %"]);
-        assert_eq!([Unit::Millisecond, Unit::Centisecond].map(Unit::symbol), ["ms", "× 10 ms"]);
     }
 }

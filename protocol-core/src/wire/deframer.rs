@@ -1,4 +1,5 @@
-//! Splits a stream of bytes into frames, and re-synchronises after damage (D3, D4).
+//! Splits a stream of bytes into frames, and re-synchronises after damage ([D3](crate::decisions#d3),
+//! [D4](crate::decisions#d4)).
 //!
 //! ```text
 //!      finished       the head: first byte that
@@ -30,11 +31,11 @@ use crate::time::{Duration, Instant};
 
 /// The shortest gap (D4).
 const SHORTEST_GAP: Duration = Duration::from_millis(2);
-/// Timeout after which an incomplete frame is abandoned (D4).
+/// Timeout after which an incomplete frame is abandoned ([D4](crate::decisions#d4)).
 pub const ABANDON_AFTER: Duration = Duration::from_millis(100);
 
-/// The silence after which complete frames may pass an incomplete one (D4). It is 2 ms, or three and a half
-/// characters of ten bits where those take longer. `baud` is in bits per second.
+/// The silence after which complete frames may pass an incomplete one ([D4](crate::decisions#d4)). It is 2 ms, or three
+/// and a half characters of ten bits where those take longer. `baud` is in bits per second.
 #[must_use]
 pub fn gap(baud: u32) -> Duration {
     let characters = 35_000_000_u32.checked_div(baud).unwrap_or(u32::MAX);

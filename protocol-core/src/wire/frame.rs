@@ -15,7 +15,7 @@ pub const PREFIX_LENGTH: usize = 5;
 pub const CRC_LENGTH: usize = 2;
 /// The shortest frame: one without data.
 pub const MIN_LENGTH: usize = PREFIX_LENGTH + CRC_LENGTH;
-/// The longest frame: 255 bytes of data in their envelope (D1).
+/// The longest frame: 255 bytes of data in their envelope ([D1](crate::decisions#d1)).
 pub const MAX_LENGTH: usize = PREFIX_LENGTH + 255 + CRC_LENGTH;
 
 /// An encoded frame.
@@ -28,13 +28,13 @@ pub type FrameBuffer = heapless::Vec<u8, MAX_LENGTH>;
 pub enum Function {
     /// 03: a read request, or the reply to one.
     Read = 0x03,
-    /// 04: a write request in map 2.1; it has no reply (M1).
+    /// 04: a write request in map 2.1; it has no reply ([M1](crate::decisions#m1)).
     WriteMap21 = 0x04,
-    /// 05: a report in map 2.1 (M4).
+    /// 05: a report in map 2.1 ([M4](crate::decisions#m4)).
     Report = 0x05,
-    /// 06: a write request in map 2.2; it has no reply (D6).
+    /// 06: a write request in map 2.2; it has no reply ([D6](crate::decisions#d6)).
     Write = 0x06,
-    /// 08: an alarm (M8). It has a level and a kind in place of address and count, and no data.
+    /// 08: an alarm ([M8](crate::decisions#m8)). It has a level and a kind in place of address and count, and no data.
     Alarm = 0x08,
 }
 
@@ -113,7 +113,7 @@ pub struct Frame<'a> {
 pub enum Defect {
     /// The CRC does not match the bytes before it.
     WrongCrc,
-    /// The CRC is correct, but the range ends beyond address 255 (D2).
+    /// The CRC is correct, but the range ends beyond address 255 ([D2](crate::decisions#d2)).
     MalformedRange {
         /// The first register of the range.
         address: u8,

@@ -30,7 +30,7 @@ pub(crate) fn run(session: &mut Session) -> Result<(), CommandError> {
     session.printer.print(&ArmInfo {
         identity: ArmIdentity::of(&arm),
         settings: ArmSettings::from(&settings),
-        health: status.as_ref().map(Health::from),
+        health: status.as_ref().map(HealthFigures::from),
     })?;
     match arm.health()?.problems() {
         problems if problems.is_empty() => Ok(()),
@@ -44,7 +44,7 @@ struct ArmInfo {
     identity: ArmIdentity,
     settings: ArmSettings,
     /// None for the maker's firmware.
-    health: Option<Health>,
+    health: Option<HealthFigures>,
 }
 
 #[derive(Serialize)]
@@ -69,7 +69,7 @@ struct ArmSettings {
 }
 
 #[derive(Serialize)]
-struct Health {
+struct HealthFigures {
     healthy: bool,
     faults: String,
     fault_bits: u8,
@@ -115,7 +115,7 @@ impl From<&Snapshot> for ArmSettings {
     }
 }
 
-impl From<&StatusBlock> for Health {
+impl From<&StatusBlock> for HealthFigures {
     fn from(status: &StatusBlock) -> Self {
         Self {
             healthy: status.is_healthy(),
@@ -179,7 +179,7 @@ fn joint_numbers<S: Serializer>(bits: &u8, serializer: S) -> Result<S::Ok, S::Er
         .collect_seq(Joint::ALL.iter().filter(|joint| bits & joint.bit() != 0).map(|joint| joint.number()))
 }
 
-impl Printable for Health {
+impl Printable for HealthFigures {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
         let styled = |is_good: bool, words: &str| {
             let style = if is_good { GOOD } else { BAD };
@@ -197,7 +197,7 @@ impl Printable for Health {
     }
 }
 
-impl Health {
+impl HealthFigures {
     fn write_counters(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{BOLD}Counters{BOLD:#}")?;
         line(out, "frames accepted", &self.frames_accepted.to_string())?;

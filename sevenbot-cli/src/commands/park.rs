@@ -10,7 +10,7 @@ use crate::command_error::CommandError;
 use crate::interrupt::hold_on_interrupt;
 use crate::printer::note;
 use crate::session::Session;
-use crate::watch::Watch;
+use crate::watch::ProgressWatch;
 
 /// Move the arm to a pose in which it may be let go, and let it go.
 ///
@@ -64,7 +64,10 @@ pub(crate) fn run(session: &mut Session, args: &ParkArgs) -> Result<(), CommandE
     let mut arm = session.connect_to_move()?;
     let pose = pose(&arm, args)?;
     let parked =
-        hold_on_interrupt(&mut arm, |arm, interrupt| Ok(arm.park(pose, &mut Watch::new(interrupt))?))?;
+        hold_on_interrupt(
+            &mut arm,
+            |arm, interrupt| Ok(arm.park(pose, &mut ProgressWatch::new(interrupt))?),
+        )?;
     if let (true, Some(pose)) = (args.keep, &pose) {
         keep(&arm, pose)?;
     }

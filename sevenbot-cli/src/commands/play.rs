@@ -21,10 +21,10 @@ use crate::guard_args::{GuardArgs, warn_of};
 use crate::input_file;
 use crate::interrupt::hold_on_interrupt;
 use crate::output_file::{ForceArg, OutputFile};
-use crate::plot::{self, Track};
+use crate::plot::{self, JointTrack};
 use crate::printer::Printable;
 use crate::session::Session;
-use crate::watch::{Watch, note_rounding_of};
+use crate::watch::{ProgressWatch, note_rounding_of};
 
 /// Play a recorded movement.
 ///
@@ -111,7 +111,9 @@ pub(super) fn follow(arm: &mut Arm, recording: &Recording) -> Result<(), Command
 }
 
 fn play(player: &mut Player, arm: &mut Arm, times: u32) -> Result<(), CommandError> {
-    hold_on_interrupt(arm, |arm, interrupt| Ok(player.play(arm, times, &mut Watch::new(interrupt))?))
+    hold_on_interrupt(arm, |arm, interrupt| {
+        Ok(player.play(arm, times, &mut ProgressWatch::new(interrupt))?)
+    })
 }
 
 /// Reads the recording, and checks that an arm can follow it.
@@ -144,7 +146,7 @@ fn times(text: &str) -> Result<u32, &'static str> {
 
 /// Targets and measured positions as SVG.
 fn drawing(recording: &Recording, player: &Player, args: &PlayArgs) -> String {
-    let mut tracks: [Track; 7] = Default::default();
+    let mut tracks: [JointTrack; 7] = Default::default();
     let start = recording.moments().next().map_or(Duration::ZERO, |moment| moment.time);
     for moment in recording.moments() {
         let seconds = (moment.time.saturating_sub(start)).as_secs_f64() / args.speed;

@@ -17,7 +17,7 @@ use crate::interrupt::hold_on_interrupt;
 use crate::printer::Printable;
 use crate::session::Session;
 use crate::step_target::step_target;
-use crate::watch::{Watch, note_rounding};
+use crate::watch::{ProgressWatch, note_rounding};
 
 /// Move joints to a pose.
 #[derive(Debug, Args)]
@@ -203,7 +203,7 @@ fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<
         interrupt.check()?;
         let begun = JointMove::begin_fine(arm, targets)?;
         note_rounding(&begun);
-        let reached = pace.wait.then(|| begun.finish(arm, &mut Watch::new(interrupt))).transpose()?;
+        let reached = pace.wait.then(|| begun.finish(arm, &mut ProgressWatch::new(interrupt))).transpose()?;
         reached.map(|whole| measured(arm, goals, whole)).transpose()
     });
     // While a joint may still move, another speed would act at once.
@@ -212,32 +212,34 @@ fn move_to(session: &mut Session, goals: &[PoseArg], pace: &PaceArgs) -> Result<
     }
     match reached? {
         None => Ok(()),
-        Some(Reached::Degrees(positions_degrees)) => session.printer.print(&Positions { positions_degrees }),
-        Some(Reached::Hundredths(positions)) => session.printer.print(&positions),
+        Some(ReachedPose::Degrees(positions_degrees)) => {
+            session.printer.print(&Positions { positions_degrees })
+        }
+        Some(ReachedPose::Hundredths(positions)) => session.printer.print(&positions),
     }
 }
 
 /// Measured positions, in the resolution of the arguments.
-enum Reached {
+enum ReachedPose {
     Degrees([u8; 7]),
     Hundredths(FinePositions),
 }
 
 /// The positions in hundredths if an argument has a fraction, and the arm measures them.
-fn measured(arm: &mut Arm, goals: &[PoseArg], whole: [u8; 7]) -> Result<Reached, CommandError> {
+fn measured(arm: &mut Arm, goals: &[PoseArg], whole: [u8; 7]) -> Result<ReachedPose, CommandError> {
     let is_whole = goals.iter().all(|goal| match goal {
         PoseArg::At(angle) => angle.is_whole(),
         PoseArg::By(hundredths) => hundredths % 100 == 0,
         PoseArg::Leave => true,
     });
     if is_whole || !arm.has_extended_block()? {
-        return Ok(Reached::Degrees(whole));
+        return Ok(ReachedPose::Degrees(whole));
     }
     let mut positions_degrees = whole.map(f64::from);
     for (degrees, angle) in positions_degrees.iter_mut().zip(arm.fine_state()?.positions) {
         *degrees = angle.map_or(*degrees, FineAngle::degrees);
     }
-    Ok(Reached::Hundredths(FinePositions { positions_degrees }))
+    Ok(ReachedPose::Hundredths(FinePositions { positions_degrees }))
 }
 
 fn targets(goals: &[PoseArg], arm: &mut Arm) -> Result<FineTargets, CommandError> {

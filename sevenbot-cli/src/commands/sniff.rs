@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde::Serialize;
+use sevenbot::host_line::HostLine;
 use sevenbot::open_port::OpenPort;
 use sevenbot::traffic::{Traffic, TrafficParser};
 use sevenbot::wire_log::{self, Sender};

@@ -59,12 +59,12 @@ pub(crate) struct ArmStatus {
     alarm_bits: Option<u8>,
     supply_lost: Option<bool>,
     protection: Option<bool>,
-    joints: Vec<JointStatus>,
+    joints: Vec<JointLine>,
     problems: Vec<ProblemText>,
 }
 
 #[derive(Debug, Serialize)]
-struct JointStatus {
+struct JointLine {
     joint: u8,
     position_degrees: Option<f64>,
     target_degrees: f64,
@@ -112,13 +112,13 @@ impl From<&Health> for ArmStatus {
             alarm_bits: health.alarms,
             supply_lost: health.is_supply_lost,
             protection: health.is_protected,
-            joints: health.joints.iter().map(|joint| JointStatus::of(joint, health.is_driven())).collect(),
+            joints: health.joints.iter().map(|joint| JointLine::of(joint, health.is_driven())).collect(),
             problems,
         }
     }
 }
 
-impl JointStatus {
+impl JointLine {
     fn of(joint: &JointHealth, is_driven: bool) -> Self {
         Self {
             joint: joint.joint.number(),

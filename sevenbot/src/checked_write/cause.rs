@@ -30,26 +30,28 @@ pub enum MismatchCause {
     NotServed,
     /// A write to any part of a position makes the maker's firmware move the arm, so it was not sent.
     StartsMotion,
-    /// The register is a setting, and the EEPROM lock protects it (D15).
+    /// The register is a setting, and the EEPROM lock protects it ([D15](protocol_core::decisions#d15)).
     Locked,
-    /// A value in the frame was out of range, so the arm ignored the whole frame (D16).
+    /// A value in the frame was out of range, so the arm ignored the whole frame ([D16](protocol_core::decisions#d16)).
     OutOfRange {
         /// The register with the value that was out of range.
         address: u8,
     },
-    /// The frame covered one byte of a two-byte register, so the arm ignored the whole frame (D22).
+    /// The frame covered one byte of a two-byte register, so the arm ignored the whole frame
+    /// ([D22](protocol_core::decisions#d22)).
     HalfOfWord {
         /// The register, at its low byte.
         address: u8,
     },
-    /// A target was against a limit that is switched on, so the arm ignored the whole frame (D25).
+    /// A target was against a limit that is switched on, so the arm ignored the whole frame
+    /// ([D25](protocol_core::decisions#d25)).
     AgainstLimit {
         /// The target, or the register of the limits if they were to be switched on.
         address: u8,
     },
-    /// No joint angles reach the position that a write of map 2.1 asks for (M7).
+    /// No joint angles reach the position that a write of map 2.1 asks for ([M7](protocol_core::decisions#m7)).
     OutOfReach,
-    /// The settings storage is full until the next restart (D19).
+    /// The settings storage is full until the next restart ([D19](protocol_core::decisions#d19)).
     StorageFull,
     /// The controller restarted since the write, and has its defaults.
     Restarted,

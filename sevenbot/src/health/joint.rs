@@ -33,11 +33,12 @@ pub struct JointHealth {
     pub is_moving: Option<bool>,
     /// Does the servo not answer?
     pub is_silent: Option<bool>,
-    /// Does an obstacle keep the joint from its target (D27)? Not of a gripper that holds something.
+    /// Does an obstacle keep the joint from its target ([D27](protocol_core::decisions#d27))? Not of a gripper that
+    /// holds something.
     pub is_blocked: Option<bool>,
     /// Does the joint, a gripper, hold something?
     pub is_gripping: Option<bool>,
-    /// Does the servo hold no torque although it should (D28)?
+    /// Does the servo hold no torque although it should ([D28](protocol_core::decisions#d28))?
     pub has_let_go: Option<bool>,
     /// Is the joint driven, at rest, and within 3 degrees of its target?
     pub is_at_target: bool,

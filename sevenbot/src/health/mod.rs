@@ -64,9 +64,11 @@ pub struct Health {
     pub faults: Option<u8>,
     /// The bits of [`crate::map::servo_alarm`], of all servos together.
     pub alarms: Option<u8>,
-    /// Did the controller switch the motors off because the servos lost their supply (D29)?
+    /// Did the controller switch the motors off because the servos lost their supply
+    /// ([D29](protocol_core::decisions#d29))?
     pub is_supply_lost: Option<bool>,
-    /// Does a joint that pushes too hard give way, and a servo that let go engage anew (D27, D28)?
+    /// Does a joint that pushes too hard give way, and a servo that let go engage anew
+    /// ([D27](protocol_core::decisions#d27), [D28](protocol_core::decisions#d28))?
     pub is_protected: Option<bool>,
     /// The supply voltage of the servos.
     pub supply_volts: Option<f64>,

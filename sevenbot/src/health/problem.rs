@@ -12,7 +12,8 @@ use protocol_core::registers::map::{fault, servo_alarm};
 pub enum ProblemKind {
     /// The controller restarted while a program used the arm.
     Restarted,
-    /// The supply of the servos was lost, and the controller keeps the motors off (D29).
+    /// The supply of the servos was lost, and the controller keeps the motors off
+    /// ([D29](protocol_core::decisions#d29)).
     SupplyLost,
     /// No servo answers.
     NoServoAnswers,
@@ -20,9 +21,9 @@ pub enum ProblemKind {
     NoAnswer,
     /// A servo reports that its supply is too low or too high.
     Voltage,
-    /// The joint's servo holds no torque although it should (D28).
+    /// The joint's servo holds no torque although it should ([D28](protocol_core::decisions#d28)).
     LetGo,
-    /// An obstacle keeps the joint from its target (D27).
+    /// An obstacle keeps the joint from its target ([D27](protocol_core::decisions#d27)).
     Blocked,
     /// A servo reports that it was overloaded.
     Overload,
@@ -30,9 +31,9 @@ pub enum ProblemKind {
     Overheat,
     /// A servo reports an error, and the firmware does not tell which.
     ServoBus,
-    /// The watchdog of the host acted (D24).
+    /// The watchdog of the host acted ([D24](protocol_core::decisions#d24)).
     HostSilent,
-    /// Settings cannot be stored, or could not be read (D19).
+    /// Settings cannot be stored, or could not be read ([D19](protocol_core::decisions#d19)).
     SettingsStorage,
     /// The controller hung and restarted.
     WatchdogRestart,

@@ -4,7 +4,7 @@
 //! of a read never has the length of its answer.
 
 use std::fmt;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use motion_core::servo_bus::frame::{self, Decoder, Instruction, ServoFrame, ServoFrameBuffer};
 
@@ -17,6 +17,9 @@ use crate::open_port::OpenPort;
 
 /// The line is idle after this time without bytes: more than the latency timer of an FTDI chip, 16 ms.
 const IDLE_TIME: Duration = Duration::from_millis(25);
+/// Pause before each frame: a servo releases the line some microseconds after its last stop bit. A USB adapter pauses
+/// longer anyway, but a UART on the bus may not.
+const GUARD_TIME: Duration = Duration::from_micros(100);
 
 /// Timeout and attempts.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +48,7 @@ pub struct ServoReply {
 /// The only master of a servo bus.
 pub struct BusMaster {
     line: Box<dyn ServoLine>,
+    start: Instant,
     options: BusOptions,
     decoder: Decoder,
     /// Received bytes that the decoder had no room for.
@@ -74,6 +78,7 @@ impl BusMaster {
     #[must_use]
     pub fn with_line(line: Box<dyn ServoLine>, options: BusOptions) -> Self {
         Self {
+            start: line.now(),
             line,
             options,
             decoder: Decoder::new(),
@@ -96,10 +101,10 @@ impl BusMaster {
         self.options
     }
 
-    /// The time since a fixed instant.
+    /// The time since the bus was opened.
     #[must_use]
     pub fn now(&self) -> Duration {
-        self.line.now()
+        self.line.now().saturating_duration_since(self.start)
     }
 
     /// Changes the baud rate. Drops bytes that have not been read.
@@ -216,12 +221,13 @@ impl BusMaster {
     ) -> Result<Option<ServoReply>, ServoError> {
         self.wait_for_silence(Duration::ZERO)?;
         trace!("-> {request:02x?}");
+        self.line.sleep(GUARD_TIME);
         self.line.send(request)?;
-        let deadline = self.line.now() + timeout;
+        let deadline = self.now() + timeout;
         loop {
-            let has_more = self.receive(deadline.saturating_sub(self.line.now()))?;
+            let has_more = self.receive(deadline.saturating_sub(self.now()))?;
             let answer = self.find_answer(request, &is_answer);
-            if answer.is_some() || (!has_more && self.line.now() >= deadline) {
+            if answer.is_some() || (!has_more && self.now() >= deadline) {
                 return Ok(answer);
             }
         }

@@ -139,7 +139,7 @@ fn drive(
     bus.write(id, register::GOAL_POSITION, &goal(start, options.speed))?;
     bus.write(id, register::TORQUE_SWITCH, &TORQUE_ON)?;
     bus.write(id, register::GOAL_POSITION, &goal(MIDDLE, options.speed))?;
-    let mut check = MoveCheck { closest: start.abs_diff(MIDDLE), since: bus.now(), overloaded: 0 };
+    let mut check = CenterCheck { closest: start.abs_diff(MIDDLE), since: bus.now(), overloaded: 0 };
     loop {
         bus.wait_for_silence(options.poll_period)?;
         let (reading, errors, is_moving) = measure(bus, id)?;
@@ -169,7 +169,7 @@ fn measure(bus: &mut BusMaster, id: u8) -> Result<(Reading, u8, bool), CenterErr
 }
 
 /// Progress and load of the move so far.
-struct MoveCheck {
+struct CenterCheck {
     /// The smallest distance to the middle, in counts.
     closest: u16,
     /// When the servo was that close first.
@@ -178,7 +178,7 @@ struct MoveCheck {
     overloaded: u32,
 }
 
-impl MoveCheck {
+impl CenterCheck {
     fn update(
         &mut self,
         reading: &Reading,

@@ -28,8 +28,6 @@ pub mod servo_info;
 pub mod servo_line;
 pub mod set_id;
 #[cfg(test)]
-mod simulated;
-#[cfg(test)]
 mod tests;
 
 pub use bus_master::{BusMaster, BusOptions, ServoReply};

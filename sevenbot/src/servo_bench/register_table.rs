@@ -313,7 +313,7 @@ const _: () = assert!(MAX_ID == 253, "the range of the id is that of the table")
 
 #[cfg(test)]
 mod tests {
-    use super::super::simulated::{SimulatedServo, bus};
+    use super::super::tests::simulated::{SimulatedServo, bus};
     use super::*;
 
     fn row(name: &str) -> &'static ServoRegister {
@@ -337,11 +337,11 @@ mod tests {
         let (mut bus, wire) = bus(vec![SimulatedServo::new(3)]);
         assert_eq!(set(&mut bus, 3, row("max-torque"), 600).map(|set| set.value), Ok(600));
         assert_eq!(get(&mut bus, 3, row("lock")).map(|lock| lock.value), Ok(1));
-        let sent = wire.borrow().sent.clone();
+        let sent = wire.lock().unwrap().sent.clone();
         let writes: Vec<_> =
             sent.iter().filter(|frame| frame[4] == 3).map(|frame| frame[5..7].to_vec()).collect();
         assert_eq!(writes, [vec![48, 0], vec![16, 2], vec![48, 1]]);
-        wire.borrow_mut().servos[0].servo.power_cycle(protocol_core::time::Instant::ZERO);
+        wire.lock().unwrap().servos[0].servo.power_cycle(protocol_core::time::Instant::ZERO);
         assert_eq!(get(&mut bus, 3, row("max-torque")).map(|kept| kept.value), Ok(600));
     }
 
@@ -354,14 +354,14 @@ mod tests {
             let register = *row("max-torque");
             assert_eq!(set(&mut bus, 3, &register, value), Err(SetError::OutOfRange { register, value }));
         }
-        assert_eq!(wire.borrow().sent.len(), 0);
+        assert_eq!(wire.lock().unwrap().sent.len(), 0);
     }
 
     #[test]
     fn a_new_baud_rate_is_that_of_the_bus_from_then_on() {
         let (mut bus, wire) = bus(vec![SimulatedServo::new(3)]);
         assert_eq!(set(&mut bus, 3, row("baud-rate"), 4).map(|set| set.value), Ok(4));
-        assert_eq!(wire.borrow().servos[0].servo.baud(), 115_200);
+        assert_eq!(wire.lock().unwrap().servos[0].servo.baud(), 115_200);
         assert_eq!(get(&mut bus, 3, row("lock")).map(|lock| lock.value), Ok(1));
     }
 

@@ -60,9 +60,9 @@ impl ServoInfo {
     /// # Errors
     /// The servo does not answer, or the port failed.
     pub fn read(bus: &mut BusMaster, id: u8) -> Result<Self, ServoError> {
-        let settings = Block::read(bus, id, 0, SETTINGS)?;
-        let orders = Block::read(bus, id, register::TORQUE_SWITCH, ORDERS)?;
-        let measured = Block::read(bus, id, register::PRESENT_POSITION, MEASURED)?;
+        let settings = RegisterBlock::read(bus, id, 0, SETTINGS)?;
+        let orders = RegisterBlock::read(bus, id, register::TORQUE_SWITCH, ORDERS)?;
+        let measured = RegisterBlock::read(bus, id, register::PRESENT_POSITION, MEASURED)?;
         let reading = measured.values.get(..usize::from(Reading::REGISTERS));
         Ok(Self {
             id,
@@ -118,13 +118,13 @@ pub fn error_words(errors: u8) -> String {
 }
 
 /// Consecutive registers from one answer.
-struct Block {
+struct RegisterBlock {
     first: u8,
     errors: u8,
     values: Vec<u8>,
 }
 
-impl Block {
+impl RegisterBlock {
     fn read(bus: &mut BusMaster, id: u8, first: u8, count: u8) -> Result<Self, ServoError> {
         let answer = bus.read(id, first, count)?;
         Ok(Self { first, errors: answer.errors, values: answer.values })

@@ -7,14 +7,16 @@ use motion_core::servo_bus::Torque;
 use motion_core::servo_bus::frame::{ServoFrameBuffer, error, register, write};
 use protocol_core::time::{Duration as SimulatedDuration, Instant};
 
+pub(super) mod simulated;
+
 use super::bus_master::BusMaster;
 use super::center::{CenterError, CenterOptions, center};
 use super::error::ServoError;
 use super::scan::{AnswerQuality, FoundServo, ScanPlan, ScanResult, scan};
 use super::servo_info::{ServoInfo, error_words};
 use super::set_id::{SetIdError, set_id};
-use super::simulated::{SimulatedServo, bus};
 use super::{BAUD_RATES, MAX_ID};
+use simulated::{SimulatedServo, bus};
 
 const FAST: u32 = 1_000_000;
 
@@ -73,7 +75,7 @@ fn a_scan_of_one_rate_takes_at_most_two_seconds() {
 #[test]
 fn an_answer_after_an_echo_is_found() {
     let (mut bus, wire) = bus([1, 5].map(SimulatedServo::new).into());
-    wire.borrow_mut().has_echo = true;
+    wire.lock().unwrap().has_echo = true;
     assert_eq!(
         found(&mut bus, &plan(&[FAST])),
         [(FAST, 1, AnswerQuality::Good), (FAST, 5, AnswerQuality::Good)]
@@ -90,11 +92,11 @@ fn a_servo_with_a_voltage_error_is_found_despite_echoes() {
     let servo = SimulatedServo { errors: error::VOLTAGE, ..SimulatedServo::new(4) };
     let (mut bus, wire) = bus(vec![servo]);
     for has_echo in [false, true] {
-        wire.borrow_mut().has_echo = has_echo;
+        wire.lock().unwrap().has_echo = has_echo;
         assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 4, AnswerQuality::Good)]);
     }
     // An answer with two values is as long as a question, and error bits 2 equal the code of a read.
-    wire.borrow_mut().servos[0].errors = 2;
+    wire.lock().unwrap().servos[0].errors = 2;
     let answer = bus.read(4, register::ID, 2).unwrap();
     assert_eq!((answer.errors, answer.values), (2, vec![4, 0]));
 }
@@ -109,7 +111,8 @@ fn a_scan_with_a_slow_adapter_finds_every_servo() {
 #[test]
 fn late_echoes_are_not_late_answers() {
     let (mut bus, wire) = bus(vec![SimulatedServo::new(3)]);
-    (wire.borrow_mut().has_echo, wire.borrow_mut().echo_delay) = (true, Duration::from_millis(60));
+    wire.lock().unwrap().has_echo = true;
+    wire.lock().unwrap().echo_delay = Duration::from_millis(60);
     assert_eq!(found(&mut bus, &plan(&[FAST])), [(FAST, 3, AnswerQuality::Good)]);
     assert!(bus.has_echo());
     // In virtual time: 254 short timeouts, and full timeouts for one id only.
@@ -129,7 +132,7 @@ fn damaged_answers_and_duplicate_ids_are_reported() {
 #[test]
 fn unsupported_rates_are_reported() {
     let (mut bus, wire) = bus(vec![SimulatedServo::new(0)]);
-    wire.borrow_mut().rates = vec![500_000, FAST];
+    wire.lock().unwrap().rates = vec![500_000, FAST];
     let scan = scan(&mut bus, &plan(&BAUD_RATES), |_| ()).unwrap();
     assert_eq!(scan.found.len(), 1);
     assert_eq!(scan.unknown_rates, BAUD_RATES[2..]);
@@ -139,7 +142,7 @@ fn unsupported_rates_are_reported() {
 fn a_late_answer_is_not_taken_for_the_next() {
     let (mut bus, wire) = bus(vec![SimulatedServo::with(0, late(610_000))]);
     assert!(matches!(bus.read(0, register::ID, 1), Err(ServoError::NoAnswer { attempts: 3, .. })));
-    wire.borrow_mut().servos[0].set_fault(None);
+    wire.lock().unwrap().servos[0].set_fault(None);
     assert_eq!(bus.read(0, register::RESPONSE_LEVEL, 1).unwrap().values, [1]);
 }
 
@@ -163,9 +166,9 @@ fn registers_are_read_high_byte_first() {
 fn an_id_is_changed_and_locked_again() {
     for has_echo in [false, true] {
         let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
-        wire.borrow_mut().has_echo = has_echo;
+        wire.lock().unwrap().has_echo = has_echo;
         set_id(&mut bus, &ScanPlan::all_ids(FAST, None), 1, 6, |_| ()).unwrap();
-        let servo = &mut wire.borrow_mut().servos[0].servo;
+        let servo = &mut wire.lock().unwrap().servos[0].servo;
         servo.power_cycle(Instant::ZERO);
         assert_eq!(servo.id(), 6);
     }
@@ -180,7 +183,7 @@ fn an_id_is_changed_on_a_servo_that_acknowledges_nothing() {
     set(&mut servo, register::RESPONSE_LEVEL, &[0]);
     let (mut bus, wire) = bus(vec![servo]);
     set_id(&mut bus, &ScanPlan::all_ids(FAST, None), 1, 6, |_| ()).unwrap();
-    assert_eq!(wire.borrow().servos[0].servo.id(), 6);
+    assert_eq!(wire.lock().unwrap().servos[0].servo.id(), 6);
 }
 
 #[test]
@@ -197,7 +200,7 @@ fn a_new_id_needs_exactly_one_servo() {
         let error = set_id(&mut bus, &ScanPlan::all_ids(FAST, None), 1, 6, |_| ()).unwrap_err();
         assert!(matches!(error, SetIdError::NotAlone { .. }));
         assert!(error.to_string().contains(says), "{error}");
-        assert!(wire.borrow().sent.iter().all(|frame| frame[4] == 2), "only reads");
+        assert!(wire.lock().unwrap().sent.iter().all(|frame| frame[4] == 2), "only reads");
     }
 }
 
@@ -208,7 +211,7 @@ fn a_servo_lost_while_unlocking_is_an_error() {
     scan(&mut first, &plan, |_| ()).unwrap();
     let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
     // Just after the scan, while the EEPROM is being unlocked.
-    wire.borrow_mut().servos[0].fails_at = first.now() + Duration::from_micros(100);
+    wire.lock().unwrap().servos[0].fails_at = first.now() + Duration::from_micros(100);
     let error = set_id(&mut bus, &plan, 1, 6, |_| ()).unwrap_err();
     assert!(matches!(error, SetIdError::StaysLocked(_)), "{error:?}");
 }
@@ -218,13 +221,13 @@ fn each_error_after_a_lost_port_gives_the_servos_state() {
     let plan = ScanPlan::all_ids(FAST, None);
     let (mut bus_to_count, counted) = bus(vec![SimulatedServo::new(1)]);
     set_id(&mut bus_to_count, &plan, 1, 6, |_| ()).unwrap();
-    let frames = counted.borrow().sent.clone();
+    let frames = counted.lock().unwrap().sent.clone();
     let first_write = frames.iter().position(|frame| frame[4] == 3).unwrap();
     for frames_until_lost in first_write..frames.len() {
         let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
-        wire.borrow_mut().frames_until_lost = Some(frames_until_lost);
+        wire.lock().unwrap().frames_until_lost = Some(frames_until_lost);
         let error = set_id(&mut bus, &plan, 1, 6, |_| ()).unwrap_err();
-        let id = wire.borrow().servos[0].servo.id();
+        let id = wire.lock().unwrap().servos[0].servo.id();
         match error {
             SetIdError::StaysLocked(_) => assert_eq!(id, 1),
             SetIdError::StaysOpen(_) => assert_eq!(id, 6),
@@ -240,7 +243,8 @@ fn a_servo_moves_to_its_middle_without_a_jump() {
     let middle = center(&mut bus, 1, &CenterOptions::default(), |_| true);
     assert!(matches!(middle, Ok(510..=512)), "static friction holds it up to a count off: {middle:?}");
     let goals: Vec<Vec<u8>> = wire
-        .borrow()
+        .lock()
+        .unwrap()
         .sent
         .iter()
         .filter(|frame| frame[4] == 3)
@@ -258,11 +262,11 @@ fn a_blocked_servo_loses_its_torque() {
         matches!(error, CenterError::Overload { position: 300, load: 601..=1_000, errors: 0 }),
         "{error:?}"
     );
-    assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
+    assert_ne!(wire.lock().unwrap().servos[0].servo.torque_switch(), Torque::On);
     let weak = CenterOptions { load: 1_000, stall: Duration::from_millis(500), ..CenterOptions::default() };
     let error = center(&mut bus, 1, &weak, |_| true).unwrap_err();
     assert_eq!(error, CenterError::Stalled { position: 300 });
-    assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
+    assert_ne!(wire.lock().unwrap().servos[0].servo.torque_switch(), Torque::On);
 }
 
 #[test]
@@ -271,7 +275,7 @@ fn an_interrupted_move_ends_without_torque() {
     let error =
         center(&mut bus, 1, &CenterOptions::default(), |reading| reading.position_counts < 320).unwrap_err();
     assert_eq!(error, CenterError::Interrupted);
-    assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
+    assert_ne!(wire.lock().unwrap().servos[0].servo.torque_switch(), Torque::On);
 }
 
 #[test]
@@ -282,7 +286,7 @@ fn a_servo_that_cannot_reach_its_middle_gets_no_torque() {
         let (mut bus, wire) = bus(vec![servo]);
         let error = center(&mut bus, 1, &CenterOptions::default(), |_| true).unwrap_err();
         assert!(error.to_string().contains(says), "{error}");
-        assert_ne!(wire.borrow().servos[0].servo.torque_switch(), Torque::On);
+        assert_ne!(wire.lock().unwrap().servos[0].servo.torque_switch(), Torque::On);
     }
 }
 
@@ -290,7 +294,7 @@ fn a_servo_that_cannot_reach_its_middle_gets_no_torque() {
 fn a_servo_lost_during_its_move_may_still_be_moving() {
     let (mut bus, wire) = bus(vec![SimulatedServo::new(1)]);
     let silence = Duration::from_millis(500);
-    wire.borrow_mut().servos[0].fails_at = silence;
+    wire.lock().unwrap().servos[0].fails_at = silence;
     let error = center(&mut bus, 1, &CenterOptions::default(), |_| true).unwrap_err();
     assert!(matches!(error, CenterError::TorqueStillOn(_)), "{error:?}");
     assert!(error.to_string().contains("may still be moving"), "{error}");

@@ -1,4 +1,4 @@
-//! The emulator's debugger interface: GDB's remote serial protocol, as far as breakpoints need it.
+//! The emulator's debugger interface: GDB's remote serial protocol, as far as breakpoints and jumps need it.
 //!
 //! ```text
 //!   $data#checksum      both directions; the other end acknowledges with +
@@ -10,15 +10,18 @@ use std::path::Path;
 
 use crate::process::{TIMEOUT, TaskResult, wait_for};
 
-/// A connection to an emulator that is stopped.
-pub(crate) struct Debugger {
+/// A connection to an emulator. It is stopped as long as it lasts.
+pub struct Debugger {
     stream: UnixStream,
     received: Vec<u8>,
 }
 
 impl Debugger {
-    /// Connects to the socket of an emulator that waits for its debugger.
-    pub(crate) fn connect(socket: &Path) -> TaskResult<Self> {
+    /// Connects to the emulator's socket for a debugger, which stops the chip.
+    ///
+    /// # Errors
+    /// The socket does not open.
+    pub fn connect(socket: &Path) -> TaskResult<Self> {
         let stream =
             wait_for("the emulator opens its debugger socket", || Ok(UnixStream::connect(socket).ok()))?;
         stream.set_read_timeout(Some(TIMEOUT))?;
@@ -50,9 +53,37 @@ impl Debugger {
         Ok(word.swap_bytes())
     }
 
+    /// Makes the chip go on at another instruction, without the debugger.
+    ///
+    /// # Errors
+    /// The emulator refuses it.
+    pub fn continue_at(mut self, address: u32) -> TaskResult {
+        self.answer("qSupported")?;
+        // The emulator allows writes of registers only to a debugger that has read its description of the chip.
+        self.answer("qXfer:features:read:target.xml:0,40")?;
+        let reply = self.answer(&format!("Pf={:08x}", address.swap_bytes()))?;
+        if reply != "OK" {
+            Err(format!("the emulator does not set the program counter: {reply}"))?;
+        }
+        self.answer("D").map(drop)
+    }
+
+    /// The reply to a command that does not run the chip. The notice that the chip has stopped may arrive before it.
+    fn answer(&mut self, command: &str) -> TaskResult<String> {
+        let mut reply = self.execute(command)?;
+        while reply.starts_with('T') {
+            reply = self.next_reply()?;
+        }
+        Ok(reply)
+    }
+
     fn execute(&mut self, command: &str) -> TaskResult<String> {
         let checksum = command.bytes().fold(0_u8, u8::wrapping_add);
         self.stream.write_all(format!("${command}#{checksum:02x}").as_bytes())?;
+        self.next_reply()
+    }
+
+    fn next_reply(&mut self) -> TaskResult<String> {
         let mut bytes = [0; 256];
         loop {
             if let Some(reply) = self.take_reply() {

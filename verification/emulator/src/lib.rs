@@ -21,7 +21,7 @@ use tempfile::TempDir;
 use tty_ports::symlink::Symlink;
 
 pub mod chip_program;
-mod debugger;
+pub mod debugger;
 pub mod lockstep;
 mod log;
 pub mod monitor;

@@ -41,8 +41,8 @@ pub struct Lockstep<B> {
     debugger: Debugger,
     monitor: Monitor,
     log: PathBuf,
-    host: Line,
-    servos: Line,
+    host: ImageLine,
+    servos: ImageLine,
     sent_to_servos: usize,
     now: Instant,
     // In this order: the emulator ends before the sockets.
@@ -59,7 +59,7 @@ pub struct Sent {
 }
 
 /// One serial line of the image.
-struct Line {
+struct ImageLine {
     stream: UnixStream,
     status: u32,
     to_image: VecDeque<u8>,
@@ -79,7 +79,7 @@ impl<B: ServoBus> Lockstep<B> {
         let options = ["-S", "-icount", "shift=3,sleep=on", "-singlestep", "-D", &log_option];
         let options = [&options[..], &["-chardev", &chardev, "-gdb", "chardev:debugger"]].concat();
         let machine = crate::start_machine(&IMAGE, &folder, &crate::servo_socket(&folder), &options)?;
-        let line = |listener, status| Line::accept(listener, status);
+        let line = |listener, status| ImageLine::accept(listener, status);
         let (host, servos) = (line(&host, HOST_STATUS)?, line(&servos, SERVO_STATUS)?);
         let monitor = Monitor::new(monitor::accept(&commands)?, folder.path())?;
         let mut debugger = Debugger::connect(&socket)?;
@@ -152,7 +152,7 @@ impl<B: ServoBus> Lockstep<B> {
     }
 }
 
-impl Line {
+impl ImageLine {
     fn accept(listener: &UnixListener, status: u32) -> TaskResult<Self> {
         let stream = monitor::accept(listener)?;
         stream.set_nonblocking(true)?;

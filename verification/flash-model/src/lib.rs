@@ -8,11 +8,24 @@
 //! - A sector whose erase was cut may read as anything, even as blank. Programming it before a complete erase is an error.
 //! - Erases can be forbidden, sectors and cells wear out, bits flip. An inert flash changes nothing, as in an emulator.
 //!
-//! The flash of a chip also has a [`Cache`], a [`Supply`] and a [`Comparator`] that monitors the supply. A model of a chip
+//! The flash of a chip also has a [`Cache`], a [`FlashSupply`] and a [`Comparator`] that monitors the supply. A model of a chip
 //! combines them with [`Flash`].
 //!
 //! The model does not know what is stored in it. It is cheap to clone, so that a test can try every continuation of a
 //! state.
+//!
+//! ```
+//! use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
+//! use flash_model::{Error, Flash};
+//!
+//! let mut flash = Flash::new(2);
+//! flash.write(0, &[1, 2, 3, 4])?;
+//! assert!(flash.write(0, &[5, 2, 3, 4]).is_err(), "a programmed word needs an erase first");
+//! let mut bytes = [0; 4];
+//! flash.read(0, &mut bytes)?;
+//! assert_eq!(bytes, [1, 2, 3, 4]);
+//! # Ok::<(), Error>(())
+//! ```
 
 mod cache;
 mod error;
@@ -27,7 +40,7 @@ pub use error::Error;
 pub use flash::{Cut, Flash, Operation};
 pub use power_cut::{EraseTear, ProgramTear};
 pub use random::Random;
-pub use supply::{Comparator, Supply};
+pub use supply::{Comparator, FlashSupply};
 
 #[cfg(test)]
 mod tests;

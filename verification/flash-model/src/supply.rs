@@ -2,12 +2,12 @@
 
 /// A voltage over time, linear between points.
 #[derive(Clone, Debug)]
-pub struct Supply {
+pub struct FlashSupply {
     /// Microseconds and millivolts, in ascending order of time. The last voltage stays.
     points: Vec<(u32, u32)>,
 }
 
-impl Supply {
+impl FlashSupply {
     /// A constant supply.
     #[must_use]
     pub fn steady(millivolts: u32) -> Self {
@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn the_voltage_is_interpolated_between_points() {
-        let supply = Supply::steady(3_300).then(100, 3_300).then(200, 2_800).then(600, 3_300);
+        let supply = FlashSupply::steady(3_300).then(100, 3_300).then(200, 2_800).then(600, 3_300);
         assert_eq!(
             [0, 99, 150, 200, 400, 9_999].map(|at| supply.at(at)),
             [3_300, 3_300, 3_050, 2_800, 3_050, 3_300]

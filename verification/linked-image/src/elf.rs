@@ -14,7 +14,7 @@ use crate::ReadResult;
 use crate::jump_table::FunctionCode;
 use crate::thumb_decode::{self, Effect, halfword};
 
-type Lines<'data> = addr2line::Context<EndianSlice<'data, LittleEndian>>;
+type SourceLines<'data> = addr2line::Context<EndianSlice<'data, LittleEndian>>;
 
 /// A linked program.
 pub struct Program<'data> {
@@ -27,7 +27,7 @@ pub struct Program<'data> {
     instructions: BTreeMap<u64, Effect>,
     /// The addresses of the exception handlers, reset first, each handler once.
     handlers: Vec<u64>,
-    lines: Lines<'data>,
+    lines: SourceLines<'data>,
 }
 
 /// A function or a piece of data.
@@ -277,11 +277,11 @@ fn handlers(elf: &ElfFile32<'_>) -> ReadResult<Vec<u64>> {
     Ok(handlers)
 }
 
-fn lines<'data>(elf: &ElfFile32<'data>) -> ReadResult<Lines<'data>> {
+fn lines<'data>(elf: &ElfFile32<'data>) -> ReadResult<SourceLines<'data>> {
     let section = |id: gimli::SectionId| -> ReadResult<_> {
         let section = elf.section_by_name(id.name());
         let bytes = section.map_or(Ok([].as_slice()), |section| section.data())?;
         Ok(EndianSlice::new(bytes, LittleEndian))
     };
-    Ok(Lines::from_dwarf(gimli::Dwarf::load(section)?)?)
+    Ok(SourceLines::from_dwarf(gimli::Dwarf::load(section)?)?)
 }

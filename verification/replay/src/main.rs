@@ -9,7 +9,7 @@ use wasmi::{Engine, Linker, Module, Store, TypedFunc};
 
 /// Records random sessions natively and in a WebAssembly module, compares them, and replays them.
 #[derive(Debug, Parser)]
-struct Options {
+struct ReplayOptions {
     /// The module: this package, built for wasm32-unknown-unknown
     #[arg(long)]
     module: PathBuf,
@@ -46,7 +46,7 @@ impl WasmModule {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let Options { module, sessions, times, seed } = Options::parse();
+    let ReplayOptions { module, sessions, times, seed } = ReplayOptions::parse();
     let mut wasm = WasmModule::load(&module)?;
     for seed in seed..seed + sessions {
         let checksum = wasm.session_checksum.call(&mut wasm.store, seed)?;

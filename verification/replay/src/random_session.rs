@@ -23,9 +23,9 @@ const ARM_FAULTS: [&str; 5] =
 
 /// Collects the lines of a session.
 #[derive(Clone, Debug, Default)]
-struct Lines(Arc<Mutex<String>>);
+struct SessionLines(Arc<Mutex<String>>);
 
-impl Lines {
+impl SessionLines {
     fn add(&self, line: &dyn std::fmt::Display) {
         let mut text = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         // A string takes everything.
@@ -33,9 +33,9 @@ impl Lines {
     }
 }
 
-impl Recorder for Lines {
+impl Recorder for SessionLines {
     fn add(&mut self, entry: &Entry) {
-        Lines::add(self, entry);
+        SessionLines::add(self, entry);
     }
 }
 
@@ -43,7 +43,7 @@ impl Recorder for Lines {
 #[must_use]
 pub fn random_session(seed: u64) -> String {
     let mut random = Random(Xoshiro256PlusPlus::seed_from_u64(seed));
-    let lines = Lines::default();
+    let lines = SessionLines::default();
     lines.add(&SessionHeader::default());
     let mut arm = Simulation::default();
     arm.set_recorder(lines.clone());

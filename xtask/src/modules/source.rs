@@ -14,7 +14,7 @@ pub(crate) type Path = Vec<String>;
 
 /// The contents of a file, without tests.
 #[derive(Debug, Default)]
-pub(crate) struct Source {
+pub(crate) struct SourceFile {
     /// Modules in files of their own: `mod name;`.
     pub(crate) modules: Vec<String>,
     /// Names of defined items.
@@ -33,7 +33,7 @@ type Tokens = Peekable<IntoIter>;
 const ITEMS: [&str; 10] =
     ["const", "enum", "fn", "macro_rules", "mod", "static", "struct", "trait", "type", "union"];
 
-impl Source {
+impl SourceFile {
     /// Reads a file.
     pub(crate) fn parse(text: &str) -> TaskResult<Self> {
         let mut source = Self::default();
@@ -193,7 +193,8 @@ mod tests {
     #[test]
     fn imports_are_parsed() {
         let source =
-            Source::parse("use crate::a::{self, b as c, d::{E, F}}; pub use super::g::*; use h;").unwrap();
+            SourceFile::parse("use crate::a::{self, b as c, d::{E, F}}; pub use super::g::*; use h;")
+                .unwrap();
         let expected = [
             ("a", "crate::a"),
             ("c", "crate::a::b"),
@@ -212,7 +213,7 @@ mod tests {
     fn paths_are_found_in_bodies_and_macros_but_not_in_comments_and_tests() {
         let text = "/// [`crate::doc`]\nconst fn f() { a::b(); println!(\"{}\", super::c::D); }\n\
                     #[cfg(test)]\nmod tests { use super::e::F; fn g() { h::i(); } }\n#[inline]\nfn last() {}";
-        let source = Source::parse(text).unwrap();
+        let source = SourceFile::parse(text).unwrap();
         assert_eq!(source.paths, [path("a::b"), path("super::c::D")]);
         assert_eq!(source.items, ["f", "last"]);
         assert!(source.imports.is_empty());
@@ -221,7 +222,8 @@ mod tests {
     #[test]
     fn reexports_are_found() {
         let source =
-            Source::parse("pub use a::B; pub(crate) use c::D; use e::F; pub fn g() { use h::I; }").unwrap();
+            SourceFile::parse("pub use a::B; pub(crate) use c::D; use e::F; pub fn g() { use h::I; }")
+                .unwrap();
         assert_eq!(source.reexports, [path("a::B"), path("c::D")]);
         assert_eq!(source.imports.len(), 4);
     }
@@ -229,7 +231,7 @@ mod tests {
     #[test]
     fn modules_in_files_differ_from_inline_modules() {
         let source =
-            Source::parse("mod a; pub(crate) mod b; mod c { fn d() {} } #[cfg(test)] mod e;").unwrap();
+            SourceFile::parse("mod a; pub(crate) mod b; mod c { fn d() {} } #[cfg(test)] mod e;").unwrap();
         assert_eq!(source.modules, ["a", "b"]);
         assert_eq!(source.items, ["c", "d"]);
     }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path as FilePath, PathBuf};
 
-use super::source::{Path, Source};
+use super::source::{Path, SourceFile};
 use crate::run::TaskResult;
 
 /// The largest number of imports to follow for one path.
@@ -14,7 +14,7 @@ const MAX_IMPORTS: usize = 16;
 type Module = Vec<String>;
 
 /// The modules of a crate with their files.
-pub(crate) struct Tree(BTreeMap<Module, (PathBuf, Source)>);
+pub(crate) struct Tree(BTreeMap<Module, (PathBuf, SourceFile)>);
 
 /// The files that a file uses.
 pub(crate) type Uses = BTreeMap<PathBuf, BTreeSet<PathBuf>>;
@@ -31,7 +31,7 @@ impl Tree {
     /// Adds a module and those below it, which are in `folder`.
     fn add(&mut self, module: Module, file: PathBuf, folder: &FilePath) -> TaskResult {
         let text = fs::read_to_string(&file).map_err(|why| format!("{}: {why}", file.display()))?;
-        let source = Source::parse(&text).map_err(|why| format!("{}: {why}", file.display()))?;
+        let source = SourceFile::parse(&text).map_err(|why| format!("{}: {why}", file.display()))?;
         for name in &source.modules {
             let inner = folder.join(name);
             let [flat, nested] = [inner.with_extension("rs"), inner.join("mod.rs")];

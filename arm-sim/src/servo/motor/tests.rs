@@ -1,6 +1,6 @@
 use super::MotorMode::{Blocked, Driven, Free};
 use super::*;
-use crate::servo::surroundings::{Obstacle, Side};
+use crate::servo::surroundings::{Side, Surface};
 
 /// A motor may take longer than its set-point by this.
 const SETTLING_MS: u32 = 250;
@@ -221,7 +221,7 @@ fn motor_at_a_wall(stiffness: Option<i64>) -> Motor {
     let mut motor = motor(1);
     motor.turn_to(500);
     motor.step(Free);
-    motor.surroundings.wall = Some(Obstacle { side: Side::MoreCounts, position: 520 * COUNT, stiffness });
+    motor.surroundings.wall = Some(Surface { side: Side::MoreCounts, position: 520 * COUNT, stiffness });
     motor
 }
 
@@ -241,7 +241,7 @@ fn a_stiff_wall_stops_a_motor_which_then_pushes() {
     steps(&mut motor, 500, Driven);
     assert_is_at(&motor, 530);
     motor.surroundings.wall =
-        Some(Obstacle { side: Side::MoreCounts, position: 520 * COUNT, stiffness: None });
+        Some(Surface { side: Side::MoreCounts, position: 520 * COUNT, stiffness: None });
     motor.start(goal(400, 0, 0));
     steps(&mut motor, 1_000, Driven);
     assert_is_at(&motor, 400);

@@ -3,7 +3,7 @@
 
 use std::cell::{Cell, RefCell};
 
-use flash_model::{Cache, Comparator, Supply};
+use flash_model::{Cache, Comparator, FlashSupply};
 
 use super::super::*;
 use super::{FIRST_SECTOR, SECOND, WRITE_PROTECTED};
@@ -27,7 +27,7 @@ pub(super) struct ChipModel {
     /// Time to erase a sector.
     pub(super) sector_micros: u32,
     pub(super) brown_out_level_3: bool,
-    pub(super) supply: Supply,
+    pub(super) supply: FlashSupply,
     pub(super) monitor: RefCell<Option<Comparator>>,
     /// The time from which the monitor is valid.
     pub(super) monitor_settled: u32,
@@ -62,7 +62,7 @@ impl ChipModel {
             word_micros: 16,
             sector_micros: 250_000,
             brown_out_level_3: true,
-            supply: Supply::steady(3_300),
+            supply: FlashSupply::steady(3_300),
             monitor: RefCell::new(None),
             monitor_settled: 0,
             protected: false,
@@ -71,7 +71,7 @@ impl ChipModel {
         }
     }
 
-    pub(super) fn supplied(supply: Supply) -> Self {
+    pub(super) fn supplied(supply: FlashSupply) -> Self {
         Self { supply, ..Self::new() }
     }
 

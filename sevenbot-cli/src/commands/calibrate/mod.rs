@@ -24,7 +24,7 @@ use crate::interrupt::hold_on_interrupt;
 use crate::printer::{Printable, note, warn};
 use crate::session::Session;
 use crate::step_target::step_target;
-use crate::watch::Watch;
+use crate::watch::ProgressWatch;
 use crate::write_result::uses_offsets_after_restart;
 use sevenbot::moves::JointMove;
 
@@ -173,7 +173,7 @@ fn nudge(arm: &mut Arm, joint: Joint, degrees: i16) -> Result<(), CommandError> 
         let wanted = step_target(&arm.driven_joints()?, joint, degrees)?.max(0);
         let wanted = u8::try_from(wanted).unwrap_or(u8::MAX).min(Angle::MAX_DEGREES);
         let targets = Joint::ALL.map(|other| (other == joint).then_some(wanted));
-        Ok(JointMove::begin(arm, targets)?.finish(arm, &mut Watch::new(interrupt))?)
+        Ok(JointMove::begin(arm, targets)?.finish(arm, &mut ProgressWatch::new(interrupt))?)
     });
     match moved {
         Err(CommandError::Arm(reason)) => warn(reason),

@@ -11,7 +11,7 @@ use sevenbot::map::{MOTOR_STATE, SPEED, motor_state};
 use sevenbot::moves::JointMove;
 use sevenbot::{Angle, Arm, ArmOptions, Error, Joint, ports};
 
-use super::sample::Sample;
+use super::sample::ArmSample;
 use super::view::{ArmEvent, UiCommand};
 use crate::command_error::CommandError;
 use crate::interrupt::{Interrupt, hold};
@@ -110,7 +110,7 @@ impl ArmThread {
         let mut unanswered = 0;
         let mut due = Instant::now();
         loop {
-            let ended = match Sample::take(arm, self.start) {
+            let ended = match ArmSample::take(arm, self.start) {
                 Ok(sample) => {
                     unanswered = 0;
                     self.tell(ArmEvent::Sample(sample))

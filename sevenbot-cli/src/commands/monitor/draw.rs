@@ -25,8 +25,8 @@ use sevenbot::{Angle, Joint};
 
 use super::keys::HELP;
 use super::plot_kind::{PastSample, PlotKind};
-use super::sample::Sample;
-use super::view::{Connection, Dialog, PLOT_SPAN, View};
+use super::sample::ArmSample;
+use super::view::{Dialog, LinkState, MonitorView, PLOT_SPAN};
 
 /// One colour per joint. Users can change these in their terminal.
 const COLOURS: [Color; 7] =
@@ -48,7 +48,7 @@ const JOINT_ROWS: u16 = 8;
 const ROOMY: u16 = 18;
 
 /// Draws the view.
-pub(crate) fn draw(frame: &mut Frame<'_>, view: &View) {
+pub(crate) fn draw(frame: &mut Frame<'_>, view: &MonitorView) {
     let problems = problem_lines(view);
     let heights = heights(frame.area().height, u16::try_from(problems.len()).unwrap_or(0));
     let [title, table, _, plot, _, foot, keys] = Layout::vertical(heights).areas(frame.area());
@@ -84,7 +84,7 @@ fn heights(screen: u16, problem_lines: u16) -> [Constraint; 7] {
 }
 
 /// The most important problems, and below each what to do.
-fn problem_lines(view: &View) -> Vec<Line<'static>> {
+fn problem_lines(view: &MonitorView) -> Vec<Line<'static>> {
     let problems = view.sample.as_ref().map(|sample| sample.health.problems()).unwrap_or_default();
     let shown = problems.iter().take(PROBLEMS_SHOWN);
     let lines = shown.flat_map(|problem| {
@@ -95,19 +95,19 @@ fn problem_lines(view: &View) -> Vec<Line<'static>> {
     lines.chain(rest).collect()
 }
 
-fn title_left(view: &View) -> Line<'_> {
+fn title_left(view: &MonitorView) -> Line<'_> {
     let mut line = Line::from(vec![Span::styled(" 7Bot V2 ", BOLD), Span::raw(format!(" {}", view.port))]);
-    if let Connection::Open { firmware } = &view.connection {
+    if let LinkState::Open { firmware } = &view.connection {
         line.push_span(Span::styled(format!("  firmware {firmware}"), FAINT));
     }
     line
 }
 
-fn title_right(view: &View) -> Line<'static> {
+fn title_right(view: &MonitorView) -> Line<'static> {
     let state = match (&view.connection, view.arm()) {
-        (Connection::Looking(_), _) => Span::styled("no arm, looking again ", BAD),
-        (Connection::Open { .. }, None) => Span::styled("connected ", FAINT),
-        (Connection::Open { .. }, Some(sample)) => {
+        (LinkState::Looking(_), _) => Span::styled("no arm, looking again ", BAD),
+        (LinkState::Open { .. }, None) => Span::styled("connected ", FAINT),
+        (LinkState::Open { .. }, Some(sample)) => {
             let state = sample.joints.motor_state();
             let style = if state == motor_state::SERVO { GOOD } else { BAD };
             Span::styled(format!("{} ", motor_state_name(state)), style)
@@ -117,7 +117,7 @@ fn title_right(view: &View) -> Line<'static> {
     Line::from_iter(frozen.into_iter().chain([state]))
 }
 
-fn table_lines(view: &View, width: u16) -> Vec<Line<'static>> {
+fn table_lines(view: &MonitorView, width: u16) -> Vec<Line<'static>> {
     let mut head = "   joint  target  position       speed".to_owned();
     if view.plot != PlotKind::Position {
         head = format!("{head:<TABLE_WIDTH$}{}", view.plot.name());
@@ -131,7 +131,7 @@ fn table_lines(view: &View, width: u16) -> Vec<Line<'static>> {
     lines
 }
 
-fn marker(view: &View, joint: Joint) -> Span<'static> {
+fn marker(view: &MonitorView, joint: Joint) -> Span<'static> {
     Span::styled(if joint == view.selected { " ▸ " } else { "   " }, BOLD)
 }
 
@@ -144,7 +144,7 @@ fn colour(joint: Joint) -> Style {
     Style::new().fg(COLOURS.get(index).copied().unwrap_or(Color::Reset))
 }
 
-fn row(view: &View, sample: &Sample, joint: Joint, bar: usize) -> Line<'static> {
+fn row(view: &MonitorView, sample: &ArmSample, joint: Joint, bar: usize) -> Line<'static> {
     let (target, present) = (sample.joints.target(joint), sample.joints.present(joint));
     let stale = if view.arm().is_some() { Style::new() } else { FAINT };
     let (word, style) = joint_word(sample, joint);
@@ -161,7 +161,7 @@ fn row(view: &View, sample: &Sample, joint: Joint, bar: usize) -> Line<'static> 
 }
 
 /// The most important problem of a joint, or what it does.
-fn joint_word(sample: &Sample, joint: Joint) -> (&'static str, Style) {
+fn joint_word(sample: &ArmSample, joint: Joint) -> (&'static str, Style) {
     let health = sample.health.joints.iter().find(|health| health.joint == joint);
     let problem = health.and_then(|health| health.problems().next());
     let is_gripping = health.is_some_and(|health| health.is_gripping == Some(true));
@@ -185,7 +185,7 @@ fn bar_spans(width: usize, target: u8, present: u8, colour: Style) -> Vec<Span<'
     cells.collect()
 }
 
-fn draw_plot(frame: &mut Frame<'_>, view: &View, area: Rect) {
+fn draw_plot(frame: &mut Frame<'_>, view: &MonitorView, area: Rect) {
     // Draw the selected joint last, above the others.
     let mut order = Joint::ALL.to_vec();
     order.sort_by_key(|&joint| joint == view.selected);
@@ -203,7 +203,7 @@ fn draw_plot(frame: &mut Frame<'_>, view: &View, area: Rect) {
 }
 
 /// The curves of one joint, in seconds before now and the unit of the plot. A gap starts a new curve.
-fn curve_segments(view: &View, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
+fn curve_segments(view: &MonitorView, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
     let point = |sample: &PastSample| {
         let before = view.now.saturating_sub(sample.time).as_secs_f64();
         Some((-before, sample.value(view.plot, joint)?))
@@ -213,7 +213,7 @@ fn curve_segments(view: &View, joint: Joint) -> Vec<(Joint, Vec<(f64, f64)>)> {
     lines.map(|line| (joint, line.iter().filter_map(point).collect())).collect()
 }
 
-fn health(view: &View) -> Line<'static> {
+fn health(view: &MonitorView) -> Line<'static> {
     let Some(sample) = &view.sample else { return Line::default() };
     let Some(status) = sample.joints.status() else {
         return Line::styled(" the maker's firmware reports no health", FAINT);
@@ -230,7 +230,7 @@ fn health(view: &View) -> Line<'static> {
     Line::from(spans)
 }
 
-fn link(view: &View) -> Line<'static> {
+fn link(view: &MonitorView) -> Line<'static> {
     let link = &view.link;
     let losses = link.unanswered + u64::try_from(link.damaged).unwrap_or(u64::MAX);
     let style = if losses + u64::from(link.damaged_at_arm()) == 0 { Style::new() } else { BAD };
@@ -250,9 +250,9 @@ fn link(view: &View) -> Line<'static> {
 }
 
 /// The error or the note, or else the most important keys.
-fn last_line(view: &View) -> Line<'_> {
+fn last_line(view: &MonitorView) -> Line<'_> {
     match (&view.connection, view.note()) {
-        (Connection::Looking(reason), _) => Line::styled(format!(" {reason}"), BAD),
+        (LinkState::Looking(reason), _) => Line::styled(format!(" {reason}"), BAD),
         (_, Some(note)) => Line::styled(format!(" {note}"), BOLD),
         _ if view.jog.is_some() => Line::styled(jog_keys(view.jog), BOLD),
         _ => Line::styled(
@@ -319,7 +319,7 @@ mod tests {
 
     const NOTHING: Snapshot = Snapshot { address: 0, values: Vec::new() };
 
-    fn screen(view: &View, width: u16, height: u16) -> TestBackend {
+    fn screen(view: &MonitorView, width: u16, height: u16) -> TestBackend {
         let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("memory");
         terminal.draw(|frame| draw(frame, view)).expect("memory takes all");
         terminal.backend().clone()
@@ -340,7 +340,7 @@ mod tests {
             let fine = FineState { loads: [0, -205, 0, 0, 0, 0, 1_000], ..FineState::new(&NOTHING) };
             let sample = sample(60_000 + half_seconds * 500, 90);
             view.tick(sample.time);
-            view.update(ArmEvent::Sample(Sample { fine: Some(fine), ..sample }));
+            view.update(ArmEvent::Sample(ArmSample { fine: Some(fine), ..sample }));
         }
         insta::assert_snapshot!(screen(&view, 80, 24));
     }

@@ -5,7 +5,7 @@ use sevenbot::Joint;
 use sevenbot::cartesian::JogAxes;
 use sevenbot::map::motor_state;
 
-use super::view::{Dialog, SpeedChange, UiCommand, View};
+use super::view::{Dialog, MonitorView, SpeedChange, UiCommand};
 
 /// Degrees of a nudge, without and with Shift.
 const NUDGE: i16 = 1;
@@ -45,7 +45,7 @@ pub(crate) enum KeyAction {
 }
 
 /// Handles a key.
-pub(crate) fn press(view: &mut View, key: KeyEvent) -> KeyAction {
+pub(crate) fn press(view: &mut MonitorView, key: KeyEvent) -> KeyAction {
     let is_ctrl_c = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
     if is_ctrl_c {
         return KeyAction::Stop;
@@ -56,7 +56,7 @@ pub(crate) fn press(view: &mut View, key: KeyEvent) -> KeyAction {
     }
 }
 
-fn press_in_view(view: &mut View, key: KeyEvent) -> KeyAction {
+fn press_in_view(view: &mut MonitorView, key: KeyEvent) -> KeyAction {
     let is_shifted = key.modifiers.contains(KeyModifiers::SHIFT);
     let degrees = if is_shifted { BIG_NUDGE } else { NUDGE };
     let millimetres = if is_shifted { BIG_JOG } else { JOG };
@@ -88,7 +88,7 @@ fn press_in_view(view: &mut View, key: KeyEvent) -> KeyAction {
     KeyAction::Redraw
 }
 
-fn press_in_dialog(view: &mut View, dialog: Dialog, key: KeyCode) -> KeyAction {
+fn press_in_dialog(view: &mut MonitorView, dialog: Dialog, key: KeyCode) -> KeyAction {
     view.dialog = None;
     match (dialog, key) {
         (Dialog::ChooseState, KeyCode::Char('h' | '1')) => {
@@ -102,19 +102,19 @@ fn press_in_dialog(view: &mut View, dialog: Dialog, key: KeyCode) -> KeyAction {
 }
 
 /// Asks for confirmation, because the arm may fall.
-fn release(view: &mut View, state: u8) -> KeyAction {
+fn release(view: &mut MonitorView, state: u8) -> KeyAction {
     view.dialog = Some(Dialog::ConfirmState(state));
     KeyAction::Redraw
 }
 
-fn select(view: &mut View, number: i16) {
+fn select(view: &mut MonitorView, number: i16) {
     if let Some(joint) = u8::try_from(number).ok().and_then(Joint::new) {
         view.selected = joint;
     }
 }
 
 /// Shows the next quantity in the plot, if the arm measures it.
-fn change_plot(view: &mut View) {
+fn change_plot(view: &mut MonitorView) {
     if view.sample.as_ref().is_some_and(|sample| sample.fine.is_none()) {
         view.show_note("this arm's firmware measures no velocities and loads");
     } else {
@@ -143,12 +143,12 @@ const fn next_axes(axes: Option<JogAxes>) -> Option<JogAxes> {
     }
 }
 
-fn nudge(view: &mut View, degrees: i16) -> KeyAction {
+fn nudge(view: &mut MonitorView, degrees: i16) -> KeyAction {
     drive(view, UiCommand::Nudge { joint: view.selected, degrees })
 }
 
 /// Sends a command that moves the arm, if the motors drive it.
-fn drive(view: &mut View, command: UiCommand) -> KeyAction {
+fn drive(view: &mut MonitorView, command: UiCommand) -> KeyAction {
     match view.arm().map(|arm| arm.joints.motor_state()) {
         Some(motor_state::SERVO) => KeyAction::Send(command),
         Some(_) => {
@@ -162,7 +162,7 @@ fn drive(view: &mut View, command: UiCommand) -> KeyAction {
     }
 }
 
-fn stop(view: &mut View) -> KeyAction {
+fn stop(view: &mut MonitorView) -> KeyAction {
     if view.arm().is_some() {
         view.show_note("stopped: the arm holds where it is");
         return KeyAction::Send(UiCommand::Stop);
@@ -171,7 +171,7 @@ fn stop(view: &mut View) -> KeyAction {
     KeyAction::Redraw
 }
 
-fn change(view: &View, change: SpeedChange) -> KeyAction {
+fn change(view: &MonitorView, change: SpeedChange) -> KeyAction {
     view.arm().map_or(KeyAction::Redraw, |_| {
         KeyAction::Send(UiCommand::SpeedChange { joint: view.selected, change })
     })
@@ -183,7 +183,7 @@ mod tests {
     use crate::commands::monitor::plot_kind::PlotKind;
     use crate::commands::monitor::view::tests::watching;
 
-    fn pressed(view: &mut View, keys: &[KeyCode]) -> Vec<KeyAction> {
+    fn pressed(view: &mut MonitorView, keys: &[KeyCode]) -> Vec<KeyAction> {
         keys.iter().map(|&key| press(view, KeyEvent::from(key))).collect()
     }
 
@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn without_an_arm_keys_send_nothing() {
-        let mut view = View::new("COM3", PlotKind::Position);
+        let mut view = MonitorView::new("COM3", PlotKind::Position);
         let keys = [KeyCode::Left, KeyCode::Char('+'), KeyCode::Char(']'), KeyCode::Char('j'), KeyCode::Up];
         assert_eq!(pressed(&mut view, &keys), [KeyAction::Redraw; 5]);
     }

@@ -8,7 +8,7 @@ use sevenbot::health::JointHealth;
 use sevenbot::{FineAngle, Joint, StatusBlock};
 
 use super::super::status::ProblemText;
-use super::sample::Sample;
+use super::sample::ArmSample;
 use crate::printer::Printable;
 
 /// Text format of a sample.
@@ -43,7 +43,7 @@ impl LineFormat {
     }
 
     /// One sample.
-    pub(crate) fn line(self, sample: &Sample) -> String {
+    pub(crate) fn line(self, sample: &ArmSample) -> String {
         match self {
             Self::Columns => columns(sample),
             Self::Csv => csv(sample),
@@ -51,7 +51,7 @@ impl LineFormat {
     }
 }
 
-fn columns(sample: &Sample) -> String {
+fn columns(sample: &ArmSample) -> String {
     let targets = sample.joints.targets().map(|degrees| degrees.to_string()).join(" ");
     let present = sample.joints.positions().map(|degrees| degrees.to_string()).join(" ");
     let moving: String = numbers(|joint| sample.joints.is_moving(joint)).iter().map(u8::to_string).collect();
@@ -59,8 +59,9 @@ fn columns(sample: &Sample) -> String {
     format!("{:.3} {targets} {present} {moving}", sample.time.as_secs_f64())
 }
 
-fn csv(sample: &Sample) -> String {
-    let joints = |field: fn(&Sample, Joint) -> String| Joint::ALL.map(|joint| field(sample, joint)).join(",");
+fn csv(sample: &ArmSample) -> String {
+    let joints =
+        |field: fn(&ArmSample, Joint) -> String| Joint::ALL.map(|joint| field(sample, joint)).join(",");
     let status = sample.joints.status();
     let number = |value: Option<u8>| value.map_or_else(String::new, |value| value.to_string());
     let volts = status.and_then(StatusBlock::supply_volts);
@@ -88,7 +89,7 @@ fn csv(sample: &Sample) -> String {
 }
 
 /// The joints of which this is so; `None` if the firmware does not tell.
-fn joint_bits(sample: &Sample, is_so: fn(&JointHealth) -> Option<bool>) -> Option<u8> {
+fn joint_bits(sample: &ArmSample, is_so: fn(&JointHealth) -> Option<bool>) -> Option<u8> {
     sample
         .health
         .joints
@@ -146,8 +147,8 @@ impl From<FineState> for FineJson {
     }
 }
 
-impl From<&Sample> for SampleJson {
-    fn from(sample: &Sample) -> Self {
+impl From<&ArmSample> for SampleJson {
+    fn from(sample: &ArmSample) -> Self {
         let status = sample.joints.status();
         Self {
             seconds: thousandths(sample.time.as_secs_f64()),

@@ -25,7 +25,7 @@ use sevenbot::{Arm, Health, Problem};
 
 use self::lines::{LineFormat, SampleJson};
 use self::plot_kind::PlotKind;
-use self::sample::Sample;
+use self::sample::ArmSample;
 use crate::command_error::CommandError;
 use crate::guard_args::GuardArgs;
 use crate::line_file::LineFile;
@@ -102,7 +102,7 @@ pub(super) fn each_sample(
     arm: &mut Arm,
     period: Duration,
     count: u64,
-    mut take: impl FnMut(Sample) -> Result<(), CommandError>,
+    mut take: impl FnMut(ArmSample) -> Result<(), CommandError>,
 ) -> Result<(), CommandError> {
     let start = Instant::now();
     let (mut due, mut told) = (start, Vec::new());
@@ -110,7 +110,7 @@ pub(super) fn each_sample(
         sleep(due.saturating_duration_since(Instant::now()));
         // A late sample is not made up for.
         due = (due + period).max(Instant::now());
-        let sample = Sample::take(arm, start)?;
+        let sample = ArmSample::take(arm, start)?;
         warn_of_problems(&sample.health, &mut told);
         take(sample)?;
     }

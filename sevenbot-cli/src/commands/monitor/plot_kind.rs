@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use sevenbot::Joint;
 use sevenbot::fine::FineState;
 
-use super::sample::Sample;
+use super::sample::ArmSample;
 
 /// What the plot shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -57,8 +57,8 @@ pub(crate) struct PastSample {
     fine: Option<FineState>,
 }
 
-impl From<&Sample> for PastSample {
-    fn from(sample: &Sample) -> Self {
+impl From<&ArmSample> for PastSample {
+    fn from(sample: &ArmSample) -> Self {
         Self { time: sample.time, positions: sample.joints.positions(), fine: sample.fine }
     }
 }

@@ -10,7 +10,7 @@ use sevenbot::{Angle, Arm, Error, Health, Joint, StatusBlock};
 
 /// The state of an arm at one time.
 #[derive(Clone, Debug)]
-pub(crate) struct Sample {
+pub(crate) struct ArmSample {
     /// Since the start of the monitor.
     pub(crate) time: Duration,
     pub(crate) joints: JointSnapshot,
@@ -22,7 +22,7 @@ pub(crate) struct Sample {
     pub(crate) round_trip: Duration,
 }
 
-impl Sample {
+impl ArmSample {
     /// Reads a sample from the arm.
     pub(crate) fn take(arm: &mut Arm, start: Instant) -> Result<Self, Error> {
         let asked = Instant::now();

@@ -13,7 +13,7 @@ use super::arm_thread::ArmThread;
 use super::draw::draw;
 use super::keys::{KeyAction, press};
 use super::plot_kind::PlotKind;
-use super::view::{ArmEvent, UiCommand, View};
+use super::view::{ArmEvent, MonitorView, UiCommand};
 use crate::command_error::CommandError;
 use crate::interrupt::{Interrupt, report_hold};
 use crate::printer::warn;
@@ -32,7 +32,7 @@ pub(crate) fn run(
     // Without a port there is an error. A port without an answer is tried again.
     let port = session.port_name()?;
     let start = Instant::now();
-    let mut view = View::new(&port, plot);
+    let mut view = MonitorView::new(&port, plot);
     let (events, hear) = mpsc::channel();
     let (command, commands) = mpsc::channel();
     let asked = session.port.clone();
@@ -73,7 +73,7 @@ fn on_terminal(work: impl FnOnce(&mut DefaultTerminal) -> io::Result<()>) -> Res
 
 fn show(
     terminal: &mut DefaultTerminal,
-    view: &mut View,
+    view: &mut MonitorView,
     start: Instant,
     events: &Receiver<ArmEvent>,
     commands: &Sender<UiCommand>,
@@ -119,7 +119,7 @@ fn wait_for_input(timeout: Duration, _reads_stdin: bool) -> io::Result<bool> {
 }
 
 /// Reacts to an event; `false` ends the monitor.
-fn react(view: &mut View, event: &Event, commands: &Sender<UiCommand>) -> bool {
+fn react(view: &mut MonitorView, event: &Event, commands: &Sender<UiCommand>) -> bool {
     match event {
         // Some terminals also report releases.
         Event::Key(key) if key.kind != KeyEventKind::Release => match press(view, *key) {

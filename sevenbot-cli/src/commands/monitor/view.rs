@@ -14,7 +14,7 @@ use sevenbot::cartesian::JogAxes;
 use sevenbot::{Joint, StatusBlock};
 
 use super::plot_kind::{PastSample, PlotKind};
-use super::sample::Sample;
+use super::sample::ArmSample;
 
 /// Time span of the plot.
 pub(crate) const PLOT_SPAN: Duration = Duration::from_secs(20);
@@ -32,7 +32,7 @@ pub(crate) enum ArmEvent {
     /// Not connected, for this reason.
     Lost(String),
     /// A new sample.
-    Sample(Sample),
+    Sample(ArmSample),
     /// A question without an answer, and the number of damaged frames received.
     Unanswered { damaged: usize },
     /// A command failed.
@@ -84,7 +84,7 @@ impl SpeedChange {
 
 /// State of the connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Connection {
+pub(crate) enum LinkState {
     /// Not connected, for this reason.
     Looking(String),
     /// Connected to an arm with this firmware version.
@@ -116,7 +116,7 @@ pub(crate) struct LinkQuality {
 }
 
 impl LinkQuality {
-    fn answer(&mut self, sample: &Sample) {
+    fn answer(&mut self, sample: &ArmSample) {
         let last = sample.round_trip.as_secs_f64() * 1e3;
         let mean = if self.answers == 0 { last } else { self.round_trip_ms };
         self.round_trip_ms = mean + (last - mean) * MEAN_WEIGHT;
@@ -134,11 +134,11 @@ impl LinkQuality {
 
 /// The content of the screen.
 #[derive(Clone, Debug)]
-pub(crate) struct View {
+pub(crate) struct MonitorView {
     pub(crate) port: String,
-    pub(crate) connection: Connection,
+    pub(crate) connection: LinkState,
     /// The last sample, or the frozen one.
-    pub(crate) sample: Option<Sample>,
+    pub(crate) sample: Option<ArmSample>,
     /// The samples of the last [`PLOT_SPAN`], oldest first.
     pub(crate) past: VecDeque<PastSample>,
     /// What the plot shows.
@@ -155,11 +155,11 @@ pub(crate) struct View {
     clock: Duration,
 }
 
-impl View {
+impl MonitorView {
     pub(crate) fn new(port: &str, plot: PlotKind) -> Self {
         Self {
             port: port.to_owned(),
-            connection: Connection::Looking("opening the port".to_owned()),
+            connection: LinkState::Looking("opening the port".to_owned()),
             sample: None,
             past: VecDeque::new(),
             plot,
@@ -187,11 +187,11 @@ impl View {
         match event {
             ArmEvent::Found { port, firmware } => {
                 self.port = port;
-                self.connection = Connection::Open { firmware };
+                self.connection = LinkState::Open { firmware };
                 // The arm may have restarted, with new counters.
                 self.link.corrupted = None;
             }
-            ArmEvent::Lost(reason) => self.connection = Connection::Looking(reason),
+            ArmEvent::Lost(reason) => self.connection = LinkState::Looking(reason),
             ArmEvent::Sample(sample) => self.add_sample(sample),
             ArmEvent::Unanswered { damaged } => {
                 self.link.unanswered += 1;
@@ -201,7 +201,7 @@ impl View {
         }
     }
 
-    fn add_sample(&mut self, sample: Sample) {
+    fn add_sample(&mut self, sample: ArmSample) {
         self.link.answer(&sample);
         if self.is_frozen {
             return;
@@ -225,8 +225,8 @@ impl View {
     }
 
     /// The last sample, while the arm is connected.
-    pub(crate) fn arm(&self) -> Option<&Sample> {
-        self.sample.as_ref().filter(|_| matches!(self.connection, Connection::Open { .. }))
+    pub(crate) fn arm(&self) -> Option<&ArmSample> {
+        self.sample.as_ref().filter(|_| matches!(self.connection, LinkState::Open { .. }))
     }
 }
 
@@ -248,7 +248,7 @@ pub(crate) mod tests {
     }
 
     /// A sample with joint 2 moving from 90 to 120 degrees.
-    pub(crate) fn sample(millis: u64, position: u8) -> Sample {
+    pub(crate) fn sample(millis: u64, position: u8) -> ArmSample {
         let mut registers = zeros(JointSnapshot::REGISTERS);
         set(&mut registers, MOTOR_STATE.address, &[1]);
         set(&mut registers, SPEED.address, &[10; 7]);
@@ -261,7 +261,7 @@ pub(crate) mod tests {
         for part in [&registers, &status] {
             set(&mut all, part.address, &part.values);
         }
-        Sample {
+        ArmSample {
             time: Duration::from_millis(millis),
             health: sevenbot::Health::new(&all),
             joints: JointSnapshot::new(registers, Some(StatusBlock::from(status))),
@@ -271,8 +271,8 @@ pub(crate) mod tests {
     }
 
     /// A view after 10 s of such samples.
-    pub(crate) fn watching() -> View {
-        let mut view = View::new("/dev/ttyUSB0", PlotKind::Position);
+    pub(crate) fn watching() -> MonitorView {
+        let mut view = MonitorView::new("/dev/ttyUSB0", PlotKind::Position);
         view.update(ArmEvent::Found { port: "/dev/ttyUSB0".to_owned(), firmware: "3.0".to_owned() });
         for tenth in 0..100_u8 {
             view.tick(Duration::from_millis(u64::from(tenth) * 100));

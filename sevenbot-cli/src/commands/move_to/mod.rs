@@ -15,7 +15,7 @@ use crate::interrupt::hold_on_interrupt;
 use crate::measured_pose::MeasuredPose;
 use crate::printer::note;
 use crate::session::Session;
-use crate::watch::{Watch, note_rounding};
+use crate::watch::{ProgressWatch, note_rounding};
 
 mod args;
 mod facts;
@@ -95,7 +95,7 @@ fn move_to(
         if !args.wait {
             return Ok(None);
         }
-        let positions = begun.finish(arm, &mut Watch::new(interrupt))?;
+        let positions = begun.finish(arm, &mut ProgressWatch::new(interrupt))?;
         Ok(Some(MeasuredPose::read(arm, positions)?))
     })
 }

@@ -6,6 +6,7 @@ mod values;
 
 use std::path::PathBuf;
 
+use arm_sim::faults::FAULTS_HELP;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -13,7 +14,7 @@ use serde_json::{Value, json};
 use crate::command_error::CommandError;
 use crate::printer::Printable;
 use crate::session::Session;
-use socket::Connection;
+use socket::SimulatorConnection;
 pub(crate) use socket::running_ports;
 use values::{factor, grams, hand, millis};
 
@@ -66,7 +67,7 @@ enum SimCommand {
     /// Switch the power of the arm.
     Power {
         /// 'off' loses what is in RAM, and loaded joints fall; 'cycle' is off and on.
-        to: PowerState,
+        to: Power,
     },
     /// Restart the controller, as its watchdog does. The servos keep power, torque and goals.
     Restart,
@@ -88,33 +89,9 @@ enum SimCommand {
 
 /// Give the arm a fault, list the faults, or take them back.
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(after_help = format!("\
 Faults:
-  3=missing                the servo of joint 3 has no power
-  3=late, 3=late=MS        its answers are 30 ms late, or MS
-  3=garbled, 3=garbled=N   each answer has a wrong checksum, or each Nth one
-  3=stuck                  something keeps it from turning
-  3=restarting=MS          it restarts each MS, and loses its torque
-  2=wall=60                a wall at 60 degrees stops joint 2, from where the
-                           joint is now
-  2=wall=60/500            a soft one: it pushes back with 500 mN m for each
-                           degree
-  2=push=-300              a hand pushes joint 2 with 300 mN m, towards smaller
-                           angles
-  7=thing=30, 7=thing=30/100
-                           a thing between the claws: they cannot close below
-                           30 degrees of joint 7
-  bus=echo                 the controller receives its own bytes
-  supply=volts=V           the supply has V volts instead of 7.4; a servo
-                           restarts below 4.5
-  supply=dips=MS           each MS it falls to 3 V for 20 ms
-  supply=off               the servos have no supply; the controller has its own
-  flash=fails, flash=full  no settings can be stored
-  line=loss=P%, line=corruption=P%, line=delay=MS
-                           of the bytes on the host line
-  arm=supported            no fault: a stand supports the arm, and it does not
-                           fall
-  arm=goal-starts-torque   in a servo that restarted, a goal switches torque on
+{FAULTS_HELP}
 
 Examples:
   sevenbot sim fault 3=garbled=10  until it is cleared
@@ -128,7 +105,7 @@ Examples:
   sevenbot sim fault clear         all
 
 A fault that never took effect is marked: a test with such a fault
-proves nothing.")]
+proves nothing."))]
 struct FaultArgs {
     /// The fault, 'list' or 'clear'.
     #[arg(value_name = "FAULT|list|clear")]
@@ -232,25 +209,25 @@ enum Alarm {
 
 #[derive(Clone, Copy, Debug, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-enum PowerState {
+enum Power {
     On,
     Off,
     Cycle,
 }
 
 /// An answer of the simulator.
-struct Answer<'a> {
+struct SimulatorAnswer<'a> {
     command: &'a SimCommand,
     value: Value,
 }
 
-impl Serialize for Answer<'_> {
+impl Serialize for SimulatorAnswer<'_> {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.value.serialize(serializer)
     }
 }
 
-impl Printable for Answer<'_> {
+impl Printable for SimulatorAnswer<'_> {
     fn write_text(&self, out: &mut dyn std::io::Write) -> std::io::Result<()> {
         match self.command {
             SimCommand::Fault(args) => text::faults(out, &args.action, &self.value),
@@ -272,12 +249,12 @@ impl Printable for Answer<'_> {
 
 pub(crate) fn run(session: &mut Session, args: &SimArgs) -> Result<(), CommandError> {
     let request = request(&args.command)?;
-    let mut connection = Connection::open(args.control.as_deref(), session.port.as_deref())?;
+    let mut connection = SimulatorConnection::open(args.control.as_deref(), session.port.as_deref())?;
     if matches!(args.command, SimCommand::Advance(_)) {
         connection.wait_forever()?;
     }
     let value = connection.ask(&request)?;
-    session.printer.print(&Answer { command: &args.command, value })
+    session.printer.print(&SimulatorAnswer { command: &args.command, value })
 }
 
 /// The request of a command.

@@ -15,12 +15,12 @@ use crate::command_error::CommandError;
 const TIMEOUT: Duration = Duration::from_secs(20);
 
 /// A connection to a simulator.
-pub(super) struct Connection {
+pub(super) struct SimulatorConnection {
     path: PathBuf,
     stream: BufReader<UnixStream>,
 }
 
-impl Connection {
+impl SimulatorConnection {
     /// Connects to the simulator with this socket, or to the only one that is running. If several are running, to the one
     /// with this port.
     pub(super) fn open(control: Option<&Path>, port: Option<&str>) -> Result<Self, CommandError> {
@@ -108,8 +108,9 @@ impl Connection {
 
 /// The ports of the simulators that run.
 pub(crate) fn running_ports() -> Vec<String> {
-    let mut found: Vec<_> = sockets().iter().filter_map(|path| Connection::connect(path).ok()).collect();
-    found.iter_mut().filter_map(Connection::port).collect()
+    let mut found: Vec<_> =
+        sockets().iter().filter_map(|path| SimulatorConnection::connect(path).ok()).collect();
+    found.iter_mut().filter_map(SimulatorConnection::port).collect()
 }
 
 /// The default sockets, also of simulators that were killed.

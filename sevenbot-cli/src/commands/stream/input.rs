@@ -36,7 +36,7 @@ struct JsonLine {
 pub(super) fn read_in_background() -> Receiver<Result<TimedPoint, String>> {
     let (sender, receiver) = sync_channel(LINES_AHEAD);
     thread::spawn(move || {
-        let mut lines = Lines::default();
+        let mut lines = InputLines::default();
         for line in io::stdin().lock().lines() {
             let parsed = line.map_err(|error| error.to_string()).and_then(|line| lines.next(&line));
             let is_end = parsed.is_err();
@@ -52,12 +52,12 @@ pub(super) fn read_in_background() -> Receiver<Result<TimedPoint, String>> {
 
 /// The lines so far.
 #[derive(Debug, Default)]
-struct Lines {
+struct InputLines {
     number: usize,
     last: Option<Duration>,
 }
 
-impl Lines {
+impl InputLines {
     /// The set-point in the next line; `None` for an empty line and for the heading of a table: a first line with eight
     /// words.
     fn next(&mut self, line: &str) -> Result<Option<TimedPoint>, String> {
@@ -132,7 +132,7 @@ mod tests {
     type Numbers = (u128, [Option<u16>; 7]);
 
     fn parsed(text: &str) -> Result<Vec<Numbers>, String> {
-        let mut lines = Lines::default();
+        let mut lines = InputLines::default();
         let points = text.lines().filter_map(|line| lines.next(line).transpose());
         let hundredths = |point: TimedPoint| point.joints.map(|joint| joint.map(FineAngle::hundredths));
         points.map(|point| point.map(|point| (point.time.as_millis(), hundredths(point)))).collect()

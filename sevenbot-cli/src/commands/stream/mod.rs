@@ -31,7 +31,7 @@ use crate::command_error::CommandError;
 use crate::guard_args::{GuardArgs, warn_of};
 use crate::interrupt::{Interrupt, hold_on_interrupt};
 use crate::session::Session;
-use crate::watch::Watch;
+use crate::watch::ProgressWatch;
 
 /// Stream set-points from standard input, in hundredths of a degree.
 ///
@@ -90,8 +90,8 @@ pub(crate) struct StreamArgs {
     #[arg(long, value_name = "MS", default_value_t = 300, value_parser = value_parser!(u16).range(0..=2_550))]
     watchdog: u16,
     /// What the watchdog of the arm does.
-    #[arg(long, value_name = "ACTION", value_enum, default_value_t = Action::Hold)]
-    watchdog_action: Action,
+    #[arg(long, value_name = "ACTION", value_enum, default_value_t = WatchdogActionArg::Hold)]
+    watchdog_action: WatchdogActionArg,
     #[command(flatten)]
     approach: ApproachArgs,
     #[command(flatten)]
@@ -100,18 +100,18 @@ pub(crate) struct StreamArgs {
 
 /// What the arm does if this program is silent.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Action {
+enum WatchdogActionArg {
     /// The joints hold.
     Hold,
     /// Damping protection: the arm sinks slowly.
     Damping,
 }
 
-impl From<Action> for WatchdogAction {
-    fn from(action: Action) -> Self {
+impl From<WatchdogActionArg> for WatchdogAction {
+    fn from(action: WatchdogActionArg) -> Self {
         match action {
-            Action::Hold => Self::Hold,
-            Action::Damping => Self::Damping,
+            WatchdogActionArg::Hold => Self::Hold,
+            WatchdogActionArg::Damping => Self::Damping,
         }
     }
 }
@@ -170,7 +170,7 @@ fn stream(
     let (options, guard) = (args.options()?, args.guard.guard());
     let stream = SetPointStream::open(arm, options)?;
     let pace = StreamPace::new(Instant::now(), options.period());
-    let source = Source { lines: input::read_in_background(), feed: Feed::default(), end: None };
+    let source = PointSource { lines: input::read_in_background(), feed: Feed::default(), end: None };
     let mut streamer = Streamer { stream, pace, source, start, guard, tracking, period: options.period() };
     while streamer.play(interrupt)? {}
     streamer.wait_until_still(interrupt)?;
@@ -181,14 +181,14 @@ fn stream(
 }
 
 /// The input, and its points that are not sent yet.
-struct Source {
+struct PointSource {
     lines: Receiver<Result<TimedPoint, String>>,
     feed: Feed,
     /// How the input has ended; `None` while there may be more.
     end: Option<Result<(), String>>,
 }
 
-impl Source {
+impl PointSource {
     /// Takes the lines that have come.
     fn poll(&mut self) {
         while self.end.is_none() {
@@ -206,7 +206,7 @@ impl Source {
 struct Streamer<'a, 'b> {
     stream: SetPointStream<'a>,
     pace: StreamPace,
-    source: Source,
+    source: PointSource,
     start: StreamStart,
     /// `None` after the first warning, too.
     guard: Option<Guard>,
@@ -248,7 +248,7 @@ impl Streamer<'_, '_> {
     fn approach(&mut self, first: &FineTargets, interrupt: Interrupt) -> Result<(), CommandError> {
         let standing = self.stream.arm().standing()?;
         let way = Approach::plan(&standing, first, self.start.rule).map_err(MoveError::from)?;
-        Ok(self.stream.approach(&way, &mut Watch::new(interrupt))?)
+        Ok(self.stream.approach(&way, &mut ProgressWatch::new(interrupt))?)
     }
 
     /// Makes the next point due, as the first of the stream or after a pause.

@@ -10,7 +10,7 @@ mod sine;
 use fastrand::Rng;
 
 use methods::{CYCLE, METHODS, Method, OURS, SetPoints};
-use sine::Targets;
+use sine::SineTargets;
 
 /// Degrees per second. Ten minutes stay below the largest angle of motion-core.
 const VELOCITY: f64 = 3.0;
@@ -22,7 +22,7 @@ const SETTLING_POINTS: usize = 40;
 
 /// How the frames of a stream come.
 #[derive(Clone, Copy)]
-struct Scenario {
+struct StreamScenario {
     name: &'static str,
     /// A frame comes up to this part of a period early or late.
     jitter: f64,
@@ -35,23 +35,29 @@ struct Scenario {
     seconds: f64,
 }
 
-const EVEN: Scenario =
-    Scenario { name: "even", jitter: 0.0, loss: 0.0, pause: false, drift: 0.0, seconds: 20.0 };
+const EVEN: StreamScenario =
+    StreamScenario { name: "even", jitter: 0.0, loss: 0.0, pause: false, drift: 0.0, seconds: 20.0 };
 
-const SCENARIOS: [Scenario; 8] = [
+const SCENARIOS: [StreamScenario; 8] = [
     EVEN,
-    Scenario { name: "jitter 25 %", jitter: 0.25, ..EVEN },
-    Scenario { name: "jitter 40 %", jitter: 0.4, ..EVEN },
-    Scenario { name: "jitter 50 %", jitter: 0.5, ..EVEN },
-    Scenario { name: "1 % lost", loss: 0.01, ..EVEN },
-    Scenario { name: "25 %, 1 % lost", jitter: 0.25, loss: 0.01, ..EVEN },
-    Scenario { name: "a pause of 5 periods", pause: true, ..EVEN },
-    Scenario { name: "25 %, clocks 200 ppm apart", jitter: 0.25, drift: 200e-6, seconds: 600.0, ..EVEN },
+    StreamScenario { name: "jitter 25 %", jitter: 0.25, ..EVEN },
+    StreamScenario { name: "jitter 40 %", jitter: 0.4, ..EVEN },
+    StreamScenario { name: "jitter 50 %", jitter: 0.5, ..EVEN },
+    StreamScenario { name: "1 % lost", loss: 0.01, ..EVEN },
+    StreamScenario { name: "25 %, 1 % lost", jitter: 0.25, loss: 0.01, ..EVEN },
+    StreamScenario { name: "a pause of 5 periods", pause: true, ..EVEN },
+    StreamScenario {
+        name: "25 %, clocks 200 ppm apart",
+        jitter: 0.25,
+        drift: 200e-6,
+        seconds: 600.0,
+        ..EVEN
+    },
 ];
 
 /// Of one run, or the worst of several.
 #[derive(Clone, Copy, Default)]
-struct Figures {
+struct StreamFigures {
     /// The largest deviation from the velocity of the motion, in percent.
     ripple: f64,
     /// The root of the mean square of that deviation, in percent.
@@ -64,7 +70,7 @@ struct Figures {
     stopped: f64,
 }
 
-impl Figures {
+impl StreamFigures {
     fn worst(self, other: Self) -> Self {
         Self {
             ripple: self.ripple.max(other.ripple),
@@ -103,7 +109,8 @@ fn print_sine() {
     println!("\nA sine of 30 degrees at 0.2 Hz, 50 points a second with 25 % jitter; joint 1.\n");
     println!("| targets | delay ms | rms error degrees | largest change of velocity, degrees/s | rms |");
     println!("| --- | --- | --- | --- | --- |");
-    for (name, targets) in [("fine, with a period", Targets::Fine), ("whole degrees", Targets::WholeDegrees)]
+    for (name, targets) in
+        [("fine, with a period", SineTargets::Fine), ("whole degrees", SineTargets::WholeDegrees)]
     {
         let measured = sine::record(targets);
         let ((delay, error), (largest, rms)) = (sine::tracking(&measured), sine::roughness(&measured));
@@ -111,18 +118,20 @@ fn print_sine() {
     }
 }
 
-fn worst(method: &Method, scenario: &Scenario, period: f64) -> Figures {
-    (0..RUNS).map(|seed| one_run(method, scenario, period, seed)).fold(Figures::default(), Figures::worst)
+fn worst(method: &Method, scenario: &StreamScenario, period: f64) -> StreamFigures {
+    (0..RUNS)
+        .map(|seed| one_run(method, scenario, period, seed))
+        .fold(StreamFigures::default(), StreamFigures::worst)
 }
 
 /// A frame: when it comes, when it was to be sent, and its angle.
-struct Frame {
+struct PointFrame {
     comes: f64,
     planned: f64,
     angle: f64,
 }
 
-fn frames(scenario: &Scenario, period: f64, random: &mut Rng) -> Vec<Frame> {
+fn frames(scenario: &StreamScenario, period: f64, random: &mut Rng) -> Vec<PointFrame> {
     let count = (scenario.seconds / period).min(30_000.0);
     let mut frames = Vec::new();
     let mut k = 0.0;
@@ -131,14 +140,14 @@ fn frames(scenario: &Scenario, period: f64, random: &mut Rng) -> Vec<Frame> {
         let planned = 1.0 + (k + pause) * period * (1.0 - scenario.drift);
         let comes = planned + (random.f64() * 2.0 - 1.0) * scenario.jitter * period;
         if random.f64() >= scenario.loss {
-            frames.push(Frame { comes, planned, angle: VELOCITY * (k + 1.0) * period });
+            frames.push(PointFrame { comes, planned, angle: VELOCITY * (k + 1.0) * period });
         }
         k += 1.0;
     }
     frames
 }
 
-fn one_run(method: &Method, scenario: &Scenario, period: f64, seed: u64) -> Figures {
+fn one_run(method: &Method, scenario: &StreamScenario, period: f64, seed: u64) -> StreamFigures {
     let mut random = Rng::with_seed(seed);
     let frames = frames(scenario, period, &mut random);
     let phase = random.f64() * CYCLE;
@@ -146,7 +155,7 @@ fn one_run(method: &Method, scenario: &Scenario, period: f64, seed: u64) -> Figu
     let errors: Vec<f64> = track.velocities.iter().map(|velocity| (velocity - 1.0).abs()).collect();
     let squares: Vec<f64> = errors.iter().map(|error| error * error).collect();
     let still: Vec<f64> = track.velocities.iter().map(|velocity| f64::from(*velocity < 0.05)).collect();
-    Figures {
+    StreamFigures {
         ripple: 100.0 * errors.iter().copied().fold(0.0, f64::max),
         rms: 100.0 * mean(&squares).sqrt(),
         delay: mean(&track.delays) / period,
@@ -167,7 +176,7 @@ struct Track {
 }
 
 impl Track {
-    fn of(mut set_points: Box<dyn SetPoints>, frames: &[Frame], period: f64, phase: f64) -> Self {
+    fn of(mut set_points: Box<dyn SetPoints>, frames: &[PointFrame], period: f64, phase: f64) -> Self {
         let mut track = Self::default();
         let settled = frames.get(SETTLING_POINTS..).unwrap_or_default();
         let (Some(first), Some(last)) = (settled.first(), settled.last()) else { return track };

@@ -34,7 +34,7 @@ pub(super) type Curve = Vec<(f64, f64)>;
 
 /// How a program sends points.
 #[derive(Clone, Copy)]
-pub(super) enum Targets {
+pub(super) enum SineTargets {
     /// Registers 128 to 141, with a set-point period.
     Fine,
     /// Registers 46 to 52.
@@ -42,7 +42,7 @@ pub(super) enum Targets {
 }
 
 /// Streams the sine to a simulated arm.
-pub(super) fn record(targets: Targets) -> Curve {
+pub(super) fn record(targets: SineTargets) -> Curve {
     let config = ArmConfig { chip_id: [0; 6], is_paced: true, torque_codes: Default::default() };
     let plant = Plant::new(Instant::ZERO);
     let mut arm: SimulatedArm<Flash, Plant> =
@@ -63,10 +63,10 @@ pub(super) fn record(targets: Targets) -> Curve {
 }
 
 /// The frames of a program and when it sends them.
-fn frames(targets: Targets) -> Vec<(f64, Vec<u8>)> {
+fn frames(targets: SineTargets) -> Vec<(f64, Vec<u8>)> {
     let write = |register: u8, values: &[u8]| frame(Request::Write { address: register, values });
     let mut frames = vec![(1.0, write(SPEED.address, &[100; JOINTS]))];
-    if matches!(targets, Targets::Fine) {
+    if matches!(targets, SineTargets::Fine) {
         frames.push((1.1, write(SET_POINT_PERIOD.address, &PERIOD_MS.to_le_bytes())));
     }
     let mut random = Rng::with_seed(1);
@@ -75,11 +75,11 @@ fn frames(targets: Targets) -> Vec<(f64, Vec<u8>)> {
     while planned < START + LENGTH {
         let angles = MIDDLE.map(|middle| middle + AMPLITUDE * (TAU * FREQUENCY * (planned - START)).sin());
         let bytes = match targets {
-            Targets::Fine => write(
+            SineTargets::Fine => write(
                 FINE_TARGET.address,
                 angles.map(|angle| whole(angle * 100.0).to_le_bytes()).as_flattened(),
             ),
-            Targets::WholeDegrees => {
+            SineTargets::WholeDegrees => {
                 write(TARGET_POSITION.address, &angles.map(|angle| whole(angle).to_le_bytes()[0]))
             }
         };

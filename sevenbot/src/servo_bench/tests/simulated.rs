@@ -1,19 +1,20 @@
-//! A [`ServoLine`] to simulated servos in virtual time, for tests.
+//! A [`ServoLine`] to simulated servos in virtual time.
 
-use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::rc::Rc;
-use std::time::Duration;
+use std::fmt;
+use std::sync::{Arc, Mutex};
+use std::time::{self, Duration};
 
 use arm_sim::servo::{Servo, ServoConfig, ServoFault};
 use motion_core::servo_bus::frame::{Decoder, ServoFrame};
 use protocol_core::registers::Joint;
 use protocol_core::time::Instant;
 
-use super::bus_master::{BusMaster, BusOptions};
-use super::error::ServoError;
-use super::servo_line::ServoLine;
 use crate::error::PortError;
+use crate::host_line::HostLine;
+use crate::servo_bench::bus_master::{BusMaster, BusOptions};
+use crate::servo_bench::error::ServoError;
+use crate::servo_bench::servo_line::ServoLine;
 
 /// The supply voltage in 0.1 V.
 const SUPPLY: u8 = 74;
@@ -21,16 +22,16 @@ const SUPPLY: u8 = 74;
 const STEP: Duration = Duration::from_millis(1);
 
 /// A servo with more faults than the simulated arm has.
-pub(super) struct SimulatedServo {
-    pub(super) servo: Servo,
+pub(crate) struct SimulatedServo {
+    pub(crate) servo: Servo,
     /// Error bits added to each answer.
-    pub(super) errors: u8,
+    pub(crate) errors: u8,
     /// When the servo loses its power.
-    pub(super) fails_at: Duration,
+    pub(crate) fails_at: Duration,
 }
 
 impl SimulatedServo {
-    pub(super) fn new(id: u8) -> Self {
+    pub(crate) fn new(id: u8) -> Self {
         let mut servo = Servo::new(Joint::ALL[0], ServoConfig::default(), 300, Instant::ZERO);
         servo.set_id(id);
         // The first step fills the measurement registers.
@@ -38,13 +39,13 @@ impl SimulatedServo {
         Self { servo, errors: 0, fails_at: Duration::MAX }
     }
 
-    pub(super) fn with(id: u8, fault: ServoFault) -> Self {
+    pub(crate) fn with(id: u8, fault: ServoFault) -> Self {
         let mut simulated = Self::new(id);
         simulated.set_fault(Some(fault));
         simulated
     }
 
-    pub(super) fn set_fault(&mut self, fault: Option<ServoFault>) {
+    pub(crate) fn set_fault(&mut self, fault: Option<ServoFault>) {
         self.servo.set_fault(Instant::ZERO, fault, Instant::ZERO);
     }
 
@@ -65,15 +66,15 @@ impl SimulatedServo {
 
 /// The other end of the line.
 #[derive(Default)]
-pub(super) struct SimulatedWire {
-    pub(super) servos: Vec<SimulatedServo>,
-    pub(super) has_echo: bool,
+pub(crate) struct SimulatedWire {
+    pub(crate) servos: Vec<SimulatedServo>,
+    pub(crate) has_echo: bool,
     /// The delay of an echo.
-    pub(super) echo_delay: Duration,
+    pub(crate) echo_delay: Duration,
     /// After this many frames the port fails.
-    pub(super) frames_until_lost: Option<usize>,
+    pub(crate) frames_until_lost: Option<usize>,
     /// The rates of the adapter; empty means all.
-    pub(super) rates: Vec<u32>,
+    pub(crate) rates: Vec<u32>,
     baud: u32,
     now: Duration,
     /// The servos are simulated up to this time.
@@ -81,7 +82,7 @@ pub(super) struct SimulatedWire {
     /// Bytes and their time of arrival, in this order.
     in_transit: VecDeque<(Duration, Vec<u8>)>,
     /// All frames sent.
-    pub(super) sent: Vec<Vec<u8>>,
+    pub(crate) sent: Vec<Vec<u8>>,
 }
 
 impl SimulatedWire {
@@ -105,11 +106,21 @@ impl SimulatedWire {
 }
 
 /// The line to the servos of a wire.
-pub(super) struct SimulatedLine(pub(super) Rc<RefCell<SimulatedWire>>);
+struct WireLine {
+    wire: Arc<Mutex<SimulatedWire>>,
+    /// The virtual time 0.
+    start: time::Instant,
+}
 
-impl ServoLine for SimulatedLine {
+impl fmt::Debug for WireLine {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.debug_struct("WireLine").finish_non_exhaustive()
+    }
+}
+
+impl HostLine for WireLine {
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        let wire = &mut *self.0.borrow_mut();
+        let wire = &mut *self.wire.lock().unwrap();
         if wire.frames_until_lost.is_some_and(|frames| wire.sent.len() >= frames) {
             return Err(PortError::Lost(std::io::ErrorKind::BrokenPipe));
         }
@@ -124,7 +135,7 @@ impl ServoLine for SimulatedLine {
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
-        let wire = &mut *self.0.borrow_mut();
+        let wire = &mut *self.wire.lock().unwrap();
         let deadline = wire.now + timeout;
         match wire.in_transit.pop_front_if(|(at, _)| *at <= deadline) {
             Some((at, bytes)) => {
@@ -138,17 +149,22 @@ impl ServoLine for SimulatedLine {
         }
     }
 
+    fn now(&self) -> time::Instant {
+        self.start + self.wire.lock().unwrap().now
+    }
+
+    /// A pause before a frame takes no virtual time.
+    fn sleep(&mut self, _: Duration) {}
+}
+
+impl ServoLine for WireLine {
     fn set_baud(&mut self, baud: u32) -> Result<(), ServoError> {
-        let wire = &mut *self.0.borrow_mut();
+        let wire = &mut *self.wire.lock().unwrap();
         if !wire.rates.is_empty() && !wire.rates.contains(&baud) {
             return Err(ServoError::NoSuchRate { baud });
         }
         wire.baud = baud;
         Ok(())
-    }
-
-    fn now(&self) -> Duration {
-        self.0.borrow().now
     }
 }
 
@@ -157,7 +173,9 @@ fn instant(time: Duration) -> Instant {
 }
 
 /// A bus with these servos, at 1 Mbaud.
-pub(super) fn bus(servos: Vec<SimulatedServo>) -> (BusMaster, Rc<RefCell<SimulatedWire>>) {
-    let wire = Rc::new(RefCell::new(SimulatedWire { servos, baud: 1_000_000, ..SimulatedWire::default() }));
-    (BusMaster::with_line(Box::new(SimulatedLine(Rc::clone(&wire))), BusOptions::default()), wire)
+pub(crate) fn bus(servos: Vec<SimulatedServo>) -> (BusMaster, Arc<Mutex<SimulatedWire>>) {
+    let wire = SimulatedWire { servos, baud: 1_000_000, ..SimulatedWire::default() };
+    let wire = Arc::new(Mutex::new(wire));
+    let line = WireLine { wire: Arc::clone(&wire), start: time::Instant::now() };
+    (BusMaster::with_line(Box::new(line), BusOptions::default()), wire)
 }
