@@ -91,7 +91,7 @@ impl Joints {
     /// The host wrote the motor state, perhaps the present one: joints that are let go may engage again (D28). Returns
     /// whether there is one.
     pub(crate) fn order(&mut self) -> bool {
-        self.supply.ordered();
+        self.supply.ordered(self.joints.iter().any(|state| state.position.is_known()));
         self.joints.iter_mut().for_each(JointState::order);
         self.joints.iter().any(JointState::is_let_go)
     }

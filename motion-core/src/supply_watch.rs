@@ -49,9 +49,13 @@ impl SupplyWatch {
         *self = Self::NEW;
     }
 
-    /// The host wrote the motor state. An outage that lasts goes on.
-    pub(crate) const fn ordered(&mut self) {
+    /// The host wrote the motor state. Servos that answer have supply, so the order counts for them: their joints may engage,
+    /// although no driven servo has answered yet. An outage of all servos goes on.
+    pub(crate) const fn ordered(&mut self, any_answers: bool) {
         self.was_outage = false;
+        if any_answers {
+            self.all_silent_since = None;
+        }
     }
 
     /// Was the supply perhaps lost? Then no joint may engage.

@@ -121,6 +121,23 @@ fn d29_a_joint_that_was_let_go_before_the_stop_does_not_engage_after_it() {
 }
 
 #[test]
+fn d29_a_write_of_the_motor_state_drives_a_servo_that_was_not_driven_before_the_others_fell_silent() {
+    let mut rig = Rig::started();
+    rig.write(192, &[0]);
+    rig.plant.restart_servo(Instant::from_micros(rig.now_us), FIRST);
+    rig.run_ms(500);
+    for joint in Joint::ALL.into_iter().skip(1) {
+        rig.plant.set_fault(joint, Some(ServoFault::Garbled(1)));
+    }
+    rig.run_ms(3_000);
+    assert_eq!((rig.get(LET_GO), rig.get(242)), (1, 0x7E));
+    rig.write(29, &[1]);
+    rig.run_ms(200);
+    assert!(rig.plant.has_torque(FIRST), "it has supply");
+    assert_eq!((rig.get(LET_GO), rig.get(242)), (0, 0x7E));
+}
+
+#[test]
 fn d29_the_torque_of_a_joint_that_is_let_go_is_read_after_a_silence_too() {
     let joint = Joint::ALL[4];
     let mut rig = Rig::started();
