@@ -25,6 +25,8 @@ pub(super) struct JointTruth {
     off_at: Instant,
     /// The last alarm. A joint that nothing moves counts as held as long as its servo has an alarm (D28).
     alarm_at: Option<Instant>,
+    /// It has no torque since a disturbance: the controller cannot tell a lost order from lost torque.
+    lacks_order: bool,
     /// The last push over the limit.
     pushed_at: Option<Instant>,
 }
@@ -35,9 +37,10 @@ impl JointTruth {
         self.alarm_at = Some(now);
     }
 
-    /// Takes the torque of the servo, and its push and its limit in 0.1 %.
-    pub(super) fn observe(&mut self, now: Instant, torque: Option<Torque>, push: i16, limit: Option<i16>) {
+    /// Takes the torque of the servo. `may_miss_orders` tells that frames may be lost, or questions not answered.
+    pub(super) fn observe(&mut self, now: Instant, torque: Option<Torque>, may_miss_orders: bool) {
         let is_on = torque == Some(Torque::On);
+        self.lacks_order = !is_on && (self.lacks_order || may_miss_orders);
         if self.is_on && !is_on {
             self.lost_at = Some(now);
         }
@@ -45,6 +48,10 @@ impl JointTruth {
             self.off_at = now;
         }
         self.is_on = is_on;
+    }
+
+    /// Takes the push of the servo and its limit in 0.1 %.
+    pub(super) fn pushes(&mut self, now: Instant, push: i16, limit: Option<i16>) {
         if limit.is_some_and(|limit| push.saturating_abs().saturating_add(PUSH_ERROR) > limit) {
             self.pushed_at = Some(now);
         }
@@ -61,15 +68,70 @@ impl JointTruth {
     }
 
     /// True if the controller may take the joint for let go (D28): it has an alarm, or it lost its torque, or an alarm kept it
-    /// from getting any.
+    /// from getting any, or the order may be lost.
     pub(super) fn may_be_let_go(&self, now: Instant) -> bool {
         let has_alarm = self.alarm_at.is_some_and(|at| now - at < NOTICE_TIME);
         let had_cause = self.lost_at.is_some() || self.alarm_at.is_some();
-        has_alarm || had_cause && now - self.off_at < NOTICE_TIME
+        has_alarm || self.lacks_order || had_cause && now - self.off_at < NOTICE_TIME
     }
 
     /// True if the set-point may give way, or gave way a moment ago (D27).
     pub(super) fn may_give_way(&self, now: Instant) -> bool {
         self.pushed_at.is_some_and(|at| now - at < GIVE_WAY_TIME)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ON: Option<Torque> = Some(Torque::On);
+    const OFF: Option<Torque> = Some(Torque::Damping);
+
+    fn at(millis: u64) -> Instant {
+        Instant::from_micros(millis * 1_000)
+    }
+
+    #[test]
+    fn a_joint_may_be_let_go_after_it_lost_its_torque_and_a_while_longer() {
+        let mut truth = JointTruth::default();
+        truth.observe(at(0), OFF, false);
+        assert!(!truth.may_be_let_go(at(0)) && !truth.may_wait_for_torque(at(0)), "it had no torque yet");
+        truth.observe(at(100), ON, false);
+        truth.observe(at(200), OFF, false);
+        assert_eq!(truth.lost_at(), Some(at(200)));
+        assert!(truth.may_wait_for_torque(at(10_199)) && !truth.may_wait_for_torque(at(10_200)));
+        truth.observe(at(20_000), OFF, false);
+        assert!(truth.may_be_let_go(at(27_499)) && !truth.may_be_let_go(at(27_500)));
+    }
+
+    #[test]
+    fn a_joint_whose_order_may_be_lost_may_be_let_go_until_it_has_torque() {
+        let mut truth = JointTruth::default();
+        truth.observe(at(0), OFF, true);
+        truth.observe(at(60_000), OFF, false);
+        assert!(truth.may_be_let_go(at(60_000)), "only the host can order it again");
+        truth.observe(at(60_100), ON, true);
+        assert!(!truth.may_be_let_go(at(60_100)));
+    }
+
+    #[test]
+    fn a_joint_with_an_alarm_may_be_let_go() {
+        let mut truth = JointTruth::default();
+        truth.observe(at(0), ON, false);
+        assert!(!truth.may_be_let_go(at(0)));
+        truth.has_alarm(at(1_000));
+        assert!(truth.may_be_let_go(at(8_499)) && !truth.may_be_let_go(at(8_500)));
+        assert!(truth.may_wait_for_torque(at(10_999)) && !truth.may_wait_for_torque(at(11_000)));
+    }
+
+    #[test]
+    fn a_joint_may_give_way_after_a_push_over_its_limit() {
+        let mut truth = JointTruth::default();
+        truth.pushes(at(0), 550, Some(700));
+        truth.pushes(at(0), 1_000, None);
+        assert!(!truth.may_give_way(at(0)));
+        truth.pushes(at(100), -551, Some(700));
+        assert!(truth.may_give_way(at(7_099)) && !truth.may_give_way(at(7_100)));
     }
 }

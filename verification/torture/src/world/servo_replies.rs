@@ -15,6 +15,8 @@ const START_UP_REPLIES: u8 = 2;
 const LOST_AFTER: Duration = Duration::from_millis(900);
 /// So long after a silence its end may still matter.
 const NOTICE_TIME: Duration = Duration::from_millis(3_000);
+/// A joint is let go once its torque was read off this often: one reading may be false.
+const LOST_BY: u8 = 2;
 /// The registers of a reading.
 const READING: usize = 8;
 
@@ -39,6 +41,10 @@ struct Known {
     is_read_on: bool,
     /// Its torque was read off last.
     is_read_off: bool,
+    /// How often its torque was read off without a reading that it is on.
+    offs: u8,
+    /// Its torque was read off [`LOST_BY`] times since it was last given torque.
+    was_lost: bool,
     /// When its torque was read after that, and how often that happened since its last goal.
     trusted_at: Instant,
     ended_doubts: u64,
@@ -142,6 +148,7 @@ impl ServoReplies {
     pub(super) fn forget_doubt(&mut self, joint: Joint) {
         let servo = &mut self.servos[joint];
         (servo.is_doubtful, servo.is_read_on, servo.is_read_off) = (false, false, false);
+        (servo.offs, servo.was_lost) = (0, false);
         servo.is_driven = false;
     }
 
@@ -153,6 +160,11 @@ impl ServoReplies {
     /// True if the torque was off when it was read last.
     pub(super) fn was_read_off(&self, joint: Joint) -> bool {
         self.servos[joint].is_read_off
+    }
+
+    /// True if the torque was lost since the joint was last given torque. A goal may have switched it on again.
+    pub(super) fn was_lost(&self, joint: Joint) -> bool {
+        self.servos[joint].was_lost
     }
 
     /// True if a silence of a second or longer ended a moment ago.
@@ -201,6 +213,8 @@ impl Known {
             }
             self.is_read_on = code == on;
             self.is_read_off = code != on;
+            self.offs = if code == on { 0 } else { self.offs.saturating_add(1) };
+            self.was_lost |= self.offs >= LOST_BY;
             self.held_goal = goal(params).filter(|_| code == on);
         }
         torque_switch(params) == Some(on)
@@ -227,9 +241,14 @@ mod tests {
 
     /// The servo is asked, and answers that its torque is on.
     fn is_on(replies: &mut ServoReplies, millis: u64) {
+        has(replies, millis, Torque::On);
+    }
+
+    /// The servo is asked, and answers that it has this torque.
+    fn has(replies: &mut ServoReplies, millis: u64, torque: Torque) {
         replies.asked(at_ms(millis), JOINT, 24, true);
         let mut params = [0; 24];
-        params[0] = TorqueCodes::default().code(Torque::On);
+        params[0] = TorqueCodes::default().code(torque);
         let mut answer = ServoFrameBuffer::new();
         frame::status(&mut answer, JOINT.index(), 0, &params);
         replies.received(at_ms(millis + 1), &answer);
@@ -252,5 +271,51 @@ mod tests {
         is_on(&mut replies, 240);
         assert_eq!(ahead(&mut replies, 245), 2 * 70 + 4, "two doubts without a goal between them");
         assert_eq!(ahead(&mut replies, 255), 70 + 14);
+    }
+
+    #[test]
+    fn lost_torque_counts_until_the_joint_is_given_torque_also_if_a_goal_switched_it_on() {
+        let mut replies = ServoReplies::new(TorqueCodes::default());
+        is_on(&mut replies, 0);
+        has(&mut replies, 10, Torque::Damping);
+        is_on(&mut replies, 20);
+        has(&mut replies, 30, Torque::Damping);
+        assert!(!replies.was_lost(JOINT) && replies.was_read_off(JOINT), "one reading may be false");
+        has(&mut replies, 40, Torque::Damping);
+        is_on(&mut replies, 50);
+        assert!(replies.was_lost(JOINT) && !replies.was_read_off(JOINT));
+        replies.forget_doubt(JOINT);
+        assert!(!replies.was_lost(JOINT));
+    }
+
+    #[test]
+    fn d29_a_driven_servo_is_doubtful_after_a_silence_until_its_torque_is_read() {
+        let mut replies = ServoReplies::new(TorqueCodes::default());
+        is_on(&mut replies, 0);
+        fails(&mut replies, 10);
+        assert!(!replies.is_doubtful(JOINT), "the reply may be on its way");
+        fails(&mut replies, 20);
+        assert!(replies.is_doubtful(JOINT) && replies.unanswered(JOINT) == 2);
+        is_on(&mut replies, 30);
+        assert!(!replies.is_doubtful(JOINT));
+        has(&mut replies, 40, Torque::Damping);
+        fails(&mut replies, 50);
+        fails(&mut replies, 60);
+        assert!(!replies.is_doubtful(JOINT), "it was read off, so it is not driven");
+    }
+
+    #[test]
+    fn d29_an_outage_begins_when_all_driven_servos_are_silent_for_a_second_and_ends_with_torque() {
+        let mut replies = ServoReplies::new(TorqueCodes::default());
+        is_on(&mut replies, 0);
+        [10, 20, 900].into_iter().for_each(|millis| fails(&mut replies, millis));
+        assert!(!replies.was_outage());
+        fails(&mut replies, 911);
+        assert!(replies.was_outage());
+        has(&mut replies, 1_200, Torque::Damping);
+        assert!(replies.was_outage() && replies.was_silent_for_a_second(JOINT, at_ms(1_300)));
+        is_on(&mut replies, 1_210);
+        assert!(!replies.was_outage());
+        assert!(!replies.was_silent_for_a_second(JOINT, at_ms(4_300)), "long ago");
     }
 }

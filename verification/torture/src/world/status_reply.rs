@@ -1,6 +1,6 @@
 //! Status replies of servos in the bytes on the servo bus.
 
-use motion_core::servo_bus::frame::{Decoder, Reading};
+use motion_core::servo_bus::frame::Reading;
 use protocol_core::registers::Joint;
 
 /// The registers from the torque switch to the measurements.
@@ -14,22 +14,6 @@ pub(super) struct StatusFields {
     pub(super) speed: u16,
     pub(super) decivolts: u8,
     pub(super) celsius: u8,
-}
-
-/// The parameters of each status reply with a valid checksum in `bytes`.
-pub(super) fn status_replies(bytes: &[u8]) -> Vec<(Joint, Vec<u8>)> {
-    let mut decoder = Decoder::new();
-    decoder.push(bytes);
-    let mut found = Vec::new();
-    while let Some(result) = decoder.pull() {
-        if let Ok(frame) = result
-            && let Some(joint) = Joint::from_index(frame.id)
-            && frame.params.len() >= usize::from(Reading::REGISTERS)
-        {
-            found.push((joint, frame.params.to_vec()));
-        }
-    }
-    found
 }
 
 /// The status in `bytes`, if they are exactly one reply with a valid checksum.

@@ -1,8 +1,8 @@
 //! The targets: as the host wrote them, or as the arm set them (D12, D13, D24).
 
-use motion_core::calibration::MicroDegrees;
-use protocol_core::registers::Joint;
+use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use protocol_core::registers::map::{MOTOR_STATE, TARGET_POSITION, motor_state};
+use protocol_core::registers::{Joint, RegisterFile};
 
 use super::RegisterModel;
 use crate::per_joint::PerJoint;
@@ -54,5 +54,11 @@ impl RegisterModel {
     /// The target with its fraction, if the host set it and it is in force.
     pub(crate) fn host_target(&self, joint: Joint) -> Option<MicroDegrees> {
         self.targets[joint].filter(|_| self.has_host_target[joint])
+    }
+
+    /// Where the servo of a joint is at the target in its register, in counts.
+    pub(crate) fn target_counts(&self, joint: Joint, registers: &RegisterFile) -> u16 {
+        let shown = MicroDegrees::from_degrees(registers.get(TARGET_POSITION.of(joint)));
+        counts_from_angle(joint, self.host_target(joint).unwrap_or(shown), self.offset(joint))
     }
 }

@@ -1,0 +1,129 @@
+//! Goals are within reach of the last ones, end at the target and keep the linkage. After a silence, and without torque, they
+//! are where the joint stands (D10, D12, D25, D27, D29).
+
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{
+    LIMITS, MOTOR_STATE, MOVING_JOINTS, SPEED, TARGET_POSITION, limit, motor_state,
+};
+
+use super::position::degree;
+use super::{CommandChecker, CommandContext, invalid_frame};
+use crate::per_joint::PerJoint;
+use crate::violation::{Check, Violation, ensure};
+use crate::world::reachable_range::ReachableRange;
+
+impl CommandChecker {
+    pub(super) fn check_goals(&mut self, items: &[u8], context: &CommandContext<'_>) -> Check {
+        let state = context.registers.get(MOTOR_STATE.address);
+        ensure(state == motor_state::SERVO, || format!("goals are sent in motor state {state}"))?;
+        let mut has_goal = PerJoint::all(false);
+        for item in items.chunks(7) {
+            let &[id, high, low, ref rest @ ..] = item else { return Err(invalid_frame(items)) };
+            let Some(joint) = Joint::from_index(id) else { return Err(invalid_frame(items)) };
+            ensure(*rest == [0, 10, 0, 0], || {
+                format!("time and speed of joint {}: {rest:?}", joint.number())
+            })?;
+            has_goal[joint] = true;
+            self.goal_at[joint] = context.now;
+            self.check_responding(joint, "is driven", context)?;
+            self.check_goal(joint, u16::from_be_bytes([high, low]), context)?;
+        }
+        for joint in Joint::ALL.into_iter().filter(|joint| !has_goal[*joint]) {
+            self.paused[joint] = self.ranges[joint].take().or(self.paused[joint]);
+            self.paused_at[joint] = context.now;
+        }
+        self.check_linkage(context)
+    }
+
+    /// The goals of joints 2 and 3 keep the linkage, if it limits them (D25). A joint that gives way may leave it (D27).
+    fn check_linkage(&mut self, context: &CommandContext<'_>) -> Check {
+        let [_, two, three, ..] = Joint::ALL;
+        let gives_way = |joint| context.bus.truth(joint).may_give_way(context.now);
+        let is_off = context.registers.get(LIMITS.address) & limit::LINKAGE == 0;
+        if is_off || gives_way(two) || gives_way(three) {
+            self.linkage.reset();
+            return Ok(());
+        }
+        let offset = |joint| context.model.offset(joint);
+        let goal = |joint| self.ranges[joint].map(|range: ReachableRange| range.last_goal);
+        self.linkage.check([goal(two), goal(three)], [offset(two), offset(three)])
+    }
+
+    fn check_goal(&mut self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
+        let speed = context.registers.get(SPEED.of(joint));
+        let ahead = self.replies.take_trusted_time(joint, context.now, self.ahead_time);
+        let paused = self.paused[joint].take().map(|range| range.resumed(context.now, ahead));
+        let before = self.ranges[joint].or(paused);
+        let reached = before.and_then(|range| range.after(joint, goal, speed, context.now));
+        let new = ReachableRange::at(joint, goal, speed, context.now);
+        // A joint without torque that engages anew where it is did not move there.
+        let is_engaging = !self.is_on[joint] || self.replies.was_read_off(joint);
+        self.ranges[joint] = reached.filter(|_| paused.is_none() && !is_engaging).or(Some(new));
+        self.check_doubt(joint, goal, context)?;
+        match before {
+            _ if reached.is_some() => check_arrival(joint, goal, context),
+            Some(before) if self.gives_way(joint, before, goal, context) => {
+                check_arrival(joint, goal, context)
+            }
+            Some(before) if paused.is_none() && !is_engaging => Err(Violation(format!(
+                "joint {} gets the goal {goal} after {}, out of reach with speed {speed}",
+                joint.number(),
+                before.last_goal
+            ))),
+            _ => {
+                self.linkage.reset();
+                self.check_position(joint, goal, "is driven", context)
+            }
+        }
+    }
+
+    /// A servo without torque gets no goal but where it stands. After an unanswered question its torque is read first
+    /// (D29).
+    fn check_doubt(&self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
+        if !context.bus.is_undisturbed(context.now) {
+            return Ok(());
+        }
+        ensure(!self.replies.is_doubtful(joint), || {
+            format!("joint {} gets a goal, but its torque was not read after a silence", joint.number())
+        })?;
+        if context.bus.is_free(joint) {
+            return self.check_position(joint, goal, "gets a goal without torque", context);
+        }
+        Ok(())
+    }
+
+    /// True if this goal brings the set-point of a joint that pushes too hard nearer to the measured position (D27).
+    fn gives_way(
+        &self,
+        joint: Joint,
+        before: ReachableRange,
+        goal: u16,
+        context: &CommandContext<'_>,
+    ) -> bool {
+        let speed = context.registers.get(SPEED.of(joint));
+        let reached = |position| before.giving_way(position).after(joint, goal, speed, context.now);
+        let is_nearer = self.replies.position(joint).and_then(reached).is_some();
+        is_nearer && context.bus.truth(joint).may_give_way(context.now)
+    }
+}
+
+/// The goal of a joint that has arrived is its target. A target that the host did not write is the measured position,
+/// rounded to degrees and limited to 0..=180.
+fn check_arrival(joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
+    if context.registers.get(MOVING_JOINTS.address) & joint.bit() != 0 {
+        return Ok(());
+    }
+    let target = context.registers.get(TARGET_POSITION.of(joint));
+    let tolerance = match (context.model.has_host_target[joint], target) {
+        (true, _) => 1,
+        (false, 0 | 180) => return Ok(()),
+        (false, _) => degree(joint) / 2 + 1,
+    };
+    let wanted = context.model.target_counts(joint, context.registers);
+    ensure(goal.abs_diff(wanted) <= tolerance, || {
+        format!(
+            "joint {} has arrived at {target} degrees ({wanted} counts), but its goal is {goal}",
+            joint.number()
+        )
+    })
+}

@@ -1,0 +1,62 @@
+//! A joint gets a goal or torque only where it stands, and only if its servo answers (D12).
+
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::MISSING_SERVOS;
+use protocol_core::time::Duration;
+
+use super::{CommandChecker, CommandContext};
+use crate::violation::{Check, ensure};
+
+/// The number of reads without a reply after which a servo is silent: three have failed (D12), one may be in progress.
+const MAX_UNANSWERED: u8 = 4;
+/// The controller reads a joint again before it gives torque later than this after a reading.
+const FRESH_FOR: Duration = Duration::from_millis(20);
+/// Counts that a joint without torque may fall in that time, at 130 degrees/s.
+const MAX_FALL: u16 = 12;
+
+impl CommandChecker {
+    /// A silent servo receives only reads (D12).
+    pub(super) fn check_responding(&self, joint: Joint, what: &str, context: &CommandContext<'_>) -> Check {
+        let is_flagged = context.registers.get(MISSING_SERVOS.address) & joint.bit() != 0;
+        // On a disturbed bus the controller may decode a reply that this decoder misses.
+        let unanswered = self.replies.unanswered(joint);
+        let is_silent = unanswered >= MAX_UNANSWERED && context.bus.is_undisturbed(context.now);
+        ensure(!is_flagged && !is_silent, || {
+            let number = joint.number();
+            format!("joint {number} {what} while its servo is silent: {unanswered} reads without a reply")
+        })
+    }
+
+    /// A joint starts from its position, or from a near goal that it kept while its servo was lost or the controller
+    /// restarted (D12).
+    pub(super) fn check_position(
+        &self,
+        joint: Joint,
+        goal: u16,
+        what: &str,
+        context: &CommandContext<'_>,
+    ) -> Check {
+        let bus = context.bus;
+        let held = self.held_goal(joint).map(|held| (held, 1));
+        let is_at = |(kept, tolerance): (u16, u16)| goal.abs_diff(kept) <= tolerance;
+        let is_kept = self.kept_goals[joint].into_iter().chain(held).any(is_at);
+        let degrees = if is_kept { 4 } else { 1 };
+        let fall = if bus.has_torque(joint) { 0 } else { MAX_FALL };
+        // After its reading the joint may go on moving: the servo may execute a corrupted goal. A reply may be old.
+        let speed = u64::from(bus.last_status(joint).speed);
+        let moved = (bus.reply_age(joint).as_micros() * 1_757 + FRESH_FOR.as_micros() * speed) / 1_000_000;
+        let error = bus.position_tolerance(joint, context.now);
+        let tolerance = u64::from(degrees * degree(joint) + fall) + moved + error;
+        let position = bus.position(joint);
+        let is_near =
+            u64::from(goal.abs_diff(position)) <= tolerance || bus.may_be_misread(joint, context.now);
+        ensure(is_near, || {
+            format!("joint {} {what} at {position} counts with the goal {goal}", joint.number())
+        })
+    }
+}
+
+/// Counts of a degree, with the rounding of a reading.
+pub(super) fn degree(joint: Joint) -> u16 {
+    if joint.number() < 5 { 5 } else { 4 }
+}

@@ -1,0 +1,126 @@
+//! Where a joint may be: the range of its goals, which shrinks behind it.
+
+use protocol_core::time::Instant;
+
+/// The accepted distance of a joint from its range, in millidegrees, without load and speed. A goal is a multiple of up
+/// to 0.29 degrees, and the angle is measured after the goal is computed.
+const TOLERANCE: i32 = 450;
+/// A servo with this load, in 0.1 %, drives its joint back.
+const DRIVES_BACK: i16 = 100;
+
+/// Why a joint may move without a goal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) enum Exemption {
+    /// Its servo has restarted, and has no torque until the controller gives it.
+    PowerLoss,
+    /// The motor state is not servo.
+    MotorState,
+    /// A hand turns it, or something holds it.
+    Hand,
+    /// The panic handler switched the servos to damping.
+    Panic,
+    /// Noise corrupted a command or formed one, so the command that the servo received is unknown.
+    Noise,
+}
+
+/// The angles that a joint may have, in millidegrees.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AngleRange {
+    pub(super) low: i32,
+    pub(super) high: i32,
+}
+
+impl AngleRange {
+    pub(super) const fn at(angle: i32) -> Self {
+        Self { low: angle, high: angle }
+    }
+
+    pub(super) fn reach(&mut self, angle: i32) {
+        self.low = self.low.min(angle);
+        self.high = self.high.max(angle);
+    }
+
+    /// Shrinks towards the recent goals, but not past the joint.
+    pub(super) fn shrink(&mut self, goals: Self, angle: i32, by: i32) {
+        self.low = (self.low + by).min(angle.max(self.low)).min(goals.low);
+        self.high = (self.high - by).max(angle.min(self.high)).max(goals.high);
+    }
+
+    /// True if a servo with this load, positive towards greater angles, drives a joint at this angle towards the range.
+    pub(super) fn is_driven_back(&self, angle: i32, load: i16) -> bool {
+        (angle > self.high && load < -DRIVES_BACK) || (angle < self.low && load > DRIVES_BACK)
+    }
+
+    pub(super) fn excess(&self, angle: i32) -> i32 {
+        (angle - self.high).max(self.low - angle)
+    }
+}
+
+/// The checked state of a joint.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct JointBounds {
+    /// Why it may move without a goal, and the earliest end of that.
+    pub(super) exemption: Option<(Exemption, Instant)>,
+    /// The last goal that its servo has received since it has had power.
+    pub(super) goal: Option<i32>,
+    /// The goals of the present period of 100 ms, and of the period before.
+    pub(super) goals: [AngleRange; 2],
+    pub(super) range: AngleRange,
+    /// Until then the joint may run past its goals if its servo drives it back.
+    pub(super) overruns_until: Instant,
+    /// Its servo had torque at the last check.
+    pub(super) had_torque: bool,
+    /// How far it was outside its range at the last check.
+    pub(super) excess: i32,
+    /// The greatest yield in the present period, and in the period before.
+    pub(super) yields: [i32; 2],
+}
+
+impl JointBounds {
+    /// The state of a joint whose servo has no power.
+    pub(super) const fn without_power(now: Instant) -> Self {
+        Self {
+            exemption: Some((Exemption::PowerLoss, now)),
+            goal: None,
+            goals: [AngleRange::at(0); 2],
+            range: AngleRange::at(0),
+            overruns_until: now,
+            had_torque: false,
+            excess: 0,
+            yields: [0; 2],
+        }
+    }
+
+    /// Starts a new period for the goals and for the yield.
+    pub(super) fn age(&mut self) {
+        let [new, _] = self.goals;
+        self.goals = [AngleRange::at(self.goal.unwrap_or(0)), new];
+        let [new, _] = self.yields;
+        self.yields = [0, new];
+    }
+
+    /// How far the joint may be outside its range.
+    pub(super) fn tolerance(&self) -> i32 {
+        let [new, old] = self.yields;
+        new.max(old).saturating_add(TOLERANCE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lagging_joint_is_inside_its_range_and_a_falling_joint_is_not() {
+        let goal = AngleRange::at(10_000);
+        let mut range = AngleRange { low: 0, high: 10_000 };
+        range.shrink(goal, 2_000, 3_000);
+        assert_eq!((range.low, range.high), (2_000, 10_000), "not past the joint");
+        range.shrink(goal, 9_900, 8_000);
+        assert_eq!((range.low, range.excess(9_900)), (9_900, 0));
+        range.shrink(goal, 4_000, 0);
+        assert_eq!(range.excess(4_000), 5_900, "away from the goal");
+        range.shrink(goal, 11_000, 0);
+        assert_eq!(range.excess(11_000), 1_000);
+    }
+}

@@ -1,0 +1,34 @@
+//! The true state of the arm, beside its registers.
+
+use protocol_core::registers::{Joint, RegisterFile};
+use protocol_core::time::{Duration, Instant};
+
+use crate::world::command_checker::CommandChecker;
+use crate::world::disturbed_bus::{Availability, DisturbedBus};
+use crate::world::register_model::RegisterModel;
+use crate::world::watchdog_model::WatchdogModel;
+
+/// A joint whose last questions were not answered is late by this much.
+const PAUSE: Duration = Duration::from_millis(1_000);
+
+/// The true state of the arm, and its registers.
+pub(in super::super) struct StatusContext<'a> {
+    pub(in super::super) now: Instant,
+    pub(in super::super) registers: &'a RegisterFile,
+    pub(in super::super) model: &'a RegisterModel,
+    pub(in super::super) watchdog: &'a WatchdogModel,
+    pub(in super::super) bus: &'a DisturbedBus,
+    pub(in super::super) command_checker: &'a CommandChecker,
+}
+
+impl StatusContext<'_> {
+    /// True if a joint need not go on with its move: it gives way, it is let go, some questions are not answered, or it is not
+    /// known whether the supply was lost.
+    pub(super) fn may_be_late(&self, joint: Joint) -> bool {
+        self.bus.truth(joint).may_give_way(self.now)
+            || self.bus.may_be_let_go(joint, self.now)
+            || self.command_checker.is_undecided()
+            || self.bus.availability(joint) == Availability::Uncertain
+            || self.now - self.command_checker.paused_at[joint] < PAUSE
+    }
+}

@@ -1,0 +1,135 @@
+//! The status of one joint: missing, moving, let go, with torque, and where.
+
+use motion_core::calibration::angle_from_counts;
+use motion_core::servo_bus::frame::error;
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{LIMITS, MISSING_SERVOS, MOVING_JOINTS, PRESENT_POSITION, limit};
+use protocol_core::time::Duration;
+
+use super::context::StatusContext;
+use super::move_time::{WHOLE_RANGE, rest_by};
+use super::{CHECK_PERIOD, DETECTION_TIME, StatusChecker};
+use crate::violation::{Check, ensure};
+use crate::world::disturbed_bus::Availability;
+use crate::world::extended_model;
+use crate::world::protection_model::PROTECTION;
+
+/// A position that was not checked for longer may have changed meanwhile: two checks.
+const UNCHECKED_TIME: Duration = Duration::from_millis(500);
+/// Torque is off this long after a change to another motor state than servo.
+const RELEASE_TIME: Duration = Duration::from_millis(300);
+/// The time of a move over the whole range at the lowest speed, 1.9 degrees/s.
+const LONGEST_MOVE: Duration = Duration::from_millis(125_000);
+/// A servo that was too hot gets torque again when it is 5 degrees cooler (D28). Its limit is 80 degrees Celsius.
+const COOL: u8 = 75;
+
+impl StatusChecker {
+    pub(super) fn check_joint(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
+        let (number, now) = (joint.number(), context.now);
+        let is_missing = context.registers.get(MISSING_SERVOS.address) & joint.bit() != 0;
+        let is_moving = context.registers.get(MOVING_JOINTS.address) & joint.bit() != 0;
+        match context.bus.availability(joint) {
+            Availability::Silent(since) if self.settled_time(now, since) > DETECTION_TIME => {
+                ensure(is_missing, || format!("servo {number} is silent and not reported as missing"))?;
+            }
+            Availability::Responding(since) if self.settled_time(now, since) > DETECTION_TIME => {
+                ensure(!is_missing, || format!("servo {number} responds and is reported as missing"))?;
+                self.check_position(joint, context)?;
+                self.check_torque(joint, context)?;
+            }
+            _ => {}
+        }
+        self.check_latch(joint, context)?;
+        // A joint of the linkage may wait for the other one (D25), even for one whose servo is missing.
+        let may_wait =
+            context.model.get(LIMITS.address) & limit::LINKAGE != 0 && matches!(joint.number(), 2 | 3);
+        if may_wait {
+            // It has its full time once the limit is off.
+            self.settled_by[joint] = self.settled_by[joint].max(now + LONGEST_MOVE);
+        }
+        if context.may_be_late(joint) {
+            let by = rest_by(now, joint, WHOLE_RANGE, context.registers, context.model);
+            self.settled_by[joint] = self.settled_by[joint].max(by);
+        }
+        let is_late = is_moving && now > self.settled_by[joint];
+        ensure(!is_late, || format!("joint {number} has been moving for too long"))?;
+        ensure(!(is_moving && is_missing), || format!("joint {number} is reported as moving and missing"))?;
+        let is_free = context.model.is_servo() || !context.command_checker.is_on(joint);
+        ensure(is_free || self.settled_time(now, self.state_at) < RELEASE_TIME, || {
+            format!("joint {number} still has torque")
+        })
+    }
+
+    /// Checks the positions of the extended block, which the arm has just shown (D21).
+    pub(in super::super) fn check_fine_positions(&self, context: &StatusContext<'_>) -> Check {
+        extended_model::check_positions(context.registers)?;
+        for joint in Joint::ALL.into_iter().filter(|joint| self.is_responding(*joint, context)) {
+            let (position, since) = self.last_moves[joint];
+            let at_rest = self.settled_time(context.now, since.max(self.motion_at));
+            if position == context.bus.position(joint) && at_rest >= DETECTION_TIME {
+                let offset = context.model.offset(joint);
+                // Since its last reading a joint that meets an obstacle may have moved by a count.
+                let read =
+                    context.command_checker.measured(joint).filter(|read| read.abs_diff(position) <= 1);
+                let shown = read.unwrap_or(position);
+                extended_model::check_position(joint, shown, offset, context.registers)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The position register of a joint at rest holds its position.
+    fn check_position(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
+        let position = context.bus.position(joint);
+        let (last, since) = self.last_moves[joint];
+        let checked_at = std::mem::replace(&mut self.position_checked_at[joint], context.now);
+        // While it was not checked, the joint may have moved away and back.
+        let may_have_moved = last != position || context.now - checked_at > UNCHECKED_TIME;
+        if may_have_moved {
+            self.last_moves[joint] = (position, context.now);
+        }
+        // So it may after a write.
+        if may_have_moved || self.settled_time(context.now, since.max(self.motion_at)) < DETECTION_TIME {
+            return Ok(());
+        }
+        let angle = angle_from_counts(joint, position, context.model.offset(joint)).nearest_degree();
+        let shown = context.registers.get(PRESENT_POSITION.of(joint));
+        ensure(shown.abs_diff(angle) == 0, || {
+            format!("joint {} is at {angle} degrees, and its register holds {shown}", joint.number())
+        })
+    }
+
+    /// A joint that is let go gets torque-off, which ends a latched overload (D28).
+    fn check_latch(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
+        // Register 196 is as old as its last read. A joint that gets no goals at all is let go.
+        let is_let_go = context.now - context.command_checker.goal_at[joint] > CHECK_PERIOD;
+        let is_due = is_let_go
+            && context.model.is_servo()
+            && context.model.get(PROTECTION) == 1
+            && self.is_responding(joint, context);
+        if !is_due || context.bus.last_status(joint).alarms & error::OVERLOAD == 0 {
+            self.unlatched_at[joint] = context.now;
+        }
+        ensure(context.now - self.unlatched_at[joint] < DETECTION_TIME, || {
+            format!("joint {} is let go, and its overload stays latched", joint.number())
+        })
+    }
+
+    /// A servo that responds has torque in motor state servo.
+    fn check_torque(&self, joint: Joint, context: &StatusContext<'_>) -> Check {
+        let is_due =
+            context.model.is_servo() && self.settled_time(context.now, self.state_at) > DETECTION_TIME;
+        let is_on = context.command_checker.is_on(joint);
+        let all_respond = || Joint::ALL.into_iter().all(|other| self.is_responding(other, context));
+        let may_wait = context.bus.truth(joint).may_wait_for_torque(context.now)
+            || context.command_checker.is_exhausted(joint)
+            || (context.command_checker.is_undecided() && !all_respond())
+            || context.bus.may_be_misread(joint, context.now)
+            || context.bus.last_status(joint).alarms != 0
+            || context.bus.last_status(joint).celsius > COOL
+            || context.model.get(PROTECTION) == 0;
+        ensure(is_on || may_wait || !is_due, || {
+            format!("servo {} responds and has no torque", joint.number())
+        })
+    }
+}
