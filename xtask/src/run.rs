@@ -63,7 +63,7 @@ pub(crate) fn build_image() -> TaskResult {
 
 /// Builds the simulator, with one of its tests: cargo then selects features as for all tests.
 pub(crate) fn build_host_sim() -> TaskResult {
-    cargo(&format!("test --quiet {TESTED} --test command_line --no-run"))
+    cargo(&format!("test --quiet {TESTED} --test simulator --no-run"))
 }
 
 /// Builds the simulated arm and its kinematics for a browser, without an operating system.

@@ -1,6 +1,6 @@
 //! Random poses, and the bits that kinematics make of them: the same on chip and host.
 //!
-//! `kinematics/tests/same_bits.rs` includes this file, so that the host checks the same number as the chip.
+//! `kinematics/tests/all/same_bits.rs` includes this file, so that the host checks the same number as the chip.
 
 use kinematics::limits::check_arm;
 use kinematics::{Vector, forward, ik7};

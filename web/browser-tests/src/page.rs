@@ -162,7 +162,7 @@ impl Page {
         self.wait_for_state("time passes", |state| state["time"].as_f64() >= Some(end));
     }
 
-    /// The same angle of all joints: 0 measured, 1 targets, in degrees.
+    /// The measured angles of all joints, in degrees.
     #[track_caller]
     pub fn measured(&mut self) -> [f64; 7] {
         let state = self.state();

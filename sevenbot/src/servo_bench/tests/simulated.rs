@@ -64,7 +64,7 @@ impl SimulatedServo {
     }
 }
 
-/// The other end of the line.
+/// The adapter and the servos at the other end of the line, and the bytes on their way back.
 #[derive(Default)]
 pub(crate) struct SimulatedWire {
     pub(crate) servos: Vec<SimulatedServo>,

@@ -1,0 +1,13 @@
+//! Tests of the public face of arm-sim, in one program.
+
+#![allow(clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // A panic is a failed test.
+
+mod disturbances;
+mod gravity;
+mod obstacles;
+mod rig;
+mod servo_faults;
+mod simulated_arm;
+mod simulated_servos;
+mod simulation;
+mod stock_arm;

@@ -1,0 +1,375 @@
+//! Streams of bytes, damaged and cut at will: what the deframer makes of them (D1 to D4).
+
+use crate::stream;
+
+use crate::stream::{Event, GAP_US, Model, Received, frame, receive};
+use proptest::prelude::*;
+use protocol_core::time::{Duration, Instant};
+use protocol_core::wire::frame::{Defect, ParseOutcome, parse};
+use protocol_core::wire::{Deframer, MAX_LENGTH, ToArm, ToHost, deframer};
+
+const LONG_SILENCE_US: u64 = 100_000;
+
+/// A stretch of a stream that is likely to hold trouble: whole frames, pieces of frames, headers that
+/// promise too much, ranges past the end, noise rich in header bytes.
+fn stretch() -> impl Strategy<Value = Vec<u8>> {
+    let noise = prop_oneof![Just(0xAA_u8), Just(0x77), Just(0x06), Just(0x04), Just(0x03), any::<u8>()];
+    let function = prop_oneof![Just(3), Just(4), Just(6)];
+    let whole = (function, any::<u8>(), proptest::collection::vec(any::<u8>(), 0..12))
+        .prop_map(|(function, address, data)| frame(function, address, &data));
+    prop_oneof![
+        4 => whole.clone(),
+        2 => (whole.clone(), any::<proptest::sample::Index>()).prop_map(|(bytes, cut)| {
+            let length = cut.index(bytes.len());
+            bytes[..length].to_vec()
+        }),
+        1 => (whole, any::<proptest::sample::Index>(), any::<u8>()).prop_map(|(mut bytes, place, value)| {
+            let place = place.index(bytes.len());
+            bytes[place] = value;
+            bytes
+        }),
+        1 => (prop_oneof![Just(4), Just(6)], any::<u8>(), any::<u8>())
+            .prop_map(|(function, address, count)| vec![0xAA, 0x77, function, address, count]),
+        1 => proptest::collection::vec(noise, 1..20),
+        1 => Just(stream::raw_frame(6, 250, 7, &[1; 7])),
+        // A frame inside the data of another one.
+        1 => any::<u8>().prop_map(|address| frame(6, address, &frame(3, 54, &[]))),
+        // A frame whose checksum ends like a header begins.
+        1 => Just(stream::frame_ending_in_aa()),
+    ]
+}
+
+fn stretches() -> impl Strategy<Value = Vec<u8>> {
+    proptest::collection::vec(stretch(), 1..24).prop_map(|stretches| stretches.concat())
+}
+
+fn events() -> impl Strategy<Value = Vec<Event>> {
+    let silence = prop_oneof![Just(500), Just(GAP_US), Just(20_000), Just(LONG_SILENCE_US)];
+    let event = prop_oneof![3 => stretch().prop_map(Event::Bytes), 1 => silence.prop_map(Event::Silence)];
+    proptest::collection::vec(event, 1..24)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+    #[test]
+    fn d03_d04_the_deframer_agrees_with_a_slow_and_obvious_model(events in events()) {
+        let mut model = Model::default();
+        let expected: Vec<Received> = events.iter().flat_map(|event| model.take(event)).collect();
+        prop_assert_eq!(receive::<ToArm>(&events, MAX_LENGTH), expected);
+    }
+
+    #[test]
+    fn d03_any_cutting_of_a_stream_gives_the_same_frames(events in events(), piece in 1_usize..40) {
+        prop_assert_eq!(receive::<ToArm>(&events, piece), receive::<ToArm>(&events, MAX_LENGTH));
+        prop_assert_eq!(receive::<ToHost>(&events, piece), receive::<ToHost>(&events, MAX_LENGTH));
+    }
+
+    #[test]
+    fn nothing_comes_out_before_as_many_bytes_came_as_were_wanted(bytes in stretches()) {
+        let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+        for byte in bytes {
+            let wanted = deframer.wanted();
+            prop_assert!((1..=MAX_LENGTH).contains(&wanted));
+            deframer.push(Instant::ZERO, &[byte]);
+            prop_assert!(deframer.pull().is_none() || wanted == 1);
+            while deframer.pull().is_some() {}
+        }
+    }
+
+    #[test]
+    fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 0..2_000), piece in 1_usize..300) {
+        let events = [Event::Bytes(bytes), Event::Silence(GAP_US), Event::Silence(LONG_SILENCE_US)];
+        receive::<ToArm>(&events, piece);
+        receive::<ToHost>(&events, piece);
+    }
+}
+
+#[test]
+fn d01_the_longest_frame_passes() {
+    let longest = frame(6, 1, &[0x55; 255]);
+    assert_eq!((longest.len(), MAX_LENGTH), (262, 262));
+    let received = receive::<ToArm>(&[Event::Bytes(longest.clone())], 7);
+    assert_eq!(received, [Received::Frame(longest)]);
+}
+
+#[test]
+fn a_frame_is_parsed_without_a_stream() {
+    let bytes = [frame(6, 46, &[1, 2]), vec![9]].concat();
+    let ParseOutcome::Complete(parsed, length) = parse::<ToArm>(&bytes) else { panic!("{bytes:?}") };
+    assert_eq!((length, parsed.address, parsed.data), (9, 46, [1, 2].as_slice()));
+    assert_eq!(parse::<ToArm>(&bytes[..8]), ParseOutcome::Incomplete(9));
+    assert_eq!(parse::<ToArm>(&bytes[1..]), ParseOutcome::NotAFrame);
+    let mut damaged = bytes.clone();
+    damaged[6] ^= 1;
+    assert_eq!(parse::<ToArm>(&damaged), ParseOutcome::Defective(Defect::WrongCrc, 9));
+    let malformed = stream::raw_frame(6, 255, 2, &[1, 2]);
+    let defect = Defect::MalformedRange { address: 255 };
+    assert_eq!(parse::<ToArm>(&malformed), ParseOutcome::Defective(defect, 9));
+}
+
+#[test]
+fn the_beginning_of_a_frame_is_distinguished_from_other_bytes() {
+    let beginning = [0xAA, 0x77, 6, 46];
+    for length in 0..=beginning.len() {
+        let outcome = parse::<ToArm>(&beginning[..length]);
+        assert_eq!(outcome, ParseOutcome::Incomplete(7), "{length} bytes");
+    }
+    for wrong in [
+        [0xAB].as_slice(),
+        &[0xAA, 0x78],
+        &[0xAA, 0x77, 5],
+        &[0xAA, 0x77, 8],
+        &[0xAA, 0x78, 6],
+        &[0xAB, 0x77, 6, 46],
+    ] {
+        assert_eq!(parse::<ToArm>(wrong), ParseOutcome::NotAFrame, "{wrong:?}");
+    }
+}
+
+#[test]
+fn d02_a_range_may_end_at_255_and_not_behind() {
+    let last = stream::raw_frame(6, 255, 1, &[1]);
+    assert_eq!(receive::<ToArm>(&[Event::Bytes(last.clone())], 9), [Received::Frame(last)]);
+    let read = stream::raw_frame(3, 255, 2, &[]);
+    assert_eq!(receive::<ToArm>(&[Event::Bytes(read)], 9), [Received::MalformedRange(255)]);
+    let inner = frame(3, 54, &[]);
+    let outer = stream::raw_frame(6, 250, 7, &inner);
+    assert_eq!(
+        receive::<ToArm>(&[Event::Bytes(outer)], 99),
+        [Received::MalformedRange(250), Received::Frame(inner)],
+        "it is not well formed, so what it holds is not inside a well-formed frame"
+    );
+}
+
+#[test]
+fn d02_what_a_malformed_frame_holds_is_searched_like_any_bytes() {
+    // Registers 170 to 288. The address and the count read as a header, too, of a frame with a wrong CRC.
+    let malformed = stream::raw_frame(6, 0xAA, 0x77, &[3; 0x77]);
+    assert!(malformed[3..].starts_with(&[0xAA, 0x77, 3, 3, 3]));
+    let expected = [Received::MalformedRange(0xAA), Received::WrongCrc];
+    assert_eq!(receive::<ToArm>(&[Event::Bytes(malformed)], 99), expected);
+}
+
+#[test]
+fn d03_a_frame_inside_a_good_frame_is_data() {
+    let outer = frame(6, 46, &frame(3, 54, &[]));
+    assert_eq!(receive::<ToArm>(&[Event::Bytes(outer.clone())], 3), [Received::Frame(outer)]);
+}
+
+#[test]
+fn d03_a_frame_lends_its_end_to_the_next_one() {
+    let next = frame(3, 54, &[]);
+    // Checksums are unlike for unlike pairs of bytes: one of them makes it a header.
+    let pairs = (0..=u16::MAX).map(|pair| frame(6, 0, &pair.to_le_bytes()));
+    let ending_in_header = pairs.into_iter().find(|bytes| bytes.ends_with(&[0xAA, 0x77])).unwrap();
+    let mut shortest = (0..=255).map(|count| stream::raw_frame(3, 0, count, &[]));
+    let shortest = shortest.find(|bytes| bytes.ends_with(&[0xAA])).unwrap();
+    for (whole, lent) in [(ending_in_header, 2), (stream::frame_ending_in_aa(), 1), (shortest, 1)] {
+        let bytes = [&whole[..whole.len() - lent], &next].concat();
+        let expected = [Received::Frame(whole), Received::Frame(next.clone())];
+        assert_eq!(receive::<ToArm>(&[Event::Bytes(bytes.clone())], 1), expected, "{lent} lent");
+        let behind_a_head = [&[0xAA, 0x77, 6, 0x10, 0xFF], bytes.as_slice()].concat();
+        let events = [Event::Bytes(behind_a_head), Event::Silence(GAP_US)];
+        assert_eq!(receive::<ToArm>(&events, 99), expected, "{lent} lent, behind a head");
+    }
+}
+
+#[test]
+fn d05_a_stream_longer_than_the_buffer_loses_nothing_however_it_is_cut() {
+    let good = frame(3, 54, &[]);
+    let false_header = [0xAA, 0x77, 6, 0x10, 0xFF].to_vec();
+    let bytes = [false_header, good.repeat(100)].concat();
+    let frames = std::iter::repeat_n(Received::Frame(good), 100);
+    let expected: Vec<_> = std::iter::once(Received::WrongCrc).chain(frames).collect();
+    for piece in [1, 2, 7, 40, 262, 300] {
+        assert_eq!(receive::<ToArm>(&[Event::Bytes(bytes.clone())], piece), expected, "pieces of {piece}");
+    }
+}
+
+#[test]
+fn d04_a_false_header_holds_nothing_up_for_longer_than_the_gap() {
+    let good = frame(3, 54, &[]);
+    let mut bytes = vec![0xAA, 0x77, 6, 0x10, 0xFF];
+    bytes.extend(&good);
+    let mut events = vec![Event::Bytes(bytes)];
+    assert_eq!(receive::<ToArm>(&events, 99), []);
+    events.push(Event::Silence(GAP_US));
+    assert_eq!(receive::<ToArm>(&events, 99), [Received::Frame(good)]);
+}
+
+#[test]
+fn d04_a_pause_inside_a_frame_costs_nothing() {
+    let good = frame(6, 46, &[90; 7]);
+    for cut in 1..good.len() {
+        let (head, tail) = good.split_at(cut);
+        let paused = [Event::Bytes(head.to_vec()), Event::Silence(99_000), Event::Bytes(tail.to_vec())];
+        assert_eq!(receive::<ToArm>(&paused, 99), [Received::Frame(good.clone())]);
+        let too_long = [Event::Bytes(head.to_vec()), Event::Silence(100_000), Event::Bytes(tail.to_vec())];
+        assert_eq!(receive::<ToArm>(&too_long, 99), [], "cut at {cut}");
+    }
+}
+
+#[test]
+fn d04_a_pause_inside_a_frame_makes_no_damage_of_its_data() {
+    let data = [0xAA, 0x77, 3, 3, 3, 3, 3, 3];
+    let good = frame(6, 46, &data);
+    for cut in 12..good.len() {
+        let (head, tail) = good.split_at(cut);
+        let silence = [Event::Bytes(head.to_vec()), Event::Silence(GAP_US)];
+        assert_eq!(receive::<ToArm>(&silence, 99), [], "cut at {cut}");
+        let [head, silence] = silence;
+        let whole = [head.clone(), silence.clone(), Event::Bytes(tail.to_vec())];
+        assert_eq!(receive::<ToArm>(&whole, 99), [Received::Frame(good.clone())], "cut at {cut}");
+        let abandoned = [head, silence, Event::Silence(LONG_SILENCE_US)];
+        assert_eq!(
+            receive::<ToArm>(&abandoned, 99),
+            [Received::WrongCrc],
+            "counted once, when it is no data"
+        );
+    }
+}
+
+#[test]
+fn d04_the_gap_is_2_ms_or_three_and_a_half_characters() {
+    assert_eq!(deframer::gap(1_000_000), Duration::from_micros(2_000));
+    assert_eq!(deframer::gap(19_200), Duration::from_micros(2_000));
+    assert_eq!(deframer::gap(9_600), Duration::from_micros(3_645));
+    assert_eq!(deframer::gap(0), Duration::from_micros(u32::MAX.into()));
+}
+
+#[test]
+fn a_held_up_shell_does_not_mistake_its_own_pause_for_silence() {
+    let good = frame(6, 46, &[90; 7]);
+    let (head, tail) = good.split_at(8);
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    deframer.push(Instant::from_micros(0), head);
+    assert_eq!(deframer.pull(), None);
+    deframer.push(Instant::from_micros(5_000_000), tail);
+    assert!(matches!(deframer.pull(), Some(Ok(_))), "nobody saw the line silent");
+}
+
+#[test]
+fn the_deadline_says_when_silence_matters() {
+    let at = Instant::from_micros;
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    assert_eq!(deframer.deadline(), None);
+    deframer.push(at(1_000), &[0xAA, 0x77]);
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.deadline(), Some(at(3_000)));
+    deframer.push(at(3_000), &[]);
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.deadline(), Some(at(101_000)));
+    deframer.push(at(101_000), &[]);
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.deadline(), None);
+    deframer.push(at(102_000), &frame(3, 54, &[]));
+    assert!(deframer.pull().is_some());
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.deadline(), None, "nothing of it is left");
+}
+
+#[test]
+fn what_is_wanted_is_the_rest_of_the_frame() {
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    let bytes = [frame(3, 54, &[]), frame(6, 46, &[90; 7])].concat();
+    let mut wanted = Vec::new();
+    for byte in bytes {
+        wanted.push(deframer.wanted());
+        deframer.push(Instant::ZERO, &[byte]);
+        let _ = deframer.pull();
+    }
+    assert_eq!(wanted, [7, 6, 5, 4, 3, 2, 1, 7, 6, 5, 4, 3, 2, 1, 7, 6, 5, 4, 3, 2, 1]);
+    deframer.push(Instant::from_micros(0), &[0xAA]);
+    deframer.push(Instant::from_micros(LONG_SILENCE_US), &[]);
+    assert_eq!(deframer.wanted(), 0, "silence is news by itself");
+}
+
+#[test]
+fn d05_silence_counts_even_while_nobody_pulls() {
+    let at = Instant::from_micros;
+    let good = frame(6, 46, &[90; 7]);
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    // Two silences in a row, so that the second must not make the first forgotten.
+    for (number, part) in (0..).zip(good.chunks(6)) {
+        let now = at(number * LONG_SILENCE_US);
+        deframer.push(now, &[]);
+        assert_eq!(deframer.push(now, part), if number == 0 { part.len() } else { 0 });
+    }
+    assert_eq!(deframer.pull(), None);
+    assert_eq!(deframer.push(at(LONG_SILENCE_US), &good), good.len(), "what came before is done with");
+    assert!(matches!(deframer.pull(), Some(Ok(_))));
+}
+
+#[test]
+fn d05_a_silence_during_a_search_behind_a_head_tells_nothing_twice() {
+    let at = |gaps| Instant::from_micros(gaps * GAP_US);
+    let frames = [frame(3, 54, &[]), frame(6, 46, &[1]), frame(6, 46, &[2])];
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    deframer.push(at(0), &[&[0xAA, 0x77, 6, 0x10, 0xFF], frames[0].as_slice(), &frames[1]].concat());
+    deframer.push(at(1), &[]);
+    let mut received: Vec<_> = stream::pull(&mut deframer).into_iter().collect();
+    deframer.push(at(1), &frames[2]);
+    for gaps in 2..4 {
+        deframer.push(at(gaps), &[]);
+        stream::drain(&mut deframer, &mut received);
+    }
+    assert_eq!(received, frames.map(Received::Frame));
+}
+
+#[test]
+fn d05_a_search_behind_a_head_goes_on_where_it_stopped() {
+    let at = Instant::from_micros;
+    let inner = [frame(3, 54, &[]), frame(6, 46, &[1]), frame(6, 46, &[2])];
+    let spoiled = |checksum: u8| {
+        let mut bytes = stream::raw_frame(6, 0, 23, &inner.concat());
+        bytes[28] ^= checksum;
+        bytes
+    };
+    // The head fails, or proves right, while one of three frames behind it is told.
+    for (checksum, expected) in [(1, 2), (0, 1)] {
+        let outer = spoiled(checksum);
+        let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+        deframer.push(at(0), &outer[..29]);
+        deframer.push(at(GAP_US), &[]);
+        assert!(matches!(deframer.pull(), Some(Ok(told)) if told.address == 54));
+        deframer.push(at(GAP_US), &outer[29..]);
+        let mut received = Vec::new();
+        stream::drain(&mut deframer, &mut received);
+        received.retain(|said| matches!(said, Received::Frame(_)));
+        assert_eq!(received.len(), expected, "{received:?}");
+    }
+}
+
+/// A byte with a framing error belongs to no frame (D3): the frame around it is lost, and no other one.
+#[test]
+fn d03_no_frame_continues_across_a_damaged_byte() {
+    let frames = [frame(6, 46, &[1]), frame(6, 46, &[2]), frame(6, 46, &[3])];
+    let (length, bytes) = (frames[0].len(), frames.concat());
+    for cut in 0..=bytes.len() {
+        let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+        let mut received = Vec::new();
+        let (before, behind) = bytes.split_at(cut);
+        assert_eq!(deframer.push(Instant::ZERO, before), cut);
+        deframer.break_off();
+        stream::drain(&mut deframer, &mut received);
+        assert_eq!(deframer.push(Instant::ZERO, behind), behind.len());
+        stream::drain(&mut deframer, &mut received);
+        let is_split = |index: &usize| (index * length + 1..(index + 1) * length).contains(&cut);
+        let whole =
+            (0..3).filter(|index| !is_split(index)).map(|index| Received::Frame(frames[index].clone()));
+        let found: Vec<_> = received.into_iter().filter(|found| *found != Received::WrongCrc).collect();
+        assert_eq!(found, whole.collect::<Vec<_>>(), "damage after {cut} bytes");
+    }
+}
+
+#[test]
+fn d03_a_frame_in_the_data_of_a_broken_one_comes_out_at_once() {
+    let inner = frame(6, 46, &[90; 7]);
+    let mut deframer = Deframer::<ToArm>::new(deframer::gap(115_200));
+    deframer.push(Instant::ZERO, &[&[0xAA, 0x77, 6, 0x10, 0xFF], inner.as_slice()].concat());
+    deframer.break_off();
+    assert_eq!(deframer.push(Instant::ZERO, &[1]), 0, "pull first");
+    assert_eq!(stream::pull(&mut deframer), Some(Received::Frame(inner)));
+    assert_eq!(stream::pull(&mut deframer), None);
+}
