@@ -31,6 +31,8 @@ pub struct LinkOptions {
 enum Queued {
     Read(OpenRead),
     Write(Vec<u8>),
+    /// A write that goes before all others.
+    WriteAhead(Vec<u8>),
 }
 
 /// The host's end of the link to one arm.
@@ -83,11 +85,13 @@ impl HostLink {
     /// Writes registers, at most 255, by the function of a map (M1). A write has no reply (D6). It is sent behind the reads
     /// before it, and none of these is repeated behind it.
     pub fn write(&mut self, map: Map, address: u8, values: &[u8]) {
-        let request = match map {
-            Map::V22 => Request::Write { address, values },
-            Map::V21 => Request::WriteMap21 { address, values },
-        };
-        self.queue.push_back(Queued::Write(encoded(&request)));
+        self.queue.push_back(Queued::Write(encoded_write(map, address, values)));
+    }
+
+    /// As [`Self::write`], before everything that waits to be sent: for a stop. Several of these keep their order.
+    pub fn write_ahead(&mut self, map: Map, address: u8, values: &[u8]) {
+        let place = self.queue.iter().take_while(|queued| matches!(queued, Queued::WriteAhead(_))).count();
+        self.queue.insert(place, Queued::WriteAhead(encoded_write(map, address, values)));
     }
 
     /// Gives a read up. Its reply may still come, and is [`HostEvent::Unmatched`] then.
@@ -101,7 +105,7 @@ impl HostLink {
     pub fn reset(&mut self) {
         let queued = std::mem::take(&mut self.queue).into_iter().filter_map(|queued| match queued {
             Queued::Read(read) => Some(read),
-            Queued::Write(_) => None,
+            Queued::Write(_) | Queued::WriteAhead(_) => None,
         });
         let events = self.open.take_all().chain(queued).map(no_reply).collect();
         let (line, last_id) = (self.line, self.last_id);
@@ -155,7 +159,7 @@ impl HostLink {
     /// The next queued frame that may be sent. A read waits while another one on its way has the only possible range.
     fn next_frame(&mut self, now: Instant) -> Option<HostEvent> {
         let frame = match self.queue.pop_front()? {
-            Queued::Write(frame) => {
+            Queued::Write(frame) | Queued::WriteAhead(frame) => {
                 self.writes = self.writes.wrapping_add(1);
                 self.line.send(now, frame.len());
                 frame
@@ -259,6 +263,13 @@ impl From<Frame<'_>> for Message {
 
 const fn no_reply(read: OpenRead) -> HostEvent {
     HostEvent::NoReply(read.id, read.wanted)
+}
+
+fn encoded_write(map: Map, address: u8, values: &[u8]) -> Vec<u8> {
+    encoded(&match map {
+        Map::V22 => Request::Write { address, values },
+        Map::V21 => Request::WriteMap21 { address, values },
+    })
 }
 
 fn encoded(request: &Request<'_>) -> Vec<u8> {

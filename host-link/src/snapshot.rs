@@ -73,6 +73,13 @@ impl Snapshot {
         Self { address: span.address(), values: span.addresses().map(|address| self.at(address)).collect() }
     }
 
+    /// Does it hold all of these registers?
+    #[must_use]
+    pub fn holds(&self, span: Span) -> bool {
+        let end = usize::from(self.address) + self.values.len();
+        self.address <= span.address() && usize::from(span.address()) + usize::from(span.count()) <= end
+    }
+
     /// The registers; none if they would reach past 255.
     #[must_use]
     pub fn span(&self) -> Span {
@@ -91,5 +98,7 @@ mod tests {
         assert_eq!(snapshot.counter(&FRAMES_ACCEPTED), 0x1234);
         assert_eq!(snapshot.at(245), 9);
         assert_eq!((snapshot.at(244), snapshot.at(248)), (0, 0), "beyond what was read");
+        let holds = |address, count| Span::new(address, count).is_some_and(|span| snapshot.holds(span));
+        assert_eq!([holds(245, 3), holds(246, 1), holds(244, 2), holds(247, 2)], [true, true, false, false]);
     }
 }

@@ -158,6 +158,30 @@ fn a_read_is_not_repeated_behind_a_write() {
 }
 
 #[test]
+fn a_write_ahead_goes_before_a_read_that_waits_and_before_all_that_is_queued() {
+    let mut link = link(115_200);
+    let patience = Patience { attempts: 1, timeout: Duration::from_millis(500) };
+    // The second read waits for the only range, and everything queued behind it.
+    for _ in 0..2 {
+        link.read(span(0, 255), patience);
+    }
+    link.write(Map::V22, 46, &[90]);
+    assert_eq!(sent(&mut link, at_ms(0)), (0, 255));
+    assert!(matches!(link.poll(at_ms(0)), HostEvent::Wait(_)));
+    link.write_ahead(Map::V22, 32, &[1]);
+    link.write_ahead(Map::V22, 47, &[80]);
+    let frames = events(&mut link, at_ms(1)).0;
+    let addresses: Vec<u8> = frames
+        .iter()
+        .map(|event| match event {
+            HostEvent::Send(frame) => frame[3],
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(addresses, [32, 47], "in their order, and the others still wait");
+}
+
+#[test]
 fn a_reply_to_a_read_that_was_given_up_is_no_reply_to_the_next() {
     let mut link = link(115_200);
     let given_up = link.read(span(10, 4), PATIENCE);

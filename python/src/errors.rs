@@ -172,7 +172,9 @@ impl Raise for MoveError {
                 let hint = "`arm.stop()`, or switch off the supply of the servos".to_owned();
                 error::<MayMove>(py, &message, &[hint])
             }
-            Self::StillMoving { .. } | Self::NotReached { .. } => error::<NotReached>(py, &message, &[]),
+            Self::StillMoving { .. } | Self::NotReached { .. } | Self::Paused { .. } => {
+                error::<NotReached>(py, &message, &[])
+            }
             Self::StartTooFar(_) => {
                 let hint = "approach=SECONDS goes there smoothly first: look that the way is free".to_owned();
                 error::<TooFar>(py, &message, &[hint])

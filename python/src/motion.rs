@@ -10,7 +10,7 @@ use sevenbot::map::{FINE_POSITION, MOTOR_STATE, VACUUM_PUMP, motor_state};
 use sevenbot::moves::{
     GuardedMoveError, JointMove, LineStart, MoveError, Observer, Pace, ParkError, Player, Recorder,
 };
-use sevenbot::recording::{FileVersion, Moment, Recording, head};
+use sevenbot::recording::{FileVersion, Moment, Recording, RecordingLines};
 use sevenbot::{Arm, Error, FineAngle, Span, park_poses};
 
 use crate::errors::StraightMoveError;
@@ -190,7 +190,8 @@ fn record_reports(
     watch: &mut Watch,
 ) -> Result<String, MoveError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
-    let mut text = head(FileVersion::Hundredths);
+    let mut lines = RecordingLines::new(FileVersion::Hundredths);
+    let mut text = lines.head();
     let mut recorder = Recorder::new(arm, options.hz, content);
     while watch.goes_on() {
         let Some(recorded) = recorder.next(arm, POLL_PERIOD)? else { continue };
@@ -198,8 +199,7 @@ fn record_reports(
             break;
         }
         let moment = Moment { time: recorded.time, pose: recorded.pose, vacuum };
-        text.push_str(&moment.line(FileVersion::Hundredths));
-        text.push('\n');
+        text.extend(lines.add(&moment));
     }
     Ok(text)
 }
@@ -222,11 +222,11 @@ pub(crate) fn play(
     arm.driven_joints()?;
     let mut player = Player::new(recording, options.factor).with_approach(options.approach);
     player.play(arm, options.times, watch)?;
-    let mut text = head(FileVersion::Hundredths);
+    let mut lines = RecordingLines::new(FileVersion::Hundredths);
+    let mut text = lines.head();
     for (time, pose) in player.measured() {
         let moment = Moment { time: *time, pose: *pose, vacuum: false };
-        text.push_str(&moment.line(FileVersion::Hundredths));
-        text.push('\n');
+        text.extend(lines.add(&moment));
     }
     Ok(text)
 }

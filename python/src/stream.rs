@@ -79,7 +79,7 @@ impl PacedStream<'_> {
     ) -> Result<(), MoveError> {
         let way = Approach::plan(&self.stream.arm().standing()?, first, rule)?;
         self.stream.approach(&way, watch)?;
-        let now = self.stream.arm().now();
+        let now = self.stream.arm().elapsed();
         if self.pace.counts().points == 0 {
             self.pace = StreamPace::new(now, self.stream.period());
         } else if !way.duration().is_zero() {
@@ -118,7 +118,7 @@ impl Stream {
                 open.first.take(&point);
             }
             loop {
-                let left = open.pace.due().saturating_duration_since(open.stream.arm().now());
+                let left = open.pace.due().saturating_sub(open.stream.arm().elapsed());
                 if left.is_zero() {
                     break;
                 }
@@ -128,7 +128,7 @@ impl Stream {
                 open.stream.arm().sleep(left.min(SLICE));
                 open.stream.keep_alive()?;
             }
-            let now = open.stream.arm().now();
+            let now = open.stream.arm().elapsed();
             let number = open.pace.take(now);
             open.stream.send(&point)?;
             open.stream.check()?;

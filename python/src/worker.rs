@@ -37,7 +37,7 @@ impl<'a> PacedStream<'a> {
     fn open(arm: &'a mut Arm, options: StreamOptions) -> Result<Self, StreamError> {
         let mut stream = SetPointStream::open(arm, options)?;
         let pose = stream.arm().standing()?.targets;
-        let pace = StreamPace::new(stream.arm().now(), options.period());
+        let pace = StreamPace::new(stream.arm().elapsed(), options.period());
         Ok(Self { stream, pace, first: FirstPoints::default(), pose })
     }
 }

@@ -12,11 +12,16 @@ use std::fmt;
 use std::time::Duration;
 
 use protocol_core::registers::Joint;
+use protocol_core::registers::map::{
+    EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, PRESENT_POSITION, SPEED, TARGET_POSITION,
+};
 
+use crate::fine::KNOWN_LAYOUT;
 use crate::fine_angle::FineAngle;
 use crate::fine_state::FineTargets;
 use crate::recording::{Moment, Recording};
 use crate::units::Speed;
+use host_link::Snapshot;
 
 /// A first point is refused if a joint is further from it, in degrees.
 pub const NEAR_DEGREES: f64 = 5.0;
@@ -51,6 +56,20 @@ pub struct Standing {
 }
 
 impl Standing {
+    /// From registers 0 to 255. Those of a block that the firmware does not have are 0.
+    #[must_use]
+    pub fn of(registers: &Snapshot) -> Self {
+        let speeds = registers.joints(&SPEED).map(|steps| Speed::from_steps(steps).unwrap_or(Speed::MAXIMUM));
+        if registers.byte(&EXTENDED_VERSION) != KNOWN_LAYOUT {
+            let [measured, targets] =
+                [&PRESENT_POSITION, &TARGET_POSITION].map(|row| registers.joints(row).map(f64::from));
+            return Self { measured: measured.map(Some), targets, speeds };
+        }
+        let angles = |row| registers.words(row).map(|word| Some(FineAngle::from_hundredths(word)?.degrees()));
+        let targets = angles(&FINE_TARGET).map(Option::unwrap_or_default);
+        Self { measured: angles(&FINE_POSITION), targets, speeds }
+    }
+
     /// At the last moment of a recording, after it was played.
     pub(crate) fn at_pose(pose: [FineAngle; 7], speeds: [Speed; 7]) -> Self {
         let targets = pose.map(FineAngle::degrees);
@@ -152,7 +171,8 @@ impl Approach {
     }
 
     /// The way as a recording, for an arm that takes no stream. Every joint has an angle at its end.
-    pub(crate) fn recording(&self, end: Moment) -> Recording {
+    #[must_use]
+    pub fn recording(&self, end: Moment) -> Recording {
         let count = u32::try_from(self.duration.as_millis() / MOMENT.as_millis()).unwrap_or(u32::MAX);
         let moments = (0..count).map(|number| {
             let time = MOMENT.saturating_mul(number);

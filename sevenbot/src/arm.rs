@@ -252,6 +252,12 @@ impl Arm {
         self.link.now()
     }
 
+    /// The time since this arm was opened, on the clock of its line.
+    #[must_use]
+    pub fn elapsed(&self) -> Duration {
+        self.link.elapsed()
+    }
+
     /// Waits, on the clock of the arm's line.
     pub fn sleep(&mut self, duration: Duration) {
         self.link.sleep(duration);

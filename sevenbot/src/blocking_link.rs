@@ -96,6 +96,11 @@ impl BlockingLink {
         self.line.now()
     }
 
+    /// The time since the line was opened.
+    pub(crate) fn elapsed(&self) -> Duration {
+        self.now().saturating_duration_since(self.start)
+    }
+
     /// Waits on the clock of the line.
     pub(crate) fn sleep(&mut self, duration: Duration) {
         self.line.sleep(duration);

@@ -14,7 +14,7 @@ use crate::joints::frames_of;
 use host_link::Span;
 
 /// The layout of the extended block that this library knows.
-const KNOWN_LAYOUT: u8 = 1;
+pub(crate) const KNOWN_LAYOUT: u8 = 1;
 
 impl Arm {
     /// Does the arm have the extended block? Only this project's firmware has it, and only in map 2.2.

@@ -88,7 +88,7 @@ impl Arm {
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JointSnapshot {
     /// From the motor state to the present positions.
     registers: Snapshot,

@@ -44,6 +44,7 @@ pub mod identity;
 pub mod joints;
 mod map21_text;
 mod map_view;
+pub mod movement_run;
 pub mod moves;
 pub mod names;
 #[cfg(feature = "serial")]

@@ -8,7 +8,7 @@
 //!
 //! If the program dies, the watchdog makes the arm hold. A clean end, an error and a panic put the registers back.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{
@@ -87,7 +87,9 @@ impl StreamOptions {
         Duration::from_millis(self.period_ms as u64)
     }
 
-    fn registers(self) -> [u8; 4] {
+    /// The values of registers 184 to 187 that begin the stream. Zeros end it.
+    #[must_use]
+    pub fn registers(self) -> [u8; 4] {
         let [low, high] = self.period_ms.to_le_bytes();
         let (steps, action) = self.watchdog;
         [low, high, steps, u8::from(action == WatchdogAction::Damping)]
@@ -133,16 +135,16 @@ impl From<WriteError> for StreamError {
 /// ```no_run
 /// use sevenbot::stream::{SetPointStream, StreamOptions, StreamPace};
 /// use sevenbot::{Arm, FineAngle};
-/// use std::{thread::sleep, time::Instant};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let mut arm = Arm::open("/dev/ttyUSB0", 115_200)?;
 /// let options = StreamOptions::new(20).ok_or("a period")?;
 /// let mut stream = SetPointStream::open(&mut arm, options)?;
-/// let mut pace = StreamPace::new(Instant::now(), options.period());
+/// let mut pace = StreamPace::new(stream.arm().elapsed(), options.period());
 /// for hundredths in (9000..9500).step_by(20) {
-///     sleep(pace.due().saturating_duration_since(Instant::now()));
-///     pace.take(Instant::now());
+///     let now = stream.arm().elapsed();
+///     stream.arm().sleep(pace.due().saturating_sub(now));
+///     pace.take(now.max(pace.due()));
 ///     stream.send(&[FineAngle::from_hundredths(hundredths), None, None, None, None, None, None])?;
 ///     stream.check()?;
 /// }
@@ -156,7 +158,7 @@ pub struct SetPointStream<'a> {
     options: StreamOptions,
     /// The registers of the stream before it; `None` once they are put back.
     before: Option<Vec<u8>>,
-    last_sent: Instant,
+    last_sent: Duration,
     /// Watches over the joints that got a point.
     check: MoveCheck,
 }
@@ -171,11 +173,11 @@ impl<'a> SetPointStream<'a> {
             return Err(StreamError::NoExtendedBlock);
         }
         let before = registers_before(arm)?;
-        let last_sent = arm.now();
-        let check = MoveCheck::idle(arm).with_period(options.period_ms);
+        let last_sent = arm.elapsed();
+        let check = MoveCheck::idle(arm, 0).with_period(options.period_ms);
         let mut stream = Self { arm, options, before: Some(before), last_sent, check };
         stream.arm.write_checked(STREAM_REGISTERS.address(), &options.registers())?;
-        stream.last_sent = stream.arm.now();
+        stream.last_sent = stream.arm.elapsed();
         Ok(stream)
     }
 
@@ -186,10 +188,10 @@ impl<'a> SetPointStream<'a> {
     pub fn send(&mut self, point: &FineTargets) -> Result<(), Error> {
         for (address, values) in fine_frames(point) {
             self.arm.write(address, &values)?;
-            self.last_sent = self.arm.now();
+            self.last_sent = self.arm.elapsed();
         }
         let joints = Joint::ALL.into_iter().zip(point).filter(|(_, angle)| angle.is_some());
-        self.check.add_joints(joints.fold(0, |bits, (joint, _)| bits | joint.bit()), self.last_sent);
+        self.check.add_joints(joints.fold(0, |bits, (joint, _)| bits | joint.bit()), self.arm);
         Ok(())
     }
 
@@ -221,9 +223,9 @@ impl<'a> SetPointStream<'a> {
     /// # Errors
     /// The port failed.
     pub fn keep_alive(&mut self) -> Result<(), Error> {
-        if self.arm.now() >= self.last_sent + self.options.keep_alive_period() {
+        if self.arm.elapsed() >= self.last_sent + self.options.keep_alive_period() {
             self.arm.write(FINE_TARGET.address, &[])?;
-            self.last_sent = self.arm.now();
+            self.last_sent = self.arm.elapsed();
         }
         Ok(())
     }

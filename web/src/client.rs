@@ -29,7 +29,7 @@ const LOST_ROUNDS: u32 = 3;
 /// How many writes, and frames that were not asked for, are kept to be shown.
 const KEPT_FRAMES: usize = 40;
 /// The baud rate of the arm's line where nothing else is known.
-const BAUD: u32 = 115_200;
+pub const BAUD: u32 = 115_200;
 
 /// What each round reads.
 const ROUND: [Span; 3] = [
@@ -47,6 +47,11 @@ pub struct Client {
     to_send: Vec<u8>,
     /// The last known value of each register.
     registers: Snapshot,
+    /// The time of the last write or round: each has a time of its own, so that their order is known.
+    last_time: Instant,
+    /// When the reads of this round were queued, and those of the last complete one.
+    round_begun: Instant,
+    read_since: Instant,
     /// Reads of this round without an end.
     awaited: Vec<RequestId>,
     /// Was a reply of this round lost?
@@ -63,6 +68,9 @@ impl Default for Client {
             link: HostLink::new(LinkOptions { baud: BAUD, reports: &[] }),
             to_send: Vec::new(),
             registers: Snapshot { address: 0, values: vec![0; 256] },
+            last_time: Instant::ZERO,
+            round_begun: Instant::ZERO,
+            read_since: Instant::ZERO,
             awaited: Vec::new(),
             is_round_lost: false,
             rounds: 0,
@@ -84,6 +92,12 @@ impl Client {
     #[must_use]
     pub const fn rounds(&self) -> u64 {
         self.rounds
+    }
+
+    /// Were all registers read by requests that were sent after this write? Then they show it.
+    #[must_use]
+    pub fn was_read_since(&self, write: Instant) -> bool {
+        self.rounds > 0 && self.read_since > write
     }
 
     /// The last known value of each register, 0 to 255.
@@ -109,18 +123,25 @@ impl Client {
         self.frames.iter()
     }
 
-    /// Writes registers from `address` on. What a stop has found out is no longer news.
-    pub fn write(&mut self, now: Instant, address: u8, values: &[u8]) {
-        if self.stop.progress() != StopProgress::Verifying {
-            self.stop = Stop::default();
-        }
+    /// Writes registers from `address` on. Returns the time of the write, for [`Self::was_read_since`]. What a stop has found out
+    /// is no longer news.
+    pub fn write(&mut self, now: Instant, address: u8, values: &[u8]) -> Instant {
+        self.stop.forget();
         self.show(now, true, Traffic::Write { address, values: values.to_vec() });
         self.link.write(Map::V22, address, values);
+        self.next_time(now)
     }
 
-    /// Lets every joint hold where it is. [`Client::stop_progress`] tells whether the arm took it.
-    pub fn stop(&mut self) {
-        self.stop.start();
+    fn next_time(&mut self, now: Instant) -> Instant {
+        self.last_time = now.max(self.last_time + Duration::from_micros(1));
+        self.last_time
+    }
+
+    /// Lets every joint hold where it is: before all that waits to be sent, and again until the arm confirms it.
+    /// [`Client::stop_progress`] tells whether it did. `speeds` are those to restore, if the registers hold others for a while.
+    pub fn stop(&mut self, now: Instant, speeds: Option<[u8; 7]>) {
+        self.stop.start(Some(&self.registers).filter(|_| self.rounds > 0), speeds);
+        self.continue_stop(now);
     }
 
     /// Takes bytes of the arm; none if its line is silent at `now`.
@@ -158,23 +179,30 @@ impl Client {
         } else {
             self.rounds += 1;
             self.lost_rounds = 0;
+            self.read_since = self.round_begun;
+            self.stop.registers(self.round_begun, now, &self.registers);
             self.continue_stop(now);
         }
     }
 
     fn continue_stop(&mut self, now: Instant) {
-        let mut stop = std::mem::take(&mut self.stop);
-        for (address, values) in stop.frames(now, &self.registers, self.rounds) {
-            self.write(now, address, &values);
+        if self.stop.progress() != StopProgress::Verifying {
+            return;
         }
-        self.stop = stop;
+        let time = self.next_time(now);
+        for (address, values) in self.stop.frames(time) {
+            self.link.write_ahead(Map::V22, address, &values);
+            self.show(now, true, Traffic::Write { address, values });
+        }
     }
 
     /// Begins a new round of reads if the last one is over. Returns the bytes for the arm.
     pub fn poll(&mut self, now: Instant) -> Vec<u8> {
         self.advance(now);
+        self.continue_stop(now);
         if self.awaited.is_empty() {
             self.is_round_lost = false;
+            self.round_begun = self.next_time(now);
             self.awaited = ROUND.map(|span| self.link.read(span, PATIENCE)).to_vec();
             self.advance(now);
         }

@@ -37,7 +37,7 @@ pub enum ParkProgress {
 #[derive(Debug)]
 pub struct Park {
     way: Vec<FineTargets>,
-    speeds: Vec<u8>,
+    speeds: [u8; 7],
     /// When the present part of the way was sent, and how many complete rounds of reads there were then.
     sent: Option<(Instant, u64)>,
     /// The angles and the time at which the arm was let go.
@@ -54,8 +54,14 @@ impl Park {
         }
         let mut way = park_way(None, now);
         way.reverse();
-        let speeds = client.registers().joints(&SPEED).to_vec();
+        let speeds = client.registers().joints(&SPEED);
         Some(Self { way, speeds, sent: None, let_go: None })
+    }
+
+    /// The speeds of the joints before it.
+    #[must_use]
+    pub const fn speeds(&self) -> [u8; 7] {
+        self.speeds
     }
 
     /// Writes what is due.
@@ -72,7 +78,9 @@ impl Park {
             (None, Some(targets)) => {
                 let frames = frames(client, targets);
                 client.write(now, SPEED.address, &[SPEED_STEPS; 7]);
-                frames.into_iter().for_each(|(address, values)| client.write(now, address, &values));
+                for (address, values) in frames {
+                    client.write(now, address, &values);
+                }
                 self.sent = Some((now, client.rounds()));
             }
             (Some((at, rounds)), Some(targets)) => {

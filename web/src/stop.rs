@@ -1,18 +1,13 @@
-//! A stop that is verified: the measured positions become the targets, and are read back.
-//!
-//! [`sevenbot::hold`] decides what to write, as for `sevenbot stop`. The registers here are those that are read in rounds.
+//! A stop of the page: [`Hold`] decides what to write and when, as for `sevenbot stop`. Here are its clock and its news.
 
-use protocol_core::time::{Duration, Instant};
+use std::time::Duration;
+
+use protocol_core::time::Instant;
 use sevenbot::Snapshot;
 use sevenbot::hold::{HeldJoints, Hold, HoldStep};
-use sevenbot::joints::{JointSnapshot, START_UP_TIME};
-use sevenbot::map::{SET_POINT_PERIOD, STATUS_VERSION};
-use sevenbot::status_block::StatusBlock;
 
-use crate::arm_state::has_extended_block;
-
-/// An address and its values.
-type Frame = (u8, Vec<u8>);
+/// Addresses and their values.
+type Frames = Vec<(u8, Vec<u8>)>;
 
 /// How far a stop has come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,7 +15,7 @@ pub enum StopProgress {
     /// Nobody asked for one.
     #[default]
     None,
-    /// The targets were written, and are not read back yet.
+    /// It was written, and is not confirmed yet.
     Verifying,
     /// The arm has the targets that hold it.
     Holds,
@@ -30,21 +25,23 @@ pub enum StopProgress {
     Failed,
 }
 
-/// A stop in progress.
+/// The last stop.
 #[derive(Debug, Default)]
 pub struct Stop {
     progress: StopProgress,
     hold: Hold,
-    /// When the first step was taken.
-    start: Option<Instant>,
-    /// The next step needs this many complete rounds.
-    next_round: u64,
 }
 
 impl Stop {
-    /// Begins a stop.
-    pub fn start(&mut self) {
-        *self = Self { progress: StopProgress::Verifying, ..Self::default() };
+    /// Begins a stop of an arm with these registers; `None` if they were not read yet. `speeds` are those to restore, if
+    /// the registers hold others for a while. A stop that is not confirmed goes on.
+    pub fn start(&mut self, registers: Option<&Snapshot>, speeds: Option<[u8; 7]>) {
+        if self.progress == StopProgress::Verifying {
+            return;
+        }
+        let hold = self.hold.again(registers.map(HeldJoints::of).as_ref());
+        self.hold = speeds.map_or(hold.clone(), |speeds| hold.restoring(speeds));
+        self.progress = StopProgress::Verifying;
     }
 
     /// How far the stop has come.
@@ -53,34 +50,38 @@ impl Stop {
         self.progress
     }
 
-    /// The frames to write after a round, given the number of complete rounds.
-    pub fn frames(&mut self, now: Instant, registers: &Snapshot, rounds: u64) -> Vec<Frame> {
-        if self.progress != StopProgress::Verifying || rounds < self.next_round {
+    /// The arm was told something else: what the stop has found out is no longer news.
+    pub fn forget(&mut self) {
+        if self.progress != StopProgress::Verifying {
+            self.progress = StopProgress::None;
+        }
+    }
+
+    /// Takes registers that came at `now`, from reads that were sent at `asked` or later.
+    pub fn registers(&mut self, asked: Instant, now: Instant, registers: &Snapshot) {
+        if self.progress == StopProgress::Verifying {
+            self.hold.joints(since_start(asked), since_start(now), &HeldJoints::of(registers));
+        }
+    }
+
+    /// The frames to write now, before everything else.
+    pub fn frames(&mut self, now: Instant) -> Frames {
+        if self.progress != StopProgress::Verifying {
             return Vec::new();
         }
-        let start_up = Duration::from_micros(u64::try_from(START_UP_TIME.as_micros()).unwrap_or(u64::MAX));
-        let is_past_start_up = now >= *self.start.get_or_insert(now) + start_up;
-        self.progress = match self.hold.step(&held_joints(registers), is_past_start_up) {
-            HoldStep::Wait => return Vec::new(),
-            HoldStep::Write(targets) => {
-                // The next round may have been on its way before these targets.
-                self.next_round = rounds + 2;
-                // With a period, a target would be one more point of a stream (D23). Later moves need their speed.
-                let ends_stream =
-                    has_extended_block(registers).then(|| (SET_POINT_PERIOD.address, vec![0, 0]));
-                return ends_stream.into_iter().chain(targets).collect();
-            }
-            HoldStep::Holds => StopProgress::Holds,
-            HoldStep::NotDriven => StopProgress::NotDriven,
-            HoldStep::NotTaken(_) => StopProgress::Failed,
-        };
+        match self.hold.poll(since_start(now)) {
+            HoldStep::Write(frames) => return frames,
+            HoldStep::Read | HoldStep::Wait(_) => {}
+            HoldStep::Holds(_) => self.progress = StopProgress::Holds,
+            HoldStep::NotDriven(_) => self.progress = StopProgress::NotDriven,
+            HoldStep::NotTaken(_) => self.progress = StopProgress::Failed,
+        }
         Vec::new()
     }
 }
 
-fn held_joints(registers: &Snapshot) -> HeldJoints {
-    let all = || registers.clone();
-    let has_status = registers.byte(&STATUS_VERSION) == 1;
-    let joints = JointSnapshot::new(all(), has_status.then(|| StatusBlock::from(all())));
-    HeldJoints::new(joints, has_extended_block(registers).then(all))
+/// The time since the start of the page's clock.
+#[must_use]
+pub const fn since_start(now: Instant) -> Duration {
+    Duration::from_micros(now.as_micros())
 }

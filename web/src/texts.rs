@@ -301,6 +301,20 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ),
     ("closed", "The connection ended:", "连接已断开："),
     ("bad-file", "This file is no recording:", "此文件不是动作录制："),
+    ("play-failed", "The movement ended early.", "动作提前结束。"),
+    ("record-failed", "The recording ended early.", "录制提前结束。"),
+    ("motors-are-off", "The motors are off.", "电机已关闭。"),
+    (
+        "paused",
+        "This page did not run for a while, and the arm has stopped.",
+        "本页面暂停运行了一段时间，机械臂已停止。",
+    ),
+    ("not-taken", "The arm does not take its commands.", "机械臂不接受命令。"),
+    (
+        "not-reached",
+        "The arm is not at its last pose. Look for what holds these joints:",
+        "机械臂未到达最后的姿态，请检查以下关节是否被卡住：",
+    ),
     ("bad-value", "This value cannot be written:", "无法写入此数值："),
     ("no-picture", "There is no 3D picture:", "无法显示三维画面："),
 ];

@@ -1,9 +1,11 @@
 //! What the page says of the arm, in one line.
 
 use sevenbot::ProblemKind;
+use sevenbot::health::MoveFault;
 use sevenbot::map::motor_state;
 
 use crate::arm_state::ArmState;
+use crate::movement::PlayFailure;
 use crate::stop::StopProgress;
 use crate::texts::Language;
 
@@ -85,6 +87,38 @@ pub fn state_line(
     }
 }
 
+/// Why a movement ended early.
+#[must_use]
+pub fn play_failure(language: Language, failure: &PlayFailure) -> String {
+    let reason = match failure {
+        PlayFailure::Arm(fault) => move_fault(language, fault),
+        PlayFailure::Paused(_) => language.text("paused").to_owned(),
+        PlayFailure::NotTaken => language.text("not-taken").to_owned(),
+        PlayFailure::NotReached(away) => {
+            let numbers = away.iter().map(|(joint, ..)| joint.number().to_string());
+            format!("{} {}", language.text("not-reached"), numbers.collect::<Vec<_>>().join(", "))
+        }
+    };
+    format!("{} {reason}", language.text("play-failed"))
+}
+
+/// Why a recording ended early.
+#[must_use]
+pub fn recording_failure(language: Language, fault: &MoveFault) -> String {
+    format!("{} {}", language.text("record-failed"), move_fault(language, fault))
+}
+
+fn move_fault(language: Language, fault: &MoveFault) -> String {
+    match fault {
+        MoveFault::Problems(problems) => {
+            let texts = problems.iter().take(PROBLEMS_SHOWN).map(|&problem| language.problem(problem));
+            texts.collect::<Vec<_>>().join(" ")
+        }
+        MoveFault::NotDriven { .. } => language.text("motors-are-off").to_owned(),
+        MoveFault::Silent => language.text("lost").to_owned(),
+    }
+}
+
 /// The numbers of joints, bit n-1 for joint n.
 fn joints(bits: u8) -> String {
     let numbers = (1..=7).filter(|number| bits >> (number - 1) & 1 == 1);
@@ -141,6 +175,17 @@ mod tests {
         assert!(said(&supply, StopProgress::None).starts_with("The servos lost their supply"));
         let limp = ArmState { motor_state: 2, ..state() };
         assert!(said(&limp, StopProgress::NotDriven).contains("nothing to stop"));
+    }
+
+    #[test]
+    fn a_movement_that_ends_early_is_told_with_its_reason() {
+        let silent = sevenbot::Problem { kind: ProblemKind::NoAnswer, joint: sevenbot::Joint::new(3) };
+        let silent = PlayFailure::Arm(MoveFault::Problems(vec![silent]));
+        let text = play_failure(Language::English, &silent);
+        assert!(text.starts_with("The movement ended early. Joint 3 does not answer"), "{text}");
+        let away =
+            PlayFailure::NotReached(sevenbot::Joint::ALL[..2].iter().map(|&joint| (joint, 1, 9)).collect());
+        assert!(play_failure(Language::English, &away).ends_with("these joints: 1, 2"));
     }
 
     #[test]

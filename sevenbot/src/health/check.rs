@@ -8,37 +8,14 @@
 //! A driven joint that is blocked, let go or silent ends the move, and so do a lost supply and a restart of the controller. The
 //! firmware without status block tells nothing of this.
 
-use std::time::{Duration, Instant};
+use protocol_core::registers::map::{MISSING_SERVOS, MOVING_JOINTS, STATUS_VERSION};
 
-use protocol_core::registers::map::{
-    EFFECTOR_TYPE, FRAMES_ACCEPTED, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, SERVO_TEMPERATURE,
-    SET_POINT_PERIOD, STATUS_VERSION, motor_state,
-};
-
+use super::Problem;
 use super::problem::sentences;
-use super::told::GRIPPER;
-use super::{ALL_JOINTS, Problem, ProblemFlags, ProblemKind};
+use super::watch::{MoveFault, MoveWatch, REGISTERS, SILENCE, STATE_REGISTERS};
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::status_block::has_restarted;
-use host_link::{Snapshot, Span};
-
-/// The registers of a check: set-point period, protection block, status block.
-const REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &SERVO_TEMPERATURE);
-/// Motor state and effector.
-const STATE_REGISTERS: Span = Span::between(&MOTOR_STATE, &EFFECTOR_TYPE);
-/// The shortest time between two questions of [`MoveCheck::poll`].
-const POLL_PERIOD: Duration = Duration::from_millis(100);
-/// The answers to these questions take at most this part of the line.
-const SHARE_OF_LINE: u32 = 10;
-/// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
-const BITS_PER_CHECK: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
-/// An arm that answers none of the last questions of [`MoveCheck::poll`] for this time is gone.
-const SILENCE: Duration = Duration::from_millis(1_500);
-/// So many questions at least.
-const UNANSWERED_QUESTIONS: u32 = 3;
-/// A joint that was blocked before the move has this time to get free: a point of a stream clears the flag only then (D27).
-const TIME_TO_GET_FREE: Duration = Duration::from_secs(2);
+use host_link::Snapshot;
 
 /// Why an arm does not carry out a move.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -77,25 +54,7 @@ pub enum MoveCheckError {
 /// # }
 /// ```
 #[derive(Clone, Debug)]
-pub struct MoveCheck {
-    /// The driven joints, as [`Joint::bit`](crate::Joint::bit)s.
-    joints: u8,
-    /// Do the motors have to drive the joints? If not, they have to be measured only.
-    needs_motors: bool,
-    /// Blocked since before the move.
-    blocked_before: u8,
-    /// Is the effector a gripper? Then an obstacle of joint 7 is what it holds.
-    is_gripper: bool,
-    begun: Instant,
-    /// The arm's counter of frames at the last answer.
-    accepted: Option<u16>,
-    /// The period that the arm has to have while a stream is open.
-    period_ms: Option<u16>,
-    last_answer: Instant,
-    unanswered: u32,
-    next_question: Instant,
-    is_state_next: bool,
-}
+pub struct MoveCheck(MoveWatch);
 
 /// What an arm does during a move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -115,57 +74,38 @@ impl MoveCheck {
     /// [`MoveCheckError::Problems`] if a joint cannot be driven now; one that is blocked can, because its next target tries again.
     /// [`MoveCheckError::NotDriven`] if the motors are off, and the errors of [`Arm::read`].
     pub fn begin(arm: &mut Arm, joints: u8) -> Result<Self, MoveCheckError> {
-        let mut check = Self { joints, ..Self::idle(arm) };
+        let mut check = Self::idle(arm, joints);
         check.read(arm)?;
         Ok(check)
     }
 
-    /// Watches over no joint yet, and asks nothing now.
-    pub(crate) fn idle(arm: &mut Arm) -> Self {
+    /// Begins to watch over these joints, and asks nothing now.
+    pub(crate) fn idle(arm: &mut Arm, joints: u8) -> Self {
         // The answer to a question of the move before is no news.
         arm.forget_background_question();
-        let now = arm.now();
-        Self {
-            joints: 0,
-            needs_motors: true,
-            blocked_before: u8::MAX,
-            is_gripper: true,
-            begun: now,
-            accepted: None,
-            period_ms: None,
-            last_answer: now,
-            unanswered: 0,
-            next_question: now + poll_period(arm),
-            is_state_next: true,
-        }
+        Self(MoveWatch::new(arm.elapsed(), joints, arm.options().baud))
     }
 
-    /// For a stream: from now on the arm has this set-point period, in milliseconds.
+    /// See [`MoveWatch::with_period`].
     #[must_use]
-    pub const fn with_period(mut self, milliseconds: u16) -> Self {
-        self.period_ms = Some(milliseconds);
-        self
+    pub const fn with_period(self, milliseconds: u16) -> Self {
+        Self(self.0.with_period(milliseconds))
     }
 
-    /// For a recording of all joints: only what makes the positions wrong ends it, and the motors may be off.
-    pub(crate) const fn of_positions(mut self) -> Self {
-        self.joints = ALL_JOINTS;
-        self.needs_motors = false;
-        self
+    /// See [`MoveWatch::of_positions`].
+    pub(crate) const fn of_positions(self) -> Self {
+        Self(self.0.of_positions())
     }
 
     /// The joints that it watches over, as [`Joint::bit`](crate::Joint::bit)s.
     #[must_use]
     pub const fn joints(&self) -> u8 {
-        self.joints
+        self.0.joints()
     }
 
-    /// Watches over these joints, too, from `now` on.
-    pub const fn add_joints(&mut self, joints: u8, now: Instant) {
-        if joints & !self.joints != 0 {
-            self.joints |= joints;
-            self.begun = now;
-        }
+    /// Watches over these joints, too, from now on.
+    pub(crate) fn add_joints(&mut self, joints: u8, arm: &Arm) {
+        self.0.add_joints(joints, arm.elapsed());
     }
 
     /// Asks the arm, and waits for its answer.
@@ -177,7 +117,7 @@ impl MoveCheck {
         Ok(registers.map_or_else(MoveState::default, |registers| MoveState {
             moving: Some(registers.byte(&MOVING_JOINTS)),
             missing: registers.byte(&MISSING_SERVOS),
-            is_gripping: ProblemFlags::of(&registers, self.is_gripper).is_gripping,
+            is_gripping: self.0.is_gripping(&registers),
         }))
     }
 
@@ -189,22 +129,14 @@ impl MoveCheck {
         if !arm.identity().has_status_block() {
             return Ok(());
         }
-        let now = arm.now();
-        if let Some(answer) = arm.take_background_answer()? {
-            (self.last_answer, self.unanswered) = (now, 0);
-            if let Err(reason) = self.judge(&answer, now) {
-                // A read of everything finds the most important reason.
-                return self.read(arm).and(Err(reason));
-            }
+        if let Some(answer) = arm.take_background_answer()?
+            && let Err(fault) = self.0.registers(arm.elapsed(), &answer)
+        {
+            // A read of everything finds the most important reason.
+            return self.read(arm).and(Err(told(arm, fault)));
         }
-        if self.unanswered >= UNANSWERED_QUESTIONS && now >= self.last_answer + SILENCE {
-            return Err(MoveCheckError::Exchange(arm.no_background_answer(REGISTERS, SILENCE)));
-        }
-        if now >= self.next_question {
-            self.next_question = now + poll_period(arm);
-            self.unanswered = self.unanswered.saturating_add(1);
-            let span = if self.is_state_next && self.needs_motors { STATE_REGISTERS } else { REGISTERS };
-            self.is_state_next = !self.is_state_next;
+        let question = self.0.question(arm.elapsed());
+        if let Some(span) = question.map_err(|fault| told(arm, fault))? {
             arm.ask_in_background(span)?;
         }
         Ok(())
@@ -212,59 +144,21 @@ impl MoveCheck {
 
     /// Reads the registers, and judges them. `None` from firmware without a status block.
     fn read(&mut self, arm: &mut Arm) -> Result<Option<Snapshot>, MoveCheckError> {
-        let state = arm.read_span(STATE_REGISTERS)?;
-        self.is_gripper = state.byte(&EFFECTOR_TYPE) == GRIPPER;
-        let has_status = arm.identity().has_status_block();
-        let registers = has_status.then(|| arm.read_span(REGISTERS)).transpose()?;
-        let now = arm.now();
-        (self.last_answer, self.unanswered) = (now, 0);
-        // A lost supply is the reason for motors that are off.
-        registers.iter().try_for_each(|registers| self.judge(registers, now))?;
-        self.judge(&state, now)?;
-        Ok(registers.filter(|registers| registers.byte(&STATUS_VERSION) != 0))
-    }
-
-    /// Fails if these registers tell that the move has ended.
-    fn judge(&mut self, registers: &Snapshot, now: Instant) -> Result<(), MoveCheckError> {
-        if registers.span() == STATE_REGISTERS {
-            self.is_gripper = registers.byte(&EFFECTOR_TYPE) == GRIPPER;
-            let state = registers.byte(&MOTOR_STATE);
-            return if state == motor_state::SERVO || !self.needs_motors {
-                Ok(())
-            } else {
-                Err(MoveCheckError::NotDriven { state })
-            };
+        let mut registers = arm.read_span(STATE_REGISTERS)?;
+        if arm.identity().has_status_block() {
+            let mut all = Snapshot { address: 0, values: vec![0; 256] };
+            [registers, arm.read_span(REGISTERS)?].iter().for_each(|read| all.put(read));
+            registers = all;
         }
-        let problems = self.problems(registers, now);
-        if problems.is_empty() { Ok(()) } else { Err(MoveCheckError::Problems(problems)) }
-    }
-
-    fn problems(&mut self, registers: &Snapshot, now: Instant) -> Vec<Problem> {
-        let mut flags = ProblemFlags::of(registers, self.is_gripper);
-        self.blocked_before &= flags.blocked;
-        if now < self.begun + TIME_TO_GET_FREE {
-            flags.blocked &= !self.blocked_before;
-        }
-        let restarted = self.has_restarted(registers).then_some(Problem::of_arm(ProblemKind::Restarted));
-        let all = restarted.into_iter().chain(flags.problems(self.joints));
-        all.filter(|problem| self.needs_motors || problem.kind.hides_positions()).collect()
-    }
-
-    /// Has the controller restarted since the last answer? Then its counter of frames begins again, and its stream is off.
-    fn has_restarted(&mut self, registers: &Snapshot) -> bool {
-        if registers.byte(&STATUS_VERSION) == 0 {
-            return false;
-        }
-        let accepted = registers.counter(&FRAMES_ACCEPTED);
-        let before = self.accepted.replace(accepted).unwrap_or(accepted);
-        let has_other_period =
-            self.period_ms.is_some_and(|period| registers.word(SET_POINT_PERIOD.address) != period);
-        has_other_period || has_restarted(before, accepted)
+        self.0.registers(arm.elapsed(), &registers).map_err(|fault| told(arm, fault))?;
+        Ok(Some(registers).filter(|registers| registers.byte(&STATUS_VERSION) != 0))
     }
 }
 
-/// The time between two questions, so that the line has room for points and reports.
-fn poll_period(arm: &Arm) -> Duration {
-    let check = Duration::from_secs(1) * BITS_PER_CHECK / arm.options().baud.max(1);
-    POLL_PERIOD.max(check * SHARE_OF_LINE)
+fn told(arm: &mut Arm, fault: MoveFault) -> MoveCheckError {
+    match fault {
+        MoveFault::Problems(problems) => MoveCheckError::Problems(problems),
+        MoveFault::NotDriven { state } => MoveCheckError::NotDriven { state },
+        MoveFault::Silent => MoveCheckError::Exchange(arm.no_background_answer(REGISTERS, SILENCE)),
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   registers 29 to 60, 128 to 255 ──▶ Health ──▶ problems ──▶ words and remedies (problem.rs)
-//!   the same during a move ──▶ MoveCheck ──▶ the reason to end it
+//!   the same during a move ──▶ MoveWatch, MoveCheck ──▶ the reason to end it
 //! ```
 //!
 //! Firmware without the blocks of this project does not tell everything: then a value is `None`, and never "healthy".
@@ -11,6 +11,7 @@ mod check;
 mod joint;
 mod problem;
 mod told;
+mod watch;
 
 use protocol_core::registers::map::{
     BLOCKED_JOINTS, EFFECTOR_TYPE, FAULTS, FINE_TARGET, LET_GO_JOINTS, MISSING_SERVOS, MOTOR_STATE,
@@ -30,6 +31,7 @@ pub use check::{MoveCheck, MoveCheckError, MoveState};
 pub use joint::JointHealth;
 pub(crate) use problem::{ALARM_BITS, FAULT_BITS};
 pub use problem::{Problem, ProblemKind, remedies, sentences};
+pub use watch::{MoveFault, MoveWatch};
 
 /// The bits of all joints.
 const ALL_JOINTS: u8 = (1 << JOINTS) - 1;

@@ -4,23 +4,19 @@
 //!   Arm::standing ──▶ Approach::plan ──▶ SetPointStream::approach, or frames in whole degrees
 //! ```
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use protocol_core::registers::Joint;
-use protocol_core::registers::map::{PRESENT_POSITION, SPEED, TARGET_POSITION};
+use protocol_core::registers::map::{EXTENDED_VERSION, FINE_TARGET, PRESENT_POSITION, SPEED};
 
+use super::drive::{POLL_PERIOD, drive};
 use super::error::MoveError;
 use super::observer::Observer;
 use crate::approach::{Approach, Standing};
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::fine_angle::FineAngle;
+use crate::movement_run::MovementRun;
 use crate::stream::SetPointStream;
-use crate::units::Speed;
-use host_link::Span;
-
-/// The longest time between two questions to the observer.
-const POLL_PERIOD: Duration = Duration::from_millis(20);
+use host_link::{Snapshot, Span};
 
 impl Arm {
     /// Where the arm stands, as exact as it tells.
@@ -28,16 +24,12 @@ impl Arm {
     /// # Errors
     /// As [`Arm::read`].
     pub fn standing(&mut self) -> Result<Standing, Error> {
-        let registers = self.read_span(Span::between(&SPEED, &PRESENT_POSITION))?;
-        let speeds = Joint::ALL.map(|joint| registers.at(SPEED.of(joint)));
-        let speeds = speeds.map(|steps| Speed::from_steps(steps).unwrap_or(Speed::MAXIMUM));
-        let Some(fine) = self.fine_state_if_served()? else {
-            let [measured, targets] =
-                [&PRESENT_POSITION, &TARGET_POSITION].map(|row| registers.joints(row).map(f64::from));
-            return Ok(Standing { measured: measured.map(Some), targets, speeds });
-        };
-        let measured = fine.positions.map(|angle| angle.map(FineAngle::degrees));
-        Ok(Standing { measured, targets: self.fine_targets()?.map(FineAngle::degrees), speeds })
+        let mut registers = Snapshot { address: 0, values: vec![0; 256] };
+        registers.put(&self.read_span(Span::between(&SPEED, &PRESENT_POSITION))?);
+        if self.has_extended_block()? {
+            registers.put(&self.read_span(Span::between(&FINE_TARGET, &EXTENDED_VERSION))?);
+        }
+        Ok(Standing::of(&registers))
     }
 }
 
@@ -45,30 +37,22 @@ impl SetPointStream<'_> {
     /// Streams the way to a first point, if there is one. Afterwards the next point is due.
     ///
     /// # Errors
-    /// The observer ended it, or the port failed. The joints then stop at the last point.
+    /// The observer ended it, the port failed, or the arm does not follow: [`SetPointStream::check`]. The joints then stop at
+    /// the last point.
     pub fn approach(&mut self, way: &Approach, observer: &mut dyn Observer) -> Result<(), MoveError> {
         if way.duration().is_zero() {
             return Ok(());
         }
-        let (start, period) = (self.arm().now(), self.period());
-        let mut number = 0;
-        loop {
-            let time = period.saturating_mul(number);
-            self.wait_until(start + time, observer)?;
-            if time >= way.duration() + period {
-                return Ok(());
-            }
-            self.send(&way.at(time))?;
-            number = number.saturating_add(1);
-        }
+        let run = MovementRun::approach(*way, self.arm().elapsed(), self.period());
+        drive(run, self, observer, Self::wait_until)
     }
 
-    fn wait_until(&mut self, end: Instant, observer: &mut dyn Observer) -> Result<(), MoveError> {
+    fn wait_until(&mut self, end: Duration, observer: &mut dyn Observer) -> Result<(), MoveError> {
         loop {
             if !observer.goes_on() {
                 return Err(MoveError::Interrupted);
             }
-            let left = end.saturating_duration_since(self.arm().now());
+            let left = end.saturating_sub(self.arm().elapsed());
             if left.is_zero() {
                 return Ok(());
             }

@@ -19,6 +19,12 @@ pub enum MoveError {
     /// still be moving.
     #[error("interrupted")]
     Interrupted,
+    /// This program did not run for so long that the movement is over: the arm has stopped.
+    #[error("this program paused for {:.1} s, so the movement ended: the arm has stopped on its way", time.as_secs_f64())]
+    Paused {
+        /// The time.
+        time: Duration,
+    },
     /// The motors do not drive the joints.
     #[error("the arm's motors are in state {state}, {}", motor_state_name(*state))]
     NotDriven {

@@ -9,6 +9,7 @@
 //! All calls block on the clock of the arm's line.
 
 mod approach;
+mod drive;
 mod error;
 mod hold_watch;
 mod joint_move;

@@ -9,17 +9,19 @@ use std::time::{Duration, Instant};
 
 use protocol_core::registers::map::{SPEED, TIME, VACUUM_PUMP};
 
+use super::drive::{POLL_PERIOD, drive};
 use super::error::{ConnectionLost, MoveError};
 use super::joint_move::JointMove;
-use super::observer::{Observer, Stage};
+use super::observer::Observer;
 use crate::approach::{Approach, ApproachRule, Standing, StartTooFar};
 use crate::arm::Arm;
 use crate::fine_angle::FineAngle;
 use crate::health::MoveCheck;
+use crate::movement_run::MovementRun;
 use crate::playback::{self, Step};
 use crate::point_path::PointPath;
 use crate::recording::{Moment, Recording};
-use crate::stream::{SetPointStream, StreamError, StreamOptions, StreamPace};
+use crate::stream::{SetPointStream, StreamError, StreamOptions};
 use crate::units::Speed;
 use host_link::Span;
 
@@ -27,10 +29,6 @@ use host_link::Span;
 const FEEDBACK_HZ: u8 = 30;
 /// Without a report for this time, the arm has stopped reporting.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
-/// The longest time between two questions to the observer.
-const POLL_PERIOD: Duration = Duration::from_millis(20);
-/// Reports are taken for this time after the end, because servos lag.
-const TAIL: Duration = Duration::from_millis(300);
 /// Time between two points of a stream, in milliseconds.
 const PERIOD_MS: u16 = 20;
 
@@ -185,90 +183,70 @@ impl Player {
             stream.approach(&way, observer)?;
             return Ok(stream.close()?);
         }
-        let mut run = Run { measured: Vec::new(), start: arm.now(), last_report: arm.now() };
-        self.send_steps(&playback::steps(&way.recording(*first), 1.0), &mut run, arm, observer)
+        send_steps(playback::steps(&way.recording(*first), 1.0), &mut Tape::default(), arm, observer)
     }
 
     fn play_once(&mut self, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
-        let mut run = Run { measured: Vec::new(), start: arm.now(), last_report: arm.now() };
+        let mut tape = Tape::default();
         let done = if arm.has_extended_block()? {
-            self.stream(&mut run, arm, observer)
+            self.stream(&mut tape, arm, observer)
         } else {
-            self.send_steps(&self.steps, &mut run, arm, observer)
+            send_steps(self.steps.clone(), &mut tape, arm, observer)
         };
         if self.played == 0 {
-            self.measured = run.measured;
+            self.measured = tape.measured;
         }
         done?;
         self.moments.last().map_or(Ok(()), |last| move_to(arm, last.pose, observer))
     }
 
-    /// Sends one frame per step.
-    fn send_steps(
-        &self,
-        steps: &[Step],
-        run: &mut Run,
-        arm: &mut Arm,
-        observer: &mut dyn Observer,
-    ) -> Result<(), MoveError> {
-        run.restart(arm);
-        for (number, step) in (1..).zip(steps) {
-            run.take_reports_until(step.time, arm, observer)?;
-            arm.write(VACUUM_PUMP.address, &step.registers())?;
-            observer.progress(Stage::Playing, number, count(steps.len()));
-        }
-        let end = steps.last().map_or(Duration::ZERO, |step| step.time);
-        run.take_reports_until(end + TAIL, arm, observer)
-    }
-
     /// Streams all points once, from where the arm is: at the first of them.
-    fn stream(&self, run: &mut Run, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
+    fn stream(&self, tape: &mut Tape, arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
         let options = StreamOptions::new(PERIOD_MS).ok_or(StreamError::NoExtendedBlock)?;
         // The points tell the speed. The recording was checked, and the arm is at its first pose.
         arm.write_checked(SPEED.address, &[Speed::MAXIMUM.steps(); 7])?;
         let mut stream = SetPointStream::open(arm, options)?;
-        let (mut path, period) = (self.path.clone(), options.period());
-        let points = path.duration().as_millis().div_ceil(period.as_millis().max(1));
-        run.restart(stream.arm());
-        let mut pace = StreamPace::new(run.start, period);
-        let mut vacuum = self.moments.first().is_some_and(|first| first.vacuum);
-        let mut time = Duration::ZERO;
-        while pace.counts().points == 0 || time < path.duration() {
-            run.take_reports_until(pace.due().saturating_duration_since(run.start), stream.arm(), observer)?;
-            let number = pace.take(stream.arm().now());
-            time = period.saturating_mul(number);
-            let Some(point) = path.at(time) else { break };
-            if point.vacuum != vacuum {
-                vacuum = point.vacuum;
-                stream.arm().write(VACUUM_PUMP.address, &[u8::from(vacuum)])?;
-            }
-            stream.send(&point.pose.map(Some))?;
-            stream.check()?;
-            observer.progress(Stage::Playing, number.into(), u64::try_from(points).unwrap_or(u64::MAX));
-        }
-        run.take_reports_until(time + 2 * period + TAIL, stream.arm(), observer)?;
+        let vacuum = self.moments.first().map(|first| first.vacuum);
+        tape.restart(stream.arm());
+        let run = MovementRun::along(self.path.clone(), vacuum, stream.arm().elapsed(), options.period());
+        drive(run, &mut stream, observer, |stream, until, observer| {
+            tape.take_reports_until(until, stream.arm(), observer)
+        })?;
         Ok(stream.close()?)
     }
 }
 
-/// One run through a recording.
-struct Run {
-    measured: Vec<(Duration, [FineAngle; 7])>,
-    start: Instant,
-    last_report: Instant,
+/// Sends one frame per step.
+fn send_steps(
+    steps: Vec<Step>,
+    tape: &mut Tape,
+    arm: &mut Arm,
+    observer: &mut dyn Observer,
+) -> Result<(), MoveError> {
+    tape.restart(arm);
+    let run = MovementRun::in_steps(steps, arm.elapsed());
+    drive(run, arm, observer, |arm, until, observer| tape.take_reports_until(until, arm, observer))
 }
 
-impl Run {
+/// The poses that are measured during one run.
+#[derive(Default)]
+struct Tape {
+    measured: Vec<(Duration, [FineAngle; 7])>,
+    start: Option<Instant>,
+    last_report: Option<Instant>,
+}
+
+impl Tape {
     fn restart(&mut self, arm: &mut Arm) {
         arm.reports().for_each(drop);
-        self.start = arm.now();
+        self.start = Some(arm.now());
         self.last_report = self.start;
     }
 
-    /// Takes reports until `time` after the start.
+    /// Takes reports until a time of the arm's clock.
     fn take_reports_until(
         &mut self,
-        time: Duration,
+        end: Duration,
         arm: &mut Arm,
         observer: &mut dyn Observer,
     ) -> Result<(), MoveError> {
@@ -276,25 +254,23 @@ impl Run {
             if !observer.goes_on() {
                 return Err(MoveError::Interrupted);
             }
-            let left = (self.start + time).saturating_duration_since(arm.now());
+            let left = end.saturating_sub(arm.elapsed());
             if left.is_zero() {
                 return Ok(());
             }
             match arm.next_report(left.min(POLL_PERIOD))? {
                 Some(report) => {
-                    self.last_report = report.received;
-                    let time = report.received.saturating_duration_since(self.start);
-                    self.measured.push((time, report.pose()));
+                    self.last_report = Some(report.received);
+                    let start = self.start.unwrap_or(report.received);
+                    self.measured.push((report.received.saturating_duration_since(start), report.pose()));
                 }
-                None if arm.now() > self.last_report + REPORT_TIMEOUT => return Err(silent(arm)),
+                None if self.last_report.is_some_and(|last| arm.now() > last + REPORT_TIMEOUT) => {
+                    return Err(silent(arm));
+                }
                 None => {}
             }
         }
     }
-}
-
-fn count(items: usize) -> u64 {
-    u64::try_from(items).unwrap_or(u64::MAX)
 }
 
 fn move_to(arm: &mut Arm, pose: [FineAngle; 7], observer: &mut dyn Observer) -> Result<(), MoveError> {

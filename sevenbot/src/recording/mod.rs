@@ -19,9 +19,11 @@ use protocol_core::registers::Joint;
 use crate::units::Speed;
 
 mod line;
+mod lines;
 mod version;
 
 pub use line::{LineError, Moment};
+pub use lines::RecordingLines;
 pub use version::FileVersion;
 
 /// The first word of every recording.

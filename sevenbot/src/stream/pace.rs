@@ -1,6 +1,7 @@
-//! When the points of a stream are due, and how well they kept to it: arithmetic without an arm.
+//! When the points of a stream are due, and how well they kept to it: arithmetic without an arm or a clock. Times are those
+//! since any instant of one clock, such as [`Arm::elapsed`](crate::Arm::elapsed).
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A point may be early or late by a quarter of the period without a ripple of the velocity (D23).
 const TOLERANCE_DIVISOR: u32 = 4;
@@ -9,9 +10,9 @@ const TOLERANCE_DIVISOR: u32 = 4;
 ///
 /// ```
 /// use sevenbot::stream::StreamPace;
-/// use std::time::{Duration, Instant};
+/// use std::time::Duration;
 ///
-/// let (start, period) = (Instant::now(), Duration::from_millis(20));
+/// let (start, period) = (Duration::from_secs(5), Duration::from_millis(20));
 /// let mut pace = StreamPace::new(start, period);
 /// assert_eq!(pace.take(start), 0);
 /// assert_eq!(pace.due(), start + period);
@@ -19,10 +20,10 @@ const TOLERANCE_DIVISOR: u32 = 4;
 /// ```
 #[derive(Clone, Debug)]
 pub struct StreamPace {
-    start: Instant,
+    start: Duration,
     period: Duration,
     next: u32,
-    last_taken: Option<Instant>,
+    last_taken: Option<Duration>,
     counts: PaceCounts,
 }
 
@@ -52,37 +53,43 @@ impl PaceCounts {
 impl StreamPace {
     /// The first point is due at `start`.
     #[must_use]
-    pub fn new(start: Instant, period: Duration) -> Self {
+    pub fn new(start: Duration, period: Duration) -> Self {
         Self { start, period, next: 0, last_taken: None, counts: PaceCounts::default() }
+    }
+
+    /// When the first point was due, or the next one after the last pause.
+    #[must_use]
+    pub const fn start(&self) -> Duration {
+        self.start
     }
 
     /// When the next point is due.
     #[must_use]
-    pub fn due(&self) -> Instant {
+    pub fn due(&self) -> Duration {
         self.start + self.period.saturating_mul(self.next)
     }
 
     /// The number of the point to send at `now`: the next one, or a later one if that is due already. The arm would pass
     /// over the ones before (D23).
     #[must_use]
-    pub fn number_at(&self, now: Instant) -> u32 {
-        let lateness = now.saturating_duration_since(self.due());
+    pub fn number_at(&self, now: Duration) -> u32 {
+        let lateness = now.saturating_sub(self.due());
         let passed = lateness.as_micros() / self.period.as_micros().max(1);
         self.next.saturating_add(u32::try_from(passed).unwrap_or(u32::MAX))
     }
 
     /// Takes the point to send at `now`: its number, as [`Self::number_at`] gives it.
-    pub fn take(&mut self, now: Instant) -> u32 {
+    pub fn take(&mut self, now: Duration) -> u32 {
         let number = self.number_at(now);
         let passed = number.saturating_sub(self.next);
         self.next = number;
-        self.count(now.saturating_duration_since(self.due()), passed, now);
+        self.count(now.saturating_sub(self.due()), passed, now);
         self.next = number.saturating_add(1);
         number
     }
 
     /// Makes the next point due at `now`: the source of the points has paused. The pause counts as one late point.
-    pub fn restart(&mut self, now: Instant) {
+    pub fn restart(&mut self, now: Duration) {
         self.start = now;
         self.next = 0;
         self.counts.late = self.counts.late.saturating_add(1);
@@ -94,9 +101,9 @@ impl StreamPace {
         self.counts
     }
 
-    fn count(&mut self, lateness: Duration, passed: u32, now: Instant) {
+    fn count(&mut self, lateness: Duration, passed: u32, now: Duration) {
         let is_late = lateness > self.period / TOLERANCE_DIVISOR;
-        let gap = self.last_taken.map_or(Duration::ZERO, |last| now.saturating_duration_since(last));
+        let gap = self.last_taken.map_or(Duration::ZERO, |last| now.saturating_sub(last));
         let counts = &mut self.counts;
         counts.points = counts.points.saturating_add(1);
         counts.late = counts.late.saturating_add(passed).saturating_add(u32::from(is_late));
@@ -115,7 +122,7 @@ mod tests {
 
     #[test]
     fn due_times_do_not_drift() {
-        let start = Instant::now();
+        let start = Duration::from_secs(5);
         let mut pace = StreamPace::new(start, PERIOD);
         for number in 0..50 {
             let due = start + PERIOD * number;
@@ -129,7 +136,7 @@ mod tests {
 
     #[test]
     fn points_that_are_too_late_are_passed_over_and_counted() {
-        let start = Instant::now();
+        let start = Duration::from_secs(5);
         let mut pace = StreamPace::new(start, PERIOD);
         pace.take(start);
         assert_eq!(pace.take(start + Duration::from_millis(26)), 1, "late by more than a quarter");
@@ -145,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_pause_of_the_source_starts_the_due_times_again() {
-        let start = Instant::now();
+        let start = Duration::from_secs(5);
         let mut pace = StreamPace::new(start, PERIOD);
         pace.take(start);
         let later = start + Duration::from_secs(5);

@@ -40,11 +40,11 @@ fn a_stream_and_its_watchdog_are_exact() {
     arm.sleep(Duration::from_secs(1));
     let options = StreamOptions::new(20).unwrap();
     let mut stream = SetPointStream::open(&mut arm, options).unwrap();
-    let mut pace = StreamPace::new(stream.arm().now(), options.period());
+    let mut pace = StreamPace::new(stream.arm().elapsed(), options.period());
     for hundredths in (9_000..10_000).step_by(20) {
-        let wait = pace.due().saturating_duration_since(stream.arm().now());
+        let wait = pace.due().saturating_sub(stream.arm().elapsed());
         stream.arm().sleep(wait);
-        pace.take(stream.arm().now());
+        pace.take(stream.arm().elapsed());
         stream.send(&[FineAngle::from_hundredths(hundredths), None, None, None, None, None, None]).unwrap();
     }
     assert_eq!(pace.counts().late, 0);

@@ -16,11 +16,12 @@ use super::dom::{Dom, number};
 use super::hand;
 use super::page::{App, Line, on, with_app};
 use crate::arm_state::target_frame;
-use crate::movement::{self, PlayRefusal, Player, Recorder};
+use crate::movement::{PlayProgress, PlayRefusal, Player, Recorder};
 use crate::park::{Park, ParkProgress};
 use crate::plots::Quantity;
 use crate::source::serial::SerialSource;
 use crate::source::socket::SocketSource;
+use crate::words;
 
 /// The longest way to the first pose of a movement, in seconds.
 const LONGEST_APPROACH: f32 = 60.0;
@@ -120,13 +121,26 @@ impl App {
         self.dom.notice(self.language.text(text));
     }
 
-    fn stop(&mut self) {
-        self.park = None;
-        if self.player.take().is_some() {
-            let now = self.now();
-            movement::end(&mut self.client, now);
+    /// Goes on with a movement.
+    pub(super) fn play_on(&mut self, now: Instant) {
+        let Some(mut player) = self.player.take() else { return };
+        match player.poll(now, &mut self.client) {
+            PlayProgress::Playing => self.player = Some(player),
+            PlayProgress::Played => {}
+            PlayProgress::Failed(failure) => {
+                self.dom.notice(&words::play_failure(self.language, &failure));
+            }
         }
-        self.client.stop();
+    }
+
+    fn stop(&mut self) {
+        let now = self.now();
+        let (park, player) = (self.park.take(), self.player.take());
+        let speeds = park.map(|park| park.speeds()).or(player.as_ref().map(Player::speeds));
+        self.client.stop(now, speeds);
+        if let Some(player) = player {
+            player.end_stream(now, &mut self.client);
+        }
     }
 
     fn choose_plot(&mut self, value: &str) {
@@ -237,11 +251,16 @@ impl App {
     }
 
     fn record(&mut self) {
-        if let Some(recorder) = self.recorder.take() {
-            self.recording = recorder.finish().or(self.recording.take());
+        if self.recorder.is_some() {
+            self.end_recording();
         } else {
             self.recorder = Some(Recorder::new(self.now()));
         }
+    }
+
+    pub(super) fn end_recording(&mut self) {
+        let recorded = self.recorder.take().and_then(Recorder::finish);
+        self.recording = recorded.or(self.recording.take());
     }
 
     fn begin_play(&mut self) {

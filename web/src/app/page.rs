@@ -19,6 +19,7 @@ use crate::scene::{Part, Scene};
 use crate::source::simulator::SimulatedSource;
 use crate::source::{LineState, Source};
 use crate::texts::Language;
+use crate::words;
 
 /// Longer pauses of the browser, as in a tab in the background, let no more virtual time pass: 100 ms.
 const LONGEST_FRAME_MS: f64 = 100.0;
@@ -210,10 +211,7 @@ impl App {
 
     fn play(&mut self, now: Instant) {
         self.park_on(now);
-        let Some(mut player) = self.player.take() else { return };
-        if player.poll(now, &mut self.client) {
-            self.player = Some(player);
-        }
+        self.play_on(now);
     }
 
     /// The registers are new.
@@ -221,8 +219,12 @@ impl App {
     fn new_state(&mut self, now: Instant) {
         let state = self.client.state();
         let vacuum = self.client.registers().byte(&VACUUM_PUMP) != 0;
-        if let Some(recorder) = &mut self.recorder {
-            recorder.add(now, &state, vacuum);
+        let registers = self.client.registers();
+        if let Some(recorder) = &mut self.recorder
+            && let Err(fault) = recorder.add(now, registers, vacuum)
+        {
+            self.end_recording();
+            self.dom.notice(&words::recording_failure(self.language, &fault));
         }
         let time = now.as_micros() as f64 / 1e6;
         let (angles, loads, velocities) = (state.angles(), state.loads, state.velocities);

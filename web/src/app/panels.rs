@@ -130,7 +130,7 @@ fn show_recording(app: &App) {
     let text = |name| app.language.text(name);
     let line = match (&app.recorder, &app.player, &app.recording) {
         (Some(_), ..) => format!("● {}", text("record")),
-        (_, Some(player), _) => format!("{} {:.0} %", text("playing"), player.progress(app.now()) * 100.0),
+        (_, Some(player), _) => format!("{} {:.0} %", text("playing"), player.progress() * 100.0),
         (_, _, Some(recording)) => {
             format!("{}: {}", text("recorded"), recording.lines().count().saturating_sub(2))
         }

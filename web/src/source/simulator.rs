@@ -71,8 +71,9 @@ mod tests {
     use super::*;
     use crate::arm_state::target_frame;
     use crate::client::Client;
-    use crate::movement::Player;
+    use crate::movement::{PlayFailure, PlayProgress, Player};
     use crate::stop::StopProgress;
+    use sevenbot::map::{SET_POINT_PERIOD, SPEED, WATCHDOG_ACTION};
     use sevenbot::{Joint, Problem, ProblemKind};
 
     /// A client and an arm that was switched on a second ago.
@@ -92,6 +93,106 @@ mod tests {
         }
     }
 
+    /// As [`pass`], but nothing that the arm sends gets through.
+    fn pass_without_replies(client: &mut Client, arm: &mut SimulatedSource, frames: u32) {
+        for _ in 0..frames {
+            arm.send(&client.poll(arm.now()));
+            arm.advance(16_667.0, || true);
+            arm.receive();
+            client.receive(arm.now(), &[]);
+        }
+    }
+
+    /// Where joint 1 is, in degrees.
+    fn base(arm: &SimulatedSource) -> f64 {
+        f64::from(arm.simulation().plant().angle(Joint::ALL[0])) / 1e3
+    }
+
+    #[test]
+    fn a_stop_acts_at_once_although_no_reply_comes() {
+        let (mut client, mut arm) = connected();
+        let (address, values) = target_frame(client.registers(), 1, 175.0).expect("a target");
+        client.write(arm.now(), address, &values);
+        pass(&mut client, &mut arm, 12);
+        client.stop(arm.now(), None);
+        let bytes = client.poll(arm.now());
+        assert_eq!(bytes.get(..5), Some(&[0xAA, 0x77, 6, 184, 2][..]), "the stop is the first: {bytes:?}");
+        arm.send(&bytes);
+        pass_without_replies(&mut client, &mut arm, 30);
+        let stopped = base(&arm);
+        // It goes back to where it was read last, at 1.9 degrees per second.
+        pass_without_replies(&mut client, &mut arm, 300);
+        let rested = base(&arm);
+        assert_eq!(client.stop_progress(), StopProgress::Verifying, "nothing has confirmed it");
+        assert!(stopped < 140.0 && (0.0..5.0).contains(&(stopped - rested)), "from {stopped} to {rested}");
+        pass(&mut client, &mut arm, 60);
+        assert_eq!(client.stop_progress(), StopProgress::Holds);
+        let speeds = client.registers().joints(&SPEED);
+        assert_eq!((speeds, client.state().moving), ([60; 7], 0), "the speeds are those of before");
+        assert!((base(&arm) - rested).abs() < 0.5, "from {rested} to {}", base(&arm));
+    }
+
+    /// Plays a movement of joint 1 until it ends; `during` may break something after so many pictures.
+    fn play(
+        client: &mut Client,
+        arm: &mut SimulatedSource,
+        mut during: impl FnMut(u32, &mut SimulatedSource),
+    ) -> PlayProgress {
+        let movement = "7bot-recording 2\n0 90 90 65 90 90 90 80 0\n3 120 90 65 90 90 90 80 1\n";
+        let mut player = Player::new(movement, client.registers(), None, arm.now()).expect("a recording");
+        for pictures in 0..1_000 {
+            during(pictures, arm);
+            match player.poll(arm.now(), client) {
+                PlayProgress::Playing => pass(client, arm, 1),
+                end => {
+                    pass(client, arm, 20);
+                    return end;
+                }
+            }
+        }
+        panic!("it does not end");
+    }
+
+    #[test]
+    fn a_movement_ends_where_the_arm_does_not_carry_it_out() {
+        let reason = |action: &'static str| {
+            let (mut client, mut arm) = connected();
+            let end = play(&mut client, &mut arm, |pictures, arm| {
+                if pictures == 60 {
+                    arm.act(action.parse().expect("an action"));
+                }
+            });
+            let PlayProgress::Failed(failure) = end else { panic!("{action}: {end:?}") };
+            crate::words::play_failure(crate::texts::Language::English, &failure)
+        };
+        for (action, word) in [
+            ("fault 3=missing", "Joint 3 does not answer"),
+            ("fault 1=stuck", "Joint 1 is blocked"),
+            ("fault supply=off", "does not answer"),
+            ("power-cycle", "restarted"),
+            ("halt", "does not answer"),
+        ] {
+            assert!(reason(action).contains(word), "{action}: {}", reason(action));
+        }
+    }
+
+    #[test]
+    fn a_page_that_pauses_ends_its_movement() {
+        let (mut client, mut arm) = connected();
+        let mut at = 0.0;
+        let end = play(&mut client, &mut arm, |pictures, arm| {
+            if pictures == 60 {
+                arm.advance(7e6, || true);
+                while arm.now() < Instant::from_micros(8_000_000) {
+                    arm.advance(10_000.0, || true);
+                }
+                at = base(arm);
+            }
+        });
+        assert!(matches!(end, PlayProgress::Failed(PlayFailure::Paused(_))), "{end:?}");
+        assert!((base(&arm) - at).abs() < 0.5, "from {at} to {}", base(&arm));
+    }
+
     #[test]
     fn a_target_moves_the_arm_and_a_stop_holds_it() {
         let (mut client, mut arm) = connected();
@@ -100,7 +201,7 @@ mod tests {
         pass(&mut client, &mut arm, 12);
         let moving = client.state();
         assert_eq!((moving.targets[0], moving.moving), (150.25, 1));
-        client.stop();
+        client.stop(arm.now(), None);
         pass(&mut client, &mut arm, 12);
         assert_eq!(client.stop_progress(), StopProgress::Holds);
         let held = client.state();
@@ -116,7 +217,7 @@ mod tests {
         }
         let (address, values) = target_frame(client.registers(), 1, 180.0).expect("a target");
         client.write(arm.now(), address, &values);
-        client.stop();
+        client.stop(arm.now(), None);
         pass(&mut client, &mut arm, 100);
         assert_eq!(client.stop_progress(), StopProgress::Holds);
         let held = client.state();
@@ -128,7 +229,7 @@ mod tests {
         let (mut client, mut arm) = connected();
         client.write(arm.now(), sevenbot::map::MOTOR_STATE.address, &[2]);
         pass(&mut client, &mut arm, 10);
-        client.stop();
+        client.stop(arm.now(), None);
         pass(&mut client, &mut arm, 10);
         assert_eq!(client.stop_progress(), StopProgress::NotDriven);
     }
@@ -165,18 +266,13 @@ mod tests {
     #[test]
     fn a_movement_is_played_to_its_end() {
         let (mut client, mut arm) = connected();
-        let movement = "7bot-recording 2\n0 90 90 65 90 90 90 80 0\n1 110 90 65 90 90 90 80 1\n";
-        let mut player = Player::new(movement, client.registers(), None, arm.now()).expect("a recording");
-        let mut frames = 0;
-        while player.poll(arm.now(), &mut client) {
-            pass(&mut client, &mut arm, 1);
-            frames += 1;
-            assert!(frames < 1_000, "it does not end");
-        }
-        pass(&mut client, &mut arm, 60);
+        assert_eq!(play(&mut client, &mut arm, |_, _| ()), PlayProgress::Played);
+        let registers = client.registers();
+        let stream = registers.part(sevenbot::Span::between(&SET_POINT_PERIOD, &WATCHDOG_ACTION));
+        assert_eq!((stream.values, registers.joints(&SPEED)), (vec![0; 4], [60; 7]), "as before");
         let (state, pump) = (client.state(), client.registers().byte(&sevenbot::map::VACUUM_PUMP));
-        assert!((state.angles()[0] - 110.0).abs() < 0.5, "{state:?}");
-        assert_eq!((state.targets[0], state.faults, pump), (110.0, 0, 1));
+        assert!((state.angles()[0] - 120.0).abs() < 0.5, "{state:?}");
+        assert_eq!((state.targets[0], state.faults, pump), (120.0, 0, 1));
     }
 
     #[test]

@@ -18,7 +18,7 @@ use serde::Serialize;
 use sevenbot::health::ProblemKind;
 use sevenbot::map::{MOTOR_STATE, VACUUM_PUMP, motor_state, report_content};
 use sevenbot::moves::{ConnectionLost, RecordedPose, Recorder};
-use sevenbot::recording::{self, FileVersion, Moment};
+use sevenbot::recording::{FileVersion, Moment, RecordingLines};
 use sevenbot::{Arm, Problem, Span};
 
 use self::teach_pendant::TeachPendant;
@@ -119,7 +119,7 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
     // Without a connection the arm cannot be made to hold.
     let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
     let held = if is_gone && !Interrupt::is_requested() { Ok(()) } else { hold_at_end(&mut arm, args) };
-    let RecordingFile { moments, seconds, .. } = recording;
+    let (moments, seconds) = (recording.lines.count(), recording.lines.duration().as_secs_f64());
     let recorded = Recorded { file: args.file.display().to_string(), moments, seconds };
     if done.is_err() {
         note(format_args!("{} is complete up to {seconds:.1} s, {moments} moments", recorded.file));
@@ -165,30 +165,25 @@ fn record_reports(
             break;
         }
         recording.add(&Moment { time, pose, vacuum: pendant.vacuum() })?;
-        pendant.show(recording.moments, time);
+        pendant.show(recording.lines.count(), time);
     }
     Ok(())
 }
 
-/// The file, and the length of the recording so far.
+/// The file, and the lines of the recording so far.
 struct RecordingFile {
     file: LineFile,
-    version: FileVersion,
-    moments: u64,
-    seconds: f64,
+    lines: RecordingLines,
 }
 
 impl RecordingFile {
     fn create(path: &Path, version: FileVersion) -> Result<Self, CommandError> {
-        let mut file = LineFile::create(path)?;
-        file.add(&recording::head(version))?;
-        Ok(Self { file, version, moments: 0, seconds: 0.0 })
+        let (mut file, lines) = (LineFile::create(path)?, RecordingLines::new(version));
+        file.add(&lines.head())?;
+        Ok(Self { file, lines })
     }
 
     fn add(&mut self, moment: &Moment) -> Result<(), CommandError> {
-        self.file.add(&(moment.line(self.version) + "\n"))?;
-        self.moments += 1;
-        self.seconds = moment.time.as_secs_f64();
-        Ok(())
+        self.lines.add(moment).map_or(Ok(()), |line| self.file.add(&line))
     }
 }

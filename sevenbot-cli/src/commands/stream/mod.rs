@@ -11,7 +11,7 @@ mod summary;
 mod tracking;
 
 use std::sync::mpsc::{Receiver, TryRecvError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum, value_parser};
 use sevenbot::approach::{Approach, ApproachRule, FirstPoints};
@@ -168,8 +168,8 @@ fn stream(
     tracking: &mut Tracking,
 ) -> Result<(PaceCounts, Result<(), String>), CommandError> {
     let (options, guard) = (args.options()?, args.guard.guard());
-    let stream = SetPointStream::open(arm, options)?;
-    let pace = StreamPace::new(Instant::now(), options.period());
+    let mut stream = SetPointStream::open(arm, options)?;
+    let pace = StreamPace::new(stream.arm().elapsed(), options.period());
     let source = PointSource { lines: input::read_in_background(), feed: Feed::default(), end: None };
     let mut streamer = Streamer { stream, pace, source, start, guard, tracking, period: options.period() };
     while streamer.play(interrupt)? {}
@@ -227,19 +227,22 @@ impl Streamer<'_, '_> {
         loop {
             self.take_reports_until(self.pace.due(), interrupt)?;
             self.source.poll();
-            let time = start + self.period.saturating_mul(self.pace.number_at(Instant::now()));
+            let now = self.now();
+            let number = self.pace.number_at(now);
+            let time = start + self.period.saturating_mul(number);
             let Some(point) = self.source.feed.take(time) else { return Ok(true) };
             if let Some(first) = self.start.first.take(&point) {
                 self.approach(&first, interrupt)?;
                 // The time of the stream stands still meanwhile.
                 start = time;
-                self.make_due(Instant::now());
+                self.make_due();
             }
-            let now = Instant::now();
+            let now = self.now();
             self.pace.take(now);
+            let sent = self.stream.arm().now();
             self.stream.send(&point)?;
             self.stream.check()?;
-            self.tracking.add_point(now, &point);
+            self.tracking.add_point(sent, &point);
             self.warn_of_pose();
         }
     }
@@ -252,7 +255,8 @@ impl Streamer<'_, '_> {
     }
 
     /// Makes the next point due, as the first of the stream or after a pause.
-    fn make_due(&mut self, now: Instant) {
+    fn make_due(&mut self) {
+        let now = self.now();
         if self.pace.counts().points == 0 {
             self.pace = StreamPace::new(now, self.period);
         } else {
@@ -276,19 +280,24 @@ impl Streamer<'_, '_> {
             if self.source.end.is_some() {
                 return Ok(None);
             }
-            self.take_reports_until(Instant::now() + POLL_PERIOD, interrupt)?;
+            let end = self.now() + POLL_PERIOD;
+            self.take_reports_until(end, interrupt)?;
             self.stream.keep_alive()?;
             self.stream.check()?;
             self.source.poll();
         }
-        self.make_due(Instant::now());
+        self.make_due();
         Ok(Some(self.source.feed.resume_time(self.period)))
     }
 
-    fn take_reports_until(&mut self, end: Instant, interrupt: Interrupt) -> Result<(), CommandError> {
+    fn now(&mut self) -> Duration {
+        self.stream.arm().elapsed()
+    }
+
+    fn take_reports_until(&mut self, end: Duration, interrupt: Interrupt) -> Result<(), CommandError> {
         loop {
             interrupt.check()?;
-            let left = end.saturating_duration_since(Instant::now());
+            let left = end.saturating_sub(self.now());
             if left.is_zero() {
                 return Ok(());
             }
@@ -302,32 +311,35 @@ impl Streamer<'_, '_> {
 
     /// Waits until no set-point moves.
     fn wait_until_still(&mut self, interrupt: Interrupt) -> Result<(), CommandError> {
-        let deadline = Instant::now() + ARRIVAL_TIMEOUT;
-        self.take_reports_until(Instant::now() + 2 * self.period, interrupt)?;
-        while Instant::now() < deadline {
+        let deadline = self.now() + ARRIVAL_TIMEOUT;
+        let end = self.now() + 2 * self.period;
+        self.take_reports_until(end, interrupt)?;
+        while self.now() < deadline {
             // Each read is a sign of life.
             let state = self.stream.check_now()?;
             if state.moving.is_none_or(|moving| moving & !state.missing == 0) {
                 break;
             }
-            self.take_reports_until(Instant::now() + self.period, interrupt)?;
+            let end = self.now() + self.period;
+            self.take_reports_until(end, interrupt)?;
         }
         Ok(())
     }
 
     /// Waits until the joints stand at the last points. Fails if one does not get there.
     fn wait_until_arrived(&mut self, interrupt: Interrupt) -> Result<(), CommandError> {
-        let deadline = Instant::now() + SETTLE_TIMEOUT;
+        let deadline = self.now() + SETTLE_TIMEOUT;
         loop {
             self.stream.check_now()?;
             let away = self.stream.arm().health()?.away_from_targets(self.stream.joints());
             if away.is_empty() {
                 return Ok(());
             }
-            if Instant::now() >= deadline {
+            if self.now() >= deadline {
                 return Err(MoveError::NotReached { away, missing: 0 }.into());
             }
-            self.take_reports_until(Instant::now() + self.period, interrupt)?;
+            let end = self.now() + self.period;
+            self.take_reports_until(end, interrupt)?;
         }
     }
 }

@@ -1,142 +1,24 @@
-//! A verified stop: writes targets that hold the arm, reads them back, and writes those again that differ.
-//!
-//! ```text
-//!   read the joints ──▶ targets that hold them ──▶ write ──▶ read again, until no target differs
-//! ```
-//!
-//! On an arm with the extended block, targets are the measured positions in hundredths of a degree, so that a stop moves no
-//! joint. On other arms they are whole degrees. [`crate::joints`] interprets the registers of each joint.
+//! The joints of an arm that has to hold: which targets hold them, and which of these were lost.
 
-use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, TARGET_POSITION};
+use protocol_core::registers::map::{
+    EXTENDED_VERSION, FINE_POSITION, FINE_TARGET, STATUS_VERSION, TARGET_POSITION,
+};
 use protocol_core::registers::{Joint, Register};
 
-use crate::arm::Arm;
-use crate::checked_write::{MismatchCause, NotTaken, WriteError, WriteMismatch, cause_from_counters};
-use crate::error::Error;
-use crate::fine::fine_frames;
+use crate::checked_write::{MismatchCause, WriteMismatch, cause_from_counters};
+use crate::fine::{KNOWN_LAYOUT, fine_frames};
 use crate::fine_angle::FineAngle;
-use crate::joints::{JointSnapshot, POLL_PERIOD, START_UP_TIME, frames_for};
+use crate::joints::{JointSnapshot, frames_for};
+use crate::status_block::StatusBlock;
 use host_link::{Snapshot, Span};
-
-/// Targets are written this many times before their loss is an error.
-const HOLD_ATTEMPTS: u32 = 5;
-
-/// Why the arm may not hold: it may still be moving.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the arm may not hold: {0}")]
-pub struct HoldError(#[from] pub WriteError);
 
 /// A target that was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct SentTarget {
+pub(super) struct SentTarget {
     /// The raw value of the register.
-    value: u16,
+    pub(super) value: u16,
     /// The target is 0, and the joint was possibly not measured.
-    may_be_unmeasured: bool,
-}
-
-impl Arm {
-    /// Makes every joint hold its present position, and verifies the targets. Returns the joints as read back.
-    ///
-    /// - If the motors do not drive the joints (state 0 or 2), writes nothing.
-    /// - A joint whose servo does not answer gets its last measured position as its target, and none if it was never
-    ///   measured.
-    /// - After power-up waits up to 0.7 s for the joints that are not measured yet. The other joints hold at once.
-    /// - A stream of another program ends at each joint. Its set-point period stays as it was ([D23](protocol_core::decisions#d23)).
-    ///
-    /// # Errors
-    /// No answer, or the arm does not take the targets: it may be moving.
-    pub fn hold(&mut self) -> Result<JointSnapshot, HoldError> {
-        self.hold_through_restarts().map(|(joints, _)| joints)
-    }
-
-    /// As [`Arm::hold`]. Also tells whether the controller restarted meanwhile.
-    pub(crate) fn hold_through_restarts(&mut self) -> Result<(JointSnapshot, bool), HoldError> {
-        let held = self.with_min_attempts(|arm| match arm.has_extended_block()? {
-            true => arm.without_set_point_period(|arm| arm.hold_until_verified(true)),
-            false => arm.hold_until_verified(false),
-        });
-        Ok(held?)
-    }
-
-    fn hold_until_verified(&mut self, is_fine: bool) -> Result<(JointSnapshot, bool), WriteError> {
-        let start = self.now();
-        let mut hold = Hold::default();
-        loop {
-            let now = self.held_joints(is_fine)?;
-            match hold.step(&now, self.now() >= start + START_UP_TIME) {
-                HoldStep::Holds | HoldStep::NotDriven => return Ok((now.joints, hold.has_restarted)),
-                HoldStep::NotTaken(lost) => return Err(lost.into()),
-                HoldStep::Wait => self.sleep(POLL_PERIOD),
-                HoldStep::Write(frames) => {
-                    for (address, values) in frames {
-                        self.write(address, &values)?;
-                    }
-                }
-            }
-        }
-    }
-
-    fn held_joints(&mut self, is_fine: bool) -> Result<HeldJoints, Error> {
-        let fine = is_fine.then(|| self.read_span(HeldJoints::FINE_REGISTERS)).transpose()?;
-        Ok(HeldJoints::new(self.joints()?, fine))
-    }
-}
-
-/// A stop in progress, without input and output: [`Arm::hold`] and clients of their own give it what they read.
-#[derive(Clone, Debug, Default)]
-pub struct Hold {
-    /// At the first step.
-    before: Option<JointSnapshot>,
-    sent: [Option<SentTarget>; 7],
-    losses: u32,
-    has_restarted: bool,
-}
-
-/// What a stop has to do next.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum HoldStep {
-    /// Write these frames, each an address and its values. Then read the joints, and take the next step.
-    Write(Vec<(u8, Vec<u8>)>),
-    /// A joint is not measured yet. Read the joints again, and take the next step.
-    Wait,
-    /// Every joint that is known holds: the stop is over.
-    Holds,
-    /// The motors do not drive the joints: there is nothing to stop.
-    NotDriven,
-    /// The arm does not take these targets. It may be moving.
-    NotTaken(NotTaken),
-}
-
-impl Hold {
-    /// The next step, given the joints as they are now. `is_past_start_up`: 0.7 s have passed since the first step, after
-    /// which each joint is measured or missing.
-    pub fn step(&mut self, now: &HeldJoints, is_past_start_up: bool) -> HoldStep {
-        if !now.joints.is_driven() {
-            return HoldStep::NotDriven;
-        }
-        if self.before.as_ref().is_some_and(|before| now.joints.has_restarted_since(before)) {
-            // What was sent is lost. The arm holds by itself, and measures its joints anew (D12).
-            *self = Self { has_restarted: true, ..Self::default() };
-        }
-        let before = self.before.get_or_insert_with(|| now.joints.clone());
-        if let Err(lost) = NotTaken::check(now.lost_targets(&self.sent, before)) {
-            self.losses += 1;
-            if self.losses >= HOLD_ATTEMPTS {
-                return HoldStep::NotTaken(lost);
-            }
-        }
-        let targets = now.targets_to_write(&self.sent, is_past_start_up);
-        for ((sent, target), joint) in self.sent.iter_mut().zip(targets).zip(Joint::ALL) {
-            let may_be_unmeasured = now.may_be_unmeasured(joint, is_past_start_up);
-            *sent = target.map(|value| SentTarget { value, may_be_unmeasured }).or(*sent);
-        }
-        if targets != [None; 7] {
-            return HoldStep::Write(now.frames(&targets));
-        }
-        let is_waiting = Joint::ALL.into_iter().any(|joint| now.may_be_unmeasured(joint, is_past_start_up));
-        if is_waiting { HoldStep::Wait } else { HoldStep::Holds }
-    }
+    pub(super) may_be_unmeasured: bool,
 }
 
 /// The joints of an arm that has to hold.
@@ -144,7 +26,7 @@ impl Hold {
 pub struct HeldJoints {
     /// Targets and positions in hundredths of a degree, from an arm with the extended block.
     fine: Option<Snapshot>,
-    joints: JointSnapshot,
+    pub(super) joints: JointSnapshot,
 }
 
 impl HeldJoints {
@@ -157,6 +39,20 @@ impl HeldJoints {
         Self { fine, joints }
     }
 
+    /// From registers 0 to 255. Those of a block that the firmware does not have are 0.
+    #[must_use]
+    pub fn of(registers: &Snapshot) -> Self {
+        let has = |row| registers.byte(row) == KNOWN_LAYOUT;
+        let status = has(&STATUS_VERSION).then(|| StatusBlock::from(registers.clone()));
+        let fine = has(&EXTENDED_VERSION).then(|| registers.clone());
+        Self::new(JointSnapshot::new(registers.clone(), status), fine)
+    }
+
+    /// Does the arm have the extended block?
+    pub(super) const fn is_fine(&self) -> bool {
+        self.fine.is_some()
+    }
+
     const fn row(&self) -> &'static Register {
         if self.fine.is_some() { &FINE_TARGET } else { &TARGET_POSITION }
     }
@@ -167,7 +63,7 @@ impl HeldJoints {
     }
 
     /// Is the joint possibly not measured yet?
-    fn may_be_unmeasured(&self, joint: Joint, is_past_start_up: bool) -> bool {
+    pub(super) fn may_be_unmeasured(&self, joint: Joint, is_past_start_up: bool) -> bool {
         if self.fine.is_none() {
             return self.joints.may_be_unmeasured(joint, is_past_start_up);
         }
@@ -182,7 +78,11 @@ impl HeldJoints {
     }
 
     /// The targets to write now so that the joints hold, after `sent` was written.
-    fn targets_to_write(&self, sent: &[Option<SentTarget>; 7], is_past_start_up: bool) -> [Option<u16>; 7] {
+    pub(super) fn targets_to_write(
+        &self,
+        sent: &[Option<SentTarget>; 7],
+        is_past_start_up: bool,
+    ) -> [Option<u16>; 7] {
         let mut targets = [None; 7];
         for ((target, sent), joint) in targets.iter_mut().zip(sent).zip(Joint::ALL) {
             let is_done = sent.is_some_and(|sent| {
@@ -209,7 +109,7 @@ impl HeldJoints {
     }
 
     /// The frames that write these targets.
-    fn frames(&self, targets: &[Option<u16>; 7]) -> Vec<(u8, Vec<u8>)> {
+    pub(super) fn frames(&self, targets: &[Option<u16>; 7]) -> Vec<(u8, Vec<u8>)> {
         if self.fine.is_some() {
             return fine_frames(&targets.map(|target| FineAngle::from_hundredths(target?)));
         }
@@ -217,7 +117,11 @@ impl HeldJoints {
     }
 
     /// The targets that differ from what was sent.
-    fn lost_targets(&self, sent: &[Option<SentTarget>; 7], before: &JointSnapshot) -> Vec<WriteMismatch> {
+    pub(super) fn lost_targets(
+        &self,
+        sent: &[Option<SentTarget>; 7],
+        before: &JointSnapshot,
+    ) -> Vec<WriteMismatch> {
         let cause = match (&before.status, &self.joints.status) {
             (Some(before), Some(after)) => cause_from_counters(before, after),
             _ => MismatchCause::Unknown,

@@ -1,0 +1,270 @@
+//! Tells from the registers of an arm whether it still carries out a move: without input, output or a clock.
+//!
+//! ```text
+//!   time ──▶ MoveWatch::question ──▶ the registers to ask for, or MoveFault::Silent
+//!   registers ──▶ MoveWatch::registers ──▶ Ok, or MoveFault
+//! ```
+//!
+//! [`MoveCheck`](super::MoveCheck) is the shell for a blocking program. The page in a browser reads all registers in rounds, and
+//! passes them on. Times are those since any instant of one clock.
+
+use std::time::Duration;
+
+use protocol_core::registers::map::{
+    EFFECTOR_TYPE, FRAMES_ACCEPTED, MOTOR_STATE, SERVO_TEMPERATURE, SET_POINT_PERIOD, STATUS_VERSION,
+    motor_state,
+};
+
+use super::told::GRIPPER;
+use super::{ALL_JOINTS, Problem, ProblemFlags, ProblemKind};
+use crate::status_block::has_restarted;
+use host_link::{Snapshot, Span};
+
+/// The registers of a check: set-point period, protection block, status block.
+pub(super) const REGISTERS: Span = Span::between(&SET_POINT_PERIOD, &SERVO_TEMPERATURE);
+/// Motor state and effector.
+pub(super) const STATE_REGISTERS: Span = Span::between(&MOTOR_STATE, &EFFECTOR_TYPE);
+/// The shortest time between two questions.
+const POLL_PERIOD: Duration = Duration::from_millis(100);
+/// The answers to these questions take at most this part of the line.
+const SHARE_OF_LINE: u32 = 10;
+/// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
+const BITS_PER_CHECK: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
+/// An arm that answers none of the last questions for this time is gone.
+pub(super) const SILENCE: Duration = Duration::from_millis(1_500);
+/// So many questions at least.
+const UNANSWERED_QUESTIONS: u32 = 3;
+/// A joint that was blocked before the move has this time to get free: a point of a stream clears the flag only then (D27).
+const TIME_TO_GET_FREE: Duration = Duration::from_secs(2);
+
+/// Why an arm does not carry out a move.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum MoveFault {
+    /// These problems end the move. Each tells what to do: [`ProblemKind::remedy`].
+    Problems(Vec<Problem>),
+    /// The motors do not drive the joints.
+    NotDriven {
+        /// The value of register 29.
+        state: u8,
+    },
+    /// The arm has not answered for 1.5 s.
+    Silent,
+}
+
+/// Watches over the driven joints of one move.
+///
+/// ```
+/// use sevenbot::health::{MoveFault, MoveWatch};
+/// use sevenbot::{Snapshot, map};
+/// use std::time::Duration;
+///
+/// let mut watch = MoveWatch::new(Duration::ZERO, 0b1, 115_200);
+/// let mut registers = Snapshot { address: 0, values: vec![0; 256] };
+/// registers.values[usize::from(map::MOTOR_STATE.address)] = map::motor_state::SERVO;
+/// assert_eq!(watch.registers(Duration::from_millis(100), &registers), Ok(()));
+/// registers.values[usize::from(map::MOTOR_STATE.address)] = map::motor_state::FORCELESS;
+/// let fault = watch.registers(Duration::from_millis(200), &registers);
+/// assert_eq!(fault, Err(MoveFault::NotDriven { state: 2 }));
+/// ```
+#[derive(Clone, Debug)]
+pub struct MoveWatch {
+    /// The driven joints, as [`Joint::bit`](crate::Joint::bit)s.
+    joints: u8,
+    /// Do the motors have to drive the joints? If not, they have to be measured only.
+    needs_motors: bool,
+    /// Blocked since before the move.
+    blocked_before: u8,
+    /// Is the effector a gripper? Then an obstacle of joint 7 is what it holds.
+    is_gripper: bool,
+    begun: Duration,
+    /// The arm's counter of frames at the last answer.
+    accepted: Option<u16>,
+    /// The period that the arm has to have while a stream is open.
+    period_ms: Option<u16>,
+    last_answer: Duration,
+    unanswered: u32,
+    question_period: Duration,
+    next_question: Duration,
+    is_state_next: bool,
+}
+
+impl MoveWatch {
+    /// Watches over these joints, as [`Joint::bit`](crate::Joint::bit)s, of an arm on a line with this baud rate.
+    #[must_use]
+    pub fn new(now: Duration, joints: u8, baud: u32) -> Self {
+        let check = Duration::from_secs(1) * BITS_PER_CHECK / baud.max(1);
+        let question_period = POLL_PERIOD.max(check * SHARE_OF_LINE);
+        Self {
+            joints,
+            needs_motors: true,
+            blocked_before: u8::MAX,
+            is_gripper: true,
+            begun: now,
+            accepted: None,
+            period_ms: None,
+            last_answer: now,
+            unanswered: 0,
+            question_period,
+            next_question: now + question_period,
+            is_state_next: true,
+        }
+    }
+
+    /// For a stream: from now on the arm has this set-point period, in milliseconds.
+    #[must_use]
+    pub const fn with_period(mut self, milliseconds: u16) -> Self {
+        self.period_ms = Some(milliseconds);
+        self
+    }
+
+    /// For a recording of all joints: only what makes the positions wrong ends it, and the motors may be off.
+    #[must_use]
+    pub const fn of_positions(mut self) -> Self {
+        self.joints = ALL_JOINTS;
+        self.needs_motors = false;
+        self
+    }
+
+    /// The joints that it watches over, as [`Joint::bit`](crate::Joint::bit)s.
+    #[must_use]
+    pub const fn joints(&self) -> u8 {
+        self.joints
+    }
+
+    /// Does joint 7, a gripper, hold something in these registers?
+    pub(super) fn is_gripping(&self, registers: &Snapshot) -> bool {
+        ProblemFlags::of(registers, self.is_gripper).is_gripping
+    }
+
+    /// Watches over these joints, too, from `now` on.
+    pub const fn add_joints(&mut self, joints: u8, now: Duration) {
+        if joints & !self.joints != 0 {
+            self.joints |= joints;
+            self.begun = now;
+        }
+    }
+
+    /// The registers to ask for now, if it is time for a question.
+    ///
+    /// # Errors
+    /// [`MoveFault::Silent`] if the last questions, three or more in 1.5 s, were not answered.
+    pub fn question(&mut self, now: Duration) -> Result<Option<Span>, MoveFault> {
+        if self.unanswered >= UNANSWERED_QUESTIONS && now >= self.last_answer + SILENCE {
+            return Err(MoveFault::Silent);
+        }
+        if now < self.next_question {
+            return Ok(None);
+        }
+        self.next_question = now + self.question_period;
+        self.unanswered = self.unanswered.saturating_add(1);
+        let span = if self.is_state_next && self.needs_motors { STATE_REGISTERS } else { REGISTERS };
+        self.is_state_next = !self.is_state_next;
+        Ok(Some(span))
+    }
+
+    /// Takes registers that came at `now`: motor state and effector, those from 184 to 255, or both.
+    ///
+    /// # Errors
+    /// They tell that the move has ended.
+    pub fn registers(&mut self, now: Duration, registers: &Snapshot) -> Result<(), MoveFault> {
+        (self.last_answer, self.unanswered) = (now, 0);
+        let has_state = registers.holds(STATE_REGISTERS);
+        if has_state {
+            self.is_gripper = registers.byte(&EFFECTOR_TYPE) == GRIPPER;
+        }
+        // A lost supply is the reason for motors that are off.
+        if registers.holds(REGISTERS) {
+            let problems = self.problems(registers, now);
+            if !problems.is_empty() {
+                return Err(MoveFault::Problems(problems));
+            }
+        }
+        let state = registers.byte(&MOTOR_STATE);
+        if has_state && self.needs_motors && state != motor_state::SERVO {
+            return Err(MoveFault::NotDriven { state });
+        }
+        Ok(())
+    }
+
+    fn problems(&mut self, registers: &Snapshot, now: Duration) -> Vec<Problem> {
+        let mut flags = ProblemFlags::of(registers, self.is_gripper);
+        self.blocked_before &= flags.blocked;
+        if now < self.begun + TIME_TO_GET_FREE {
+            flags.blocked &= !self.blocked_before;
+        }
+        let restarted = self.has_restarted(registers).then_some(Problem::of_arm(ProblemKind::Restarted));
+        let all = restarted.into_iter().chain(flags.problems(self.joints));
+        all.filter(|problem| self.needs_motors || problem.kind.hides_positions()).collect()
+    }
+
+    /// Has the controller restarted since the last answer? Then its counter of frames begins again, and its stream is off.
+    fn has_restarted(&mut self, registers: &Snapshot) -> bool {
+        if registers.byte(&STATUS_VERSION) == 0 {
+            return false;
+        }
+        let accepted = registers.counter(&FRAMES_ACCEPTED);
+        let before = self.accepted.replace(accepted).unwrap_or(accepted);
+        let has_other_period =
+            self.period_ms.is_some_and(|period| registers.word(SET_POINT_PERIOD.address) != period);
+        has_other_period || has_restarted(before, accepted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol_core::registers::map::{MISSING_SERVOS, PROTECTION_VERSION};
+
+    const fn ms(milliseconds: u64) -> Duration {
+        Duration::from_millis(milliseconds)
+    }
+
+    /// All registers of a driven arm with a stream of 20 ms, after so many frames.
+    fn registers(frames: u8) -> Snapshot {
+        let mut all = Snapshot { address: 0, values: vec![0; 256] };
+        let rows = [&STATUS_VERSION, &PROTECTION_VERSION, &MOTOR_STATE].map(|row| (row.address, 1));
+        let values = [(FRAMES_ACCEPTED.address, frames), (SET_POINT_PERIOD.address, 20)];
+        for (address, value) in rows.into_iter().chain(values) {
+            all.values[usize::from(address)] = value;
+        }
+        all
+    }
+
+    #[test]
+    fn questions_take_turns_and_an_arm_that_answers_none_is_silent() {
+        let mut watch = MoveWatch::new(ms(0), 1, 115_200);
+        let asked: Vec<_> =
+            (1..=4).map(|number| watch.question(ms(100 * number)).expect("not silent yet")).collect();
+        let [state, rest] = [STATE_REGISTERS, REGISTERS].map(Some);
+        assert_eq!(asked, [state, rest, state, rest]);
+        assert_eq!(watch.question(ms(410)), Ok(None), "not yet");
+        assert!(watch.question(ms(1_499)).is_ok());
+        assert_eq!(watch.question(ms(1_500)), Err(MoveFault::Silent));
+        assert_eq!(watch.registers(ms(1_510), &registers(1)), Ok(()));
+        assert!(watch.question(ms(3_000)).is_ok(), "only one question since");
+    }
+
+    #[test]
+    fn a_restart_and_a_lost_period_end_a_stream() {
+        let restarted = MoveFault::Problems(vec![Problem::of_arm(ProblemKind::Restarted)]);
+        let mut watch = MoveWatch::new(ms(0), 1, 115_200).with_period(20);
+        assert_eq!(watch.registers(ms(10), &registers(200)), Ok(()));
+        assert_eq!(watch.registers(ms(20), &registers(3)), Err(restarted.clone()));
+        let mut other_period = registers(4);
+        other_period.values[usize::from(SET_POINT_PERIOD.address)] = 0;
+        assert_eq!(watch.registers(ms(30), &other_period), Err(restarted));
+    }
+
+    #[test]
+    fn a_silent_joint_ends_a_recording_and_motors_that_are_off_do_not() {
+        let mut recorded = MoveWatch::new(ms(0), 0, 115_200).of_positions();
+        let mut limp = registers(1);
+        limp.values[usize::from(MOTOR_STATE.address)] = motor_state::FORCELESS;
+        assert_eq!(recorded.registers(ms(10), &limp), Ok(()));
+        limp.values[usize::from(MISSING_SERVOS.address)] = 0b100;
+        let fault = recorded.registers(ms(20), &limp).expect_err("joint 3 is silent");
+        let MoveFault::Problems(problems) = fault else { panic!("{fault:?}") };
+        assert_eq!((problems.len(), problems[0].kind), (1, ProblemKind::NoAnswer));
+        assert!(MoveWatch::new(ms(0), 0b1, 115_200).registers(ms(20), &limp).is_err(), "not driven");
+    }
+}

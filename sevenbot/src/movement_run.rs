@@ -1,0 +1,359 @@
+//! One run of a movement: what is due, when it is over, and what was missed. Without an arm, input or output, or a clock.
+//!
+//! ```text
+//!   Approach, PointPath or steps ──▶ MovementRun ◀── time
+//!                                        │
+//!                                        └──▶ RunStep: points and frames to send, or until when to wait
+//! ```
+//!
+//! The blocking [`Player`](crate::moves::Player) and the page in a browser are shells round it. Times are those since any
+//! instant of one clock.
+
+use std::time::Duration;
+
+use protocol_core::registers::map::VACUUM_PUMP;
+
+use crate::approach::Approach;
+use crate::fine::fine_frames;
+use crate::fine_state::FineTargets;
+use crate::playback::Step;
+use crate::point_path::PointPath;
+use crate::stream::{PaceCounts, StreamPace};
+
+/// The measurements go on for this time after the end of a path, because servos lag.
+const TAIL: Duration = Duration::from_millis(300);
+/// After a longer pause of the program the movement goes on where it paused. The arm has stopped there, and a later point would
+/// make it leap.
+const LONGEST_PASSED_OVER: Duration = Duration::from_millis(200);
+/// After a longer pause the movement is over. A person may rely on an arm that has stopped.
+const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+
+/// What is due.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RunStep {
+    /// Send this point of a stream.
+    Point(FineTargets),
+    /// Switch the pump: true sucks.
+    Vacuum(bool),
+    /// Send this step in whole degrees.
+    Step(Step),
+    /// Nothing is due before this time.
+    Wait(Duration),
+    /// The run is over.
+    Over,
+    /// The run is over before its end: the program paused for this time, and the arm has stopped.
+    Paused(Duration),
+}
+
+impl RunStep {
+    /// The frames to write, each an address and its values.
+    #[must_use]
+    pub fn frames(&self) -> Vec<(u8, Vec<u8>)> {
+        match self {
+            Self::Point(point) => fine_frames(point),
+            Self::Vacuum(is_on) => vec![(VACUUM_PUMP.address, vec![u8::from(*is_on)])],
+            Self::Step(step) => vec![(VACUUM_PUMP.address, step.registers())],
+            Self::Wait(_) | Self::Over | Self::Paused(_) => Vec::new(),
+        }
+    }
+}
+
+/// What a run sends.
+#[derive(Clone, Debug)]
+enum Content {
+    Way(Approach),
+    Path(PointPath),
+    Steps(Vec<Step>),
+}
+
+/// A run that was begun.
+///
+/// ```
+/// use sevenbot::movement_run::{MovementRun, RunStep};
+/// use sevenbot::{point_path::PointPath, recording::Recording};
+/// use std::time::Duration;
+///
+/// # fn main() -> Result<(), sevenbot::recording::RecordingError> {
+/// let text = "7bot-recording 1\n0 90 90 65 90 90 90 80 0\n1 120 90 65 90 90 90 80 0\n";
+/// let path = PointPath::new(&Recording::parse(text)?, 1.0);
+/// let period = Duration::from_millis(20);
+/// let mut run = MovementRun::along(path, Some(false), Duration::ZERO, period);
+/// assert!(matches!(run.poll(Duration::ZERO), RunStep::Point(_)));
+/// assert_eq!(run.poll(Duration::ZERO), RunStep::Wait(period));
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct MovementRun {
+    content: Content,
+    period: Duration,
+    pace: StreamPace,
+    /// The time along the movement of the point with number 0.
+    base: Duration,
+    /// The time along the movement of the last thing that was sent.
+    reached: Duration,
+    /// The number of the next step in whole degrees.
+    next_step: usize,
+    /// What the pump does; `None` if unknown.
+    vacuum: Option<bool>,
+    /// A point that is due after the pump was switched.
+    point: Option<FineTargets>,
+    /// After the last point: when the run is over.
+    end: Option<Duration>,
+}
+
+impl MovementRun {
+    /// Goes the way to a first point, with a point each `period`.
+    #[must_use]
+    pub fn approach(way: Approach, now: Duration, period: Duration) -> Self {
+        Self::new(Content::Way(way), None, now, period)
+    }
+
+    /// Goes along a path, with a point each `period`. `vacuum` is what the pump does; `None` if unknown.
+    #[must_use]
+    pub fn along(path: PointPath, vacuum: Option<bool>, now: Duration, period: Duration) -> Self {
+        Self::new(Content::Path(path), vacuum, now, period)
+    }
+
+    /// Sends steps in whole degrees, for an arm that takes no stream.
+    #[must_use]
+    pub fn in_steps(steps: Vec<Step>, now: Duration) -> Self {
+        Self::new(Content::Steps(steps), None, now, Duration::ZERO)
+    }
+
+    fn new(content: Content, vacuum: Option<bool>, now: Duration, period: Duration) -> Self {
+        let pace = StreamPace::new(now, period);
+        let (base, reached) = (Duration::ZERO, Duration::ZERO);
+        Self { content, period, pace, base, reached, next_step: 0, vacuum, point: None, end: None }
+    }
+
+    /// How many points or steps along the movement were reached, and how many there are.
+    #[must_use]
+    pub fn progress(&self) -> (u64, u64) {
+        let points = |time: Duration| time.as_millis().div_ceil(self.period.as_millis().max(1));
+        let [reached, all] = match &self.content {
+            Content::Steps(steps) => [self.next_step, steps.len()].map(|count| u64::try_from(count).ok()),
+            _ => [self.reached, self.duration()].map(|time| u64::try_from(points(time)).ok()),
+        };
+        (reached.unwrap_or(u64::MAX), all.unwrap_or(u64::MAX))
+    }
+
+    /// How well the points kept to their due times.
+    #[must_use]
+    pub const fn counts(&self) -> PaceCounts {
+        self.pace.counts()
+    }
+
+    fn duration(&self) -> Duration {
+        match &self.content {
+            Content::Way(way) => way.duration(),
+            Content::Path(path) => path.duration(),
+            Content::Steps(steps) => steps.last().map_or(Duration::ZERO, |last| last.time),
+        }
+    }
+
+    /// What is due at `now`. Do it and call again, until [`RunStep::Wait`] or an end.
+    pub fn poll(&mut self, now: Duration) -> RunStep {
+        if let Some(point) = self.point.take() {
+            return RunStep::Point(point);
+        }
+        if let Some(end) = self.end {
+            return if now >= end { RunStep::Over } else { RunStep::Wait(end) };
+        }
+        let due = self.due();
+        let lateness = now.saturating_sub(due);
+        if now < due {
+            return RunStep::Wait(due);
+        }
+        if lateness > LONGEST_PAUSE {
+            return RunStep::Paused(lateness);
+        }
+        if lateness > LONGEST_PASSED_OVER {
+            // What is due now was due before the pause.
+            self.base = self.along_at(due);
+            self.pace.restart(now);
+        }
+        if let Content::Steps(steps) = &self.content {
+            let step = steps.get(self.next_step).copied();
+            return self.send_step(now, step);
+        }
+        let number = self.pace.take(now);
+        self.send_point(now, self.base + self.period.saturating_mul(number))
+    }
+
+    /// The time along the movement at a time of the clock.
+    fn along_at(&self, time: Duration) -> Duration {
+        self.base + time.saturating_sub(self.pace.start())
+    }
+
+    /// When the next thing is due.
+    fn due(&self) -> Duration {
+        match &self.content {
+            Content::Steps(steps) => {
+                let time = steps.get(self.next_step).map_or(Duration::ZERO, |step| step.time);
+                self.pace.start() + time.saturating_sub(self.base)
+            }
+            _ => self.pace.due(),
+        }
+    }
+
+    fn send_step(&mut self, now: Duration, step: Option<Step>) -> RunStep {
+        let Some(step) = step else { return RunStep::Over };
+        (self.reached, self.next_step) = (step.time, self.next_step + 1);
+        if step.time >= self.duration() {
+            self.end = Some(now + TAIL);
+        }
+        RunStep::Step(step)
+    }
+
+    fn send_point(&mut self, now: Duration, time: Duration) -> RunStep {
+        self.reached = time.min(self.duration());
+        let (point, vacuum) = match &mut self.content {
+            Content::Path(path) => {
+                let Some(moment) = path.at(time) else { return RunStep::Over };
+                (moment.pose.map(Some), Some(moment.vacuum))
+            }
+            Content::Way(way) => (way.at(time), None),
+            Content::Steps(_) => return RunStep::Over,
+        };
+        if time >= self.duration() {
+            // A joint reaches a point at most two periods after its frame (D23).
+            let rest = if vacuum.is_some() { 2 * self.period + TAIL } else { self.period };
+            self.end = Some(now + rest);
+        }
+        match vacuum.filter(|_| vacuum != self.vacuum) {
+            None => RunStep::Point(point),
+            Some(is_on) => {
+                (self.vacuum, self.point) = (vacuum, Some(point));
+                RunStep::Vacuum(is_on)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::approach::{ApproachRule, Standing};
+    use crate::playback;
+    use crate::recording::Recording;
+    use crate::units::Speed;
+
+    const PERIOD: Duration = ms(20);
+
+    const fn ms(milliseconds: u64) -> Duration {
+        Duration::from_millis(milliseconds)
+    }
+
+    /// Joint 1 goes from 90 to 100 degrees within a second; the pump sucks from 50 ms on.
+    fn recording() -> Recording {
+        let text = "7bot-recording 2\n0 90 90 65 90 90 90 80 0\n0.05 90.5 90 65 90 90 90 80 1\n1 100 90 65 90 90 90 80 1\n";
+        Recording::parse(text).expect("a recording")
+    }
+
+    fn run() -> MovementRun {
+        MovementRun::along(PointPath::new(&recording(), 1.0), Some(false), ms(5_000), PERIOD)
+    }
+
+    /// What happens until the run waits.
+    fn steps(run: &mut MovementRun, now: Duration) -> Vec<RunStep> {
+        let all = std::iter::from_fn(|| Some(run.poll(now)));
+        let is_end = |step: &RunStep| matches!(step, RunStep::Wait(_) | RunStep::Over | RunStep::Paused(_));
+        let mut ended = false;
+        all.take_while(|step| !std::mem::replace(&mut ended, is_end(step))).collect()
+    }
+
+    /// Joint 1 in hundredths of a degree.
+    fn base(step: &RunStep) -> u16 {
+        let RunStep::Point([Some(base), ..]) = step else { panic!("no point: {step:?}") };
+        base.hundredths()
+    }
+
+    #[test]
+    fn a_path_sends_a_point_each_period_and_switches_the_pump_before_its_point() {
+        let mut run = run();
+        let first = steps(&mut run, ms(5_000));
+        assert_eq!((base(&first[0]), &first[1]), (9_000, &RunStep::Wait(ms(5_020))));
+        assert_eq!(steps(&mut run, ms(5_010)), [RunStep::Wait(ms(5_020))], "not due yet");
+        for time in [5_020, 5_040] {
+            assert_eq!(steps(&mut run, ms(time)).len(), 2);
+        }
+        let third = steps(&mut run, ms(5_060));
+        assert_eq!((&third[0], base(&third[1])), (&RunStep::Vacuum(true), 9_060));
+        assert_eq!(third[0].frames(), [(VACUUM_PUMP.address, vec![1])]);
+        let (mut now, mut points) = (ms(5_080), 4);
+        let end = loop {
+            match run.poll(now) {
+                RunStep::Wait(until) => now = until,
+                RunStep::Over => break now,
+                step => {
+                    base(&step);
+                    points += 1;
+                }
+            }
+        };
+        assert_eq!((points, end), (51, ms(6_000) + 2 * PERIOD + TAIL));
+        assert_eq!((run.progress(), run.counts().late), ((50, 50), 0));
+    }
+
+    #[test]
+    fn a_late_program_passes_points_over_and_counts_them() {
+        let mut run = run();
+        steps(&mut run, ms(5_000));
+        let late = steps(&mut run, ms(5_190));
+        assert_eq!((&late[0], base(&late[1])), (&RunStep::Vacuum(true), 9_180));
+        assert_eq!(run.counts().late, 9, "eight passed over, and this one");
+    }
+
+    #[test]
+    fn after_a_pause_the_movement_goes_on_where_the_arm_stopped() {
+        let mut run = run();
+        for time in (5_000..=5_100).step_by(20) {
+            steps(&mut run, ms(time));
+        }
+        let after = steps(&mut run, ms(5_900));
+        assert_eq!(base(&after[0]), 9_120, "the next point, not that of 900 ms");
+        let next = steps(&mut run, ms(5_920));
+        assert!((9_120..9_160).contains(&base(&next[0])), "{next:?}");
+        assert_eq!(steps(&mut run, ms(8_000)), [RunStep::Paused(ms(2_060))], "a person may rely on the stop");
+    }
+
+    #[test]
+    fn a_way_ends_at_its_point() {
+        let here = [90.0; 7];
+        let standing = Standing { measured: here.map(Some), targets: here, speeds: [Speed::MAXIMUM; 7] };
+        let first = [crate::FineAngle::from_degrees(93.0); 7];
+        let way = Approach::plan(&standing, &first, ApproachRule::Near).expect("near");
+        let mut run = MovementRun::approach(way, ms(0), PERIOD);
+        let (mut now, mut last) = (ms(0), RunStep::Over);
+        loop {
+            match run.poll(now) {
+                RunStep::Wait(until) => now = until,
+                RunStep::Over => break,
+                step => last = step,
+            }
+        }
+        assert_eq!(
+            (last, now),
+            (RunStep::Point(first), ms(180)),
+            "150 ms at up to 30 degrees/s, and a period"
+        );
+    }
+
+    #[test]
+    fn steps_keep_their_times_and_are_not_passed_over() {
+        let all = playback::steps(&recording(), 1.0);
+        let mut run = MovementRun::in_steps(all.clone(), ms(1_000));
+        assert_eq!(steps(&mut run, ms(1_000)).len(), 2);
+        let second = steps(&mut run, ms(1_000) + all[2].time);
+        assert_eq!(second.len(), 3, "two were due: {second:?}");
+        let after = steps(&mut run, ms(1_700));
+        assert_eq!(after.len(), 2, "one, and the others later: {after:?}");
+        assert_eq!(steps(&mut run, ms(9_000)).len(), 1, "paused for too long");
+    }
+
+    #[test]
+    fn nothing_to_send_is_over_at_once() {
+        assert_eq!(MovementRun::in_steps(Vec::new(), ms(7)).poll(ms(7)), RunStep::Over);
+    }
+}
