@@ -83,6 +83,8 @@ pub struct Simulation<C = Controller> {
     to_send: VecDeque<u8>,
     /// Bytes that have arrived at the host.
     received: Vec<u8>,
+    /// What is done to the arm later, and when.
+    planned: Vec<(Instant, Action)>,
 }
 
 impl Default for Simulation {
@@ -113,7 +115,7 @@ impl<C: ArmController> Simulation<C> {
         let config = ArmConfig { chip_id, is_paced, torque_codes: servos.torque_codes };
         let plant = Plant::with_config(Instant::ZERO, servos);
         let arm = SimulatedArm::power_up(Instant::ZERO, config, Flash::on(settings), plant);
-        Self { arm, now: Instant::ZERO, to_send: VecDeque::new(), received: Vec::new() }
+        Self { arm, now: Instant::ZERO, to_send: VecDeque::new(), received: Vec::new(), planned: Vec::new() }
     }
 
     /// The virtual time since power-up.
@@ -144,7 +146,7 @@ impl<C: ArmController> Simulation<C> {
     pub fn advance(&mut self, time: Duration) {
         let end = self.now + time;
         while self.now < end {
-            self.advance_to(end.min(self.now + TAKE_PERIOD));
+            self.advance_to(end);
         }
     }
 
@@ -170,7 +172,7 @@ impl<C: ArmController> Simulation<C> {
             if self.now >= end {
                 return false;
             }
-            self.advance_to(end.min(self.arm.next_event()).min(self.now + TAKE_PERIOD));
+            self.advance_to(end.min(self.arm.next_event()));
         }
     }
 
@@ -180,9 +182,15 @@ impl<C: ArmController> Simulation<C> {
         &self.received
     }
 
-    fn advance_to(&mut self, now: Instant) {
-        self.now = now;
-        self.arm.advance(now, self.to_send.is_empty());
+    /// Lets time pass until this time, but not past the next thing to do.
+    fn advance_to(&mut self, end: Instant) {
+        let planned = self.planned.iter().map(|(time, _)| *time).min().unwrap_or(end);
+        self.now = end.min(self.now + TAKE_PERIOD).min(planned.max(self.now));
+        self.arm.advance(self.now, self.to_send.is_empty());
+        while let Some(due) = self.planned.iter().position(|(time, _)| *time <= self.now) {
+            let (_, action) = self.planned.remove(due);
+            self.act(action);
+        }
         self.pass_bytes();
     }
 
@@ -283,6 +291,23 @@ impl<C: ArmController> Simulation<C> {
     /// Does something to the arm. Returns the reports of the faults that this ended.
     pub fn act(&mut self, action: Action) -> Vec<FaultReport> {
         self.arm.act(self.now, action)
+    }
+
+    /// Does something to the arm after this time, also while a program waits for the arm.
+    ///
+    /// ```
+    /// use arm_sim::{Duration, Simulation};
+    ///
+    /// let mut arm = Simulation::default();
+    /// arm.plan(Duration::from_millis(1_500), "fault 3=missing".parse()?);
+    /// arm.advance(Duration::from_millis(1_499));
+    /// assert!(arm.faults().is_empty());
+    /// arm.advance(Duration::from_millis(1));
+    /// assert_eq!(arm.faults().len(), 1);
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    pub fn plan(&mut self, after: Duration, action: Action) {
+        self.planned.push((self.now + after, action));
     }
 
     /// Passes everything that is done to the arm by [`Simulation::send`] and [`Simulation::act`], and every byte that it

@@ -29,7 +29,7 @@ type Angles = (f64, f64, f64, f64, f64, f64, f64);
 /// A 7Bot V2 arm.
 ///
 /// `Arm("/dev/ttyUSB0")` opens a port, `Arm()` the only port with an arm that answers, and `Arm.simulated()` an arm in
-/// virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the end, and closes the port.
+/// virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the end, as `stop()`, and closes the port.
 ///
 /// Angles are degrees, 0 to 180, joint 1 first; positions millimetres; times seconds.
 #[pyclass(frozen, module = "sevenbot")]
@@ -129,25 +129,29 @@ impl Arm {
     /// Writes a register, or several with one number for all or one each, and reads them back.
     ///
     /// Raises `ValueError` for a number out of range, and `NotTaken` if the arm does not take it. `unlock=True` opens the
-    /// EEPROM lock (register 28) for this write.
+    /// EEPROM lock (register 28) for this write. A target of a driven joint is a move: `ArmProblem` is raised if the joint does
+    /// not answer or has let go, and nothing is written. Motor state 1 is watched for half a second as `stop()`. A motor state
+    /// without torque warns of servos that do not answer.
     #[pyo3(signature = (name, values, *, unlock = false))]
     fn set(&self, py: Python<'_>, name: &str, values: Values, unlock: bool) -> PyResult<()> {
         registers::set(py, &self.worker, name, &values, unlock)
     }
 
     /// The measured angles in degrees, joint 1 first: in steps of 0.01 with this project's firmware, else of 1.
+    ///
+    /// Raises `ArmProblem` if a servo does not answer, because its angle is unknown then; `status()` has the others.
     #[getter]
     fn angles(&self, py: Python<'_>) -> PyResult<Angles> {
-        let read = self.worker.call(py, |arm, _| motion::angles(arm))?;
+        let read = self.worker.call(py, |arm, _| motion::known_angles(arm))?;
         Ok(raised(py, read)?.into())
     }
 
-    /// Where the arm is: tip, tool and wrist in millimetres, and the angles.
+    /// Where the arm is: tip, tool and wrist in millimetres, and the angles. Raises `ArmProblem` as `angles` does.
     #[pyo3(name = "where")]
     fn where_(&self, py: Python<'_>) -> PyResult<Tip> {
         let read = self.worker.call(py, |arm, _| {
             arm.wait_until_settled()?;
-            motion::angles(arm)
+            motion::known_angles(arm)
         })?;
         raised(py, read).map(Tip::at)
     }
@@ -230,13 +234,15 @@ impl Arm {
         raised(py, slept)
     }
 
-    /// Makes every joint hold its position, and verifies that. Ends a move of another thread.
+    /// Makes every joint hold its position, and watches for half a second whether it does. Ends a move of another thread.
     ///
-    /// Returns the targets in degrees. If the motors are off, writes nothing.
+    /// Returns the targets in degrees. If the motors are off, writes nothing. Raises `ArmProblem` if a joint is silent or has let
+    /// go, the servos have no supply, or the controller restarted; the other joints hold. Raises `MayMove` if the arm does not
+    /// answer.
     fn stop(&self, py: Python<'_>) -> PyResult<Vec<u16>> {
         self.worker.interrupt();
         lock(&self.sent).take();
-        let held = self.worker.call(py, |arm, _| arm.hold())?;
+        let held = self.worker.call(py, |arm, _| arm.hold_and_watch())?;
         raised(py, held).map(|joints| joints.targets().map(u16::from).to_vec())
     }
 
@@ -328,6 +334,8 @@ impl Arm {
     }
 
     /// Reads all positions `count` times, one read after the other, or one each `period` seconds.
+    ///
+    /// Raises `ArmProblem` if a servo does not answer meanwhile, or the controller restarts.
     ///
     /// Returns times in seconds and angles in degrees: numpy arrays of shape (n,) and (n, 7) if numpy is installed. Python
     /// threads run meanwhile, and do not delay the reads.

@@ -6,6 +6,7 @@ use std::time::Duration;
 use sevenbot::approach::ApproachRule;
 use sevenbot::cartesian::{Guard, PathBreach, StraightLine, StraightLineRequest, Vector};
 use sevenbot::fine::FineTargets;
+use sevenbot::health::{MoveCheck, Problem, ProblemKind};
 use sevenbot::map::{FINE_POSITION, MOTOR_STATE, VACUUM_PUMP, motor_state};
 use sevenbot::moves::{
     GuardedMoveError, JointMove, LineStart, MoveError, Observer, Pace, ParkError, Player, Recorder,
@@ -32,8 +33,15 @@ pub(crate) struct TipWish {
     pub(crate) guard: Option<Guard>,
 }
 
+/// The measured angles in degrees. Fails if a servo is silent: its angle is that of before.
+pub(crate) fn known_angles(arm: &mut Arm) -> Result<[f64; 7], MoveError> {
+    let angles = angles(arm)?;
+    MoveCheck::of_positions(arm).check(arm)?;
+    Ok(angles)
+}
+
 /// The measured angles in degrees, as exact as the arm has them.
-pub(crate) fn angles(arm: &mut Arm) -> Result<[f64; 7], Error> {
+fn angles(arm: &mut Arm) -> Result<[f64; 7], Error> {
     let fine = arm.fine_state_if_served()?.map_or([None; 7], |state| state.positions);
     if let [Some(a), Some(b), Some(c), Some(d), Some(e), Some(f), Some(g)] = fine {
         return Ok([a, b, c, d, e, f, g].map(FineAngle::degrees));
@@ -123,11 +131,12 @@ pub(crate) fn sleep(arm: &mut Arm, time: Duration, watch: &mut Watch) -> Result<
     }
 }
 
-/// Makes the arm hold if a joint moves. The maker's firmware does not tell, so it always holds.
+/// Makes the arm hold if a joint moves, or may move because its servo is silent. The maker's firmware does not tell, so it always
+/// holds.
 pub(crate) fn hold_if_moving(arm: &mut Arm) -> Result<(), MoveError> {
-    let is_moving = arm.status()?.is_none_or(|status| status.moving() != 0);
+    let is_moving = arm.status()?.is_none_or(|status| status.moving() != 0 || status.missing() != 0);
     if is_moving {
-        arm.hold()?;
+        arm.hold_and_watch()?;
     }
     Ok(())
 }
@@ -138,7 +147,8 @@ pub(crate) fn sample(
     count: u32,
     period: Duration,
     watch: &mut Watch,
-) -> Result<(Vec<f64>, Vec<[f64; 7]>), Error> {
+) -> Result<(Vec<f64>, Vec<[f64; 7]>), MoveError> {
+    let mut check = MoveCheck::of_positions(arm);
     let row = arm.has_extended_block()?.then_some(FINE_POSITION);
     let start = arm.now();
     let (mut times, mut rows) = (Vec::new(), Vec::new());
@@ -154,8 +164,10 @@ pub(crate) fn sample(
         };
         times.push(arm.now().saturating_duration_since(start).as_secs_f64());
         rows.push(angles);
+        check.poll(arm)?;
         watch.progress(sevenbot::moves::Stage::Playing, u64::from(number), u64::from(count));
     }
+    check.check(arm)?;
     Ok((times, rows))
 }
 
@@ -170,11 +182,18 @@ pub(crate) struct RecordOptions {
 /// Records until the time is over or the caller ends it. Returns the text of the recording.
 pub(crate) fn record(arm: &mut Arm, options: RecordOptions, watch: &mut Watch) -> Result<String, MoveError> {
     let RecordOptions { hz, is_guided, .. } = options;
+    let before = arm.joints()?;
     if is_guided {
         arm.write_motion(MOTOR_STATE.address, &[motor_state::FORCELESS])?;
     }
     let content = arm.exact_positions()?;
-    let recorded = arm.with_reports(hz, content, |arm| record_reports(arm, options, content, watch));
+    let recorded = arm.with_reports(hz, content, |arm| {
+        // A restart would drive the joints of an arm that is to be guided.
+        if arm.joints()?.has_restarted_since(&before) {
+            return Err(MoveError::Problems(vec![Problem::of_arm(ProblemKind::Restarted)]));
+        }
+        record_reports(arm, options, content, watch)
+    });
     if is_guided {
         // The targets become the measured positions (D13).
         let held = arm.engage_and_watch();

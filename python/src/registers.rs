@@ -1,10 +1,12 @@
 //! Registers by their names, with the numbers of the register table.
 
+use std::ffi::CString;
 use std::sync::Arc;
 
-use pyo3::exceptions::PyKeyError;
+use pyo3::exceptions::{PyKeyError, PyUserWarning};
 use pyo3::prelude::*;
-use sevenbot::map::{FINE_TARGET, TARGET_POSITION};
+use sevenbot::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION};
+use sevenbot::moves::MoveError;
 use sevenbot::names::{name_of, parse};
 use sevenbot::register_text::{RegisterEntry, entries};
 use sevenbot::register_values::bytes;
@@ -73,10 +75,22 @@ pub(crate) fn set(
         if span.addresses().any(|address| TARGET_POSITION.holds(address) || FINE_TARGET.holds(address)) {
             arm.end_abandoned_stream()?;
         }
-        let write = |arm: &mut sevenbot::Arm| arm.write_checked(span.address(), &bytes);
-        if unlock { arm.with_open_lock(write) } else { write(arm) }
+        arm.set_registers(span.address(), &bytes, unlock)?;
+        let is_state = span.addresses().any(|address| MOTOR_STATE.holds(address));
+        let joints = is_state.then(|| arm.joints()).transpose()?;
+        Ok(joints.filter(|joints| !joints.is_driven()).map_or(0, |joints| joints.missing()))
     })?;
-    raised(py, written)
+    warn_of_silent(py, raised::<_, MoveError>(py, written)?)
+}
+
+/// Without an answer it is unknown whether a motor is off.
+fn warn_of_silent(py: Python<'_>, silent: u8) -> PyResult<()> {
+    if silent == 0 {
+        return Ok(());
+    }
+    let joints = sevenbot::register_text::joints(silent);
+    let text = format!("no answer from the servos of {joints}: it is unknown whether they still hold");
+    PyErr::warn(py, py.get_type::<PyUserWarning>().as_any(), &CString::new(text)?, 1)
 }
 
 /// The registers of an arm as a mapping from names to numbers: `arm.registers["speed.1"]`.

@@ -79,6 +79,26 @@ impl Simulation {
         Ok(())
     }
 
+    /// Does something to the arm after this many seconds, 0 to 86400, also during a call: `later(2, "restart")`,
+    /// `"fault 3=missing"`, `"fault supply=off 300000"` (for 300,000 microseconds), `"halt"`, `"trip 2"`, `"power-cycle"`.
+    ///
+    /// The words are those of a session of `host-sim --record`. A wrong word raises `ValueError` with the list.
+    fn later(&self, py: Python<'_>, seconds: f64, action: &str) -> PyResult<()> {
+        let action: arm_sim::Action =
+            action.parse().map_err(|why| PyValueError::new_err(format!("{action}: {why}")))?;
+        let time = virtual_time(duration(seconds)?);
+        self.with(py, |simulation| simulation.plan(time, action));
+        Ok(())
+    }
+
+    /// Pulls the cable of the line after this many seconds, 0 to 86400. There is no way to plug it in again.
+    #[pyo3(signature = (seconds = 0.0))]
+    fn unplug(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let time = duration(seconds)?;
+        py.detach(|| self.0.unplug(time));
+        Ok(())
+    }
+
     /// Takes all faults back, or those at one location: `"3"`, `"supply"`, `"line"`.
     ///
     /// Returns how often each took effect, as text.

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use sevenbot::FineAngle;
 use sevenbot::approach::{Approach, ApproachRule};
 use sevenbot::cartesian::Guard;
@@ -22,7 +23,8 @@ const SLICE: Duration = Duration::from_millis(20);
 /// A stream of set-points, a context manager: `with arm.stream(0.02) as stream: stream.send(...)`.
 ///
 /// `send` waits until the next point is due. If the program sends nothing for longer than the watchdog's time, the arm
-/// holds. At the end the registers of the stream have their old values again.
+/// holds. At the end it waits until the joints stand at their last points, and raises `ArmProblem` or `NotReached` if one
+/// does not get there. The registers of the stream have their old values again.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct Stream {
     worker: Arc<Worker>,
@@ -70,6 +72,14 @@ impl Stream {
 }
 
 impl PacedStream<'_> {
+    /// Waits until the joints stand at their last points.
+    fn arrive(&mut self, watch: &mut Watch) -> Result<(), MoveError> {
+        if self.pace.counts().points == 0 {
+            return Ok(());
+        }
+        self.stream.wait_until_arrived(|stream, end| stream.wait_until(end, watch))
+    }
+
     /// Goes to the first point of joints. The next point is due afterwards.
     fn approach(
         &mut self,
@@ -96,10 +106,17 @@ impl Stream {
         Ok(slf)
     }
 
-    #[pyo3(signature = (*_exception))]
-    fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, PyAny>) -> PyResult<bool> {
-        self.worker.close_stream(py)?;
-        Ok(false)
+    #[pyo3(signature = (*exception))]
+    fn __exit__(&self, py: Python<'_>, exception: &Bound<'_, PyTuple>) -> PyResult<bool> {
+        let failed = exception.get_item(0).is_ok_and(|kind| !kind.is_none());
+        let arrived = if failed {
+            Ok(Ok(()))
+        } else {
+            self.worker.stream_call(py, |stream, watch| stream.arrive(watch))
+        };
+        let closed = self.worker.close_stream(py);
+        raised(py, arrived?)?;
+        closed.map(|()| false)
     }
 
     /// Sends a point when it is due: seven angles, 0 to 180 degrees in steps of 0.01, `None` for joints without a point.

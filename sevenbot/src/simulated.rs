@@ -25,6 +25,7 @@
 //! Time passes only while the arm is asked or slept for, and in [`SharedSimulation::with`]. So a program may think as long
 //! as it likes, and gives the same result on every machine.
 
+use std::io::ErrorKind;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -54,19 +55,35 @@ pub fn arm_with(config: SimulationConfig, options: ArmOptions) -> Result<(Arm, S
 
 /// A simulation that an [`Arm`] and a test share.
 #[derive(Clone, Debug)]
-pub struct SharedSimulation(Arc<Mutex<Simulation>>);
+pub struct SharedSimulation {
+    simulation: Arc<Mutex<Simulation>>,
+    /// When the cable of the host line is pulled.
+    unplugged: Arc<Mutex<Option<time::Instant>>>,
+}
 
 impl SharedSimulation {
     /// Shares a simulation.
     #[must_use]
     pub fn new(simulation: Simulation) -> Self {
-        Self(Arc::new(Mutex::new(simulation)))
+        Self { simulation: Arc::new(Mutex::new(simulation)), unplugged: Arc::default() }
+    }
+
+    /// Pulls the cable of the host line after this time: then sends and receives fail.
+    pub fn unplug(&self, after: Duration) {
+        let time = self.with(|simulation| simulation.now()) + virtual_time(after);
+        *self.unplugged.lock().unwrap_or_else(PoisonError::into_inner) = Some(time);
+    }
+
+    fn check_plug(&self) -> Result<(), PortError> {
+        let unplugged = *self.unplugged.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_unplugged = unplugged.is_some_and(|time| self.with(|simulation| simulation.now()) >= time);
+        if is_unplugged { Err(PortError::Lost(ErrorKind::BrokenPipe)) } else { Ok(()) }
     }
 
     /// Does something with the simulation, while no time passes for the arm.
     pub fn with<T>(&self, work: impl FnOnce(&mut Simulation) -> T) -> T {
         // A panic in `work` leaves a simulation that can go on.
-        work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+        work(&mut self.simulation.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// The host's end of its line.
@@ -86,11 +103,13 @@ pub struct SimulatedLine {
 
 impl HostLine for SimulatedLine {
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.simulation.check_plug()?;
         self.simulation.with(|simulation| simulation.send(bytes));
         Ok(())
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
+        self.simulation.check_plug()?;
         Ok(self.simulation.with(|simulation| {
             simulation.advance_until(virtual_time(timeout), |simulation| !simulation.received().is_empty());
             simulation.take_received()

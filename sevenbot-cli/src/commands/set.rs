@@ -1,12 +1,11 @@
 //! `set`: writes registers in one frame, reads them back, and reports those that differ.
 
 use clap::Args;
-use sevenbot::health::MoveCheck;
 use sevenbot::map::{BAUD_RATE, FINE_TARGET, MOTOR_STATE, SPEED, TARGET_POSITION, motor_state};
 use sevenbot::names;
 use sevenbot::register_text::entries;
 use sevenbot::register_values::{self, ValueError};
-use sevenbot::{Arm, Joint, Span};
+use sevenbot::{Arm, Span};
 
 use super::get::{NAMES, RegisterList, not_served};
 use super::state::confirm_state;
@@ -83,19 +82,15 @@ pub(crate) fn run(session: &mut Session, args: &SetArgs) -> Result<(), CommandEr
     confirm_release(&mut arm, span, &bytes, args.yes)?;
     // Targets, offsets and the motor state move the arm.
     let written = hold_on_interrupt(&mut arm, |arm, _| {
-        let joints = joints_with_target(span);
-        if joints != 0 || span.addresses().any(|address| SPEED.holds(address)) {
+        let moves = |address| [TARGET_POSITION, FINE_TARGET, SPEED].iter().any(|row| row.holds(address));
+        if span.addresses().any(moves) {
             put_right(arm)?;
         }
-        let is_move = joints != 0 && !args.raw && arm.joints()?.is_driven();
-        let mut check = is_move.then(|| MoveCheck::begin(arm, joints)).transpose()?;
-        if span == Span::of(&MOTOR_STATE) && bytes == [motor_state::SERVO] {
-            return Ok(arm.engage_and_watch()?);
+        if !args.raw || span == Span::of(&MOTOR_STATE) {
+            return Ok(arm.set_registers(span.address(), &bytes, args.unlock)?);
         }
         let write = |arm: &mut Arm| arm.write_checked(span.address(), &bytes);
-        if args.unlock { arm.with_open_lock(write) } else { write(arm) }?;
-        check.as_mut().map(|check| check.check(arm)).transpose()?;
-        Ok(())
+        Ok(if args.unlock { arm.with_open_lock(write) } else { write(arm) }?)
     });
     if matches!(written, Ok(()) | Err(CommandError::NotTaken(_))) {
         session.printer.print(&RegisterList::from(entries(&arm.read_span(span)?)))?;
@@ -117,14 +112,6 @@ fn confirm_release(arm: &mut Arm, span: Span, bytes: &[u8], yes: bool) -> Result
         Some((_, &state)) if state <= motor_state::FORCELESS => confirm_state(arm, state, yes),
         _ => Ok(()),
     }
-}
-
-/// The joints whose targets are in the span, as [`Joint::bit`]s.
-fn joints_with_target(span: Span) -> u8 {
-    let holds =
-        |first: u8, count: u8| span.addresses().any(|address| (first..first + count).contains(&address));
-    let is_target = |joint: &Joint| holds(TARGET_POSITION.of(*joint), 1) || holds(FINE_TARGET.of(*joint), 2);
-    Joint::ALL.into_iter().filter(is_target).fold(0, |bits, joint| bits | joint.bit())
 }
 
 /// The bytes for a span: one value per register, or one for all. A register of two bytes takes one value.
@@ -151,14 +138,6 @@ mod tests {
         assert_eq!(number("0x85"), Ok(0x85));
         assert!(number("0x100").is_err());
         assert!(number("five").is_err());
-    }
-
-    #[test]
-    fn the_joints_of_a_span_are_those_with_a_target_in_it() {
-        let joints = |address, count| joints_with_target(Span::new(address, count).expect("a span"));
-        assert_eq!(joints_with_target(Span::of(&TARGET_POSITION)), 0x7F);
-        assert_eq!((joints(29, 18), joints(52, 3), joints(53, 7)), (1, 0x40, 0));
-        assert_eq!((joints(130, 2), joints(131, 2), joints(142, 4)), (0b10, 0b110, 0));
     }
 
     #[test]

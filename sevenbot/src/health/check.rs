@@ -79,6 +79,11 @@ impl MoveCheck {
         Ok(check)
     }
 
+    /// Begins to watch over the positions of all joints, for a measurement: the motors may be off. Asks nothing now.
+    pub fn of_positions(arm: &mut Arm) -> Self {
+        Self(Self::idle(arm, 0).0.of_positions())
+    }
+
     /// Begins to watch over these joints, and asks nothing now.
     pub(crate) fn idle(arm: &mut Arm, joints: u8) -> Self {
         // The answer to a question of the move before is no news.
@@ -90,11 +95,6 @@ impl MoveCheck {
     #[must_use]
     pub const fn with_period(self, milliseconds: u16) -> Self {
         Self(self.0.with_period(milliseconds))
-    }
-
-    /// See [`MoveWatch::of_positions`].
-    pub(crate) const fn of_positions(self) -> Self {
-        Self(self.0.of_positions())
     }
 
     /// The joints that it watches over, as [`Joint::bit`](crate::Joint::bit)s.

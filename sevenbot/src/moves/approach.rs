@@ -18,6 +18,11 @@ use crate::movement_run::MovementRun;
 use crate::stream::SetPointStream;
 use host_link::{Snapshot, Span};
 
+/// The set-points reach the last point of a stream within this time.
+const ARRIVAL_TIMEOUT: Duration = Duration::from_secs(100);
+/// Afterwards the joints have this time to settle.
+const SETTLE_TIMEOUT: Duration = Duration::from_secs(2);
+
 impl Arm {
     /// Where the arm stands, as exact as it tells.
     ///
@@ -47,7 +52,49 @@ impl SetPointStream<'_> {
         drive(run, self, observer, Self::wait_until)
     }
 
-    fn wait_until(&mut self, end: Duration, observer: &mut dyn Observer) -> Result<(), MoveError> {
+    /// Waits until the joints of the stream stand at their last points. `wait` waits until a time of [`Arm::elapsed`].
+    ///
+    /// # Errors
+    /// A joint does not get there: [`MoveError::NotReached`], or the reasons of [`SetPointStream::check`]. Those of `wait`, or
+    /// an exchange failed.
+    pub fn wait_until_arrived<E: From<MoveError>>(
+        &mut self,
+        mut wait: impl FnMut(&mut Self, Duration) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let deadline = self.arm().elapsed() + ARRIVAL_TIMEOUT;
+        // The set-points reach a point at most two periods after its frame.
+        let mut next = self.arm().elapsed() + 2 * self.period();
+        loop {
+            wait(self, next)?;
+            // Each read is a sign of life.
+            let state = self.check_now().map_err(MoveError::from)?;
+            let now = self.arm().elapsed();
+            if now >= deadline || state.moving.is_none_or(|moving| moving & !state.missing == 0) {
+                break;
+            }
+            next = now + self.period();
+        }
+        let deadline = self.arm().elapsed() + SETTLE_TIMEOUT;
+        loop {
+            self.check_now().map_err(MoveError::from)?;
+            let joints = self.joints();
+            let health = self.arm().health().map_err(MoveError::from)?;
+            let (now, away) = (self.arm().elapsed(), health.away_from_targets(joints));
+            if away.is_empty() {
+                return Ok(());
+            }
+            if now >= deadline {
+                return Err(MoveError::NotReached { away, missing: 0 }.into());
+            }
+            wait(self, now + self.period())?;
+        }
+    }
+
+    /// Waits until a time of [`Arm::elapsed`], and keeps the watchdog of the arm from acting. Reports are dropped.
+    ///
+    /// # Errors
+    /// The observer ended the wait, or the port failed.
+    pub fn wait_until(&mut self, end: Duration, observer: &mut dyn Observer) -> Result<(), MoveError> {
         loop {
             if !observer.goes_on() {
                 return Err(MoveError::Interrupted);

@@ -18,6 +18,7 @@ mod pace;
 mod park;
 mod player;
 mod recorder;
+mod register_write;
 mod report_clock;
 mod report_session;
 mod tip_move;

@@ -53,7 +53,7 @@ impl Recorder {
     /// For the reports of [`Arm::with_reports`] with the same arguments.
     #[must_use]
     pub fn new(arm: &mut Arm, hz: u8, content: u8) -> Self {
-        let check = MoveCheck::idle(arm, 0).of_positions();
+        let check = MoveCheck::of_positions(arm);
         Self { clock: ReportClock::new(arm.report_period(hz, content)), last_report: arm.now(), check }
     }
 

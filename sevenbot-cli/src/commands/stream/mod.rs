@@ -120,10 +120,6 @@ impl From<WatchdogActionArg> for WatchdogAction {
 const FEEDBACK_HZ: u8 = 50;
 /// The longest reaction time to a line or Ctrl-C.
 const POLL_PERIOD: Duration = Duration::from_millis(2);
-/// After the last point a joint at 1.9 degrees/s may need 95 s.
-const ARRIVAL_TIMEOUT: Duration = Duration::from_secs(100);
-/// After that the joints have this time to settle.
-const SETTLE_TIMEOUT: Duration = Duration::from_secs(2);
 /// One step of the watchdog's time, in milliseconds.
 const WATCHDOG_STEP_MS: u16 = 10;
 
@@ -173,7 +169,6 @@ fn stream(
     let source = PointSource { lines: input::read_in_background(), feed: Feed::default(), end: None };
     let mut streamer = Streamer { stream, pace, source, start, guard, tracking, period: options.period() };
     while streamer.play(interrupt)? {}
-    streamer.wait_until_still(interrupt)?;
     streamer.wait_until_arrived(interrupt)?;
     let Streamer { stream, pace, source, .. } = streamer;
     stream.close()?;
@@ -295,51 +290,32 @@ impl Streamer<'_, '_> {
     }
 
     fn take_reports_until(&mut self, end: Duration, interrupt: Interrupt) -> Result<(), CommandError> {
-        loop {
-            interrupt.check()?;
-            let left = end.saturating_sub(self.now());
-            if left.is_zero() {
-                return Ok(());
-            }
-            if let Some(report) = self.stream.arm().next_report(left)?
-                && let Some(fine) = report.fine
-            {
-                self.tracking.add_measured(report.received, &fine.positions);
-            }
-        }
-    }
-
-    /// Waits until no set-point moves.
-    fn wait_until_still(&mut self, interrupt: Interrupt) -> Result<(), CommandError> {
-        let deadline = self.now() + ARRIVAL_TIMEOUT;
-        let end = self.now() + 2 * self.period;
-        self.take_reports_until(end, interrupt)?;
-        while self.now() < deadline {
-            // Each read is a sign of life.
-            let state = self.stream.check_now()?;
-            if state.moving.is_none_or(|moving| moving & !state.missing == 0) {
-                break;
-            }
-            let end = self.now() + self.period;
-            self.take_reports_until(end, interrupt)?;
-        }
-        Ok(())
+        take_reports_until(&mut self.stream, self.tracking, end, interrupt)
     }
 
     /// Waits until the joints stand at the last points. Fails if one does not get there.
     fn wait_until_arrived(&mut self, interrupt: Interrupt) -> Result<(), CommandError> {
-        let deadline = self.now() + SETTLE_TIMEOUT;
-        loop {
-            self.stream.check_now()?;
-            let away = self.stream.arm().health()?.away_from_targets(self.stream.joints());
-            if away.is_empty() {
-                return Ok(());
-            }
-            if self.now() >= deadline {
-                return Err(MoveError::NotReached { away, missing: 0 }.into());
-            }
-            let end = self.now() + self.period;
-            self.take_reports_until(end, interrupt)?;
+        let Self { stream, tracking, .. } = self;
+        stream.wait_until_arrived(|stream, end| take_reports_until(stream, tracking, end, interrupt))
+    }
+}
+
+fn take_reports_until(
+    stream: &mut SetPointStream<'_>,
+    tracking: &mut Tracking,
+    end: Duration,
+    interrupt: Interrupt,
+) -> Result<(), CommandError> {
+    loop {
+        interrupt.check()?;
+        let left = end.saturating_sub(stream.arm().elapsed());
+        if left.is_zero() {
+            return Ok(());
+        }
+        if let Some(report) = stream.arm().next_report(left)?
+            && let Some(fine) = report.fine
+        {
+            tracking.add_measured(report.received, &fine.positions);
         }
     }
 }

@@ -1,0 +1,71 @@
+//! Writes of any registers that may move the arm: refused or watched like the moves that they are.
+
+use protocol_core::registers::Joint;
+use protocol_core::registers::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION, motor_state};
+
+use super::error::MoveError;
+use crate::arm::Arm;
+use crate::health::MoveCheck;
+use host_link::Span;
+
+impl Arm {
+    /// As [`Arm::write_checked`], for registers that a user names. `unlocks` opens the EEPROM lock for this write.
+    ///
+    /// - A target of a joint that is driven is a move: it is not written while the joint is silent or has let go, and the arm is
+    ///   asked afterwards.
+    /// - Motor state 1 alone is [`Arm::engage_and_watch`].
+    ///
+    /// ```
+    /// use sevenbot::moves::MoveError;
+    /// use sevenbot::simulated::{self, SimulationConfig};
+    /// use sevenbot::{Joint, map};
+    /// use std::time::Duration;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let (mut arm, simulation) = simulated::arm(SimulationConfig::default())?;
+    /// arm.set_registers(map::TARGET_POSITION.address, &[100], false)?;
+    /// simulation.with(|arm| arm.plant_mut().set_fault(Joint::ALL[0], "missing".parse().ok()));
+    /// arm.sleep(Duration::from_secs(1));
+    /// let silent = arm.set_registers(map::TARGET_POSITION.address, &[90], false);
+    /// assert!(matches!(silent, Err(MoveError::Problems(_))));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`Arm::write_checked`] and, for a move, of [`MoveCheck::begin`].
+    pub fn set_registers(&mut self, address: u8, values: &[u8], unlocks: bool) -> Result<(), MoveError> {
+        let span = Span::of_values(address, values).unwrap_or(Span::NONE);
+        if span == Span::of(&MOTOR_STATE) && values == [motor_state::SERVO] {
+            return self.engage_and_watch();
+        }
+        let joints = joints_with_target(span);
+        let is_move = joints != 0 && self.joints()?.is_driven();
+        let mut check = is_move.then(|| MoveCheck::begin(self, joints)).transpose()?;
+        let write = |arm: &mut Self| arm.write_checked(address, values);
+        if unlocks { self.with_open_lock(write) } else { write(self) }?;
+        check.as_mut().map(|check| check.check(self)).transpose()?;
+        Ok(())
+    }
+}
+
+/// The joints whose targets are in the span, as [`Joint::bit`]s.
+fn joints_with_target(span: Span) -> u8 {
+    let holds =
+        |first: u8, count: u8| span.addresses().any(|address| (first..first + count).contains(&address));
+    let is_target = |joint: &Joint| holds(TARGET_POSITION.of(*joint), 1) || holds(FINE_TARGET.of(*joint), 2);
+    Joint::ALL.into_iter().filter(is_target).fold(0, |bits, joint| bits | joint.bit())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_joints_of_a_span_are_those_with_a_target_in_it() {
+        let joints = |address, count| joints_with_target(Span::new(address, count).expect("a span"));
+        assert_eq!(joints_with_target(Span::of(&TARGET_POSITION)), 0x7F);
+        assert_eq!((joints(29, 18), joints(52, 3), joints(53, 7)), (1, 0x40, 0));
+        assert_eq!((joints(130, 2), joints(131, 2), joints(142, 4)), (0b10, 0b110, 0));
+    }
+}
