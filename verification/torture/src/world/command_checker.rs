@@ -168,13 +168,20 @@ impl CommandChecker {
     }
 
     /// The joint is no longer driven. Its next goal need not be near the last one.
-    pub(super) fn forget(&mut self, joint: Joint) {
+    fn forget(&mut self, joint: Joint) {
         self.linkage.reset();
         (self.ranges[joint], self.paused[joint]) = (None, None);
         self.kept_goals[joint] = None;
         self.is_first[joint] = false;
         self.is_released[joint] = true;
         self.replies.forget_doubt(joint);
+    }
+
+    /// The motor state changed: no joint is driven any more, or none was.
+    pub(super) fn state_changed(&mut self) {
+        Joint::ALL.into_iter().for_each(|joint| self.forget(joint));
+        // A joint that engages anew keeps the target that the host wrote since then.
+        self.engaged_at = PerJoint::all(None);
     }
 
     /// The joint's servo was lost. It may hold its last goal.

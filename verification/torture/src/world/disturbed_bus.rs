@@ -32,6 +32,8 @@ use reply_comparison::ReplyComparison;
 const BOOT_TIME: Duration = Duration::from_millis(200);
 /// The longest delay of a reply on the wire.
 const MAX_DELAY: Duration = Duration::from_millis(40);
+/// A joint that is turned faster than this, in counts per second, may be faster than the controller believes (D12): 2,000.
+const BELIEVED_SPEED: u16 = 1_900;
 /// Kept bytes of an incomplete reply. The longest reply of a servo is shorter.
 const MAX_REPLY: usize = 32;
 
@@ -77,6 +79,8 @@ pub(super) struct DisturbedBus {
     /// The time of the last restart of the controller alone.
     pub(super) restarted_at: Instant,
     last_status: PerJoint<StatusFields>,
+    /// When each joint was last turned faster than the controller believes.
+    outran_at: PerJoint<Instant>,
     /// The received part of an incomplete reply.
     partial_reply: Vec<u8>,
     /// A reply with at most the first delay is in time. From the second delay on, it is a timeout.
@@ -111,6 +115,7 @@ impl DisturbedBus {
             disturbed_at: now,
             restarted_at: Instant::ZERO,
             last_status: PerJoint::default(),
+            outran_at: PerJoint::all(Instant::ZERO),
             partial_reply: Vec::new(),
             timely_limit,
             late_limit,
@@ -167,7 +172,7 @@ impl DisturbedBus {
         let is_disturbed = self.disturbance != DisturbanceRates::default();
         let mut bytes = self.plant.poll(now);
         if !bytes.is_empty() {
-            self.record_status(&bytes);
+            self.record_status(now, &bytes);
             if is_disturbed {
                 self.comparison.sent(&bytes);
                 bytes = self.disturb_reply(now, bytes, rng);
@@ -183,12 +188,15 @@ impl DisturbedBus {
     }
 
     /// Records the status in a reply that was alone on the wire. The reply may come in parts of any length.
-    fn record_status(&mut self, bytes: &[u8]) {
+    fn record_status(&mut self, now: Instant, bytes: &[u8]) {
         self.partial_reply.extend_from_slice(bytes);
         let starts = 0..self.partial_reply.len();
         let status = starts.filter_map(|start| self.partial_reply.get(start..)).find_map(whole_status);
         if let Some((joint, status)) = status {
             self.last_status[joint] = status;
+            if status.speed > BELIEVED_SPEED {
+                self.outran_at[joint] = now;
+            }
             self.partial_reply.clear();
         }
         let excess = self.partial_reply.len().saturating_sub(MAX_REPLY);

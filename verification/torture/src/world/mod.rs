@@ -36,6 +36,8 @@ mod register_model;
 mod report_checker;
 mod request_effects;
 mod request_generator;
+#[cfg(test)]
+mod scripted_arm;
 mod servo_replies;
 mod settings_storage;
 mod state;

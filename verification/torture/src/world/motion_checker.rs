@@ -9,7 +9,7 @@
 //! behind a joint that moves to its goal, more slowly than a servo moves. So a joint that lags behind is inside the
 //! range, and a joint that falls is outside.
 //!
-//! Torque comes back with a goal of the controller, never by itself with the goal that the servo had before (D28).
+//! After a loss of power, torque comes back with a goal of the controller, never by itself (D29).
 //!
 //! A joint with a payload, or that meets an obstacle or a hand, may be past its goals as long as its servo drives it back.
 //!
@@ -139,12 +139,18 @@ impl MotionChecker {
         Ok(())
     }
 
-    /// A servo that lost its torque does not have it again before it has received a goal.
+    /// True if the servo has lost its power and does not hold its joint yet.
+    fn lost_power(&self, joint: Joint) -> bool {
+        matches!(self.joints[joint].exemption, Some((Exemption::PowerLoss, _)))
+    }
+
+    /// A servo that lost its power does not have torque again before it has received a goal.
     fn check_return_of_torque(&mut self, joint: Joint, is_guarded: bool, plant: &Plant) -> Check {
+        let was_lost = self.lost_power(joint);
         let bounds = &mut self.joints[joint];
         let has_torque = plant.torque(joint) == Some(Torque::On);
-        let is_back = has_torque && !std::mem::replace(&mut bounds.had_torque, has_torque);
-        let was_lost = matches!(bounds.exemption, Some((Exemption::PowerLoss, _)));
+        let had_torque = std::mem::replace(&mut bounds.had_torque, has_torque);
+        let is_back = has_torque && !had_torque;
         ensure(!(is_back && was_lost && is_guarded) || bounds.goal.is_some(), || {
             format!("the torque of joint {} came back by itself", joint.number())
         })
@@ -155,7 +161,8 @@ impl MotionChecker {
         let [largest, _] = &mut self.joints[joint].yields;
         *largest = (*largest).max(yield_of(joint, plant));
         if torque.is_none() {
-            self.exempt(now, joint, Exemption::PowerLoss);
+            let is_off = self.lost_power(joint);
+            self.exempt(now, joint, if is_off { Exemption::PowerLoss } else { Exemption::Alarm });
         }
         let bounds = &mut self.joints[joint];
         let Some(goal) = bounds.goal else { return Ok(()) };
@@ -200,4 +207,101 @@ fn yield_of(joint: Joint, plant: &Plant) -> i32 {
 fn load_of(joint: Joint, plant: &Plant) -> i16 {
     let load = plant.load(joint);
     if millidegrees(joint, 1_000) > millidegrees(joint, 0) { load } else { -load }
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_sim::servo::Trip;
+
+    use super::*;
+    use crate::violation::Violation;
+    use crate::world::scripted_arm::{ScriptedArm, goal_frame, torque_frame};
+
+    /// A joint that carries weight.
+    const JOINT: Joint = Joint::ALL[2];
+
+    fn says(check: &Check, what: &str) -> bool {
+        matches!(check, Err(Violation(text)) if text.contains(what))
+    }
+
+    /// An arm whose servo has restarted and is back, without torque.
+    fn restarted() -> ScriptedArm {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        arm.run(1_000).unwrap();
+        arm.bus.restart_servo(arm.now, JOINT);
+        arm.run(1_000).unwrap();
+        assert!(arm.bus.is_free(JOINT));
+        arm
+    }
+
+    #[test]
+    fn torque_that_comes_back_without_a_goal_is_noticed() {
+        // The planted fault: a controller that refreshes torque without reading it.
+        let mut arm = restarted();
+        let noticed = arm.send_unchecked(&torque_frame(JOINT, Torque::On)).and_then(|()| arm.run(10));
+        assert!(says(&noticed, "the torque of joint 3 came back by itself"), "{noticed:?}");
+    }
+
+    #[test]
+    fn torque_that_comes_back_after_an_emergency_stop_is_noticed() {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        arm.run(1_000).unwrap();
+        arm.bus.begin_stop(arm.now);
+        arm.run(300).unwrap();
+        arm.bus.end_stop(arm.now);
+        arm.run(1_000).unwrap();
+        let noticed = arm.send_unchecked(&torque_frame(JOINT, Torque::On)).and_then(|()| arm.run(10));
+        assert!(says(&noticed, "the torque of joint 3 came back by itself"), "{noticed:?}");
+    }
+
+    #[test]
+    fn torque_with_a_goal_and_torque_of_an_unguarded_arm_may_come_back() {
+        let mut with_goal = restarted();
+        let position = with_goal.bus.position(JOINT);
+        with_goal.send_unchecked(&goal_frame(JOINT, position)).unwrap();
+        with_goal.send_unchecked(&torque_frame(JOINT, Torque::On)).unwrap();
+        assert_eq!(with_goal.run(100), Ok(()));
+        let mut unguarded = restarted();
+        unguarded.is_guarded = false;
+        unguarded.send_unchecked(&torque_frame(JOINT, Torque::On)).unwrap();
+        assert_eq!(unguarded.run(10), Ok(()), "without protection, or after a stall");
+    }
+
+    #[test]
+    fn a_servo_that_was_hot_may_hold_its_goal_again_by_itself() {
+        let mut arm = ScriptedArm::with_engaged(Joint::ALL[0]);
+        arm.run(1_000).unwrap();
+        arm.bus.trip(arm.now, Joint::ALL[0], Trip::Heat);
+        arm.run(100).unwrap();
+        assert!(!arm.bus.has_torque(Joint::ALL[0]));
+        while !arm.bus.has_torque(Joint::ALL[0]) {
+            assert_eq!(arm.run(100), Ok(()));
+        }
+        assert_eq!(arm.run(100), Ok(()));
+    }
+
+    #[test]
+    fn a_joint_that_falls_is_noticed_unless_it_is_exempt() {
+        for exemption in [None, Some(Exemption::MotorState)] {
+            let mut arm = ScriptedArm::with_engaged(JOINT);
+            arm.bus.set_load(arm.now, 300);
+            arm.run(500).unwrap();
+            arm.send_unchecked(&torque_frame(JOINT, Torque::Free)).unwrap();
+            if exemption.is_some() {
+                arm.bus.exempt_all_by_state(arm.now);
+            }
+            let check = arm.run(2_000);
+            assert_eq!(says(&check, "joint 3 moved by itself"), exemption.is_none(), "{check:?}");
+        }
+    }
+
+    #[test]
+    fn a_joint_may_be_turned_past_its_goal_while_its_servo_drives_it_back() {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        arm.run(500).unwrap();
+        arm.bus.push(arm.now, JOINT, 1_000);
+        assert_eq!(arm.run(1_000), Ok(()));
+        arm.bus.push(arm.now, JOINT, 0);
+        assert_eq!(arm.run(2_000), Ok(()), "back at its goal");
+    }
 }

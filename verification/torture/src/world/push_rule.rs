@@ -55,8 +55,8 @@ impl PushRule {
         if limit.is_none() {
             self.unable_at = now;
         }
-        let has_tripped =
-            push.is_overloaded && !std::mem::replace(&mut self.was_overloaded, push.is_overloaded);
+        let was_overloaded = std::mem::replace(&mut self.was_overloaded, push.is_overloaded);
+        let has_tripped = push.is_overloaded && !was_overloaded;
         let is_able_for = now - self.unable_at;
         ensure(!has_tripped || is_able_for < ABLE_FOR, || {
             format!("the servo of joint {} protects itself by switching itself off", joint.number())
@@ -95,5 +95,9 @@ mod tests {
         rule.overload_is_forced();
         assert!(check(&mut rule, 3_200, tripped(None)) && check(&mut rule, 3_300, push(0, Some(700))));
         assert!(check(&mut rule, 3_400, tripped(Some(700))), "the controller could not limit before");
+        rule.overload_is_forced();
+        assert!(check(&mut rule, 9_000, tripped(Some(700))), "forced");
+        assert!(check(&mut rule, 9_100, push(0, Some(700))), "it is over");
+        assert!(!check(&mut rule, 9_200, tripped(Some(700))), "the next one is not forced");
     }
 }

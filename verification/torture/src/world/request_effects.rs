@@ -75,7 +75,7 @@ impl TortureWorld {
             arm.watchdog.heard(self.now);
         }
         if arm.model.is_servo() != was_servo {
-            Joint::ALL.into_iter().for_each(|joint| arm.command_checker.forget(joint));
+            arm.command_checker.state_changed();
         }
         if !arm.model.is_servo() {
             self.bus.exempt_all_by_state(self.now);
@@ -140,7 +140,7 @@ impl TortureWorld {
     /// The arm has entered state 0 by itself.
     fn record_damping(&mut self, arm: &mut PoweredArm) {
         arm.status_checker.state_written(self.now);
-        Joint::ALL.into_iter().for_each(|joint| arm.command_checker.forget(joint));
+        arm.command_checker.state_changed();
         self.bus.exempt_all_by_state(self.now);
     }
 

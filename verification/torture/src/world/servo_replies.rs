@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn d29_a_driven_servo_is_doubtful_after_a_silence_until_its_torque_is_read() {
+    fn a_driven_servo_is_doubtful_after_a_silence_until_its_torque_is_read() {
         let mut replies = ServoReplies::new(TorqueCodes::default());
         is_on(&mut replies, 0);
         fails(&mut replies, 10);
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn d29_an_outage_begins_when_all_driven_servos_are_silent_for_a_second_and_ends_with_torque() {
+    fn an_outage_begins_when_all_driven_servos_are_silent_for_a_second_and_ends_with_torque() {
         let mut replies = ServoReplies::new(TorqueCodes::default());
         is_on(&mut replies, 0);
         [10, 20, 900].into_iter().for_each(|millis| fails(&mut replies, millis));

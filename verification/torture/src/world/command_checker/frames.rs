@@ -13,7 +13,7 @@ const FOLLOWED_TIME: Duration = Duration::from_millis(1_000);
 
 impl CommandChecker {
     /// Checks a frame to the servos.
-    pub(in super::super) fn check(&mut self, frame: &[u8], context: &CommandContext<'_>) -> Check {
+    pub(crate) fn check(&mut self, frame: &[u8], context: &CommandContext<'_>) -> Check {
         self.count += 1;
         ensure(context.now >= self.wire_free_at, || "a frame before the end of the last one".to_owned())?;
         self.wire_free_at = context.now + Duration::from_micros(10 * frame.len() as u64);

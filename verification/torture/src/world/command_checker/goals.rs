@@ -127,3 +127,98 @@ fn check_arrival(joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_sim::servo::ServoFault;
+
+    use super::*;
+    use crate::world::scripted_arm::ScriptedArm;
+
+    const JOINT: Joint = Joint::ALL[0];
+
+    fn says(check: &Check, what: &str) -> bool {
+        matches!(check, Err(Violation(text)) if text.contains(what))
+    }
+
+    /// An arm whose joint is engaged, with its goal.
+    fn engaged() -> (ScriptedArm, u16) {
+        let arm = ScriptedArm::with_engaged(JOINT);
+        let goal = arm.bus.position(JOINT);
+        (arm, goal)
+    }
+
+    #[test]
+    fn a_goal_out_of_reach_is_a_violation() {
+        let (mut arm, goal) = engaged();
+        arm.registers.set(SPEED.of(JOINT), 1);
+        assert_eq!(arm.goal(JOINT, goal), Ok(()));
+        assert!(says(&arm.goal(JOINT, goal + 10), "out of reach with speed 1"));
+    }
+
+    #[test]
+    fn a_joint_without_torque_may_engage_where_it_is_measured_anew() {
+        for has_torque in [false, true] {
+            let mut arm = ScriptedArm::started();
+            arm.registers.set(SPEED.of(JOINT), 1);
+            arm.ask(JOINT).unwrap();
+            let position = arm.bus.position(JOINT);
+            if has_torque {
+                arm.engage(JOINT).unwrap();
+            } else {
+                arm.goal(JOINT, position).unwrap();
+            }
+            arm.bus.turn_by_hand(arm.now, JOINT, position + 30);
+            arm.ask_for_reading(JOINT).unwrap();
+            assert_eq!(arm.goal(JOINT, position + 30).is_ok(), !has_torque, "torque: {has_torque}");
+        }
+        let mut arm = ScriptedArm::started();
+        arm.ask(JOINT).unwrap();
+        let position = arm.bus.position(JOINT);
+        assert!(says(&arm.goal(JOINT, position + 30), "gets a goal without torque at"));
+    }
+
+    #[test]
+    fn a_joint_that_pushes_too_hard_may_give_way_at_any_speed_but_only_towards_its_position() {
+        for (limit, towards, is_right) in
+            [(None, true, false), (Some(200), true, true), (Some(200), false, false)]
+        {
+            let (mut arm, goal) = engaged();
+            arm.registers.set(SPEED.of(JOINT), 1);
+            arm.registers.set(MOVING_JOINTS.address, JOINT.bit());
+            arm.push_limit = limit;
+            arm.bus.push(arm.now, JOINT, 1_200);
+            for _ in 0..20 {
+                arm.goal(JOINT, goal).unwrap();
+                arm.ask(JOINT).unwrap();
+            }
+            let position = arm.bus.position(JOINT);
+            assert!(position.abs_diff(goal) > 4, "pushed from {goal} to {position}");
+            let next = if towards { position } else { 2 * goal - position };
+            assert_eq!(arm.goal(JOINT, next).is_ok(), is_right, "limit {limit:?}, towards {towards}");
+        }
+    }
+
+    #[test]
+    fn after_a_silence_the_torque_is_read_before_the_next_goal() {
+        let (mut arm, goal) = engaged();
+        arm.run(600).unwrap();
+        arm.goal(JOINT, goal).unwrap();
+        arm.ask(JOINT).unwrap();
+        arm.bus.set_fault(arm.now, JOINT, Some(ServoFault::Garbled(1)));
+        arm.ask(JOINT).unwrap();
+        arm.ask(JOINT).unwrap();
+        arm.bus.set_fault(arm.now, JOINT, None);
+        arm.ask_for_reading(JOINT).unwrap();
+        assert!(says(&arm.goal(JOINT, goal), "was not read after a silence"));
+        arm.ask(JOINT).unwrap();
+        assert_eq!(arm.goal(JOINT, goal), Ok(()));
+    }
+
+    #[test]
+    fn goals_are_sent_only_in_state_servo() {
+        let (mut arm, goal) = engaged();
+        arm.registers.set(MOTOR_STATE.address, motor_state::DAMPING);
+        assert!(says(&arm.goal(JOINT, goal), "in motor state 0"));
+    }
+}

@@ -60,3 +60,46 @@ impl CommandChecker {
 pub(super) fn degree(joint: Joint) -> u16 {
     if joint.number() < 5 { 5 } else { 4 }
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_sim::servo::ServoFault;
+
+    use super::*;
+    use crate::violation::Violation;
+    use crate::world::scripted_arm::ScriptedArm;
+
+    const JOINT: Joint = Joint::ALL[0];
+
+    #[test]
+    fn after_a_restart_of_the_controller_the_goal_of_the_servo_may_be_three_degrees_away() {
+        // 3 degrees are 14 counts; 4 degrees are allowed.
+        for (turned, kept, is_right) in [(18, true, true), (18, false, true), (25, true, false)] {
+            let mut arm = ScriptedArm::with_engaged(JOINT);
+            let goal = arm.bus.position(JOINT);
+            arm.restart_controller();
+            arm.bus.turn_by_hand(arm.now, JOINT, goal + turned);
+            arm.ask(JOINT).unwrap();
+            let next = if kept { goal } else { goal + turned };
+            assert_eq!(arm.goal(JOINT, next).is_ok(), is_right, "turned by {turned}, the old goal: {kept}");
+        }
+        let mut arm = ScriptedArm::started();
+        arm.ask(JOINT).unwrap();
+        let position = arm.bus.position(JOINT);
+        assert!(arm.goal(JOINT, position - 18).is_err(), "it held no goal");
+    }
+
+    #[test]
+    fn a_silent_servo_gets_no_goal() {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        let goal = arm.bus.position(JOINT);
+        arm.run(600).unwrap();
+        arm.bus.set_fault(arm.now, JOINT, Some(ServoFault::Garbled(1)));
+        (0..4).for_each(|_| arm.ask(JOINT).unwrap());
+        let refused = arm.goal(JOINT, goal);
+        assert!(matches!(&refused, Err(Violation(text)) if text.contains("4 reads without a reply")));
+        let mut flagged = ScriptedArm::with_engaged(JOINT);
+        flagged.registers.set(MISSING_SERVOS.address, JOINT.bit());
+        assert!(flagged.goal(JOINT, goal).is_err(), "reported as missing");
+    }
+}

@@ -120,3 +120,90 @@ impl CommandChecker {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use protocol_core::registers::map::MOVING_JOINTS;
+
+    use super::*;
+    use crate::world::scripted_arm::ScriptedArm;
+
+    const JOINT: Joint = Joint::ALL[0];
+
+    /// An arm whose joint has its goal, and no torque yet.
+    fn with_goal() -> ScriptedArm {
+        let mut arm = ScriptedArm::started();
+        arm.ask(JOINT).unwrap();
+        let position = arm.bus.position(JOINT);
+        arm.goal(JOINT, position).unwrap();
+        arm.ask(JOINT).unwrap();
+        arm
+    }
+
+    fn says<T: std::fmt::Debug>(check: &Check<T>, what: &str) -> bool {
+        matches!(check, Err(Violation(text)) if text.contains(what))
+    }
+
+    #[test]
+    fn torque_goes_only_where_the_joint_stands_with_a_goal() {
+        assert_eq!(with_goal().torque(JOINT, Torque::On), Ok(()));
+        let mut without_goal = ScriptedArm::started();
+        without_goal.ask(JOINT).unwrap();
+        assert!(says(&without_goal.torque(JOINT, Torque::On), "without a goal"));
+        let mut elsewhere = with_goal();
+        let position = elsewhere.bus.position(JOINT);
+        elsewhere.bus.turn_by_hand(elsewhere.now, JOINT, position + 30);
+        assert!(says(&elsewhere.torque(JOINT, Torque::On), "is given torque at"));
+    }
+
+    #[test]
+    fn torque_for_a_servo_that_has_it_and_this_goal_changes_nothing() {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        let goal = arm.bus.position(JOINT);
+        // Its servo was silent, and something has turned it.
+        arm.checker.servo_lost(arm.now, JOINT);
+        arm.ask(JOINT).unwrap();
+        arm.goal(JOINT, goal).unwrap();
+        arm.bus.turn_by_hand(arm.now, JOINT, goal + 30);
+        assert_eq!(arm.torque(JOINT, Torque::On), Ok(()));
+        let mut freed = with_goal();
+        freed.bus.turn_by_hand(freed.now, JOINT, goal + 30);
+        assert!(says(&freed.torque(JOINT, Torque::On), "is given torque at"), "without torque it counts");
+    }
+
+    #[test]
+    fn torque_is_refreshed_only_if_it_was_read_on() {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        assert_eq!(arm.torque(JOINT, Torque::On), Ok(()));
+        arm.ask_for_reading(JOINT).unwrap();
+        assert!(says(&arm.torque(JOINT, Torque::On), "was not read on"));
+    }
+
+    #[test]
+    fn torque_off_in_state_servo_goes_only_to_a_servo_without_torque() {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        // A second after the start of the bus its state is known.
+        assert!(says(&arm.torque(JOINT, Torque::Damping), "holds its torque and is freed"));
+        assert!(says(&arm.torque(JOINT, Torque::Free), "in state 1"));
+        arm.bus.restart_servo(arm.now, JOINT);
+        arm.run(300).unwrap();
+        assert_eq!(arm.torque(JOINT, Torque::Damping), Ok(()));
+    }
+
+    #[test]
+    fn a_joint_gets_torque_again_where_its_target_is_unless_the_host_wrote_one() {
+        for (target, is_written, is_right) in [(90, false, true), (120, false, false), (120, true, true)] {
+            let mut arm = ScriptedArm::with_engaged(JOINT);
+            arm.run(1_000).unwrap();
+            arm.bus.restart_servo(arm.now, JOINT);
+            arm.run(300).unwrap();
+            arm.registers.set(TARGET_POSITION.of(JOINT), target);
+            if is_written {
+                arm.checker.target_written(arm.now, JOINT);
+                arm.registers.set(MOVING_JOINTS.address, JOINT.bit());
+            }
+            let check = arm.engage(JOINT);
+            assert_eq!(check.is_ok(), is_right, "target {target}, written: {is_written}: {check:?}");
+        }
+    }
+}

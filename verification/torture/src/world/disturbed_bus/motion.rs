@@ -14,13 +14,13 @@ const SHORT: Duration = Duration::from_micros(2_500);
 
 impl DisturbedBus {
     /// Exempts all joints from the motion check: the motor state is not servo.
-    pub(in super::super) fn exempt_all_by_state(&mut self, now: Instant) {
+    pub(crate) fn exempt_all_by_state(&mut self, now: Instant) {
         self.motion_checker.exempt_all(now, Exemption::MotorState);
     }
 
     /// Checks that no joint has moved by itself. `is_guarded` tells that the controller runs and protects the servos.
     /// `limits` are those of the pushes in 0.1 %; `None` without protection.
-    pub(in super::super) fn check_motion(
+    pub(crate) fn check_motion(
         &mut self,
         now: Instant,
         is_servo: bool,

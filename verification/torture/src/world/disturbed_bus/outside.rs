@@ -13,11 +13,11 @@ use crate::world::motion_checker::Exemption;
 const STEP: Duration = Duration::from_millis(1);
 
 impl DisturbedBus {
-    pub(in super::super) fn set_echo(&mut self, has_echo: bool) {
+    pub(crate) fn set_echo(&mut self, has_echo: bool) {
         self.plant.set_echo(has_echo);
     }
 
-    pub(in super::super) fn set_fault(&mut self, now: Instant, joint: Joint, fault: Option<ServoFault>) {
+    pub(crate) fn set_fault(&mut self, now: Instant, joint: Joint, fault: Option<ServoFault>) {
         let was_missing = self.faults[joint] == Some(ServoFault::Missing);
         let _ = self.plant.poll(now);
         self.plant.set_fault(joint, fault);
@@ -33,13 +33,13 @@ impl DisturbedBus {
     }
 
     /// Restarts a servo, as after a dip of its supply. Its torque is off after that.
-    pub(in super::super) fn restart_servo(&mut self, now: Instant, joint: Joint) {
+    pub(crate) fn restart_servo(&mut self, now: Instant, joint: Joint) {
         let fault = self.faults[joint];
         self.set_fault(now, joint, Some(ServoFault::Missing));
         self.set_fault(now, joint, fault.filter(|fault| *fault != ServoFault::Missing));
     }
 
-    pub(in super::super) fn power_cycle(&mut self, now: Instant) {
+    pub(crate) fn power_cycle(&mut self, now: Instant) {
         self.end_stop(now);
         self.plant.power_cycle(now);
         self.motion_checker.power_cycle(now);
@@ -48,21 +48,21 @@ impl DisturbedBus {
     }
 
     /// Puts a wall in the way of a joint, or takes it away.
-    pub(in super::super) fn set_wall(&mut self, now: Instant, joint: Joint, wall: Option<Wall>) {
+    pub(crate) fn set_wall(&mut self, now: Instant, joint: Joint, wall: Option<Wall>) {
         self.plant.bytes(now, &[]);
         self.plant.set_wall(joint, wall);
         self.has_wall[joint] = wall.is_some();
     }
 
     /// Puts a thing between the claws, or takes it away.
-    pub(in super::super) fn set_thing(&mut self, now: Instant, thing: Option<Thing>) {
+    pub(crate) fn set_thing(&mut self, now: Instant, thing: Option<Thing>) {
         self.plant.bytes(now, &[]);
         self.plant.set_thing(thing);
         self.has_thing = thing.is_some();
     }
 
     /// Pushes a joint with a torque in millinewton metres. 0 ends the push, and the joint may turn back.
-    pub(in super::super) fn push(&mut self, now: Instant, joint: Joint, torque: i16) {
+    pub(crate) fn push(&mut self, now: Instant, joint: Joint, torque: i16) {
         self.plant.bytes(now, &[]);
         self.motion_checker.exempt(now, joint, Exemption::Hand);
         self.plant.push(joint, torque);
@@ -70,20 +70,20 @@ impl DisturbedBus {
     }
 
     /// Puts a weight into the gripper, in grams.
-    pub(in super::super) fn set_load(&mut self, now: Instant, grams: u16) {
+    pub(crate) fn set_load(&mut self, now: Instant, grams: u16) {
         self.plant.bytes(now, &[]);
         self.plant.set_load(grams);
     }
 
     /// Forces an alarm on a servo.
-    pub(in super::super) fn trip(&mut self, now: Instant, joint: Joint, trip: Trip) {
+    pub(crate) fn trip(&mut self, now: Instant, joint: Joint, trip: Trip) {
         self.plant.bytes(now, &[]);
         self.plant.trip(joint, trip);
         self.push_rules[joint].overload_is_forced();
     }
 
     /// Cuts the supply of all servos.
-    pub(in super::super) fn begin_stop(&mut self, now: Instant) {
+    pub(crate) fn begin_stop(&mut self, now: Instant) {
         self.plant.bytes(now, &[]);
         self.plant.set_supply_fault(Some(SupplyFault::Off));
         self.motion_checker.exempt_all(now, Exemption::PowerLoss);
@@ -92,7 +92,7 @@ impl DisturbedBus {
     }
 
     /// The supply of the servos is back.
-    pub(in super::super) fn end_stop(&mut self, now: Instant) {
+    pub(crate) fn end_stop(&mut self, now: Instant) {
         self.plant.bytes(now, &[]);
         self.plant.set_supply_fault(None);
         if std::mem::take(&mut self.is_stopped) {
@@ -101,13 +101,13 @@ impl DisturbedBus {
     }
 
     /// A hand moves the joint to this position.
-    pub(in super::super) fn turn_by_hand(&mut self, now: Instant, joint: Joint, counts: u16) {
+    pub(crate) fn turn_by_hand(&mut self, now: Instant, joint: Joint, counts: u16) {
         self.motion_checker.exempt(now, joint, Exemption::Hand);
         self.plant.move_by_hand(joint, counts);
     }
 
     /// The hand releases the joint.
-    pub(in super::super) fn release_by_hand(&mut self, joint: Joint) {
+    pub(crate) fn release_by_hand(&mut self, joint: Joint) {
         self.plant.let_go(joint);
     }
 }

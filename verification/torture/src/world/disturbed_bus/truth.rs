@@ -15,41 +15,41 @@ const REPEAT_TIME: Duration = Duration::from_millis(600);
 const SETTLED: Duration = Duration::from_millis(3_000);
 
 impl DisturbedBus {
-    pub(in super::super) fn position(&self, joint: Joint) -> u16 {
+    pub(crate) fn position(&self, joint: Joint) -> u16 {
         self.plant.position_counts(joint)
     }
 
     /// The true angle of a joint in millidegrees.
-    pub(in super::super) fn angle(&self, joint: Joint) -> i32 {
+    pub(crate) fn angle(&self, joint: Joint) -> i32 {
         self.plant.angle(joint)
     }
 
     /// The goal that the servo of a joint truly holds, in counts.
-    pub(in super::super) fn servo_goal(&self, joint: Joint) -> u16 {
+    pub(crate) fn servo_goal(&self, joint: Joint) -> u16 {
         self.plant.goal_counts(joint)
     }
 
-    pub(in super::super) fn last_status(&self, joint: Joint) -> StatusFields {
+    pub(crate) fn last_status(&self, joint: Joint) -> StatusFields {
         self.last_status[joint]
     }
 
     /// What the servo of a joint did.
-    pub(in super::super) fn truth(&self, joint: Joint) -> &JointTruth {
+    pub(crate) fn truth(&self, joint: Joint) -> &JointTruth {
         &self.truths[joint]
     }
 
     /// True if the servo has power and holds no torque.
-    pub(in super::super) fn is_free(&self, joint: Joint) -> bool {
+    pub(crate) fn is_free(&self, joint: Joint) -> bool {
         matches!(self.plant.torque(joint), Some(torque) if torque != Torque::On)
     }
 
     /// True if the servo drives its motor.
-    pub(in super::super) fn has_torque(&self, joint: Joint) -> bool {
+    pub(crate) fn has_torque(&self, joint: Joint) -> bool {
         self.plant.torque(joint) == Some(Torque::On)
     }
 
     /// True if all servos respond and have torque.
-    pub(in super::super) fn all_hold(&self, now: Instant) -> bool {
+    pub(crate) fn all_hold(&self, now: Instant) -> bool {
         let responds = |joint: Joint| matches!(self.availability(joint), Availability::Responding(since) if now - since > SETTLED);
         let holds =
             |joint: &Joint| responds(*joint) && self.has_torque(*joint) && !self.may_be_let_go(*joint, now);
@@ -57,7 +57,7 @@ impl DisturbedBus {
     }
 
     /// True if the servo may be let go, as the controller sees it (D28), perhaps because of a false reading.
-    pub(in super::super) fn may_be_let_go(&self, joint: Joint, now: Instant) -> bool {
+    pub(crate) fn may_be_let_go(&self, joint: Joint, now: Instant) -> bool {
         self.truths[joint].may_be_let_go(now) || self.may_be_misread(joint, now)
     }
 
@@ -67,23 +67,23 @@ impl DisturbedBus {
     }
 
     /// True if there have been no disturbances for long enough that the controller knows the state of the servos.
-    pub(in super::super) fn is_undisturbed(&self, now: Instant) -> bool {
+    pub(crate) fn is_undisturbed(&self, now: Instant) -> bool {
         self.disturbance == DisturbanceRates::default() && now - self.disturbed_at > REPEAT_TIME
     }
 
     /// True if the controller may use a false reading of this joint.
-    pub(in super::super) fn may_be_misread(&self, joint: Joint, now: Instant) -> bool {
+    pub(crate) fn may_be_misread(&self, joint: Joint, now: Instant) -> bool {
         self.misreadings.may_be_used(joint, now)
     }
 
     /// The accepted error of a position reading, in counts. The controller may accept a single undetected error if it is
     /// no larger than the motion of a joint at rest.
-    pub(in super::super) fn position_tolerance(&self, joint: Joint, now: Instant) -> u64 {
+    pub(crate) fn position_tolerance(&self, joint: Joint, now: Instant) -> u64 {
         self.misreadings.tolerance(joint, now)
     }
 
     /// The largest age of a reading when its reply arrives.
-    pub(in super::super) fn reply_age(&self, joint: Joint) -> Duration {
+    pub(crate) fn reply_age(&self, joint: Joint) -> Duration {
         let delayed = if self.disturbance.delayed > 0 { MAX_DELAY } else { Duration::ZERO };
         match self.faults[joint] {
             Some(ServoFault::Late(by)) => by.max(delayed),
@@ -91,7 +91,7 @@ impl DisturbedBus {
         }
     }
 
-    pub(in super::super) fn availability(&self, joint: Joint) -> Availability {
+    pub(crate) fn availability(&self, joint: Joint) -> Availability {
         let since = self.since[joint];
         // A corrupted reply with a valid checksum ends a silence.
         let silent = Availability::Silent(since.max(self.misreadings.may_be_used_until(joint)));
@@ -103,7 +103,7 @@ impl DisturbedBus {
             Some(ServoFault::Late(by)) if by >= self.late_limit => silent,
             Some(ServoFault::Late(by)) if by > self.timely_limit => Availability::Uncertain,
             Some(ServoFault::Garbled(_)) => Availability::Uncertain,
-            _ => Availability::Responding(since.max(self.disturbed_at)),
+            _ => Availability::Responding(since.max(self.disturbed_at).max(self.outran_at[joint])),
         }
     }
 }

@@ -10,9 +10,11 @@ const DRIVES_BACK: i16 = 100;
 
 /// Why a joint may move without a goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in super::super) enum Exemption {
+pub(crate) enum Exemption {
     /// Its servo has restarted, and has no torque until the controller gives it.
     PowerLoss,
+    /// An alarm has switched its motor off. When heat ends, the servo holds its goal again by itself.
+    Alarm,
     /// The motor state is not servo.
     MotorState,
     /// A hand turns it, or something holds it.
@@ -122,5 +124,25 @@ mod tests {
         assert_eq!(range.excess(4_000), 5_900, "away from the goal");
         range.shrink(goal, 11_000, 0);
         assert_eq!(range.excess(11_000), 1_000);
+    }
+
+    #[test]
+    fn a_servo_drives_its_joint_back_only_with_a_load_towards_the_range() {
+        let range = AngleRange { low: 0, high: 10_000 };
+        assert!(range.is_driven_back(12_000, -101) && range.is_driven_back(-2_000, 101));
+        assert!(!range.is_driven_back(12_000, 101) && !range.is_driven_back(-2_000, -101), "away from it");
+        assert!(!range.is_driven_back(12_000, -100), "as friction does");
+        assert!(!range.is_driven_back(5_000, -500), "inside");
+    }
+
+    #[test]
+    fn the_tolerance_is_the_greatest_yield_of_two_periods() {
+        let mut bounds = JointBounds::without_power(Instant::ZERO);
+        bounds.yields = [2_000, 0];
+        assert_eq!(bounds.tolerance(), 2_450);
+        bounds.age();
+        assert_eq!(bounds.tolerance(), 2_450);
+        bounds.age();
+        assert_eq!(bounds.tolerance(), 450);
     }
 }

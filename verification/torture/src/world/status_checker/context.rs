@@ -12,13 +12,13 @@ use crate::world::watchdog_model::WatchdogModel;
 const PAUSE: Duration = Duration::from_millis(1_000);
 
 /// The true state of the arm, and its registers.
-pub(in super::super) struct StatusContext<'a> {
-    pub(in super::super) now: Instant,
-    pub(in super::super) registers: &'a RegisterFile,
-    pub(in super::super) model: &'a RegisterModel,
-    pub(in super::super) watchdog: &'a WatchdogModel,
-    pub(in super::super) bus: &'a DisturbedBus,
-    pub(in super::super) command_checker: &'a CommandChecker,
+pub(crate) struct StatusContext<'a> {
+    pub(crate) now: Instant,
+    pub(crate) registers: &'a RegisterFile,
+    pub(crate) model: &'a RegisterModel,
+    pub(crate) watchdog: &'a WatchdogModel,
+    pub(crate) bus: &'a DisturbedBus,
+    pub(crate) command_checker: &'a CommandChecker,
 }
 
 impl StatusContext<'_> {

@@ -61,7 +61,7 @@ impl StatusChecker {
     }
 
     /// Checks the positions of the extended block, which the arm has just shown (D21).
-    pub(in super::super) fn check_fine_positions(&self, context: &StatusContext<'_>) -> Check {
+    pub(crate) fn check_fine_positions(&self, context: &StatusContext<'_>) -> Check {
         extended_model::check_positions(context.registers)?;
         for joint in Joint::ALL.into_iter().filter(|joint| self.is_responding(*joint, context)) {
             let (position, since) = self.last_moves[joint];
@@ -131,5 +131,121 @@ impl StatusChecker {
         ensure(is_on || may_wait || !is_due, || {
             format!("servo {} responds and has no torque", joint.number())
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_sim::servo::{ServoFault, Trip};
+    use protocol_core::time::Instant;
+
+    use super::*;
+    use crate::violation::Violation;
+    use crate::world::scripted_arm::ScriptedArm;
+
+    const JOINT: Joint = Joint::ALL[0];
+
+    fn says(check: &Check, what: &str) -> bool {
+        matches!(check, Err(Violation(text)) if text.contains(what))
+    }
+
+    /// Asks the joint for this many milliseconds, with or without goals, and checks it four times a second.
+    fn check(arm: &mut ScriptedArm, checker: &mut StatusChecker, millis: u64, is_driven: bool) -> Check {
+        for _ in 0..millis / 250 {
+            for _ in 0..25 {
+                arm.ask(JOINT)?;
+                if is_driven {
+                    arm.goal(JOINT, arm.bus.servo_goal(JOINT))?;
+                }
+                arm.run(if is_driven { 6 } else { 8 })?;
+            }
+            let angle = angle_from_counts(JOINT, arm.bus.position(JOINT), 0).nearest_degree();
+            arm.registers.set(PRESENT_POSITION.of(JOINT), angle);
+            checker.check_joint(JOINT, &arm.status())?;
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_servo_that_responds_has_torque_in_time() {
+        let mut engaged = ScriptedArm::with_engaged(JOINT);
+        let mut checker = StatusChecker::new(engaged.now);
+        assert_eq!(check(&mut engaged, &mut checker, 4_000, true), Ok(()));
+        let mut waits = ScriptedArm::started();
+        let mut checker = StatusChecker::new(waits.now);
+        assert_eq!(check(&mut waits, &mut checker, 2_250, false), Ok(()));
+        assert!(says(&check(&mut waits, &mut checker, 1_000, false), "responds and has no torque"));
+    }
+
+    #[test]
+    fn a_servo_that_lost_its_torque_gets_it_again_in_time_or_never_by_itself() {
+        let lose = |arm: &mut ScriptedArm| {
+            arm.bus.restart_servo(arm.now, JOINT);
+            arm.run(300).unwrap();
+            arm.checker.servo_lost(arm.now, JOINT);
+        };
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        lose(&mut arm);
+        let mut checker = StatusChecker::new(arm.now);
+        assert_eq!(check(&mut arm, &mut checker, 9_000, false), Ok(()), "it may wait");
+        assert!(says(&check(&mut arm, &mut checker, 2_000, false), "responds and has no torque"));
+        let mut exhausted = ScriptedArm::started();
+        for _ in 0..3 {
+            exhausted.engage(JOINT).unwrap();
+            lose(&mut exhausted);
+        }
+        assert!(exhausted.checker.is_exhausted(JOINT));
+        let mut checker = StatusChecker::new(exhausted.now);
+        assert_eq!(check(&mut exhausted, &mut checker, 15_000, false), Ok(()));
+        exhausted.checker.state_written();
+        assert!(check(&mut exhausted, &mut checker, 500, false).is_err(), "the host has ordered it");
+    }
+
+    #[test]
+    fn an_overload_of_a_joint_that_is_let_go_does_not_stay_latched() {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        arm.bus.trip(arm.now, JOINT, Trip::Overload);
+        let mut checker = StatusChecker::new(arm.now);
+        assert_eq!(check(&mut arm, &mut checker, 4_000, true), Ok(()), "it gets goals, so it is not let go");
+        assert!(says(&check(&mut arm, &mut checker, 4_000, false), "stays latched"));
+    }
+
+    #[test]
+    fn a_move_ends_in_time_unless_something_holds_the_joint() {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        let mut checker = StatusChecker::new(arm.now);
+        arm.run(1_000).unwrap();
+        arm.registers.set(MOVING_JOINTS.address, JOINT.bit());
+        assert!(says(&check(&mut arm, &mut checker, 1_000, true), "moving for too long"));
+        let mut pushes = ScriptedArm::with_engaged(JOINT);
+        let mut checker = StatusChecker::new(pushes.now);
+        pushes.push_limit = Some(200);
+        pushes.bus.push(pushes.now, JOINT, 900);
+        pushes.run(1_000).unwrap();
+        pushes.registers.set(MOVING_JOINTS.address, JOINT.bit());
+        assert_eq!(check(&mut pushes, &mut checker, 1_000, true), Ok(()), "it gives way");
+    }
+
+    #[test]
+    fn a_silent_servo_is_reported_and_one_that_responds_is_not() {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        let mut checker = StatusChecker::new(arm.now);
+        arm.registers.set(MISSING_SERVOS.address, JOINT.bit());
+        assert!(says(&check(&mut arm, &mut checker, 3_000, false), "responds and is reported as missing"));
+        let mut silent = ScriptedArm::with_engaged(JOINT);
+        silent.bus.set_fault(silent.now, JOINT, Some(ServoFault::Missing));
+        let mut checker = StatusChecker::new(silent.now);
+        assert_eq!(check(&mut silent, &mut checker, 2_500, false), Ok(()));
+        assert!(says(&check(&mut silent, &mut checker, 500, false), "silent and not reported"));
+    }
+
+    #[test]
+    fn the_position_of_a_joint_at_rest_is_shown() {
+        let mut arm = ScriptedArm::with_engaged(JOINT);
+        let mut checker = StatusChecker::new(Instant::ZERO);
+        assert_eq!(check(&mut arm, &mut checker, 6_000, true), Ok(()));
+        arm.registers.set(PRESENT_POSITION.of(JOINT), 7);
+        let noticed = checker.check_joint(JOINT, &arm.status());
+        assert!(says(&noticed, "its register holds 7"), "{noticed:?}");
     }
 }

@@ -54,7 +54,7 @@ pub(super) fn rest_by(
 }
 
 /// True if a write to these registers, in any map, can move joints.
-pub(in super::super) fn affects_motion(first: u8, count: usize) -> bool {
+pub(crate) fn affects_motion(first: u8, count: usize) -> bool {
     let last = usize::from(first) + count;
     let (from, to) = (OFFSET.address, WRIST_POSITION.address + WRIST_POSITION.count);
     let is_extended =
