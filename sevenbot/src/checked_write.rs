@@ -12,6 +12,7 @@ use crate::arm::Arm;
 use crate::error::Error;
 use crate::identity::Firmware;
 use crate::names::name_of_register;
+use crate::status_block::StatusBlock;
 use host_link::{Snapshot, Span};
 
 mod cause;
@@ -135,18 +136,54 @@ impl Arm {
 
     /// Runs `work` with the EEPROM lock open. Closes the lock afterwards, also after a failure.
     ///
+    /// A controller that restarts meanwhile has closed the lock. Then the restart is the reason, and not the lock:
+    ///
+    /// ```
+    /// use sevenbot::map::DEVICE_ID;
+    /// use sevenbot::simulated::{self, SimulationConfig};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let (mut arm, simulation) = simulated::arm(SimulationConfig::default())?;
+    /// for _ in 0..50 {
+    ///     arm.status()?;
+    /// }
+    /// let failed = arm.with_open_lock(|arm| {
+    ///     simulation.with(|simulation| simulation.restart_controller());
+    ///     arm.write_checked(DEVICE_ID.address, &[7])
+    /// });
+    /// assert!(failed.is_err_and(|error| error.to_string().contains("the controller restarted")));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// Those of `work`, or the lock did not open or close: as [`Arm::write_checked`].
     pub fn with_open_lock<T>(
         &mut self,
         work: impl FnOnce(&mut Self) -> Result<T, WriteError>,
     ) -> Result<T, WriteError> {
+        let before = self.status()?;
         self.write_checked(EEPROM_LOCK.address, &[0])?;
-        let done = work(self);
+        let done = self.told_of_restart(before, work);
         let closed = self.write_checked(EEPROM_LOCK.address, &[1]);
         let done = done?;
         closed?;
         Ok(done)
+    }
+
+    /// Runs `work`. If the controller has restarted, that is the reason why it did not take a value.
+    fn told_of_restart<T>(
+        &mut self,
+        before: Option<StatusBlock>,
+        work: impl FnOnce(&mut Self) -> Result<T, WriteError>,
+    ) -> Result<T, WriteError> {
+        let done = work(self);
+        let Err(WriteError::NotTaken(NotTaken(mut lost))) = done else { return done };
+        let causes = before.zip(self.status()?).map(|(before, after)| cause_from_counters(&before, &after));
+        if causes == Some(MismatchCause::Restarted) {
+            lost.iter_mut().for_each(|register| register.cause = MismatchCause::Restarted);
+        }
+        Err(NotTaken(lost).into())
     }
 
     fn write_until_taken(&mut self, writes: &[(u8, Vec<u8>)]) -> Result<(), WriteError> {

@@ -153,8 +153,8 @@ pub(crate) const COMMANDS: [Command; 37] = [
     still("set speed 30", Moment::Request(6), Asked::Register(SPEED, 30)),
     still("set --unlock device-id 7", Moment::Request(8), Asked::Register(11, 7)),
     still("set motor-state 1", Moment::Request(5), Asked::Hold).in_state(&[(MOTOR_STATE, &[0])]),
-    still("restore --yes FOLDER/settings.toml", Moment::Request(8), Asked::Register(11, 7)),
-    still("calibrate --reset --yes", Moment::Request(8), Asked::Register(13, 0))
+    still("restore --yes FOLDER/settings.toml", Moment::Request(9), Asked::Register(11, 7)),
+    still("calibrate --reset --yes", Moment::Request(9), Asked::Register(13, 0))
         .in_state(&[(28, &[0]), (13, &[3])]),
     still("record --yes --seconds 1 FOLDER/hand.txt", Moment::Reply(45), Asked::Record).supported(),
     still("record --driven --seconds 1 FOLDER/driven.txt", Moment::Reply(45), Asked::Record)
