@@ -31,7 +31,7 @@ pub use header::{ControllerKind, HeaderError, SessionHeader};
 pub const VERSION: u32 = 1;
 
 /// Gets what happens to an arm.
-pub trait Recorder: Debug + Send {
+pub trait SessionRecorder: Debug + Send {
     /// Something happened.
     fn add(&mut self, entry: &Entry);
 }

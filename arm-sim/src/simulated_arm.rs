@@ -28,7 +28,7 @@ use crate::faulty_flash::FaultyFlash;
 use crate::host_line::LineDirection;
 use crate::plant::Plant;
 use crate::servo_bus::ServoBus;
-use crate::session::Recorder;
+use crate::session::SessionRecorder;
 use crate::settings_log;
 use crate::tap::{Tap, Watcher};
 
@@ -64,7 +64,7 @@ pub struct SimulatedArm<F, B = Plant, C = Controller> {
     to_arm: LineDirection,
     to_host: LineDirection,
     tap: Watcher<dyn Tap>,
-    recorder: Watcher<dyn Recorder>,
+    recorder: Watcher<dyn SessionRecorder>,
     now: Instant,
     /// When the controller has to be polled again.
     controller_due: Instant,

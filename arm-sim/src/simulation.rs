@@ -43,7 +43,7 @@ use crate::faults::{ArmFault, FaultLocation, FaultReport};
 use crate::flash::{Flash, Memory};
 use crate::plant::Plant;
 use crate::servo::ServoConfig;
-use crate::session::Recorder;
+use crate::session::SessionRecorder;
 use crate::simulated_arm::{ArmConfig, SimulatedArm};
 use crate::tap::Tap;
 
@@ -312,7 +312,7 @@ impl<C: ArmController> Simulation<C> {
 
     /// Passes everything that is done to the arm by [`Simulation::send`] and [`Simulation::act`], and every byte that it
     /// sends, to `recorder` from now on: see [`crate::session`]. A copy of the simulation has no recorder.
-    pub fn set_recorder(&mut self, recorder: impl Recorder + 'static) {
+    pub fn set_recorder(&mut self, recorder: impl SessionRecorder + 'static) {
         self.arm.set_recorder(recorder);
     }
 

@@ -1,12 +1,13 @@
 //! The program `host-sim`: arms on pseudo-terminals until a signal ends them.
 
+mod failure;
+
 use std::fmt::Display;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use arm_sim::controller::ArmController;
-use arm_sim::faults::ArmFault;
 use arm_sim::flash::Flash;
 use arm_sim::plant::Plant;
 use arm_sim::servo::ServoConfig;
@@ -18,7 +19,7 @@ use host_sim::bus_line::BusLine;
 use host_sim::cli::{Options, in_one_line};
 use host_sim::clock::RealClock;
 use host_sim::control::{self, socket::ControlSocket};
-use host_sim::eeprom::{Eeprom, ImageError};
+use host_sim::eeprom::Eeprom;
 use host_sim::event_loop::EventLoop;
 use host_sim::image_file::ImageFile;
 use host_sim::per_arm;
@@ -26,8 +27,8 @@ use host_sim::private_socket::SocketError;
 use host_sim::pty_arm::PtyArm;
 use host_sim::real_servos::{self, RealServos};
 use host_sim::servo_socket::ServoSocket;
-use host_sim::servos_only::{self, ServosOnly, ServosOnlyError};
-use host_sim::session_file::{self, SessionFile, SessionFileError};
+use host_sim::servos_only::{self, ServosOnly};
+use host_sim::session_file::{self, SessionFile};
 use host_sim::signals::Signals;
 use host_sim::trace::Trace;
 use host_sim::virtual_clock::VirtualClock;
@@ -39,59 +40,16 @@ use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
 use tty_ports::clients::Clients;
 use tty_ports::pty::Pty;
-use tty_ports::serial::{Serial, SerialError};
+use tty_ports::serial::Serial;
 use tty_ports::symlink::{Symlink, SymlinkError};
+
+use failure::Failure;
 
 /// The log target of frames. `--trace` shows it at any log level.
 const FRAMES: &str = "frames";
 
 /// With --lockstep the servos have started when the port is ready: no virtual time passes before the first byte.
 const LOCKSTEP_START: Instant = Instant::from_micros(1_000_000);
-
-/// Why the program failed.
-#[derive(Debug, thiserror::Error)]
-enum Failure {
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    #[error("--link {0}")]
-    Symlink(#[from] SymlinkError),
-    #[error("--servos {0}")]
-    Serial(#[from] SerialError),
-    #[error(transparent)]
-    Socket(#[from] SocketError),
-    #[error(
-        "--fault {0}: without a controller there is no host line and no flash: see FAULTS in host-sim --help"
-    )]
-    FaultOfController(ArmFault),
-    #[error("no pseudo-terminal: {0}: see that /dev/pts is mounted and has not run out, nor 'ulimit -n'")]
-    Port(io::Error),
-    #[error(transparent)]
-    Session(#[from] SessionFileError),
-    #[error("cannot catch signals: {0}")]
-    Signals(io::Error),
-    #[error("the operating system failed: {0}")]
-    Running(io::Error),
-}
-
-impl From<ServosOnlyError> for Failure {
-    fn from(error: ServosOnlyError) -> Self {
-        match error {
-            ServosOnlyError::Symlink(error) => Self::Symlink(error),
-            ServosOnlyError::System(cause) => Self::Running(cause),
-        }
-    }
-}
-
-impl Failure {
-    /// The exit status, as in `--help`.
-    const fn status(&self) -> u8 {
-        if matches!(self, Self::Running(_) | Self::Session(SessionFileError::Different { .. })) {
-            1
-        } else {
-            2
-        }
-    }
-}
 
 fn main() -> ExitCode {
     let options = match Options::try_parse() {

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use arm_sim::flash::Memory;
 use arm_sim::replay::{Difference, Replay, ReplayError};
-use arm_sim::session::{ControllerKind, Entry, Recorder, SessionEvent, SessionHeader};
+use arm_sim::session::{ControllerKind, Entry, SessionEvent, SessionHeader, SessionRecorder};
 use arm_sim::tap::Tap;
 use tracing::error;
 
@@ -124,7 +124,7 @@ impl SessionFile {
     }
 }
 
-impl Recorder for SessionFile {
+impl SessionRecorder for SessionFile {
     fn add(&mut self, entry: &Entry) {
         let Some(file) = &mut self.file else { return };
         // One call of the system for each line.

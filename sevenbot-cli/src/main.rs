@@ -31,6 +31,7 @@ mod settings_file;
 mod space_plot;
 mod step_target;
 mod style;
+mod svg;
 mod watch;
 mod write_result;
 

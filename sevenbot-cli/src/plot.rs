@@ -10,6 +10,8 @@
 
 use std::fmt::Write;
 
+use crate::svg;
+
 /// Seconds and degrees.
 pub(crate) type PlotPoint = (f64, f64);
 
@@ -42,20 +44,16 @@ text { font: 12px sans-serif; fill: #444 } .title { font-size: 15px; fill: #111 
 .target { stroke: #f2b56b; stroke-width: 5 } .measured { stroke: #1b5e9e; stroke-width: 1.5 }";
 
 /// The plot of seven joints.
-pub(crate) fn svg(title: &str, tracks: &[JointTrack; 7]) -> String {
+pub(crate) fn drawing(title: &str, tracks: &[JointTrack; 7]) -> String {
     let seconds = AxisScale::of_time(tracks);
     let height = TOP + 7.0 * (PANEL + GAP) - GAP + BOTTOM;
-    let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" \
-         height=\"{height}\">\n<style>{STYLE}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n"
-    );
+    let mut out = svg::sheet(WIDTH, height, STYLE);
     heading(&mut out, title);
     for ((track, top), number) in tracks.iter().zip(tops()).zip(1..) {
         panel(&mut out, number, track, top, &seconds);
     }
     axis_of_time(&mut out, &seconds, height - BOTTOM);
-    out.push_str("</svg>\n");
-    out
+    svg::end(out)
 }
 
 fn tops() -> impl Iterator<Item = f64> {
@@ -63,11 +61,11 @@ fn tops() -> impl Iterator<Item = f64> {
 }
 
 fn heading(out: &mut String, title: &str) {
-    text(out, "title", LEFT, 24.0, &escaped(title));
+    svg::text(out, "title", [LEFT, 24.0], &svg::escaped(title));
     let legend = [("target", "target", 0.0), ("measured", "measured position", 100.0)];
     for (class, label, offset) in legend {
-        line(out, class, &[(LEFT + offset, 42.0), (LEFT + offset + 24.0, 42.0)]);
-        text(out, "", LEFT + offset + 30.0, 46.0, label);
+        svg::line(out, class, [(LEFT + offset, 42.0), (LEFT + offset + 24.0, 42.0)]);
+        svg::text(out, "", [LEFT + offset + 30.0, 46.0], label);
     }
 }
 
@@ -78,37 +76,22 @@ fn panel(out: &mut String, number: u8, track: &JointTrack, top: f64, seconds: &A
         out,
         "<rect class=\"panel\" x=\"{LEFT}\" y=\"{top:.1}\" width=\"{width}\" height=\"{PANEL}\"/>"
     );
-    text(out, "joint", 16.0, top + PANEL / 2.0 + 4.0, &format!("joint {number}"));
+    svg::text(out, "joint", [16.0, top + PANEL / 2.0 + 4.0], &format!("joint {number}"));
     for tick in degrees.ticks(4.0) {
         let y = degrees.at(tick);
         let _ = writeln!(out, "<path class=\"grid\" d=\"M{LEFT} {y:.1}H{:.1}\"/>", WIDTH - RIGHT);
-        text(out, "end", LEFT - 6.0, y + 4.0, &format!("{tick}°"));
+        svg::text(out, "end", [LEFT - 6.0, y + 4.0], &format!("{tick}°"));
     }
     for (class, points) in [("target", &track.target), ("measured", &track.measured)] {
-        let points: Vec<PlotPoint> = points.iter().map(|&(x, y)| (seconds.at(x), degrees.at(y))).collect();
-        line(out, class, &points);
+        svg::line(out, class, points.iter().map(|&(x, y)| (seconds.at(x), degrees.at(y))));
     }
 }
 
 fn axis_of_time(out: &mut String, seconds: &AxisScale, bottom: f64) {
     for tick in seconds.ticks(10.0) {
-        text(out, "middle", seconds.at(tick), bottom + 18.0, &format!("{tick}"));
+        svg::text(out, "middle", [seconds.at(tick), bottom + 18.0], &format!("{tick}"));
     }
-    text(out, "end", WIDTH - RIGHT, bottom + 34.0, "seconds");
-}
-
-fn text(out: &mut String, class: &str, x: f64, y: f64, text: &str) {
-    let _ = writeln!(out, "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\">{text}</text>");
-}
-
-fn line(out: &mut String, class: &str, points: &[PlotPoint]) {
-    let points: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-    let _ = writeln!(out, "<polyline class=\"{class}\" points=\"{}\"/>", points.join(" "));
-}
-
-/// Escapes text for SVG.
-pub(crate) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+    svg::text(out, "end", [WIDTH - RIGHT, bottom + 34.0], "seconds");
 }
 
 /// Converts a value to a coordinate.
@@ -175,7 +158,7 @@ mod tests {
     fn every_joint_has_a_panel_with_both_lines() {
         let track = JointTrack { target: vec![(0.0, 90.0), (1.0, 120.0)], measured: vec![(0.0, 90.0)] };
         let tracks = std::array::from_fn(|_| track.clone());
-        let drawing = svg("a < b & c", &tracks);
+        let drawing = drawing("a < b & c", &tracks);
         assert!(drawing.contains("a &lt; b &amp; c"));
         assert_eq!(drawing.matches("class=\"panel\"").count(), 7);
         assert_eq!(drawing.matches("<polyline").count(), 2 * 7 + 2, "and the legend's");
@@ -184,7 +167,7 @@ mod tests {
 
     #[test]
     fn an_empty_plot_has_finite_numbers() {
-        let drawing = svg("nothing", &Default::default());
+        let drawing = drawing("nothing", &Default::default());
         assert!(!drawing.contains("NaN") && !drawing.contains("inf"), "{drawing}");
     }
 }

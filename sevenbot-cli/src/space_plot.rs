@@ -13,7 +13,7 @@ use std::fmt::Write;
 
 use sevenbot::cartesian::Vector;
 
-use crate::plot::escaped;
+use crate::svg;
 
 /// A point of the way.
 #[derive(Clone, Copy, Debug)]
@@ -57,21 +57,22 @@ const VIEWS: [SpaceView; 3] = [
 ];
 
 /// The plot of a way.
-pub(crate) fn svg(title: &str, way: &[WayPoint]) -> String {
+pub(crate) fn drawing(title: &str, way: &[WayPoint]) -> String {
     let (width, height) = (3.0 * (PANEL + GAP) + GAP / 2.0, TOP + PANEL + BOTTOM);
-    let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
-         height=\"{height}\">\n<style>{STYLE}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n"
+    let mut out = svg::sheet(width, height, STYLE);
+    svg::text(&mut out, "title", [GAP, 26.0], &svg::escaped(title));
+    svg::text(
+        &mut out,
+        "",
+        [GAP, 46.0],
+        "millimetres; green: start, red: end, broad: suction, dashed: the base",
     );
-    text(&mut out, "title", [GAP, 26.0], &escaped(title));
-    text(&mut out, "", [GAP, 46.0], "millimetres; green: start, red: end, broad: suction, dashed: the base");
     let span = span(way);
     for (view, number) in VIEWS.iter().zip(0..) {
         let left = GAP + f64::from(number) * (PANEL + GAP);
         Panel::of(view, way, left, span).draw(&mut out, way);
     }
-    out.push_str("</svg>\n");
-    out
+    svg::end(out)
 }
 
 /// The side of all panels in millimetres: the largest extent of the way in any direction, and a margin.
@@ -116,9 +117,9 @@ impl<'a> Panel<'a> {
             "<rect class=\"panel\" x=\"{left:.1}\" y=\"{TOP}\" width=\"{PANEL}\" height=\"{PANEL}\"/>"
         );
         let [across, up] = self.view.axes;
-        text(out, "middle", [left + PANEL / 2.0, TOP - 8.0], self.view.heading);
-        text(out, "middle", [left + PANEL / 2.0, TOP + PANEL + 36.0], across);
-        text(out, "end", [left - 8.0, TOP + 12.0], up);
+        svg::text(out, "middle", [left + PANEL / 2.0, TOP - 8.0], self.view.heading);
+        svg::text(out, "middle", [left + PANEL / 2.0, TOP + PANEL + 36.0], across);
+        svg::text(out, "end", [left - 8.0, TOP + 12.0], up);
         self.grid(out);
         self.base(out);
         for part in way
@@ -141,12 +142,12 @@ impl<'a> Panel<'a> {
         for mark in marks(low, self.span) {
             let [x, _] = self.at([mark, 0.0]);
             let _ = writeln!(out, "<path class=\"grid\" d=\"M{x:.1} {TOP}V{:.1}\"/>", TOP + PANEL);
-            text(out, "middle", [x, TOP + PANEL + 18.0], &mark.to_string());
+            svg::text(out, "middle", [x, TOP + PANEL + 18.0], &mark.to_string());
         }
         for mark in marks(bottom, self.span) {
             let [_, y] = self.at([0.0, mark]);
             let _ = writeln!(out, "<path class=\"grid\" d=\"M{:.1} {y:.1}h{PANEL}\"/>", self.left);
-            text(out, "end", [self.left - 6.0, y + 4.0], &mark.to_string());
+            svg::text(out, "end", [self.left - 6.0, y + 4.0], &mark.to_string());
         }
     }
 
@@ -163,9 +164,7 @@ impl<'a> Panel<'a> {
     }
 
     fn line(&self, out: &mut String, class: &str, way: &[WayPoint]) {
-        let points = way.iter().map(|point| self.at((self.view.flat)(point.tip)));
-        let points: Vec<String> = points.map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
-        let _ = writeln!(out, "<polyline class=\"{class}\" points=\"{}\"/>", points.join(" "));
+        svg::line(out, class, way.iter().map(|point| self.at((self.view.flat)(point.tip)).into()));
     }
 }
 
@@ -175,10 +174,6 @@ fn marks(low: f64, span: f64) -> impl Iterator<Item = f64> {
     (0..)
         .map(move |step: u32| (first + f64::from(step)) * GRID_MM + 0.0)
         .take_while(move |mark| *mark <= low + span)
-}
-
-fn text(out: &mut String, class: &str, [x, y]: [f64; 2], text: &str) {
-    let _ = writeln!(out, "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\">{text}</text>");
 }
 
 #[cfg(test)]
@@ -193,7 +188,7 @@ mod tests {
     fn every_view_shows_the_way_and_its_suction() {
         let way =
             way(&[([0.0, 200.0, 50.0], false), ([-80.0, 200.0, 50.0], true), ([-80.0, 200.0, 150.0], true)]);
-        let drawing = svg("a < b", &way);
+        let drawing = drawing("a < b", &way);
         assert_eq!(drawing.matches("class=\"way\"").count(), 3);
         assert_eq!(drawing.matches("class=\"suction\"").count(), 3);
         assert_eq!(drawing.matches("<circle class=\"base\"").count(), 1);
@@ -214,7 +209,7 @@ mod tests {
 
     #[test]
     fn nothing_at_all_can_be_plotted() {
-        let drawing = svg("nothing", &[]);
+        let drawing = drawing("nothing", &[]);
         assert!(!drawing.contains("NaN") && !drawing.contains("inf"), "{drawing}");
     }
 }

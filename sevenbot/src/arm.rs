@@ -10,6 +10,7 @@ use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, OFFSET, SERVO_TEMPERAT
 use protocol_core::registers::map21::Map;
 use protocol_core::time;
 
+use crate::arm_options::ArmOptions;
 use crate::blocking_link::BlockingLink;
 use crate::error::{Error, OpenError};
 use crate::host_line::HostLine;
@@ -25,34 +26,6 @@ pub const STATUS: Span = Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE);
 
 /// At least this many attempts for a read after a write.
 const MIN_ATTEMPTS: u32 = 3;
-
-/// Baud rate, timeout and attempts.
-///
-/// ```
-/// use sevenbot::ArmOptions;
-/// use std::time::Duration;
-///
-/// let patient = ArmOptions { reply_timeout: Duration::from_secs(2), ..ArmOptions::default() };
-/// assert_eq!(patient.baud, 115_200);
-/// ```
-#[derive(Clone, Copy, Debug)]
-pub struct ArmOptions {
-    /// Baud rate of the port. The arm starts with the rate in its register 12.
-    pub baud: u32,
-    /// The longest wait for one attempt. A read is repeated as soon as its reply is overdue, so a lost reply costs less:
-    /// [`Patience`].
-    pub reply_timeout: Duration,
-    /// Attempts for a read, at least one. A read changes nothing, so repeating it is safe.
-    pub attempts: u32,
-    /// The register map to speak; `None`: the one that the arm's version tells.
-    pub map: Option<Map>,
-}
-
-impl Default for ArmOptions {
-    fn default() -> Self {
-        Self { baud: 115_200, reply_timeout: Duration::from_millis(500), attempts: 3, map: None }
-    }
-}
 
 /// A 7Bot V2 at the other end of a serial port.
 ///

@@ -29,6 +29,7 @@
 pub mod advice;
 pub mod approach;
 pub mod arm;
+mod arm_options;
 mod arm_values;
 mod blocking_link;
 pub mod cartesian;
@@ -71,7 +72,8 @@ mod traffic_text;
 pub mod units;
 pub mod wire_log;
 
-pub use arm::{Arm, ArmOptions};
+pub use arm::Arm;
+pub use arm_options::ArmOptions;
 pub use error::{Error, OpenError, PortError, ReceiveCounts};
 pub use fine_angle::FineAngle;
 pub use health::{Health, Problem, ProblemKind};

@@ -6,7 +6,8 @@ use std::time::Duration;
 use protocol_core::registers::map::{BAUD_RATES, DEVICE_ID};
 use serialport::SerialPortType;
 
-use crate::arm::{Arm, ArmOptions};
+use crate::arm::Arm;
+use crate::arm_options::ArmOptions;
 use crate::error::OpenError;
 use crate::identity::Identity;
 use host_link::Span;

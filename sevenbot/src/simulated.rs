@@ -32,7 +32,8 @@ use std::time::{Duration, Instant};
 pub use arm_sim::{Simulation, SimulationConfig};
 use protocol_core::time;
 
-use crate::arm::{Arm, ArmOptions};
+use crate::arm::Arm;
+use crate::arm_options::ArmOptions;
 use crate::error::{OpenError, PortError};
 use crate::host_line::HostLine;
 

@@ -133,7 +133,8 @@ pub fn entries(text: &str) -> Result<Vec<LogEntry>, usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::{Arm, ArmOptions};
+    use crate::arm::Arm;
+    use crate::arm_options::ArmOptions;
     use crate::simulated::{SharedSimulation, Simulation, SimulationConfig};
     use std::sync::{Arc, Mutex};
 

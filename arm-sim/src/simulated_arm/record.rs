@@ -6,13 +6,13 @@ use protocol_core::time::Instant;
 
 use super::SimulatedArm;
 use crate::action::Action;
-use crate::session::{Entry, Recorder, SessionEvent};
+use crate::session::{Entry, SessionEvent, SessionRecorder};
 use crate::tap::Watcher;
 
 impl<F, B, C> SimulatedArm<F, B, C> {
     /// Passes everything that is done to the arm from outside, and the bytes that the host takes, to `recorder` from now
     /// on. What is done to the plant by [`SimulatedArm::plant_mut`] is not recorded: use [`SimulatedArm::act`].
-    pub fn set_recorder(&mut self, recorder: impl Recorder + 'static) {
+    pub fn set_recorder(&mut self, recorder: impl SessionRecorder + 'static) {
         self.recorder = Watcher::holding(Box::new(recorder));
     }
 

@@ -31,9 +31,6 @@ struct ModbusRegisters {
 const ENVELOPE: usize = 3;
 const WRITE_MULTIPLE_REGISTERS: u8 = 0x10;
 
-/// The reason why a request is refused.
-type Refusal = Exception;
-
 impl Default for ModbusCoreServer {
     /// A server that has received nothing.
     fn default() -> Self {
@@ -115,24 +112,25 @@ fn execute<'data>(
     registers: &mut [u16],
     request: Request<'_>,
     data: &'data mut [u8],
-) -> Result<Response<'data>, Refusal> {
+) -> Result<Response<'data>, Exception> {
     match request {
         Request::ReadHoldingRegisters(first, count) => {
             let first = usize::from(first);
             let words =
-                registers.get(first..first + usize::from(count)).ok_or(Refusal::IllegalDataAddress)?;
-            let data = Data::from_words(words, data).map_err(|_| Refusal::IllegalDataValue)?;
+                registers.get(first..first + usize::from(count)).ok_or(Exception::IllegalDataAddress)?;
+            let data = Data::from_words(words, data).map_err(|_| Exception::IllegalDataValue)?;
             Ok(Response::ReadHoldingRegisters(data))
         }
         Request::WriteMultipleRegisters(first, words) => {
             let start = usize::from(first);
-            let targets = registers.get_mut(start..start + words.len()).ok_or(Refusal::IllegalDataAddress)?;
+            let targets =
+                registers.get_mut(start..start + words.len()).ok_or(Exception::IllegalDataAddress)?;
             for (target, word) in targets.iter_mut().zip(words) {
                 *target = word;
             }
-            let count = u16::try_from(words.len()).map_err(|_| Refusal::IllegalDataValue)?;
+            let count = u16::try_from(words.len()).map_err(|_| Exception::IllegalDataValue)?;
             Ok(Response::WriteMultipleRegisters(first, count))
         }
-        _ => Err(Refusal::IllegalFunction),
+        _ => Err(Exception::IllegalFunction),
     }
 }

@@ -11,7 +11,7 @@ use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 use serde_json::{Value, json};
 
-use super::request::{self, Alarm, ControlRequest, Grip, HandAction, Power, Refusal, SpeedFactor};
+use super::request::{self, Alarm, ControlRefusal, ControlRequest, Grip, HandAction, Power, SpeedFactor};
 use super::socket::ControlReply;
 use super::state;
 use crate::pty_arm::PtyArm;
@@ -43,7 +43,7 @@ struct Executor<'a, F, C> {
 }
 
 impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
-    fn execute(&mut self, request: ControlRequest) -> Result<Value, Refusal> {
+    fn execute(&mut self, request: ControlRequest) -> Result<Value, ControlRefusal> {
         let now = self.now();
         match request {
             ControlRequest::Pause => self.pace(|clock| clock.pause(true)),
@@ -52,7 +52,7 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
                 let speed = speed(factor)?;
                 self.pace(|clock| clock.set_speed(speed))
             }
-            ControlRequest::Advance { .. } => Err(Refusal::new(
+            ControlRequest::Advance { .. } => Err(ControlRefusal::new(
                 "the time is not from 1 to 86400000 ms",
                 "use several requests for more than a day",
             )),
@@ -86,10 +86,10 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
     }
 
     /// Refuses if the arm has no power.
-    fn act_with_power(&mut self, action: Action) -> Result<Value, Refusal> {
+    fn act_with_power(&mut self, action: Action) -> Result<Value, ControlRefusal> {
         if !self.arm.simulation_mut().has_power() {
             let hint = "switch it on first: {\"do\":\"power\",\"to\":\"on\"}";
-            return Err(Refusal::new("the arm has no power", hint));
+            return Err(ControlRefusal::new("the arm has no power", hint));
         }
         self.act(action);
         Ok(json!({}))
@@ -99,36 +99,36 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
     fn pace<E: ToString>(
         &mut self,
         change: impl FnOnce(&mut VirtualClock) -> Result<(), E>,
-    ) -> Result<Value, Refusal> {
+    ) -> Result<Value, ControlRefusal> {
         const HINT: &str = "without --lockstep, virtual time can be paused and has a speed";
-        change(self.clock).map_err(|error| Refusal::new(error, HINT))?;
+        change(self.clock).map_err(|error| ControlRefusal::new(error, HINT))?;
         Ok(with_speed(json!({ "time_us": self.now().as_micros() }), self.clock))
     }
 
-    fn snapshot(&mut self, name: String) -> Result<Value, Refusal> {
+    fn snapshot(&mut self, name: String) -> Result<Value, ControlRefusal> {
         self.check_can_go_back()?;
         let answer = json!({ "snapshot": name, "time_us": self.now().as_micros() });
-        self.arm.keep_snapshot(name).map_err(|error| Refusal::new(&error, error.hint()))?;
+        self.arm.keep_snapshot(name).map_err(|error| ControlRefusal::new(&error, error.hint()))?;
         Ok(answer)
     }
 
-    fn restore(&mut self, name: &str) -> Result<Value, Refusal> {
+    fn restore(&mut self, name: &str) -> Result<Value, ControlRefusal> {
         self.check_can_go_back()?;
         let restored = self.arm.restore_snapshot(name);
-        self.clock.set_now(restored.map_err(|error| Refusal::new(&error, error.hint()))?);
+        self.clock.set_now(restored.map_err(|error| ControlRefusal::new(&error, error.hint()))?);
         Ok(json!({ "snapshot": name, "time_us": self.now().as_micros() }))
     }
 
     /// Refuses if virtual time cannot go back.
-    fn check_can_go_back(&mut self) -> Result<(), Refusal> {
+    fn check_can_go_back(&mut self) -> Result<(), ControlRefusal> {
         if self.clock.is_shared() {
-            return Err(Refusal::new(
+            return Err(ControlRefusal::new(
                 "several arms have the same virtual time, because host-sim runs with --arms",
                 "only a simulator of one arm has snapshots",
             ));
         }
         if self.arm.simulation_mut().is_recorded() {
-            return Err(Refusal::new(
+            return Err(ControlRefusal::new(
                 "a recorded session cannot go back in time",
                 "only host-sim without --record has snapshots",
             ));
@@ -136,11 +136,11 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
         Ok(())
     }
 
-    fn begin_fault(&mut self, fault: &str, for_ms: Option<u64>) -> Result<Value, Refusal> {
+    fn begin_fault(&mut self, fault: &str, for_ms: Option<u64>) -> Result<Value, ControlRefusal> {
         const HINT: &str = "FAULTS in host-sim --help lists the faults";
-        let fault: ArmFault = fault.parse().map_err(|error| Refusal::new(error, HINT))?;
+        let fault: ArmFault = fault.parse().map_err(|error| ControlRefusal::new(error, HINT))?;
         if for_ms.is_some_and(|millis| !(1..=LONGEST_MS).contains(&millis)) {
-            return Err(Refusal::new(
+            return Err(ControlRefusal::new(
                 "for_ms is not from 1 to 86400000",
                 "a fault without a time stays until it is cleared",
             ));
@@ -149,25 +149,28 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
         Ok(json!({ "fault": fault.to_string(), "replaced": replaced }))
     }
 
-    fn end_faults(&mut self, at: Option<&str>) -> Result<Value, Refusal> {
+    fn end_faults(&mut self, at: Option<&str>) -> Result<Value, ControlRefusal> {
         let location: Result<Option<FaultLocation>, _> = at.map(str::parse).transpose();
-        let location =
-            location.map_err(|error| Refusal::new(error, "{\"do\":\"clear\"} takes all faults back"))?;
+        let location = location
+            .map_err(|error| ControlRefusal::new(error, "{\"do\":\"clear\"} takes all faults back"))?;
         let ended = self.act(Action::Clear(location));
         if ended.is_empty() {
-            return Err(Refusal::new("there is no such fault", "{\"do\":\"faults\"} lists the faults"));
+            return Err(ControlRefusal::new(
+                "there is no such fault",
+                "{\"do\":\"faults\"} lists the faults",
+            ));
         }
         Ok(json!({ "ended": ended }))
     }
 
-    fn hand(&mut self, joint: u8, to: HandAction) -> Result<Value, Refusal> {
+    fn hand(&mut self, joint: u8, to: HandAction) -> Result<Value, ControlRefusal> {
         let joint = joint_of(joint)?;
         let has_torque = self.arm.simulation_mut().plant().has_torque(joint);
         let action = match to {
             HandAction::Degrees(degrees) => Action::Hand(joint, counts(joint, degrees)?),
             HandAction::Grip(Grip::LetGo) => Action::LetGo(joint),
             HandAction::Grip(Grip::Hold) if has_torque => {
-                return Err(Refusal::new(
+                return Err(ControlRefusal::new(
                     "the joint has torque, which is stronger than a hand",
                     "switch the motors off (motor state 2), or use the fault JOINT=stuck",
                 ));
@@ -179,11 +182,11 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
         Ok(json!({ "has_torque": has_torque, "angle_degrees": f64::from(angle) / 1_000.0 }))
     }
 
-    fn trip(&mut self, joint: u8, alarm: Alarm) -> Result<Value, Refusal> {
+    fn trip(&mut self, joint: u8, alarm: Alarm) -> Result<Value, ControlRefusal> {
         let joint = joint_of(joint)?;
         let trip = match alarm {
             Alarm::Overload if !self.arm.simulation_mut().plant().has_torque(joint) => {
-                return Err(Refusal::new(
+                return Err(ControlRefusal::new(
                     "the joint has no torque, so its servo cannot be overloaded",
                     "switch the motors on first (motor state 1), or use the alarm heat",
                 ));
@@ -195,19 +198,22 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
         Ok(json!({}))
     }
 
-    fn weight(&mut self, grams: u16) -> Result<Value, Refusal> {
+    fn weight(&mut self, grams: u16) -> Result<Value, ControlRefusal> {
         if grams > HEAVIEST_LOAD_G {
-            return Err(Refusal::new("the weight is not from 0 to 1000 grams", "0 takes the weight away"));
+            return Err(ControlRefusal::new(
+                "the weight is not from 0 to 1000 grams",
+                "0 takes the weight away",
+            ));
         }
         self.act(Action::Weight(grams));
         Ok(json!({ "grams": grams }))
     }
 
-    fn power(&mut self, to: Power) -> Result<Value, Refusal> {
+    fn power(&mut self, to: Power) -> Result<Value, ControlRefusal> {
         let action = match (to, self.arm.simulation_mut().has_power()) {
             (Power::Off, _) => Action::PowerOff,
             (Power::On, true) => {
-                return Err(Refusal::new(
+                return Err(ControlRefusal::new(
                     "the power is on",
                     "{\"do\":\"power\",\"to\":\"cycle\"} switches it off and on",
                 ));
@@ -219,14 +225,14 @@ impl<F: NorFlash + Clone, C: ArmController> Executor<'_, F, C> {
     }
 }
 
-fn joint_of(number: u8) -> Result<Joint, Refusal> {
-    Joint::new(number).ok_or_else(|| Refusal::new("no such joint", "joints are 1 to 7"))
+fn joint_of(number: u8) -> Result<Joint, ControlRefusal> {
+    Joint::new(number).ok_or_else(|| ControlRefusal::new("no such joint", "joints are 1 to 7"))
 }
 
 /// The position of a joint's servo in counts.
-fn counts(joint: Joint, degrees: f64) -> Result<u16, Refusal> {
+fn counts(joint: Joint, degrees: f64) -> Result<u16, ControlRefusal> {
     if !(0.0..=180.0).contains(&degrees) {
-        return Err(Refusal::new(
+        return Err(ControlRefusal::new(
             "the angle is not from 0 to 180 degrees",
             "an angle, \"hold\" or \"let-go\"",
         ));
@@ -236,13 +242,13 @@ fn counts(joint: Joint, degrees: f64) -> Result<u16, Refusal> {
     Ok(counts_from_angle(joint, angle, 0))
 }
 
-fn speed(factor: SpeedFactor) -> Result<TimeSpeed, Refusal> {
+fn speed(factor: SpeedFactor) -> Result<TimeSpeed, ControlRefusal> {
     let speed = match factor {
         SpeedFactor::Max(_) => Some(TimeSpeed::Max),
         SpeedFactor::Times(factor) => TimeSpeed::times(factor),
     };
     speed.ok_or_else(|| {
-        Refusal::new("the speed is not from 0.001 to 1000", "1 is real time, and max is the fastest")
+        ControlRefusal::new("the speed is not from 0.001 to 1000", "1 is real time, and max is the fastest")
     })
 }
 

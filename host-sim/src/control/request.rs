@@ -148,14 +148,14 @@ pub enum Power {
 
 /// Why a request was refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refusal {
+pub struct ControlRefusal {
     /// What is wrong.
     pub error: String,
     /// What to do.
     pub hint: &'static str,
 }
 
-impl Refusal {
+impl ControlRefusal {
     /// A refusal with a hint.
     #[must_use]
     pub fn new(error: impl ToString, hint: &'static str) -> Self {
@@ -167,9 +167,9 @@ impl Refusal {
 ///
 /// # Errors
 /// It is no request.
-pub fn parse(line: &[u8]) -> Result<ControlRequest, Refusal> {
+pub fn parse(line: &[u8]) -> Result<ControlRequest, ControlRefusal> {
     serde_json::from_slice(line).map_err(|error| {
-        Refusal::new(
+        ControlRefusal::new(
             error,
             "a request is one JSON object in a line, as {\"do\":\"state\"}; docs/simulation.md lists them",
         )
@@ -178,10 +178,10 @@ pub fn parse(line: &[u8]) -> Result<ControlRequest, Refusal> {
 
 /// The line of an answer, with its end.
 #[must_use]
-pub fn line(answer: Result<Value, Refusal>) -> String {
+pub fn line(answer: Result<Value, ControlRefusal>) -> String {
     let value = match answer {
         Ok(result) => json!({ "ok": result }),
-        Err(Refusal { error, hint }) => json!({ "error": error, "hint": hint }),
+        Err(ControlRefusal { error, hint }) => json!({ "error": error, "hint": hint }),
     };
     format!("{value}\n")
 }
@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn an_answer_is_one_line() {
         assert_eq!(line(Ok(json!({}))), "{\"ok\":{}}\n");
-        let refused = line(Err(Refusal::new("a\nb", "c")));
+        let refused = line(Err(ControlRefusal::new("a\nb", "c")));
         assert_eq!(refused, "{\"error\":\"a\\nb\",\"hint\":\"c\"}\n");
     }
 }

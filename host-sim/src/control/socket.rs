@@ -13,7 +13,7 @@ use protocol_core::time::Instant;
 use rustix::event::epoll::{self, EventData, EventFlags};
 use serde_json::json;
 
-use super::request::{Refusal, line};
+use super::request::{ControlRefusal, line};
 use crate::private_socket::{PrivateSocket, SocketError, is_temporary};
 
 /// The longest line, in bytes.
@@ -112,7 +112,7 @@ impl ControlSocket {
         while let Some(stream) = self.socket.accept()? {
             let mut client = ControlClient::new(stream);
             if self.clients.len() >= CLIENTS {
-                client.refuse(&Refusal::new("16 clients are connected", "close one of them"));
+                client.refuse(&ControlRefusal::new("16 clients are connected", "close one of them"));
                 client.send();
                 continue;
             }
@@ -169,7 +169,7 @@ impl ControlClient {
         }
         if self.input.len() >= LONGEST_LINE && !self.input.contains(&b'\n') {
             self.input.clear();
-            self.refuse(&Refusal::new(
+            self.refuse(&ControlRefusal::new(
                 "a line has more than 4096 bytes",
                 "end each request with a line feed",
             ));
@@ -186,7 +186,7 @@ impl ControlClient {
     }
 
     /// Sends an error, and then closes the connection.
-    fn refuse(&mut self, refusal: &Refusal) {
+    fn refuse(&mut self, refusal: &ControlRefusal) {
         self.output.extend_from_slice(line(Err(refusal.clone())).as_bytes());
         self.is_at_end = true;
     }

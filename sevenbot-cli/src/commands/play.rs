@@ -161,5 +161,5 @@ fn drawing(recording: &Recording, player: &Player, args: &PlayArgs) -> String {
     }
     let name = args.file.file_name().unwrap_or_default().to_string_lossy();
     let speed = if args.speed == 1.0 { String::new() } else { format!(", speed {}", args.speed) };
-    plot::svg(&format!("{name}{speed}"), &tracks)
+    plot::drawing(&format!("{name}{speed}"), &tracks)
 }

@@ -11,7 +11,7 @@ use crate::command_error::CommandError;
 use crate::input_file;
 use crate::output_file::{ForceArg, OutputFile};
 use crate::session::Session;
-use crate::space_plot::{WayPoint, svg};
+use crate::space_plot::{WayPoint, drawing};
 
 /// Plot the way of the tip in a recording, as SVG.
 #[derive(Debug, Args)]
@@ -36,7 +36,7 @@ pub(crate) struct PlotArgs {
 pub(crate) fn run(session: &mut Session, args: &PlotArgs) -> Result<(), CommandError> {
     let recording = input_file::recording(&args.file)?;
     let name = args.file.file_name().unwrap_or_default().to_string_lossy();
-    let drawing = svg(&name, &way(&recording));
+    let drawing = drawing(&name, &way(&recording));
     match &args.out {
         Some(path) => OutputFile::open(path, Some(&args.file), args.force)?.write(drawing.as_bytes()),
         None => session.printer.print_raw(drawing.as_bytes()),

@@ -73,8 +73,8 @@ pub(crate) struct ServeArgs {
 
 /// Where programs can connect.
 #[derive(Serialize)]
-struct Ready {
-    ready: String,
+pub(super) struct Ready {
+    pub(super) ready: String,
 }
 
 impl Printable for Ready {
@@ -119,7 +119,12 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
     if let Some(address) = server.web_socket_address() {
         session.printer.print(&Ready { ready: format!("ws://{address}/ws") })?;
     }
-    let ended = server.run(&stop, &mut |notice| report(&notice));
+    run_server(server, &stop)
+}
+
+/// Serves until `stop` is readable.
+pub(super) fn run_server(server: Server, stop: &UnixStream) -> Result<(), CommandError> {
+    let ended = server.run(stop, &mut |notice| report(&notice));
     ended.map_err(|error| CommandError::Arm(format!("the operating system failed: {error}")))
 }
 
@@ -154,7 +159,7 @@ fn is_token(token: &str) -> bool {
     (8..=128).contains(&token.len()) && token.bytes().all(|byte| byte.is_ascii_graphic())
 }
 
-pub(super) fn report(notice: &Notice) {
+fn report(notice: &Notice) {
     match notice {
         Notice::ArmFound(port) => note(format_args!("{}: the arm answers", port.display())),
         Notice::ArmLost { reason, .. } => warn(format_args!("no arm: {reason}. Trying again all the time")),

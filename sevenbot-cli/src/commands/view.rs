@@ -1,17 +1,16 @@
 //! `view`: the arm in a browser.
 
-use std::io::{self, Write};
+use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
 
 use clap::Args;
 use rust_embed::RustEmbed;
 use rustix::rand::{GetRandomFlags, getrandom};
-use serde::Serialize;
 use sevenbot_serve::server::{AccessPolicy, ArmLocation, PageConfig, Server, ServerConfig, StartError};
 
-use super::serve::{check_not_busy, location, report, stop_signal};
+use super::serve::{Ready, check_not_busy, location, run_server, stop_signal};
 use crate::command_error::CommandError;
-use crate::printer::{Printable, note};
+use crate::printer::note;
 use crate::session::Session;
 
 /// The port that is tried first. A browser keeps its permissions and settings for each port.
@@ -60,18 +59,6 @@ pub(crate) struct ViewArgs {
 #[allow_missing = true]
 struct PageFile;
 
-/// The address of the page.
-#[derive(Serialize)]
-struct Address {
-    ready: String,
-}
-
-impl Printable for Address {
-    fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "ready {}", self.ready)
-    }
-}
-
 pub(crate) fn run(session: &mut Session, args: &ViewArgs) -> Result<(), CommandError> {
     if PageFile::get("index.html").is_none() {
         return Err(CommandError::Usage(
@@ -102,13 +89,12 @@ pub(crate) fn run(session: &mut Session, args: &ViewArgs) -> Result<(), CommandE
     let server = open(config, args.http.is_none()).map_err(|error| CommandError::Arm(error.to_string()))?;
     if let Some(address) = server.page_address() {
         let address = format!("http://{address}/{query}");
-        session.printer.print(&Address { ready: address.clone() })?;
+        session.printer.print(&Ready { ready: address.clone() })?;
         if !args.no_open && open::that_detached(&address).is_err() {
             note(format_args!("no browser starts: open the address above"));
         }
     }
-    let ended = server.run(&stop, &mut |notice| report(&notice));
-    ended.map_err(|error| CommandError::Arm(format!("the operating system failed: {error}")))
+    run_server(server, &stop)
 }
 
 /// `None`: no port leads to an arm.

@@ -1,7 +1,7 @@
 //! Single servos without the arm's controller, for building and repairing an arm.
 //!
 //! ```text
-//!   scan, servo_info, register_table, set_id, center ──▶ BusMaster ──▶ ServoLine ──▶ half-duplex adapter ──▶ servos
+//!   scan, servo_info, register_access, set_id, center ─▶ BusMaster ──▶ ServoLine ──▶ half-duplex adapter ──▶ servos
 //!                                                            │
 //!                                                            └── frames of motion-core, as in the arm's controller
 //! ```
@@ -22,6 +22,7 @@
 pub mod bus_master;
 pub mod center;
 pub mod error;
+pub mod register_access;
 pub mod register_table;
 pub mod scan;
 pub mod servo_info;

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use arm_sim::request::Request;
-use arm_sim::session::{Entry, Recorder, SessionHeader};
+use arm_sim::session::{Entry, SessionHeader, SessionRecorder};
 use arm_sim::{Action, Duration, Joint, Simulation};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -33,7 +33,7 @@ impl SessionLines {
     }
 }
 
-impl Recorder for SessionLines {
+impl SessionRecorder for SessionLines {
     fn add(&mut self, entry: &Entry) {
         SessionLines::add(self, entry);
     }

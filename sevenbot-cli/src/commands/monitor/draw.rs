@@ -17,16 +17,17 @@ use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Axis, Block, Chart, Clear, Dataset, GraphType, Paragraph};
-use sevenbot::cartesian::{JogAxes, PointText};
+use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Paragraph};
+use sevenbot::cartesian::PointText;
 use sevenbot::map::motor_state;
 use sevenbot::register_text::{faults, joints, motor_state_name};
 use sevenbot::{Angle, Joint};
 
-use super::keys::HELP;
+use super::draw_dialog::draw_dialog;
+use super::keys::jog_keys;
 use super::plot_kind::{PastSample, PlotKind};
 use super::sample::ArmSample;
-use super::view::{Dialog, LinkState, MonitorView, PLOT_SPAN};
+use super::view::{LinkState, MonitorView, PLOT_SPAN};
 
 /// One colour per joint. Users can change these in their terminal.
 const COLOURS: [Color; 7] =
@@ -262,56 +263,11 @@ fn last_line(view: &MonitorView) -> Line<'_> {
     }
 }
 
-/// The keys that move the tip.
-const fn jog_keys(axes: Option<JogAxes>) -> &'static str {
-    match axes {
-        Some(JogAxes::Tool) => {
-            " tip, tool axes: ←→ x  ↑↓ y  PgUp PgDn z, along the tool  Shift 20 mm  j: axes"
-        }
-        _ => " tip, base axes: ←→ x  ↑↓ y  PgUp PgDn z, up and down  Shift 20 mm  j: axes",
-    }
-}
-
-fn draw_dialog(frame: &mut Frame<'_>, dialog: Dialog) {
-    let (title, lines) = match dialog {
-        Dialog::Help => (" keys ", HELP.map(|(keys, what)| format!(" {keys:<18}{what}")).to_vec()),
-        Dialog::ChooseState => (" motor state ", CHOICES.map(str::to_owned).to_vec()),
-        Dialog::ConfirmState(state) => (" motor state ", question(state)),
-    };
-    let width = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0) + 3;
-    let area = centred(frame.area(), width, lines.len() + 2);
-    frame.render_widget(Clear, area);
-    let text: Vec<Line<'_>> = lines.into_iter().map(Line::from).collect();
-    frame.render_widget(Paragraph::new(text).block(Block::bordered().title(title)), area);
-}
-
-const CHOICES: [&str; 4] = [
-    " h  servo: hold where it is",
-    " d  damping: the arm sinks slowly",
-    " f  forceless: the arm falls",
-    " any other key changes nothing",
-];
-
-fn question(state: u8) -> Vec<String> {
-    let falls = if state == motor_state::FORCELESS { "fall" } else { "sink" };
-    vec![
-        format!(" The arm will {falls}. Hold it with your hand."),
-        " Let it go?  y: yes   any other key: no".to_owned(),
-    ]
-}
-
-fn centred(area: Rect, width: usize, height: usize) -> Rect {
-    let fit = |wanted: usize, there: u16| u16::try_from(wanted).unwrap_or(u16::MAX).min(there);
-    let (width, height) = (fit(width, area.width), fit(height, area.height));
-    let (x, y) = (area.x + (area.width - width) / 2, area.y + (area.height - height) / 2);
-    Rect { x, y, width, height }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::monitor::view::ArmEvent;
     use crate::commands::monitor::view::tests::{sample, watching};
+    use crate::commands::monitor::view::{ArmEvent, Dialog};
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
     use sevenbot::Snapshot;

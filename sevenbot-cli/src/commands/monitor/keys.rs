@@ -177,6 +177,16 @@ fn change(view: &MonitorView, change: SpeedChange) -> KeyAction {
     })
 }
 
+/// The keys that move the tip.
+pub(super) const fn jog_keys(axes: Option<JogAxes>) -> &'static str {
+    match axes {
+        Some(JogAxes::Tool) => {
+            " tip, tool axes: ←→ x  ↑↓ y  PgUp PgDn z, along the tool  Shift 20 mm  j: axes"
+        }
+        _ => " tip, base axes: ←→ x  ↑↓ y  PgUp PgDn z, up and down  Shift 20 mm  j: axes",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,6 +9,7 @@
 
 mod arm_thread;
 mod draw;
+mod draw_dialog;
 mod keys;
 mod lines;
 mod plot_kind;

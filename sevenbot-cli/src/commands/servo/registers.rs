@@ -5,9 +5,8 @@ use std::io::{self, Write};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use sevenbot::servo_bench::BusMaster;
-use sevenbot::servo_bench::register_table::{
-    SERVO_REGISTERS, ServoRegister, ServoValue, SetError, get, get_all, set,
-};
+use sevenbot::servo_bench::register_access::{ServoValue, SetError, get, get_all, set};
+use sevenbot::servo_bench::register_table::{SERVO_REGISTERS, ServoRegister};
 
 use super::port::{Rate, exchange_error, id, open};
 use crate::command_error::CommandError;

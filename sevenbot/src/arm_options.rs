@@ -1,0 +1,33 @@
+//! How an arm is talked to: baud rate, timeout and attempts.
+
+use std::time::Duration;
+
+use protocol_core::registers::map21::Map;
+
+/// Baud rate, timeout and attempts.
+///
+/// ```
+/// use sevenbot::ArmOptions;
+/// use std::time::Duration;
+///
+/// let patient = ArmOptions { reply_timeout: Duration::from_secs(2), ..ArmOptions::default() };
+/// assert_eq!(patient.baud, 115_200);
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct ArmOptions {
+    /// Baud rate of the port. The arm starts with the rate in its register 12.
+    pub baud: u32,
+    /// The longest wait for one attempt. A read is repeated as soon as its reply is overdue, so a lost reply costs less:
+    /// [`Patience`](host_link::Patience).
+    pub reply_timeout: Duration,
+    /// Attempts for a read, at least one. A read changes nothing, so repeating it is safe.
+    pub attempts: u32,
+    /// The register map to speak; `None`: the one that the arm's version tells.
+    pub map: Option<Map>,
+}
+
+impl Default for ArmOptions {
+    fn default() -> Self {
+        Self { baud: 115_200, reply_timeout: Duration::from_millis(500), attempts: 3, map: None }
+    }
+}
