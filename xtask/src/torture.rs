@@ -62,7 +62,9 @@ pub(crate) fn run(args: &TortureArgs) -> TaskResult {
 pub(crate) fn journal(seed: u32, trials: &mut Trials) -> TaskResult {
     let tests = "power_loss:: journal_faults::";
     trials.take(
-        &format!("cargo test --package protocol-core --test all -- {tests} --include-ignored --nocapture --quiet"),
+        &format!(
+            "cargo test --package protocol-core --test all -- {tests} --include-ignored --nocapture --quiet"
+        ),
         &[("JOURNAL_LONG", "1"), ("JOURNAL_SEED", &seed.to_string())],
     )
 }
