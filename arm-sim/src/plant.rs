@@ -272,6 +272,12 @@ impl Plant {
         self.servo(joint).and_then(|servo| servo.torque(self.now))
     }
 
+    /// Had a joint's servo power at the last call with a time, and had it started?
+    #[must_use]
+    pub fn has_power(&self, joint: Joint) -> bool {
+        self.servo(joint).is_some_and(|servo| servo.has_power(self.now))
+    }
+
     /// The position of a joint's servo in counts, at the last call with a time.
     #[must_use]
     pub fn position_counts(&self, joint: Joint) -> u16 {

@@ -206,7 +206,8 @@ impl Servo {
         (self.has_power(now) && !is_freed).then_some(switch)
     }
 
-    fn has_power(&self, now: Instant) -> bool {
+    /// Has the servo power, and has it started?
+    pub(crate) fn has_power(&self, now: Instant) -> bool {
         now >= self.ready_at && !self.fault.is_missing()
     }
 

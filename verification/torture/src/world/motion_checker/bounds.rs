@@ -93,6 +93,12 @@ impl JointBounds {
         }
     }
 
+    /// Exempts the joint until this time at least, because an alarm has switched its motor off. Its servo keeps its goal.
+    pub(super) fn suspend(&mut self, until: Instant) {
+        let why = self.exemption.map_or(Exemption::Alarm, |(why, _)| why);
+        self.exemption = Some((why, until));
+    }
+
     /// Starts a new period for the goals and for the yield.
     pub(super) fn age(&mut self) {
         let [new, _] = self.goals;
