@@ -55,6 +55,10 @@ pub const fn exchange(error: &Error) -> &'static [&'static str] {
             "is this the right port? `sevenbot ports` says which ones lead to arms",
             "is the baud rate right (--baud)? `sevenbot --port PORT baud --find` tries all of them",
         ],
+        Error::NoAnswer { received: ReceiveCounts { other_frames: 1.., .. }, .. } => &[
+            "the arm sent frames, and then no answer: was it switched off, or has its controller stopped? Switch it off and on",
+            "does another program use the same arm? `sevenbot serve` shares it",
+        ],
         Error::NoAnswer { .. } => &[
             "bytes arrive, but no frames: probably the baud rate is wrong (--baud); \
              `sevenbot --port PORT baud --find` tries all rates",
@@ -67,6 +71,18 @@ pub const fn exchange(error: &Error) -> &'static [&'static str] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_arm_that_fell_silent_is_not_taken_for_a_wrong_baud_rate() {
+        let received =
+            |bytes, other_frames| ReceiveCounts { bytes, other_frames, ..ReceiveCounts::default() };
+        let advice = |received| {
+            let (span, waited) = (host_link::Span::one(0), std::time::Duration::ZERO);
+            exchange(&Error::NoAnswer { span, attempts: 1, waited, received }).concat()
+        };
+        assert!(advice(received(700, 50)).contains("has its controller stopped?"));
+        assert!(advice(received(700, 0)).contains("the baud rate is wrong"));
+    }
 
     #[test]
     fn a_denied_permission_names_the_group_to_join() {

@@ -26,6 +26,8 @@ const MARGIN: Duration = Duration::from_secs(5);
 const STILL_TIME: Duration = Duration::from_millis(300);
 /// Joints have this time to settle. A joint that oscillates never does.
 const SETTLE_TIMEOUT: Duration = Duration::from_secs(2);
+/// A joint that is slower than this rests: 1 degree/s, in tenths.
+const STILL_VELOCITY: u16 = 10;
 /// A joint this near to its target has arrived: positions are whole degrees.
 const ARRIVED_DEGREES: u8 = 1;
 /// A joint that settled this near to its target has reached it: servos have play.
@@ -205,17 +207,18 @@ impl JointMove {
         check: &mut MoveCheck,
         observer: &mut dyn Observer,
     ) -> Result<[u8; 7], MoveError> {
-        let (mut state, mut last) = (check.check(arm)?, positions(arm)?);
+        let (mut state, mut is_still) = (check.check(arm)?, self.is_still(arm)?);
+        let mut last = positions(arm)?;
         let start = arm.now();
         let mut changed = start;
         // Without moving bits the joints may still be on their way: their duration is only an estimate.
         let timeout = if arm.identity().has_status_block() { SETTLE_TIMEOUT } else { self.timeout() };
-        while !self.away(&last, self.arrived, state).is_empty()
+        while !(is_still && self.away(&last, self.arrived, state).is_empty())
             && arm.now() < changed + STILL_TIME
             && arm.now() < start + timeout
         {
             pause(arm, observer)?;
-            state = check.check(arm)?;
+            (state, is_still) = (check.check(arm)?, self.is_still(arm)?);
             let present = positions(arm)?;
             if present != last {
                 changed = arm.now();
@@ -227,6 +230,14 @@ impl JointMove {
             [] => Ok(last),
             away => Err(not_reached(arm, away.to_vec())),
         }
+    }
+
+    /// Do the joints of this move rest, as their servos measure it? Also true if the firmware does not tell.
+    fn is_still(&self, arm: &mut Arm) -> Result<bool, Error> {
+        let Some(fine) = arm.fine_state_if_served()? else { return Ok(true) };
+        let velocities = fine.velocities.into_iter().zip(self.targets);
+        let mut ours = velocities.filter(|(_, goal)| goal.is_some());
+        Ok(ours.all(|(velocity, _)| velocity.unsigned_abs() < STILL_VELOCITY))
     }
 
     fn elapsed(&self, arm: &Arm) -> Duration {

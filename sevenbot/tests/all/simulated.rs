@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use sevenbot::moves::JointMove;
 use sevenbot::simulated::{self, SharedSimulation, SimulationConfig};
 use sevenbot::stream::{SetPointStream, StreamOptions, StreamPace};
 use sevenbot::{Angle, Arm, Error, FineAngle, Joint};
@@ -21,6 +22,23 @@ fn a_hold_stops_a_moving_arm_and_waits_in_virtual_time() {
     arm.sleep(Duration::from_secs(5));
     let angle = simulation.with(|simulation| simulation.plant().angle(Joint::ALL[0]));
     assert!((angle - i32::from(at) * 1_000).abs() < 1_500, "{angle}");
+}
+
+#[test]
+fn a_move_in_whole_degrees_ends_at_rest() {
+    for (degrees, speed) in [(31, 60), (32, 100), (150, 0), (70, 60), (119, 0)] {
+        let (mut arm, simulation) = arm();
+        arm.driven_joints().unwrap();
+        arm.write_checked(sevenbot::map::SPEED.address, &[speed; 7]).unwrap();
+        let sent = JointMove::begin(&mut arm, [Some(degrees), None, None, None, None, None, None]).unwrap();
+        let reached = sent.finish(&mut arm, &mut ()).unwrap();
+        let angle = || simulation.with(|simulation| simulation.plant().angle(Joint::ALL[0]));
+        let at_end = angle();
+        arm.sleep(Duration::from_secs(2));
+        assert!((angle() - at_end).abs() < 200, "{degrees}: from {at_end} to {}", angle());
+        let now = arm.positions().unwrap().map(Angle::degrees);
+        assert!(reached[0].abs_diff(now[0]) == 0, "{degrees}: {} was told, and it is {}", reached[0], now[0]);
+    }
 }
 
 #[test]
