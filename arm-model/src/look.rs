@@ -10,7 +10,7 @@ use kinematics::geometry::{
 
 use crate::chain::Axes;
 use crate::mesh::Finish::{Accent, Dark, Shell};
-use crate::mesh::{CoordinateAxis, Mesh};
+use crate::mesh::{Mesh, MeshAxis};
 
 /// A rigid body of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,14 +110,14 @@ const fn at(x: f64, z: f64) -> Axes {
 
 /// The same plate on the left and on the right.
 fn both_sides(mesh: &mut Mesh, circles: &[(Axes, f64)], [near, far]: [f64; 2]) {
-    mesh.plate(Shell, CoordinateAxis::Y, circles, [near, far]);
-    mesh.plate(Shell, CoordinateAxis::Y, circles, [-far, -near]);
+    mesh.plate(Shell, MeshAxis::Y, circles, [near, far]);
+    mesh.plate(Shell, MeshAxis::Y, circles, [-far, -near]);
 }
 
 /// Hubs on an axis to the left and to the right.
 fn hubs(mesh: &mut Mesh, centre: Axes, radius: f64, [near, far]: [f64; 2]) {
-    mesh.cylinder(Accent, CoordinateAxis::Y, centre, radius, [near, far]);
-    mesh.cylinder(Accent, CoordinateAxis::Y, centre, radius, [-far, -near]);
+    mesh.cylinder(Accent, MeshAxis::Y, centre, radius, [near, far]);
+    mesh.cylinder(Accent, MeshAxis::Y, centre, radius, [-far, -near]);
 }
 
 /// A box with round edges along y.
@@ -126,21 +126,21 @@ fn rounded_box(mesh: &mut Mesh, finish: crate::Finish, [x0, x1]: [f64; 2], [z0, 
         let inward = |value: f64, low: f64, high: f64| value.clamp(low + 3.0, high - 3.0);
         ([inward(x, x0, x1), y, inward(z, z0, z1)], 3.0)
     });
-    mesh.plate(finish, CoordinateAxis::Y, &corners, [-width / 2.0, width / 2.0]);
+    mesh.plate(finish, MeshAxis::Y, &corners, [-width / 2.0, width / 2.0]);
 }
 
 fn base(mesh: &mut Mesh) {
     let floor = -BASE_HEIGHT;
-    mesh.cylinder(Dark, CoordinateAxis::Z, ORIGIN, BASE_RADIUS, [floor, floor + 8.0]);
+    mesh.cylinder(Dark, MeshAxis::Z, ORIGIN, BASE_RADIUS, [floor, floor + 8.0]);
     let profile =
         [[0.0, floor + 8.0], [66.0, floor + 8.0], [64.0, -16.0], [57.0, -6.0], [55.0, -5.0], [0.0, -5.0]];
-    mesh.revolved(Shell, CoordinateAxis::Z, ORIGIN, &profile);
-    mesh.cylinder(Dark, CoordinateAxis::Z, ORIGIN, 50.0, [-6.0, 0.0]);
+    mesh.revolved(Shell, MeshAxis::Z, ORIGIN, &profile);
+    mesh.cylinder(Dark, MeshAxis::Z, ORIGIN, 50.0, [-6.0, 0.0]);
 }
 
 fn turret(mesh: &mut Mesh) {
-    mesh.cylinder(Accent, CoordinateAxis::Z, ORIGIN, 56.0, [0.0, 8.0]);
-    mesh.cylinder(Shell, CoordinateAxis::Z, ORIGIN, 50.0, [7.0, 14.0]);
+    mesh.cylinder(Accent, MeshAxis::Z, ORIGIN, 56.0, [0.0, 8.0]);
+    mesh.cylinder(Shell, MeshAxis::Z, ORIGIN, 50.0, [7.0, 14.0]);
     let cheek = [(at(-26.0, 14.0), 8.0), (at(40.0, 14.0), 8.0), (SHOULDER, 20.0)];
     both_sides(mesh, &cheek, [31.0, 37.0]);
     let shoulder = [SHOULDER_FORWARD - 16.0, SHOULDER_FORWARD + 16.0];
@@ -149,44 +149,44 @@ fn turret(mesh: &mut Mesh) {
 
 fn rear_arm(mesh: &mut Mesh) {
     hubs(mesh, ORIGIN, 17.0, [37.0, 41.0]);
-    mesh.cylinder(Dark, CoordinateAxis::Y, ORIGIN, 13.0, [-30.0, 30.0]);
+    mesh.cylinder(Dark, MeshAxis::Y, ORIGIN, 13.0, [-30.0, 30.0]);
     both_sides(mesh, &[(ORIGIN, 18.0), (ELBOW, 14.0)], [24.0, 30.0]);
-    mesh.plate(Shell, CoordinateAxis::Y, &[(at(2.0, 44.0), 6.0), (at(2.0, 74.0), 6.0)], [-24.0, 24.0]);
+    mesh.plate(Shell, MeshAxis::Y, &[(at(2.0, 44.0), 6.0), (at(2.0, 74.0), 6.0)], [-24.0, 24.0]);
 }
 
 fn lever(mesh: &mut Mesh) {
-    mesh.plate(Accent, CoordinateAxis::Y, &[(ORIGIN, 12.0), (LEVER_END, 7.0)], [8.0, 13.0]);
+    mesh.plate(Accent, MeshAxis::Y, &[(ORIGIN, 12.0), (LEVER_END, 7.0)], [8.0, 13.0]);
 }
 
 fn rod(mesh: &mut Mesh) {
-    mesh.plate(Dark, CoordinateAxis::Y, &[(ORIGIN, 5.0), (ELBOW, 5.0)], [13.0, 18.0]);
-    mesh.cylinder(Shell, CoordinateAxis::Y, ORIGIN, 3.0, [7.0, 20.0]);
-    mesh.cylinder(Shell, CoordinateAxis::Y, ELBOW, 3.0, [7.0, 20.0]);
+    mesh.plate(Dark, MeshAxis::Y, &[(ORIGIN, 5.0), (ELBOW, 5.0)], [13.0, 18.0]);
+    mesh.cylinder(Shell, MeshAxis::Y, ORIGIN, 3.0, [7.0, 20.0]);
+    mesh.cylinder(Shell, MeshAxis::Y, ELBOW, 3.0, [7.0, 20.0]);
 }
 
 fn forearm(mesh: &mut Mesh) {
     hubs(mesh, ORIGIN, 12.0, [30.0, 34.0]);
-    mesh.cylinder(Dark, CoordinateAxis::Y, ORIGIN, 9.0, [-24.0, 24.0]);
+    mesh.cylinder(Dark, MeshAxis::Y, ORIGIN, 9.0, [-24.0, 24.0]);
     mesh.plate(
         Shell,
-        CoordinateAxis::Y,
+        MeshAxis::Y,
         &[(LEVER_END, 7.0), (ORIGIN, 14.0), (at(30.0, ELBOW_OFFSET), 12.0)],
         [6.0, 12.0],
     );
     mesh.plate(
         Shell,
-        CoordinateAxis::Y,
+        MeshAxis::Y,
         &[(ORIGIN, 15.0), (at(0.0, ELBOW_OFFSET), 15.0), (at(66.0, ELBOW_OFFSET), 13.0)],
         [-21.0, 6.0],
     );
     rounded_box(mesh, Shell, [-8.0, 74.0], [ELBOW_OFFSET - 14.0, ELBOW_OFFSET + 17.0], 38.0);
     let axis = [0.0, 0.0, ELBOW_OFFSET];
-    mesh.cylinder(Shell, CoordinateAxis::X, axis, 13.0, [72.0, FOREARM - 48.0]);
-    mesh.cylinder(Dark, CoordinateAxis::X, axis, 16.0, [FOREARM - 50.0, FOREARM - 26.0]);
+    mesh.cylinder(Shell, MeshAxis::X, axis, 13.0, [72.0, FOREARM - 48.0]);
+    mesh.cylinder(Dark, MeshAxis::X, axis, 16.0, [FOREARM - 50.0, FOREARM - 26.0]);
 }
 
 fn wrist(mesh: &mut Mesh) {
-    mesh.cylinder(Accent, CoordinateAxis::X, ORIGIN, 16.0, [-26.0, -18.0]);
+    mesh.cylinder(Accent, MeshAxis::X, ORIGIN, 16.0, [-26.0, -18.0]);
     rounded_box(mesh, Shell, [-19.0, -11.0], [-11.0, 11.0], 38.0);
     both_sides(mesh, &[(at(-12.0, 0.0), 10.0), (ORIGIN, 10.0)], [14.0, 19.0]);
 }
@@ -194,13 +194,13 @@ fn wrist(mesh: &mut Mesh) {
 fn hand(mesh: &mut Mesh) {
     hubs(mesh, ORIGIN, 8.0, [19.0, 22.0]);
     rounded_box(mesh, Dark, [-9.0, 10.0], [-10.0, 10.0], 27.0);
-    mesh.cylinder(Shell, CoordinateAxis::X, ORIGIN, 11.0, [9.0, TOOL - 5.0]);
+    mesh.cylinder(Shell, MeshAxis::X, ORIGIN, 11.0, [9.0, TOOL - 5.0]);
 }
 
 /// The disc, and a pin that shows its direction.
 fn disc(mesh: &mut Mesh) {
-    mesh.cylinder(Accent, CoordinateAxis::X, ORIGIN, DISC_RADIUS, [-5.0, 0.0]);
-    mesh.cylinder(Dark, CoordinateAxis::X, [0.0, DISC_RADIUS - 3.5, 0.0], 2.5, [-1.0, 3.0]);
+    mesh.cylinder(Accent, MeshAxis::X, ORIGIN, DISC_RADIUS, [-5.0, 0.0]);
+    mesh.cylinder(Dark, MeshAxis::X, [0.0, DISC_RADIUS - 3.5, 0.0], 2.5, [-1.0, 3.0]);
 }
 
 /// What carries the fingers.
@@ -209,7 +209,7 @@ fn palm(mesh: &mut Mesh) {
     let left = [ahead - 2.0, aside, 0.0];
     let right = [ahead - 2.0, -aside, 0.0];
     let foot = [([4.0, 8.0, 0.0], 4.0), ([4.0, -8.0, 0.0], 4.0)];
-    mesh.plate(Dark, CoordinateAxis::Z, &[foot[0], foot[1], (left, 6.0), (right, 6.0)], [-6.0, 6.0]);
+    mesh.plate(Dark, MeshAxis::Z, &[foot[0], foot[1], (left, 6.0), (right, 6.0)], [-6.0, 6.0]);
 }
 
 /// A finger from its axis on: the one on the left for a `side` of 1, the opposite one for -1.
@@ -219,9 +219,9 @@ fn finger(mesh: &mut Mesh, side: f64) {
         let [r0, r1] = radii;
         [([x0, side * y0, 0.0], r0), ([x1, side * y1, 0.0], r1)]
     };
-    mesh.cylinder(Accent, CoordinateAxis::Z, ORIGIN, 5.5, [-9.0, 9.0]);
-    mesh.plate(Accent, CoordinateAxis::Z, &bone([[0.0, 0.0], [22.0, 6.0]], [4.5, 4.0]), [-8.0, 8.0]);
-    mesh.plate(Shell, CoordinateAxis::Z, &bone([[22.0, 6.0], [52.0, -7.0]], [4.0, 2.5]), [-8.0, 8.0]);
+    mesh.cylinder(Accent, MeshAxis::Z, ORIGIN, 5.5, [-9.0, 9.0]);
+    mesh.plate(Accent, MeshAxis::Z, &bone([[0.0, 0.0], [22.0, 6.0]], [4.5, 4.0]), [-8.0, 8.0]);
+    mesh.plate(Shell, MeshAxis::Z, &bone([[22.0, 6.0], [52.0, -7.0]], [4.0, 2.5]), [-8.0, 8.0]);
 }
 
 /// The meshes of the links of the models, in mm. Those have neither rod nor claw.

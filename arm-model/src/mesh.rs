@@ -33,13 +33,13 @@ pub struct Mesh {
 
 /// The axis of a solid of revolution, or the direction of a plate's thickness.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum CoordinateAxis {
+pub(crate) enum MeshAxis {
     X,
     Y,
     Z,
 }
 
-impl CoordinateAxis {
+impl MeshAxis {
     /// The two coordinates across the axis and the one along it, as x, y, z.
     fn xyz(self, [u, v, w]: Axes) -> Axes {
         match self {
@@ -49,7 +49,7 @@ impl CoordinateAxis {
         }
     }
 
-    /// The two coordinates across the axis, in the order of [`CoordinateAxis::xyz`].
+    /// The two coordinates across the axis, in the order of [`MeshAxis::xyz`].
     fn across(self, [x, y, z]: Axes) -> [f64; 2] {
         match self {
             Self::X => [y, z],
@@ -98,7 +98,7 @@ impl Mesh {
     pub(crate) fn cylinder(
         &mut self,
         finish: Finish,
-        axis: CoordinateAxis,
+        axis: MeshAxis,
         centre: Axes,
         radius: f64,
         ends: [f64; 2],
@@ -117,13 +117,7 @@ impl Mesh {
 
     /// Adds a solid of revolution about a line along `axis` through `centre`. The profile is points of radius and
     /// coordinate along the axis, from the low end to the high one; it begins and ends on the axis.
-    pub(crate) fn revolved(
-        &mut self,
-        finish: Finish,
-        axis: CoordinateAxis,
-        centre: Axes,
-        profile: &[[f64; 2]],
-    ) {
+    pub(crate) fn revolved(&mut self, finish: Finish, axis: MeshAxis, centre: Axes, profile: &[[f64; 2]]) {
         let centre = axis.across(centre);
         for pair in profile.windows(2) {
             let &[[radius, low], [end_radius, high]] = pair else { continue };
@@ -148,13 +142,7 @@ impl Mesh {
 
     /// Adds a plate: the convex hull of circles (a point in the plane across `axis` and a radius), between two
     /// coordinates along the axis. Radii are larger than the chamfer of 1.2 mm.
-    pub(crate) fn plate(
-        &mut self,
-        finish: Finish,
-        axis: CoordinateAxis,
-        circles: &[(Axes, f64)],
-        ends: [f64; 2],
-    ) {
+    pub(crate) fn plate(&mut self, finish: Finish, axis: MeshAxis, circles: &[(Axes, f64)], ends: [f64; 2]) {
         let outline = hull(circles.iter().flat_map(|&(centre, radius)| {
             let centre = axis.across(centre);
             (0..SIDES).map(move |side| OutlinePoint::on_circle(centre, radius, side))
@@ -251,7 +239,7 @@ mod tests {
     fn solids_are_closed_and_face_outward() {
         // The area of a polygon of 20 sides in a circle of radius 1.
         let circle = 10.0 * (TAU / 20.0).sin();
-        for axis in [CoordinateAxis::X, CoordinateAxis::Y, CoordinateAxis::Z] {
+        for axis in [MeshAxis::X, MeshAxis::Y, MeshAxis::Z] {
             let mut cylinder = Mesh::default();
             cylinder.cylinder(Finish::Shell, axis, [3.0, 4.0, 5.0], 30.0, [-10.0, 40.0]);
             let full = circle * 900.0 * 50.0;
@@ -267,8 +255,8 @@ mod tests {
     #[test]
     fn normals_have_length_1_and_the_side_of_their_triangle() {
         let mut mesh = Mesh::default();
-        mesh.cylinder(Finish::Accent, CoordinateAxis::X, [0.0; 3], 10.0, [0.0, 9.0]);
-        mesh.plate(Finish::Shell, CoordinateAxis::Y, &[([0.0; 3], 5.0), ([30.0, 0.0, 9.0], 8.0)], [2.0, 6.0]);
+        mesh.cylinder(Finish::Accent, MeshAxis::X, [0.0; 3], 10.0, [0.0, 9.0]);
+        mesh.plate(Finish::Shell, MeshAxis::Y, &[([0.0; 3], 5.0), ([30.0, 0.0, 9.0], 8.0)], [2.0, 6.0]);
         for (corners, normals) in mesh.positions.chunks(3).zip(mesh.normals.chunks(3)) {
             let side = |to: usize| [0, 1, 2].map(|axis| corners[to][axis] - corners[0][axis]);
             let (a, b) = (side(1), side(2));

@@ -162,7 +162,7 @@ mod tests {
         );
     }
 
-    /// Half a degree of each joint from there moves what it should, the way it should.
+    /// Half a degree more of each joint moves the points behind that joint, in the right direction.
     #[test]
     fn each_joint_moves_its_part() {
         let small = 0.5_f64.to_radians();

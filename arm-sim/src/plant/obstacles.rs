@@ -99,7 +99,7 @@ impl Plant {
         thing
     }
 
-    /// Milliseconds of the push of a joint.
+    /// Milliseconds in which a hand pushed the joint, since the push was set.
     #[must_use]
     pub fn push_count(&self, joint: Joint) -> FaultCount {
         let [_, _, push] = self.obstacle_counts(joint);

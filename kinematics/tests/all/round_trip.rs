@@ -17,7 +17,7 @@ fn distance(a: Vector<f64>, b: Vector<f64>) -> f64 {
     (a - b).length()
 }
 
-/// How far wrist, tip and edge of the disc are from where they were, in mm. The edges may have changed places.
+/// The distances between old and new wrist, tip and edge of the disc, in mm. The two edges may have changed places.
 fn distances(was: &Frames<f64>, is: &Frames<f64>) -> [f64; 3] {
     let edge = distance(was.hand.disc_edge, is.hand.disc_edge);
     let opposite = distance(was.hand.disc_edge, is.hand.opposite_edge);

@@ -106,7 +106,7 @@ pub(crate) fn cause_from_counters(before: &StatusBlock, after: &StatusBlock) -> 
     }
 }
 
-/// The reason if the arm has no status block.
+/// The cause as far as the table tells it, for an arm without a status block.
 pub(super) fn cause_from_range(address: u8, wanted: u16) -> MismatchCause {
     match find_readable(address) {
         Some(row) if !row.range.contains(wanted) => MismatchCause::OutOfRange { address },

@@ -193,8 +193,8 @@ impl JointMove {
         if let Some(moving) = state.moving {
             return Ok(moving & joints_of(&self.targets));
         }
-        // The maker's firmware has no moving bits: take the joints away from their targets, for the duration of the
-        // move.
+        // The maker's firmware has no moving bits: until the move should be over, joints that are not at their targets
+        // count as moving.
         let away = self.away(&positions(arm)?, ARRIVED_DEGREES, state);
         let is_due = self.elapsed(arm) >= self.duration();
         Ok(if is_due { 0 } else { away.iter().fold(0, |bits, (joint, ..)| bits | joint.bit()) })

@@ -62,7 +62,7 @@ struct ImageAddresses {
     host_interrupt: u64,
     servo_interrupt: u64,
     wake_up: u64,
-    /// Where a log line begins, and masks the interrupts.
+    /// The address at which a log line begins. There the image masks the interrupts.
     log_line: u64,
     handlers: Vec<u64>,
     effects: HashMap<u64, Effect>,
