@@ -67,6 +67,7 @@ impl MotionChecker {
         let bounds = &mut self.joints[joint];
         bounds.exemption = Some((exemption, now + SETTLE_TIME));
         bounds.goal = None;
+        bounds.awaits_goal &= exemption == Exemption::PowerLoss;
     }
 
     /// The set-point of a joint that pushes may come back at once (D27).
@@ -109,6 +110,7 @@ impl MotionChecker {
                     bounds.goals = [AngleRange::at(angle); 2];
                 }
                 bounds.goal = Some(angle);
+                bounds.awaits_goal = false;
                 let [new, _] = &mut bounds.goals;
                 new.reach(angle);
                 bounds.range.reach(angle);
@@ -145,8 +147,7 @@ impl MotionChecker {
         let has_torque = plant.torque(joint) == Some(Torque::On);
         let had_torque = std::mem::replace(&mut bounds.had_torque, has_torque);
         let is_back = has_torque && !had_torque;
-        let was_lost = matches!(bounds.exemption, Some((Exemption::PowerLoss, _)));
-        ensure(!(is_back && was_lost && is_guarded) || bounds.goal.is_some(), || {
+        ensure(!(is_back && bounds.awaits_goal && is_guarded), || {
             format!("the torque of joint {} came back by itself", joint.number())
         })
     }
@@ -157,6 +158,7 @@ impl MotionChecker {
         *largest = (*largest).max(yield_of(joint, plant));
         if !plant.has_power(joint) {
             self.exempt(now, joint, Exemption::PowerLoss);
+            self.joints[joint].awaits_goal = true;
         }
         let bounds = &mut self.joints[joint];
         if torque.is_none() {

@@ -65,6 +65,8 @@ pub(super) struct JointBounds {
     pub(super) exemption: Option<(Exemption, Instant)>,
     /// The last goal that its servo has received since it has had power.
     pub(super) goal: Option<i32>,
+    /// Its servo had no power, and has received no goal since then.
+    pub(super) awaits_goal: bool,
     /// The goals of the present period of 100 ms, and of the period before.
     pub(super) goals: [AngleRange; 2],
     pub(super) range: AngleRange,
@@ -84,6 +86,7 @@ impl JointBounds {
         Self {
             exemption: Some((Exemption::PowerLoss, now)),
             goal: None,
+            awaits_goal: false,
             goals: [AngleRange::at(0); 2],
             range: AngleRange::at(0),
             overruns_until: now,
