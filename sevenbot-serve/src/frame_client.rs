@@ -32,7 +32,18 @@ impl FrameClient {
         Self { id, deframer: Deframer::new(gap(baud)), output: Vec::new() }
     }
 
-    /// Leaves the hub.
+    /// The id in the hub.
+    #[must_use]
+    pub const fn id(&self) -> ClientId {
+        self.id
+    }
+
+    /// Leaves the hub after a clean end: see [`Hub::leave`].
+    pub fn leave(self, hub: &mut Hub, now: Instant) {
+        hub.leave(now, self.id);
+    }
+
+    /// Leaves the hub: see [`Hub::disconnect`].
     pub fn disconnect(self, hub: &mut Hub, now: Instant) {
         hub.disconnect(now, self.id);
     }
@@ -42,14 +53,14 @@ impl FrameClient {
     pub fn push(&mut self, hub: &mut Hub, now: Instant, bytes: &[u8]) -> usize {
         let mut rest = bytes;
         loop {
-            self.pull_all(hub);
+            self.pull_all(hub, now);
             if !hub.has_room(self.id) {
                 break;
             }
             let count = self.deframer.push(now, rest);
             rest = rest.get(count..).unwrap_or(&[]);
             if count == 0 {
-                self.pull_all(hub);
+                self.pull_all(hub, now);
                 break;
             }
         }
@@ -57,11 +68,11 @@ impl FrameClient {
     }
 
     /// Queues the requests in the bytes taken so far.
-    fn pull_all(&mut self, hub: &mut Hub) {
+    fn pull_all(&mut self, hub: &mut Hub, now: Instant) {
         while hub.has_room(self.id) {
             match self.deframer.pull() {
                 Some(Ok(frame)) => {
-                    hub.request(self.id, WholeRequest::from_frame(frame));
+                    hub.request(now, self.id, WholeRequest::from_frame(frame));
                 }
                 Some(Err(_)) => {}
                 None => return,

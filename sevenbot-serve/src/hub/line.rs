@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId, Snapshot, Span};
 use protocol_core::registers::Map;
+use protocol_core::registers::map::{FINE_POSITION, LOAD, PRESENT_POSITION};
 use protocol_core::time::{Duration, Instant};
 
 use super::client::{Client, Event};
@@ -22,6 +23,10 @@ const AHEAD: Duration = Duration::from_millis(1);
 /// Bytes of replies that may be on their way. One read is always allowed.
 const WINDOW: usize = 96;
 
+/// The registers of a report of map 2.2 (D26).
+const REPORTS: &[Span] =
+    &[Span::of(&PRESENT_POSITION), Span::of(&FINE_POSITION), Span::between(&FINE_POSITION, &LOAD)];
+
 /// The owner of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Owner {
@@ -29,6 +34,8 @@ pub(crate) enum Owner {
     Client(ClientId),
     /// The sampler.
     Sample(Stream),
+    /// The hub, to hold the arm.
+    Hold,
     /// The hub, to find out whether a 7Bot V2 is there.
     Identity,
 }
@@ -44,9 +51,11 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    pub(crate) fn new(baud: u32) -> Self {
+    /// `may_report`: the arm may send reports that an earlier program asked for.
+    pub(crate) fn new(baud: u32, may_report: bool) -> Self {
         // The hub switches reports off, and samples the arm itself.
-        let link = HostLink::new(LinkOptions { baud, reports: &[] });
+        let reports = if may_report { REPORTS } else { &[] };
+        let link = HostLink::new(LinkOptions { baud, reports });
         Self { link, output: Vec::new(), owners: BTreeMap::new(), events: VecDeque::new() }
     }
 
@@ -98,11 +107,6 @@ impl Line {
         }
     }
 
-    /// When the last byte leaves, or has left.
-    pub(crate) const fn idle_since(&self) -> Instant {
-        self.link.busy_until()
-    }
-
     /// May reads be sent whose replies have `bytes` bytes?
     pub(crate) fn has_window(&self, bytes: usize) -> bool {
         let on_their_way = self.link.awaited_bytes();
@@ -111,7 +115,7 @@ impl Line {
 
     /// Can the client's oldest request be sent?
     pub(crate) fn takes(&self, client: &Client) -> bool {
-        match client.waiting.front() {
+        match client.waiting.front().map(|waiting| &waiting.request) {
             Some(WholeRequest::Read { count, .. }) => {
                 client.can_receive && client.unanswered == 0 && self.has_window(reply_bytes(*count))
             }

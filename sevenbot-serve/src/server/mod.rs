@@ -38,7 +38,7 @@ use self::page::{PageConnection, Site};
 use self::pty_connection::PtyConnection;
 use self::tcp_connection::TcpConnection;
 use self::web_connection::WebConnection;
-use crate::hub::Hub;
+use crate::hub::{Hub, HubOptions};
 
 pub use self::arm_location::ArmLocation;
 pub use self::handshake::AccessPolicy;
@@ -93,7 +93,8 @@ impl Server {
     /// # Errors
     /// See [`StartError`].
     pub fn open(config: ServerConfig) -> Result<Self, StartError> {
-        let mut hub = Hub::new(config.baud, config.is_read_only);
+        let mut hub =
+            Hub::new(config.baud, HubOptions { is_read_only: config.is_read_only, ..HubOptions::default() });
         let mut pty_clients = Clients::new().ok();
         let mut ptys = Vec::new();
         for link in &config.ptys {
