@@ -21,8 +21,10 @@ pub(crate) enum Intent {
     Motion,
     /// It holds joints where its client has read that they are.
     Hold,
-    /// The same for the arm, or it switches the motors off.
+    /// The same for the arm.
     Stop,
+    /// It switches the motors off.
+    MotorsOff,
 }
 
 impl Intent {
@@ -31,7 +33,7 @@ impl Intent {
         let covers = |row: &Register| covers(row, address, values);
         let state = byte_at(MOTOR_STATE.address, address, values);
         if matches!(state, Some(motor_state::DAMPING | motor_state::FORCELESS)) {
-            return Self::Stop;
+            return Self::MotorsOff;
         }
         let has_targets = covers(&TARGET_POSITION) || covers(&FINE_TARGET);
         let solves = map == Map::V21 && [TIP_POSITION, WRIST_POSITION, DISC_DIRECTION].iter().any(covers);
@@ -50,12 +52,17 @@ impl Intent {
 
     /// Does it do harm when it comes late?
     pub(crate) const fn must_be_fresh(self) -> bool {
-        !matches!(self, Self::Setting)
+        !matches!(self, Self::Setting | Self::MotorsOff)
     }
 
     /// Does it go before everything else?
     pub(crate) const fn is_urgent(self) -> bool {
-        matches!(self, Self::Hold | Self::Stop)
+        matches!(self, Self::Hold | Self::Stop | Self::MotorsOff)
+    }
+
+    /// Does it end what others stream?
+    pub(crate) const fn ends_streams(self) -> bool {
+        matches!(self, Self::Stop | Self::MotorsOff)
     }
 
     /// Does a stop end it?
@@ -97,7 +104,7 @@ mod tests {
         assert_eq!(of(Map::V22, 128, &[0x28, 0x23, 0xFF, 0xFF]), Intent::Motion, "not measured");
         assert_eq!(of(Map::V22, 46, &[90, 91, 65, 90, 90, 90, 81]), Intent::Motion);
         for state in [0, 2] {
-            assert_eq!(of(Map::V22, 29, &[state]), Intent::Stop);
+            assert_eq!(of(Map::V22, 29, &[state]), Intent::MotorsOff);
         }
     }
 

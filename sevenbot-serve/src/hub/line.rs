@@ -20,6 +20,8 @@ use super::stream::Stream;
 const PATIENCE: Patience = Patience { attempts: 1, timeout: Duration::from_millis(1_000) };
 /// The line may be filled this far ahead, so that it is not idle while the program wakes up.
 const AHEAD: Duration = Duration::from_millis(1);
+/// Bytes that may wait for the port.
+const MOST_OUTPUT: usize = 64;
 /// Bytes of replies that may be on their way. One read is always allowed.
 const WINDOW: usize = 96;
 
@@ -98,9 +100,11 @@ impl Line {
         self.free_at(now) <= now
     }
 
-    /// When the line is free for another frame.
+    /// When the line is free for another frame. Not before the port takes bytes, if it takes fewer than the baud rate allows.
     pub(crate) fn free_at(&self, now: Instant) -> Instant {
-        if self.link.busy_until() <= now + AHEAD {
+        if self.output.len() >= MOST_OUTPUT {
+            Instant::FAR_FUTURE
+        } else if self.link.busy_until() <= now + AHEAD {
             now
         } else {
             Instant::from_micros(self.link.busy_until().as_micros() - AHEAD.as_micros())

@@ -83,6 +83,8 @@ pub enum Admission {
     Stopped,
     /// It is dropped: another client drives.
     AnotherDrives,
+    /// It is dropped: it came too late.
+    Late,
 }
 
 /// Does an arm answer?
@@ -173,8 +175,15 @@ impl Hub {
         self.clients.get(&id).is_some_and(Client::has_room)
     }
 
-    /// Takes a request of a client. A stop is carried out with the next [`Hub::poll`], before everything else.
-    pub fn request(&mut self, now: Instant, id: ClientId, request: WholeRequest) -> Admission {
+    /// Takes a request of a client, which was sent at `since` or later. A stop is carried out with the next [`Hub::poll`],
+    /// before everything else.
+    pub fn request(
+        &mut self,
+        now: Instant,
+        id: ClientId,
+        since: Instant,
+        request: WholeRequest,
+    ) -> Admission {
         let Some(client) = self.clients.get_mut(&id).filter(|client| client.has_room()) else {
             return Admission::NoRoom;
         };
@@ -185,7 +194,7 @@ impl Hub {
         }
         let (intent, command) = client.meaning(now, &request, &self.known);
         if self.options.is_read_only {
-            self.queue(now, id, Waiting { request, intent: Intent::Setting, since: now });
+            self.queue(now, id, Waiting { request, intent: Intent::Setting, since });
             return if intent.is_some() { Admission::ReadOnly } else { Admission::Queued };
         }
         if let Some(command) = command {
@@ -195,11 +204,26 @@ impl Hub {
         if let Err(reason) = self.check_motion(now, id, intent) {
             return reason;
         }
-        if intent == Intent::Stop {
+        if intent.must_be_fresh() && now - since >= LONGEST_WAIT {
+            return self.refuse_late(now, id, intent);
+        }
+        if intent.ends_streams() {
             self.stop(now, id);
         }
-        self.queue(now, id, Waiting { request, intent, since: now });
+        self.queue(now, id, Waiting { request, intent, since });
         Admission::Queued
+    }
+
+    /// A request comes too late. The targets of a late stop would move the arm, so the hub holds it where it is.
+    fn refuse_late(&mut self, now: Instant, id: ClientId, intent: Intent) -> Admission {
+        if intent.is_urgent() {
+            self.obey(now, id, Command::Stop);
+            return Admission::Queued;
+        }
+        if let Some(client) = self.clients.get_mut(&id) {
+            client.dropped = client.dropped.wrapping_add(1);
+        }
+        Admission::Late
     }
 
     fn queue(&mut self, now: Instant, id: ClientId, waiting: Waiting) {

@@ -24,7 +24,8 @@ const MOST_ANSWERS: usize = 8;
 pub struct MakerClient {
     id: ClientId,
     is_browser: bool,
-    waiting: VecDeque<Result<MakerCommand, MakerCommandError>>,
+    /// Each with the time at which it was sent at the earliest.
+    waiting: VecDeque<(Instant, Result<MakerCommand, MakerCommandError>)>,
     /// The command whose read has no reply yet.
     current: Option<MakerCommand>,
     /// The first of two events that the command waits for.
@@ -69,9 +70,9 @@ impl MakerClient {
         self.waiting.len() < MOST_WAITING
     }
 
-    /// Takes a message. Call it only if [`MakerClient::has_room`].
-    pub fn message(&mut self, text: &str) {
-        self.waiting.push_back(MakerCommand::parse(text));
+    /// Takes a message that was sent at `since` or later. Call it only if [`MakerClient::has_room`].
+    pub fn message(&mut self, since: Instant, text: &str) {
+        self.waiting.push_back((since, MakerCommand::parse(text)));
     }
 
     /// Carries out commands, as far as possible. Call it after messages, after [`Hub::poll`] and [`Hub::arm_bytes`].
@@ -80,8 +81,8 @@ impl MakerClient {
             self.finish_read(hub, now, event);
         }
         while self.current.is_none() && self.answers.len() < MOST_ANSWERS && hub.has_room(self.id) {
-            let Some(command) = self.waiting.pop_front() else { return };
-            self.start(hub, now, command);
+            let Some((since, command)) = self.waiting.pop_front() else { return };
+            self.start(hub, now, since, command);
         }
     }
 
@@ -90,18 +91,24 @@ impl MakerClient {
         self.answers.pop_front()
     }
 
-    fn start(&mut self, hub: &mut Hub, now: Instant, command: Result<MakerCommand, MakerCommandError>) {
+    fn start(
+        &mut self,
+        hub: &mut Hub,
+        now: Instant,
+        since: Instant,
+        command: Result<MakerCommand, MakerCommandError>,
+    ) {
         match command {
             Err(MakerCommandError { message, is_read }) => self.answer(is_read, &error(&message)),
             Ok(MakerCommand::Ping) => {
                 self.answer(false, &json!({"status": "pong", "timestamp": now.as_micros() / 1_000}));
             }
             Ok(MakerCommand::Write { address, values, done }) => {
-                let admission = hub.request(now, self.id, write(address, values));
+                let admission = hub.request(now, self.id, since, write(address, values));
                 self.answer(false, &done_or_refused(done, admission));
             }
             Ok(MakerCommand::Read { address, count }) => {
-                hub.request(now, self.id, WholeRequest::Read { address, count });
+                hub.request(now, self.id, since, WholeRequest::Read { address, count });
                 self.current = Some(MakerCommand::Read { address, count });
             }
             Ok(MakerCommand::InverseKinematics { address, values }) => {
@@ -110,7 +117,7 @@ impl MakerClient {
                     writes: solving_writes(address, &values),
                     read: (FRAMES_REFUSED.address, FRAMES_REFUSED.count),
                 };
-                match hub.request(now, self.id, request) {
+                match hub.request(now, self.id, since, request) {
                     // It still ends, with two events.
                     Admission::Queued | Admission::NoArm => {
                         self.current = Some(MakerCommand::InverseKinematics { address, values });
@@ -120,7 +127,7 @@ impl MakerClient {
             }
             Ok(MakerCommand::Stop) => {
                 let (address, count) = (PRESENT_POSITION.address, PRESENT_POSITION.count);
-                hub.request(now, self.id, WholeRequest::Read { address, count });
+                hub.request(now, self.id, since, WholeRequest::Read { address, count });
                 self.current = Some(MakerCommand::Stop);
             }
         }
@@ -136,7 +143,7 @@ impl MakerClient {
                 Some(before) => self.answer(false, &solution(&before, &event)),
             },
             (Some(MakerCommand::Stop), Event::Reply { values, .. }) => {
-                let admission = hub.request(now, self.id, write(TARGET_POSITION.address, values));
+                let admission = hub.request(now, self.id, now, write(TARGET_POSITION.address, values));
                 self.answer(false, &done_or_refused("Stopped", admission));
             }
             (Some(_), Event::Reply { values, .. }) => {
@@ -193,6 +200,7 @@ fn done_or_refused(done: &str, admission: Admission) -> Value {
         Admission::NoArm => error("The arm does not answer"),
         Admission::ReadOnly => error("The server is read-only"),
         Admission::Stopped => error("Another program stopped the arm: pause for a second to start anew"),
+        Admission::Late => error("The command waited too long"),
         Admission::AnotherDrives => error("Another program drives the arm"),
     }
 }

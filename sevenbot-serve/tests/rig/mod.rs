@@ -166,7 +166,7 @@ impl World {
     /// Hands over what the programs sent, and nothing else.
     pub fn push(&mut self) {
         for program in &mut self.programs {
-            let taken = program.client.push(&mut self.hub, self.now, &program.to_send);
+            let taken = program.client.push(&mut self.hub, self.now, self.now, &program.to_send);
             program.to_send.drain(..taken);
         }
     }
@@ -239,7 +239,7 @@ impl Page {
     fn send(&mut self, hub: &mut Hub, now: Instant) {
         for _ in 0..20 {
             let Some(message) = self.to_send.pop_front_if(|_| self.client.has_room()) else { break };
-            self.client.message(&message);
+            self.client.message(now, &message);
         }
         self.client.advance(hub, now);
     }
