@@ -75,6 +75,8 @@ fn stop_all(session: &mut Session) -> Result<(), CommandError> {
     let listed = ports::available().into_iter().map(|port| port.name);
     let free = |port: &String| network::serving(port).is_none();
     names.extend(listed.chain(running_simulators()).chain(session.port.clone()).filter(free));
+    names.sort();
+    names.dedup();
     let options =
         ArmOptions { reply_timeout: session.options.reply_timeout.min(PATIENCE), ..session.options };
     let stop = |name: String| {

@@ -14,6 +14,7 @@ use std::time::Duration;
 
 use http_body_util::Full;
 use hyper::body::{Bytes, Incoming};
+use hyper::header::UPGRADE;
 use hyper::server::conn::http1;
 use hyper::upgrade::OnUpgrade;
 use hyper::{Request, Response, StatusCode};
@@ -112,7 +113,10 @@ impl WebServer {
         peer: SocketAddr,
         upgrade: &Mutex<Option<Upgrade>>,
     ) -> Response<Full<Bytes>> {
-        self.admission.wait(Some(peer.ip())).await;
+        // The files are public: only what needs the token waits for it.
+        if request.headers().contains_key(UPGRADE) {
+            self.admission.wait(Some(peer.ip())).await;
+        }
         let (response, protocol) = match self.site.answer(&request) {
             Answer::Whole(response) => {
                 if response.status() == StatusCode::UNAUTHORIZED {

@@ -127,13 +127,14 @@ const fn is_private(_: &Path) -> bool {
     false
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
     use super::*;
-    use std::os::unix::fs::PermissionsExt;
 
+    #[cfg(unix)]
     #[test]
     fn a_directory_that_others_can_write_to_is_not_used() {
+        use std::os::unix::fs::PermissionsExt;
         let directory = env::temp_dir().join(format!("sevenbot-private-{}", process::id()));
         assert!(is_private(&directory));
         fs::set_permissions(&directory, fs::Permissions::from_mode(0o777)).expect("permissions");
