@@ -57,7 +57,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Options of every command")]
 pub(crate) struct Global {
-    /// Serial port of the arm: /dev/ttyUSB0, COM3, the link of a simulator.
+    /// Serial port of the arm: /dev/ttyUSB0, COM3, the link of a simulator. Or a server: unix:PATH, tcp://HOST:PORT, sevenbot://NAME.
     #[arg(long, global = true, env = "SEVENBOT_PORT", hide_env_values = true)]
     pub(crate) port: Option<String>,
     /// Baud rate of the port. The arm starts with the rate in its register 12.
@@ -146,7 +146,7 @@ impl Command {
             Self::Park(args) => park::run(session, &args),
             Self::Where(_) => position::run(session),
             Self::MoveTo(args) => move_to::run(session, &args),
-            Self::Stop(_) => stop::run(session),
+            Self::Stop(args) => stop::run(session, &args),
             Self::State(args) => state::run(session, &args),
             Self::Vacuum(args) => effector::vacuum(session, &args),
             Self::Effector(args) => effector::effector(session, &args),

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
-use sevenbot::open_port::OpenPort;
+use sevenbot::network;
 use sevenbot::ports::{self, ProbeResult};
 use sevenbot::wire_log::LoggedLine;
 use sevenbot::{Arm, ArmOptions, Firmware, OpenError};
@@ -43,6 +43,21 @@ impl Session {
         Ok(arm)
     }
 
+    /// As [`Self::connect`]. If a server of this user holds the port, connects through the server.
+    pub(crate) fn connect_through_server(&self) -> Result<Arm, CommandError> {
+        let port = self.port_name()?;
+        match self.open(port.clone()) {
+            Err(CommandError::Open { error: OpenError::Busy, .. }) => {
+                let Some(server) = network::serving(&port) else {
+                    return Err(CommandError::Open { port, error: OpenError::Busy });
+                };
+                note(format_args!("{port}: through `sevenbot serve`, which holds this port"));
+                self.open(server.address())
+            }
+            opened => opened,
+        }
+    }
+
     /// As [`Self::connect`], for a command that moves the arm: [`put_right`].
     pub(crate) fn connect_to_move(&self) -> Result<Arm, CommandError> {
         let mut arm = self.connect()?;
@@ -55,7 +70,7 @@ impl Session {
     fn open(&self, port: String) -> Result<Arm, CommandError> {
         let failed = |error| CommandError::Open { port: port.clone(), error };
         let Some(path) = &self.log else { return Arm::open_with(&port, self.options).map_err(failed) };
-        let line = OpenPort::open(&port, self.options.baud).map_err(failed)?;
+        let line = network::open_line(&port, self.options.baud).map_err(failed)?;
         let file = File::create_new(path).map_err(|error| match error.kind() {
             ErrorKind::AlreadyExists => {
                 CommandError::file(path, "the file exists: choose a new name for the log")
@@ -105,12 +120,12 @@ fn the_only(probed: Vec<ProbeResult>) -> Result<String, CommandError> {
 }
 
 #[cfg(unix)]
-fn running_simulators() -> Vec<String> {
+pub(crate) fn running_simulators() -> Vec<String> {
     crate::commands::sim::running_ports()
 }
 
 #[cfg(not(unix))]
-const fn running_simulators() -> Vec<String> {
+pub(crate) const fn running_simulators() -> Vec<String> {
     Vec::new()
 }
 

@@ -32,24 +32,35 @@ impl FrameClient {
         Self { id, deframer: Deframer::new(gap(baud)), output: Vec::new() }
     }
 
-    /// Leaves the hub.
+    /// The id in the hub.
+    #[must_use]
+    pub const fn id(&self) -> ClientId {
+        self.id
+    }
+
+    /// Leaves the hub after a clean end: see [`Hub::leave`].
+    pub fn leave(self, hub: &mut Hub, now: Instant) {
+        hub.leave(now, self.id);
+    }
+
+    /// Leaves the hub: see [`Hub::disconnect`].
     pub fn disconnect(self, hub: &mut Hub, now: Instant) {
         hub.disconnect(now, self.id);
     }
 
-    /// Takes bytes of the client, and returns how many. Offer the rest again when requests were sent to the arm. An
-    /// empty slice states that the client is silent at `now`.
-    pub fn push(&mut self, hub: &mut Hub, now: Instant, bytes: &[u8]) -> usize {
+    /// Takes bytes that the client sent at `since` or later, and returns how many. Offer the rest again when requests were sent
+    /// to the arm. An empty slice states that the client is silent at `now`.
+    pub fn push(&mut self, hub: &mut Hub, now: Instant, since: Instant, bytes: &[u8]) -> usize {
         let mut rest = bytes;
         loop {
-            self.pull_all(hub);
+            self.pull_all(hub, now, since);
             if !hub.has_room(self.id) {
                 break;
             }
             let count = self.deframer.push(now, rest);
             rest = rest.get(count..).unwrap_or(&[]);
             if count == 0 {
-                self.pull_all(hub);
+                self.pull_all(hub, now, since);
                 break;
             }
         }
@@ -57,11 +68,11 @@ impl FrameClient {
     }
 
     /// Queues the requests in the bytes taken so far.
-    fn pull_all(&mut self, hub: &mut Hub) {
+    fn pull_all(&mut self, hub: &mut Hub, now: Instant, since: Instant) {
         while hub.has_room(self.id) {
             match self.deframer.pull() {
                 Some(Ok(frame)) => {
-                    hub.request(self.id, WholeRequest::from_frame(frame));
+                    hub.request(now, self.id, since, WholeRequest::from_frame(frame));
                 }
                 Some(Err(_)) => {}
                 None => return,

@@ -5,8 +5,8 @@
 mod rig;
 
 use protocol_core::registers::map::{
-    FAULTS, FEEDBACK_FREQUENCY, FINE_POSITION, FINE_TARGET, HOST_WATCHDOG, PRESENT_POSITION, REPORT_CONTENT,
-    fault, report_content,
+    FAULTS, FEEDBACK_FREQUENCY, FINE_POSITION, FINE_TARGET, HOST_WATCHDOG, MOTOR_STATE, PRESENT_POSITION,
+    REPORT_CONTENT, TARGET_POSITION, WATCHDOG_ACTION, fault, report_content,
 };
 use protocol_core::time::Duration;
 use rig::{World, read, write};
@@ -17,8 +17,13 @@ const POINT: [u8; 2] = [0x28, 0x23];
 const STEPS: u8 = 20;
 const TIMEOUT_MS: u64 = 200;
 
-fn has_acted(world: &World) -> bool {
-    world.arm.registers().get(FAULTS.address) & fault::HOST_SILENT != 0
+/// Fault bit 6, as a program reads it.
+fn has_acted(world: &mut World, program: usize) -> bool {
+    world.take(program);
+    world.send(program, &read(FAULTS.address, 1));
+    world.run(10);
+    let faults = world.take(program).into_iter().find(|(address, _)| *address == FAULTS.address);
+    faults.expect("a reply").1[0] & fault::HOST_SILENT != 0
 }
 
 /// A program that streams with a watchdog, and one that reads and has reports.
@@ -34,23 +39,46 @@ fn streamer_and_reader() -> World {
     world
 }
 
+/// The joint moves and the streamer is silent. The arm holds in time, and nobody waits for it.
 #[test]
 fn d24_the_frames_of_others_do_not_keep_the_watchdog_of_a_silent_program_alive() {
     let mut world = streamer_and_reader();
-    assert!(!has_acted(&world), "the program sends every 50 ms");
-    let slowest = (0..100).map(|_| world.round_trip(1, &read(1, 2))).max();
-    assert!(slowest.is_some_and(|time| time > Duration::from_millis(TIMEOUT_MS)), "the arm hears nothing");
-    assert!(has_acted(&world));
-    let delays = (0..50).map(|_| world.round_trip(1, &read(1, 2)));
-    assert!(delays.max().is_some_and(|time| time < Duration::from_millis(20)), "once in each silence");
+    assert!(!has_acted(&mut world, 1), "the program sends every 50 ms");
+    world.send(0, &write(TARGET_POSITION.address, &[150]));
+    let delays: Vec<_> = (0..200).map(|_| world.round_trip(1, &read(1, 2))).collect();
+    assert!(delays.iter().all(|time| *time < Duration::from_millis(20)), "nobody waits");
+    assert!(has_acted(&mut world, 1));
+    let held = world.arm.registers().get(TARGET_POSITION.address);
+    assert!((95..145).contains(&held), "it was on its way: {held}");
+    world.run(500);
+    assert_eq!(world.arm.registers().get(TARGET_POSITION.address), held, "once in each silence");
 }
 
 #[test]
 fn d24_the_watchdog_of_a_program_that_is_gone_acts() {
+    for is_reset in [false, true] {
+        let mut world = streamer_and_reader();
+        world.send(0, &write(TARGET_POSITION.address, &[150]));
+        world.run(10);
+        if is_reset {
+            world.reset(0);
+        } else {
+            world.leave(0);
+        }
+        world.run(TIMEOUT_MS + 30);
+        assert!(has_acted(&mut world, 0));
+        let held = world.arm.registers().get(TARGET_POSITION.address);
+        assert!((95..145).contains(&held), "it was on its way: {held}");
+    }
+}
+
+#[test]
+fn d24_a_watchdog_that_damps_switches_the_motors_off() {
     let mut world = streamer_and_reader();
-    world.leave(0);
-    world.run(2 * TIMEOUT_MS + 100);
-    assert!(has_acted(&world));
+    world.send(0, &write(WATCHDOG_ACTION.address, &[1]));
+    world.run(2 * TIMEOUT_MS);
+    assert!(has_acted(&mut world, 1));
+    assert_eq!(world.arm.registers().get(MOTOR_STATE.address), 0);
 }
 
 #[test]
@@ -59,7 +87,21 @@ fn d24_a_program_that_switches_its_watchdog_off_delays_nobody() {
     world.send(0, &write(HOST_WATCHDOG.address, &[0]));
     let delays: Vec<_> = (0..100).map(|_| world.round_trip(1, &read(1, 2))).collect();
     assert!(delays.iter().all(|time| *time < Duration::from_millis(20)));
-    assert!(!has_acted(&world));
+    assert!(!has_acted(&mut world, 1));
+}
+
+/// A program that sets the watchdog again and again, and is silent for as long as it can be.
+#[test]
+fn d24_no_watchdog_keeps_the_others_from_the_arm() {
+    let mut world = World::new(2);
+    for _ in 0..4 {
+        world.send(0, &write(HOST_WATCHDOG.address, &[255]));
+        for _ in 0..131 {
+            let time = world.round_trip(1, &read(1, 2));
+            assert!(time < Duration::from_millis(20), "{time:?}");
+            world.run(20);
+        }
+    }
 }
 
 #[test]

@@ -17,7 +17,7 @@ use arm_sim::plant::Plant;
 use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::servo_bus::TorqueCodes;
 use protocol_core::time::Instant;
-use sevenbot_serve::server::{AccessPolicy, ArmLocation, Notice, Server, ServerConfig};
+use sevenbot_serve::server::{ArmLocation, Notice, Server, ServerConfig};
 use tty_ports::pty::Pty;
 use tty_ports::symlink::Symlink;
 
@@ -91,16 +91,8 @@ fn an_arm_that_comes_back_under_another_name_is_found_among_others() {
     let (stop, mut trigger) = UnixStream::pair().expect("a pair");
     let (sender, notices) = mpsc::channel();
     let server = thread::spawn(move || {
-        let config = ServerConfig {
-            arm: Some(ArmLocation::Search { first: port("ttyUSB0"), list: ports }),
-            baud: 115_200,
-            ptys: Vec::new(),
-            tcp: None,
-            web_socket: None,
-            page: None,
-            access: AccessPolicy { token: None, allows_any_page: false },
-            is_read_only: false,
-        };
+        let location = ArmLocation::Search { first: port("ttyUSB0"), list: ports };
+        let config = ServerConfig::new(Some(location), 115_200);
         Server::open(config).expect("a server").run(&stop, &mut |notice| drop(sender.send(notice)))
     });
     assert_eq!(next(&notices), Notice::ArmFound(port("ttyUSB0")));

@@ -294,7 +294,7 @@ fn an_arm_that_stops_answering_loses_replies_but_never_crosses_them() {
 fn a_damaged_reply_is_lost_to_its_own_program_only() {
     let mut world = World::new(3);
     world.damages_next_byte = true;
-    world.send(0, &read(SPEED.address, 3));
+    world.send(0, &read(SPEED.address, 1));
     world.send(1, &read(CHIP_ID.address, 6));
     world.send(2, &read(DEVICE_CODE.address, 1));
     world.run(100);

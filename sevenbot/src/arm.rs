@@ -17,7 +17,7 @@ use crate::host_line::HostLine;
 use crate::identity::{Firmware, Identity};
 use crate::map_view::{MapView, WriteFrame};
 #[cfg(feature = "serial")]
-use crate::open_port::OpenPort;
+use crate::network::open_line;
 use crate::reports::{Report, ReportQueue, report_period};
 use host_link::{Snapshot, Span};
 
@@ -67,7 +67,7 @@ impl fmt::Debug for Arm {
 
 #[cfg(feature = "serial")]
 impl Arm {
-    /// Opens a port and checks that a 7Bot V2 answers.
+    /// Opens a port and checks that a 7Bot V2 answers. `path` may be the address of a server: [`Address`](crate::network::Address).
     ///
     /// # Errors
     /// The port cannot be opened, no device answers, or another device answers.
@@ -80,7 +80,7 @@ impl Arm {
     /// # Errors
     /// The port cannot be opened, no device answers, or another device answers.
     pub fn open_with(path: &str, options: ArmOptions) -> Result<Self, OpenError> {
-        Self::over(Box::new(OpenPort::open(path, options.baud)?), path, options)
+        Self::over(open_line(path, options.baud)?, path, options)
     }
 }
 

@@ -32,3 +32,21 @@ pub trait HostLine: fmt::Debug + Send {
         thread::sleep(duration);
     }
 }
+
+impl HostLine for Box<dyn HostLine> {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.as_mut().send(bytes)
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
+        self.as_mut().receive(timeout)
+    }
+
+    fn now(&self) -> Instant {
+        self.as_ref().now()
+    }
+
+    fn sleep(&mut self, duration: Duration) {
+        self.as_mut().sleep(duration);
+    }
+}

@@ -49,6 +49,8 @@ pub mod movement_run;
 pub mod moves;
 pub mod names;
 #[cfg(feature = "serial")]
+pub mod network;
+#[cfg(feature = "serial")]
 pub mod open_port;
 pub mod park_poses;
 #[cfg(feature = "serial")]

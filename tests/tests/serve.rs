@@ -187,10 +187,11 @@ fn all_of(output: &Output) -> String {
 fn what_cannot_be_served_is_an_error_that_says_what_to_do() {
     let served = Served::start(1, &[]);
     let taken = served.ports[1].to_str().expect("text").rsplit(':').next().expect("a port").to_owned();
-    let cases: [(&[&str], &str); 4] = [
-        (&[], "nothing to serve"),
+    let cases: [(&[&str], &str); 5] = [
+        (&["--name", "with a space"], "letters, digits and hyphens"),
         (&["--tcp", &taken], "another program listens there"),
         (&["--tcp", "0", "--listen", "0.0.0.0"], "--token"),
+        (&["--tcp", "0", "--listen", "0.0.0.0", "--token", "correct-horse"], "unencrypted"),
         (&["--pty", "/nowhere/a"], "/nowhere/a"),
     ];
     for (arguments, expected) in cases {

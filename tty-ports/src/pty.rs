@@ -18,8 +18,8 @@ use rustix::fs::{Mode, OFlags, fchmod, fcntl_setfl, open};
 use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{
-    InputModes, LocalModes, OptionalActions, OutputModes, QueueSelector, Termios, ioctl_tiocnxcl, tcflush,
-    tcgetattr, tcsetattr,
+    Action, InputModes, LocalModes, OptionalActions, OutputModes, QueueSelector, Termios, ioctl_tiocnxcl,
+    tcflow, tcflush, tcgetattr, tcsetattr,
 };
 use tracing::{debug, info, warn};
 
@@ -145,6 +145,8 @@ impl Pty {
     /// reset only without a client that may have set it.
     fn reset(&self, is_unused: bool) -> io::Result<()> {
         tcflush(&self.terminal, QueueSelector::IFlush)?;
+        // Output that a client has suspended (XOFF) stays so for the next one.
+        tcflow(&self.terminal, Action::OOn)?;
         ioctl_tiocnxcl(&self.terminal)?;
         let mut mode = tcgetattr(&self.terminal)?;
         if is_unused && !is_raw(&mode) {
@@ -296,6 +298,20 @@ mod tests {
         assert!(is_raw(&tcgetattr(&pty.terminal).unwrap()));
         // Root may open a locked terminal, so read the lock itself.
         assert!(!is_exclusive(&pty.terminal));
+    }
+
+    #[test]
+    fn output_that_a_client_suspended_goes_on_for_the_next_one() {
+        let mut port = open();
+        let visitor = client(&port.0);
+        tcflow(&visitor, Action::OOff).unwrap();
+        drop(visitor);
+        assert!(update(&mut port));
+        let (pty, _) = port;
+        let mut next = OpenOptions::new().read(true).write(true).open(pty.path()).unwrap();
+        rustix::io::ioctl_fionbio(&next, true).unwrap();
+        next.write_all(b"request").unwrap();
+        assert_eq!(read_exactly(&pty, 7), b"request");
     }
 
     /// TIOCGEXCL has no safe wrapper.

@@ -4,6 +4,8 @@ use std::io::{self, Write};
 
 use clap::Args;
 use serde::Serialize;
+use sevenbot::network::mdns::{self, Announced};
+use sevenbot::network::{self, LocalServer};
 use sevenbot::ports::{PortInfo, ProbeResult, available, probe};
 
 use crate::command_error::CommandError;
@@ -11,11 +13,12 @@ use crate::printer::Printable;
 use crate::session::Session;
 use crate::style::GOOD;
 
-/// List serial ports, and the arms behind them.
+/// List serial ports and servers, and the arms behind them.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Opens all ports at the same time and asks each for its device code. Other
-devices receive 14 bytes.
+devices receive 14 bytes. Lists the servers of this user, too; an arm that
+`sevenbot serve` holds is found through its server.
 
 Examples:
   sevenbot ports
@@ -24,19 +27,52 @@ pub(crate) struct PortsArgs {
     /// Ask only these ports.
     #[arg(value_name = "PORT")]
     ports: Vec<String>,
+    /// Ask the local network for the names of arms, too. It takes a second and a half.
+    #[arg(long)]
+    network: bool,
 }
 
 pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), CommandError> {
     let named = args.ports.iter().chain(&session.port);
     let named = named.map(|name| PortInfo { name: name.clone(), description: String::new() });
-    let mut asked: Vec<PortInfo> = if args.ports.is_empty() { available() } else { Vec::new() };
+    let served = if args.ports.is_empty() { network::servers() } else { Vec::new() };
+    let mut asked: Vec<PortInfo> = served.iter().map(served_port).collect();
+    if args.ports.is_empty() {
+        asked.extend(available().into_iter().filter(|port| network::serving(&port.name).is_none()));
+    }
     for port in named {
         if asked.iter().all(|known| known.name != port.name) {
             asked.push(port);
         }
     }
-    let ports = probe(asked, session.options.baud).into_iter().map(PortLine::from).collect();
+    let announced = if args.network { mdns::announced() } else { Vec::new() };
+    let ports = probe(asked, session.options.baud).into_iter().map(PortLine::from);
+    let ports = ports.chain(announced.into_iter().map(announced_line)).collect();
     session.printer.print(&Ports { ports })
+}
+
+/// A server of the local network in the list of ports. It is not asked: it may want a token.
+fn announced_line(arm: Announced) -> PortLine {
+    let Announced { name, address } = arm;
+    let port = format!("sevenbot://{name}");
+    PortLine {
+        port,
+        description: format!("tcp://{address}"),
+        arm: None,
+        no_arm: Some("announced on the network".to_owned()),
+    }
+}
+
+/// A server in the list of ports.
+fn served_port(server: &LocalServer) -> PortInfo {
+    let port = server.port.display();
+    match &server.name {
+        Some(name) => PortInfo {
+            name: format!("sevenbot://{name}"),
+            description: format!("{}, for {port}", server.address()),
+        },
+        None => PortInfo { name: server.address(), description: format!("for {port}") },
+    }
 }
 
 #[derive(Serialize)]

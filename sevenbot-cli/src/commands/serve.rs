@@ -1,15 +1,21 @@
 //! `serve`: one arm for many programs at once.
 
+use std::fs;
 use std::io::{self, Write};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
+use sevenbot::network::mdns::Announcement;
+use sevenbot::network::{LocalServer, Registered};
 use sevenbot::open_port::OpenPort;
 use sevenbot::{OpenError, ports};
-use sevenbot_serve::server::{AccessPolicy, ArmLocation, Notice, Server, ServerConfig};
+use sevenbot_serve::hub::HubOptions;
+use sevenbot_serve::server::{
+    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, TlsFiles,
+};
 
 use crate::command_error::CommandError;
 use crate::printer::{Printable, note, warn};
@@ -18,13 +24,15 @@ use crate::session::Session;
 /// Share the arm between many programs at once.
 ///
 /// Each program sees an arm of its own: it gets the replies to its own requests, and the reports that it asked for
-/// itself. Requests of all programs take turns on the arm's line. While the arm is unplugged, programs get no replies,
-/// as on a cable; when it is plugged in again, they go on. Ctrl-C ends the server.
+/// itself. Requests of all programs take turns on the arm's line, and a stop goes before everything else. While the arm is
+/// unplugged, programs get no replies, as on a cable; when it is plugged in again, they go on. Ctrl-C ends the server.
 ///
 /// With --port the server keeps to this port. Without it, an arm that comes back under another name is found again, by
 /// its chip id.
 #[derive(Debug, Args)]
 #[command(after_help = "\
+Programs of this user reach the arm through a Unix socket that only they can
+open; `sevenbot --port unix:PATH` uses it, and `sevenbot stop` finds it.
 Pseudo-terminals (--pty) work with every program that opens a serial port. TCP
 (--tcp) carries the same frames, for example to pyserial's
 `socket://127.0.0.1:7777`. The maker's WebSocket (--ws) works with the maker's
@@ -33,23 +41,32 @@ Python client; its web pages need --maker-pages as well.
 Only programs of this computer can connect. --listen opens the TCP port and the
 WebSocket to others. Then they need the token: over TCP as a first line, with a
 line feed; over the WebSocket in its address, ws://ADDRESS:8080/ws?token=TOKEN.
-The token passes the network unencrypted.
+With --tls-cert and --tls-key both are encrypted (wss for the WebSocket).
 
 Two programs that write targets at the same time both move the arm: the last
-target counts. --read-only is for programs that only watch.
+target counts. With --one-driver the first one drives, until it has written no
+target for a second. --read-only is for programs that only watch.
 
 Examples:
+  sevenbot --port /dev/ttyUSB0 serve --name lab-3
+  sevenbot --port sevenbot://lab-3 monitor  in a second terminal
   sevenbot --port /dev/ttyUSB0 serve --pty ./a --pty ./b
-  sevenbot --port ./a monitor  in a second terminal
   python my_program.py ./b     in a third
   sevenbot --port /dev/ttyUSB0 serve --tcp 7777
   sevenbot --port /dev/ttyUSB0 serve --ws --maker-pages
   sevenbot --port /dev/ttyUSB0 serve --tcp 7777 --listen 0.0.0.0 \\
-      --token \"$(openssl rand -hex 16)\"")]
+      --token-file token.txt --tls-cert arm.pem --tls-key arm.key")]
 pub(crate) struct ServeArgs {
     /// Offer a pseudo-terminal behind this link. Repeat it for more programs.
     #[arg(long, value_name = "LINK")]
     pty: Vec<PathBuf>,
+    /// Offer the frames at this Unix socket. Without this option at one in the user's runtime directory.
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
+    /// A name for the arm: programs of this user find it as sevenbot://NAME. With --tcp and --listen also other computers, by
+    /// multicast DNS.
+    #[arg(long, value_parser = name)]
+    name: Option<String>,
     /// Offer the frames on this TCP port; 0: a free one.
     #[arg(long, value_name = "PORT")]
     tcp: Option<u16>,
@@ -60,16 +77,43 @@ pub(crate) struct ServeArgs {
     /// then move the arm. Without it only pages that this computer serves can connect.
     #[arg(long, requires = "ws")]
     maker_pages: bool,
-    /// Listen on this address of this computer, for other computers; needs --token.
+    /// Listen on this address of this computer, for other computers; needs --token-file or --token, and --tls-cert or
+    /// --unencrypted.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), requires = "token")]
     listen: IpAddr,
-    /// What programs have to know to connect over TCP.
-    #[arg(long, env = "SEVENBOT_TOKEN", hide_env_values = true)]
+    /// What programs have to know to connect over TCP. Other users of this computer can see it in the list of processes: use
+    /// --token-file.
+    #[arg(
+        long = "token",
+        value_name = "TOKEN",
+        env = "SEVENBOT_TOKEN",
+        hide_env_values = true,
+        id = "token_text",
+        group = "token"
+    )]
     token: Option<String>,
+    /// Read the token from the first line of a file, which may be a descriptor: /dev/fd/3.
+    #[arg(long, value_name = "FILE", group = "token")]
+    token_file: Option<PathBuf>,
+    /// Encrypt TCP and the WebSocket with this certificate, a file in PEM.
+    #[arg(long, value_name = "FILE", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// The private key of the certificate, a file in PEM.
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
+    /// Let the token and all frames pass the network unencrypted: everybody there can read them, and then move the arm.
+    #[arg(long, conflicts_with = "tls_cert")]
+    unencrypted: bool,
+    /// Only one program moves the arm at a time; the others watch, and can stop it.
+    #[arg(long)]
+    one_driver: bool,
     /// Write nothing to the arm. Programs can read, and choose their own reports.
     #[arg(long)]
     read_only: bool,
 }
+
+/// The longest path of a Unix socket that every system takes.
+const LONGEST_PATH: usize = 100;
 
 /// Where programs can connect.
 #[derive(Serialize)]
@@ -84,48 +128,129 @@ impl Printable for Ready {
 }
 
 pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), CommandError> {
-    if args.pty.is_empty() && args.tcp.is_none() && args.ws.is_none() {
+    let config = config(session, args)?;
+    let local = local(args);
+    if local.is_none() && args.pty.is_empty() && args.tcp.is_none() && args.ws.is_none() {
         return Err(CommandError::Usage(
             "nothing to serve: use --pty LINK for programs that open a serial port, --tcp PORT for others"
                 .to_owned(),
         ));
     }
-    if args.token.as_deref().is_some_and(|token| !is_token(token)) {
-        return Err(CommandError::Usage(
-            "--token: use 8 to 128 letters, digits and punctuation marks, without spaces".to_owned(),
-        ));
-    }
-    let arm = location(session)?;
-    check_not_busy(&arm, session.options.baud)?;
-    let config = ServerConfig {
-        arm: Some(arm),
-        baud: session.options.baud,
-        ptys: args.pty.clone(),
-        tcp: args.tcp.map(|port| SocketAddr::new(args.listen, port)),
-        web_socket: args.ws.map(|port| SocketAddr::new(args.listen, port)),
-        page: None,
-        access: AccessPolicy { token: args.token.clone(), allows_any_page: args.maker_pages },
-        is_read_only: args.read_only,
-    };
+    let config = ServerConfig { socket: local.as_ref().map(|local| local.socket.clone()), ..config };
     // Before the links are created: Ctrl-C has to remove them.
     let stop = stop_signal()?;
     let server = Server::open(config).map_err(|error| CommandError::Arm(error.to_string()))?;
-    for link in &args.pty {
-        session.printer.print(&Ready { ready: link.display().to_string() })?;
-    }
-    if let Some(address) = server.tcp_address() {
-        session.printer.print(&Ready { ready: format!("socket://{address}") })?;
-    }
-    if let Some(address) = server.web_socket_address() {
-        session.printer.print(&Ready { ready: format!("ws://{address}/ws") })?;
-    }
-    run_server(server, &stop)
+    announce(session, args, &server)?;
+    let _announcement = announce_name(args, &server);
+    run_server(server, &stop, local.as_ref())
 }
 
-/// Serves until `stop` is readable.
-pub(super) fn run_server(server: Server, stop: &UnixStream) -> Result<(), CommandError> {
-    let ended = server.run(stop, &mut |notice| report(&notice));
+/// Serves until `stop` is readable. Other programs of this user find the server by `local`.
+pub(super) fn run_server(
+    server: Server,
+    stop: &UnixStream,
+    local: Option<&LocalServer>,
+) -> Result<(), CommandError> {
+    let mut registered = None;
+    let ended = server.run(stop, &mut |notice| {
+        if let (Notice::ArmFound(port), Some(local)) = (&notice, local) {
+            registered = register(local, port);
+        }
+        report(&notice);
+    });
     ended.map_err(|error| CommandError::Arm(format!("the operating system failed: {error}")))
+}
+
+/// The Unix socket, and what other programs learn of the server. `None` if this user has no private directory for it.
+fn local(args: &ServeArgs) -> Option<LocalServer> {
+    let name = args.name.clone();
+    match &args.socket {
+        Some(socket) => Some(LocalServer { socket: socket.clone(), name, ..LocalServer::default() }),
+        None => default_local(name),
+    }
+}
+
+/// The usual Unix socket.
+pub(super) fn default_local(name: Option<String>) -> Option<LocalServer> {
+    LocalServer::of_this_process(name).filter(|local| local.socket.as_os_str().len() <= LONGEST_PATH)
+}
+
+/// Announces the name to the local network, if other computers can connect.
+fn announce_name(args: &ServeArgs, server: &Server) -> Option<Announcement> {
+    let (name, address) =
+        args.name.as_ref().zip(server.tcp_address().filter(|address| !address.ip().is_loopback()))?;
+    let announced = Announcement::new(name, address);
+    announced.inspect_err(|error| warn(format_args!("the name is not announced: {error}"))).ok()
+}
+
+/// Tells other programs of this user which port the server holds.
+fn register(local: &LocalServer, port: &Path) -> Option<Registered> {
+    let server = LocalServer { port: port.to_owned(), ..local.clone() };
+    let failed = |error: &io::Error| warn(format_args!("`sevenbot stop` will not find this server: {error}"));
+    server.register().inspect_err(failed).ok()
+}
+
+/// Prints where programs can connect.
+fn announce(session: &mut Session, args: &ServeArgs, server: &Server) -> Result<(), CommandError> {
+    let links = args.pty.iter().map(|link| link.display().to_string());
+    let tcp = server.tcp_address().map(|address| format!("socket://{address}"));
+    let scheme = if args.tls_cert.is_some() { "wss" } else { "ws" };
+    let web = server.web_socket_address().map(|address| format!("{scheme}://{address}/ws"));
+    for ready in links.chain(tcp).chain(web) {
+        session.printer.print(&Ready { ready })?;
+    }
+    if let Some(path) = server.socket_path() {
+        session.printer.print(&Ready { ready: format!("unix:{}", path.display()) })?;
+    }
+    Ok(())
+}
+
+fn config(session: &Session, args: &ServeArgs) -> Result<ServerConfig, CommandError> {
+    let is_network = args.tcp.is_some() || args.ws.is_some();
+    if !args.listen.is_loopback() && is_network && args.tls_cert.is_none() && !args.unencrypted {
+        return Err(CommandError::Usage(
+            "--listen: the token would pass the network unencrypted. Use --tls-cert and --tls-key, or --unencrypted if \
+             everybody on this network may move the arm"
+                .to_owned(),
+        ));
+    }
+    let token = token(args)?;
+    let arm = location(session)?;
+    check_not_busy(&arm, session.options.baud)?;
+    let tls = args.tls_cert.clone().zip(args.tls_key.clone());
+    Ok(ServerConfig {
+        ptys: args.pty.clone(),
+        tcp: args.tcp.map(|port| SocketAddr::new(args.listen, port)),
+        web_socket: args.ws.map(|port| SocketAddr::new(args.listen, port)),
+        access: AccessPolicy { token, allows_any_page: args.maker_pages },
+        tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
+        options: HubOptions { is_read_only: args.read_only, has_one_driver: args.one_driver },
+        ..ServerConfig::new(Some(arm), session.options.baud)
+    })
+}
+
+/// The token of the command line, or of its file.
+fn token(args: &ServeArgs) -> Result<Option<String>, CommandError> {
+    let token = match &args.token_file {
+        None => args.token.clone(),
+        Some(path) => {
+            let text = fs::read_to_string(path).map_err(|error| CommandError::file(path, error))?;
+            Some(text.lines().next().unwrap_or_default().to_owned())
+        }
+    };
+    if token.as_deref().is_some_and(|token| !is_token(token)) {
+        return Err(CommandError::Usage(
+            "the token: use 8 to 128 letters, digits and punctuation marks, without spaces".to_owned(),
+        ));
+    }
+    Ok(token)
+}
+
+/// Parses the name of an arm.
+fn name(text: &str) -> Result<String, &'static str> {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-';
+    let is_name = (1..=63).contains(&text.len()) && text.bytes().all(is_plain);
+    if is_name { Ok(text.to_owned()) } else { Err("use 1 to 63 letters, digits and hyphens") }
 }
 
 /// A port from the command line is kept. Otherwise the arm is searched again each time it was unplugged.
@@ -154,7 +279,7 @@ pub(super) fn stop_signal() -> Result<UnixStream, CommandError> {
     Ok(stop)
 }
 
-/// Long enough not to be guessed, and fit for a line and for an address.
+/// Long enough not to be guessed, and fit for a line.
 fn is_token(token: &str) -> bool {
     (8..=128).contains(&token.len()) && token.bytes().all(|byte| byte.is_ascii_graphic())
 }
@@ -167,6 +292,16 @@ fn report(notice: &Notice) {
             "{}: the port is open, but no 7Bot V2 answers: has the arm power, and is --baud right? Trying again all \
              the time",
             port.display()
+        )),
+        Notice::Refused { peer, reason } => warn(format_args!(
+            "a client was refused{}: {}",
+            peer.map(|peer| format!(", {peer}")).unwrap_or_default(),
+            match reason {
+                RefusalReason::WrongToken => "its token is wrong",
+                RefusalReason::Full => "there are too many clients",
+                RefusalReason::NoFrames =>
+                    "it does not speak frames, as a web page does that tries this port",
+            }
         )),
     }
 }

@@ -6,9 +6,10 @@ use std::net::{Ipv4Addr, SocketAddr};
 use clap::Args;
 use rust_embed::RustEmbed;
 use rustix::rand::{GetRandomFlags, getrandom};
-use sevenbot_serve::server::{AccessPolicy, ArmLocation, PageConfig, Server, ServerConfig, StartError};
+use sevenbot_serve::hub::HubOptions;
+use sevenbot_serve::server::{ArmLocation, PageConfig, Server, ServerConfig, StartError};
 
-use super::serve::{Ready, check_not_busy, location, run_server, stop_signal};
+use super::serve::{Ready, check_not_busy, default_local, location, run_server, stop_signal};
 use crate::command_error::CommandError;
 use crate::printer::note;
 use crate::session::Session;
@@ -26,8 +27,8 @@ The address contains a token, which is different each time. A page without it
 can show and move a simulated arm only. So do not pass the address on. Keep the
 page's window in view while the arm moves: the space bar stops the arm.
 
-Other programs can use the arm at the same time through `sevenbot serve`, and
-`view --port` accepts a link of `serve`.
+`sevenbot stop` stops the arm while the page has it, and other programs of this
+user find it with `sevenbot ports`. `view --port` accepts a link of `serve`.
 
 Examples:
   sevenbot view             the only port that leads to an arm; without one, a
@@ -75,15 +76,12 @@ pub(crate) fn run(session: &mut Session, args: &ViewArgs) -> Result<(), CommandE
         files: |path| PageFile::get(path).map(|file| file.data),
     };
     let query = if arm.is_some() { format!("?token={token}") } else { String::new() };
+    let local = arm.as_ref().and_then(|_| default_local(None));
     let config = ServerConfig {
-        arm,
-        baud: session.options.baud,
-        ptys: Vec::new(),
-        tcp: None,
-        web_socket: None,
         page: Some(page),
-        access: AccessPolicy { token: None, allows_any_page: false },
-        is_read_only: args.read_only,
+        socket: local.as_ref().map(|local| local.socket.clone()),
+        options: HubOptions { is_read_only: args.read_only, ..HubOptions::default() },
+        ..ServerConfig::new(arm, session.options.baud)
     };
     let stop = stop_signal()?;
     let server = open(config, args.http.is_none()).map_err(|error| CommandError::Arm(error.to_string()))?;
@@ -94,7 +92,7 @@ pub(crate) fn run(session: &mut Session, args: &ViewArgs) -> Result<(), CommandE
             note(format_args!("no browser starts: open the address above"));
         }
     }
-    run_server(server, &stop)
+    run_server(server, &stop, local.as_ref())
 }
 
 /// `None`: no port leads to an arm.

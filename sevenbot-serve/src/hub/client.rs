@@ -2,16 +2,31 @@
 
 use std::collections::VecDeque;
 
-use protocol_core::time::Instant;
+use protocol_core::registers::Map;
+use protocol_core::time::{Duration, Instant};
 
+use super::drive::Driving;
+use super::intent::Intent;
+use super::known_registers::KnownRegisters;
 use super::own_registers::OwnRegisters;
+use super::readings::Readings;
 use super::request::WholeRequest;
 use super::schedule::Schedule;
 use super::shares::Share;
+use super::sharing_block::Command;
 use super::stream::Stream;
 
+/// Requests of one client that may wait. The maker's arm has the same limit for its WebSocket.
+pub const MOST_WAITING: usize = 20;
+/// How long a request that moves or switches something may wait.
+pub const LONGEST_WAIT: Duration = Duration::from_millis(200);
 /// Reports that wait for a client to take them. More are dropped.
 const MOST_REPORTS: usize = 4;
+/// Bytes on the line, replies included, that may wait for a client: 90 ms at 115 200 baud. One request is always allowed.
+const MOST_WAITING_BYTES: usize = 1_024;
+/// A client may send this many stops in each period. More wait like other requests, so that a flood of them holds up nobody.
+const MOST_URGENT: u8 = 4;
+const URGENT_PERIOD: Duration = Duration::from_millis(100);
 
 /// What the hub has for a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,10 +54,29 @@ pub enum Event {
     },
 }
 
+/// A request that waits.
+#[derive(Debug)]
+pub(crate) struct Waiting {
+    pub(crate) request: WholeRequest,
+    pub(crate) intent: Intent,
+    /// When it came.
+    pub(crate) since: Instant,
+}
+
 /// One client.
 #[derive(Debug, Default)]
 pub(crate) struct Client {
-    pub(crate) waiting: VecDeque<WholeRequest>,
+    pub(crate) waiting: VecDeque<Waiting>,
+    /// Stops, which go before everything else.
+    pub(crate) urgent: VecDeque<Waiting>,
+    /// When the current period of urgent requests began, and how many there were in it.
+    urgent_period: (Instant, u8),
+    pub(crate) driving: Driving,
+    readings: Readings,
+    /// Writes that were not carried out, wrapping.
+    pub(crate) dropped: u16,
+    /// When it closed its connection.
+    pub(crate) left: Option<Instant>,
     pub(crate) events: VecDeque<Event>,
     pub(crate) own: OwnRegisters,
     pub(crate) schedule: Schedule,
@@ -54,22 +88,129 @@ pub(crate) struct Client {
 }
 
 impl Client {
+    /// Can it make another request?
+    pub(crate) fn has_room(&self) -> bool {
+        let bytes: usize = self.waiting.iter().map(|waiting| waiting.request.line_bytes()).sum();
+        self.left.is_none() && self.waiting.len() < MOST_WAITING && bytes < MOST_WAITING_BYTES
+    }
+
+    /// What a request means for the arm's motion, if it is a write, and the command to the server in it.
+    /// A write that the arm refuses has no effect.
+    pub(crate) fn meaning(
+        &self,
+        now: Instant,
+        request: &WholeRequest,
+        known: &KnownRegisters,
+    ) -> (Option<Intent>, Option<Command>) {
+        match request {
+            WholeRequest::Read { .. } => (None, None),
+            WholeRequest::Write { map, address, values } if !known.accepts(*map, *address, values) => {
+                (Some(Intent::Setting), None)
+            }
+            WholeRequest::Write { map, address, values } => {
+                let intent = Intent::of(now, *map, *address, values, &self.readings);
+                let command = Command::in_write(*address, values).filter(|_| *map == Map::V22);
+                (Some(intent), command)
+            }
+            WholeRequest::WritesBetweenReads { .. } => (Some(Intent::Motion), None),
+        }
+    }
+
+    /// Queues a request. A stop goes before the others.
+    pub(crate) fn queue(&mut self, now: Instant, waiting: Waiting) {
+        if waiting.intent.is_urgent() && self.may_be_urgent(now) {
+            self.urgent.push_back(waiting);
+        } else {
+            self.waiting.push_back(waiting);
+        }
+    }
+
+    fn may_be_urgent(&mut self, now: Instant) -> bool {
+        let (begin, count) = &mut self.urgent_period;
+        if now - *begin >= URGENT_PERIOD {
+            (*begin, *count) = (now, 0);
+        }
+        *count = count.saturating_add(1);
+        *count <= MOST_URGENT
+    }
+
+    /// Bytes that the next request takes on the line.
+    pub(crate) fn next_bytes(&self) -> usize {
+        self.waiting.front().map_or(0, |waiting| waiting.request.line_bytes())
+    }
+
     /// Queues a report, if one of this stream is due.
-    pub(crate) fn report(&mut self, now: Instant, stream: Stream, values: &[u8]) {
-        if self.schedule.take_due(now, stream) && self.events.len() < MOST_REPORTS {
+    pub(crate) fn report(&mut self, now: Instant, stream: Stream, values: &[u8]) -> bool {
+        let is_due = self.schedule.take_due(now, stream) && self.events.len() < MOST_REPORTS;
+        if is_due {
+            self.readings.note(now, stream.registers().0, values);
             self.events.push_back(Event::Report { stream, values: values.to_vec() });
         }
+        is_due
+    }
+
+    /// Its oldest read has ended.
+    pub(crate) fn end_read(&mut self, now: Instant, event: Event) {
+        if let Event::Reply { address, values } = &event {
+            self.readings.note(now, *address, values);
+        }
+        self.unanswered = self.unanswered.saturating_sub(1);
+        if self.left.is_none() {
+            self.events.push_back(event);
+        }
+    }
+
+    /// It closed its connection: only its writes are left, and nobody waits for a reply.
+    pub(crate) fn leave(&mut self, now: Instant) {
+        self.left = Some(now);
+        self.own = OwnRegisters::default();
+        self.schedule = Schedule::default();
+        self.unanswered = 0;
+        self.events.clear();
+        self.waiting.retain(|waiting| matches!(waiting.request, WholeRequest::Write { .. }));
+    }
+
+    /// Did it close its connection, and is nothing left to carry out?
+    pub(crate) fn has_left(&self, now: Instant) -> bool {
+        let is_idle = self.waiting.is_empty() && self.urgent.is_empty();
+        self.left.is_some_and(|left| is_idle || now - left >= LONGEST_WAIT)
+    }
+
+    /// A stop: drops what moves the arm, but no hold.
+    pub(crate) fn drop_motion(&mut self) {
+        self.drop_where(|waiting| waiting.intent.is_ended_by_stop());
+    }
+
+    /// Drops what has waited too long. Returns whether there was something.
+    pub(crate) fn drop_stale(&mut self, now: Instant) -> bool {
+        self.drop_where(|waiting| waiting.intent.must_be_fresh() && now - waiting.since >= LONGEST_WAIT)
     }
 
     /// Drops the requests that wait. Their reads get no reply.
     pub(crate) fn drop_waiting(&mut self) {
-        for request in self.waiting.drain(..) {
-            let (reads, (address, count)) = match request {
-                WholeRequest::Read { address, count } => (1, (address, count)),
-                WholeRequest::WritesBetweenReads { read, .. } => (2, read),
-                WholeRequest::Write { .. } => continue,
-            };
-            self.events.extend((0..reads).map(|_| Event::NoReply { address, count }));
-        }
+        self.urgent.clear();
+        self.drop_where(|_| true);
+    }
+
+    fn drop_where(&mut self, is_dropped: impl Fn(&Waiting) -> bool) -> bool {
+        let before = self.waiting.len();
+        let (dropped, kept) = std::mem::take(&mut self.waiting).into_iter().partition(is_dropped);
+        self.waiting = kept;
+        let dropped: VecDeque<Waiting> = dropped;
+        dropped.iter().for_each(|waiting| self.refuse(&waiting.request));
+        self.waiting.len() != before
+    }
+
+    /// A request is not carried out. Its reads get no reply.
+    pub(crate) fn refuse(&mut self, request: &WholeRequest) {
+        let (reads, (address, count)) = match request {
+            WholeRequest::Read { address, count } => (1, (*address, *count)),
+            WholeRequest::WritesBetweenReads { read, .. } => (2, *read),
+            WholeRequest::Write { .. } => {
+                self.dropped = self.dropped.wrapping_add(1);
+                return;
+            }
+        };
+        self.events.extend((0..reads).map(|_| Event::NoReply { address, count }));
     }
 }

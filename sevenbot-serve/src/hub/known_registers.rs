@@ -5,7 +5,7 @@
 //! unknown here, and so is a restart of the controller, which locks the EEPROM.
 
 use motion_core::reach;
-use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, EEPROM_LOCK};
+use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, EEPROM_LOCK, FIRMWARE_VERSION, WATCHDOG_ACTION};
 use protocol_core::registers::map21::{OPTIONS, option};
 use protocol_core::registers::{Accepted, Map, RegisterFile};
 
@@ -26,7 +26,8 @@ impl KnownRegisters {
     pub(crate) fn of_arm(values: &[u8]) -> Option<Self> {
         let mut known = Self::new();
         for (address, &value) in (Self::IDENTITY.0..).zip(values) {
-            if [DEVICE_CODE, CHIP_ID, EEPROM_LOCK, OPTIONS].iter().any(|register| register.holds(address)) {
+            let known_rows = [DEVICE_CODE, FIRMWARE_VERSION, CHIP_ID, EEPROM_LOCK, OPTIONS];
+            if known_rows.iter().any(|register| register.holds(address)) {
                 known.0.set(address, value);
             }
         }
@@ -37,6 +38,21 @@ impl KnownRegisters {
     /// The chip id.
     pub(crate) fn chip_id(&self) -> &[u8] {
         self.0.read(CHIP_ID.address, CHIP_ID.count)
+    }
+
+    /// Has the arm the extended block and the status block?
+    pub(crate) fn is_ours(&self) -> bool {
+        self.0.get(FIRMWARE_VERSION.address) == FIRMWARE_VERSION.default_at(FIRMWARE_VERSION.address)
+    }
+
+    /// Does the watchdog switch the motors off (register 187)?
+    pub(crate) fn watchdog_damps(&self) -> bool {
+        self.0.get(WATCHDOG_ACTION.address) != 0
+    }
+
+    /// A register of two bytes.
+    pub(crate) fn word(&self, address: u8) -> u16 {
+        self.0.word(address)
     }
 
     /// Does the arm accept a write (D16, M7)?

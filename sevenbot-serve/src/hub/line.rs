@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId, Snapshot, Span};
 use protocol_core::registers::Map;
+use protocol_core::registers::map::{FINE_POSITION, LOAD, PRESENT_POSITION};
 use protocol_core::time::{Duration, Instant};
 
 use super::client::{Client, Event};
@@ -19,8 +20,14 @@ use super::stream::Stream;
 const PATIENCE: Patience = Patience { attempts: 1, timeout: Duration::from_millis(1_000) };
 /// The line may be filled this far ahead, so that it is not idle while the program wakes up.
 const AHEAD: Duration = Duration::from_millis(1);
+/// Bytes that may wait for the port.
+const MOST_OUTPUT: usize = 64;
 /// Bytes of replies that may be on their way. One read is always allowed.
 const WINDOW: usize = 96;
+
+/// The registers of a report of map 2.2 (D26).
+const REPORTS: &[Span] =
+    &[Span::of(&PRESENT_POSITION), Span::of(&FINE_POSITION), Span::between(&FINE_POSITION, &LOAD)];
 
 /// The owner of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +36,8 @@ pub(crate) enum Owner {
     Client(ClientId),
     /// The sampler.
     Sample(Stream),
+    /// The hub, to hold the arm.
+    Hold,
     /// The hub, to find out whether a 7Bot V2 is there.
     Identity,
 }
@@ -44,9 +53,11 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    pub(crate) fn new(baud: u32) -> Self {
+    /// `may_report`: the arm may send reports that an earlier program asked for.
+    pub(crate) fn new(baud: u32, may_report: bool) -> Self {
         // The hub switches reports off, and samples the arm itself.
-        let link = HostLink::new(LinkOptions { baud, reports: &[] });
+        let reports = if may_report { REPORTS } else { &[] };
+        let link = HostLink::new(LinkOptions { baud, reports });
         Self { link, output: Vec::new(), owners: BTreeMap::new(), events: VecDeque::new() }
     }
 
@@ -89,18 +100,15 @@ impl Line {
         self.free_at(now) <= now
     }
 
-    /// When the line is free for another frame.
+    /// When the line is free for another frame. Not before the port takes bytes, if it takes fewer than the baud rate allows.
     pub(crate) fn free_at(&self, now: Instant) -> Instant {
-        if self.link.busy_until() <= now + AHEAD {
+        if self.output.len() >= MOST_OUTPUT {
+            Instant::FAR_FUTURE
+        } else if self.link.busy_until() <= now + AHEAD {
             now
         } else {
             Instant::from_micros(self.link.busy_until().as_micros() - AHEAD.as_micros())
         }
-    }
-
-    /// When the last byte leaves, or has left.
-    pub(crate) const fn idle_since(&self) -> Instant {
-        self.link.busy_until()
     }
 
     /// May reads be sent whose replies have `bytes` bytes?
@@ -111,7 +119,7 @@ impl Line {
 
     /// Can the client's oldest request be sent?
     pub(crate) fn takes(&self, client: &Client) -> bool {
-        match client.waiting.front() {
+        match client.waiting.front().map(|waiting| &waiting.request) {
             Some(WholeRequest::Read { count, .. }) => {
                 client.can_receive && client.unanswered == 0 && self.has_window(reply_bytes(*count))
             }

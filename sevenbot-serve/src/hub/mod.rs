@@ -10,43 +10,82 @@
 //! * A client has at most one read without a reply; its later requests wait behind it, so their order is kept.
 //! * The report registers belong to each client (`own_registers`). The arm sends no reports: the sampler reads the
 //!   arm once, at the highest frequency that any client wants, and all clients share the values.
-//! * Without an arm requests are dropped. A request that waited could move an arm that a person just plugged in.
+//! * Without an arm requests are dropped. A request that waited could move an arm that a person just plugged in. With one,
+//!   what moves or switches something is dropped after 200 ms in the queue.
+//! * A stop goes before everything else, and ends what the other clients stream (`drive`, `intent`).
 
+mod arm_hold;
 mod client;
 mod client_id;
+mod delivery;
+mod drive;
+mod intent;
 mod known_registers;
 mod line;
 mod own_registers;
+mod readings;
 mod request;
 mod sampler;
 mod schedule;
+mod sending;
 mod shares;
+mod sharing_block;
 mod stream;
 mod watchdog;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use protocol_core::registers::Map;
 use protocol_core::registers::map::FEEDBACK_FREQUENCY;
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::time::{Duration, Instant};
 
-use self::client::Client;
+use self::arm_hold::ArmHold;
+use self::client::{Client, Waiting};
+use self::drive::{Driver, MayNotMove};
+use self::intent::Intent;
 use self::known_registers::KnownRegisters;
 use self::line::{Line, Owner};
 use self::sampler::Sampler;
 use self::shares::Shares;
+use self::sharing_block::Command;
 use self::watchdog::ClientWatchdog;
 
-pub use self::client::Event;
+pub use self::client::{Event, LONGEST_WAIT, MOST_WAITING};
 pub use self::client_id::ClientId;
 pub use self::request::WholeRequest;
 pub use self::stream::Stream;
 
-/// Requests of one client that may wait. The maker's arm has the same limit for its WebSocket.
-pub const MOST_WAITING: usize = 20;
 /// Time between two questions to a port behind which no arm has answered yet.
 const IDENTIFY_PERIOD: Duration = Duration::from_millis(250);
+
+/// What clients may do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HubOptions {
+    /// Writes do not reach the arm; each client can still choose its own reports.
+    pub is_read_only: bool,
+    /// Only one client moves the arm at a time.
+    pub has_one_driver: bool,
+}
+
+/// What becomes of a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Admission {
+    /// It waits for its turn.
+    Queued,
+    /// The client has too many requests: it is dropped.
+    NoRoom,
+    /// There is no arm: it is dropped.
+    NoArm,
+    /// It waits for its turn, and then writes nothing but the client's own registers.
+    ReadOnly,
+    /// It is dropped: somebody stopped the arm, and the client has not started anew.
+    Stopped,
+    /// It is dropped: another client drives.
+    AnotherDrives,
+    /// It is dropped: it came too late.
+    Late,
+}
 
 /// Does an arm answer?
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,26 +110,36 @@ pub struct Hub {
     line: Line,
     sampler: Sampler,
     watchdog: ClientWatchdog,
+    /// The hub holds the arm by itself.
+    hold: Option<ArmHold>,
+    driver: Driver,
+    /// Stops of all clients so far, wrapping.
+    stops: u8,
     shares: Shares,
-    is_read_only: bool,
+    /// Clients with events or with room that they did not have before.
+    news: BTreeSet<ClientId>,
+    options: HubOptions,
 }
 
 impl Hub {
     /// A hub without clients, whose port is closed. `baud` is the rate of the arm's line, in bits per second.
-    /// `is_read_only`: writes do not reach the arm; each client can still choose its own reports.
     #[must_use]
-    pub fn new(baud: u32, is_read_only: bool) -> Self {
+    pub fn new(baud: u32, options: HubOptions) -> Self {
         Self {
             clients: BTreeMap::new(),
             next_id: ClientId::default(),
             arm: ArmState::Absent,
             known: KnownRegisters::new(),
             chip_id: None,
-            line: Line::new(baud),
+            line: Line::new(baud, options.is_read_only),
             sampler: Sampler::new(baud),
             watchdog: ClientWatchdog::default(),
+            hold: None,
+            driver: Driver::new(options.has_one_driver),
+            stops: 0,
             shares: Shares::default(),
-            is_read_only,
+            news: BTreeSet::new(),
+            options,
         }
     }
 
@@ -102,29 +151,146 @@ impl Hub {
         id
     }
 
-    /// Removes a client with its requests and its streams of reports. A reply that comes for it is dropped.
+    /// The client has closed its connection. What it wrote before is carried out, for [`LONGEST_WAIT`] at most. Its reads and
+    /// its streams of reports end.
+    pub fn leave(&mut self, now: Instant, id: ClientId) {
+        if let Some(client) = self.clients.get_mut(&id) {
+            client.leave(now);
+        }
+        self.driver.end(Some(id));
+        self.set_frequencies(now);
+    }
+
+    /// The client is gone: its requests are dropped with it.
     pub fn disconnect(&mut self, now: Instant, id: ClientId) {
         self.clients.remove(&id);
-        self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
+        self.news.remove(&id);
+        self.driver.end(Some(id));
+        self.set_frequencies(now);
     }
 
     /// Can the client make another request?
     #[must_use]
     pub fn has_room(&self, id: ClientId) -> bool {
-        self.clients.get(&id).is_some_and(|client| client.waiting.len() < MOST_WAITING)
+        self.clients.get(&id).is_some_and(Client::has_room)
     }
 
-    /// Queues a request. Returns false, and drops it, if [`Hub::has_room`] is false.
-    pub fn request(&mut self, id: ClientId, request: WholeRequest) -> bool {
-        if !self.has_room(id) {
-            return false;
+    /// Takes a request of a client, which was sent at `since` or later. A stop is carried out with the next [`Hub::poll`],
+    /// before everything else.
+    pub fn request(
+        &mut self,
+        now: Instant,
+        id: ClientId,
+        since: Instant,
+        request: WholeRequest,
+    ) -> Admission {
+        let Some(client) = self.clients.get_mut(&id).filter(|client| client.has_room()) else {
+            return Admission::NoRoom;
+        };
+        if self.arm != ArmState::Present {
+            client.refuse(&request);
+            self.news.insert(id);
+            return Admission::NoArm;
         }
-        let Some(client) = self.clients.get_mut(&id) else { return false };
+        let (intent, command) = client.meaning(now, &request, &self.known);
+        if self.options.is_read_only {
+            self.queue(now, id, Waiting { request, intent: Intent::Setting, since });
+            return if intent.is_some() { Admission::ReadOnly } else { Admission::Queued };
+        }
+        if let Some(command) = command {
+            self.obey(now, id, command);
+        }
+        let intent = intent.unwrap_or(Intent::Setting);
+        if let Err(reason) = self.check_motion(now, id, intent) {
+            return reason;
+        }
+        if intent.must_be_fresh() && now - since >= LONGEST_WAIT {
+            return self.refuse_late(now, id, intent);
+        }
+        if intent.ends_streams() {
+            self.stop(now, id);
+        }
+        self.queue(now, id, Waiting { request, intent, since });
+        Admission::Queued
+    }
+
+    /// A request comes too late. The targets of a late stop would move the arm, so the hub holds it where it is.
+    fn refuse_late(&mut self, now: Instant, id: ClientId, intent: Intent) -> Admission {
+        if intent.is_urgent() {
+            self.obey(now, id, Command::Stop);
+            return Admission::Queued;
+        }
+        if let Some(client) = self.clients.get_mut(&id) {
+            client.dropped = client.dropped.wrapping_add(1);
+        }
+        Admission::Late
+    }
+
+    fn queue(&mut self, now: Instant, id: ClientId, waiting: Waiting) {
+        let Some(client) = self.clients.get_mut(&id) else { return };
         if client.waiting.is_empty() {
             self.shares.join(&mut client.share);
         }
-        client.waiting.push_back(request);
-        true
+        client.queue(now, waiting);
+    }
+
+    /// May the client move the arm?
+    fn check_motion(&mut self, now: Instant, id: ClientId, intent: Intent) -> Result<(), Admission> {
+        let Some(client) = self.clients.get_mut(&id).filter(|_| intent.is_ended_by_stop()) else {
+            return Ok(());
+        };
+        self.driver.check(now, id, &mut client.driving).map_err(|reason| {
+            client.dropped = client.dropped.wrapping_add(1);
+            match reason {
+                MayNotMove::Stopped => Admission::Stopped,
+                MayNotMove::AnotherDrives => Admission::AnotherDrives,
+            }
+        })
+    }
+
+    /// A client stops the arm: what moves it is dropped, and what the others stream ends.
+    fn stop(&mut self, now: Instant, by: ClientId) {
+        self.stops = self.stops.wrapping_add(1);
+        self.driver.end(None);
+        for (&id, client) in &mut self.clients {
+            client.drop_motion();
+            if id == by {
+                client.driving.start_anew();
+            } else {
+                client.driving.stop(now);
+            }
+        }
+    }
+
+    /// Carries out a command in register 239.
+    fn obey(&mut self, now: Instant, id: ClientId, command: Command) {
+        match command {
+            Command::Stop => {
+                self.stop(now, id);
+                self.start_hold();
+            }
+            Command::StartAnew => {
+                if let Some(client) = self.clients.get_mut(&id) {
+                    client.driving.start_anew();
+                }
+            }
+            Command::HandOver => self.driver.end(Some(id)),
+        }
+    }
+
+    fn start_hold(&mut self) {
+        self.hold = Some(ArmHold::new(self.known.is_ours()));
+    }
+
+    /// The clients that have something new since the last call: events, or room for requests.
+    pub fn take_news(&mut self) -> BTreeSet<ClientId> {
+        std::mem::take(&mut self.news)
+    }
+
+    /// Do writes not reach the arm?
+    #[must_use]
+    pub const fn is_read_only(&self) -> bool {
+        self.options.is_read_only
     }
 
     /// States whether the client has room for the longest reply. While it has none, its reads wait.
@@ -141,15 +307,26 @@ impl Hub {
 
     /// The port to the arm is open. Requests pass once a 7Bot V2 has answered.
     pub fn open_arm(&mut self, now: Instant) {
-        self.line.reset();
+        self.forget_arm();
         self.arm = ArmState::Identifying(now);
     }
 
     /// The port to the arm is closed.
     pub fn close_arm(&mut self) {
         self.arm = ArmState::Absent;
-        self.line.reset();
+        self.forget_arm();
         self.deliver_all(Instant::ZERO);
+    }
+
+    /// Nothing of what was sent or waits may reach the arm that comes next.
+    fn forget_arm(&mut self) {
+        self.line.reset();
+        self.hold = None;
+        self.driver.end(None);
+        for (&id, client) in &mut self.clients {
+            client.drop_waiting();
+            self.news.insert(id);
+        }
     }
 
     /// Does a 7Bot V2 answer?
@@ -172,10 +349,10 @@ impl Hub {
     /// Moves requests to the line, as far as the line is free. The caller sends [`Hub::to_arm`] afterwards.
     pub fn poll(&mut self, now: Instant) {
         self.deliver_all(now);
+        self.clients.retain(|_, client| !client.has_left(now));
         match self.arm {
-            ArmState::Absent => self.drop_waiting(),
+            ArmState::Absent => {}
             ArmState::Identifying(due) => {
-                self.drop_waiting();
                 if due <= now && self.line.is_free(now) {
                     let (address, count) = KnownRegisters::IDENTITY;
                     self.line.send_read(now, Owner::Identity, address, count);
@@ -183,8 +360,11 @@ impl Hub {
                 }
             }
             ArmState::Present => {
-                self.watchdog.poll(now, self.line.idle_since());
-                while self.watchdog.allows(now) && self.line.is_free(now) && self.send_next(now) {}
+                if let Some(action) = self.watchdog.poll(now).filter(|_| !self.options.is_read_only) {
+                    self.act(now, action);
+                }
+                self.send_urgent(now);
+                while self.line.is_free(now) && self.send_next(now) {}
             }
         }
     }
@@ -204,100 +384,14 @@ impl Hub {
     #[must_use]
     pub fn deadline(&self, now: Instant) -> Instant {
         let line = self.line.deadline();
+        let watchdog = self.watchdog.due();
         match self.arm {
-            ArmState::Absent | ArmState::Identifying(_) if self.has_waiting() => now,
             ArmState::Absent => Instant::FAR_FUTURE,
             ArmState::Identifying(due) => line.min(due),
-            ArmState::Present if !self.watchdog.allows(now) => line.min(self.watchdog.quiet_until()),
             ArmState::Present if self.clients.values().any(|client| self.line.takes(client)) => {
-                line.min(self.line.free_at(now))
+                line.min(self.line.free_at(now)).min(watchdog)
             }
-            ArmState::Present => line.min(self.sampler.due().max(self.line.free_at(now))),
-        }
-    }
-
-    /// Sends the next request or sample. Returns false if there is none.
-    fn send_next(&mut self, now: Instant) -> bool {
-        let sendable = self.clients.iter().filter(|(_, client)| self.line.takes(client));
-        let sampler = self.sampler.next_due(now).map(|stream| (self.sampler.share, None, Some(stream)));
-        let clients = sendable.map(|(&id, client)| (client.share, Some(id), None));
-        let next = clients.chain(sampler).min_by_key(|&(share, ..)| self.shares.order(share));
-        match next {
-            Some((_, Some(id), _)) => self.send_request(now, id),
-            Some((_, _, Some(stream))) => self.send_sample(now, stream),
-            _ => return false,
-        }
-        true
-    }
-
-    fn send_request(&mut self, now: Instant, id: ClientId) {
-        let Some(client) = self.clients.get_mut(&id) else { return };
-        let Some(request) = client.waiting.pop_front() else { return };
-        self.shares.charge(&mut client.share, request.line_bytes());
-        self.watchdog.sent_request(now, id);
-        match request {
-            WholeRequest::Read { address, count } => self.send_read(now, id, address, count),
-            WholeRequest::Write { map, address, values } => {
-                self.send_write(now, id, map, address, values);
-            }
-            WholeRequest::WritesBetweenReads { map, writes, read: (first, count) } => {
-                self.send_read(now, id, first, count);
-                writes.into_iter().for_each(|(start, bytes)| self.send_write(now, id, map, start, bytes));
-                self.send_read(now, id, first, count);
-            }
-        }
-    }
-
-    fn send_read(&mut self, now: Instant, id: ClientId, address: u8, count: u8) {
-        let Some(client) = self.clients.get_mut(&id) else { return };
-        client.unanswered += 1;
-        // A write of 0 registers chooses the form of the offsets (M5).
-        if let Some(map) = client.own.form_of_read(address, count, self.known.form_before_writes()) {
-            self.line.send_write(now, map, 0, &[]);
-        }
-        self.line.send_read(now, Owner::Client(id), address, count);
-    }
-
-    fn send_write(&mut self, now: Instant, id: ClientId, map: Map, address: u8, mut values: Vec<u8>) {
-        let Some(client) = self.clients.get_mut(&id) else { return };
-        let is_accepted = self.known.accepts(map, address, &values);
-        if is_accepted && client.own.write(map, address, &mut values) {
-            client.schedule.set(now, &client.own);
-            self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
-        }
-        if !self.is_read_only {
-            if is_accepted && map == Map::V22 {
-                self.watchdog.wrote(now, id, address, &values);
-            }
-            self.known.write(map, address, &values);
-            self.line.send_write(now, map, address, &values);
-        }
-    }
-
-    fn send_sample(&mut self, now: Instant, stream: Stream) {
-        let (address, count) = stream.registers();
-        self.shares.charge(&mut self.sampler.share, request::read_bytes(count));
-        self.sampler.note_sent(now, stream);
-        self.line.send_read(now, Owner::Sample(stream), address, count);
-    }
-
-    fn deliver(&mut self, now: Instant, owner: Owner, event: Event) {
-        match (owner, event) {
-            (Owner::Client(id), mut event) => {
-                let Some(client) = self.clients.get_mut(&id) else { return };
-                if let Event::Reply { address, values } = &mut event {
-                    client.own.overlay(*address, values);
-                }
-                client.unanswered = client.unanswered.saturating_sub(1);
-                client.events.push_back(event);
-            }
-            (Owner::Sample(stream), Event::Reply { values, .. }) => {
-                for client in self.clients.values_mut() {
-                    client.report(now, stream, &values);
-                }
-            }
-            (Owner::Identity, Event::Reply { values, .. }) => self.identify(now, &values),
-            (Owner::Sample(_) | Owner::Identity, _) => {}
+            ArmState::Present => line.min(watchdog).min(self.sampler.due().max(self.line.free_at(now))),
         }
     }
 
@@ -309,6 +403,9 @@ impl Hub {
             self.arm = ArmState::Present;
             self.known = known;
             self.watchdog.forget();
+            if self.options.is_read_only {
+                return;
+            }
             for register in [ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY] {
                 self.line.send_write(now, Map::V21, register.address, &[0]);
             }
@@ -320,17 +417,6 @@ impl Hub {
     fn deliver_all(&mut self, now: Instant) {
         while let Some((owner, event)) = self.line.next_event(now) {
             self.deliver(now, owner, event);
-        }
-    }
-
-    fn has_waiting(&self) -> bool {
-        self.clients.values().any(|client| !client.waiting.is_empty())
-    }
-
-    /// Drops the requests that wait, because there is no arm.
-    fn drop_waiting(&mut self) {
-        for client in self.clients.values_mut() {
-            client.drop_waiting();
         }
     }
 }

@@ -1,6 +1,7 @@
 //! A whole request of a client, with its values.
 
 use protocol_core::registers::Map;
+use protocol_core::registers::map::{DEVICE_ID, GRIP_LIMIT};
 use protocol_core::wire::{Frame, Function, MIN_LENGTH};
 
 /// A request that owns its values.
@@ -60,6 +61,20 @@ impl WholeRequest {
     }
 }
 
+/// A write without the registers at its ends that no write has an effect on (D15): the longest frame that is left takes 17 ms
+/// at 115 200 baud and not 23, and a stop cannot interrupt it.
+pub(crate) fn without_idle_ends(address: u8, values: &[u8]) -> (u8, &[u8]) {
+    let is_idle = |place: usize| {
+        let register = usize::from(address) + place;
+        register < usize::from(DEVICE_ID.address)
+            || register >= usize::from(GRIP_LIMIT.address + GRIP_LIMIT.count)
+    };
+    let Some(first) = (0..values.len()).find(|&place| !is_idle(place)) else { return (address, &[]) };
+    let last = (0..values.len()).rfind(|&place| !is_idle(place)).unwrap_or(first);
+    let start = u8::try_from(usize::from(address) + first).unwrap_or(address);
+    (start, values.get(first..=last).unwrap_or_default())
+}
+
 /// Bytes that a read of `count` registers and its reply take on the line.
 pub(crate) fn read_bytes(count: u8) -> usize {
     MIN_LENGTH + reply_bytes(count)
@@ -68,4 +83,19 @@ pub(crate) fn read_bytes(count: u8) -> usize {
 /// Bytes of the reply with `count` registers.
 pub(crate) fn reply_bytes(count: u8) -> usize {
     MIN_LENGTH + usize::from(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn registers_without_effect_at_the_ends_of_a_write_are_not_sent() {
+        let values = [7; 255];
+        assert_eq!(without_idle_ends(0, &values), (11, &values[11..195]));
+        assert_eq!(without_idle_ends(46, &values[..7]), (46, &values[..7]));
+        assert_eq!(without_idle_ends(8, &values[..4]), (11, &values[..1]));
+        assert_eq!(without_idle_ends(232, &values[..8]), (232, &[][..]));
+        assert_eq!(without_idle_ends(0, &[]), (0, &[][..]));
+    }
 }

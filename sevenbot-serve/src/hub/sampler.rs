@@ -16,6 +16,8 @@ use super::stream::{STREAMS, Stream};
 pub(crate) struct Sampler {
     timers: [Timer; STREAMS],
     pub(crate) share: Share,
+    /// A sample is due, and its share has joined those of the clients.
+    waits: bool,
     /// In bits per second.
     baud: u32,
 }
@@ -23,7 +25,7 @@ pub(crate) struct Sampler {
 impl Sampler {
     /// A sampler that reads nothing. `baud` is in bits per second.
     pub(crate) const fn new(baud: u32) -> Self {
-        Self { timers: [Timer::OFF; STREAMS], share: Share::IDLE, baud }
+        Self { timers: [Timer::OFF; STREAMS], share: Share::IDLE, waits: false, baud }
     }
 
     /// Sets the highest frequencies that these clients want.
@@ -54,8 +56,16 @@ impl Sampler {
         streams.find(|(timer, _)| timer.due <= now).map(|(_, stream)| stream)
     }
 
+    /// Does a sample begin to wait?
+    pub(crate) fn begins_to_wait(&mut self, now: Instant) -> bool {
+        let begins = !self.waits && self.due() <= now;
+        self.waits |= begins;
+        begins
+    }
+
     /// A sample was asked for.
     pub(crate) fn note_sent(&mut self, now: Instant, stream: Stream) {
+        self.waits = false;
         if let Some(timer) = self.timers.get_mut(stream.index()) {
             timer.advance(now);
         }

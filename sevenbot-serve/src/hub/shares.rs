@@ -1,8 +1,8 @@
 //! Fair use of the line: start-time fair queueing, counted in bytes.
 //!
-//! Each client has a tag: the bytes up to which it has used the line. The client with the lowest tag is next. A client
-//! that was idle starts at the tag of the request that was sent last. So it waits for one frame, and however many
-//! frames others have queued does not matter.
+//! Each client has a tag: the bytes up to which it has used the line. The request that would end at the lowest tag is next, so
+//! a short one does not wait for long ones that could begin at the same tag. A client that was idle starts at the tag of the
+//! request that was sent last. So it waits for one frame, and however many frames others have queued does not matter.
 
 /// The tag of a client, and when it was served last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,9 +31,10 @@ impl Shares {
         share.tag = share.tag.max(self.current);
     }
 
-    /// The client with the smallest order is next. Between equal tags it is the one that has waited longest.
-    pub(crate) fn order(&self, share: Share) -> (u64, u64) {
-        (share.tag.max(self.current), share.turn)
+    /// The request with the smallest order is next; it has this many bytes. Between equal ends it is that of the client that
+    /// has waited longest.
+    pub(crate) fn order(share: Share, bytes: usize) -> (u64, u64) {
+        (share.tag.saturating_add(length(bytes)), share.turn)
     }
 
     /// A request of this many bytes was sent.
@@ -41,8 +42,12 @@ impl Shares {
         self.current = self.current.max(share.tag);
         self.turns += 1;
         share.turn = self.turns;
-        share.tag = self.current + u64::try_from(bytes).unwrap_or(u64::MAX);
+        share.tag = share.tag.saturating_add(length(bytes));
     }
+}
+
+fn length(bytes: usize) -> u64 {
+    u64::try_from(bytes).unwrap_or(u64::from(u32::MAX))
 }
 
 #[cfg(test)]
@@ -55,7 +60,8 @@ mod tests {
         let mut clients = [Share::default(); COUNT];
         let mut served = [0; COUNT];
         for _ in 0..rounds {
-            let next = (0..COUNT).min_by_key(|&client| shares.order(clients[client])).unwrap();
+            let next =
+                (0..COUNT).min_by_key(|&client| Shares::order(clients[client], lengths[client])).unwrap();
             shares.charge(&mut clients[next], lengths[next]);
             served[next] += lengths[next];
         }
@@ -70,6 +76,28 @@ mod tests {
     }
 
     #[test]
+    fn a_short_request_seldom_waits_for_a_round_of_long_ones() {
+        let (mut shares, mut busy, mut one) = (Shares::default(), [Share::default(); 31], Share::default());
+        let mut waits = Vec::new();
+        let mut wait = 0;
+        for turn in 0..10_000 {
+            let next = (0..31).min_by_key(|&client| Shares::order(busy[client], 269)).unwrap();
+            // It asks again while the reply to another one is on the line.
+            if turn % 2 == 0 && Shares::order(one, 21) < Shares::order(busy[next], 269) {
+                shares.charge(&mut one, 21);
+                waits.push(wait);
+                wait = 0;
+            } else {
+                shares.charge(&mut busy[next], 269);
+                shares.join(&mut one);
+                wait += 1;
+            }
+        }
+        waits.sort_unstable();
+        assert!(waits[waits.len() / 2] <= 3, "{waits:?}");
+    }
+
+    #[test]
     fn a_client_that_was_idle_is_next_but_does_not_catch_up() {
         let mut shares = Shares::default();
         let mut busy = [Share::default(); 9];
@@ -78,11 +106,11 @@ mod tests {
             shares.charge(&mut busy[turn % 9], 262);
         }
         shares.join(&mut idle);
-        assert!(busy.iter().all(|&share| shares.order(idle) < shares.order(share)));
-        (0..20).for_each(|_| shares.charge(&mut idle, 14));
+        assert!(busy.iter().all(|&share| Shares::order(idle, 14) < Shares::order(share, 262)));
+        (0..40).for_each(|_| shares.charge(&mut idle, 14));
         assert!(
-            busy.iter().any(|&share| shares.order(share) < shares.order(idle)),
-            "a frame's length, not 100"
+            busy.iter().any(|&share| Shares::order(share, 262) < Shares::order(idle, 14)),
+            "the length of two frames, not of 100"
         );
     }
 }

@@ -1,31 +1,30 @@
 //! The watchdog of the arm (D24) for the client that set it: requests of other clients must not hide its silence.
 //!
 //! ```text
-//!   Off ── register 186 written ──▶ Watching ── the client is silent ──▶ Quiet ── the arm has acted ──▶ Acted
-//!                                      ▲                                                                 │
-//!                                      └───────────────── the client sends again ────────────────────────┘
+//!   Off ── register 186 written ──▶ Watching ── the client is silent ──▶ Acted
+//!                                      ▲                                   │
+//!                                      └────── the client sends again ─────┘
 //! ```
 //!
 //! The arm counts the frames of all clients, and the samples. So once the client has been silent for the time of its
-//! watchdog, the hub sends nothing until the arm has noticed the silence and acted by itself. A client that has left
-//! is silent, too.
+//! watchdog, the hub does what the arm would do. A client that has left is silent, too. The arm's own watchdog stays as the
+//! client set it, and acts if the server fails.
 
-use protocol_core::registers::map::HOST_WATCHDOG;
+use protocol_core::registers::map::{HOST_WATCHDOG, WATCHDOG_ACTION};
 use protocol_core::time::{Duration, Instant};
 
 use super::client_id::ClientId;
 
 /// One step of register 186.
 const STEP: Duration = Duration::from_millis(10);
-/// The arm acts within 10 ms of its time, and a USB adapter may hold frames back.
-const MARGIN: Duration = Duration::from_millis(50);
 
+/// What a watchdog does (register 187).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
-    Watching,
-    /// Nothing may be sent before this time.
-    Quiet(Instant),
-    Acted,
+pub(crate) enum WatchdogAction {
+    /// Every joint holds.
+    Hold,
+    /// The motors are switched off.
+    Damp,
 }
 
 /// The watchdog that a client has set.
@@ -33,65 +32,70 @@ enum State {
 struct Watched {
     client: ClientId,
     timeout: Duration,
+    action: WatchdogAction,
     /// When the last request of the client was sent.
     heard: Instant,
-    state: State,
+    is_silent: bool,
 }
 
 /// Follows the client that set the watchdog last.
 #[derive(Debug, Default)]
-pub(crate) struct ClientWatchdog(Option<Watched>);
+pub(crate) struct ClientWatchdog {
+    watched: Option<Watched>,
+    /// It acted since register 186 was written (fault bit 6).
+    has_acted: bool,
+}
 
 impl ClientWatchdog {
-    /// The arm accepted a write of a client, of function 06.
-    pub(crate) fn wrote(&mut self, now: Instant, client: ClientId, address: u8, values: &[u8]) {
-        let place = HOST_WATCHDOG.address.checked_sub(address);
-        if let Some(&steps) = place.and_then(|place| values.get(usize::from(place))) {
-            self.set(now, client, steps);
+    /// The arm accepted a write of a client, of function 06. `damps`: what register 187 says after it.
+    pub(crate) fn wrote(&mut self, now: Instant, client: ClientId, damps: bool, address: u8, values: &[u8]) {
+        let value = |register: u8| values.get(usize::from(register.checked_sub(address)?)).copied();
+        let action = if damps { WatchdogAction::Damp } else { WatchdogAction::Hold };
+        if let Some(watched) = self.watched.as_mut().filter(|_| value(WATCHDOG_ACTION.address).is_some()) {
+            watched.action = action;
+        }
+        if let Some(steps) = value(HOST_WATCHDOG.address) {
+            self.set(now, client, steps, action);
         }
     }
 
     /// A client wrote register 186, in steps of 10 ms; 0 switches the watchdog off.
-    fn set(&mut self, now: Instant, client: ClientId, steps: u8) {
+    fn set(&mut self, now: Instant, client: ClientId, steps: u8, action: WatchdogAction) {
         let timeout = Duration::from_micros(STEP.as_micros() * u64::from(steps));
-        let watched = Watched { client, timeout, heard: now, state: State::Watching };
-        self.0 = (steps > 0).then_some(watched);
+        let watched = Watched { client, timeout, action, heard: now, is_silent: false };
+        *self = Self { watched: (steps > 0).then_some(watched), has_acted: false };
     }
 
     /// The arm may have restarted.
     pub(crate) fn forget(&mut self) {
-        self.0 = None;
+        *self = Self::default();
     }
 
     /// A request of a client was sent.
     pub(crate) fn sent_request(&mut self, now: Instant, client: ClientId) {
-        if let Some(watched) = self.0.as_mut().filter(|watched| watched.client == client) {
-            (watched.heard, watched.state) = (now, State::Watching);
+        if let Some(watched) = self.watched.as_mut().filter(|watched| watched.client == client) {
+            (watched.heard, watched.is_silent) = (now, false);
         }
     }
 
-    /// Begins and ends the time without frames. `idle_since` is when the last byte left on the line.
-    pub(crate) fn poll(&mut self, now: Instant, idle_since: Instant) {
-        let Some(watched) = &mut self.0 else { return };
-        if watched.state == State::Watching && now >= watched.heard + watched.timeout {
-            watched.state = State::Quiet(idle_since + watched.timeout + MARGIN);
-        }
-        if matches!(watched.state, State::Quiet(until) if until <= now) {
-            watched.state = State::Acted;
-        }
+    /// What to do now, once in each silence.
+    pub(crate) fn poll(&mut self, now: Instant) -> Option<WatchdogAction> {
+        let due = self.due();
+        let watched = self.watched.as_mut().filter(|_| due <= now)?;
+        watched.is_silent = true;
+        self.has_acted = true;
+        Some(watched.action)
     }
 
-    /// When frames may be sent again.
-    pub(crate) fn quiet_until(&self) -> Instant {
-        match self.0 {
-            Some(Watched { state: State::Quiet(until), .. }) => until,
-            _ => Instant::ZERO,
-        }
+    /// When the client has been silent for too long.
+    pub(crate) fn due(&self) -> Instant {
+        let watched = self.watched.filter(|watched| !watched.is_silent);
+        watched.map_or(Instant::FAR_FUTURE, |watched| watched.heard + watched.timeout)
     }
 
-    /// May frames be sent?
-    pub(crate) fn allows(&self, now: Instant) -> bool {
-        self.quiet_until() <= now
+    /// Did it act since register 186 was written?
+    pub(crate) const fn has_acted(&self) -> bool {
+        self.has_acted
     }
 }
 
@@ -103,39 +107,34 @@ mod tests {
         Instant::from_micros(millis * 1_000)
     }
 
-    fn quiet(watchdog: &mut ClientWatchdog, now: Instant, idle_since: Instant) -> Option<Instant> {
-        watchdog.poll(now, idle_since);
-        (!watchdog.allows(now)).then(|| watchdog.quiet_until())
-    }
-
     #[test]
-    fn d24_the_line_is_quiet_once_in_each_silence_of_the_client() {
+    fn d24_it_acts_once_in_each_silence_of_the_client() {
         let (one, mut watchdog) = (ClientId::default(), ClientWatchdog::default());
-        assert_eq!(quiet(&mut watchdog, at_ms(9_000), at_ms(0)), None, "it is off");
-        watchdog.set(at_ms(0), one, 20);
+        assert_eq!(watchdog.poll(at_ms(9_000)), None, "it is off");
+        watchdog.wrote(at_ms(0), one, false, 186, &[20]);
         watchdog.sent_request(at_ms(100), one);
         watchdog.sent_request(at_ms(250), one.next());
-        assert_eq!(quiet(&mut watchdog, at_ms(299), at_ms(298)), None);
-        assert_eq!(quiet(&mut watchdog, at_ms(300), at_ms(299)), Some(at_ms(549)));
-        assert_eq!(quiet(&mut watchdog, at_ms(549), at_ms(299)), None, "the arm has acted");
-        assert_eq!(quiet(&mut watchdog, at_ms(9_000), at_ms(8_999)), None, "once");
+        assert_eq!(watchdog.poll(at_ms(299)), None);
+        assert_eq!((watchdog.due(), watchdog.has_acted()), (at_ms(300), false));
+        assert_eq!(watchdog.poll(at_ms(300)), Some(WatchdogAction::Hold));
+        assert_eq!(watchdog.poll(at_ms(9_000)), None, "once");
+        assert!(watchdog.has_acted());
         watchdog.sent_request(at_ms(9_000), one);
-        assert_eq!(quiet(&mut watchdog, at_ms(9_199), at_ms(9_199)), None);
-        assert_eq!(
-            quiet(&mut watchdog, at_ms(9_300), at_ms(9_000)),
-            None,
-            "on an idle line the arm acts by itself"
-        );
+        watchdog.wrote(at_ms(9_100), one.next(), true, 187, &[1]);
+        assert_eq!(watchdog.poll(at_ms(9_199)), None);
+        assert_eq!(watchdog.poll(at_ms(9_200)), Some(WatchdogAction::Damp));
+        watchdog.wrote(at_ms(9_201), one, true, 186, &[20]);
+        assert!(!watchdog.has_acted());
     }
 
     #[test]
-    fn a_watchdog_that_is_switched_off_stops_nothing() {
+    fn a_watchdog_that_is_switched_off_does_nothing() {
         let (one, mut watchdog) = (ClientId::default(), ClientWatchdog::default());
-        watchdog.set(at_ms(0), one, 1);
-        watchdog.set(at_ms(1), one.next(), 0);
-        assert_eq!(quiet(&mut watchdog, at_ms(9_000), at_ms(8_999)), None);
-        watchdog.set(at_ms(0), one, 1);
+        watchdog.wrote(at_ms(0), one, false, 186, &[1]);
+        watchdog.wrote(at_ms(1), one.next(), false, 186, &[0]);
+        assert_eq!(watchdog.poll(at_ms(9_000)), None);
+        watchdog.wrote(at_ms(0), one, false, 186, &[1]);
         watchdog.forget();
-        assert_eq!(quiet(&mut watchdog, at_ms(9_000), at_ms(8_999)), None);
+        assert_eq!(watchdog.poll(at_ms(9_000)), None);
     }
 }

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use super::block::has_solution;
 use super::command::{MakerCommand, MakerCommandError};
-use crate::hub::{ClientId, Event, Hub, MOST_WAITING, WholeRequest};
+use crate::hub::{Admission, ClientId, Event, Hub, MOST_WAITING, WholeRequest};
 
 /// Answers that may wait for a client to take them. Its commands wait meanwhile.
 const MOST_ANSWERS: usize = 8;
@@ -24,7 +24,8 @@ const MOST_ANSWERS: usize = 8;
 pub struct MakerClient {
     id: ClientId,
     is_browser: bool,
-    waiting: VecDeque<Result<MakerCommand, MakerCommandError>>,
+    /// Each with the time at which it was sent at the earliest.
+    waiting: VecDeque<(Instant, Result<MakerCommand, MakerCommandError>)>,
     /// The command whose read has no reply yet.
     current: Option<MakerCommand>,
     /// The first of two events that the command waits for.
@@ -47,7 +48,18 @@ impl MakerClient {
         }
     }
 
-    /// Leaves the hub.
+    /// The id in the hub.
+    #[must_use]
+    pub const fn id(&self) -> ClientId {
+        self.id
+    }
+
+    /// Leaves the hub after a clean end: see [`Hub::leave`].
+    pub fn leave(self, hub: &mut Hub, now: Instant) {
+        hub.leave(now, self.id);
+    }
+
+    /// Leaves the hub: see [`Hub::disconnect`].
     pub fn disconnect(self, hub: &mut Hub, now: Instant) {
         hub.disconnect(now, self.id);
     }
@@ -58,19 +70,19 @@ impl MakerClient {
         self.waiting.len() < MOST_WAITING
     }
 
-    /// Takes a message. Call it only if [`MakerClient::has_room`].
-    pub fn message(&mut self, text: &str) {
-        self.waiting.push_back(MakerCommand::parse(text));
+    /// Takes a message that was sent at `since` or later. Call it only if [`MakerClient::has_room`].
+    pub fn message(&mut self, since: Instant, text: &str) {
+        self.waiting.push_back((since, MakerCommand::parse(text)));
     }
 
     /// Carries out commands, as far as possible. Call it after messages, after [`Hub::poll`] and [`Hub::arm_bytes`].
     pub fn advance(&mut self, hub: &mut Hub, now: Instant) {
         while let Some(event) = hub.take_event(self.id) {
-            self.finish_read(hub, event);
+            self.finish_read(hub, now, event);
         }
         while self.current.is_none() && self.answers.len() < MOST_ANSWERS && hub.has_room(self.id) {
-            let Some(command) = self.waiting.pop_front() else { return };
-            self.start(hub, now, command);
+            let Some((since, command)) = self.waiting.pop_front() else { return };
+            self.start(hub, now, since, command);
         }
     }
 
@@ -79,18 +91,24 @@ impl MakerClient {
         self.answers.pop_front()
     }
 
-    fn start(&mut self, hub: &mut Hub, now: Instant, command: Result<MakerCommand, MakerCommandError>) {
+    fn start(
+        &mut self,
+        hub: &mut Hub,
+        now: Instant,
+        since: Instant,
+        command: Result<MakerCommand, MakerCommandError>,
+    ) {
         match command {
             Err(MakerCommandError { message, is_read }) => self.answer(is_read, &error(&message)),
             Ok(MakerCommand::Ping) => {
                 self.answer(false, &json!({"status": "pong", "timestamp": now.as_micros() / 1_000}));
             }
             Ok(MakerCommand::Write { address, values, done }) => {
-                hub.request(self.id, write(address, values));
-                self.answer(false, &message(done));
+                let admission = hub.request(now, self.id, since, write(address, values));
+                self.answer(false, &done_or_refused(done, admission));
             }
             Ok(MakerCommand::Read { address, count }) => {
-                hub.request(self.id, WholeRequest::Read { address, count });
+                hub.request(now, self.id, since, WholeRequest::Read { address, count });
                 self.current = Some(MakerCommand::Read { address, count });
             }
             Ok(MakerCommand::InverseKinematics { address, values }) => {
@@ -99,18 +117,23 @@ impl MakerClient {
                     writes: solving_writes(address, &values),
                     read: (FRAMES_REFUSED.address, FRAMES_REFUSED.count),
                 };
-                hub.request(self.id, request);
-                self.current = Some(MakerCommand::InverseKinematics { address, values });
+                match hub.request(now, self.id, since, request) {
+                    // It still ends, with two events.
+                    Admission::Queued | Admission::NoArm => {
+                        self.current = Some(MakerCommand::InverseKinematics { address, values });
+                    }
+                    refused => self.answer(false, &done_or_refused("", refused)),
+                }
             }
             Ok(MakerCommand::Stop) => {
                 let (address, count) = (PRESENT_POSITION.address, PRESENT_POSITION.count);
-                hub.request(self.id, WholeRequest::Read { address, count });
+                hub.request(now, self.id, since, WholeRequest::Read { address, count });
                 self.current = Some(MakerCommand::Stop);
             }
         }
     }
 
-    fn finish_read(&mut self, hub: &mut Hub, event: Event) {
+    fn finish_read(&mut self, hub: &mut Hub, now: Instant, event: Event) {
         match (self.current.take(), event) {
             (
                 Some(command @ MakerCommand::InverseKinematics { .. }),
@@ -120,8 +143,8 @@ impl MakerClient {
                 Some(before) => self.answer(false, &solution(&before, &event)),
             },
             (Some(MakerCommand::Stop), Event::Reply { values, .. }) => {
-                hub.request(self.id, write(TARGET_POSITION.address, values));
-                self.answer(false, &message("Stopped"));
+                let admission = hub.request(now, self.id, now, write(TARGET_POSITION.address, values));
+                self.answer(false, &done_or_refused("Stopped", admission));
             }
             (Some(_), Event::Reply { values, .. }) => {
                 self.answer(true, &json!({"status": "ok", "data": values}))
@@ -166,6 +189,19 @@ fn solution(before: &Event, after: &Event) -> Value {
             }
         }
         _ => error("The arm does not answer"),
+    }
+}
+
+/// The answer to a write.
+fn done_or_refused(done: &str, admission: Admission) -> Value {
+    match admission {
+        Admission::Queued => message(done),
+        Admission::NoRoom => error("Too many commands wait"),
+        Admission::NoArm => error("The arm does not answer"),
+        Admission::ReadOnly => error("The server is read-only"),
+        Admission::Stopped => error("Another program stopped the arm: pause for a second to start anew"),
+        Admission::Late => error("The command waited too long"),
+        Admission::AnotherDrives => error("Another program drives the arm"),
     }
 }
 

@@ -3,12 +3,15 @@
 use std::io;
 use std::path::PathBuf;
 
+use std::sync::Arc;
+
 use protocol_core::time::{Duration, Instant};
-use rustix::event::{PollFd, PollFlags};
 use tty_ports::serial::Serial;
 
 use super::arm_location::{ArmLocation, PortSearch};
 use super::notice::Notice;
+use super::readiness::Readiness;
+use super::shared::Shared;
 use crate::hub::Hub;
 
 /// Time between two attempts to open the port.
@@ -20,7 +23,7 @@ const SEARCH_TIMEOUT: Duration = Duration::from_millis(1_000);
 
 /// The serial port of the arm.
 #[derive(Debug)]
-pub(crate) struct ArmPort {
+pub(super) struct ArmPort {
     path: PathBuf,
     search: Option<PortSearch>,
     baud: u32,
@@ -34,11 +37,11 @@ enum ArmPortState {
     /// Tried again at this time.
     Closed(Instant),
     /// Opened at this time.
-    Open(Serial, Instant),
+    Open(Serial, Readiness, Instant),
 }
 
 impl ArmPort {
-    pub(crate) fn new(location: ArmLocation, baud: u32) -> Self {
+    pub(super) fn new(location: ArmLocation, baud: u32) -> Self {
         let (path, search) = match location {
             ArmLocation::Port(path) => (path, None),
             ArmLocation::Search { first, list } => (first, Some(PortSearch::new(list))),
@@ -46,12 +49,39 @@ impl ArmPort {
         Self { path, search, baud, state: ArmPortState::Closed(Instant::ZERO), last_notice: None }
     }
 
+    /// Serves the arm for ever.
+    pub(super) async fn serve(mut self, shared: Arc<Shared>, mut notify: impl FnMut(Notice)) {
+        loop {
+            let (deadline, has_output) = shared.with_hub(|hub, now| {
+                self.receive(hub, now, &mut notify);
+                hub.poll(now);
+                self.send(hub, now, &mut notify);
+                (hub.deadline(now).min(self.deadline()), !hub.to_arm().is_empty())
+            });
+            tokio::select! {
+                () = self.is_ready(has_output) => {}
+                () = shared.clients_acted() => {}
+                () = shared.sleep_until(deadline) => {}
+            }
+        }
+    }
+
+    /// Ends when the port has bytes, or takes some.
+    async fn is_ready(&self, has_output: bool) {
+        let ArmPortState::Open(_, readiness, _) = &self.state else { return std::future::pending().await };
+        // An error shows itself when the port is used.
+        let _ = tokio::select! {
+            ready = readiness.readable() => ready,
+            ready = readiness.writable(), if has_output => ready,
+        };
+    }
+
     /// Opens the port if it is time to, and passes bytes of the arm to the hub.
-    pub(crate) fn receive(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
+    fn receive(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
         match &self.state {
             ArmPortState::Closed(due) if *due <= now => self.open(hub, now, notify),
             ArmPortState::Closed(_) => {}
-            ArmPortState::Open(port, opened) => {
+            ArmPortState::Open(port, _, opened) => {
                 let had_arm = hub.has_arm();
                 match read_all(port, hub, now) {
                     Err(error) => self.close(hub, now, notify, &error.to_string()),
@@ -74,8 +104,8 @@ impl ArmPort {
     }
 
     /// Sends the hub's bytes.
-    pub(crate) fn send(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
-        let ArmPortState::Open(port, _) = &self.state else { return };
+    fn send(&mut self, hub: &mut Hub, now: Instant, notify: &mut dyn FnMut(Notice)) {
+        let ArmPortState::Open(port, ..) = &self.state else { return };
         if hub.to_arm().is_empty() {
             return;
         }
@@ -86,24 +116,17 @@ impl ArmPort {
     }
 
     /// When to call [`ArmPort::receive`] without other events.
-    pub(crate) fn deadline(&self) -> Instant {
+    fn deadline(&self) -> Instant {
         match &self.state {
             ArmPortState::Closed(due) => *due,
             // Only while it is not known what is behind the port does the time matter, but then it is short.
-            ArmPortState::Open(_, opened)
+            ArmPortState::Open(.., opened)
                 if self.last_notice != Some(Notice::ArmFound(self.path.clone())) =>
             {
                 *opened + self.identify_timeout()
             }
             ArmPortState::Open(..) => Instant::FAR_FUTURE,
         }
-    }
-
-    /// What poll(2) has to wait for.
-    pub(crate) fn interest(&self, hub: &Hub) -> Option<PollFd<'_>> {
-        let ArmPortState::Open(port, _) = &self.state else { return None };
-        let output = if hub.to_arm().is_empty() { PollFlags::empty() } else { PollFlags::OUT };
-        Some(PollFd::new(port, PollFlags::IN | output))
     }
 
     const fn identify_timeout(&self) -> Duration {
@@ -114,9 +137,10 @@ impl ArmPort {
         if let Some(path) = self.search.as_mut().and_then(|search| search.next(&self.path)) {
             self.path = path;
         }
-        match Serial::open(&self.path, self.baud) {
-            Ok(port) => {
-                self.state = ArmPortState::Open(port, now);
+        let opened = Serial::open(&self.path, self.baud).map_err(io::Error::other);
+        match opened.and_then(|port| Ok((Readiness::of(&port)?, port))) {
+            Ok((readiness, port)) => {
+                self.state = ArmPortState::Open(port, readiness, now);
                 hub.open_arm(now);
             }
             Err(error) => self.close(hub, now, notify, &error.to_string()),

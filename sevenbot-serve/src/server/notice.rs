@@ -1,6 +1,9 @@
 //! What happens while the server runs.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
+
+use tokio::sync::mpsc::Sender;
 
 /// What happens to the server while it runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,4 +19,32 @@ pub enum Notice {
     },
     /// The port is open, and no 7Bot V2 answers.
     ArmSilent(PathBuf),
+    /// A client was refused.
+    Refused {
+        /// Its address.
+        peer: Option<SocketAddr>,
+        /// Why.
+        reason: RefusalReason,
+    },
+}
+
+/// Why a client was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RefusalReason {
+    /// Its token is wrong.
+    WrongToken,
+    /// There are too many clients.
+    Full,
+    /// It does not speak frames, but for example HTTP.
+    NoFrames,
+}
+
+/// Where tasks send notices. When many wait, more are dropped.
+#[derive(Clone, Debug)]
+pub(super) struct Notices(pub(super) Sender<Notice>);
+
+impl Notices {
+    pub(super) fn send(&self, notice: Notice) {
+        let _ = self.0.try_send(notice);
+    }
 }

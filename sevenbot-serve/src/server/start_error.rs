@@ -2,6 +2,7 @@
 
 use std::io;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 
 use tty_ports::symlink::SymlinkError;
 
@@ -17,6 +18,25 @@ pub enum StartError {
     /// Another program listens there.
     #[error("{0}: another program listens there: choose another port, or end it; 'ss -ltnp' shows which one")]
     InUse(SocketAddr),
+    /// The local socket cannot be used.
+    #[error("{}: {cause}: choose another path for the socket", path.display())]
+    Socket {
+        /// The path.
+        path: PathBuf,
+        /// The reason.
+        cause: io::Error,
+    },
+    /// The certificate or its key cannot be used.
+    #[error("{}: {cause}", path.display())]
+    Certificate {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        cause: io::Error,
+    },
+    /// The operating system refuses what every server needs.
+    #[error("the operating system refuses: {0}")]
+    System(io::Error),
     /// The address cannot be used.
     #[error("{address}: {cause}: choose an address of this computer")]
     Address {

@@ -9,6 +9,7 @@ use motion_core::servo_bus::TorqueCodes;
 use protocol_core::request::{Reply, Report, Request};
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, FrameBuffer, ToHost};
+use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::{FrameClient, Hub, MakerClient};
 
 use std::collections::VecDeque;
@@ -43,6 +44,8 @@ pub struct World {
     pub hub: Hub,
     pub arm: SimulatedArm<Flash>,
     pub is_plugged: bool,
+    /// What the hub sent, for tests that look at it.
+    pub sent: Vec<u8>,
     /// The next byte of the arm is damaged on the line.
     pub damages_next_byte: bool,
     pub programs: Vec<Program>,
@@ -74,16 +77,21 @@ impl World {
     }
 
     pub fn with_access(programs: usize, is_read_only: bool) -> Self {
+        Self::with_options(programs, HubOptions { is_read_only, ..HubOptions::default() })
+    }
+
+    pub fn with_options(programs: usize, options: HubOptions) -> Self {
         let config =
             ArmConfig { chip_id: *b"SIM\0\0\x01", is_paced: true, torque_codes: TorqueCodes::default() };
         let plant = Plant::new(Instant::ZERO);
         let arm = SimulatedArm::new(Instant::ZERO, config, Flash::in_memory(), plant);
-        let hub = Hub::new(BAUD, is_read_only);
+        let hub = Hub::new(BAUD, options);
         let mut world = Self {
             now: Instant::ZERO,
             hub,
             arm,
             is_plugged: false,
+            sent: Vec::new(),
             damages_next_byte: false,
             programs: Vec::new(),
             pages: Vec::new(),
@@ -119,6 +127,11 @@ impl World {
     }
 
     pub fn leave(&mut self, number: usize) {
+        self.programs.remove(number).client.leave(&mut self.hub, self.now);
+    }
+
+    /// The program's connection is reset.
+    pub fn reset(&mut self, number: usize) {
         self.programs.remove(number).client.disconnect(&mut self.hub, self.now);
     }
 
@@ -139,17 +152,27 @@ impl World {
 
     /// Runs for some milliseconds, in steps of 0.1 ms.
     pub fn run(&mut self, millis: u64) {
-        for _ in 0..millis * 10 {
+        self.advance(millis * 10);
+    }
+
+    /// Runs for some steps of 0.1 ms.
+    pub fn advance(&mut self, steps: u64) {
+        for _ in 0..steps {
             self.now = self.now + Duration::from_micros(100);
             self.step();
         }
     }
 
-    fn step(&mut self) {
+    /// Hands over what the programs sent, and nothing else.
+    pub fn push(&mut self) {
         for program in &mut self.programs {
-            let taken = program.client.push(&mut self.hub, self.now, &program.to_send);
+            let taken = program.client.push(&mut self.hub, self.now, self.now, &program.to_send);
             program.to_send.drain(..taken);
         }
+    }
+
+    fn step(&mut self) {
+        self.push();
         for page in &mut self.pages {
             page.send(&mut self.hub, self.now);
         }
@@ -157,6 +180,7 @@ impl World {
         if self.is_plugged {
             let room = self.arm.host_room().min(self.hub.to_arm().len());
             let sent = self.arm.host_send(self.now, &self.hub.to_arm()[..room]);
+            self.sent.extend(&self.hub.to_arm()[..sent]);
             self.hub.sent_to_arm(sent);
             self.arm.advance(self.now, true);
             let mut received = self.arm.host_received().to_vec();
@@ -215,7 +239,7 @@ impl Page {
     fn send(&mut self, hub: &mut Hub, now: Instant) {
         for _ in 0..20 {
             let Some(message) = self.to_send.pop_front_if(|_| self.client.has_room()) else { break };
-            self.client.message(&message);
+            self.client.message(now, &message);
         }
         self.client.advance(hub, now);
     }

@@ -38,12 +38,13 @@ impl Served {
         let mut command = tool();
         command
             .current_dir(&folder)
+            .env("XDG_RUNTIME_DIR", folder.path())
             .args(["--port", "./arm", "serve", "--tcp", "0", "--ws", "0"])
             .args(options);
         for name in names(ptys) {
             command.args(["--pty", name]);
         }
-        let (server, ports) = process::start(&mut command, ptys + 2).expect("the server is ready");
+        let (server, ports) = process::start(&mut command, ptys + 3).expect("the server is ready");
         let served = Self { simulator, server, ports, folder };
         if ptys > 0 {
             served.wait_for_arm(&mut served.open("a"));
@@ -56,15 +57,21 @@ impl Served {
     }
 
     pub(crate) fn connect(&self) -> TcpStream {
-        let port = self.ports.iter().rev().nth(1).and_then(|port| port.to_str()).expect("a TCP port");
+        let port = self.ports.iter().rev().nth(2).and_then(|port| port.to_str()).expect("a TCP port");
         let stream =
             TcpStream::connect(port.strip_prefix("socket://").expect("an address")).expect("a connection");
         stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
         stream
     }
 
+    /// The path of the Unix socket.
+    pub(crate) fn local_socket(&self) -> PathBuf {
+        let ready = self.ports.last().and_then(|port| port.to_str()).expect("a socket");
+        ready.strip_prefix("unix:").expect("a path").into()
+    }
+
     fn web_url(&self) -> &str {
-        self.ports.last().and_then(|port| port.to_str()).expect("a WebSocket")
+        self.ports.iter().rev().nth(1).and_then(|port| port.to_str()).expect("a WebSocket")
     }
 
     /// A connection to the WebSocket, before the handshake.

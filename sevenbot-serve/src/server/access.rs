@@ -3,12 +3,9 @@
 //! A browser lets any page connect to any address, and tells the server which page it was (`Origin`) and which name it
 //! looked up (`Host`). So both are checked: otherwise each web site that is open on this computer could move the arm.
 
-use std::cell::Cell;
 use std::net::{Ipv4Addr, Ipv6Addr};
-use std::rc::Rc;
 
-use tungstenite::handshake::server::{Callback, ErrorResponse, Request, Response};
-use tungstenite::http::{StatusCode, Uri};
+use hyper::{Request, StatusCode, Uri};
 
 use crate::token::is_equal;
 
@@ -16,7 +13,7 @@ use crate::token::is_equal;
 const PATH: &str = "/ws";
 
 /// What a request needs to be accepted.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct AccessPolicy {
     /// The secret, if one is needed.
     pub token: Option<String>,
@@ -24,12 +21,21 @@ pub struct AccessPolicy {
     pub allows_any_page: bool,
 }
 
+impl std::fmt::Debug for AccessPolicy {
+    /// Without the secret.
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { token, allows_any_page } = self;
+        let mut form = formatter.debug_struct("AccessPolicy");
+        form.field("has_token", &token.is_some()).field("allows_any_page", allows_any_page).finish()
+    }
+}
+
 /// Why a request is refused: the status and a text.
-type Refusal = (StatusCode, &'static str);
+pub(super) type Refusal = (StatusCode, &'static str);
 
 impl AccessPolicy {
     /// Checks a request. Returns whether it came from a browser.
-    fn check(&self, request: &Request) -> Result<bool, Refusal> {
+    pub(super) fn check<B>(&self, request: &Request<B>) -> Result<bool, Refusal> {
         let header = |name: &str| request.headers().get(name).map(|value| value.to_str().unwrap_or_default());
         if request.uri().path() != PATH {
             return Err((StatusCode::NOT_FOUND, "The WebSocket is at /ws.\n"));
@@ -41,7 +47,8 @@ impl AccessPolicy {
         if !self.allows_any_page && origin.is_some_and(|origin| !is_local_page(origin)) {
             return Err((StatusCode::FORBIDDEN, "Origin: this page needs `sevenbot serve --maker-pages`.\n"));
         }
-        let given = header("authorization").and_then(|value| value.strip_prefix("Bearer "));
+        let given =
+            header("authorization").and_then(|value| value.strip_prefix("Bearer ")).map(str::to_owned);
         let given = given.or_else(|| token_of(request.uri())).unwrap_or_default();
         if self.token.as_ref().is_some_and(|token| !is_equal(given.as_bytes(), token.as_bytes())) {
             return Err((StatusCode::UNAUTHORIZED, "Token: connect to /ws?token=TOKEN.\n"));
@@ -50,13 +57,23 @@ impl AccessPolicy {
     }
 }
 
-/// The token in an address such as `/ws?token=TOKEN`.
-pub(crate) fn token_of(uri: &Uri) -> Option<&str> {
-    uri.query()?.split('&').find_map(|pair| pair.strip_prefix("token="))
+/// The token in an address such as `/ws?token=TOKEN`. A byte may be written as `%` and two hexadecimal digits.
+pub(super) fn token_of(uri: &Uri) -> Option<String> {
+    let given = uri.query()?.split('&').find_map(|pair| pair.strip_prefix("token="))?;
+    let mut bytes = Vec::new();
+    let mut rest = given.as_bytes();
+    while let Some((&byte, tail)) = rest.split_first() {
+        let escaped =
+            tail.get(..2).filter(|_| byte == b'%').and_then(|digits| std::str::from_utf8(digits).ok());
+        let escaped = escaped.and_then(|digits| u8::from_str_radix(digits, 16).ok());
+        bytes.push(escaped.unwrap_or(byte));
+        rest = if escaped.is_some() { tail.get(2..).unwrap_or_default() } else { tail };
+    }
+    String::from_utf8(bytes).ok()
 }
 
 /// Is it an IP address or `localhost`? Another name may belong to a site that points it to this computer.
-pub(crate) fn is_address(authority: &str) -> bool {
+pub(super) fn is_address(authority: &str) -> bool {
     let name = without_port(authority);
     let inner = name.strip_prefix('[').and_then(|name| name.strip_suffix(']'));
     name == "localhost"
@@ -75,29 +92,6 @@ fn without_port(authority: &str) -> &str {
     match authority.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
         _ => authority,
-    }
-}
-
-/// Checks one request, and notes whether a browser sent it.
-#[derive(Debug)]
-pub(crate) struct Gate {
-    pub(crate) access: AccessPolicy,
-    pub(crate) is_browser: Rc<Cell<bool>>,
-}
-
-impl Callback for Gate {
-    fn on_request(self, request: &Request, response: Response) -> Result<Response, ErrorResponse> {
-        match self.access.check(request) {
-            Ok(is_browser) => {
-                self.is_browser.set(is_browser);
-                Ok(response)
-            }
-            Err((status, text)) => {
-                let mut refusal = ErrorResponse::new(Some(text.to_owned()));
-                *refusal.status_mut() = status;
-                Err(refusal)
-            }
-        }
     }
 }
 
@@ -154,5 +148,9 @@ mod tests {
         assert_eq!(check(&access, "/ws?token=secret1", &[host]), Err(StatusCode::UNAUTHORIZED));
         assert_eq!(check(&access, "/ws?a=b&token=secret12", &[host]), Ok(false));
         assert_eq!(check(&access, "/ws", &[host, ("authorization", "Bearer secret12")]), Ok(false));
+        let access = AccessPolicy { token: Some("a&b#c%d+".to_owned()), ..CLOSED };
+        assert_eq!(check(&access, "/ws?token=a%26b%23c%25d+", &[host]), Ok(false), "escaped");
+        assert_eq!(check(&access, "/ws?token=a&b#c%d+", &[host]), Err(StatusCode::UNAUTHORIZED));
+        assert!(!format!("{access:?}").contains("a&b"), "it is not in a log");
     }
 }

@@ -1,0 +1,68 @@
+//! From the line to the clients: each reply to the client that asked, with the registers that are not the arm's.
+
+use protocol_core::registers::map::{FAULTS, fault};
+use protocol_core::time::Instant;
+
+use super::Hub;
+use super::client::{Client, Event};
+use super::client_id::ClientId;
+use super::line::Owner;
+use super::sharing_block::{DrivenBy, SharingState};
+
+impl Hub {
+    pub(super) fn deliver(&mut self, now: Instant, owner: Owner, event: Event) {
+        match (owner, event) {
+            (Owner::Client(id), mut event) => {
+                if let Event::Reply { address, values } = &mut event {
+                    self.overlay(now, id, *address, values);
+                }
+                let Some(client) = self.clients.get_mut(&id) else { return };
+                client.end_read(now, event);
+                self.news.insert(id);
+            }
+            (Owner::Sample(stream), Event::Reply { values, .. }) => {
+                for (&id, client) in &mut self.clients {
+                    if client.report(now, stream, &values) {
+                        self.news.insert(id);
+                    }
+                }
+            }
+            (Owner::Hold, Event::Reply { address, values }) => {
+                self.continue_hold(now, Some((address, &values)));
+            }
+            (Owner::Hold, _) => self.continue_hold(now, None),
+            (Owner::Identity, Event::Reply { values, .. }) => self.identify(now, &values),
+            (Owner::Sample(_) | Owner::Identity, _) => {}
+        }
+    }
+
+    /// Replaces the registers that are not the arm's in a reply.
+    fn overlay(&self, now: Instant, id: ClientId, address: u8, values: &mut [u8]) {
+        let place = FAULTS.address.checked_sub(address).map(usize::from);
+        if let Some(faults) = place.and_then(|place| values.get_mut(place)).filter(|_| self.known.is_ours()) {
+            *faults |= if self.watchdog.has_acted() { fault::HOST_SILENT } else { 0 };
+        }
+        if let Some(client) = self.clients.get(&id) {
+            client.own.overlay(address, values);
+            self.sharing_state(now, id, client).overlay(address, values);
+        }
+    }
+
+    /// What the registers of the server tell a client.
+    fn sharing_state(&self, now: Instant, id: ClientId, client: &Client) -> SharingState {
+        let clients = self.clients.values().filter(|client| client.left.is_none()).count();
+        SharingState {
+            clients: u8::try_from(clients).unwrap_or(u8::MAX),
+            driven_by: match self.driver.at(now) {
+                None => DrivenBy::Nobody,
+                Some(driver) if driver == id => DrivenBy::This,
+                Some(_) => DrivenBy::Another,
+            },
+            stops: self.stops,
+            is_stopped: client.driving.is_stopped(now),
+            is_read_only: self.options.is_read_only,
+            has_one_driver: self.options.has_one_driver,
+            dropped: client.dropped,
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! The positions that a client has read of late. Targets that equal them hold the arm: that is how every program stops it
+//! (D24 and `sevenbot::hold`), for the wire has no request to stop.
+
+use std::collections::VecDeque;
+
+use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, PRESENT_POSITION, TARGET_POSITION};
+use protocol_core::registers::{Joint, Register};
+use protocol_core::time::{Duration, Instant};
+
+/// A client may ask again before it writes what it read, so some readings are kept.
+const KEPT: usize = 8;
+/// Older readings tell nothing about where the arm is.
+const FRESH: Duration = Duration::from_millis(1_000);
+/// The value of a fine position that was not measured.
+const UNMEASURED: [u8; 2] = [0xFF; 2];
+
+/// A reply or a report that holds positions.
+#[derive(Debug)]
+struct Reading {
+    at: Instant,
+    address: u8,
+    values: Vec<u8>,
+}
+
+/// The last readings of a client.
+#[derive(Debug, Default)]
+pub(crate) struct Readings(VecDeque<Reading>);
+
+impl Readings {
+    /// The client got these values.
+    pub(crate) fn note(&mut self, now: Instant, address: u8, values: &[u8]) {
+        let holds =
+            |row: &Register| Joint::ALL.into_iter().any(|joint| bytes(row, joint, address, values).is_some());
+        if !holds(&PRESENT_POSITION) && !holds(&FINE_POSITION) {
+            return;
+        }
+        if self.0.len() == KEPT {
+            self.0.pop_front();
+        }
+        self.0.push_back(Reading { at: now, address, values: values.to_vec() });
+    }
+
+    /// The number of joints that a write holds; `None` if it sends one elsewhere than the client has read.
+    pub(crate) fn held_joints(&self, now: Instant, address: u8, values: &[u8]) -> Option<usize> {
+        let fresh = self.0.iter().rev().take_while(|reading| now - reading.at < FRESH);
+        let held = |reading: &Reading| {
+            let coarse = reading.held(&TARGET_POSITION, &PRESENT_POSITION, address, values)?;
+            Some(coarse + reading.held(&FINE_TARGET, &FINE_POSITION, address, values)?)
+        };
+        fresh.filter_map(held).max().filter(|&joints| joints > 0)
+    }
+}
+
+impl Reading {
+    /// The number of joints whose target in the write is the position of this reading; `None` if one is not.
+    fn held(&self, targets: &Register, positions: &Register, address: u8, values: &[u8]) -> Option<usize> {
+        let mut count = 0;
+        for joint in Joint::ALL {
+            let Some(target) = bytes(targets, joint, address, values) else { continue };
+            let position = bytes(positions, joint, self.address, &self.values)?;
+            if target != position || target == UNMEASURED {
+                return None;
+            }
+            count += 1;
+        }
+        Some(count)
+    }
+}
+
+/// The bytes of a joint's register in the values from `address` on.
+fn bytes<'a>(row: &Register, joint: Joint, address: u8, values: &'a [u8]) -> Option<&'a [u8]> {
+    let start = usize::from(row.of(joint).checked_sub(address)?);
+    values.get(start..start + usize::from(row.range.width()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const POSE: [u8; 7] = [10, 20, 30, 40, 50, 60, 70];
+
+    fn at_ms(millis: u64) -> Instant {
+        Instant::from_micros(millis * 1_000)
+    }
+
+    #[test]
+    fn one_of_the_last_readings_has_to_hold_all_targets() {
+        let mut readings = Readings::default();
+        assert_eq!(readings.held_joints(at_ms(0), 46, &POSE), None);
+        readings.note(at_ms(0), 54, &POSE);
+        readings.note(at_ms(10), 54, &[11, 20, 30, 40, 50, 60, 70]);
+        assert_eq!(readings.held_joints(at_ms(20), 46, &POSE), Some(7), "the one before");
+        assert_eq!(readings.held_joints(at_ms(20), 46, &[11]), Some(1));
+        assert_eq!(readings.held_joints(at_ms(20), 46, &[12]), None);
+        assert_eq!(readings.held_joints(at_ms(999), 46, &POSE), Some(7));
+        assert_eq!(readings.held_joints(at_ms(1_000), 46, &POSE), None, "too old");
+        assert_eq!(readings.held_joints(at_ms(20), 32, &POSE), None, "no targets");
+        (0..8).for_each(|_| readings.note(at_ms(20), 60, &[1]));
+        assert_eq!(readings.held_joints(at_ms(20), 46, &POSE), None, "forgotten");
+        assert_eq!(readings.held_joints(at_ms(20), 52, &[1]), Some(1));
+    }
+}

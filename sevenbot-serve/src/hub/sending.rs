@@ -1,0 +1,156 @@
+//! From the queues to the line: stops first, then what the hub does by itself, then the client whose turn it is.
+
+use protocol_core::registers::Map;
+use protocol_core::registers::map::{MOTOR_STATE, SET_POINT_PERIOD, motor_state};
+use protocol_core::time::Instant;
+
+use super::Hub;
+use super::arm_hold::ArmHold;
+use super::client_id::ClientId;
+use super::line::Owner;
+use super::request::{WholeRequest, read_bytes, without_idle_ends};
+use super::shares::Shares;
+use super::stream::Stream;
+use super::watchdog::WatchdogAction;
+
+impl Hub {
+    /// The watchdog of a client acts.
+    pub(super) fn act(&mut self, now: Instant, action: WatchdogAction) {
+        match action {
+            WatchdogAction::Hold => self.start_hold(),
+            WatchdogAction::Damp => self.write_arm(now, MOTOR_STATE.address, &[motor_state::DAMPING]),
+        }
+    }
+
+    /// Sends stops, and what the hub needs to hold the arm. They wait for no other frame.
+    pub(super) fn send_urgent(&mut self, now: Instant) {
+        let ids: Vec<ClientId> = self.clients.keys().copied().collect();
+        for id in ids {
+            while let Some(waiting) = self.clients.get_mut(&id).and_then(|client| client.urgent.pop_front()) {
+                self.send_request(now, id, waiting.request);
+            }
+        }
+        if let Some((address, count)) = self.hold.as_mut().and_then(ArmHold::next_read) {
+            self.line.send_read(now, Owner::Hold, address, count);
+        }
+    }
+
+    /// Writes registers by itself. A set-point period would delay targets.
+    fn write_arm(&mut self, now: Instant, address: u8, values: &[u8]) {
+        self.known.write(Map::V22, address, values);
+        self.line.send_write(now, Map::V22, address, values);
+    }
+
+    /// Writes the targets that hold the arm.
+    pub(super) fn continue_hold(&mut self, now: Instant, reply: Option<(u8, &[u8])>) {
+        let Some(mut hold) = self.hold.take() else { return };
+        let Some((address, values)) = reply else {
+            self.hold = hold.note_no_reply().then_some(hold);
+            return;
+        };
+        let frames = hold.frames(address, values);
+        let period = self.known.word(SET_POINT_PERIOD.address);
+        if !frames.is_empty() && period != 0 {
+            self.write_arm(now, SET_POINT_PERIOD.address, &[0, 0]);
+        }
+        for (address, values) in &frames {
+            self.write_arm(now, *address, values);
+        }
+        if !frames.is_empty() && period != 0 {
+            self.write_arm(now, SET_POINT_PERIOD.address, &period.to_le_bytes());
+        }
+        self.hold = (!hold.is_over(&frames)).then_some(hold);
+    }
+
+    /// Sends the next request or sample. Returns false if there is none.
+    pub(super) fn send_next(&mut self, now: Instant) -> bool {
+        self.drop_stale(now);
+        if self.sampler.begins_to_wait(now) {
+            self.shares.join(&mut self.sampler.share);
+        }
+        let sendable = self.clients.iter().filter(|(_, client)| self.line.takes(client));
+        let sampler = self.sampler.next_due(now).map(|stream| {
+            let bytes = read_bytes(stream.registers().1);
+            (Shares::order(self.sampler.share, bytes), None, Some(stream))
+        });
+        let clients =
+            sendable.map(|(&id, client)| (Shares::order(client.share, client.next_bytes()), Some(id), None));
+        let next = clients.chain(sampler).min_by_key(|&(order, ..)| order);
+        match next {
+            Some((_, Some(id), _)) => {
+                let waiting = self.clients.get_mut(&id).and_then(|client| client.waiting.pop_front());
+                waiting.into_iter().for_each(|waiting| self.send_request(now, id, waiting.request));
+                self.news.insert(id);
+            }
+            Some((_, _, Some(stream))) => self.send_sample(now, stream),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Drops what waited too long.
+    fn drop_stale(&mut self, now: Instant) {
+        for (&id, client) in &mut self.clients {
+            if client.drop_stale(now) {
+                self.news.insert(id);
+            }
+        }
+    }
+
+    fn send_request(&mut self, now: Instant, id: ClientId, request: WholeRequest) {
+        let Some(client) = self.clients.get_mut(&id) else { return };
+        self.shares.charge(&mut client.share, request.line_bytes());
+        self.watchdog.sent_request(now, id);
+        match request {
+            WholeRequest::Read { address, count } => self.send_read(now, id, address, count),
+            WholeRequest::Write { map, address, values } => {
+                self.send_write(now, id, map, address, values);
+            }
+            WholeRequest::WritesBetweenReads { map, writes, read: (first, count) } => {
+                self.send_read(now, id, first, count);
+                writes.into_iter().for_each(|(start, bytes)| self.send_write(now, id, map, start, bytes));
+                self.send_read(now, id, first, count);
+            }
+        }
+    }
+
+    fn send_read(&mut self, now: Instant, id: ClientId, address: u8, count: u8) {
+        let Some(client) = self.clients.get_mut(&id) else { return };
+        client.unanswered += 1;
+        // A write of 0 registers chooses the form of the offsets (M5).
+        let form = client.own.form_of_read(address, count, self.known.form_before_writes());
+        if let Some(map) = form.filter(|_| !self.options.is_read_only) {
+            self.line.send_write(now, map, 0, &[]);
+        }
+        self.line.send_read(now, Owner::Client(id), address, count);
+    }
+
+    fn send_write(&mut self, now: Instant, id: ClientId, map: Map, address: u8, mut values: Vec<u8>) {
+        let Some(client) = self.clients.get_mut(&id) else { return };
+        let is_accepted = self.known.accepts(map, address, &values);
+        if is_accepted && client.own.write(map, address, &mut values) {
+            client.schedule.set(now, &client.own);
+            self.set_frequencies(now);
+        }
+        if !self.options.is_read_only {
+            self.known.write(map, address, &values);
+            if is_accepted && map == Map::V22 {
+                let damps = self.known.watchdog_damps();
+                self.watchdog.wrote(now, id, damps, address, &values);
+            }
+            let (start, bytes) = without_idle_ends(address, &values);
+            self.line.send_write(now, map, start, bytes);
+        }
+    }
+
+    pub(super) fn set_frequencies(&mut self, now: Instant) {
+        self.sampler.set_frequencies(now, self.clients.values().map(|client| &client.own));
+    }
+
+    fn send_sample(&mut self, now: Instant, stream: Stream) {
+        let (address, count) = stream.registers();
+        self.shares.charge(&mut self.sampler.share, read_bytes(count));
+        self.sampler.note_sent(now, stream);
+        self.line.send_read(now, Owner::Sample(stream), address, count);
+    }
+}

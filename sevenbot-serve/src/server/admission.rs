@@ -1,0 +1,151 @@
+//! Places for connections: a few for those that have not shown their token yet, and others for clients.
+//!
+//! A place before the token is taken over by the next connection if all are taken: the oldest one loses it. So connections that
+//! send nothing keep nobody out who sends the token at once. Wrong tokens make the next ones of the same address wait.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::net::IpAddr;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore};
+
+use super::shared::lock;
+
+/// Clients over the network at the same time. The next one is closed at once.
+pub const MOST_NETWORK_CLIENTS: usize = 32;
+/// Connections that have not shown their token.
+const MOST_UNKNOWN: usize = 16;
+/// The first wait after a wrong token; each further one doubles it.
+const FIRST_WAIT: Duration = Duration::from_millis(100);
+const LONGEST_WAIT: Duration = Duration::from_secs(2);
+/// Addresses with wrong tokens that are remembered.
+const MOST_ADDRESSES: usize = 256;
+
+/// A place of a client.
+pub(super) type Place = OwnedSemaphorePermit;
+
+/// The places.
+#[derive(Debug)]
+pub(super) struct Admission {
+    clients: Arc<Semaphore>,
+    unknown: Mutex<VecDeque<Arc<Notify>>>,
+    wrong: Mutex<BTreeMap<IpAddr, WrongTokens>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct WrongTokens {
+    count: u32,
+    /// The next token is looked at then.
+    next: Instant,
+}
+
+impl Admission {
+    pub(super) fn new() -> Arc<Self> {
+        let clients = Arc::new(Semaphore::new(MOST_NETWORK_CLIENTS));
+        Arc::new(Self { clients, unknown: Mutex::default(), wrong: Mutex::default() })
+    }
+
+    /// Runs the login of a connection, which has to end within `timeout`. `None` if it does not, or lost its place.
+    pub(super) async fn log_in<T>(
+        &self,
+        timeout: Duration,
+        login: impl Future<Output = Option<T>>,
+    ) -> Option<T> {
+        let ticket = Arc::new(Notify::new());
+        {
+            let mut unknown = lock(&self.unknown);
+            unknown.push_back(Arc::clone(&ticket));
+            if unknown.len() > MOST_UNKNOWN
+                && let Some(oldest) = unknown.pop_front()
+            {
+                oldest.notify_one();
+            }
+        }
+        let done = tokio::select! {
+            done = login => done,
+            () = ticket.notified() => None,
+            () = tokio::time::sleep(timeout) => None,
+        };
+        lock(&self.unknown).retain(|other| !Arc::ptr_eq(other, &ticket));
+        done
+    }
+
+    /// A place for a client; `None` if all are taken.
+    pub(super) fn place(&self) -> Option<Place> {
+        Arc::clone(&self.clients).try_acquire_owned().ok()
+    }
+
+    /// Waits as long as the wrong tokens of this address make it wait.
+    pub(super) async fn wait(&self, address: Option<IpAddr>) {
+        let known = address.and_then(|address| lock(&self.wrong).get(&address).copied());
+        if let Some(WrongTokens { next, .. }) = known {
+            tokio::time::sleep_until(next.into()).await;
+        }
+    }
+
+    /// Notes whether the token of this address was right.
+    pub(super) fn note(&self, address: Option<IpAddr>, is_right: bool) {
+        let Some(address) = address else { return };
+        let mut wrong = lock(&self.wrong);
+        if is_right {
+            wrong.remove(&address);
+            return;
+        }
+        if wrong.len() >= MOST_ADDRESSES && !wrong.contains_key(&address) {
+            wrong.clear();
+        }
+        let now = Instant::now();
+        let entry = wrong.entry(address).or_insert(WrongTokens { count: 0, next: now });
+        let wait = FIRST_WAIT.saturating_mul(1 << entry.count.min(10)).min(LONGEST_WAIT);
+        *entry = WrongTokens { count: entry.count.saturating_add(1), next: now + wait };
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // A panic is a failed test.
+mod tests {
+    use super::*;
+    use std::future::{pending, ready};
+
+    fn run<T>(work: impl Future<Output = T>) -> T {
+        tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(work)
+    }
+
+    const LONG: Duration = Duration::from_secs(600);
+
+    #[test]
+    fn silent_connections_lose_their_places_to_the_next_ones() {
+        run(async {
+            let admission = Admission::new();
+            let silent: Vec<_> = (0..40)
+                .map(|_| {
+                    let admission = Arc::clone(&admission);
+                    tokio::spawn(async move { admission.log_in(LONG, pending::<Option<()>>()).await })
+                })
+                .collect();
+            tokio::task::yield_now().await;
+            assert_eq!(admission.log_in(LONG, ready(Some(7))).await, Some(7));
+            let mut ended = silent.iter().filter(|task| task.is_finished()).count();
+            while ended < 25 {
+                tokio::task::yield_now().await;
+                ended = silent.iter().filter(|task| task.is_finished()).count();
+            }
+            assert_eq!(lock(&admission.unknown).len(), 15);
+        });
+    }
+
+    #[test]
+    fn each_wrong_token_makes_the_next_one_of_the_address_wait_longer() {
+        let admission = Admission::new();
+        let address: IpAddr = "10.0.0.1".parse().unwrap();
+        let start = Instant::now();
+        (0..6).for_each(|_| admission.note(Some(address), false));
+        let next = lock(&admission.wrong).get(&address).unwrap().next;
+        assert!(next - start >= Duration::from_secs(2), "{:?}", next - start);
+        admission.note(Some(address), true);
+        assert!(lock(&admission.wrong).is_empty());
+        (0..1_000_u32).for_each(|number| admission.note(Some(IpAddr::V4(number.into())), false));
+        assert!(lock(&admission.wrong).len() <= MOST_ADDRESSES);
+    }
+}

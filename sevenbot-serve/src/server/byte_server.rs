@@ -1,0 +1,108 @@
+//! Clients that send frames as bytes: over TCP, TLS, or a Unix socket.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::io::AsyncReadExt;
+use tokio::net::{TcpListener, TcpStream};
+use tokio_rustls::TlsAcceptor;
+
+use super::admission::Admission;
+use super::byte_connection::{self, ByteStream, NoFrames};
+use super::listener::{LocalSocket, accept_tcp};
+use super::notice::{Notice, Notices, RefusalReason};
+use super::shared::Shared;
+use crate::token::is_equal;
+
+/// How long a client may take for the handshake of TLS, and to send the token.
+const LOGIN_TIMEOUT: Duration = Duration::from_secs(5);
+/// The longest first line.
+const LONGEST_LINE: usize = 256;
+
+/// What all connections of a TCP port share.
+#[derive(Clone)]
+pub(super) struct ByteServer {
+    pub(super) shared: Arc<Shared>,
+    pub(super) admission: Arc<Admission>,
+    pub(super) notices: Notices,
+    pub(super) token: Option<String>,
+    pub(super) tls: Option<TlsAcceptor>,
+}
+
+impl ByteServer {
+    /// Serves all clients of a TCP port.
+    pub(super) async fn serve_tcp(self, listener: TcpListener) {
+        loop {
+            let (stream, peer) = accept_tcp(&listener).await;
+            let server = self.clone();
+            tokio::spawn(async move { server.serve_client(stream, peer).await });
+        }
+    }
+
+    /// Serves all clients of a Unix socket. They are programs of this user, and need no token.
+    pub(super) async fn serve_local(self, socket: LocalSocket) {
+        loop {
+            let stream = socket.accept().await;
+            let server = self.clone();
+            tokio::spawn(async move {
+                if let Some(_place) = server.admission.place() {
+                    let _ = byte_connection::serve(&server.shared, stream, Vec::new()).await;
+                }
+            });
+        }
+    }
+
+    async fn serve_client(&self, stream: TcpStream, peer: SocketAddr) {
+        let refuse = |reason| self.notices.send(Notice::Refused { peer: Some(peer), reason });
+        let login = async {
+            let mut stream = self.secure(stream).await.ok()?;
+            let first = match &self.token {
+                None => Vec::new(),
+                Some(token) => self.read_token(&mut stream, peer, token).await?,
+            };
+            Some((stream, first))
+        };
+        let Some((stream, first)) = self.admission.log_in(LOGIN_TIMEOUT, login).await else { return };
+        let Some(_place) = self.admission.place() else { return refuse(RefusalReason::Full) };
+        if byte_connection::serve(&self.shared, stream, first).await == Err(NoFrames) {
+            refuse(RefusalReason::NoFrames);
+        }
+    }
+
+    async fn secure(&self, stream: TcpStream) -> io::Result<Box<dyn ByteStream>> {
+        Ok(match &self.tls {
+            None => Box::new(stream),
+            Some(tls) => Box::new(tls.accept(stream).await?),
+        })
+    }
+
+    /// Reads the first line. Returns what follows it; `None` if it is not the token.
+    async fn read_token(
+        &self,
+        stream: &mut Box<dyn ByteStream>,
+        peer: SocketAddr,
+        token: &str,
+    ) -> Option<Vec<u8>> {
+        let mut line = Vec::new();
+        let (given, rest) = loop {
+            let mut bytes = [0; LONGEST_LINE];
+            let count = stream.read(&mut bytes).await.ok().filter(|&count| count > 0)?;
+            line.extend_from_slice(bytes.get(..count)?);
+            if let Some(end) = line.iter().position(|&byte| byte == b'\n') {
+                break (line.get(..end)?, line.get(end + 1..)?);
+            }
+            if line.len() >= LONGEST_LINE {
+                break (line.as_slice(), &[][..]);
+            }
+        };
+        self.admission.wait(Some(peer.ip())).await;
+        let is_right = is_equal(given.strip_suffix(b"\r").unwrap_or(given), token.as_bytes());
+        self.admission.note(Some(peer.ip()), is_right);
+        if !is_right {
+            self.notices.send(Notice::Refused { peer: Some(peer), reason: RefusalReason::WrongToken });
+        }
+        is_right.then(|| rest.to_vec())
+    }
+}

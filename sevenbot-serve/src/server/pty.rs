@@ -1,0 +1,117 @@
+//! A pseudo-terminal that behaves like an arm of its own, for one program after the other.
+
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
+use protocol_core::time::Instant;
+use tty_ports::clients::Clients;
+use tty_ports::pty::Pty;
+use tty_ports::symlink::Symlink;
+
+use super::frame_session::FrameSession;
+use super::readiness::Readiness;
+use super::shared::Shared;
+use super::start_error::StartError;
+
+/// Bytes that are read at once: all that the kernel keeps.
+const PIECE: usize = 4_096;
+
+/// A pseudo-terminal and its link.
+#[derive(Debug)]
+pub(super) struct PtyPort {
+    pty: Pty,
+    clients: Option<Clients>,
+    _link: Symlink,
+}
+
+impl PtyPort {
+    pub(super) fn open(link: &Path) -> Result<Self, StartError> {
+        let mut clients = Clients::new().ok();
+        let pty = Pty::open(clients.as_mut()).map_err(StartError::Pty)?;
+        let link = Symlink::new(link, pty.path())?;
+        Ok(Self { pty, clients, _link: link })
+    }
+
+    /// Serves programs. When the last program has closed the terminal, what it wrote is carried out, its streams of reports
+    /// end, and the next program finds an arm that has just been opened.
+    pub(super) async fn serve(mut self, shared: Arc<Shared>) -> io::Result<()> {
+        let master = Readiness::of(&self.pty.master())?;
+        let opened = self.clients.as_ref().map(Readiness::of).transpose()?;
+        let mut session = FrameSession::open(&shared);
+        let mut last_empty = shared.now();
+        loop {
+            session.exchange();
+            let count = self.receive(&mut session, &mut last_empty, &shared)?;
+            if self.was_closed()? {
+                session = session.succeed();
+            }
+            session.exchange();
+            self.send(&mut session)?;
+            if count > 0 {
+                tokio::task::yield_now().await;
+                continue;
+            }
+            let waits_for_input = session.has_room();
+            wait(&master, opened.as_ref(), &session).await?;
+            if waits_for_input {
+                last_empty = shared.now();
+            }
+        }
+    }
+
+    /// Reads bytes, unless earlier ones wait.
+    fn receive(
+        &self,
+        session: &mut FrameSession,
+        last_empty: &mut Instant,
+        shared: &Shared,
+    ) -> io::Result<usize> {
+        if !session.has_room() {
+            return Ok(0);
+        }
+        let mut bytes = [0; PIECE];
+        let count = self.pty.read(&mut bytes)?;
+        if count == 0 {
+            *last_empty = shared.now();
+        }
+        session.put(*last_empty, bytes.get(..count).unwrap_or_default());
+        Ok(count)
+    }
+
+    /// Has the last program closed the terminal? Called after each read: the program that sent bytes has to be counted before
+    /// its reply is written.
+    fn was_closed(&mut self) -> io::Result<bool> {
+        let Some(clients) = &mut self.clients else { return Ok(false) };
+        clients.update()?;
+        self.pty.update_clients(clients)
+    }
+
+    /// Writes replies and reports; without a program they are dropped.
+    fn send(&self, session: &mut FrameSession) -> io::Result<()> {
+        let count = match session.output() {
+            [] => 0,
+            bytes if self.pty.has_client() => self.pty.write(bytes)?,
+            bytes => bytes.len(),
+        };
+        session.consume(count);
+        Ok(())
+    }
+}
+
+/// Waits until there is something to do.
+async fn wait(master: &Readiness, opened: Option<&Readiness>, session: &FrameSession) -> io::Result<()> {
+    let was_opened = async {
+        match opened {
+            Some(opened) => opened.readable().await,
+            None => std::future::pending().await,
+        }
+    };
+    tokio::select! {
+        ready = master.readable(), if session.has_room() => ready?,
+        ready = master.writable(), if !session.output().is_empty() => ready?,
+        done = was_opened => done?,
+        () = session.news() => {}
+    }
+    Ok(())
+}

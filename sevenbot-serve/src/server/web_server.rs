@@ -1,0 +1,143 @@
+//! HTTP: the files of the page, and the WebSockets at `/frames` and `/ws`.
+//!
+//! ```text
+//!   browser ── GET /, /style.css ... ──▶ WebServer ──▶ answer: a file
+//!           ── GET /frames, upgrade ───▶ WebServer ──▶ web_socket: frames ◀── binary messages ──▶ Hub
+//!   maker's program ── GET /ws ────────▶ WebServer ──▶ web_socket: commands ◀── text messages ──▶ Hub
+//! ```
+
+use std::convert::Infallible;
+use std::net::SocketAddr;
+use std::os::fd::{AsFd, OwnedFd};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use http_body_util::Full;
+use hyper::body::{Bytes, Incoming};
+use hyper::header::UPGRADE;
+use hyper::server::conn::http1;
+use hyper::upgrade::OnUpgrade;
+use hyper::{Request, Response, StatusCode};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use rustix::net::sockopt::set_socket_send_buffer_size;
+use tokio::net::{TcpListener, TcpStream};
+use tokio_rustls::TlsAcceptor;
+use tower_http::compression::Compression;
+
+use super::admission::{Admission, Place};
+use super::byte_connection::ByteStream;
+use super::listener::{SEND_BUFFER, accept_tcp};
+use super::notice::{Notice, Notices, RefusalReason};
+use super::shared::{Shared, lock};
+use super::site::{Answer, Protocol, Site, refusal};
+use super::web_socket::{serve_frames, serve_maker};
+
+/// How long a request and its answer may take.
+const TIMEOUT: Duration = Duration::from_secs(30);
+/// How long a client may take for the head of its request, and the handshake of TLS.
+const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
+/// The longest request.
+const LONGEST_REQUEST: usize = 16 * 1_024;
+/// Bytes of a file that the kernel keeps; the kernel doubles it.
+const FILE_BUFFER: usize = 256 * 1_024;
+
+/// What all connections of a port share.
+#[derive(Clone)]
+pub(super) struct WebServer {
+    pub(super) shared: Arc<Shared>,
+    pub(super) admission: Arc<Admission>,
+    pub(super) notices: Notices,
+    pub(super) site: Site,
+    pub(super) tls: Option<TlsAcceptor>,
+}
+
+/// An accepted request for a WebSocket.
+struct Upgrade {
+    connection: OnUpgrade,
+    protocol: Protocol,
+    place: Place,
+}
+
+impl WebServer {
+    /// Serves all clients of a port.
+    pub(super) async fn serve(self, listener: TcpListener) {
+        loop {
+            let (stream, peer) = accept_tcp(&listener).await;
+            let server = self.clone();
+            tokio::spawn(async move { server.serve_client(stream, peer).await });
+        }
+    }
+
+    /// Answers one request, and then serves the WebSocket if it asked for one.
+    async fn serve_client(&self, stream: TcpStream, peer: SocketAddr) {
+        // A smaller buffer is only slower.
+        let _ = set_socket_send_buffer_size(&stream, FILE_BUFFER);
+        let Ok(socket) = stream.as_fd().try_clone_to_owned() else { return };
+        let answered = self.admission.log_in(TIMEOUT, self.answer_request(stream, peer)).await;
+        let Some(Upgrade { connection, protocol, place }) = answered else { return };
+        let Ok(connection) = connection.await else { return };
+        let _ = set_socket_send_buffer_size(&socket, SEND_BUFFER);
+        drop::<OwnedFd>(socket);
+        let stream = TokioIo::new(connection);
+        match protocol {
+            Protocol::Frames => serve_frames(&self.shared, stream).await,
+            Protocol::Maker { is_browser } => serve_maker(&self.shared, stream, is_browser).await,
+        }
+        drop(place);
+    }
+
+    async fn answer_request(&self, stream: TcpStream, peer: SocketAddr) -> Option<Upgrade> {
+        let secured: Box<dyn ByteStream> = match &self.tls {
+            None => Box::new(stream),
+            Some(tls) => Box::new(tokio::time::timeout(HEAD_TIMEOUT, tls.accept(stream)).await.ok()?.ok()?),
+        };
+        let upgrade = Arc::new(Mutex::new(None));
+        let service = tower::service_fn(|request: Request<Incoming>| {
+            let upgrade = Arc::clone(&upgrade);
+            async move { Ok::<_, Infallible>(self.answer(request, peer, &upgrade).await) }
+        });
+        let service = TowerToHyperService::new(Compression::new(service));
+        let connection = http1::Builder::new()
+            .timer(TokioTimer::new())
+            .header_read_timeout(HEAD_TIMEOUT)
+            .max_buf_size(LONGEST_REQUEST)
+            .serve_connection(TokioIo::new(secured), service);
+        let _ = connection.with_upgrades().await;
+        lock(&upgrade).take()
+    }
+
+    async fn answer(
+        &self,
+        mut request: Request<Incoming>,
+        peer: SocketAddr,
+        upgrade: &Mutex<Option<Upgrade>>,
+    ) -> Response<Full<Bytes>> {
+        // The files are public: only what needs the token waits for it.
+        if request.headers().contains_key(UPGRADE) {
+            self.admission.wait(Some(peer.ip())).await;
+        }
+        let (response, protocol) = match self.site.answer(&request) {
+            Answer::Whole(response) => {
+                if response.status() == StatusCode::UNAUTHORIZED {
+                    self.admission.note(Some(peer.ip()), false);
+                    self.refused(peer, RefusalReason::WrongToken);
+                }
+                return response;
+            }
+            Answer::Upgrade(response, protocol) => (response, protocol),
+        };
+        self.admission.note(Some(peer.ip()), true);
+        let Some(place) = self.admission.place() else {
+            self.refused(peer, RefusalReason::Full);
+            return refusal(StatusCode::SERVICE_UNAVAILABLE, "The server has too many clients.\n");
+        };
+        let connection = hyper::upgrade::on(&mut request);
+        *lock(upgrade) = Some(Upgrade { connection, protocol, place });
+        response
+    }
+
+    fn refused(&self, peer: SocketAddr, reason: RefusalReason) {
+        self.notices.send(Notice::Refused { peer: Some(peer), reason });
+    }
+}

@@ -1,0 +1,274 @@
+//! WebSockets: frames in binary messages for the page, and the maker's commands in text messages.
+
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::task::{Context, Poll};
+use std::{io, mem};
+
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{FutureExt, SinkExt, StreamExt};
+use protocol_core::time::Instant;
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::sync::Notify;
+use tokio_tungstenite::WebSocketStream;
+use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::{Error, Message};
+
+use super::frame_session::{End, FrameSession};
+use super::shared::Shared;
+use crate::maker::MakerClient;
+
+/// The longest message of a page.
+const LONGEST_FRAMES: usize = 4_096;
+/// The longest message of the maker's programs, as in the maker's firmware.
+const LONGEST_COMMAND: usize = 2_048;
+/// Bytes that a client may send without a whole message among them: fragments without end fill no memory, but cost time.
+const MOST_UNFINISHED: usize = 32 * 1_024;
+
+/// A stream that fails when a client sends too many bytes without a whole message.
+struct Metered<S> {
+    stream: S,
+    unfinished: Arc<AtomicUsize>,
+}
+
+impl<S: AsyncRead + Unpin> AsyncRead for Metered<S> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
+        let outcome = Pin::new(&mut self.stream).poll_read(context, buffer);
+        let count = buffer.filled().len().saturating_sub(before);
+        if self.unfinished.fetch_add(count, Ordering::Relaxed) > MOST_UNFINISHED {
+            return Poll::Ready(Err(io::Error::other("a message without an end")));
+        }
+        outcome
+    }
+}
+
+impl<S: AsyncWrite + Unpin> AsyncWrite for Metered<S> {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}
+
+type Socket<S> = WebSocketStream<Metered<S>>;
+type Sink<S> = SplitSink<Socket<S>, Message>;
+
+/// The messages of a client.
+struct Messages<S> {
+    stream: SplitStream<Socket<S>>,
+    unfinished: Arc<AtomicUsize>,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Messages<S> {
+    /// The next message; how the connection ended if there is none.
+    async fn next(&mut self) -> Result<Message, End> {
+        let message = self.stream.next().await;
+        self.unfinished.store(0, Ordering::Relaxed);
+        match message {
+            Some(Ok(Message::Close(_))) | None | Some(Err(Error::ConnectionClosed)) => Err(End::Clean),
+            Some(Ok(message)) => Ok(message),
+            // Many programs close the connection without a word.
+            Some(Err(Error::Protocol(tungstenite::error::ProtocolError::ResetWithoutClosingHandshake))) => {
+                Err(End::Clean)
+            }
+            Some(Err(_)) => Err(End::Broken),
+        }
+    }
+}
+
+type Sending<S> = Pin<Box<dyn Future<Output = (Sink<S>, Result<(), Error>)> + Send>>;
+
+/// Sends one message after the other, while the task does other things.
+enum Sender<S> {
+    Idle(Sink<S>),
+    Busy(Sending<S>),
+    Failed,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + Send + 'static> Sender<S> {
+    const fn is_idle(&self) -> bool {
+        matches!(self, Self::Idle(_))
+    }
+
+    fn start(&mut self, message: Message) {
+        if let Self::Idle(mut sink) = mem::replace(self, Self::Failed) {
+            *self = Self::Busy(Box::pin(async move {
+                let outcome = sink.send(message).await;
+                (sink, outcome)
+            }));
+        }
+    }
+
+    /// Ends when the message is sent.
+    async fn done(&mut self) -> Result<(), End> {
+        let Self::Busy(sending) = self else { return std::future::pending().await };
+        let (sink, outcome) = sending.await;
+        *self = Self::Idle(sink);
+        outcome.map_err(|_| End::Broken)
+    }
+}
+
+async fn open<S>(stream: S, longest: usize) -> (Sender<S>, Messages<S>)
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
+    let config = WebSocketConfig::default()
+        .max_message_size(Some(longest))
+        .max_frame_size(Some(longest))
+        .read_buffer_size(2 * longest)
+        .write_buffer_size(0);
+    let unfinished = Arc::new(AtomicUsize::new(0));
+    let metered = Metered { stream, unfinished: Arc::clone(&unfinished) };
+    let socket = WebSocketStream::from_raw_socket(metered, Role::Server, Some(config)).await;
+    let (sink, stream) = socket.split();
+    (Sender::Idle(sink), Messages { stream, unfinished })
+}
+
+/// Serves a client whose binary messages carry frames, as bytes over TCP do. A frame may be spread over messages, and a message
+/// may hold several.
+pub(super) async fn serve_frames<S>(shared: &Arc<Shared>, stream: S)
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    let (mut sender, mut messages) = open(stream, LONGEST_FRAMES).await;
+    let mut session = FrameSession::open(shared);
+    let mut last_empty = shared.now();
+    let put = |session: &mut FrameSession, since: Instant, message: Message| {
+        if let Message::Binary(bytes) = message {
+            session.put(since, &bytes);
+        }
+    };
+    let end = loop {
+        session.exchange();
+        if sender.is_idle() && !session.output().is_empty() {
+            sender.start(Message::binary(session.take_output()));
+        }
+        let waits_for_input = session.has_room();
+        if waits_for_input {
+            match messages.next().now_or_never() {
+                Some(Ok(message)) => {
+                    put(&mut session, last_empty, message);
+                    tokio::task::yield_now().await;
+                    continue;
+                }
+                Some(Err(end)) => break end,
+                None => last_empty = shared.now(),
+            }
+        }
+        tokio::select! {
+            message = messages.next(), if waits_for_input => match message {
+                Ok(message) => put(&mut session, shared.now(), message),
+                Err(end) => break end,
+            },
+            sent = sender.done() => if let Err(end) = sent { break end },
+            () = session.news() => {}
+        }
+        if waits_for_input {
+            last_empty = shared.now();
+        }
+    };
+    session.close(end);
+}
+
+/// A client of the maker's WebSocket. Dropped, its connection has broken.
+struct MakerSession {
+    shared: Arc<Shared>,
+    client: Option<MakerClient>,
+    wake: Arc<Notify>,
+}
+
+impl MakerSession {
+    fn open(shared: &Arc<Shared>, is_browser: bool) -> Self {
+        let client = shared.with_client(|hub, _| MakerClient::connect(hub, is_browser));
+        let wake = shared.join(client.id());
+        Self { shared: Arc::clone(shared), client: Some(client), wake }
+    }
+
+    /// Carries out commands as far as possible. Returns the next answer.
+    fn advance(&mut self, wants_answer: bool) -> Option<String> {
+        let client = self.client.as_mut()?;
+        self.shared.with_client(|hub, now| client.advance(hub, now));
+        if wants_answer { client.take_answer() } else { None }
+    }
+
+    fn has_room(&self) -> bool {
+        self.client.as_ref().is_some_and(MakerClient::has_room)
+    }
+
+    fn put(&mut self, since: Instant, message: &Message) {
+        if let (Some(client), Message::Text(text)) = (&mut self.client, message) {
+            client.message(since, text);
+        }
+    }
+
+    fn leave(&mut self, end: End) {
+        let Some(client) = self.client.take() else { return };
+        self.shared.part(client.id());
+        self.shared.with_client(|hub, now| match end {
+            End::Clean => client.leave(hub, now),
+            End::Broken => client.disconnect(hub, now),
+        });
+    }
+}
+
+impl Drop for MakerSession {
+    fn drop(&mut self) {
+        self.leave(End::Broken);
+    }
+}
+
+/// Serves a client of the maker's WebSocket.
+pub(super) async fn serve_maker<S>(shared: &Arc<Shared>, stream: S, is_browser: bool)
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    let (mut sender, mut messages) = open(stream, LONGEST_COMMAND).await;
+    let mut session = MakerSession::open(shared, is_browser);
+    let mut last_empty = shared.now();
+    let end = loop {
+        if let Some(answer) = session.advance(sender.is_idle()) {
+            sender.start(Message::text(answer));
+        }
+        let waits_for_input = session.has_room();
+        if waits_for_input {
+            match messages.next().now_or_never() {
+                Some(Ok(message)) => {
+                    session.put(last_empty, &message);
+                    tokio::task::yield_now().await;
+                    continue;
+                }
+                Some(Err(end)) => break end,
+                None => last_empty = shared.now(),
+            }
+        }
+        tokio::select! {
+            message = messages.next(), if waits_for_input => match message {
+                Ok(message) => session.put(shared.now(), &message),
+                Err(end) => break end,
+            },
+            sent = sender.done() => if let Err(end) = sent { break end },
+            () = session.wake.notified() => {}
+        }
+        if waits_for_input {
+            last_empty = shared.now();
+        }
+    };
+    session.advance(false);
+    session.leave(end);
+}

@@ -1,0 +1,340 @@
+//! A stop goes before everything else and ends what others stream; what is late or has lost its sender is not carried out.
+//!
+//! `SERVE_STOPS` sets the number of stops beside each attack; 1000 take some minutes.
+
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
+
+mod rig;
+
+use protocol_core::registers::map::{
+    CHIP_ID, FINE_POSITION, FINE_TARGET, MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION,
+};
+use protocol_core::time::Duration;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use rig::{World, read, write};
+use sevenbot_serve::hub::HubOptions;
+
+const SEED: u64 = 25;
+/// The registers of the server.
+const SHARING: (u8, u8) = (232, 8);
+const COMMAND: u8 = 239;
+const POSE: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];
+
+fn targets(world: &World) -> Vec<u8> {
+    world.arm.registers().read(FINE_TARGET.address, FINE_TARGET.count).to_vec()
+}
+
+fn positions(world: &World) -> [i32; 7] {
+    let bytes = world.arm.registers().read(FINE_POSITION.address, FINE_POSITION.count);
+    std::array::from_fn(|joint| i32::from(u16::from_le_bytes([bytes[2 * joint], bytes[2 * joint + 1]])))
+}
+
+/// The registers of the server, as a program reads them.
+fn sharing(world: &mut World, program: usize) -> Vec<u8> {
+    world.take(program);
+    world.send(program, &read(SHARING.0, SHARING.1));
+    world.run(30);
+    let reply = world.take(program).into_iter().find(|(address, _)| *address == SHARING.0);
+    reply.expect("a reply").1
+}
+
+/// A program stops the arm as `sevenbot stop` does: it reads where the arm is, and writes that. Returns how long the write took
+/// to the arm, and what it wrote.
+fn stop(world: &mut World, program: usize) -> (Duration, Vec<u8>) {
+    world.round_trip(program, &read(FINE_TARGET.address, 28));
+    let (_, values) = world.take(program).pop().expect("a reply");
+    let held = values[14..].to_vec();
+    world.send(program, &write(FINE_TARGET.address, &held));
+    let start = world.now;
+    while targets(world) != held {
+        world.advance(1);
+        assert!(world.now - start < Duration::from_millis(500), "the stop did not reach the arm");
+    }
+    (world.now - start, held)
+}
+
+/// Who else uses the server while the arm is stopped.
+#[derive(Clone, Copy, Debug)]
+enum Attack {
+    Nothing,
+    Readers,
+    LongWrites,
+    Targets,
+    Stops,
+}
+
+const ATTACKERS: usize = 31;
+
+impl Attack {
+    fn refill(self, world: &mut World, turn: u64) {
+        let request = match self {
+            Self::Nothing => return,
+            Self::Readers => read(0, 255),
+            Self::LongWrites => write(0, &[0; 255]),
+            Self::Targets => write(TARGET_POSITION.address, &[u8::try_from(turn % 100).unwrap() + 40]),
+            Self::Stops => write(MOTOR_STATE.address, &[1]),
+        };
+        for attacker in 2..2 + ATTACKERS {
+            while world.programs[attacker].to_send_bytes() < 600 {
+                world.send(attacker, &request);
+            }
+        }
+    }
+}
+
+/// Stops the arm at random moments while program 0 streams. The arm does not move after it took the stop.
+fn stop_often(attack: Attack) {
+    let times: u64 = std::env::var("SERVE_STOPS").map_or(8, |text| text.parse().expect("a number"));
+    let mut world = World::new(2 + ATTACKERS);
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
+    let mut delays = Vec::new();
+    world.send(0, &write(SPEED.address, &[100; 7]));
+    for turn in 0..times {
+        let goal = if turn % 2 == 0 { 40 } else { 140 };
+        world.send(0, &[write(COMMAND, &[2]), write(TARGET_POSITION.address, &[goal])].concat());
+        for _ in 0..1 + random.next_u64() % 20 {
+            world.send(0, &write(TARGET_POSITION.address, &[goal]));
+            attack.refill(&mut world, turn);
+            world.advance(20 + random.next_u64() % 100);
+        }
+        let (delay, held) = stop(&mut world, 1);
+        delays.push(delay.as_micros());
+        for settling in 0..14 {
+            let before = positions(&world);
+            for _ in 0..4 {
+                world.send(0, &write(TARGET_POSITION.address, &[goal]));
+                attack.refill(&mut world, turn);
+                world.advance(50);
+            }
+            assert_eq!(targets(&world), held, "{attack:?}, stop {turn}: nothing moves it");
+            let after = positions(&world);
+            let moved = before.iter().zip(after).map(|(before, after)| (before - after).abs()).max().unwrap();
+            assert!(settling < 10 || moved <= 30, "{attack:?}, stop {turn}: moved by {moved} hundredths");
+        }
+    }
+    delays.sort_unstable();
+    let (p50, p99) = (delays[delays.len() / 2], delays[delays.len() * 99 / 100]);
+    println!(
+        "{attack:?}: {times} stops, seed {SEED}: p50 {p50} us, p99 {p99} us, at most {:?} us",
+        delays.last()
+    );
+    assert!(p99 <= 20_000, "{attack:?}: p99 {p99} us");
+}
+
+#[test]
+fn a_stop_reaches_the_arm_at_once_and_nothing_moves_it_afterwards() {
+    stop_often(Attack::Nothing);
+}
+
+#[test]
+fn a_stop_reaches_the_arm_beside_readers_of_long_replies() {
+    stop_often(Attack::Readers);
+}
+
+#[test]
+fn a_stop_reaches_the_arm_beside_long_writes() {
+    stop_often(Attack::LongWrites);
+}
+
+#[test]
+fn a_stop_reaches_the_arm_beside_others_that_stream() {
+    stop_often(Attack::Targets);
+}
+
+#[test]
+fn a_stop_reaches_the_arm_beside_others_that_switch_the_motors_on() {
+    stop_often(Attack::Stops);
+}
+
+#[test]
+fn what_a_stop_ended_starts_anew_after_a_pause_and_is_told() {
+    let mut world = World::new(2);
+    world.send(0, &write(TARGET_POSITION.address, &[120]));
+    world.run(50);
+    assert_eq!(sharing(&mut world, 0), [1, 2, 1, 0, 0, 0, 0, 0], "it drives");
+    assert_eq!(sharing(&mut world, 1), [1, 2, 2, 0, 0, 0, 0, 0], "another one drives");
+    let (_, held) = stop(&mut world, 1);
+    for _ in 0..30 {
+        world.send(0, &write(TARGET_POSITION.address, &[120]));
+        world.run(50);
+    }
+    assert_eq!(targets(&world), held);
+    assert_eq!(sharing(&mut world, 0), [1, 2, 0, 1, 1, 30, 0, 0], "stopped, and 30 writes dropped");
+    world.run(1_000);
+    world.send(0, &write(TARGET_POSITION.address, &[120]));
+    world.run(20);
+    assert_eq!(world.arm.registers().get(TARGET_POSITION.address), 120);
+}
+
+#[test]
+fn a_command_to_the_server_stops_the_arm_and_ends_streams() {
+    let mut world = World::new(2);
+    world.send(0, &write(TARGET_POSITION.address, &[150]));
+    world.run(300);
+    world.send(1, &write(COMMAND, &[1]));
+    world.send(0, &write(TARGET_POSITION.address, &[150]));
+    world.run(20);
+    let held = world.arm.registers().get(TARGET_POSITION.address);
+    assert!((91..149).contains(&held), "on its way: {held}");
+    world.send(0, &write(TARGET_POSITION.address, &[150]));
+    world.run(200);
+    assert_eq!(world.arm.registers().get(TARGET_POSITION.address), held);
+}
+
+/// With a set-point period a fine target is the next point of a stream, up to two seconds later.
+#[test]
+fn a_command_stops_a_stream_with_a_long_period() {
+    let mut world = World::new(2);
+    world.send(0, &write(184, &1_000_u16.to_le_bytes()));
+    world.send(0, &write(FINE_TARGET.address, &14_000_u16.to_le_bytes()));
+    world.run(700);
+    world.send(1, &write(COMMAND, &[1]));
+    world.run(200);
+    let before = positions(&world);
+    world.run(500);
+    assert!(positions(&world)[0].abs_diff(before[0]) <= 30, "{before:?} {:?}", positions(&world));
+    assert_eq!(world.arm.registers().read(184, 2), 1_000_u16.to_le_bytes(), "the period stays");
+}
+
+#[test]
+fn a_flood_of_a_client_that_is_gone_moves_nothing() {
+    for is_reset in [false, true] {
+        let mut world = World::new(2);
+        for turn in 0..3_000_u32 {
+            let value = u8::try_from(turn % 100).unwrap() + 40;
+            world.send(0, &write(TARGET_POSITION.address, &[value, value]));
+        }
+        world.run(300);
+        if is_reset {
+            world.reset(0);
+        } else {
+            world.leave(0);
+        }
+        world.run(if is_reset { 5 } else { 200 });
+        let before = targets(&world);
+        world.run(2_000);
+        assert_eq!(targets(&world), before);
+    }
+}
+
+#[test]
+fn what_a_client_wrote_directly_before_it_left_is_carried_out() {
+    for count in 1..=10_u8 {
+        let mut world = World::new(1);
+        for value in 1..=count {
+            world.send(0, &write(SPEED.address, &[value]));
+        }
+        world.send(0, &write(TARGET_POSITION.address, &[100 + count]));
+        world.push();
+        world.leave(0);
+        world.run(100);
+        let registers = world.arm.registers();
+        assert_eq!(
+            (registers.get(SPEED.address), registers.get(TARGET_POSITION.address)),
+            (count, 100 + count)
+        );
+    }
+}
+
+/// The arm does not answer, so the target waits behind its program's read for a second.
+#[test]
+fn a_target_that_waited_too_long_is_dropped() {
+    let mut world = World::new(2);
+    world.damages_next_byte = true;
+    world.send(0, &read(CHIP_ID.address, 6));
+    world.send(0, &[write(TARGET_POSITION.address, &[120]), write(SPEED.address, &[7])].concat());
+    world.run(1_500);
+    let registers = world.arm.registers();
+    assert_eq!((registers.get(TARGET_POSITION.address), registers.get(SPEED.address)), (90, 7));
+    assert_eq!(sharing(&mut world, 0)[5], 1, "it is told");
+}
+
+#[test]
+fn nothing_that_was_sent_to_an_unplugged_arm_is_carried_out() {
+    let mut world = World::new(2);
+    world.unplug();
+    for turn in 0..3_000_u32 {
+        let value = u8::try_from(turn % 100).unwrap() + 40;
+        world.send(0, &write(TARGET_POSITION.address, &[value]));
+    }
+    world.run(100);
+    assert!(!world.programs[0].is_waiting(), "nothing is kept");
+    world.plug();
+    world.run(2_000);
+    assert_eq!(world.arm.registers().read(TARGET_POSITION.address, 7), POSE);
+}
+
+#[test]
+fn a_short_read_beside_31_readers_of_long_replies_takes_at_most_100_ms() {
+    let mut world = World::new(33);
+    let mut times: Vec<u64> = (0..60)
+        .map(|turn| {
+            Attack::Readers.refill(&mut world, 0);
+            world.advance(turn * 7 % 50);
+            world.round_trip(1, &read(PRESENT_POSITION.address, 7)).as_micros()
+        })
+        .collect();
+    times.sort_unstable();
+    println!("p50 {} us, at most {:?} us", times[30], times.last());
+    assert!(times[30] <= 100_000, "{times:?}");
+}
+
+#[test]
+fn with_one_driver_the_others_watch_until_it_pauses_or_hands_over() {
+    let options = HubOptions { has_one_driver: true, ..HubOptions::default() };
+    let mut world = World::with_options(2, options);
+    let target = |world: &World| world.arm.registers().get(TARGET_POSITION.address);
+    let move_to = |world: &mut World, program, value| {
+        world.send(program, &write(TARGET_POSITION.address, &[value]));
+        world.run(20);
+        target(world)
+    };
+    assert_eq!(move_to(&mut world, 0, 100), 100);
+    assert_eq!(move_to(&mut world, 1, 110), 100);
+    assert_eq!(sharing(&mut world, 1), [1, 2, 2, 0, 4, 1, 0, 0]);
+    world.send(0, &write(COMMAND, &[3]));
+    world.run(20);
+    assert_eq!(move_to(&mut world, 1, 110), 110, "handed over");
+    assert_eq!(move_to(&mut world, 0, 100), 110);
+    let (_, held) = stop(&mut world, 0);
+    assert_eq!(targets(&world), held, "a stop works whoever drives");
+    world.run(1_000);
+    assert_eq!(move_to(&mut world, 0, 100), 100, "the other one was silent");
+}
+
+#[test]
+fn with_read_only_access_nothing_but_reads_is_sent() {
+    let mut world = World::with_access(2, true);
+    for request in [write(SPEED.address, &[7]), write(COMMAND, &[1]), read(13, 7), write(53, &[50])] {
+        world.send(0, &request);
+    }
+    world.join_page();
+    for message in [r#"{"cmd":"angle","id":0,"angle":80}"#, r#"{"cmd":"stop"}"#] {
+        world.send_message(0, message);
+    }
+    world.run(1_000);
+    let functions: Vec<u8> = world.sent.chunks(7).map(|frame| frame[2]).collect();
+    assert!(functions.len() > 10 && functions.iter().all(|&function| function == 3), "{functions:?}");
+    let answers: Vec<_> = world.pages[0].answers.iter().map(|(_, answer)| answer.as_str()).collect();
+    assert!(answers.iter().all(|answer| answer.contains("read-only")) && answers.len() == 2, "{answers:?}");
+    assert_eq!(sharing(&mut world, 0)[4], 2);
+}
+
+#[test]
+fn without_an_arm_a_page_is_told() {
+    let mut world = World::new(0);
+    world.join_page();
+    world.unplug();
+    for message in
+        [r#"{"cmd":"angle","id":0,"angle":80}"#, r#"{"cmd":"stop"}"#, r#"{"cmd":"IK5","pos":[0,250,100]}"#]
+    {
+        world.send_message(0, message);
+    }
+    world.run(100);
+    let answers = &world.pages[0].answers;
+    assert!(
+        answers.iter().all(|(_, answer)| answer.contains("does not answer")) && answers.len() == 3,
+        "{answers:?}"
+    );
+}

@@ -1,0 +1,63 @@
+//! The address of an arm behind a server, as it stands in the place of a port's name.
+
+use std::env;
+use std::path::PathBuf;
+
+/// The environment variable with the token of servers that want one.
+pub const TOKEN_VARIABLE: &str = "SEVENBOT_TOKEN";
+
+/// The address of an arm behind a server.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Address {
+    /// `tcp://HOST:PORT`, or `socket://HOST:PORT` as pyserial writes it.
+    Tcp(String),
+    /// `unix:PATH`.
+    Unix(PathBuf),
+    /// `sevenbot://NAME`: the server that was started with this name.
+    Name(String),
+}
+
+impl Address {
+    /// The address in a port's name; `None` if it names a serial port.
+    ///
+    /// ```
+    /// use sevenbot::network::Address;
+    ///
+    /// assert_eq!(Address::parse("tcp://10.0.0.5:7777"), Some(Address::Tcp("10.0.0.5:7777".to_owned())));
+    /// assert_eq!(Address::parse("sevenbot://lab-3"), Some(Address::Name("lab-3".to_owned())));
+    /// assert_eq!(Address::parse("/dev/ttyUSB0"), None);
+    /// ```
+    #[must_use]
+    pub fn parse(name: &str) -> Option<Self> {
+        let tcp = || name.strip_prefix("tcp://").or_else(|| name.strip_prefix("socket://"));
+        let path = || name.strip_prefix("unix://").or_else(|| name.strip_prefix("unix:"));
+        if let Some(name) = name.strip_prefix("sevenbot://") {
+            return Some(Self::Name(name.trim_end_matches('/').to_owned()));
+        }
+        match tcp() {
+            Some(address) => Some(Self::Tcp(address.trim_end_matches('/').to_owned())),
+            None => path().map(|path| Self::Unix(path.into())),
+        }
+    }
+
+    /// The token that servers over TCP may want: of the environment variable [`TOKEN_VARIABLE`].
+    pub(super) fn token() -> Option<String> {
+        env::var(TOKEN_VARIABLE).ok().filter(|token| !token.is_empty())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_serial_ports_are_no_addresses() {
+        for port in ["/dev/ttyUSB0", "COM3", "./7bot", "tcp", "unix", "sevenbot", ""] {
+            assert_eq!(Address::parse(port), None, "{port}");
+        }
+        assert_eq!(Address::parse("socket://h:1/"), Some(Address::Tcp("h:1".to_owned())));
+        for path in ["unix:/run/a.sock", "unix:///run/a.sock"] {
+            assert_eq!(Address::parse(path), Some(Address::Unix("/run/a.sock".into())));
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The servers of this user on this computer. Each has a file in a directory that nobody else can write to, with lines such as
+//! `port /dev/ttyUSB0`, and a Unix socket of the same name beside it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::{env, process};
+
+/// What the file of a server ends with, and its socket.
+const FILE: &str = "server";
+const SOCKET: &str = "sock";
+
+/// A server of this user.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LocalServer {
+    /// Its Unix socket.
+    pub socket: PathBuf,
+    /// The serial port of its arm.
+    pub port: PathBuf,
+    /// Its name.
+    pub name: Option<String>,
+}
+
+/// The file of a server that runs. Dropping it removes the file.
+#[derive(Debug)]
+pub struct Registered(PathBuf);
+
+impl Drop for Registered {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+impl LocalServer {
+    /// The server of this process. `None` if there is no directory for its files.
+    #[must_use]
+    pub fn of_this_process(name: Option<String>) -> Option<Self> {
+        let socket = directory()?.join(format!("serve-{}.{SOCKET}", process::id()));
+        Some(Self { socket, port: PathBuf::new(), name })
+    }
+
+    /// Tells other programs of this user of the server.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn register(&self) -> io::Result<Registered> {
+        let path = self.socket.with_extension(FILE);
+        let mut text =
+            format!("port {}\n", fs::canonicalize(&self.port).as_deref().unwrap_or(&self.port).display());
+        if let Some(name) = &self.name {
+            text.push_str(&format!("name {name}\n"));
+        }
+        // No link that somebody planted is followed.
+        let _ = fs::remove_file(&path);
+        let mut file = fs::File::create_new(&path)?;
+        io::Write::write_all(&mut file, text.as_bytes())?;
+        Ok(Registered(path))
+    }
+
+    fn read(file: &Path) -> Option<Self> {
+        let text = fs::read_to_string(file).ok()?;
+        let value = |key: &str| text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(' '));
+        let port = value("port")?.into();
+        Some(Self { socket: file.with_extension(SOCKET), port, name: value("name").map(str::to_owned) })
+    }
+
+    /// Does it accept connections? The file of a server that was killed stays.
+    #[cfg(unix)]
+    fn is_running(&self) -> bool {
+        std::os::unix::net::UnixStream::connect(&self.socket).is_ok()
+    }
+
+    #[cfg(not(unix))]
+    const fn is_running(&self) -> bool {
+        false
+    }
+
+    /// Its address, in the place of a port's name.
+    #[must_use]
+    pub fn address(&self) -> String {
+        format!("unix:{}", self.socket.display())
+    }
+}
+
+/// The servers of this user that run.
+#[must_use]
+pub fn servers() -> Vec<LocalServer> {
+    let entries = directory().and_then(|directory| fs::read_dir(directory).ok());
+    let files = entries.into_iter().flatten().flatten().map(|entry| entry.path());
+    let files = files.filter(|path| path.extension().is_some_and(|extension| extension == FILE));
+    let mut found: Vec<_> =
+        files.filter_map(|file| LocalServer::read(&file)).filter(LocalServer::is_running).collect();
+    found.sort_by(|one, other| one.socket.cmp(&other.socket));
+    found
+}
+
+/// The server of this user that has a port open.
+#[must_use]
+pub fn serving(port: &str) -> Option<LocalServer> {
+    let port = fs::canonicalize(port).ok()?;
+    servers().into_iter().find(|server| server.port == port)
+}
+
+/// Where the files are. `None` if others can write there.
+fn directory() -> Option<PathBuf> {
+    let absolute = |name| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let base = absolute("XDG_RUNTIME_DIR").or_else(|| absolute("XDG_STATE_HOME"));
+    let directory = base.or_else(|| Some(absolute("HOME")?.join(".local/state")))?.join("7bot");
+    is_private(&directory).then_some(directory)
+}
+
+/// Is it a directory that only this user can write to? It is created if it does not exist.
+#[cfg(unix)]
+fn is_private(directory: &Path) -> bool {
+    use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+    let _ = fs::DirBuilder::new().recursive(true).mode(0o700).create(directory);
+    // The owner of what this process shows of itself, where the system has that, is this user.
+    let user = fs::metadata("/proc/self").map(|shown| shown.uid()).ok();
+    fs::symlink_metadata(directory).is_ok_and(|found| {
+        let is_ours = user.is_none_or(|user| user == found.uid());
+        found.is_dir() && is_ours && found.mode() & 0o022 == 0
+    })
+}
+
+#[cfg(not(unix))]
+const fn is_private(_: &Path) -> bool {
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_directory_that_others_can_write_to_is_not_used() {
+        use std::os::unix::fs::PermissionsExt;
+        let directory = env::temp_dir().join(format!("sevenbot-private-{}", process::id()));
+        assert!(is_private(&directory));
+        fs::set_permissions(&directory, fs::Permissions::from_mode(0o777)).expect("permissions");
+        assert!(!is_private(&directory));
+        let link = directory.join("link");
+        std::os::unix::fs::symlink(env::temp_dir(), &link).expect("a link");
+        assert!(!is_private(&link));
+        fs::remove_dir_all(directory).expect("its end");
+    }
+}

@@ -1,0 +1,112 @@
+//! Names of arms on the local network: multicast DNS, service `_sevenbot._tcp`.
+
+use std::net::{IpAddr, SocketAddr};
+use std::time::{Duration, Instant};
+
+use mdns_sd::{ServiceDaemon, ServiceEvent, ServiceInfo};
+
+/// The type of service.
+const SERVICE: &str = "_sevenbot._tcp.local.";
+/// How long answers are waited for.
+const ANSWER_TIME: Duration = Duration::from_millis(1_500);
+
+/// An arm that a server of the network announces.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Announced {
+    /// Its name.
+    pub name: String,
+    /// Its address over TCP.
+    pub address: SocketAddr,
+}
+
+/// Why a name is not announced.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct AnnounceError(#[from] mdns_sd::Error);
+
+/// A name that is announced. Dropping it ends that.
+pub struct Announcement {
+    daemon: ServiceDaemon,
+    name: String,
+}
+
+impl Announcement {
+    /// Announces a server that listens on a TCP port, at all addresses of this computer if `address` is unspecified.
+    ///
+    /// # Errors
+    /// The system has no multicast, or the name is not fit for it.
+    pub fn new(name: &str, address: SocketAddr) -> Result<Self, AnnounceError> {
+        let daemon = ServiceDaemon::new()?;
+        let host = format!("sevenbot-{name}.local.");
+        let listed = if address.ip().is_unspecified() { String::new() } else { address.ip().to_string() };
+        let none: &[(&str, &str)] = &[];
+        let service = ServiceInfo::new(SERVICE, name, &host, listed.as_str(), address.port(), none)?;
+        let service = if listed.is_empty() { service.enable_addr_auto() } else { service };
+        let full_name = service.get_fullname().to_owned();
+        daemon.register(service)?;
+        Ok(Self { daemon, name: full_name })
+    }
+}
+
+impl std::fmt::Debug for Announcement {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("Announcement").field(&self.name).finish()
+    }
+}
+
+impl Drop for Announcement {
+    fn drop(&mut self) {
+        // Others learn at once that the name is gone.
+        if let Ok(done) = self.daemon.unregister(&self.name) {
+            let _ = done.recv_timeout(Duration::from_millis(200));
+        }
+        let _ = self.daemon.shutdown();
+    }
+}
+
+/// The arms that are announced now. Asks the network for a second and a half.
+#[must_use]
+pub fn announced() -> Vec<Announced> {
+    let mut found = Vec::new();
+    let _ = browse(|arm| {
+        found.push(arm);
+        false
+    });
+    found.sort_by(|one: &Announced, other| one.name.cmp(&other.name));
+    found.dedup();
+    found
+}
+
+/// The address of an arm by its name.
+#[must_use]
+pub fn find(name: &str) -> Option<SocketAddr> {
+    let mut found = None;
+    let _ = browse(|arm| {
+        let is_wanted = arm.name == name;
+        found = found.or(is_wanted.then_some(arm.address));
+        is_wanted
+    });
+    found
+}
+
+/// Calls `on_arm` with each arm that answers, until it returns true or the time is over.
+fn browse(mut on_arm: impl FnMut(Announced) -> bool) -> Result<(), mdns_sd::Error> {
+    let daemon = ServiceDaemon::new()?;
+    let events = daemon.browse(SERVICE)?;
+    let end = Instant::now() + ANSWER_TIME;
+    while let Ok(event) = events.recv_deadline(end) {
+        let ServiceEvent::ServiceResolved(service) = event else { continue };
+        let name =
+            service.fullname.strip_suffix(SERVICE).unwrap_or_default().trim_end_matches('.').to_owned();
+        // IPv4 first: an address of IPv6 may need a scope.
+        let mut addresses: Vec<IpAddr> =
+            service.addresses.iter().map(mdns_sd::ScopedIp::to_ip_addr).collect();
+        addresses.sort();
+        let Some(&address) = addresses.first() else { continue };
+        if on_arm(Announced { name, address: SocketAddr::new(address, service.port) }) {
+            break;
+        }
+    }
+    let _ = daemon.shutdown();
+    Ok(())
+}
