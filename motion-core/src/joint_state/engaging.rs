@@ -27,6 +27,12 @@ impl JointState {
             self.lose_torque(now);
             return None;
         }
+        if held.is_on && answer.alarms != 0 && answer.reading.load == 0 && !self.position.is_steady() {
+            // An alarm keeps the servo from holding, and the joint falls (D28).
+            self.lose_torque(now);
+            self.let_go.follow(now, answer);
+            return None;
+        }
         let goal = counts_from_angle(self.joint, self.drive.set_point(), registers.offset(self.joint));
         let is_there = |counts: u16| counts.abs_diff(goal) <= 1;
         let repeats = if held.is_on || is_there(held.goal_counts) {

@@ -71,6 +71,20 @@ fn d12_a_joint_is_not_given_torque_where_it_was_measured_long_ago() {
     assert_eq!(joints.take_torque(true), [None; JOINTS]);
 }
 
+/// Some servos show their torque switch as on while heat keeps them from holding.
+#[test]
+fn d28_a_joint_that_an_alarm_frees_while_its_torque_is_pending_gets_none() {
+    let (mut joints, mut registers) = (Joints::new(MotorState::Servo), RegisterFile::new([0; 6], None));
+    let mut read = |millis, position_counts, goal_counts| {
+        let torque = Some(HeldGoal { is_on: true, goal_counts });
+        let answer = Answer { torque, ..answer(position_counts) };
+        joints.measured(at_ms(millis), J1, &answer, true, &mut registers)
+    };
+    assert_eq!([(0, 513, 620), (2, 511, 620)].map(|(ms, at, goal)| read(ms, at, goal))[1], Measured::Engaged);
+    assert_eq!(read(32, 477, 511), Measured::Accepted, "it falls");
+    assert_eq!(joints.take_torque(true)[0], Some(Torque::Damping), "which ends a latched overload");
+}
+
 #[test]
 fn d29_a_joint_that_was_silent_before_it_had_torque_engages_after_any_time() {
     let (mut joints, mut registers) = measured(MotorState::Servo);

@@ -20,7 +20,7 @@ use host_link::Snapshot;
 /// Why an arm does not carry out a move.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MoveCheckError {
-    /// These problems end the move. Each tells what to do: [`ProblemKind::remedy`].
+    /// These problems end the move. Each tells what to do: [`ProblemKind::remedy`](super::ProblemKind::remedy).
     #[error("{}", sentences(.0))]
     Problems(Vec<Problem>),
     /// The motors do not drive the joints.
