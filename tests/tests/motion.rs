@@ -268,7 +268,12 @@ fn d14_reports_have_their_frequency_and_stop_at_zero() {
         let start = Instant::now();
         arm.write(FEEDBACK_FREQUENCY, &[20]);
         let report = arm.reply();
-        assert_eq!((report.address, report.values), (PRESENT_POSITION, here));
+        assert_eq!((report.address, report.values.len()), (PRESENT_POSITION, here.len()));
+        // A joint that droops may pass from one degree to the next meanwhile.
+        assert!(
+            report.values.iter().zip(&here).all(|(&shown, &read)| near(shown, read)),
+            "{report:?} after {here:?}"
+        );
         receive_reports(arm, start, 40, 20);
         arm.write(FEEDBACK_FREQUENCY, &[0]);
         arm.read(FEEDBACK_FREQUENCY, 1);

@@ -29,6 +29,8 @@ pub(super) struct JointTruth {
     lacks_order: bool,
     /// The last push over the limit.
     pushed_at: Option<Instant>,
+    /// Where its servo stands, in counts, and since when.
+    position: (u16, Instant),
 }
 
 impl JointTruth {
@@ -48,6 +50,18 @@ impl JointTruth {
             self.off_at = now;
         }
         self.is_on = is_on;
+    }
+
+    /// Takes the position of the servo in counts.
+    pub(super) fn stands(&mut self, now: Instant, counts: u16) {
+        if counts != self.position.0 {
+            self.position = (counts, now);
+        }
+    }
+
+    /// True if the joint has turned after `then`.
+    pub(super) fn has_turned_since(&self, then: Instant) -> bool {
+        self.position.1 > then
     }
 
     /// Takes the push of the servo and its limit in 0.1 %.
@@ -123,6 +137,15 @@ mod tests {
         truth.has_alarm(at(1_000));
         assert!(truth.may_be_let_go(at(8_499)) && !truth.may_be_let_go(at(8_500)));
         assert!(truth.may_wait_for_torque(at(10_999)) && !truth.may_wait_for_torque(at(11_000)));
+    }
+
+    #[test]
+    fn a_joint_that_turned_there_and_back_has_turned() {
+        let mut truth = JointTruth::default();
+        for (millis, counts) in [(0, 500), (100, 501), (200, 500), (300, 500)] {
+            truth.stands(at(millis), counts);
+        }
+        assert!(truth.has_turned_since(at(199)) && !truth.has_turned_since(at(200)));
     }
 
     #[test]

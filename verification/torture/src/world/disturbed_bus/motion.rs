@@ -38,6 +38,7 @@ impl DisturbedBus {
         for joint in Joint::ALL.into_iter().filter(|_| is_servo) {
             let may_miss = self.may_miss_orders(now, joint);
             self.truths[joint].observe(now, self.plant.torque(joint), may_miss);
+            self.truths[joint].stands(now, self.plant.position_counts(joint));
             self.truths[joint].pushes(now, self.plant.motor_torque(joint), limits[joint]);
             if self.last_status[joint].alarms != 0 {
                 self.truths[joint].has_alarm(now);

@@ -84,7 +84,9 @@ impl StatusChecker {
         let (last, since) = self.last_moves[joint];
         let checked_at = std::mem::replace(&mut self.position_checked_at[joint], context.now);
         // While it was not checked, the joint may have moved away and back.
-        let may_have_moved = last != position || context.now - checked_at > UNCHECKED_TIME;
+        let may_have_moved = last != position
+            || context.now - checked_at > UNCHECKED_TIME
+            || context.bus.truth(joint).has_turned_since(checked_at);
         if may_have_moved {
             self.last_moves[joint] = (position, context.now);
         }
