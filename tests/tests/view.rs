@@ -113,9 +113,9 @@ fn the_page_is_served_with_a_strict_policy() {
     let viewed = Viewed::start(true);
     let page = viewed.get(&format!("/?token={}", viewed.token()), &[viewed.host()]);
     assert!(page.starts_with("HTTP/1.1 200 OK\r\n") && page.contains("<!doctype html>"), "{page}");
-    assert!(page.contains("Content-Security-Policy: default-src 'self'; "), "{page}");
+    assert!(page.contains("content-security-policy: default-src 'self'; "), "{page}");
     let module = viewed.get("/sevenbot_web_bg.wasm", &[viewed.host()]);
-    assert!(module.contains("Content-Type: application/wasm\r\n"));
+    assert!(module.contains("content-type: application/wasm\r\n"));
     assert!(!page.contains(viewed.token()), "the token is in the address only");
 }
 
