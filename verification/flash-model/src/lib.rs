@@ -18,7 +18,7 @@
 //! use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 //! use flash_model::{Error, Flash};
 //!
-//! let mut flash = Flash::new(2);
+//! let mut flash = Flash::<4096>::new(2);
 //! flash.write(0, &[1, 2, 3, 4])?;
 //! assert!(flash.write(0, &[5, 2, 3, 4]).is_err(), "a programmed word needs an erase first");
 //! let mut bytes = [0; 4];
