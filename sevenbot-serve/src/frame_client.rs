@@ -38,16 +38,6 @@ impl FrameClient {
         self.id
     }
 
-    /// Leaves the hub after a clean end: see [`Hub::leave`].
-    pub fn leave(self, hub: &mut Hub, now: Instant) {
-        hub.leave(now, self.id);
-    }
-
-    /// Leaves the hub: see [`Hub::disconnect`].
-    pub fn disconnect(self, hub: &mut Hub, now: Instant) {
-        hub.disconnect(now, self.id);
-    }
-
     /// Takes bytes that the client sent at `since` or later, and returns how many. Offer the rest again when requests were sent
     /// to the arm. An empty slice states that the client is silent at `now`.
     pub fn push(&mut self, hub: &mut Hub, now: Instant, since: Instant, bytes: &[u8]) -> usize {

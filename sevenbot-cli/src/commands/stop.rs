@@ -1,5 +1,6 @@
 //! `stop`: makes every joint hold its position.
 
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::time::Duration;
 
@@ -68,28 +69,15 @@ impl Printable for Stopped {
     }
 }
 
+/// What became of the stop of an arm, and its port.
+type Outcome = (Result<JointSnapshot, CommandError>, String);
+
 /// Stops all arms at the same time. The ports that a server holds are stopped through the server.
 fn stop_all(session: &mut Session) -> Result<(), CommandError> {
-    let served = network::servers();
-    let mut names: Vec<String> = served.iter().map(network::LocalServer::address).collect();
-    let listed = ports::available().into_iter().map(|port| port.name);
-    let free = |port: &String| network::serving(port).is_none();
-    names.extend(listed.chain(running_simulators()).chain(session.port.clone()).filter(free));
-    names.sort();
-    names.dedup();
-    let options =
-        ArmOptions { reply_timeout: session.options.reply_timeout.min(PATIENCE), ..session.options };
-    let stop = |name: String| {
-        std::thread::spawn(move || {
-            let opened = Arm::open_with(&name, options);
-            let held = opened.map_err(|error| CommandError::Open { port: name.clone(), error });
-            (held.and_then(|mut arm| hold(&mut arm)), name)
-        })
-    };
-    let threads: Vec<_> = names.into_iter().map(stop).collect();
+    let served: Vec<_> = network::servers().iter().map(network::LocalServer::address).collect();
     let mut failed: Option<CommandError> = None;
     let mut has_stopped = false;
-    for (held, port) in threads.into_iter().filter_map(|thread| thread.join().ok()) {
+    for (held, port) in stop_each(session, &served) {
         match held {
             Ok(joints) => {
                 warn_about_unheld_joints(&joints);
@@ -97,9 +85,7 @@ fn stop_all(session: &mut Session) -> Result<(), CommandError> {
                 has_stopped = true;
             }
             // A port without an arm, or one that another program uses, need not be an arm.
-            Err(CommandError::Open { error, .. })
-                if !served.iter().any(|server| server.address() == port) =>
-            {
+            Err(CommandError::Open { error, .. }) if !served.contains(&port) => {
                 warn(format_args!("{port}: {error}"));
             }
             Err(error) => {
@@ -113,4 +99,23 @@ fn stop_all(session: &mut Session) -> Result<(), CommandError> {
         None if has_stopped => Ok(()),
         None => Err(CommandError::NoArm { tried: Vec::new() }),
     }
+}
+
+/// Stops each arm in a thread of its own, and waits for all: no arm goes on because the outcome of another cannot be printed.
+fn stop_each(session: &Session, served: &[String]) -> Vec<Outcome> {
+    let listed = ports::available().into_iter().map(|port| port.name);
+    let free = |port: &String| network::serving(port).is_none();
+    let free = listed.chain(running_simulators()).chain(session.port.clone()).filter(free);
+    let names: BTreeSet<String> = served.iter().cloned().chain(free).collect();
+    let options =
+        ArmOptions { reply_timeout: session.options.reply_timeout.min(PATIENCE), ..session.options };
+    let stop = |name: String| {
+        std::thread::spawn(move || {
+            let opened = Arm::open_with(&name, options);
+            let held = opened.map_err(|error| CommandError::Open { port: name.clone(), error });
+            (held.and_then(|mut arm| hold(&mut arm)), name)
+        })
+    };
+    let threads: Vec<_> = names.into_iter().map(stop).collect();
+    threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
 }

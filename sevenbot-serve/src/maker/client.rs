@@ -54,16 +54,6 @@ impl MakerClient {
         self.id
     }
 
-    /// Leaves the hub after a clean end: see [`Hub::leave`].
-    pub fn leave(self, hub: &mut Hub, now: Instant) {
-        hub.leave(now, self.id);
-    }
-
-    /// Leaves the hub: see [`Hub::disconnect`].
-    pub fn disconnect(self, hub: &mut Hub, now: Instant) {
-        hub.disconnect(now, self.id);
-    }
-
     /// Can the client send another message?
     #[must_use]
     pub fn has_room(&self) -> bool {

@@ -6,7 +6,8 @@ use futures_util::FutureExt;
 use protocol_core::time::Instant;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
-use super::frame_session::{End, FrameSession};
+use super::frame_session::FrameSession;
+use super::seat::End;
 use super::shared::Shared;
 
 /// Bytes that are read at once.
@@ -34,41 +35,31 @@ pub(super) async fn serve(
     first: Vec<u8>,
 ) -> Result<(), NoFrames> {
     let (mut reader, mut writer) = tokio::io::split(stream);
-    let mut session = FrameSession::open(shared);
-    let mut has_begun = false;
+    let mut client = FrameStream { session: FrameSession::open(shared), has_begun: false };
     // When it was last seen that no byte waits to be read: what is read now was sent later.
     let mut last_empty = shared.now();
     let mut piece = vec![0; PIECE];
-    let mut begin = |session: &mut FrameSession, since: Instant, bytes: &[u8]| {
-        has_begun |= bytes.first() == Some(&FIRST_BYTE);
-        session.put(since, bytes);
-        if has_begun || bytes.is_empty() { Ok(()) } else { Err(NoFrames) }
-    };
-    begin(&mut session, last_empty, &first)?;
+    client.put(last_empty, &first)?;
     let end = loop {
-        session.exchange();
-        if session.has_room() {
-            match reader.read(&mut piece).now_or_never() {
-                Some(Ok(0)) => break End::Clean,
-                Some(Ok(count)) => {
-                    begin(&mut session, last_empty, piece.get(..count).unwrap_or_default())?;
+        client.session.exchange();
+        let waits_for_input = client.session.has_room();
+        if waits_for_input {
+            match receive(&mut reader, &mut piece).now_or_never() {
+                Some(Ok(bytes)) => {
+                    client.put(last_empty, bytes)?;
                     // So that a flood leaves the thread to others.
                     tokio::task::yield_now().await;
                     continue;
                 }
-                Some(Err(_)) => break End::Broken,
+                Some(Err(end)) => break end,
                 None => last_empty = shared.now(),
             }
         }
-        let waits_for_input = session.has_room();
+        let session = &mut client.session;
         tokio::select! {
-            read = reader.read(&mut piece), if session.has_room() => match read {
-                Ok(0) => break End::Clean,
-                Ok(count) => {
-                    last_empty = shared.now();
-                    begin(&mut session, last_empty, piece.get(..count).unwrap_or_default())?;
-                }
-                Err(_) => break End::Broken,
+            received = receive(&mut reader, &mut piece), if waits_for_input => match received {
+                Ok(bytes) => client.put(shared.now(), bytes)?,
+                Err(end) => break end,
             },
             written = writer.write(session.output()), if !session.output().is_empty() => match written {
                 Ok(count) => session.consume(count),
@@ -80,6 +71,30 @@ pub(super) async fn serve(
             last_empty = shared.now();
         }
     };
-    session.close(end);
+    client.session.close(end);
     Ok(())
+}
+
+/// A client whose bytes have to be frames.
+struct FrameStream {
+    session: FrameSession,
+    has_begun: bool,
+}
+
+impl FrameStream {
+    /// Takes bytes that the client sent at `since` or later.
+    fn put(&mut self, since: Instant, bytes: &[u8]) -> Result<(), NoFrames> {
+        self.has_begun |= bytes.first() == Some(&FIRST_BYTE);
+        self.session.put(since, bytes);
+        if self.has_begun || bytes.is_empty() { Ok(()) } else { Err(NoFrames) }
+    }
+}
+
+/// Receives bytes; how the connection ended if there are none.
+async fn receive<'a>(reader: &mut (impl AsyncRead + Unpin), piece: &'a mut [u8]) -> Result<&'a [u8], End> {
+    match reader.read(piece).await {
+        Ok(0) => Err(End::Clean),
+        Ok(count) => Ok(piece.get(..count).unwrap_or_default()),
+        Err(_) => Err(End::Broken),
+    }
 }

@@ -3,26 +3,16 @@
 use std::sync::Arc;
 
 use protocol_core::time::Instant;
-use tokio::sync::Notify;
 
+use super::seat::{End, Seat};
 use super::shared::Shared;
 use crate::frame_client::FrameClient;
-
-/// How a connection ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum End {
-    /// The client closed it: what it sent before is carried out.
-    Clean,
-    /// It broke, or the client did what it must not do: nothing more is carried out.
-    Broken,
-}
 
 /// A client of the hub, and the bytes that the hub has no room for yet. A dropped session is a broken connection.
 #[derive(Debug)]
 pub(super) struct FrameSession {
-    shared: Arc<Shared>,
-    client: Option<FrameClient>,
-    wake: Arc<Notify>,
+    seat: Seat,
+    client: FrameClient,
     input: Vec<u8>,
     /// The bytes of `input` were sent at this time or later.
     since: Instant,
@@ -30,10 +20,9 @@ pub(super) struct FrameSession {
 
 impl FrameSession {
     pub(super) fn open(shared: &Arc<Shared>) -> Self {
-        let client = shared.with_client(|hub, _| FrameClient::connect(hub, shared.baud));
-        let wake = shared.join(client.id());
-        let (shared, since) = (Arc::clone(shared), Instant::ZERO);
-        Self { shared, client: Some(client), wake, input: Vec::new(), since }
+        let connect = |hub: &mut _| FrameClient::connect(hub, shared.baud);
+        let (seat, client) = Seat::take(shared, connect, FrameClient::id);
+        Self { seat, client, input: Vec::new(), since: Instant::ZERO }
     }
 
     /// Adds bytes that the client sent at `since` or later.
@@ -46,10 +35,9 @@ impl FrameSession {
 
     /// Passes bytes to the hub as far as it has room, and collects replies and reports.
     pub(super) fn exchange(&mut self) {
-        let Some(client) = &mut self.client else { return };
-        let (input, since) = (&mut self.input, self.since);
-        self.shared.with_client(|hub, now| {
-            let taken = client.push(hub, now, since.min(now), input);
+        let Self { seat, client, input, since } = self;
+        seat.shared().with_client(|hub, now| {
+            let taken = client.push(hub, now, (*since).min(now), input);
             input.drain(..taken.min(input.len()));
             client.collect(hub);
         });
@@ -62,12 +50,12 @@ impl FrameSession {
 
     /// Bytes for the client.
     pub(super) fn output(&self) -> &[u8] {
-        self.client.as_ref().map_or(&[], FrameClient::output)
+        self.client.output()
     }
 
     /// Removes bytes that the client took.
     pub(super) fn consume(&mut self, count: usize) {
-        self.client.iter_mut().for_each(|client| client.consume(count));
+        self.client.consume(count);
     }
 
     /// Takes all bytes for the client.
@@ -79,21 +67,15 @@ impl FrameSession {
 
     /// Ends when [`FrameSession::exchange`] has something to do: the hub has news, or silence of the client has an effect.
     pub(super) async fn news(&self) {
-        let deadline = match &self.client {
-            Some(client) if self.input.is_empty() => client.deadline(),
-            _ => Instant::FAR_FUTURE,
-        };
-        tokio::select! {
-            () = self.wake.notified() => {}
-            () = self.shared.sleep_until(deadline) => {}
-        }
+        let is_through = self.input.is_empty();
+        self.seat.news_until(if is_through { self.client.deadline() } else { Instant::FAR_FUTURE }).await;
     }
 
     /// Another client uses the same wire from now on. The bytes that the hub has not got yet may be its own.
-    pub(super) fn succeed(mut self) -> Self {
-        let mut next = Self::open(&self.shared);
-        (next.input, next.since) = (std::mem::take(&mut self.input), self.since);
-        self.leave(End::Clean);
+    pub(super) fn succeed(self) -> Self {
+        let mut next = Self::open(self.seat.shared());
+        (next.input, next.since) = (self.input, self.since);
+        self.seat.leave(End::Clean);
         next
     }
 
@@ -101,22 +83,7 @@ impl FrameSession {
     pub(super) fn close(mut self, end: End) {
         if end == End::Clean {
             self.exchange();
-            self.leave(end);
         }
-    }
-
-    fn leave(&mut self, end: End) {
-        let Some(client) = self.client.take() else { return };
-        self.shared.part(client.id());
-        self.shared.with_client(|hub, now| match end {
-            End::Clean => client.leave(hub, now),
-            End::Broken => client.disconnect(hub, now),
-        });
-    }
-}
-
-impl Drop for FrameSession {
-    fn drop(&mut self) {
-        self.leave(End::Broken);
+        self.seat.leave(end);
     }
 }

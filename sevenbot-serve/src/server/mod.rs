@@ -20,6 +20,7 @@ mod listener;
 mod notice;
 mod pty;
 mod readiness;
+mod seat;
 mod shared;
 mod site;
 mod start_error;

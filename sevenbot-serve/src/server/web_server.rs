@@ -39,7 +39,7 @@ const TIMEOUT: Duration = Duration::from_secs(30);
 const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
 /// The longest request.
 const LONGEST_REQUEST: usize = 16 * 1_024;
-/// Bytes of a file that the kernel keeps; the kernel doubles it.
+/// Bytes of a file that wait in the kernel for a slow client. Linux reserves twice as many.
 const FILE_BUFFER: usize = 256 * 1_024;
 
 /// What all connections of a port share.

@@ -10,12 +10,12 @@ use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{FutureExt, SinkExt, StreamExt};
 use protocol_core::time::Instant;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::sync::Notify;
 use tokio_tungstenite::WebSocketStream;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message};
 
-use super::frame_session::{End, FrameSession};
+use super::frame_session::FrameSession;
+use super::seat::{End, Seat};
 use super::shared::Shared;
 use crate::maker::MakerClient;
 
@@ -140,30 +140,128 @@ where
     (Sender::Idle(sink), Messages { stream, unfinished })
 }
 
-/// Serves a client whose binary messages carry frames, as bytes over TCP do. A frame may be spread over messages, and a message
-/// may hold several.
+/// What a client's messages are for.
+trait Session {
+    /// Carries out what came, as far as possible. Returns the next message for the client, if it `can_send` one.
+    fn advance(&mut self, can_send: bool) -> Option<Message>;
+
+    /// May another message be put?
+    fn has_room(&self) -> bool;
+
+    /// Takes a message that the client sent at `since` or later.
+    fn put(&mut self, since: Instant, message: Message);
+
+    /// Ends when [`Session::advance`] has something to do.
+    fn news(&self) -> impl Future<Output = ()> + Send;
+
+    /// The connection has ended.
+    fn close(self, end: End);
+}
+
+/// Frames in binary messages, as bytes over TCP have them. A frame may be spread over messages, and a message may hold several.
+impl Session for FrameSession {
+    fn advance(&mut self, can_send: bool) -> Option<Message> {
+        self.exchange();
+        (can_send && !self.output().is_empty()).then(|| Message::binary(self.take_output()))
+    }
+
+    fn has_room(&self) -> bool {
+        FrameSession::has_room(self)
+    }
+
+    fn put(&mut self, since: Instant, message: Message) {
+        if let Message::Binary(bytes) = message {
+            FrameSession::put(self, since, &bytes);
+        }
+    }
+
+    fn news(&self) -> impl Future<Output = ()> + Send {
+        FrameSession::news(self)
+    }
+
+    fn close(self, end: End) {
+        FrameSession::close(self, end);
+    }
+}
+
+/// A client of the maker's WebSocket: commands in text messages. A dropped session is a broken connection.
+struct MakerSession {
+    seat: Seat,
+    client: MakerClient,
+}
+
+impl MakerSession {
+    fn open(shared: &Arc<Shared>, is_browser: bool) -> Self {
+        let connect = |hub: &mut _| MakerClient::connect(hub, is_browser);
+        let (seat, client) = Seat::take(shared, connect, MakerClient::id);
+        Self { seat, client }
+    }
+}
+
+impl Session for MakerSession {
+    fn advance(&mut self, can_send: bool) -> Option<Message> {
+        let Self { seat, client } = self;
+        seat.shared().with_client(|hub, now| client.advance(hub, now));
+        can_send.then(|| client.take_answer()).flatten().map(Message::text)
+    }
+
+    fn has_room(&self) -> bool {
+        self.client.has_room()
+    }
+
+    fn put(&mut self, since: Instant, message: Message) {
+        if let Message::Text(text) = message {
+            self.client.message(since, &text);
+        }
+    }
+
+    fn news(&self) -> impl Future<Output = ()> + Send {
+        self.seat.news_until(Instant::FAR_FUTURE)
+    }
+
+    fn close(mut self, end: End) {
+        if end == End::Clean {
+            self.advance(false);
+        }
+        self.seat.leave(end);
+    }
+}
+
+/// Serves a client whose messages carry frames.
 pub(super) async fn serve_frames<S>(shared: &Arc<Shared>, stream: S)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    let (mut sender, mut messages) = open(stream, LONGEST_FRAMES).await;
-    let mut session = FrameSession::open(shared);
+    serve(shared, stream, LONGEST_FRAMES, || FrameSession::open(shared)).await;
+}
+
+/// Serves a client of the maker's WebSocket.
+pub(super) async fn serve_maker<S>(shared: &Arc<Shared>, stream: S, is_browser: bool)
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    serve(shared, stream, LONGEST_COMMAND, || MakerSession::open(shared, is_browser)).await;
+}
+
+/// Serves a client until it ends. `longest`: bytes of its longest message.
+async fn serve<S, T: Session>(shared: &Shared, stream: S, longest: usize, session: impl FnOnce() -> T)
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    let (mut sender, mut messages) = open(stream, longest).await;
+    let mut session = session();
+    // When it was last seen that no message waits: what is read now was sent later.
     let mut last_empty = shared.now();
-    let put = |session: &mut FrameSession, since: Instant, message: Message| {
-        if let Message::Binary(bytes) = message {
-            session.put(since, &bytes);
-        }
-    };
     let end = loop {
-        session.exchange();
-        if sender.is_idle() && !session.output().is_empty() {
-            sender.start(Message::binary(session.take_output()));
+        if let Some(message) = session.advance(sender.is_idle()) {
+            sender.start(message);
         }
         let waits_for_input = session.has_room();
         if waits_for_input {
             match messages.next().now_or_never() {
                 Some(Ok(message)) => {
-                    put(&mut session, last_empty, message);
+                    session.put(last_empty, message);
+                    // So that a flood leaves the thread to others.
                     tokio::task::yield_now().await;
                     continue;
                 }
@@ -173,7 +271,7 @@ where
         }
         tokio::select! {
             message = messages.next(), if waits_for_input => match message {
-                Ok(message) => put(&mut session, shared.now(), message),
+                Ok(message) => session.put(shared.now(), message),
                 Err(end) => break end,
             },
             sent = sender.done() => if let Err(end) = sent { break end },
@@ -184,91 +282,4 @@ where
         }
     };
     session.close(end);
-}
-
-/// A client of the maker's WebSocket. Dropped, its connection has broken.
-struct MakerSession {
-    shared: Arc<Shared>,
-    client: Option<MakerClient>,
-    wake: Arc<Notify>,
-}
-
-impl MakerSession {
-    fn open(shared: &Arc<Shared>, is_browser: bool) -> Self {
-        let client = shared.with_client(|hub, _| MakerClient::connect(hub, is_browser));
-        let wake = shared.join(client.id());
-        Self { shared: Arc::clone(shared), client: Some(client), wake }
-    }
-
-    /// Carries out commands as far as possible. Returns the next answer.
-    fn advance(&mut self, wants_answer: bool) -> Option<String> {
-        let client = self.client.as_mut()?;
-        self.shared.with_client(|hub, now| client.advance(hub, now));
-        if wants_answer { client.take_answer() } else { None }
-    }
-
-    fn has_room(&self) -> bool {
-        self.client.as_ref().is_some_and(MakerClient::has_room)
-    }
-
-    fn put(&mut self, since: Instant, message: &Message) {
-        if let (Some(client), Message::Text(text)) = (&mut self.client, message) {
-            client.message(since, text);
-        }
-    }
-
-    fn leave(&mut self, end: End) {
-        let Some(client) = self.client.take() else { return };
-        self.shared.part(client.id());
-        self.shared.with_client(|hub, now| match end {
-            End::Clean => client.leave(hub, now),
-            End::Broken => client.disconnect(hub, now),
-        });
-    }
-}
-
-impl Drop for MakerSession {
-    fn drop(&mut self) {
-        self.leave(End::Broken);
-    }
-}
-
-/// Serves a client of the maker's WebSocket.
-pub(super) async fn serve_maker<S>(shared: &Arc<Shared>, stream: S, is_browser: bool)
-where
-    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
-{
-    let (mut sender, mut messages) = open(stream, LONGEST_COMMAND).await;
-    let mut session = MakerSession::open(shared, is_browser);
-    let mut last_empty = shared.now();
-    let end = loop {
-        if let Some(answer) = session.advance(sender.is_idle()) {
-            sender.start(Message::text(answer));
-        }
-        let waits_for_input = session.has_room();
-        if waits_for_input {
-            match messages.next().now_or_never() {
-                Some(Ok(message)) => {
-                    session.put(last_empty, &message);
-                    tokio::task::yield_now().await;
-                    continue;
-                }
-                Some(Err(end)) => break end,
-                None => last_empty = shared.now(),
-            }
-        }
-        tokio::select! {
-            message = messages.next(), if waits_for_input => match message {
-                Ok(message) => session.put(shared.now(), &message),
-                Err(end) => break end,
-            },
-            sent = sender.done() => if let Err(end) = sent { break end },
-            () = session.wake.notified() => {}
-        }
-        if waits_for_input {
-            last_empty = shared.now();
-        }
-    };
-    session.advance(false);
-    session.leave(end);
 }

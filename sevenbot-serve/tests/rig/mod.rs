@@ -127,12 +127,12 @@ impl World {
     }
 
     pub fn leave(&mut self, number: usize) {
-        self.programs.remove(number).client.leave(&mut self.hub, self.now);
+        self.hub.leave(self.now, self.programs.remove(number).client.id());
     }
 
     /// The program's connection is reset.
     pub fn reset(&mut self, number: usize) {
-        self.programs.remove(number).client.disconnect(&mut self.hub, self.now);
+        self.hub.disconnect(self.now, self.programs.remove(number).client.id());
     }
 
     pub fn plug(&mut self) {
