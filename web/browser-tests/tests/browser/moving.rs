@@ -5,8 +5,7 @@ use browser_tests::{Page, Viewed};
 use kinematics::forward;
 
 /// The tip in mm.
-fn tip(page: &mut Page) -> [f64; 3] {
-    let [one, two, three, four, five, six, _] = page.measured();
+fn tip([one, two, three, four, five, six, _]: [f64; 7]) -> [f64; 3] {
     let tip = forward([one, two, three, four, five, six]).hand.tip;
     [tip.x, tip.y, tip.z]
 }
@@ -14,8 +13,19 @@ fn tip(page: &mut Page) -> [f64; 3] {
 /// Where the tip is on the screen.
 fn tip_on_screen(page: &mut Page) -> [f64; 2] {
     page.evaluate("scrollTo(0, 0)");
-    let tip = tip(page);
-    page.project(tip)
+    let measured = page.measured();
+    page.project(tip(measured))
+}
+
+/// Where the tip would be on the screen if each joint were at its target.
+fn sent_tip_on_screen(page: &mut Page) -> [f64; 2] {
+    page.evaluate("scrollTo(0, 0)");
+    let state = page.state();
+    page.project(tip(std::array::from_fn(|joint| state["targets"][joint].as_f64().expect("an angle"))))
+}
+
+fn distance([x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) -> f64 {
+    (x - to_x).hypot(y - to_y)
 }
 
 fn wait_until_it_rests(page: &mut Page) {
@@ -100,8 +110,11 @@ fn the_tip_follows_the_mouse_and_a_position_out_of_reach_is_shown() {
     let to = [from[0] - 40.0, from[1] + 30.0];
     page.drag(from, to);
     wait_until_it_rests(&mut page);
+    let sent = sent_tip_on_screen(&mut page);
+    assert!(distance(sent, to) < 2.0, "{sent:?}, wanted {to:?}");
+    // The arm droops under its weight, by friction sometimes more and sometimes less.
     let [x, y] = tip_on_screen(&mut page);
-    assert!((x - to[0]).hypot(y - to[1]) < 4.0, "{x} {y}, wanted {to:?}");
+    assert!(distance([x, y], to) < 10.0, "{x} {y}, wanted {to:?}");
 
     let empty = page.picture();
     let far = [x + 220.0, y - 60.0];
@@ -114,7 +127,7 @@ fn the_tip_follows_the_mouse_and_a_position_out_of_reach_is_shown() {
     let picture = page.picture();
     assert!(picture.near(ring, 30, far, 20.0) > 20, "{}", picture.near(ring, 30, far, 20.0));
     let reached = tip_on_screen(&mut page);
-    assert!((reached[0] - far[0]).hypot(reached[1] - far[1]) > 30.0, "{reached:?} for {far:?}");
+    assert!(distance(reached, far) > 30.0, "{reached:?} for {far:?}");
     page.release(far);
     page.pass(0.2);
     assert!(!page.text("#tip").contains("out of reach"));
