@@ -5,6 +5,8 @@
 use motion_core::servo_bus::Torque;
 use protocol_core::time::{Duration, Instant};
 
+use super::status_reply::StatusFields;
+
 /// The controller finds within this time that a servo has lost its torque, and that it has torque again. Its shell may
 /// stall for five seconds of it.
 const NOTICE_TIME: Duration = Duration::from_millis(7_500);
@@ -14,6 +16,9 @@ const ENGAGE_TIME: Duration = Duration::from_millis(10_000);
 const GIVE_WAY_TIME: Duration = Duration::from_millis(7_000);
 /// The controller measures a push this much too high at most, in 0.1 %: speed and load are not of the same instant.
 const PUSH_ERROR: i16 = 150;
+/// A joint that was let go because of heat may engage again when its servo is 5 degrees cooler (D28). Its limit is 80 degrees
+/// Celsius.
+pub(super) const COOL: u8 = 75;
 
 /// The truth about one joint.
 #[derive(Clone, Copy, Debug, Default)]
@@ -23,7 +28,7 @@ pub(super) struct JointTruth {
     lost_at: Option<Instant>,
     /// The last time without torque after a loss.
     off_at: Instant,
-    /// The last alarm. A joint that nothing moves counts as held as long as its servo has an alarm (D28).
+    /// The last alarm, or the last time that the servo was still hot after one. A joint that nothing moves counts as held as long as its servo has an alarm (D28).
     alarm_at: Option<Instant>,
     /// It has no torque since a disturbance: the controller cannot tell a lost order from lost torque.
     lacks_order: bool,
@@ -34,9 +39,12 @@ pub(super) struct JointTruth {
 }
 
 impl JointTruth {
-    /// The servo has an alarm.
-    pub(super) fn has_alarm(&mut self, now: Instant) {
-        self.alarm_at = Some(now);
+    /// Takes the last status of the servo. After an alarm the joint may be let go until the servo is cool.
+    pub(super) fn reports(&mut self, now: Instant, status: StatusFields) {
+        let is_hot = self.alarm_at.is_some() && status.celsius > COOL;
+        if status.alarms != 0 || is_hot {
+            self.alarm_at = Some(now);
+        }
     }
 
     /// Takes the torque of the servo. `may_miss_orders` tells that frames may be lost, or questions not answered.
@@ -97,6 +105,8 @@ impl JointTruth {
 
 #[cfg(test)]
 mod tests {
+    use motion_core::servo_bus::frame::error;
+
     use super::*;
 
     const ON: Option<Torque> = Some(Torque::On);
@@ -134,7 +144,14 @@ mod tests {
         let mut truth = JointTruth::default();
         truth.observe(at(0), ON, false);
         assert!(!truth.may_be_let_go(at(0)));
-        truth.has_alarm(at(1_000));
+        truth.reports(at(0), StatusFields { celsius: 79, ..StatusFields::default() });
+        assert!(!truth.may_be_let_go(at(0)), "it is warm");
+        truth.reports(
+            at(400),
+            StatusFields { celsius: 81, alarms: error::OVERHEAT, ..StatusFields::default() },
+        );
+        truth.reports(at(1_000), StatusFields { celsius: 76, ..StatusFields::default() });
+        truth.reports(at(1_100), StatusFields { celsius: 75, ..StatusFields::default() });
         assert!(truth.may_be_let_go(at(8_499)) && !truth.may_be_let_go(at(8_500)));
         assert!(truth.may_wait_for_torque(at(10_999)) && !truth.may_wait_for_torque(at(11_000)));
     }

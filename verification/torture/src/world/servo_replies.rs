@@ -60,6 +60,8 @@ pub(super) struct ServoReplies {
     codes: TorqueCodes,
     /// Decodes the bytes that the controller receives.
     decoder: Decoder,
+    /// The servo that was asked last, until it answers. The controller waits for no other.
+    asked: Option<Joint>,
     servos: PerJoint<Known>,
     /// All driven servos were silent at once for a second, and none was read with torque since then.
     was_outage: bool,
@@ -67,7 +69,7 @@ pub(super) struct ServoReplies {
 
 impl ServoReplies {
     pub(super) fn new(codes: TorqueCodes) -> Self {
-        Self { codes, decoder: Decoder::new(), servos: PerJoint::default(), was_outage: false }
+        Self { codes, decoder: Decoder::new(), asked: None, servos: PerJoint::default(), was_outage: false }
     }
 
     /// The controller reads a servo.
@@ -83,6 +85,7 @@ impl ServoReplies {
         servo.unanswered = servo.unanswered.saturating_add(1);
         servo.asked_at = now;
         servo.asked_count = count;
+        self.asked = Some(joint);
         let mut driven = self.servos.0.iter().filter(|servo| servo.is_driven).peekable();
         self.was_outage |= driven.peek().is_some() && driven.all(|servo| servo.is_lost(now));
         // The controller does the same: bytes from before a read are not its reply.
@@ -95,10 +98,11 @@ impl ServoReplies {
             self.decoder.push(piece);
             while let Some(heard) = self.decoder.pull() {
                 let Some(frame) = heard.ok().filter(|frame| frame.params.len() >= READING) else { continue };
-                let Some(joint) = Joint::from_index(frame.id) else { continue };
+                let Some(joint) = self.asked.filter(|asked| asked.index() == frame.id) else { continue };
                 if frame.params.len() != usize::from(self.servos[joint].asked_count) {
                     continue;
                 }
+                self.asked = None;
                 let has_torque = self.servos[joint].answered(now, frame.params, self.codes.code(Torque::On));
                 self.was_outage &= !has_torque;
             }
@@ -271,6 +275,18 @@ mod tests {
         is_on(&mut replies, 240);
         assert_eq!(ahead(&mut replies, 245), 2 * 70 + 4, "two doubts without a goal between them");
         assert_eq!(ahead(&mut replies, 255), 70 + 14);
+    }
+
+    #[test]
+    fn a_servo_that_answers_while_another_is_asked_tells_nothing() {
+        let mut replies = ServoReplies::new(TorqueCodes::default());
+        is_on(&mut replies, 0);
+        fails(&mut replies, 10);
+        replies.asked(at_ms(20), Joint::ALL[0], 24, true);
+        let mut late = ServoFrameBuffer::new();
+        frame::status(&mut late, JOINT.index(), 0, &[0; 10]);
+        replies.received(at_ms(21), &late);
+        assert_eq!(replies.unanswered(JOINT), 1);
     }
 
     #[test]

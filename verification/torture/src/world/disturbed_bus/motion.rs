@@ -40,9 +40,7 @@ impl DisturbedBus {
             self.truths[joint].observe(now, self.plant.torque(joint), may_miss);
             self.truths[joint].stands(now, self.plant.position_counts(joint));
             self.truths[joint].pushes(now, self.plant.motor_torque(joint), limits[joint]);
-            if self.last_status[joint].alarms != 0 {
-                self.truths[joint].has_alarm(now);
-            }
+            self.truths[joint].reports(now, self.last_status[joint]);
             if self.truths[joint].may_give_way(now) {
                 self.motion_checker.may_recoil(joint, &self.plant);
             }

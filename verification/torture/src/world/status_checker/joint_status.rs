@@ -12,6 +12,7 @@ use super::{CHECK_PERIOD, DETECTION_TIME, StatusChecker};
 use crate::violation::{Check, ensure};
 use crate::world::disturbed_bus::Availability;
 use crate::world::extended_model;
+use crate::world::joint_truth::COOL;
 use crate::world::protection_model::PROTECTION;
 
 /// A position that was not checked for longer may have changed meanwhile: two checks.
@@ -20,8 +21,6 @@ const UNCHECKED_TIME: Duration = Duration::from_millis(500);
 const RELEASE_TIME: Duration = Duration::from_millis(300);
 /// The time of a move over the whole range at the lowest speed, 1.9 degrees/s.
 const LONGEST_MOVE: Duration = Duration::from_millis(125_000);
-/// A servo that was too hot gets torque again when it is 5 degrees cooler (D28). Its limit is 80 degrees Celsius.
-const COOL: u8 = 75;
 
 impl StatusChecker {
     pub(super) fn check_joint(&mut self, joint: Joint, context: &StatusContext<'_>) -> Check {
