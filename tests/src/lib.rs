@@ -3,9 +3,9 @@
 //! (`ARM=adapter`), or the arm on `ARM_PORT`.
 //!
 //! ```text
-//!   tests/*.rs ──▶ TestArm ──▶ ArmClient ──▶ serial port ──▶ StartedArm: one for each test
-//!                     │                                 └──▶ ExternalArm on ARM_PORT: one for all tests, in turn
-//!                     └── ArmControl: power cycles, kills
+//!   tests/system ──▶ TestArm ──▶ ArmClient ──▶ serial port ──▶ StartedArm: one for each test
+//!                       │                                 └──▶ ExternalArm on ARM_PORT: one for all tests, in turn
+//!                       └── ArmControl: power cycles, kills
 //! ```
 //!
 //! The tests share no code with the product. Frames, checksum and register numbers are written from `docs/protocol.md`

@@ -9,8 +9,8 @@ use crate::run::{TESTED, TaskResult, run};
 pub(crate) struct SystemTests {
     /// The value of the variable `ARM`.
     arm: &'static str,
-    /// The files of `tests/tests` to run.
-    files: &'static [&'static str],
+    /// The modules of `tests/tests/system` to run, as prefixes of the names of their tests.
+    modules: &'static [&'static str],
     /// The skipped tests, each after its reason.
     skipped: &'static [&'static str],
 }
@@ -20,15 +20,15 @@ pub(crate) const EMULATOR: SystemTests = SystemTests {
     arm: "emulator",
     // Most tests of the tool test its own code, which does not depend on the arm. The emulator's flash does not change, so the
     // tests of the settings after a restart are left out.
-    files: &[
-        "wire",
-        "registers",
-        "motion",
-        "servo_faults",
-        "tool",
-        "tool_map21",
-        "self_test",
-        "maker_clients",
+    modules: &[
+        "device::wire::",
+        "device::registers::",
+        "device::motion::",
+        "device::servo_faults::",
+        "device::self_test::",
+        "device::maker_clients::",
+        "tool::basics::",
+        "tool::map21::",
     ],
     skipped: &[
         // The chip id of the emulator cannot be chosen.
@@ -46,23 +46,38 @@ pub(crate) const EMULATOR: SystemTests = SystemTests {
 /// The controller on this computer, with simulated servos behind a simulated USB adapter.
 pub(crate) const ADAPTER: SystemTests = SystemTests {
     arm: "adapter",
-    files: &[
-        "wire",
-        "registers",
-        "motion",
-        "settings",
-        "servo_faults",
-        "tool",
-        "tool_map21",
-        "maker_clients",
+    modules: &[
+        "device::wire::",
+        "device::registers::",
+        "device::motion::",
+        "device::settings::",
+        "device::servo_faults::",
+        "device::maker_clients::",
+        "tool::basics::",
+        "tool::map21::",
     ],
     skipped: &[],
 };
 
 /// Runs the system tests on this kind of arm.
 pub(crate) fn run_on(tests: &SystemTests) -> TaskResult {
-    let files: String = tests.files.iter().map(|file| format!(" --test {file}")).collect();
+    let modules = tests.modules.join(" ");
     let skipped: String = tests.skipped.iter().map(|test| format!(" --skip {test}")).collect();
-    let words = format!("test {TESTED}{files} -- {skipped}");
+    let words = format!("test {TESTED} --test system -- {modules}{skipped}");
     run("cargo", &words, &[("ARM", tests.arm), ("ARM_MEETS_ALL_NEEDS", "1")])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::root;
+
+    /// A filter that selects no test would pass.
+    #[test]
+    fn the_modules_exist() {
+        for module in [EMULATOR, ADAPTER].iter().flat_map(|tests| tests.modules) {
+            let file = module.trim_end_matches("::").replace("::", "/");
+            assert!(root().join(format!("tests/tests/system/{file}.rs")).is_file(), "{module}");
+        }
+    }
 }

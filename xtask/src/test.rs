@@ -96,7 +96,7 @@ const STAGES: &[Stage] = &[
             trials.finish(1)
         }),
         long("the linkage between all pairs of whole degrees", || {
-            cargo("test --release -p motion-core --test linkage -- --ignored")
+            cargo("test --release -p motion-core --test all linkage -- --ignored")
         }),
         long("the arm's model in MuJoCo", mujoco::check),
         long("more fuzzing", || {

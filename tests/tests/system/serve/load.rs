@@ -1,0 +1,191 @@
+//! Ten programs of three kinds share one arm in real time: each reply reaches the program that asked for it.
+//!
+//! The length is `SERVE_LOAD_SECONDS`. A quarter of an hour:
+//!
+//! ```sh
+//! SERVE_LOAD_SECONDS=900 cargo nextest run -p system-tests --test system serve::load --no-capture
+//! ```
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::ops::AddAssign;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use system_tests::frames::{reply, with_checksum};
+use system_tests::registers::{FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED, TIME};
+use system_tests::{ArmClient, read_request, write_request};
+
+use super::served::{LOCAL_PAGE, Served, WebClient, names};
+
+/// A reply that has not come after this time is lost.
+const LOST: Duration = Duration::from_secs(10);
+/// Rate of the reports of present angles, in map 2.1.
+const ANGLE_FEEDBACK_FREQUENCY: u8 = 82;
+
+/// What one program, or all of them, sent and received.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Tally {
+    /// Writes and reads.
+    requests: usize,
+    /// Replies with the value that the program wrote directly before.
+    replies: usize,
+    reports: usize,
+    /// Reads without a reply.
+    lost: usize,
+    /// Replies of another program, and reports that the program did not ask for.
+    crossed: usize,
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.requests += other.requests;
+        self.replies += other.replies;
+        self.reports += other.reports;
+        self.lost += other.lost;
+        self.crossed += other.crossed;
+    }
+}
+
+/// A wire that carries frames.
+trait Wire: Send {
+    fn send(&mut self, bytes: &[u8]);
+    /// The next frame; `None` if it is lost.
+    fn frame(&mut self) -> Option<Vec<u8>>;
+}
+
+impl Wire for ArmClient {
+    fn send(&mut self, bytes: &[u8]) {
+        Self::send(self, bytes);
+    }
+
+    fn frame(&mut self) -> Option<Vec<u8>> {
+        self.frame_within(LOST)
+    }
+}
+
+impl Wire for TcpStream {
+    fn send(&mut self, bytes: &[u8]) {
+        self.write_all(bytes).expect("the server takes bytes");
+    }
+
+    fn frame(&mut self) -> Option<Vec<u8>> {
+        let mut frame = vec![0; 5];
+        self.read_exact(&mut frame).ok()?;
+        frame.resize(7 + usize::from(frame[4]), 0);
+        self.read_exact(&mut frame[5..]).ok()?;
+        Some(frame)
+    }
+}
+
+/// The function code of a program's writes.
+#[derive(Clone, Copy)]
+enum Map {
+    V22,
+    V21,
+}
+
+impl Map {
+    fn write(self, address: u8, value: u8) -> Vec<u8> {
+        match self {
+            Self::V22 => write_request(address, &[value]),
+            Self::V21 => with_checksum(&[0xAA, 0x77, 4, address, 1, value]),
+        }
+    }
+
+    /// Asks for reports.
+    fn subscribe(self, hertz: u8) -> Vec<u8> {
+        match self {
+            Self::V22 => self.write(FEEDBACK_FREQUENCY, hertz),
+            Self::V21 => self.write(ANGLE_FEEDBACK_FREQUENCY, hertz),
+        }
+    }
+
+    /// The first bytes of a report.
+    const fn report(self) -> [u8; 5] {
+        match self {
+            Self::V22 => [0xAA, 0x77, 3, PRESENT_POSITION, 7],
+            Self::V21 => [0xAA, 0x77, 5, ANGLE_FEEDBACK_FREQUENCY + 1, 7],
+        }
+    }
+}
+
+/// A program that writes its own register and reads it back until `end`. `hertz`: it also wants reports.
+fn frame_program(mut wire: impl Wire, own: u8, map: Map, hertz: u8, end: Instant) -> Tally {
+    let mut tally = Tally { requests: 1, ..Tally::default() };
+    wire.send(&map.subscribe(hertz));
+    for value in (1..=100).cycle().take_while(|_| Instant::now() < end) {
+        wire.send(&[map.write(own, value), read_request(own, 1)].concat());
+        tally.requests += 2;
+        loop {
+            match wire.frame() {
+                None => tally.lost += 1,
+                Some(frame) if hertz > 0 && frame.starts_with(&map.report()) => {
+                    tally.reports += 1;
+                    continue;
+                }
+                Some(frame) if frame == reply(own, &[value]) => tally.replies += 1,
+                Some(_) => tally.crossed += 1,
+            }
+            break;
+        }
+    }
+    tally
+}
+
+/// The same over the WebSocket. A page also gets an answer to each write.
+fn web_program(mut client: WebClient, own: u8, is_page: bool, end: Instant) -> Tally {
+    let mut tally = Tally::default();
+    for value in (1..=100_u8).cycle().take_while(|_| Instant::now() < end) {
+        client.send(&format!(r#"{{"cmd":"write","id":{own},"num":1,"value":[{value}]}}"#));
+        client.send(&format!(r#"{{"cmd":"read","id":{own},"num":1}}"#));
+        tally.requests += 2;
+        if is_page && client.receive().is_none_or(|answer| answer["message"] != "Values written") {
+            tally.crossed += 1;
+        }
+        match client.receive() {
+            None => tally.lost += 1,
+            Some(answer) if answer["data"] == serde_json::json!([value]) => tally.replies += 1,
+            Some(_) => tally.crossed += 1,
+        }
+    }
+    tally
+}
+
+#[test]
+fn ten_clients_of_three_kinds_lose_nothing_and_cross_nothing() {
+    let seconds = std::env::var("SERVE_LOAD_SECONDS").map_or(5, |text| text.parse().expect("a number"));
+    let served = Served::start(4, &[]);
+    let end = Instant::now() + Duration::from_secs(seconds);
+    let tallies: Vec<(&str, Tally)> = thread::scope(|scope| {
+        let mut programs = Vec::new();
+        let forms = [(Map::V22, 0), (Map::V21, 0), (Map::V22, 50), (Map::V21, 30)];
+        for ((name, own), (map, hertz)) in names(4).zip(SPEED..).zip(forms) {
+            let wire = served.open(name);
+            let run = move || ("pseudo-terminal", frame_program(wire, own, map, hertz, end));
+            programs.push(scope.spawn(run));
+        }
+        for ((map, hertz), own) in
+            [(Map::V22, 0), (Map::V22, 20), (Map::V21, 10)].into_iter().zip(SPEED + 4..)
+        {
+            let wire = served.connect();
+            wire.set_read_timeout(Some(LOST)).expect("a timeout");
+            programs.push(scope.spawn(move || ("TCP", frame_program(wire, own, map, hertz, end))));
+        }
+        for (is_page, own) in [false, false, true].into_iter().zip(TIME..) {
+            let headers: &[_] = if is_page { &[LOCAL_PAGE] } else { &[] };
+            let client = WebClient::connect(&served, headers).expect("accepted");
+            programs.push(scope.spawn(move || ("WebSocket", web_program(client, own, is_page, end))));
+        }
+        programs.into_iter().map(|program| program.join().expect("no program fails")).collect()
+    });
+    let mut total = Tally::default();
+    for (kind, tally) in &tallies {
+        println!("{kind:>15}: {tally:?}");
+        total += *tally;
+    }
+    println!("{seconds} s, all: {total:?}");
+    assert_eq!((total.lost, total.crossed), (0, 0));
+    assert!(tallies.iter().all(|(_, tally)| tally.replies > 0));
+    assert!(tallies.iter().filter(|(_, tally)| tally.reports > 0).count() == 4, "four programs want reports");
+}

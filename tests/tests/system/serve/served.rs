@@ -1,0 +1,183 @@
+//! A simulator, and a server that shares it.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+use std::time::Duration;
+
+use serde_json::Value;
+use system_tests::process;
+use system_tests::programs::{host_sim, tool};
+use system_tests::registers::DEVICE_CODE;
+use system_tests::wait::wait_until;
+use system_tests::{ArmClient, read_request};
+use tempfile::TempDir;
+use tungstenite::client::IntoClientRequest;
+use tungstenite::http::HeaderValue;
+use tungstenite::{Message, WebSocket};
+
+/// A header of a page that a program of this computer serves.
+pub(crate) const LOCAL_PAGE: (&str, &str) = ("origin", "http://localhost:3000");
+
+/// A simulator and a server, in a folder with their links.
+pub(crate) struct Served {
+    pub(crate) simulator: Child,
+    pub(crate) server: Child,
+    pub(crate) ports: Vec<PathBuf>,
+    pub(crate) folder: TempDir,
+}
+
+impl Served {
+    /// Starts a server with the pseudo-terminals `a`, `b`, ..., a TCP port and a WebSocket.
+    pub(crate) fn start(ptys: usize, options: &[&str]) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let simulator = simulator(folder.path());
+        let mut command = tool();
+        command
+            .current_dir(&folder)
+            .env("XDG_RUNTIME_DIR", folder.path())
+            .args(["--port", "./arm", "serve", "--tcp", "0", "--ws", "0"])
+            .args(options);
+        for name in names(ptys) {
+            command.args(["--pty", name]);
+        }
+        let (server, ports) = process::start(&mut command, ptys + 3).expect("the server is ready");
+        let served = Self { simulator, server, ports, folder };
+        if ptys > 0 {
+            served.wait_for_arm(&mut served.open("a"));
+        }
+        served
+    }
+
+    pub(crate) fn open(&self, name: &str) -> ArmClient {
+        ArmClient::open(&self.folder.path().join(name), 115_200)
+    }
+
+    pub(crate) fn connect(&self) -> TcpStream {
+        let port = self.ports.iter().rev().nth(2).and_then(|port| port.to_str()).expect("a TCP port");
+        let stream =
+            TcpStream::connect(port.strip_prefix("socket://").expect("an address")).expect("a connection");
+        stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
+        stream
+    }
+
+    /// The path of the Unix socket.
+    pub(crate) fn local_socket(&self) -> PathBuf {
+        let ready = self.ports.last().and_then(|port| port.to_str()).expect("a socket");
+        ready.strip_prefix("unix:").expect("a path").into()
+    }
+
+    fn web_url(&self) -> &str {
+        self.ports.iter().rev().nth(1).and_then(|port| port.to_str()).expect("a WebSocket")
+    }
+
+    /// A connection to the WebSocket, before the handshake.
+    pub(crate) fn connect_web(&self) -> TcpStream {
+        let address = self.web_url().strip_prefix("ws://").and_then(|url| url.strip_suffix("/ws"));
+        let stream = TcpStream::connect(address.expect("an address")).expect("a connection");
+        stream.set_nodelay(true).expect("an option");
+        stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
+        stream
+    }
+
+    pub(crate) fn wait_for_arm(&self, client: &mut ArmClient) {
+        wait_until("the arm answers", || {
+            client.send(&read_request(DEVICE_CODE, 1));
+            client.reply_within(Duration::from_millis(500)).is_some()
+        });
+        client.drain();
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        process::kill(&mut self.server);
+        process::kill(&mut self.simulator);
+    }
+}
+
+pub(crate) fn names(count: usize) -> impl Iterator<Item = &'static str> {
+    ["a", "b", "c", "d"].into_iter().take(count)
+}
+
+pub(crate) fn simulator(folder: &Path) -> Child {
+    let mut command = Command::new(host_sim());
+    command.args(["--quiet", "--eeprom", "none", "--link"]).arg(folder.join("arm"));
+    process::start(&mut command, 1).expect("the simulator is ready").0
+}
+
+/// Sends a request and checks the reply.
+#[track_caller]
+pub(crate) fn exchange(stream: &mut TcpStream, request: &[u8], expected: &[u8]) {
+    stream.write_all(request).expect("the server takes bytes");
+    let mut received = vec![0; expected.len()];
+    stream.read_exact(&mut received).expect("a reply");
+    assert_eq!(received, expected);
+}
+
+/// A frame of a WebSocket client: `start` holds the bit for the last fragment and the kind.
+pub(crate) fn web_frame(start: u8, payload: &[u8]) -> Vec<u8> {
+    let length = u16::try_from(payload.len()).expect("a short frame");
+    let mut frame = vec![start];
+    match u8::try_from(length) {
+        Ok(short @ ..126) => frame.push(0x80 | short),
+        _ => frame.extend([[0x80 | 126].as_slice(), &length.to_be_bytes()].concat()),
+    }
+    // A mask of 0 leaves the payload as it is.
+    frame.extend([0; 4]);
+    frame.extend(payload);
+    frame
+}
+
+/// A client of the maker's WebSocket.
+pub(crate) struct WebClient(WebSocket<TcpStream>);
+
+impl WebClient {
+    /// Connects with these headers. The error is the HTTP status.
+    pub(crate) fn connect(served: &Served, headers: &[(&'static str, &str)]) -> Result<Self, u16> {
+        let stream = served.connect_web();
+        let mut request = served.web_url().into_client_request().expect("a request");
+        for (name, value) in headers {
+            request.headers_mut().insert(*name, HeaderValue::from_str(value).expect("a header"));
+        }
+        match tungstenite::client(request, stream) {
+            Ok((socket, _)) => Ok(Self(socket)),
+            Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(response))) => {
+                Err(response.status().as_u16())
+            }
+            Err(other) => panic!("{other}"),
+        }
+    }
+
+    /// Sends a message.
+    pub(crate) fn send(&mut self, text: &str) {
+        self.0.send(Message::text(text)).expect("the server takes messages");
+    }
+
+    /// Sends bytes as they are, which need not be whole messages.
+    pub(crate) fn send_bytes(&mut self, bytes: &[u8]) {
+        self.0.get_mut().write_all(bytes).expect("the server takes bytes");
+    }
+
+    /// A second handle of the connection.
+    pub(crate) fn stream(&self) -> TcpStream {
+        self.0.get_ref().try_clone().expect("a second handle")
+    }
+
+    /// The next message; `None` if the server has closed the connection.
+    pub(crate) fn receive(&mut self) -> Option<Value> {
+        let message = self.0.read().ok()?;
+        message.to_text().ok().and_then(|text| serde_json::from_str(text).ok())
+    }
+
+    /// Reads registers.
+    #[track_caller]
+    pub(crate) fn read(&mut self, address: u8, count: u8) -> Vec<u8> {
+        self.send(&format!(r#"{{"cmd":"read","id":{address},"num":{count}}}"#));
+        let answer = self.receive().expect("an answer");
+        assert_eq!(answer["status"], "ok", "{answer}");
+        let values = answer["data"].as_array().expect("values").iter();
+        values.map(|value| u8::try_from(value.as_u64().expect("a number")).expect("a byte")).collect()
+    }
+}

@@ -1,0 +1,123 @@
+//! Every command times every fault of the simulator: none reports a success that was none.
+//!
+//! The snapshot holds what each command says under each fault. Its lines were read one by one: a command succeeds only where
+//! the arm did what it was asked, or where it was asked for words alone. docs/reliability.md has the exit statuses.
+//!
+//! `CELL="stop / silent" cargo test -p system-tests --test system tool::faults -- --nocapture` shows all that these cells say.
+
+use std::env;
+use std::fmt::Write;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use super::fault_table::{COMMANDS, Cell, Command, FAULTS, Fault, run};
+use serde_json::json;
+use system_tests::control::Control;
+use system_tests::programs::sevenbot;
+use system_tests::simulator::Simulator;
+use system_tests::terminal::Terminal;
+
+/// Cells at the same time. They wait for most of their time.
+const THREADS: usize = 24;
+/// It holds the table in short.
+const DOCUMENT: &str = include_str!("../../../../docs/reliability.md");
+
+#[test]
+fn no_command_reports_success_under_a_fault_that_prevents_it() {
+    let only = env::var("CELL").unwrap_or_default();
+    let cells = run_cells(&only);
+    if !only.is_empty() {
+        cells.iter().for_each(|(name, cell)| {
+            println!("=== {name}: {:?} {:?}\n{}", cell.status, cell.is_done, cell.text);
+        });
+        return;
+    }
+    let wrong: Vec<_> =
+        cells.iter().filter(|(_, cell)| cell.is_wrong()).map(|(name, _)| name.as_str()).collect();
+    assert!(wrong.is_empty(), "successes that were none:\n{}\n{}", wrong.join("\n"), table(&cells));
+    insta::assert_snapshot!(table(&cells));
+    let short = short_table(&cells);
+    assert!(DOCUMENT.contains(&short), "docs/reliability.md has another table than this one:\n{short}");
+}
+
+/// The cells whose names contain this text, row by row, with their names.
+fn run_cells(only: &str) -> Vec<(String, Cell)> {
+    let all = COMMANDS.iter().flat_map(|command| FAULTS.iter().map(move |fault| (*command, *fault)));
+    let name = |(command, fault): &(Command, Fault)| format!("{} / {}", command.arguments, fault.name);
+    let chosen: Vec<_> =
+        all.map(|cell| (name(&cell), cell)).filter(|(name, _)| name.contains(only)).collect();
+    let cells = Mutex::new(vec![None; chosen.len()]);
+    let next = AtomicUsize::new(0);
+    let work = || {
+        loop {
+            let number = next.fetch_add(1, Ordering::SeqCst);
+            let Some((_, (command, fault))) = chosen.get(number) else { return };
+            let cell = run(*command, *fault);
+            cells.lock().expect("cells")[number] = Some(cell);
+        }
+    };
+    thread::scope(|scope| (0..THREADS).for_each(|_| drop(scope.spawn(work))));
+    let names = chosen.iter().map(|(name, _)| name.clone());
+    names.zip(cells.into_inner().expect("cells").into_iter().flatten()).collect()
+}
+
+#[test]
+fn a_key_of_the_monitor_says_why_the_arm_does_not_obey() {
+    let silent = json!({ "do": "fault", "fault": "3=missing" });
+    let no_supply = json!({ "do": "fault", "fault": "supply=off" });
+    let hot = json!({ "do": "trip", "joint": 3, "alarm": "heat" });
+    for (fault, nudge, hold) in [
+        (silent, "its servo does not answer", "joint 3 does not answer"),
+        (no_supply, "its servo does not answer", "no servo answers"),
+        (hot, "joint 3 let go", "joint 3 let go"),
+    ] {
+        let simulator = Simulator::start(&["--quiet"]);
+        let mut control = Control::connect(&simulator.sockets()[0]);
+        control.advance(1_500);
+        control.result(&fault);
+        control.advance(1_500);
+        for (keys, refusal) in [("3]", nudge), ("sh", hold)] {
+            let port = simulator.ports[0].to_str().expect("text");
+            let mut terminal = Terminal::run(sevenbot(), &["monitor", "--port", port]);
+            terminal.wait_for("114.0 °/s");
+            terminal.keys(keys);
+            terminal.wait_for(refusal);
+            terminal.keys("q");
+            assert!(terminal.wait().success());
+        }
+    }
+}
+
+/// The exit statuses, for the document.
+fn short_table(cells: &[(String, Cell)]) -> String {
+    let names: Vec<_> = FAULTS.iter().map(|fault| fault.name).collect();
+    let mut text =
+        format!("| `sevenbot` | {} |\n| --- |{}\n", names.join(" | "), " --: |".repeat(FAULTS.len()));
+    for (command, row) in COMMANDS.iter().zip(cells.chunks(FAULTS.len())) {
+        let statuses: Vec<_> = row.iter().map(|(_, cell)| cell.status_text()).collect();
+        let _ =
+            writeln!(text, "| `{}` | {} |", command.arguments.replace("FOLDER/", ""), statuses.join(" | "));
+    }
+    text
+}
+
+/// The table: for each command a line for each fault.
+fn table(cells: &[(String, Cell)]) -> String {
+    let mut text = String::new();
+    for (command, row) in COMMANDS.iter().zip(cells.chunks(FAULTS.len())) {
+        let _ = writeln!(text, "{}", command.arguments);
+        for (fault, (_, cell)) in FAULTS.iter().zip(row) {
+            let status = cell.status_text();
+            // After a failure it depends on the moment of the fault.
+            let is_success = cell.status == Some(0);
+            let done = match cell.is_done.filter(|_| is_success) {
+                None => "",
+                Some(true) => "done",
+                Some(false) => "not done",
+            };
+            let _ = writeln!(text, "  {:<13} {status:>3}  {done:<9} {}", fault.name, cell.words);
+        }
+    }
+    text
+}

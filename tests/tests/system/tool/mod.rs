@@ -1,0 +1,20 @@
+//! The command line tool.
+
+mod basics;
+mod calibrate;
+mod fault_table;
+mod faults;
+mod fine;
+mod map21;
+mod monitor;
+mod motion;
+mod moving;
+mod output;
+mod position;
+mod servo;
+mod settings;
+mod status;
+mod stock_arm;
+mod stream;
+mod terminal;
+mod wire;

@@ -1,0 +1,143 @@
+//! `sevenbot status`, `recover`, `park` and `--log`, and what ends a pose and a stream: with the faults of the simulator.
+
+use std::io::Write;
+use std::process::{Output, Stdio};
+
+use super::output::{all_output, failed, succeeded, words};
+use system_tests::programs::tool;
+use system_tests::simulator::Simulator;
+use system_tests::wait::wait_until;
+
+/// A simulator, and the tool on its port.
+struct Rig(Simulator);
+
+impl Rig {
+    fn start() -> Self {
+        let rig = Self(Simulator::start(&[]));
+        wait_until("the servos are driven", || rig.run(&["status"]).status.success());
+        // The start-up of the servos is over (D12).
+        std::thread::sleep(std::time::Duration::from_millis(600));
+        rig
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        let mut tool = tool();
+        tool.arg("--port").arg(&self.0.ports[0]).args(["--timeout", "2000"]).args(arguments);
+        tool.env("XDG_CONFIG_HOME", self.0.folder.path())
+            .stdin(Stdio::null())
+            .output()
+            .expect("sevenbot runs")
+    }
+
+    fn stream(&self, lines: &str) -> Output {
+        let mut tool = tool();
+        tool.arg("--port").arg(&self.0.ports[0]).arg("stream").stdin(Stdio::piped());
+        let mut tool = tool.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("sevenbot runs");
+        tool.stdin.take().expect("a pipe").write_all(lines.as_bytes()).expect("the tool reads");
+        tool.wait_with_output().expect("it ends")
+    }
+
+    /// Sets a fault, and waits until the status tells of it.
+    fn break_it(&self, fault: &str, told: &str) {
+        self.0.says(&["fault", fault]);
+        wait_until("the arm tells of the fault", || all_output(&self.run(&["status"])).contains(told));
+    }
+}
+
+#[test]
+fn d30_status_tells_a_joint_and_what_to_do() {
+    let rig = Rig::start();
+    let text = succeeded(rig.run(&["status"]));
+    assert!(text.contains("nothing needs attention"), "{text}");
+    assert_eq!(words(&text, "1 ")[..3], ["1", "90.00°", "90.00°"]);
+    rig.break_it("3=missing", "joint 3 does not answer");
+    let text = failed(&rig.run(&["status"]), 1);
+    assert!(text.contains("- check the plugs and the cable of its servo"), "{text}");
+    let json = String::from_utf8(rig.run(&["status", "--json"]).stdout).expect("text");
+    assert!(json.contains("\"needs_attention\":true") && json.contains("\"joint\":3,\"text\""), "{json}");
+}
+
+#[test]
+fn a_pose_for_a_silent_joint_moves_nothing() {
+    let rig = Rig::start();
+    rig.break_it("3=missing", "joint 3 does not answer");
+    let text = failed(&rig.run(&["pose", "120", "90", "80", "_", "_", "_", "_"]), 1);
+    assert!(text.contains("joint 3 does not answer"), "{text}");
+    let targets = succeeded(rig.run(&["get", "target-position.1"]));
+    assert_eq!(words(&targets, "46")[2], "90", "nothing was sent");
+    succeeded(rig.run(&["pose", "100", "_", "_", "_", "_", "_", "_", "--wait"]));
+}
+
+#[test]
+fn d27_a_pose_and_a_stream_end_at_a_blocked_joint_and_recover_helps() {
+    let rig = Rig::start();
+    rig.0.says(&["fault", "1=stuck"]);
+    let text = failed(&rig.run(&["pose", "130", "_", "_", "_", "_", "_", "_", "--wait"]), 1);
+    assert!(text.contains("joint 1 is blocked") && text.contains("- remove what is in its way"), "{text}");
+    let text = failed(&rig.stream("0,90,,,,,,\n1,120,,,,,,\n4,121,,,,,,\n"), 1);
+    assert!(text.contains("joint 1"), "{text}");
+    rig.0.says(&["fault", "clear"]);
+    let text = succeeded(rig.run(&["recover", "--yes"]));
+    assert!(text.contains("recovered: the motors hold the arm"), "{text}");
+    succeeded(rig.run(&["status"]));
+}
+
+#[test]
+fn d29_a_lost_supply_is_told_and_recover_asks_before_the_motors_go_on() {
+    let rig = Rig::start();
+    rig.break_it("supply=off", "no servo answers");
+    let text = failed(&rig.run(&["recover", "--yes"]), 1);
+    assert!(text.contains("the motors were not switched on"), "{text}");
+    failed(&rig.stream("0,90,90,65,90,90,90,80\n1,95,90,65,90,90,90,80\n"), 1);
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    rig.0.says(&["fault", "clear"]);
+    wait_until("the arm tells of the lost supply", || {
+        all_output(&rig.run(&["status"])).contains("the servos lost their supply")
+    });
+    let text = failed(&rig.stream("0,90,90,65,90,90,90,80\n"), 1);
+    assert!(text.contains("the servos lost their supply"), "{text}");
+    let text = failed(&rig.run(&["recover"]), 2);
+    assert!(text.contains("use --yes to confirm"), "{text}");
+    succeeded(rig.run(&["recover", "--yes"]));
+    succeeded(rig.run(&["home", "--wait"]));
+}
+
+#[test]
+fn a_parked_arm_stays_and_its_own_pose_is_kept() {
+    let rig = Rig::start();
+    let text = failed(&rig.run(&["park", "_", "90", "65", "90", "90", "_", "_", "--keep"]), 1);
+    assert!(text.contains("joint 3 sank"), "a level forearm is no park pose: {text}");
+    succeeded(rig.run(&["status"]));
+    let first = succeeded(rig.run(&["park"]));
+    assert!(first.starts_with("90.00 90.00 0."), "{first}");
+    assert!(succeeded(rig.run(&["status"])).starts_with("motors damping protection"));
+    succeeded(rig.run(&["state", "servo"]));
+    succeeded(rig.run(&["park", "100", "90", "2", "90", "50", "_", "_", "--keep"]));
+    succeeded(rig.run(&["state", "servo"]));
+    let kept = succeeded(rig.run(&["park"]));
+    let base: f64 = kept.split_whitespace().next().and_then(|angle| angle.parse().ok()).expect("an angle");
+    assert!((99.0..=101.0).contains(&base), "{kept}");
+}
+
+#[test]
+fn a_log_holds_the_bytes_of_a_command_and_sniff_shows_them() {
+    let rig = Rig::start();
+    let path = rig.0.folder.path().join("run.log");
+    let path = path.to_str().expect("UTF-8");
+    succeeded(rig.run(&["--log", path, "pose", "95", "_", "_", "_", "_", "_", "_", "--wait"]));
+    let text = succeeded(tool().args(["sniff", path]).output().expect("sevenbot runs"));
+    assert!(text.contains("read device-code") && text.contains("  write target-position"), "{text}");
+    failed(&rig.run(&["--log", path, "status"]), 1);
+}
+
+#[test]
+fn the_log_of_an_arm_moves_nothing_and_is_not_overwritten() {
+    let rig = Rig::start();
+    let path = rig.0.folder.path().join("day.log");
+    let path = path.to_str().expect("UTF-8");
+    succeeded(rig.run(&["log", path, "--hz", "50", "--seconds", "1"]));
+    let text = succeeded(tool().args(["sniff", path]).output().expect("sevenbot runs"));
+    assert!(text.matches("read ").count() >= 50 && !text.contains("write target"), "{text}");
+    failed(&rig.run(&["log", path]), 1);
+    failed(&rig.run(&["--log", "other.log", "log", "new.log"]), 2);
+}
