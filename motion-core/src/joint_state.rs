@@ -214,9 +214,9 @@ impl JointState {
     fn push_limit(&self, registers: &RegisterFile) -> PushLimit {
         let permille = |row: &Register| i16::from(registers.get(row.address)) * 10;
         if self.joint == Joint::ALL[6] && registers.get(EFFECTOR_TYPE.address) == effector::GRIPPER {
-            PushLimit::of_grip(permille(&GRIP_LIMIT))
+            PushLimit::Grip(permille(&GRIP_LIMIT))
         } else {
-            PushLimit::of_arm(permille(&PUSH_LIMIT))
+            PushLimit::Arm(permille(&PUSH_LIMIT))
         }
     }
 

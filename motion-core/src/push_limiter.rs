@@ -19,25 +19,26 @@ use crate::calibration::MicroDegrees;
 
 /// The limit of a joint's push.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PushLimit {
-    /// In 0.1 % of the stall torque.
-    pub permille: i16,
-    /// How long a turning joint may exceed it, and one at a standstill. D27 allows 300 ms.
-    pub grace: [Duration; 2],
+pub enum PushLimit {
+    /// Of a joint that carries the arm, in 0.1 % of the stall torque.
+    Arm(i16),
+    /// Of the claw, which carries nothing: what it holds may break.
+    Grip(i16),
 }
 
 impl PushLimit {
-    /// The limit of a joint that carries the arm. It stays over it for less than 250 ms while it accelerates freely with
-    /// 300 g, and turns after a push of 80 ms.
-    #[must_use]
-    pub const fn of_arm(permille: i16) -> Self {
-        Self { permille, grace: [Duration::from_millis(250), Duration::from_millis(80)] }
+    const fn permille(self) -> i16 {
+        let (Self::Arm(permille) | Self::Grip(permille)) = self;
+        permille
     }
 
-    /// The limit of the claw, which carries nothing: what it holds may break.
-    #[must_use]
-    pub const fn of_grip(permille: i16) -> Self {
-        Self { permille, grace: [Duration::from_millis(50), Duration::from_millis(30)] }
+    /// How long a turning joint may exceed it, and one at a standstill. D27 allows 300 ms. A joint of the arm stays over it for
+    /// less than 250 ms while it accelerates freely with 300 g, and turns after a push of 80 ms.
+    const fn grace(self) -> [Duration; 2] {
+        match self {
+            Self::Arm(_) => [Duration::from_millis(250), Duration::from_millis(80)],
+            Self::Grip(_) => [Duration::from_millis(50), Duration::from_millis(30)],
+        }
     }
 }
 
@@ -115,7 +116,8 @@ impl PushLimiter {
 
     /// Takes a measurement of a driven joint.
     pub fn measured(&mut self, now: Instant, sample: PushSample, set_point: MicroDegrees, limit: PushLimit) {
-        let PushLimit { permille: limit, grace: [grace, grace_at_standstill] } = limit;
+        let [grace, grace_at_standstill] = limit.grace();
+        let limit = limit.permille();
         match &mut self.phase {
             Phase::Free => {
                 if sample.push.saturating_abs() > limit {

@@ -67,7 +67,7 @@ fn one_joint() {
 fn push() {
     let mut limiter = opaque(PushLimiter::FREE);
     let sample = PushSample { angle: MicroDegrees(opaque(0)), push: opaque(0), is_saturated: opaque(true) };
-    limiter.measured(any_time(), sample, MicroDegrees(opaque(0)), PushLimit::of_arm(opaque(0)));
+    limiter.measured(any_time(), sample, MicroDegrees(opaque(0)), PushLimit::Arm(opaque(0)));
     opaque((limiter.hold_back(MicroDegrees(opaque(0))), limiter.is_limiting()));
 }
 
