@@ -2,8 +2,6 @@
 
 mod basics;
 mod calibrate;
-mod fault_table;
-mod faults;
 mod fine;
 mod map21;
 mod monitor;

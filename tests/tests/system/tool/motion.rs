@@ -2,13 +2,13 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
 use super::output::{all_output, failed, succeeded};
 use system_tests::arm_control::ArmControl;
-use system_tests::process::{Signal, send_signal};
+use system_tests::process::{RunningProgram, Signal, send_signal};
 use system_tests::programs::{TOOL_TIMEOUT, sevenbot, tool};
 use system_tests::registers::{
     FEEDBACK_FREQUENCY, MOTOR_STATE, SPEED, STANDARD_POSE, TARGET_POSITION, VACUUM_PUMP,
@@ -53,17 +53,13 @@ fn moments(path: &Path) -> Vec<Vec<f64>> {
 }
 
 /// Plays a recording, and waits until the arm moves.
-fn start_to_play(arm: &mut TestArm, arguments: &[&str]) -> Child {
+fn start_to_play(arm: &mut TestArm, arguments: &[&str]) -> RunningProgram {
     arm.spawn_sevenbot_until(&[&["play", "--verbose"], arguments].concat(), "-> write vacuum-pump")
 }
 
 #[track_caller]
 fn wait_for_moments(path: &Path, count: usize) {
     wait_until("the moments are recorded", || moments(path).len() >= count);
-}
-
-fn end(tool: Child) -> Output {
-    tool.wait_with_output().expect("the tool ends")
 }
 
 #[test]
@@ -114,7 +110,7 @@ fn an_arm_moved_by_hand_holds_its_position_after_the_recording() {
         let tool = arm.spawn_sevenbot(&["record", text(&recording), "--yes"]);
         wait_for_moments(&recording, 5);
         send_signal(&tool, Signal::INT);
-        let output = end(tool);
+        let output = tool.output();
         let printed = all_output(&output);
         assert_eq!(output.status.code(), Some(0), "Ctrl-C ends a recording: {printed}");
         assert!(printed.contains("the arm holds"), "{printed}");
@@ -191,7 +187,7 @@ fn an_interrupted_play_holds_the_arm() {
         let (_folder, recording) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
         let tool = start_to_play(arm, &[text(&recording)]);
         send_signal(&tool, Signal::INT);
-        let text = failed(&end(tool), 130);
+        let text = failed(&tool.output(), 130);
         assert!(text.contains("the arm holds where it is"), "{text}");
         arm.reopen(115_200);
         arm.wait_until_still();
@@ -208,7 +204,7 @@ fn kill_while_playing(arm: &mut TestArm) {
     let (_folder, recording) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
     let arguments = ["play", "--verbose", text(&recording)];
     let mut tool = arm.spawn_sevenbot_until(&arguments, "-> write fine-target");
-    tool.kill().and_then(|()| tool.wait()).expect("its end");
+    tool.kill();
 }
 
 /// Set-point period, watchdog and its action.
@@ -275,7 +271,7 @@ fn a_recording_is_complete_up_to_a_lost_connection() {
         let tool = arm.spawn_sevenbot(&["record", text(&recording), "--driven"]);
         wait_for_moments(&recording, 10);
         arm.kill_and_restart();
-        let text = failed(&end(tool), 3);
+        let text = failed(&tool.output(), 3);
         assert!(text.contains("the connection is gone") && text.contains("is complete up to"), "{text}");
         let moments = moments(&recording);
         assert!(moments.len() >= 10 && moments.iter().all(|moment| moment.len() == 9), "{moments:?}");
@@ -312,7 +308,7 @@ fn a_lost_connection_during_play_leaves_a_plot() {
         let drawing = folder.path().join("cut.svg");
         let tool = start_to_play(arm, &[text(&recording), "--plot", text(&drawing)]);
         arm.kill_and_restart();
-        let text = failed(&end(tool), 3);
+        let text = failed(&tool.output(), 3);
         assert!(text.contains("the connection is gone"), "{text}");
         assert!(fs::read_to_string(&drawing).expect("a drawing").ends_with("</svg>\n"));
     });
@@ -325,10 +321,11 @@ fn a_restart_of_the_arm_ends_a_recording() {
     let (_folder, recording) = file("restart.txt", "");
     let mut tool = tool();
     tool.arg("--port").arg(arm.port()).args(["record", text(&recording), "--driven"]);
-    let tool = tool.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    tool.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let tool = RunningProgram::spawn(&mut tool);
     wait_for_moments(&recording, 3);
     arm.power_cycle();
-    let text = failed(&end(tool.expect("sevenbot runs")), 1);
+    let text = failed(&tool.output(), 1);
     // The counter of frames tells a restart, unless the arm had received hardly any: then its reports are missed.
     assert!(text.contains("the controller restarted") || text.contains("switched off and on"), "{text}");
 }
