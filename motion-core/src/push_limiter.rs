@@ -1,4 +1,4 @@
-//! Keeps one joint from pushing harder than its limit (D27).
+//! Keeps one joint from pushing harder than its limit ([D27](protocol_core::decisions#d27)).
 //!
 //! ```text
 //!            over the limit for longer than its grace
@@ -22,7 +22,7 @@ use crate::calibration::MicroDegrees;
 pub struct PushLimit {
     /// In 0.1 % of the stall torque.
     pub permille: i16,
-    /// How long a turning joint may exceed it, and one at a standstill. D27 allows 300 ms.
+    /// How long a turning joint may exceed it, and one at a standstill. [D27](protocol_core::decisions#d27) allows 300 ms.
     pub grace: [Duration; 2],
 }
 
@@ -48,10 +48,11 @@ const STANDSTILL: u32 = 300_000;
 const FULL_LOAD_DISTANCE: i32 = 4_300_000;
 /// From this load on a servo may give all it has, in 0.1 %.
 pub(crate) const FULL_LOAD: i16 = 950;
-/// How far the push may exceed the limit while a joint sinks slowly (D27).
+/// How far the push may exceed the limit while a joint sinks slowly ([D27](protocol_core::decisions#d27)).
 const TOLERANCE: i16 = 50;
-/// The largest speed at which a joint with a push up to the tolerance sinks: 10 degrees/s (D27), in
-/// micro-degrees per millisecond. Goals are whole counts, so the bound itself moves at 8 degrees/s.
+/// The largest speed at which a joint with a push up to the tolerance sinks: 10 degrees/s
+/// ([D27](protocol_core::decisions#d27)), in micro-degrees per millisecond. Goals are whole counts, so the bound itself
+/// moves at 8 degrees/s.
 const SINK_PER_MILLISECOND: i32 = 8_000;
 /// This far under the limit, the distance may grow again; half the limit if that is less.
 const SLACK: i16 = 100;
