@@ -29,9 +29,9 @@ pub enum HostEvent {
     Reply(RequestId, Snapshot),
     /// No reply comes to the read of these registers: it was lost or damaged, or the arm does not answer.
     NoReply(RequestId, Span),
-    /// A report of the arm (D14, M4). The map tells its form.
+    /// A report of the arm ([D14](protocol_core::decisions#d14), [M4](protocol_core::decisions#m4)). The map tells its form.
     Report(Map, Snapshot),
-    /// An alarm of the arm (M8).
+    /// An alarm of the arm ([M8](protocol_core::decisions#m8)).
     Alarm(Alarm),
     /// A good frame that answers no open read: a late reply, or the echo of a request on a one-wire line. An echo of a
     /// read holds no values.

@@ -10,7 +10,7 @@ pub const ROUND_TRIP: Duration = Duration::from_millis(100);
 const BYTE: u64 = 10_000_000;
 /// With each reply in time, this part of the allowance is forgotten.
 const FORGETTING: u64 = 8;
-/// Reports take up to half of the line (D14), so that a reply may take twice its own time.
+/// Reports take up to half of the line ([D14](protocol_core::decisions#d14)), so that a reply may take twice its own time.
 const REPORT_SHARE: u64 = 2;
 
 /// The time that bytes take on a line; `baud` is in bits per second.

@@ -21,8 +21,8 @@ use crate::span::Span;
 pub struct LinkOptions {
     /// Baud rate of the line to the arm.
     pub baud: u32,
-    /// The registers that a report of map 2.2 may have (D26). A report looks like the reply to a read of these, so no read asks
-    /// for exactly these.
+    /// The registers that a report of map 2.2 may have ([D26](protocol_core::decisions#d26)). A report looks like the reply
+    /// to a read of these, so no read asks for exactly these.
     pub reports: &'static [Span],
 }
 
@@ -82,8 +82,8 @@ impl HostLink {
         self.last_id
     }
 
-    /// Writes registers, at most 255, by the function of a map (M1). A write has no reply (D6). It is sent behind the reads
-    /// before it, and none of these is repeated behind it.
+    /// Writes registers, at most 255, by the function of a map ([M1](protocol_core::decisions#m1)). A write has no reply
+    /// ([D6](protocol_core::decisions#d6)). It is sent behind the reads before it, and none of these is repeated behind it.
     pub fn write(&mut self, map: Map, address: u8, values: &[u8]) {
         self.queue.push_back(Queued::Write(encoded_write(map, address, values)));
     }
@@ -230,7 +230,8 @@ impl HostLink {
         });
     }
 
-    /// The reply to a later read came first, so this one is lost (D5). It is repeated at once, if it may be and was not.
+    /// The reply to a later read came first, so this one is lost ([D5](protocol_core::decisions#d5)). It is repeated at
+    /// once, if it may be and was not.
     fn lose(&mut self, id: RequestId) {
         if self.pending.awaits(id) {
             return;

@@ -1,10 +1,11 @@
 //! Which read a reply answers.
 //!
-//! The arm replies in the order of the requests (D5), and a reply names its registers only. So:
+//! The arm replies in the order of the requests ([D5](protocol_core::decisions#d5)), and a reply names its registers only.
+//! So:
 //!
 //! * A reply belongs to the oldest read that was sent with its range. The reads before that one have lost their replies.
 //! * No two reads on their way have the same range: the second asks for a few registers more. This also keeps a read of the
-//!   present positions apart from a report (D14).
+//!   present positions apart from a report ([D14](protocol_core::decisions#d14)).
 //! * A read that was given up stays in the list, so that its late reply is recognised.
 
 use std::collections::VecDeque;

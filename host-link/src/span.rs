@@ -1,4 +1,4 @@
-//! A range of registers that is checked when it is made: it never reaches past 255 (D2).
+//! A range of registers that is checked when it is made: it never reaches past 255 ([D2](protocol_core::decisions#d2)).
 
 use std::fmt;
 

@@ -6,7 +6,8 @@
 //!                Status ◀─────┴── outcome ◀─┘
 //! ```
 //!
-//! A write is checked completely, then executed completely (D15 to D17). This file does not know the host's stream.
+//! A write is checked completely, then executed completely ([D15](protocol_core::decisions#d15) to
+//! [D17](protocol_core::decisions#d17)). This file does not know the host's stream.
 
 use protocol_core::registers::map::{
     FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_CORRUPTED, HOST_WATCHDOG, LIMITS, MOTOR_STATE, PROTECTION,
@@ -240,7 +241,8 @@ impl ArmControl {
         }
     }
 
-    /// Holds or damps the arm if the host was silent for too long (D24). Returns whether it did.
+    /// Holds or damps the arm if the host was silent for too long ([D24](protocol_core::decisions#d24)). Returns whether it
+    /// did.
     pub(crate) fn poll_watchdog(&mut self, now: Instant) -> bool {
         self.watchdog_is_due = false;
         if !self.watchdog.poll(now) {
@@ -261,7 +263,7 @@ impl ArmControl {
         self.registers.set(LOAD_FEEDBACK_FREQUENCY.address, 0);
     }
 
-    /// Ends all reports, and forgets in which map the last write was (M12).
+    /// Ends all reports, and forgets in which map the last write was ([M12](protocol_core::decisions#m12)).
     pub(crate) fn forget_host(&mut self) {
         self.registers.forget_last_write();
         self.registers.set(FEEDBACK_FREQUENCY.address, 0);
@@ -278,7 +280,7 @@ impl ArmControl {
         }
     }
 
-    /// Enters state 0 by itself (D24, D29).
+    /// Enters state 0 by itself ([D24](protocol_core::decisions#d24), [D29](protocol_core::decisions#d29)).
     fn damp(&mut self) {
         self.registers.set(MOTOR_STATE.address, motor_state::DAMPING);
         self.enter_state(MotorState::Damping);
@@ -315,7 +317,7 @@ impl ArmControl {
         self.registers.increment(&FRAMES_CORRUPTED);
     }
 
-    /// Refuses a frame whose range ends beyond address 255 (D2).
+    /// Refuses a frame whose range ends beyond address 255 ([D2](protocol_core::decisions#d2)).
     pub(crate) fn refuse_range(&mut self, address: u8) {
         Status::refuse(&mut self.registers, refusal::MALFORMED_RANGE, address);
     }

@@ -1,4 +1,4 @@
-//! The schedule of the servo bus: control cycles, goals, torque, reads (D12).
+//! The schedule of the servo bus: control cycles, goals, torque, reads ([D12](protocol_core::decisions#d12)).
 //!
 //! ```text
 //!   one cycle of 10 ms:   goals of all driven joints │ torque, if it is due │ one read of each servo
@@ -23,9 +23,10 @@ use crate::servo_bus::{Bus, Outcome};
 const START_UP_TIME: Duration = Duration::from_millis(500);
 /// The torque switches are set again after this many control cycles, in case a frame was lost.
 const TORQUE_REFRESH_CYCLES: u8 = 25;
-/// A torque switch is refreshed only if it was read on shortly before (D28). From this many cycles before on, the servos are
-/// asked for it, one more in each cycle, because these answers are longer. A servo that restarts after its answer cannot be back
-/// by the refresh, and the last one has 110 ms to be asked in, on a bus on which a question takes up to 16 ms.
+/// A torque switch is refreshed only if it was read on shortly before ([D28](protocol_core::decisions#d28)). From this many
+/// cycles before on, the servos are asked for it, one more in each cycle, because these answers are longer. A servo that
+/// restarts after its answer cannot be back by the refresh, and the last one has 110 ms to be asked in, on a bus on which a
+/// question takes up to 16 ms.
 const TORQUE_READ_CYCLES: u8 = 17;
 
 /// The servo bus and its schedule.

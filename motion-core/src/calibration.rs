@@ -4,13 +4,13 @@
 //!   counts = a × k + s - offset × k        a = angle, or 180° - angle where the servo is mounted reversed
 //! ```
 //!
-//! The constants come from the maker's published firmware. As in that firmware, the offset (D9) applies on the servo's
-//! side of the reversal. The arithmetic uses thousandths of a degree in 32-bit integers; one count is at least 212 of
-//! them. This file does not know targets.
+//! The constants come from the maker's published firmware. As in that firmware, the offset
+//! ([D9](protocol_core::decisions#d9)) applies on the servo's side of the reversal. The arithmetic uses thousandths of a
+//! degree in 32-bit integers; one count is at least 212 of them. This file does not know targets.
 
 use protocol_core::registers::Joint;
 
-/// An angle in millionths of a degree, the unit of all positions in this crate (D18).
+/// An angle in millionths of a degree, the unit of all positions in this crate ([D18](protocol_core::decisions#d18)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MicroDegrees(pub i32);
@@ -34,7 +34,7 @@ impl MicroDegrees {
         Self((if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i32)
     }
 
-    /// The value of a position register: the nearest degree, 0 to 180 (D18).
+    /// The value of a position register: the nearest degree, 0 to 180 ([D18](protocol_core::decisions#d18)).
     #[must_use]
     pub fn nearest_degree(self) -> u8 {
         let degrees = rounded::<{ Self::PER_DEGREE }>(self.0.clamp(0, 180 * Self::PER_DEGREE));
@@ -47,7 +47,8 @@ impl MicroDegrees {
         Self(i32::from(centidegrees) * Self::PER_CENTIDEGREE)
     }
 
-    /// The value of a fine position register: the nearest hundredth of a degree, 0 to 18000 (D21).
+    /// The value of a fine position register: the nearest hundredth of a degree, 0 to 18000
+    /// ([D21](protocol_core::decisions#d21)).
     #[must_use]
     pub fn nearest_centidegree(self) -> u16 {
         let limited = self.0.clamp(0, 180 * Self::PER_DEGREE);
@@ -150,7 +151,7 @@ pub const fn load_from_servo(joint: Joint, load: i16) -> i16 {
 }
 
 /// The push of a joint in 0.1 % of the stall torque, positive towards greater angles: the load of its servo less what its
-/// speed needs, 100 % at 372 degrees/s (D27). `speed` is in counts per second.
+/// speed needs, 100 % at 372 degrees/s ([D27](protocol_core::decisions#d27)). `speed` is in counts per second.
 #[must_use]
 pub fn push_from_servo(joint: Joint, load: i16, speed: i16) -> i16 {
     let mounting = Mounting::of(joint);

@@ -7,7 +7,7 @@ use crate::servo_bus::TorqueCodes;
 /// The properties of the board and of the arm.
 #[derive(Clone, Copy, Debug)]
 pub struct Config {
-    /// The chip id, most significant byte first (D8).
+    /// The chip id, most significant byte first ([D8](protocol_core::decisions#d8)).
     pub chip_id: [u8; 6],
     /// Fault bits known at start: reset cause, clock (`protocol_core::registers::map::fault`).
     pub faults: u8,

@@ -30,7 +30,7 @@ pub enum Output<'a> {
     ToHost(&'a [u8]),
     /// Send this frame on the servo bus. The bus is free: at most one read is outstanding.
     ToServos(&'a [u8]),
-    /// Switch the pump and the valve (D20).
+    /// Switch the pump and the valve ([D20](protocol_core::decisions#d20)).
     Vacuum(Vacuum),
     /// Store this image, then call [`Controller::set_storage`] with the result, before the next `poll`. So no later
     /// request is answered before the image is stored.
@@ -84,9 +84,9 @@ impl Controller {
         self.host.byte_damaged();
     }
 
-    /// The next action at `now`. Call it until it returns [`Output::Wait`]. `host_room` is how many bytes the host link
-    /// can take at once now. A read whose reply does not fit waits, and every request behind it waits, too (D5). An
-    /// idle link must take the longest frame, 262 bytes.
+    /// The next action at `now`. Call it until it returns [`Output::Wait`]. `host_room` is how many bytes the host link can
+    /// take at once now. A read whose reply does not fit waits, and every request behind it waits, too
+    /// ([D5](protocol_core::decisions#d5)). An idle link must take the longest frame, 262 bytes.
     pub fn poll(&mut self, now: Instant, host_room: usize) -> Output<'_> {
         self.arm.take_answers(now);
         // Before the control cycle, so that targets go out with its goals if no read waits before them.
@@ -155,7 +155,8 @@ impl Controller {
         self.host.deadline()
     }
 
-    /// The last host has closed the link: ends the reports, and forgets in which map the last write was (M12).
+    /// The last host has closed the link: ends the reports, and forgets in which map the last write was
+    /// ([M12](protocol_core::decisions#m12)).
     pub fn host_left(&mut self, now: Instant) {
         self.arm.forget_host();
         self.host.set_report_frequencies(now, &self.arm.registers);

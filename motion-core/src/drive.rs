@@ -1,4 +1,5 @@
-//! The drive of one joint: from released to engaged without a jump (D12, D13).
+//! The drive of one joint: from released to engaged without a jump ([D12](protocol_core::decisions#d12),
+//! [D13](protocol_core::decisions#d13)).
 //!
 //! ```text
 //!                 wait                       measured, steady            torque is on
@@ -18,7 +19,8 @@ use protocol_core::time::{Duration, Instant};
 use crate::calibration::MicroDegrees;
 use crate::trajectory::Trajectory;
 
-/// A silent joint that is measured within this distance of its set-point continues its move (D12).
+/// A silent joint that is measured within this distance of its set-point continues its move
+/// ([D12](protocol_core::decisions#d12)).
 const REJOIN_WITHIN: MicroDegrees = MicroDegrees::from_degrees(3);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -238,7 +240,7 @@ impl Drive {
     }
 }
 
-/// Is a joint measured at `angle` so near to its set-point that it goes on from there (D12)?
+/// Is a joint measured at `angle` so near to its set-point that it goes on from there ([D12](protocol_core::decisions#d12))?
 pub(crate) fn is_near(set_point: MicroDegrees, angle: MicroDegrees) -> bool {
     angle.0.abs_diff(set_point.0) <= REJOIN_WITHIN.0.unsigned_abs()
 }

@@ -1,4 +1,4 @@
-//! Does the servo of a joint that engages show the goal that was sent to it (D12)?
+//! Does the servo of a joint that engages show the goal that was sent to it ([D12](protocol_core::decisions#d12))?
 //!
 //! ```text
 //!   goal sent ──▶ question ──▶ it shows the goal ──────────────────────────▶ torque

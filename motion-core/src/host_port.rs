@@ -1,4 +1,5 @@
-//! The arm's end of the host link: decodes requests, encodes replies and reports (D3 to D5, D14).
+//! The arm's end of the host link: decodes requests, encodes replies and reports ([D3](protocol_core::decisions#d3) to
+//! [D5](protocol_core::decisions#d5), [D14](protocol_core::decisions#d14)).
 //!
 //! ```text
 //!   bytes ──▶ Deframer ──▶ next_event ──▶ writes, damage
@@ -124,7 +125,8 @@ impl HostPort {
         self.reports.set(now, registers, self.baud);
     }
 
-    /// The report that is due. Replies go first, and a report that does not fit `room` is skipped (D14).
+    /// The report that is due. Replies go first, and a report that does not fit `room` is skipped
+    /// ([D14](protocol_core::decisions#d14)).
     pub(crate) fn take_report(&mut self, now: Instant, room: usize) -> Option<ReportKind> {
         while let Some(kind) = self.reports.poll_due(now) {
             let (_, count) = kind.registers();

@@ -1,4 +1,4 @@
-//! The watchdog of the host link: acts once in each silence of the host (D24).
+//! The watchdog of the host link: acts once in each silence of the host ([D24](protocol_core::decisions#d24)).
 //!
 //! This file does not know what the watchdog does.
 

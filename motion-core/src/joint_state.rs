@@ -1,4 +1,5 @@
-//! One joint: its drive, its target, what its servo measured, and what protects it (D12, D21, D27, D28).
+//! One joint: its drive, its target, what its servo measured, and what protects it ([D12](protocol_core::decisions#d12),
+//! [D21](protocol_core::decisions#d21), [D27](protocol_core::decisions#d27), [D28](protocol_core::decisions#d28)).
 //!
 //! ```text
 //!   answers of the servo ──▶ this file ───▶ what protects the joint
@@ -46,11 +47,13 @@ pub(crate) enum Measured {
     Engaged,
     /// The joint needs torque, after its goal was sent this often.
     TorqueDue { goals: u8 },
-    /// An alarm has freed the joint: its servo needs torque-off, which frees nothing and ends a latched overload (D28).
+    /// An alarm has freed the joint: its servo needs torque-off, which frees nothing and ends a latched overload
+    /// ([D28](protocol_core::decisions#d28)).
     Freed,
-    /// The servo of a driven joint has no torque. [`Joints`](crate::joints::Joints) decides what that means (D29).
+    /// The servo of a driven joint has no torque. [`Joints`](crate::joints::Joints) decides what that means
+    /// ([D29](protocol_core::decisions#d29)).
     TorqueLost,
-    /// All driven servos have no torque after a long silence (D29).
+    /// All driven servos have no torque after a long silence ([D29](protocol_core::decisions#d29)).
     SupplyLost,
 }
 
@@ -210,7 +213,7 @@ impl JointState {
         Protected::Holds
     }
 
-    /// How hard the joint may push (D27).
+    /// How hard the joint may push ([D27](protocol_core::decisions#d27)).
     fn push_limit(&self, registers: &RegisterFile) -> PushLimit {
         let permille = |row: &Register| i16::from(registers.get(row.address)) * 10;
         if self.joint == Joint::ALL[6] && registers.get(EFFECTOR_TYPE.address) == effector::GRIPPER {
@@ -228,7 +231,7 @@ impl JointState {
         }
     }
 
-    /// The servo holds no torque: the joint is let go (D28).
+    /// The servo holds no torque: the joint is let go ([D28](protocol_core::decisions#d28)).
     pub(crate) fn lose_torque(&mut self, now: Instant) {
         self.drive.lose_torque(false);
         self.obstacle = Obstacle::NONE;
@@ -253,7 +256,8 @@ impl JointState {
         self.torque.doubt();
     }
 
-    /// Is the joint sent goals? Not while it is doubtful whether its servo has restarted (D29).
+    /// Is the joint sent goals? Not while it is doubtful whether its servo has restarted
+    /// ([D29](protocol_core::decisions#d29)).
     pub(crate) fn takes_goals(&self) -> bool {
         self.drive.is_driven() && self.torque.is_trusted()
     }
@@ -266,7 +270,8 @@ impl JointState {
     }
 
     /// Has the next question to ask for the torque switch? `is_refresh_near` tells that torque is refreshed soon. A waiting
-    /// joint is always asked: it may have been silent, and its goal follows the answer at once (D29).
+    /// joint is always asked: it may have been silent, and its goal follows the answer at once
+    /// ([D29](protocol_core::decisions#d29)).
     pub(crate) fn wants_torque_read(&self, is_refresh_near: bool) -> bool {
         self.drive.is_waiting()
             || (self.drive.has_set_point()
@@ -308,33 +313,34 @@ impl JointState {
         if is_driven { self.drive.wait() } else { self.drive.release() }
     }
 
-    /// The host wrote the motor state: a joint that is let go may engage again (D28).
+    /// The host wrote the motor state: a joint that is let go may engage again ([D28](protocol_core::decisions#d28)).
     pub(crate) const fn order(&mut self) {
         self.let_go.ordered();
     }
 
-    /// Forgets an obstacle: the set-point is free (D27).
+    /// Forgets an obstacle: the set-point is free ([D27](protocol_core::decisions#d27)).
     pub(crate) const fn forget_obstacle(&mut self) {
         self.obstacle = Obstacle::NONE;
     }
 
-    /// Does the set-point give way with the step that it made from `before`, towards the measured position (D27)?
+    /// Does the set-point give way with the step that it made from `before`, towards the measured position
+    /// ([D27](protocol_core::decisions#d27))?
     pub(crate) fn gives_way_from(&self, before: MicroDegrees) -> bool {
         let distance = |angle: MicroDegrees| self.measured.map(|at| at.0.abs_diff(angle.0));
         self.obstacle.is_holding_back() && distance(self.drive.set_point()) < distance(before)
     }
 
-    /// Is the joint blocked (D27)?
+    /// Is the joint blocked ([D27](protocol_core::decisions#d27))?
     pub(crate) const fn is_blocked(&self) -> bool {
         self.obstacle.is_blocked()
     }
 
-    /// Is the joint let go (D28)?
+    /// Is the joint let go ([D28](protocol_core::decisions#d28))?
     pub(crate) const fn is_let_go(&self) -> bool {
         self.let_go.is_let_go()
     }
 
-    /// Shows target, position, velocity and load in the extended block (D21).
+    /// Shows target, position, velocity and load in the extended block ([D21](protocol_core::decisions#d21)).
     pub(crate) fn show_extended(&self, registers: &mut RegisterFile) {
         let position = self.measured.map_or(u16::MAX, MicroDegrees::nearest_centidegree);
         let velocity = velocity_from_servo(self.joint, self.servo_velocity);
@@ -349,7 +355,7 @@ impl JointState {
     }
 }
 
-/// The register value of a load in 0.1 %: 128 + load / 8, 3 to 253 (M9).
+/// The register value of a load in 0.1 %: 128 + load / 8, 3 to 253 ([M9](protocol_core::decisions#m9)).
 fn shown_load(load: i16) -> u8 {
     let steps = (load / 8).clamp(-125, 125);
     u8::try_from(128 + steps).unwrap_or(128)

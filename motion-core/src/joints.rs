@@ -1,4 +1,5 @@
-//! The seven joints: their measured positions, their drives, and the goals and torque of their servos (D9, D12, D13).
+//! The seven joints: their measured positions, their drives, and the goals and torque of their servos
+//! ([D9](protocol_core::decisions#d9), [D12](protocol_core::decisions#d12), [D13](protocol_core::decisions#d13)).
 //!
 //! ```text
 //!   targets, offsets, state ──▶ ┌──────────────────────────┐ ──▶ goals, torque
@@ -69,8 +70,8 @@ impl Joints {
         self.each().filter(|(_, state)| belongs(state)).fold(0, |bits, (joint, _)| bits | joint.bit())
     }
 
-    /// Enters a motor state. The servo state takes the measured positions as targets (D13). Returns whether the state
-    /// changed.
+    /// Enters a motor state. The servo state takes the measured positions as targets ([D13](protocol_core::decisions#d13)).
+    /// Returns whether the state changed.
     pub(crate) fn set_state(&mut self, state: MotorState, registers: &mut RegisterFile) -> bool {
         if state == self.state {
             return false;
@@ -88,15 +89,15 @@ impl Joints {
         true
     }
 
-    /// The host wrote the motor state, perhaps the present one: joints that are let go may engage again (D28). Returns
-    /// whether there is one.
+    /// The host wrote the motor state, perhaps the present one: joints that are let go may engage again
+    /// ([D28](protocol_core::decisions#d28)). Returns whether there is one.
     pub(crate) fn order(&mut self) -> bool {
         self.supply.ordered(self.joints.iter().any(|state| state.position.is_known()));
         self.joints.iter_mut().for_each(JointState::order);
         self.joints.iter().any(JointState::is_let_go)
     }
 
-    /// Forgets all obstacles, because the protection is switched off (D27).
+    /// Forgets all obstacles, because the protection is switched off ([D27](protocol_core::decisions#d27)).
     pub(crate) fn forget_obstacles(&mut self) {
         self.joints.iter_mut().for_each(JointState::forget_obstacle);
     }
@@ -129,7 +130,7 @@ impl Joints {
         }
     }
 
-    /// Starts the moves to the positions in a write that was applied (M7).
+    /// Starts the moves to the positions in a write that was applied ([M7](protocol_core::decisions#m7)).
     pub(crate) fn reach(&mut self, reached: &Reached, registers: &mut RegisterFile) {
         for ((joint, state), target) in self.each_mut().zip(reached.targets) {
             if let Some(angle) = target {
@@ -138,8 +139,8 @@ impl Joints {
         }
     }
 
-    /// Re-expresses the set-points under the new offsets (D9): a changed offset changes the angle of a joint that did
-    /// not move. From there the joint moves to its target at its speed.
+    /// Re-expresses the set-points under the new offsets ([D9](protocol_core::decisions#d9)): a changed offset changes the
+    /// angle of a joint that did not move. From there the joint moves to its target at its speed.
     pub(crate) fn rebase_offsets(&mut self, before: &[i8; JOINTS], registers: &RegisterFile) {
         for ((joint, state), &before) in self.each_mut().zip(before) {
             let offset = registers.offset(joint);
@@ -176,7 +177,8 @@ impl Joints {
         if outcome == Measured::TorqueLost { self.torque_lost(now, joint) } else { outcome }
     }
 
-    /// Decides what it means that the servo of a driven joint has no torque (D28, D29).
+    /// Decides what it means that the servo of a driven joint has no torque ([D28](protocol_core::decisions#d28),
+    /// [D29](protocol_core::decisions#d29)).
     fn torque_lost(&mut self, now: Instant, joint: Joint) -> Measured {
         let driven = self.set_of(|state| state.drive.has_set_point());
         if self.supply.is_lost(driven & !joint.bit() != 0) {
@@ -197,7 +199,7 @@ impl Joints {
     }
 
     /// Doubts the torque of servos that were not heard for long, so that it is read before the next goal: after a late call,
-    /// or on a bus with many missing servos, they may have restarted unnoticed (D29).
+    /// or on a bus with many missing servos, they may have restarted unnoticed ([D29](protocol_core::decisions#d29)).
     fn doubt_torque(&mut self, now: Instant) {
         if now < self.doubt_at {
             return;
@@ -246,8 +248,9 @@ impl Joints {
         both.then(|| [two.drive.set_point(), three.drive.set_point()])
     }
 
-    /// Lets joints 2 and 3 wait for each other where their step would break the linkage (D25). A joint that gives way to an
-    /// obstacle does not wait: it would go on pushing until its servo switches itself off (D27).
+    /// Lets joints 2 and 3 wait for each other where their step would break the linkage
+    /// ([D25](protocol_core::decisions#d25)). A joint that gives way to an obstacle does not wait: it would go on pushing
+    /// until its servo switches itself off ([D27](protocol_core::decisions#d27)).
     fn keep_linkage(&mut self, before: [MicroDegrees; 2]) {
         let Some(after) = self.linkage_set_points() else { return };
         let allowed = linkage_step(before, after);
@@ -261,7 +264,7 @@ impl Joints {
         }
     }
 
-    /// The first register because of which a write is refused against a limit (D25).
+    /// The first register because of which a write is refused against a limit ([D25](protocol_core::decisions#d25)).
     pub(crate) fn against_limit(&self, check: &LimitCheck<'_>) -> Option<u8> {
         let enters_servo = self.state != MotorState::Servo
             && check.accepted.value_at(MOTOR_STATE.address) == Some(motor_state::SERVO);
@@ -273,14 +276,15 @@ impl Joints {
         check.first_refused(&self.joints.each_ref().map(target), &self.joints.each_ref().map(set_point))
     }
 
-    /// Holds every joint at its set-point (D24).
+    /// Holds every joint at its set-point ([D24](protocol_core::decisions#d24)).
     pub(crate) fn hold(&mut self, registers: &mut RegisterFile) {
         for joint in &mut self.joints {
             joint.hold(registers);
         }
     }
 
-    /// Shows the registers of the extended block and of the protection block that follow from the joints (D21, D27, D28).
+    /// Shows the registers of the extended block and of the protection block that follow from the joints
+    /// ([D21](protocol_core::decisions#d21), [D27](protocol_core::decisions#d27), [D28](protocol_core::decisions#d28)).
     pub(crate) fn show_extended(&self, registers: &mut RegisterFile) {
         for joint in &self.joints {
             joint.show_extended(registers);

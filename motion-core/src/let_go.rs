@@ -1,4 +1,5 @@
-//! Finds out that a servo holds no torque although it should, and when its joint may engage anew (D28).
+//! Finds out that a servo holds no torque although it should, and when its joint may engage anew
+//! ([D28](protocol_core::decisions#d28)).
 //!
 //! ```text
 //!            torque switch off, or an alarm without load while the joint leaves its set-point

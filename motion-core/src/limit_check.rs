@@ -1,4 +1,4 @@
-//! Checks a write against the limits of linkage and claw, before it is executed (D25).
+//! Checks a write against the limits of linkage and claw, before it is executed ([D25](protocol_core::decisions#d25)).
 //!
 //! ```text
 //!   write, targets before it ──▶ targets after it ──▶ limits that are on after it ──▶ register that is the reason

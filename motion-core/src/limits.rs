@@ -1,4 +1,4 @@
-//! The limits of the linkage and the claw (D25).
+//! The limits of the linkage and the claw ([D25](protocol_core::decisions#d25)).
 //!
 //! This file does not know registers or the bus.
 

@@ -1,4 +1,4 @@
-//! The three motor states of register 29 (D13).
+//! The three motor states of register 29 ([D13](protocol_core::decisions#d13)).
 
 use protocol_core::registers::map::motor_state;
 

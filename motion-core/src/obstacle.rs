@@ -1,4 +1,5 @@
-//! What an obstacle does to one joint: it holds the set-point back, and after a second the joint counts as blocked (D27).
+//! What an obstacle does to one joint: it holds the set-point back, and after a second the joint counts as blocked
+//! ([D27](protocol_core::decisions#d27)).
 //!
 //! This file does not know registers or the bus.
 

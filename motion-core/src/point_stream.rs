@@ -1,4 +1,4 @@
-//! The schedule of a stream of points for one joint (D23).
+//! The schedule of a stream of points for one joint ([D23](protocol_core::decisions#d23)).
 //!
 //! ```text
 //!   frames of the host     │k      │k+1   │k+2        │k+3      each up to half a period early or late

@@ -7,7 +7,8 @@
 
 use protocol_core::time::{Duration, Instant};
 
-/// After this many consecutive reads without an accepted answer, the servo counts as silent (D12).
+/// After this many consecutive reads without an accepted answer, the servo counts as silent
+/// ([D12](protocol_core::decisions#d12)).
 const GIVE_UP_AFTER: u8 = 3;
 /// How long a silent servo is not read, because each read costs a timeout on the bus. With the wait for the next cycle
 /// it is read ten times a second.
@@ -15,7 +16,8 @@ const RETRY_AFTER: Duration = Duration::from_millis(90);
 /// How long the measured position of a joint without torque is valid: two control cycles. A falling joint moves by
 /// about 2 degrees meanwhile.
 const FRESH_FOR: Duration = Duration::from_millis(20);
-/// The highest speed of a joint: 372 degrees/s (D10) are 1757 counts per second. A hand can be slightly faster.
+/// The highest speed of a joint: 372 degrees/s ([D10](protocol_core::decisions#d10)) are 1757 counts per second. A hand can
+/// be slightly faster.
 const COUNTS_PER_SECOND: u32 = 2_000;
 /// A joint that sinks this slowly counts as steady, or a servo that is seldom asked would not catch its joint before it
 /// lies at the bottom.

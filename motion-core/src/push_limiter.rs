@@ -1,4 +1,4 @@
-//! Keeps one joint from pushing harder than its limit (D27).
+//! Keeps one joint from pushing harder than its limit ([D27](protocol_core::decisions#d27)).
 //!
 //! ```text
 //!            over the limit for longer than its grace
@@ -32,7 +32,7 @@ impl PushLimit {
         permille
     }
 
-    /// How long a turning joint may exceed it, and one at a standstill. D27 allows 300 ms. A joint of the arm stays over it for
+    /// How long a turning joint may exceed it, and one at a standstill. [D27](protocol_core::decisions#d27) allows 300 ms. A joint of the arm stays over it for
     /// less than 250 ms while it accelerates freely with 300 g, and turns after a push of 80 ms.
     const fn grace(self) -> [Duration; 2] {
         match self {
@@ -49,10 +49,11 @@ const STANDSTILL: u32 = 300_000;
 const FULL_LOAD_DISTANCE: i32 = 4_300_000;
 /// From this load on a servo may give all it has, in 0.1 %.
 pub(crate) const FULL_LOAD: i16 = 950;
-/// How far the push may exceed the limit while a joint sinks slowly (D27).
+/// How far the push may exceed the limit while a joint sinks slowly ([D27](protocol_core::decisions#d27)).
 const TOLERANCE: i16 = 50;
-/// The largest speed at which a joint with a push up to the tolerance sinks: 10 degrees/s (D27), in
-/// micro-degrees per millisecond. Goals are whole counts, so the bound itself moves at 8 degrees/s.
+/// The largest speed at which a joint with a push up to the tolerance sinks: 10 degrees/s
+/// ([D27](protocol_core::decisions#d27)), in micro-degrees per millisecond. Goals are whole counts, so the bound itself
+/// moves at 8 degrees/s.
 const SINK_PER_MILLISECOND: i32 = 8_000;
 /// This far under the limit, the distance may grow again; half the limit if that is less.
 const SLACK: i16 = 100;

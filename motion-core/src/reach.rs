@@ -1,4 +1,4 @@
-//! The positions in a write of map 2.1, and the joint angles that reach them (M7).
+//! The positions in a write of map 2.1, and the joint angles that reach them ([M7](protocol_core::decisions#m7)).
 //!
 //! ```text
 //!   68..73  wrist                        IK5: joints 1 to 3
@@ -58,7 +58,8 @@ impl OutOfReach {
     }
 }
 
-/// Do joint angles exist for all positions in a write? The arm refuses the write otherwise (M7).
+/// Do joint angles exist for all positions in a write? The arm refuses the write otherwise
+/// ([M7](protocol_core::decisions#m7)).
 #[must_use]
 pub fn is_within(accepted: &Accepted<'_>) -> bool {
     targets(accepted).is_ok()

@@ -1,4 +1,5 @@
-//! The timer of reports (D14, D26). This file does not know the content of a report.
+//! The timer of reports ([D14](protocol_core::decisions#d14), [D26](protocol_core::decisions#d26)). This file does not know
+//! the content of a report.
 
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::MIN_LENGTH;

@@ -1,4 +1,5 @@
-//! The streams of reports: register 53 of map 2.2, or registers 82 and 90 of map 2.1 (D14, M4).
+//! The streams of reports: register 53 of map 2.2, or registers 82 and 90 of map 2.1 ([D14](protocol_core::decisions#d14),
+//! [M4](protocol_core::decisions#m4)).
 //!
 //! The streams of both maps never run at the same time. The streams of map 2.1 share the half of the line that D14 allows.
 //! This file does not know the values in a report.
@@ -30,7 +31,7 @@ pub(crate) enum ReportKind {
 }
 
 impl ReportKind {
-    /// The kind for a value of register 189 (D26).
+    /// The kind for a value of register 189 ([D26](protocol_core::decisions#d26)).
     const fn from_register(value: u8) -> Self {
         match value {
             report_content::FINE_POSITIONS => Self::FinePositions,

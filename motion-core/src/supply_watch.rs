@@ -1,4 +1,4 @@
-//! Finds out that the servos lost their supply: an emergency stop (D29).
+//! Finds out that the servos lost their supply: an emergency stop ([D29](protocol_core::decisions#d29)).
 //!
 //! ```text
 //!   all driven servos silent for 1 s ──▶ undecided: no joint engages ──▶ one answers with torque: a cable was gone

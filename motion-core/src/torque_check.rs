@@ -1,4 +1,5 @@
-//! What is known of the torque switch of one servo that should be on (D28, D29).
+//! What is known of the torque switch of one servo that should be on ([D28](protocol_core::decisions#d28),
+//! [D29](protocol_core::decisions#d29)).
 //!
 //! ```text
 //!                 read: on                 a question was not answered

@@ -1,4 +1,5 @@
-//! The set-point of one joint during a move or in a stream (D10, D11, D18, D23).
+//! The set-point of one joint during a move or in a stream ([D10](protocol_core::decisions#d10),
+//! [D11](protocol_core::decisions#d11), [D18](protocol_core::decisions#d18), [D23](protocol_core::decisions#d23)).
 //!
 //! Each control cycle advances the set-point by one step. A late call delays the move; it never makes a step larger.
 //! This file does not know the joint, its measured position or its servo.
@@ -10,9 +11,10 @@ use crate::point_stream::PointStream;
 
 /// Control cycles in one unit of the time registers: 100 ms at 100 Hz.
 const CYCLES_PER_TIME_UNIT: u16 = 10;
-/// Step of one control cycle for each unit of the speed registers: 1.9 degrees/s at 100 Hz (D10).
+/// Step of one control cycle for each unit of the speed registers: 1.9 degrees/s at 100 Hz
+/// ([D10](protocol_core::decisions#d10)).
 const STEP_PER_SPEED_UNIT: i32 = 19_000;
-/// Step of one control cycle at the motor's maximum: 62 rpm are 372 degrees/s (D10).
+/// Step of one control cycle at the motor's maximum: 62 rpm are 372 degrees/s ([D10](protocol_core::decisions#d10)).
 const LARGEST_STEP: i32 = 3_720_000;
 
 /// The set-point of one joint and its target.
@@ -105,8 +107,8 @@ impl Trajectory {
         self.set_point.0 += distance.min(most).max(-most);
     }
 
-    /// Takes back the part of the last step beyond `set_point`, because the joint has to wait (D25). The time of a timed
-    /// move does not pass meanwhile.
+    /// Takes back the part of the last step beyond `set_point`, because the joint has to wait
+    /// ([D25](protocol_core::decisions#d25)). The time of a timed move does not pass meanwhile.
     pub fn hold_back(&mut self, set_point: MicroDegrees) {
         self.set_point = set_point;
         if self.cycles_left > 0 {

@@ -1,4 +1,4 @@
-//! The control of the vacuum pump and its valve (D20).
+//! The control of the vacuum pump and its valve ([D20](protocol_core::decisions#d20)).
 
 use protocol_core::time::{Duration, Instant};
 

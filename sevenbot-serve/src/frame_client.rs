@@ -1,7 +1,8 @@
 //! A client with frames as on the arm's line: parses its requests, and encodes its replies and reports.
 //!
-//! A client that does not read loses reports first. Its replies wait, its reads wait for room, and finally its bytes
-//! wait where it sent them from; its writes are carried out as long as they do not stand behind a read that waits (D5).
+//! A client that does not read loses reports first. Its replies wait, its reads wait for room, and finally its bytes wait
+//! where it sent them from; its writes are carried out as long as they do not stand behind a read that waits
+//! ([D5](protocol_core::decisions#d5)).
 
 use protocol_core::request::{Reply, Report};
 use protocol_core::time::Instant;
@@ -25,7 +26,7 @@ pub struct FrameClient {
 
 impl FrameClient {
     /// A new client of `hub`. `baud` is the rate of the arm's line: gaps between bytes are measured in its characters
-    /// (D4).
+    /// ([D4](protocol_core::decisions#d4)).
     pub fn connect(hub: &mut Hub, baud: u32) -> Self {
         let id = hub.connect();
         hub.set_can_receive(id, true);
@@ -104,7 +105,7 @@ impl FrameClient {
     }
 }
 
-/// A report has the form of the register that asked for it (M4).
+/// A report has the form of the register that asked for it ([M4](protocol_core::decisions#m4)).
 fn encode_report(stream: Stream, values: &[u8], frame: &mut FrameBuffer) {
     let (address, _) = stream.registers();
     match stream {

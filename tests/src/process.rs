@@ -1,8 +1,9 @@
-//! Processes under test: start, signals and end.
+//! Programs under test: start, signals and end.
 
 use std::io::{BufRead, BufReader, Read};
-use std::path::PathBuf;
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::ops::{Deref, DerefMut};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::mpsc::{self, Receiver};
 use std::thread;
 
@@ -12,23 +13,84 @@ pub use rustix::process::Signal;
 
 use crate::wait::{TIMEOUT, wait_for};
 
+/// A program that is killed when it is dropped, so that it does not outlive a test that fails.
+#[derive(Debug)]
+pub struct RunningProgram {
+    /// `None` after its end.
+    child: Option<Child>,
+    /// Has the program processes of its own, which it ends when it is terminated?
+    has_processes: bool,
+}
+
+impl RunningProgram {
+    /// Starts a program.
+    #[must_use]
+    pub fn spawn(command: &mut Command) -> Self {
+        let child = command.spawn().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+        // The emulator has servos and a machine.
+        let has_processes = Path::new(command.get_program()).ends_with("xtask");
+        Self { child: Some(child), has_processes }
+    }
+
+    /// Waits for the end of the program, and returns what it wrote into its pipes.
+    #[must_use]
+    pub fn output(mut self) -> Output {
+        let child = self.child.take().expect("a running program");
+        child.wait_with_output().expect("the program ends")
+    }
+
+    /// Kills the program, unless it has ended.
+    pub fn kill(&mut self) {
+        let Some(child) = &mut self.child else { return };
+        // A process that has ended and was waited for has no id.
+        if self.has_processes && matches!(child.try_wait(), Ok(None)) {
+            let _ = kill_process(Pid::from_child(child), Signal::TERM);
+            let _ = child.wait();
+        }
+        let _ = child.kill();
+        let _ = child.wait();
+    }
+}
+
+impl From<Child> for RunningProgram {
+    fn from(child: Child) -> Self {
+        Self { child: Some(child), has_processes: false }
+    }
+}
+
+impl Deref for RunningProgram {
+    type Target = Child;
+
+    fn deref(&self) -> &Child {
+        self.child.as_ref().expect("a running program")
+    }
+}
+
+impl DerefMut for RunningProgram {
+    fn deref_mut(&mut self) -> &mut Child {
+        self.child.as_mut().expect("a running program")
+    }
+}
+
+impl Drop for RunningProgram {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
 /// Starts a program that prints `ready PORT` for each of its ports, and waits for these lines.
 ///
 /// # Errors
 /// Another line, or an empty one after a timeout.
-pub fn start(command: &mut Command, ports: usize) -> Result<(Child, Vec<PathBuf>), String> {
-    let process = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn();
-    let mut process = process.expect("the program starts");
-    let lines = lines(process.stdout.take().expect("a pipe"));
+pub fn start(command: &mut Command, ports: usize) -> Result<(RunningProgram, Vec<PathBuf>), String> {
+    let mut program = RunningProgram::spawn(command.stdin(Stdio::null()).stdout(Stdio::piped()));
+    let lines = lines(program.stdout.take().expect("a pipe"));
     let port = |_| {
         let line = lines.recv_timeout(TIMEOUT).unwrap_or_default();
         line.strip_prefix("ready ").map(PathBuf::from).ok_or(line)
     };
-    let ports = (0..ports).map(port).collect::<Result<_, _>>();
-    if ports.is_err() {
-        kill(&mut process);
-    }
-    Ok((process, ports?))
+    let ports = (0..ports).map(port).collect::<Result<_, _>>()?;
+    Ok((program, ports))
 }
 
 /// The lines of a pipe. They are read to the end, so that the program never writes into a closed pipe.
@@ -53,8 +115,50 @@ pub fn wait_for_exit(process: &mut Child) -> ExitStatus {
     })
 }
 
-/// Kills a process, unless it has ended.
-pub fn kill(process: &mut Child) {
-    let _ = process.kill();
-    let _ = process.wait();
+#[cfg(test)]
+mod tests {
+    use rustix::process::test_kill_process;
+
+    use super::*;
+
+    /// A shell that prints its process id, and waits.
+    fn shell() -> Command {
+        let mut command = Command::new("sh");
+        command.args(["-c", "echo $$; exec sleep 600"]);
+        command
+    }
+
+    fn is_running(id: &str) -> bool {
+        let id = id.trim().parse().ok().and_then(Pid::from_raw);
+        test_kill_process(id.expect("a process id")).is_ok()
+    }
+
+    #[test]
+    fn a_program_ends_when_its_test_panics() {
+        let (sender, receiver) = mpsc::channel();
+        let test = thread::spawn(move || {
+            let mut program = RunningProgram::spawn(shell().stdout(Stdio::piped()));
+            let lines = lines(program.stdout.take().expect("a pipe"));
+            sender.send(lines.recv().expect("a line")).expect("a receiver");
+            panic!("the test fails");
+        });
+        assert!(test.join().is_err());
+        assert!(!is_running(&receiver.recv().expect("a process id")));
+    }
+
+    #[test]
+    fn a_program_that_is_not_ready_ends() {
+        let id = start(&mut shell(), 1).expect_err("not ready");
+        assert!(!is_running(&id), "{id}");
+    }
+
+    #[test]
+    fn a_program_that_has_ended_is_not_killed_again() {
+        let mut program = RunningProgram::spawn(&mut Command::new("true"));
+        assert!(wait_for_exit(&mut program).success());
+        program.kill();
+        program.kill();
+        let output = RunningProgram::spawn(Command::new("echo").arg("text").stdout(Stdio::piped())).output();
+        assert_eq!(output.stdout, b"text\n");
+    }
 }

@@ -2,20 +2,20 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::process::{Child, Command, Output};
+use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::ArmClient;
-use crate::process;
+use crate::process::{self, RunningProgram};
 use crate::programs::{host_sim, tool};
 
 /// A simulator, and its folder for everything.
 #[derive(Debug)]
 pub struct Simulator {
     /// Its process.
-    pub process: Child,
+    pub process: RunningProgram,
     /// The ports of its arms.
     pub ports: Vec<PathBuf>,
     /// Its folder.
@@ -85,11 +85,5 @@ impl Simulator {
     #[must_use]
     pub fn joint(&self, number: usize, key: &str) -> Value {
         self.state()["joints"][number - 1][key].clone()
-    }
-}
-
-impl Drop for Simulator {
-    fn drop(&mut self) {
-        process::kill(&mut self.process);
     }
 }

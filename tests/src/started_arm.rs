@@ -8,13 +8,13 @@
 use std::env;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command};
+use std::process::Command;
 use std::thread;
 
 use tempfile::TempDir;
 
 use crate::arm_control::{ArmControl, Need};
-use crate::process::{self, Signal, send_signal};
+use crate::process::{self, RunningProgram, Signal, send_signal};
 use crate::programs::{host_sim, xtask};
 
 /// The kind of an arm: where its controller runs.
@@ -104,8 +104,8 @@ pub struct StartedArm {
 
 /// The processes of an arm.
 struct Processes {
-    servos: Option<Child>,
-    controller: Child,
+    controller: RunningProgram,
+    servos: Option<RunningProgram>,
     port: PathBuf,
 }
 
@@ -119,14 +119,8 @@ impl StartedArm {
     }
 
     fn end(&mut self) {
-        let Processes { servos, controller, .. } = &mut self.processes;
-        if self.kind == ArmKind::Emulator {
-            // The emulator has to end its own processes.
-            send_signal(controller, Signal::TERM);
-            let _ = controller.wait();
-        }
-        process::kill(controller);
-        servos.iter_mut().for_each(process::kill);
+        self.processes.controller.kill();
+        self.processes.servos.iter_mut().for_each(RunningProgram::kill);
     }
 }
 
@@ -138,12 +132,12 @@ impl Processes {
         };
         let servos = kind.servos(folder).map(|mut command| launch(command.args(options_of(true)), folder).0);
         let (controller, port) = launch(kind.controller(folder).args(options_of(false)), folder);
-        Self { servos, controller, port }
+        Self { controller, servos, port }
     }
 }
 
 /// Starts a process with one port, and a log in `folder`.
-fn launch(command: &mut Command, folder: &Path) -> (Child, PathBuf) {
+fn launch(command: &mut Command, folder: &Path) -> (RunningProgram, PathBuf) {
     let path = folder.join("log");
     let log = File::options().create(true).append(true).open(&path).expect("a log file");
     match process::start(command.stderr(log), 1) {

@@ -3,7 +3,7 @@
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
 use std::path::Path;
-use std::process::{Child, ExitStatus};
+use std::process::ExitStatus;
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
@@ -11,7 +11,7 @@ use pty_process::Size;
 use pty_process::blocking::{Command, Pty, open};
 use vt100::Parser;
 
-use crate::process;
+use crate::process::RunningProgram;
 use crate::programs::TOOL_TIMEOUT;
 use crate::wait::wait_for;
 
@@ -23,7 +23,7 @@ const COLUMNS: NonZeroU16 = NonZeroU16::new(80).unwrap();
 pub struct Terminal {
     pty: Arc<Pty>,
     screen: Arc<Mutex<Parser>>,
-    program: Child,
+    program: RunningProgram,
     /// Draws the output on the screen, until the program has ended.
     painter: Option<JoinHandle<()>>,
 }
@@ -36,7 +36,7 @@ impl Terminal {
         pty.resize(Size::new(ROWS.get(), COLUMNS.get())).expect("a size");
         let command = Command::new(program).args(arguments).env("TERM", "xterm-256color");
         let command = command.env(TOOL_TIMEOUT.0, TOOL_TIMEOUT.1);
-        let program = command.spawn(terminal).expect("the program starts");
+        let program = command.spawn(terminal).expect("the program starts").into();
         let screen = Arc::new(Mutex::new(Parser::new(ROWS, COLUMNS, 0)));
         let (pty, drawn) = (Arc::new(pty), Arc::clone(&screen));
         let output = Arc::clone(&pty);
@@ -91,11 +91,5 @@ impl Terminal {
         });
         self.painter.take().map(JoinHandle::join);
         status
-    }
-}
-
-impl Drop for Terminal {
-    fn drop(&mut self) {
-        process::kill(&mut self.program);
     }
 }

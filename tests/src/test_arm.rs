@@ -6,12 +6,13 @@ use std::fs::File;
 use std::io::{self, Read, Write};
 use std::ops::{Deref, DerefMut};
 use std::path::PathBuf;
-use std::process::{Child, Output, Stdio};
+use std::process::{Output, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
 use crate::arm_client::ArmClient;
 use crate::arm_control::{ArmControl, ExternalArm, Need};
+use crate::process::RunningProgram;
 use crate::programs::tool;
 use crate::registers::{
     DEVICE_ID, EEPROM_LOCK, EFFECTOR_TYPE, FEEDBACK_FREQUENCY, MOVING_JOINTS, PRESENT_POSITION,
@@ -249,14 +250,14 @@ impl TestArm {
     }
 
     /// Starts the command line tool on the port of this arm, without standard input. [`TestArm::reopen`] follows its end.
-    pub fn spawn_sevenbot(&mut self, arguments: &[&str]) -> Child {
+    pub fn spawn_sevenbot(&mut self, arguments: &[&str]) -> RunningProgram {
         let mut tool = tool();
         tool.arg("--port").arg(self.lend_port()).args(arguments).stdin(Stdio::null());
-        tool.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("sevenbot runs")
+        RunningProgram::spawn(tool.stdout(Stdio::piped()).stderr(Stdio::piped()))
     }
 
     /// Likewise, and waits until the tool prints `text` on standard error: with `--verbose`, a frame for example.
-    pub fn spawn_sevenbot_until(&mut self, arguments: &[&str], text: &str) -> Child {
+    pub fn spawn_sevenbot_until(&mut self, arguments: &[&str], text: &str) -> RunningProgram {
         let mut tool = self.spawn_sevenbot(arguments);
         let mut stderr = tool.stderr.take().expect("a pipe");
         let mut received = Vec::new();

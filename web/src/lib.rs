@@ -20,6 +20,7 @@ pub mod client;
 pub mod movement;
 pub mod park;
 pub mod plots;
+mod problems_in_chinese;
 pub mod scene;
 pub mod source;
 pub mod stop;

@@ -14,7 +14,7 @@ use crate::run::{TaskResult, root};
 /// The letter and the number of a decision.
 type Decision = (char, u8);
 
-/// All decisions on the device. M11 is about the host.
+/// All decisions. The number M11 is not used.
 fn all_decisions() -> impl Iterator<Item = Decision> {
     let of_map22 = (1..=29).map(|number| ('D', number));
     of_map22.chain((1..=10).chain([12]).map(|number| ('M', number)))

@@ -10,6 +10,7 @@
 //! assumed. Its WebSocket, its buttons and the defects of its inverse kinematics are not simulated.
 
 mod feedback;
+mod goals;
 mod inverse;
 mod measurement;
 mod parser;
@@ -19,11 +20,10 @@ mod servo_master;
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use motion_core::vacuum::VacuumControl;
 use motion_core::{Config, Output};
 use protocol_core::registers::map::{
-    BAUD_RATE, MOTOR_STATE, SPEED, TARGET_POSITION, TIME, VACUUM_PUMP, baud_rate, motor_state,
+    BAUD_RATE, MOTOR_STATE, TARGET_POSITION, VACUUM_PUMP, baud_rate, motor_state,
 };
 use protocol_core::registers::map21::{
     ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, PRESENT_ANGLE, PRESENT_LOAD,
@@ -36,21 +36,16 @@ use protocol_core::wire::FrameBuffer;
 
 use crate::controller::ArmController;
 use feedback::Feedback;
+use goals::LastGoals;
 use inverse::Requested;
 use measurement::Measurement;
 use parser::{Parser, StockRequest};
 use registers::StockRegisters;
-use servo_master::{ReadOutcome, ServoGoal, ServoMaster};
+use servo_master::{ReadOutcome, ServoMaster};
 
 /// The arm obeys nothing before this time after power-up. Then it moves to the standard pose.
 const BOOT_TIME: Duration = Duration::from_millis(500);
 const WAKE_UP_MS: u16 = 2_000;
-/// Speed, in counts per second, and time of the goals after that move.
-const SPEED_AT_START: u16 = 600;
-const TIME_AT_START_MS: u16 = 1_000;
-/// A unit of the speed registers in counts per second, and of the time registers in milliseconds.
-const SPEED_UNIT: u16 = 10;
-const TIME_UNIT_MS: u16 = 100;
 /// How long an alarm beeps. The arm does nothing else meanwhile.
 const BEEP: Duration = Duration::from_millis(100);
 const BANNER: &[u8] = b"7Bot V2, firmware 2.1.4\r\n";
@@ -77,7 +72,7 @@ pub struct StockController {
     angle_feedback: Feedback,
     load_feedback: Feedback,
     vacuum: VacuumControl,
-    joints: [LastGoal; JOINTS],
+    goals: LastGoals,
     requested: Requested,
     /// The servos get their first goals at this time.
     wake_up: Option<Instant>,
@@ -86,21 +81,10 @@ pub struct StockController {
     baud: u32,
 }
 
-/// The last target of a joint, and how fast it moves to the next one.
-#[derive(Clone, Copy, Debug)]
-struct LastGoal {
-    /// In degrees. A target that is equal is not sent again.
-    target: u8,
-    /// In counts per second.
-    speed: u16,
-    time_ms: u16,
-}
-
 impl ArmController for StockController {
     fn power_up(now: Instant, config: Config, stored: Option<&Image>, _storage: Storage) -> Self {
         let registers = StockRegisters::new(config.chip_id, stored);
-        let joint = |target| LastGoal { target, speed: SPEED_AT_START, time_ms: TIME_AT_START_MS };
-        let joints = registers.joints(&TARGET_POSITION).map(joint);
+        let goals = LastGoals::new(registers.joints(&TARGET_POSITION));
         let is_fast = registers.get(BAUD_RATE.address) == FAST;
         Self {
             servos: ServoMaster::new(config.servo_baud, config.servo_timeout, config.guard_time),
@@ -114,7 +98,7 @@ impl ArmController for StockController {
             angle_feedback: Feedback::default(),
             load_feedback: Feedback::default(),
             vacuum: VacuumControl::default(),
-            joints,
+            goals,
             wake_up: Some(now + BOOT_TIME),
             requested: Requested::default(),
             beep_end: None,
@@ -185,9 +169,7 @@ impl StockController {
             if now >= wake_up {
                 self.wake_up = None;
                 self.servos.set_torque(motor_state::SERVO);
-                let goal = |goal| LastGoal { speed: 0, time_ms: WAKE_UP_MS, ..goal };
-                let goals = Joint::ALL.into_iter().zip(self.joints.map(goal)).collect();
-                self.send_goals(goals);
+                self.servos.set_goals(self.goals.within(WAKE_UP_MS, &self.registers).into_iter());
             }
             return now >= wake_up;
         }
@@ -272,15 +254,7 @@ impl StockController {
         if is_written(VACUUM_PUMP.address) {
             self.vacuum.set(now, self.registers.get(VACUUM_PUMP.address) == 1);
         }
-        for (joint, goal) in Joint::ALL.into_iter().zip(&mut self.joints) {
-            let (speed, time) = (SPEED.of(joint), TIME.of(joint));
-            if is_written(speed) {
-                goal.speed = SPEED_UNIT * u16::from(self.registers.get(speed));
-            }
-            if is_written(time) {
-                goal.time_ms = TIME_UNIT_MS * u16::from(self.registers.get(time));
-            }
-        }
+        self.goals.set_pace(&self.registers, is_written);
         let targets = Joint::ALL.map(|joint| {
             let target = TARGET_POSITION.of(joint);
             is_written(target).then(|| self.registers.get(target))
@@ -320,25 +294,10 @@ impl StockController {
 
     /// Sends the targets that differ from the last ones to the servos.
     fn move_to(&mut self, targets: [Option<u8>; JOINTS]) {
-        let mut goals = Vec::new();
-        for ((joint, goal), target) in Joint::ALL.into_iter().zip(&mut self.joints).zip(targets) {
-            if let Some(target) = target.filter(|&target| target != goal.target) {
-                goal.target = target;
-                goals.push((joint, *goal));
-            }
-        }
+        let goals = self.goals.change(targets, &self.registers);
         if !goals.is_empty() {
-            self.send_goals(goals);
+            self.servos.set_goals(goals.into_iter());
         }
-    }
-
-    fn send_goals(&mut self, goals: Vec<(Joint, LastGoal)>) {
-        let goals = goals.into_iter().map(|(joint, LastGoal { target, speed, time_ms })| {
-            let angle = MicroDegrees::from_degrees(target);
-            let position_counts = counts_from_angle(joint, angle, self.registers.offset(joint));
-            (joint, ServoGoal { position_counts, time_ms, speed })
-        });
-        self.servos.set_goals(goals);
     }
 
     fn send(&mut self, encode: impl FnOnce(&mut FrameBuffer)) {

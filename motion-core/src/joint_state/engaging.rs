@@ -1,4 +1,5 @@
-//! How a waiting joint engages: measured at rest, given its goal, asked whether it has it, given torque (D12, D29).
+//! How a waiting joint engages: measured at rest, given its goal, asked whether it has it, given torque
+//! ([D12](protocol_core::decisions#d12), [D29](protocol_core::decisions#d29)).
 
 use protocol_core::registers::RegisterFile;
 use protocol_core::registers::map::PROTECTION;
@@ -12,8 +13,9 @@ use crate::servo_bus::Answer;
 use crate::torque_check::TorqueCheck;
 
 impl JointState {
-    /// Checks the goal that the servo of a joint shows whose torque is pending (D12). Returns how often the goal has to be
-    /// sent before torque; `None` if it is not known that the servo has it. Then the joint waits for its next answer.
+    /// Checks the goal that the servo of a joint shows whose torque is pending ([D12](protocol_core::decisions#d12)).
+    /// Returns how often the goal has to be sent before torque; `None` if it is not known that the servo has it. Then the
+    /// joint waits for its next answer.
     pub(super) fn check_goal(
         &mut self,
         now: Instant,

@@ -1,4 +1,6 @@
-//! The set-point of one joint: towards the targets of the host, as far as an obstacle allows (D10, D23, D24, D27).
+//! The set-point of one joint: towards the targets of the host, as far as an obstacle allows
+//! ([D10](protocol_core::decisions#d10), [D23](protocol_core::decisions#d23), [D24](protocol_core::decisions#d24),
+//! [D27](protocol_core::decisions#d27)).
 
 use protocol_core::registers::RegisterFile;
 use protocol_core::registers::map::TARGET_POSITION;
@@ -8,7 +10,8 @@ use super::JointState;
 use crate::calibration::MicroDegrees;
 
 impl JointState {
-    /// Advances the set-point by the control cycle that ends at `end`, as far as an obstacle allows (D27).
+    /// Advances the set-point by the control cycle that ends at `end`, as far as an obstacle allows
+    /// ([D27](protocol_core::decisions#d27)).
     pub(crate) fn advance(&mut self, end: Instant, speed: u8, registers: &mut RegisterFile) {
         self.drive.advance(end, speed);
         let Some(angle) = self.measured else { return };
@@ -28,7 +31,8 @@ impl JointState {
         self.drive.set_target(self.target, time);
     }
 
-    /// Moves to the next point of a stream, whose frame came at `now`. A joint that is let go takes none (D28).
+    /// Moves to the next point of a stream, whose frame came at `now`. A joint that is let go takes none
+    /// ([D28](protocol_core::decisions#d28)).
     pub(crate) fn stream_to(
         &mut self,
         now: Instant,

@@ -13,4 +13,5 @@ mod journal_world;
 mod power_loss;
 mod register_rules;
 mod register_rules_21;
+mod silence;
 mod stream;

@@ -1,4 +1,5 @@
-//! The hub holds the arm by itself: for a client whose watchdog acts (D24), or that sent the command to stop.
+//! The hub holds the arm by itself: for a client whose watchdog acts ([D24](protocol_core::decisions#d24)), or that sent the
+//! command to stop.
 //!
 //! ```text
 //!   read targets and positions ──▶ write the positions as targets ──▶ read again, until no target differs

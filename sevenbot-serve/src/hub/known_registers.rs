@@ -55,7 +55,7 @@ impl KnownRegisters {
         self.0.word(address)
     }
 
-    /// Does the arm accept a write (D16, M7)?
+    /// Does the arm accept a write ([D16](protocol_core::decisions#d16), [M7](protocol_core::decisions#m7))?
     pub(crate) fn accepts(&self, map: Map, address: u8, values: &[u8]) -> bool {
         self.check(map, address, values).is_some()
     }
@@ -74,7 +74,8 @@ impl KnownRegisters {
         }
     }
 
-    /// The map whose form offsets have for a client that has written nothing (M5, M6).
+    /// The map whose form offsets have for a client that has written nothing ([M5](protocol_core::decisions#m5),
+    /// [M6](protocol_core::decisions#m6)).
     pub(crate) fn form_before_writes(&self) -> Map {
         if self.0.get(OPTIONS.address) & option::BIASED_OFFSETS == 0 { Map::V22 } else { Map::V21 }
     }

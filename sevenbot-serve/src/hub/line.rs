@@ -25,7 +25,7 @@ const MOST_OUTPUT: usize = 64;
 /// Bytes of replies that may be on their way. One read is always allowed.
 const WINDOW: usize = 96;
 
-/// The registers of a report of map 2.2 (D26).
+/// The registers of a report of map 2.2 ([D26](protocol_core::decisions#d26)).
 const REPORTS: &[Span] =
     &[Span::of(&PRESENT_POSITION), Span::of(&FINE_POSITION), Span::between(&FINE_POSITION, &LOAD)];
 
@@ -142,7 +142,7 @@ impl Line {
         self.advance(now);
     }
 
-    /// Sends a write with the function code of its map (M1).
+    /// Sends a write with the function code of its map ([M1](protocol_core::decisions#m1)).
     pub(crate) fn send_write(&mut self, now: Instant, map: Map, address: u8, values: &[u8]) {
         self.link.write(map, address, values);
         self.advance(now);

@@ -14,13 +14,13 @@ use super::stream::Stream;
 pub(crate) struct OwnRegisters {
     /// Of the reports of map 2.2, in Hz.
     positions: u8,
-    /// What these reports hold (D26).
+    /// What these reports hold ([D26](protocol_core::decisions#d26)).
     content: u8,
     /// Of the reports of present angles of map 2.1, in Hz.
     angles: u8,
     /// Of the reports of present loads of map 2.1, in Hz.
     loads: u8,
-    /// The map of the client's last write. The arm's form of the offsets depends on it (M5).
+    /// The map of the client's last write. The arm's form of the offsets depends on it ([M5](protocol_core::decisions#m5)).
     last_map: Option<Map>,
 }
 
@@ -57,7 +57,7 @@ impl OwnRegisters {
         has_offsets.then_some(self.last_map.unwrap_or(before_writes))
     }
 
-    /// A write of 53 stops the reports of map 2.1 (M4).
+    /// A write of 53 stops the reports of map 2.1 ([M4](protocol_core::decisions#m4)).
     fn write_map22(&mut self, address: u8, values: &mut [u8]) {
         if let Some(byte) = byte_at(address, values, &FEEDBACK_FREQUENCY) {
             *self = Self { positions: std::mem::take(byte), angles: 0, loads: 0, ..*self };
@@ -67,7 +67,7 @@ impl OwnRegisters {
         }
     }
 
-    /// Every write stops the reports of map 2.2 (M4).
+    /// Every write stops the reports of map 2.2 ([M4](protocol_core::decisions#m4)).
     fn write_map21(&mut self, address: u8, values: &mut [u8]) {
         self.positions = 0;
         if let Some(byte) = byte_at(address, values, &ANGLE_FEEDBACK_FREQUENCY) {

@@ -1,5 +1,5 @@
 //! The positions that a client has read of late. Targets that equal them hold the arm: that is how every program stops it
-//! (D24 and `sevenbot::hold`), for the wire has no request to stop.
+//! ([D24](protocol_core::decisions#d24) and `sevenbot::hold`), for the wire has no request to stop.
 
 use std::collections::VecDeque;
 

@@ -16,7 +16,7 @@ pub enum WholeRequest {
     },
     /// Writes registers from `address` on.
     Write {
-        /// The map that the write is in (M1).
+        /// The map that the write is in ([M1](protocol_core::decisions#m1)).
         map: Map,
         /// The first register.
         address: u8,
@@ -26,7 +26,7 @@ pub enum WholeRequest {
     /// Writes between two reads of the same registers, to find out what they change. No other client's request comes
     /// between them. Gives two events.
     WritesBetweenReads {
-        /// The map that the writes are in (M1).
+        /// The map that the writes are in ([M1](protocol_core::decisions#m1)).
         map: Map,
         /// The first register of each write, and one byte per register, at most 255.
         writes: Vec<(u8, Vec<u8>)>,
@@ -61,8 +61,8 @@ impl WholeRequest {
     }
 }
 
-/// A write without the registers at its ends that no write has an effect on (D15): the longest frame that is left takes 17 ms
-/// at 115 200 baud and not 23, and a stop cannot interrupt it.
+/// A write without the registers at its ends that no write has an effect on ([D15](protocol_core::decisions#d15)): the
+/// longest frame that is left takes 17 ms at 115 200 baud and not 23, and a stop cannot interrupt it.
 pub(crate) fn without_idle_ends(address: u8, values: &[u8]) -> (u8, &[u8]) {
     let is_idle = |place: usize| {
         let register = usize::from(address) + place;

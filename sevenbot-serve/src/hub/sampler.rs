@@ -72,7 +72,8 @@ impl Sampler {
     }
 }
 
-/// At most half of the line is for reports, of all streams together (D14, M2). `bytes`: of one report of each.
+/// At most half of the line is for reports, of all streams together ([D14](protocol_core::decisions#d14),
+/// [M2](protocol_core::decisions#m2)). `bytes`: of one report of each.
 fn highest_frequency(baud: u32, bytes: usize) -> u32 {
     let bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
     (baud / 20).checked_div(bytes).unwrap_or(0).max(1)

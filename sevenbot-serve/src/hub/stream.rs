@@ -8,9 +8,9 @@ use protocol_core::registers::map21::{PRESENT_ANGLE, PRESENT_LOAD};
 pub enum Stream {
     /// The present positions of map 2.2.
     Positions,
-    /// The present positions in hundredths of a degree (D26).
+    /// The present positions in hundredths of a degree ([D26](protocol_core::decisions#d26)).
     FinePositions,
-    /// The present positions in hundredths of a degree, velocities and loads (D26).
+    /// The present positions in hundredths of a degree, velocities and loads ([D26](protocol_core::decisions#d26)).
     FineState,
     /// The present angles of map 2.1.
     Angles,
@@ -26,7 +26,7 @@ impl Stream {
     pub(crate) const ALL: [Self; STREAMS] =
         [Self::Positions, Self::FinePositions, Self::FineState, Self::Angles, Self::Loads];
 
-    /// The stream of register 53 for a value of register 189 (D26).
+    /// The stream of register 53 for a value of register 189 ([D26](protocol_core::decisions#d26)).
     pub(crate) const fn of_content(content: u8) -> Self {
         match content {
             report_content::FINE_POSITIONS => Self::FinePositions,

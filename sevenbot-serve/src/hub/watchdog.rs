@@ -1,4 +1,5 @@
-//! The watchdog of the arm (D24) for the client that set it: requests of other clients must not hide its silence.
+//! The watchdog of the arm ([D24](protocol_core::decisions#d24)) for the client that set it: requests of other clients must
+//! not hide its silence.
 //!
 //! ```text
 //!   Off ── register 186 written ──▶ Watching ── the client is silent ──▶ Acted

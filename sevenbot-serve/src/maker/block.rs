@@ -1,4 +1,5 @@
-//! The blocks of registers for inverse kinematics: positions and directions in JSON, encoded as map 2.1 has them (M7).
+//! The blocks of registers for inverse kinematics: positions and directions in JSON, encoded as map 2.1 has them
+//! ([M7](protocol_core::decisions#m7)).
 
 use motion_core::reach;
 use protocol_core::registers::RegisterFile;

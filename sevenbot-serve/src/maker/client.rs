@@ -156,7 +156,7 @@ impl MakerClient {
     }
 }
 
-/// Function 04, so that offsets have the forms of the maker's programs (M5, M11).
+/// Function 04, so that offsets have the forms of the maker's programs ([M5](protocol_core::decisions#m5)).
 fn write(address: u8, values: Vec<u8>) -> WholeRequest {
     WholeRequest::Write { map: Map::V21, address, values }
 }

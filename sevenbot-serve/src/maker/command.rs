@@ -29,7 +29,7 @@ pub enum MakerCommand {
         /// The text of the answer.
         done: &'static str,
     },
-    /// Writes a block of registers for which the arm finds joint angles (M7).
+    /// Writes a block of registers for which the arm finds joint angles ([M7](protocol_core::decisions#m7)).
     InverseKinematics {
         /// The first register of the block.
         address: u8,

@@ -1,4 +1,5 @@
-//! The system tests, in one program. A filter selects a module: `cargo test -p system-tests --test system device::motion`.
+//! The system tests, in one program; only the table of commands and faults has its own. A filter selects a module:
+//! `cargo test -p system-tests --test system device::motion`.
 
 mod device;
 mod serve;

@@ -1,10 +1,10 @@
 //! Debian's Chromium, with software rendering and no way to other computers.
 
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::{Value, json};
-use system_tests::process;
+use system_tests::process::RunningProgram;
 use tempfile::TempDir;
 
 use crate::connection::{Connection, line_after};
@@ -61,7 +61,7 @@ static TURN: Mutex<()> = Mutex::new(());
 pub struct Chromium {
     /// The connection to the page.
     pub page: Connection,
-    process: Child,
+    _process: RunningProgram,
     _profile: TempDir,
     _turn: MutexGuard<'static, ()>,
 }
@@ -75,7 +75,7 @@ impl Chromium {
         let mut command = Command::new("chromium");
         command.args(OPTIONS).arg(format!("--user-data-dir={}", profile.path().display()));
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
-        let mut process = command.spawn().expect("`cargo xtask test` installs chromium");
+        let mut process = RunningProgram::spawn(&mut command);
         let address = line_after("DevTools listening on ws://", process.stderr.take());
         let is_kept = |event: &Value| KEPT.iter().any(|method| event["method"] == *method);
         let mut page = Connection::open(&address, is_kept);
@@ -83,12 +83,6 @@ impl Chromium {
         let attach = json!({ "targetId": target["targetId"], "flatten": true });
         let session = page.call("Target.attachToTarget", attach);
         page.session = session["sessionId"].as_str().map(str::to_owned);
-        Self { page, process, _profile: profile, _turn: turn }
-    }
-}
-
-impl Drop for Chromium {
-    fn drop(&mut self) {
-        process::kill(&mut self.process);
+        Self { page, _process: process, _profile: profile, _turn: turn }
     }
 }

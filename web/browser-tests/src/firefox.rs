@@ -3,12 +3,12 @@
 //! Without a screen this Firefox has no WebGL, so it gets one that no monitor shows: `Xvfb`, with OpenGL in software.
 
 use std::fs;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
-use system_tests::process;
+use system_tests::process::RunningProgram;
 use system_tests::wait::wait_for;
 use tempfile::TempDir;
 
@@ -25,23 +25,13 @@ user_pref(\"datareporting.policy.dataSubmissionEnabled\", false);
 #[derive(Debug)]
 pub struct Firefox {
     // The browser is killed before its screen.
-    _browser: Running,
-    _screen: Running,
+    _browser: RunningProgram,
+    _screen: RunningProgram,
     _profile: TempDir,
     /// It keeps all events: what the page logged and requested.
     session: Connection,
     /// The identifier of the page.
     context: Value,
-}
-
-/// A process that ends with its owner.
-#[derive(Debug)]
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        process::kill(&mut self.0);
-    }
 }
 
 impl Firefox {
@@ -53,14 +43,14 @@ impl Firefox {
 
         let mut screen = Command::new("Xvfb");
         screen.args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", "1280x800x24"]);
-        let mut screen = Running::start(screen.stdout(Stdio::piped()).stderr(Stdio::null()));
-        let display = line_after("", screen.0.stdout.take());
+        let mut screen = RunningProgram::spawn(screen.stdout(Stdio::piped()).stderr(Stdio::null()));
+        let display = line_after("", screen.stdout.take());
 
         let mut browser = Command::new("firefox-esr");
         browser.args(["--no-remote", "--remote-debugging-port", "0", "--profile"]).arg(profile.path());
         browser.env("DISPLAY", format!(":{display}")).env("HOME", profile.path());
-        let mut browser = Running::start(browser.stdout(Stdio::null()).stderr(Stdio::piped()));
-        let address = line_after("WebDriver BiDi listening on ws://", browser.0.stderr.take());
+        let mut browser = RunningProgram::spawn(browser.stdout(Stdio::null()).stderr(Stdio::piped()));
+        let address = line_after("WebDriver BiDi listening on ws://", browser.stderr.take());
 
         let mut session = Connection::open(&format!("{address}/session"), |_| true);
         session.call("session.new", json!({ "capabilities": {} }));
@@ -121,13 +111,5 @@ impl Firefox {
     /// The addresses of all requests.
     pub fn requests(&self) -> impl Iterator<Item = &str> {
         self.session.events.iter().filter_map(|event| event["params"]["request"]["url"].as_str())
-    }
-}
-
-impl Running {
-    fn start(command: &mut Command) -> Self {
-        Self(command.spawn().unwrap_or_else(|error| {
-            panic!("{}: {error}; `cargo xtask test` installs it", command.get_program().display())
-        }))
     }
 }

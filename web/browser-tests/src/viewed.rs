@@ -1,9 +1,9 @@
 //! `sevenbot view`, with or without a simulated arm behind it.
 
 use std::path::PathBuf;
-use std::process::{Child, Command};
+use std::process::Command;
 
-use system_tests::process;
+use system_tests::process::{self, RunningProgram};
 use system_tests::programs::{host_sim, tool};
 use tempfile::TempDir;
 
@@ -12,8 +12,8 @@ use crate::page::Page;
 /// A running server of the page.
 #[derive(Debug)]
 pub struct Viewed {
-    simulator: Option<Child>,
-    server: Child,
+    _server: RunningProgram,
+    _simulator: Option<RunningProgram>,
     /// The address to open, with its token if there is an arm.
     pub url: String,
     folder: TempDir,
@@ -41,7 +41,7 @@ impl Viewed {
         command.args(["view", "--no-open", "--http", "0"]).args(arm);
         let (server, addresses) = process::start(&mut command, 1).expect("the server is ready");
         let url = addresses.first().expect("an address").display().to_string();
-        Self { simulator, server, url, folder }
+        Self { _server: server, _simulator: simulator, url, folder }
     }
 
     /// Opens the page, ends its tour, and waits until an arm answers.
@@ -66,14 +66,7 @@ impl Viewed {
     }
 }
 
-impl Drop for Viewed {
-    fn drop(&mut self) {
-        process::kill(&mut self.server);
-        self.simulator.iter_mut().for_each(process::kill);
-    }
-}
-
-fn simulator(folder: &TempDir) -> Child {
+fn simulator(folder: &TempDir) -> RunningProgram {
     let mut command = Command::new(host_sim());
     command.args(["--quiet", "--eeprom", "none", "--link"]).arg(folder.path().join("arm"));
     process::start(&mut command, 1).expect("the simulator is ready").0

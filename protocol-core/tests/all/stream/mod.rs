@@ -9,6 +9,8 @@ use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Defect, Deframer, Direction, MAX_LENGTH};
 
 pub const GAP_US: u64 = 2_000;
+/// After this an incomplete frame is abandoned (D4).
+pub const LONG_SILENCE_US: u64 = 100_000;
 const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
 
 /// What happens on the line.

@@ -5,12 +5,12 @@
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command};
+use std::process::Command;
 use std::time::Duration;
 use std::{env, fs, thread};
 
 use serialport::SerialPort;
-use system_tests::process::{self, Signal, send_signal};
+use system_tests::process::{self, RunningProgram};
 use system_tests::programs::xtask;
 use system_tests::wait::wait_for;
 use tempfile::TempDir;
@@ -27,7 +27,7 @@ const ECHO_TRIES: usize = 20;
 
 /// The image in an emulator, with its port.
 struct SelfTest {
-    process: Child,
+    _process: RunningProgram,
     port: Box<dyn SerialPort>,
     received: String,
     servo_line: PathBuf,
@@ -45,7 +45,7 @@ impl SelfTest {
         let port =
             serialport::new(ports[0].to_string_lossy(), 115_200).timeout(Duration::from_millis(100)).open();
         let port = port.expect("the port opens");
-        Self { process, port, received: String::new(), servo_line, _folder: folder }
+        Self { _process: process, port, received: String::new(), servo_line, _folder: folder }
     }
 
     /// Sends a command, and returns the next line with this beginning.
@@ -69,14 +69,6 @@ impl SelfTest {
             self.received.push_str(&String::from_utf8_lossy(&bytes[..count]));
             Err(format!("{:?}", self.received))
         })
-    }
-}
-
-impl Drop for SelfTest {
-    fn drop(&mut self) {
-        // The emulator has to end its own processes.
-        send_signal(&self.process, Signal::TERM);
-        let _ = self.process.wait();
     }
 }
 

@@ -10,7 +10,6 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use system_tests::frames::reply;
-use system_tests::process;
 use system_tests::programs::tool;
 use system_tests::registers::{DEVICE_CODE, PRESENT_POSITION, SPEED, TARGET_POSITION};
 use system_tests::{ArmClient, read_request, write_request};
@@ -103,7 +102,7 @@ fn fragments_without_end_keep_nobody_waiting() {
 fn what_was_sent_to_an_unplugged_arm_never_moves_it() {
     let mut served = Served::start(1, &[]);
     let mut arm = served.open("a");
-    process::kill(&mut served.simulator);
+    served.simulator.kill();
     let mut streams = [served.connect(), served.connect()];
     for stream in &mut streams {
         stream.set_write_timeout(Some(Duration::from_secs(5))).expect("a timeout");

@@ -3,11 +3,11 @@
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command};
+use std::process::Command;
 use std::time::Duration;
 
 use serde_json::Value;
-use system_tests::process;
+use system_tests::process::{self, RunningProgram};
 use system_tests::programs::{host_sim, tool};
 use system_tests::registers::DEVICE_CODE;
 use system_tests::wait::wait_until;
@@ -22,8 +22,8 @@ pub(crate) const LOCAL_PAGE: (&str, &str) = ("origin", "http://localhost:3000");
 
 /// A simulator and a server, in a folder with their links.
 pub(crate) struct Served {
-    pub(crate) simulator: Child,
-    pub(crate) server: Child,
+    pub(crate) server: RunningProgram,
+    pub(crate) simulator: RunningProgram,
     pub(crate) ports: Vec<PathBuf>,
     pub(crate) folder: TempDir,
 }
@@ -43,7 +43,7 @@ impl Served {
             command.args(["--pty", name]);
         }
         let (server, ports) = process::start(&mut command, ptys + 3).expect("the server is ready");
-        let served = Self { simulator, server, ports, folder };
+        let served = Self { server, simulator, ports, folder };
         if ptys > 0 {
             served.wait_for_arm(&mut served.open("a"));
         }
@@ -90,18 +90,11 @@ impl Served {
     }
 }
 
-impl Drop for Served {
-    fn drop(&mut self) {
-        process::kill(&mut self.server);
-        process::kill(&mut self.simulator);
-    }
-}
-
 pub(crate) fn names(count: usize) -> impl Iterator<Item = &'static str> {
     ["a", "b", "c", "d"].into_iter().take(count)
 }
 
-pub(crate) fn simulator(folder: &Path) -> Child {
+pub(crate) fn simulator(folder: &Path) -> RunningProgram {
     let mut command = Command::new(host_sim());
     command.args(["--quiet", "--eeprom", "none", "--link"]).arg(folder.join("arm"));
     process::start(&mut command, 1).expect("the simulator is ready").0

@@ -7,7 +7,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use system_tests::frames::{reply, with_checksum};
-use system_tests::process::{self, Signal, send_signal, wait_for_exit};
+use system_tests::process::{Signal, send_signal, wait_for_exit};
 use system_tests::programs::tool;
 use system_tests::registers::{CHIP_ID, DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED};
 use system_tests::{read_request, write_request};
@@ -87,7 +87,7 @@ fn an_arm_that_was_unplugged_is_found_again() {
     let mut stream = served.connect();
     arm.write(SPEED, &[7]);
     assert_eq!(arm.register(SPEED), 7);
-    process::kill(&mut served.simulator);
+    served.simulator.kill();
     arm.send(&read_request(SPEED, 1));
     assert_eq!(arm.reply_within(Duration::from_millis(1_000)), None, "silence, as on a cable");
     served.simulator = simulator(served.folder.path());

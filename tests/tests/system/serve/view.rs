@@ -2,11 +2,10 @@
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
-use std::process::Child;
 use std::time::Duration;
 
 use super::served::simulator;
-use system_tests::process;
+use system_tests::process::{self, RunningProgram};
 use system_tests::programs::tool;
 use system_tests::read_request;
 use system_tests::registers::{DEVICE_CODE, TARGET_POSITION};
@@ -18,8 +17,8 @@ use tungstenite::{Message, WebSocket};
 
 /// A simulator, and a server of the page.
 struct Viewed {
-    simulator: Option<Child>,
-    server: Child,
+    _server: RunningProgram,
+    _simulator: Option<RunningProgram>,
     /// Such as `127.0.0.1:40000`.
     address: String,
     token: Option<String>,
@@ -41,7 +40,7 @@ impl Viewed {
         let (address, query) =
             url.strip_prefix("http://").and_then(|url| url.split_once('/')).expect("a URL");
         let token = query.strip_prefix("?token=").map(str::to_owned);
-        Self { simulator, server, address: address.to_owned(), token, _folder: folder }
+        Self { _server: server, _simulator: simulator, address: address.to_owned(), token, _folder: folder }
     }
 
     fn stream(&self) -> TcpStream {
@@ -82,13 +81,6 @@ impl Viewed {
 
     fn token(&self) -> &str {
         self.token.as_deref().expect("a token")
-    }
-}
-
-impl Drop for Viewed {
-    fn drop(&mut self) {
-        process::kill(&mut self.server);
-        self.simulator.iter_mut().for_each(process::kill);
     }
 }
 

@@ -44,7 +44,7 @@ fn a_page_gets_every_answer_in_order() {
     assert_eq!(next()["message"], "Invalid JSON format");
 }
 
-/// M5 and M11: the maker's two forms of offsets. Their bytes are out of range in function 06.
+/// M5: the maker's two forms of offsets. Their bytes are out of range in function 06.
 #[test]
 fn a_write_has_the_forms_of_the_makers_map() {
     let served = Served::start(1, &[]);

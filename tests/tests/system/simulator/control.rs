@@ -229,7 +229,7 @@ fn the_socket_is_removed_at_the_end_and_a_left_one_replaced() {
     let path = folder.path().join("control");
     let text = path.to_str().expect("text");
     let mut simulator = Simulator::start(&["--control", text]);
-    process::kill(&mut simulator.process);
+    simulator.process.kill();
     assert!(path.exists(), "a kill leaves it");
     let mut simulator = Simulator::start(&["--control", text]);
     assert!(simulator.says(&["--control", text, "state"]).contains("controller"));

@@ -5,9 +5,9 @@ use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
-use std::process::{Child, Command};
+use std::process::Command;
 
-use system_tests::process::{self, Signal};
+use system_tests::process::{self, RunningProgram, Signal};
 use system_tests::programs::{host_sim, tool};
 use system_tests::wait::wait_until;
 use tempfile::TempDir;
@@ -17,7 +17,7 @@ const PAGE: &str = include_str!("../../../../docs/simulation.md");
 /// The terminals of a user: one for a simulator, and one for everything else.
 struct Terminals {
     folder: TempDir,
-    simulator: Option<Child>,
+    simulator: Option<RunningProgram>,
 }
 
 impl Terminals {
@@ -95,12 +95,6 @@ impl Terminals {
         let mut entries = fs::read_dir(self.own_folder().join("7bot")).expect("the folder of sockets");
         let is_socket = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "sock");
         entries.find_map(|entry| Some(entry.ok()?.path()).filter(is_socket)).expect("a control socket")
-    }
-}
-
-impl Drop for Terminals {
-    fn drop(&mut self) {
-        self.simulator.iter_mut().for_each(process::kill);
     }
 }
 

@@ -2,9 +2,9 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::process::{Child, Command};
+use std::process::Command;
 
-use system_tests::process::{self, Signal, send_signal, wait_for_exit};
+use system_tests::process::{self, RunningProgram, Signal, send_signal, wait_for_exit};
 use system_tests::programs::host_sim;
 use system_tests::registers::{
     CHIP_ID, DEVICE_ID, EEPROM_LOCK, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED, STANDARD_POSE,
@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 /// A simulator with several arms, and a folder with their links and settings.
 struct Arms {
-    process: Child,
+    process: RunningProgram,
     ports: Vec<PathBuf>,
     folder: TempDir,
 }
@@ -57,12 +57,6 @@ impl Arms {
             .collect();
         names.sort();
         names
-    }
-}
-
-impl Drop for Arms {
-    fn drop(&mut self) {
-        process::kill(&mut self.process);
     }
 }
 

@@ -4,7 +4,6 @@ use std::fs;
 use std::time::Duration;
 
 use serde_json::json;
-use system_tests::process;
 use system_tests::registers::{DEVICE_ID, EEPROM_LOCK, PRESENT_POSITION, TARGET_POSITION};
 use system_tests::simulator::Simulator;
 use system_tests::wait;
@@ -73,7 +72,7 @@ fn the_settings_of_a_snapshot_reach_their_file() {
     wait::wait_until("it is stored", || fs::read(&file).expect("a file") != fresh);
     simulator.says(&["restore", "fresh"]);
     assert_eq!(fs::read(&file).expect("a file"), fresh);
-    process::kill(&mut simulator.process);
+    simulator.process.kill();
     let simulator = Simulator::start(&["--eeprom", path]);
     assert_ne!(simulator.client().register(DEVICE_ID), 42);
 }

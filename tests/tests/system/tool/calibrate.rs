@@ -5,6 +5,7 @@ use std::process::{Output, Stdio};
 
 use super::output::{all_output, failed, succeeded, words};
 use system_tests::arm_control::ArmControl;
+use system_tests::process::RunningProgram;
 use system_tests::programs::{sevenbot, tool};
 use system_tests::registers::{EEPROM_LOCK, MOTOR_STATE, OFFSET};
 use system_tests::started_arm::{ArmKind, StartedArm};
@@ -15,12 +16,12 @@ use system_tests::{Need, TestArm, TestSetup, near, with_arm};
 fn with_input(arm: &mut TestArm, arguments: &[&str], input: &str) -> Output {
     let mut tool = tool();
     tool.arg("--port").arg(arm.lend_port()).args(arguments);
-    let tool = tool.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
-    let mut tool = tool.expect("sevenbot runs");
+    tool.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut tool = RunningProgram::spawn(&mut tool);
     let mut lines = tool.stdin.take().expect("a pipe");
     lines.write_all(input.as_bytes()).expect("the tool reads");
     drop(lines);
-    let output = tool.wait_with_output().expect("the tool ends");
+    let output = tool.output();
     arm.reopen(115_200);
     output
 }

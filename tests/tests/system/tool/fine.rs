@@ -4,7 +4,7 @@ use std::fs;
 use std::process::{Command, Output};
 
 use super::output::{failed, succeeded};
-use system_tests::process::{kill, start};
+use system_tests::process::start;
 use system_tests::programs::{host_sim, tool};
 use system_tests::registers::{
     FAULTS, FEEDBACK_FREQUENCY, SPEED, STANDARD_POSE, TARGET_POSITION, VACUUM_PUMP,
@@ -94,12 +94,11 @@ fn with_stock_arm(test: impl FnOnce(&dyn Fn(&[&str]) -> Output, &dyn Fn(&str) ->
     let path = |name: &str| folder.path().join(name).display().to_string();
     let mut command = Command::new(host_sim());
     command.args(["--as-maker", "2.1.4", "--eeprom", &path("eeprom.bin"), "--link", &path("7bot")]);
-    let (mut process, _) = start(&mut command, 1).expect("a simulator");
+    let _simulator = start(&mut command, 1).expect("a simulator");
     let run = |arguments: &[&str]| {
         tool().args(["--port", &path("7bot")]).args(arguments).output().expect("sevenbot runs")
     };
     test(&run, &path);
-    kill(&mut process);
 }
 
 #[test]

@@ -2,9 +2,8 @@
 
 mod basics;
 mod calibrate;
-mod fault_table;
-mod faults;
 mod fine;
+mod lost_recordings;
 mod map21;
 mod monitor;
 mod motion;

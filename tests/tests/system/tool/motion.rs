@@ -1,26 +1,23 @@
-//! `sevenbot record` and `play`: recordings of moves, also with a lost connection.
+//! `sevenbot record` and `play`: recordings of moves.
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
 use super::output::{all_output, failed, succeeded};
-use system_tests::arm_control::ArmControl;
-use system_tests::process::{Signal, send_signal};
-use system_tests::programs::{TOOL_TIMEOUT, sevenbot, tool};
+use system_tests::process::{RunningProgram, Signal, send_signal};
+use system_tests::programs::sevenbot;
 use system_tests::registers::{
     FEEDBACK_FREQUENCY, MOTOR_STATE, SPEED, STANDARD_POSE, TARGET_POSITION, VACUUM_PUMP,
 };
-use system_tests::started_arm::{ArmKind, StartedArm};
 use system_tests::terminal::Terminal;
 use system_tests::wait::wait_until;
-use system_tests::{Need, TestArm, TestSetup, near, with_arm};
+use system_tests::{TestArm, TestSetup, near, with_arm};
 use tempfile::TempDir;
 
 /// A recording: joint 1 moves by 30 degrees and back, and the pump is switched on.
-const WAVE: &str = "\
+pub(super) const WAVE: &str = "\
 7bot-recording 1
 # by hand
 0.0  90 90 65 90 90 90 80  0
@@ -29,7 +26,7 @@ const WAVE: &str = "\
 ";
 
 /// A path in a new folder, with a file unless the text is empty.
-fn file(name: &str, text: &str) -> (TempDir, PathBuf) {
+pub(super) fn file(name: &str, text: &str) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join(name);
     if !text.is_empty() {
@@ -38,12 +35,12 @@ fn file(name: &str, text: &str) -> (TempDir, PathBuf) {
     (folder, path)
 }
 
-fn text(path: &Path) -> &str {
+pub(super) fn text(path: &Path) -> &str {
     path.to_str().expect("UTF-8")
 }
 
 /// The fields of the moments of a recording.
-fn moments(path: &Path) -> Vec<Vec<f64>> {
+pub(super) fn moments(path: &Path) -> Vec<Vec<f64>> {
     let text = fs::read_to_string(path).unwrap_or_default();
     let lines = text.lines().filter(|line| line.starts_with(|first: char| first.is_ascii_digit()));
     let moments = lines.filter(|line| !line.starts_with("7bot"));
@@ -53,17 +50,13 @@ fn moments(path: &Path) -> Vec<Vec<f64>> {
 }
 
 /// Plays a recording, and waits until the arm moves.
-fn start_to_play(arm: &mut TestArm, arguments: &[&str]) -> Child {
+pub(super) fn start_to_play(arm: &mut TestArm, arguments: &[&str]) -> RunningProgram {
     arm.spawn_sevenbot_until(&[&["play", "--verbose"], arguments].concat(), "-> write vacuum-pump")
 }
 
 #[track_caller]
-fn wait_for_moments(path: &Path, count: usize) {
+pub(super) fn wait_for_moments(path: &Path, count: usize) {
     wait_until("the moments are recorded", || moments(path).len() >= count);
-}
-
-fn end(tool: Child) -> Output {
-    tool.wait_with_output().expect("the tool ends")
 }
 
 #[test]
@@ -114,7 +107,7 @@ fn an_arm_moved_by_hand_holds_its_position_after_the_recording() {
         let tool = arm.spawn_sevenbot(&["record", text(&recording), "--yes"]);
         wait_for_moments(&recording, 5);
         send_signal(&tool, Signal::INT);
-        let output = end(tool);
+        let output = tool.output();
         let printed = all_output(&output);
         assert_eq!(output.status.code(), Some(0), "Ctrl-C ends a recording: {printed}");
         assert!(printed.contains("the arm holds"), "{printed}");
@@ -191,7 +184,7 @@ fn an_interrupted_play_holds_the_arm() {
         let (_folder, recording) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
         let tool = start_to_play(arm, &[text(&recording)]);
         send_signal(&tool, Signal::INT);
-        let text = failed(&end(tool), 130);
+        let text = failed(&tool.output(), 130);
         assert!(text.contains("the arm holds where it is"), "{text}");
         arm.reopen(115_200);
         arm.wait_until_still();
@@ -208,7 +201,7 @@ fn kill_while_playing(arm: &mut TestArm) {
     let (_folder, recording) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
     let arguments = ["play", "--verbose", text(&recording)];
     let mut tool = arm.spawn_sevenbot_until(&arguments, "-> write fine-target");
-    tool.kill().and_then(|()| tool.wait()).expect("its end");
+    tool.kill();
 }
 
 /// Set-point period, watchdog and its action.
@@ -233,104 +226,6 @@ fn what_a_killed_play_left_is_put_right_by_the_next_move() {
         let said = all_output(&arm.sevenbot(&["home", "--wait"]));
         assert!(!said.contains("ended"), "told once: {said}");
     });
-}
-
-#[test]
-fn a_file_that_cannot_be_written_is_refused_before_anything_moves() {
-    with_arm(TestSetup::any(), |arm| {
-        let (folder, recording) = file("wave.txt", WAVE);
-        let drawing = folder.path().join("wave.svg");
-        fs::write(&drawing, "years").expect("a file");
-        let refused = |arm: &mut TestArm, arguments: &[&str], says: &str| {
-            let said = failed(&arm.sevenbot(arguments), 1);
-            assert!(said.contains(says), "{said}");
-        };
-        let play = ["play", text(&recording), "--plot"];
-        arm.write(VACUUM_PUMP, &[0]);
-        refused(arm, &[&play[..], &["/nonexistent/wave.svg"]].concat(), "/nonexistent/wave.svg");
-        refused(arm, &[&play[..], &[text(&drawing)]].concat(), "the file exists; --force replaces it");
-        refused(arm, &[&play[..], &[text(&recording), "--force"]].concat(), "the file that is read");
-        let plot = ["plot", text(&recording), "--out"];
-        refused(arm, &[&plot[..], &[text(&recording), "--force"]].concat(), "the file that is read");
-        refused(arm, &[&plot[..], &[text(&drawing)]].concat(), "the file exists");
-        refused(arm, &["monitor", "--samples", "1", "--csv", text(&drawing)], "the file exists");
-        refused(arm, &["play", "/dev/zero"], "not a recording");
-        refused(arm, &["restore", "/dev/zero"], "is it the right file?");
-        assert_eq!(fs::read_to_string(&drawing).expect("a file"), "years");
-        assert_eq!(fs::read_to_string(&recording).expect("a file"), WAVE);
-        assert_eq!((arm.read(TARGET_POSITION, 7), arm.register(VACUUM_PUMP)), (STANDARD_POSE.to_vec(), 0));
-        let said = failed(&arm.sevenbot(&["record", "-", "--driven"]), 2);
-        assert!(said.contains("- is no name of a file"), "{said}");
-        let said = failed(&arm.sevenbot(&["play", text(&recording), "--loop=0"]), 2);
-        assert!(said.contains("1 or more"), "{said}");
-        succeeded(arm.sevenbot(&[&plot[..], &[text(&drawing), "--force"]].concat()));
-        assert!(fs::read_to_string(&drawing).expect("a file").ends_with("</svg>\n"));
-    });
-}
-
-#[test]
-fn a_recording_is_complete_up_to_a_lost_connection() {
-    with_arm(TestSetup::any().needs(Need::Kill), |arm| {
-        let (_folder, recording) = file("cut.txt", "");
-        let tool = arm.spawn_sevenbot(&["record", text(&recording), "--driven"]);
-        wait_for_moments(&recording, 10);
-        arm.kill_and_restart();
-        let text = failed(&end(tool), 3);
-        assert!(text.contains("the connection is gone") && text.contains("is complete up to"), "{text}");
-        let moments = moments(&recording);
-        assert!(moments.len() >= 10 && moments.iter().all(|moment| moment.len() == 9), "{moments:?}");
-        succeeded(arm.sevenbot(&["play", recording.to_str().expect("UTF-8"), "--speed", "5"]));
-    });
-}
-
-#[test]
-fn a_recording_is_complete_up_to_a_full_disk() {
-    with_arm(TestSetup::any(), |arm| {
-        let (_folder, recording) = file("full.txt", "");
-        // Limits files to 1 or 2 KiB, depending on the shell, and ignores the signal at the limit.
-        let limited = "trap '' XFSZ; ulimit -f 2; exec \"$0\" \"$@\"";
-        let mut tool = Command::new("sh");
-        tool.env(TOOL_TIMEOUT.0, TOOL_TIMEOUT.1)
-            .args(["-c", limited])
-            .arg(sevenbot())
-            .arg("--port")
-            .arg(arm.lend_port());
-        let output = tool.args(["record", text(&recording), "--driven", "--hz", "50"]).output();
-        let error = failed(&output.expect("a shell"), 1);
-        assert!(error.contains("is complete up to") && error.contains("full.txt: "), "{error}");
-        arm.reopen(115_200);
-        assert!(fs::read_to_string(&recording).expect("a file").ends_with('\n'), "a complete last line");
-        succeeded(arm.sevenbot(&["play", text(&recording), "--speed", "10"]));
-        assert_eq!(arm.register(FEEDBACK_FREQUENCY), 0, "reports are off again");
-    });
-}
-
-#[test]
-fn a_lost_connection_during_play_leaves_a_plot() {
-    with_arm(TestSetup::any().needs(Need::Kill), |arm| {
-        let (folder, recording) = file("long.txt", &format!("{WAVE}60 180 90 65 90 90 90 80 0\n"));
-        let drawing = folder.path().join("cut.svg");
-        let tool = start_to_play(arm, &[text(&recording), "--plot", text(&drawing)]);
-        arm.kill_and_restart();
-        let text = failed(&end(tool), 3);
-        assert!(text.contains("the connection is gone"), "{text}");
-        assert!(fs::read_to_string(&drawing).expect("a drawing").ends_with("</svg>\n"));
-    });
-}
-
-#[test]
-fn a_restart_of_the_arm_ends_a_recording() {
-    // The arm is restarted while the tool has its port open.
-    let mut arm = StartedArm::start(ArmKind::Simulator, Vec::new());
-    let (_folder, recording) = file("restart.txt", "");
-    let mut tool = tool();
-    tool.arg("--port").arg(arm.port()).args(["record", text(&recording), "--driven"]);
-    let tool = tool.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
-    wait_for_moments(&recording, 3);
-    arm.power_cycle();
-    let text = failed(&end(tool.expect("sevenbot runs")), 1);
-    // The counter of frames tells a restart, unless the arm had received hardly any: then its reports are missed.
-    assert!(text.contains("the controller restarted") || text.contains("switched off and on"), "{text}");
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! The commands that move the arm, also when they are interrupted.
 
 use std::io::{BufRead, BufReader};
-use std::process::Child;
+use std::process::ChildStderr;
 use std::time::Duration;
 
 use super::output::{failed, succeeded, words};
 use system_tests::arm_control::ArmControl;
-use system_tests::process::{Signal, send_signal};
+use system_tests::process::{RunningProgram, Signal, send_signal};
 use system_tests::programs::tool;
 use system_tests::registers::{
     EFFECTOR_TYPE, MOTOR_STATE, PRESENT_POSITION, SPEED, STANDARD_POSE, TARGET_POSITION, TIME,
@@ -19,7 +19,7 @@ use system_tests::{ArmClient, Need, TestArm, TestSetup, near, with_arm};
 const FAR: [&str; 7] = ["170", "90", "65", "90", "90", "90", "80"];
 
 /// Starts a slow move to a far pose, and waits until the arm moves.
-fn start_slow_move(arm: &mut TestArm) -> (Child, BufReader<std::process::ChildStderr>) {
+fn start_slow_move(arm: &mut TestArm) -> (RunningProgram, BufReader<ChildStderr>) {
     let mut tool = arm.spawn_sevenbot(&[&["--verbose", "pose", "--wait", "--speed", "5"][..], &FAR].concat());
     let mut frames = BufReader::new(tool.stderr.take().expect("a pipe"));
     let (mut line, mut text) = (String::new(), String::new());
@@ -32,7 +32,7 @@ fn start_slow_move(arm: &mut TestArm) -> (Child, BufReader<std::process::ChildSt
 }
 
 /// The rest of its standard error, without frames, and its exit status.
-fn end((mut tool, mut frames): (Child, BufReader<std::process::ChildStderr>)) -> (String, Option<i32>) {
+fn end((mut tool, mut frames): (RunningProgram, BufReader<ChildStderr>)) -> (String, Option<i32>) {
     let mut text = String::new();
     std::io::Read::read_to_string(&mut frames, &mut text).expect("text");
     let lines = text.lines().filter(|line| !line.contains("->") && !line.contains("<-"));

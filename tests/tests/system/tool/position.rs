@@ -1,11 +1,11 @@
 //! `sevenbot where` and `move-to`: positions of the tip in millimetres.
 
-use std::process::{Child, Output};
+use std::process::Output;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use super::output::{all_output, failed, run_without_arm, succeeded};
-use system_tests::process::{Signal, send_signal};
+use system_tests::process::{RunningProgram, Signal, send_signal};
 use system_tests::registers::{SPEED, STANDARD_POSE, TARGET_POSITION, VACUUM_PUMP};
 use system_tests::{TestArm, TestSetup, with_arm};
 
@@ -23,7 +23,7 @@ fn distance(one: &[f64], other: [f64; 3]) -> f64 {
 }
 
 /// Starts a move, and waits until the arm got the first frame of it.
-fn start_to_move(arm: &mut TestArm, arguments: &[&str], first_frame: &str) -> Child {
+fn start_to_move(arm: &mut TestArm, arguments: &[&str], first_frame: &str) -> RunningProgram {
     arm.spawn_sevenbot_until(&[arguments, &["--verbose"]].concat(), first_frame)
 }
 
@@ -150,7 +150,7 @@ fn ctrl_c_holds_an_arm_on_its_way_to_a_point() {
         let tool = start_to_move(arm, &["move-to", "200", "100", "60", "--wait"], "-> write fine-target");
         sleep(Duration::from_millis(500));
         send_signal(&tool, Signal::INT);
-        let output = tool.wait_with_output().expect("the tool ends");
+        let output = tool.output();
         assert_eq!(output.status.code(), Some(130), "{}", all_output(&output));
         assert!(all_output(&output).contains("holds where it is"), "{}", all_output(&output));
         assert!(begin.elapsed() < Duration::from_secs(20), "before the end of the move");
@@ -208,7 +208,7 @@ fn ctrl_c_holds_an_arm_on_a_straight_line() {
         let tool = start_to_move(arm, &line, "-> write vacuum-pump");
         sleep(Duration::from_millis(2000));
         send_signal(&tool, Signal::INT);
-        let output = tool.wait_with_output().expect("the tool ends");
+        let output = tool.output();
         assert_eq!(output.status.code(), Some(130), "{}", all_output(&output));
         arm.reopen(115_200);
         arm.wait_until_still();

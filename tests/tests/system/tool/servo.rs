@@ -1,10 +1,10 @@
 //! `sevenbot servo`: servos behind a simulated USB adapter, without the controller of an arm.
 
 use std::path::PathBuf;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 
 use super::output::{failed, run_without_arm, succeeded, words};
-use system_tests::process::{self, Signal, send_signal};
+use system_tests::process::{self, RunningProgram, Signal, send_signal};
 use system_tests::programs::{host_sim, sevenbot, tool};
 use system_tests::terminal::Terminal;
 use system_tests::wait::wait_until;
@@ -17,7 +17,7 @@ const LONG_TIMEOUT: &str = "2000";
 
 /// A simulated adapter with servos.
 struct SimulatedAdapter {
-    process: Child,
+    process: RunningProgram,
     port: PathBuf,
     baud: u32,
 }
@@ -65,12 +65,6 @@ impl SimulatedAdapter {
             sevenbot(),
             &[&["--port", port, "--timeout", LONG_TIMEOUT, "servo"], arguments].concat(),
         )
-    }
-}
-
-impl Drop for SimulatedAdapter {
-    fn drop(&mut self) {
-        process::kill(&mut self.process);
     }
 }
 

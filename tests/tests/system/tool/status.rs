@@ -4,6 +4,7 @@ use std::io::Write;
 use std::process::{Output, Stdio};
 
 use super::output::{all_output, failed, succeeded, words};
+use system_tests::process::RunningProgram;
 use system_tests::programs::tool;
 use system_tests::simulator::Simulator;
 use system_tests::wait::wait_until;
@@ -32,9 +33,9 @@ impl Rig {
     fn stream(&self, lines: &str) -> Output {
         let mut tool = tool();
         tool.arg("--port").arg(&self.0.ports[0]).arg("stream").stdin(Stdio::piped());
-        let mut tool = tool.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("sevenbot runs");
+        let mut tool = RunningProgram::spawn(tool.stdout(Stdio::piped()).stderr(Stdio::piped()));
         tool.stdin.take().expect("a pipe").write_all(lines.as_bytes()).expect("the tool reads");
-        tool.wait_with_output().expect("it ends")
+        tool.output()
     }
 
     /// Sets a fault, and waits until the status tells of it.

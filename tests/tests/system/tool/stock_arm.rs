@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use super::output::{failed, succeeded};
 use system_tests::arm_client::ArmClient;
 use system_tests::frames::with_checksum;
-use system_tests::process::{kill, start};
+use system_tests::process::{RunningProgram, start};
 use system_tests::programs::{host_sim, sevenbot, tool};
 use system_tests::terminal::Terminal;
 use system_tests::{Need, TestSetup, near, with_arm};
@@ -14,7 +14,7 @@ use tempfile::TempDir;
 
 /// A running arm of the maker.
 struct StockArm {
-    process: std::process::Child,
+    _process: RunningProgram,
     folder: TempDir,
 }
 
@@ -26,7 +26,7 @@ impl StockArm {
         command.args(["--as-maker", "2.1.4", "--eeprom"]).arg(folder.path().join("eeprom.bin"));
         command.arg("--link").arg(folder.path().join("7bot"));
         let (process, _) = start(&mut command, 1).expect("a simulator");
-        Self { process, folder }
+        Self { _process: process, folder }
     }
 
     fn path(&self, name: &str) -> String {
@@ -35,12 +35,6 @@ impl StockArm {
 
     fn sevenbot(&self, arguments: &[&str]) -> Output {
         tool().args(["--port", &self.path("7bot")]).args(arguments).output().expect("sevenbot")
-    }
-}
-
-impl Drop for StockArm {
-    fn drop(&mut self) {
-        kill(&mut self.process);
     }
 }
 

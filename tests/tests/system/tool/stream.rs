@@ -1,12 +1,12 @@
 //! `sevenbot stream`: set-points from standard input, and what happens when the program dies.
 
 use std::io::{Read, Write};
-use std::process::{Child, ChildStdin, Output, Stdio};
+use std::process::{ChildStdin, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use super::output::{all_output, failed, succeeded};
-use system_tests::process::{Signal, send_signal, start, wait_for_exit};
+use system_tests::process::{RunningProgram, Signal, send_signal, start, wait_for_exit};
 use system_tests::programs::{host_sim, tool};
 use system_tests::registers::{
     FAULTS, FEEDBACK_FREQUENCY, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, SPEED, STANDARD_POSE,
@@ -26,14 +26,14 @@ const SILENCE: Duration = Duration::from_secs(1);
 const UNDER_WAY: Duration = Duration::from_millis(500);
 
 /// Starts `sevenbot stream` with these options. The test writes its standard input.
-fn start_stream(arm: &mut TestArm, options: &[&str]) -> Child {
+fn start_stream(arm: &mut TestArm, options: &[&str]) -> RunningProgram {
     let mut tool = tool();
     tool.arg("--port").arg(arm.lend_port()).arg("stream").args(options).stdin(Stdio::piped());
-    tool.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("sevenbot runs")
+    RunningProgram::spawn(tool.stdout(Stdio::piped()).stderr(Stdio::piped()))
 }
 
 /// Starts `sevenbot stream` with a point far away, and waits until the first one is sent. The joint turns by 6 degrees/s.
-fn start_slow_stream(arm: &mut TestArm) -> (Child, ChildStdin) {
+fn start_slow_stream(arm: &mut TestArm) -> (RunningProgram, ChildStdin) {
     arm.write(SPEED, &[5]);
     assert_eq!(arm.register(SPEED), 5);
     let mut tool = start_stream(arm, &["--verbose"]);
@@ -56,7 +56,7 @@ fn start_slow_stream(arm: &mut TestArm) -> (Child, ChildStdin) {
 fn stream(arm: &mut TestArm, options: &[&str], lines: &str) -> Output {
     let mut tool = start_stream(arm, options);
     tool.stdin.take().expect("a pipe").write_all(lines.as_bytes()).expect("the tool reads");
-    let output = tool.wait_with_output().expect("the tool ends");
+    let output = tool.output();
     arm.reopen(115_200);
     output
 }
@@ -198,7 +198,7 @@ fn d24_a_killed_stream_can_leave_the_arm_damped() {
 }
 
 /// Sends the point where the arm stands, and waits until the stream must have begun.
-fn arm_is_watched(tool: &mut Child) {
+fn arm_is_watched(tool: &mut RunningProgram) {
     tool.stdin.as_mut().expect("a pipe").write_all(b"0,90,90,65,90,90,90,80\n").expect("the tool reads");
     sleep(SILENCE);
 }
@@ -208,7 +208,7 @@ fn d24_ctrl_c_holds_the_arm_and_puts_the_registers_back() {
     with_arm(TestSetup::any(), |arm| {
         let (tool, _lines) = start_slow_stream(arm);
         send_signal(&tool, Signal::INT);
-        let text = failed(&tool.wait_with_output().expect("the tool ends"), 130);
+        let text = failed(&tool.output(), 130);
         assert!(text.contains("the arm holds where it is"), "{text}");
         arm.reopen(115_200);
         arm.wait_until_still();
@@ -230,10 +230,9 @@ fn an_arm_of_the_maker_takes_no_stream() {
         .arg(folder.path().join("eeprom.bin"))
         .arg("--link")
         .arg(&link);
-    let (mut process, _) = start(&mut command, 1).expect("a simulator");
+    let _simulator = start(&mut command, 1).expect("a simulator");
     let output =
         tool().arg("--port").arg(&link).arg("stream").stdin(Stdio::null()).output().expect("sevenbot runs");
-    system_tests::process::kill(&mut process);
     let text = failed(&output, 1);
     assert!(text.contains("takes no stream of set-points: it has whole degrees only"), "{text}");
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use super::output::{failed, succeeded};
 use serialport::{SerialPort, TTYPort};
+use system_tests::process::RunningProgram;
 use system_tests::programs;
 use system_tests::registers::MOTOR_STATE;
 use system_tests::wait::wait_for;
@@ -51,15 +52,12 @@ fn the_state_forceless_needs_a_confirmation() {
     with_arm(TestSetup::any(), |arm| {
         for (answer, state) in [("\n", 1), ("no\n", 1), ("y\n", 2)] {
             let (mut ours, theirs) = terminal();
-            let tool = tool(arm, &["state", "forceless"])
-                .stdin(stdio(&theirs))
-                .stdout(Stdio::piped())
-                .stderr(stdio(&theirs))
-                .spawn()
-                .expect("sevenbot runs");
+            let mut tool = tool(arm, &["state", "forceless"]);
+            tool.stdin(stdio(&theirs)).stdout(Stdio::piped()).stderr(stdio(&theirs));
+            let tool = RunningProgram::spawn(&mut tool);
             read_until(&mut ours, "[y/N]");
             ours.write_all(answer.as_bytes()).expect("the terminal takes an answer");
-            let output = tool.wait_with_output().expect("the tool ends");
+            let output = tool.output();
             if state == 2 {
                 drop(succeeded(output))
             } else {
@@ -75,14 +73,12 @@ fn the_state_forceless_needs_a_confirmation() {
 fn a_wait_shows_a_progress_bar() {
     with_arm(TestSetup::any(), |arm| {
         let (mut ours, theirs) = terminal();
-        let tool = tool(arm, &["pose", "130", "_", "_", "_", "_", "_", "_", "--speed", "10", "--wait"])
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(stdio(&theirs))
-            .spawn()
-            .expect("sevenbot runs");
+        let arguments = ["pose", "130", "_", "_", "_", "_", "_", "_", "--speed", "10", "--wait"];
+        let mut tool = tool(arm, &arguments);
+        tool.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(stdio(&theirs));
+        let tool = RunningProgram::spawn(&mut tool);
         read_until(&mut ours, "of 40 degrees");
-        let positions = succeeded(tool.wait_with_output().expect("the tool ends"));
+        let positions = succeeded(tool.output());
         assert_eq!(positions.split_whitespace().count(), 7, "{positions}");
         arm.reopen(115_200);
     });
@@ -92,7 +88,7 @@ fn a_wait_shows_a_progress_bar() {
 fn output_in_a_terminal_has_colours() {
     with_arm(TestSetup::any(), |arm| {
         let (mut ours, theirs) = terminal();
-        let mut info = tool(arm, &["info"]).stdout(stdio(&theirs)).spawn().expect("sevenbot runs");
+        let mut info = RunningProgram::spawn(tool(arm, &["info"]).stdout(stdio(&theirs)));
         let text = read_until(&mut ours, "servo bus errors");
         assert!(text.contains("\x1b[32mnone"), "missing servos: none, in green: {text}");
         info.wait().expect("the tool ends");

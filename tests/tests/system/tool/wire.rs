@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use super::output::{failed, run_without_arm, succeeded, words};
 use system_tests::frames::reply;
-use system_tests::process;
+use system_tests::process::RunningProgram;
 use system_tests::programs::tool;
 use system_tests::registers::{DEVICE_ID, FEEDBACK_FREQUENCY};
 use system_tests::{TestSetup, read_request, with_arm, write_request};
@@ -72,14 +72,11 @@ a damaged frame or a part of one, 4 bytes: AA 77 03 00
 }
 
 fn through_standard_input(bytes: &[u8]) -> String {
-    let mut tool = tool()
-        .args(["sniff", "-"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("sevenbot runs");
+    let mut tool = tool();
+    tool.args(["sniff", "-"]).stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut tool = RunningProgram::spawn(&mut tool);
     tool.stdin.take().expect("a pipe").write_all(bytes).expect("the tool reads");
-    succeeded(tool.wait_with_output().expect("the tool ends"))
+    succeeded(tool.output())
 }
 
 #[test]
@@ -93,7 +90,7 @@ fn sniff_prints_the_frames_of_a_port() {
         let lines = BufReader::new(tool.stdout.take().expect("a pipe")).lines().map_while(Result::ok);
         let reports = lines.filter(|line| line.contains("  answer present-position 1..7 = 9"));
         assert_eq!(reports.take(3).count(), 3);
-        process::kill(&mut tool);
+        tool.kill();
         arm.reopen(115_200);
         arm.write(FEEDBACK_FREQUENCY, &[0]);
     });

@@ -7,12 +7,12 @@
 
 use std::iter;
 
-use crate::shared::stream::{Event, GAP_US, Model, Received, drain, pull, raw_frame, receive};
+use crate::shared::stream::{
+    Event, GAP_US, LONG_SILENCE_US, Model, Received, drain, pull, raw_frame, receive,
+};
 use arbitrary::Arbitrary;
 use protocol_core::time::{Duration, Instant};
 use protocol_core::wire::{Deframer, ToArm};
-
-const LONG_SILENCE_US: u64 = 100_000;
 
 /// The input of a run.
 #[derive(Arbitrary, Debug)]

@@ -101,33 +101,55 @@ fn print_arms(program: &Path) -> Outcome {
     print_row(columns.map(str::to_owned));
     let mut memory = Vec::new();
     for size in SIZES {
-        let folder = tempfile::tempdir()?;
-        let image = folder.path().join("arm.bin").display().to_string();
-        let arms = Simulator::start(program, size, &["--eeprom", &image])?;
-        let idle = arms.share_idle()?;
-        let (busy, rate) = arms.share_polled()?;
-        let kibibytes = arms.memory()?;
-        let reply = (busy - idle).max(0.0) / (rate * size as f64);
-        let each = idle / size as f64;
-        let at_100_hz = each + 100.0 * reply;
-        print_row([
-            size.to_string(),
-            format!("{:.2} %", 100.0 * idle),
-            format!("{:.3} %", 100.0 * each),
-            format!("{rate:.1} Hz"),
-            format!("{:.2} %", 100.0 * busy),
-            format!("{:.1} us", 1e6 * reply),
-            format!("{:.3} %", 100.0 * at_100_hz),
-            format!("{:.0}", at_100_hz.recip()),
-            kibibytes.to_string(),
-        ]);
-        memory.push((size, kibibytes));
+        let load = ArmsLoad::measure(program, size)?;
+        print_row(load.row());
+        memory.push((size, load.kibibytes));
     }
     if let ([(1, one), ..], [.., (most, all)]) = (memory.as_slice(), memory.as_slice()) {
         let more = all.saturating_sub(*one) as f64 / (most - 1) as f64;
         println!("each further arm takes {more:.1} KiB");
     }
     Ok(())
+}
+
+/// The load of some arms in one process.
+struct ArmsLoad {
+    size: usize,
+    /// Shares of a core while the arms are idle, and while a host polls each of them.
+    idle: f64,
+    busy: f64,
+    /// How often it polls each, in Hz.
+    rate: f64,
+    kibibytes: u64,
+}
+
+impl ArmsLoad {
+    fn measure(program: &Path, size: usize) -> Outcome<Self> {
+        let folder = tempfile::tempdir()?;
+        let image = folder.path().join("arm.bin").display().to_string();
+        let arms = Simulator::start(program, size, &["--eeprom", &image])?;
+        let idle = arms.share_idle()?;
+        let (busy, rate) = arms.share_polled()?;
+        Ok(Self { size, idle, busy, rate, kibibytes: arms.memory()? })
+    }
+
+    fn row(&self) -> [String; 9] {
+        let size = self.size as f64;
+        let reply = (self.busy - self.idle).max(0.0) / (self.rate * size);
+        let each = self.idle / size;
+        let at_100_hz = each + 100.0 * reply;
+        [
+            self.size.to_string(),
+            format!("{:.2} %", 100.0 * self.idle),
+            format!("{:.3} %", 100.0 * each),
+            format!("{:.1} Hz", self.rate),
+            format!("{:.2} %", 100.0 * self.busy),
+            format!("{:.1} us", 1e6 * reply),
+            format!("{:.3} %", 100.0 * at_100_hz),
+            format!("{:.0}", at_100_hz.recip()),
+            self.kibibytes.to_string(),
+        ]
+    }
 }
 
 fn print_row(cells: [String; 9]) {

@@ -12,6 +12,7 @@ use std::time::Duration;
 use serde_json::Value;
 use serde_json::json;
 use system_tests::control::Control;
+use system_tests::process::RunningProgram;
 use system_tests::programs::tool;
 use system_tests::registers::TARGET_POSITION;
 use system_tests::relay::{Relay, RelayPlan};
@@ -128,10 +129,10 @@ fn run_tool(command: Command, port: &Path, folder: &Path) -> Output {
     let place = folder.to_str().expect("text");
     tool.args(command.arguments.split(' ').map(|argument| argument.replace("FOLDER", place)));
     tool.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut tool = tool.spawn().expect("sevenbot runs");
+    let mut tool = RunningProgram::spawn(&mut tool);
     // A command that fails early does not read it.
     let _ = tool.stdin.take().expect("a pipe").write_all(command.input.as_bytes());
-    tool.wait_with_output().expect("sevenbot ends")
+    tool.output()
 }
 
 /// Did the arm do what it was asked? From the state at the end of the command, and some time later.

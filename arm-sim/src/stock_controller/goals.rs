@@ -1,0 +1,79 @@
+//! The last target of each joint, and how fast it moves to the next one.
+
+use alloc::vec::Vec;
+
+use motion_core::calibration::{MicroDegrees, counts_from_angle};
+use protocol_core::registers::map::{SPEED, TIME};
+use protocol_core::registers::{JOINTS, Joint};
+
+use super::registers::StockRegisters;
+use super::servo_master::ServoGoal;
+
+/// Speed, in counts per second, and time of the goals after the move at start.
+const SPEED_AT_START: u16 = 600;
+const TIME_AT_START_MS: u16 = 1_000;
+/// A unit of the speed registers in counts per second, and of the time registers in milliseconds.
+const SPEED_UNIT: u16 = 10;
+const TIME_UNIT_MS: u16 = 100;
+
+/// The last goals of all joints.
+#[derive(Clone, Debug)]
+pub(super) struct LastGoals([LastGoal; JOINTS]);
+
+#[derive(Clone, Copy, Debug)]
+struct LastGoal {
+    /// In degrees. A target that is equal is not sent again.
+    target: u8,
+    /// In counts per second.
+    speed: u16,
+    time_ms: u16,
+}
+
+impl LastGoals {
+    pub(super) fn new(targets: [u8; JOINTS]) -> Self {
+        Self(targets.map(|target| LastGoal { target, speed: SPEED_AT_START, time_ms: TIME_AT_START_MS }))
+    }
+
+    /// All targets, to be reached within this time.
+    pub(super) fn within(&self, time_ms: u16, registers: &StockRegisters) -> Vec<(Joint, ServoGoal)> {
+        let goals = Joint::ALL.into_iter().zip(self.0);
+        goals.map(|(joint, goal)| LastGoal { speed: 0, time_ms, ..goal }.of_servo(joint, registers)).collect()
+    }
+
+    /// Takes speeds and times from the registers that were written.
+    pub(super) fn set_pace(&mut self, registers: &StockRegisters, is_written: impl Fn(u8) -> bool) {
+        for (joint, goal) in Joint::ALL.into_iter().zip(&mut self.0) {
+            let (speed, time) = (SPEED.of(joint), TIME.of(joint));
+            if is_written(speed) {
+                goal.speed = SPEED_UNIT * u16::from(registers.get(speed));
+            }
+            if is_written(time) {
+                goal.time_ms = TIME_UNIT_MS * u16::from(registers.get(time));
+            }
+        }
+    }
+
+    /// Takes new targets. Returns the goals of those that differ from the last ones.
+    pub(super) fn change(
+        &mut self,
+        targets: [Option<u8>; JOINTS],
+        registers: &StockRegisters,
+    ) -> Vec<(Joint, ServoGoal)> {
+        let mut goals = Vec::new();
+        for ((joint, goal), target) in Joint::ALL.into_iter().zip(&mut self.0).zip(targets) {
+            if let Some(target) = target.filter(|&target| target != goal.target) {
+                goal.target = target;
+                goals.push(goal.of_servo(joint, registers));
+            }
+        }
+        goals
+    }
+}
+
+impl LastGoal {
+    fn of_servo(self, joint: Joint, registers: &StockRegisters) -> (Joint, ServoGoal) {
+        let angle = MicroDegrees::from_degrees(self.target);
+        let position_counts = counts_from_angle(joint, angle, registers.offset(joint));
+        (joint, ServoGoal { position_counts, time_ms: self.time_ms, speed: self.speed })
+    }
+}
