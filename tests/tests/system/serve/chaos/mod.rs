@@ -1,14 +1,22 @@
 //! Fifty programs that come, behave badly and go, while the arm is unplugged again and again: no reply is lost, none reaches
 //! another program, and no target is carried out late.
 //!
+//! ```text
+//!   Visitor ──▶ Wire: pseudo-terminal, Unix socket, TCP, WebSocket ──▶ server ──▶ relay ──▶ simulator
+//!      └── what it sent, and when ──▶ SentTargets ◀── what reached the arm ──────────┘
+//! ```
+//!
 //! The length is `SERVE_CHAOS_SECONDS`. An hour, with an outage each minute:
 //!
 //! ```sh
-//! SERVE_CHAOS_SECONDS=3600 cargo test --release -p system-tests --test serve_chaos -- --nocapture
+//! SERVE_CHAOS_SECONDS=3600 cargo test --release -p system-tests --test system serve::chaos -- --nocapture
 //! ```
 
-mod chaos;
-mod served;
+mod frame_visits;
+mod sent_targets;
+mod visitor;
+mod web_visits;
+mod wire;
 
 use std::fs;
 use std::io::{Read, Write};
@@ -24,8 +32,9 @@ use system_tests::registers::DEVICE_CODE;
 use system_tests::relay::Watch;
 use system_tests::wait::{wait_for, wait_until};
 
-use chaos::{Chaos, Security, Tally, WayIn, visit};
-use served::{Served, names};
+use self::visitor::{Chaos, Tally, visit};
+use self::wire::{Security, WayIn};
+use super::served::{Served, names};
 
 const TOKEN: &str = "correct-horse";
 /// Programs on each way in: eight pseudo-terminals, and the others in turn.

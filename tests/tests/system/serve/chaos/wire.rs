@@ -17,7 +17,7 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
-use super::super::served::LOCAL_PAGE;
+use crate::serve::served::LOCAL_PAGE;
 
 /// How long a wire waits for bytes.
 const RECEIVE_TIME: Duration = Duration::from_millis(100);

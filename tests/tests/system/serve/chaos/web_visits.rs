@@ -7,9 +7,9 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use system_tests::random::Random;
 
-use super::super::served::web_frame;
 use super::visitor::{Answer, Chaos, Tally};
 use super::wire::WebWire;
+use crate::serve::served::web_frame;
 
 /// One connection.
 pub(super) struct WebVisit<'a> {
