@@ -48,7 +48,9 @@ impl FrameClient {
             if !hub.has_room(self.id) {
                 break;
             }
-            let count = self.deframer.push(now, rest);
+            // Not more than up to the end of a frame: how old the rest is, is known where it waits.
+            let piece = rest.get(..self.deframer.wanted().max(1)).unwrap_or(rest);
+            let count = self.deframer.push(now, piece);
             rest = rest.get(count..).unwrap_or(&[]);
             if count == 0 {
                 self.pull_all(hub, now, since);

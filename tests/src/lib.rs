@@ -20,6 +20,7 @@ pub mod control;
 pub mod frames;
 pub mod process;
 pub mod programs;
+pub mod random;
 pub mod registers;
 pub mod relay;
 pub mod simulator;

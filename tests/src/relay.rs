@@ -48,6 +48,9 @@ pub enum LineAction {
     Unplug,
 }
 
+/// Sees each frame of the program before it is passed on.
+pub type Watch = Box<dyn FnMut(&[u8]) + Send>;
+
 /// What happens on the line.
 pub struct RelayPlan {
     /// When the action takes place.
@@ -71,6 +74,21 @@ impl Relay {
     /// Opens a port that leads to the arm at `port`.
     #[must_use]
     pub fn open(port: &Path, plan: RelayPlan) -> Self {
+        Self::open_with(port, plan, Box::new(|_| ()))
+    }
+
+    /// Opens a port that leads to the arm at `port`, and shows each frame of the program.
+    #[must_use]
+    pub fn open_watched(port: &Path, watch: Watch) -> Self {
+        let plan = RelayPlan {
+            moment: Moment::Request(u32::MAX),
+            action: Box::new(|| LineAction::Nothing),
+            is_noisy: false,
+        };
+        Self::open_with(port, plan, watch)
+    }
+
+    fn open_with(port: &Path, plan: RelayPlan, watch: Watch) -> Self {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).expect("a port");
         grantpt(&master).and_then(|()| unlockpt(&master)).expect("a port");
         let name = ptsname(&master, Vec::new()).expect("a name");
@@ -89,6 +107,7 @@ impl Relay {
             replies: FrameSplitter::new(true),
             after_target: None,
             plan,
+            watch,
             has_acted: false,
             reports: 0,
             answers: 0,
@@ -137,6 +156,7 @@ struct Line {
     /// Frames of the program since the first target.
     after_target: Option<u32>,
     plan: RelayPlan,
+    watch: Watch,
     has_acted: bool,
     /// Reports and other frames of the arm on a noisy line.
     reports: u32,
@@ -189,6 +209,7 @@ impl Line {
         if self.plan.is_noisy {
             disturb(&mut frame, self.requests.count, 9);
         }
+        (self.watch)(&frame);
         // An arm that reads no more is a fault that a test wants.
         let _ = rustix::io::write(&self.arm, &frame);
         LineAction::Nothing

@@ -227,9 +227,10 @@ impl Hub {
     }
 
     fn queue(&mut self, now: Instant, id: ClientId, waiting: Waiting) {
+        let floor = self.floor();
         let Some(client) = self.clients.get_mut(&id) else { return };
         if client.waiting.is_empty() {
-            self.shares.join(&mut client.share);
+            client.share.join(floor);
         }
         client.queue(now, waiting);
     }

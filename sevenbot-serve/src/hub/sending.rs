@@ -66,7 +66,7 @@ impl Hub {
     pub(super) fn send_next(&mut self, now: Instant) -> bool {
         self.drop_stale(now);
         if self.sampler.begins_to_wait(now) {
-            self.shares.join(&mut self.sampler.share);
+            self.sampler.share.join(self.floor());
         }
         let sendable = self.clients.iter().filter(|(_, client)| self.line.takes(client));
         let sampler = self.sampler.next_due(now).map(|stream| {
@@ -86,6 +86,12 @@ impl Hub {
             _ => return false,
         }
         true
+    }
+
+    /// Where a client that was idle starts beside those that wait.
+    pub(super) fn floor(&self) -> u64 {
+        let waiting = self.clients.values().filter(|client| !client.waiting.is_empty());
+        self.shares.floor(waiting.map(|client| client.share))
     }
 
     /// Drops what waited too long.

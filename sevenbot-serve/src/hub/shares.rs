@@ -1,8 +1,8 @@
 //! Fair use of the line: start-time fair queueing, counted in bytes.
 //!
 //! Each client has a tag: the bytes up to which it has used the line. The request that would end at the lowest tag is next, so
-//! a short one does not wait for long ones that could begin at the same tag. A client that was idle starts at the tag of the
-//! request that was sent last. So it waits for one frame, and however many frames others have queued does not matter.
+//! a short one does not wait for long ones that could begin at the same tag. A client that was idle starts at the lowest tag of
+//! those that wait. So it waits for one frame, and however many frames others have queued does not matter.
 
 /// The tag of a client, and when it was served last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -14,21 +14,27 @@ pub(crate) struct Share {
 impl Share {
     /// The share of a client that has sent nothing.
     pub(crate) const IDLE: Self = Self { tag: 0, turn: 0 };
+
+    /// A client that was idle has a request again. `floor` comes from [`Shares::floor`].
+    pub(crate) fn join(&mut self, floor: u64) {
+        self.tag = self.tag.max(floor);
+    }
 }
 
 /// The state that all clients share.
 #[derive(Debug, Default)]
 pub(crate) struct Shares {
-    /// The tag of the request that was sent last.
+    /// The highest tag of a request that was sent.
     current: u64,
     /// Number of requests sent.
     turns: u64,
 }
 
 impl Shares {
-    /// A client that was idle has a request again.
-    pub(crate) fn join(&self, share: &mut Share) {
-        share.tag = share.tag.max(self.current);
+    /// Where a client starts that was idle, beside those that wait. Not at the tag of the last request: many short ones of one
+    /// client run ahead of the others by the length of a long one.
+    pub(crate) fn floor(&self, waiting: impl Iterator<Item = Share>) -> u64 {
+        waiting.map(|share| share.tag).min().unwrap_or(self.current)
     }
 
     /// The request with the smallest order is next; it has this many bytes. Between equal ends it is that of the client that
@@ -89,12 +95,25 @@ mod tests {
                 wait = 0;
             } else {
                 shares.charge(&mut busy[next], 269);
-                shares.join(&mut one);
+                one.join(shares.floor(busy.iter().copied()));
                 wait += 1;
             }
         }
         waits.sort_unstable();
         assert!(waits[waits.len() / 2] <= 3, "{waits:?}");
+    }
+
+    #[test]
+    fn a_client_that_was_idle_is_next_also_beside_one_that_has_used_its_share() {
+        let (mut shares, mut busy, mut chatty) =
+            (Shares::default(), [Share::default(); 31], Share::default());
+        shares.charge(&mut busy[0], 269);
+        while Shares::order(chatty, 8) < Shares::order(busy[1], 269) {
+            shares.charge(&mut chatty, 8);
+        }
+        let mut idle = Share::default();
+        idle.join(shares.floor(busy.iter().copied().chain([chatty])));
+        assert!(Shares::order(idle, 21) < Shares::order(busy[1], 269));
     }
 
     #[test]
@@ -105,7 +124,7 @@ mod tests {
         for turn in 0..900 {
             shares.charge(&mut busy[turn % 9], 262);
         }
-        shares.join(&mut idle);
+        idle.join(shares.floor(busy.iter().copied()));
         assert!(busy.iter().all(|&share| Shares::order(idle, 14) < Shares::order(share, 262)));
         (0..40).for_each(|_| shares.charge(&mut idle, 14));
         assert!(

@@ -1,4 +1,4 @@
-//! Places for connections: a few for those that have not shown their token yet, and others for clients.
+//! Places for connections: for those that have not shown their token yet, and others for clients.
 //!
 //! A place before the token is taken over by the next connection if all are taken: the oldest one loses it. So connections that
 //! send nothing keep nobody out who sends the token at once. Wrong tokens make the next ones of the same address wait.
@@ -13,9 +13,10 @@ use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore};
 use super::shared::lock;
 
 /// Clients over the network at the same time. The next one is closed at once.
-pub const MOST_NETWORK_CLIENTS: usize = 32;
+const MOST_NETWORK_CLIENTS: usize = 64;
 /// Connections that have not shown their token.
-const MOST_UNKNOWN: usize = 16;
+/// All programs of a server may come back at once.
+const MOST_UNKNOWN: usize = MOST_NETWORK_CLIENTS;
 /// The first wait after a wrong token; each further one doubles it.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
@@ -118,12 +119,16 @@ mod tests {
     fn silent_connections_lose_their_places_to_the_next_ones() {
         run(async {
             let admission = Admission::new();
-            let silent: Vec<_> = (0..40)
+            let silent: Vec<_> = (0..MOST_UNKNOWN + 24)
                 .map(|_| {
                     let admission = Arc::clone(&admission);
                     tokio::spawn(async move { admission.log_in(LONG, pending::<Option<()>>()).await })
                 })
                 .collect();
+            while lock(&admission.unknown).len() < MOST_UNKNOWN {
+                tokio::task::yield_now().await;
+            }
+            // The last ones have to be there, too.
             tokio::task::yield_now().await;
             assert_eq!(admission.log_in(LONG, ready(Some(7))).await, Some(7));
             let mut ended = silent.iter().filter(|task| task.is_finished()).count();
@@ -131,7 +136,7 @@ mod tests {
                 tokio::task::yield_now().await;
                 ended = silent.iter().filter(|task| task.is_finished()).count();
             }
-            assert_eq!(lock(&admission.unknown).len(), 15);
+            assert_eq!(lock(&admission.unknown).len(), MOST_UNKNOWN - 1);
         });
     }
 

@@ -13,6 +13,7 @@ use super::admission::Admission;
 use super::byte_connection::{self, ByteStream, NoFrames};
 use super::listener::{LocalSocket, accept_tcp};
 use super::notice::{Notice, Notices, RefusalReason};
+use super::readiness::Breakage;
 use super::shared::Shared;
 use crate::token::is_equal;
 
@@ -56,6 +57,7 @@ impl ByteServer {
 
     async fn serve_client(&self, stream: TcpStream, peer: SocketAddr) {
         let refuse = |reason| self.notices.send(Notice::Refused { peer: Some(peer), reason });
+        let Ok(breakage) = Breakage::of(&stream) else { return };
         let login = async {
             let mut stream = self.secure(stream).await.ok()?;
             let first = match &self.token {
@@ -66,7 +68,8 @@ impl ByteServer {
         };
         let Some((stream, first)) = self.admission.log_in(LOGIN_TIMEOUT, login).await else { return };
         let Some(_place) = self.admission.place() else { return refuse(RefusalReason::Full) };
-        if byte_connection::serve(&self.shared, stream, first).await == Err(NoFrames) {
+        let served = breakage.or_end(byte_connection::serve(&self.shared, stream, first)).await;
+        if served == Some(Err(NoFrames)) {
             refuse(RefusalReason::NoFrames);
         }
     }

@@ -53,7 +53,6 @@ use self::web_server::WebServer;
 use crate::hub::{Hub, HubOptions};
 
 pub use self::access::AccessPolicy;
-pub use self::admission::MOST_NETWORK_CLIENTS;
 pub use self::arm_location::ArmLocation;
 pub use self::notice::{Notice, RefusalReason};
 pub use self::site::{PageConfig, PageFiles};

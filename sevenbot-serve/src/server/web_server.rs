@@ -29,6 +29,7 @@ use super::admission::{Admission, Place};
 use super::byte_connection::ByteStream;
 use super::listener::{SEND_BUFFER, accept_tcp};
 use super::notice::{Notice, Notices, RefusalReason};
+use super::readiness::Breakage;
 use super::shared::{Shared, lock};
 use super::site::{Answer, Protocol, Site, refusal};
 use super::web_socket::{serve_frames, serve_maker};
@@ -78,12 +79,16 @@ impl WebServer {
         let Some(Upgrade { connection, protocol, place }) = answered else { return };
         let Ok(connection) = connection.await else { return };
         let _ = set_socket_send_buffer_size(&socket, SEND_BUFFER);
+        let Ok(breakage) = Breakage::of(&socket) else { return };
         drop::<OwnedFd>(socket);
         let stream = TokioIo::new(connection);
-        match protocol {
-            Protocol::Frames => serve_frames(&self.shared, stream).await,
-            Protocol::Maker { is_browser } => serve_maker(&self.shared, stream, is_browser).await,
-        }
+        let serve = async {
+            match protocol {
+                Protocol::Frames => serve_frames(&self.shared, stream).await,
+                Protocol::Maker { is_browser } => serve_maker(&self.shared, stream, is_browser).await,
+            }
+        };
+        let _ = breakage.or_end(serve).await;
         drop(place);
     }
 

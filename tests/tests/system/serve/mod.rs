@@ -2,8 +2,10 @@
 
 mod attacks;
 mod bad_web;
+mod chaos;
 mod load;
 mod served;
 mod sharing;
+mod stops;
 mod view;
 mod web;

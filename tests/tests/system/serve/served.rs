@@ -10,6 +10,7 @@ use serde_json::Value;
 use system_tests::process::{self, RunningProgram};
 use system_tests::programs::{host_sim, tool};
 use system_tests::registers::DEVICE_CODE;
+use system_tests::relay::{Relay, Watch};
 use system_tests::wait::wait_until;
 use system_tests::{ArmClient, read_request};
 use tempfile::TempDir;
@@ -25,14 +26,29 @@ pub(crate) struct Served {
     pub(crate) server: RunningProgram,
     pub(crate) simulator: RunningProgram,
     pub(crate) ports: Vec<PathBuf>,
+    /// Shows the frames of the server, if it was started for that.
+    relay: Option<Relay>,
     pub(crate) folder: TempDir,
 }
+
+/// The link of the simulator when a relay is between it and the server.
+const SIMULATOR: &str = "sim";
 
 impl Served {
     /// Starts a server with the pseudo-terminals `a`, `b`, ..., a TCP port and a WebSocket.
     pub(crate) fn start(ptys: usize, options: &[&str]) -> Self {
+        Self::start_with(ptys, options, None)
+    }
+
+    /// Starts one whose frames to the arm `watch` sees.
+    pub(crate) fn start_watched(ptys: usize, options: &[&str], watch: Watch) -> Self {
+        Self::start_with(ptys, options, Some(watch))
+    }
+
+    fn start_with(ptys: usize, options: &[&str], watch: Option<Watch>) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let simulator = simulator(folder.path());
+        let simulator = simulator_at(&folder.path().join(if watch.is_some() { SIMULATOR } else { "arm" }));
+        let relay = watch.map(|watch| plug(folder.path(), watch));
         let mut command = tool();
         command
             .current_dir(&folder)
@@ -43,11 +59,22 @@ impl Served {
             command.args(["--pty", name]);
         }
         let (server, ports) = process::start(&mut command, ptys + 3).expect("the server is ready");
-        let served = Self { server, simulator, ports, folder };
+        let served = Self { server, simulator, ports, relay, folder };
         if ptys > 0 {
             served.wait_for_arm(&mut served.open("a"));
         }
         served
+    }
+
+    /// Unplugs the arm from the server.
+    pub(crate) fn unplug(&mut self) {
+        self.relay = None;
+        std::fs::remove_file(self.folder.path().join("arm")).expect("a link");
+    }
+
+    /// Plugs it in again.
+    pub(crate) fn plug(&mut self, watch: Watch) {
+        self.relay = Some(plug(self.folder.path(), watch));
     }
 
     pub(crate) fn open(&self, name: &str) -> ArmClient {
@@ -74,8 +101,9 @@ impl Served {
 
     /// A connection to the WebSocket, before the handshake.
     pub(crate) fn connect_web(&self) -> TcpStream {
-        let address = self.web_url().strip_prefix("ws://").and_then(|url| url.strip_suffix("/ws"));
-        let stream = TcpStream::connect(address.expect("an address")).expect("a connection");
+        let address =
+            self.web_url().trim_start_matches("wss://").trim_start_matches("ws://").trim_end_matches("/ws");
+        let stream = TcpStream::connect(address).expect("a connection");
         stream.set_nodelay(true).expect("an option");
         stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
         stream
@@ -91,12 +119,23 @@ impl Served {
 }
 
 pub(crate) fn names(count: usize) -> impl Iterator<Item = &'static str> {
-    ["a", "b", "c", "d"].into_iter().take(count)
+    ["a", "b", "c", "d", "e", "f", "g", "h"].into_iter().take(count)
+}
+
+/// A relay between the simulator and the link that the server opens.
+fn plug(folder: &Path, watch: Watch) -> Relay {
+    let relay = Relay::open_watched(&folder.join(SIMULATOR), watch);
+    std::os::unix::fs::symlink(relay.path(), folder.join("arm")).expect("a link");
+    relay
 }
 
 pub(crate) fn simulator(folder: &Path) -> RunningProgram {
+    simulator_at(&folder.join("arm"))
+}
+
+fn simulator_at(link: &Path) -> RunningProgram {
     let mut command = Command::new(host_sim());
-    command.args(["--quiet", "--eeprom", "none", "--link"]).arg(folder.join("arm"));
+    command.args(["--quiet", "--eeprom", "none", "--link"]).arg(link);
     process::start(&mut command, 1).expect("the simulator is ready").0
 }
 

@@ -1,0 +1,170 @@
+//! Fifty programs that come, behave badly and go, while the arm is unplugged again and again: no reply is lost, none reaches
+//! another program, and no target is carried out late.
+//!
+//! ```text
+//!   Visitor ──▶ Wire: pseudo-terminal, Unix socket, TCP, WebSocket ──▶ server ──▶ relay ──▶ simulator
+//!      └── what it sent, and when ──▶ SentTargets ◀── what reached the arm ──────────┘
+//! ```
+//!
+//! The length is `SERVE_CHAOS_SECONDS`. An hour, with an outage each minute:
+//!
+//! ```sh
+//! SERVE_CHAOS_SECONDS=3600 cargo test --release -p system-tests --test system serve::chaos -- --nocapture
+//! ```
+
+mod frame_visits;
+mod sent_targets;
+mod visitor;
+mod web_visits;
+mod wire;
+
+use std::fs;
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::Child;
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use system_tests::read_request;
+use system_tests::registers::DEVICE_CODE;
+use system_tests::relay::Watch;
+use system_tests::wait::{wait_for, wait_until};
+
+use self::visitor::{Chaos, Tally, visit};
+use self::wire::{Security, WayIn};
+use super::served::{Served, names};
+
+const TOKEN: &str = "correct-horse";
+/// Programs on each way in: eight pseudo-terminals, and the others in turn.
+const TERMINALS: usize = 8;
+const PROGRAMS: usize = 50;
+/// Time from the end of an outage to the next one, at most, and how long each is.
+const BETWEEN_OUTAGES: Duration = Duration::from_secs(56);
+const OUTAGE: Duration = Duration::from_millis(3_500);
+/// A target waits in the server for 200 ms at most. The rest is for programs that the system does not run for a while.
+const LATE: Duration = Duration::from_millis(2_000);
+/// Kilobytes by which the server may grow.
+const MOST_GROWTH: u64 = 8_192;
+
+#[test]
+fn fifty_chaotic_programs_lose_nothing_cross_nothing_and_move_nothing_late() {
+    let seconds = std::env::var("SERVE_CHAOS_SECONDS").map_or(8, |text| text.parse().expect("a number"));
+    let seed = std::env::var("SERVE_CHAOS_SEED").map_or(25, |text| text.parse().expect("a number"));
+    println!("{seconds} s, seed {seed}");
+    run(Duration::from_secs(seconds), seed);
+}
+
+fn run(length: Duration, seed: u64) {
+    let certificate = |name: &str| -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../sevenbot-serve/tests/certificate").join(name)
+    };
+    let path = |name: &str| certificate(name).to_str().expect("text").to_owned();
+    let options = ["--token", TOKEN, "--tls-cert", &path("certificate.pem"), "--tls-key", &path("key.pem")];
+    let security = Security::new(TOKEN, Some(certificate("certificate.pem")));
+    let chaos = Arc::new(Chaos::new(security, length));
+    let watch = || -> Watch {
+        let chaos = Arc::clone(&chaos);
+        Box::new(move |frame| chaos.targets.reached(frame))
+    };
+    let mut served = Served::start_watched(TERMINALS, &options, watch());
+    let socket = served.local_socket();
+    wait_until("the arm answers", || is_answered(&socket));
+    let files = open_files(&served.server);
+    let ways_in = ways_in(&served);
+    let (total, memory) = thread::scope(|scope| {
+        let mut programs = Vec::new();
+        for (number, way_in) in (0..).zip(&ways_in) {
+            let chaos = Arc::clone(&chaos);
+            programs.push(scope.spawn(move || visit(&chaos, way_in, number, seed)));
+            thread::sleep(Duration::from_millis(10));
+        }
+        let warm_up = Instant::now() + length / 8;
+        let mut memory = None;
+        let between = BETWEEN_OUTAGES.min(length / 6);
+        let mut next_outage = Instant::now() + between;
+        while !chaos.is_over() {
+            thread::sleep(Duration::from_millis(50));
+            if memory.is_none() && Instant::now() >= warm_up {
+                memory = Some(kilobytes(&served.server));
+            }
+            if Instant::now() >= next_outage {
+                chaos.turn_over();
+                served.unplug();
+                thread::sleep(OUTAGE);
+                served.plug(watch());
+                wait_until("the arm answers", || is_answered(&socket));
+                chaos.turn_over();
+                next_outage = Instant::now() + between;
+            }
+        }
+        let mut total = Tally::default();
+        for (program, way_in) in programs.into_iter().zip(&ways_in) {
+            let tally = program.join().expect("no program fails");
+            println!("{way_in:?}: {tally:?}");
+            total += tally;
+        }
+        (total, memory.expect("a sample"))
+    });
+    check(&chaos, &served, total, memory, files);
+}
+
+fn check(chaos: &Chaos, served: &Served, total: Tally, memory: u64, files: usize) {
+    let (ages, sent) = chaos.targets.ages();
+    let age = |share: usize| ages.get(ages.len() * share / 1_000).copied().unwrap_or_default();
+    println!("all: {total:?}");
+    println!("{} outages; {} of {sent} targets reached the arm", chaos.outages(), ages.len());
+    println!(
+        "their ages: p50 {:?}, p99 {:?}, p99.9 {:?}, at most {:?}",
+        age(500),
+        age(990),
+        age(999),
+        ages.last()
+    );
+    let at_end = kilobytes(&served.server);
+    println!("memory of the server: {memory} KiB after the first eighth, {at_end} KiB at the end");
+    assert_eq!((total.lost, total.crossed), (0, 0));
+    assert!(total.replies > 100 && chaos.outages() > 0 && ages.len() > 100, "something happened");
+    assert!(ages.last().is_some_and(|&age| age < LATE), "a late target: {:?}", ages.last());
+    assert!(at_end <= memory + MOST_GROWTH, "the server grows");
+    wait_for("no place stays taken", || {
+        let open = open_files(&served.server);
+        if open <= files { Ok(()) } else { Err(format!("{open} open files, {files} before")) }
+    });
+}
+
+/// Each program, with its way to the server.
+fn ways_in(served: &Served) -> Vec<WayIn> {
+    let address = |stream: std::net::TcpStream| stream.peer_addr().expect("an address").to_string();
+    let (tcp, web) = (address(served.connect()), address(served.connect_web()));
+    let terminals = names(TERMINALS).map(|name| WayIn::Terminal(served.folder.path().join(name)));
+    let others = (TERMINALS..PROGRAMS).map(|number| match number % 4 {
+        0 => WayIn::Unix(served.local_socket()),
+        1 => WayIn::Web { address: web.clone(), is_page: false },
+        2 => WayIn::Web { address: web.clone(), is_page: true },
+        _ => WayIn::Tcp(tcp.clone()),
+    });
+    let mut all: Vec<WayIn> = terminals.chain(others).collect();
+    // The first ones have registers of their own: they are of all kinds.
+    all.rotate_left(TERMINALS / 2);
+    all
+}
+
+/// Does the arm answer a program that connects now?
+fn is_answered(socket: &Path) -> bool {
+    let Ok(mut stream) = UnixStream::connect(socket) else { return false };
+    let mut received = [0; 8];
+    stream.set_read_timeout(Some(Duration::from_millis(300))).expect("a timeout");
+    stream.write_all(&read_request(DEVICE_CODE, 1)).is_ok() && stream.read_exact(&mut received).is_ok()
+}
+
+fn kilobytes(process: &Child) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{}/status", process.id())).expect("a status");
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("its memory");
+    line.trim().trim_end_matches("kB").trim().parse().expect("a number")
+}
+
+fn open_files(process: &Child) -> usize {
+    fs::read_dir(format!("/proc/{}/fd", process.id())).expect("its files").count()
+}

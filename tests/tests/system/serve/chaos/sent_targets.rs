@@ -1,0 +1,91 @@
+//! Targets that tell by their values when they were sent.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use system_tests::registers::TARGET_POSITION;
+
+/// Joints whose targets hold the number of a write.
+const DIGITS: u32 = 4;
+/// Each target is one of a hundred.
+const BASE: u64 = 100;
+/// The lowest target.
+const LOWEST: u64 = 40;
+/// Writes whose times are known at the same time.
+const KEPT: u64 = 1 << 20;
+
+/// The times of the last targets, and those that reached the arm.
+pub(crate) struct SentTargets {
+    start: Instant,
+    next: AtomicU64,
+    /// Microseconds from `start` on at which the target had been sent; 0: it is being sent.
+    times: Vec<AtomicU64>,
+    arrived: Mutex<Vec<Duration>>,
+}
+
+impl SentTargets {
+    pub(crate) fn new() -> Self {
+        let times = (0..KEPT).map(|_| AtomicU64::new(0)).collect();
+        Self { start: Instant::now(), next: AtomicU64::new(0), times, arrived: Mutex::default() }
+    }
+
+    /// Sends targets that hold a number of their own.
+    pub(crate) fn send<T>(&self, send: impl FnOnce([u8; DIGITS as usize]) -> T) -> T {
+        let number = self.next.fetch_add(1, Ordering::SeqCst);
+        let time = self.slot(number);
+        time.store(0, Ordering::SeqCst);
+        let outcome = send(targets(number));
+        // The writer may have been blocked for long: the bytes are on their way from now on.
+        let sent = u64::try_from(self.start.elapsed().as_micros()).expect("a test of less than an age");
+        time.store(sent.max(1), Ordering::SeqCst);
+        outcome
+    }
+
+    /// A frame has reached the arm.
+    pub(crate) fn reached(&self, frame: &[u8]) {
+        let [_, _, 4 | 6, TARGET_POSITION, _, values @ ..] = frame else { return };
+        let Some(number) = number(values) else { return };
+        let sent = self.slot(number).load(Ordering::SeqCst);
+        let age = match sent {
+            0 => Duration::ZERO,
+            sent => self.start.elapsed().saturating_sub(Duration::from_micros(sent)),
+        };
+        self.arrived.lock().expect("no panic").push(age);
+    }
+
+    /// How long the targets that reached the arm had been on their way, in ascending order, and how many were sent.
+    pub(crate) fn ages(&self) -> (Vec<Duration>, u64) {
+        let mut ages = self.arrived.lock().expect("no panic").clone();
+        ages.sort_unstable();
+        (ages, self.next.load(Ordering::SeqCst))
+    }
+
+    fn slot(&self, number: u64) -> &AtomicU64 {
+        &self.times[usize::try_from(number % KEPT).expect("small")]
+    }
+}
+
+fn targets(number: u64) -> [u8; DIGITS as usize] {
+    std::array::from_fn(|digit| {
+        let power = BASE.pow(u32::try_from(digit).expect("small"));
+        u8::try_from(LOWEST + number / power % BASE).expect("a target")
+    })
+}
+
+/// The number in targets; `None` if they hold none.
+fn number(targets: &[u8]) -> Option<u64> {
+    (0..DIGITS).try_fold(0, |number, digit| {
+        let target = u64::from(*targets.get(usize::try_from(digit).ok()?)?);
+        let value = target.checked_sub(LOWEST).filter(|&value| value < BASE)?;
+        Some(number + value * BASE.pow(digit))
+    })
+}
+
+#[test]
+fn a_number_passes_through_targets() {
+    for wanted in [0, 7, 99, 100, 123_456, 99_999_999] {
+        assert_eq!(number(&targets(wanted)), Some(wanted));
+    }
+    assert_eq!(number(&[90, 90, 65]), None);
+}

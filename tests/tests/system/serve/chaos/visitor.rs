@@ -1,0 +1,176 @@
+//! A program that visits the server again and again, each time in another mood.
+
+use std::ops::AddAssign;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use system_tests::random::Random;
+use system_tests::registers::SPEED;
+
+use super::frame_visits::FrameVisit;
+use super::sent_targets::SentTargets;
+use super::web_visits::WebVisit;
+use super::wire::{Security, WayIn};
+
+/// A reply that has not come after this time is lost.
+const LOST: Duration = Duration::from_secs(30);
+/// A reply that an outage took does not come any more after this time.
+const AFTER_OUTAGE: Duration = Duration::from_secs(1);
+/// Programs that have a register of their own, from [`SPEED`] on.
+const OWNERS: u8 = 14;
+
+/// What all programs share.
+pub(crate) struct Chaos {
+    pub(crate) security: Security,
+    pub(crate) end: Instant,
+    pub(crate) targets: SentTargets,
+    /// Odd while the arm is unplugged, and until it was seen to answer again.
+    outages: AtomicU64,
+    questions: AtomicU64,
+}
+
+impl Chaos {
+    pub(crate) fn new(security: Security, length: Duration) -> Self {
+        Self {
+            security,
+            end: Instant::now() + length,
+            targets: SentTargets::new(),
+            outages: AtomicU64::new(0),
+            questions: AtomicU64::new(0),
+        }
+    }
+
+    pub(crate) fn is_over(&self) -> bool {
+        Instant::now() >= self.end
+    }
+
+    /// The arm is about to be unplugged, or was seen to answer again.
+    pub(crate) fn turn_over(&self) {
+        self.outages.fetch_add(1, Ordering::SeqCst);
+    }
+
+    pub(crate) fn outages(&self) -> u64 {
+        self.outages.load(Ordering::SeqCst).div_ceil(2)
+    }
+
+    /// Registers that no other program reads at about the same time: the first one, and how many.
+    pub(super) fn question(&self) -> (u8, u8) {
+        let number = self.questions.fetch_add(1, Ordering::SeqCst);
+        let (address, count) = (60 + number % 100, 15 + number / 100 % 40);
+        (u8::try_from(address).expect("small"), u8::try_from(count).expect("small"))
+    }
+
+    /// A wait for a reply begins.
+    pub(super) fn wait(&self) -> ReplyWait<'_> {
+        ReplyWait { chaos: self, sent: Instant::now(), outages: self.outages.load(Ordering::SeqCst) }
+    }
+}
+
+/// A program waits for a reply.
+pub(super) struct ReplyWait<'a> {
+    chaos: &'a Chaos,
+    sent: Instant,
+    outages: u64,
+}
+
+impl ReplyWait<'_> {
+    /// The reply may be missing, because the arm was unplugged.
+    pub(super) fn may_be_cut(&self) -> bool {
+        let now = self.chaos.outages.load(Ordering::SeqCst);
+        self.outages % 2 == 1 || now != self.outages
+    }
+
+    /// Why it is waited no longer; `None` while it is.
+    pub(super) fn ended(&self) -> Option<Answer> {
+        let elapsed = self.sent.elapsed();
+        if elapsed >= AFTER_OUTAGE && self.may_be_cut() {
+            return Some(Answer::Cut);
+        }
+        (elapsed >= LOST).then_some(Answer::Lost)
+    }
+}
+
+/// What came of a question.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// Its reply.
+    Replied,
+    /// Nothing: the arm was unplugged.
+    Cut,
+    /// Nothing, although the arm was there.
+    Lost,
+    /// Something else.
+    Crossed,
+    /// The server has ended the connection.
+    Ended,
+}
+
+/// What a program did, and what became of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Tally {
+    pub(crate) visits: usize,
+    /// Connections that ended before their first reply.
+    pub(crate) turned_away: usize,
+    pub(crate) replies: usize,
+    /// Questions that an outage took.
+    pub(crate) cut: usize,
+    pub(crate) lost: usize,
+    pub(crate) crossed: usize,
+    /// Connections that the server ended after their first reply.
+    pub(crate) ended: usize,
+    pub(crate) resets: usize,
+}
+
+impl Tally {
+    pub(super) fn note(&mut self, answer: Answer) {
+        match answer {
+            Answer::Replied => self.replies += 1,
+            Answer::Cut => self.cut += 1,
+            Answer::Lost => self.lost += 1,
+            Answer::Crossed => self.crossed += 1,
+            Answer::Ended => self.ended += 1,
+        }
+    }
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.visits += other.visits;
+        self.turned_away += other.turned_away;
+        self.replies += other.replies;
+        self.cut += other.cut;
+        self.lost += other.lost;
+        self.crossed += other.crossed;
+        self.ended += other.ended;
+        self.resets += other.resets;
+    }
+}
+
+/// Visits the server until the end.
+pub(crate) fn visit(chaos: &Chaos, way_in: &WayIn, number: u8, seed: u64) -> Tally {
+    let mut random = Random::new(seed ^ u64::from(number) << 32);
+    let mut tally = Tally::default();
+    let own = (number < OWNERS).then(|| SPEED + number);
+    while !chaos.is_over() {
+        let before = tally.replies;
+        tally.visits += 1;
+        let last = match way_in {
+            WayIn::Web { address, is_page } => {
+                WebVisit::open(chaos, address, *is_page).map(|visit| visit.run(own, &mut random, &mut tally))
+            }
+            _ => FrameVisit::open(chaos, way_in).map(|visit| visit.run(own, &mut random, &mut tally)),
+        };
+        match last {
+            Some(Answer::Replied) => {}
+            // What the server still has of this program is not carried out after this time.
+            Some(Answer::Cut) => thread::sleep(Duration::from_millis(400)),
+            None | Some(Answer::Ended) if tally.replies == before => {
+                tally.turned_away += 1;
+                thread::sleep(Duration::from_millis(50));
+            }
+            _ => thread::sleep(Duration::from_millis(50)),
+        }
+    }
+    tally
+}

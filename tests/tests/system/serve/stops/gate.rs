@@ -1,0 +1,78 @@
+//! Starts all programs of a turn together, and ends them.
+
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+
+/// The state of the turns.
+#[derive(Default)]
+struct Turns {
+    /// Turns so far.
+    count: usize,
+    /// Programs that have begun this turn.
+    begun: usize,
+    is_over: bool,
+}
+
+/// Lets programs into one turn after the other.
+#[derive(Default)]
+pub(crate) struct Gate {
+    turns: Mutex<Turns>,
+    changed: Condvar,
+}
+
+thread_local! {
+    /// The turn that this thread is in.
+    static TURN: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+}
+
+/// Ends all programs when it is dropped.
+pub(crate) struct End<'a>(&'a Gate);
+
+impl Drop for End<'_> {
+    fn drop(&mut self) {
+        self.0.lock().is_over = true;
+        self.0.changed.notify_all();
+    }
+}
+
+impl Gate {
+    pub(crate) const fn ends_others(&self) -> End<'_> {
+        End(self)
+    }
+
+    /// Begins the next turn, and waits until as many programs have begun it.
+    pub(crate) fn release(&self, programs: usize) {
+        let mut turns = self.lock();
+        turns.count += 1;
+        turns.begun = 0;
+        self.changed.notify_all();
+        while turns.begun < programs {
+            turns = self.changed.wait(turns).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Waits for the next turn. Returns false at the end.
+    pub(crate) fn wait(&self) -> bool {
+        let mut turns = self.lock();
+        while turns.count == TURN.get() && !turns.is_over {
+            turns = self.changed.wait(turns).unwrap_or_else(PoisonError::into_inner);
+        }
+        TURN.set(turns.count);
+        !turns.is_over
+    }
+
+    /// This program has begun the turn.
+    pub(crate) fn has_begun(&self) {
+        self.lock().begun += 1;
+        self.changed.notify_all();
+    }
+
+    /// Does the turn go on?
+    pub(crate) fn is_open(&self) -> bool {
+        let turns = self.lock();
+        turns.count == TURN.get() && !turns.is_over
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Turns> {
+        self.turns.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,172 @@
+//! Stops through real sockets, at random moments, beside programs that attack the server: each reaches the arm, and no target
+//! of another program does after it.
+//!
+//! `SERVE_STOPS` is the number of stops beside each attack, and `SERVE_ATTACK` selects one, such as `Readers`. A thousand beside
+//! each take about an hour:
+//!
+//! ```sh
+//! SERVE_STOPS=1000 cargo test --release -p system-tests --test system serve::stops -- --nocapture
+//! ```
+
+mod attack;
+mod gate;
+mod program;
+
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use system_tests::random::Random;
+use system_tests::registers::TARGET_POSITION;
+use system_tests::write_request;
+
+use self::attack::Attack;
+use self::gate::Gate;
+use self::program::{Program, TOKEN, stream};
+use super::served::Served;
+
+const SEED: u64 = 25;
+/// First register of the fine targets, of the fine positions, and the bytes of each.
+const FINE_TARGET: u8 = 128;
+const FINE_POSITION: u8 = 142;
+const FINE: u8 = 14;
+/// How long it is watched that nothing moves the arm.
+const WATCHED: Duration = Duration::from_millis(60);
+/// Movement of a joint that holds, in hundredths of a degree.
+const STILL: u16 = 30;
+
+/// The writes of targets on the arm's line, in their order.
+type Line = Arc<Mutex<Vec<(Instant, Vec<u8>)>>>;
+
+/// How long a stop took.
+struct StopTimes {
+    /// From the write that holds the arm to its arrival on the arm's line.
+    to_arm: Duration,
+    /// From the question where the arm is to the reply that it holds there.
+    in_all: Duration,
+}
+
+#[test]
+fn nothing_moves_the_arm_after_a_stop_whoever_attacks() {
+    let count = std::env::var("SERVE_STOPS").map_or(2, |text| text.parse().expect("a number"));
+    println!("{count} stops beside each attack, seed {SEED}");
+    let line = Line::default();
+    let watched = Arc::clone(&line);
+    let watch = move |frame: &[u8]| {
+        if writes_targets(frame) {
+            watched.lock().expect("no panic").push((Instant::now(), frame.to_vec()));
+        }
+    };
+    let served = Served::start_watched(1, &["--token", TOKEN], Box::new(watch));
+    let mut random = Random::new(SEED);
+    let mut stoppers = Program::of_each_kind(&served);
+    let chosen = std::env::var("SERVE_ATTACK").ok();
+    for attack in Attack::ALL {
+        if chosen.as_ref().is_some_and(|chosen| *chosen != format!("{attack:?}")) {
+            continue;
+        }
+        beside(attack, &served, &line, &mut stoppers, count, &mut random);
+    }
+}
+
+/// Stops the arm again and again beside an attack.
+fn beside(
+    attack: Attack,
+    served: &Served,
+    line: &Line,
+    stoppers: &mut [Program],
+    count: usize,
+    random: &mut Random,
+) {
+    let gate = &Gate::default();
+    let mut times = Vec::new();
+    thread::scope(|scope| {
+        // Ends the others also if this thread panics.
+        let _end = gate.ends_others();
+        let mut streamer = Program::over_tcp(served);
+        scope.spawn(move || stream(&mut streamer, gate));
+        (0..attack.attackers()).for_each(|_| drop(scope.spawn(|| attack.run(served, gate))));
+        for turn in 0..count {
+            gate.release(attack.attackers() + 1);
+            thread::sleep(Duration::from_millis(20 + random.below(130)));
+            let stopper = &mut stoppers[turn % 3];
+            let (stop, held) = stop(stopper, line);
+            times.push(stop);
+            thread::sleep(WATCHED);
+            let context = format!("{attack:?}, stop {turn}");
+            check_rests(line, &write_request(FINE_TARGET, &held), &context);
+            if !attack.lets_the_server_hold() {
+                assert_eq!(stopper.read(FINE_TARGET, FINE), held, "{context}: nothing moves it");
+            }
+        }
+        thread::sleep(Duration::from_millis(400));
+        let before = stoppers[0].read(FINE_POSITION, FINE);
+        thread::sleep(Duration::from_millis(200));
+        let moved = farthest(&before, &stoppers[0].read(FINE_POSITION, FINE));
+        assert!(moved <= STILL, "{attack:?}: moved by {moved} hundredths");
+    });
+    report(attack, &times);
+}
+
+/// Stops the arm as `sevenbot stop` does: reads where it is, writes that, and reads it back, until it is so. Returns what it
+/// wrote, too.
+fn stop(stopper: &mut Program, line: &Line) -> (StopTimes, Vec<u8>) {
+    let start = Instant::now();
+    for _ in 0..100 {
+        let held = stopper.read(FINE_POSITION, FINE);
+        line.lock().expect("no panic").clear();
+        let request = write_request(FINE_TARGET, &held);
+        let sent = Instant::now();
+        stopper.send(&request);
+        if stopper.read(FINE_TARGET, FINE) != held {
+            continue;
+        }
+        let in_all = start.elapsed();
+        let line = line.lock().expect("no panic");
+        if let Some((arrived, _)) = line.iter().find(|(_, frame)| *frame == request) {
+            return (StopTimes { to_arm: *arrived - sent, in_all }, held);
+        }
+    }
+    panic!("the arm did not take a stop");
+}
+
+/// No program's target has come after the stop.
+#[track_caller]
+fn check_rests(line: &Line, stop: &[u8], context: &str) {
+    let line = line.lock().expect("no panic");
+    let place = line.iter().position(|(_, frame)| frame == stop).expect("the stop");
+    let after =
+        line[place..].iter().filter(|(_, frame)| frame[3] >= TARGET_POSITION && frame[3] < FINE_TARGET);
+    assert_eq!(after.count(), 0, "{context}: a target came after it");
+}
+
+/// Does the frame write targets, of this map or of the maker's?
+fn writes_targets(frame: &[u8]) -> bool {
+    let &[_, _, 4 | 6, address, count, ..] = frame else { return false };
+    let holds =
+        |first: u8, registers: u8| address < first + registers && address.saturating_add(count) > first;
+    holds(TARGET_POSITION, 7) || holds(FINE_TARGET, FINE)
+}
+
+fn farthest(one: &[u8], other: &[u8]) -> u16 {
+    let words = |bytes: &[u8]| -> Vec<u16> {
+        bytes.chunks(2).map(|word| u16::from_le_bytes([word[0], word[1]])).collect()
+    };
+    let pairs = words(one).into_iter().zip(words(other));
+    pairs.map(|(one, other)| one.abs_diff(other)).max().expect("joints")
+}
+
+fn report(attack: Attack, times: &[StopTimes]) {
+    let of = |select: fn(&StopTimes) -> Duration| {
+        let mut all: Vec<_> = times.iter().map(|times| select(times).as_secs_f64() * 1e3).collect();
+        all.sort_by(f64::total_cmp);
+        let at = |share: usize| all[(all.len() * share / 100).min(all.len() - 1)];
+        format!("p50 {:.1} ms, p99 {:.1} ms, at most {:.1} ms", at(50), at(99), at(100))
+    };
+    println!(
+        "{attack:?}: {} stops; on the line {}; confirmed {}",
+        times.len(),
+        of(|stop| stop.to_arm),
+        of(|stop| stop.in_all)
+    );
+}
