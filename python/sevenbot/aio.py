@@ -9,15 +9,21 @@ One thread of each arm waits for its calls, so that they run in order. A cancell
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterable, Awaitable, Callable, Iterable, Sequence
+from collections.abc import AsyncIterable, Awaitable, Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, SupportsIndex, TypeAlias, TypeVar, overload
 
 import sevenbot
+
+if TYPE_CHECKING:
+    from numpy import float64
+    from numpy.typing import NDArray
 
 __all__ = ["Arm", "Stream"]
 
 _Result = TypeVar("_Result")
+_Goal: TypeAlias = float | None
+_Angles: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 
 class Arm:
@@ -44,7 +50,11 @@ class Arm:
         return self.sync.simulation
 
     async def _call(self, method: Callable[..., _Result], *arguments: Any, **options: Any) -> _Result:
-        call = self._thread.submit(lambda: method(*arguments, **options))
+        try:
+            call = self._thread.submit(lambda: method(*arguments, **options))
+        except RuntimeError as error:
+            # The thread ends when the arm is closed.
+            raise sevenbot.Closed("the arm is closed") from error
         future = asyncio.wrap_future(call)
         # The result of a cancelled call is not used.
         future.add_done_callback(lambda done: done.cancelled() or done.exception())
@@ -58,7 +68,7 @@ class Arm:
                 await asyncio.to_thread(self.sync.stop)
             raise
 
-    async def angles(self) -> tuple[float, float, float, float, float, float, float]:
+    async def angles(self) -> _Angles:
         """The measured angles in degrees."""
         return await self._call(lambda: self.sync.angles)
 
@@ -66,7 +76,7 @@ class Arm:
         """As `sevenbot.Arm.get`."""
         return self._call(self.sync.get, name)
 
-    def set(self, name: str, values: Any, *, unlock: bool = False) -> Awaitable[None]:
+    def set(self, name: str, values: SupportsIndex | Iterable[SupportsIndex], *, unlock: bool = False) -> Awaitable[None]:
         """As `sevenbot.Arm.set`."""
         return self._call(self.sync.set, name, values, unlock=unlock)
 
@@ -74,15 +84,43 @@ class Arm:
         """As `sevenbot.Arm.where`."""
         return self._call(self.sync.where)
 
-    def pose(self, *angles: Any, **options: Any) -> Awaitable[Any]:
+    @overload
+    def pose(
+        self, *angles: _Goal | Iterable[_Goal],
+        speed: float | None = ..., duration: float | None = ..., wait: Literal[True] = ...,
+        table: float | None = ..., guard: bool = ...,
+    ) -> Awaitable[_Angles]: ...
+
+    @overload
+    def pose(
+        self, *angles: _Goal | Iterable[_Goal],
+        speed: float | None = ..., duration: float | None = ..., wait: Literal[False],
+        table: float | None = ..., guard: bool = ...,
+    ) -> Awaitable[None]: ...
+
+    def pose(self, *angles: Any, **options: Any) -> Awaitable[_Angles | None]:
         """As `sevenbot.Arm.pose`."""
         return self._call(self.sync.pose, *angles, **options)
 
-    def move_to(self, x: float, y: float, z: float, **options: Any) -> Awaitable[Any]:
+    @overload
+    def move_to(
+        self, x: float, y: float, z: float, *,
+        speed: float | None = ..., duration: float | None = ..., wait: Literal[True] = ...,
+        table: float | None = ..., guard: bool = ..., tool: Iterable[float] | None = ..., straight: bool = ...,
+    ) -> Awaitable[_Angles]: ...
+
+    @overload
+    def move_to(
+        self, x: float, y: float, z: float, *,
+        speed: float | None = ..., duration: float | None = ..., wait: Literal[False],
+        table: float | None = ..., guard: bool = ..., tool: Iterable[float] | None = ..., straight: bool = ...,
+    ) -> Awaitable[None]: ...
+
+    def move_to(self, x: float, y: float, z: float, **options: Any) -> Awaitable[_Angles | None]:
         """As `sevenbot.Arm.move_to`."""
         return self._call(self.sync.move_to, x, y, z, **options)
 
-    def wait(self) -> Awaitable[Any]:
+    def wait(self) -> Awaitable[_Angles | None]:
         """As `sevenbot.Arm.wait`."""
         return self._call(self.sync.wait)
 
@@ -94,9 +132,9 @@ class Arm:
         """As `sevenbot.Arm.status`."""
         return self._call(self.sync.status)
 
-    def park(self, *angles: Any, **options: Any) -> Awaitable[Any]:
+    def park(self, *angles: _Goal | Iterable[_Goal], keep: bool = False) -> Awaitable[_Angles]:
         """As `sevenbot.Arm.park`."""
-        return self._call(self.sync.park, *angles, **options)
+        return self._call(self.sync.park, *angles, keep=keep)
 
     def record(self, seconds: float, **options: Any) -> Awaitable[sevenbot.Recording]:
         """As `sevenbot.Arm.record`."""
@@ -106,9 +144,9 @@ class Arm:
         """As `sevenbot.Arm.play`."""
         return self._call(self.sync.play, recording, **options)
 
-    def sample(self, count: int, **options: Any) -> Awaitable[tuple[Any, Any]]:
+    def sample(self, count: int, *, period: float = 0.0) -> Awaitable[tuple[NDArray[float64], NDArray[float64]]]:
         """As `sevenbot.Arm.sample`."""
-        return self._call(self.sync.sample, count, **options)
+        return self._call(self.sync.sample, count, period=period)
 
     def stream(self, period: float = 0.02, **options: Any) -> Stream:
         """As `sevenbot.Arm.stream`: `async with arm.stream(0.02) as stream: await stream.send(...)`."""
@@ -120,7 +158,7 @@ class Arm:
 
     async def close(self) -> None:
         """Closes the port. The arm goes on with its move."""
-        await self._call(self.sync.close)
+        await asyncio.to_thread(self.sync.close)
         self._thread.shutdown(wait=False)
 
     async def __aenter__(self) -> Arm:
@@ -147,12 +185,12 @@ class Stream:
     async def __aexit__(self, *exception: Any) -> None:
         await self._arm._call(self.sync.__exit__, *exception)
 
-    def send(self, angles: Sequence[float | None]) -> Awaitable[int]:
+    def send(self, angles: Iterable[_Goal]) -> Awaitable[int]:
         """As `sevenbot.Stream.send`: waits until the point is due, and returns its number."""
         return self._arm._call(self.sync.send, angles)
 
     async def send_all(
-        self, points: AsyncIterable[Sequence[float | None]] | Iterable[Sequence[float | None]]
+        self, points: AsyncIterable[Iterable[_Goal]] | Iterable[Iterable[_Goal]]
     ) -> int:
         """Sends each point of an iterator, or of an asynchronous one. Returns how many it sent.
 

@@ -1,20 +1,21 @@
 //! `Arm`: a real arm or a simulated one.
 
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyTuple, PyType};
-use sevenbot::cartesian::{DOWN, TipTarget, Vector};
+use sevenbot::cartesian::{TipTarget, Vector};
 use sevenbot::moves::JointMove;
-use sevenbot::simulated::{self, SharedSimulation, SimulationConfig};
 
-use crate::arguments::{self, Goals, options, pace};
-use crate::errors::{not_opened, raised, warn_of};
+use crate::arguments::{self, Direction, Goals, OpenArguments, PortName, pace, whole};
+use crate::errors::{InvalidType, raised, without_attribute};
 use crate::motion::{self, PlayOptions, RecordOptions, TipWish};
+use crate::numbers::{Values, seed};
+use crate::opening::{self, Opened};
 use crate::recording::Recording;
-use crate::registers::{self, Registers, Shown, Values};
-use crate::simulation::{Simulation, duration};
+use crate::registers::{self, Registers, Shown};
+use crate::simulation::{SimulatedArm, Simulation, duration};
 use crate::status::Status;
 use crate::stream::Stream;
 use crate::tip::Tip;
@@ -24,7 +25,7 @@ use crate::{bulk, ports};
 mod calls;
 
 /// Seven angles.
-type Angles = (f64, f64, f64, f64, f64, f64, f64);
+pub(crate) type Angles = (f64, f64, f64, f64, f64, f64, f64);
 
 /// A 7Bot V2 arm.
 ///
@@ -32,91 +33,98 @@ type Angles = (f64, f64, f64, f64, f64, f64, f64);
 /// virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the end, as `stop()`, and closes the port.
 ///
 /// Angles are degrees, 0 to 180, joint 1 first; positions millimetres; times seconds.
-#[pyclass(frozen, module = "sevenbot")]
+#[pyclass(frozen, subclass, module = "sevenbot")]
 pub(crate) struct Arm {
     worker: Arc<Worker>,
-    simulation: Option<SharedSimulation>,
+    simulation: Option<Simulation>,
     /// The move that `wait` waits for.
     sent: Mutex<Option<Arc<JointMove>>>,
-    port: String,
-    firmware: String,
-    chip: String,
-    map: &'static str,
+    opened: Opened,
 }
 
+#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 #[pymethods]
 impl Arm {
     #[new]
     #[pyo3(signature = (port = None, *, baud = 115_200, timeout = 0.5, attempts = 3, map = None))]
     fn new(
         py: Python<'_>,
-        port: Option<String>,
-        baud: u32,
+        port: Option<PortName>,
+        baud: i64,
         timeout: f64,
-        attempts: u32,
+        attempts: i64,
         map: Option<&str>,
     ) -> PyResult<Self> {
-        let options = options(baud, timeout, attempts, map)?;
-        let port = port.map_or_else(|| ports::only_one(py, baud), Ok)?;
-        let opened = py.detach(|| sevenbot::Arm::open_with(&port, options));
-        let arm = opened.map_err(|why| not_opened(py, &port, &why))?;
-        Ok(Self::of(arm, None))
+        let options = OpenArguments { baud, timeout, attempts, map }.options(py)?;
+        let port = port.map_or_else(|| ports::only_one(py, options.baud), |port| Ok(port.0))?;
+        opening::port(py, &port, options).map(|(worker, opened)| Self::of(worker, opened, None))
     }
 
     /// An arm in virtual time. The same calls give the same values on every machine.
     ///
     /// `seed` determines the random faults of the host line, 0 to 2**64 - 1. `attempts` and `timeout` are as for a port.
     #[classmethod]
-    #[pyo3(signature = (seed = 1, *, timeout = 0.5, attempts = 3, map = None))]
+    #[pyo3(signature = (seed = None, *, timeout = 0.5, attempts = 3, map = None), text_signature = "(seed=1, *, timeout=0.5, attempts=3, map=None)")]
     fn simulated(
         _: &Bound<'_, PyType>,
         py: Python<'_>,
-        seed: u64,
+        seed: Option<&Bound<'_, PyAny>>,
         timeout: f64,
-        attempts: u32,
+        attempts: i64,
         map: Option<&str>,
-    ) -> PyResult<Self> {
-        let options = options(115_200, timeout, attempts, map)?;
-        let opened = py.detach(|| simulated::arm_with(SimulationConfig::default(), options));
-        let (arm, simulation) = opened.map_err(|why| not_opened(py, "simulated", &why))?;
-        simulation.with(|simulation| simulation.set_seed(seed));
-        Ok(Self::of(arm, Some(simulation)))
+    ) -> PyResult<Py<SimulatedArm>> {
+        let options = OpenArguments { baud: 115_200, timeout, attempts, map }.options(py)?;
+        let seed = seed.map_or(Ok(1), self::seed)?;
+        let (worker, opened, simulation) = opening::simulated(py, seed, options)?;
+        let simulation = Simulation::of(simulation);
+        SimulatedArm::of(py, Self::of(worker, opened, Some(simulation.clone())), simulation)
     }
 
     /// The simulation behind this arm; `None` for a real one.
     #[getter]
     fn simulation(&self) -> Option<Simulation> {
-        self.simulation.clone().map(Simulation::of)
+        self.simulation.clone()
     }
 
     /// The name of the port.
     #[getter]
     fn port(&self) -> &str {
-        &self.port
+        &self.opened.port
     }
 
     /// The firmware's version, such as `"3.0"`.
     #[getter]
     fn firmware(&self) -> &str {
-        &self.firmware
+        &self.opened.firmware
     }
 
     /// The chip's unique number, twelve hexadecimal digits.
     #[getter]
     fn chip_id(&self) -> &str {
-        &self.chip
+        &self.opened.chip
     }
 
     /// The register map of the frames, `"2.1"` or `"2.2"`. Names and addresses are those of map 2.2 with both.
     #[getter]
     fn map(&self) -> &str {
-        self.map
+        self.opened.map
+    }
+
+    /// Whether a long call shows its progress on a terminal. `True` at first.
+    #[getter]
+    fn progress(&self) -> bool {
+        self.worker.progress_switch().load(Ordering::Relaxed)
+    }
+
+    #[setter]
+    fn set_progress(&self, shown: bool) {
+        self.worker.progress_switch().store(shown, Ordering::Relaxed);
     }
 
     /// The registers as a mapping: `arm.registers["speed.1"] = 10`.
     #[getter]
     fn registers(&self) -> Registers {
-        Registers::of(Arc::clone(&self.worker))
+        Registers::of(Arc::clone(&self.worker), Arc::clone(&self.opened.names))
     }
 
     /// The value of a register, or a list if the name has several: `arm.get("offset")`.
@@ -126,12 +134,7 @@ impl Arm {
         registers::get(py, &self.worker, name)
     }
 
-    /// Writes a register, or several with one number for all or one each, and reads them back.
-    ///
-    /// Raises `ValueError` for a number out of range, and `NotTaken` if the arm does not take it. `unlock=True` opens the
-    /// EEPROM lock (register 28) for this write. A target of a driven joint is a move: `ArmProblem` is raised if the joint does
-    /// not answer or has let go, and nothing is written. Motor state 1 is watched for half a second as `stop()`. A motor state
-    /// without torque warns of servos that do not answer.
+    #[doc = include_str!("arm/help/set.txt")]
     #[pyo3(signature = (name, values, *, unlock = false))]
     fn set(&self, py: Python<'_>, name: &str, values: Values, unlock: bool) -> PyResult<()> {
         registers::set(py, &self.worker, name, &values, unlock)
@@ -142,30 +145,23 @@ impl Arm {
     /// Raises `ArmProblem` if a servo does not answer, because its angle is unknown then; `status()` has the others.
     #[getter]
     fn angles(&self, py: Python<'_>) -> PyResult<Angles> {
-        let read = self.worker.call(py, |arm, _| motion::known_angles(arm))?;
+        let read =
+            self.worker.read(py, motion::known_angles).map_err(|error| without_attribute(py, error))?;
         Ok(raised(py, read)?.into())
     }
 
     /// Where the arm is: tip, tool and wrist in millimetres, and the angles. Raises `ArmProblem` as `angles` does.
     #[pyo3(name = "where")]
     fn where_(&self, py: Python<'_>) -> PyResult<Tip> {
-        let read = self.worker.call(py, |arm, _| {
+        let read = self.worker.read(py, |arm| {
             arm.wait_until_settled()?;
             motion::known_angles(arm)
         })?;
         raised(py, read).map(Tip::at)
     }
 
-    /// Moves joints: `arm.pose(120, 90, 65.25, None, None, None, 80)`, or one list of seven.
-    ///
-    /// Angles are 0 to 180 degrees in steps of 0.01; `None` leaves a joint. `speed` is 1.9 to 190 degrees per second in
-    /// steps of 1.9, rounded down; or `duration` 0.1 to 10 seconds. Both stay set for later moves. Waits until the joints
-    /// have arrived and returns the measured angles; with `wait=False` returns `None` at once. Raises `ArmProblem` if a joint of the
-    /// move is blocked, let go or silent, the servos have no supply, or the controller restarted.
-    ///
-    /// Warns with `GuardWarning` if the way leads below the table or into the base: see `move_to`.
+    #[doc = include_str!("arm/help/pose.txt")]
     #[pyo3(signature = (*angles, speed = None, duration = None, wait = true, table = None, guard = true))]
-    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn pose(
         &self,
         py: Python<'_>,
@@ -176,30 +172,21 @@ impl Arm {
         table: Option<f64>,
         guard: bool,
     ) -> PyResult<Option<Angles>> {
-        let (targets, pace) = (Goals::of(angles)?.targets()?, pace(speed, duration)?);
-        self.warn_of_way(py, targets, pace, arguments::guard(table, guard)?)?;
+        let (targets, pace) = (Goals::of(angles)?.targets(py)?, pace(py, speed, duration)?);
+        self.warn_of_way(py, targets, pace, arguments::guard(py, table, guard)?)?;
         self.go(py, targets, pace, wait)
     }
 
-    /// Moves the tip to x, y, z in millimetres, with the tool in a direction of any length, by default straight down.
-    ///
-    /// `speed` and `duration` are those of `pose`. With `straight` the tip moves on a straight line, from its present
-    /// targets, with `speed` in millimetres per second (default 50). Raises `OutOfReach` with the nearest point within
-    /// reach; then nothing moves.
-    ///
-    /// The guard keeps the arm above a table at the height `table` in millimetres, by default the foot of the base (-60),
-    /// and 10 mm away from the base, also on the way. It knows no suction cup and no claw: raise the table by its length.
-    /// Raises `OutsideGuard` with the nearest allowed point; then nothing moves. `guard=False` checks none of this.
+    #[doc = include_str!("arm/help/move_to.txt")]
     #[pyo3(signature = (x, y, z, *, tool = None, speed = None, duration = None, wait = true, straight = false,
                         table = None, guard = true))]
-    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn move_to(
         &self,
         py: Python<'_>,
         x: f64,
         y: f64,
         z: f64,
-        tool: Option<(f64, f64, f64)>,
+        tool: Option<Direction>,
         speed: Option<f64>,
         duration: Option<f64>,
         wait: bool,
@@ -207,20 +194,20 @@ impl Arm {
         table: Option<f64>,
         guard: bool,
     ) -> PyResult<Option<Angles>> {
-        let tip = Vector::new(x, y, z);
-        let tool = tool.map_or(DOWN, |(x, y, z)| Vector::new(x, y, z));
-        let guard = arguments::guard(table, guard)?;
-        let wish = TipWish { tip, tool, speed, guard };
-        let target = raised(py, TipTarget::guarded(tip, tool, guard.as_ref()))?;
+        let (tip, tool) = (Vector::new(x, y, z), Direction::or_down(tool));
+        let guard = arguments::guard(py, table, guard)?;
         if straight {
-            return self.move_straight(py, wish).map(Some);
+            let pace = arguments::line_pace(py, speed, duration)?;
+            return self.move_straight(py, TipWish { tip, tool, guard }, pace, wait).map(Some);
         }
-        self.go_to_tip(py, wish, target, pace(speed, duration)?, wait)
+        let pace = pace(py, speed, duration)?;
+        let target = raised(py, TipTarget::guarded(tip, tool, guard.as_ref()))?;
+        self.go_to_tip(py, TipWish { tip, tool, guard }, target, pace, wait)
     }
 
-    /// Waits until the joints of the last move have arrived, and returns the measured angles.
+    /// Waits until the joints of the last move rest, and returns their measured angles; `None` if there is no move.
     ///
-    /// Raises `NotReached` if a joint does not arrive. Ctrl-C makes the arm hold.
+    /// Raises `NotReached` if a joint does not arrive. Ctrl-C makes the arm hold. Other threads may read meanwhile.
     fn wait(&self, py: Python<'_>) -> PyResult<Option<Angles>> {
         let Some(sent) = lock(&self.sent).take() else { return Ok(None) };
         let finished = self.worker.call(py, move |arm, watch| motion::finish(arm, &sent, watch))?;
@@ -229,16 +216,12 @@ impl Arm {
 
     /// Waits this many seconds, 0 to 86400, on the clock of the arm: virtual time for a simulated one.
     fn sleep(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
-        let time = duration(seconds)?;
+        let time = duration(py, seconds)?;
         let slept = self.worker.call(py, move |arm, watch| motion::sleep(arm, time, watch))?;
         raised(py, slept)
     }
 
-    /// Makes every joint hold its position, and watches for half a second whether it does. Ends a move of another thread.
-    ///
-    /// Returns the targets in degrees. If the motors are off, writes nothing. Raises `ArmProblem` if a joint is silent or has let
-    /// go, the servos have no supply, or the controller restarted; the other joints hold. Raises `MayMove` if the arm does not
-    /// answer.
+    #[doc = include_str!("arm/help/stop.txt")]
     fn stop(&self, py: Python<'_>) -> PyResult<Vec<u16>> {
         self.worker.interrupt();
         lock(&self.sent).take();
@@ -249,35 +232,26 @@ impl Arm {
     /// The health of the arm: each joint, alarms, supply, and what needs attention. `None` if the firmware does not tell, as
     /// the maker's.
     fn status(&self, py: Python<'_>) -> PyResult<Option<Status>> {
-        let read = self.worker.call(py, |arm, _| Status::read(arm))?;
+        let read = self.worker.read(py, Status::read)?;
         raised(py, read)
     }
 
-    /// Moves slowly to a pose in which the arm may be let go, switches the motors to damping, and checks for two seconds that the
-    /// arm stays. Returns the measured angles.
-    ///
-    /// Without angles it is the pose that was kept for this arm, or the standard park pose, which is right for an empty gripper:
-    /// rear arm upright, forearm folded up. `keep=True` keeps the given angles for this arm. If a joint sinks by more than 2 degrees,
-    /// the arm holds again, and `NotReached` is raised. `arm.set("motor-state", 1)` makes a parked arm hold.
+    #[doc = include_str!("arm/help/park.txt")]
     #[pyo3(signature = (*angles, keep = false))]
     fn park(&self, py: Python<'_>, angles: &Bound<'_, PyTuple>, keep: bool) -> PyResult<Angles> {
-        let pose = if angles.is_empty() { None } else { Some(Goals::of(angles)?.targets()?) };
+        let pose = if angles.is_empty() { None } else { Some(Goals::of(angles)?.targets(py)?) };
         if keep && pose.is_none() {
-            return Err(PyValueError::new_err("keep=True needs seven angles"));
+            return Err(InvalidType::raise(py, "keep=True needs seven angles"));
         }
-        let parked = self.worker.call(py, move |arm, watch| motion::park(arm, pose, keep, watch))?;
-        Ok(raised(py, parked)?.map_err(|error| PyOSError::new_err(error.to_string()))?.into())
+        self.park_at(py, pose, keep)
     }
 
-    /// A stream of set-points, one each `period` seconds, 0.005 to 1: a context manager.
-    ///
-    /// If the program sends nothing for `watchdog` seconds, 0.01 to 2.55 or 0 for never, the arm holds; with `damping` it
-    /// sinks slowly. Needs this project's firmware, or raises `NotServed`. `approach`: seconds to go smoothly to the first
-    /// point, 0.1 to 60; without it a point further than 5 degrees raises `TooFar`. `table` and `guard`: see `pose`.
+    #[doc = include_str!("arm/help/stream.txt")]
     #[pyo3(signature = (period = 0.02, *, watchdog = 0.3, damping = false, approach = None, table = None,
                         guard = true))]
     fn stream(
         &self,
+        py: Python<'_>,
         period: f64,
         watchdog: f64,
         damping: bool,
@@ -285,70 +259,53 @@ impl Arm {
         table: Option<f64>,
         guard: bool,
     ) -> PyResult<Stream> {
-        let (rule, guard) = (arguments::approach(approach)?, arguments::guard(table, guard)?);
-        Stream::new(Arc::clone(&self.worker), period, (watchdog, damping), rule, guard)
+        let (rule, guard) = (arguments::approach(py, approach)?, arguments::guard(py, table, guard)?);
+        let options = arguments::stream(py, period, watchdog, damping)?;
+        let simulation = self.simulation.as_ref().map(|simulation| simulation.shared_with_line().clone());
+        Ok(Stream::new(Arc::clone(&self.worker), options, rule, guard, simulation))
     }
 
-    /// Records the positions for `seconds`, 0 to 86400, or until Ctrl-C, `hz` times a second, 1 to 50.
+    /// Records the positions for `seconds`, 0 to 86400, or until Ctrl-C, `hz` times a second, 1 to 50. Raises `Interrupted` if
+    /// another thread calls `stop()`.
     ///
     /// With `guided` the motors go off, so that you can guide the arm by hand: it falls unless you hold it. At the end it
     /// holds where it is.
     #[pyo3(signature = (seconds = None, *, hz = 30, guided = false))]
-    fn record(&self, py: Python<'_>, seconds: Option<f64>, hz: u8, guided: bool) -> PyResult<Recording> {
-        if !(1..=50).contains(&hz) {
-            return Err(PyValueError::new_err("use 1 to 50 moments per second"));
-        }
-        let limit = seconds.map(duration).transpose()?;
+    fn record(&self, py: Python<'_>, seconds: Option<f64>, hz: i64, guided: bool) -> PyResult<Recording> {
+        let hz = whole(py, "hz", hz, 1, 50)?;
+        let limit = seconds.map(|seconds| duration(py, seconds)).transpose()?;
         self.record_moments(py, RecordOptions { limit, hz, is_guided: guided })
     }
 
-    /// Plays a recording, `speed` times as fast (0.1 to 10), `times` times, and returns the measured positions of the
-    /// first run.
-    ///
-    /// The whole recording is checked before the arm moves. Ctrl-C makes it hold. `approach`: seconds to go smoothly to the
-    /// first pose, 0.1 to 60, also between the runs; without it a pose further than 5 degrees raises `TooFar`.
-    ///
-    /// Warns with `GuardWarning` if the recording leads below the table or into the base: see `move_to`.
+    #[doc = include_str!("arm/help/play.txt")]
     #[pyo3(signature = (recording, *, speed = 1.0, times = 1, approach = None, table = None, guard = true))]
-    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn play(
         &self,
         py: Python<'_>,
         recording: &Recording,
         speed: f64,
-        times: u32,
+        times: i64,
         approach: Option<f64>,
         table: Option<f64>,
         guard: bool,
     ) -> PyResult<Recording> {
-        if !(0.1..=10.0).contains(&speed) || times == 0 {
-            return Err(PyValueError::new_err("use a speed of 0.1 to 10, and at least one time"));
-        }
-        raised(py, recording.moments().check_speeds(speed))?;
-        let guard = arguments::guard(table, guard)?;
-        if let Some(breach) = guard.and_then(|guard| guard.check_recording(recording.moments()).err()) {
-            warn_of(py, &breach)?;
-        }
-        let options = PlayOptions { factor: speed, times, approach: arguments::approach(approach)? };
-        self.play_moments(py, recording.moments().clone(), options)
+        let times = whole(py, "times", times, 1, i64::from(u32::MAX))?;
+        let guard = arguments::guard(py, table, guard)?;
+        let options = PlayOptions { factor: speed, times, approach: arguments::approach(py, approach)? };
+        self.play_guarded(py, recording.moments(), options, guard)
     }
 
-    /// Reads all positions `count` times, one read after the other, or one each `period` seconds.
-    ///
-    /// Raises `ArmProblem` if a servo does not answer meanwhile, or the controller restarts.
-    ///
-    /// Returns times in seconds and angles in degrees: numpy arrays of shape (n,) and (n, 7) if numpy is installed. Python
-    /// threads run meanwhile, and do not delay the reads.
+    #[doc = include_str!("arm/help/sample.txt")]
     #[pyo3(signature = (count, *, period = 0.0))]
     fn sample<'py>(
         &self,
         py: Python<'py>,
-        count: u32,
+        count: i64,
         period: f64,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let period = duration(period)?;
-        let work = move |arm: &mut _, watch: &mut _| motion::sample(arm, count, period, watch);
-        let (times, rows) = raised(py, self.worker.call(py, work)?)?;
+        let (count, period) = (whole(py, "count", count, 0, i64::from(u32::MAX))?, duration(py, period)?);
+        let sampled = self.worker.call(py, move |arm, watch| motion::sample(arm, count, period, watch))?;
+        let (times, rows) = raised(py, sampled)?;
         Ok((bulk::numbers(py, &times)?, bulk::angles(py, &rows)?))
     }
 
@@ -373,6 +330,7 @@ impl Arm {
 
     fn __repr__(&self) -> String {
         let state = if self.worker.is_open() { "" } else { ", closed" };
-        format!("<Arm at {}, firmware {}, map {}{state}>", self.port, self.firmware, self.map)
+        let Opened { port, firmware, map, .. } = &self.opened;
+        format!("<Arm at {port}, firmware {firmware}, map {map}{state}>")
     }
 }

@@ -18,6 +18,9 @@ mod bulk;
 mod errors;
 mod health;
 mod motion;
+mod numbers;
+mod opening;
+mod place;
 mod ports;
 mod progress;
 mod recording;
@@ -26,6 +29,7 @@ mod simulation;
 mod status;
 mod stream;
 mod tip;
+mod watch;
 mod worker;
 
 /// The compiled part of `sevenbot`.
@@ -37,6 +41,7 @@ fn _sevenbot(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<health::Problem>()?;
     module.add_class::<recording::Recording>()?;
     module.add_class::<registers::Registers>()?;
+    module.add_class::<simulation::SimulatedArm>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<simulation::SimulationSnapshot>()?;
     module.add_class::<status::Status>()?;

@@ -4,7 +4,7 @@ use std::io;
 use std::time::Duration;
 
 use sevenbot::approach::ApproachRule;
-use sevenbot::cartesian::{Guard, PathBreach, StraightLine, StraightLineRequest, Vector};
+use sevenbot::cartesian::{Guard, PathBreach, StraightLine, StraightLineRequest, TipPose, Vector};
 use sevenbot::fine::FineTargets;
 use sevenbot::health::{MoveCheck, Problem, ProblemKind};
 use sevenbot::map::{FINE_POSITION, MOTOR_STATE, VACUUM_PUMP, motor_state};
@@ -14,22 +14,22 @@ use sevenbot::moves::{
 use sevenbot::recording::{FileVersion, Moment, Recording, RecordingLines};
 use sevenbot::{Arm, Error, FineAngle, Span, park_poses};
 
+use crate::arguments::{LINE_SPEEDS, LinePace};
 use crate::errors::StraightMoveError;
-use crate::worker::Watch;
+use crate::watch::Watch;
 
 /// The longest time between two questions whether the call goes on.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
-
-/// Speed of the tip on a straight line, in mm/s.
-const DEFAULT_MM_PER_SECOND: f64 = 50.0;
+/// The same for a caller that sleeps, on the clock of the arm.
+const SLEEP_PERIOD: Duration = Duration::from_millis(20);
+/// The tip stays on a line that is shorter than this, in millimetres.
+const SHORTEST_LINE: f64 = 0.5;
 
 /// Where the tip shall go.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TipWish {
     pub(crate) tip: Vector,
     pub(crate) tool: Vector,
-    /// Of the joints in degrees per second, or of the tip on a straight line in mm/s.
-    pub(crate) speed: Option<f64>,
     pub(crate) guard: Option<Guard>,
 }
 
@@ -57,7 +57,7 @@ pub(crate) fn begin(arm: &mut Arm, targets: FineTargets, pace: Pace) -> Result<J
 }
 
 /// Waits for a move. If the caller ends the wait, the arm holds.
-pub(crate) fn finish(arm: &mut Arm, sent: &JointMove, watch: &mut Watch) -> Result<[f64; 7], MoveError> {
+pub(crate) fn finish(arm: &mut Arm, sent: &JointMove, watch: &mut Watch<'_>) -> Result<[f64; 7], MoveError> {
     let finished = sent.finish(arm, watch);
     if finished == Err(MoveError::Interrupted) {
         arm.hold()?;
@@ -71,7 +71,7 @@ pub(crate) fn park(
     arm: &mut Arm,
     pose: Option<FineTargets>,
     keep: bool,
-    watch: &mut Watch,
+    watch: &mut Watch<'_>,
 ) -> Result<io::Result<[f64; 7]>, ParkError> {
     let (path, chip) = (park_poses::path(), arm.identity().chip_name());
     let kept = match (&path, pose) {
@@ -108,15 +108,35 @@ pub(crate) fn breach_on_way(
 }
 
 /// A straight line from the present targets, as a recording.
-pub(crate) fn straight_line(arm: &mut Arm, wish: TipWish) -> Result<Recording, StraightMoveError> {
-    let TipWish { tip, tool, guard, .. } = wish;
+pub(crate) fn straight_line(
+    arm: &mut Arm,
+    wish: TipWish,
+    pace: LinePace,
+) -> Result<Recording, StraightMoveError> {
+    let TipWish { tip, tool, guard } = wish;
     let joints = arm.driven_joints()?;
-    let line = LineStart::of(arm, &joints)?.line_to(tip, tool, wish.speed.unwrap_or(DEFAULT_MM_PER_SECOND));
+    let start = LineStart::of(arm, &joints)?;
+    let speed = match pace {
+        LinePace::Speed(speed) => speed,
+        LinePace::Within(seconds) => speed_within(start, tip, seconds)?,
+    };
+    let line = start.line_to(tip, tool, speed);
     Ok(StraightLine::plan(&StraightLineRequest { guard, ..line })?.recording)
 }
 
+/// The speed of the tip, in mm/s, that takes it there in this time. A tip that stays has none: the tool alone turns.
+fn speed_within(start: LineStart, tip: Vector, seconds: f64) -> Result<f64, StraightMoveError> {
+    let from = TipPose::of_fine(start.targets).tip;
+    let length = (tip.x - from.x).hypot(tip.y - from.y).hypot(tip.z - from.z);
+    match length / seconds {
+        _ if length < SHORTEST_LINE => Ok(*LINE_SPEEDS.start()),
+        speed if LINE_SPEEDS.contains(&speed) => Ok(speed),
+        _ => Err(StraightMoveError::Pace { length, seconds }),
+    }
+}
+
 /// Waits on the clock of the arm's line.
-pub(crate) fn sleep(arm: &mut Arm, time: Duration, watch: &mut Watch) -> Result<(), MoveError> {
+pub(crate) fn sleep(arm: &mut Arm, time: Duration, watch: &mut Watch<'_>) -> Result<(), MoveError> {
     let end = arm.now() + time;
     loop {
         let left = end.saturating_duration_since(arm.now());
@@ -127,7 +147,7 @@ pub(crate) fn sleep(arm: &mut Arm, time: Duration, watch: &mut Watch) -> Result<
             arm.hold()?;
             return Err(MoveError::Interrupted);
         }
-        arm.sleep(left.min(POLL_PERIOD));
+        watch.pause(arm, left.min(SLEEP_PERIOD));
     }
 }
 
@@ -146,7 +166,7 @@ pub(crate) fn sample(
     arm: &mut Arm,
     count: u32,
     period: Duration,
-    watch: &mut Watch,
+    watch: &mut Watch<'_>,
 ) -> Result<(Vec<f64>, Vec<[f64; 7]>), MoveError> {
     let mut check = MoveCheck::of_positions(arm);
     let row = arm.has_extended_block()?.then_some(FINE_POSITION);
@@ -154,7 +174,7 @@ pub(crate) fn sample(
     let (mut times, mut rows) = (Vec::new(), Vec::new());
     for number in 0..count {
         if !watch.goes_on() {
-            break;
+            return Err(MoveError::Interrupted);
         }
         let due = start + period.saturating_mul(number);
         arm.sleep(due.saturating_duration_since(arm.now()));
@@ -179,8 +199,21 @@ pub(crate) struct RecordOptions {
     pub(crate) is_guided: bool,
 }
 
-/// Records until the time is over or the caller ends it. Returns the text of the recording.
-pub(crate) fn record(arm: &mut Arm, options: RecordOptions, watch: &mut Watch) -> Result<String, MoveError> {
+/// What was recorded.
+#[derive(Debug, Default)]
+pub(crate) struct Recorded {
+    /// The text of the recording.
+    pub(crate) text: String,
+    /// When each moment arrived here, in seconds since the first.
+    pub(crate) arrivals: Vec<f64>,
+}
+
+/// Records until the time is over or a signal of Python ends it.
+pub(crate) fn record(
+    arm: &mut Arm,
+    options: RecordOptions,
+    watch: &mut Watch<'_>,
+) -> Result<Recorded, MoveError> {
     let RecordOptions { hz, is_guided, .. } = options;
     let before = arm.joints()?;
     if is_guided {
@@ -206,21 +239,24 @@ fn record_reports(
     arm: &mut Arm,
     options: RecordOptions,
     content: u8,
-    watch: &mut Watch,
-) -> Result<String, MoveError> {
+    watch: &mut Watch<'_>,
+) -> Result<Recorded, MoveError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut lines = RecordingLines::new(FileVersion::Hundredths);
-    let mut text = lines.head();
+    let mut done = Recorded { text: lines.head(), arrivals: Vec::new() };
     let mut recorder = Recorder::new(arm, options.hz, content);
+    let mut first = None;
     while watch.goes_on() {
-        let Some(recorded) = recorder.next(arm, POLL_PERIOD)? else { continue };
-        if options.limit.is_some_and(|limit| recorded.time > limit) {
+        let Some(pose) = recorder.next(arm, POLL_PERIOD)? else { continue };
+        if options.limit.is_some_and(|limit| pose.time > limit) {
             break;
         }
-        let moment = Moment { time: recorded.time, pose: recorded.pose, vacuum };
-        text.extend(lines.add(&moment));
+        let line = lines.add(&Moment { time: pose.time, pose: pose.pose, vacuum });
+        let first = *first.get_or_insert(pose.received);
+        done.arrivals.extend(line.is_some().then(|| (pose.received - first).as_secs_f64()));
+        done.text.extend(line);
     }
-    Ok(text)
+    if watch.is_stopped() { Err(MoveError::Interrupted) } else { Ok(done) }
 }
 
 /// How a recording is played.
@@ -236,7 +272,7 @@ pub(crate) fn play(
     arm: &mut Arm,
     recording: &Recording,
     options: PlayOptions,
-    watch: &mut Watch,
+    watch: &mut Watch<'_>,
 ) -> Result<String, MoveError> {
     arm.driven_joints()?;
     let mut player = Player::new(recording, options.factor).with_approach(options.approach);

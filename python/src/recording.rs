@@ -1,35 +1,56 @@
 //! `Recording`: a movement as a text file, and as arrays.
 
 use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
-use pyo3::types::PyType;
+use pyo3::types::{PySlice, PyType};
 use sevenbot::recording::{FileVersion, Moment, Recording as Moments, head};
 
+use crate::arm::Angles;
 use crate::bulk;
-use crate::errors::raised;
+use crate::errors::{InvalidType, InvalidValue, file_error, raised};
+use crate::numbers::{Numbers, Rows, elements};
 
 /// A movement: times in seconds, angles of joints 1 to 7 in degrees, and the vacuum pump.
 ///
-/// The file is that of `sevenbot record`: text, one line for each moment.
+/// The file is that of `sevenbot record`: text, one line for each moment. `recording[0]` is the first moment: its time, its
+/// angles, and whether the pump sucks. `recording[10:20]` is a part, and `len(recording)` the number of moments. Recordings
+/// with the same moments are equal.
 #[pyclass(frozen, module = "sevenbot")]
-pub(crate) struct Recording(Moments);
+pub(crate) struct Recording {
+    moments: Moments,
+    arrivals: Option<Vec<f64>>,
+}
 
 impl Recording {
-    pub(crate) fn parse(py: Python<'_>, text: &str) -> PyResult<Self> {
-        raised(py, Moments::parse(text)).map(Self)
+    /// From a text that this program has written.
+    pub(crate) fn of_text(py: Python<'_>, text: &str) -> PyResult<Self> {
+        raised(py, Moments::parse(text)).map(|moments| Self { moments, arrivals: None })
+    }
+
+    pub(crate) fn with_arrivals(self, arrivals: Vec<f64>) -> Self {
+        Self { arrivals: Some(arrivals), ..self }
     }
 
     pub(crate) const fn moments(&self) -> &Moments {
-        &self.0
+        &self.moments
     }
 
-    fn text(&self) -> String {
-        let lines = self.0.moments().map(|moment| moment.line(FileVersion::Hundredths) + "\n");
+    fn text_of(moments: impl Iterator<Item = Moment>) -> String {
+        let lines = moments.map(|moment| moment.line(FileVersion::Hundredths) + "\n");
         head(FileVersion::Hundredths) + &lines.collect::<String>()
     }
+}
+
+/// The arguments of [`Recording::parse`].
+type Pickled = (String, Option<Vec<f64>>);
+
+/// A moment in Python: time, angles, pump.
+fn told(moment: Moment) -> (f64, Angles, bool) {
+    (moment.time.as_secs_f64(), moment.pose.map(sevenbot::FineAngle::degrees).into(), moment.vacuum)
 }
 
 #[pymethods]
@@ -37,7 +58,23 @@ impl Recording {
     /// Reads a file.
     #[classmethod]
     fn load(_: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        Self::parse(py, &fs::read_to_string(path)?)
+        let text = fs::read_to_string(&path).map_err(|why| file_error(py, &path, &why))?;
+        Self::of_text(py, &text)
+    }
+
+    /// From the text of a file, as `str(recording)` gives it, and the times of arrival.
+    #[classmethod]
+    #[pyo3(signature = (text, arrivals = None))]
+    fn parse(_: &Bound<'_, PyType>, py: Python<'_>, text: &str, arrivals: Option<Numbers>) -> PyResult<Self> {
+        let recording = Self::of_text(py, text)?;
+        let Some(Numbers(arrivals)) = arrivals else { return Ok(recording) };
+        if arrivals.len() != recording.__len__() {
+            return Err(InvalidValue::raise(
+                py,
+                "the recording and its times of arrival have different lengths",
+            ));
+        }
+        Ok(recording.with_arrivals(arrivals))
     }
 
     /// From times in seconds, in ascending order, and as many rows of seven angles, 0 to 180 degrees.
@@ -46,63 +83,142 @@ impl Recording {
     fn from_points(
         _: &Bound<'_, PyType>,
         py: Python<'_>,
-        times: Vec<f64>,
-        angles: Vec<[f64; 7]>,
-        vacuum: Option<Vec<bool>>,
+        times: Numbers,
+        angles: Rows,
+        vacuum: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let vacuum = vacuum.unwrap_or_else(|| vec![false; times.len()]);
+        let (Numbers(times), Rows(angles)) = (times, angles);
+        let vacuum = vacuum.map_or_else(|| Ok(vec![false; times.len()]), |vacuum| switches(py, vacuum))?;
         if times.len() != angles.len() || times.len() != vacuum.len() {
-            return Err(PyValueError::new_err("times, angles and vacuum have different lengths"));
+            return Err(InvalidValue::raise(py, "times, angles and vacuum have different lengths"));
         }
         let lines = times.iter().zip(&angles).zip(&vacuum).map(|((time, angles), vacuum)| {
             let angles = angles.map(|angle| format!(" {angle:.2}")).concat();
             format!("{time:.3}{angles} {}\n", u8::from(*vacuum))
         });
-        Self::parse(py, &(head(FileVersion::Hundredths) + &lines.collect::<String>()))
+        Self::of_text(py, &(head(FileVersion::Hundredths) + &lines.collect::<String>()))
     }
 
     /// Writes a file, which `sevenbot play` takes, too.
-    fn save(&self, path: PathBuf) -> PyResult<()> {
-        Ok(fs::write(path, self.text())?)
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        fs::write(&path, self.__str__()).map_err(|why| file_error(py, &path, &why))
     }
 
     /// The times of the moments in seconds: a numpy array, or a tuple without numpy.
+    ///
+    /// `Arm.record` has the times of measurement: the arm measures at even times, and a moment that arrives late still has its
+    /// own.
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let times: Vec<f64> = self.0.moments().map(|moment| moment.time.as_secs_f64()).collect();
+        let times: Vec<f64> = self.moments.moments().map(|moment| moment.time.as_secs_f64()).collect();
         bulk::numbers(py, &times)
+    }
+
+    /// When each moment of `Arm.record` arrived here, in seconds since the first: as `times`. `None` for another recording.
+    #[getter]
+    fn arrivals<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.arrivals.as_ref().map(|arrivals| bulk::numbers(py, arrivals)).transpose()
     }
 
     /// The angles in degrees, one row of seven for each moment: a numpy array, or a tuple of lists without numpy.
     #[getter]
     fn angles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let degrees = |moment: Moment| moment.pose.map(sevenbot::FineAngle::degrees);
-        bulk::angles(py, &self.0.moments().map(degrees).collect::<Vec<_>>())
+        bulk::angles(py, &self.moments.moments().map(degrees).collect::<Vec<_>>())
     }
 
     /// Does the vacuum pump suck? One for each moment.
     #[getter]
     fn vacuum(&self) -> Vec<bool> {
-        self.0.moments().map(|moment| moment.vacuum).collect()
+        self.moments.moments().map(|moment| moment.vacuum).collect()
     }
 
     /// The time from the first moment to the last, in seconds.
     #[getter]
     fn duration(&self) -> f64 {
-        self.0.duration().as_secs_f64()
+        self.moments.duration().as_secs_f64()
     }
 
     /// Checks that every joint can follow at `speed` times the recorded speed. Raises `BadRecording`.
     #[pyo3(signature = (speed = 1.0))]
     fn check(&self, py: Python<'_>, speed: f64) -> PyResult<()> {
-        raised(py, self.0.check_speeds(speed))
+        if !(speed.is_finite() && speed > 0.0) {
+            return Err(InvalidValue::raise(py, "use a positive speed: 2 is twice that of the recording"));
+        }
+        raised(py, self.moments.check_speeds(speed))
     }
 
     fn __len__(&self) -> usize {
-        self.0.moments().count()
+        self.moments.moments().count()
+    }
+
+    fn __getitem__(&self, py: Python<'_>, index: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        let length = isize::try_from(self.__len__()).unwrap_or(isize::MAX);
+        if let Ok(slice) = index.cast::<PySlice>() {
+            let at = slice.indices(length)?;
+            return Ok(self
+                .part(py, (at.start, at.step), at.slicelength)?
+                .into_pyobject(py)?
+                .into_any()
+                .unbind());
+        }
+        let index: isize =
+            index.call_method0("__index__").and_then(|index| index.extract()).map_err(|_| {
+                InvalidType::raise(py, "a recording has the numbers of its moments, and slices, as indices")
+            })?;
+        let index = if index < 0 { index.saturating_add(length) } else { index };
+        let moment = usize::try_from(index).ok().and_then(|index| self.moments.moments().nth(index));
+        let moment =
+            moment.ok_or_else(|| PyIndexError::new_err("the recording has no moment of this number"))?;
+        Ok(told(moment).into_pyobject(py)?.into_any().unbind())
+    }
+
+    fn __iter__(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let moments: Vec<_> = self.moments.moments().map(told).collect();
+        Ok(moments.into_pyobject(py)?.call_method0("__iter__")?.unbind())
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.moments.moments().eq(other.moments.moments())
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.__str__().hash(&mut hasher);
+        hasher.finish()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
+        Ok((py.get_type::<Self>().getattr("parse")?, (self.__str__(), self.arrivals.clone())))
+    }
+
+    fn __str__(&self) -> String {
+        Self::text_of(self.moments.moments())
     }
 
     fn __repr__(&self) -> String {
         format!("<Recording: {} moments in {:.1} s>", self.__len__(), self.duration())
     }
+}
+
+impl Recording {
+    /// The moments from a start on, each this many further than the one before. Backwards there is no time.
+    fn part(&self, py: Python<'_>, (start, step): (isize, isize), length: usize) -> PyResult<Self> {
+        let (Ok(start), Ok(step @ 1..)) = (usize::try_from(start), usize::try_from(step)) else {
+            return Err(InvalidValue::raise(py, "a part of a recording goes forward: use a positive step"));
+        };
+        let moments = self.moments.moments().skip(start).step_by(step).take(length);
+        let part = Self::of_text(py, &Self::text_of(moments))?;
+        let arrivals = self.arrivals.as_ref().map(|arrivals| {
+            arrivals.iter().copied().skip(start).step_by(step).take(length).collect::<Vec<_>>()
+        });
+        Ok(Self { arrivals, ..part })
+    }
+}
+
+/// On or off, of numbers or truths.
+fn switches(py: Python<'_>, vacuum: &Bound<'_, PyAny>) -> PyResult<Vec<bool>> {
+    let wrong = || InvalidType::raise(py, "vacuum is a list or an array of truths");
+    let each = elements(vacuum, usize::MAX).ok_or_else(wrong)?;
+    each.iter().map(|one| one.is_truthy().map_err(|_| wrong())).collect()
 }

@@ -3,7 +3,7 @@
 use std::ffi::CString;
 use std::sync::Arc;
 
-use pyo3::exceptions::{PyKeyError, PyUserWarning};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use sevenbot::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION};
 use sevenbot::moves::MoveError;
@@ -13,24 +13,9 @@ use sevenbot::register_values::bytes;
 use sevenbot::table::{access, range, rows};
 use sevenbot::{Register, Span};
 
-use crate::errors::{NotServed, error, raised};
+use crate::errors::{NotServed, UnknownRegister, error, raised};
+use crate::numbers::Values;
 use crate::worker::Worker;
-
-/// A number, or one for each register.
-#[derive(FromPyObject)]
-pub(crate) enum Values {
-    One(i32),
-    Each(Vec<i32>),
-}
-
-impl Values {
-    fn as_slice(&self) -> &[i32] {
-        match self {
-            Self::One(value) => std::slice::from_ref(value),
-            Self::Each(values) => values,
-        }
-    }
-}
 
 /// A number, a text (chip id), or a list of them.
 #[derive(IntoPyObject)]
@@ -49,7 +34,7 @@ impl From<&RegisterEntry> for Shown {
 /// Reads the registers of a name.
 pub(crate) fn get(py: Python<'_>, worker: &Worker, name: &str) -> PyResult<Shown> {
     let span = raised(py, parse(name))?;
-    let snapshot = raised(py, worker.call(py, move |arm, _| arm.read_span(span))?)?;
+    let snapshot = raised(py, worker.read(py, move |arm| arm.read_span(span))?)?;
     match entries(&snapshot).as_slice() {
         [only] => Ok(only.into()),
         several => Ok(Shown::Each(several.iter().map(Shown::from).collect())),
@@ -93,25 +78,25 @@ fn warn_of_silent(py: Python<'_>, silent: u8) -> PyResult<()> {
     PyErr::warn(py, py.get_type::<PyUserWarning>().as_any(), &CString::new(text)?, 1)
 }
 
-/// The registers of an arm as a mapping from names to numbers: `arm.registers["speed.1"]`.
-///
-/// Names are those of docs/registers.md, in any case, shortened while they are unique, with `.3` for joint 3; or numbers
-/// and ranges, `"54..60"`. Numbers are in the units of the table. Each access asks the arm, and each assignment is read
-/// back.
-#[pyclass(frozen, mapping, module = "sevenbot")]
-pub(crate) struct Registers(Arc<Worker>);
-
-impl Registers {
-    pub(crate) const fn of(worker: Arc<Worker>) -> Self {
-        Self(worker)
-    }
-}
-
 /// What [`access()`] calls a register that must not be used.
 const RESERVED: &str = "reserved";
 
-fn names() -> Vec<String> {
-    rows().filter(|row| access(row.access) != RESERVED).map(name_of).collect()
+/// The names of the registers that this arm has, each once.
+pub(crate) fn readable_names(arm: &sevenbot::Arm) -> Vec<String> {
+    let mut names = Vec::new();
+    for row in rows().filter(|row| access(row.access) != RESERVED) {
+        let name = name_of(row);
+        let is_served =
+            span_of(&name).is_some_and(|span| span.addresses().all(|address| arm.serves(address)));
+        if is_served && !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+fn span_of(name: &str) -> Option<Span> {
+    parse(name).ok().filter(|span| span.count() > 0)
 }
 
 fn row(name: &str) -> Option<&'static Register> {
@@ -119,14 +104,31 @@ fn row(name: &str) -> Option<&'static Register> {
     rows().find(|row| row.holds(span.address()))
 }
 
+/// The registers of an arm as a mapping from names to numbers: `arm.registers["speed.1"]`.
+///
+/// Names are those of docs/registers.md, in any case, shortened while they are unique, with `.3` for joint 3; or numbers
+/// and ranges, `"54..60"`. Numbers are in the units of the table. Each access asks the arm, and each assignment is read
+/// back. `keys()` has the full names that this arm has, and `dict(arm.registers)` all their values.
+#[pyclass(frozen, mapping, module = "sevenbot")]
+pub(crate) struct Registers {
+    worker: Arc<Worker>,
+    names: Arc<[String]>,
+}
+
+impl Registers {
+    pub(crate) const fn of(worker: Arc<Worker>, names: Arc<[String]>) -> Self {
+        Self { worker, names }
+    }
+}
+
 #[pymethods]
 impl Registers {
     fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Shown> {
-        get(py, &self.0, name)
+        get(py, &self.worker, name)
     }
 
     fn __setitem__(&self, py: Python<'_>, name: &str, value: Values) -> PyResult<()> {
-        set(py, &self.0, name, &value, false)
+        set(py, &self.worker, name, &value, false)
     }
 
     fn __contains__(&self, name: &str) -> bool {
@@ -134,29 +136,52 @@ impl Registers {
     }
 
     fn __len__(&self) -> usize {
-        names().len()
+        self.names.len()
     }
 
     fn __iter__(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         Ok(self.keys().into_pyobject(py)?.call_method0("__iter__")?.unbind())
     }
 
-    /// The names of all registers.
+    /// The names of the registers that this arm has.
     fn keys(&self) -> Vec<String> {
-        names()
+        self.names.to_vec()
+    }
+
+    /// The values of all registers, in the order of `keys()`.
+    fn values(&self, py: Python<'_>) -> PyResult<Vec<Shown>> {
+        self.names.iter().map(|name| get(py, &self.worker, name)).collect()
+    }
+
+    /// The names and the values of all registers.
+    fn items(&self, py: Python<'_>) -> PyResult<Vec<(String, Shown)>> {
+        Ok(self.keys().into_iter().zip(self.values(py)?).collect())
+    }
+
+    /// The value of a register, or `default` if there is none of this name.
+    #[pyo3(signature = (name, default = None))]
+    fn get(&self, py: Python<'_>, name: &str, default: Option<Py<PyAny>>) -> PyResult<Py<PyAny>> {
+        match (parse(name), default) {
+            (Ok(_), _) => Ok(get(py, &self.worker, name)?.into_pyobject(py)?.unbind()),
+            (Err(_), default) => Ok(default.unwrap_or_else(|| py.None())),
+        }
+    }
+
+    fn _ipython_key_completions_(&self) -> Vec<String> {
+        self.keys()
     }
 
     /// What the register table says about a name: meaning, access, range and unit.
     fn describe(&self, py: Python<'_>, name: &str) -> PyResult<String> {
         raised(py, parse(name))?;
-        let row = row(name).ok_or_else(|| PyKeyError::new_err(name.to_owned()))?;
+        let row = row(name).ok_or_else(|| UnknownRegister::raise(py, name))?;
         let meaning = sevenbot::table::description(row);
         let range = range(row).map_or_else(String::new, |(low, high)| format!(", {low} to {high}"));
         Ok(format!("{}: {meaning} ({}{range}{})", name_of(row), access(row.access), unit(row)))
     }
 
     fn __repr__(&self) -> String {
-        format!("<Registers: {} names; `arm.registers['speed.1']`>", names().len())
+        format!("<Registers: {} names; `arm.registers['speed.1']`>", self.names.len())
     }
 }
 

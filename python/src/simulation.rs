@@ -5,44 +5,87 @@ use std::time::Duration;
 
 use arm_sim::faults::{ArmFault, FaultLocation};
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use sevenbot::Joint;
 use sevenbot::simulated::SharedSimulation;
 
+use crate::arguments::{angle, whole};
+use crate::arm::{Angles, Arm};
+use crate::errors::{Closed, InvalidValue, without_attribute};
 use crate::worker::lock;
+
+/// Virtual time between two checks of Python's signals: some ten milliseconds of a processor.
+const ADVANCE_SLICE: Duration = Duration::from_secs(20);
 
 /// The simulated arm of `Arm.simulated()`.
 ///
 /// Its time is virtual: it passes only while the arm is asked or slept for, and in `advance`. A program may think as long
 /// as it likes, and gets the same result on every machine.
 #[pyclass(frozen, module = "sevenbot")]
-pub(crate) struct Simulation(SharedSimulation);
+#[derive(Clone)]
+pub(crate) struct Simulation {
+    shared: SharedSimulation,
+    /// A forked process has a copy, whose lock may be held for ever.
+    process: u32,
+}
 
 /// A simulated arm at one instant: servos, registers, settings and time.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct SimulationSnapshot(Mutex<arm_sim::Simulation>);
 
+/// An arm in virtual time: an `Arm` that always has its `simulation`.
+#[pyclass(frozen, extends = Arm, module = "sevenbot")]
+pub(crate) struct SimulatedArm(Simulation);
+
+impl SimulatedArm {
+    pub(crate) fn of(py: Python<'_>, arm: Arm, simulation: Simulation) -> PyResult<Py<Self>> {
+        Py::new(py, PyClassInitializer::from(arm).add_subclass(Self(simulation)))
+    }
+}
+
+#[pymethods]
+impl SimulatedArm {
+    /// The simulation behind this arm.
+    #[getter]
+    fn simulation(&self) -> Simulation {
+        self.0.clone()
+    }
+}
+
 impl Simulation {
-    pub(crate) const fn of(simulation: SharedSimulation) -> Self {
-        Self(simulation)
+    pub(crate) fn of(shared: SharedSimulation) -> Self {
+        Self { shared, process: std::process::id() }
     }
 
-    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut arm_sim::Simulation) -> T + Send) -> T {
-        py.detach(|| self.0.with(work))
+    /// What the arm and its line share.
+    pub(crate) const fn shared_with_line(&self) -> &SharedSimulation {
+        &self.shared
+    }
+
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut arm_sim::Simulation) -> T + Send,
+    ) -> PyResult<T> {
+        self.shared(py).map(|shared| py.detach(|| shared.with(work)))
+    }
+
+    fn shared(&self, py: Python<'_>) -> PyResult<&SharedSimulation> {
+        if self.process == std::process::id() { Ok(&self.shared) } else { Err(Closed::raise_forked(py)) }
     }
 }
 
 /// A time in seconds, at most a day.
-pub(crate) fn duration(seconds: f64) -> PyResult<Duration> {
+pub(crate) fn duration(py: Python<'_>, seconds: f64) -> PyResult<Duration> {
     const LONGEST: Duration = Duration::from_secs(86_400);
     let time = Duration::try_from_secs_f64(seconds).ok().filter(|time| *time <= LONGEST);
-    time.ok_or_else(|| PyValueError::new_err(format!("{seconds} s: use 0 to 86400 seconds")))
+    time.ok_or_else(|| InvalidValue::raise(py, &format!("{seconds} s: use 0 to 86400 seconds")))
 }
 
 /// A joint by its number.
-pub(crate) fn joint(number: u8) -> PyResult<Joint> {
-    Joint::new(number).ok_or_else(|| PyValueError::new_err(format!("joint {number}: use 1 to 7")))
+fn joint(py: Python<'_>, number: i64) -> PyResult<Joint> {
+    let joint = u8::try_from(number).ok().and_then(Joint::new);
+    joint.ok_or_else(|| InvalidValue::raise(py, &format!("joint {number}: use 1 to 7")))
 }
 
 fn virtual_time(duration: Duration) -> arm_sim::Duration {
@@ -53,15 +96,21 @@ fn virtual_time(duration: Duration) -> arm_sim::Duration {
 impl Simulation {
     /// The virtual time since power-up, in seconds.
     #[getter]
-    fn now(&self, py: Python<'_>) -> f64 {
+    fn now(&self, py: Python<'_>) -> PyResult<f64> {
         let micros = self.with(py, |simulation| simulation.now().as_micros());
-        Duration::from_micros(micros).as_secs_f64()
+        let micros = micros.map_err(|error| without_attribute(py, error))?;
+        Ok(Duration::from_micros(micros).as_secs_f64())
     }
 
-    /// Lets this many seconds pass, 0 to 86400.
+    /// Lets this many seconds pass, 0 to 86400. Ctrl-C ends it early.
     fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
-        let time = virtual_time(duration(seconds)?);
-        self.with(py, |simulation| simulation.advance(time));
+        let mut left = duration(py, seconds)?;
+        while !left.is_zero() {
+            let slice = left.min(ADVANCE_SLICE);
+            self.with(py, |simulation| simulation.advance(virtual_time(slice)))?;
+            left = left.saturating_sub(slice);
+            py.check_signals()?;
+        }
         Ok(())
     }
 
@@ -73,10 +122,9 @@ impl Simulation {
     #[pyo3(signature = (fault, seconds = None))]
     fn fault(&self, py: Python<'_>, fault: &str, seconds: Option<f64>) -> PyResult<()> {
         let fault: ArmFault =
-            fault.parse().map_err(|why| PyValueError::new_err(format!("{fault}: {why}")))?;
-        let time = seconds.map(duration).transpose()?.map(virtual_time);
-        self.with(py, |simulation| simulation.set_fault(fault, time));
-        Ok(())
+            fault.parse().map_err(|why| InvalidValue::raise(py, &format!("{fault}: {why}")))?;
+        let time = seconds.map(|seconds| duration(py, seconds)).transpose()?.map(virtual_time);
+        self.with(py, |simulation| simulation.set_fault(fault, time)).map(|_| ())
     }
 
     /// Does something to the arm after this many seconds, 0 to 86400, also during a call: `later(2, "restart")`,
@@ -85,17 +133,16 @@ impl Simulation {
     /// The words are those of a session of `host-sim --record`. A wrong word raises `ValueError` with the list.
     fn later(&self, py: Python<'_>, seconds: f64, action: &str) -> PyResult<()> {
         let action: arm_sim::Action =
-            action.parse().map_err(|why| PyValueError::new_err(format!("{action}: {why}")))?;
-        let time = virtual_time(duration(seconds)?);
-        self.with(py, |simulation| simulation.plan(time, action));
-        Ok(())
+            action.parse().map_err(|why| InvalidValue::raise(py, &format!("{action}: {why}")))?;
+        let time = virtual_time(duration(py, seconds)?);
+        self.with(py, |simulation| simulation.plan(time, action))
     }
 
     /// Pulls the cable of the line after this many seconds, 0 to 86400. There is no way to plug it in again.
     #[pyo3(signature = (seconds = 0.0))]
     fn unplug(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
-        let time = duration(seconds)?;
-        py.detach(|| self.0.unplug(time));
+        let (time, shared) = (duration(py, seconds)?, self.shared(py)?);
+        py.detach(|| shared.unplug(time));
         Ok(())
     }
 
@@ -104,106 +151,106 @@ impl Simulation {
     /// Returns how often each took effect, as text.
     #[pyo3(signature = (location = None))]
     fn clear(&self, py: Python<'_>, location: Option<&str>) -> PyResult<Vec<String>> {
-        let parse =
-            |text: &str| text.parse::<FaultLocation>().map_err(|why| PyValueError::new_err(why.to_string()));
+        let parse = |text: &str| {
+            text.parse::<FaultLocation>().map_err(|why| InvalidValue::raise(py, &why.to_string()))
+        };
         let location = location.map(parse).transpose()?;
-        let ended = self.with(py, |simulation| simulation.end_faults(location));
+        let ended = self.with(py, |simulation| simulation.end_faults(location))?;
         Ok(ended.iter().map(ToString::to_string).collect())
     }
 
     /// The present faults, and how often each took effect so far, as text.
     #[getter]
-    fn faults(&self, py: Python<'_>) -> Vec<String> {
-        self.with(py, |simulation| simulation.faults()).iter().map(ToString::to_string).collect()
+    fn faults(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        Ok(self.with(py, |simulation| simulation.faults())?.iter().map(ToString::to_string).collect())
     }
 
     /// The true angles of joints 1 to 7 in degrees, without offsets and without noise.
     #[getter]
-    fn angles(&self, py: Python<'_>) -> (f64, f64, f64, f64, f64, f64, f64) {
+    fn angles(&self, py: Python<'_>) -> PyResult<Angles> {
         let angles = self.with(py, |simulation| Joint::ALL.map(|joint| simulation.plant().angle(joint)));
-        angles.map(|angle| f64::from(angle) / 1_000.0).into()
+        let angles = angles.map_err(|error| without_attribute(py, error))?;
+        Ok(angles.map(|angle| f64::from(angle) / 1_000.0).into())
     }
 
     /// Turns a joint by hand to an angle of 0 to 180 degrees, and holds it there until it has torque or `let_go`.
-    fn move_by_hand(&self, py: Python<'_>, joint: u8, degrees: f64) -> PyResult<()> {
-        let joint = self::joint(joint)?;
-        let angle = sevenbot::FineAngle::from_degrees(degrees)
-            .ok_or_else(|| PyValueError::new_err(format!("{degrees}: use 0 to 180 degrees")))?;
+    fn move_by_hand(&self, py: Python<'_>, joint: i64, degrees: f64) -> PyResult<()> {
+        let joint = self::joint(py, joint)?;
+        let angle = angle(py, "", degrees)?;
         let counts = counts_from_angle(joint, MicroDegrees(i32::from(angle.hundredths()) * 10_000), 0);
         self.with(py, |simulation| {
             simulation.plant_mut().move_by_hand(joint, counts);
             simulation.plant_mut().hold(joint);
-        });
-        Ok(())
+        })
     }
 
     /// Lets a hand hold a joint where it is, until it has torque. Has no effect on a joint with torque.
-    fn hold_by_hand(&self, py: Python<'_>, joint: u8) -> PyResult<()> {
-        let joint = self::joint(joint)?;
-        self.with(py, |simulation| simulation.plant_mut().hold(joint));
-        Ok(())
+    fn hold_by_hand(&self, py: Python<'_>, joint: i64) -> PyResult<()> {
+        let joint = self::joint(py, joint)?;
+        self.with(py, |simulation| simulation.plant_mut().hold(joint))
     }
 
     /// Takes the hand away from a joint: without torque, a loaded joint falls.
-    fn let_go(&self, py: Python<'_>, joint: u8) -> PyResult<()> {
-        let joint = self::joint(joint)?;
-        self.with(py, |simulation| simulation.plant_mut().let_go(joint));
-        Ok(())
+    fn let_go(&self, py: Python<'_>, joint: i64) -> PyResult<()> {
+        let joint = self::joint(py, joint)?;
+        self.with(py, |simulation| simulation.plant_mut().let_go(joint))
     }
 
     /// The weight at the tip in grams, 0 to 65535.
     #[getter]
-    fn load_grams(&self, py: Python<'_>) -> u16 {
+    fn load_grams(&self, py: Python<'_>) -> PyResult<u16> {
         self.with(py, |simulation| simulation.plant().load_grams())
     }
 
     #[setter]
-    fn set_load_grams(&self, py: Python<'_>, grams: u16) {
-        self.with(py, |simulation| simulation.plant_mut().set_load(grams));
+    fn set_load_grams(&self, py: Python<'_>, grams: i64) -> PyResult<()> {
+        let grams = whole(py, "load_grams", grams, 0, i64::from(u16::MAX))?;
+        self.with(py, |simulation| simulation.plant_mut().set_load(grams))
     }
 
     /// Drops what is in the gripper: the thing between the claws, and the weight.
-    fn drop_load(&self, py: Python<'_>) {
-        self.with(py, |arm| drop(arm.act(arm_sim::Action::Drop)));
+    fn drop_load(&self, py: Python<'_>) -> PyResult<()> {
+        self.with(py, |arm| drop(arm.act(arm_sim::Action::Drop)))
     }
 
     /// Forces an alarm on a joint's servo, which switches its motor off: `"overload"`, until its torque is switched off
     /// and on, or `"heat"`, until it has cooled down. An overload has no effect on a joint without torque.
     #[pyo3(signature = (joint, alarm = "overload"))]
-    fn trip(&self, py: Python<'_>, joint: u8, alarm: &str) -> PyResult<()> {
-        let joint = self::joint(joint)?;
+    fn trip(&self, py: Python<'_>, joint: i64, alarm: &str) -> PyResult<()> {
+        let joint = self::joint(py, joint)?;
         let alarm = match alarm {
             "overload" => arm_sim::servo::Trip::Overload,
             "heat" => arm_sim::servo::Trip::Heat,
-            _ => return Err(PyValueError::new_err("alarm must be \"overload\" or \"heat\"")),
+            _ => return Err(InvalidValue::raise(py, "alarm must be \"overload\" or \"heat\"")),
         };
-        self.with(py, |arm| drop(arm.act(arm_sim::Action::Trip(joint, alarm))));
-        Ok(())
+        self.with(py, |arm| drop(arm.act(arm_sim::Action::Trip(joint, alarm))))
     }
 
     /// Switches the arm off and on. The settings stay.
-    fn power_cycle(&self, py: Python<'_>) {
-        self.with(py, |simulation| simulation.power_cycle());
+    fn power_cycle(&self, py: Python<'_>) -> PyResult<()> {
+        self.with(py, |simulation| simulation.power_cycle())
     }
 
     /// Switches the arm off, until `power_cycle`. Loaded joints fall.
-    fn power_off(&self, py: Python<'_>) {
-        self.with(py, |simulation| simulation.power_off());
+    fn power_off(&self, py: Python<'_>) -> PyResult<()> {
+        self.with(py, |simulation| simulation.power_off())
     }
 
     /// A copy of the arm as it is now.
-    fn snapshot(&self, py: Python<'_>) -> SimulationSnapshot {
-        SimulationSnapshot(Mutex::new(self.with(py, |simulation| simulation.clone())))
+    fn snapshot(&self, py: Python<'_>) -> PyResult<SimulationSnapshot> {
+        Ok(SimulationSnapshot(Mutex::new(self.with(py, |simulation| simulation.clone())?)))
     }
 
-    /// Makes the arm as it was at a snapshot, its time included.
-    fn restore(&self, py: Python<'_>, snapshot: &SimulationSnapshot) {
-        let copy = lock(&snapshot.0).clone();
-        self.with(py, |simulation| *simulation = copy);
+    /// Makes the arm as it was at a snapshot, its time included. The clock of its line goes on: sleeps, streams and timeouts are
+    /// as long as without it.
+    fn restore(&self, py: Python<'_>, snapshot: &SimulationSnapshot) -> PyResult<()> {
+        let (copy, shared) = (lock(&snapshot.0).clone(), self.shared(py)?);
+        py.detach(|| shared.restore(copy));
+        Ok(())
     }
 
-    fn __repr__(&self, py: Python<'_>) -> String {
-        format!("<Simulation at {:.3} s, {} faults>", self.now(py), self.faults(py).len())
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(format!("<Simulation at {:.3} s, {} faults>", self.now(py)?, self.faults(py)?.len()))
     }
 }
 

@@ -3,19 +3,20 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use sevenbot::FineAngle;
-use sevenbot::approach::{Approach, ApproachRule};
+use sevenbot::approach::{Approach, ApproachRule, FirstPoints};
 use sevenbot::cartesian::Guard;
 use sevenbot::fine::FineTargets;
 use sevenbot::moves::{MoveError, Observer};
-use sevenbot::stream::{StreamOptions, StreamPace, WatchdogAction};
+use sevenbot::simulated::SharedSimulation;
+use sevenbot::stream::{StreamError, StreamOptions, StreamPace};
 
 use crate::arguments::Goals;
 use crate::errors::{raised, warn_of};
-use crate::worker::{PacedStream, Watch, Worker, lock};
+use crate::watch::Watch;
+use crate::worker::{PacedStream, Worker, lock};
 
 /// The longest time between two frames while a point is not due yet: a watchdog of 10 ms needs more than this.
 const SLICE: Duration = Duration::from_millis(20);
@@ -32,35 +33,28 @@ pub(crate) struct Stream {
     rule: ApproachRule,
     /// `None` after the first warning, too.
     guard: Mutex<Option<Guard>>,
+    /// `None` for a real arm.
+    simulation: Option<SharedSimulation>,
 }
 
 impl Stream {
     pub(crate) fn new(
         worker: Arc<Worker>,
-        period: f64,
-        watchdog: (f64, bool),
+        options: StreamOptions,
         rule: ApproachRule,
         guard: Option<Guard>,
-    ) -> PyResult<Self> {
-        let (watchdog, damping) = watchdog;
-        let milliseconds = steps(period * 1_000.0, f64::from(u16::MAX));
-        let options = milliseconds.and_then(StreamOptions::new);
-        let options = options
-            .ok_or_else(|| PyValueError::new_err(format!("a period of {period} s: use 0.005 to 1 s")))?;
-        let watchdog = steps(watchdog * 100.0, 255.0).and_then(|steps| u8::try_from(steps).ok());
-        let watchdog = watchdog
-            .ok_or_else(|| PyValueError::new_err("use a watchdog of 0.01 to 2.55 s, or 0 for none"))?;
-        let action = if damping { WatchdogAction::Damping } else { WatchdogAction::Hold };
-        Ok(Self { worker, options: options.with_watchdog(watchdog, action), rule, guard: Mutex::new(guard) })
+        simulation: Option<SharedSimulation>,
+    ) -> Self {
+        Self { worker, options, rule, guard: Mutex::new(guard), simulation }
     }
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked: 0 to the limit")]
-fn steps(number: f64, limit: f64) -> Option<u16> {
-    (0.0..=limit).contains(&number.round()).then(|| number.round() as u16)
-}
-
 impl Stream {
+    /// How often the simulated arm was restored; 0 for a real one.
+    fn restores(&self) -> u64 {
+        self.simulation.as_ref().map_or(0, SharedSimulation::restores)
+    }
+
     /// Warns once if the guard would not allow the points of the stream.
     fn warn_of_pose(&self, py: Python<'_>, [t1, t2, t3, t4, t5, ..]: [f64; 7]) -> PyResult<()> {
         let mut guard = lock(&self.guard);
@@ -73,11 +67,22 @@ impl Stream {
 
 impl PacedStream<'_> {
     /// Waits until the joints stand at their last points.
-    fn arrive(&mut self, watch: &mut Watch) -> Result<(), MoveError> {
+    fn arrive(&mut self, watch: &mut Watch<'_>) -> Result<(), MoveError> {
         if self.pace.counts().points == 0 {
             return Ok(());
         }
         self.stream.wait_until_arrived(|stream, end| stream.wait_until(end, watch))
+    }
+
+    /// After a restore the arm is elsewhere, and does not know of the stream.
+    fn notice_restores(&mut self, restores: u64) -> Result<(), StreamError> {
+        if self.restores != restores {
+            self.stream.begin_again()?;
+            (self.restores, self.first) = (restores, FirstPoints::default());
+            self.pose = self.stream.arm().standing()?.targets;
+            self.pace.restart(self.stream.arm().elapsed());
+        }
+        Ok(())
     }
 
     /// Goes to the first point of joints. The next point is due afterwards.
@@ -85,7 +90,7 @@ impl PacedStream<'_> {
         &mut self,
         first: &FineTargets,
         rule: ApproachRule,
-        watch: &mut Watch,
+        watch: &mut Watch<'_>,
     ) -> Result<(), MoveError> {
         let way = Approach::plan(&self.stream.arm().standing()?, first, rule)?;
         self.stream.approach(&way, watch)?;
@@ -102,7 +107,7 @@ impl PacedStream<'_> {
 #[pymethods]
 impl Stream {
     fn __enter__<'py>(slf: PyRef<'py, Self>) -> PyResult<PyRef<'py, Self>> {
-        slf.worker.open_stream(slf.py(), slf.options)?;
+        slf.worker.open_stream(slf.py(), slf.options, slf.restores())?;
         Ok(slf)
     }
 
@@ -126,10 +131,11 @@ impl Stream {
     ///
     /// The first point of a joint has to be within 5 degrees of where it stands, and is approached at up to 30 degrees per
     /// second; else `TooFar` is raised, unless the stream has an `approach`. Then the call takes that time. The first point below
-    /// the table or in the base gives a `GuardWarning`.
+    /// the table or in the base gives a `GuardWarning`. After `Simulation.restore` the next point is a first one again.
     fn send(&self, py: Python<'_>, angles: Goals) -> PyResult<u32> {
-        let (point, rule) = (angles.targets()?, self.rule);
+        let (point, rule, restores) = (angles.targets(py)?, self.rule, self.restores());
         let sent = self.worker.stream_call(py, move |open, watch| {
+            open.notice_restores(restores)?;
             if let Some(first) = { open.first }.take(&point) {
                 open.approach(&first, rule, watch)?;
                 open.first.take(&point);

@@ -1,12 +1,18 @@
 //! `Tip`: where the arm's tip is.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
+
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use sevenbot::cartesian::{DirectionText, PointText, TipPose, Vector};
+
+use crate::arguments::Goals;
+use crate::arm::Angles;
 
 /// Where the arm is.
 ///
 /// Positions are millimetres from the point where the axis of the base meets the top plate: x to the right, y forward,
-/// z up. The tip is the middle of the disc that joint 6 turns.
+/// z up. The tip is the middle of the disc that joint 6 turns. Tips of the same angles are equal.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct Tip {
     angles: [f64; 7],
@@ -33,6 +39,13 @@ impl Tip {
 
 #[pymethods]
 impl Tip {
+    /// Where an arm with these seven angles is, in degrees: forward kinematics, without an arm.
+    #[staticmethod]
+    #[pyo3(signature = (*angles))]
+    fn of(py: Python<'_>, angles: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        Ok(Self::at(Goals::of(angles)?.all(py)?))
+    }
+
     /// The tip in millimetres: x, y, z.
     #[getter]
     fn tip(&self) -> (f64, f64, f64) {
@@ -53,8 +66,23 @@ impl Tip {
 
     /// The angles of joints 1 to 7 in degrees.
     #[getter]
-    fn angles(&self) -> (f64, f64, f64, f64, f64, f64, f64) {
+    fn angles(&self) -> Angles {
         self.angles.into()
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.angles == other.angles
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        // 0.0 and -0.0 are equal.
+        self.angles.map(|angle| (angle + 0.0).to_bits()).hash(&mut hasher);
+        hasher.finish()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Angles)> {
+        Ok((py.get_type::<Self>().getattr("of")?, self.angles.into()))
     }
 
     fn __repr__(&self) -> String {

@@ -5,6 +5,8 @@
 //!        ▲                        │
 //!        └──────── result ────────┘
 //! ```
+//!
+//! Calls run one after the other. Only a read may run while an earlier call waits for joints.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
@@ -13,16 +15,17 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use sevenbot::Arm;
 use sevenbot::approach::FirstPoints;
-use sevenbot::moves::{Observer, Stage};
 use sevenbot::stream::{SetPointStream, StreamError, StreamOptions, StreamPace};
+use sevenbot::{Arm, OpenError};
 
 use crate::errors::{Closed, Raise};
+use crate::place::{Place, no_thread};
 use crate::progress::ProgressLine;
+use crate::watch::{CallState, Inbox, Watch};
 
 /// Time between two checks of Python's signals.
-const SIGNAL_PERIOD: Duration = Duration::from_millis(50);
+pub(crate) const SIGNAL_PERIOD: Duration = Duration::from_millis(50);
 
 /// A stream, when its next point is due, and which joints had one.
 pub(crate) struct PacedStream<'a> {
@@ -31,72 +34,83 @@ pub(crate) struct PacedStream<'a> {
     pub(crate) first: FirstPoints,
     /// The last point of each joint in degrees, and the target at the start where it had none.
     pub(crate) pose: [f64; 7],
+    /// How often a simulated arm was restored when the stream began.
+    pub(crate) restores: u64,
 }
 
 impl<'a> PacedStream<'a> {
-    fn open(arm: &'a mut Arm, options: StreamOptions) -> Result<Self, StreamError> {
+    fn open(arm: &'a mut Arm, options: StreamOptions, restores: u64) -> Result<Self, StreamError> {
         let mut stream = SetPointStream::open(arm, options)?;
         let pose = stream.arm().standing()?.targets;
         let pace = StreamPace::new(stream.arm().elapsed(), options.period());
-        Ok(Self { stream, pace, first: FirstPoints::default(), pose })
+        Ok(Self { stream, pace, first: FirstPoints::default(), pose, restores })
     }
 }
 
-type ArmCall = Box<dyn FnOnce(&mut Arm) + Send>;
-type StreamCall = Box<dyn FnOnce(&mut PacedStream<'_>) + Send>;
+type ArmCall = Box<dyn FnOnce(&mut Arm, &Inbox) + Send>;
+type StreamCall = Box<dyn FnOnce(&mut PacedStream<'_>, &Inbox) + Send>;
 type StreamResult = SyncSender<Result<(), StreamError>>;
+/// What opens an arm. The flag is set when the caller no longer waits.
+type Opener = Box<dyn FnOnce(Arc<AtomicBool>) -> Result<Arm, OpenError> + Send>;
 
-enum Message {
+/// What the thread of the port shall do.
+pub(crate) enum Message {
     Call(ArmCall),
-    OpenStream(StreamOptions, StreamResult),
+    /// A short read, which changes nothing.
+    Read(ArmCall),
+    OpenStream(StreamOptions, u64, StreamResult),
     StreamCall(StreamCall),
     CloseStream(StreamResult),
 }
 
-/// What the two threads of a call share.
-#[derive(Debug, Default)]
-pub(crate) struct CallState {
-    is_interrupted: AtomicBool,
-    /// The number of stops so far, and that at the start of the call.
-    stops: Arc<AtomicU64>,
-    stops_before: u64,
-    done: AtomicU64,
-    total: AtomicU64,
-}
-
-impl CallState {
-    fn goes_on(&self) -> bool {
-        !self.is_interrupted.load(Ordering::Relaxed)
-            && self.stops.load(Ordering::Relaxed) == self.stops_before
-    }
-}
-
-/// The end of a [`CallState`] in the thread of the port.
-pub(crate) struct Watch(Arc<CallState>);
-
-impl Observer for Watch {
-    fn goes_on(&mut self) -> bool {
-        self.0.goes_on()
-    }
-
-    fn progress(&mut self, _: Stage, done: u64, total: u64) {
-        self.0.done.store(done, Ordering::Relaxed);
-        self.0.total.store(total, Ordering::Relaxed);
-    }
+struct Port {
+    messages: Sender<Message>,
+    thread: JoinHandle<()>,
 }
 
 /// The thread that owns an arm. It ends when this is closed or dropped.
 pub(crate) struct Worker {
-    open: Mutex<Option<(Sender<Message>, JoinHandle<()>)>>,
+    open: Mutex<Option<Port>>,
     /// How often [`Self::interrupt`] was called.
     stops: Arc<AtomicU64>,
+    /// The process of the thread. A forked process does not have it.
+    process: u32,
+    shows_progress: AtomicBool,
 }
 
 impl Worker {
-    pub(crate) fn start(arm: Arm) -> Self {
-        let (messages, received) = channel();
-        let thread = thread::spawn(move || serve(arm, &received));
-        Self { open: Mutex::new(Some((messages, thread))), stops: Arc::default() }
+    /// Starts a thread that opens an arm and owns it. Returns also what `seen` says of the arm. The inner error is that of the
+    /// arm. A signal of Python ends the wait.
+    pub(crate) fn start<T: Send + 'static>(
+        py: Python<'_>,
+        open: Opener,
+        seen: fn(&mut Arm) -> T,
+    ) -> PyResult<Result<(Self, T), OpenError>> {
+        let ((messages, received), (reply, answer)) = (channel(), sync_channel(1));
+        let is_cancelled = Arc::new(AtomicBool::new(false));
+        let (place, flag) = (Place::take(py)?, Arc::clone(&is_cancelled));
+        let thread = thread::Builder::new().name("sevenbot".to_owned()).spawn(move || {
+            let _place = place;
+            match open(flag) {
+                Ok(mut arm) => {
+                    let _ = reply.send(Ok(seen(&mut arm)));
+                    serve(arm, &Inbox::new(received));
+                }
+                Err(error) => drop(reply.send(Err(error))),
+            }
+        });
+        let thread = thread.map_err(|why| no_thread(py, &why.to_string()))?;
+        let (opened, _) = wait(py, answer, &CallState::default(), Wait::AtMostUntilSignal(&is_cancelled))?;
+        Ok(opened.map(|told| (Self::of(Port { messages, thread }), told)))
+    }
+
+    fn of(port: Port) -> Self {
+        Self {
+            open: Mutex::new(Some(port)),
+            stops: Arc::default(),
+            process: std::process::id(),
+            shows_progress: AtomicBool::new(true),
+        }
     }
 
     /// Runs `work` in the thread of the port, and waits for it without the interpreter's lock. A signal of Python interrupts
@@ -104,9 +118,22 @@ impl Worker {
     pub(crate) fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut Arm, &mut Watch) -> T + Send + 'static,
+        work: impl FnOnce(&mut Arm, &mut Watch<'_>) -> T + Send + 'static,
     ) -> PyResult<T> {
         let (result, signal) = self.call_until_signal(py, work)?;
+        signal.map_or(Ok(result), Err)
+    }
+
+    /// As [`Self::call`], for a short read. It may run while another call waits for joints.
+    pub(crate) fn read<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Arm) -> T + Send + 'static,
+    ) -> PyResult<T> {
+        let (reply, answer) = sync_channel(1);
+        let call = move |arm: &mut Arm, _: &Inbox| drop(reply.send(work(arm)));
+        self.send(py, Message::Read(Box::new(call)))?;
+        let (result, signal) = self.wait(py, answer, &CallState::default())?;
         signal.map_or(Ok(result), Err)
     }
 
@@ -114,15 +141,17 @@ impl Worker {
     pub(crate) fn call_until_signal<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut Arm, &mut Watch) -> T + Send + 'static,
+        work: impl FnOnce(&mut Arm, &mut Watch<'_>) -> T + Send + 'static,
     ) -> PyResult<(T, Option<PyErr>)> {
         let (reply, answer) = sync_channel(1);
-        let state = self.new_state();
-        let mut watch = Watch(Arc::clone(&state));
+        let state = Arc::new(CallState::new(&self.stops));
+        let shared = Arc::clone(&state);
         // The caller has gone only if the interpreter ends.
-        let call = move |arm: &mut Arm| drop(reply.send(work(arm, &mut watch)));
+        let call = move |arm: &mut Arm, inbox: &Inbox| {
+            drop(reply.send(work(arm, &mut Watch { state: shared, inbox })));
+        };
         self.send(py, Message::Call(Box::new(call)))?;
-        wait(py, answer, &state)
+        self.wait(py, answer, &state)
     }
 
     /// Interrupts all calls so far, whether they run or wait.
@@ -130,42 +159,42 @@ impl Worker {
         self.stops.fetch_add(1, Ordering::Relaxed);
     }
 
-    fn new_state(&self) -> Arc<CallState> {
-        let stops_before = self.stops.load(Ordering::Relaxed);
-        Arc::new(CallState { stops: Arc::clone(&self.stops), stops_before, ..CallState::default() })
-    }
-
-    pub(crate) fn open_stream(&self, py: Python<'_>, options: StreamOptions) -> PyResult<()> {
+    pub(crate) fn open_stream(&self, py: Python<'_>, options: StreamOptions, restores: u64) -> PyResult<()> {
         let (reply, answer) = sync_channel(1);
-        self.send(py, Message::OpenStream(options, reply))?;
-        finish(py, wait(py, answer, &CallState::default())?)
+        self.send(py, Message::OpenStream(options, restores, reply))?;
+        finish(py, self.wait(py, answer, &CallState::default())?)
     }
 
     /// As [`Self::call`], for the open stream.
     pub(crate) fn stream_call<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut PacedStream<'_>, &mut Watch) -> T + Send + 'static,
+        work: impl FnOnce(&mut PacedStream<'_>, &mut Watch<'_>) -> T + Send + 'static,
     ) -> PyResult<T> {
         let (reply, answer) = sync_channel(1);
-        let state = self.new_state();
-        let mut watch = Watch(Arc::clone(&state));
-        let call = move |stream: &mut PacedStream<'_>| drop(reply.send(work(stream, &mut watch)));
+        let state = Arc::new(CallState::new(&self.stops));
+        let shared = Arc::clone(&state);
+        let call = move |stream: &mut PacedStream<'_>, inbox: &Inbox| {
+            drop(reply.send(work(stream, &mut Watch { state: shared, inbox })));
+        };
         self.send(py, Message::StreamCall(Box::new(call)))?;
-        let (result, signal) = wait(py, answer, &state)?;
+        let (result, signal) = self.wait(py, answer, &state)?;
         signal.map_or(Ok(result), Err)
     }
 
     pub(crate) fn close_stream(&self, py: Python<'_>) -> PyResult<()> {
         let (reply, answer) = sync_channel(1);
         self.send(py, Message::CloseStream(reply))?;
-        finish(py, wait(py, answer, &CallState::default())?)
+        finish(py, self.wait(py, answer, &CallState::default())?)
     }
 
-    /// Ends the thread, and waits until the port is closed.
+    /// Ends the thread, and waits until the port is closed. A forked process has nothing to close.
     pub(crate) fn close(&self, py: Python<'_>) {
+        if self.is_forked() {
+            return;
+        }
         let open = lock(&self.open).take();
-        if let Some((messages, thread)) = open {
+        if let Some(Port { messages, thread }) = open {
             drop(messages);
             // After a panic the thread has ended, too.
             py.detach(|| drop(thread.join()));
@@ -173,13 +202,49 @@ impl Worker {
     }
 
     pub(crate) fn is_open(&self) -> bool {
-        lock(&self.open).is_some()
+        !self.is_forked() && lock(&self.open).is_some()
+    }
+
+    /// Whether long calls show their progress on a terminal.
+    pub(crate) const fn progress_switch(&self) -> &AtomicBool {
+        &self.shows_progress
+    }
+
+    fn is_forked(&self) -> bool {
+        self.process != std::process::id()
     }
 
     fn send(&self, py: Python<'_>, message: Message) -> PyResult<()> {
+        if self.is_forked() {
+            return Err(Closed::raise_forked(py));
+        }
         let open = lock(&self.open);
-        let sent = open.as_ref().and_then(|(messages, _)| messages.send(message).ok());
+        let sent = open.as_ref().and_then(|port| port.messages.send(message).ok());
         sent.ok_or_else(|| Closed::raise_closed(py))
+    }
+
+    fn wait<T: Send>(
+        &self,
+        py: Python<'_>,
+        answer: Receiver<T>,
+        state: &CallState,
+    ) -> PyResult<(T, Option<PyErr>)> {
+        wait(
+            py,
+            answer,
+            state,
+            Wait::ToTheEnd { shows_progress: self.shows_progress.load(Ordering::Relaxed) },
+        )
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        if self.is_forked() {
+            // The thread is not there, and it may have held the locks of the channel.
+            let open = self.open.get_mut().unwrap_or_else(PoisonError::into_inner);
+            std::mem::forget(open.take());
+        }
     }
 }
 
@@ -188,8 +253,21 @@ fn finish(py: Python<'_>, (result, signal): (Result<(), StreamError>, Option<PyE
     signal.map_or(Ok(()), Err)
 }
 
-/// Waits for a result without the interpreter's lock. A signal interrupts the call; then its result follows at once.
-fn wait<T: Send>(py: Python<'_>, mut answer: Receiver<T>, state: &CallState) -> PyResult<(T, Option<PyErr>)> {
+/// What a signal of Python does to a wait.
+enum Wait<'a> {
+    /// It interrupts the call, whose result follows at once.
+    ToTheEnd { shows_progress: bool },
+    /// The caller leaves, and sets this.
+    AtMostUntilSignal(&'a AtomicBool),
+}
+
+/// Waits for a result without the interpreter's lock.
+fn wait<T: Send>(
+    py: Python<'_>,
+    mut answer: Receiver<T>,
+    state: &CallState,
+    how: Wait<'_>,
+) -> PyResult<(T, Option<PyErr>)> {
     let mut line = ProgressLine::default();
     let mut signal = None;
     loop {
@@ -201,28 +279,35 @@ fn wait<T: Send>(py: Python<'_>, mut answer: Receiver<T>, state: &CallState) -> 
         match received {
             Ok(result) => return Ok((result, signal)),
             Err(RecvTimeoutError::Disconnected) => return Err(Closed::raise_closed(py)),
-            Err(RecvTimeoutError::Timeout) => {
-                line.show(state.done.load(Ordering::Relaxed), state.total.load(Ordering::Relaxed));
-            }
+            Err(RecvTimeoutError::Timeout) => {}
         }
-        if let Err(raised) = py.check_signals() {
-            state.is_interrupted.store(true, Ordering::Relaxed);
-            signal = Some(raised);
+        if matches!(how, Wait::ToTheEnd { shows_progress: true }) {
+            let (done, total) = state.progress();
+            line.show(done, total);
         }
+        let Err(raised) = py.check_signals() else { continue };
+        state.interrupt();
+        if let Wait::AtMostUntilSignal(is_left) = how {
+            is_left.store(true, Ordering::Relaxed);
+            return Err(raised);
+        }
+        signal = Some(raised);
     }
 }
 
-fn serve(mut arm: Arm, messages: &Receiver<Message>) {
-    while let Ok(message) = messages.recv() {
+fn serve(mut arm: Arm, inbox: &Inbox) {
+    while let Some(message) = inbox.next() {
         match message {
-            Message::Call(call) => call(&mut arm),
-            Message::OpenStream(options, opened) => match PacedStream::open(&mut arm, options) {
-                Ok(stream) => {
-                    let _ = opened.send(Ok(()));
-                    serve_stream(stream, messages);
+            Message::Call(call) | Message::Read(call) => call(&mut arm, inbox),
+            Message::OpenStream(options, restores, opened) => {
+                match PacedStream::open(&mut arm, options, restores) {
+                    Ok(stream) => {
+                        let _ = opened.send(Ok(()));
+                        serve_stream(stream, inbox);
+                    }
+                    Err(error) => drop(opened.send(Err(error))),
                 }
-                Err(error) => drop(opened.send(Err(error))),
-            },
+            }
             // No stream is open. The caller sees the end of the channel.
             Message::StreamCall(_) | Message::CloseStream(_) => {}
         }
@@ -230,11 +315,11 @@ fn serve(mut arm: Arm, messages: &Receiver<Message>) {
 }
 
 /// Serves calls while a stream is open. Without a caller the stream sends nothing, so that the arm's watchdog acts.
-fn serve_stream(mut stream: PacedStream<'_>, messages: &Receiver<Message>) {
-    while let Ok(message) = messages.recv() {
+fn serve_stream(mut stream: PacedStream<'_>, inbox: &Inbox) {
+    while let Some(message) = inbox.next() {
         match message {
-            Message::Call(call) => call(stream.stream.arm()),
-            Message::StreamCall(call) => call(&mut stream),
+            Message::Call(call) | Message::Read(call) => call(stream.stream.arm(), inbox),
+            Message::StreamCall(call) => call(&mut stream, inbox),
             Message::OpenStream(..) => {}
             Message::CloseStream(closed) => {
                 let _ = closed.send(stream.stream.close());

@@ -28,6 +28,9 @@ def test_coroutines_do_what_the_methods_do() -> None:
             assert len(times) == 5
         with pytest.raises(sevenbot.Closed):
             arm.sync.get("speed")
+        with pytest.raises(sevenbot.Closed):
+            await arm.get("speed")
+        await arm.close()
 
     asyncio.run(run())
 

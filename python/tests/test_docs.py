@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -28,6 +29,26 @@ def test_the_blocks_of_the_first_steps_run(tmp_path: Path, monkeypatch: pytest.M
         # The empty lines give a traceback the line of the page.
         exec(compile("\n" * (line - 1) + block, str(page), "exec"), names)
     assert len(blocks(page)) >= 8
+
+
+@pytest.mark.parametrize("checker", ["mypy", "basedpyright"])
+def test_a_strict_type_checker_accepts_the_blocks_of_the_pages(checker: str, tmp_path: Path) -> None:
+    pytest.importorskip(checker)
+    for page in ["python", "simulation"]:
+        text = "\n".join(block for _, block in blocks(DOCS / f"{page}.md"))
+        (tmp_path / f"{page}_page.py").write_text(text, encoding="utf-8")
+    # Two blocks import the same.
+    options = {"typeCheckingMode": "strict", "reportDuplicateImport": False}
+    (tmp_path / "pyrightconfig.json").write_text(json.dumps(options), encoding="utf-8")
+    arguments = {
+        # The cache in the current folder has numpy and the stubs from the other checks.
+        "mypy": ["--strict", str(tmp_path)],
+        # Pyright, packed for PyPI.
+        "basedpyright": ["--pythonpath", sys.executable, "--project", str(tmp_path)],
+    }
+    command = [sys.executable, "-m", checker, *arguments[checker]]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stdout + result.stderr
 
 
 @pytest.mark.parametrize("page", ["python.md", "simulation.md"])

@@ -26,7 +26,7 @@
 //! as it likes, and gives the same result on every machine.
 
 use std::io::ErrorKind;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 pub use arm_sim::{Simulation, SimulationConfig};
@@ -58,26 +58,68 @@ pub fn arm_with(config: SimulationConfig, options: ArmOptions) -> Result<(Arm, S
 #[derive(Clone, Debug)]
 pub struct SharedSimulation {
     simulation: Arc<Mutex<Simulation>>,
+    clock: Arc<Mutex<HostClock>>,
+}
+
+/// The clock of the host line. It goes on when the arm's time is set back.
+#[derive(Debug, Default)]
+struct HostClock {
+    /// The time that restores took back, less the time that they skipped, in microseconds.
+    ahead: i64,
     /// When the cable of the host line is pulled.
-    unplugged: Arc<Mutex<Option<time::Instant>>>,
+    unplugged: Option<Duration>,
+    restores: u64,
+}
+
+impl HostClock {
+    fn at(&self, now: time::Instant) -> Duration {
+        Duration::from_micros(now.as_micros().saturating_add_signed(self.ahead))
+    }
 }
 
 impl SharedSimulation {
     /// Shares a simulation.
     #[must_use]
     pub fn new(simulation: Simulation) -> Self {
-        Self { simulation: Arc::new(Mutex::new(simulation)), unplugged: Arc::default() }
+        Self { simulation: Arc::new(Mutex::new(simulation)), clock: Arc::default() }
     }
 
     /// Pulls the cable of the host line after this time: then sends and receives fail.
     pub fn unplug(&self, after: Duration) {
-        let time = self.with(|simulation| simulation.now()) + virtual_time(after);
-        *self.unplugged.lock().unwrap_or_else(PoisonError::into_inner) = Some(time);
+        let time = self.elapsed() + after;
+        self.clock().unplugged = Some(time);
+    }
+
+    /// Puts another simulation in the place of this one, such as a copy of before. The clock of the host line goes on
+    /// without a leap, so that due times and timeouts stay what they are.
+    pub fn restore(&self, other: Simulation) {
+        self.with(|simulation| {
+            let (before, after) = (simulation.now().as_micros(), other.now().as_micros());
+            let mut clock = self.clock();
+            clock.ahead = clock.ahead.saturating_add_unsigned(before).saturating_sub_unsigned(after);
+            clock.restores = clock.restores.saturating_add(1);
+            *simulation = other;
+        });
+    }
+
+    /// How often it was restored.
+    #[must_use]
+    pub fn restores(&self) -> u64 {
+        self.clock().restores
+    }
+
+    fn clock(&self) -> MutexGuard<'_, HostClock> {
+        self.clock.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The time of the host line since the start.
+    fn elapsed(&self) -> Duration {
+        self.with(|simulation| self.clock().at(simulation.now()))
     }
 
     fn check_plug(&self) -> Result<(), PortError> {
-        let unplugged = *self.unplugged.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_unplugged = unplugged.is_some_and(|time| self.with(|simulation| simulation.now()) >= time);
+        let elapsed = self.elapsed();
+        let is_unplugged = self.clock().unplugged.is_some_and(|time| elapsed >= time);
         if is_unplugged { Err(PortError::Lost(ErrorKind::BrokenPipe)) } else { Ok(()) }
     }
 
@@ -118,8 +160,7 @@ impl HostLine for SimulatedLine {
     }
 
     fn now(&self) -> Instant {
-        let elapsed = self.simulation.with(|simulation| simulation.now().as_micros());
-        self.start + Duration::from_micros(elapsed)
+        self.start + self.simulation.elapsed()
     }
 
     fn sleep(&mut self, duration: Duration) {
@@ -129,4 +170,26 @@ impl HostLine for SimulatedLine {
 
 fn virtual_time(duration: Duration) -> time::Duration {
     time::Duration::from_micros(u64::try_from(duration.as_micros()).unwrap_or(u64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_clock_of_the_line_goes_on_when_the_arm_is_restored() {
+        let shared = SharedSimulation::new(Simulation::new(SimulationConfig::default()));
+        let mut line = shared.line();
+        let (start, before) = (line.now(), shared.with(|simulation| simulation.clone()));
+        line.sleep(Duration::from_secs(10));
+        let later = shared.with(|simulation| simulation.clone());
+        shared.unplug(Duration::from_secs(1));
+        shared.restore(before);
+        assert_eq!(line.now() - start, Duration::from_secs(10));
+        line.sleep(Duration::from_secs(1));
+        assert_eq!(line.now() - start, Duration::from_secs(11));
+        assert_eq!(line.send(&[0]), Err(PortError::Lost(ErrorKind::BrokenPipe)), "a second after the order");
+        shared.restore(later);
+        assert_eq!(line.now() - start, Duration::from_secs(11), "also forward");
+    }
 }

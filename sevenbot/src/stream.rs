@@ -212,6 +212,18 @@ impl<'a> SetPointStream<'a> {
         self.check.check(self.arm)
     }
 
+    /// Begins anew on an arm that is not where it was, such as a simulated one that was restored: sets period and watchdog again,
+    /// and watches over no joint until it gets a point.
+    ///
+    /// # Errors
+    /// The arm does not take the values, or an exchange failed.
+    pub fn begin_again(&mut self) -> Result<(), StreamError> {
+        self.check = MoveCheck::idle(self.arm, 0).with_period(self.options.period_ms);
+        self.arm.write_checked(STREAM_REGISTERS.address(), &self.options.registers())?;
+        self.last_sent = self.arm.elapsed();
+        Ok(())
+    }
+
     /// The joints that got a point, as [`Joint::bit`]s.
     #[must_use]
     pub const fn joints(&self) -> u8 {

@@ -7,9 +7,10 @@ use std::process::{Command, Stdio};
 use crate::run::{TaskResult, root, target_directory};
 
 /// The packages from PyPI, at versions that were tried. numpy is optional for users, but has tests.
-const PACKAGES: [&str; 5] = [
+const PACKAGES: [&str; 6] = [
     "maturin==1.16.0",
     "mypy==2.4.1",
+    "basedpyright==1.40.2",
     "pytest==9.2.0",
     "numpy==2.4.6; python_version >= '3.11'",
     "numpy==2.2.6; python_version < '3.11'",

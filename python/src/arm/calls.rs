@@ -7,27 +7,20 @@ use sevenbot::approach::ApproachRule;
 use sevenbot::cartesian::{Guard, TipTarget};
 use sevenbot::fine::FineTargets;
 use sevenbot::moves::{GuardedMoveError, Pace, TipMove};
-use sevenbot::simulated::SharedSimulation;
 
 use super::{Angles, Arm};
-use crate::errors::{raised, warn_of};
-use crate::motion::{self, PlayOptions, RecordOptions, TipWish};
+use crate::arguments::LinePace;
+use crate::errors::{InvalidType, InvalidValue, file_error, raised, warn_of};
+use crate::motion::{self, PlayOptions, RecordOptions, Recorded, TipWish};
+use crate::opening::Opened;
 use crate::recording::Recording;
+use crate::simulation::Simulation;
+use crate::watch::Watch;
 use crate::worker::{Worker, lock};
 
 impl Arm {
-    pub(super) fn of(arm: sevenbot::Arm, simulation: Option<SharedSimulation>) -> Self {
-        let (port, map) = (arm.port().to_owned(), arm.map().version());
-        let (firmware, chip) = (arm.identity().version(), arm.identity().chip_name());
-        Self {
-            worker: Arc::new(Worker::start(arm)),
-            simulation,
-            sent: Mutex::new(None),
-            port,
-            firmware,
-            chip,
-            map,
-        }
+    pub(super) fn of(worker: Worker, opened: Opened, simulation: Option<Simulation>) -> Self {
+        Self { worker: Arc::new(worker), simulation, sent: Mutex::new(None), opened }
     }
 
     /// Starts a move, and waits for it.
@@ -52,12 +45,12 @@ impl Arm {
         pace: Pace,
         wait: bool,
     ) -> PyResult<Option<Angles>> {
-        let work = move |arm: &mut _, _: &mut _| -> Result<FineTargets, GuardedMoveError> {
+        let planned = self.worker.call(py, move |arm, _| -> Result<FineTargets, GuardedMoveError> {
             let targets = TipMove::of(arm, &target, wish.tip, wish.tool)?.targets;
             wish.guard.map_or(Ok(()), |guard| arm.check_way(&targets, pace, &guard))?;
             Ok(targets)
-        };
-        let targets = raised(py, self.worker.call(py, work)?)?;
+        })?;
+        let targets = raised(py, planned)?;
         self.go(py, targets, pace, wait)
     }
 
@@ -70,29 +63,48 @@ impl Arm {
         guard: Option<Guard>,
     ) -> PyResult<()> {
         let Some(guard) = guard else { return Ok(()) };
-        let work = move |arm: &mut _, _: &mut _| motion::breach_on_way(arm, &targets, pace, &guard);
-        let breach = raised(py, self.worker.call(py, work)?)?;
+        let breach =
+            self.worker.call(py, move |arm, _| motion::breach_on_way(arm, &targets, pace, &guard))?;
+        let breach = raised(py, breach)?;
         breach.map_or(Ok(()), |breach| warn_of(py, &breach))
     }
 
     /// Plans a straight line, and plays it.
-    pub(super) fn move_straight(&self, py: Python<'_>, wish: TipWish) -> PyResult<Angles> {
-        let work = move |arm: &mut _, _: &mut _| motion::straight_line(arm, wish);
-        let line = raised(py, self.worker.call(py, work)?)?;
+    pub(super) fn move_straight(
+        &self,
+        py: Python<'_>,
+        wish: TipWish,
+        pace: LinePace,
+        wait: bool,
+    ) -> PyResult<Angles> {
+        if !wait {
+            let message = "straight=True needs wait=True: this program leads the tip until it is there";
+            return Err(InvalidType::raise(py, message));
+        }
+        raised(py, TipTarget::guarded(wish.tip, wish.tool, wish.guard.as_ref()))?;
+        let line = self.worker.call(py, move |arm, _| motion::straight_line(arm, wish, pace))?;
         // It begins at the targets of the arm.
         let options = PlayOptions { factor: 1.0, times: 1, approach: ApproachRule::Slowly };
-        self.play_moments(py, line, options)?;
+        self.play_moments(py, raised(py, line)?, options)?;
         self.angles(py)
+    }
+
+    /// Parks the arm, and keeps the pose if that is wished.
+    pub(super) fn park_at(&self, py: Python<'_>, pose: Option<FineTargets>, keep: bool) -> PyResult<Angles> {
+        let parked = self.worker.call(py, move |arm, watch| motion::park(arm, pose, keep, watch))?;
+        let path = sevenbot::park_poses::path().unwrap_or_default();
+        Ok(raised(py, parked)?.map_err(|why| file_error(py, &path, &why))?.into())
     }
 
     /// Records until the time is over, or a signal of Python ends a recording without a limit.
     pub(super) fn record_moments(&self, py: Python<'_>, options: RecordOptions) -> PyResult<Recording> {
-        let work = move |arm: &mut _, watch: &mut _| motion::record(arm, options, watch);
+        let work = move |arm: &mut sevenbot::Arm, watch: &mut Watch<'_>| motion::record(arm, options, watch);
         let (recorded, signal) = self.worker.call_until_signal(py, work)?;
-        match signal.filter(|_| options.limit.is_some()) {
-            Some(signal) => Err(signal),
-            None => Recording::parse(py, &raised(py, recorded)?),
+        if let Some(signal) = signal.filter(|_| options.limit.is_some()) {
+            return Err(signal);
         }
+        let Recorded { text, arrivals } = raised(py, recorded)?;
+        Ok(Recording::of_text(py, &text)?.with_arrivals(arrivals))
     }
 
     /// Makes a moving arm hold, and closes the port.
@@ -105,6 +117,24 @@ impl Arm {
         held.and_then(|held| raised(py, held))
     }
 
+    /// Plays a recording after it was checked, and returns the measured one.
+    pub(super) fn play_guarded(
+        &self,
+        py: Python<'_>,
+        moments: &sevenbot::recording::Recording,
+        options: PlayOptions,
+        guard: Option<Guard>,
+    ) -> PyResult<Recording> {
+        if !(0.1..=10.0).contains(&options.factor) {
+            return Err(InvalidValue::raise(py, "use a speed of 0.1 to 10 times that of the recording"));
+        }
+        raised(py, moments.check_speeds(options.factor))?;
+        if let Some(breach) = guard.and_then(|guard| guard.check_recording(moments).err()) {
+            warn_of(py, &breach)?;
+        }
+        self.play_moments(py, moments.clone(), options)
+    }
+
     /// Plays a recording, and returns the measured one.
     pub(super) fn play_moments(
         &self,
@@ -112,8 +142,7 @@ impl Arm {
         moments: sevenbot::recording::Recording,
         options: PlayOptions,
     ) -> PyResult<Recording> {
-        let work = move |arm: &mut _, watch: &mut _| motion::play(arm, &moments, options, watch);
-        let measured = raised(py, self.worker.call(py, work)?)?;
-        Recording::parse(py, &measured)
+        let played = self.worker.call(py, move |arm, watch| motion::play(arm, &moments, options, watch))?;
+        Recording::of_text(py, &raised(py, played)?)
     }
 }

@@ -281,7 +281,7 @@ fn pause(arm: &mut Arm, observer: &mut dyn Observer) -> Result<(), MoveError> {
     if !observer.goes_on() {
         return Err(MoveError::Interrupted);
     }
-    arm.sleep(POLL_PERIOD);
+    observer.pause(arm, POLL_PERIOD);
     Ok(())
 }
 

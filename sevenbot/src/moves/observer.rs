@@ -1,5 +1,9 @@
 //! Who watches a call that takes a while.
 
+use std::time::Duration;
+
+use crate::arm::Arm;
+
 /// What a call does at the moment, and in what its progress is counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
@@ -47,6 +51,11 @@ pub trait Observer {
     /// `done` of `total` units of this stage are done.
     fn progress(&mut self, stage: Stage, done: u64, total: u64) {
         let _ = (stage, done, total);
+    }
+
+    /// Waits between two reads of an arm that moves. It may use the arm meanwhile for short reads.
+    fn pause(&mut self, arm: &mut Arm, time: Duration) {
+        arm.sleep(time);
     }
 }
 

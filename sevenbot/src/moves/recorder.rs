@@ -19,6 +19,8 @@ const REPORT_TIMEOUT: Duration = Duration::from_secs(3);
 pub struct RecordedPose {
     /// Since the first pose.
     pub time: Duration,
+    /// When it arrived, on the clock of the arm's line.
+    pub received: Instant,
     /// The angles, joint 1 first.
     pub pose: [FineAngle; 7],
 }
@@ -66,7 +68,12 @@ impl Recorder {
         self.check.poll(arm)?;
         if let Some(report) = arm.next_report(timeout)? {
             self.last_report = report.received;
-            return Ok(Some(RecordedPose { time: self.clock.time_of(report.received), pose: report.pose() }));
+            let received = report.received;
+            return Ok(Some(RecordedPose {
+                time: self.clock.time_of(received),
+                received,
+                pose: report.pose(),
+            }));
         }
         if arm.now() > self.last_report + REPORT_TIMEOUT {
             // Does the arm answer at all?

@@ -160,7 +160,7 @@ fn record_reports(
     let mut recorder = Recorder::new(arm, args.hz, content);
     let limit = args.seconds.map(|seconds| Duration::from_secs(seconds.into()));
     while !Interrupt::is_requested() && !pendant.poll_keys(arm)? {
-        let Some(RecordedPose { time, pose }) = recorder.next(arm, POLL_PERIOD)? else { continue };
+        let Some(RecordedPose { time, pose, .. }) = recorder.next(arm, POLL_PERIOD)? else { continue };
         if limit.is_some_and(|limit| time > limit) {
             break;
         }

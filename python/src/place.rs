@@ -1,0 +1,37 @@
+//! How many arms a process may have.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use pyo3::prelude::*;
+
+use crate::errors::{PortError, error};
+
+/// Each arm has a thread, a thread has four mappings of memory, and Linux allows a process 65,530.
+const MOST_ARMS: usize = 8_192;
+/// The open arms of this process.
+static OPEN_ARMS: AtomicUsize = AtomicUsize::new(0);
+
+/// One of the threads that a process may have.
+pub(crate) struct Place;
+
+impl Place {
+    pub(crate) fn take(py: Python<'_>) -> PyResult<Self> {
+        let place = Self;
+        if OPEN_ARMS.fetch_add(1, Ordering::Relaxed) < MOST_ARMS {
+            return Ok(place);
+        }
+        Err(no_thread(py, &format!("{MOST_ARMS} are open already")))
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        OPEN_ARMS.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// The exception of an arm that gets no thread.
+pub(crate) fn no_thread(py: Python<'_>, why: &str) -> PyErr {
+    let hint = "close the arms that are no longer used: `arm.close()`, or `with`".to_owned();
+    error::<PortError>(py, &format!("there is no thread for another arm: {why}"), &[hint])
+}
