@@ -254,7 +254,9 @@ impl Hub {
         self.stops = self.stops.wrapping_add(1);
         self.driver.end(None);
         for (&id, client) in &mut self.clients {
-            client.drop_motion();
+            if client.drop_motion() {
+                self.news.insert(id);
+            }
             if id == by {
                 client.driving.start_anew();
             } else {
