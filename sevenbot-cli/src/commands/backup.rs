@@ -81,7 +81,10 @@ fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), Command
     }
     if may_replace {
         let beside = path.with_extension("toml.new");
-        return fs::write(&beside, text)
+        // What an earlier program left, or a link that somebody planted: it is not followed.
+        let _ = fs::remove_file(&beside);
+        return File::create_new(&beside)
+            .and_then(|mut file| file.write_all(text.as_bytes()))
             .and_then(|()| fs::rename(&beside, path))
             .map_err(|error| CommandError::file(path, error));
     }
