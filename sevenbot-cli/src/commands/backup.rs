@@ -195,3 +195,21 @@ fn in_words(address: u8, byte: u8) -> String {
         None => byte.to_string(),
     }
 }
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_planted_link_is_not_followed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [path, victim, draft] =
+            ["arm.toml", "victim", "arm.toml.new"].map(|name| folder.path().join(name));
+        fs::write(&victim, "letters").expect("a file");
+        std::os::unix::fs::symlink(&victim, &draft).expect("a link");
+        write_whole(&path, "settings", true).expect("a file");
+        assert_eq!(fs::read(&victim).expect("a file"), b"letters");
+        assert_eq!(fs::read(&path).expect("a file"), b"settings");
+        assert!(fs::symlink_metadata(&path).expect("a file").is_file());
+    }
+}

@@ -1,9 +1,9 @@
 //! Names of arms on the local network: multicast DNS, service `_sevenbot._tcp`.
 
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use mdns_sd::{ServiceDaemon, ServiceEvent, ServiceInfo};
+use mdns_sd::{IfKind, ServiceDaemon, ServiceEvent, ServiceInfo};
 
 /// The type of service.
 const SERVICE: &str = "_sevenbot._tcp.local.";
@@ -42,6 +42,10 @@ impl Announcement {
     /// The system has no multicast, or the name is not fit for it.
     pub fn new(name: &str, address: SocketAddr, is_encrypted: bool) -> Result<Self, AnnounceError> {
         let daemon = ServiceDaemon::new()?;
+        if address.is_ipv4() {
+            // Nobody would answer at the addresses of IPv6.
+            daemon.disable_interface(IfKind::IPv6)?;
+        }
         let host = format!("sevenbot-{name}.local.");
         let listed = if address.ip().is_unspecified() { String::new() } else { address.ip().to_string() };
         let properties: &[(&str, &str)] = if is_encrypted { &[ENCRYPTED] } else { &[] };
@@ -105,11 +109,9 @@ fn browse(mut on_arm: impl FnMut(Announced) -> bool) -> Result<(), mdns_sd::Erro
         let ServiceEvent::ServiceResolved(service) = event else { continue };
         let name =
             service.fullname.strip_suffix(SERVICE).unwrap_or_default().trim_end_matches('.').to_owned();
-        // IPv4 first: an address of IPv6 may need a scope.
-        let mut addresses: Vec<IpAddr> =
-            service.addresses.iter().map(mdns_sd::ScopedIp::to_ip_addr).collect();
-        addresses.sort();
-        let Some(&address) = addresses.first() else { continue };
+        // IPv4 first: an address of IPv6 may need a scope. That of loopback last: it is each computer's own.
+        let addresses = service.addresses.iter().map(mdns_sd::ScopedIp::to_ip_addr);
+        let Some(address) = addresses.min_by_key(|ip| (ip.is_loopback(), *ip)) else { continue };
         let is_encrypted = service.txt_properties.get_property_val_str(ENCRYPTED.0) == Some(ENCRYPTED.1);
         if on_arm(Announced { name, address: SocketAddr::new(address, service.port), is_encrypted }) {
             break;

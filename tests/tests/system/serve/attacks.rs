@@ -316,34 +316,3 @@ fn what_was_sent_to_a_suspended_server_moves_nothing() {
     streams[0].write_all(&write_request(TARGET_POSITION, &[100])).expect("taken");
     system_tests::wait::wait_until("the server goes on", || target(&mut arm) == 100);
 }
-
-/// TLS with the certificate that the user has, in the tool; the library and Python connect in the same way.
-#[test]
-fn the_tool_connects_with_tls_and_the_certificate_of_the_server() {
-    let file =
-        |name: &str| format!("{}/../sevenbot-serve/tests/certificate/{name}", env!("CARGO_MANIFEST_DIR"));
-    let (certificate, key) = (file("certificate.pem"), file("key.pem"));
-    let served =
-        Served::start(1, &["--token", "correct-horse", "--tls-cert", &certificate, "--tls-key", &key]);
-    let port = served.connect().peer_addr().expect("an address").port();
-    let read = |host: &str, certificate: Option<&str>| {
-        let mut command = tool();
-        command.env("SEVENBOT_TOKEN", "correct-horse").env_remove("SEVENBOT_CERTIFICATE");
-        command.envs(certificate.map(|path| ("SEVENBOT_CERTIFICATE", path)));
-        let output = command.args(["--port", &format!("tls://{host}:{port}"), "get", "device-code"]).output();
-        output.expect("the tool runs")
-    };
-    for host in ["localhost", "127.0.0.1"] {
-        let output = read(host, Some(&certificate));
-        assert!(output.status.success(), "{host}: {output:?}");
-    }
-    let said = |output: Output| String::from_utf8_lossy(&output.stderr).into_owned();
-    let missing = read("localhost", None);
-    assert!(!missing.status.success());
-    assert!(said(missing).contains("SEVENBOT_CERTIFICATE"));
-    let wrong = read("localhost", Some(&key));
-    assert!(!wrong.status.success(), "{wrong:?}");
-    // It has this address, too, but the certificate is not for it.
-    let other = read("127.0.0.2", Some(&certificate));
-    assert!(!other.status.success(), "{other:?}");
-}
