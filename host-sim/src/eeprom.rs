@@ -138,6 +138,8 @@ fn users_own(variable: impl Fn(&str) -> Option<PathBuf>) -> Result<PathBuf, Imag
 fn make_blank(path: &Path) -> io::Result<()> {
     let mut draft = path.as_os_str().to_owned();
     draft.push(format!(".{}.new", std::process::id()));
+    // What an earlier program left, or a link that somebody planted: it is not followed.
+    let _ = fs::remove_file(&draft);
     let made = write_blank(Path::new(&draft)).and_then(|()| publish(Path::new(&draft), path));
     if made.is_err() {
         let _ = fs::remove_file(&draft);
@@ -146,7 +148,7 @@ fn make_blank(path: &Path) -> io::Result<()> {
 }
 
 fn write_blank(path: &Path) -> io::Result<()> {
-    let mut file = OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(path)?;
+    let mut file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path)?;
     file.write_all(&[ERASED; SIZE])?;
     file.sync_all()
 }
@@ -190,6 +192,23 @@ mod tests {
         assert_eq!(users_own(both).unwrap(), Path::new("/state/7bot"));
         let relative = |name: &str| Some(if name == "HOME" { "/home/ada" } else { "state" }.into());
         assert_eq!(users_own(relative).unwrap(), Path::new("/home/ada/.local/state/7bot"));
+    }
+
+    #[test]
+    fn a_planted_link_is_not_followed() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("arm.bin");
+        let victim = directory.path().join("victim");
+        fs::write(&victim, "letters").unwrap();
+        let draft = directory.path().join(format!("arm.bin.{}.new", std::process::id()));
+        std::os::unix::fs::symlink(&victim, &draft).unwrap();
+        Eeprom::File(path.clone()).open(None).unwrap();
+        assert_eq!(fs::read(&victim).unwrap(), b"letters");
+        assert!(fs::symlink_metadata(&path).unwrap().is_file() && !draft.exists());
+        // Nor is one that was planted directly before the file is made.
+        std::os::unix::fs::symlink(&victim, &draft).unwrap();
+        assert!(write_blank(&draft).is_err());
+        assert_eq!(fs::read(&victim).unwrap(), b"letters");
     }
 
     #[test]

@@ -57,7 +57,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Options of every command")]
 pub(crate) struct Global {
-    /// Serial port of the arm: /dev/ttyUSB0, COM3, the link of a simulator. Or a server: unix:PATH, tcp://HOST:PORT, sevenbot://NAME.
+    /// Serial port of the arm: /dev/ttyUSB0, COM3, the link of a simulator. Or a server: unix:PATH, tcp://HOST:PORT, tls://HOST:PORT, sevenbot://NAME.
     #[arg(long, global = true, env = "SEVENBOT_PORT", hide_env_values = true)]
     pub(crate) port: Option<String>,
     /// Baud rate of the port. The arm starts with the rate in its register 12.

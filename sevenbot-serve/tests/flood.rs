@@ -1,4 +1,4 @@
-//! A flood of one client costs the others less than 10 ms, in virtual time.
+//! A flood of one client costs the others less than 10 ms, in virtual time; and what becomes of frames without room.
 //!
 //! Pseudo-terminals and TCP have the same client, which sends frames.
 
@@ -6,7 +6,7 @@
 
 mod rig;
 
-use protocol_core::registers::map::{PRESENT_POSITION, TARGET_POSITION};
+use protocol_core::registers::map::{MOTOR_STATE, PRESENT_POSITION, TARGET_POSITION};
 use protocol_core::time::Duration;
 use rig::{World, read, write, write_map21};
 
@@ -89,4 +89,27 @@ fn a_flood_of_messages_costs_the_others_less_than_10_ms() {
             });
         }
     }
+}
+
+/// Only there it is known how old they are.
+#[test]
+fn frames_that_the_hub_has_no_room_for_stay_with_their_sender() {
+    let mut world = World::new(1);
+    let frame = write(TARGET_POSITION.address, &[120]);
+    (0..60).for_each(|_| world.send(0, &frame));
+    world.push();
+    let taken = 60 - world.programs[0].to_send_bytes() / frame.len();
+    assert!((20..=21).contains(&taken), "{taken} frames are taken");
+}
+
+/// Otherwise nobody would pass on the bytes that wait for the room, and the program would wait for ever.
+#[test]
+fn a_stop_that_makes_room_for_a_program_is_news_for_it() {
+    let mut world = World::new(2);
+    (0..20).for_each(|_| world.send(0, &write(TARGET_POSITION.address, &[120])));
+    world.push();
+    assert!(!world.has_news(0));
+    world.send(1, &write(MOTOR_STATE.address, &[2]));
+    world.push();
+    assert!(world.has_news(0));
 }

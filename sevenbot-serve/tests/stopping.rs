@@ -237,17 +237,6 @@ fn what_a_client_wrote_directly_before_it_left_is_carried_out() {
     }
 }
 
-/// Only there it is known how old they are.
-#[test]
-fn frames_that_the_hub_has_no_room_for_stay_with_their_sender() {
-    let mut world = World::new(1);
-    let frame = write(TARGET_POSITION.address, &[120]);
-    (0..60).for_each(|_| world.send(0, &frame));
-    world.push();
-    let taken = 60 - world.programs[0].to_send_bytes() / frame.len();
-    assert!((20..=21).contains(&taken), "{taken} frames are taken");
-}
-
 /// The arm does not answer, so the target waits behind its program's read for a second.
 #[test]
 fn a_target_that_waited_too_long_is_dropped() {

@@ -18,6 +18,7 @@ pub mod arm_client;
 pub mod arm_control;
 pub mod control;
 pub mod frames;
+pub mod multicast;
 pub mod process;
 pub mod programs;
 pub mod random;

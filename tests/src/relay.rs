@@ -210,8 +210,7 @@ impl Line {
             disturb(&mut frame, self.requests.count, 9);
         }
         (self.watch)(&frame);
-        // An arm that reads no more is a fault that a test wants.
-        let _ = rustix::io::write(&self.arm, &frame);
+        pass_on(&self.arm, &frame);
         LineAction::Nothing
     }
 
@@ -234,6 +233,20 @@ impl Line {
     fn act(&mut self) -> LineAction {
         let is_first = !std::mem::replace(&mut self.has_acted, true);
         if is_first { (self.plan.action)() } else { LineAction::Nothing }
+    }
+}
+
+/// Writes a frame. An arm that takes no bytes for a second is a fault that a test wants.
+fn pass_on(arm: &OwnedFd, frame: &[u8]) {
+    let mut rest = frame;
+    while let Some(more) =
+        rest.get(rustix::io::write(arm, rest).unwrap_or(0)..).filter(|more| !more.is_empty())
+    {
+        rest = more;
+        let timeout = Timespec { tv_sec: 1, tv_nsec: 0 };
+        if poll(&mut [PollFd::new(arm, PollFlags::OUT)], Some(&timeout)).is_ok_and(|ready| ready == 0) {
+            return;
+        }
     }
 }
 

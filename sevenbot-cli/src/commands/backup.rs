@@ -81,7 +81,10 @@ fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), Command
     }
     if may_replace {
         let beside = path.with_extension("toml.new");
-        return fs::write(&beside, text)
+        // What an earlier program left, or a link that somebody planted: it is not followed.
+        let _ = fs::remove_file(&beside);
+        return File::create_new(&beside)
+            .and_then(|mut file| file.write_all(text.as_bytes()))
             .and_then(|()| fs::rename(&beside, path))
             .map_err(|error| CommandError::file(path, error));
     }
@@ -190,5 +193,23 @@ fn in_words(address: u8, byte: u8) -> String {
         Some(row) if [BAUD_RATE, OPTIONS].contains(row) => meaning(row, byte),
         Some(row) => format!("{} {}", row.range.decode_byte(byte), row.unit.symbol()).trim_end().to_owned(),
         None => byte.to_string(),
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_planted_link_is_not_followed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [path, victim, draft] =
+            ["arm.toml", "victim", "arm.toml.new"].map(|name| folder.path().join(name));
+        fs::write(&victim, "letters").expect("a file");
+        std::os::unix::fs::symlink(&victim, &draft).expect("a link");
+        write_whole(&path, "settings", true).expect("a file");
+        assert_eq!(fs::read(&victim).expect("a file"), b"letters");
+        assert_eq!(fs::read(&path).expect("a file"), b"settings");
+        assert!(fs::symlink_metadata(&path).expect("a file").is_file());
     }
 }

@@ -53,11 +53,12 @@ pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), Command
 
 /// A server of the local network in the list of ports. It is not asked: it may want a token.
 fn announced_line(arm: Announced) -> PortLine {
-    let Announced { name, address } = arm;
+    let Announced { name, address, is_encrypted } = arm;
+    let scheme = if is_encrypted { "tls" } else { "tcp" };
     let port = format!("sevenbot://{name}");
     PortLine {
         port,
-        description: format!("tcp://{address}"),
+        description: format!("{scheme}://{address}"),
         arm: None,
         no_arm: Some("announced on the network".to_owned()),
     }

@@ -41,7 +41,8 @@ Python client; its web pages need --maker-pages as well.
 Only programs of this computer can connect. --listen opens the TCP port and the
 WebSocket to others. Then they need the token: over TCP as a first line, with a
 line feed; over the WebSocket in its address, ws://ADDRESS:8080/ws?token=TOKEN.
-With --tls-cert and --tls-key both are encrypted (wss for the WebSocket).
+With --tls-cert and --tls-key both are encrypted (wss for the WebSocket), and
+--port tls://HOST:7777 connects with the certificate in SEVENBOT_CERTIFICATE.
 
 Two programs that write targets at the same time both move the arm: the last
 target counts. With --one-driver the first one drives, until it has written no
@@ -179,7 +180,7 @@ pub(super) fn default_local(name: Option<String>) -> Option<LocalServer> {
 fn announce_name(args: &ServeArgs, server: &Server) -> Option<Announcement> {
     let (name, address) =
         args.name.as_ref().zip(server.tcp_address().filter(|address| !address.ip().is_loopback()))?;
-    let announced = Announcement::new(name, address);
+    let announced = Announcement::new(name, address, args.tls_cert.is_some());
     announced.inspect_err(|error| warn(format_args!("the name is not announced: {error}"))).ok()
 }
 
@@ -193,9 +194,9 @@ fn register(local: &LocalServer, port: &Path) -> Option<Registered> {
 /// Prints where programs can connect.
 fn announce(session: &mut Session, args: &ServeArgs, server: &Server) -> Result<(), CommandError> {
     let links = args.pty.iter().map(|link| link.display().to_string());
-    let tcp = server.tcp_address().map(|address| format!("socket://{address}"));
-    let scheme = if args.tls_cert.is_some() { "wss" } else { "ws" };
-    let web = server.web_socket_address().map(|address| format!("{scheme}://{address}/ws"));
+    let (bytes, messages) = if args.tls_cert.is_some() { ("tls", "wss") } else { ("socket", "ws") };
+    let tcp = server.tcp_address().map(|address| format!("{bytes}://{address}"));
+    let web = server.web_socket_address().map(|address| format!("{messages}://{address}/ws"));
     for ready in links.chain(tcp).chain(web) {
         session.printer.print(&Ready { ready })?;
     }

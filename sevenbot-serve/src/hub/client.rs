@@ -176,9 +176,9 @@ impl Client {
         self.left.is_some_and(|left| is_idle || now - left >= LONGEST_WAIT)
     }
 
-    /// A stop: drops what moves the arm, but no hold.
-    pub(crate) fn drop_motion(&mut self) {
-        self.drop_where(|waiting| waiting.intent.is_ended_by_stop());
+    /// A stop: drops what moves the arm, but no hold. Returns whether there was something.
+    pub(crate) fn drop_motion(&mut self) -> bool {
+        self.drop_where(|waiting| waiting.intent.is_ended_by_stop())
     }
 
     /// Drops what has waited too long. Returns whether there was something.

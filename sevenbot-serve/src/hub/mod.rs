@@ -14,6 +14,7 @@
 //!   what moves or switches something is dropped after 200 ms in the queue.
 //! * A stop goes before everything else, and ends what the other clients stream (`drive`, `intent`).
 
+mod admission;
 mod arm_hold;
 mod client;
 mod client_id;
@@ -41,16 +42,15 @@ use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FR
 use protocol_core::time::{Duration, Instant};
 
 use self::arm_hold::ArmHold;
-use self::client::{Client, Waiting};
-use self::drive::{Driver, MayNotMove};
-use self::intent::Intent;
+use self::client::Client;
+use self::drive::Driver;
 use self::known_registers::KnownRegisters;
 use self::line::{Line, Owner};
 use self::sampler::Sampler;
 use self::shares::Shares;
-use self::sharing_block::Command;
 use self::watchdog::ClientWatchdog;
 
+pub use self::admission::Admission;
 pub use self::client::{Event, LONGEST_WAIT, MOST_WAITING};
 pub use self::client_id::ClientId;
 pub use self::request::WholeRequest;
@@ -66,25 +66,6 @@ pub struct HubOptions {
     pub is_read_only: bool,
     /// Only one client moves the arm at a time.
     pub has_one_driver: bool,
-}
-
-/// What becomes of a request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Admission {
-    /// It waits for its turn.
-    Queued,
-    /// The client has too many requests: it is dropped.
-    NoRoom,
-    /// There is no arm: it is dropped.
-    NoArm,
-    /// It waits for its turn, and then writes nothing but the client's own registers.
-    ReadOnly,
-    /// It is dropped: somebody stopped the arm, and the client has not started anew.
-    Stopped,
-    /// It is dropped: another client drives.
-    AnotherDrives,
-    /// It is dropped: it came too late.
-    Late,
 }
 
 /// Does an arm answer?
@@ -173,110 +154,6 @@ impl Hub {
     #[must_use]
     pub fn has_room(&self, id: ClientId) -> bool {
         self.clients.get(&id).is_some_and(Client::has_room)
-    }
-
-    /// Takes a request of a client, which was sent at `since` or later. A stop is carried out with the next [`Hub::poll`],
-    /// before everything else.
-    pub fn request(
-        &mut self,
-        now: Instant,
-        id: ClientId,
-        since: Instant,
-        request: WholeRequest,
-    ) -> Admission {
-        let Some(client) = self.clients.get_mut(&id).filter(|client| client.has_room()) else {
-            return Admission::NoRoom;
-        };
-        if self.arm != ArmState::Present {
-            client.refuse(&request);
-            self.news.insert(id);
-            return Admission::NoArm;
-        }
-        let (intent, command) = client.meaning(now, &request, &self.known);
-        if self.options.is_read_only {
-            self.queue(now, id, Waiting { request, intent: Intent::Setting, since });
-            return if intent.is_some() { Admission::ReadOnly } else { Admission::Queued };
-        }
-        if let Some(command) = command {
-            self.obey(now, id, command);
-        }
-        let intent = intent.unwrap_or(Intent::Setting);
-        if let Err(reason) = self.check_motion(now, id, intent) {
-            return reason;
-        }
-        if intent.must_be_fresh() && now - since >= LONGEST_WAIT {
-            return self.refuse_late(now, id, intent);
-        }
-        if intent.ends_streams() {
-            self.stop(now, id);
-        }
-        self.queue(now, id, Waiting { request, intent, since });
-        Admission::Queued
-    }
-
-    /// A request comes too late. The targets of a late stop would move the arm, so the hub holds it where it is.
-    fn refuse_late(&mut self, now: Instant, id: ClientId, intent: Intent) -> Admission {
-        if intent.is_urgent() {
-            self.obey(now, id, Command::Stop);
-            return Admission::Queued;
-        }
-        if let Some(client) = self.clients.get_mut(&id) {
-            client.dropped = client.dropped.wrapping_add(1);
-        }
-        Admission::Late
-    }
-
-    fn queue(&mut self, now: Instant, id: ClientId, waiting: Waiting) {
-        let floor = self.floor();
-        let Some(client) = self.clients.get_mut(&id) else { return };
-        if client.waiting.is_empty() {
-            client.share.join(floor);
-        }
-        client.queue(now, waiting);
-    }
-
-    /// May the client move the arm?
-    fn check_motion(&mut self, now: Instant, id: ClientId, intent: Intent) -> Result<(), Admission> {
-        let Some(client) = self.clients.get_mut(&id).filter(|_| intent.is_ended_by_stop()) else {
-            return Ok(());
-        };
-        self.driver.check(now, id, &mut client.driving).map_err(|reason| {
-            client.dropped = client.dropped.wrapping_add(1);
-            match reason {
-                MayNotMove::Stopped => Admission::Stopped,
-                MayNotMove::AnotherDrives => Admission::AnotherDrives,
-            }
-        })
-    }
-
-    /// A client stops the arm: what moves it is dropped, and what the others stream ends.
-    fn stop(&mut self, now: Instant, by: ClientId) {
-        self.stops = self.stops.wrapping_add(1);
-        self.driver.end(None);
-        for (&id, client) in &mut self.clients {
-            client.drop_motion();
-            if id == by {
-                client.driving.start_anew();
-            } else {
-                client.driving.stop(now);
-            }
-        }
-    }
-
-    /// Carries out a command in register 239.
-    fn obey(&mut self, now: Instant, id: ClientId, command: Command) {
-        match command {
-            Command::Stop => {
-                self.stop(now, id);
-                self.start_hold();
-            }
-            Command::StartAnew => {
-                if let Some(client) = self.clients.get_mut(&id) {
-                    client.driving.start_anew();
-                }
-            }
-            Command::HandOver => self.driver.end(Some(id)),
-        }
     }
 
     fn start_hold(&mut self) {

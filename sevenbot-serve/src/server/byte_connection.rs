@@ -10,8 +10,8 @@ use super::frame_session::FrameSession;
 use super::seat::End;
 use super::shared::Shared;
 
-/// Bytes that are read at once.
-const PIECE: usize = 4_096;
+/// Bytes that are read at once. Between two pieces of a flood the others have their turns.
+const PIECE: usize = 512;
 /// What a frame begins with. A web page can reach this port, but whatever it sends begins otherwise: the method of HTTP, or
 /// the handshake of TLS.
 const FIRST_BYTE: u8 = 0xAA;
@@ -58,7 +58,7 @@ pub(super) async fn serve(
         let session = &mut client.session;
         tokio::select! {
             received = receive(&mut reader, &mut piece), if waits_for_input => match received {
-                Ok(bytes) => client.put(shared.now(), bytes)?,
+                Ok(bytes) => client.put(shared.earliest(), bytes)?,
                 Err(end) => break end,
             },
             written = writer.write(session.output()), if !session.output().is_empty() => match written {
@@ -68,7 +68,7 @@ pub(super) async fn serve(
             () = session.news() => {}
         }
         if waits_for_input {
-            last_empty = shared.now();
+            last_empty = shared.earliest();
         }
     };
     client.session.close(end);

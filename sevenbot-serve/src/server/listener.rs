@@ -119,3 +119,24 @@ impl Drop for LocalSocket {
         }
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // A panic is a failed test.
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peer_whose_computer_is_gone_is_noticed() {
+        tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap().block_on(async {
+            let listener = open_tcp(SocketAddr::from(([127, 0, 0, 1], 0))).unwrap();
+            let _client = std::net::TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+            let (stream, _) = accept_tcp(&listener).await;
+            assert!(sockopt::socket_keepalive(&stream).unwrap());
+            let silence = sockopt::tcp_keepidle(&stream).unwrap()
+                + sockopt::tcp_keepintvl(&stream).unwrap() * sockopt::tcp_keepcnt(&stream).unwrap();
+            assert_eq!(silence, Duration::from_secs(25), "the time in docs/serve.md");
+            assert_eq!(sockopt::tcp_user_timeout(&stream).unwrap(), 60_000);
+            assert!(stream.nodelay().unwrap());
+        });
+    }
+}

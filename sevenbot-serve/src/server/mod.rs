@@ -64,6 +64,10 @@ const MOST_NOTICES: usize = 4;
 /// Time between two notices about refused clients, so that a flood of them fills no log.
 const NOTICE_PERIOD: Duration = Duration::from_millis(200);
 
+/// Turns of tasks after which it is looked which other connections have bytes. A flood keeps tasks ready all the time, and a stop
+/// must not wait for many of their turns.
+const POLL_INTERVAL: u32 = 4;
+
 /// What to serve.
 #[derive(Clone, Debug)]
 pub struct ServerConfig {
@@ -137,7 +141,8 @@ impl Server {
     /// # Errors
     /// See [`StartError`].
     pub fn open(config: ServerConfig) -> Result<Self, StartError> {
-        let runtime = Builder::new_current_thread().enable_all().build().map_err(StartError::System)?;
+        let runtime = Builder::new_current_thread().enable_all().event_interval(POLL_INTERVAL).build();
+        let runtime = runtime.map_err(StartError::System)?;
         let inside = runtime.enter();
         let ptys = config.ptys.iter().map(|link| PtyPort::open(link)).collect::<Result<_, _>>()?;
         let tls = config.tls.as_ref().map(tls::acceptor).transpose()?.map(TlsSettings);
@@ -182,6 +187,7 @@ impl Server {
         runtime.block_on(async {
             let stop = Readiness::of(stop)?;
             let shared = Shared::new(Hub::new(config.baud, config.options), config.baud);
+            tokio::spawn(Arc::clone(&shared).beat());
             let (arm_notices, mut arm_news) = mpsc::unbounded_channel();
             let (refusals, mut refused) = mpsc::channel(MOST_NOTICES);
             let (failures, mut failed) = mpsc::channel(1);

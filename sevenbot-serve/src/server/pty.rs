@@ -55,7 +55,7 @@ impl PtyPort {
             let waits_for_input = session.has_room();
             wait(&master, opened.as_ref(), &session).await?;
             if waits_for_input {
-                last_empty = shared.now();
+                last_empty = shared.earliest();
             }
         }
     }

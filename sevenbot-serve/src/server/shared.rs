@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use protocol_core::time::Instant;
+use protocol_core::time::{Duration, Instant};
 use tokio::sync::Notify;
 
 use crate::hub::{ClientId, Hub};
@@ -19,6 +19,32 @@ pub(super) struct Shared {
     arm: Notify,
     pub(super) baud: u32,
     start: std::time::Instant,
+    pulse: Mutex<Pulse>,
+}
+
+/// Time between two beats.
+const BEAT: Duration = Duration::from_millis(50);
+/// A beat that comes so long after the last one shows that the system did not run the server.
+const MISSED: Duration = Duration::from_millis(150);
+
+/// Tells whether the server ran all the time.
+#[derive(Debug, Default)]
+struct Pulse {
+    last: Instant,
+    /// The server did not run from this time on, until less than a beat ago.
+    gap: Option<Instant>,
+}
+
+impl Pulse {
+    fn beat(&mut self, now: Instant) {
+        self.gap = (now - self.last >= MISSED).then_some(self.last);
+        self.last = now;
+    }
+
+    /// When what comes now can have been sent at the earliest, although it was waited for.
+    fn earliest(&self, now: Instant) -> Instant {
+        self.gap.unwrap_or(if now - self.last >= MISSED { self.last } else { now })
+    }
 }
 
 impl Shared {
@@ -29,7 +55,22 @@ impl Shared {
             arm: Notify::new(),
             baud,
             start: std::time::Instant::now(),
+            pulse: Mutex::default(),
         })
+    }
+
+    /// Notes for ever that the server runs.
+    pub(super) async fn beat(self: Arc<Self>) {
+        loop {
+            lock(&self.pulse).beat(self.now());
+            tokio::time::sleep(std::time::Duration::from_micros(BEAT.as_micros())).await;
+        }
+    }
+
+    /// When bytes that were waited for and come now can have been sent at the earliest: now, or while the server was suspended.
+    pub(super) fn earliest(&self) -> Instant {
+        let now = self.now();
+        lock(&self.pulse).earliest(now)
     }
 
     pub(super) fn now(&self) -> Instant {
@@ -85,4 +126,25 @@ impl Shared {
 /// A task that panicked leaves a hub that others can use: each of its steps is complete.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at_ms(millis: u64) -> Instant {
+        Instant::from_micros(millis * 1_000)
+    }
+
+    #[test]
+    fn what_comes_after_a_gap_may_be_as_old_as_the_gap() {
+        let mut pulse = Pulse::default();
+        (0..20).for_each(|beat| pulse.beat(at_ms(beat * 50)));
+        assert_eq!(pulse.earliest(at_ms(990)), at_ms(990));
+        assert_eq!(pulse.earliest(at_ms(3_000)), at_ms(950), "before the next beat");
+        pulse.beat(at_ms(3_000));
+        assert_eq!(pulse.earliest(at_ms(3_010)), at_ms(950), "behind it");
+        pulse.beat(at_ms(3_050));
+        assert_eq!(pulse.earliest(at_ms(3_060)), at_ms(3_060));
+    }
 }

@@ -271,14 +271,14 @@ where
         }
         tokio::select! {
             message = messages.next(), if waits_for_input => match message {
-                Ok(message) => session.put(shared.now(), message),
+                Ok(message) => session.put(shared.earliest(), message),
                 Err(end) => break end,
             },
             sent = sender.done() => if let Err(end) = sent { break end },
             () = session.news() => {}
         }
         if waits_for_input {
-            last_empty = shared.now();
+            last_empty = shared.earliest();
         }
     };
     session.close(end);

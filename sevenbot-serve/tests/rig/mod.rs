@@ -126,6 +126,11 @@ impl World {
         self.pages[page].to_send.push_back(message.to_owned());
     }
 
+    /// Has the hub something new for the program since the last call?
+    pub fn has_news(&mut self, program: usize) -> bool {
+        self.hub.take_news().contains(&self.programs[program].client.id())
+    }
+
     pub fn leave(&mut self, number: usize) {
         self.hub.leave(self.now, self.programs.remove(number).client.id());
     }

@@ -6,11 +6,16 @@ use std::path::PathBuf;
 /// The environment variable with the token of servers that want one.
 pub const TOKEN_VARIABLE: &str = "SEVENBOT_TOKEN";
 
+/// The environment variable with the file, in PEM, of the certificates that servers with TLS may have.
+pub const CERTIFICATE_VARIABLE: &str = "SEVENBOT_CERTIFICATE";
+
 /// The address of an arm behind a server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     /// `tcp://HOST:PORT`, or `socket://HOST:PORT` as pyserial writes it.
     Tcp(String),
+    /// `tls://HOST:PORT`: the connection is encrypted, and the server shows a certificate for this host.
+    Tls(String),
     /// `unix:PATH`.
     Unix(PathBuf),
     /// `sevenbot://NAME`: the server that was started with this name.
@@ -34,13 +39,16 @@ impl Address {
         if let Some(name) = name.strip_prefix("sevenbot://") {
             return Some(Self::Name(name.trim_end_matches('/').to_owned()));
         }
+        if let Some(address) = name.strip_prefix("tls://") {
+            return Some(Self::Tls(address.trim_end_matches('/').to_owned()));
+        }
         match tcp() {
             Some(address) => Some(Self::Tcp(address.trim_end_matches('/').to_owned())),
             None => path().map(|path| Self::Unix(path.into())),
         }
     }
 
-    /// The token that servers over TCP may want: of the environment variable [`TOKEN_VARIABLE`].
+    /// The token that servers over TCP, also with TLS, may want: of the environment variable [`TOKEN_VARIABLE`].
     pub(super) fn token() -> Option<String> {
         env::var(TOKEN_VARIABLE).ok().filter(|token| !token.is_empty())
     }
@@ -55,6 +63,7 @@ mod tests {
         for port in ["/dev/ttyUSB0", "COM3", "./7bot", "tcp", "unix", "sevenbot", ""] {
             assert_eq!(Address::parse(port), None, "{port}");
         }
+        assert_eq!(Address::parse("tls://h:1/"), Some(Address::Tls("h:1".to_owned())));
         assert_eq!(Address::parse("socket://h:1/"), Some(Address::Tcp("h:1".to_owned())));
         for path in ["unix:/run/a.sock", "unix:///run/a.sock"] {
             assert_eq!(Address::parse(path), Some(Address::Unix("/run/a.sock".into())));

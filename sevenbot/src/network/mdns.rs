@@ -1,12 +1,14 @@
 //! Names of arms on the local network: multicast DNS, service `_sevenbot._tcp`.
 
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use mdns_sd::{ServiceDaemon, ServiceEvent, ServiceInfo};
+use mdns_sd::{IfKind, ServiceDaemon, ServiceEvent, ServiceInfo};
 
 /// The type of service.
 const SERVICE: &str = "_sevenbot._tcp.local.";
+/// The property of a server with TLS.
+const ENCRYPTED: (&str, &str) = ("tls", "1");
 /// How long answers are waited for.
 const ANSWER_TIME: Duration = Duration::from_millis(1_500);
 
@@ -17,6 +19,8 @@ pub struct Announced {
     pub name: String,
     /// Its address over TCP.
     pub address: SocketAddr,
+    /// The connection has to be encrypted.
+    pub is_encrypted: bool,
 }
 
 /// Why a name is not announced.
@@ -32,15 +36,20 @@ pub struct Announcement {
 
 impl Announcement {
     /// Announces a server that listens on a TCP port, at all addresses of this computer if `address` is unspecified.
+    /// `is_encrypted`: with TLS.
     ///
     /// # Errors
     /// The system has no multicast, or the name is not fit for it.
-    pub fn new(name: &str, address: SocketAddr) -> Result<Self, AnnounceError> {
+    pub fn new(name: &str, address: SocketAddr, is_encrypted: bool) -> Result<Self, AnnounceError> {
         let daemon = ServiceDaemon::new()?;
+        if address.is_ipv4() {
+            // Nobody would answer at the addresses of IPv6.
+            daemon.disable_interface(IfKind::IPv6)?;
+        }
         let host = format!("sevenbot-{name}.local.");
         let listed = if address.ip().is_unspecified() { String::new() } else { address.ip().to_string() };
-        let none: &[(&str, &str)] = &[];
-        let service = ServiceInfo::new(SERVICE, name, &host, listed.as_str(), address.port(), none)?;
+        let properties: &[(&str, &str)] = if is_encrypted { &[ENCRYPTED] } else { &[] };
+        let service = ServiceInfo::new(SERVICE, name, &host, listed.as_str(), address.port(), properties)?;
         let service = if listed.is_empty() { service.enable_addr_auto() } else { service };
         let full_name = service.get_fullname().to_owned();
         daemon.register(service)?;
@@ -77,13 +86,15 @@ pub fn announced() -> Vec<Announced> {
     found
 }
 
-/// The address of an arm by its name.
+/// An arm by its name.
 #[must_use]
-pub fn find(name: &str) -> Option<SocketAddr> {
+pub fn find(name: &str) -> Option<Announced> {
     let mut found = None;
     let _ = browse(|arm| {
         let is_wanted = arm.name == name;
-        found = found.or(is_wanted.then_some(arm.address));
+        if is_wanted {
+            found = Some(arm);
+        }
         is_wanted
     });
     found
@@ -98,12 +109,11 @@ fn browse(mut on_arm: impl FnMut(Announced) -> bool) -> Result<(), mdns_sd::Erro
         let ServiceEvent::ServiceResolved(service) = event else { continue };
         let name =
             service.fullname.strip_suffix(SERVICE).unwrap_or_default().trim_end_matches('.').to_owned();
-        // IPv4 first: an address of IPv6 may need a scope.
-        let mut addresses: Vec<IpAddr> =
-            service.addresses.iter().map(mdns_sd::ScopedIp::to_ip_addr).collect();
-        addresses.sort();
-        let Some(&address) = addresses.first() else { continue };
-        if on_arm(Announced { name, address: SocketAddr::new(address, service.port) }) {
+        // IPv4 first: an address of IPv6 may need a scope. That of loopback last: it is each computer's own.
+        let addresses = service.addresses.iter().map(mdns_sd::ScopedIp::to_ip_addr);
+        let Some(address) = addresses.min_by_key(|ip| (ip.is_loopback(), *ip)) else { continue };
+        let is_encrypted = service.txt_properties.get_property_val_str(ENCRYPTED.0) == Some(ENCRYPTED.1);
+        if on_arm(Announced { name, address: SocketAddr::new(address, service.port), is_encrypted }) {
             break;
         }
     }

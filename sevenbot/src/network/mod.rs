@@ -2,7 +2,8 @@
 //!
 //! ```text
 //!   tcp://HOST:PORT ──▶ address ──▶ socket_line ──▶ Arm
-//!   unix:PATH       ──▶    ▲
+//!   tls://HOST:PORT ──▶    ▲            └── tls
+//!   unix:PATH       ──▶    │
 //!   sevenbot://NAME ──▶ local_server: the servers of this user; mdns: those of the local network
 //! ```
 
@@ -11,12 +12,14 @@ mod local_server;
 #[cfg(feature = "mdns")]
 pub mod mdns;
 mod socket_line;
+#[cfg(feature = "tls")]
+mod tls;
 
 use crate::error::OpenError;
 use crate::host_line::HostLine;
 use crate::open_port::OpenPort;
 
-pub use self::address::{Address, TOKEN_VARIABLE};
+pub use self::address::{Address, CERTIFICATE_VARIABLE, TOKEN_VARIABLE};
 pub use self::local_server::{LocalServer, Registered, servers, serving};
 pub use self::socket_line::SocketLine;
 

@@ -1,5 +1,6 @@
 //! A line to an arm behind a server: a TCP connection, or a Unix socket.
 
+use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
 #[cfg(unix)]
@@ -18,25 +19,50 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
 /// How long a computer may take to answer.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-#[derive(Debug)]
-enum Stream {
-    Tcp(TcpStream),
-    #[cfg(unix)]
-    Unix(UnixStream),
+/// A stream of bytes whose reads have a timeout.
+trait Stream: Read + Write + Send + Sync {
+    fn set_timeout(&self, timeout: Duration) -> io::Result<()>;
+}
+
+impl Stream for TcpStream {
+    fn set_timeout(&self, timeout: Duration) -> io::Result<()> {
+        self.set_read_timeout(Some(timeout))
+    }
+}
+
+#[cfg(unix)]
+impl Stream for UnixStream {
+    fn set_timeout(&self, timeout: Duration) -> io::Result<()> {
+        self.set_read_timeout(Some(timeout))
+    }
+}
+
+#[cfg(feature = "tls")]
+impl Stream for super::tls::TlsStream {
+    fn set_timeout(&self, timeout: Duration) -> io::Result<()> {
+        self.sock.set_read_timeout(Some(timeout))
+    }
 }
 
 /// A line to an arm behind a server.
-#[derive(Debug)]
-pub struct SocketLine(Stream);
+pub struct SocketLine(Box<dyn Stream>);
+
+impl fmt::Debug for SocketLine {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str("SocketLine")
+    }
+}
 
 impl SocketLine {
-    /// Connects to a server. Over TCP the token is that of the environment variable [`TOKEN_VARIABLE`](super::TOKEN_VARIABLE).
+    /// Connects to a server. Over TCP the token is that of the environment variable [`TOKEN_VARIABLE`](super::TOKEN_VARIABLE), and
+    /// with TLS the certificate is one of those in the file of [`CERTIFICATE_VARIABLE`](super::CERTIFICATE_VARIABLE).
     ///
     /// # Errors
     /// There is no such server, or it cannot be reached.
     pub fn connect(address: &Address) -> Result<Self, OpenError> {
         match address {
-            Address::Tcp(address) => connect_tcp(address),
+            Address::Tcp(address) => connect_tcp(address, None),
+            Address::Tls(address) => connect_tcp(address, Some(host(address))),
             Address::Unix(path) => connect_unix(path),
             Address::Name(name) => {
                 let named = servers().into_iter().find(|server| server.name.as_ref() == Some(name));
@@ -49,49 +75,72 @@ impl SocketLine {
 
 /// Connects to a server of the local network.
 #[cfg(feature = "mdns")]
-fn connect_named(name: &str) -> Result<Stream, OpenError> {
-    let address = super::mdns::find(name).ok_or(OpenError::NotFound)?;
-    connect_tcp(&address.to_string())
+fn connect_named(name: &str) -> Result<Box<dyn Stream>, OpenError> {
+    let found = super::mdns::find(name).ok_or(OpenError::NotFound)?;
+    // The certificate is for the name: the address may be another one tomorrow.
+    connect_tcp(&found.address.to_string(), found.is_encrypted.then_some(name))
 }
 
 #[cfg(not(feature = "mdns"))]
-fn connect_named(_: &str) -> Result<Stream, OpenError> {
+fn connect_named(_: &str) -> Result<Box<dyn Stream>, OpenError> {
     Err(OpenError::NotFound)
 }
 
-fn connect_tcp(address: &str) -> Result<Stream, OpenError> {
+/// `host`: the connection is encrypted, and the certificate is for this host.
+fn connect_tcp(address: &str, host: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
     let addresses = std::net::ToSocketAddrs::to_socket_addrs(address).map_err(|error| failed(&error))?;
     let mut last = OpenError::NotFound;
     for address in addresses {
-        match TcpStream::connect_timeout(&address, CONNECT_TIMEOUT).and_then(log_in) {
-            Ok(stream) => return Ok(Stream::Tcp(stream)),
+        match TcpStream::connect_timeout(&address, CONNECT_TIMEOUT).and_then(|stream| log_in(stream, host)) {
+            Ok(stream) => return Ok(stream),
             Err(error) => last = failed(&error),
         }
     }
     Err(last)
 }
 
-fn log_in(mut stream: TcpStream) -> io::Result<TcpStream> {
+/// The host of `HOST:PORT`, where the host may be an address of IPv6 in brackets.
+fn host(address: &str) -> &str {
+    let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
+    host.trim_start_matches('[').trim_end_matches(']')
+}
+
+fn log_in(stream: TcpStream, host: Option<&str>) -> io::Result<Box<dyn Stream>> {
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
+    stream.set_read_timeout(Some(CONNECT_TIMEOUT))?;
+    let mut stream: Box<dyn Stream> = match host {
+        None => Box::new(stream),
+        Some(host) => encrypt(stream, host)?,
+    };
     if let Some(token) = Address::token() {
         stream.write_all(format!("{token}\n").as_bytes())?;
     }
     Ok(stream)
 }
 
+#[cfg(feature = "tls")]
+fn encrypt(stream: TcpStream, host: &str) -> io::Result<Box<dyn Stream>> {
+    Ok(Box::new(super::tls::connect(stream, host)?))
+}
+
+#[cfg(not(feature = "tls"))]
+fn encrypt(_: TcpStream, _: &str) -> io::Result<Box<dyn Stream>> {
+    Err(io::Error::other("this program was built without TLS"))
+}
+
 #[cfg(unix)]
-fn connect_unix(path: &std::path::Path) -> Result<Stream, OpenError> {
-    let connect = || {
+fn connect_unix(path: &std::path::Path) -> Result<Box<dyn Stream>, OpenError> {
+    let connect = || -> io::Result<Box<dyn Stream>> {
         let stream = UnixStream::connect(path)?;
         stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
-        Ok(Stream::Unix(stream))
+        Ok(Box::new(stream))
     };
     connect().map_err(|error: io::Error| failed(&error))
 }
 
 #[cfg(not(unix))]
-fn connect_unix(_: &std::path::Path) -> Result<Stream, OpenError> {
+fn connect_unix(_: &std::path::Path) -> Result<Box<dyn Stream>, OpenError> {
     Err(OpenError::Unusable("this system has no Unix sockets".to_owned()))
 }
 
@@ -112,23 +161,14 @@ fn lost(error: io::Error) -> PortError {
 
 impl SocketLine {
     fn read(&mut self, timeout: Duration, bytes: &mut [u8]) -> io::Result<usize> {
-        let timeout = Some(timeout.max(SHORTEST_WAIT));
-        match &mut self.0 {
-            Stream::Tcp(stream) => stream.set_read_timeout(timeout).and_then(|()| stream.read(bytes)),
-            #[cfg(unix)]
-            Stream::Unix(stream) => stream.set_read_timeout(timeout).and_then(|()| stream.read(bytes)),
-        }
+        self.0.set_timeout(timeout.max(SHORTEST_WAIT))?;
+        self.0.read(bytes)
     }
 }
 
 impl HostLine for SocketLine {
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        match &mut self.0 {
-            Stream::Tcp(stream) => stream.write_all(bytes),
-            #[cfg(unix)]
-            Stream::Unix(stream) => stream.write_all(bytes),
-        }
-        .map_err(lost)
+        self.0.write_all(bytes).map_err(lost)
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
@@ -166,6 +206,13 @@ mod tests {
         assert_eq!(line.receive(Duration::from_secs(10)), Ok(b"reply".to_vec()));
         drop(server);
         assert_eq!(line.receive(Duration::from_secs(10)), Err(PortError::Lost(ErrorKind::UnexpectedEof)));
+    }
+
+    #[test]
+    fn the_host_of_an_address_has_no_port_and_no_brackets() {
+        for (address, wanted) in [("lab-3:7777", "lab-3"), ("10.0.0.5:1", "10.0.0.5"), ("[::1]:7", "::1")] {
+            assert_eq!(host(address), wanted);
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use system_tests::frames::reply;
+use system_tests::process::{self, Signal};
 use system_tests::programs::tool;
 use system_tests::registers::{DEVICE_CODE, PRESENT_POSITION, SPEED, TARGET_POSITION};
 use system_tests::{ArmClient, read_request, write_request};
@@ -289,4 +290,29 @@ fn with_one_driver_others_are_told_that_they_only_watch() {
     assert_eq!((second.register(STATE), second.register(DRIVEN_BY)), (4, 2));
     assert_eq!(target(&mut second), 100);
     assert_eq!(second.read(PRESENT_POSITION, 7).len(), 7, "it reads");
+}
+
+/// What waits for a server that does not run is as old as it is.
+#[test]
+fn what_was_sent_to_a_suspended_server_moves_nothing() {
+    let served = Served::start(1, &[]);
+    let mut arm = served.open("a");
+    let mut streams = [served.connect(), served.connect()];
+    let mut local = UnixStream::connect(served.local_socket()).expect("a connection");
+    let mut web = WebClient::connect(&served, &[]).expect("accepted");
+    // All of them have been idle for a while.
+    thread::sleep(Duration::from_millis(500));
+    process::send_signal(&served.server, Signal::STOP);
+    arm.write(TARGET_POSITION, &[120]);
+    for stream in &mut streams {
+        stream.write_all(&write_request(TARGET_POSITION, &[130])).expect("taken");
+    }
+    local.write_all(&write_request(TARGET_POSITION, &[140])).expect("taken");
+    web.send(r#"{"cmd":"angle","id":0,"angle":150}"#);
+    thread::sleep(Duration::from_millis(800));
+    process::send_signal(&served.server, Signal::CONT);
+    check_rests(&mut arm, "suspended");
+    assert_eq!(target(&mut arm), 90);
+    streams[0].write_all(&write_request(TARGET_POSITION, &[100])).expect("taken");
+    system_tests::wait::wait_until("the server goes on", || target(&mut arm) == 100);
 }

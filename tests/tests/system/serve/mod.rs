@@ -4,6 +4,7 @@ mod attacks;
 mod bad_web;
 mod chaos;
 mod load;
+mod network;
 mod served;
 mod sharing;
 mod stops;

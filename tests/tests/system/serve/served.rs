@@ -83,8 +83,8 @@ impl Served {
 
     pub(crate) fn connect(&self) -> TcpStream {
         let port = self.ports.iter().rev().nth(2).and_then(|port| port.to_str()).expect("a TCP port");
-        let stream =
-            TcpStream::connect(port.strip_prefix("socket://").expect("an address")).expect("a connection");
+        let (_, address) = port.split_once("://").expect("an address");
+        let stream = TcpStream::connect(address).expect("a connection");
         stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a timeout");
         stream
     }

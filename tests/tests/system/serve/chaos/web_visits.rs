@@ -75,6 +75,10 @@ impl<'a> WebVisit<'a> {
                     if (answer["status"] == "error" || own.is_some()) && wait.may_be_cut() {
                         return Ok(Answer::Cut);
                     }
+                    if answer["status"] == "error" {
+                        println!("lost: {text}");
+                        return Ok(Answer::Lost);
+                    }
                     println!("crossed: {text} instead of {count} values from {address} on, {value}");
                     return Ok(Answer::Crossed);
                 }
