@@ -10,6 +10,8 @@ use crate::world::watchdog_model::WatchdogModel;
 
 /// A joint whose last questions were not answered is late by this much.
 const PAUSE: Duration = Duration::from_millis(1_000);
+/// A joint that is driven gets a goal in each control cycle, or after each timeout on a bus with long ones.
+const GOAL_PERIOD: Duration = Duration::from_millis(100);
 
 /// The true state of the arm, and its registers.
 pub(crate) struct StatusContext<'a> {
@@ -23,12 +25,15 @@ pub(crate) struct StatusContext<'a> {
 
 impl StatusContext<'_> {
     /// True if a joint need not go on with its move: it gives way, it is let go, some questions are not answered, or it is not
-    /// known whether the supply was lost.
+    /// known whether the supply was lost. On a disturbed bus a joint may get no goals: the only one that is driven has no other's
+    /// frame that shows its pause.
     pub(super) fn may_be_late(&self, joint: Joint) -> bool {
         self.bus.truth(joint).may_give_way(self.now)
             || self.bus.may_be_let_go(joint, self.now)
             || self.command_checker.is_undecided()
             || self.bus.availability(joint) == Availability::Uncertain
             || self.now - self.command_checker.paused_at[joint] < PAUSE
+            || (!self.bus.is_undisturbed(self.now)
+                && self.now - self.command_checker.goal_at[joint] > GOAL_PERIOD)
     }
 }
