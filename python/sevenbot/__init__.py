@@ -27,6 +27,7 @@ from sevenbot._sevenbot import (
     NotReached,
     NotServed,
     NotTaken,
+    Observation,
     OutOfReach,
     OutsideGuard,
     PortError,
@@ -42,6 +43,9 @@ from sevenbot._sevenbot import (
     TooFar,
     UnknownRegister,
     __version__,
+    forward,
+    inverse,
+    limits,
     ports,
 )
 
@@ -63,6 +67,7 @@ __all__ = [
     "NotReached",
     "NotServed",
     "NotTaken",
+    "Observation",
     "OutOfReach",
     "OutsideGuard",
     "PortError",
@@ -78,5 +83,8 @@ __all__ = [
     "TooFar",
     "UnknownRegister",
     "__version__",
+    "forward",
+    "inverse",
+    "limits",
     "ports",
 ]

@@ -27,6 +27,7 @@ __all__ = [
     "NotReached",
     "NotServed",
     "NotTaken",
+    "Observation",
     "OutOfReach",
     "OutsideGuard",
     "PortError",
@@ -42,6 +43,9 @@ __all__ = [
     "TooFar",
     "UnknownRegister",
     "__version__",
+    "forward",
+    "inverse",
+    "limits",
     "ports",
 ]
 
@@ -104,6 +108,33 @@ class FileError(Error, OSError):
 class GuardWarning(UserWarning):
     """Joints were sent below the table or into the base of the arm."""
 
+@overload
+def forward(angles: Iterable[float], /) -> Tip:
+    """Where an arm with these seven angles is, in degrees: forward kinematics. The same as `Tip.of`."""
+@overload
+def forward(
+    angle1: float,
+    angle2: float,
+    angle3: float,
+    angle4: float,
+    angle5: float,
+    angle6: float,
+    angle7: float,
+    /,
+) -> Tip: ...
+def inverse(
+    x: float, y: float, z: float, *, tool: Iterable[float] | None = None
+) -> NDArray[float64]:
+    """The angles of joints 1 to 5 in degrees that bring the tip to x, y, z in millimetres, with the tool in this direction, by
+    default straight down: inverse kinematics. With numpy an array.
+
+    Raises `OutOfReach` with the nearest point within reach. Knows no table and no base: `Arm.move_to` does.
+    """
+def limits() -> tuple[NDArray[float64], NDArray[float64]]:
+    """The smallest and the largest angles of joints 1 to 7 in degrees: two arrays with numpy, or tuples.
+
+    The linkage keeps joints 2 and 3 together: joint 2 + joint 3 - 65 is 19 to 161.
+    """
 def ports(baud: int = 115200) -> list[tuple[str, str, int, str]]:
     """The serial ports of this machine with an arm: name, description, device id (register 11) and firmware version.
 
@@ -114,8 +145,8 @@ def ports(baud: int = 115200) -> list[tuple[str, str, int, str]]:
 class Arm:
     """A 7Bot V2 arm.
 
-    `Arm("/dev/ttyUSB0")` opens a port, `Arm()` the only port with an arm that answers, and `Arm.simulated()` an arm in
-    virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the end, as `stop()`, and closes the port.
+    `Arm("/dev/ttyUSB0")` opens a port, `Arm()` the only port with an arm that answers, `Arm(id=5)` that of the arm with this
+    number (register 11), `Arm(chip="...")` that with this `chip_id`, and `Arm.simulated()` an arm in virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the end, as `stop()`, and closes the port.
 
     Angles are degrees, 0 to 180, joint 1 first; positions millimetres; times seconds.
     """
@@ -123,6 +154,8 @@ class Arm:
         cls,
         port: _Path | None = None,
         *,
+        id: int | None = None,
+        chip: str | None = None,
         baud: int = 115200,
         timeout: float = 0.5,
         attempts: int = 3,
@@ -183,6 +216,19 @@ class Arm:
         not answer or has let go, and nothing is written. Motor state 1 is watched for half a second as `stop()`. A motor state
         without torque warns of servos that do not answer.
         """
+    def observe(self) -> Observation:
+        """Positions, velocities and loads of one read, with its time and how old the measurement is: for a control loop.
+
+        A damaged answer is asked for again within some milliseconds. Raises `NotServed` with the maker's firmware. A servo that does
+        not answer keeps its last position here: `status()` tells.
+        """
+    @property
+    def is_connected(self) -> bool:
+        """Does the arm answer now? `False` if it is closed, does not answer, or its port is gone. Asks it."""
+    def torque_on(self) -> None:
+        """Makes the motors hold all joints where they are, and watches for half a second, as `stop()` does."""
+    def torque_off(self) -> None:
+        """Switches all motors off, so that a hand can lead the arm: it falls unless you hold it. Warns of servos that do not answer."""
     def where(self) -> Tip:
         """Where the arm is: tip, tool and wrist in millimetres, and the angles. Raises `ArmProblem` as `angles` does."""
     @overload
@@ -521,6 +567,32 @@ class Tip:
     def __eq__(self, value: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def _repr_html_(self) -> str: ...
+
+@final
+class Observation:
+    """What one read of the arm tells: positions, velocities and loads of all joints, measured in the same cycle of the controller.
+
+    The controller asks its servos once in a cycle of 10 ms, so a position is up to 10 ms old when the arm answers, and `age`
+    adds the time that the answer took.
+    """
+    @property
+    def positions(self) -> NDArray[float64]:
+        """The measured positions in degrees; NaN for a joint that was not measured since power-up. With numpy an array."""
+    @property
+    def velocities(self) -> NDArray[float64]:
+        """The velocities in degrees per second, in steps of 0.1: as `positions`."""
+    @property
+    def loads(self) -> NDArray[float64]:
+        """The loads in percent of the stall torque, positive if the motor pushes towards greater angles: as `positions`."""
+    @property
+    def time(self) -> float:
+        """When the answer was here: seconds since the arm was opened, on the clock of its line. It never goes back."""
+    @property
+    def age(self) -> float:
+        """The longest time between the measurement and `time`, in seconds: a cycle of the controller, and that of the exchange."""
+    @property
+    def monotonic(self) -> float:
+        """When the answer was here, on the clock of `time.monotonic()`."""
 
 @final
 class Problem:

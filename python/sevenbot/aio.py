@@ -80,6 +80,10 @@ class Arm:
         """As `sevenbot.Arm.set`."""
         return self._call(self.sync.set, name, values, unlock=unlock)
 
+    def observe(self) -> Awaitable[sevenbot.Observation]:
+        """As `sevenbot.Arm.observe`."""
+        return self._call(self.sync.observe)
+
     def where(self) -> Awaitable[sevenbot.Tip]:
         """As `sevenbot.Arm.where`."""
         return self._call(self.sync.where)

@@ -6,13 +6,17 @@ use std::sync::{Arc, Mutex};
 use pyo3::prelude::*;
 use pyo3::types::{PyTuple, PyType};
 use sevenbot::cartesian::{TipTarget, Vector};
+use sevenbot::map::motor_state;
 use sevenbot::moves::JointMove;
 
 use crate::arguments::{self, Direction, Goals, OpenArguments, PortName, pace, whole};
-use crate::errors::{InvalidType, raised, without_attribute};
+use crate::bulk;
+use crate::errors::{InvalidType, NotServed, raised, without_attribute};
 use crate::motion::{self, PlayOptions, RecordOptions, TipWish};
 use crate::numbers::{Values, seed};
+use crate::observation::Observation;
 use crate::opening::{self, Opened};
+use crate::ports::Wanted;
 use crate::recording::Recording;
 use crate::registers::{self, Registers, Shown};
 use crate::simulation::{SimulatedArm, Simulation, duration};
@@ -20,7 +24,6 @@ use crate::status::Status;
 use crate::stream::Stream;
 use crate::tip::Tip;
 use crate::worker::{Worker, lock};
-use crate::{bulk, ports};
 
 mod calls;
 
@@ -29,8 +32,8 @@ pub(crate) type Angles = (f64, f64, f64, f64, f64, f64, f64);
 
 /// A 7Bot V2 arm.
 ///
-/// `Arm("/dev/ttyUSB0")` opens a port, `Arm()` the only port with an arm that answers, and `Arm.simulated()` an arm in
-/// virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the end, as `stop()`, and closes the port.
+/// `Arm("/dev/ttyUSB0")` opens a port, `Arm()` the only port with an arm that answers, `Arm(id=5)` that of the arm with this
+/// number (register 11), `Arm(chip="...")` that with this `chip_id`, and `Arm.simulated()` an arm in virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the end, as `stop()`, and closes the port.
 ///
 /// Angles are degrees, 0 to 180, joint 1 first; positions millimetres; times seconds.
 #[pyclass(frozen, subclass, module = "sevenbot")]
@@ -46,17 +49,20 @@ pub(crate) struct Arm {
 #[pymethods]
 impl Arm {
     #[new]
-    #[pyo3(signature = (port = None, *, baud = 115_200, timeout = 0.5, attempts = 3, map = None))]
+    #[pyo3(signature = (port = None, *, id = None, chip = None, baud = 115_200, timeout = 0.5, attempts = 3, map = None))]
     fn new(
         py: Python<'_>,
         port: Option<PortName>,
+        id: Option<i64>,
+        chip: Option<&str>,
         baud: i64,
         timeout: f64,
         attempts: i64,
         map: Option<&str>,
     ) -> PyResult<Self> {
         let options = OpenArguments { baud, timeout, attempts, map }.options(py)?;
-        let port = port.map_or_else(|| ports::only_one(py, options.baud), |port| Ok(port.0))?;
+        let wanted = Wanted::of(py, id, chip)?;
+        let port = wanted.port(py, port, options.baud)?;
         opening::port(py, &port, options).map(|(worker, opened)| Self::of(worker, opened, None))
     }
 
@@ -127,9 +133,7 @@ impl Arm {
         Registers::of(Arc::clone(&self.worker), Arc::clone(&self.opened.names))
     }
 
-    /// The value of a register, or a list if the name has several: `arm.get("offset")`.
-    ///
-    /// Numbers are in the units of docs/registers.md. An unknown name raises `KeyError`.
+    #[doc = include_str!("arm/help/get.txt")]
     fn get(&self, py: Python<'_>, name: &str) -> PyResult<Shown> {
         registers::get(py, &self.worker, name)
     }
@@ -140,14 +144,34 @@ impl Arm {
         registers::set(py, &self.worker, name, &values, unlock)
     }
 
-    /// The measured angles in degrees, joint 1 first: in steps of 0.01 with this project's firmware, else of 1.
-    ///
-    /// Raises `ArmProblem` if a servo does not answer, because its angle is unknown then; `status()` has the others.
+    #[doc = include_str!("arm/help/angles.txt")]
     #[getter]
     fn angles(&self, py: Python<'_>) -> PyResult<Angles> {
         let read =
             self.worker.read(py, motion::known_angles).map_err(|error| without_attribute(py, error))?;
         Ok(raised(py, read)?.into())
+    }
+
+    #[doc = include_str!("arm/help/observe.txt")]
+    fn observe(&self, py: Python<'_>) -> PyResult<Observation> {
+        let read = raised(py, self.worker.read(py, Observation::read)?)?;
+        read.ok_or_else(|| NotServed::of_arm(py, "positions in hundredths, velocities and loads"))
+    }
+
+    #[doc = include_str!("arm/help/is_connected.txt")]
+    #[getter]
+    fn is_connected(&self, py: Python<'_>) -> PyResult<bool> {
+        self.worker.answers(py)
+    }
+
+    #[doc = include_str!("arm/help/torque_on.txt")]
+    fn torque_on(&self, py: Python<'_>) -> PyResult<()> {
+        registers::set(py, &self.worker, "motor-state", &Values::One(motor_state::SERVO.into()), false)
+    }
+
+    #[doc = include_str!("arm/help/torque_off.txt")]
+    fn torque_off(&self, py: Python<'_>) -> PyResult<()> {
+        registers::set(py, &self.worker, "motor-state", &Values::One(motor_state::FORCELESS.into()), false)
     }
 
     /// Where the arm is: tip, tool and wrist in millimetres, and the angles. Raises `ArmProblem` as `angles` does.
@@ -205,9 +229,7 @@ impl Arm {
         self.go_to_tip(py, TipWish { tip, tool, guard }, target, pace, wait)
     }
 
-    /// Waits until the joints of the last move rest, and returns their measured angles; `None` if there is no move.
-    ///
-    /// Raises `NotReached` if a joint does not arrive. Ctrl-C makes the arm hold. Other threads may read meanwhile.
+    #[doc = include_str!("arm/help/wait.txt")]
     fn wait(&self, py: Python<'_>) -> PyResult<Option<Angles>> {
         let Some(sent) = lock(&self.sent).take() else { return Ok(None) };
         let finished = self.worker.call(py, move |arm, watch| motion::finish(arm, &sent, watch))?;
@@ -229,8 +251,7 @@ impl Arm {
         raised(py, held).map(|joints| joints.targets().map(u16::from).to_vec())
     }
 
-    /// The health of the arm: each joint, alarms, supply, and what needs attention. `None` if the firmware does not tell, as
-    /// the maker's.
+    #[doc = include_str!("arm/help/status.txt")]
     fn status(&self, py: Python<'_>) -> PyResult<Option<Status>> {
         let read = self.worker.read(py, Status::read)?;
         raised(py, read)
@@ -265,11 +286,7 @@ impl Arm {
         Ok(Stream::new(Arc::clone(&self.worker), options, rule, guard, simulation))
     }
 
-    /// Records the positions for `seconds`, 0 to 86400, or until Ctrl-C, `hz` times a second, 1 to 50. Raises `Interrupted` if
-    /// another thread calls `stop()`.
-    ///
-    /// With `guided` the motors go off, so that you can guide the arm by hand: it falls unless you hold it. At the end it
-    /// holds where it is.
+    #[doc = include_str!("arm/help/record.txt")]
     #[pyo3(signature = (seconds = None, *, hz = 30, guided = false))]
     fn record(&self, py: Python<'_>, seconds: Option<f64>, hz: i64, guided: bool) -> PyResult<Recording> {
         let hz = whole(py, "hz", hz, 1, 50)?;

@@ -57,6 +57,13 @@ pub(crate) fn warn_of(py: Python<'_>, breach: &dyn Display) -> PyResult<()> {
     PyErr::warn(py, py.get_type::<GuardWarning>().as_any(), &text, 1)
 }
 
+impl NotServed {
+    /// The exception of an arm whose firmware does not have this.
+    pub(crate) fn of_arm(py: Python<'_>, what: &str) -> PyErr {
+        error::<Self>(py, &format!("the arm's firmware does not have {what}"), &[])
+    }
+}
+
 impl Closed {
     /// The exception of a call after `close()`.
     pub(crate) fn raise_closed(py: Python<'_>) -> PyErr {

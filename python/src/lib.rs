@@ -16,9 +16,11 @@ mod arguments;
 mod arm;
 mod bulk;
 mod errors;
+mod geometry;
 mod health;
 mod motion;
 mod numbers;
+mod observation;
 mod opening;
 mod place;
 mod ports;
@@ -39,6 +41,7 @@ fn _sevenbot(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<arm::Arm>()?;
     module.add_class::<health::JointStatus>()?;
     module.add_class::<health::Problem>()?;
+    module.add_class::<observation::Observation>()?;
     module.add_class::<recording::Recording>()?;
     module.add_class::<registers::Registers>()?;
     module.add_class::<simulation::SimulatedArm>()?;
@@ -47,6 +50,9 @@ fn _sevenbot(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<status::Status>()?;
     module.add_class::<stream::Stream>()?;
     module.add_class::<tip::Tip>()?;
+    module.add_function(wrap_pyfunction!(geometry::forward, module)?)?;
+    module.add_function(wrap_pyfunction!(geometry::inverse, module)?)?;
+    module.add_function(wrap_pyfunction!(geometry::limits, module)?)?;
     module.add_function(wrap_pyfunction!(ports::ports, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

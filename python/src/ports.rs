@@ -1,9 +1,11 @@
 //! Serial ports, and which of them lead to an arm.
 
 use pyo3::prelude::*;
-use sevenbot::ports::{available, probe};
+use sevenbot::Identity;
+use sevenbot::ports::{ProbeResult, available, probe};
 
-use crate::errors::{PortError, error};
+use crate::arguments::{PortName, whole};
+use crate::errors::{InvalidType, PortError, error};
 
 /// The serial ports of this machine with an arm: name, description, device id (register 11) and firmware version.
 ///
@@ -19,23 +21,59 @@ pub(crate) fn ports(py: Python<'_>, baud: u32) -> Vec<(String, String, u8, Strin
     arms.collect()
 }
 
-/// The name of the only port with an arm.
-pub(crate) fn only_one(py: Python<'_>, baud: u32) -> PyResult<String> {
-    let found = ports(py, baud);
-    match found.as_slice() {
-        [(name, ..)] => Ok(name.clone()),
-        [] => {
-            let hints = [
-                "is the arm plugged in, and has it power? A simulator's port has to be named",
-                "is the baud rate right (baud=)?",
-                "`sevenbot ports` lists the ports",
-            ];
-            Err(error::<PortError>(py, "no port has an arm that answers", &hints.map(str::to_owned)))
+/// The arm that is wanted: its number (register 11), its chip, or any.
+#[derive(Default)]
+pub(crate) struct Wanted {
+    id: Option<u8>,
+    chip: Option<String>,
+}
+
+impl Wanted {
+    pub(crate) fn of(py: Python<'_>, id: Option<i64>, chip: Option<&str>) -> PyResult<Self> {
+        let id = id.map(|id| whole(py, "id", id, 0, 255)).transpose()?;
+        Ok(Self { id, chip: chip.map(str::to_ascii_uppercase) })
+    }
+
+    /// The port of this name, or the only port with the wanted arm.
+    pub(crate) fn port(&self, py: Python<'_>, named: Option<PortName>, baud: u32) -> PyResult<String> {
+        match named {
+            Some(_) if self.id.is_some() || self.chip.is_some() => {
+                Err(InvalidType::raise(py, "give a port, or the id or the chip of an arm, not both"))
+            }
+            Some(PortName(name)) => Ok(name),
+            None => self.only_one(py, baud),
         }
-        several => {
-            let names: Vec<_> = several.iter().map(|(name, ..)| name.as_str()).collect();
-            let message = format!("several arms answer: {}", names.join(", "));
-            Err(error::<PortError>(py, &message, &["name one of these ports".to_owned()]))
+    }
+
+    fn is(&self, identity: &Identity, id: u8) -> bool {
+        let is_chip = |chip: &String| identity.chip_name().to_ascii_uppercase() == *chip;
+        self.id.is_none_or(|wanted| wanted == id) && self.chip.as_ref().is_none_or(is_chip)
+    }
+
+    fn only_one(&self, py: Python<'_>, baud: u32) -> PyResult<String> {
+        let found = py.detach(|| probe(available(), baud));
+        let is_wanted =
+            |found: &ProbeResult| found.answer.as_ref().is_ok_and(|(identity, id)| self.is(identity, *id));
+        let names: Vec<_> = found.into_iter().filter(is_wanted).map(|found| found.port.name).collect();
+        match names.as_slice() {
+            [name] => Ok(name.clone()),
+            [] => Err(self.none(py)),
+            several => {
+                let message = format!("several arms answer: {}", several.join(", "));
+                Err(error::<PortError>(py, &message, &["name one of these ports".to_owned()]))
+            }
         }
+    }
+
+    fn none(&self, py: Python<'_>) -> PyErr {
+        let hints = [
+            "is the arm plugged in, and has it power? A simulator's port has to be named",
+            "is the baud rate right (baud=)?",
+            "`sevenbot ports` lists the ports",
+        ];
+        let id = self.id.map(|id| format!(" with id {id}"));
+        let chip = self.chip.as_ref().map(|chip| format!(" with chip {chip}"));
+        let which = [id, chip].into_iter().flatten().collect::<String>();
+        error::<PortError>(py, &format!("no port has an arm{which} that answers"), &hints.map(str::to_owned))
     }
 }

@@ -16,8 +16,9 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use sevenbot::approach::FirstPoints;
+use sevenbot::map::DEVICE_CODE;
 use sevenbot::stream::{SetPointStream, StreamError, StreamOptions, StreamPace};
-use sevenbot::{Arm, OpenError};
+use sevenbot::{Arm, OpenError, Span};
 
 use crate::errors::{Closed, Raise};
 use crate::place::{Place, no_thread};
@@ -135,6 +136,14 @@ impl Worker {
         self.send(py, Message::Read(Box::new(call)))?;
         let (result, signal) = self.wait(py, answer, &CallState::default())?;
         signal.map_or(Ok(result), Err)
+    }
+
+    /// Is the arm open, and does it answer a read now?
+    pub(crate) fn answers(&self, py: Python<'_>) -> PyResult<bool> {
+        match self.read(py, |arm| arm.read_span(Span::of(&DEVICE_CODE)).is_ok()) {
+            Err(error) if error.is_instance_of::<Closed>(py) => Ok(false),
+            answered => answered,
+        }
     }
 
     /// As [`Self::call`]. A signal ends the work but does not replace its result.

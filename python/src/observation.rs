@@ -1,0 +1,95 @@
+//! `Observation`: positions, velocities and loads of one exchange.
+
+use std::time::Instant;
+
+use pyo3::prelude::*;
+use sevenbot::fine::FineState;
+use sevenbot::{Arm, Error, FineAngle};
+
+use crate::arm::Angles;
+use crate::bulk;
+
+/// What one read of the arm tells: positions, velocities and loads of all joints, measured in the same cycle of the controller.
+///
+/// The controller asks its servos once in a cycle of 10 ms, so a position is up to 10 ms old when the arm answers, and `age`
+/// adds the time that the answer took.
+#[pyclass(frozen, module = "sevenbot")]
+pub(crate) struct Observation {
+    positions: [f64; 7],
+    velocities: [f64; 7],
+    loads: [f64; 7],
+    time: f64,
+    age: f64,
+    monotonic: Instant,
+}
+
+/// A cycle of the controller, in seconds.
+const CYCLE: f64 = 0.01;
+
+impl Observation {
+    /// Reads it; `None` if the firmware does not tell.
+    pub(crate) fn read(arm: &mut Arm) -> Result<Option<Self>, Error> {
+        let before = arm.elapsed();
+        let Some(state) = arm.fine_state_if_served()? else { return Ok(None) };
+        let time = arm.elapsed();
+        let waited = time.saturating_sub(before).as_secs_f64();
+        Ok(Some(Self::of(&state, time.as_secs_f64(), waited)))
+    }
+
+    fn of(state: &FineState, time: f64, waited: f64) -> Self {
+        let tenths = |values: [i16; 7]| values.map(|value| f64::from(value) / 10.0);
+        Self {
+            positions: state.positions.map(|angle| angle.map_or(f64::NAN, FineAngle::degrees)),
+            velocities: tenths(state.velocities),
+            loads: tenths(state.loads),
+            time,
+            age: CYCLE + waited,
+            monotonic: Instant::now(),
+        }
+    }
+}
+
+#[pymethods]
+impl Observation {
+    /// The measured positions in degrees; NaN for a joint that was not measured since power-up. With numpy an array.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        bulk::numbers(py, &self.positions)
+    }
+
+    /// The velocities in degrees per second, in steps of 0.1: as `positions`.
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        bulk::numbers(py, &self.velocities)
+    }
+
+    /// The loads in percent of the stall torque, positive if the motor pushes towards greater angles: as `positions`.
+    #[getter]
+    fn loads<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        bulk::numbers(py, &self.loads)
+    }
+
+    /// When the answer was here: seconds since the arm was opened, on the clock of its line. It never goes back.
+    #[getter]
+    const fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// The longest time between the measurement and `time`, in seconds: a cycle of the controller, and that of the exchange.
+    #[getter]
+    const fn age(&self) -> f64 {
+        self.age
+    }
+
+    /// When the answer was here, on the clock of `time.monotonic()`.
+    #[getter]
+    fn monotonic(&self, py: Python<'_>) -> PyResult<f64> {
+        let now: f64 = py.import("time")?.call_method0("monotonic")?.extract()?;
+        Ok(now - self.monotonic.elapsed().as_secs_f64())
+    }
+
+    fn __repr__(&self) -> String {
+        let angles: Angles = self.positions.into();
+        format!("<Observation at {:.3} s: {angles:?}>", self.time)
+    }
+}
