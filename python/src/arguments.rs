@@ -10,8 +10,7 @@ use sevenbot::stream::{StreamOptions, WatchdogAction};
 use sevenbot::{ArmOptions, FineAngle, Map, MoveTime, Speed};
 
 use crate::errors::{InvalidType, InvalidValue};
-use crate::numbers::{elements, real};
-use crate::simulation::duration;
+use crate::numbers::{duration, elements, real};
 
 const WHAT_ANGLES: &str =
     "angles are seven numbers, or one list or array of seven, with None for a joint that stays";

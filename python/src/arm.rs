@@ -13,22 +13,19 @@ use crate::arguments::{self, Direction, Goals, OpenArguments, PortName, pace, wh
 use crate::bulk;
 use crate::errors::{InvalidType, NotServed, raised, without_attribute};
 use crate::motion::{self, PlayOptions, RecordOptions, TipWish};
-use crate::numbers::{Values, seed};
+use crate::numbers::{Angles, Values, duration, seed};
 use crate::observation::Observation;
 use crate::opening::{self, Opened};
 use crate::ports::Wanted;
 use crate::recording::Recording;
 use crate::registers::{self, Registers, Shown};
-use crate::simulation::{SimulatedArm, Simulation, duration};
+use crate::simulation::Simulation;
 use crate::status::Status;
 use crate::stream::Stream;
 use crate::tip::Tip;
 use crate::worker::{Worker, lock};
 
 mod calls;
-
-/// Seven angles.
-pub(crate) type Angles = (f64, f64, f64, f64, f64, f64, f64);
 
 /// A 7Bot V2 arm.
 ///
@@ -349,5 +346,24 @@ impl Arm {
         let state = if self.worker.is_open() { "" } else { ", closed" };
         let Opened { port, firmware, map, .. } = &self.opened;
         format!("<Arm at {port}, firmware {firmware}, map {map}{state}>")
+    }
+}
+
+/// An arm in virtual time: an `Arm` that always has its `simulation`.
+#[pyclass(frozen, extends = Arm, module = "sevenbot")]
+pub(crate) struct SimulatedArm(Simulation);
+
+impl SimulatedArm {
+    pub(crate) fn of(py: Python<'_>, arm: Arm, simulation: Simulation) -> PyResult<Py<Self>> {
+        Py::new(py, PyClassInitializer::from(arm).add_subclass(Self(simulation)))
+    }
+}
+
+#[pymethods]
+impl SimulatedArm {
+    /// The simulation behind this arm.
+    #[getter]
+    fn simulation(&self) -> Simulation {
+        self.0.clone()
     }
 }

@@ -11,7 +11,9 @@ use pyo3::types::PyTuple;
 mod also;
 mod raise;
 
-pub(crate) use also::{InvalidType, InvalidValue, UnknownRegister, file_error, without_attribute};
+pub(crate) use also::{
+    InvalidType, InvalidValue, UnknownRegister, file_error, register as register_also, without_attribute,
+};
 pub(crate) use raise::{Raise, StraightMoveError, not_opened, raised};
 
 macro_rules! exceptions {
@@ -25,7 +27,7 @@ macro_rules! exceptions {
             py.get_type::<ArmProblem>().setattr("problems", PyTuple::empty(py))?;
             py.get_type::<ArmProblem>().setattr("joints", PyTuple::empty(py))?;
             $(module.add(stringify!($name), py.get_type::<$name>())?;)*
-            also::register(module)
+            Ok(())
         }
     };
 }

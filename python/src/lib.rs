@@ -38,13 +38,14 @@ mod worker;
 #[pymodule]
 fn _sevenbot(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
+    errors::register_also(module)?;
     module.add_class::<arm::Arm>()?;
     module.add_class::<health::JointStatus>()?;
     module.add_class::<health::Problem>()?;
     module.add_class::<observation::Observation>()?;
     module.add_class::<recording::Recording>()?;
     module.add_class::<registers::Registers>()?;
-    module.add_class::<simulation::SimulatedArm>()?;
+    module.add_class::<arm::SimulatedArm>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<simulation::SimulationSnapshot>()?;
     module.add_class::<status::Status>()?;

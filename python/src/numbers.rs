@@ -1,9 +1,14 @@
 //! Numbers of Python: lists, tuples, arrays and whatever can be iterated, without texts and bytes.
 
+use std::time::Duration;
+
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyDict, PyFrozenSet, PySet, PyString};
 
 use crate::errors::{InvalidType, InvalidValue};
+
+/// Seven angles.
+pub(crate) type Angles = (f64, f64, f64, f64, f64, f64, f64);
 
 /// Much more than a recording has.
 const MOST_ROWS: usize = 10_000_000;
@@ -105,4 +110,11 @@ impl<'py> FromPyObject<'_, 'py> for Rows {
 pub(crate) fn seed(number: &Bound<'_, PyAny>) -> PyResult<u64> {
     let wrong = |_| InvalidValue::raise(number.py(), "a seed is a whole number, 0 to 2**64 - 1");
     number.extract().map_err(wrong)
+}
+
+/// A time in seconds, at most a day.
+pub(crate) fn duration(py: Python<'_>, seconds: f64) -> PyResult<Duration> {
+    const LONGEST: Duration = Duration::from_secs(86_400);
+    let time = Duration::try_from_secs_f64(seconds).ok().filter(|time| *time <= LONGEST);
+    time.ok_or_else(|| InvalidValue::raise(py, &format!("{seconds} s: use 0 to 86400 seconds")))
 }

@@ -6,8 +6,8 @@ use pyo3::prelude::*;
 use sevenbot::fine::FineState;
 use sevenbot::{Arm, Error, FineAngle};
 
-use crate::arm::Angles;
 use crate::bulk;
+use crate::numbers::Angles;
 
 /// What one read of the arm tells: positions, velocities and loads of all joints, measured in the same cycle of the controller.
 ///

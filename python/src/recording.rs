@@ -9,10 +9,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyType};
 use sevenbot::recording::{FileVersion, Moment, Recording as Moments, head};
 
-use crate::arm::Angles;
 use crate::bulk;
 use crate::errors::{InvalidType, InvalidValue, file_error, raised};
-use crate::numbers::{Numbers, Rows, elements};
+use crate::numbers::{Angles, Numbers, Rows, elements};
 
 /// A movement: times in seconds, angles of joints 1 to 7 in degrees, and the vacuum pump.
 ///

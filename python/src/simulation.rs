@@ -10,8 +10,8 @@ use sevenbot::Joint;
 use sevenbot::simulated::SharedSimulation;
 
 use crate::arguments::{angle, whole};
-use crate::arm::{Angles, Arm};
 use crate::errors::{Closed, InvalidValue, without_attribute};
+use crate::numbers::{Angles, duration};
 use crate::worker::lock;
 
 /// Virtual time between two checks of Python's signals: some ten milliseconds of a processor.
@@ -32,25 +32,6 @@ pub(crate) struct Simulation {
 /// A simulated arm at one instant: servos, registers, settings and time.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct SimulationSnapshot(Mutex<arm_sim::Simulation>);
-
-/// An arm in virtual time: an `Arm` that always has its `simulation`.
-#[pyclass(frozen, extends = Arm, module = "sevenbot")]
-pub(crate) struct SimulatedArm(Simulation);
-
-impl SimulatedArm {
-    pub(crate) fn of(py: Python<'_>, arm: Arm, simulation: Simulation) -> PyResult<Py<Self>> {
-        Py::new(py, PyClassInitializer::from(arm).add_subclass(Self(simulation)))
-    }
-}
-
-#[pymethods]
-impl SimulatedArm {
-    /// The simulation behind this arm.
-    #[getter]
-    fn simulation(&self) -> Simulation {
-        self.0.clone()
-    }
-}
 
 impl Simulation {
     pub(crate) fn of(shared: SharedSimulation) -> Self {
@@ -73,13 +54,6 @@ impl Simulation {
     fn shared(&self, py: Python<'_>) -> PyResult<&SharedSimulation> {
         if self.process == std::process::id() { Ok(&self.shared) } else { Err(Closed::raise_forked(py)) }
     }
-}
-
-/// A time in seconds, at most a day.
-pub(crate) fn duration(py: Python<'_>, seconds: f64) -> PyResult<Duration> {
-    const LONGEST: Duration = Duration::from_secs(86_400);
-    let time = Duration::try_from_secs_f64(seconds).ok().filter(|time| *time <= LONGEST);
-    time.ok_or_else(|| InvalidValue::raise(py, &format!("{seconds} s: use 0 to 86400 seconds")))
 }
 
 /// A joint by its number.

@@ -15,8 +15,8 @@ use sevenbot::stream::{StreamError, StreamOptions, StreamPace};
 
 use crate::arguments::Goals;
 use crate::errors::{raised, warn_of};
-use crate::watch::Watch;
-use crate::worker::{PacedStream, Worker, lock};
+use crate::watch::{PacedStream, Watch};
+use crate::worker::{Worker, lock};
 
 /// The longest time between two frames while a point is not due yet: a watchdog of 10 ms needs more than this.
 const SLICE: Duration = Duration::from_millis(20);

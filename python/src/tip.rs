@@ -7,7 +7,7 @@ use pyo3::types::PyTuple;
 use sevenbot::cartesian::{DirectionText, PointText, TipPose, Vector};
 
 use crate::arguments::Goals;
-use crate::arm::Angles;
+use crate::numbers::Angles;
 
 /// Where the arm is.
 ///

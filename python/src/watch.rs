@@ -4,16 +4,49 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::Duration;
 
 use sevenbot::Arm;
+use sevenbot::approach::FirstPoints;
 use sevenbot::moves::{Observer, Stage};
-
-use crate::worker::Message;
+use sevenbot::stream::{SetPointStream, StreamError, StreamOptions, StreamPace};
 
 /// The longest time that a read of another thread waits for an arm that moves.
 const BETWEEN_READS: Duration = Duration::from_millis(20);
+
+/// A stream, when its next point is due, and which joints had one.
+pub(crate) struct PacedStream<'a> {
+    pub(crate) stream: SetPointStream<'a>,
+    pub(crate) pace: StreamPace,
+    pub(crate) first: FirstPoints,
+    /// The last point of each joint in degrees, and the target at the start where it had none.
+    pub(crate) pose: [f64; 7],
+    /// How often a simulated arm was restored when the stream began.
+    pub(crate) restores: u64,
+}
+
+impl<'a> PacedStream<'a> {
+    pub(crate) fn open(arm: &'a mut Arm, options: StreamOptions, restores: u64) -> Result<Self, StreamError> {
+        let mut stream = SetPointStream::open(arm, options)?;
+        let pose = stream.arm().standing()?.targets;
+        let pace = StreamPace::new(stream.arm().elapsed(), options.period());
+        Ok(Self { stream, pace, first: FirstPoints::default(), pose, restores })
+    }
+}
+
+type ArmCall = Box<dyn FnOnce(&mut Arm, &Inbox) + Send>;
+type StreamCall = Box<dyn FnOnce(&mut PacedStream<'_>, &Inbox) + Send>;
+type StreamResult = SyncSender<Result<(), StreamError>>;
+/// What the thread of the port shall do.
+pub(crate) enum Message {
+    Call(ArmCall),
+    /// A short read, which changes nothing.
+    Read(ArmCall),
+    OpenStream(StreamOptions, u64, StreamResult),
+    StreamCall(StreamCall),
+    CloseStream(StreamResult),
+}
 
 /// What the two threads of a call share.
 #[derive(Debug, Default)]

@@ -9,60 +9,26 @@
 //! Calls run one after the other. Only a read may run while an earlier call waits for joints.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use sevenbot::approach::FirstPoints;
 use sevenbot::map::DEVICE_CODE;
-use sevenbot::stream::{SetPointStream, StreamError, StreamOptions, StreamPace};
+use sevenbot::stream::{StreamError, StreamOptions};
 use sevenbot::{Arm, OpenError, Span};
 
 use crate::errors::{Closed, Raise};
 use crate::place::{Place, no_thread};
 use crate::progress::ProgressLine;
-use crate::watch::{CallState, Inbox, Watch};
+use crate::watch::{CallState, Inbox, Message, PacedStream, Watch};
 
 /// Time between two checks of Python's signals.
 pub(crate) const SIGNAL_PERIOD: Duration = Duration::from_millis(50);
 
-/// A stream, when its next point is due, and which joints had one.
-pub(crate) struct PacedStream<'a> {
-    pub(crate) stream: SetPointStream<'a>,
-    pub(crate) pace: StreamPace,
-    pub(crate) first: FirstPoints,
-    /// The last point of each joint in degrees, and the target at the start where it had none.
-    pub(crate) pose: [f64; 7],
-    /// How often a simulated arm was restored when the stream began.
-    pub(crate) restores: u64,
-}
-
-impl<'a> PacedStream<'a> {
-    fn open(arm: &'a mut Arm, options: StreamOptions, restores: u64) -> Result<Self, StreamError> {
-        let mut stream = SetPointStream::open(arm, options)?;
-        let pose = stream.arm().standing()?.targets;
-        let pace = StreamPace::new(stream.arm().elapsed(), options.period());
-        Ok(Self { stream, pace, first: FirstPoints::default(), pose, restores })
-    }
-}
-
-type ArmCall = Box<dyn FnOnce(&mut Arm, &Inbox) + Send>;
-type StreamCall = Box<dyn FnOnce(&mut PacedStream<'_>, &Inbox) + Send>;
-type StreamResult = SyncSender<Result<(), StreamError>>;
 /// What opens an arm. The flag is set when the caller no longer waits.
 type Opener = Box<dyn FnOnce(Arc<AtomicBool>) -> Result<Arm, OpenError> + Send>;
-
-/// What the thread of the port shall do.
-pub(crate) enum Message {
-    Call(ArmCall),
-    /// A short read, which changes nothing.
-    Read(ArmCall),
-    OpenStream(StreamOptions, u64, StreamResult),
-    StreamCall(StreamCall),
-    CloseStream(StreamResult),
-}
 
 struct Port {
     messages: Sender<Message>,

@@ -8,10 +8,11 @@ use sevenbot::cartesian::{Guard, TipTarget};
 use sevenbot::fine::FineTargets;
 use sevenbot::moves::{GuardedMoveError, Pace, TipMove};
 
-use super::{Angles, Arm};
+use super::Arm;
 use crate::arguments::LinePace;
 use crate::errors::{InvalidType, InvalidValue, file_error, raised, warn_of};
 use crate::motion::{self, PlayOptions, RecordOptions, Recorded, TipWish};
+use crate::numbers::Angles;
 use crate::opening::Opened;
 use crate::recording::Recording;
 use crate::simulation::Simulation;

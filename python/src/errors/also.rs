@@ -37,7 +37,7 @@ macro_rules! also {
         )*
 
         /// Adds the exceptions to the module.
-        pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
             $(module.add(stringify!($name), $name::class(module.py())?)?;)*
             Ok(())
         }
