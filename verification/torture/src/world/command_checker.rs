@@ -66,6 +66,8 @@ pub(super) struct CommandChecker {
     engaged_at: PerJoint<Option<Instant>>,
     servo_lost_at: PerJoint<Option<Instant>>,
     target_written_at: PerJoint<Option<Instant>>,
+    /// The last target came while the joint may have been let go: it is kept until the joint engages (D28).
+    is_written_for_later: PerJoint<bool>,
     /// How often each joint was given torque since register 29 was written.
     attempts: PerJoint<EngagementAttempts>,
     pub(super) count: u64,
@@ -109,6 +111,7 @@ impl CommandChecker {
             engaged_at: PerJoint::all(None),
             servo_lost_at: PerJoint::all(None),
             target_written_at: PerJoint::all(None),
+            is_written_for_later: PerJoint::all(false),
             attempts: PerJoint::default(),
             count: 0,
             engagements: 0,
@@ -150,9 +153,10 @@ impl CommandChecker {
         self.attempts[joint].is_exhausted
     }
 
-    /// The host wrote the target of a joint.
-    pub(super) fn target_written(&mut self, now: Instant, joint: Joint) {
+    /// The host wrote the target of a joint, which may be let go.
+    pub(super) fn target_written(&mut self, now: Instant, joint: Joint, may_be_let_go: bool) {
         self.target_written_at[joint] = Some(now);
+        self.is_written_for_later[joint] = may_be_let_go;
     }
 
     /// Register 29 was written: the attempts count anew (D28).

@@ -69,7 +69,8 @@ impl TortureWorld {
         let effect = arm.model.execute(request, room);
         for joint in Joint::ALL.into_iter().filter(|joint| arm.model.target_writes[*joint] != writes[*joint])
         {
-            arm.command_checker.target_written(self.now, joint);
+            let may_be_let_go = self.bus.may_be_let_go(joint, self.now);
+            arm.command_checker.target_written(self.now, joint, may_be_let_go);
         }
         if request.is_well_formed() {
             arm.watchdog.heard(self.now);

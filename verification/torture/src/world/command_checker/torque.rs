@@ -97,7 +97,8 @@ impl CommandChecker {
     }
 
     /// The target of a joint that lost its torque since it was last given torque is where it gets torque again, unless the
-    /// host wrote one since then.
+    /// host wrote one since then. A joint may lose its torque more than once before it is given torque: a hot servo holds by
+    /// itself, and restarts.
     fn check_held_target(&self, joint: Joint, goal: u16, context: &CommandContext<'_>) -> Check {
         let bus = context.bus;
         let Some((lost_at, engaged_at)) = bus.truth(joint).lost_at().zip(self.engaged_at[joint]) else {
@@ -106,6 +107,7 @@ impl CommandChecker {
         // Before it lost its torque, the servo may have been silent: a target that came then is taken, too (D12).
         let silent_at = self.servo_lost_at[joint].filter(|at| *at > engaged_at);
         let since = silent_at.map_or(lost_at, |at| at.min(lost_at));
+        let since = if self.is_written_for_later[joint] { engaged_at } else { since };
         let is_written = self.target_written_at[joint].is_some_and(|at| at >= since);
         let target = context.registers.get(TARGET_POSITION.of(joint));
         if lost_at < engaged_at || is_written || !context.is_known(joint) || matches!(target, 0 | 180) {
@@ -192,18 +194,31 @@ mod tests {
 
     #[test]
     fn a_joint_gets_torque_again_where_its_target_is_unless_the_host_wrote_one() {
-        for (target, is_written, is_right) in [(90, false, true), (120, false, false), (120, true, true)] {
+        let written = |is_let_go| Some(is_let_go);
+        for (target, before, after, is_right) in [
+            (90, None, None, true),
+            (120, None, None, false),
+            (120, None, written(true), true),
+            (120, None, written(false), true),
+            (120, written(false), None, false),
+            (120, written(true), None, true),
+        ] {
             let mut arm = ScriptedArm::with_engaged(JOINT);
             arm.run(1_000).unwrap();
+            let write = |arm: &mut ScriptedArm, is_let_go: Option<bool>| {
+                if let Some(is_let_go) = is_let_go {
+                    arm.checker.target_written(arm.now, JOINT, is_let_go);
+                    arm.registers.set(MOVING_JOINTS.address, JOINT.bit());
+                }
+            };
+            write(&mut arm, before);
+            arm.run(10).unwrap();
             arm.bus.restart_servo(arm.now, JOINT);
             arm.run(300).unwrap();
             arm.registers.set(TARGET_POSITION.of(JOINT), target);
-            if is_written {
-                arm.checker.target_written(arm.now, JOINT);
-                arm.registers.set(MOVING_JOINTS.address, JOINT.bit());
-            }
+            write(&mut arm, after);
             let check = arm.engage(JOINT);
-            assert_eq!(check.is_ok(), is_right, "target {target}, written: {is_written}: {check:?}");
+            assert_eq!(check.is_ok(), is_right, "target {target}, {before:?}, {after:?}: {check:?}");
         }
     }
 }

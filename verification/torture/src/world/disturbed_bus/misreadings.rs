@@ -7,8 +7,9 @@ use crate::per_joint::PerJoint;
 
 /// The controller may accept a false reading if two undetected errors come within this time.
 const MISREAD_TIME: Duration = Duration::from_millis(1_000);
-/// The largest error in counts of a false reading that the controller accepts alone: the motion of a joint at rest.
-const TOLERANCE: u64 = 8;
+/// The largest error in counts of a false reading that the controller accepts alone: the motion of a joint at rest, and of one
+/// that sinks slowly and is read four times a second.
+const TOLERANCE: u64 = 8 + 15;
 
 /// The undetected errors of all servos.
 #[derive(Debug, Default)]
@@ -61,7 +62,7 @@ mod tests {
         misreadings.undetected_error(at(100), joint);
         assert_eq!(
             (misreadings.may_be_used(joint, at(100)), misreadings.tolerance(joint, at(100))),
-            (false, 8)
+            (false, 23)
         );
         assert_eq!(misreadings.tolerance(joint, at(1_100)), 0);
         misreadings.undetected_error(at(1_100), joint);
