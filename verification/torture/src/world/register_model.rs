@@ -69,7 +69,10 @@ pub(crate) struct RegisterModel {
     pub(crate) own_targets: PerJoint<OwnTarget>,
     /// Which of its possible outcomes the next write has.
     pub(crate) choice: usize,
-    /// The number of possible outcomes of the last request.
+    /// The outcome of the next write, where the arm's registers have told it: the register because of which it is refused.
+    pub(crate) told: Option<Option<u8>>,
+    /// The outcome of the last request, and the number of its possible ones.
+    outcome: Option<u8>,
     outcomes: usize,
 }
 
@@ -92,6 +95,8 @@ impl RegisterModel {
             held_targets: PerJoint::all(None),
             own_targets: PerJoint::all(OwnTarget::Measured),
             choice: 0,
+            told: None,
+            outcome: None,
             outcomes: 1,
         };
         let bytes_of_21 = MAP_21.iter().filter(|row| row.region == Region::Ram);
@@ -148,7 +153,7 @@ impl RegisterModel {
 
     /// Executes a request. An alarm needs `room` bytes on the link.
     pub(crate) fn execute(&mut self, request: &HostRequest, room: usize) -> RequestEffect {
-        self.outcomes = 1;
+        (self.outcome, self.outcomes) = (None, 1);
         match request {
             HostRequest::Read { address, count } if usize::from(*address) + usize::from(*count) > 256 => {
                 self.refuse(refusal::MALFORMED_RANGE, *address)
@@ -228,7 +233,8 @@ impl RegisterModel {
         }
         let outcomes = self.limit_outcomes(written);
         self.outcomes = outcomes.len();
-        if let Some(at) = outcomes.get(self.choice).copied().flatten() {
+        self.outcome = self.told.unwrap_or_else(|| outcomes.get(self.choice).copied().flatten());
+        if let Some(at) = self.outcome {
             return self.refuse(refusal::AGAINST_A_LIMIT, at);
         }
         self.apply(items);

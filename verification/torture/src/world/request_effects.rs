@@ -33,7 +33,7 @@ impl TortureWorld {
         self.record_lost_supply(arm)?;
         self.allow_own_targets(arm);
         let verdicts = arm.find_verdicts(count, room);
-        let mut choices = verdicts.choices.into_iter();
+        let mut outcomes = verdicts.outcomes.into_iter();
         let mut last = arm.owed.take();
         for _ in 0..count {
             let has_arrived = arm.pending.front().is_some_and(|first| first.arrived_at <= self.now);
@@ -42,7 +42,7 @@ impl TortureWorld {
                 .ok_or_else(|| Violation("a request was executed that the host did not send".to_owned()))?;
             let has_output = !matches!(last, None | Some(RequestEffect::NoReply { .. }));
             ensure(!has_output, || format!("the output of {last:?} is missing before {request:?}"))?;
-            arm.model.choice = choices.next().unwrap_or(0);
+            arm.model.told = outcomes.next();
             // In a poll, writes have their turn before the watchdog, and a read has it after.
             if request.is_read() {
                 self.let_watchdog_act(arm);

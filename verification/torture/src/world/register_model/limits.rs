@@ -15,8 +15,8 @@ const MAX_TRIALS: usize = 1_024;
 /// The verdicts of the arm on the requests of a poll, as far as its registers tell them.
 #[derive(Debug, Default)]
 pub(crate) struct FoundVerdicts {
-    /// For each request: which of its possible outcomes it had.
-    pub(crate) choices: Vec<usize>,
+    /// For each request: the register because of which it was refused.
+    pub(crate) outcomes: Vec<Option<u8>>,
     /// The joints whose targets remain unknown, bit n-1 for joint n.
     pub(crate) unclear: u8,
 }
@@ -56,16 +56,17 @@ impl RegisterModel {
         room: usize,
         registers: &RegisterFile,
     ) -> FoundVerdicts {
-        let mut trials = vec![(self.clone(), Vec::<usize>::new())];
+        let mut trials = vec![(Self { told: None, ..self.clone() }, Vec::<Option<u8>>::new())];
         for request in requests {
             let mut next = Vec::new();
-            for (before, choices) in trials {
+            for (before, outcomes) in trials {
                 for choice in 0.. {
                     let mut model = before.clone();
                     model.choice = choice;
                     model.execute(request, room);
                     let is_last = choice + 1 >= model.outcomes;
-                    next.push((model, [choices.as_slice(), &[choice]].concat()));
+                    let outcomes = [outcomes.as_slice(), &[model.outcome]].concat();
+                    next.push((model, outcomes));
                     if is_last {
                         break;
                     }
@@ -75,11 +76,11 @@ impl RegisterModel {
             trials = next;
         }
         trials.retain(|(model, _)| model.fits(registers));
-        let Some((first, choices)) = trials.first() else { return FoundVerdicts::default() };
+        let Some((first, outcomes)) = trials.first() else { return FoundVerdicts::default() };
         let differs =
             |joint: &Joint| trials.iter().any(|(other, _)| other.targets[*joint] != first.targets[*joint]);
         let unclear = Joint::ALL.into_iter().filter(differs).fold(0, |bits, joint| bits | joint.bit());
-        FoundVerdicts { choices: choices.clone(), unclear }
+        FoundVerdicts { outcomes: outcomes.clone(), unclear }
     }
 
     /// True if any of the requests may be against a limit.
