@@ -140,7 +140,7 @@ impl JointState {
         self.is_unanswered = false;
         let was_known = self.position.is_known();
         let reading = &answer.reading;
-        let counts = match self.position.answered(now, answer.answer_micros, reading.position_counts) {
+        let counts = match self.position.answered(now, reading.position_counts) {
             FilterOutcome::Accepted(counts) => counts,
             FilterOutcome::Rejected => return Measured::Rejected,
             FilterOutcome::FellSilent => {

@@ -11,7 +11,7 @@ fn at_ms(millis: u64) -> Instant {
 fn answer(position_counts: u16) -> Answer {
     let reading =
         Reading { position_counts, speed: 0, load: 0, voltage_decivolts: 74, temperature_celsius: 31 };
-    Answer { reading, alarms: 4, torque: None, answer_micros: 500 }
+    Answer { reading, alarms: 4, torque: None }
 }
 
 /// Joints of which joint 1 was measured at 90 degrees. In the servo state its servo has shown its goal.
@@ -40,7 +40,7 @@ fn a_reading_tells_whether_anything_changed_beside_position_velocity_and_load() 
     let (mut joints, mut registers) = (Joints::new(MotorState::Forceless), RegisterFile::new([0; 6], None));
     let mut measure = |millis, alarms, temperature_celsius| {
         let reading = Reading { temperature_celsius, ..answer(511).reading };
-        let answer = Answer { reading, alarms, ..answer(511) };
+        let answer = Answer { reading, alarms, torque: None };
         joints.measured(at_ms(millis), J1, &answer, true, &mut registers)
     };
     assert_eq!(measure(0, 0, 0), Measured::Rejected, "nothing to compare it with");
