@@ -9,6 +9,7 @@ use system_tests::random::Random;
 use system_tests::registers::{FEEDBACK_FREQUENCY, MOTOR_STATE, PRESENT_POSITION, TARGET_POSITION};
 use system_tests::{read_request, write_request};
 
+use super::visit::Visit;
 use super::visitor::{Answer, Chaos, Tally};
 use super::wire::{ByteWire, WayIn};
 
@@ -33,31 +34,34 @@ impl<'a> FrameVisit<'a> {
         Some(Self { chaos, wire, received: Vec::new(), has_reports: is_terminal, may_be_stale: is_terminal })
     }
 
-    /// Does this and that. Returns how the last question ended.
-    pub(super) fn run(mut self, own: Option<u8>, random: &mut Random, tally: &mut Tally) -> Answer {
-        let acts = 1 + random.below(20);
-        for turn in 0..acts {
-            let is_question = turn == 0 || random.below(2) == 0;
-            if is_question {
-                let answer = self.ask(own.filter(|_| random.below(2) == 0), random).unwrap_or(Answer::Ended);
-                tally.note(answer);
-                if answer != Answer::Replied {
-                    return answer;
-                }
-            } else if self.act(random).is_err() {
-                tally.note(Answer::Ended);
-                return Answer::Ended;
-            }
-            if self.chaos.is_over() {
-                break;
-            }
+    /// The next whole frame that has come. Anything but a frame is one, too, so that it is noticed.
+    fn next_frame(&mut self) -> Option<Vec<u8>> {
+        let length = match self.received.as_slice() {
+            [0xAA, 0x77, 0x03 | 0x05, _, count, ..] => 7 + usize::from(*count),
+            [] | [0xAA] | [0xAA, 0x77] | [0xAA, 0x77, 0x03 | 0x05, ..] => return None,
+            other => other.len(),
+        };
+        if self.received.len() < length {
+            return None;
         }
-        self.leave(random, tally);
-        Answer::Replied
+        let frame: Vec<u8> = self.received.drain(..length).collect();
+        let (values, _) = frame.split_at(length - 2);
+        (frame == with_checksum(values))
+            .then_some(frame.clone())
+            .or(Some([b"damaged".to_vec(), frame].concat()))
     }
 
-    /// Reads registers and checks the reply: the own register, which was written directly before, or registers that only this
-    /// program reads now.
+    fn target(&mut self) -> io::Result<()> {
+        let wire = &mut self.wire;
+        self.chaos.targets.send(|values| wire.send(&write_request(TARGET_POSITION, &values)))
+    }
+}
+
+impl Visit for FrameVisit<'_> {
+    fn chaos(&self) -> &Chaos {
+        self.chaos
+    }
+
     fn ask(&mut self, own: Option<u8>, random: &mut Random) -> io::Result<Answer> {
         let wait = self.chaos.wait();
         let (start, request) = match own {
@@ -96,23 +100,6 @@ impl<'a> FrameVisit<'a> {
         }
     }
 
-    /// The next whole frame that has come. Anything but a frame is one, too, so that it is noticed.
-    fn next_frame(&mut self) -> Option<Vec<u8>> {
-        let length = match self.received.as_slice() {
-            [0xAA, 0x77, 0x03 | 0x05, _, count, ..] => 7 + usize::from(*count),
-            [] | [0xAA] | [0xAA, 0x77] | [0xAA, 0x77, 0x03 | 0x05, ..] => return None,
-            other => other.len(),
-        };
-        if self.received.len() < length {
-            return None;
-        }
-        let frame: Vec<u8> = self.received.drain(..length).collect();
-        let (values, _) = frame.split_at(length - 2);
-        (frame == with_checksum(values))
-            .then_some(frame.clone())
-            .or(Some([b"damaged".to_vec(), frame].concat()))
-    }
-
     fn act(&mut self, random: &mut Random) -> io::Result<()> {
         match random.below(9) {
             0..=2 => {
@@ -141,12 +128,6 @@ impl<'a> FrameVisit<'a> {
         Ok(())
     }
 
-    fn target(&mut self) -> io::Result<()> {
-        let wire = &mut self.wire;
-        self.chaos.targets.send(|values| wire.send(&write_request(TARGET_POSITION, &values)))
-    }
-
-    /// Ends the connection in one of several ways.
     fn leave(mut self, random: &mut Random, tally: &mut Tally) {
         let way = random.below(5);
         match way {

@@ -14,6 +14,7 @@
 
 mod frame_visits;
 mod sent_targets;
+mod visit;
 mod visitor;
 mod web_visits;
 mod wire;

@@ -10,6 +10,7 @@ use system_tests::registers::SPEED;
 
 use super::frame_visits::FrameVisit;
 use super::sent_targets::SentTargets;
+use super::visit::Visit;
 use super::web_visits::WebVisit;
 use super::wire::{Security, WayIn};
 

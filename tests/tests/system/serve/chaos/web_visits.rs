@@ -7,6 +7,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use system_tests::random::Random;
 
+use super::visit::Visit;
 use super::visitor::{Answer, Chaos, Tally};
 use super::wire::WebWire;
 use crate::serve::served::web_frame;
@@ -27,27 +28,23 @@ impl<'a> WebVisit<'a> {
         Some(Self { chaos, wire, is_page, unread: 0 })
     }
 
-    /// Does this and that. Returns how the last question ended.
-    pub(super) fn run(mut self, own: Option<u8>, random: &mut Random, tally: &mut Tally) -> Answer {
-        let acts = 1 + random.below(20);
-        for turn in 0..acts {
-            let is_question = turn == 0 || random.below(2) == 0;
-            if is_question {
-                let answer = self.ask(own.filter(|_| random.below(2) == 0), random).unwrap_or(Answer::Ended);
-                tally.note(answer);
-                if answer != Answer::Replied {
-                    return answer;
-                }
-            } else if self.act(random).is_err() {
-                tally.note(Answer::Ended);
-                return Answer::Ended;
-            }
-            if self.chaos.is_over() {
-                break;
-            }
-        }
-        self.leave(random, tally);
-        Answer::Replied
+    fn command(&mut self, command: &Value) -> io::Result<()> {
+        self.unread += usize::from(self.is_page);
+        self.wire.send(&command.to_string())
+    }
+
+    fn target(&mut self) -> io::Result<()> {
+        self.unread += usize::from(self.is_page);
+        let wire = &mut self.wire;
+        self.chaos.targets.send(|[a, b, c, d]| {
+            wire.send(&json!({ "cmd": "angles", "angles": [a, b, c, d, 90, 90, 80] }).to_string())
+        })
+    }
+}
+
+impl Visit for WebVisit<'_> {
+    fn chaos(&self) -> &Chaos {
+        self.chaos
     }
 
     fn ask(&mut self, own: Option<u8>, random: &mut Random) -> io::Result<Answer> {
@@ -90,11 +87,6 @@ impl<'a> WebVisit<'a> {
         }
     }
 
-    fn command(&mut self, command: &Value) -> io::Result<()> {
-        self.unread += usize::from(self.is_page);
-        self.wire.send(&command.to_string())
-    }
-
     fn act(&mut self, random: &mut Random) -> io::Result<()> {
         match random.below(6) {
             0..=2 => {
@@ -112,15 +104,6 @@ impl<'a> WebVisit<'a> {
         }
     }
 
-    fn target(&mut self) -> io::Result<()> {
-        self.unread += usize::from(self.is_page);
-        let wire = &mut self.wire;
-        self.chaos.targets.send(|[a, b, c, d]| {
-            wire.send(&json!({ "cmd": "angles", "angles": [a, b, c, d, 90, 90, 80] }).to_string())
-        })
-    }
-
-    /// Ends the connection in one of several ways.
     fn leave(mut self, random: &mut Random, tally: &mut Tally) {
         match random.below(5) {
             0 => {
