@@ -1,4 +1,4 @@
-//! What the thread of Python and the thread of the port share during one call.
+//! What the thread of Python tells the thread of the port, and what the two share during one call.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -38,6 +38,7 @@ impl<'a> PacedStream<'a> {
 type ArmCall = Box<dyn FnOnce(&mut Arm, &Inbox) + Send>;
 type StreamCall = Box<dyn FnOnce(&mut PacedStream<'_>, &Inbox) + Send>;
 type StreamResult = SyncSender<Result<(), StreamError>>;
+
 /// What the thread of the port shall do.
 pub(crate) enum Message {
     Call(ArmCall),

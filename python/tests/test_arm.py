@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import _thread
-import signal
 import threading
 import warnings
-from collections.abc import Iterator
 
 import pytest
 
@@ -235,14 +233,6 @@ def test_map_21_has_the_same_names() -> None:
         with pytest.raises(sevenbot.NotServed):
             with arm.stream():
                 pass
-
-
-@pytest.fixture
-def ctrl_c() -> Iterator[None]:
-    """Ctrl-C raises KeyboardInterrupt, also in a background job, where the shell has it ignored."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.usefixtures("ctrl_c")

@@ -6,11 +6,10 @@ import _thread
 import os
 import pickle
 import pty
-import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy
@@ -165,14 +164,6 @@ def test_the_registers_are_a_mapping(simulated_arm: sevenbot.Arm) -> None:
     assert registers._ipython_key_completions_() == keys
     with sevenbot.Arm.simulated(map="2.1") as other:
         assert len(dict(other.registers)) > 20
-
-
-@pytest.fixture
-def ctrl_c() -> Iterator[None]:
-    """Ctrl-C raises KeyboardInterrupt, also in a background job, where the shell has it ignored."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.usefixtures("ctrl_c")
