@@ -67,13 +67,10 @@ pub(crate) struct RegisterModel {
     pub(crate) held_targets: PerJoint<Option<u8>>,
     /// The targets that the arm may have set itself (D27, D28).
     pub(crate) own_targets: PerJoint<OwnTarget>,
-    /// Which of its possible outcomes the next write has.
-    pub(crate) choice: usize,
     /// The outcome of the next write, where the arm's registers have told it: the register because of which it is refused.
     pub(crate) told: Option<Option<u8>>,
-    /// The outcome of the last request, and the number of its possible ones.
-    outcome: Option<u8>,
-    outcomes: usize,
+    /// The possible outcomes of the last request.
+    outcomes: Vec<Option<u8>>,
 }
 
 impl RegisterModel {
@@ -94,10 +91,8 @@ impl RegisterModel {
             target_writes: PerJoint::all(0),
             held_targets: PerJoint::all(None),
             own_targets: PerJoint::all(OwnTarget::Measured),
-            choice: 0,
             told: None,
-            outcome: None,
-            outcomes: 1,
+            outcomes: vec![None],
         };
         let bytes_of_21 = MAP_21.iter().filter(|row| row.region == Region::Ram);
         for row in bytes_of_21.chain(MAP) {
@@ -153,7 +148,7 @@ impl RegisterModel {
 
     /// Executes a request. An alarm needs `room` bytes on the link.
     pub(crate) fn execute(&mut self, request: &HostRequest, room: usize) -> RequestEffect {
-        (self.outcome, self.outcomes) = (None, 1);
+        self.outcomes = vec![None];
         match request {
             HostRequest::Read { address, count } if usize::from(*address) + usize::from(*count) > 256 => {
                 self.refuse(refusal::MALFORMED_RANGE, *address)
@@ -231,10 +226,8 @@ impl RegisterModel {
         if let (Some(at), Storage::Full) = (changed, self.storage) {
             return self.refuse(refusal::STORAGE_FULL, at);
         }
-        let outcomes = self.limit_outcomes(written);
-        self.outcomes = outcomes.len();
-        self.outcome = self.told.unwrap_or_else(|| outcomes.get(self.choice).copied().flatten());
-        if let Some(at) = self.outcome {
+        self.outcomes = self.limit_outcomes(written);
+        if let Some(at) = self.told.or(self.outcomes.first().copied()).flatten() {
             return self.refuse(refusal::AGAINST_A_LIMIT, at);
         }
         self.apply(items);

@@ -56,20 +56,16 @@ impl RegisterModel {
         room: usize,
         registers: &RegisterFile,
     ) -> FoundVerdicts {
-        let mut trials = vec![(Self { told: None, ..self.clone() }, Vec::<Option<u8>>::new())];
+        let mut trials = vec![(self.clone(), Vec::<Option<u8>>::new())];
         for request in requests {
             let mut next = Vec::new();
             for (before, outcomes) in trials {
-                for choice in 0.. {
-                    let mut model = before.clone();
-                    model.choice = choice;
+                let mut any = Self { told: None, ..before.clone() };
+                any.execute(request, room);
+                for outcome in any.outcomes {
+                    let mut model = Self { told: Some(outcome), ..before.clone() };
                     model.execute(request, room);
-                    let is_last = choice + 1 >= model.outcomes;
-                    let outcomes = [outcomes.as_slice(), &[model.outcome]].concat();
-                    next.push((model, outcomes));
-                    if is_last {
-                        break;
-                    }
+                    next.push((model, [outcomes.as_slice(), &[outcome]].concat()));
                 }
             }
             next.truncate(MAX_TRIALS);
