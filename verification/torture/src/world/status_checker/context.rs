@@ -25,8 +25,8 @@ pub(crate) struct StatusContext<'a> {
 
 impl StatusContext<'_> {
     /// True if a joint need not go on with its move: it gives way, it is let go, some questions are not answered, or it is not
-    /// known whether the supply was lost. On a disturbed bus a joint may get no goals: the only one that is driven has no other's
-    /// frame that shows its pause.
+    /// known whether the supply was lost. On a disturbed bus a joint may get no goals; if it is the only driven one, no frame
+    /// of goals shows that it pauses.
     pub(super) fn may_be_late(&self, joint: Joint) -> bool {
         self.bus.truth(joint).may_give_way(self.now)
             || self.bus.may_be_let_go(joint, self.now)
