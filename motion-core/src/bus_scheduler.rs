@@ -23,11 +23,9 @@ use crate::servo_bus::{Bus, Outcome};
 const START_UP_TIME: Duration = Duration::from_millis(500);
 /// The torque switches are set again after this many control cycles, in case a frame was lost.
 const TORQUE_REFRESH_CYCLES: u8 = 25;
-/// A torque switch is refreshed only if it was read on shortly before ([D28](protocol_core::decisions#d28)). From this many
-/// cycles before on, the servos are asked for it, one more in each cycle, because these answers are longer. A servo that
-/// restarts after its answer cannot be back by the refresh, and the last one has 110 ms to be asked in, on a bus on which a
-/// question takes up to 16 ms.
-const TORQUE_READ_CYCLES: u8 = 17;
+/// A torque switch is refreshed only if it was read on at most this many cycles before ([D28](protocol_core::decisions#d28)):
+/// enough for a bus on which a question takes 16 ms.
+const TORQUE_READ_CYCLES: u8 = 12;
 
 /// The servo bus and its schedule.
 #[derive(Clone, Debug)]
@@ -194,7 +192,7 @@ impl BusScheduler {
             self.left_to_read -= 1;
             let joint = self.next_to_read;
             self.next_to_read = Joint::from_index(joint.index() + 1).unwrap_or(Joint::ALL[0]);
-            let is_refresh_near = self.torque_refresh_in.saturating_add(joint.index()) <= TORQUE_READ_CYCLES;
+            let is_refresh_near = self.torque_refresh_in <= TORQUE_READ_CYCLES;
             if let Some(question) = joints.question(joint, now, is_refresh_near) {
                 self.bus.ask(now, joint, question);
                 return true;
