@@ -18,6 +18,7 @@ use crate::session::Session;
 
 const EXAMPLES: &str = "\
 Examples:
+  sevenbot --port sim info               without an arm: simulated here
   sevenbot --port /dev/ttyUSB0 info
   export SEVENBOT_PORT=/dev/ttyUSB0
   sevenbot pose 120 90 65 90 90 90 80 --speed 30 --wait
@@ -57,7 +58,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Options of every command")]
 pub(crate) struct Global {
-    /// Serial port of the arm: /dev/ttyUSB0, COM3, the link of a simulator. Or a server: unix:PATH, tcp://HOST:PORT, tls://HOST:PORT, sevenbot://NAME.
+    /// Serial port of the arm: /dev/ttyUSB0, COM3, the link of a simulator. Or a server: unix:PATH, tcp://HOST:PORT, tls://HOST:PORT, sevenbot://NAME. Or sim: an arm simulated in this command, new each time (sim:SEED: with other faults of its line).
     #[arg(long, global = true, env = "SEVENBOT_PORT", hide_env_values = true)]
     pub(crate) port: Option<String>,
     /// Baud rate of the port. The arm starts with the rate in its register 12.

@@ -235,8 +235,9 @@ impl CommandError {
         match self {
             Self::NoArm { tried } => {
                 let tried = tried.iter().map(|(port, reason)| format!("{port}: {reason}"));
-                let simulator = "`cargo sim -- --link ./7bot` starts a simulated arm, for --port ./7bot";
-                tried.chain([say_which, simulator].map(str::to_owned)).collect()
+                let inside = "--port sim is a simulated arm inside this command";
+                let simulator = "`cargo sim -- --link ./7bot` starts one that stays, for --port ./7bot";
+                tried.chain([say_which, inside, simulator].map(str::to_owned)).collect()
             }
             Self::SeveralArms { .. } => vec![say_which.to_owned()],
             Self::NoRate { .. } => {

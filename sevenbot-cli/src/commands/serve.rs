@@ -11,6 +11,7 @@ use serde::Serialize;
 use sevenbot::network::mdns::Announcement;
 use sevenbot::network::{LocalServer, Registered};
 use sevenbot::open_port::OpenPort;
+use sevenbot::simulated::simulated_port;
 use sevenbot::{OpenError, ports};
 use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::server::{
@@ -256,7 +257,13 @@ fn name(text: &str) -> Result<String, &'static str> {
 
 /// A port from the command line is kept. Otherwise the arm is searched again each time it was unplugged.
 pub(super) fn location(session: &Session) -> Result<ArmLocation, CommandError> {
-    let first = PathBuf::from(session.port_name()?);
+    let first = session.port_name()?;
+    if simulated_port(&first).is_some() {
+        let reason = "the arm of --port sim lives in one command only: start one that stays with `cargo sim -- --link ./7bot`, \
+                      and use --port ./7bot";
+        return Err(CommandError::Usage(reason.to_owned()));
+    }
+    let first = PathBuf::from(first);
     let list = || ports::available().into_iter().map(|port| port.name.into()).collect();
     Ok(if session.port.is_some() { ArmLocation::Port(first) } else { ArmLocation::Search { first, list } })
 }

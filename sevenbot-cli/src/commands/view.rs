@@ -6,6 +6,7 @@ use std::net::{Ipv4Addr, SocketAddr};
 use clap::Args;
 use rust_embed::RustEmbed;
 use rustix::rand::{GetRandomFlags, getrandom};
+use sevenbot::simulated::simulated_port;
 use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::server::{ArmLocation, PageConfig, Server, ServerConfig, StartError};
 
@@ -95,8 +96,11 @@ pub(crate) fn run(session: &mut Session, args: &ViewArgs) -> Result<(), CommandE
     run_server(server, &stop, local.as_ref())
 }
 
-/// `None`: no port leads to an arm.
+/// `None`: no port leads to an arm, or the page is to simulate one.
 fn find_arm(session: &Session) -> Result<Option<ArmLocation>, CommandError> {
+    if session.port.as_deref().and_then(simulated_port).is_some() {
+        return Ok(None);
+    }
     match location(session) {
         Ok(arm) => Ok(Some(arm)),
         Err(CommandError::NoArm { .. }) => {

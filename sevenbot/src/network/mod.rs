@@ -1,10 +1,12 @@
-//! Arms behind `sevenbot serve`: addresses in the place of a port, and the servers of this computer.
+//! Arms that are not at a serial port: behind `sevenbot serve`, or simulated in this program. Addresses in the place of a port,
+//! and the servers of this computer.
 //!
 //! ```text
 //!   tcp://HOST:PORT ──▶ address ──▶ socket_line ──▶ Arm
 //!   tls://HOST:PORT ──▶    ▲            └── tls
 //!   unix:PATH       ──▶    │
 //!   sevenbot://NAME ──▶ local_server: the servers of this user; mdns: those of the local network
+//!   sim, sim:SEED   ──▶ RealTimeLine ──▶ Arm
 //! ```
 
 mod address;
@@ -18,16 +20,20 @@ mod tls;
 use crate::error::OpenError;
 use crate::host_line::HostLine;
 use crate::open_port::OpenPort;
+use crate::simulated::{RealTimeLine, simulated_port};
 
 pub use self::address::{Address, CERTIFICATE_VARIABLE, TOKEN_VARIABLE};
 pub use self::local_server::{LocalServer, Registered, servers, serving};
 pub use self::socket_line::SocketLine;
 
-/// Opens a serial port, or connects to a server.
+/// Opens a serial port, connects to a server, or switches a simulated arm on.
 ///
 /// # Errors
 /// The port cannot be opened, or the server not be reached.
 pub fn open_line(name: &str, baud: u32) -> Result<Box<dyn HostLine>, OpenError> {
+    if let Some(seed) = simulated_port(name) {
+        return Ok(Box::new(RealTimeLine::new(seed)));
+    }
     Ok(match Address::parse(name) {
         Some(address) => Box::new(SocketLine::connect(&address)?),
         None => Box::new(OpenPort::open(name, baud)?),

@@ -12,6 +12,7 @@ mod output;
 mod position;
 mod servo;
 mod settings;
+mod sim_port;
 mod status;
 mod stock_arm;
 mod stream;

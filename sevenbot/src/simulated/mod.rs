@@ -23,7 +23,10 @@
 //! ```
 //!
 //! Time passes only while the arm is asked or slept for, and in [`SharedSimulation::with`]. So a program may think as long
-//! as it likes, and gives the same result on every machine.
+//! as it likes, and gives the same result on every machine. [`RealTimeLine`] is an arm in the time of the computer: the port
+//! `sim` of the programs.
+
+mod real_time;
 
 use std::io::ErrorKind;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -36,6 +39,8 @@ use crate::arm::Arm;
 use crate::arm_options::ArmOptions;
 use crate::error::{OpenError, PortError};
 use crate::host_line::HostLine;
+
+pub use self::real_time::{RealTimeLine, simulated_port};
 
 /// A simulated arm, and its simulation.
 ///
