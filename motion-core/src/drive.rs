@@ -197,6 +197,11 @@ impl Drive {
         self.trajectory.hold_back(set_point);
     }
 
+    /// See [`Trajectory::catch_up`].
+    pub fn catch_up(&mut self, angle: MicroDegrees) {
+        self.trajectory.catch_up(angle);
+    }
+
     /// Does the joint have a set-point? A silent joint does, because its servo may still hold there.
     #[must_use]
     pub fn has_set_point(&self) -> bool {

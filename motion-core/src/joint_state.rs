@@ -140,7 +140,7 @@ impl JointState {
         self.is_unanswered = false;
         let was_known = self.position.is_known();
         let reading = &answer.reading;
-        let counts = match self.position.answered(now, reading.position_counts) {
+        let counts = match self.position.answered(now, answer.answer_micros, reading.position_counts) {
             FilterOutcome::Accepted(counts) => counts,
             FilterOutcome::Rejected => return Measured::Rejected,
             FilterOutcome::FellSilent => {
@@ -209,6 +209,9 @@ impl JointState {
             let push = push_from_servo(self.joint, load, speed);
             let sample = PushSample { angle, push, is_saturated: load.saturating_abs() >= FULL_LOAD };
             self.obstacle.measured(now, sample, set_point, self.push_limit(registers));
+            if self.obstacle.is_passed(set_point, angle) {
+                self.drive.catch_up(angle);
+            }
         }
         Protected::Holds
     }

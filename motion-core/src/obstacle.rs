@@ -61,6 +61,11 @@ impl Obstacle {
         self.limiter.measured(now, sample, set_point, limit);
     }
 
+    /// Has the joint, measured at `angle`, turned past the set-point that was held back in the last control cycle?
+    pub(crate) fn is_passed(&self, set_point: MicroDegrees, angle: MicroDegrees) -> bool {
+        self.is_holding_back() && self.limiter.has_passed(set_point, angle)
+    }
+
     /// The host wrote a target: the joint tries again.
     pub(crate) const fn target_written(&mut self) {
         (self.held, self.is_blocked, self.retrying_since) = (None, false, None);

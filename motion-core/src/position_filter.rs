@@ -43,6 +43,8 @@ pub enum FilterOutcome {
 pub struct PositionFilter {
     /// The last answer, accepted or rejected.
     last: Option<(u16, Instant)>,
+    /// How long before the last answer its position may have been measured, in microseconds.
+    last_micros: u16,
     /// The last accepted position, in servo counts; `None` while the servo is silent.
     position: Option<u16>,
     /// Were the last two answers nearly equal?
@@ -54,15 +56,22 @@ pub struct PositionFilter {
 
 impl PositionFilter {
     /// The filter before the first answer.
-    pub const UNKNOWN: Self =
-        Self { last: None, position: None, is_steady: false, failures: 0, ask_again_at: Instant::ZERO };
+    pub const UNKNOWN: Self = Self {
+        last: None,
+        last_micros: 0,
+        position: None,
+        is_steady: false,
+        failures: 0,
+        ask_again_at: Instant::ZERO,
+    };
 
-    /// Filters the position that the servo answered at `now`.
-    pub fn answered(&mut self, now: Instant, counts: u16) -> FilterOutcome {
+    /// Filters the position that the servo answered at `now`. It measured it in the last `answer_micros` microseconds.
+    pub fn answered(&mut self, now: Instant, answer_micros: u16, counts: u16) -> FilterOutcome {
         let (distance, time) = self.last.map_or((u32::MAX, Duration::ZERO), |(last, then)| {
             (u32::from(last.abs_diff(counts)), now - then)
         });
-        let agrees = distance <= reach(time);
+        let last_micros = core::mem::replace(&mut self.last_micros, answer_micros);
+        let agrees = distance <= reach(time) + turned_in(last_micros.into());
         self.is_steady = distance <= travel(time.min(SINKS_FOR), SINKING_COUNTS_PER_SECOND);
         self.last = Some((counts, now));
         if agrees {
@@ -132,6 +141,11 @@ fn reach(time: Duration) -> u32 {
     travel(time, COUNTS_PER_SECOND)
 }
 
+/// How many counts a joint turns in this time at most.
+const fn turned_in(micros: u32) -> u32 {
+    micros / 1_000 * COUNTS_PER_SECOND / 1_000
+}
+
 /// How far two readings may be apart after `time` at this speed.
 fn travel(time: Duration, counts_per_second: u32) -> u32 {
     // After a second every position is within reach. 32 bits are enough then, and the chip divides them in hardware.
@@ -150,28 +164,32 @@ mod tests {
     #[test]
     fn the_first_position_is_accepted_after_a_second_answer() {
         let mut filter = PositionFilter::UNKNOWN;
-        assert_eq!(filter.answered(at_ms(0), 500), FilterOutcome::Rejected);
+        assert_eq!(filter.answered(at_ms(0), 0, 500), FilterOutcome::Rejected);
         assert!(!filter.is_known());
-        assert_eq!(filter.answered(at_ms(10), 501), FilterOutcome::Accepted(501));
+        assert_eq!(filter.answered(at_ms(10), 0, 501), FilterOutcome::Accepted(501));
         assert_eq!(filter.position(), Some(501));
     }
 
     #[test]
     fn an_outlier_is_rejected_and_a_new_position_is_accepted_at_the_second_answer() {
         let mut filter = PositionFilter::UNKNOWN;
-        filter.answered(at_ms(0), 500);
-        filter.answered(at_ms(10), 500);
-        assert_eq!(filter.answered(at_ms(20), 900), FilterOutcome::Rejected);
+        filter.answered(at_ms(0), 0, 500);
+        filter.answered(at_ms(10), 0, 500);
+        assert_eq!(filter.answered(at_ms(20), 0, 900), FilterOutcome::Rejected);
         assert_eq!(filter.position(), Some(500), "the old position is kept");
-        assert_eq!(filter.answered(at_ms(30), 500), FilterOutcome::Rejected, "it disagrees with the outlier");
-        assert_eq!(filter.answered(at_ms(40), 500), FilterOutcome::Accepted(500));
+        assert_eq!(
+            filter.answered(at_ms(30), 0, 500),
+            FilterOutcome::Rejected,
+            "it disagrees with the outlier"
+        );
+        assert_eq!(filter.answered(at_ms(40), 0, 500), FilterOutcome::Accepted(500));
     }
 
     #[test]
     fn a_joint_may_move_as_fast_as_its_motor() {
         let mut filter = PositionFilter::UNKNOWN;
         for (step, counts) in (0..=50).map(|step| (step, step * 18)) {
-            let outcome = filter.answered(at_ms(u64::from(step) * 10), counts);
+            let outcome = filter.answered(at_ms(u64::from(step) * 10), 0, counts);
             assert_eq!(outcome == FilterOutcome::Accepted(counts), step > 0);
         }
         assert_eq!(reach(Duration::from_millis(10)), 28);
@@ -181,27 +199,27 @@ mod tests {
     #[test]
     fn an_outlier_after_a_long_time_is_within_reach_but_not_steady() {
         let mut filter = PositionFilter::UNKNOWN;
-        filter.answered(at_ms(0), 404);
-        filter.answered(at_ms(10), 404);
+        filter.answered(at_ms(0), 0, 404);
+        filter.answered(at_ms(10), 0, 404);
         assert!(filter.is_steady());
         filter.failed(at_ms(100));
         assert_eq!(
-            filter.answered(at_ms(300), 1),
+            filter.answered(at_ms(300), 0, 1),
             FilterOutcome::Accepted(1),
             "the motor could have moved there"
         );
         assert!(!filter.is_steady(), "the joint is not given torque there");
-        filter.answered(at_ms(310), 404);
+        filter.answered(at_ms(310), 0, 404);
         assert!(!filter.is_steady());
-        assert_eq!(filter.answered(at_ms(320), 403), FilterOutcome::Accepted(403));
+        assert_eq!(filter.answered(at_ms(320), 0, 403), FilterOutcome::Accepted(403));
         assert!(filter.is_steady());
     }
 
     #[test]
     fn a_servo_is_silent_after_three_failures_and_is_read_again_later() {
         let mut filter = PositionFilter::UNKNOWN;
-        filter.answered(at_ms(0), 500);
-        filter.answered(at_ms(10), 500);
+        filter.answered(at_ms(0), 0, 500);
+        filter.answered(at_ms(10), 0, 500);
         assert!(!filter.failed(at_ms(20)));
         assert!(!filter.failed(at_ms(30)));
         assert!(filter.wants_asking(at_ms(31)));
@@ -210,26 +228,26 @@ mod tests {
         assert!(!filter.is_known() && !filter.wants_asking(at_ms(129)) && filter.wants_asking(at_ms(130)));
         assert!(!filter.failed(at_ms(140)), "it was silent before");
         assert!(!filter.wants_asking(at_ms(229)));
-        assert_eq!(filter.answered(at_ms(240), 100), FilterOutcome::Rejected, "one answer is not enough");
+        assert_eq!(filter.answered(at_ms(240), 0, 100), FilterOutcome::Rejected, "one answer is not enough");
         assert!(filter.wants_asking(at_ms(241)));
-        assert_eq!(filter.answered(at_ms(250), 100), FilterOutcome::Accepted(100));
+        assert_eq!(filter.answered(at_ms(250), 0, 100), FilterOutcome::Accepted(100));
     }
 
     #[test]
     fn d12_a_third_rejected_answer_makes_a_servo_silent() {
         let mut filter = PositionFilter::UNKNOWN;
-        filter.answered(at_ms(0), 500);
-        filter.answered(at_ms(10), 500);
-        assert_eq!(filter.answered(at_ms(20), 900), FilterOutcome::Rejected);
+        filter.answered(at_ms(0), 0, 500);
+        filter.answered(at_ms(10), 0, 500);
+        assert_eq!(filter.answered(at_ms(20), 0, 900), FilterOutcome::Rejected);
         assert!(!filter.failed(at_ms(30)));
-        assert_eq!(filter.answered(at_ms(40), 100), FilterOutcome::FellSilent);
+        assert_eq!(filter.answered(at_ms(40), 0, 100), FilterOutcome::FellSilent);
         assert!(!filter.is_known() && !filter.wants_asking(at_ms(129)) && filter.wants_asking(at_ms(130)));
-        assert_eq!(filter.answered(at_ms(130), 500), FilterOutcome::Rejected);
+        assert_eq!(filter.answered(at_ms(130), 0, 500), FilterOutcome::Rejected);
         assert!(filter.wants_asking(at_ms(140)), "the next answer may agree");
-        assert_eq!(filter.answered(at_ms(140), 900), FilterOutcome::Rejected, "it was silent before");
+        assert_eq!(filter.answered(at_ms(140), 0, 900), FilterOutcome::Rejected, "it was silent before");
         assert!(!filter.wants_asking(at_ms(229)) && filter.wants_asking(at_ms(230)));
-        filter.answered(at_ms(230), 500);
-        assert_eq!(filter.answered(at_ms(240), 500), FilterOutcome::Accepted(500));
+        filter.answered(at_ms(230), 0, 500);
+        assert_eq!(filter.answered(at_ms(240), 0, 500), FilterOutcome::Accepted(500));
     }
 
     #[test]
@@ -238,9 +256,20 @@ mod tests {
             [(10, 8, true), (10, 9, false), (250, 23, true), (900, 24, false)]
         {
             let mut filter = PositionFilter::UNKNOWN;
-            filter.answered(at_ms(0), 500);
-            filter.answered(at_ms(after_ms), 500 + counts);
+            filter.answered(at_ms(0), 0, 500);
+            filter.answered(at_ms(after_ms), 0, 500 + counts);
             assert_eq!(filter.is_steady(), is_steady, "{counts} counts in {after_ms} ms");
+        }
+    }
+
+    #[test]
+    fn a_joint_may_have_turned_while_its_answer_was_late() {
+        for (answer_ms, is_accepted) in [(0, false), (40, true)] {
+            let mut filter = PositionFilter::UNKNOWN;
+            filter.answered(at_ms(0), 0, 571);
+            filter.answered(at_ms(50), answer_ms * 1_000, 540);
+            let outcome = filter.answered(at_ms(58), 0, 509);
+            assert_eq!(outcome == FilterOutcome::Accepted(509), is_accepted, "{outcome:?}");
         }
     }
 }

@@ -158,6 +158,14 @@ impl PushLimiter {
         ahead.then_some(bound.set_point)
     }
 
+    /// Has a limited joint, measured at `angle`, turned past `set_point` in the direction of its push? Nothing stops it, and
+    /// this set-point would turn it back.
+    #[must_use]
+    pub fn has_passed(&self, set_point: MicroDegrees, angle: MicroDegrees) -> bool {
+        let Phase::Limiting(bound) = &self.phase else { return false };
+        if bound.is_positive { angle > set_point } else { angle < set_point }
+    }
+
     /// Is the joint limited?
     #[must_use]
     pub const fn is_limiting(&self) -> bool {

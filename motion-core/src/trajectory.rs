@@ -107,6 +107,12 @@ impl Trajectory {
         self.set_point.0 += distance.min(most).max(-most);
     }
 
+    /// Moves the set-point at once to `angle`, where the joint is already, if that is on the way to the target.
+    pub fn catch_up(&mut self, angle: MicroDegrees) {
+        let [low, high] = [self.set_point.min(self.target), self.set_point.max(self.target)];
+        self.set_point = angle.max(low).min(high);
+    }
+
     /// Takes back the part of the last step beyond `set_point`, because the joint has to wait
     /// ([D25](protocol_core::decisions#d25)). The time of a timed move does not pass meanwhile.
     pub fn hold_back(&mut self, set_point: MicroDegrees) {

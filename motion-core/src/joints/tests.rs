@@ -1,4 +1,5 @@
 use super::*;
+use crate::CYCLE;
 use crate::servo_bus::{HeldGoal, Reading};
 use protocol_core::registers::map::PRESENT_POSITION;
 
@@ -11,7 +12,7 @@ fn at_ms(millis: u64) -> Instant {
 fn answer(position_counts: u16) -> Answer {
     let reading =
         Reading { position_counts, speed: 0, load: 0, voltage_decivolts: 74, temperature_celsius: 31 };
-    Answer { reading, alarms: 4, torque: None }
+    Answer { reading, alarms: 4, torque: None, answer_micros: 500 }
 }
 
 /// Joints of which joint 1 was measured at 90 degrees. In the servo state its servo has shown its goal.
@@ -40,7 +41,7 @@ fn a_reading_tells_whether_anything_changed_beside_position_velocity_and_load() 
     let (mut joints, mut registers) = (Joints::new(MotorState::Forceless), RegisterFile::new([0; 6], None));
     let mut measure = |millis, alarms, temperature_celsius| {
         let reading = Reading { temperature_celsius, ..answer(511).reading };
-        let answer = Answer { reading, alarms, torque: None };
+        let answer = Answer { reading, alarms, ..answer(511) };
         joints.measured(at_ms(millis), J1, &answer, true, &mut registers)
     };
     assert_eq!(measure(0, 0, 0), Measured::Rejected, "nothing to compare it with");
@@ -69,6 +70,28 @@ fn d12_a_joint_is_not_given_torque_where_it_was_measured_long_ago() {
     joints.expire_pending(at_ms(31));
     assert_eq!(joints.goals(at_ms(30), &registers).count(), 0);
     assert_eq!(joints.take_torque(true), [None; JOINTS]);
+}
+
+/// A servo pushes with all it has and turns its joint on, while each answer takes five control cycles.
+#[test]
+fn d27_a_set_point_that_gave_way_never_turns_back_a_joint_that_turned_past_it() {
+    let (mut joints, mut registers) = measured(MotorState::Servo);
+    joints.take_torque(true);
+    registers.set(SPEED.of(J1), 90);
+    joints.joint_mut(J1).unwrap().move_to(180, 0);
+    let mut goals = vec![511];
+    for (millis, position) in (60..=510).step_by(50).zip((511..).step_by(25)) {
+        for cycle in (millis - 50..millis).step_by(10).map(at_ms) {
+            joints.advance(cycle, cycle + CYCLE, &mut registers);
+        }
+        let reading = Reading { speed: 300, load: 1_000, ..answer(position).reading };
+        let late = Answer { reading, alarms: 0, answer_micros: 49_000, ..answer(position) };
+        joints.measured(at_ms(millis), J1, &late, true, &mut registers);
+        let [(_, goal)] = joints.goals(at_ms(millis), &registers).collect::<Vec<_>>()[..] else { panic!() };
+        goals.push(goal);
+        assert!(goal >= position, "at {position}: {goals:?}");
+    }
+    assert!(!goals.is_sorted(), "it never gave way: {goals:?}");
 }
 
 /// Some servos show their torque switch as on while heat keeps them from holding.

@@ -27,6 +27,8 @@ pub struct Answer {
     pub alarms: u8,
     /// Its torque and its goal, if the read asked for them.
     pub torque: Option<HeldGoal>,
+    /// From the last byte of the read to the last byte of the answer, in microseconds: the servo measured in this time.
+    pub answer_micros: u16,
 }
 
 /// The torque and the goal of a servo.
@@ -76,7 +78,7 @@ impl Question {
             }),
             _ => None,
         };
-        Some(Answer { reading, alarms, torque })
+        Some(Answer { reading, alarms, torque, answer_micros: 0 })
     }
 }
 
@@ -188,9 +190,9 @@ impl Bus {
     /// The outcome of the outstanding read, once it is known.
     pub fn poll(&mut self, now: Instant) -> Option<Outcome> {
         let (joint, question) = self.awaited?;
-        if let Some(answer) = self.answer(joint, question) {
+        if let Some(mut answer) = self.answer(joint, question) {
             self.awaited = None;
-            self.note_answer(now, joint);
+            answer.answer_micros = self.note_answer(now, joint);
             self.set_busy_until(self.sent_until.max(now + self.guard_time));
             let is_timely = now <= self.answer_until + CYCLE;
             return Some(Outcome::Measured { joint, answer, is_timely });
@@ -220,13 +222,15 @@ impl Bus {
         None
     }
 
-    /// Records the answer time, from the last byte of the read to the last byte of the answer.
-    fn note_answer(&mut self, now: Instant, joint: Joint) {
+    /// Records and returns the answer time, from the last byte of the read to the last byte of the answer.
+    fn note_answer(&mut self, now: Instant, joint: Joint) -> u16 {
         let whole = self.timeout.as_micros().saturating_add(self.answer_delay.as_micros());
         let taken = whole.saturating_sub((self.answer_until - now).as_micros());
+        let taken = u16::try_from(taken).unwrap_or(u16::MAX);
         if let Some(longest) = self.longest_answers.get_mut(usize::from(joint.index())) {
-            *longest = (*longest).max(u16::try_from(taken).unwrap_or(u16::MAX));
+            *longest = (*longest).max(taken);
         }
+        taken
     }
 
     /// The longest answer time of each servo since the last call, in microseconds; 0 if it did not answer.

@@ -59,7 +59,7 @@ fn one_joint() {
     drive.mark_silent();
     drive.release();
     let mut filter = opaque(PositionFilter::UNKNOWN);
-    opaque(filter.answered(any_time(), opaque(0)));
+    opaque(filter.answered(any_time(), opaque(0), opaque(0)));
     opaque(filter.failed(any_time()));
     opaque((filter.is_known(), filter.position(), filter.wants_asking(any_time())));
 }
