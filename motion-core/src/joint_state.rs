@@ -208,8 +208,7 @@ impl JointState {
             let Reading { load, speed, .. } = answer.reading;
             let push = push_from_servo(self.joint, load, speed);
             let sample = PushSample { angle, push, is_saturated: load.saturating_abs() >= FULL_LOAD };
-            self.obstacle.measured(now, sample, set_point, self.push_limit(registers));
-            if self.obstacle.is_passed(set_point, angle) {
+            if self.obstacle.measured(now, sample, set_point, self.push_limit(registers)) {
                 self.drive.catch_up(angle);
             }
         }

@@ -50,20 +50,16 @@ impl Obstacle {
         self.is_blocked
     }
 
-    /// See [`PushLimiter::measured`].
+    /// Takes a measurement. Returns whether the joint has turned past the set-point that was held back in the last control
+    /// cycle. See [`PushLimiter::measured`].
     pub(crate) fn measured(
         &mut self,
         now: Instant,
         sample: PushSample,
         set_point: MicroDegrees,
         limit: PushLimit,
-    ) {
-        self.limiter.measured(now, sample, set_point, limit);
-    }
-
-    /// Has the joint, measured at `angle`, turned past the set-point that was held back in the last control cycle?
-    pub(crate) fn is_passed(&self, set_point: MicroDegrees, angle: MicroDegrees) -> bool {
-        self.is_holding_back() && self.limiter.has_passed(set_point, angle)
+    ) -> bool {
+        self.limiter.measured(now, sample, set_point, limit) && self.is_holding_back()
     }
 
     /// The host wrote a target: the joint tries again.

@@ -23,7 +23,7 @@ const COUNTS_PER_SECOND: u32 = 2_000;
 /// lies at the bottom.
 const SINKING_COUNTS_PER_SECOND: u32 = 60;
 /// So old a reading says the least about a joint that sinks: 15 counts more.
-const SINKS_FOR: Duration = Duration::from_millis(250);
+const SINKS_FOR_MILLIS: u32 = 250;
 /// The largest difference between two readings of a joint at rest.
 const JITTER_COUNTS: u32 = 8;
 
@@ -67,12 +67,12 @@ impl PositionFilter {
 
     /// Filters the position that the servo answered at `now`. It measured it in the last `answer_micros` microseconds.
     pub fn answered(&mut self, now: Instant, answer_micros: u16, counts: u16) -> FilterOutcome {
-        let (distance, time) = self.last.map_or((u32::MAX, Duration::ZERO), |(last, then)| {
-            (u32::from(last.abs_diff(counts)), now - then)
+        let (distance, millis) = self.last.map_or((u32::MAX, 0), |(last, then)| {
+            (u32::from(last.abs_diff(counts)), at_most_a_second(now - then))
         });
-        let last_micros = core::mem::replace(&mut self.last_micros, answer_micros);
-        let agrees = distance <= reach(time) + turned_in(last_micros.into());
-        self.is_steady = distance <= travel(time.min(SINKS_FOR), SINKING_COUNTS_PER_SECOND);
+        let last_millis = u32::from(core::mem::replace(&mut self.last_micros, answer_micros)) / 1_000;
+        let agrees = distance <= travel(millis + last_millis, COUNTS_PER_SECOND);
+        self.is_steady = distance <= travel(millis.min(SINKS_FOR_MILLIS), SINKING_COUNTS_PER_SECOND);
         self.last = Some((counts, now));
         if agrees {
             self.position = Some(counts);
@@ -136,21 +136,15 @@ impl PositionFilter {
     }
 }
 
-/// How many counts a joint can turn in `time`.
-fn reach(time: Duration) -> u32 {
-    travel(time, COUNTS_PER_SECOND)
+/// Whole milliseconds. After a second every position is within reach.
+fn at_most_a_second(time: Duration) -> u32 {
+    // 32 bits are enough then, and the chip divides them in hardware.
+    u32::try_from(time.as_micros()).unwrap_or(u32::MAX).min(1_000_000) / 1_000
 }
 
-/// How many counts a joint turns in this time at most.
-const fn turned_in(micros: u32) -> u32 {
-    micros / 1_000 * COUNTS_PER_SECOND / 1_000
-}
-
-/// How far two readings may be apart after `time` at this speed.
-fn travel(time: Duration, counts_per_second: u32) -> u32 {
-    // After a second every position is within reach. 32 bits are enough then, and the chip divides them in hardware.
-    let micros = u32::try_from(time.as_micros()).unwrap_or(u32::MAX).min(1_000_000);
-    JITTER_COUNTS + micros / 1_000 * counts_per_second / 1_000
+/// How far two readings may be apart after this time at this speed.
+const fn travel(millis: u32, counts_per_second: u32) -> u32 {
+    JITTER_COUNTS + millis * counts_per_second / 1_000
 }
 
 #[cfg(test)]
@@ -192,8 +186,8 @@ mod tests {
             let outcome = filter.answered(at_ms(u64::from(step) * 10), 0, counts);
             assert_eq!(outcome == FilterOutcome::Accepted(counts), step > 0);
         }
-        assert_eq!(reach(Duration::from_millis(10)), 28);
-        assert_eq!(reach(Duration::from_micros(u64::MAX)), 2_008);
+        let reach = |micros| travel(at_most_a_second(Duration::from_micros(micros)), COUNTS_PER_SECOND);
+        assert_eq!([10_000, 10_999, u64::MAX].map(reach), [28, 28, 2_008]);
     }
 
     #[test]

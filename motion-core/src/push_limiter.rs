@@ -116,16 +116,38 @@ impl PushLimiter {
     /// A joint that nothing holds back.
     pub const FREE: Self = Self { phase: Phase::Free };
 
-    /// Takes a measurement of a driven joint.
-    pub fn measured(&mut self, now: Instant, sample: PushSample, set_point: MicroDegrees, limit: PushLimit) {
+    /// Takes a measurement of a driven joint. Returns whether the joint is limited, and has turned past `set_point` in the
+    /// direction of its push. Nothing stops it, and this set-point would turn it back.
+    #[inline]
+    pub fn measured(
+        &mut self,
+        now: Instant,
+        sample: PushSample,
+        set_point: MicroDegrees,
+        limit: PushLimit,
+    ) -> bool {
+        let is_over = sample.push.saturating_abs() > limit.permille();
+        if !is_over && matches!(self.phase, Phase::Free) {
+            return false;
+        }
+        self.follow(now, sample, set_point, limit);
+        self.is_passed(set_point, sample.angle)
+    }
+
+    fn is_passed(&self, set_point: MicroDegrees, angle: MicroDegrees) -> bool {
+        let Phase::Limiting(bound) = &self.phase else { return false };
+        if bound.is_positive { angle > set_point } else { angle < set_point }
+    }
+
+    // Not inlined: hardly any measurement calls it, and all would save its registers.
+    #[inline(never)]
+    fn follow(&mut self, now: Instant, sample: PushSample, set_point: MicroDegrees, limit: PushLimit) {
         let [grace, grace_at_standstill] = limit.grace();
         let limit = limit.permille();
         match &mut self.phase {
             Phase::Free => {
-                if sample.push.saturating_abs() > limit {
-                    let is_positive = sample.push > 0;
-                    self.phase = Phase::Over { since: now, still: (now, sample.angle), is_positive };
-                }
+                let is_positive = sample.push > 0;
+                self.phase = Phase::Over { since: now, still: (now, sample.angle), is_positive };
             }
             Phase::Over { since, still, is_positive } => {
                 if directed(sample.push, *is_positive) <= limit {
@@ -156,14 +178,6 @@ impl PushLimiter {
         let ahead = if bound.is_positive { set_point > bound.set_point } else { set_point < bound.set_point };
         bound.is_holding_back = ahead;
         ahead.then_some(bound.set_point)
-    }
-
-    /// Has a limited joint, measured at `angle`, turned past `set_point` in the direction of its push? Nothing stops it, and
-    /// this set-point would turn it back.
-    #[must_use]
-    pub fn has_passed(&self, set_point: MicroDegrees, angle: MicroDegrees) -> bool {
-        let Phase::Limiting(bound) = &self.phase else { return false };
-        if bound.is_positive { angle > set_point } else { angle < set_point }
     }
 
     /// Is the joint limited?
