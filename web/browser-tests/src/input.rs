@@ -111,6 +111,15 @@ impl Page {
         ));
     }
 
+    /// Moves all sliders at once, as a person would one after the other.
+    #[track_caller]
+    pub fn slide_all(&mut self, degrees: [u32; 7]) {
+        self.evaluate(&format!(
+            "{degrees:?}.forEach((degrees, index) => {{ const slider = document.querySelector('#joint-' + (index + 1)); \
+             slider.value = degrees; slider.dispatchEvent(new Event('input', {{bubbles: true}})); }})"
+        ));
+    }
+
     /// Writes a register in the table of the page.
     #[track_caller]
     pub fn write_register(&mut self, address: u8, value: &str) {

@@ -183,15 +183,22 @@ impl Page {
         });
     }
 
-    /// Waits until a joint has the target `degrees` and rests there: within 1 degree, because of its play, its friction and its
-    /// load.
+    /// Waits until a joint has this target in degrees and rests there.
     #[track_caller]
     pub fn wait_until_joint_rests(&mut self, joint: usize, degrees: f64) {
-        self.wait_for_state(&format!("joint {joint} rests at {degrees} degrees"), |state| {
-            let away = |name: &str| {
-                state[name][joint - 1].as_f64().map_or(f64::INFINITY, |angle| (angle - degrees).abs())
+        self.wait_until_joints_rest(&[(joint, degrees)]);
+    }
+
+    /// Waits until these joints have these targets in degrees and rest there: within 1 degree, because of their play, their
+    /// friction and their load.
+    #[track_caller]
+    pub fn wait_until_joints_rest(&mut self, goals: &[(usize, f64)]) {
+        self.wait_for_state(&format!("the joints rest at {goals:?}"), |state| {
+            let is_near = |name: &str, most: f64| {
+                let angle = |joint: usize| state[name][joint - 1].as_f64().unwrap_or(f64::NAN);
+                goals.iter().all(|&(joint, degrees)| (angle(joint) - degrees).abs() < most)
             };
-            away("targets") < 0.01 && away("measured") < 1.0 && state["registers"][MOVING_JOINTS] == 0
+            is_near("targets", 0.01) && is_near("measured", 1.0) && state["registers"][MOVING_JOINTS] == 0
         });
         // The set-point is there. The motor needs a moment.
         self.pass(0.5);

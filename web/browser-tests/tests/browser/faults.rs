@@ -4,6 +4,9 @@ use browser_tests::picture::Picture;
 use browser_tests::{Page, Viewed};
 use sevenbot::map::MOTOR_STATE;
 
+/// The pose of an arm that was switched on.
+const STANDARD_POSE: [u32; 7] = [90, 90, 65, 90, 90, 90, 80];
+
 /// The part of the window with the arm.
 fn scene(page: &mut Page) -> Picture {
     page.evaluate("scrollTo(0, 0)");
@@ -61,6 +64,10 @@ fn each_joint_that_is_stuck_has_the_colour_of_a_fault_and_is_named() {
         page.wait_for_text("#state", "The motors are off.");
         page.click("[data-action=motors][data-value='1']");
         page.wait_for_text("#state", "The arm is ready.");
+        // It fell meanwhile, further on a busy machine. In some poses the next joint is hidden.
+        page.slide_all(STANDARD_POSE);
+        let goals: Vec<_> = (1..).zip(STANDARD_POSE.map(f64::from)).collect();
+        page.wait_until_joints_rest(&goals);
     }
     assert_eq!(page.errors(), [""; 0]);
 }
