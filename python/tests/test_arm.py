@@ -241,8 +241,8 @@ def test_a_signal_ends_a_move_and_the_arm_holds(simulated_arm: sevenbot.Arm) -> 
     simulation(simulated_arm).fault("1=stuck")
     simulated_arm.pose([180, *REST[1:]], wait=False)
     timer = threading.Timer(0.05, _thread.interrupt_main)
-    timer.start()
     with pytest.raises(KeyboardInterrupt):
+        timer.start()
         for _ in range(100):
             simulated_arm.sleep(3_600)
     timer.join()

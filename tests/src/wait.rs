@@ -3,8 +3,9 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// The timeout of all waits. It is long, because the machine may be busy.
-pub const TIMEOUT: Duration = Duration::from_secs(60);
+/// The timeout of all waits. It is long, because the machine may be busy: a page in a browser that draws one picture a second
+/// lets 0.1 s of its arm's time pass with each.
+pub const TIMEOUT: Duration = Duration::from_secs(180);
 const POLL_PERIOD: Duration = Duration::from_millis(10);
 
 /// Polls until there is a value. The error of a poll describes the state after a timeout.

@@ -3,7 +3,11 @@
 //! The DevTools protocol of Chromium and WebDriver BiDi share this form.
 
 use std::net::TcpStream;
+use std::thread;
+use std::time::Duration;
 
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
 use system_tests::process;
 use system_tests::wait::TIMEOUT;
@@ -13,6 +17,8 @@ use tungstenite::{Message, WebSocket};
 #[derive(Debug)]
 pub struct Connection {
     socket: WebSocket<TcpStream>,
+    /// For the delays of `LATE_TEST`.
+    random: Xoshiro256PlusPlus,
     last_id: u64,
     /// The session of the DevTools protocol that calls belong to, once there is one.
     pub session: Option<String>,
@@ -29,7 +35,8 @@ impl Connection {
         let stream = TcpStream::connect(host).expect("a connection");
         stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
         let (socket, _) = tungstenite::client(format!("ws://{address}"), stream).expect("a WebSocket");
-        Self { socket, last_id: 0, session: None, events: Vec::new(), is_kept }
+        let random = Xoshiro256PlusPlus::seed_from_u64(std::process::id().into());
+        Self { socket, random, last_id: 0, session: None, events: Vec::new(), is_kept }
     }
 
     /// Calls a method of the protocol.
@@ -37,6 +44,7 @@ impl Connection {
     /// # Errors
     /// The answer of the browser, if it reports an error.
     pub fn try_call(&mut self, method: &str, parameters: Value) -> Result<Value, String> {
+        thread::sleep(Duration::from_millis(self.random.next_u64() % (variable("LATE_TEST") + 1)));
         self.last_id += 1;
         let mut request = json!({ "id": self.last_id, "method": method, "params": parameters });
         if let Some(session) = &self.session {
@@ -65,6 +73,11 @@ impl Connection {
     pub fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.try_call(method, parameters).unwrap_or_else(|error| panic!("{error}"))
     }
+}
+
+/// A number in the environment; 0 without one.
+pub(crate) fn variable(name: &str) -> u64 {
+    std::env::var(name).ok().and_then(|number| number.parse().ok()).unwrap_or(0)
 }
 
 /// The rest of the first line of a process that begins like this.

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::json;
 
 use crate::page::Page;
+use system_tests::wait::wait_until;
 
 /// How many events a drag has between its ends.
 const DRAG_STEPS: u32 = 20;
@@ -108,6 +109,30 @@ impl Page {
             "(list => {{ list.value = `{value}`; list.dispatchEvent(new Event('change', {{bubbles: true}})); }})\
              (document.querySelector(`{selector}`))"
         ));
+    }
+
+    /// Moves all sliders at once, as a person would one after the other.
+    #[track_caller]
+    pub fn slide_all(&mut self, degrees: [u32; 7]) {
+        self.evaluate(&format!(
+            "{degrees:?}.forEach((degrees, index) => {{ const slider = document.querySelector('#joint-' + (index + 1)); \
+             slider.value = degrees; slider.dispatchEvent(new Event('input', {{bubbles: true}})); }})"
+        ));
+    }
+
+    /// Writes a register in the table of the page.
+    #[track_caller]
+    pub fn write_register(&mut self, address: u8, value: &str) {
+        let panel = "document.querySelector('#registers-panel').open";
+        let was_open = self.evaluate(panel);
+        self.evaluate(&format!("{panel} = true"));
+        let input = format!("document.querySelector('#register-{address}-value')");
+        wait_until("the table of registers is there", || self.evaluate(&format!("{input} != null")) == true);
+        self.evaluate(&format!(
+            "(input => {{ input.focus(); input.value = `{value}`; \
+             input.dispatchEvent(new Event('change', {{bubbles: true}})); }})({input})"
+        ));
+        self.evaluate(&format!("{panel} = {was_open}"));
     }
 
     /// Lets downloads go to a folder.

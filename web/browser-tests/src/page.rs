@@ -3,15 +3,33 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
-use system_tests::wait::wait_for;
+use system_tests::wait::{wait_for, wait_until};
 
 use crate::browser::Chromium;
+use crate::connection::variable;
 use crate::picture::Picture;
+
+/// The register that tells which joints have a moving set-point.
+const MOVING_JOINTS: usize = sevenbot::map::MOVING_JOINTS.address as usize;
+/// Keeps each text that these elements show. A test may be too late to see one that stays for seconds only.
+const KEEP_TEXTS: &str = "
+    window.said = [];
+    (() => {
+      const last = {};
+      new MutationObserver(() => {
+        for (const id of ['state', 'notice', 'recording']) {
+          const text = document.getElementById(id)?.textContent ?? '';
+          if (text != (last[id] ?? '')) window.said.push(['#' + id, last[id] = text]);
+        }
+      }).observe(document, { subtree: true, childList: true, characterData: true });
+    })();";
 
 /// An open page.
 #[derive(Debug)]
 pub struct Page {
     browser: Chromium,
+    /// The number of kept texts up to the last one that the test waited for.
+    heard: usize,
 }
 
 /// How the page is shown.
@@ -44,12 +62,15 @@ impl Page {
     /// The same, after a script that runs before those of the page.
     #[must_use]
     pub fn open_after(url: &str, script: &str) -> Self {
-        let mut page = Self { browser: Chromium::start() };
+        let mut page = Self { browser: Chromium::start(), heard: 0 };
         for domain in ["Page", "Log", "Network", "Runtime"] {
             page.call(&format!("{domain}.enable"), json!({}));
         }
+        page.call("Emulation.setCPUThrottlingRate", json!({ "rate": variable("SLOW_PAGE").max(1) }));
         page.show_on(DESKTOP);
-        page.call("Page.addScriptToEvaluateOnNewDocument", json!({ "source": script }));
+        for script in [KEEP_TEXTS, script] {
+            page.call("Page.addScriptToEvaluateOnNewDocument", json!({ "source": script }));
+        }
         page.call("Page.navigate", json!({ "url": url }));
         wait_for("the page draws", || {
             let frames = page.try_evaluate("window.sevenbot.frame_count()");
@@ -62,7 +83,8 @@ impl Page {
         page
     }
 
-    /// Changes the screen.
+    /// Changes the screen, and waits until the page has it.
+    #[track_caller]
     pub fn show_on(&mut self, screen: Screen) {
         let Screen { width, height, is_dark, is_phone } = screen;
         let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": is_phone });
@@ -71,6 +93,8 @@ impl Page {
         let feature = json!({ "name": "prefers-color-scheme", "value": scheme });
         self.call("Emulation.setEmulatedMedia", json!({ "features": [feature] }));
         self.call("Emulation.setTouchEmulationEnabled", json!({ "enabled": is_phone }));
+        let has_it = format!("matchMedia('(width: {width}px) and (prefers-color-scheme: {scheme})').matches");
+        wait_until("the page has another screen", || self.evaluate(&has_it) == true);
     }
 
     /// Calls a method of the DevTools protocol.
@@ -146,6 +170,40 @@ impl Page {
         self.wait_for_text("#state", "The arm is ready.");
     }
 
+    /// Waits until an element has shown a text since the last text that this waited for, also one that has gone again.
+    #[track_caller]
+    pub fn wait_until_said(&mut self, selector: &str, part: &str) {
+        self.heard = wait_for(&format!("{selector} has said {part}"), || {
+            let said = self.evaluate("window.said");
+            let said = said.as_array().expect("texts");
+            let is_wanted =
+                |text: &Value| text[0] == selector && text[1].as_str().is_some_and(|it| it.contains(part));
+            let found = said.iter().skip(self.heard).position(is_wanted);
+            found.map(|index| self.heard + index + 1).ok_or_else(|| format!("{said:?}; {}", self.report()))
+        });
+    }
+
+    /// Waits until a joint has this target in degrees and rests there.
+    #[track_caller]
+    pub fn wait_until_joint_rests(&mut self, joint: usize, degrees: f64) {
+        self.wait_until_joints_rest(&[(joint, degrees)]);
+    }
+
+    /// Waits until these joints have these targets in degrees and rest there: within 1 degree, because of their play, their
+    /// friction and their load.
+    #[track_caller]
+    pub fn wait_until_joints_rest(&mut self, goals: &[(usize, f64)]) {
+        self.wait_for_state(&format!("the joints rest at {goals:?}"), |state| {
+            let is_near = |name: &str, most: f64| {
+                let angle = |joint: usize| state[name][joint - 1].as_f64().unwrap_or(f64::NAN);
+                goals.iter().all(|&(joint, degrees)| (angle(joint) - degrees).abs() < most)
+            };
+            is_near("targets", 0.01) && is_near("measured", 1.0) && state["registers"][MOVING_JOINTS] == 0
+        });
+        // The set-point is there. The motor needs a moment.
+        self.pass(0.5);
+    }
+
     /// Waits until an element has a text.
     #[track_caller]
     pub fn wait_for_text(&mut self, selector: &str, part: &str) {
@@ -167,6 +225,12 @@ impl Page {
     pub fn measured(&mut self) -> [f64; 7] {
         let state = self.state();
         std::array::from_fn(|joint| state["measured"][joint].as_f64().expect("an angle"))
+    }
+
+    /// The target of a joint, in degrees.
+    #[track_caller]
+    pub fn target(&mut self, joint: usize) -> f64 {
+        self.state()["targets"][joint - 1].as_f64().expect("an angle")
     }
 
     /// Where a point in mm is drawn, in CSS pixels from the top left of the window.

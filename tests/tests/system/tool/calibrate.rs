@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::process::{Output, Stdio};
 
+use super::moving::restart;
 use super::output::{all_output, failed, succeeded, words};
 use system_tests::arm_control::ArmControl;
 use system_tests::process::RunningProgram;
@@ -84,7 +85,7 @@ fn offsets_are_verified_after_a_restart() {
     terminal.wait_for("Write these offsets?");
     terminal.keys("y\r");
     terminal.wait_for("switch the arm off and on");
-    arm.power_cycle();
+    restart(&mut arm);
     terminal.keys("\r");
     let screen = terminal.wait_for("the arm kept the offsets");
     assert!(!screen.contains("not switched off"), "{screen}");

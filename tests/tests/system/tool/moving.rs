@@ -112,7 +112,7 @@ fn stop_waits_for_an_arm_that_was_just_switched_on() {
 }
 
 /// Switches the arm off and on, and waits until it has started. It may not have read its servos yet.
-fn restart(arm: &mut StartedArm) {
+pub(super) fn restart(arm: &mut StartedArm) {
     let mut client = ArmClient::open(arm.port(), 115_200);
     client.write(EFFECTOR_TYPE, &[1]);
     assert_eq!(client.read(EFFECTOR_TYPE, 1), [1], "the mark before a restart");

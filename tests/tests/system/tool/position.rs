@@ -2,7 +2,7 @@
 
 use std::process::Output;
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::output::{all_output, failed, run_without_arm, succeeded};
 use system_tests::process::{RunningProgram, Signal, send_signal};
@@ -145,15 +145,14 @@ fn the_way_to_a_point_is_guarded_and_joints_only_warn() {
 fn ctrl_c_holds_an_arm_on_its_way_to_a_point() {
     with_arm(TestSetup::any(), |arm| {
         arm.drive_to(&STANDARD_POSE);
-        arm.write(SPEED, &[3; 7]);
-        let begin = Instant::now();
+        // Joint 1 turns by 63 degrees at 1.9 degrees/s: the signal comes before the end on a busy machine, too.
+        arm.write(SPEED, &[1; 7]);
         let tool = start_to_move(arm, &["move-to", "200", "100", "60", "--wait"], "-> write fine-target");
         sleep(Duration::from_millis(500));
         send_signal(&tool, Signal::INT);
         let output = tool.output();
         assert_eq!(output.status.code(), Some(130), "{}", all_output(&output));
         assert!(all_output(&output).contains("holds where it is"), "{}", all_output(&output));
-        assert!(begin.elapsed() < Duration::from_secs(20), "before the end of the move");
         arm.reopen(115_200);
         arm.wait_until_still();
         assert_ne!(arm.read(TARGET_POSITION, 1), [27], "not where it was sent");
@@ -204,7 +203,8 @@ fn a_line_that_breaks_moves_nothing() {
 fn ctrl_c_holds_an_arm_on_a_straight_line() {
     with_arm(TestSetup::any(), |arm| {
         arm.drive_to(&[105, 88, 110, 90, 135, 90, 80]);
-        let line = ["move-to", "100", "200", "50", "--straight", "--speed", "10"];
+        // 151 mm in half a minute.
+        let line = ["move-to", "100", "200", "50", "--straight", "--speed", "5"];
         let tool = start_to_move(arm, &line, "-> write vacuum-pump");
         sleep(Duration::from_millis(2000));
         send_signal(&tool, Signal::INT);

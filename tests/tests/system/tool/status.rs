@@ -16,8 +16,9 @@ impl Rig {
     fn start() -> Self {
         let rig = Self(Simulator::start(&[]));
         wait_until("the servos are driven", || rig.run(&["status"]).status.success());
-        // The start-up of the servos is over (D12).
-        std::thread::sleep(std::time::Duration::from_millis(600));
+        let time = || rig.0.state()["time_us"].as_u64().expect("a time");
+        let start_up = time() + 600_000;
+        wait_until("the start-up of the servos is over (D12)", || time() > start_up);
         rig
     }
 
@@ -90,7 +91,6 @@ fn d29_a_lost_supply_is_told_and_recover_asks_before_the_motors_go_on() {
     let text = failed(&rig.run(&["recover", "--yes"]), 1);
     assert!(text.contains("the motors were not switched on"), "{text}");
     failed(&rig.stream("0,90,90,65,90,90,90,80\n1,95,90,65,90,90,90,80\n"), 1);
-    std::thread::sleep(std::time::Duration::from_secs(2));
     rig.0.says(&["fault", "clear"]);
     wait_until("the arm tells of the lost supply", || {
         all_output(&rig.run(&["status"])).contains("the servos lost their supply")

@@ -32,13 +32,21 @@ fn start_stream(arm: &mut TestArm, options: &[&str]) -> RunningProgram {
     RunningProgram::spawn(tool.stdout(Stdio::piped()).stderr(Stdio::piped()))
 }
 
-/// Starts `sevenbot stream` with a point far away, and waits until the first one is sent. The joint turns by 6 degrees/s.
+/// Starts `sevenbot stream` with a point far away, and waits until the first one is sent. The joint turns by 3 degrees/s, so that
+/// it is on its way for 20 s.
 fn start_slow_stream(arm: &mut TestArm) -> (RunningProgram, ChildStdin) {
     arm.write(SPEED, &[5]);
     assert_eq!(arm.register(SPEED), 5);
     let mut tool = start_stream(arm, &["--verbose"]);
     let mut lines = tool.stdin.take().expect("a pipe");
-    lines.write_all(b"0,90,90,65,90,90,90,80\n10,150,90,65,90,90,90,80\n").expect("the tool reads");
+    lines.write_all(b"0,90,90,65,90,90,90,80\n20,150,90,65,90,90,90,80\n").expect("the tool reads");
+    wait_for_point(&mut tool);
+    sleep(UNDER_WAY);
+    (tool, lines)
+}
+
+/// Waits until a tool with `--verbose` has sent a point.
+fn wait_for_point(tool: &mut RunningProgram) {
     let mut stderr = tool.stderr.take().expect("a pipe");
     let mut received = Vec::new();
     while !String::from_utf8_lossy(&received).contains("-> write fine-target") {
@@ -48,8 +56,15 @@ fn start_slow_stream(arm: &mut TestArm) -> (RunningProgram, ChildStdin) {
         received.extend(&chunk[..length]);
     }
     tool.stderr = Some(stderr);
-    sleep(UNDER_WAY);
-    (tool, lines)
+}
+
+/// Waits until the watchdog of a program that was killed has acted.
+fn wait_for_watchdog(arm: &mut TestArm) {
+    arm.wait_until("the watchdog acts", |arm| {
+        // The reads of this test also feed the watchdog.
+        sleep(SILENCE);
+        arm.register(FAULTS) & HOST_SILENT != 0
+    });
 }
 
 /// Runs `sevenbot stream` on these lines.
@@ -133,11 +148,7 @@ fn d24_a_killed_stream_leaves_an_arm_that_holds_and_takes_the_next_client() {
         send_signal(&killed, Signal::KILL);
         wait_for_exit(&mut killed);
         arm.reopen(115_200);
-        arm.wait_until("the watchdog acts", |arm| {
-            // The reads of this test also feed the watchdog.
-            sleep(SILENCE);
-            arm.register(FAULTS) & HOST_SILENT != 0
-        });
+        wait_for_watchdog(arm);
         let held = fine_target(arm, 1);
         assert!(held < 15_000, "on its way: {held}");
         assert_eq!((arm.register(MOVING_JOINTS), arm.register(MOTOR_STATE)), (0, 1));
@@ -183,24 +194,20 @@ fn d24_the_watchdog_of_a_killed_stream_does_not_stop_what_comes_after() {
 #[test]
 fn d24_a_killed_stream_can_leave_the_arm_damped() {
     with_arm(TestSetup::any(), |arm| {
-        let mut killed = start_stream(arm, &["--watchdog-action", "damping"]);
-        arm_is_watched(&mut killed);
+        let mut killed = start_stream(arm, &["--watchdog-action", "damping", "--verbose"]);
+        let point = b"0,90,90,65,90,90,90,80\n";
+        killed.stdin.as_mut().expect("a pipe").write_all(point).expect("the tool reads");
+        wait_for_point(&mut killed);
         send_signal(&killed, Signal::KILL);
         wait_for_exit(&mut killed);
-        sleep(SILENCE);
         arm.reopen(115_200);
-        assert_eq!((arm.register(MOTOR_STATE), arm.register(FAULTS) & HOST_SILENT), (0, HOST_SILENT));
+        wait_for_watchdog(arm);
+        assert_eq!(arm.register(MOTOR_STATE), 0);
         arm.write(STREAM_REGISTERS, &[0; 4]);
         arm.write(MOTOR_STATE, &[1]);
         arm.wait_until("the arm is driven", |arm| arm.register(MOTOR_STATE) == 1);
         arm.drive_to(&STANDARD_POSE);
     });
-}
-
-/// Sends the point where the arm stands, and waits until the stream must have begun.
-fn arm_is_watched(tool: &mut RunningProgram) {
-    tool.stdin.as_mut().expect("a pipe").write_all(b"0,90,90,65,90,90,90,80\n").expect("the tool reads");
-    sleep(SILENCE);
 }
 
 #[test]

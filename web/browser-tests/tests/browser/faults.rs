@@ -2,6 +2,10 @@
 
 use browser_tests::picture::Picture;
 use browser_tests::{Page, Viewed};
+use sevenbot::map::MOTOR_STATE;
+
+/// The pose of an arm that was switched on.
+const STANDARD_POSE: [u32; 7] = [90, 90, 65, 90, 90, 90, 80];
 
 /// The part of the window with the arm.
 fn scene(page: &mut Page) -> Picture {
@@ -51,7 +55,7 @@ fn each_joint_that_is_stuck_has_the_colour_of_a_fault_and_is_named() {
         assert_eq!(faulty(&scene(&mut page)), 0);
         page.focus(&format!("#joint-{joint}"));
         page.keys("ArrowRight", 20);
-        page.wait_for_text("#state", &format!("oint {joint} is blocked"));
+        page.wait_until_said("#state", &format!("oint {joint} is blocked"));
         let picture = scene(&mut page);
         let (red, others) = (faulty(&picture), working(&picture));
         assert!(red > 40 && others > 500, "joint {joint}: {red} pixels, {others} of joints that work");
@@ -60,6 +64,10 @@ fn each_joint_that_is_stuck_has_the_colour_of_a_fault_and_is_named() {
         page.wait_for_text("#state", "The motors are off.");
         page.click("[data-action=motors][data-value='1']");
         page.wait_for_text("#state", "The arm is ready.");
+        // It fell meanwhile, further on a busy machine. In some poses the next joint is hidden.
+        page.slide_all(STANDARD_POSE);
+        let goals: Vec<_> = (1..).zip(STANDARD_POSE.map(f64::from)).collect();
+        page.wait_until_joints_rest(&goals);
     }
     assert_eq!(page.errors(), [""; 0]);
 }
@@ -87,11 +95,11 @@ fn a_servo_that_protects_itself_is_named() {
     page.choose("#fault-joint", "3");
     page.choose("#fault-kind", "trip");
     page.click("[data-action=break]");
-    page.wait_for_text("#state", "oint 3 let go");
+    page.wait_until_said("#state", "oint 3 let go");
     page.wait_for_text("#state", "The arm is ready.");
     page.choose("#fault-kind", "trip heat");
     page.click("[data-action=break]");
-    page.wait_for_text("#state", "too hot");
+    page.wait_until_said("#state", "too hot");
     assert_eq!(page.errors(), [""; 0]);
 }
 
@@ -107,7 +115,7 @@ fn a_thing_between_the_claws_stops_them_and_its_weight_loads_the_arm_until_it_fa
     assert!((loaded - empty).abs() > 0.5, "joint 3 droops from {empty} to {loaded}");
     page.focus("#joint-7");
     page.keys("Home", 1);
-    page.wait_for_text("#state", "oint 7 is blocked");
+    page.wait_until_said("#state", "oint 7 is blocked");
     let claw = page.measured()[6];
     assert!((claw - 30.0).abs() < 1.0, "{claw}");
     page.click("[data-action=drop]");
@@ -122,7 +130,7 @@ fn after_an_emergency_stop_the_motors_stay_off_until_they_are_switched_on() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();
     page.click("[data-value='supply=off 3000000']");
-    page.wait_for_text("#state", "o servo answers");
+    page.wait_until_said("#state", "o servo answers");
     page.wait_for_text("#state", "lost their supply");
     page.click("[data-action=motors][data-value='1']");
     page.wait_for_text("#state", "The arm is ready.");
@@ -137,9 +145,9 @@ fn after_a_power_cut_the_arm_holds_where_it_fell() {
     page.pass(1.5);
     page.wait_for_text("#state", "The arm is ready.");
     let state = page.state();
-    for (joint, measured) in page.measured().into_iter().enumerate() {
-        let target = state["targets"][joint].as_f64().expect("a target");
-        assert!((measured - target).abs() < 1.0, "joint {}: {state}", joint + 1);
+    for joint in 0..7 {
+        let angle = |name: &str| state[name][joint].as_f64().expect("an angle");
+        assert!((angle("measured") - angle("targets")).abs() < 1.0, "joint {}: {state}", joint + 1);
     }
 }
 
@@ -149,19 +157,12 @@ fn a_register_is_written_in_the_table_and_a_wrong_value_is_refused_in_words() {
     let mut page = viewed.open();
     page.evaluate("document.querySelectorAll('details').forEach(panel => panel.open = true)");
     page.wait_for_text("#registers", "motor-state");
-    let write = |page: &mut Page, text: &str| {
-        page.evaluate(&format!(
-            "(input => {{ input.focus(); input.value = `{text}`; \
-             input.dispatchEvent(new Event('change', {{bubbles: true}})); }})\
-             (document.querySelector('#register-29-value'))"
-        ));
-    };
-    write(&mut page, "2");
+    page.write_register(MOTOR_STATE.address, "2");
     page.wait_for_state("the motors are off", |state| state["motors"] == 2);
     page.wait_for_text("#frames", "write motor-state = 2");
-    write(&mut page, "lots");
-    page.wait_for_text("#notice", "This value cannot be written: lots");
-    write(&mut page, "7");
-    page.wait_for_text("#notice", "This value cannot be written:");
+    page.write_register(MOTOR_STATE.address, "lots");
+    page.wait_until_said("#notice", "This value cannot be written: lots");
+    page.write_register(MOTOR_STATE.address, "7");
+    page.wait_until_said("#notice", "This value cannot be written:");
     assert_eq!(page.state()["motors"], 2);
 }

@@ -3,6 +3,7 @@
 use browser_tests::Viewed;
 use browser_tests::firefox::Firefox;
 use serde_json::Value;
+use system_tests::wait::wait_for;
 
 /// Its code in the WebDriver standard.
 const ARROW_RIGHT: char = '\u{E014}';
@@ -16,13 +17,19 @@ fn the_simulated_arm_is_shown_and_moved_and_nothing_is_requested_from_elsewhere(
         text == "The arm is ready."
     });
     page.keys(ESCAPE, 1);
-    let angle = "JSON.parse(window.sevenbot.state()).measured[0]";
-    let (start, before) = (page.evaluate(angle).as_f64().expect("an angle"), page.picture());
+    let state = "JSON.parse(window.sevenbot.state())";
+    let angle = |state: &Value, name: &str| state[name][0].as_f64().expect("an angle");
+    let (start, before) = (angle(&page.evaluate(state), "targets"), page.picture());
     page.evaluate("document.querySelector('#joint-1').focus()");
     page.keys(ARROW_RIGHT, 30);
-    let has_turned = |angle: &Value| angle.as_f64().is_some_and(|angle| (angle - start - 15.0).abs() < 0.3);
-    page.wait_for("joint 1 turns", angle, has_turned);
-    assert!(page.picture().differences(&before) > 500, "the picture of the arm turns, too");
+    page.wait_for("joint 1 turns", state, |state| {
+        let target = angle(state, "targets");
+        (target - start - 15.0).abs() < 0.01 && (angle(state, "measured") - target).abs() < 1.0
+    });
+    wait_for("the picture of the arm turns, too", || {
+        let differences = page.picture().differences(&before);
+        if differences > 500 { Ok(()) } else { Err(format!("{differences} pixels")) }
+    });
     assert_eq!(page.evaluate("document.querySelector('#notice').hidden"), true, "there is a picture");
     assert_eq!(page.errors().collect::<Vec<_>>(), [""; 0]);
     // Firefox draws its own controls with pictures and a font that are within it.

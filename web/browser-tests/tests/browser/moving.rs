@@ -3,6 +3,7 @@
 use browser_tests::page::PHONE;
 use browser_tests::{Page, Viewed};
 use kinematics::forward;
+use sevenbot::map::SPEED;
 
 /// The tip in mm.
 fn tip([one, two, three, four, five, six, _]: [f64; 7]) -> [f64; 3] {
@@ -33,20 +34,21 @@ fn wait_until_it_rests(page: &mut Page) {
     page.wait_for_text("#state", "The arm is ready.");
 }
 
-/// Sends joint 1 to 180 degrees by the keyboard, and waits until it is on its way. Time passes slowly, because the machine may be
-/// slow, too.
+/// Sends joint 1 to 180 degrees by the keyboard, and waits until it is on its way. It goes slowly, and its time passes slowly: even
+/// without a pause of the page the way takes half a minute, so that the stop comes before its end on a busy machine, too.
 fn start_to_move(page: &mut Page) {
     page.click("[data-action=speed][data-value='0.25']");
+    page.write_register(SPEED.address, "5");
     let start = page.measured()[0];
     page.focus("#joint-1");
     page.key("End");
-    page.wait_for_state("joint 1 turns", |state| state["measured"][0].as_f64() > Some(start + 5.0));
+    page.wait_for_state("joint 1 turns", |state| state["measured"][0].as_f64() > Some(start + 3.0));
 }
 
 #[track_caller]
 fn check_it_stops(page: &mut Page) {
     page.wait_for_text("#state", "Stopped: the arm holds.");
-    let target = page.state()["targets"][0].as_f64().expect("a target");
+    let target = page.target(1);
     assert!(target < 179.0, "{target}");
     // The motor needs a moment to come back to where it was stopped.
     for _ in 0..2 {
@@ -60,12 +62,10 @@ fn check_it_stops(page: &mut Page) {
 fn an_arrow_key_on_a_slider_moves_the_arm_and_its_picture() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();
-    let (before, picture) = (page.measured(), page.picture());
+    let (before, picture) = (page.target(1), page.picture());
     page.focus("#joint-1");
     page.keys("ArrowRight", 30);
-    page.wait_for_state("joint 1 turns", |state| {
-        state["measured"][0].as_f64().is_some_and(|angle| (angle - before[0] - 15.0).abs() < 0.3)
-    });
+    page.wait_until_joint_rests(1, before + 15.0);
     assert!(page.picture().differences(&picture) > 500);
     assert_eq!(page.errors(), [""; 0]);
 }
@@ -94,7 +94,7 @@ fn the_button_stops_a_moving_arm_with_the_mouse_and_with_a_finger() {
     page.click("[data-action=speed][data-value='10']");
     page.focus("#joint-1");
     page.key("Home");
-    page.wait_for_state("joint 1 is back", |state| state["measured"][0].as_f64() < Some(1.0));
+    page.wait_until_joint_rests(1, 0.0);
     page.show_on(PHONE);
     start_to_move(&mut page);
     page.evaluate("scrollTo(0, document.body.scrollHeight)");

@@ -3,6 +3,7 @@
 use browser_tests::page::{DARK, PHONE};
 use browser_tests::{Page, Viewed};
 use serde_json::json;
+use system_tests::wait::wait_for;
 
 /// Everything that a person can operate and see.
 const CONTROLS: &str = "[...document.querySelectorAll('button, select, input, summary, [tabindex]')]\
@@ -25,8 +26,10 @@ fn light_and_dark_differ_and_a_phone_needs_no_sideways_scrolling() {
     let light = page.picture();
     assert!(light.colours() > 100, "{} colours", light.colours());
     page.show_on(DARK);
-    let dark = page.picture();
-    assert!(light.differences(&dark) > light.pixels.len() / 2, "{}", light.differences(&dark));
+    wait_for("the picture is dark", || {
+        let differences = light.differences(&page.picture());
+        if differences > light.pixels.len() / 2 { Ok(()) } else { Err(format!("{differences} pixels")) }
+    });
     page.show_on(PHONE);
     for language in ["English", "Chinese"] {
         let width = page.number("document.documentElement.scrollWidth");

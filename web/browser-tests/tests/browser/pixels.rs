@@ -11,14 +11,6 @@ const POSES: u32 = 60;
 const MARKER: [u8; 3] = [214, 0, 140];
 const HALF: f64 = 14.0;
 
-/// Moves all sliders at once, as a person would one after the other.
-fn choose_pose(page: &mut Page, degrees: [u32; 7]) {
-    page.evaluate(&format!(
-        "{degrees:?}.forEach((degrees, index) => {{ const slider = document.querySelector('#joint-' + (index + 1)); \
-         slider.value = degrees; slider.dispatchEvent(new Event('input', {{bubbles: true}})); }})"
-    ));
-}
-
 /// The centre of the marker in the picture, in CSS pixels, near a place.
 fn marker(page: &mut Page, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     let corner = [(x - HALF).floor(), (y - HALF).floor()];
@@ -44,7 +36,7 @@ fn the_tip_is_drawn_within_2_pixels_of_the_kinematics() {
         // Within the limits of the linkage, and in front of the camera.
         let degrees =
             [below(181), 60 + below(60), 50 + below(50), below(181), 45 + below(90), below(181), below(84)];
-        choose_pose(&mut page, degrees);
+        page.slide_all(degrees);
         // The longest move takes two seconds at the usual speed.
         page.pass(3.0);
         let [one, two, three, four, five, six, _] = page.measured();

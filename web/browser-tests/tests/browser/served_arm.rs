@@ -29,12 +29,10 @@ const SERIAL_PORT: &str = "
 
 /// Turns joint 1 by the keyboard, and waits until the arm has done so.
 fn check_it_moves(page: &mut Page) {
-    let start = page.measured()[0];
+    let target = page.target(1);
     page.focus("#joint-1");
     page.keys("ArrowRight", 30);
-    page.wait_for_state("joint 1 turns", |state| {
-        state["measured"][0].as_f64().is_some_and(|angle| (angle - start - 15.0).abs() < 0.5)
-    });
+    page.wait_until_joint_rests(1, target + 15.0);
     page.key(" ");
     page.wait_for_text("#state", "Stopped: the arm holds.");
     assert_eq!(page.errors(), [""; 0]);
