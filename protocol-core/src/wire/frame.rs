@@ -207,15 +207,17 @@ pub fn parse<D: Direction>(input: &[u8]) -> ParseOutcome<'_> {
 /// Encodes a frame into `buffer`, replacing its content. `data` is cut to 255 bytes.
 pub fn encode(buffer: &mut FrameBuffer, function: Function, address: u8, count: u8, data: &[u8]) {
     buffer.clear();
+    let (words, rest) = data.get(..255).unwrap_or(data).as_chunks();
     // The buffer holds the longest frame, so nothing here can fail.
     let _ = buffer.extend_from_slice(&[HEADER[0], HEADER[1], function as u8, address]);
     let _ = buffer.push(count);
-    // Copy and compute the CRC in one pass: a separate call to copy takes longer.
-    let (words, rest) = data.get(..255).unwrap_or(data).as_chunks();
-    let crc = words.iter().fold(crc_of_prefix((function, address, count)), |crc, word| {
+    // Copy and compute the CRC in one pass: a separate call to copy takes longer. A loop, because a fold that starts with the CRC
+    // of the prefix computes the place of each word twice.
+    let mut crc = crc_of_prefix((function, address, count));
+    for word in words {
         let _ = buffer.extend_from_slice(word);
-        crc.word(*word)
-    });
+        crc = crc.word(*word);
+    }
     let (halves, rest) = rest.as_chunks();
     let crc = halves.iter().fold(crc, |crc, half| {
         let _ = buffer.extend_from_slice(half);
