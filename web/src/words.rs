@@ -71,7 +71,9 @@ pub fn state_line(
     match state.problems.first() {
         Some(problem) if problem.kind < ProblemKind::ServoBus || state.stalled == 0 => {
             let texts = state.problems.iter().take(PROBLEMS_SHOWN).map(|&problem| language.problem(problem));
-            return (texts.collect::<Vec<_>>().join(" "), Mood::Bad);
+            // Some problems stay until a restart. They do not hide whether a stop has reached the arm.
+            let confirmation = stop_confirmation(state, stop).map(|name| language.text(name).to_owned());
+            return (confirmation.into_iter().chain(texts).collect::<Vec<_>>().join(" "), Mood::Bad);
         }
         _ if state.stalled != 0 => return (stalled(), Mood::Bad),
         _ => {}
@@ -84,6 +86,20 @@ pub fn state_line(
         _ if state.moving != 0 => plain("moving"),
         (StopProgress::Holds, _) => (language.text("holds").to_owned(), Mood::Good),
         _ => (language.text("ready").to_owned(), Mood::Good),
+    }
+}
+
+/// The text that confirms a stop to an arm with problems; `None` if there was no stop, or the arm moves again, or a joint has no
+/// torque although it should.
+fn stop_confirmation(state: &ArmState, stop: StopProgress) -> Option<&'static str> {
+    let is_without_torque = state.problems.iter().any(|problem| {
+        use ProblemKind::{LetGo, NoAnswer, NoServoAnswers, SupplyLost};
+        matches!(problem.kind, SupplyLost | NoServoAnswers | NoAnswer | LetGo)
+    });
+    match (stop, state.motor_state) {
+        (StopProgress::NotDriven, motor_state::DAMPING | motor_state::FORCELESS) => Some("stop-limp"),
+        (StopProgress::Holds, motor_state::SERVO) if state.moving == 0 && !is_without_torque => Some("holds"),
+        _ => None,
     }
 }
 
@@ -175,6 +191,25 @@ mod tests {
         assert!(said(&supply, StopProgress::None).starts_with("The servos lost their supply"));
         let limp = ArmState { motor_state: 2, ..state() };
         assert!(said(&limp, StopProgress::NotDriven).contains("nothing to stop"));
+    }
+
+    #[test]
+    fn a_fault_that_stays_does_not_hide_a_stop() {
+        let restarted = with(&[(241, 0b1000)]);
+        let fault = said(&restarted, StopProgress::None);
+        assert!(!fault.is_empty() && !fault.contains("Stopped"), "{fault}");
+        assert_eq!(said(&restarted, StopProgress::Holds), format!("Stopped: the arm holds. {fault}"));
+        let moving = ArmState { moving: 1, ..restarted.clone() };
+        assert_eq!(said(&moving, StopProgress::Holds), fault, "it was moved again");
+        let limp = ArmState { motor_state: motor_state::FORCELESS, ..restarted };
+        assert!(
+            said(&limp, StopProgress::NotDriven).starts_with("The motors are off: there is nothing to stop.")
+        );
+        let silent = said(&with(&[(242, 1), (241, 2), (243, 0)]), StopProgress::Holds);
+        assert!(
+            silent.starts_with("Joint 1 does not answer"),
+            "a joint without an answer may not hold: {silent}"
+        );
     }
 
     #[test]
