@@ -129,6 +129,8 @@ class Sevenbot(Robot):
             angles = joints.within_limits(joints.within_step(angles, self._last, self.config.max_step))
         self._tell_change(wanted, angles)
         self._send(connection, angles)
+        # The approach of a simulated arm takes no time here: without this, it would look like a pause before the next action.
+        connection.follow_time()
         self._last, self._last_time = angles, time.monotonic()
         self._log.sent(angles, connection.simulation)
         return joints.to_lerobot("pos", angles)

@@ -108,9 +108,12 @@ def test_the_first_action_is_approached_slowly(now: Clock) -> None:
     robot = follower(approach_speed=20.0)
     start = now[0]
     robot.send_action(action(130, *HOME[1:]))
-    robot.get_observation()
     assert now[0] - start == pytest.approx(2.0, abs=0.3)
     assert simulation(robot).angles[0] == pytest.approx(130, abs=1.5)
+    # It is no pause, after which the next action would be approached, too.
+    start = now[0]
+    run(robot, now, [[130 - step * 0.5, *HOME[1:]] for step in range(30)])
+    assert now[0] - start == pytest.approx(30 * FRAME, abs=0.1)
 
 
 def test_the_first_action_after_a_pause_is_approached_too(now: Clock) -> None:
