@@ -2,7 +2,6 @@
 
 import time
 from functools import cached_property
-from types import TracebackType
 from typing import Any, SupportsFloat
 
 import sevenbot
@@ -44,6 +43,7 @@ class Sevenbot(Robot):
         self._warned = Warned()
         self._last: joints.Angles = []
         self._last_time = 0.0
+        self._is_behind = False
 
     @property
     def _kinds(self) -> dict[str, bool]:
@@ -117,7 +117,8 @@ class Sevenbot(Robot):
         """Sends an action, and returns what the arm got: within its limits, and within `max_step` of the action before.
 
         The first action, and the first after a pause longer than the watchdog's time, is approached slowly: the call takes as
-        long. Later ones are points of a stream: the arm goes through them at the speed of the loop.
+        long. If the leader went on meanwhile, the arm catches up at the same speed. Later actions are points of a stream: the
+        arm goes through them at the speed of the loop.
         """
         connection = self._open()
         wanted = joints.to_angles(action)
@@ -128,12 +129,22 @@ class Sevenbot(Robot):
         if self._stream is not None and self.config.max_step is not None:
             angles = joints.within_limits(joints.within_step(angles, self._last, self.config.max_step))
         self._tell_change(wanted, angles)
+        angles = self._caught_up(angles)
         self._send(connection, angles)
         # The approach of a simulated arm takes no time here: without this, it would look like a pause before the next action.
         connection.follow_time()
         self._last, self._last_time = angles, time.monotonic()
         self._log.sent(angles, connection.simulation)
         return joints.to_lerobot("pos", angles)
+
+    def _caught_up(self, angles: joints.Angles) -> joints.Angles:
+        """After an approach the arm does not leap to where the leader went meanwhile."""
+        if self._stream is None or not self._is_behind:
+            return angles
+        step = self.config.approach_speed / self.config.fps
+        nearer = joints.towards(angles, self._last, step)
+        self._is_behind = bool(joints.differing(nearer, angles, 0.01))
+        return nearer
 
     def _tell_change(self, wanted: joints.Angles, angles: joints.Angles) -> None:
         changed = joints.differing(wanted, angles, TOLERANCE)
@@ -164,14 +175,15 @@ class Sevenbot(Robot):
             approach=min(max(seconds, SHORTEST_APPROACH), LONGEST_APPROACH),
         )
         stream.__enter__()
+        self._is_behind = True
         return stream
 
-    def _end_stream(self, *reason: type[BaseException] | BaseException | TracebackType | None) -> None:
+    def _end_stream(self) -> None:
         stream, self._stream = self._stream, None
         if stream is None:
             return
         try:
-            stream.__exit__(*(reason or (None, None, None)))
+            stream.__exit__(None, None, None)
         except (sevenbot.ArmProblem, sevenbot.NotReached) as error:
             LOGGER.warning("At the end of the motion: %s", error)
 

@@ -68,6 +68,14 @@ def within_step(angles: Iterable[float], before: Iterable[float], step: float) -
     return [min(max(angle, last - step), last + step) for angle, last in zip(angles, before, strict=True)]
 
 
+def towards(angles: Iterable[float], before: Angles, step: float) -> Angles:
+    """The angles, or a point on the straight way to them at which no joint has changed by more than a step of degrees."""
+    ways = [angle - last for angle, last in zip(angles, before, strict=True)]
+    longest = max(abs(way) for way in ways)
+    share = min(step / longest, 1.0) if longest > 0 else 1.0
+    return [last + share * way for way, last in zip(ways, before, strict=True)]
+
+
 def differing(wanted: Iterable[float], given: Iterable[float], tolerance: float) -> list[str]:
     """The names of the joints whose angles differ by more than a tolerance in degrees."""
     pairs = zip(NAMES, wanted, given, strict=True)

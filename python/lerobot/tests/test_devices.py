@@ -140,9 +140,18 @@ def test_actions_beyond_the_limits_are_brought_inside_and_told_once(
     assert simulation(robot).angles[6] <= 84.5
 
 
+def test_the_arm_does_not_leap_to_where_the_leader_went_during_the_approach(now: Clock) -> None:
+    robot = follower(approach_speed=30.0)
+    run(robot, now, [[100, *HOME[1:]]])
+    sent = [robot.send_action(action(110, *HOME[1:]))["joint_1.pos"] for _ in range(12)]
+    assert sent[:3] == pytest.approx([101, 102, 103]) and sent[9:] == pytest.approx([110, 110, 110])
+    # It has caught up: from now on it goes where the actions are.
+    assert robot.send_action(action(104, *HOME[1:]))["joint_1.pos"] == pytest.approx(104)
+
+
 def test_max_step_limits_the_change(now: Clock) -> None:
     robot = follower(max_step=1.0)
-    run(robot, now, [HOME])
+    run(robot, now, [HOME] * 2)
     assert robot.send_action(action(100, *HOME[1:]))["joint_1.pos"] == pytest.approx(91)
     assert robot.send_action(action(100, *HOME[1:]))["joint_1.pos"] == pytest.approx(92)
 

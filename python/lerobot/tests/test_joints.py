@@ -63,3 +63,10 @@ def test_a_step() -> None:
     assert joints.within_step(wanted, HOME, 3)[:3] == [93, 87, 65]
     assert joints.differing(wanted, HOME, 0.5) == ["joint_1", "joint_2"]
     assert joints.differing(HOME, HOME, 0) == []
+
+
+def test_a_way_is_straight() -> None:
+    wanted = [100.0, 85.0, *HOME[2:]]
+    assert joints.towards(wanted, HOME, 2)[:2] == pytest.approx([92, 89])
+    assert joints.towards(wanted, HOME, 10) == pytest.approx(wanted)
+    assert joints.towards(HOME, HOME, 1) == HOME
