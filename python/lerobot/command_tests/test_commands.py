@@ -3,6 +3,7 @@
 Loop times are printed and not checked: the machine may be busy. So paths are compared as curves, without their times.
 """
 
+import shlex
 import signal
 import time
 from pathlib import Path
@@ -17,6 +18,7 @@ from lerobot_robot_sevenbot import joints
 FOLLOWER = ("--robot.type=sevenbot", "--robot.port=sim", "--robot.id=follower")
 LEADER = ("--teleop.type=sevenbot_leader", "--teleop.port=sim", "--teleop.id=leader")
 SECONDS = 12
+DOCS = Path(__file__).parents[3] / "docs/lerobot.md"
 
 
 def away(points: Rows, path: Rows) -> float:
@@ -158,3 +160,12 @@ def test_a_wrong_port_is_said_with_what_to_do(lerobot: LeRobot) -> None:
     assert process.returncode != 0
     assert "/dev/none: there is no such port" in printed
     assert "--robot.port=sim is a simulated arm" in printed
+
+
+def test_the_commands_of_the_docs(lerobot: LeRobot) -> None:
+    lines = DOCS.read_text().replace("\\\n", " ").splitlines()
+    commands = [shlex.split(line) for line in lines if line.startswith("lerobot-")]
+    assert [command[0] for command in commands] == ["lerobot-record", "lerobot-replay", "lerobot-teleoperate"]
+    for command in commands:
+        lerobot.run(*command)
+    assert LeRobotDataset("me/wave", root=lerobot.folder / "wave").num_episodes == 2
