@@ -168,6 +168,20 @@ def test_a_stalled_joint_is_warned_about_once(now: Clock, caplog: pytest.LogCapt
     assert measured[-1][0] == pytest.approx(130, abs=1.5)
 
 
+def test_a_short_silence_of_a_servo_is_told_and_a_long_one_ends_the_loop(
+    now: Clock, caplog: pytest.LogCaptureFixture
+) -> None:
+    robot = follower()
+    run(robot, now, [HOME] * 30)
+    simulation(robot).fault("2=missing", 0.3)
+    run(robot, now, [[90 + step * 0.2, *HOME[1:]] for step in range(60)])
+    told = [record.message for record in caplog.records if "joint 2 does not answer" in record.message]
+    assert len(told) == 1
+    simulation(robot).fault("2=missing")
+    with pytest.raises(sevenbot.ArmProblem, match="joint 2 does not answer"):
+        run(robot, now, [[102, *HOME[1:]]] * 60)
+
+
 def test_a_lost_supply_ends_the_loop_with_what_to_do(now: Clock) -> None:
     robot = follower()
     run(robot, now, [HOME] * 3)
