@@ -14,6 +14,7 @@ mod footprint;
 mod fuzz;
 mod generated;
 mod install;
+mod lerobot;
 mod modules;
 mod mujoco;
 mod no_panic;

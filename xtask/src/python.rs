@@ -23,16 +23,21 @@ const VERSION: &str = "import sys; assert sys.version_info >= (3, 10); print('%d
 
 /// Builds the wheel, and tests it with all interpreters on PATH.
 pub(crate) fn check() -> TaskResult {
-    let interpreters = interpreters();
-    let Some((version, program)) = interpreters.first() else {
-        return Err("no Python of at least 3.10 on PATH".into());
-    };
-    let wheel = build_wheel(&environment(version, program)?)?;
-    for (version, program) in &interpreters {
+    let wheel = build()?;
+    for (version, program) in &interpreters() {
         println!("Python {version}");
         test(&environment(version, program)?, &wheel)?;
     }
     Ok(())
+}
+
+/// Builds the wheel with the first interpreter on PATH.
+pub(crate) fn build() -> TaskResult<PathBuf> {
+    let interpreters = interpreters();
+    let Some((version, program)) = interpreters.first() else {
+        return Err("no Python of at least 3.10 on PATH".into());
+    };
+    build_wheel(&environment(version, program)?)
 }
 
 /// The versions on PATH, each once, with a program of each.
@@ -49,7 +54,8 @@ fn interpreters() -> Vec<(String, &'static str)> {
     found
 }
 
-fn folder() -> PathBuf {
+/// Where the environments and the wheel are.
+pub(crate) fn folder() -> PathBuf {
     target_directory().join("python")
 }
 
@@ -64,13 +70,15 @@ fn environment(version: &str, program: &str) -> TaskResult<PathBuf> {
     Ok(python)
 }
 
-fn works(python: &Path) -> bool {
+/// Is this the Python of an environment with pip?
+pub(crate) fn works(python: &Path) -> bool {
     let mut pip = Command::new(python);
     pip.args(["-m", "pip", "--version"]).stdout(Stdio::null()).stderr(Stdio::null());
     pip.status().is_ok_and(|status| status.success())
 }
 
-fn pip(python: &Path) -> Command {
+/// `pip install`.
+pub(crate) fn pip(python: &Path) -> Command {
     let mut command = Command::new(python);
     command.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
     command
@@ -105,7 +113,8 @@ fn test(python: &Path, wheel: &Path) -> TaskResult {
     run(module(&["pytest", "--quiet", "-p", "no:cacheprovider", "--config-file"]).arg(&config).arg(&tests))
 }
 
-fn run(command: &mut Command) -> TaskResult {
+/// Runs a program, and waits for its end.
+pub(crate) fn run(command: &mut Command) -> TaskResult {
     let status = command.status().map_err(|why| format!("cannot start {command:?}: {why}"))?;
     if status.success() { Ok(()) } else { Err(format!("{command:?} failed").into()) }
 }

@@ -7,8 +7,8 @@ use clap::Args;
 use crate::run::{CHECKED, CHIP, TESTED, TaskResult, build_for_browser, cargo, run};
 use crate::steps::{self, Stage, TestScope, long, quick, whole};
 use crate::{
-    count, crate_graph, decisions, deny, footprint, fuzz, install, modules, mujoco, no_panic, python,
-    registers_md, replays, start_up, system_tests, torture, trials, web,
+    count, crate_graph, decisions, deny, footprint, fuzz, install, lerobot, modules, mujoco, no_panic,
+    python, registers_md, replays, start_up, system_tests, torture, trials, web,
 };
 
 /// The scope of the run.
@@ -76,6 +76,7 @@ const STAGES: &[Stage] = &[
                 system_tests::run_on(&system_tests::ADAPTER)
             }),
             whole("the Python package", python::check),
+            whole("the plugin for LeRobot, with the base classes of LeRobot", lerobot::check),
         ],
         &[
             whole("the page in a browser", || {
@@ -99,6 +100,7 @@ const STAGES: &[Stage] = &[
             cargo("test --release -p motion-core --test all linkage -- --ignored")
         }),
         long("the arm's model in MuJoCo", mujoco::check),
+        long("LeRobot's own commands, on the simulator and on the image in an emulator", lerobot::commands),
         long("more fuzzing", || {
             fuzz::check(&fuzz::FuzzArgs { seconds: LONG_FUZZ_SECONDS, seed: None, fixed: false })
         }),

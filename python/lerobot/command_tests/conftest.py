@@ -1,0 +1,133 @@
+"""LeRobot's own commands in processes of their own, on simulated arms and on the emulated image."""
+
+import csv
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sevenbot
+from numpy.typing import NDArray
+
+Rows = NDArray[np.float64]
+"""Angles of joints 1 to 7 in degrees, a row for each moment."""
+
+TIMEOUT = 300
+"""The longest time of a command in seconds. The machine may be busy."""
+START_UP = 120
+"""The longest time until the emulated arm answers, in seconds."""
+
+
+@dataclass(frozen=True)
+class Log:
+    """What `--robot.log` wrote: what was sent, what was measured before, and the true angles of a simulated arm."""
+
+    times: NDArray[np.float64]
+    sent: Rows
+    measured: Rows
+    true: Rows
+
+    @classmethod
+    def read(cls, path: Path) -> "Log":
+        """Reads the file. Missing angles are NaN."""
+        with path.open() as file:
+            lines = list(csv.reader(file))[1:]
+        table = np.array([[float(cell or "nan") for cell in line] for line in lines])
+        return cls(table[:, 0], table[:, 1:8], table[:, 8:15], table[:, 15:22])
+
+    def loop_times(self) -> str:
+        """For people: how long the turns of the loop were. The first one has the approach."""
+        turns = np.diff(self.times[1:]) * 1000
+        late = int((turns > 40).sum())
+        return (
+            f"{len(turns)} turns of median {np.median(turns):.1f} ms, 99 % below {np.percentile(turns, 99):.1f} ms, "
+            f"longest {turns.max():.1f} ms, {late} longer than 40 ms"
+        )
+
+
+@dataclass(frozen=True)
+class LeRobot:
+    """Runs LeRobot's commands with files in one folder."""
+
+    folder: Path
+
+    def start(self, command: str, *options: str) -> subprocess.Popen[str]:
+        """Starts a command."""
+        program = Path(sys.executable).with_name(command)
+        environment = os.environ | {"HF_HOME": str(self.folder / "home"), "HF_HUB_OFFLINE": "1"}
+        return subprocess.Popen(
+            [program, *options],
+            cwd=self.folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    def finish(self, process: subprocess.Popen[str]) -> str:
+        """What a command printed. Fails if the command failed."""
+        printed, _ = process.communicate(timeout=TIMEOUT)
+        assert process.returncode == 0, printed
+        return printed
+
+    def run(self, command: str, *options: str) -> str:
+        """Starts and finishes a command."""
+        return self.finish(self.start(command, *options))
+
+
+@pytest.fixture
+def lerobot(tmp_path: Path) -> LeRobot:
+    """LeRobot's commands."""
+    return LeRobot(tmp_path)
+
+
+@pytest.fixture
+def hand(tmp_path: Path) -> Path:
+    """A movement in which each joint has its own rhythm: a path that does not repeat itself.
+
+    The hand waits first, as a person does, until the follower has come.
+    """
+    middle = np.array([90.0, 90.0, 70.0, 90.0, 90.0, 90.0, 42.0])
+    way = np.array([40.0, 12.0, 12.0, 30.0, 25.0, 45.0, 35.0])
+    rhythm = np.array([1.0, 2.0, 3.0, 1.5, 2.5, 0.5, 2.0])
+    times = np.arange(0, 16, 0.05)
+    moved = np.maximum(times - 4, 0)[:, None]
+    angles = middle + way * np.sin(moved * rhythm * 2 * math.pi / 12)
+    path = tmp_path / "hand.txt"
+    sevenbot.Recording.from_points(times, angles).save(path)
+    return path
+
+
+@pytest.fixture
+def emulated_arm(tmp_path: Path) -> Iterator[str]:
+    """The port of the image for the arm in an emulator: `cargo xtask emulate`."""
+    link = tmp_path / "arm"
+    emulator = subprocess.Popen([os.environ["XTASK"], "emulate", "--no-build", "--link", link])
+    try:
+        deadline = time.monotonic() + START_UP
+        while not answers(link):
+            assert time.monotonic() < deadline and emulator.poll() is None, "the emulated arm does not start"
+            time.sleep(0.2)
+        yield str(link)
+    finally:
+        emulator.send_signal(signal.SIGTERM)
+        emulator.wait(timeout=TIMEOUT)
+
+
+def answers(link: Path) -> bool:
+    """Is there an arm behind the link?"""
+    if not link.exists():
+        return False
+    try:
+        sevenbot.Arm(link).close()
+    except sevenbot.Error:
+        return False
+    return True

@@ -1,0 +1,171 @@
+"""`lerobot-record`, `lerobot-replay` and `lerobot-teleoperate`, as a user runs them.
+
+Loop times are printed and not checked: the machine may be busy. So paths are compared as curves, without their times.
+"""
+
+import shlex
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import LeRobot, Log, Rows
+from lerobot.datasets import LeRobotDataset
+
+from lerobot_robot_sevenbot import joints
+
+FOLLOWER = ("--robot.type=sevenbot", "--robot.port=sim", "--robot.id=follower")
+LEADER = ("--teleop.type=sevenbot_leader", "--teleop.port=sim", "--teleop.id=leader")
+SECONDS = 12
+DOCS = Path(__file__).parents[3] / "docs/lerobot.md"
+
+
+def away(points: Rows, path: Rows) -> float:
+    """The largest distance of a point from a path through rows, in degrees of the joint that is furthest away."""
+    starts, steps = path[:-1], np.diff(path, axis=0)
+    lengths = np.maximum((steps**2).sum(axis=1), 1e-12)
+    distances = []
+    for point in points:
+        share = np.clip(((point - starts) * steps).sum(axis=1) / lengths, 0, 1)
+        nearest = starts + share[:, None] * steps
+        distances.append(np.abs(point - nearest).max(axis=1).min())
+    return float(max(distances))
+
+
+def degrees(rows: object) -> Rows:
+    """Rows of a dataset in degrees, the claw's too."""
+    angles = np.array([joints.to_angles(dict(zip(joints.keys("pos"), row, strict=True))) for row in rows])  # type: ignore[attr-defined]
+    return np.asarray(angles, dtype=np.float64)
+
+
+def record(lerobot: LeRobot, hand: Path, *robot: str) -> LeRobotDataset:
+    """Records two episodes led by a hand, and reads the dataset back as LeRobot does."""
+    root = lerobot.folder / "dataset"
+    lerobot.run(
+        "lerobot-record",
+        *robot,
+        f"--robot.log={lerobot.folder / 'record.csv'}",
+        *LEADER,
+        f"--teleop.hand={hand}",
+        "--dataset.repo_id=me/test",
+        f"--dataset.root={root}",
+        "--dataset.push_to_hub=false",
+        "--dataset.single_task=wave",
+        "--dataset.num_episodes=2",
+        f"--dataset.episode_time_s={SECONDS}",
+        "--dataset.reset_time_s=1",
+        "--play_sounds=false",
+    )
+    return LeRobotDataset("me/test", root=root)
+
+
+def replay(lerobot: LeRobot, *robot: str) -> Log:
+    """Replays the first episode."""
+    log = lerobot.folder / "replay.csv"
+    lerobot.run(
+        "lerobot-replay",
+        *robot,
+        f"--robot.log={log}",
+        "--dataset.repo_id=me/test",
+        f"--dataset.root={lerobot.folder / 'dataset'}",
+        "--dataset.episode=0",
+        "--play_sounds=false",
+    )
+    return Log.read(log)
+
+
+def check_record_and_replay(lerobot: LeRobot, hand: Path, *robot: str) -> tuple[Log, Log, int]:
+    """The dataset has what was sent and measured, and a replay goes along the recorded path within a degree."""
+    dataset = record(lerobot, hand, *robot)
+    recorded = Log.read(lerobot.folder / "record.csv")
+    assert (dataset.num_episodes, dataset.fps) == (2, 30)
+    assert dataset.features["action"]["names"] == joints.keys("pos")
+    assert dataset.features["observation.state"]["names"] == joints.keys("pos")
+    episode = np.array(dataset.hf_dataset["episode_index"])
+    frames = int((episode == 0).sum())
+    state, action = (degrees(dataset.hf_dataset[key]) for key in ("observation.state", "action"))
+    assert np.abs(state[:frames] - recorded.measured[:frames]).max() < 0.01
+    assert np.abs(action[:frames] - recorded.sent[:frames]).max() < 0.01
+    # The second episode follows the time to reset, which is not in the dataset.
+    second = len(state) - frames
+    assert np.abs(state[frames:] - recorded.measured[-second:]).max() < 0.01
+
+    replayed = replay(lerobot, *robot)
+    assert np.abs(replayed.sent - recorded.sent[:frames]).max() < 0.011
+    # The first frame is where the arm stood before the approach.
+    one, other = recorded.measured[1:frames], replayed.measured[1:]
+    distances = away(other, one), away(one, other)
+    print(f"replay: {distances[0]:.2f} and {distances[1]:.2f} degrees away from the recorded path")
+    print("record:", recorded.loop_times())
+    print("replay:", replayed.loop_times())
+    assert max(distances) < 1
+    assert (one.max(axis=0) - one.min(axis=0) > 15).all(), "a path that moves all joints"
+    return recorded, replayed, frames
+
+
+def test_record_and_replay_on_a_simulated_arm(lerobot: LeRobot, hand: Path) -> None:
+    recorded, replayed, frames = check_record_and_replay(lerobot, hand, *FOLLOWER)
+    # What the simulated arm really did: it was measured up to 10 ms before, and goes on meanwhile.
+    assert away(recorded.true[1:frames], replayed.true[1:]) < 1
+    assert away(recorded.measured[2:frames], recorded.true[: frames + 1]) < 1
+
+
+def test_record_and_replay_on_the_emulated_image(lerobot: LeRobot, hand: Path, emulated_arm: str) -> None:
+    check_record_and_replay(lerobot, hand, "--robot.type=sevenbot", f"--robot.port={emulated_arm}", "--robot.id=arm")
+
+
+def test_teleoperate_between_two_simulated_arms(lerobot: LeRobot, hand: Path) -> None:
+    log = lerobot.folder / "teleoperate.csv"
+    printed = lerobot.run(
+        "lerobot-teleoperate",
+        *FOLLOWER,
+        f"--robot.log={log}",
+        *LEADER,
+        f"--teleop.hand={hand}",
+        "--fps=30",
+        f"--teleop_time_s={SECONDS}",
+    )
+    assert "Teleop loop time" in printed
+    led = Log.read(log)
+    distance = away(led.true[1:], led.sent)
+    print(f"teleoperate: {distance:.2f} degrees away from the leader's path;", led.loop_times())
+    assert distance < 1.5
+
+
+@pytest.mark.parametrize("park", ["true", "false"])
+def test_ctrl_c_ends_both_arms(lerobot: LeRobot, park: str) -> None:
+    log = lerobot.folder / "log.csv"
+    process = lerobot.start(
+        "lerobot-teleoperate",
+        *FOLLOWER,
+        f"--robot.log={log}",
+        f"--robot.park_on_disconnect={park}",
+        *LEADER,
+        f"--teleop.park_on_disconnect={park}",
+        "--fps=30",
+    )
+    while process.poll() is None and not (log.exists() and log.read_text().count("\n") > 30):
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    printed = lerobot.finish(process)
+    assert printed.count("is disconnected") == 2
+    assert printed.count("goes to its park pose") == (2 if park == "true" else 0)
+    assert "The arm is not" not in printed
+
+
+def test_a_wrong_port_is_said_with_what_to_do(lerobot: LeRobot) -> None:
+    process = lerobot.start("lerobot-teleoperate", "--robot.type=sevenbot", "--robot.port=/dev/none", *LEADER)
+    printed, _ = process.communicate(timeout=300)
+    assert process.returncode != 0
+    assert "/dev/none: there is no such port" in printed
+    assert "--robot.port=sim is a simulated arm" in printed
+
+
+def test_the_commands_of_the_docs(lerobot: LeRobot) -> None:
+    lines = DOCS.read_text().replace("\\\n", " ").splitlines()
+    commands = [shlex.split(line) for line in lines if line.startswith("lerobot-")]
+    assert [command[0] for command in commands] == ["lerobot-record", "lerobot-replay", "lerobot-teleoperate"]
+    for command in commands:
+        lerobot.run(*command)
+    assert LeRobotDataset("me/wave", root=lerobot.folder / "wave").num_episodes == 2

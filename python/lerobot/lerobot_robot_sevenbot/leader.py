@@ -1,0 +1,115 @@
+"""The teleoperator `sevenbot_leader`: an arm without torque that you move by hand."""
+
+from functools import cached_property
+from typing import Any
+
+import sevenbot
+from lerobot.teleoperators import Teleoperator
+from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
+
+from . import joints
+from .config_sevenbot import SevenbotLeaderConfig
+from .connection import CALIBRATION, LOGGER, Connection
+from .hand import Hand
+
+
+class SevenbotLeader(Teleoperator):
+    """A 7Bot V2 arm, real or simulated, whose measured positions are actions.
+
+    They have the keys and scales of the robot `sevenbot`, and are within its limits: so a dataset has the actions that the
+    follower carries out.
+    """
+
+    config_class = SevenbotLeaderConfig
+    name = "sevenbot_leader"
+
+    def __init__(self, config: SevenbotLeaderConfig) -> None:
+        """Opens nothing yet."""
+        super().__init__(config)
+        self.config = config
+        self._connection: Connection | None = None
+        self._hand: Hand | None = None
+
+    @cached_property
+    def action_features(self) -> dict[str, type]:
+        """The keys of an action."""
+        return dict.fromkeys(joints.keys("pos"), float)
+
+    @cached_property
+    def feedback_features(self) -> dict[str, type]:
+        """None: the arm pushes nobody's hand."""
+        return {}
+
+    @property
+    def is_connected(self) -> bool:
+        """Is the arm open?"""
+        return self._connection is not None
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Always: the calibration is in the arm, in its registers `offset`."""
+        return True
+
+    def calibrate(self) -> None:
+        """Has nothing to do, and tells where the calibration is."""
+        LOGGER.info(CALIBRATION)
+
+    def configure(self) -> None:
+        """Switches the motors off. A simulated arm gets a hand."""
+        connection = self._open()
+        if connection.simulation is None:
+            LOGGER.warning("Hold the leader: its motors go off now, and it falls without a hand.")
+        connection.arm.torque_off()
+        if connection.simulation is not None:
+            self._hand = Hand(connection.simulation, self.config.hand)
+        connection.follow_time()
+
+    @check_if_already_connected
+    def connect(self, calibrate: bool = True) -> None:
+        """Opens the arm and switches its motors off: hold it."""
+        self._connection = Connection(self.config.port, self.config.seed, "--teleop.port")
+        try:
+            self.configure()
+        except BaseException:
+            self._close(park=False)
+            raise
+        arm = self._connection.arm
+        LOGGER.info("%s is connected: firmware %s at %s. %s", self, arm.firmware, arm.port, CALIBRATION)
+
+    def _open(self) -> Connection:
+        if self._connection is None:
+            raise ConnectionError(f"{self} is not connected: call connect()")
+        return self._connection
+
+    @check_if_not_connected
+    def get_action(self) -> dict[str, float]:
+        """Where the leader is, brought within the limits of the follower."""
+        connection = self._open()
+        if self._hand is not None:
+            # Before the time passes: what is measured then is where the hand is now.
+            self._hand.lead()
+        connection.follow_time()
+        return joints.to_lerobot("pos", joints.within_limits(map(float, self._positions(connection))))
+
+    @staticmethod
+    def _positions(connection: Connection) -> Any:
+        try:
+            return connection.observe().positions
+        except sevenbot.NotServed:
+            # The maker's firmware has whole degrees, and no velocities.
+            return connection.arm.angles
+
+    def send_feedback(self, feedback: dict[str, Any]) -> None:
+        """Has no effect: see `feedback_features`."""
+
+    def _close(self, *, park: bool) -> None:
+        connection, self._connection, self._hand = self._connection, None, None
+        if connection is not None:
+            connection.close(park=park)
+
+    @check_if_not_connected
+    def disconnect(self) -> None:
+        """The leader holds, then parks, or goes on holding with `park_on_disconnect=false`. Then it is closed."""
+        LOGGER.info("The leader holds now: let it go.")
+        self._close(park=self.config.park_on_disconnect)
+        LOGGER.info("%s is disconnected.", self)

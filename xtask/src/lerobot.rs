@@ -1,0 +1,134 @@
+//! The plugin for LeRobot: tested with LeRobot's base classes alone, and in the long run with all of LeRobot.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::python::{build, folder, pip, run, works};
+use crate::run::{TaskResult, build_host_sim, build_image, root};
+
+/// LeRobot without what it depends on: some gigabytes, of which its base classes need little.
+const LEROBOT: &str = "lerobot==0.6.1";
+/// What the base classes import. They name torch, too, in annotations only: the tests have a module of this name.
+const BASE_PACKAGES: [&str; 5] =
+    ["draccus==0.11.6", "numpy==2.2.6", "huggingface-hub==1.33.0", "packaging==25.0", "tqdm==4.70.1"];
+/// All of LeRobot that its commands for robots need.
+const WHOLE: &str = "lerobot[core-scripts]==0.6.1";
+/// What runs the tests.
+const TEST_PACKAGES: [&str; 2] = ["pytest==9.2.0", "mypy==2.4.1"];
+/// The free disk that the whole installation needs, in GiB: 3 for pip's downloads, and 6 that it keeps.
+const NEEDED_GIB: u64 = 9;
+/// Interpreters to look for on PATH. LeRobot 0.6.1 needs 3.12.
+const INTERPRETERS: [&str; 4] = ["python3", "python3.12", "python3.13", "python3.14"];
+/// Fails below 3.12.
+const VERSION: &str = "import sys; assert sys.version_info >= (3, 12)";
+
+/// Types and behaviour of the plugin, with the base classes of LeRobot.
+pub(crate) fn check() -> TaskResult {
+    let python = environment("lerobot-base")?;
+    run(pip(&python).args(["--no-deps", LEROBOT]))?;
+    run(pip(&python).args(BASE_PACKAGES).args(TEST_PACKAGES))?;
+    install_plugin(&python)?;
+    let [tests, commands] = ["tests", "command_tests"].map(|name| plugin().join(name));
+    mypy(&python, &["-p".as_ref(), "lerobot_robot_sevenbot".as_ref()])?;
+    mypy(&python, &[&tests])?;
+    mypy(&python, &[&commands])?;
+    run(&mut pytest(&python, &tests))
+}
+
+/// LeRobot's own commands with the plugin. Installs all of LeRobot at the first time.
+pub(crate) fn commands() -> TaskResult {
+    let python = environment("lerobot-whole")?;
+    if !python.with_file_name("lerobot-record").exists() {
+        need_disk()?;
+    }
+    run(pip(&python).arg("--no-cache-dir").args([WHOLE]).args(TEST_PACKAGES))?;
+    install_plugin(&python)?;
+    run(&mut pytest(&python, &plugin().join("tests")))?;
+    emulator::need_qemu()?;
+    build_image()?;
+    build_host_sim()?;
+    // The tests start the emulator: `cargo xtask emulate`.
+    run(pytest(&python, &plugin().join("command_tests")).env("XTASK", env::current_exe()?))
+}
+
+fn plugin() -> PathBuf {
+    root().join("python/lerobot")
+}
+
+/// An environment of its own, which is kept for the next run.
+fn environment(name: &str) -> TaskResult<PathBuf> {
+    let folder = folder().join(name);
+    let python = folder.join("bin/python");
+    if !works(&python) {
+        run(Command::new(interpreter()?).args(["-m", "venv", "--clear"]).arg(&folder))?;
+    }
+    Ok(python)
+}
+
+/// A Python that LeRobot accepts: on PATH, or one that pyenv has installed.
+fn interpreter() -> TaskResult<PathBuf> {
+    let on_path = INTERPRETERS.into_iter().map(PathBuf::from);
+    let found = on_path.chain(of_pyenv()).find(|program| is_new_enough(program));
+    found.ok_or_else(|| "LeRobot needs Python 3.12 or later: neither PATH nor pyenv has one".into())
+}
+
+fn of_pyenv() -> impl Iterator<Item = PathBuf> {
+    let home = env::var_os("PYENV_ROOT").map(PathBuf::from);
+    let home = home.or_else(|| env::home_dir().map(|home| home.join(".pyenv")));
+    let versions = home.and_then(|home| fs::read_dir(home.join("versions")).ok());
+    versions.into_iter().flatten().flatten().map(|version| version.path().join("bin/python3"))
+}
+
+fn is_new_enough(program: &Path) -> bool {
+    let mut python = Command::new(program);
+    python.args(["-c", VERSION]).stdout(Stdio::null()).stderr(Stdio::null());
+    python.status().is_ok_and(|status| status.success())
+}
+
+/// Fails before gigabytes are fetched for nothing.
+fn need_disk() -> TaskResult {
+    let output = Command::new("df").args(["-Pk"]).arg(folder()).output()?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let kib = text.lines().nth(1).and_then(|line| line.split_whitespace().nth(3)?.parse::<u64>().ok());
+    let free = kib.ok_or("df does not tell how much of the disk is free")? >> 20;
+    println!("LeRobot with all its packages: {NEEDED_GIB} GiB are needed, {free} GiB are free");
+    if free >= NEEDED_GIB {
+        return Ok(());
+    }
+    Err(format!(
+        "THE DISK IS TOO FULL: LeRobot needs {NEEDED_GIB} GiB below {}, and {free} GiB are free. LeRobot's commands were not tested",
+        folder().display()
+    )
+    .into())
+}
+
+/// The package and the plugin, without what they depend on. pip would leave files beside the sources, so it gets a copy.
+fn install_plugin(python: &Path) -> TaskResult {
+    let copy = folder().join("lerobot-plugin");
+    if copy.exists() {
+        fs::remove_dir_all(&copy)?;
+    }
+    run(Command::new("cp").arg("-r").arg(plugin()).arg(&copy))?;
+    run(pip(python).args(["--force-reinstall", "--no-deps"]).arg(build()?).arg(&copy))
+}
+
+fn module(python: &Path, name: &str) -> Command {
+    let mut command = Command::new(python);
+    // Not in the folder of the sources, so that those are not imported.
+    command.args(["-m", name]).current_dir(folder());
+    command
+}
+
+fn mypy(python: &Path, what: &[&Path]) -> TaskResult {
+    let config = plugin().join("pyproject.toml");
+    run(module(python, "mypy").args(["--strict", "--config-file"]).arg(config).args(what))
+}
+
+fn pytest(python: &Path, tests: &Path) -> Command {
+    let mut command = module(python, "pytest");
+    command.args(["--quiet", "-p", "no:cacheprovider", "--config-file"]);
+    command.arg(plugin().join("pyproject.toml")).arg(tests);
+    command
+}
