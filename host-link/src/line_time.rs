@@ -2,16 +2,16 @@
 
 use protocol_core::time::{Duration, Instant};
 
-/// A reply may come this much later than the line explains. A USB adapter holds bytes back for up to 16 ms in each direction
-/// (the latency timer of FTDI chips). An arm answers within a control cycle of 10 ms. The rest is for a busy host, or a server
-/// with other clients.
+/// Before replies have come, one may be this much later than the line explains. A USB adapter holds bytes back for up to 16 ms in
+/// each direction (the latency timer of FTDI chips). An arm answers within a control cycle of 10 ms. The rest is for a busy
+/// host, or a server with other clients.
 pub const ROUND_TRIP: Duration = Duration::from_millis(100);
+/// Where replies come in time, one may still be this much later.
+const SHORTEST: Duration = Duration::from_millis(4);
 /// Microseconds of ten bits, a byte with start and stop bit, at 1 bit/s.
 const BYTE: u64 = 10_000_000;
 /// With each reply in time, this part of the allowance is forgotten.
 const FORGETTING: u64 = 8;
-/// Reports take up to half of the line ([D14](protocol_core::decisions#d14)), so that a reply may take twice its own time.
-const REPORT_SHARE: u64 = 2;
 
 /// The time that bytes take on a line; `baud` is in bits per second.
 #[must_use]
@@ -44,8 +44,8 @@ impl LineTime {
         self.busy_until
     }
 
-    /// How much later than due replies may be: twice as much as of late, and [`ROUND_TRIP`] at least. So a slow server is not asked
-    /// more often the slower it gets.
+    /// How much later than due replies may be: twice as much as of late. So a lost reply costs little on a line where replies come
+    /// in time, and a slow server is not asked more often the slower it gets.
     pub(crate) const fn allowance(&self) -> Duration {
         self.allowance
     }
@@ -55,13 +55,12 @@ impl LineTime {
         let forgotten = self.allowance.as_micros() / FORGETTING;
         let allowance = self.allowance.as_micros().saturating_sub(forgotten);
         let late = (now - due).as_micros().saturating_mul(2);
-        self.allowance = Duration::from_micros(allowance.max(late).max(ROUND_TRIP.as_micros()));
+        self.allowance = Duration::from_micros(allowance.max(late).max(SHORTEST.as_micros()));
     }
 
     /// When the last byte of the replies on their way has arrived, if the arm answers at once.
     pub(crate) fn reply_due(&self, now: Instant, awaited_bytes: usize) -> Instant {
-        let replies = time_on_line(self.baud, awaited_bytes).as_micros().saturating_mul(REPORT_SHARE);
-        self.busy_until.max(now) + Duration::from_micros(replies)
+        self.busy_until.max(now) + time_on_line(self.baud, awaited_bytes)
     }
 }
 
@@ -76,8 +75,8 @@ mod tests {
         assert_eq!(line.allowance(), Duration::from_millis(600));
         line.note_reply(due, due);
         assert_eq!(line.allowance(), Duration::from_millis(525));
-        (0..20).for_each(|_| line.note_reply(due, due));
-        assert_eq!(line.allowance(), ROUND_TRIP);
+        (0..40).for_each(|_| line.note_reply(due, due));
+        assert_eq!(line.allowance(), SHORTEST);
     }
 
     #[test]
@@ -86,7 +85,7 @@ mod tests {
         let now = Instant::from_micros(1_000);
         line.send(now, 7);
         assert_eq!((line.busy_until() - now).as_micros(), 608, "7 bytes of 10 bits");
-        assert_eq!((line.reply_due(now, 14) - now).as_micros(), 608 + 2 * 1_216);
+        assert_eq!((line.reply_due(now, 14) - now).as_micros(), 608 + 1_216);
         line.send(now, 7);
         assert_eq!((line.busy_until() - now).as_micros(), 2 * 608, "behind the first");
     }

@@ -5,17 +5,18 @@ use std::collections::VecDeque;
 use protocol_core::time::{Duration, Instant};
 
 use crate::event::RequestId;
+use crate::line_time::ROUND_TRIP;
 use crate::span::Span;
 
-/// How often a read is sent, and how long its reply is waited for.
+/// How long the reply to a read is waited for, and whether it is repeated meanwhile.
 ///
-/// A read is repeated as soon as its reply is overdue by [`ROUND_TRIP`](crate::ROUND_TRIP), or more if the replies before were
-/// late, and then after twice the time each: a read changes
-/// nothing, so a needless one does no harm. It is given up after `timeout` for each attempt, counted from the time when its
-/// reply was due. So a lost reply costs little, and a slow arm gets all of the time.
+/// A read is repeated as soon as its reply is later than replies were of late ([`ROUND_TRIP`] before there were any). The time
+/// to the next repeat doubles, up to [`ROUND_TRIP`] or what was learned, whichever is longer. A read changes nothing, so a
+/// needless one does no harm. It is given up after `timeout` for each attempt, counted from the time when its reply was due.
+/// So a lost reply costs little, several are no error, and a slow arm gets all of the time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
-    /// How often it is sent, at least once.
+    /// How many times `timeout` the reply is waited for, at least once. A read with one attempt is sent once.
     pub attempts: u32,
     /// The longest wait for one attempt, in addition to the time on the line.
     pub timeout: Duration,
@@ -30,7 +31,8 @@ impl Patience {
     /// The time between attempt number `sent`, from 1, and the next one.
     fn before_repeat(self, sent: u32, allowance: Duration) -> Duration {
         let doubled = allowance.as_micros().checked_shl(sent.saturating_sub(1)).unwrap_or(u64::MAX);
-        self.timeout.min(Duration::from_micros(doubled))
+        let longest = self.timeout.min(allowance.max(ROUND_TRIP));
+        longest.min(Duration::from_micros(doubled))
     }
 }
 
@@ -59,14 +61,14 @@ impl OpenRead {
         self.sent = self.sent.saturating_add(1);
         self.writes_before = writes;
         let give_up_at = *self.give_up_at.get_or_insert(reply_due + self.patience.total());
-        let is_last = self.sent >= self.patience.attempts;
+        let is_last = self.patience.attempts <= 1;
         let repeat_at = reply_due + self.patience.before_repeat(self.sent, allowance);
         self.due = if is_last { give_up_at } else { repeat_at.min(give_up_at) };
     }
 
     /// May it be sent again after so many writes? Behind a write it would read what the write changed.
     pub(crate) const fn may_repeat(&self, writes: u64) -> bool {
-        self.sent < self.patience.attempts && self.writes_before == writes
+        self.patience.attempts > 1 && self.writes_before == writes
     }
 
     /// Repeating makes no sense, or not yet: wait until it is given up.

@@ -3,10 +3,10 @@
 from collections.abc import Iterable, Iterator
 from os import PathLike
 from types import TracebackType
-from typing import Any, Literal, SupportsIndex, TypeAlias, TypeVar, final, overload
+from typing import Any, ClassVar, Literal, SupportsIndex, TypeAlias, TypeVar, final, overload
 
-from numpy import float64
-from numpy.typing import NDArray
+from numpy import float32, float64
+from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Self, disjoint_base
 
 __all__ = [
@@ -35,6 +35,7 @@ __all__ = [
     "Recording",
     "Registers",
     "SimulatedArm",
+    "SimulatedArms",
     "Simulation",
     "SimulationSnapshot",
     "Status",
@@ -61,6 +62,7 @@ _Value: TypeAlias = Any
 _Map: TypeAlias = Literal["2.1", "2.2"]
 _Path: TypeAlias = str | PathLike[str]
 _T = TypeVar("_T")
+_Numbers = TypeVar("_Numbers", NDArray[float32], NDArray[float64])
 
 class Error(Exception):
     """A failure of this package. `hints` is a tuple of texts: what to try, the most likely cause first."""
@@ -480,6 +482,89 @@ class SimulatedArm(Arm):
     @property
     def simulation(self) -> Simulation:
         """The simulation behind this arm."""
+
+@final
+class SimulatedArms:
+    """Simulated arms that step together, for learning: `seen = arms.step(actions, 0.02)`, with an action of seven angles in degrees
+    for each arm.
+
+    `seen` is an array of a row for each arm. The slices `POSITIONS`, `VELOCITIES`, `LOADS`, `TIP`, `BLOCKED` and `AGE` name its
+    columns: `seen[:, arms.TIP]`. Each arm is a controller that parses frames and answers a read, with servos, virtual time,
+    faults and a load of its own. Its line takes no time. The results do not depend on the number of threads.
+
+    The first arm has the seed `seed`, and each other one the next number; or give `seeds`. By default there is a thread for each
+    processor. Needs numpy.
+    """
+
+    POSITIONS: ClassVar[slice]
+    VELOCITIES: ClassVar[slice]
+    LOADS: ClassVar[slice]
+    TIP: ClassVar[slice]
+    BLOCKED: ClassVar[slice]
+    AGE: ClassVar[slice]
+    def __new__(
+        cls,
+        n: int,
+        seed: int = 1,
+        *,
+        seeds: Iterable[SupportsIndex] | None = None,
+        threads: int | None = None,
+    ) -> Self: ...
+    @overload
+    def step(self, actions: ArrayLike | None, dt: float, out: _Numbers) -> _Numbers:
+        """Sends each arm its action, the next set-point of seven angles of 0 to 180 degrees, lets `dt` pass, and reads its state.
+
+        `actions` is an array (n, 7); arrays of float32 and float64 without gaps are not copied. With `None` the arms go on.
+        `dt` is 0.005 to 1 second in whole milliseconds. Returns `out`, or a new array (n, 32), of float32 if the actions are.
+        A wrong action raises `ValueError` before any arm moves. Ctrl-C ends the call after the step.
+        """
+    @overload
+    def step(self, actions: ArrayLike | None, dt: float = 0.02, *, out: _Numbers) -> _Numbers: ...
+    @overload
+    def step(self, actions: NDArray[float32], dt: float = 0.02, out: None = None) -> NDArray[float32]: ...
+    @overload
+    def step(self, actions: ArrayLike | None, dt: float = 0.02, out: None = None) -> NDArray[float64]: ...
+    @overload
+    def observe(self, out: _Numbers) -> _Numbers:
+        """What the last reads told: `out`, or a new array (n, 32). No time passes."""
+    @overload
+    def observe(self, out: None = None) -> NDArray[float64]: ...
+    def reset(
+        self,
+        mask: ArrayLike | None = None,
+        snapshot: SimulationSnapshot | None = None,
+        *,
+        seeds: Iterable[SupportsIndex] | None = None,
+    ) -> None:
+        """Makes the arms of the mask (n truth values), or all, as they were after their start, or as a snapshot: time, faults and
+        load, too. Each keeps its seed, or gets one of `seeds` (n numbers), and draws the same random numbers again.
+        """
+    def fault(self, mask: ArrayLike | None, fault: str, seconds: float | None = None) -> None:
+        """Gives the arms of the mask, or all with `None`, a fault, for `seconds` or until `clear` or `reset`. The words are those of
+        `Simulation.fault`.
+        """
+    def clear(self, mask: ArrayLike | None = None, location: str | None = None) -> None:
+        """Takes the faults of the arms of the mask, or of all, back: all, or those at one location, `"3"`, `"supply"`, `"line"`."""
+    def set_load(self, grams: ArrayLike, mask: ArrayLike | None = None) -> None:
+        """Hangs a weight on the tip of the arms of the mask, or of all: grams, 0 to 65535, one number or one for each of the n arms."""
+    def set(
+        self, name: str, values: SupportsIndex | Iterable[SupportsIndex], mask: ArrayLike | None = None
+    ) -> None:
+        """Writes registers of the arms of the mask, or of all, in one frame each: `arms.set("push-limit", 50)`. Names and numbers
+        are those of docs/registers.md. An arm refuses a write that its rules forbid.
+        """
+    def snapshot(self, arm: int) -> SimulationSnapshot:
+        """A copy of an arm as it is now, by its number from 0: for `reset`, and for `Simulation.restore`."""
+    @property
+    def angles(self) -> NDArray[float64]:
+        """The true angles of all joints in degrees, without noise: an array (n, 7)."""
+    @property
+    def time(self) -> NDArray[float64]:
+        """The virtual time of each arm in seconds: an array (n,)."""
+    @property
+    def threads(self) -> int:
+        """The most threads that step the arms."""
+    def __len__(self) -> int: ...
 
 @final
 class Registers:

@@ -14,6 +14,8 @@ use pyo3::prelude::*;
 
 mod arguments;
 mod arm;
+mod arms;
+mod arrays;
 mod bulk;
 mod errors;
 mod geometry;
@@ -46,6 +48,7 @@ fn _sevenbot(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<recording::Recording>()?;
     module.add_class::<registers::Registers>()?;
     module.add_class::<arm::SimulatedArm>()?;
+    module.add_class::<arms::SimulatedArms>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<simulation::SimulationSnapshot>()?;
     module.add_class::<status::Status>()?;

@@ -33,6 +33,17 @@ pub(crate) struct Simulation {
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct SimulationSnapshot(Mutex<arm_sim::Simulation>);
 
+impl SimulationSnapshot {
+    pub(crate) const fn of(simulation: arm_sim::Simulation) -> Self {
+        Self(Mutex::new(simulation))
+    }
+
+    /// A copy of the arm.
+    pub(crate) fn arm(&self) -> arm_sim::Simulation {
+        lock(&self.0).clone()
+    }
+}
+
 impl Simulation {
     pub(crate) fn of(shared: SharedSimulation) -> Self {
         Self { shared, process: std::process::id() }
@@ -62,7 +73,7 @@ fn joint(py: Python<'_>, number: i64) -> PyResult<Joint> {
     joint.ok_or_else(|| InvalidValue::raise(py, &format!("joint {number}: use 1 to 7")))
 }
 
-fn virtual_time(duration: Duration) -> arm_sim::Duration {
+pub(crate) fn virtual_time(duration: Duration) -> arm_sim::Duration {
     arm_sim::Duration::from_micros(u64::try_from(duration.as_micros()).unwrap_or(u64::MAX))
 }
 
@@ -212,13 +223,13 @@ impl Simulation {
 
     /// A copy of the arm as it is now.
     fn snapshot(&self, py: Python<'_>) -> PyResult<SimulationSnapshot> {
-        Ok(SimulationSnapshot(Mutex::new(self.with(py, |simulation| simulation.clone())?)))
+        self.with(py, |simulation| simulation.clone()).map(SimulationSnapshot::of)
     }
 
     /// Makes the arm as it was at a snapshot, its time included. The clock of its line goes on: sleeps, streams and timeouts are
     /// as long as without it.
     fn restore(&self, py: Python<'_>, snapshot: &SimulationSnapshot) -> PyResult<()> {
-        let (copy, shared) = (lock(&snapshot.0).clone(), self.shared(py)?);
+        let (copy, shared) = (snapshot.arm(), self.shared(py)?);
         py.detach(|| shared.restore(copy));
         Ok(())
     }

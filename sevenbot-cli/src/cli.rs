@@ -64,7 +64,7 @@ pub(crate) struct Global {
     /// Baud rate of the port. The arm starts with the rate in its register 12.
     #[arg(long, global = true, default_value_t = 115_200, value_parser = value_parser!(u32).range(1..))]
     pub(crate) baud: u32,
-    /// Timeout for an answer in milliseconds; a question is sent 3 times.
+    /// Timeout for an answer in milliseconds. A question is sent again whenever its answer is overdue, for three times as long.
     #[arg(long, global = true, value_name = "MS", env = "SEVENBOT_TIMEOUT", hide_env_values = true,
           default_value_t = 500, value_parser = value_parser!(u16).range(1..))]
     pub(crate) timeout: u16,

@@ -17,10 +17,11 @@ use protocol_core::registers::map21::Map;
 pub struct ArmOptions {
     /// Baud rate of the port. The arm starts with the rate in its register 12.
     pub baud: u32,
-    /// The longest wait for one attempt. A read is repeated as soon as its reply is overdue, so a lost reply costs less:
-    /// [`Patience`](host_link::Patience).
+    /// The wait for one attempt. A reply is waited for as long as all attempts together.
     pub reply_timeout: Duration,
-    /// Attempts for a read, at least one. A read changes nothing, so repeating it is safe.
+    /// Attempts for a read, at least one. With more than one, a read is sent again whenever its reply is overdue, so a lost
+    /// reply costs much less than `reply_timeout`: [`Patience`](host_link::Patience). A read changes nothing, so repeating it is
+    /// safe.
     pub attempts: u32,
     /// The register map to speak; `None`: the one that the arm's version tells.
     pub map: Option<Map>,

@@ -71,13 +71,13 @@ pub enum Error {
         count: usize,
     },
     /// A read was not answered in any attempt.
-    #[error("no answer to a read of {span} ({attempts} tries of {} ms): {received}", waited.as_millis())]
+    #[error("no answer to a read of {span} in {} ms: {received}", waited.saturating_mul(*attempts).as_millis())]
     NoAnswer {
         /// The registers of the read.
         span: Span,
         /// The number of attempts.
         attempts: u32,
-        /// The timeout of each attempt.
+        /// The timeout of each attempt. The reply was waited for as long as all of them together.
         waited: Duration,
         /// What was received instead.
         received: ReceiveCounts,
@@ -174,7 +174,7 @@ mod tests {
             Error::NoAnswer { span, attempts: 3, waited: Duration::from_millis(500), received }.to_string()
         };
         let nothing = said(ReceiveCounts::default());
-        assert_eq!(nothing, "no answer to a read of 54..60 (3 tries of 500 ms): nothing was received");
+        assert_eq!(nothing, "no answer to a read of 54..60 in 1500 ms: nothing was received");
         let garbage = said(ReceiveCounts { bytes: 12, ..ReceiveCounts::default() });
         assert!(garbage.ends_with("12 bytes were received, none of them a frame"), "{garbage}");
         let frames = said(ReceiveCounts { bytes: 50, other_frames: 2, damaged_frames: 1, echoes: 0 });

@@ -66,6 +66,7 @@ mod reports;
 #[cfg(feature = "serial")]
 pub mod servo_bench;
 pub mod simulated;
+pub mod simulated_arms;
 pub mod status_block;
 pub mod stream;
 pub mod table;

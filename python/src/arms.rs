@@ -1,0 +1,320 @@
+//! `SimulatedArms`: many simulated arms that step together.
+
+use std::num::NonZeroUsize;
+use std::sync::Mutex;
+use std::thread::available_parallelism;
+use std::time::Duration;
+
+use arm_sim::faults::{ArmFault, FaultLocation};
+use numpy::{Element, PyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PySlice;
+use sevenbot::register_values::bytes;
+use sevenbot::simulated_arms::{self as library, Number, WIDTH};
+use sevenbot::{Joint, names};
+
+use crate::arguments::whole;
+use crate::arrays::{self, each_number, given, is_single, numpy, writing};
+use crate::bulk;
+use crate::errors::{InvalidValue, raised};
+use crate::numbers::{Values, duration};
+use crate::simulation::{SimulationSnapshot, virtual_time};
+use crate::worker::lock;
+
+/// The most arms; each takes some 20 kilobytes.
+const MOST_ARMS: i64 = 1_000_000;
+
+/// Simulated arms that step together, for learning: `seen = arms.step(actions, 0.02)`, with an action of seven angles in degrees
+/// for each arm.
+///
+/// `seen` is an array of a row for each arm. The slices `POSITIONS`, `VELOCITIES`, `LOADS`, `TIP`, `BLOCKED` and `AGE` name its
+/// columns: `seen[:, arms.TIP]`. Each arm is a controller that parses frames and answers a read, with servos, virtual time,
+/// faults and a load of its own. Its line takes no time. The results do not depend on the number of threads.
+///
+/// The first arm has the seed `seed`, and each other one the next number; or give `seeds`. By default there is a thread for each
+/// processor. Needs numpy.
+#[pyclass(frozen, module = "sevenbot")]
+pub(crate) struct SimulatedArms {
+    arms: Mutex<library::SimulatedArms>,
+    count: usize,
+    threads: NonZeroUsize,
+}
+
+impl SimulatedArms {
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut library::SimulatedArms) -> T + Send) -> T {
+        py.detach(|| work(&mut lock(&self.arms)))
+    }
+
+    /// A step with arrays of one type.
+    fn step_as<'py, N: Number + Element>(
+        &self,
+        py: Python<'py>,
+        actions: Option<&Bound<'py, PyAny>>,
+        time: Duration,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let actions: Option<PyReadonlyArray2<'py, N>> =
+            actions.map(|actions| given(actions, [self.count, 7], "actions")).transpose()?;
+        let out = arrays::out::<N>(py, out, [self.count, WIDTH])?;
+        let mut filled = writing(&out)?;
+        let numbers = actions.as_ref().map(|array| array.as_slice()).transpose();
+        let (numbers, seen) =
+            (numbers.map_err(arrays::gaps(py))?, filled.as_slice_mut().map_err(arrays::gaps(py))?);
+        let stepped = self.with(py, |arms| arms.step(numbers, time, seen));
+        drop(filled);
+        stepped.map_err(|error| InvalidValue::raise(py, &error.to_string()))?;
+        py.check_signals()?;
+        Ok(out.into_any())
+    }
+
+    fn observe_as<'py, N: Number + Element>(
+        &self,
+        py: Python<'py>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let out = arrays::out::<N>(py, out, [self.count, WIDTH])?;
+        let mut filled = writing(&out)?;
+        let seen = filled.as_slice_mut().map_err(arrays::gaps(py))?;
+        let observed = self.with(py, |arms| arms.observe(seen));
+        drop(filled);
+        observed.map_err(|error| InvalidValue::raise(py, &error.to_string()))?;
+        Ok(out.into_any())
+    }
+
+    fn mask(&self, mask: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<bool>>> {
+        arrays::mask(mask, self.count)
+    }
+}
+
+#[pymethods]
+impl SimulatedArms {
+    /// Measured positions in degrees; NaN for a joint that was not measured.
+    #[classattr]
+    const POSITIONS: Columns = Columns(library::POSITIONS);
+    /// Measured velocities in degrees per second.
+    #[classattr]
+    const VELOCITIES: Columns = Columns(library::VELOCITIES);
+    /// Loads in percent of the stall torque.
+    #[classattr]
+    const LOADS: Columns = Columns(library::LOADS);
+    /// The tip in millimetres, x, y, z, by the measured positions.
+    #[classattr]
+    const TIP: Columns = Columns(library::TIP);
+    /// 1 for a joint that an obstacle keeps from its target, or else 0.
+    #[classattr]
+    const BLOCKED: Columns = Columns(library::BLOCKED);
+    /// Seconds since the last reply: 0 if the last read was answered.
+    #[classattr]
+    const AGE: Columns = Columns(library::AGE);
+
+    #[new]
+    #[pyo3(signature = (n, seed = None, *, seeds = None, threads = None), text_signature = "(n, seed=1, *, seeds=None, threads=None)")]
+    fn new(
+        py: Python<'_>,
+        n: i64,
+        seed: Option<&Bound<'_, PyAny>>,
+        seeds: Option<&Bound<'_, PyAny>>,
+        threads: Option<i64>,
+    ) -> PyResult<Self> {
+        numpy(py)?;
+        let count: usize = whole(py, "n", n, 1, MOST_ARMS)?;
+        let threads = threads.map(|threads| whole::<usize>(py, "threads", threads, 1, 1_024)).transpose()?;
+        let threads = threads.and_then(NonZeroUsize::new).or_else(|| available_parallelism().ok());
+        let threads = threads.unwrap_or(NonZeroUsize::MIN);
+        let seeds = arrays::seeds(count, seed, seeds)?;
+        let arms = py.detach(|| library::SimulatedArms::new(&seeds, threads));
+        Ok(Self { arms: Mutex::new(arms), count, threads })
+    }
+
+    /// Sends each arm its action, the next set-point of seven angles of 0 to 180 degrees, lets `dt` pass, and reads its state.
+    ///
+    /// `actions` is an array (n, 7); arrays of float32 and float64 without gaps are not copied. With `None` the arms go on.
+    /// `dt` is 0.005 to 1 second in whole milliseconds. Returns `out`, or a new array (n, 32), of float32 if the actions are.
+    /// A wrong action raises `ValueError` before any arm moves. Ctrl-C ends the call after the step.
+    #[pyo3(signature = (actions, dt = 0.02, out = None))]
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        actions: Option<&Bound<'py, PyAny>>,
+        dt: f64,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let time = duration(py, dt)?;
+        if out.or(actions).is_some_and(is_single) {
+            self.step_as::<f32>(py, actions, time, out)
+        } else {
+            self.step_as::<f64>(py, actions, time, out)
+        }
+    }
+
+    /// What the last reads told: `out`, or a new array (n, 32). No time passes.
+    #[pyo3(signature = (out = None))]
+    fn observe<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        if out.is_some_and(is_single) {
+            self.observe_as::<f32>(py, out)
+        } else {
+            self.observe_as::<f64>(py, out)
+        }
+    }
+
+    /// Makes the arms of the mask (n truth values), or all, as they were after their start, or as a snapshot: time, faults and
+    /// load, too. Each keeps its seed, or gets one of `seeds` (n numbers), and draws the same random numbers again.
+    #[pyo3(signature = (mask = None, snapshot = None, *, seeds = None))]
+    fn reset(
+        &self,
+        py: Python<'_>,
+        mask: Option<&Bound<'_, PyAny>>,
+        snapshot: Option<&SimulationSnapshot>,
+        seeds: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let mask = self.mask(mask)?;
+        let seeds = seeds.map(|each| arrays::seeds(self.count, None, Some(each))).transpose()?;
+        let snapshot = snapshot.map(SimulationSnapshot::arm);
+        self.with(py, move |arms| {
+            for (index, seed) in seeds.into_iter().flatten().enumerate() {
+                if mask.as_ref().is_none_or(|mask| mask.get(index) == Some(&true)) {
+                    arms.set_seed(index, seed);
+                }
+            }
+            arms.reset(mask.as_deref(), snapshot.as_ref());
+        });
+        Ok(())
+    }
+
+    /// Gives the arms of the mask, or all with `None`, a fault, for `seconds` or until `clear` or `reset`. The words are those of
+    /// `Simulation.fault`.
+    #[pyo3(signature = (mask, fault, seconds = None))]
+    fn fault(
+        &self,
+        py: Python<'_>,
+        mask: Option<&Bound<'_, PyAny>>,
+        fault: &str,
+        seconds: Option<f64>,
+    ) -> PyResult<()> {
+        let mask = self.mask(mask)?;
+        let fault: ArmFault =
+            fault.parse().map_err(|why| InvalidValue::raise(py, &format!("{fault}: {why}")))?;
+        let time = seconds.map(|seconds| duration(py, seconds)).transpose()?.map(virtual_time);
+        self.with(py, |arms| {
+            arms.each(mask.as_deref(), |_, arm| {
+                arm.set_fault(fault, time);
+            });
+        });
+        Ok(())
+    }
+
+    /// Takes the faults of the arms of the mask, or of all, back: all, or those at one location, `"3"`, `"supply"`, `"line"`.
+    #[pyo3(signature = (mask = None, location = None))]
+    fn clear(&self, py: Python<'_>, mask: Option<&Bound<'_, PyAny>>, location: Option<&str>) -> PyResult<()> {
+        let mask = self.mask(mask)?;
+        let parse = |text: &str| {
+            text.parse::<FaultLocation>().map_err(|why| InvalidValue::raise(py, &why.to_string()))
+        };
+        let location = location.map(parse).transpose()?;
+        self.with(py, |arms| arms.each(mask.as_deref(), |_, arm| drop(arm.end_faults(location))));
+        Ok(())
+    }
+
+    /// Hangs a weight on the tip of the arms of the mask, or of all: grams, 0 to 65535, one number or one for each of the n arms.
+    #[pyo3(signature = (grams, mask = None))]
+    fn set_load(
+        &self,
+        py: Python<'_>,
+        grams: &Bound<'_, PyAny>,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let mask = self.mask(mask)?;
+        let grams = each_number(grams, self.count, "grams")?.into_iter().map(|grams| self::grams(py, grams));
+        let grams: Vec<u16> = grams.collect::<PyResult<_>>()?;
+        self.with(py, |arms| {
+            arms.each(mask.as_deref(), |index, arm| {
+                arm.plant_mut().set_load(grams.get(index).copied().unwrap_or_default());
+            });
+        });
+        Ok(())
+    }
+
+    /// Writes registers of the arms of the mask, or of all, in one frame each: `arms.set("push-limit", 50)`. Names and numbers
+    /// are those of docs/registers.md. An arm refuses a write that its rules forbid.
+    #[pyo3(signature = (name, values, mask = None))]
+    fn set(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        values: Values,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let mask = self.mask(mask)?;
+        let span = raised(py, names::parse(name))?;
+        let bytes = raised(py, bytes(span, values.as_slice()))?;
+        self.with(py, |arms| arms.write(mask.as_deref(), span.address(), &bytes));
+        Ok(())
+    }
+
+    /// A copy of an arm as it is now, by its number from 0: for `reset`, and for `Simulation.restore`.
+    fn snapshot(&self, py: Python<'_>, arm: i64) -> PyResult<SimulationSnapshot> {
+        let last = i64::try_from(self.count).unwrap_or(i64::MAX).saturating_sub(1);
+        let index: usize = whole(py, "arm", arm, 0, last)?;
+        let copy = self.with(py, |arms| arms.arm(index).cloned());
+        copy.map(SimulationSnapshot::of).ok_or_else(|| InvalidValue::raise(py, "there is no such arm"))
+    }
+
+    /// The true angles of all joints in degrees, without noise: an array (n, 7).
+    #[getter]
+    fn angles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let rows = self.with(py, |arms| {
+            let mut rows = Vec::new();
+            let angles = |arm: &arm_sim::Simulation| Joint::ALL.map(|joint| arm.plant().angle(joint));
+            arms.each(None, |_, arm| rows.push(angles(arm).map(|angle| f64::from(angle) / 1_000.0)));
+            rows
+        });
+        bulk::angles(py, &rows)
+    }
+
+    /// The virtual time of each arm in seconds: an array (n,).
+    #[getter]
+    fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let times = self.with(py, |arms| {
+            let mut times = Vec::new();
+            let seconds = |micros| Duration::from_micros(micros).as_secs_f64();
+            arms.each(None, |_, arm| times.push(seconds(arm.now().as_micros())));
+            times
+        });
+        PyArray1::from_vec(py, times)
+    }
+
+    /// The most threads that step the arms.
+    #[getter]
+    const fn threads(&self) -> usize {
+        self.threads.get()
+    }
+
+    const fn __len__(&self) -> usize {
+        self.count
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<SimulatedArms: {} arms, {} threads>", self.count, self.threads)
+    }
+}
+
+/// Columns of an array of observations.
+struct Columns(std::ops::Range<usize>);
+
+impl<'py> IntoPyObject<'py> for Columns {
+    type Target = PySlice;
+    type Output = Bound<'py, PySlice>;
+    type Error = PyErr;
+
+    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
+        Ok(PySlice::new(py, isize::try_from(self.0.start)?, isize::try_from(self.0.end)?, 1))
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 65535")]
+fn grams(py: Python<'_>, grams: f64) -> PyResult<u16> {
+    let found = Some(grams.round()).filter(|grams| (0.0..=f64::from(u16::MAX)).contains(grams));
+    found
+        .map(|grams| grams as u16)
+        .ok_or_else(|| InvalidValue::raise(py, &format!("grams: {grams} is out of range: use 0 to 65535")))
+}

@@ -1,0 +1,130 @@
+//! numpy arrays of many arms, read and written in place.
+//!
+//! The crate `numpy` knows numpy's own interface, so it works with the ABI of Python 3.10. Python's buffer protocol is part of
+//! that ABI from 3.11 on only.
+
+use numpy::{
+    Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
+    PyReadwriteArray2, PyUntypedArray, PyUntypedArrayMethods, dtype,
+};
+use pyo3::exceptions::PyImportError;
+use pyo3::prelude::*;
+
+use crate::errors::{InvalidType, InvalidValue};
+use crate::numbers::{elements, seed};
+
+/// The rows and columns of an array.
+pub(crate) type Shape = [usize; 2];
+
+/// Without numpy there are no arrays.
+pub(crate) fn numpy(py: Python<'_>) -> PyResult<Bound<'_, PyModule>> {
+    let missing = |_| PyImportError::new_err("many arms need numpy: pip install sevenbot[numpy]");
+    py.import("numpy").map_err(missing)
+}
+
+/// Is it an array of float32?
+pub(crate) fn is_single(object: &Bound<'_, PyAny>) -> bool {
+    let array = object.cast::<PyUntypedArray>();
+    array.is_ok_and(|array| array.dtype().is_equiv_to(&dtype::<f32>(object.py())))
+}
+
+/// Numbers in rows, as an array without gaps: the object itself if it is one, or else a copy.
+pub(crate) fn given<'py, T: Element>(
+    object: &Bound<'py, PyAny>,
+    shape: Shape,
+    what: &str,
+) -> PyResult<PyReadonlyArray2<'py, T>> {
+    let py = object.py();
+    let [rows, columns] = shape;
+    let array = numpy(py)?.call_method1("ascontiguousarray", (object, dtype::<T>(py)));
+    let no_numbers = |_| {
+        InvalidType::raise(py, &format!("{what}: use an array of numbers of the shape ({rows}, {columns})"))
+    };
+    let array = array.map_err(no_numbers)?;
+    let array =
+        array.cast_into::<PyArray2<T>>().map_err(|error| wrong_shape(&error.into_inner(), shape, what))?;
+    if array.shape() != shape {
+        return Err(wrong_shape(&array, shape, what));
+    }
+    array.try_readonly().map_err(|_| in_use(py))
+}
+
+/// The array `out`, which is filled itself; a new one if there is none.
+pub(crate) fn out<'py, T: Element>(
+    py: Python<'py>,
+    object: Option<&Bound<'py, PyAny>>,
+    shape: Shape,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let Some(object) = object else { return Ok(PyArray2::zeros(py, shape, false)) };
+    let array = object.cast::<PyArray2<T>>().ok().filter(|array| array.is_c_contiguous());
+    let array = array.ok_or_else(|| {
+        let text = "out: use an array of two dimensions, float32 or float64, without gaps";
+        InvalidType::raise(py, text)
+    })?;
+    if array.shape() == shape { Ok(array.clone()) } else { Err(wrong_shape(array, shape, "out")) }
+}
+
+/// An array that is written.
+pub(crate) fn writing<'py, T: Element>(
+    array: &Bound<'py, PyArray2<T>>,
+) -> PyResult<PyReadwriteArray2<'py, T>> {
+    array.try_readwrite().map_err(|_| in_use(array.py()))
+}
+
+fn wrong_shape(object: &Bound<'_, PyAny>, [rows, columns]: Shape, what: &str) -> PyErr {
+    let found = object.getattr("shape").map(|shape| shape.to_string()).unwrap_or_default();
+    let text = format!("{what}: the shape is {found}: use ({rows}, {columns})");
+    InvalidValue::raise(object.py(), &text)
+}
+
+fn in_use(py: Python<'_>) -> PyErr {
+    InvalidValue::raise(
+        py,
+        "an array is read-only, is both argument and result, or is used by another thread",
+    )
+}
+
+/// An array without gaps has a slice.
+pub(crate) fn gaps<E>(py: Python<'_>) -> impl Fn(E) -> PyErr {
+    move |_| InvalidValue::raise(py, "an array has gaps")
+}
+
+/// A mask of all arms: `None`, or as many truth values as there are arms.
+pub(crate) fn mask(object: Option<&Bound<'_, PyAny>>, count: usize) -> PyResult<Option<Vec<bool>>> {
+    let Some(object) = object else { return Ok(None) };
+    let py = object.py();
+    let wrong = || InvalidType::raise(py, &format!("mask: use {count} truth values, or None for all arms"));
+    let array = numpy(py)?.call_method1("asarray", (object,)).map_err(|_| wrong())?;
+    let array = array.cast_into::<PyArray1<bool>>().map_err(|_| wrong())?;
+    let chosen = array.try_readonly().map_err(|_| in_use(py))?.as_array().to_vec();
+    if chosen.len() == count { Ok(Some(chosen)) } else { Err(wrong()) }
+}
+
+/// One number for all arms, or one for each.
+pub(crate) fn each_number(numbers: &Bound<'_, PyAny>, count: usize, what: &str) -> PyResult<Vec<f64>> {
+    let py = numbers.py();
+    let wrong = || InvalidType::raise(py, &format!("{what}: use a number, or {count} for the arms"));
+    let array = numpy(py)?.call_method1("asarray", (numbers, "float64")).map_err(|_| wrong())?;
+    let array: PyReadonlyArrayDyn<'_, f64> = array.extract().map_err(|_| wrong())?;
+    let numbers = array.as_array();
+    match (numbers.ndim(), numbers.first()) {
+        (0, Some(&one)) => Ok(vec![one; count]),
+        (1, _) if numbers.len() == count => Ok(numbers.iter().copied().collect()),
+        _ => Err(wrong()),
+    }
+}
+
+/// The seeds of `count` arms: those given, or the first one and the next numbers.
+pub(crate) fn seeds(
+    count: usize,
+    first: Option<&Bound<'_, PyAny>>,
+    each: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<u64>> {
+    if let Some(each) = each {
+        let wrong = || InvalidType::raise(each.py(), &format!("seeds: use {count} whole numbers"));
+        let each = elements(each, count).filter(|each| each.len() == count).ok_or_else(wrong)?;
+        return each.iter().map(seed).collect();
+    }
+    let first = first.map_or(Ok(1), seed)?;
+    Ok((0..count).zip(0_u64..).map(|(_, number)| first.wrapping_add(number)).collect())
+}

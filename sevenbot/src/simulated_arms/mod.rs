@@ -1,0 +1,209 @@
+//! Many simulated arms that step together, for learning.
+//!
+//! ```text
+//!   targets (n × 7) ──▶ each arm: a frame, time, a read ──▶ observations (n × 32)
+//!                       └─ groups of arms, each taken by the next free thread
+//! ```
+//!
+//! The controllers parse real frames, and what is observed is the reply to a read. The line takes no time, so the reply is
+//! there at once. Each arm has a time, faults and a seed of its own, so the results do not depend on the number of threads.
+//!
+//! ```
+//! use sevenbot::simulated_arms::{POSITIONS, SimulatedArms, WIDTH};
+//! use std::num::NonZeroUsize;
+//! use std::time::Duration;
+//!
+//! let mut arms = SimulatedArms::new(&[1, 2, 3], NonZeroUsize::MIN);
+//! let targets = [[100.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0]; 3];
+//! let mut seen = [[0.0; WIDTH]; 3];
+//! for _ in 0..50 {
+//!     let step = Duration::from_millis(20);
+//!     arms.step(Some(targets.as_flattened()), step, seen.as_flattened_mut())?;
+//! }
+//! let base = seen[0][POSITIONS][0];
+//! assert!((base - 100.0_f64).abs() < 1.0, "{base}");
+//! # Ok::<(), sevenbot::simulated_arms::StepError>(())
+//! ```
+
+use std::num::NonZeroUsize;
+use std::time::Duration;
+
+use arm_sim::{Simulation, SimulationConfig};
+use protocol_core::time;
+
+use crate::fine_angle::FineAngle;
+
+mod observation;
+mod one_arm;
+#[cfg(test)]
+mod tests;
+mod threads;
+
+pub use observation::{AGE, BLOCKED, LOADS, Number, POSITIONS, TIP, VELOCITIES, WIDTH};
+use one_arm::SteppedArm;
+use threads::share;
+
+/// Joints of an arm.
+const JOINTS: usize = 7;
+/// Arms that a thread takes at a time: the work of some 100 microseconds, so that taking them costs nothing.
+const GROUP: usize = 16;
+/// After power-up the servos start, and the joints are measured.
+const START: time::Duration = time::Duration::from_millis(1_000);
+
+/// Why the arms did not step. No time has passed for any of them.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// A target is out of range or not a number.
+    #[error("arm {arm}, joint {joint}: {degrees} is out of range: use 0 to 180 degrees")]
+    Target {
+        /// The number of the arm, from 0.
+        arm: usize,
+        /// The number of the joint, from 1.
+        joint: usize,
+        /// The target.
+        degrees: f64,
+    },
+    /// The time of a step.
+    #[error("a step of {} s: use 0.005 to 1 s in whole milliseconds", .0.as_secs_f64())]
+    Time(Duration),
+    /// A slice of another length than that of all arms.
+    #[error("{given} numbers: {wanted} are needed")]
+    Length {
+        /// The length of the slice.
+        given: usize,
+        /// What the arms need.
+        wanted: usize,
+    },
+}
+
+/// Arms that step together.
+#[derive(Clone, Debug)]
+pub struct SimulatedArms {
+    arms: Vec<SteppedArm>,
+    /// An arm that has just started.
+    started: Simulation,
+    threads: NonZeroUsize,
+}
+
+impl SimulatedArms {
+    /// An arm for each seed, which its line draws random faults from. At most `threads` threads step them.
+    #[must_use]
+    pub fn new(seeds: &[u64], threads: NonZeroUsize) -> Self {
+        let mut started =
+            Simulation::new(SimulationConfig { is_paced: false, ..SimulationConfig::default() });
+        started.advance(START);
+        let arms = seeds.iter().map(|&seed| SteppedArm::new(started.clone(), seed)).collect();
+        let mut arms = Self { arms, started, threads };
+        arms.reset(None, None);
+        arms
+    }
+
+    /// The number of arms.
+    #[must_use]
+    pub const fn count(&self) -> usize {
+        self.arms.len()
+    }
+
+    /// Sends each arm its seven targets in degrees as the next point of a stream, lets `time` pass, reads each arm's state, and
+    /// writes it into [`WIDTH`] numbers. Without targets the arms get no frame but the read.
+    ///
+    /// # Errors
+    /// The first target that is out of range, the time or the lengths: then nothing is done.
+    pub fn step<T: Number, N: Number>(
+        &mut self,
+        targets: Option<&[T]>,
+        time: Duration,
+        observations: &mut [N],
+    ) -> Result<(), StepError> {
+        let milliseconds = milliseconds(time).ok_or(StepError::Time(time))?;
+        self.check_length(observations.len(), WIDTH)?;
+        targets.map_or(Ok(()), |targets| self.check(targets))?;
+        let rows = observations.chunks_mut(GROUP * WIDTH);
+        // Without targets each group gets an empty slice, and so each arm none.
+        let targets = targets.unwrap_or_default().chunks(GROUP * JOINTS);
+        let targets = targets.chain(std::iter::repeat(&[][..]));
+        let threads = self.threads.get().min(self.arms.len().div_ceil(GROUP));
+        let groups = self.arms.chunks_mut(GROUP).zip(rows).zip(targets);
+        share(threads, groups, |((arms, rows), targets)| {
+            let mut targets = targets.as_chunks::<JOINTS>().0.iter();
+            for (arm, row) in arms.iter_mut().zip(rows.chunks_mut(WIDTH)) {
+                arm.step(targets.next().and_then(fine), milliseconds);
+                arm.write_row(row);
+            }
+        });
+        Ok(())
+    }
+
+    fn check_length(&self, given: usize, each: usize) -> Result<(), StepError> {
+        let wanted = self.arms.len().saturating_mul(each);
+        if given == wanted { Ok(()) } else { Err(StepError::Length { given, wanted }) }
+    }
+
+    fn check<T: Number>(&self, targets: &[T]) -> Result<(), StepError> {
+        self.check_length(targets.len(), JOINTS)?;
+        let degrees = targets.iter().map(|target| target.widen());
+        let wrong = degrees.enumerate().find(|(_, degrees)| FineAngle::from_degrees(*degrees).is_none());
+        wrong.map_or(Ok(()), |(index, degrees)| {
+            Err(StepError::Target { arm: index / JOINTS, joint: index % JOINTS + 1, degrees })
+        })
+    }
+
+    /// Writes what is known of each arm into [`WIDTH`] numbers. No time passes.
+    ///
+    /// # Errors
+    /// The length.
+    pub fn observe<N: Number>(&self, observations: &mut [N]) -> Result<(), StepError> {
+        self.check_length(observations.len(), WIDTH)?;
+        self.arms.iter().zip(observations.chunks_mut(WIDTH)).for_each(|(arm, row)| arm.write_row(row));
+        Ok(())
+    }
+
+    /// Makes the arms of the mask, or all, as this one is, or as an arm that has just started. Faults and loads are those
+    /// of that arm, too; each keeps its seed.
+    pub fn reset(&mut self, mask: Option<&[bool]>, other: Option<&Simulation>) {
+        let other = other.unwrap_or(&self.started);
+        masked(&mut self.arms, mask).for_each(|(_, arm)| arm.become_copy(other));
+    }
+
+    /// Does something to each arm of the mask, or to all. Gets the arm's number.
+    pub fn each(&mut self, mask: Option<&[bool]>, mut work: impl FnMut(usize, &mut Simulation)) {
+        masked(&mut self.arms, mask).for_each(|(index, arm)| work(index, &mut arm.simulation));
+    }
+
+    /// Draws the faults of an arm's line from this seed from its next reset on.
+    pub fn set_seed(&mut self, arm: usize, seed: u64) {
+        self.arms.get_mut(arm).into_iter().for_each(|arm| arm.seed = seed);
+    }
+
+    /// Writes registers of the arms of the mask, or of all, in one frame each. An arm refuses what is out of range.
+    pub fn write(&mut self, mask: Option<&[bool]>, address: u8, values: &[u8]) {
+        masked(&mut self.arms, mask).for_each(|(_, arm)| arm.write(address, values));
+    }
+
+    /// An arm by its number, from 0.
+    #[must_use]
+    pub fn arm(&self, index: usize) -> Option<&Simulation> {
+        self.arms.get(index).map(|arm| &arm.simulation)
+    }
+}
+
+/// The arms of the mask, or all, with their numbers.
+fn masked<'a>(
+    arms: &'a mut [SteppedArm],
+    mask: Option<&'a [bool]>,
+) -> impl Iterator<Item = (usize, &'a mut SteppedArm)> {
+    let is_chosen = move |index: usize| mask.is_none_or(|mask| mask.get(index) == Some(&true));
+    arms.iter_mut().enumerate().filter(move |(index, _)| is_chosen(*index))
+}
+
+/// Checked targets.
+fn fine<T: Number>(degrees: &[T; JOINTS]) -> Option<[FineAngle; JOINTS]> {
+    let [a, b, c, d, e, f, g] = degrees.map(|degrees| FineAngle::from_degrees(degrees.widen()));
+    Some([a?, b?, c?, d?, e?, f?, g?])
+}
+
+/// The time of a step, which is a set-point period ([D23](protocol_core::decisions#d23)).
+fn milliseconds(time: Duration) -> Option<u16> {
+    let milliseconds = u16::try_from(time.as_millis()).ok().filter(|time| (5..=1_000).contains(time))?;
+    (Duration::from_millis(milliseconds.into()) == time).then_some(milliseconds)
+}
