@@ -35,6 +35,13 @@ pub(crate) fn check() -> TaskResult {
     Ok(())
 }
 
+/// Builds the wheel.
+pub(crate) fn wheel() -> TaskResult<PathBuf> {
+    let interpreters = interpreters();
+    let (version, program) = interpreters.first().ok_or("no Python of at least 3.10 on PATH")?;
+    build_wheel(&environment(version, program)?)
+}
+
 /// The versions on PATH, each once, with a program of each.
 fn interpreters() -> Vec<(String, &'static str)> {
     let mut found: Vec<(String, &str)> = Vec::new();
