@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::python::{build, folder, pip, run, works};
+use crate::python::{folder, pip, run, wheel, works};
 use crate::run::{TaskResult, build_host_sim, build_image, root};
 
 /// LeRobot without what it depends on: some gigabytes, of which its base classes need little.
@@ -111,7 +111,7 @@ fn install_plugin(python: &Path) -> TaskResult {
         fs::remove_dir_all(&copy)?;
     }
     run(Command::new("cp").arg("-r").arg(plugin()).arg(&copy))?;
-    run(pip(python).args(["--force-reinstall", "--no-deps"]).arg(build()?).arg(&copy))
+    run(pip(python).args(["--force-reinstall", "--no-deps"]).arg(wheel()?).arg(&copy))
 }
 
 fn module(python: &Path, name: &str) -> Command {

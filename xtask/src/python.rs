@@ -32,11 +32,9 @@ pub(crate) fn check() -> TaskResult {
 }
 
 /// Builds the wheel with the first interpreter on PATH.
-pub(crate) fn build() -> TaskResult<PathBuf> {
+pub(crate) fn wheel() -> TaskResult<PathBuf> {
     let interpreters = interpreters();
-    let Some((version, program)) = interpreters.first() else {
-        return Err("no Python of at least 3.10 on PATH".into());
-    };
+    let (version, program) = interpreters.first().ok_or("no Python of at least 3.10 on PATH")?;
     build_wheel(&environment(version, program)?)
 }
 
