@@ -23,7 +23,7 @@ const VERSION: &str = "import sys; assert sys.version_info >= (3, 10); print('%d
 
 /// Builds the wheel, and tests it with all interpreters on PATH.
 pub(crate) fn check() -> TaskResult {
-    let wheel = build()?;
+    let wheel = wheel()?;
     for (version, program) in &interpreters() {
         println!("Python {version}");
         test(&environment(version, program)?, &wheel)?;
