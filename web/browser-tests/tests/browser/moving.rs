@@ -32,6 +32,7 @@ fn distance([x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) -> f64 {
 fn wait_until_it_rests(page: &mut Page) {
     page.pass(0.2);
     page.wait_for_text("#state", "The arm is ready.");
+    page.pass(0.5);
 }
 
 /// Sends joint 1 to 180 degrees by the keyboard, and waits until it is on its way. It goes slowly, and its time passes slowly: even
@@ -106,6 +107,8 @@ fn the_button_stops_a_moving_arm_with_the_mouse_and_with_a_finger() {
 fn the_tip_follows_the_mouse_and_a_position_out_of_reach_is_shown() {
     let viewed = Viewed::without_arm();
     let mut page = viewed.open();
+    // The level forearm droops by 0.7 degrees after it got torque.
+    page.pass(1.0);
     let from = tip_on_screen(&mut page);
     let to = [from[0] - 40.0, from[1] + 30.0];
     page.drag(from, to);
