@@ -6,9 +6,10 @@ use std::process::{Command, Stdio};
 
 use crate::run::{TaskResult, root, target_directory};
 
-/// The packages from PyPI, at versions that were tried. numpy is optional for users, but has tests.
-const PACKAGES: [&str; 6] = [
+/// The packages from PyPI, at versions that were tried. gymnasium and numpy are optional for users, but have tests.
+const PACKAGES: [&str; 7] = [
     "maturin==1.16.0",
+    "gymnasium==1.4.0",
     "mypy==2.4.1",
     "basedpyright==1.40.2",
     "pytest==9.2.0",

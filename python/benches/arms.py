@@ -1,0 +1,72 @@
+"""Steps of 20 ms a second of many simulated arms: `python python/benches/arms.py` prints the table of docs/simulation.md.
+
+With the package `mujoco` and the file of `sevenbot model --format mjcf --out arm.xml`, given as the argument, beside MuJoCo.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+import sevenbot
+
+REST = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0]
+SECONDS = 3.0
+
+
+def rate(step: Callable[[int], None], arms: int) -> tuple[float, float]:
+    """Arm-steps a second of the clock, and a second of the processor."""
+    step(0)
+    start, used, steps = time.perf_counter(), time.process_time(), 0
+    while time.perf_counter() - start < SECONDS:
+        steps += 1
+        step(steps)
+    done = steps * arms
+    return done / (time.perf_counter() - start), done / (time.process_time() - used)
+
+
+def ours(count: int, threads: int) -> tuple[float, float]:
+    """All arms follow a sine with joint 1."""
+    arms = sevenbot.SimulatedArms(count, threads=threads)
+    actions, seen = np.tile(REST, (count, 1)), arms.observe()
+
+    def step(number: int) -> None:
+        actions[:, 0] = 90 + 20 * np.sin(number / 25)
+        arms.step(actions, 0.02, seen)
+
+    return rate(step, count)
+
+
+def mujoco_alone(model_file: str) -> tuple[float, float]:
+    """One arm in MuJoCo, as many of its steps as 20 ms need."""
+    import mujoco  # type: ignore[import-untyped,unused-ignore]
+
+    model = mujoco.MjModel.from_xml_path(model_file)
+    data = mujoco.MjData(model)
+    substeps = round(0.02 / model.opt.timestep)
+
+    def step(number: int) -> None:
+        if model.nu:
+            data.ctrl[0] = 0.3 * np.sin(number / 25)
+        mujoco.mj_step(model, data, substeps)
+
+    return rate(step, 1)
+
+
+def main() -> None:
+    print("| arms | threads | arm-steps a second | a second of the processor |\n| --: | --: | --: | --: |")
+    for count in (1, 100, 1_000, 10_000):
+        for threads in (1, 2):
+            if threads <= count:
+                wall, processor = ours(count, threads)
+                print(f"| {count:,} | {threads} | {wall:,.0f} | {processor:,.0f} |", flush=True)
+    for model in sys.argv[1:]:
+        wall, processor = mujoco_alone(model)
+        print(f"| MuJoCo, 1 | 1 | {wall:,.0f} | {processor:,.0f} |")
+
+
+if __name__ == "__main__":
+    main()

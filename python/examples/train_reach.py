@@ -1,0 +1,107 @@
+"""Trains a policy that brings the tip to any point in front of the arm, by evolution with numpy alone.
+
+    pip install "./python[gym]"
+    python python/examples/train_reach.py
+
+Each generation tries 128 pairs of policies, one changed by a random step and one by its opposite, all on the same goals, and
+moves the policy towards the better ones. Ctrl-C ends the training early.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+import sevenbot.gym
+
+Array = NDArray[np.float32]
+
+PAIRS = 128
+STEPS = 75
+HIDDEN = 24
+# What the policy sees of an observation: joints 1 to 5, their velocities, and the way to the goal.
+INPUTS = [0, 1, 2, 3, 4, 7, 8, 9, 10, 11, 24, 25, 26]
+SHAPES = [(len(INPUTS) + 1, HIDDEN), (HIDDEN + 1, sevenbot.gym.JOINTS)]
+SIZE = sum(rows * columns for rows, columns in SHAPES)
+
+
+def act(policies: Array, seen: Array) -> Array:
+    """The actions of policies, each with an observation of its own."""
+    values, start = seen[:, INPUTS], 0
+    for rows, columns in SHAPES:
+        weights = policies[:, start : start + rows * columns].reshape(-1, rows, columns)
+        start += rows * columns
+        values = np.tanh(np.einsum("ni,nij->nj", values, weights[:, :-1]) + weights[:, -1])
+    return values.astype(np.float32)
+
+
+def run(
+    envs: sevenbot.gym.ReachVectorEnv, policies: Array, seed: int, goals: Array | None
+) -> tuple[Array, float]:
+    """The sum of rewards of each policy, and the share of arms near their goals at the end."""
+    options = None if goals is None else {"goals": goals}
+    seen, _ = envs.reset(seed=seed, options=options)
+    total, near = np.zeros(envs.num_envs, dtype=np.float32), 0.0
+    for _ in range(STEPS):
+        seen, rewards, _, _, info = envs.step(act(policies, seen))
+        total += rewards.astype(np.float32)
+        near = float(info["is_success"].mean())
+    return total, near
+
+
+def sampled_goals(count: int, seed: int) -> Array:
+    """Goals that the tip can reach."""
+    random = np.random.default_rng(seed)
+    return np.array([sevenbot.gym.sample_goal(random) for _ in range(count)], dtype=np.float32)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Trains a reach policy on simulated arms.")
+    parser.add_argument("--generations", type=int, default=120)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--disturbed", action="store_true", help="with loads, delays and faults")
+    parser.add_argument("--save", default="reach_policy.npy")
+    options = parser.parse_args()
+    random = np.random.default_rng(options.seed)
+    envs = gymnasium.make_vec(
+        "sevenbot/Reach-v0",
+        num_envs=2 * PAIRS,
+        vectorization_mode="vector_entry_point",
+        disturbed=options.disturbed,
+    )
+    assert isinstance(envs, sevenbot.gym.ReachVectorEnv)
+    policy = (random.standard_normal(SIZE) * 0.1).astype(np.float32)
+    first, second, sigma, rate = np.zeros(SIZE), np.zeros(SIZE), 0.05, 0.03
+    start = time.perf_counter()
+    try:
+        for generation in range(1, options.generations + 1):
+            noise = random.standard_normal((PAIRS, SIZE)).astype(np.float32)
+            policies = np.concatenate([policy + sigma * noise, policy - sigma * noise])
+            goals = np.tile(sampled_goals(PAIRS, generation), (2, 1))
+            total, near = run(envs, policies, generation, goals)
+            gain = total[:PAIRS] - total[PAIRS:]
+            gradient = (gain / (np.abs(gain).mean() + 1e-9)) @ noise / PAIRS
+            # Adam.
+            first = 0.9 * first + 0.1 * gradient
+            second = 0.99 * second + 0.01 * np.square(gradient)
+            corrected = first / (1 - 0.9**generation), second / (1 - 0.99**generation)
+            policy = (policy + rate * corrected[0] / (np.sqrt(corrected[1]) + 1e-8)).astype(np.float32)
+            if generation % 10 == 0:
+                passed = time.perf_counter() - start
+                words = f"mean reward {total.mean():7.2f}, near {near:.0%}"
+                print(f"{generation:4} {passed:6.1f} s  {words}", flush=True)
+    except KeyboardInterrupt:
+        print("ended early")
+    np.save(options.save, policy)
+    total, near = run(envs, np.tile(policy, (2 * PAIRS, 1)), 10_000, None)
+    seconds = STEPS * sevenbot.gym.DT
+    print(f"{2 * PAIRS} new goals: {near:.0%} within 10 mm after {seconds:.1f} s; saved {options.save}")
+    envs.close()
+
+
+if __name__ == "__main__":
+    main()
