@@ -1,0 +1,84 @@
+"""From targets that come when they like to the points of a stream: who follows whom, and how far at once.
+
+Knows neither ROS nor the arm. Angles are degrees of the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+
+from sevenbot_ros.commands import Refusal, Targets, check_linkage
+from sevenbot_ros.joints import NAMES, linkage_is_kept
+
+JOINTS = len(NAMES)
+
+
+class Jump(Enum):
+    """What a target that is far away does."""
+
+    REFUSE = "refuse"
+    APPROACH = "approach"
+
+
+class Follower:
+    """The set-point of each joint. It begins where the joints stand, and follows the targets.
+
+    A target further than `max_jump` degrees from the last one is refused, or approached on a straight line of the joints at
+    `approach_speed` degrees a second.
+    """
+
+    def __init__(
+        self, standing: Sequence[float], *, jump: Jump, max_jump: float = 5.0, approach_speed: float = 30.0
+    ) -> None:
+        self._jump = jump
+        self._max_jump = max_jump
+        self._approach_speed = approach_speed
+        self._point = list(standing)
+        self._goal = list(standing)
+        self._is_driven = [False] * JOINTS
+        # The first target may be some degrees away, too, and is approached.
+        self._is_approaching = True
+
+    @property
+    def is_approaching(self) -> bool:
+        """Is a target approached at the speed of the approach?"""
+        return self._is_approaching
+
+    def take(self, targets: Targets) -> Refusal | None:
+        """Follow these targets from now on."""
+        goal = list(self._goal)
+        for joint, angle in targets.degrees.items():
+            goal[joint] = angle
+        # A hand or a restart may have left the arm outside: then only the way back is open.
+        if (refusal := check_linkage(goal)) and linkage_is_kept(self._goal):
+            return refusal
+        distance, joint = max((abs(to - at), joint) for joint, (to, at) in enumerate(zip(goal, self._goal, strict=True)))
+        if distance > self._max_jump:
+            if self._jump is Jump.REFUSE:
+                return Refusal(
+                    "jump",
+                    f"{NAMES[joint]} would jump by {distance:.1f} degrees, and {self._max_jump:g} is the limit "
+                    "(max_jump_degrees): begin where the arm stands, or set jump to approach",
+                )
+            self._is_approaching = True
+        self._goal = goal
+        for joint in targets.degrees:
+            self._is_driven[joint] = True
+        return None
+
+    def advance(self, seconds: float) -> list[float | None]:
+        """The next point, this long after the last one. `None` for joints that never had a target."""
+        if self._is_approaching:
+            self._approach(self._approach_speed * seconds)
+        else:
+            self._point = list(self._goal)
+        return [angle if driven else None for angle, driven in zip(self._point, self._is_driven, strict=True)]
+
+    def _approach(self, step: float) -> None:
+        left = [goal - at for goal, at in zip(self._goal, self._point, strict=True)]
+        furthest = max(abs(angle) for angle in left)
+        if furthest <= step:
+            self._point, self._is_approaching = list(self._goal), False
+            return
+        self._point = [at + angle * step / furthest for at, angle in zip(self._point, left, strict=True)]
