@@ -109,12 +109,26 @@ def test_the_first_point_is_where_the_joint_stands_and_others_have_none() -> Non
 
 def test_a_near_first_target_is_approached() -> None:
     following = follower()
+    assert following.advance(0.02) == [None] * 7
     assert following.take(Targets({0: 94.0})) is None
+    following = follower()
+    following.take(Targets({0: 90.0}))
+    following.advance(0.02)
+    following.take(Targets({0: 94.0}))
     steps = [following.advance(0.02)[0] for _ in range(10)]
-    assert steps[0] == pytest.approx(90.6)
     assert steps[-1] == 94.0
     assert following.take(Targets({0: 97.0})) is None
     assert following.advance(0.02)[0] == 97.0
+
+
+def test_a_target_that_moves_on_is_caught_up_with() -> None:
+    following = follower()
+    points = []
+    for step in range(100):
+        assert following.take(Targets({0: 94.0 + step * 0.8})) is None
+        points.append(following.advance(0.02)[0])
+    assert points[-1] == pytest.approx(94.0 + 99 * 0.8)
+    assert not following.is_approaching
 
 
 def test_a_jump_is_refused_and_the_last_target_stays() -> None:

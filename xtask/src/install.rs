@@ -19,7 +19,7 @@ struct Tool {
 /// All programs know this.
 const VERSION: &[&str] = &["--version"];
 
-const TOOLS: [Tool; 7] = [
+const TOOLS: [Tool; 8] = [
     Tool { program: QEMU, arguments: VERSION, package: QEMU, purpose: "runs the image for the arm" },
     Tool { program: "c++", arguments: VERSION, package: "g++", purpose: "builds the fuzzer" },
     Tool {
@@ -41,6 +41,12 @@ const TOOLS: [Tool; 7] = [
         arguments: &["-c", "import ensurepip, venv"],
         package: "python3-venv",
         purpose: "makes environments for the Python package",
+    },
+    Tool {
+        program: "ip",
+        arguments: &["-Version"],
+        package: "iproute2",
+        purpose: "opens the network of the tests with ROS",
     },
 ];
 

@@ -23,6 +23,8 @@ mod peers;
 mod python;
 mod registers_md;
 mod replays;
+mod ros;
+mod ros_model;
 mod run;
 mod sag;
 mod size;
@@ -50,7 +52,8 @@ struct XtaskArgs {
 enum Task {
     /// Install what the tests need, then run all checks and tests, and print the time of each step
     Test(test::TestArgs),
-    /// Write the generated documents: docs/registers.md, the table of tests in docs/protocol.md, and the crates in docs/design.md
+    /// Write the generated documents: docs/registers.md, the table of tests in docs/protocol.md, the crates in docs/design.md, and the
+    /// model in the ROS packages
     Docs {
         /// Change nothing; fail if a document is out of date
         #[arg(long)]
@@ -73,6 +76,8 @@ enum Task {
     Mujoco,
     /// Build the Python package and test it with each Python on PATH from 3.10 on (installs packages from PyPI)
     Python,
+    /// Install ROS 2 from PyPI, and test the packages in the folder ros with it (needs Python 3.10 to 3.13)
+    Ros,
     /// Build the page in web/dist, and fail if it is too large
     Web,
     /// Build the page, then run `sevenbot view` with these arguments
@@ -134,8 +139,9 @@ struct Document {
     check: fn() -> TaskResult,
 }
 
-const DOCUMENTS: [Document; 3] = [
+const DOCUMENTS: [Document; 4] = [
     Document { write: registers_md::write, check: registers_md::check },
+    Document { write: ros_model::write, check: ros_model::check },
     Document { write: decisions::write, check: decisions::check },
     Document { write: crate_graph::write, check: crate_graph::check },
 ];
@@ -152,6 +158,7 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Deny => deny::check(),
         Task::Mujoco => mujoco::check(),
         Task::Python => python::check(),
+        Task::Ros => ros::check(),
         Task::Web => web::build(),
         Task::View { arguments } => web::view(arguments),
         Task::NoPanic => no_panic::check(),

@@ -8,7 +8,7 @@ use crate::run::{CHECKED, CHIP, TESTED, TaskResult, build_for_browser, cargo, ru
 use crate::steps::{self, Stage, TestScope, long, quick, whole};
 use crate::{
     count, crate_graph, decisions, deny, footprint, fuzz, install, lerobot, modules, mujoco, no_panic,
-    python, registers_md, replays, start_up, system_tests, torture, trials, web,
+    python, registers_md, replays, ros_model, start_up, system_tests, torture, trials, web,
 };
 
 /// The scope of the run.
@@ -52,6 +52,7 @@ const STAGES: &[Stage] = &[
             cargo(&format!("clippy -p footprint -p firmware-stm32 --target {CHIP} -- -D warnings"))
         }),
         quick("docs/registers.md is up to date", registers_md::check),
+        quick("the model in the ROS packages is up to date", ros_model::check),
         quick("every decision of docs/protocol.md has tests", decisions::check),
         quick("the crates in docs/design.md are up to date", crate_graph::check),
         quick("no cycle between files of a crate", modules::check),

@@ -25,7 +25,7 @@ class Follower:
     """The set-point of each joint. It begins where the joints stand, and follows the targets.
 
     A target further than `max_jump` degrees from the last one is refused, or approached on a straight line of the joints at
-    `approach_speed` degrees a second.
+    `approach_speed` degrees a second. A target that moves on meanwhile is caught up with at this speed.
     """
 
     def __init__(
@@ -39,6 +39,8 @@ class Follower:
         self._is_driven = [False] * JOINTS
         # The first target may be some degrees away, too, and is approached.
         self._is_approaching = True
+        # How far the targets went since the last point, but for jumps.
+        self._travel = 0.0
 
     @property
     def is_approaching(self) -> bool:
@@ -62,6 +64,8 @@ class Follower:
                     "(max_jump_degrees): begin where the arm stands, or set jump to approach",
                 )
             self._is_approaching = True
+        else:
+            self._travel += distance
         self._goal = goal
         for joint in targets.degrees:
             self._is_driven[joint] = True
@@ -69,8 +73,9 @@ class Follower:
 
     def advance(self, seconds: float) -> list[float | None]:
         """The next point, this long after the last one. `None` for joints that never had a target."""
+        travel, self._travel = self._travel, 0.0
         if self._is_approaching:
-            self._approach(self._approach_speed * seconds)
+            self._approach(self._approach_speed * seconds + travel)
         else:
             self._point = list(self._goal)
         return [angle if driven else None for angle, driven in zip(self._point, self._is_driven, strict=True)]

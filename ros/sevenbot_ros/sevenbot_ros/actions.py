@@ -1,0 +1,82 @@
+"""What the services do. Each call takes its time, and the arm is measured meanwhile.
+
+Knows no ROS.
+"""
+
+from __future__ import annotations
+
+import time
+
+import sevenbot
+
+from sevenbot_ros.driver import Driver
+
+# The standard pose in degrees, and the speed to it in degrees a second.
+HOME = (90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0)
+HOME_SPEED = 19.0
+# The longest move, in seconds of the arm, and the time between two looks at it.
+LONGEST_MOVE = 30.0
+LOOK = 0.1
+
+
+def stop(driver: Driver) -> str:
+    """Hold at once, and refuse commands until `hold`."""
+    targets = driver.stop("the arm was stopped")
+    return f"the joints hold at {' '.join(f'{angle:g}' for angle in targets)} degrees"
+
+
+def hold(driver: Driver) -> str:
+    """Hold where the joints are, with torque, and take commands again."""
+    with driver.action() as arm:
+        if _is_driven(arm):
+            arm.stop()
+        else:
+            arm.torque_on()
+        driver.halt(None)
+    return "the joints hold, and commands are taken"
+
+
+def home(driver: Driver) -> str:
+    """Move to the standard pose. Paced by the thread of the driver, so that a simulated arm takes its time, too."""
+    with driver.action() as arm:
+        halted = driver.halted
+        arm.pose(HOME, speed=HOME_SPEED, wait=False)
+        end = driver.now() + LONGEST_MOVE
+        while driver.now() < end:
+            time.sleep(LOOK)
+            if driver.halted != halted:
+                raise sevenbot.Interrupted(driver.halted or "the arm was stopped")
+            status = arm.status()
+            if status is None or all(joint.is_at_target for joint in status.joints):
+                return "the arm stands in the standard pose"
+            if status.problems:
+                raise sevenbot.NotReached("; ".join(f"{problem}" for problem in status.problems))
+    raise sevenbot.NotReached("the arm does not get to the standard pose")
+
+
+def park(driver: Driver) -> str:
+    """Move to the park pose, let go, and see that the arm stays. Commands are refused until `hold`."""
+    with driver.action() as arm:
+        arm.park()
+        driver.halt("the arm is parked")
+    return "the arm is parked, its motors are damped"
+
+
+def torque(driver: Driver, on: bool) -> str:
+    """Hold with torque and take commands, or let go: then a hand has to hold the arm."""
+    if on:
+        return hold(driver)
+    with driver.action() as arm:
+        driver.halt("the motors are off")
+        arm.torque_off()
+    return "the motors are off"
+
+
+def vacuum(driver: Driver, on: bool) -> str:
+    """Switch the pump."""
+    driver.arm().set("vacuum-pump", int(on))
+    return "the pump sucks" if on else "the pump is off"
+
+
+def _is_driven(arm: sevenbot.Arm) -> bool:
+    return bool(arm.get("motor-state") == 1)

@@ -1,0 +1,65 @@
+"""The clock of an arm: the real one, or that of a simulated arm, which this program paces."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+import sevenbot
+
+# Further ahead of real time than this, the simulated clock leapt, and real time does not have to catch up.
+LEAP = 0.3
+# The shortest sleep, in seconds.
+STEP = 1e-5
+
+
+class Clock(Protocol):
+    """Seconds that never go back, and a wait."""
+
+    def now(self) -> float:
+        """The present time in seconds."""
+
+    def wait_until(self, end: float) -> None:
+        """Waits until this time."""
+
+
+class RealClock:
+    """The clock of a real arm."""
+
+    def now(self) -> float:
+        return time.monotonic()
+
+    def wait_until(self, end: float) -> None:
+        left = end - self.now()
+        if left > 0.0:
+            time.sleep(left)
+
+
+class SimulatedClock:
+    """Virtual time, led so that it passes `factor` times as fast as real time.
+
+    Virtual time passes by itself while the arm is asked. A busy machine makes it slower, never uneven: it does not hurry
+    afterwards.
+    """
+
+    def __init__(self, arm: sevenbot.SimulatedArm, factor: float = 1.0) -> None:
+        self._arm = arm
+        self._factor = factor
+        self._rebase()
+
+    def _rebase(self) -> None:
+        self._virtual, self._real = self.now(), time.monotonic()
+
+    def now(self) -> float:
+        return self._arm.simulation.now
+
+    def wait_until(self, end: float) -> None:
+        left = end - self.now()
+        if left > 0.0:
+            # Shorter than a microsecond is no time for the arm.
+            self._arm.sleep(max(left, STEP))
+        ahead = (self.now() - self._virtual) / self._factor - (time.monotonic() - self._real)
+        if ahead > LEAP or ahead < -LEAP:
+            self._rebase()
+        elif ahead > 0.0:
+            time.sleep(ahead)

@@ -1,0 +1,39 @@
+"""Opens the arm that the settings name, and tells where its joints stand."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import sevenbot
+
+from sevenbot_ros.clocks import Clock, RealClock, SimulatedClock
+
+if TYPE_CHECKING:
+    from sevenbot_ros.driver import Settings
+
+# The port that is no port: an arm in this process.
+SIMULATOR = "sim"
+# The arm does not measure its joints before this, in seconds.
+START_UP = 1.0
+
+
+def open_arm(settings: Settings) -> tuple[sevenbot.Arm, Clock]:
+    """An arm and its clock. Raises a `sevenbot.Error`."""
+    if settings.port == SIMULATOR:
+        simulated = sevenbot.Arm.simulated(settings.seed)
+        simulated.sleep(START_UP)
+        return simulated, SimulatedClock(simulated, settings.real_time_factor)
+    arm = sevenbot.Arm(
+        settings.port or None,
+        id=settings.id if settings.id >= 0 else None,
+        chip=settings.chip or None,
+    )
+    return arm, RealClock()
+
+
+def standing(arm: sevenbot.Arm) -> tuple[float, ...]:
+    """The targets of the joints in degrees: where they stand, but for what a load bends."""
+    status = arm.status()
+    if status is None:
+        raise sevenbot.NotServed("streams need the firmware of this project")
+    return tuple(joint.target for joint in status.joints)

@@ -1,0 +1,182 @@
+"""The action FollowJointTrajectory, for users without ros2_control.
+
+Its type is that of `control_msgs`, which is not on PyPI. So the server reads goals and writes results through an adapter: the published
+type has one here, and tests have one for a type that can be installed.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import sevenbot
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.time import Duration
+from trajectory_msgs.msg import JointTrajectory
+
+from sevenbot_ros.commands import Refusal
+from sevenbot_ros.joints import NAMES, ZEROS
+from sevenbot_ros.lead import Outcome, TrajectoryLead
+from sevenbot_ros.node import ArmNode
+from sevenbot_ros.trajectory import RawPoint, plan
+
+# Where a goal names no tolerance: degrees, because a loaded joint bends, and seconds.
+GOAL_TOLERANCE = 3.0
+GOAL_TIME = 2.0
+FEEDBACK_PERIOD = 0.1
+# The codes of `control_msgs/action/FollowJointTrajectory`.
+SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS, OLD_HEADER, PATH_VIOLATED, GOAL_VIOLATED = 0, -1, -2, -3, -4, -5
+CODES = {Outcome.REACHED: SUCCESSFUL, Outcome.PATH: PATH_VIOLATED, Outcome.GOAL: GOAL_VIOLATED, Outcome.STOPPED: INVALID_GOAL}
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What a goal says. Tolerances are radians by joint, times seconds."""
+
+    trajectory: JointTrajectory
+    path_tolerance: dict[str, float]
+    goal_tolerance: dict[str, float]
+    goal_time: float
+
+
+class GoalAdapter(Protocol):
+    """Reads goals of an action type, and writes its feedback and results."""
+
+    def goal(self, request: Any) -> Goal:
+        """What the goal says."""
+
+    def feedback(self, names: Sequence[str], desired: Sequence[float], actual: Sequence[float], seconds: float) -> Any:
+        """The feedback, positions in radians."""
+
+    def result(self, code: int, text: str) -> Any:
+        """The result."""
+
+
+class PublishedAdapter:
+    """The type of `control_msgs`."""
+
+    def __init__(self, action: Any) -> None:
+        self._action = action
+
+    def goal(self, request: Any) -> Goal:
+        def tolerances(rows: Any) -> dict[str, float]:
+            return {row.name: row.position for row in rows if row.position > 0.0}
+
+        goal_time = Duration.from_msg(request.goal_time_tolerance).nanoseconds / 1e9
+        return Goal(
+            request.trajectory, tolerances(request.path_tolerance), tolerances(request.goal_tolerance), goal_time
+        )
+
+    def feedback(self, names: Sequence[str], desired: Sequence[float], actual: Sequence[float], seconds: float) -> Any:
+        message = self._action.Feedback()
+        message.joint_names = list(names)
+        message.desired.positions, message.actual.positions = list(desired), list(actual)
+        message.error.positions = [wanted - found for wanted, found in zip(desired, actual, strict=True)]
+        time_from_start = Duration(seconds=seconds).to_msg()
+        message.desired.time_from_start = message.actual.time_from_start = time_from_start
+        return message
+
+    def result(self, code: int, text: str) -> Any:
+        return self._action.Result(error_code=code, error_string=text)
+
+
+def published_type() -> TrajectoryAction | None:
+    """The action with the type of `control_msgs`; `None` if that is not installed."""
+    try:
+        action = importlib.import_module("control_msgs.action").FollowJointTrajectory
+    except ImportError:
+        return None
+    return TrajectoryAction(action, PublishedAdapter(action))
+
+
+class TrajectoryAction:
+    """An action server that lets the driver follow a trajectory."""
+
+    def __init__(self, action: Any, adapter: GoalAdapter) -> None:
+        self._type, self._adapter = action, adapter
+
+    def serve(self, node: ArmNode) -> None:
+        """Opens the server."""
+        self._node = node
+        self._server = ActionServer(
+            node,
+            self._type,
+            f"{node.get_parameter('controller_name').value}/follow_joint_trajectory",
+            execute_callback=self._execute,
+            goal_callback=lambda _: GoalResponse.ACCEPT,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+            callback_group=ReentrantCallbackGroup(),
+        )
+
+    def _execute(self, handle: ServerGoalHandle) -> Any:
+        lead = self._begin(self._adapter.goal(handle.request))
+        if isinstance(lead, Refusal):
+            handle.abort()
+            code = INVALID_JOINTS if lead.key == "unknown joint" else OLD_HEADER if lead.key == "old" else INVALID_GOAL
+            return self._adapter.result(code, lead.text)
+        while not lead.ended.wait(FEEDBACK_PERIOD):
+            if handle.is_cancel_requested:
+                lead.cancel()
+            self._tell(handle, lead)
+        if lead.outcome is Outcome.REACHED:
+            handle.succeed()
+        elif handle.is_cancel_requested:
+            handle.canceled()
+        else:
+            handle.abort()
+        return self._adapter.result(CODES[lead.outcome], lead.reason)
+
+    def _begin(self, goal: Goal) -> TrajectoryLead | Refusal:
+        message, driver, settings = goal.trajectory, self._node.driver, self._node.driver.settings
+        start = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
+        now = self._node.seconds()
+        if start and now - start > settings.rules.max_age:
+            return Refusal("old", f"the trajectory began {now - start:.2f} s ago")
+        try:
+            standing = driver.standing()
+        except sevenbot.Error as error:
+            return Refusal("no arm", str(error))
+        points = [
+            RawPoint(point.time_from_start.sec + point.time_from_start.nanosec / 1e9, point.positions, point.velocities)
+            for point in message.points
+        ]
+        trajectory = plan(settings.rules, message.joint_names, points, standing)
+        if isinstance(trajectory, Refusal):
+            return trajectory
+        first = max(abs(trajectory.pose(0.0)[joint] - standing[joint]) for joint in trajectory.joints)
+        if first > settings.max_jump:
+            return Refusal("jump", f"the trajectory begins {first:.1f} degrees from where the arm stands")
+        lead = TrajectoryLead(
+            trajectory,
+            settings.period,
+            path_tolerance=_degrees(goal.path_tolerance),
+            goal_tolerance={joint: GOAL_TOLERANCE for joint in trajectory.joints} | _degrees(goal.goal_tolerance),
+            goal_time=goal.goal_time or GOAL_TIME,
+        )
+        while start > self._node.seconds():
+            time.sleep(min(start - self._node.seconds(), 0.05))
+        return driver.lead(lead) or lead
+
+    def _tell(self, handle: ServerGoalHandle, lead: TrajectoryLead) -> None:
+        measurement, joints = self._node.driver.measurement, lead.trajectory.joints
+        if measurement is None:
+            return
+        desired = lead.trajectory.pose(lead.time)
+        handle.publish_feedback(
+            self._adapter.feedback(
+                [NAMES[joint] for joint in joints],
+                [math.radians(desired[joint] - ZEROS[joint]) for joint in joints],
+                [math.radians(measurement.positions[joint] - ZEROS[joint]) for joint in joints],
+                lead.time,
+            )
+        )
+
+
+def _degrees(tolerances: dict[str, float]) -> dict[int, float]:
+    return {NAMES.index(name): math.degrees(angle) for name, angle in tolerances.items() if name in NAMES}

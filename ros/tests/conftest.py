@@ -1,0 +1,146 @@
+"""What the tests share: nodes and simulators as processes, and a client. `cargo xtask ros` runs them in a network of their own."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from client import Client
+from rclpy.signals import SignalHandlerOptions
+
+# The longest wait for a condition in seconds, on a busy machine.
+TIMEOUT = 60.0
+
+
+class Program:
+    """A process that a test starts, and that does not outlive it."""
+
+    def __init__(self, words: list[str], log: Path, environment: dict[str, str]) -> None:
+        self._log = log
+        with log.open("w") as errors:
+            self.process = subprocess.Popen(
+                words, stdout=subprocess.PIPE, stderr=errors, text=True, start_new_session=True, env=environment
+            )
+
+    def line(self) -> str:
+        """The next line of its output."""
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        assert line, self.text()
+        return line
+
+    def text(self) -> str:
+        """What it wrote to its standard error."""
+        return self._log.read_text()
+
+    def memory(self) -> int:
+        """Its memory in kB."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmRSS")))
+
+    def end(self, how: signal.Signals = signal.SIGKILL) -> int:
+        """Ends it, and waits."""
+        if self.process.poll() is None:
+            # A process that has its own, such as the emulator, ends those when it is terminated.
+            os.killpg(self.process.pid, how)
+        return self.process.wait(TIMEOUT)
+
+
+class Start:
+    """Starts programs for one test."""
+
+    def __init__(self, folder: Path, stack: ExitStack, domain: int) -> None:
+        self._folder, self._stack, self._count = folder, stack, 0
+        self._environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+
+    def program(self, words: list[str]) -> Program:
+        self._count += 1
+        """Any program, in the domain of the test."""
+        program = Program(words, self._folder / f"{self._count}.log", self._environment)
+        self._stack.callback(program.end)
+        return program
+
+    def node(self, port: str = "sim", *, namespace: str = "", module: str = "sevenbot_ros", **parameters: object) -> Program:
+        """A node of the arm."""
+        words = [sys.executable, "-m", module, "--ros-args", "-p", f"port:={port}"]
+        if namespace:
+            words += ["-r", f"__ns:=/{namespace}"]
+        for name, value in parameters.items():
+            words += ["-p", f"{name.replace('__', '.')}:={value}"]
+        return self.program(words)
+
+    def simulator(self, *options: str, link: Path | None = None) -> Program:
+        """`host-sim` behind a link, ready."""
+        where = ["--link", str(link or self._folder / "arm")]
+        words = [os.environ["HOST_SIM"], "--eeprom", "none", "--control", "none", *where, *options]
+        simulator = self.program(words)
+        assert simulator.line().startswith("ready ")
+        return simulator
+
+    def emulator(self) -> tuple[Program, str]:
+        """The image for the arm in an emulator, and its port."""
+        program = self.program([os.environ["XTASK"], "emulate", "--no-build"])
+        self._stack.callback(lambda: program.end(signal.SIGTERM))
+        return program, program.line().split()[1]
+
+    @property
+    def link(self) -> str:
+        """The port of the simulator."""
+        return str(self._folder / "arm")
+
+
+_DOMAINS = itertools.count(1)
+
+
+@pytest.fixture
+def domain() -> int:
+    """A domain of its own for each test, in which no node of another one is left."""
+    return next(_DOMAINS)
+
+
+@pytest.fixture
+def start(tmp_path: Path, domain: int) -> Iterator[Start]:
+    with ExitStack() as stack:
+        yield Start(tmp_path, stack, domain)
+        for log in sorted(tmp_path.glob("*.log")):
+            print(f"--- {log.name}\n{log.read_text()[-4000:]}")
+
+
+@pytest.fixture
+def client(domain: int) -> Iterator[Callable[..., Client]]:
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+    with ExitStack() as stack:
+        stack.callback(context.try_shutdown)
+
+        def make(namespace: str = "", **options: Any) -> Client:
+            made = Client(context, namespace, TIMEOUT, **options)
+            stack.callback(made.close)
+            return made
+
+        yield make
+
+
+@pytest.fixture
+def report() -> Iterator[Callable[[str], None]]:
+    """Measured values, for the end of the run."""
+    yield _FIGURES.append
+
+
+_FIGURES: list[str] = []
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    for figure in _FIGURES:
+        terminalreporter.write_line(figure)
+    terminalreporter.write_line(f"processor time of the tests: {time.process_time():.0f} s")

@@ -1,0 +1,84 @@
+"""A node whose action FollowJointTrajectory has a type that is on PyPI: `test_msgs/action/Fibonacci`.
+
+The number of a goal names a trajectory of `TRAJECTORIES`. Feedback and results are numbers: thousandths of a radian, and the code. The
+server, its checks and the motion are those of the product.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import rclpy
+from sevenbot_ros.__main__ import spin
+from sevenbot_ros.node import ArmNode
+from sevenbot_ros.trajectory_action import Goal, TrajectoryAction
+from test_msgs.action import Fibonacci
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+JOINTS = ["joint_1", "joint_2", "joint_3", "joint_5"]
+# Degrees of the model and the phase of each joint.
+WAVES = ((30.0, 0.0), (15.0, 1.0), (20.0, 2.0), (25.0, 3.0))
+POINTS, STEP = 500, 0.02
+
+
+def planned(time: float) -> tuple[list[float], list[float]]:
+    """The positions and velocities of a planner's path in radians, from the straight pose back to it."""
+    end = POINTS * STEP
+    # It begins and ends at rest.
+    share = 0.5 - 0.5 * math.cos(math.pi * time / end)
+    speed = 0.5 * math.pi / end * math.sin(math.pi * time / end)
+    turn = 2 * math.pi
+    positions = [math.radians(size) * (math.sin(turn * share + phase) - math.sin(phase)) for size, phase in WAVES]
+    velocities = [math.radians(size) * turn * math.cos(turn * share + phase) * speed for size, phase in WAVES]
+    return positions, velocities
+
+
+def long_path() -> JointTrajectory:
+    """Points as MoveIt gives them."""
+    message = JointTrajectory(joint_names=JOINTS)
+    for number in range(1, POINTS + 1):
+        positions, velocities = planned(number * STEP)
+        point = JointTrajectoryPoint(positions=positions, velocities=velocities)
+        nanoseconds = round(number * STEP * 1e9)
+        point.time_from_start.sec, point.time_from_start.nanosec = divmod(nanoseconds, 10**9)
+        message.points.append(point)
+    return message
+
+
+def wrong(name: str) -> JointTrajectory:
+    """A trajectory that is refused."""
+    message = JointTrajectory(joint_names=[name])
+    message.points = [JointTrajectoryPoint(positions=[4.0])]
+    message.points[0].time_from_start.sec = 1
+    return message
+
+
+TRAJECTORIES = {1: long_path, 2: lambda: wrong("joint_9"), 3: lambda: wrong("joint_1")}
+
+
+class StandIn:
+    """Reads and writes `Fibonacci` as if it were FollowJointTrajectory."""
+
+    def goal(self, request: Any) -> Goal:
+        # Half a radian: who leaves the path fails.
+        tolerance = {name: 0.5 for name in JOINTS}
+        return Goal(TRAJECTORIES[request.order](), tolerance, {}, 0.0)
+
+    def feedback(self, names: Sequence[str], desired: Sequence[float], actual: Sequence[float], seconds: float) -> Any:
+        return Fibonacci.Feedback(sequence=[round(angle * 1000) for angle in [*desired, *actual]])
+
+    def result(self, code: int, text: str) -> Any:
+        print(f"result {code} {text}", file=sys.stderr)
+        return Fibonacci.Result(sequence=[code])
+
+
+def main() -> int:
+    rclpy.init()
+    return spin(ArmNode(), TrajectoryAction(Fibonacci, StandIn()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

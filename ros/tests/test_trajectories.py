@@ -1,0 +1,109 @@
+"""Trajectories of a planner: as an action, and as the commands of ros2_control's topic interface."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from client import Client, seconds_of
+from conftest import Start
+from rclpy.action import ActionClient
+from sensor_msgs.msg import JointState
+from sevenbot_ros.joints import NAMES
+from stand_in import JOINTS, POINTS, STEP, planned
+from test_msgs.action import Fibonacci
+
+Clients = Callable[..., Client]
+Report = Callable[[str], None]
+
+
+def distance_to_path(state: JointState, times: list[float], offset: float = 0.0) -> float:
+    """The distance of the furthest joint from the nearest pose of the path, in degrees."""
+    angles = dict(zip(state.name, state.position, strict=True))
+    found = [angles[name] for name in JOINTS]
+    return min(
+        max(abs(math.degrees(a - b)) for a, b in zip(planned(time)[0], found, strict=True)) for time in times
+    )
+
+
+TIMES = [number * STEP for number in range(POINTS + 1)]
+
+
+def goal(client: Client, server: ActionClient, order: int, feedback: list[Any]) -> Any:
+    """The handle of an accepted goal."""
+    sent = server.send_goal_async(
+        Fibonacci.Goal(order=order), feedback_callback=lambda message: feedback.append(message.feedback.sequence)
+    )
+    client.until(sent.done, "the goal")
+    return sent.result()
+
+
+def result(client: Client, handle: Any) -> tuple[int, int]:
+    """The state of the goal, and the code of its result."""
+    future = handle.get_result_async()
+    client.until(future.done, "the result", timeout=90.0)
+    return future.result().status, future.result().result.sequence[0]
+
+
+def test_an_action_of_500_points(start: Start, client: Clients, report: Report) -> None:
+    node = start.node(module="stand_in", rate=100.0)
+    leading = client(simulated_time=True)
+    leading.connect()
+    server = ActionClient(leading.node, Fibonacci, "arm_controller/follow_joint_trajectory")
+    leading.until(server.server_is_ready, "the action")
+    for order, code in ((2, -2), (3, -1)):
+        assert result(leading, goal(leading, server, order, [])) == (6, code)
+    feedback: list[Any] = []
+    leading.states.clear()
+    handle = goal(leading, server, 1, feedback)
+    assert result(leading, handle) == (4, 0), node.text()
+    off = [distance_to_path(state, TIMES) for state in leading.states]
+    report(f"a trajectory of {POINTS} points as an action: the joints stay within {max(off):.2f} degrees of the path")
+    assert len(off) > 500 and len(feedback) > 20
+    assert max(off) < 1.0
+    # Cancelled in the middle, it stays there.
+    handle = goal(leading, server, 1, feedback)
+    leading.until(lambda: abs(leading.degrees()[0]) > 10.0, "motion")
+    cancelled = handle.cancel_goal_async()
+    leading.until(cancelled.done, "the answer to the cancellation")
+    assert result(leading, handle)[0] == 5
+    settled = leading.seconds() + 1.0
+    leading.until(lambda: leading.seconds() > settled, "time")
+    standing = leading.degrees()[0]
+    leading.until(lambda: leading.seconds() > settled + 1.0, "time")
+    assert leading.degrees()[0] == pytest.approx(standing, abs=0.3)
+    server.destroy()
+
+
+def test_the_topic_interface_of_ros2_control(start: Start, client: Clients, report: Report) -> None:
+    """What the published plugin sends with a threshold of -1: all joints, in each cycle of 50 Hz, with NaN before a controller is
+    active, and the last target while it rests."""
+    # Slow motion, so that a busy machine does not make the client late.
+    node = start.node(real_time_factor=0.5, publish_joint_states=False)
+    leading = client(simulated_time=True)
+    leading.connect()
+    leading.each(0.02, 25, lambda _: leading.send([math.nan] * 7))
+    leading.until(lambda: "is a controller active?" in node.text(), "a warning")
+    # A controller that becomes active holds what was measured.
+    standing = leading.degrees()
+    leading.each(0.02, 20, lambda _: leading.send(standing))
+
+    def send(index: int) -> None:
+        if index == 25:
+            leading.states.clear()
+        number = min(index * 2, POINTS)
+        positions = dict(zip(JOINTS, planned(number * STEP)[0], strict=True))
+        targets = [math.degrees(positions.get(name, math.radians(at))) for name, at in zip(NAMES, standing, strict=True)]
+        leading.send(targets)
+
+    leading.each(0.02, POINTS // 2 + 50, send)
+    off = [distance_to_path(state, TIMES) for state in leading.states]
+    report(f"the same path as commands of the topic interface, twice as fast: within {max(off):.2f} degrees of the path")
+    assert max(off) < 1.0
+    # The watchdog of the arm did not act while the controller rested, and the node did not complain.
+    assert "jump" not in node.text()
+    assert leading.degrees()[0] == pytest.approx(math.degrees(planned(POINTS * STEP)[0][0]), abs=1.0)
+    assert not leading.joint_states
+    assert seconds_of(leading.states[-1]) > seconds_of(leading.states[0])

@@ -1,0 +1,94 @@
+//! The ROS packages: installed with ROS 2 from PyPI into an environment of their own, and tested in a network of their own.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::python::{build, pip, run, works};
+use crate::run::{TaskResult, build_host_sim, build_image, root, target_directory};
+
+/// The packages from PyPI, at versions that were tried.
+const PACKAGES: [&str; 13] = [
+    "ros-jazzy-rclpy==7.1.6",
+    "ros-jazzy-rmw-fastrtps-cpp==8.4.3",
+    "ros-jazzy-sensor-msgs==5.3.6",
+    "ros-jazzy-diagnostic-msgs==5.3.6",
+    "ros-jazzy-std-srvs==5.3.6",
+    "ros-jazzy-trajectory-msgs==5.3.6",
+    "ros-jazzy-test-msgs==2.0.3",
+    "rosbags==0.11.9",
+    "rerun-sdk==0.41.0",
+    "python-fcl==0.7.0.11",
+    "numpy==2.2.6",
+    "PyYAML==6.0.4",
+    "pytest==9.2.0",
+];
+/// Interpreters for which ROS 2 has wheels, the one of Debian 12 first.
+const INTERPRETERS: [&str; 5] = ["python3.11", "python3.12", "python3.13", "python3.10", "python3"];
+/// Fails for other versions.
+const VERSION: &str = "import sys; assert (3, 10) <= sys.version_info[:2] <= (3, 13)";
+/// The network of the tests has only this computer, and needs no administrator.
+const NETWORK: &str = "ip link set lo up && exec \"$@\"";
+
+/// Installs and tests the packages.
+pub(crate) fn check() -> TaskResult {
+    let python = environment()?;
+    let wheel = build()?;
+    let package = copy_of_package()?;
+    run(pip(&python).args(["--force-reinstall", "--no-deps"]).args([&wheel, &package]))?;
+    build_host_sim()?;
+    build_image()?;
+    test(&python)
+}
+
+fn folder() -> PathBuf {
+    target_directory().join("ros")
+}
+
+/// A virtual environment with the packages. It is kept for the next run, unless the list of packages changed.
+fn environment() -> TaskResult<PathBuf> {
+    let (python, installed) = (folder().join("venv/bin/python"), folder().join("packages.txt"));
+    let packages = PACKAGES.join("\n");
+    if fs::read_to_string(&installed).is_ok_and(|text| text == packages) && works(&python) {
+        return Ok(python);
+    }
+    let program = interpreter().ok_or("ROS 2 needs Python 3.10, 3.11, 3.12 or 3.13 on PATH")?;
+    run(Command::new(program).args(["-m", "venv", "--clear"]).arg(folder().join("venv")))?;
+    run(pip(&python).args(PACKAGES))?;
+    fs::write(installed, packages)?;
+    Ok(python)
+}
+
+fn interpreter() -> Option<&'static str> {
+    INTERPRETERS.into_iter().find(|program| {
+        let mut command = Command::new(program);
+        command.args(["-c", VERSION]).stderr(Stdio::null());
+        command.status().is_ok_and(|status| status.success())
+    })
+}
+
+/// The package without what setuptools would write into the sources.
+fn copy_of_package() -> TaskResult<PathBuf> {
+    let copy = folder().join("sevenbot_ros");
+    if copy.exists() {
+        fs::remove_dir_all(&copy)?;
+    }
+    run(Command::new("cp").arg("-r").arg(root().join("ros/sevenbot_ros")).arg(&copy))?;
+    Ok(copy)
+}
+
+/// The tests, in a network with only the loopback interface.
+fn test(python: &Path) -> TaskResult {
+    let mut command = Command::new("unshare");
+    command.args(["--net", "--map-root-user", "sh", "-c", NETWORK, "sh"]).arg(python);
+    command.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider", "--config-file"]);
+    command.arg(root().join("ros/pytest.ini")).arg(root().join("ros/tests"));
+    command
+        .env("HOST_SIM", target_directory().join("debug/host-sim"))
+        .env("XTASK", env::current_exe()?)
+        .env("ROS_LOG_DIR", folder().join("log"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .current_dir(folder());
+    run(&mut command)
+}

@@ -1,0 +1,83 @@
+//! `cargo xtask docs`: the arm's model in the ROS packages, from the crate `arm-model`: URDF, and a mesh of each link as STL.
+
+use std::fs;
+use std::path::PathBuf;
+
+use arm_model::{Body, Mesh};
+
+use crate::run::{TaskResult, root};
+
+/// The links with a mesh, and its body. The description that the node publishes names the files by their links.
+const MESHES: [(&str, Body); 9] = [
+    ("base_link", Body::Base),
+    ("turret", Body::Turret),
+    ("rear_arm", Body::RearArm),
+    ("forearm", Body::Forearm),
+    ("wrist", Body::Wrist),
+    ("hand", Body::Hand),
+    ("disc", Body::Disc),
+    ("finger_link", Body::Finger),
+    ("opposite_finger_link", Body::OppositeFinger),
+];
+
+/// Writes the files.
+pub(crate) fn write() -> TaskResult {
+    fs::create_dir_all(folder())?;
+    files()?.into_iter().try_for_each(|(name, bytes)| Ok(fs::write(folder().join(name), bytes)?))
+}
+
+/// Fails if a file differs from the one that [`write()`] writes.
+pub(crate) fn check() -> TaskResult {
+    for (name, bytes) in files()? {
+        if fs::read(folder().join(&name)).ok().as_ref() != Some(&bytes) {
+            return Err(format!("the model {name} for ROS is out of date: run `cargo xtask docs`").into());
+        }
+    }
+    println!("the model for ROS is up to date");
+    Ok(())
+}
+
+fn folder() -> PathBuf {
+    root().join("ros/sevenbot_ros/sevenbot_ros/model")
+}
+
+fn files() -> TaskResult<Vec<(String, Vec<u8>)>> {
+    let meshes = MESHES.into_iter().map(|(link, body)| (format!("{link}.stl"), stl(&body.mesh())));
+    let urdf = ("7bot_v2.urdf".to_owned(), arm_model::urdf()?.into_bytes());
+    Ok(meshes.chain([urdf]).collect())
+}
+
+/// Binary STL in millimetres: a header of 80 bytes, the number of triangles, and 50 bytes for each. The normals are 0, which
+/// means that readers compute them.
+fn stl(mesh: &Mesh) -> Vec<u8> {
+    let triangles: Vec<_> = mesh.positions.chunks_exact(3).collect();
+    let mut bytes = vec![b' '; 80];
+    bytes.extend(u32::try_from(triangles.len()).unwrap_or(u32::MAX).to_le_bytes());
+    for corners in triangles {
+        bytes.extend([0; 12]);
+        let coordinates = corners.iter().flatten();
+        bytes.extend(coordinates.flat_map(|&coordinate| rounded(coordinate).to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+/// To micrometres, because the last digits of a sine depend on the platform. Adding 0 makes -0 to 0.
+fn rounded(millimetres: f32) -> f32 {
+    (millimetres * 1000.0).round() / 1000.0 + 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mesh_has_its_triangles_in_the_file() {
+        let mesh = Body::Hand.mesh();
+        let bytes = stl(&mesh);
+        let triangles = mesh.positions.len() / 3;
+        assert_eq!(bytes.len(), 84 + 50 * triangles);
+        let first = f32::from_le_bytes(bytes[96..100].try_into().unwrap());
+        assert!((first - mesh.positions[0][0]).abs() < 0.001);
+    }
+}
