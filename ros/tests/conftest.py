@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -99,7 +98,8 @@ class Start:
         return str(self._folder / "arm")
 
 
-_DOMAINS = itertools.count(1)
+# Tests run in several processes: pytest-xdist numbers them.
+_DOMAINS = itertools.count(1 + 50 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")))
 
 
 @pytest.fixture
@@ -132,15 +132,13 @@ def client(domain: int) -> Iterator[Callable[..., Client]]:
 
 
 @pytest.fixture
-def report() -> Iterator[Callable[[str], None]]:
+def report(record_property: Callable[[str, object], None]) -> Callable[[str], None]:
     """Measured values, for the end of the run."""
-    yield _FIGURES.append
-
-
-_FIGURES: list[str] = []
+    return lambda text: record_property("figure", text)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    for figure in _FIGURES:
-        terminalreporter.write_line(figure)
-    terminalreporter.write_line(f"processor time of the tests: {time.process_time():.0f} s")
+    for outcome in ("passed", "failed"):
+        for test in terminalreporter.getreports(outcome):
+            for _, text in test.user_properties:
+                terminalreporter.write_line(f"{text}")

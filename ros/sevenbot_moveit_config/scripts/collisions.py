@@ -22,7 +22,7 @@ from sevenbot_ros import description
 from sevenbot_ros.joints import LINKAGE
 
 SRDF = Path(__file__).parents[1] / "config/7bot_v2.srdf"
-POSES = 10_000
+POSES = 5000
 SEED = 1
 PAIRS = re.compile(r"(?<=<!-- begin: pairs -->\n).*?(?=  <!-- end -->)", re.DOTALL)
 Matrix = NDArray[np.float64]

@@ -42,7 +42,7 @@ def spin(node: ArmNode, action: TrajectoryAction | None) -> int:
         node.close()
         node.destroy_node()
         rclpy.try_shutdown()
-    return 0
+    return 1 if node.driver.has_failed else 0
 
 
 if __name__ == "__main__":

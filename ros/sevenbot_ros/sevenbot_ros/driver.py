@@ -77,6 +77,9 @@ class Events(Protocol):
     def changed(self, text: str) -> None:
         """Something happened that a user wants to read."""
 
+    def ended(self) -> None:
+        """The thread ends."""
+
 
 class Driver:
     """One arm, opened again and again while the node lives."""
@@ -95,6 +98,8 @@ class Driver:
         # Why commands are refused until `hold`.
         self._halted: str | None = None
         self._actions = 0
+        # Did the thread end by an error of this program?
+        self.has_failed = False
         # Services that make the arm hold while its stream is still open.
         self._stops = 0
         # What leads the open stream, and how many periods it was late at its last point.
@@ -206,6 +211,14 @@ class Driver:
                 self._actions -= 1
 
     def _run(self) -> None:
+        try:
+            self._open_and_serve()
+        finally:
+            # Without this thread the node would be silent.
+            self.has_failed = not self._closing.is_set()
+            self._events.ended()
+
+    def _open_and_serve(self) -> None:
         last = ""
         while not self._closing.is_set():
             try:
@@ -242,7 +255,8 @@ class Driver:
 
     def _disconnect(self) -> None:
         try:
-            self._end_stream("the arm is lost")
+            self._drop(self._lead, "the arm is lost")
+            self._close_stream()
         except sevenbot.Error:
             pass
         with self._idle:
@@ -268,11 +282,15 @@ class Driver:
     def _advance(self, arm: sevenbot.Arm, clock: Clock) -> None:
         """Sends a point if one is due."""
         with self._lock:
-            lead = None if self._halted or self._actions else self._lead
-        if lead is None:
+            lead, stopped = self._lead, self._halted or ("a service moves the arm" if self._actions else None)
+            if stopped:
+                self._lead = None
+        if lead is not None and stopped:
+            lead.end(stopped)
+        if lead is None or stopped:
             # A stop ends the stream itself. To close it would wait until the stop has ended.
             if not self._stops:
-                self._end_stream(self._halted or "a service moves the arm")
+                self._close_stream()
             return
         if self._stream is None:
             self._begin_stream(arm, lead)
@@ -301,7 +319,7 @@ class Driver:
         if refusal := lead.refusal():
             self._events.refused(refusal)
         if point is None:
-            self._end_stream("it has ended")
+            self._drop(lead, "it has ended")
             return
         if all(angle is None for angle in point):
             self._next_point = clock.now() + self.settings.period
@@ -326,14 +344,20 @@ class Driver:
             if self._halted is None:
                 self._halted = str(error)
                 self._events.changed(f"the arm holds: {error}")
-        if not self._stops:
-            self._end_stream(str(error))
+        self._drop(self._lead, str(error))
 
-    def _end_stream(self, reason: str) -> None:
-        with self._lock:
-            lead, self._lead = self._lead, None
+    def _drop(self, lead: Lead | None, reason: str) -> None:
+        """Ends what leads the arm, and the stream if nothing else leads it meanwhile."""
         if lead is not None:
             lead.end(reason)
+        with self._lock:
+            if self._lead is lead:
+                self._lead = None
+            is_led = self._lead is not None
+        if not is_led and not self._stops:
+            self._close_stream()
+
+    def _close_stream(self) -> None:
         stream = self._stream
         if stream is None:
             return
@@ -347,11 +371,10 @@ class Driver:
 
     def _measure(self, arm: sevenbot.Arm, clock: Clock) -> None:
         seen = arm.observe()
-        self._measurement = Measurement(
-            *(tuple(float(value) for value in row) for row in (seen.positions, seen.velocities, seen.loads)),
-            age=seen.age,
-            time=clock.now(),
+        positions, velocities, loads = (
+            tuple(float(value) for value in row) for row in (seen.positions, seen.velocities, seen.loads)
         )
+        self._measurement = Measurement(positions, velocities, loads, seen.age, clock.now())
         self._events.measured(self._measurement)
 
     def _examine(self, arm: sevenbot.Arm) -> None:
@@ -359,9 +382,10 @@ class Driver:
         self._blocks.append(arm.get(health.BLOCKS[len(self._blocks)]))
         if len(self._blocks) < len(health.BLOCKS):
             return
-        errors = health.bus_errors(self._blocks[2])
+        motor, protection, status = self._blocks
+        errors = health.bus_errors(status)
         before = errors if self._errors_before is None else self._errors_before
-        self._events.diagnosed(health.of_registers(*self._blocks, errors_before=before))
+        self._events.diagnosed(health.of_registers(motor, protection, status, before))
         self._blocks, self._errors_before = [], errors
 
 

@@ -68,7 +68,8 @@ class ArmNode(Node):
             JointState,
             COMMANDS,
             self._command,
-            _quality(1, reliable=False),
+            # Commands that come together after a pause of the network are all looked at, because each is near the one before it.
+            _quality(32, reliable=False),
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
         self._description = self.create_publisher(String, "robot_description", _quality(1, reliable=True, latched=True))
@@ -171,3 +172,8 @@ class ArmNode(Node):
     def changed(self, text: str) -> None:
         """Tells the user."""
         self.get_logger().info(text)
+
+    def ended(self) -> None:
+        """Ends the program if the arm's thread has ended by itself."""
+        if self.driver.has_failed:
+            self.context.try_shutdown()

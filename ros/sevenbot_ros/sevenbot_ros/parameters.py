@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rcl_interfaces.msg import ParameterDescriptor, ParameterType
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
 from sevenbot_ros.commands import Rules
@@ -10,7 +10,6 @@ from sevenbot_ros.driver import Settings
 from sevenbot_ros.follower import Jump
 from sevenbot_ros.joints import NAMES, Limits
 
-_NUMBERS = ParameterType.PARAMETER_DOUBLE_ARRAY
 # Name, default, and meaning.
 _DECLARED: tuple[tuple[str, object, str], ...] = (
     ("port", "", "serial port; 'sim' for a simulated arm in this process; empty for the only port with an arm"),
@@ -44,9 +43,8 @@ def declare(node: Node) -> None:
     """Declares all of them, read only, so that a change at run time is refused rather than ignored."""
     for name, default, meaning in _DECLARED:
         descriptor = ParameterDescriptor(description=meaning, read_only=True)
-        if isinstance(default, list):
-            descriptor.type = _NUMBERS
-            descriptor.dynamic_typing = True
+        # A whole number is a number, and a chip id may look like one.
+        descriptor.dynamic_typing = not isinstance(default, (bool, int))
         node.declare_parameter(name, default, descriptor)
 
 
