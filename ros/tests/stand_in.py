@@ -19,19 +19,24 @@ from test_msgs.action import Fibonacci
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 JOINTS = ["joint_1", "joint_2", "joint_3", "joint_5"]
+# The pose in which the path begins and ends, in degrees of the model: with the forearm up a joint bends less than a degree.
+BEGIN = (0.0, 0.0, -45.0, 0.0)
 # Degrees of the model and the phase of each joint.
-WAVES = ((30.0, 0.0), (15.0, 1.0), (20.0, 2.0), (25.0, 3.0))
+WAVES = ((30.0, 0.0), (-8.0, 1.0), (6.0, 0.0), (15.0, 3.0))
 POINTS, STEP = 500, 0.02
 
 
 def planned(time: float) -> tuple[list[float], list[float]]:
-    """The positions and velocities of a planner's path in radians, from the straight pose back to it."""
+    """The positions and velocities of a planner's path in radians, from `BEGIN` back to it."""
     end = POINTS * STEP
     # It begins and ends at rest.
     share = 0.5 - 0.5 * math.cos(math.pi * time / end)
     speed = 0.5 * math.pi / end * math.sin(math.pi * time / end)
     turn = 2 * math.pi
-    positions = [math.radians(size) * (math.sin(turn * share + phase) - math.sin(phase)) for size, phase in WAVES]
+    positions = [
+        math.radians(begin + size * (math.sin(turn * share + phase) - math.sin(phase)))
+        for begin, (size, phase) in zip(BEGIN, WAVES, strict=True)
+    ]
     velocities = [math.radians(size) * turn * math.cos(turn * share + phase) * speed for size, phase in WAVES]
     return positions, velocities
 
@@ -48,6 +53,14 @@ def long_path() -> JointTrajectory:
     return message
 
 
+def way_to_begin() -> JointTrajectory:
+    """One point without velocities."""
+    message = JointTrajectory(joint_names=JOINTS)
+    message.points = [JointTrajectoryPoint(positions=[math.radians(angle) for angle in BEGIN])]
+    message.points[0].time_from_start.sec = 2
+    return message
+
+
 def wrong(name: str) -> JointTrajectory:
     """A trajectory that is refused."""
     message = JointTrajectory(joint_names=[name])
@@ -56,7 +69,7 @@ def wrong(name: str) -> JointTrajectory:
     return message
 
 
-TRAJECTORIES = {1: long_path, 2: lambda: wrong("joint_9"), 3: lambda: wrong("joint_1")}
+TRAJECTORIES = {1: long_path, 2: lambda: wrong("joint_9"), 3: lambda: wrong("joint_1"), 4: way_to_begin}
 
 
 class StandIn:

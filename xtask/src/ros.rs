@@ -5,11 +5,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::python::{pip, run, wheel, works};
+use crate::python::{build, pip, run, works};
 use crate::run::{TaskResult, build_host_sim, build_image, root, target_directory};
 
 /// The packages from PyPI, at versions that were tried.
-const PACKAGES: [&str; 13] = [
+const PACKAGES: [&str; 15] = [
     "ros-jazzy-rclpy==7.1.6",
     "ros-jazzy-rmw-fastrtps-cpp==8.4.3",
     "ros-jazzy-sensor-msgs==5.3.6",
@@ -22,21 +22,26 @@ const PACKAGES: [&str; 13] = [
     "python-fcl==0.7.0.11",
     "numpy==2.2.6",
     "PyYAML==6.0.4",
+    "mypy==2.4.1",
     "pytest==9.2.0",
+    "pytest-xdist==3.8.0",
 ];
 /// Interpreters for which ROS 2 has wheels, the one of Debian 12 first.
 const INTERPRETERS: [&str; 5] = ["python3.11", "python3.12", "python3.13", "python3.10", "python3"];
 /// Fails for other versions.
 const VERSION: &str = "import sys; assert (3, 10) <= sys.version_info[:2] <= (3, 13)";
+/// Processes that run tests, most of which wait for an arm.
+const PROCESSES: &str = "2";
 /// The network of the tests has only this computer, and needs no administrator.
 const NETWORK: &str = "ip link set lo up && exec \"$@\"";
 
 /// Installs and tests the packages.
 pub(crate) fn check() -> TaskResult {
     let python = environment()?;
-    let wheel = wheel()?;
+    let wheel = build()?;
     let package = copy_of_package()?;
     run(pip(&python).args(["--force-reinstall", "--no-deps"]).args([&wheel, &package]))?;
+    check_types(&python)?;
     build_host_sim()?;
     build_image()?;
     test(&python)
@@ -78,11 +83,18 @@ fn copy_of_package() -> TaskResult<PathBuf> {
     Ok(copy)
 }
 
+/// The types of the installed package.
+fn check_types(python: &Path) -> TaskResult {
+    let mut command = Command::new(python);
+    command.args(["-m", "mypy", "--config-file"]).arg(root().join("ros/mypy.ini"));
+    run(command.args(["-p", "sevenbot_ros"]).current_dir(folder()))
+}
+
 /// The tests, in a network with only the loopback interface.
 fn test(python: &Path) -> TaskResult {
     let mut command = Command::new("unshare");
     command.args(["--net", "--map-root-user", "sh", "-c", NETWORK, "sh"]).arg(python);
-    command.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider", "--config-file"]);
+    command.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider", "-n", PROCESSES, "--config-file"]);
     command.arg(root().join("ros/pytest.ini")).arg(root().join("ros/tests"));
     command
         .env("HOST_SIM", target_directory().join("debug/host-sim"))

@@ -8,7 +8,7 @@ use crate::run::{CHECKED, CHIP, TESTED, TaskResult, build_for_browser, cargo, ru
 use crate::steps::{self, Stage, TestScope, long, quick, whole};
 use crate::{
     count, crate_graph, decisions, deny, footprint, fuzz, install, lerobot, modules, mujoco, no_panic,
-    python, registers_md, replays, ros_model, start_up, system_tests, torture, trials, web,
+    python, registers_md, replays, ros, ros_model, start_up, system_tests, torture, trials, web,
 };
 
 /// The scope of the run.
@@ -77,6 +77,7 @@ const STAGES: &[Stage] = &[
                 system_tests::run_on(&system_tests::ADAPTER)
             }),
             whole("the Python package", python::check),
+            whole("the ROS packages", ros::check),
             whole("the plugin for LeRobot, with the base classes of LeRobot", lerobot::check),
         ],
         &[

@@ -342,7 +342,8 @@ class Driver:
     def _give_up(self, error: sevenbot.Error) -> None:
         with self._lock:
             if self._halted is None:
-                self._halted = str(error)
+                # The lines after the first are hints.
+                self._halted = str(error).partition("\n")[0]
                 self._events.changed(f"the arm holds: {error}")
         self._drop(self._lead, str(error))
 
