@@ -79,7 +79,7 @@ impl Visit for FrameVisit<'_> {
 
     fn ask(&mut self, own: Option<u8>, random: &mut Random) -> io::Result<Answer> {
         let asked = own.map_or_else(|| self.chaos.question(), |own| (own, 1));
-        let wait = self.chaos.wait(asked);
+        let mut wait = self.chaos.wait(asked);
         let (start, request) = match own {
             Some(own) => {
                 let value = u8::try_from(1 + random.below(100)).expect("small");
@@ -120,7 +120,11 @@ impl Visit for FrameVisit<'_> {
                 }
                 return Ok(answer);
             }
+            let before = self.received.len();
             self.wire.receive(&mut self.received)?;
+            if self.may_be_stale && self.received.len() > before {
+                wait.progress();
+            }
         }
     }
 

@@ -75,7 +75,13 @@ impl Chaos {
 
     /// A wait begins for the reply with these registers: the first one, and how many.
     pub(super) fn wait(&self, asked: (u8, u8)) -> ReplyWait<'_> {
-        ReplyWait { chaos: self, asked, sent: Instant::now(), outages: self.outages.load(Ordering::SeqCst) }
+        ReplyWait {
+            chaos: self,
+            asked,
+            sent: Instant::now(),
+            quiet_since: Instant::now(),
+            outages: self.outages.load(Ordering::SeqCst),
+        }
     }
 }
 
@@ -84,6 +90,8 @@ pub(super) struct ReplyWait<'a> {
     chaos: &'a Chaos,
     asked: (u8, u8),
     sent: Instant,
+    /// Nothing that stands before the reply has come since.
+    quiet_since: Instant,
     outages: u64,
 }
 
@@ -94,13 +102,18 @@ impl ReplyWait<'_> {
         self.outages % 2 == 1 || now != self.outages
     }
 
+    /// A reply to the program before came, which stands before this one.
+    pub(super) fn progress(&mut self) {
+        self.quiet_since = Instant::now();
+    }
+
     /// Why it is waited no longer; `None` while it is.
     pub(super) fn ended(&self) -> Option<Answer> {
         let elapsed = self.sent.elapsed();
         if elapsed >= AFTER_OUTAGE && self.may_be_cut() {
             return Some(Answer::Cut);
         }
-        (elapsed >= LOST).then(|| self.lost())
+        (self.quiet_since.elapsed() >= LOST).then(|| self.lost())
     }
 
     /// The reply is lost. Says what the line and the outages had to do with it.
