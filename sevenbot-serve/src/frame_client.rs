@@ -7,7 +7,7 @@
 use protocol_core::request::{Reply, Report};
 use protocol_core::time::Instant;
 use protocol_core::wire::deframer::gap;
-use protocol_core::wire::{Deframer, FrameBuffer, MAX_LENGTH, ToArm};
+use protocol_core::wire::{Deframer, FrameBuffer, Function, MAX_LENGTH, ToArm};
 
 use crate::hub::{ClientId, Event, Hub, Stream, WholeRequest};
 
@@ -22,6 +22,8 @@ pub struct FrameClient {
     id: ClientId,
     deframer: Deframer<ToArm>,
     output: Vec<u8>,
+    /// The bytes that come are those of a program that is gone: nobody waits for replies.
+    drops_reads: bool,
 }
 
 impl FrameClient {
@@ -30,7 +32,7 @@ impl FrameClient {
     pub fn connect(hub: &mut Hub, baud: u32) -> Self {
         let id = hub.connect();
         hub.set_can_receive(id, true);
-        Self { id, deframer: Deframer::new(gap(baud)), output: Vec::new() }
+        Self { id, deframer: Deframer::new(gap(baud)), output: Vec::new(), drops_reads: false }
     }
 
     /// The id in the hub.
@@ -64,6 +66,7 @@ impl FrameClient {
     fn pull_all(&mut self, hub: &mut Hub, now: Instant, since: Instant) {
         while hub.has_room(self.id) {
             match self.deframer.pull() {
+                Some(Ok(frame)) if self.drops_reads && frame.function == Function::Read => {}
                 Some(Ok(frame)) => {
                     hub.request(now, self.id, since, WholeRequest::from_frame(frame));
                 }
@@ -71,6 +74,11 @@ impl FrameClient {
                 None => return,
             }
         }
+    }
+
+    /// States whether reads are dropped, because who sent them is gone.
+    pub const fn set_drops_reads(&mut self, drops_reads: bool) {
+        self.drops_reads = drops_reads;
     }
 
     /// Collects replies and reports from the hub. Call it after [`Hub::poll`] and [`Hub::arm_bytes`].

@@ -48,8 +48,17 @@ pub enum LineAction {
     Unplug,
 }
 
-/// Sees each frame of the program before it is passed on.
-pub type Watch = Box<dyn FnMut(&[u8]) + Send>;
+/// A frame on the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Passing<'a> {
+    /// Of the program.
+    Request(&'a [u8]),
+    /// Of the arm.
+    Reply(&'a [u8]),
+}
+
+/// Sees each frame before it is passed on.
+pub type Watch = Box<dyn FnMut(Passing<'_>) + Send>;
 
 /// What happens on the line.
 pub struct RelayPlan {
@@ -77,7 +86,7 @@ impl Relay {
         Self::open_with(port, plan, Box::new(|_| ()))
     }
 
-    /// Opens a port that leads to the arm at `port`, and shows each frame of the program.
+    /// Opens a port that leads to the arm at `port`, and shows each frame.
     #[must_use]
     pub fn open_watched(port: &Path, watch: Watch) -> Self {
         let plan = RelayPlan {
@@ -209,7 +218,7 @@ impl Line {
         if self.plan.is_noisy {
             disturb(&mut frame, self.requests.count, 9);
         }
-        (self.watch)(&frame);
+        (self.watch)(Passing::Request(&frame));
         pass_on(&self.arm, &frame);
         LineAction::Nothing
     }
@@ -225,6 +234,7 @@ impl Line {
             *count += 1;
             disturb(&mut frame, *count, each);
         }
+        (self.watch)(Passing::Reply(&frame));
         let _ = rustix::io::write(&self.program, &frame);
         LineAction::Nothing
     }

@@ -15,9 +15,12 @@ use super::client_id::ClientId;
 use super::request::{WholeRequest, reply_bytes};
 use super::stream::Stream;
 
-/// A read is not repeated: its client does that. A reply may take this time in addition to its time on the line: USB adapters
-/// take 16 ms each way, and a busy computer takes more.
-const PATIENCE: Patience = Patience { attempts: 1, timeout: Duration::from_millis(1_000) };
+/// What a client waits for. A reply that is late is asked for again after 100 ms or more, unless something was written since:
+/// a lost frame costs its client, and those that wait for the line, no more than that. The end is late, because a computer that
+/// is busy may not run the arm's side of the port for a second.
+const CLIENT_PATIENCE: Patience = Patience { attempts: 3, timeout: Duration::from_millis(1_000) };
+/// What the hub asks for itself, and asks again in time.
+const OWN_PATIENCE: Patience = Patience { attempts: 1, timeout: Duration::from_millis(1_000) };
 /// The line may be filled this far ahead, so that it is not idle while the program wakes up.
 const AHEAD: Duration = Duration::from_millis(1);
 /// Bytes that may wait for the port.
@@ -40,6 +43,15 @@ pub(crate) enum Owner {
     Hold,
     /// The hub, to find out whether a 7Bot V2 is there.
     Identity,
+}
+
+impl Owner {
+    const fn patience(self) -> Patience {
+        match self {
+            Self::Client(_) | Self::Hold => CLIENT_PATIENCE,
+            Self::Sample(_) | Self::Identity => OWN_PATIENCE,
+        }
+    }
 }
 
 /// The line.
@@ -134,7 +146,7 @@ impl Line {
     pub(crate) fn send_read(&mut self, now: Instant, owner: Owner, address: u8, count: u8) {
         match Span::new(address, count) {
             Some(range) => {
-                self.owners.insert(self.link.read(range, PATIENCE), owner);
+                self.owners.insert(self.link.read(range, owner.patience()), owner);
             }
             // The arm would not answer (D2).
             None => self.events.push_back((owner, no_reply(address, count))),

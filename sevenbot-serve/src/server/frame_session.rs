@@ -39,6 +39,9 @@ impl FrameSession {
         seat.shared().with_client(|hub, now| {
             let taken = client.push(hub, now, (*since).min(now), input);
             input.drain(..taken.min(input.len()));
+            if input.is_empty() {
+                client.set_drops_reads(false);
+            }
             client.collect(hub);
         });
     }
@@ -71,10 +74,12 @@ impl FrameSession {
         self.seat.news_until(if is_through { self.client.deadline() } else { Instant::FAR_FUTURE }).await;
     }
 
-    /// Another client uses the same wire from now on. The bytes that the hub has not got yet may be its own.
-    pub(super) fn succeed(self) -> Self {
+    /// Another client uses the same wire from now on. The bytes that the hub has not got yet are those of the client before, or may
+    /// be its own. In the first case its writes are carried out, but the next client does not wait for replies that nobody wants.
+    pub(super) fn succeed(self, are_of_the_one_before: bool) -> Self {
         let mut next = Self::open(self.seat.shared());
         (next.input, next.since) = (self.input, self.since);
+        next.client.set_drops_reads(are_of_the_one_before);
         self.seat.leave(End::Clean);
         next
     }

@@ -44,7 +44,8 @@ impl PtyPort {
             session.exchange();
             let count = self.receive(&mut session, &mut last_empty, &shared)?;
             if self.was_closed()? {
-                session = session.succeed();
+                // What was read before, when no close was seen, the one before sent.
+                session = session.succeed(count == 0);
             }
             session.exchange();
             self.send(&mut session)?;

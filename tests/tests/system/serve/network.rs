@@ -39,7 +39,8 @@ fn the_tool_connects_with_tls_and_the_certificate_of_the_server() {
     assert!(!other.status.success(), "{other:?}");
 }
 
-/// Another user of this computer finds it by multicast, as other computers do. Without multicast there is nothing to find.
+/// Another user of this computer finds it by multicast, as other computers do. Where multicast is blocked, a name is an error that
+/// names it, and the address works.
 #[test]
 fn a_name_is_found_on_the_network() {
     let name = format!("test-{}", std::process::id());
@@ -53,8 +54,18 @@ fn a_name_is_found_on_the_network() {
     };
     let has_multicast = multicast::works();
     let port = format!("sevenbot://{name}");
+    let unknown = run(&["--port", "sevenbot://nobody-has-this-name", "get", "device-code"]);
+    assert!(!unknown.status.success(), "{unknown:?}");
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("nobody-has-this-name"), "{unknown:?}");
     if !has_multicast {
-        eprintln!("this system has no multicast: a name of the network cannot be found");
+        eprintln!(
+            "this system has no multicast: what is tested is that the name is not found, and that the address works"
+        );
+        let not_found = run(&["--port", &port, "get", "device-code"]);
+        assert!(!not_found.status.success() && String::from_utf8_lossy(&not_found.stderr).contains(&name));
+        let address = format!("tcp://127.0.0.1:{}", served.connect().peer_addr().expect("an address").port());
+        let read = run(&["--port", &address, "get", "device-code"]);
+        assert!(read.status.success(), "{read:?}");
         return;
     }
     wait_until("the name is listed", || {

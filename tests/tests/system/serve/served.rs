@@ -40,7 +40,7 @@ impl Served {
         Self::start_with(ptys, options, None)
     }
 
-    /// Starts one whose frames to the arm `watch` sees.
+    /// Starts one whose line to the arm `watch` sees.
     pub(crate) fn start_watched(ptys: usize, options: &[&str], watch: Watch) -> Self {
         Self::start_with(ptys, options, Some(watch))
     }

@@ -3,6 +3,8 @@
 use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 use std::process::Output;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -10,6 +12,7 @@ use system_tests::frames::{reply, with_checksum};
 use system_tests::process::{Signal, send_signal, wait_for_exit};
 use system_tests::programs::tool;
 use system_tests::registers::{CHIP_ID, DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED};
+use system_tests::relay::Passing;
 use system_tests::{read_request, write_request};
 
 use super::served::{Served, exchange, names, simulator};
@@ -78,6 +81,29 @@ fn programs_of_both_maps_have_their_own_reports() {
     old.send(&with_checksum(&[0xAA, 0x77, 4, 0, 0]));
     old.drain();
     assert_eq!(old.register(FEEDBACK_FREQUENCY), 0, "stopped by a write of map 2.1");
+}
+
+/// On a pseudo-terminal the server sees only afterwards who sent what.
+#[test]
+fn the_next_program_on_a_terminal_does_not_wait_for_what_the_one_before_asked() {
+    let asked = Arc::new(AtomicUsize::new(0));
+    let counter = Arc::clone(&asked);
+    let watch = move |passing: Passing<'_>| {
+        if matches!(passing, Passing::Request([_, _, 3, 0, 255, ..])) {
+            counter.fetch_add(1, Ordering::SeqCst);
+        }
+    };
+    let served = Served::start_watched(1, &[], Box::new(watch));
+    let mut gone = served.open("a");
+    gone.send(&read_request(0, 255).repeat(200));
+    (0..3).for_each(|_| drop(gone.reply()));
+    drop(gone);
+    let mut next = served.open("a");
+    next.drain();
+    assert_eq!(next.read(CHIP_ID, 6).len(), 6);
+    // Those that were on their way, and as many as the machine took its time for.
+    let asked = asked.load(Ordering::SeqCst);
+    assert!(asked < 100, "{asked} of 200 long reads of the program that is gone");
 }
 
 #[test]

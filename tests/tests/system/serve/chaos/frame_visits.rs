@@ -51,6 +51,21 @@ impl<'a> FrameVisit<'a> {
             .or(Some([b"damaged".to_vec(), frame].concat()))
     }
 
+    /// Takes the frame that begins so, and all before it: what the terminal still has of another program need not be whole frames,
+    /// because the kernel drops the bytes that were in one of its queues.
+    fn take_behind_stale(&mut self, start: &[u8]) -> bool {
+        let length = 7 + usize::from(start[4]);
+        let frames = self.received.windows(length);
+        let place = { frames }.position(|frame| {
+            let (values, _) = frame.split_at(length - 2);
+            frame.starts_with(start) && frame == with_checksum(values)
+        });
+        if let Some(place) = place {
+            self.received.drain(..place + length);
+        }
+        place.is_some()
+    }
+
     fn target(&mut self) -> io::Result<()> {
         let wire = &mut self.wire;
         self.chaos.targets.send(|values| wire.send(&write_request(TARGET_POSITION, &values)))
@@ -63,7 +78,8 @@ impl Visit for FrameVisit<'_> {
     }
 
     fn ask(&mut self, own: Option<u8>, random: &mut Random) -> io::Result<Answer> {
-        let wait = self.chaos.wait();
+        let asked = own.map_or_else(|| self.chaos.question(), |own| (own, 1));
+        let mut wait = self.chaos.wait(asked);
         let (start, request) = match own {
             Some(own) => {
                 let value = u8::try_from(1 + random.below(100)).expect("small");
@@ -71,20 +87,25 @@ impl Visit for FrameVisit<'_> {
                 (written, [write_request(own, &[value]), read_request(own, 1)].concat())
             }
             None => {
-                let (address, count) = self.chaos.question();
+                let (address, count) = asked;
                 (vec![0xAA, 0x77, 0x03, address, count], read_request(address, count))
             }
         };
         self.wire.send(&request)?;
         loop {
-            while let Some(frame) = self.next_frame() {
+            if self.may_be_stale && self.take_behind_stale(&start) {
+                self.may_be_stale = false;
+                return Ok(Answer::Replied);
+            }
+            while !self.may_be_stale
+                && let Some(frame) = self.next_frame()
+            {
                 if frame.starts_with(&start) {
-                    self.may_be_stale = false;
                     return Ok(Answer::Replied);
                 }
                 let is_report =
                     self.has_reports && frame.starts_with(&[0xAA, 0x77, 0x03, PRESENT_POSITION, 7]);
-                if !is_report && !self.may_be_stale {
+                if !is_report {
                     // A write that an outage took has another value.
                     if wait.may_be_cut() && frame[..5] == start[..5] {
                         return Ok(Answer::Cut);
@@ -94,9 +115,16 @@ impl Visit for FrameVisit<'_> {
                 }
             }
             if let Some(answer) = wait.ended() {
+                if answer == Answer::Lost {
+                    println!("of {:?}: {:02x?}", self.wire.kind(), self.received);
+                }
                 return Ok(answer);
             }
+            let before = self.received.len();
             self.wire.receive(&mut self.received)?;
+            if self.may_be_stale && self.received.len() > before {
+                wait.progress();
+            }
         }
     }
 

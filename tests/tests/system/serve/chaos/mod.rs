@@ -6,13 +6,14 @@
 //!      └── what it sent, and when ──▶ SentTargets ◀── what reached the arm ──────────┘
 //! ```
 //!
-//! The length is `SERVE_CHAOS_SECONDS`. An hour, with an outage each minute:
+//! The length is `SERVE_CHAOS_SECONDS`, and 24 s in each run of the tests. An hour, with an outage each minute:
 //!
 //! ```sh
-//! SERVE_CHAOS_SECONDS=3600 cargo test --release -p system-tests --test system serve::chaos -- --ignored --nocapture
+//! SERVE_CHAOS_SECONDS=3600 cargo test --release -p system-tests --test system serve::chaos -- --nocapture
 //! ```
 
 mod frame_visits;
+mod line_history;
 mod sent_targets;
 mod visit;
 mod visitor;
@@ -41,7 +42,9 @@ const TOKEN: &str = "correct-horse";
 /// Programs on each way in: eight pseudo-terminals, and the others in turn.
 const TERMINALS: usize = 8;
 const PROGRAMS: usize = 50;
-/// Time from the end of an outage to the next one, at most, and how long each is.
+/// Time to the first outage, from the end of each to the next one, and how long each is. A reply that is missing is lost only if it
+/// was waited for until no doubt was left, and no outage came meanwhile: so the time between two is longer than that.
+const BEFORE_OUTAGES: Duration = Duration::from_secs(4);
 const BETWEEN_OUTAGES: Duration = Duration::from_secs(56);
 const OUTAGE: Duration = Duration::from_millis(3_500);
 /// A target waits in the server for 200 ms at most. The rest is for programs that the system does not run for a while.
@@ -50,9 +53,8 @@ const LATE: Duration = Duration::from_millis(2_000);
 const MOST_GROWTH: u64 = 8_192;
 
 #[test]
-#[ignore = "a campaign: replies were lost in a run of 19 minutes on a busy machine, and why is not known"]
 fn fifty_chaotic_programs_lose_nothing_cross_nothing_and_move_nothing_late() {
-    let seconds = std::env::var("SERVE_CHAOS_SECONDS").map_or(8, |text| text.parse().expect("a number"));
+    let seconds = std::env::var("SERVE_CHAOS_SECONDS").map_or(24, |text| text.parse().expect("a number"));
     let seed = std::env::var("SERVE_CHAOS_SEED").map_or(25, |text| text.parse().expect("a number"));
     println!("{seconds} s, seed {seed}");
     run(Duration::from_secs(seconds), seed);
@@ -68,7 +70,7 @@ fn run(length: Duration, seed: u64) {
     let chaos = Arc::new(Chaos::new(security, length));
     let watch = || -> Watch {
         let chaos = Arc::clone(&chaos);
-        Box::new(move |frame| chaos.targets.reached(frame))
+        Box::new(move |passing| chaos.note(passing))
     };
     let mut served = Served::start_watched(TERMINALS, &options, watch());
     let socket = served.local_socket();
@@ -84,8 +86,7 @@ fn run(length: Duration, seed: u64) {
         }
         let warm_up = Instant::now() + length / 8;
         let mut memory = None;
-        let between = BETWEEN_OUTAGES.min(length / 6);
-        let mut next_outage = Instant::now() + between;
+        let mut next_outage = Instant::now() + BEFORE_OUTAGES;
         while !chaos.is_over() {
             thread::sleep(Duration::from_millis(50));
             if memory.is_none() && Instant::now() >= warm_up {
@@ -98,7 +99,7 @@ fn run(length: Duration, seed: u64) {
                 served.plug(watch());
                 wait_until("the arm answers", || is_answered(&socket));
                 chaos.turn_over();
-                next_outage = Instant::now() + between;
+                next_outage = Instant::now() + BETWEEN_OUTAGES;
             }
         }
         let mut total = Tally::default();

@@ -1,10 +1,12 @@
 //! Targets that tell by their values when they were sent.
 
+use std::collections::VecDeque;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use system_tests::registers::TARGET_POSITION;
+use system_tests::registers::{PRESENT_POSITION, TARGET_POSITION};
+use system_tests::relay::Passing;
 
 /// Joints whose targets hold the number of a write.
 const DIGITS: u32 = 4;
@@ -14,6 +16,9 @@ const BASE: u64 = 100;
 const LOWEST: u64 = 40;
 /// Writes whose times are known at the same time.
 const KEPT: u64 = 1 << 20;
+/// Joints, and positions of theirs that are remembered.
+const JOINTS: usize = 7;
+const REMEMBERED: usize = 512;
 
 /// The times of the last targets, and those that reached the arm.
 pub(crate) struct SentTargets {
@@ -22,12 +27,21 @@ pub(crate) struct SentTargets {
     /// Microseconds from `start` on at which the target had been sent; 0: it is being sent.
     times: Vec<AtomicU64>,
     arrived: Mutex<Vec<Duration>>,
+    /// Where the arm said it was. A stop of the maker's WebSocket writes one of these: it moves nothing, and is no target of
+    /// this list, although it may look like one that was sent long ago.
+    positions: Mutex<VecDeque<[u8; JOINTS]>>,
 }
 
 impl SentTargets {
     pub(crate) fn new() -> Self {
         let times = (0..KEPT).map(|_| AtomicU64::new(0)).collect();
-        Self { start: Instant::now(), next: AtomicU64::new(0), times, arrived: Mutex::default() }
+        Self {
+            start: Instant::now(),
+            next: AtomicU64::new(0),
+            times,
+            arrived: Mutex::default(),
+            positions: Mutex::default(),
+        }
     }
 
     /// Sends targets that hold a number of their own.
@@ -42,10 +56,37 @@ impl SentTargets {
         outcome
     }
 
-    /// A frame has reached the arm.
-    pub(crate) fn reached(&self, frame: &[u8]) {
-        let [_, _, 4 | 6, TARGET_POSITION, _, values @ ..] = frame else { return };
+    /// A frame is on the arm's line.
+    pub(crate) fn note(&self, passing: Passing<'_>) {
+        match passing {
+            Passing::Request([_, _, 4 | 6, TARGET_POSITION, _, values @ ..]) => self.reached(values),
+            Passing::Reply([_, _, 3, address, _, values @ ..]) => self.note_positions(*address, values),
+            _ => {}
+        }
+    }
+
+    fn note_positions(&self, address: u8, values: &[u8]) {
+        let place = PRESENT_POSITION.checked_sub(address).map(usize::from);
+        let Some(&found) = place.and_then(|place| values.get(place..)?.first_chunk()) else { return };
+        let mut positions = self.positions.lock().expect("no panic");
+        positions.push_back(found);
+        if positions.len() > REMEMBERED {
+            positions.pop_front();
+        }
+    }
+
+    /// Targets have reached the arm.
+    fn reached(&self, values: &[u8]) {
+        let is_hold = |all: &[u8; JOINTS]| self.positions.lock().expect("no panic").contains(all);
+        if values.first_chunk().is_some_and(is_hold) {
+            return;
+        }
         let Some(number) = number(values) else { return };
+        let newer = self.next.load(Ordering::SeqCst).checked_sub(number);
+        assert!(
+            newer.is_some_and(|newer| newer < KEPT),
+            "the target {number} was not sent of late: {values:?}"
+        );
         let sent = self.slot(number).load(Ordering::SeqCst);
         let age = match sent {
             0 => Duration::ZERO,

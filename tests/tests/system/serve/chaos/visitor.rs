@@ -7,8 +7,10 @@ use std::time::{Duration, Instant};
 
 use system_tests::random::Random;
 use system_tests::registers::SPEED;
+use system_tests::relay::Passing;
 
 use super::frame_visits::FrameVisit;
+use super::line_history::LineHistory;
 use super::sent_targets::SentTargets;
 use super::visit::Visit;
 use super::web_visits::WebVisit;
@@ -26,6 +28,7 @@ pub(crate) struct Chaos {
     pub(crate) security: Security,
     pub(crate) end: Instant,
     pub(crate) targets: SentTargets,
+    history: LineHistory,
     /// Odd while the arm is unplugged, and until it was seen to answer again.
     outages: AtomicU64,
     questions: AtomicU64,
@@ -37,6 +40,7 @@ impl Chaos {
             security,
             end: Instant::now() + length,
             targets: SentTargets::new(),
+            history: LineHistory::default(),
             outages: AtomicU64::new(0),
             questions: AtomicU64::new(0),
         }
@@ -48,6 +52,7 @@ impl Chaos {
 
     /// The arm is about to be unplugged, or was seen to answer again.
     pub(crate) fn turn_over(&self) {
+        self.history.turn_over();
         self.outages.fetch_add(1, Ordering::SeqCst);
     }
 
@@ -62,16 +67,31 @@ impl Chaos {
         (u8::try_from(address).expect("small"), u8::try_from(count).expect("small"))
     }
 
-    /// A wait for a reply begins.
-    pub(super) fn wait(&self) -> ReplyWait<'_> {
-        ReplyWait { chaos: self, sent: Instant::now(), outages: self.outages.load(Ordering::SeqCst) }
+    /// A frame is on the arm's line.
+    pub(crate) fn note(&self, passing: Passing<'_>) {
+        self.targets.note(passing);
+        self.history.note(passing);
+    }
+
+    /// A wait begins for the reply with these registers: the first one, and how many.
+    pub(super) fn wait(&self, asked: (u8, u8)) -> ReplyWait<'_> {
+        ReplyWait {
+            chaos: self,
+            asked,
+            sent: Instant::now(),
+            quiet_since: Instant::now(),
+            outages: self.outages.load(Ordering::SeqCst),
+        }
     }
 }
 
 /// A program waits for a reply.
 pub(super) struct ReplyWait<'a> {
     chaos: &'a Chaos,
+    asked: (u8, u8),
     sent: Instant,
+    /// Nothing that stands before the reply has come since.
+    quiet_since: Instant,
     outages: u64,
 }
 
@@ -82,13 +102,24 @@ impl ReplyWait<'_> {
         self.outages % 2 == 1 || now != self.outages
     }
 
+    /// A reply to the program before came, which stands before this one.
+    pub(super) fn progress(&mut self) {
+        self.quiet_since = Instant::now();
+    }
+
     /// Why it is waited no longer; `None` while it is.
     pub(super) fn ended(&self) -> Option<Answer> {
         let elapsed = self.sent.elapsed();
         if elapsed >= AFTER_OUTAGE && self.may_be_cut() {
             return Some(Answer::Cut);
         }
-        (elapsed >= LOST).then_some(Answer::Lost)
+        (self.quiet_since.elapsed() >= LOST).then(|| self.lost())
+    }
+
+    /// The reply is lost. Says what the line and the outages had to do with it.
+    pub(super) fn lost(&self) -> Answer {
+        println!("lost: {}", self.chaos.history.told(self.sent, self.asked));
+        Answer::Lost
     }
 }
 

@@ -48,16 +48,13 @@ impl Visit for WebVisit<'_> {
     }
 
     fn ask(&mut self, own: Option<u8>, random: &mut Random) -> io::Result<Answer> {
-        let wait = self.chaos.wait();
         let value = 1 + random.below(100);
-        let (address, count) = match own {
-            Some(own) => {
-                let write = json!({ "cmd": "write", "id": own, "num": 1, "value": [value] });
-                self.command(&write)?;
-                (own, 1)
-            }
-            None => self.chaos.question(),
-        };
+        let (address, count) = own.map_or_else(|| self.chaos.question(), |own| (own, 1));
+        let wait = self.chaos.wait((address, count));
+        if let Some(own) = own {
+            let write = json!({ "cmd": "write", "id": own, "num": 1, "value": [value] });
+            self.command(&write)?;
+        }
         self.wire.send(&json!({ "cmd": "read", "id": address, "num": count }).to_string())?;
         loop {
             match self.wire.receive()? {
@@ -73,8 +70,8 @@ impl Visit for WebVisit<'_> {
                         return Ok(Answer::Cut);
                     }
                     if answer["status"] == "error" {
-                        println!("lost: {text}");
-                        return Ok(Answer::Lost);
+                        println!("{text}");
+                        return Ok(wait.lost());
                     }
                     println!("crossed: {text} instead of {count} values from {address} on, {value}");
                     return Ok(Answer::Crossed);

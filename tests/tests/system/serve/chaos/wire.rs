@@ -134,6 +134,14 @@ impl ByteWire {
         }
     }
 
+    pub(crate) const fn kind(&self) -> &'static str {
+        match self {
+            Self::Terminal(_) => "a terminal",
+            Self::Unix(_) => "the Unix socket",
+            Self::Tcp(_) => "TCP",
+        }
+    }
+
     pub(crate) fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self {
             Self::Terminal(port) => port.write_all(bytes),

@@ -24,7 +24,7 @@ thread_local! {
     static TURN: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
 }
 
-/// Ends all programs when it is dropped.
+/// Ends all programs when it is dropped, also by a panic.
 pub(crate) struct End<'a>(&'a Gate);
 
 impl Drop for End<'_> {
@@ -39,15 +39,16 @@ impl Gate {
         End(self)
     }
 
-    /// Begins the next turn, and waits until as many programs have begun it.
+    /// Begins the next turn, and waits until as many programs have begun it. Fails if one of them has failed.
     pub(crate) fn release(&self, programs: usize) {
         let mut turns = self.lock();
         turns.count += 1;
         turns.begun = 0;
         self.changed.notify_all();
-        while turns.begun < programs {
+        while turns.begun < programs && !turns.is_over {
             turns = self.changed.wait(turns).unwrap_or_else(PoisonError::into_inner);
         }
+        assert!(!turns.is_over, "a program failed");
     }
 
     /// Waits for the next turn. Returns false at the end.

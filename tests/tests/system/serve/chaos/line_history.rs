@@ -1,0 +1,70 @@
+//! What was on the arm's line of late, and when it was unplugged: tells why a reply is missing.
+
+use std::collections::VecDeque;
+use std::sync::Mutex;
+use std::time::Instant;
+
+use system_tests::relay::Passing;
+
+/// Frames that are remembered: those of more than half a minute.
+const REMEMBERED: usize = 40_000;
+
+#[derive(Clone, Copy)]
+struct Read {
+    at: Instant,
+    is_reply: bool,
+    address: u8,
+    count: u8,
+}
+
+/// The reads and replies on the line, and the outages.
+#[derive(Default)]
+pub(super) struct LineHistory {
+    reads: Mutex<VecDeque<Read>>,
+    /// Each outage has two: when it began, and when the arm was seen to answer again.
+    turns: Mutex<Vec<Instant>>,
+}
+
+impl LineHistory {
+    pub(super) fn turn_over(&self) {
+        self.turns.lock().expect("no panic").push(Instant::now());
+    }
+
+    pub(super) fn note(&self, passing: Passing<'_>) {
+        let (Passing::Request(frame) | Passing::Reply(frame)) = passing;
+        let &[_, _, 3, address, count, ..] = frame else { return };
+        let mut reads = self.reads.lock().expect("no panic");
+        if reads.len() == REMEMBERED {
+            reads.pop_front();
+        }
+        let is_reply = matches!(passing, Passing::Reply(_));
+        reads.push_back(Read { at: Instant::now(), is_reply, address, count });
+    }
+
+    /// What became of a read of these registers that was sent at this time.
+    pub(super) fn told(&self, sent: Instant, (address, count): (u8, u8)) -> String {
+        let since = |at: Instant| match at.checked_duration_since(sent) {
+            Some(after) => after.as_secs_f64(),
+            None => -(sent - at).as_secs_f64(),
+        };
+        let turns = self.turns.lock().expect("no panic");
+        let turns: Vec<String> = turns.iter().rev().take(3).map(|&at| format!("{:+.3}", since(at))).collect();
+        let reads = self.reads.lock().expect("no panic");
+        let end = |address: u8, count: u8| u16::from(address) + u16::from(count);
+        // The line asks for a few registers more, if another read is like this one.
+        let of_it = reads.iter().filter(|read| {
+            let is_near = read.at >= sent && since(read.at) < 40.0 && read.count <= count + 2;
+            is_near && read.address <= address && end(read.address, read.count) >= end(address, count)
+        });
+        let on_line: Vec<String> = of_it
+            .take(6)
+            .map(|read| {
+                let kind = if read.is_reply { "reply" } else { "read" };
+                format!("{kind} {}+{} at {:+.3}", read.address, read.count, since(read.at))
+            })
+            .collect();
+        format!(
+            "{address}+{count}; turns of outages at {turns:?} s from its sending; on the line: {on_line:?}"
+        )
+    }
+}
