@@ -12,7 +12,7 @@ setup(
     description="A node of ROS 2 for the 7Bot V2 arm",
     license="MIT OR Apache-2.0",
     packages=[NAME],
-    package_data={NAME: ["model/*"]},
+    package_data={NAME: ["model/*", "py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -76,6 +76,8 @@ class Client:
     def connect(self) -> None:
         """Waits until states come and commands are heard."""
         self.until(lambda: self.states and self.commands.get_subscription_count(), "states")
+        # Simulated time is 0 before the first /clock.
+        self.until(lambda: self.seconds() > 0.0, "the clock")
 
     def degrees(self) -> list[float]:
         """The newest positions in degrees of the model."""

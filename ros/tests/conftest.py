@@ -60,7 +60,10 @@ class Start:
 
     def __init__(self, folder: Path, stack: ExitStack, domain: int) -> None:
         self._folder, self._stack, self._count = folder, stack, 0
-        self._environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+        # The node with the stand-in of an action is a module of the tests.
+        paths = [str(Path(__file__).parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+        path = os.pathsep.join(filter(None, paths))
+        self._environment = os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": path}
 
     def program(self, words: list[str]) -> Program:
         self._count += 1

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::python::{build, pip, run, works};
+use crate::python::{pip, run, wheel, works};
 use crate::run::{TaskResult, build_host_sim, build_image, root, target_directory};
 
 /// The packages from PyPI, at versions that were tried.
@@ -38,7 +38,7 @@ const NETWORK: &str = "ip link set lo up && exec \"$@\"";
 /// Installs and tests the packages.
 pub(crate) fn check() -> TaskResult {
     let python = environment()?;
-    let wheel = build()?;
+    let wheel = wheel()?;
     let package = copy_of_package()?;
     run(pip(&python).args(["--force-reinstall", "--no-deps"]).args([&wheel, &package]))?;
     check_types(&python)?;
@@ -73,9 +73,9 @@ fn interpreter() -> Option<&'static str> {
     })
 }
 
-/// The package without what setuptools would write into the sources.
+/// The package without what setuptools would write into the sources. Its name is another one, so that it is not imported.
 fn copy_of_package() -> TaskResult<PathBuf> {
-    let copy = folder().join("sevenbot_ros");
+    let copy = folder().join("package");
     if copy.exists() {
         fs::remove_dir_all(&copy)?;
     }

@@ -78,7 +78,6 @@ const STAGES: &[Stage] = &[
             }),
             whole("the Python package", python::check),
             whole("the ROS packages", ros::check),
-            whole("the plugin for LeRobot, with the base classes of LeRobot", lerobot::check),
         ],
         &[
             whole("the page in a browser", || {
@@ -102,6 +101,7 @@ const STAGES: &[Stage] = &[
             cargo("test --release -p motion-core --test all linkage -- --ignored")
         }),
         long("the arm's model in MuJoCo", mujoco::check),
+        long("the plugin for LeRobot, with the base classes of LeRobot", lerobot::check),
         long("LeRobot's own commands, on the simulator and on the image in an emulator", lerobot::commands),
         long("more fuzzing", || {
             fuzz::check(&fuzz::FuzzArgs { seconds: LONG_FUZZ_SECONDS, seed: None, fixed: false })
