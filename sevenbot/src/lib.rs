@@ -59,6 +59,7 @@ pub mod playback;
 pub mod point_path;
 #[cfg(feature = "serial")]
 pub mod ports;
+mod real_time_line;
 pub mod recording;
 pub mod register_text;
 pub mod register_values;

@@ -20,7 +20,7 @@ mod tls;
 use crate::error::OpenError;
 use crate::host_line::HostLine;
 use crate::open_port::OpenPort;
-use crate::simulated::{RealTimeLine, simulated_port};
+use crate::real_time_line::{RealTimeLine, simulated_port};
 
 pub use self::address::{Address, CERTIFICATE_VARIABLE, TOKEN_VARIABLE};
 pub use self::local_server::{LocalServer, Registered, servers, serving};
