@@ -254,14 +254,15 @@ class Driver:
         self._events.changed(f"the arm {arm.chip_id} answers at {arm.port}, firmware {arm.firmware}")
 
     def _disconnect(self) -> None:
+        # First, so that no command of this time leads the arm after the next connection.
+        with self._lock:
+            self._arm = self._measurement = None
         try:
             self._drop(self._lead, "the arm is lost")
             self._close_stream()
         except sevenbot.Error:
+            # The stream is forgotten all the same.
             pass
-        with self._idle:
-            self._arm = self._stream = self._measurement = None
-            self._idle.notify_all()
 
     def _serve(self, arm: sevenbot.Arm, clock: Clock) -> None:
         next_state = next_health = clock.now()
