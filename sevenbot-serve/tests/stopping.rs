@@ -237,13 +237,16 @@ fn what_a_client_wrote_directly_before_it_left_is_carried_out() {
     }
 }
 
-/// The arm does not answer, so the target waits behind its program's read for a second.
+/// No reply of the arm arrives whole for half a second, so the target waits behind its program's read.
 #[test]
 fn a_target_that_waited_too_long_is_dropped() {
     let mut world = World::new(2);
-    world.damages_next_byte = true;
     world.send(0, &read(CHIP_ID.address, 6));
     world.send(0, &[write(TARGET_POSITION.address, &[120]), write(SPEED.address, &[7])].concat());
+    for _ in 0..500 {
+        world.damages_next_byte = true;
+        world.run(1);
+    }
     world.run(1_500);
     let registers = world.arm.registers();
     assert_eq!((registers.get(TARGET_POSITION.address), registers.get(SPEED.address)), (90, 7));
