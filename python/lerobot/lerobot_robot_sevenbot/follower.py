@@ -13,6 +13,7 @@ from . import joints
 from .action_log import ActionLog
 from .config_sevenbot import SevenbotConfig
 from .connection import CALIBRATION, LOGGER, Connection
+from .device import Device
 from .warned import Warned
 
 SHORTEST_APPROACH, LONGEST_APPROACH = 0.1, 60.0
@@ -21,7 +22,7 @@ TOLERANCE = 0.5
 """A smaller change of an action is not worth a warning, in degrees: a measured angle may be this far outside."""
 
 
-class Sevenbot(Robot):
+class Sevenbot(Device, Robot):
     """A 7Bot V2 arm, real or simulated.
 
     Actions and observations have `joint_1.pos` to `joint_6.pos` in degrees, 0 to 180, and `claw.pos` from 0 (closed) to 100
@@ -37,7 +38,6 @@ class Sevenbot(Robot):
         super().__init__(config)
         self.config = config
         self.cameras: dict[str, Any] = make_cameras_from_configs(config.cameras)
-        self._connection: Connection | None = None
         self._stream: sevenbot.Stream | None = None
         self._log = ActionLog(None)
         self._warned = Warned()
@@ -55,25 +55,6 @@ class Sevenbot(Robot):
         numbers = {key: float for kind, is_on in self._kinds.items() if is_on for key in joints.keys(kind)}
         images = {name: (camera.height, camera.width, 3) for name, camera in self.cameras.items()}
         return {**numbers, **images}
-
-    @cached_property
-    def action_features(self) -> dict[str, type]:
-        """The keys of an action."""
-        return dict.fromkeys(joints.keys("pos"), float)
-
-    @property
-    def is_connected(self) -> bool:
-        """Is the arm open?"""
-        return self._connection is not None
-
-    @property
-    def is_calibrated(self) -> bool:
-        """Always: the calibration is in the arm, in its registers `offset`."""
-        return True
-
-    def calibrate(self) -> None:
-        """Has nothing to do, and tells where the calibration is."""
-        LOGGER.info(CALIBRATION)
 
     def configure(self) -> None:
         """Makes the motors hold. An arm that was parked is driven again."""
@@ -94,11 +75,6 @@ class Sevenbot(Robot):
             raise
         arm = self._connection.arm
         LOGGER.info("%s is connected: firmware %s at %s. %s", self, arm.firmware, arm.port, CALIBRATION)
-
-    def _open(self) -> Connection:
-        if self._connection is None:
-            raise ConnectionError(f"{self} is not connected: call connect()")
-        return self._connection
 
     @check_if_not_connected
     def get_observation(self) -> dict[str, Any]:

@@ -10,10 +10,11 @@ from lerobot.utils.decorators import check_if_already_connected, check_if_not_co
 from . import joints
 from .config_sevenbot import SevenbotLeaderConfig
 from .connection import CALIBRATION, LOGGER, Connection
+from .device import Device
 from .hand import Hand
 
 
-class SevenbotLeader(Teleoperator):
+class SevenbotLeader(Device, Teleoperator):
     """A 7Bot V2 arm, real or simulated, whose measured positions are actions.
 
     They have the keys and scales of the robot `sevenbot`, and are within its limits: so a dataset has the actions that the
@@ -27,32 +28,12 @@ class SevenbotLeader(Teleoperator):
         """Opens nothing yet."""
         super().__init__(config)
         self.config = config
-        self._connection: Connection | None = None
         self._hand: Hand | None = None
-
-    @cached_property
-    def action_features(self) -> dict[str, type]:
-        """The keys of an action."""
-        return dict.fromkeys(joints.keys("pos"), float)
 
     @cached_property
     def feedback_features(self) -> dict[str, type]:
         """None: the arm pushes nobody's hand."""
         return {}
-
-    @property
-    def is_connected(self) -> bool:
-        """Is the arm open?"""
-        return self._connection is not None
-
-    @property
-    def is_calibrated(self) -> bool:
-        """Always: the calibration is in the arm, in its registers `offset`."""
-        return True
-
-    def calibrate(self) -> None:
-        """Has nothing to do, and tells where the calibration is."""
-        LOGGER.info(CALIBRATION)
 
     def configure(self) -> None:
         """Switches the motors off. A simulated arm gets a hand."""
@@ -75,11 +56,6 @@ class SevenbotLeader(Teleoperator):
             raise
         arm = self._connection.arm
         LOGGER.info("%s is connected: firmware %s at %s. %s", self, arm.firmware, arm.port, CALIBRATION)
-
-    def _open(self) -> Connection:
-        if self._connection is None:
-            raise ConnectionError(f"{self} is not connected: call connect()")
-        return self._connection
 
     @check_if_not_connected
     def get_action(self) -> dict[str, float]:
