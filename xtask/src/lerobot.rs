@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::python::{folder, pip, run, wheel, works};
+use crate::python::{copy_of, folder, pip, run, wheel, works};
 use crate::run::{TaskResult, build_host_sim, build_image, root};
 
 /// LeRobot without what it depends on: some gigabytes, of which its base classes need little.
@@ -104,13 +104,10 @@ fn need_disk() -> TaskResult {
     .into())
 }
 
-/// The package and the plugin, without what they depend on. pip would leave files beside the sources, so it gets a copy.
+/// The package and the plugin, without what they depend on.
 fn install_plugin(python: &Path) -> TaskResult {
     let copy = folder().join("lerobot-plugin");
-    if copy.exists() {
-        fs::remove_dir_all(&copy)?;
-    }
-    run(Command::new("cp").arg("-r").arg(plugin()).arg(&copy))?;
+    copy_of(&plugin(), &copy)?;
     run(pip(python).args(["--force-reinstall", "--no-deps"]).arg(wheel()?).arg(&copy))
 }
 

@@ -112,6 +112,14 @@ fn test(python: &Path, wheel: &Path) -> TaskResult {
     run(module(&["pytest", "--quiet", "-p", "no:cacheprovider", "--config-file"]).arg(&config).arg(&tests))
 }
 
+/// A copy of a package: setuptools would leave files beside the sources.
+pub(crate) fn copy_of(package: &Path, copy: &Path) -> TaskResult {
+    if copy.exists() {
+        fs::remove_dir_all(copy)?;
+    }
+    run(Command::new("cp").arg("-r").arg(package).arg(copy))
+}
+
 /// Runs a program, and waits for its end.
 pub(crate) fn run(command: &mut Command) -> TaskResult {
     let status = command.status().map_err(|why| format!("cannot start {command:?}: {why}"))?;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::python::{pip, run, wheel, works};
+use crate::python::{copy_of, pip, run, wheel, works};
 use crate::run::{TaskResult, build_host_sim, build_image, root, target_directory};
 
 /// The packages from PyPI, at versions that were tried.
@@ -39,7 +39,9 @@ const NETWORK: &str = "ip link set lo up && exec \"$@\"";
 pub(crate) fn check() -> TaskResult {
     let python = environment()?;
     let wheel = wheel()?;
-    let package = copy_of_package()?;
+    // Its name is another one, so that it is not imported.
+    let package = folder().join("package");
+    copy_of(&root().join("ros/sevenbot_ros"), &package)?;
     run(pip(&python).args(["--force-reinstall", "--no-deps"]).args([&wheel, &package]))?;
     check_types(&python)?;
     build_host_sim()?;
@@ -71,16 +73,6 @@ fn interpreter() -> Option<&'static str> {
         command.args(["-c", VERSION]).stderr(Stdio::null());
         command.status().is_ok_and(|status| status.success())
     })
-}
-
-/// The package without what setuptools would write into the sources. Its name is another one, so that it is not imported.
-fn copy_of_package() -> TaskResult<PathBuf> {
-    let copy = folder().join("package");
-    if copy.exists() {
-        fs::remove_dir_all(&copy)?;
-    }
-    run(Command::new("cp").arg("-r").arg(root().join("ros/sevenbot_ros")).arg(&copy))?;
-    Ok(copy)
 }
 
 /// The types of the installed package.
