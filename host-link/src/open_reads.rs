@@ -28,6 +28,11 @@ impl Patience {
         Duration::from_micros(self.timeout.as_micros().saturating_mul(self.attempts.max(1).into()))
     }
 
+    /// Is the read repeated at all?
+    const fn repeats(self) -> bool {
+        self.attempts > 1
+    }
+
     /// The time between attempt number `sent`, from 1, and the next one.
     fn before_repeat(self, sent: u32, allowance: Duration) -> Duration {
         let doubled = allowance.as_micros().checked_shl(sent.saturating_sub(1)).unwrap_or(u64::MAX);
@@ -61,14 +66,13 @@ impl OpenRead {
         self.sent = self.sent.saturating_add(1);
         self.writes_before = writes;
         let give_up_at = *self.give_up_at.get_or_insert(reply_due + self.patience.total());
-        let is_last = self.patience.attempts <= 1;
         let repeat_at = reply_due + self.patience.before_repeat(self.sent, allowance);
-        self.due = if is_last { give_up_at } else { repeat_at.min(give_up_at) };
+        self.due = if self.patience.repeats() { repeat_at.min(give_up_at) } else { give_up_at };
     }
 
     /// May it be sent again after so many writes? Behind a write it would read what the write changed.
     pub(crate) const fn may_repeat(&self, writes: u64) -> bool {
-        self.patience.attempts > 1 && self.writes_before == writes
+        self.patience.repeats() && self.writes_before == writes
     }
 
     /// Repeating makes no sense, or not yet: wait until it is given up.

@@ -59,6 +59,13 @@ impl Duration {
     }
 }
 
+/// A fraction of a microsecond counts as a whole one, so that a wait for what is left of a time always ends.
+impl From<core::time::Duration> for Duration {
+    fn from(time: core::time::Duration) -> Self {
+        Self(time.as_nanos().div_ceil(1_000).try_into().unwrap_or(u64::MAX))
+    }
+}
+
 impl Add<Duration> for Instant {
     type Output = Self;
 

@@ -5,7 +5,6 @@ use std::sync::Mutex;
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use arm_sim::faults::{ArmFault, FaultLocation};
 use numpy::{Element, PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
@@ -18,7 +17,7 @@ use crate::arrays::{self, each_number, given, is_single, numpy, writing};
 use crate::bulk;
 use crate::errors::{InvalidValue, raised};
 use crate::numbers::{Values, duration};
-use crate::simulation::{SimulationSnapshot, virtual_time};
+use crate::simulation::{self, SimulationSnapshot, fault_location, fault_time};
 use crate::worker::lock;
 
 /// The most arms; each takes some 20 kilobytes.
@@ -192,9 +191,7 @@ impl SimulatedArms {
         seconds: Option<f64>,
     ) -> PyResult<()> {
         let mask = self.mask(mask)?;
-        let fault: ArmFault =
-            fault.parse().map_err(|why| InvalidValue::raise(py, &format!("{fault}: {why}")))?;
-        let time = seconds.map(|seconds| duration(py, seconds)).transpose()?.map(virtual_time);
+        let (fault, time) = (simulation::fault(py, fault)?, fault_time(py, seconds)?);
         self.with(py, |arms| {
             arms.each(mask.as_deref(), |_, arm| {
                 arm.set_fault(fault, time);
@@ -207,10 +204,7 @@ impl SimulatedArms {
     #[pyo3(signature = (mask = None, location = None))]
     fn clear(&self, py: Python<'_>, mask: Option<&Bound<'_, PyAny>>, location: Option<&str>) -> PyResult<()> {
         let mask = self.mask(mask)?;
-        let parse = |text: &str| {
-            text.parse::<FaultLocation>().map_err(|why| InvalidValue::raise(py, &why.to_string()))
-        };
-        let location = location.map(parse).transpose()?;
+        let location = fault_location(py, location)?;
         self.with(py, |arms| arms.each(mask.as_deref(), |_, arm| drop(arm.end_faults(location))));
         Ok(())
     }

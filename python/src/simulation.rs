@@ -73,8 +73,20 @@ fn joint(py: Python<'_>, number: i64) -> PyResult<Joint> {
     joint.ok_or_else(|| InvalidValue::raise(py, &format!("joint {number}: use 1 to 7")))
 }
 
-pub(crate) fn virtual_time(duration: Duration) -> arm_sim::Duration {
-    arm_sim::Duration::from_micros(u64::try_from(duration.as_micros()).unwrap_or(u64::MAX))
+/// A fault by its words.
+pub(crate) fn fault(py: Python<'_>, text: &str) -> PyResult<ArmFault> {
+    text.parse().map_err(|why| InvalidValue::raise(py, &format!("{text}: {why}")))
+}
+
+/// How long a fault lasts; `None`: until it is taken back.
+pub(crate) fn fault_time(py: Python<'_>, seconds: Option<f64>) -> PyResult<Option<arm_sim::Duration>> {
+    Ok(seconds.map(|seconds| duration(py, seconds)).transpose()?.map(Into::into))
+}
+
+/// Where faults are; `None`: everywhere.
+pub(crate) fn fault_location(py: Python<'_>, text: Option<&str>) -> PyResult<Option<FaultLocation>> {
+    let parse = |text: &str| text.parse().map_err(|why| InvalidValue::raise(py, &format!("{why}")));
+    text.map(parse).transpose()
 }
 
 #[pymethods]
@@ -92,7 +104,7 @@ impl Simulation {
         let mut left = duration(py, seconds)?;
         while !left.is_zero() {
             let slice = left.min(ADVANCE_SLICE);
-            self.with(py, |simulation| simulation.advance(virtual_time(slice)))?;
+            self.with(py, |simulation| simulation.advance(slice.into()))?;
             left = left.saturating_sub(slice);
             py.check_signals()?;
         }
@@ -106,9 +118,7 @@ impl Simulation {
     /// The words are those of `host-sim --fault`. A wrong word raises `ValueError` with the list.
     #[pyo3(signature = (fault, seconds = None))]
     fn fault(&self, py: Python<'_>, fault: &str, seconds: Option<f64>) -> PyResult<()> {
-        let fault: ArmFault =
-            fault.parse().map_err(|why| InvalidValue::raise(py, &format!("{fault}: {why}")))?;
-        let time = seconds.map(|seconds| duration(py, seconds)).transpose()?.map(virtual_time);
+        let (fault, time) = (self::fault(py, fault)?, fault_time(py, seconds)?);
         self.with(py, |simulation| simulation.set_fault(fault, time)).map(|_| ())
     }
 
@@ -119,7 +129,7 @@ impl Simulation {
     fn later(&self, py: Python<'_>, seconds: f64, action: &str) -> PyResult<()> {
         let action: arm_sim::Action =
             action.parse().map_err(|why| InvalidValue::raise(py, &format!("{action}: {why}")))?;
-        let time = virtual_time(duration(py, seconds)?);
+        let time = duration(py, seconds)?.into();
         self.with(py, |simulation| simulation.plan(time, action))
     }
 
@@ -136,10 +146,7 @@ impl Simulation {
     /// Returns how often each took effect, as text.
     #[pyo3(signature = (location = None))]
     fn clear(&self, py: Python<'_>, location: Option<&str>) -> PyResult<Vec<String>> {
-        let parse = |text: &str| {
-            text.parse::<FaultLocation>().map_err(|why| InvalidValue::raise(py, &why.to_string()))
-        };
-        let location = location.map(parse).transpose()?;
+        let location = fault_location(py, location)?;
         let ended = self.with(py, |simulation| simulation.end_faults(location))?;
         Ok(ended.iter().map(ToString::to_string).collect())
     }

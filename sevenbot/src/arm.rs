@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 use host_link::{HostEvent, Patience, RequestId};
 use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, OFFSET, SERVO_TEMPERATURE, STATUS_VERSION};
 use protocol_core::registers::map21::Map;
-use protocol_core::time;
 
 use crate::arm_options::ArmOptions;
 use crate::blocking_link::BlockingLink;
@@ -174,8 +173,7 @@ impl Arm {
     }
 
     fn patience(&self, attempts: u32) -> Patience {
-        let micros = u64::try_from(self.options.reply_timeout.as_micros()).unwrap_or(u64::MAX);
-        Patience { attempts: attempts.max(1), timeout: time::Duration::from_micros(micros) }
+        Patience { attempts: attempts.max(1), timeout: self.options.reply_timeout.into() }
     }
 
     /// Runs `work` with at least three attempts for each read.

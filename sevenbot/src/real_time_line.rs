@@ -4,7 +4,6 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use arm_sim::{Simulation, SimulationConfig};
-use protocol_core::time;
 
 use crate::error::PortError;
 use crate::host_line::HostLine;
@@ -64,8 +63,7 @@ impl RealTimeLine {
     /// Lets the arm live until now.
     fn catch_up(&mut self) {
         let lived = Duration::from_micros(self.simulation.now().as_micros());
-        let left = (ON_BEFORE + self.opened.elapsed()).saturating_sub(lived).as_micros();
-        self.simulation.advance(time::Duration::from_micros(u64::try_from(left).unwrap_or(u64::MAX)));
+        self.simulation.advance((ON_BEFORE + self.opened.elapsed()).saturating_sub(lived).into());
     }
 }
 

@@ -157,7 +157,7 @@ impl HostLine for SimulatedLine {
     fn receive(&mut self, timeout: Duration) -> Result<Vec<u8>, PortError> {
         self.simulation.check_plug()?;
         Ok(self.simulation.with(|simulation| {
-            simulation.advance_until(virtual_time(timeout), |simulation| !simulation.received().is_empty());
+            simulation.advance_until(timeout.into(), |simulation| !simulation.received().is_empty());
             simulation.take_received()
         }))
     }
@@ -167,12 +167,8 @@ impl HostLine for SimulatedLine {
     }
 
     fn sleep(&mut self, duration: Duration) {
-        self.simulation.with(|simulation| simulation.advance(virtual_time(duration)));
+        self.simulation.with(|simulation| simulation.advance(duration.into()));
     }
-}
-
-fn virtual_time(duration: Duration) -> time::Duration {
-    time::Duration::from_micros(u64::try_from(duration.as_micros()).unwrap_or(u64::MAX))
 }
 
 #[cfg(test)]
@@ -207,5 +203,16 @@ mod tests {
         while arm.positions().expect("positions")[0].degrees() < 100 {}
         // 10 degrees at the speed 60 of the factory settings, at most 117 degrees/s.
         assert!(start.elapsed() > Duration::from_millis(85), "{:?}", start.elapsed());
+    }
+
+    /// A third of a second is no whole number of microseconds.
+    #[test]
+    fn a_wait_in_slices_of_what_is_left_ends() {
+        let mut line = SharedSimulation::new(Simulation::new(SimulationConfig::default())).line();
+        let end = line.now() + Duration::from_secs(1) / 3;
+        for _ in 0..2 {
+            line.sleep(end.saturating_duration_since(line.now()));
+        }
+        assert!(line.now() >= end);
     }
 }

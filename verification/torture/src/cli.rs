@@ -88,8 +88,7 @@ impl CampaignArgs {
 }
 
 fn virtual_days(days: f64) -> Duration {
-    let time = RealTime::from_secs_f64(days * 86_400.0);
-    Duration::from_micros(u64::try_from(time.as_micros()).unwrap_or(u64::MAX))
+    RealTime::from_secs_f64(days * 86_400.0).into()
 }
 
 #[cfg(test)]
