@@ -13,6 +13,7 @@
 mod disturbance;
 mod inertia;
 mod obstacles;
+mod outside;
 mod pose;
 mod sine;
 mod supply;
@@ -32,6 +33,7 @@ use crate::fault_count::FaultCount;
 use crate::servo::units::STEP;
 use crate::servo::{Servo, ServoConfig, ServoFault};
 pub use obstacles::{HIGHEST_STIFFNESS, STRONGEST_PUSH, Thing, Wall};
+pub use outside::OutsideState;
 use pose::{AngleScale, JointSines};
 use supply::Supply;
 pub use supply::{SupplyFault, UnknownSupplyFault};

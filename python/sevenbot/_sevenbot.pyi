@@ -40,6 +40,7 @@ __all__ = [
     "SimulationSnapshot",
     "Status",
     "Stream",
+    "StreamCounts",
     "Tip",
     "TooFar",
     "UnknownRegister",
@@ -47,6 +48,7 @@ __all__ = [
     "forward",
     "inverse",
     "limits",
+    "model",
     "ports",
 ]
 
@@ -137,7 +139,8 @@ def limits() -> tuple[NDArray[float64], NDArray[float64]]:
 
     The linkage keeps joints 2 and 3 together: joint 2 + joint 3 - 65 is 19 to 161.
     """
-def ports(baud: int = 115200) -> list[tuple[str, str, int, str]]:
+def model(format: Literal["urdf", "mjcf"]) -> str: ...
+def ports(baud: int = 115200) -> list[tuple[str, str, int, str, str]]:
     """The serial ports of this machine with an arm: name, description, device id (register 11) and firmware version.
 
     Asks all ports at the same time, at `baud` bits per second, for about half a second.
@@ -158,6 +161,7 @@ class Arm:
         *,
         id: int | None = None,
         chip: str | None = None,
+        token: str | None = None,
         baud: int = 115200,
         timeout: float = 0.5,
         attempts: int = 3,
@@ -502,6 +506,9 @@ class SimulatedArms:
     TIP: ClassVar[slice]
     BLOCKED: ClassVar[slice]
     AGE: ClassVar[slice]
+    SET_POINTS: ClassVar[slice]
+    SET_VELOCITIES: ClassVar[slice]
+    DRIVES: ClassVar[slice]
     def __new__(
         cls,
         n: int,
@@ -524,6 +531,19 @@ class SimulatedArms:
     def step(self, actions: NDArray[float32], dt: float = 0.02, out: None = None) -> NDArray[float32]: ...
     @overload
     def step(self, actions: ArrayLike | None, dt: float = 0.02, out: None = None) -> NDArray[float64]: ...
+    def send(self, actions: ArrayLike, period: float = 0.02) -> None: ...
+    @overload
+    def exchange(
+        self, measured: ArrayLike, dt: float = 0.002, out: None = None
+    ) -> NDArray[float64]: ...
+    @overload
+    def exchange(self, measured: ArrayLike, dt: float, out: NDArray[float64]) -> NDArray[float64]: ...
+    @overload
+    def exchange(self, measured: ArrayLike, dt: float = 0.002, *, out: NDArray[float64]) -> NDArray[float64]: ...
+    @overload
+    def read(self, out: _Numbers) -> _Numbers: ...
+    @overload
+    def read(self, out: None = None) -> NDArray[float64]: ...
     @overload
     def observe(self, out: _Numbers) -> _Numbers:
         """What the last reads told: `out`, or a new array (n, 32). No time passes."""
@@ -553,6 +573,9 @@ class SimulatedArms:
         """Writes registers of the arms of the mask, or of all, in one frame each: `arms.set("push-limit", 50)`. Names and numbers
         are those of docs/registers.md. An arm refuses a write that its rules forbid.
         """
+    def scale_servos(
+        self, torque: ArrayLike, friction: ArrayLike, mask: ArrayLike | None = None
+    ) -> None: ...
     def snapshot(self, arm: int) -> SimulationSnapshot:
         """A copy of an arm as it is now, by its number from 0: for `reset`, and for `Simulation.restore`."""
     @property
@@ -818,9 +841,25 @@ class Stream:
         second; else `TooFar` is raised, unless the stream has an `approach`. Then the call takes that time. The first point below
         the table or in the base gives a `GuardWarning`. After `Simulation.restore` the next point is a first one again.
         """
+    def latest(self, angles: _Goals) -> StreamCounts: ...
+    @property
+    def counts(self) -> StreamCounts: ...
     @property
     def period(self) -> float:
         """The time between two points in seconds."""
+
+@final
+class StreamCounts:
+    @property
+    def sent(self) -> int: ...
+    @property
+    def skipped(self) -> int: ...
+    @property
+    def repeated(self) -> int: ...
+    @property
+    def missed(self) -> int: ...
+    @property
+    def watchdog(self) -> int: ...
 
 @final
 class Recording:

@@ -5,8 +5,7 @@ use std::io::{self, Write};
 use clap::Args;
 use serde::Serialize;
 use sevenbot::network::mdns::{self, Announced};
-use sevenbot::network::{self, LocalServer};
-use sevenbot::ports::{PortInfo, ProbeResult, available, probe};
+use sevenbot::ports::{PortInfo, ProbeResult, probe, reachable};
 
 use crate::command_error::CommandError;
 use crate::printer::Printable;
@@ -35,11 +34,7 @@ pub(crate) struct PortsArgs {
 pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), CommandError> {
     let named = args.ports.iter().chain(&session.port);
     let named = named.map(|name| PortInfo { name: name.clone(), description: String::new() });
-    let served = if args.ports.is_empty() { network::servers() } else { Vec::new() };
-    let mut asked: Vec<PortInfo> = served.iter().map(served_port).collect();
-    if args.ports.is_empty() {
-        asked.extend(available().into_iter().filter(|port| network::serving(&port.name).is_none()));
-    }
+    let mut asked = if args.ports.is_empty() { reachable() } else { Vec::new() };
     for port in named {
         if asked.iter().all(|known| known.name != port.name) {
             asked.push(port);
@@ -61,18 +56,6 @@ fn announced_line(arm: Announced) -> PortLine {
         description: format!("{scheme}://{address}"),
         arm: None,
         no_arm: Some("announced on the network".to_owned()),
-    }
-}
-
-/// A server in the list of ports.
-fn served_port(server: &LocalServer) -> PortInfo {
-    let port = server.port.display();
-    match &server.name {
-        Some(name) => PortInfo {
-            name: format!("sevenbot://{name}"),
-            description: format!("{}, for {port}", server.address()),
-        },
-        None => PortInfo { name: server.address(), description: format!("for {port}") },
     }
 }
 
