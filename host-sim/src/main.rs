@@ -18,6 +18,7 @@ use clap::Parser;
 use host_sim::bus_line::BusLine;
 use host_sim::cli::{Options, in_one_line};
 use host_sim::clock::RealClock;
+use host_sim::angle_log::AngleLog;
 use host_sim::control::{self, socket::ControlSocket};
 use host_sim::eeprom::Eeprom;
 use host_sim::event_loop::EventLoop;
@@ -132,7 +133,8 @@ fn run_servo_socket(
     signals: &mut Signals,
 ) -> Result<(), Failure> {
     let plant = plant_alone(options, clock)?;
-    let socket = ServoSocket::listen(path)?;
+    let angles = options.angles.as_deref().map(AngleLog::create).transpose().map_err(Failure::Running)?;
+    let socket = ServoSocket::listen(path, angles)?;
     print_ready(&[path.to_owned()]);
     socket.serve(plant, clock, signals).map_err(Failure::Running)
 }
