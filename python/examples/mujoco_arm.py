@@ -9,7 +9,7 @@ push. MuJoCo tells the force on the post.
 
 from __future__ import annotations
 
-import mujoco
+import mujoco  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
 from numpy.typing import NDArray
 

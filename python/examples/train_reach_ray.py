@@ -38,7 +38,7 @@ class Worker:
 def start(workers: int) -> list[Any]:
     """Workers that share the arms of a generation."""
     count = 2 * train_reach.PAIRS // workers
-    return [Worker.remote(count) for _ in range(workers)]
+    return [Worker.remote(count) for _ in range(workers)]  # type: ignore[attr-defined]
 
 
 def rewards(workers: list[Any], policies: Array, seed: int, goals: Array) -> Array:
