@@ -35,7 +35,10 @@ pub(crate) fn token(py: Python<'_>, port: &str, token: Option<String>) -> PyResu
     if Address::parse(port).is_some_and(|address| address.takes_token()) {
         return Ok(Some(token));
     }
-    Err(InvalidType::raise(py, "a token goes with a port as \"tcp://HOST:PORT\", \"tls://HOST:PORT\" or \"sevenbot://NAME\""))
+    Err(InvalidType::raise(
+        py,
+        "a token goes with a port as \"tcp://HOST:PORT\", \"tls://HOST:PORT\" or \"sevenbot://NAME\"",
+    ))
 }
 
 /// The arm that is wanted: its number (register 11), its chip, or any.

@@ -49,7 +49,11 @@ pub(crate) struct PacedStream<'a> {
 }
 
 impl<'a> PacedStream<'a> {
-    pub(crate) fn open(arm: &'a mut Arm, order: StreamOrder, stops: &Arc<AtomicU64>) -> Result<Self, StreamError> {
+    pub(crate) fn open(
+        arm: &'a mut Arm,
+        order: StreamOrder,
+        stops: &Arc<AtomicU64>,
+    ) -> Result<Self, StreamError> {
         let StreamOrder { options, rule, slot, simulation } = order;
         let mut stream = SetPointStream::open(arm, options)?;
         let pose = stream.arm().standing()?.targets;

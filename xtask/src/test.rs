@@ -101,6 +101,7 @@ const STAGES: &[Stage] = &[
         }),
         long("the arm's model in MuJoCo", mujoco::check),
         long("the ROS packages", ros::check),
+        long("many arms in two processes, with Ray", python::ray),
         long("the plugin for LeRobot, with the base classes of LeRobot", lerobot::check),
         long("LeRobot's own commands, on the simulator and on the image in an emulator", lerobot::commands),
         long("more fuzzing", || {

@@ -106,17 +106,35 @@ def hand(tmp_path: Path) -> Path:
     return path
 
 
+@dataclass(frozen=True)
+class EmulatedArm:
+    """The image for the arm in an emulator: its port, and a file of the true angles of its simulated servos."""
+
+    port: Path
+    angles: Path
+
+    def true_path(self, log: Log, rows: slice) -> tuple[NDArray[np.float64], Rows]:
+        """The times of the log's clock and the true angles, from the first to the last of these rows of a log."""
+        table = np.loadtxt(self.angles, delimiter=",")
+        # The file has the time since 1970.
+        times = table[:, 0] - (time.time() - time.monotonic())
+        begin, *_, end = log.times[rows]
+        inside = (times >= begin) & (times <= end)
+        return times[inside], table[inside, 1:]
+
+
 @pytest.fixture
-def emulated_arm(tmp_path: Path) -> Iterator[str]:
-    """The port of the image for the arm in an emulator: `cargo xtask emulate`."""
-    link = tmp_path / "arm"
-    emulator = subprocess.Popen([os.environ["XTASK"], "emulate", "--no-build", "--link", link])
+def emulated_arm(tmp_path: Path) -> Iterator[EmulatedArm]:
+    """`cargo xtask emulate`."""
+    arm = EmulatedArm(tmp_path / "arm", tmp_path / "angles.csv")
+    options = ["--no-build", "--link", arm.port, "--angles", arm.angles]
+    emulator = subprocess.Popen([os.environ["XTASK"], "emulate", *options])
     try:
         deadline = time.monotonic() + START_UP
-        while not answers(link):
+        while not answers(arm.port):
             assert time.monotonic() < deadline and emulator.poll() is None, "the emulated arm does not start"
             time.sleep(0.2)
-        yield str(link)
+        yield arm
     finally:
         emulator.send_signal(signal.SIGTERM)
         emulator.wait(timeout=TIMEOUT)

@@ -90,11 +90,7 @@ fn connect_named(_: &str, _: Option<&str>) -> Result<Box<dyn Stream>, OpenError>
 }
 
 /// `host`: the connection is encrypted, and the certificate is for this host.
-fn connect_tcp(
-    address: &str,
-    host: Option<&str>,
-    token: Option<&str>,
-) -> Result<Box<dyn Stream>, OpenError> {
+fn connect_tcp(address: &str, host: Option<&str>, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
     let addresses = std::net::ToSocketAddrs::to_socket_addrs(address).map_err(|error| failed(&error))?;
     let mut last = OpenError::NotFound;
     for address in addresses {
@@ -228,6 +224,9 @@ mod tests {
     fn no_server_is_an_error() {
         let name = Address::Name("no server has this name".to_owned());
         assert!(matches!(SocketLine::connect(&name, None), Err(OpenError::NotFound)));
-        assert!(matches!(SocketLine::connect(&Address::Unix("/none".into()), None), Err(OpenError::NotFound)));
+        assert!(matches!(
+            SocketLine::connect(&Address::Unix("/none".into()), None),
+            Err(OpenError::NotFound)
+        ));
     }
 }

@@ -50,7 +50,8 @@ pub(super) fn exchange<T: Number, N: Number>(
         let value = |kind: usize| measured.get(kind * JOINTS + index).map_or(f64::NAN, |value| value.widen());
         arm.plant_mut().measure(joint, state([0, 1, 2].map(value)));
     }
-    let set_points = |arm: &Simulation| Joint::ALL.map(|joint| f64::from(arm.plant().set_point(joint)) / 1_000.0);
+    let set_points =
+        |arm: &Simulation| Joint::ALL.map(|joint| f64::from(arm.plant().set_point(joint)) / 1_000.0);
     let before = set_points(arm);
     arm.advance(time);
     let after = set_points(arm);

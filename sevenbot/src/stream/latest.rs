@@ -227,7 +227,10 @@ mod tests {
             points.offer(after(millis), &action(degrees));
             assert_eq!(points.next(after(millis)), None);
         }
-        assert_eq!((points.wake_at(), points.next(after(20))), (Some(after(20)), Some(LatestStep::Send(action(93)))));
+        assert_eq!(
+            (points.wake_at(), points.next(after(20))),
+            (Some(after(20)), Some(LatestStep::Send(action(93))))
+        );
         let counts = LatestCounts { sent: 2, skipped: 2, ..LatestCounts::default() };
         assert_eq!(points.counts(), counts);
     }
@@ -284,7 +287,8 @@ mod tests {
 
     #[test]
     fn without_a_watchdog_the_last_point_is_repeated_for_ever() {
-        let options = StreamOptions::new(20).expect("a period").with_watchdog(0, super::super::WatchdogAction::Hold);
+        let options =
+            StreamOptions::new(20).expect("a period").with_watchdog(0, super::super::WatchdogAction::Hold);
         let mut points = LatestPoints::new(options);
         points.offer(START, &action(90));
         assert_eq!(sent_until(&mut points, after(100_000)).len(), 5_000);
