@@ -105,11 +105,11 @@ struct ServoClass {
 const LARGE: ServoClass = ServoClass { name: "large", joint: Joint::ALL[0] };
 const SMALL: ServoClass = ServoClass { name: "small", joint: Joint::ALL[6] };
 
-/// The class of the servo of one of joints 1 to 6, by its name in the model.
-fn class_of(name: &str) -> &'static str {
-    let index = JOINT_NAMES.iter().position(|other| *other == name).unwrap_or_default();
-    let is_large = ServoParameters::of(Joint::ALL[index]) == ServoParameters::of(LARGE.joint);
-    if is_large { LARGE.name } else { SMALL.name }
+/// The class of the servo of one of joints 1 to 6, by its name in the model; `None` for a passive joint.
+fn class_of(name: &str) -> Option<(&'static str, String)> {
+    let (joint, _) = Joint::ALL.into_iter().zip(JOINT_NAMES).find(|(_, other)| *other == name)?;
+    let is_large = ServoParameters::of(joint) == ServoParameters::of(LARGE.joint);
+    Some(text("class", if is_large { LARGE.name } else { SMALL.name }))
 }
 
 /// From micronewton metres, and from gram square millimetres times 1000, to newton metres and kilogram square metres.
@@ -215,9 +215,8 @@ fn mass(out: &mut XmlDocument, kilograms: f64, centre: Axes) -> io::Result<()> {
 /// A joint, with its servo if it is one of joints 1 to 6.
 fn hinge(out: &mut XmlDocument, name: &str, axis: Axes, range: [f64; 2]) -> io::Result<()> {
     let range = range.map(number).join(" ");
-    let class = JOINT_NAMES.contains(&name).then(|| text("class", class_of(name)));
     let mut words = vec![text("name", name), text("type", "hinge"), ("axis", triple(axis)), ("range", range)];
-    words.extend(class);
+    words.extend(class_of(name));
     out.empty("joint", &words)
 }
 
@@ -234,8 +233,9 @@ fn equality(out: &mut XmlDocument) -> io::Result<()> {
 fn actuators(out: &mut XmlDocument) -> io::Result<()> {
     out.begin("actuator", &[])?;
     for name in JOINT_NAMES {
-        let class = text("class", class_of(name));
-        out.empty("position", &[text("name", name), text("joint", name), text("inheritrange", "1"), class])?;
+        let mut words = vec![text("name", name), text("joint", name), text("inheritrange", "1")];
+        words.extend(class_of(name));
+        out.empty("position", &words)?;
     }
     out.end()
 }

@@ -89,21 +89,35 @@ def lerobot(tmp_path: Path) -> LeRobot:
     return LeRobot(tmp_path)
 
 
-@pytest.fixture
-def hand(tmp_path: Path) -> Path:
+def led(path: Path, speed: float) -> Path:
     """A movement in which each joint has its own rhythm: a path that does not repeat itself.
 
     The hand waits first, as a person does, until the follower has come.
     """
     middle = np.array([90.0, 90.0, 70.0, 90.0, 90.0, 90.0, 42.0])
-    way = np.array([40.0, 12.0, 12.0, 30.0, 25.0, 45.0, 35.0])
-    rhythm = np.array([1.0, 2.0, 3.0, 1.5, 2.5, 0.5, 2.0])
+    way = np.array([40.0, 18.0, 18.0, 30.0, 25.0, 45.0, 35.0])
+    rhythm = speed * np.array([1.0, 2.0, 3.0, 1.5, 2.5, 0.5, 2.0])
     times = np.arange(0, 16, 0.05)
     moved = np.maximum(times - 4, 0)[:, None]
     angles = middle + way * np.sin(moved * rhythm * 2 * math.pi / 12)
-    path = tmp_path / "hand.txt"
     sevenbot.Recording.from_points(times, angles).save(path)
     return path
+
+
+@pytest.fixture
+def hand(tmp_path: Path) -> Path:
+    """A hand that moves joints at up to 37 degrees a second."""
+    return led(tmp_path / "hand.txt", 1.0)
+
+
+@pytest.fixture
+def slow_hand(tmp_path: Path) -> Path:
+    """A hand that moves joints at up to 12 degrees a second.
+
+    The emulator has the time of the computer. On a busy one it stands still for 0.1 to 0.3 s, and then each joint catches up at a speed of
+    its own, off the path by up to the way that it missed. So the path is as exact as the hand is slow.
+    """
+    return led(tmp_path / "hand.txt", 1 / 3)
 
 
 @dataclass(frozen=True)

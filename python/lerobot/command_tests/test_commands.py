@@ -129,9 +129,11 @@ def test_record_and_replay_on_a_simulated_arm(lerobot: LeRobot, hand: Path) -> N
     assert away(recorded.measured[2 : rows.stop], recorded.true[: rows.stop + 1]) < 1
 
 
-def test_record_and_replay_on_the_emulated_image(lerobot: LeRobot, hand: Path, emulated_arm: EmulatedArm) -> None:
+def test_record_and_replay_on_the_emulated_image(
+    lerobot: LeRobot, slow_hand: Path, emulated_arm: EmulatedArm
+) -> None:
     robot = ("--robot.type=sevenbot", f"--robot.port={emulated_arm.port}", "--robot.id=arm")
-    runs = record_and_replay(lerobot, hand, *robot)
+    runs = record_and_replay(lerobot, slow_hand, *robot)
     logs = (runs.recorded, runs.replayed)
     paths = [emulated_arm.true_path(log, runs.rows) for log in logs]
     check_same_path("true", paths[0][1], paths[1][1])
@@ -143,8 +145,8 @@ def test_record_and_replay_on_the_emulated_image(lerobot: LeRobot, hand: Path, e
 def measured_ages(log: Log, rows: slice, times: NDArray[np.float64], path: Rows) -> NDArray[np.float64]:
     """How old each measured angle was, in seconds: the joint was there, within a degree, at some time not long before.
 
-    The emulator has the time of the computer, and its servos answer through sockets. On a busy computer an answer takes longer
-    than on a servo bus, and the seven angles of a row are not of the same moment. So they do not lie on the path together.
+    The servos of the emulator answer through sockets. On a busy computer an answer takes longer than on a servo bus, and the seven
+    angles of a row are not of the same moment. So they do not lie on the path together, and the true path is compared.
     """
     ages = []
     for moment, measured in zip(log.times[rows], log.measured[rows], strict=True):

@@ -5,7 +5,7 @@ use std::ops::Range;
 use arm_sim::plant::OutsideState;
 use arm_sim::{Joint, Simulation};
 use motion_core::servo_bus::Torque;
-use protocol_core::time::{Duration, Instant};
+use protocol_core::time::Duration;
 
 use super::observation::Number;
 use super::{JOINTS, StepError};
@@ -27,16 +27,26 @@ const MOST: f64 = 100_000.0;
 
 /// The first measurement that is no number where the position is one.
 pub(super) fn check<T: Number>(measured: &[T]) -> Result<(), StepError> {
-    for (arm, row) in measured.as_chunks::<MEASURED>().0.iter().enumerate() {
-        for joint in 0..JOINTS {
-            let values = [0, 1, 2].map(|kind| row[kind * JOINTS + joint].widen());
+    for (arm, row) in measured.chunks(MEASURED).enumerate() {
+        for joint in 1..=JOINTS {
+            let values = of_joint(row, joint);
             let wrong = values.into_iter().find(|value| !(-MOST..=MOST).contains(value));
-            if let Some(value) = wrong.filter(|_| !values[0].is_nan()) {
-                return Err(StepError::Measured { arm, joint: joint + 1, value });
+            if let Some(value) = wrong.filter(|_| !is_inside(values)) {
+                return Err(StepError::Measured { arm, joint, value });
             }
         }
     }
     Ok(())
+}
+
+/// Position, velocity and load of a joint, by its number from 1.
+fn of_joint<T: Number>(row: &[T], joint: usize) -> [f64; 3] {
+    [0, 1, 2].map(|kind| row.get(kind * JOINTS + joint - 1).map_or(f64::NAN, |value| value.widen()))
+}
+
+/// Does the simulation here move the joint?
+const fn is_inside([position, ..]: [f64; 3]) -> bool {
+    position.is_nan()
 }
 
 /// Tells the arm what was measured, lets time pass, and writes what the servos want.
@@ -46,16 +56,15 @@ pub(super) fn exchange<T: Number, N: Number>(
     time: Duration,
     wanted: &mut [N],
 ) {
-    for (joint, index) in Joint::ALL.into_iter().zip(0..) {
-        let value = |kind: usize| measured.get(kind * JOINTS + index).map_or(f64::NAN, |value| value.widen());
-        arm.plant_mut().measure(joint, state([0, 1, 2].map(value)));
+    for joint in Joint::ALL {
+        arm.plant_mut().measure(joint, state(of_joint(measured, joint.number().into())));
     }
     let set_points =
         |arm: &Simulation| Joint::ALL.map(|joint| f64::from(arm.plant().set_point(joint)) / 1_000.0);
     let before = set_points(arm);
     arm.advance(time);
     let after = set_points(arm);
-    let seconds = (Instant::ZERO + time).as_micros() as f64 / 1e6;
+    let seconds = std::time::Duration::from_micros(time.as_micros()).as_secs_f64();
     let velocities = after.into_iter().zip(before).map(|(after, before)| (after - before) / seconds);
     let drives = Joint::ALL.map(|joint| drive(arm.plant().torque(joint)));
     let numbers = after.into_iter().chain(velocities).chain(drives);
@@ -63,9 +72,10 @@ pub(super) fn exchange<T: Number, N: Number>(
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "checked to be small")]
-fn state([position, velocity, load]: [f64; 3]) -> Option<OutsideState> {
+fn state(values: [f64; 3]) -> Option<OutsideState> {
+    let [position, velocity, load] = values;
     let thousandths = |value: f64| (value * 1_000.0).round() as i32;
-    (!position.is_nan()).then(|| OutsideState {
+    (!is_inside(values)).then(|| OutsideState {
         angle: thousandths(position),
         velocity: thousandths(velocity),
         load: (load.clamp(-100.0, 100.0) * 10.0).round() as i16,
