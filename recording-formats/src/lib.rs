@@ -12,6 +12,7 @@
 #![forbid(unsafe_code)]
 
 mod cdr;
+mod convert;
 mod csv;
 mod diagnosis;
 mod format;
@@ -24,6 +25,7 @@ mod topics;
 mod write;
 mod writer;
 
+pub use convert::convert;
 pub use format::Format;
 pub use mcap_reader::McapReadError;
 pub use read::{ReadError, read};

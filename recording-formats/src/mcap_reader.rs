@@ -3,7 +3,7 @@
 //! A file without an end is read as far as it goes.
 
 use std::collections::BTreeMap;
-use std::io::Read;
+use std::io::{self, Read};
 use std::time::Duration;
 
 use mcap::io::MessageReader;
@@ -64,8 +64,11 @@ pub enum McapReadError {
     Unreadable(String),
 }
 
-/// Reads the recording.
-pub(crate) fn read(source: impl Read) -> Result<Recording, ReadError> {
+/// Reads the recording, and passes each message on.
+pub(crate) fn read(
+    source: impl Read,
+    mut pass_on: impl FnMut(&Message) -> io::Result<()>,
+) -> Result<Recording, ReadError> {
     let options = LinearReaderOptions::default()
         .with_prevalidate_chunk_crcs(true)
         .with_validate_data_section_crc(true)
@@ -73,7 +76,10 @@ pub(crate) fn read(source: impl Read) -> Result<Recording, ReadError> {
     let mut tracks = Tracks::default();
     for message in MessageReader::new_with_options(source, options) {
         match message {
-            Ok(message) => tracks.add(&message)?,
+            Ok(message) => {
+                tracks.add(&message)?;
+                pass_on(&message)?;
+            }
             Err(McapError::Io(error)) => return Err(error.into()),
             Err(McapError::UnsupportedCompression(name)) => {
                 return Err(McapReadError::Compressed(name).into());

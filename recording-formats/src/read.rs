@@ -4,6 +4,7 @@
 
 use std::io::{self, Read};
 
+use mcap::Message;
 use sevenbot::recording::{Recording, RecordingError};
 
 use crate::csv;
@@ -53,11 +54,19 @@ pub enum ReadError {
 ///
 /// # Errors
 /// The source cannot be read, or is no whole recording. [`ReadError::Damaged`] has what can be read.
-pub fn read(mut source: impl Read) -> Result<Recording, ReadError> {
+pub fn read(source: impl Read) -> Result<Recording, ReadError> {
+    read_and_pass_on(source, |_| Ok(()))
+}
+
+/// The same, and passes on each message of an MCAP file.
+pub(crate) fn read_and_pass_on(
+    mut source: impl Read,
+    pass_on: impl FnMut(&Message) -> io::Result<()>,
+) -> Result<Recording, ReadError> {
     let mut bytes = Vec::new();
     source.by_ref().take(START).read_to_end(&mut bytes)?;
     if bytes.starts_with(mcap::MAGIC) {
-        return mcap_reader::read(bytes.as_slice().chain(source));
+        return mcap_reader::read(bytes.as_slice().chain(source), pass_on);
     }
     if length(&bytes) == START && !is_recording(&bytes) {
         return Err(RecordingError::NotARecording.into());

@@ -86,12 +86,7 @@ impl<W: Write> McapWriter<W> {
     /// # Errors
     /// Those of the output.
     pub fn new(out: W, layout: McapLayout) -> io::Result<Self> {
-        let options = WriteOptions::new()
-            .compression(None)
-            .profile("ros2")
-            .library(concat!("sevenbot ", env!("CARGO_PKG_VERSION")))
-            .disable_seeking(true)
-            .use_chunks(layout == McapLayout::Indexed);
+        let options = options().use_chunks(layout == McapLayout::Indexed);
         Ok(Self {
             writer: options.create(NoSeek::new(out)).map_err(io_error)?,
             layout,
@@ -191,7 +186,13 @@ impl<W: Write> McapWriter<W> {
     }
 }
 
-fn io_error(error: McapError) -> io::Error {
+/// How all files are written.
+pub(crate) fn options() -> WriteOptions {
+    let library = concat!("sevenbot ", env!("CARGO_PKG_VERSION"));
+    WriteOptions::new().compression(None).profile("ros2").library(library).disable_seeking(true)
+}
+
+pub(crate) fn io_error(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,
         other => io::Error::other(other),

@@ -11,18 +11,12 @@ use crate::command_error::CommandError;
 
 /// Reads a recording in any format; `-` is standard input.
 pub(crate) fn recording(path: &Path) -> Result<Recording, CommandError> {
-    any_recording(path)?.map_err(|error| match error {
-        ReadError::Damaged { .. } => CommandError::file(
-            path,
-            format!("{error}. `sevenbot convert` writes what can be read to a new file"),
-        ),
+    recording_formats::read(open(path)?).map_err(|error| match error {
+        ReadError::Damaged { .. } => {
+            CommandError::file(path, format!("{error}: `sevenbot convert` writes them to a new file"))
+        }
         other => CommandError::file(path, other),
     })
-}
-
-/// The same, with what is wrong in the file itself apart from what keeps it from being opened.
-pub(crate) fn any_recording(path: &Path) -> Result<Result<Recording, ReadError>, CommandError> {
-    Ok(recording_formats::read(open(path)?))
 }
 
 /// Reads a text that is shorter than `longest` bytes; `-` is standard input.
@@ -39,7 +33,8 @@ pub(crate) fn short_text(path: &Path, longest: u64) -> Result<String, CommandErr
     String::from_utf8(bytes).map_err(|_| CommandError::file(path, "this is not text in UTF-8"))
 }
 
-fn open(path: &Path) -> Result<Box<dyn Read>, CommandError> {
+/// Opens a file; `-` is standard input.
+pub(crate) fn open(path: &Path) -> Result<Box<dyn Read>, CommandError> {
     if path.as_os_str() == "-" {
         return Ok(Box::new(io::stdin().lock()));
     }

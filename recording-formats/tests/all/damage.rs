@@ -1,6 +1,6 @@
 //! MCAP files that are cut off, as a kill or a full disk leaves them, and files with wrong bytes.
 
-use recording_formats::{McapLayout, McapReadError, ReadError, read};
+use recording_formats::{Format, McapLayout, McapReadError, ReadError, convert, read};
 use sevenbot::recording::{Moment, Recording};
 
 use crate::{mcap_bytes, recording};
@@ -46,6 +46,18 @@ fn a_cut_file_says_so() {
     assert!(said.starts_with("the file ends in the middle; 51 moments, 1.0 s, can be read"), "{said}");
     let said = read(&bytes[..100]).expect_err("it is cut off").to_string();
     assert_eq!(said, "the file ends in the middle, before its first moment");
+}
+
+#[test]
+fn a_converted_cut_file_is_whole_and_has_all_its_messages() {
+    let bytes = mcap_bytes(&recording(100), McapLayout::Indexed);
+    let mut whole = Vec::new();
+    let converted = convert(&bytes[..bytes.len() * 3 / 4], Format::Mcap, &mut whole);
+    assert!(matches!(converted, Err(ReadError::Damaged { .. })), "it says that this is not all");
+    let again = read(whole.as_slice()).expect("a whole file");
+    assert!(again.moments().eq(recording(100).moments().take(51)));
+    let summary = mcap::Summary::read(&whole).expect("a file").expect("an index");
+    assert_eq!(summary.stats.expect("statistics").message_count, 2 * 51 + 5);
 }
 
 #[test]

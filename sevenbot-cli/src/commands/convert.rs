@@ -1,12 +1,11 @@
 //! `convert`: a recording in another format.
 
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use recording_formats::{Format, ReadError, write};
+use recording_formats::{Format, ReadError, convert};
 use serde::Serialize;
-use sevenbot::recording::Recording;
 
 use crate::command_error::CommandError;
 use crate::input_file;
@@ -22,6 +21,7 @@ Examples:
   sevenbot convert wave.txt wave.csv       for a spreadsheet
   sevenbot convert run.mcap run.txt        then `sevenbot play run.txt`
   sevenbot convert run.mcap - --to csv     to standard output
+  sevenbot convert cut.mcap whole.mcap     an end for a file of a killed program
 
 Needs no arm. The end of OUTPUT's name tells its format:
   .txt   text, as `sevenbot record` writes it: degrees
@@ -33,7 +33,7 @@ is converted, also of a bag of this project's ROS 2 node. Velocities, loads and
 targets are in MCAP files of `sevenbot record --mcap`, and in no other format.
 
 Of a file that is cut off or damaged, what can be read is converted, and exit
-status 1 says so.")]
+status 1 says so. From MCAP to MCAP all topics are kept.")]
 pub(crate) struct ConvertArgs {
     /// The recording; - is standard input.
     input: PathBuf,
@@ -82,9 +82,12 @@ pub(crate) fn run(session: &mut Session, args: &ConvertArgs) -> Result<(), Comma
     let is_stdout = args.output.as_os_str() == "-";
     let file = (!is_stdout).then(|| OutputFile::open(&args.output, Some(&args.input), args.force));
     let file = file.transpose()?;
-    let (recording, damage) = readable(&args.input)?;
     let mut bytes = Vec::new();
-    write(&recording, format, &mut bytes)?;
+    let (recording, damage) = match convert(input_file::open(&args.input)?, format, &mut bytes) {
+        Ok(recording) => (recording, None),
+        Err(ReadError::Damaged { readable, cause }) => (readable, Some(cause)),
+        Err(error) => return Err(CommandError::file(&args.input, error)),
+    };
     match file {
         None => session.printer.print_raw(&bytes)?,
         Some(file) => {
@@ -94,7 +97,8 @@ pub(crate) fn run(session: &mut Session, args: &ConvertArgs) -> Result<(), Comma
             session.printer.print(&Converted { file, moments, seconds })?;
         }
     }
-    damage.map_or(Ok(()), Err)
+    let failed = |cause| CommandError::file(&args.input, format!("{cause}: what can be read was converted"));
+    damage.map_or(Ok(()), |cause| Err(failed(cause)))
 }
 
 fn format(args: &ConvertArgs) -> Result<Format, CommandError> {
@@ -105,16 +109,4 @@ fn format(args: &ConvertArgs) -> Result<Format, CommandError> {
             args.output.display()
         ))
     })
-}
-
-/// The recording, or what can be read of it, and what is wrong then.
-fn readable(path: &Path) -> Result<(Recording, Option<CommandError>), CommandError> {
-    match input_file::any_recording(path)? {
-        Ok(recording) => Ok((recording, None)),
-        Err(ReadError::Damaged { readable, cause }) => {
-            let reason = format!("{cause}: what can be read was converted");
-            Ok((readable, Some(CommandError::file(path, reason))))
-        }
-        Err(error) => Err(CommandError::file(path, error)),
-    }
 }

@@ -17,7 +17,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, value_parser};
+use clap::{ArgGroup, Args, value_parser};
 use recording_formats::{Format, Telemetry};
 use serde::Serialize;
 use sevenbot::health::ProblemKind;
@@ -41,6 +41,7 @@ use crate::session::Session;
 /// arm holds its pose, also with --driven. On a terminal v switches the vacuum pump, and the space bar ends
 /// the recording as Ctrl-C does.
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("outputs").args(["file", "mcap"]).required(true).multiple(true)))]
 #[command(after_help = "\
 Examples:
   sevenbot record wave.txt  hold the arm, answer y, guide it; Ctrl-C ends
@@ -68,7 +69,6 @@ unknown then, or if the controller restarts. The file has what was recorded
 before.")]
 pub(crate) struct RecordArgs {
     /// The text file for the recording.
-    #[arg(required_unless_present = "mcap")]
     file: Option<PathBuf>,
     /// Write an MCAP file, beside FILE or without it; - is standard output.
     #[arg(long, value_name = "MCAP")]
@@ -103,7 +103,10 @@ struct Recorded {
 
 impl Recorded {
     fn of(args: &RecordArgs, outputs: &Outputs) -> Self {
-        let name = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
+        let name = |path: &Option<PathBuf>| match path {
+            Some(path) if is_stdout(path) => Some("standard output".to_owned()),
+            path => path.as_ref().map(|path| path.display().to_string()),
+        };
         let (moments, seconds) = (outputs.count(), outputs.duration().as_secs_f64());
         Self { file: name(&args.file), mcap: name(&args.mcap), moments, seconds }
     }

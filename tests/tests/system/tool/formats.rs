@@ -77,12 +77,19 @@ fn what_a_killed_recording_left_can_be_read() {
         arm.reopen(115_200);
         arm.write(FEEDBACK_FREQUENCY, &[0]);
         let refused = failed(&arm.sevenbot(&["play", text(&mcap)]), 1);
-        assert!(refused.contains("`sevenbot convert` writes what can be read"), "{refused}");
+        assert!(refused.contains("can be read: `sevenbot convert` writes them"), "{refused}");
         let again = folder.path().join("killed.txt");
         let said = failed(&run_without_arm(&["convert", text(&mcap), text(&again)]), 1);
         assert!(said.contains("the file ends in the middle: what can be read was converted"), "{said}");
         assert!(moments(&again).len() > 25, "{}", moments(&again).len());
         succeeded(arm.sevenbot(&["play", text(&again)]));
+        let whole = folder.path().join("whole.mcap");
+        failed(&run_without_arm(&["convert", text(&mcap), text(&whole)]), 1);
+        assert!(
+            holds(&whole, "/diagnostics") && holds(&whole, "/robot_joint_command"),
+            "all topics are kept"
+        );
+        succeeded(arm.sevenbot(&["play", text(&whole)]));
     });
 }
 
@@ -130,7 +137,7 @@ fn recordings_are_converted_without_an_arm() {
     refused(&["convert", "/dev/zero", &path("zero.csv")], 1, "not a recording");
     refused(&["record", &path("x.mcap")], 2, "for MCAP use --mcap");
     refused(&["record", &path("x.csv")], 2, "`sevenbot convert` makes");
-    refused(&["record"], 2, "<FILE");
+    refused(&["record"], 2, "<FILE|--mcap <MCAP>>");
     assert!(!folder.path().join("zero.csv").exists() && !folder.path().join("x.mcap").exists());
 }
 
