@@ -97,8 +97,8 @@ fn what_a_killed_recording_left_can_be_read() {
 fn a_full_disk_leaves_whole_moments_in_an_mcap_file() {
     with_arm(TestSetup::any(), |arm| {
         let (folder, mcap) = file("full.mcap", "");
-        // Limits files to 64 or 128 KiB, depending on the shell, and ignores the signal at the limit.
-        let limited = "trap '' XFSZ; ulimit -f 128; exec \"$0\" \"$@\"";
+        // Limits files to 128 or 256 KiB, depending on the shell, and ignores the signal at the limit.
+        let limited = "trap '' XFSZ; ulimit -f 256; exec \"$0\" \"$@\"";
         let mut tool = Command::new("sh");
         tool.env(TOOL_TIMEOUT.0, TOOL_TIMEOUT.1).args(["-c", limited]).arg(sevenbot());
         tool.arg("--port").arg(arm.lend_port());
