@@ -215,9 +215,11 @@ fn record_reports(
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut pendant = TeachPendant::new(arm.targets()?, vacuum, args.driven);
     let mut recorder = Recorder::new(arm, args.hz, content);
-    let is_fine = content == report_content::FINE_POSITIONS;
-    let mut telemetry =
-        outputs.has_telemetry().then(|| TelemetryReader::new(arm, baud, args.driven, is_fine));
+    let mut telemetry = outputs.has_telemetry().then(|| {
+        let (reports, is_fine) =
+            (arm.report_period(args.hz, content), content == report_content::FINE_POSITIONS);
+        TelemetryReader::new(arm, baud, reports, args.driven, is_fine)
+    });
     let limit = args.seconds.map(|seconds| Duration::from_secs(seconds.into()));
     while !Interrupt::is_requested() && !pendant.poll_keys(arm)? {
         let Some(RecordedPose { time, pose, .. }) = recorder.next(arm, POLL_PERIOD)? else { continue };

@@ -24,16 +24,26 @@ pub(crate) struct TelemetryReader {
     is_driven: bool,
     /// Does the arm have hundredths, velocities and loads?
     is_fine: bool,
+    /// The shortest time between two questions; 0 where the line is fast enough for one at each report.
     period: Duration,
     next: Instant,
+    health_period: Duration,
     next_health: Instant,
 }
 
 impl TelemetryReader {
-    /// For an arm whose line has this baud rate.
-    pub(crate) fn new(arm: &Arm, baud: u32, is_driven: bool, is_fine: bool) -> Self {
-        let period = Duration::from_secs(1) * BITS * SHARE_OF_LINE / baud.max(1);
-        Self { is_driven, is_fine, period, next: arm.now(), next_health: arm.now() }
+    /// For an arm whose line has this baud rate, and that reports in this period.
+    pub(crate) fn new(arm: &Arm, baud: u32, reports: Duration, is_driven: bool, is_fine: bool) -> Self {
+        let answer = Duration::from_secs(1) * BITS / baud.max(1);
+        let period = answer * SHARE_OF_LINE;
+        Self {
+            is_driven,
+            is_fine,
+            period: if period <= reports { Duration::ZERO } else { period },
+            next: arm.now(),
+            health_period: HEALTH_PERIOD.max(period * ANSWERS_PER_HEALTH),
+            next_health: arm.now(),
+        }
     }
 
     /// What the arm tells now. Nothing on a slow line, until it is time again.
@@ -56,7 +66,7 @@ impl TelemetryReader {
         if now < self.next_health {
             return Ok(None);
         }
-        self.next_health = now + HEALTH_PERIOD.max(self.period * ANSWERS_PER_HEALTH);
+        self.next_health = now + self.health_period;
         arm.health().map(Some)
     }
 }
