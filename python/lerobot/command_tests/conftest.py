@@ -112,12 +112,12 @@ def hand(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def slow_hand(tmp_path: Path) -> Path:
-    """A hand that moves joints at up to 12 degrees a second.
+    """A hand that moves joints at up to 7 degrees a second.
 
     The emulator has the time of the computer. On a busy one it stands still for 0.1 to 0.3 s, and then each joint catches up at a speed of
     its own, off the path by up to the way that it missed. So the path is as exact as the hand is slow.
     """
-    return led(tmp_path / "hand.txt", 1 / 3)
+    return led(tmp_path / "hand.txt", 1 / 5)
 
 
 @dataclass(frozen=True)
@@ -127,13 +127,16 @@ class EmulatedArm:
     port: Path
     angles: Path
 
-    def true_path(self, log: Log, rows: slice) -> tuple[NDArray[np.float64], Rows]:
-        """The times of the log's clock and the true angles, from the first to the last of these rows of a log."""
+    def true_path(self, log: Log, rows: slice, more: float = 0.0) -> tuple[NDArray[np.float64], Rows]:
+        """The times of the log's clock and the true angles, from the first to the last of these rows of a log.
+
+        And this much more before and after, in seconds.
+        """
         table = np.loadtxt(self.angles, delimiter=",")
         # The file has the time since 1970.
         times = table[:, 0] - (time.time() - time.monotonic())
         begin, *_, end = log.times[rows]
-        inside = (times >= begin) & (times <= end)
+        inside = (times >= begin - more) & (times <= end + more)
         return times[inside], table[inside, 1:]
 
 
