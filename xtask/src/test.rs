@@ -77,6 +77,7 @@ const STAGES: &[Stage] = &[
                 system_tests::run_on(&system_tests::ADAPTER)
             }),
             whole("the Python package", python::check),
+            whole("the ROS packages", ros::check),
         ],
         &[
             whole("the page in a browser", || {
@@ -100,7 +101,6 @@ const STAGES: &[Stage] = &[
             cargo("test --release -p motion-core --test all linkage -- --ignored")
         }),
         long("the arm's model in MuJoCo", mujoco::check),
-        long("the ROS packages", ros::check),
         long("the plugin for LeRobot, with the base classes of LeRobot", lerobot::check),
         long("LeRobot's own commands, on the simulator and on the image in an emulator", lerobot::commands),
         long("more fuzzing", || {
