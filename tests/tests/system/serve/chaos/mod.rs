@@ -29,6 +29,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use system_tests::process::kilobytes;
 use system_tests::read_request;
 use system_tests::registers::DEVICE_CODE;
 use system_tests::relay::Watch;
@@ -161,12 +162,6 @@ fn is_answered(socket: &Path) -> bool {
     let mut received = [0; 8];
     stream.set_read_timeout(Some(Duration::from_millis(300))).expect("a timeout");
     stream.write_all(&read_request(DEVICE_CODE, 1)).is_ok() && stream.read_exact(&mut received).is_ok()
-}
-
-fn kilobytes(process: &Child) -> u64 {
-    let status = fs::read_to_string(format!("/proc/{}/status", process.id())).expect("a status");
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("its memory");
-    line.trim().trim_end_matches("kB").trim().parse().expect("a number")
 }
 
 fn open_files(process: &Child) -> usize {
