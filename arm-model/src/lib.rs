@@ -4,6 +4,7 @@
 //!   kinematics::geometry ──▶ chain: links and joints ──▶ urdf: a tree, the elbow by a mimic joint
 //!                   │               │                └──▶ glb: nodes with meshes, in the standard pose
 //!                   │               └── the same ────▶ mjcf: the parallelogram closed by an equality constraint
+//!                   │               └── the same ────▶ transforms: where each link is in its parent
 //!                   └──▶ look: meshes of the bodies; pose: where they are, for programs that draw the arm
 //! ```
 //!
@@ -29,6 +30,7 @@ mod look;
 mod mesh;
 mod mjcf;
 mod pose;
+mod transforms;
 mod urdf;
 mod xml;
 
@@ -37,6 +39,7 @@ pub use look::Body;
 pub use mesh::{Finish, Mesh};
 pub use mjcf::mjcf;
 pub use pose::{Pose, poses};
+pub use transforms::{LinkTransform, link_transforms};
 pub use urdf::urdf;
 
 /// The angles of joints 1 to 6 in degrees, as the registers have them, at which all joints of the model are 0.

@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 
-use arm_model::{JOINT_NAMES, TIP, joint_angles};
+use arm_model::{JOINT_NAMES, TIP, joint_angles, link_transforms};
 use kinematics::limits::check_arm;
 use kinematics::{Vector, forward};
 use urdf_rs::{JointType, Robot};
@@ -52,6 +52,22 @@ fn urdf_poses(robot: &Robot, angles: &HashMap<String, f64>) -> HashMap<String, P
     poses
 }
 
+/// The same from the transforms of the links.
+fn transformed_poses(angles: [f64; 6]) -> HashMap<&'static str, Pose> {
+    let zero = Vector::new(0.0, 0.0, 0.0);
+    let axes = [Vector::new(1.0, 0.0, 0.0), Vector::new(0.0, 1.0, 0.0), Vector::new(0.0, 0.0, 1.0)];
+    let mut poses = HashMap::from([("base_link", (axes, zero))]);
+    for link in link_transforms(angles) {
+        let parent = poses[link.parent];
+        let [x, y, z, w] = link.rotation;
+        let sine = (x * x + y * y + z * z).sqrt();
+        let axis = if sine == 0.0 { [0.0, 0.0, 1.0] } else { [x, y, z].map(|part| part / sine) };
+        let columns = rotation(axis, 2.0 * sine.atan2(w)).map(|column| turned(parent, column));
+        poses.insert(link.child, (columns, parent.1 + turned(parent, link.translation)));
+    }
+    poses
+}
+
 /// From millimetres with x to the right and y forward to metres with x forward and y to the left.
 fn rep_103(point: Vector<f64>) -> Vector<f64> {
     Vector::new(point.y, -point.x, point.z) * 0.001
@@ -71,6 +87,14 @@ fn the_urdf_has_the_forward_kinematics_of_the_arm() {
         let names = JOINT_NAMES.map(str::to_owned).into_iter();
         let angles: HashMap<String, f64> = names.zip(joint_angles(degrees)).collect();
         let found = urdf_poses(&robot, &angles);
+        let transformed = transformed_poses(joint_angles(degrees));
+        assert_eq!(transformed.len(), found.len());
+        for (link, (columns, origin)) in transformed {
+            let (expected, place) = found[link];
+            assert!((origin - place).length() < 1e-9, "{link} at {degrees:?}");
+            let turned = columns.into_iter().zip(expected).map(|(one, other)| (one - other).length());
+            assert!(turned.into_iter().all(|apart| apart < 1e-9), "{link} at {degrees:?}");
+        }
         let frames = forward(degrees);
         let (hand, arm) = (frames.hand, frames.arm);
         let points = [

@@ -55,8 +55,14 @@ impl Span {
     /// All registers from one row of the table to a later one.
     #[must_use]
     pub const fn between(first: &Register, last: &Register) -> Self {
-        let distance = last.address.saturating_sub(first.address);
-        Self { address: first.address, count: distance.saturating_add(last.count) }
+        Self::of(first).through(last)
+    }
+
+    /// All registers from the first of this span to a later row of the table.
+    #[must_use]
+    pub const fn through(self, last: &Register) -> Self {
+        let distance = last.address.saturating_sub(self.address);
+        Self { address: self.address, count: distance.saturating_add(last.count) }
     }
 
     /// The first register.

@@ -112,7 +112,7 @@ impl ArmControl {
         match outcome {
             Measured::Rejected => return,
             Measured::FellSilent => return self.show_servos(),
-            Measured::Accepted | Measured::ServoChanged | Measured::TorqueLost => {}
+            Measured::Accepted | Measured::ServoChanged | Measured::TorqueLost | Measured::TurnedPast => {}
             Measured::Engaged => self.bus.joint_engaged(joint),
             Measured::TorqueDue { goals } => self.bus.torque_due_after(goals),
             Measured::Freed => self.bus.torque_changed(),

@@ -55,6 +55,9 @@ pub(crate) enum Measured {
     TorqueLost,
     /// All driven servos have no torque after a long silence ([D29](protocol_core::decisions#d29)).
     SupplyLost,
+    /// The joint has turned past a set-point that an obstacle held back. [`Joints`](crate::joints::Joints) lets the set-point
+    /// catch up.
+    TurnedPast,
 }
 
 /// What became of a joint that has a set-point.
@@ -62,6 +65,7 @@ enum Protected {
     Holds,
     Freed,
     TorqueLost,
+    TurnedPast,
 }
 
 /// The state of one joint.
@@ -168,6 +172,7 @@ impl JointState {
                 Protected::Holds => {}
                 Protected::Freed => return Measured::Freed,
                 Protected::TorqueLost => return Measured::TorqueLost,
+                Protected::TurnedPast => return Measured::TurnedPast,
             }
         } else if self.let_go.is_let_go() {
             self.follow(now, answer, angle, registers);
@@ -209,7 +214,7 @@ impl JointState {
             let push = push_from_servo(self.joint, load, speed);
             let sample = PushSample { angle, push, is_saturated: load.saturating_abs() >= FULL_LOAD };
             if self.obstacle.measured(now, sample, set_point, self.push_limit(registers)) {
-                self.drive.catch_up(angle);
+                return Protected::TurnedPast;
             }
         }
         Protected::Holds

@@ -7,11 +7,13 @@
 //!                               └──────────────────────────┘
 //! ```
 //!
-//! This file does not know the frames or the timing of the bus.
+//! linkage.rs lets joints 2 and 3 wait for each other. This file does not know the frames or the timing of the bus.
+
+mod linkage;
 
 use protocol_core::registers::map::{
-    BLOCKED_JOINTS, FINE_TARGET, LET_GO_JOINTS, LIMITS, MEASURED_JOINTS, MOTOR_STATE, SERVO_ALARMS,
-    SET_POINT_PERIOD, SPEED, TARGET_POSITION, TIME, limit, motor_state,
+    BLOCKED_JOINTS, FINE_TARGET, LET_GO_JOINTS, MEASURED_JOINTS, SERVO_ALARMS, SET_POINT_PERIOD, SPEED,
+    TARGET_POSITION, TIME,
 };
 use protocol_core::registers::{Accepted, JOINTS, Joint, RegisterFile};
 use protocol_core::time::{Duration, Instant};
@@ -19,8 +21,6 @@ use protocol_core::time::{Duration, Instant};
 use crate::calibration::{MicroDegrees, angle_from_counts, counts_from_angle};
 use crate::drive::Drive;
 use crate::joint_state::{JointState, Measured};
-use crate::limit_check::LimitCheck;
-use crate::limits::linkage_step;
 use crate::motor_state::MotorState;
 use crate::reach::Reached;
 use crate::servo_bus::{Answer, Question, Torque};
@@ -174,7 +174,11 @@ impl Joints {
         if state.drive.has_set_point() {
             self.supply.answered(now);
         }
-        if outcome == Measured::TorqueLost { self.torque_lost(now, joint) } else { outcome }
+        match outcome {
+            Measured::TorqueLost => self.torque_lost(now, joint),
+            Measured::TurnedPast => self.catch_up(joint, registers),
+            _ => outcome,
+        }
     }
 
     /// Decides what it means that the servo of a driven joint has no torque ([D28](protocol_core::decisions#d28),
@@ -226,8 +230,7 @@ impl Joints {
     /// Advances all set-points at `now` by the control cycle that ends at `end`. Returns whether any joint takes goals.
     pub(crate) fn advance(&mut self, now: Instant, end: Instant, registers: &mut RegisterFile) -> bool {
         self.doubt_torque(now);
-        let keeps_linkage = registers.get(LIMITS.address) & limit::LINKAGE != 0;
-        let before = if keeps_linkage { self.linkage_set_points() } else { None };
+        let before = self.kept_linkage(registers);
         let mut any = false;
         for (joint, state) in self.each_mut() {
             if state.takes_goals() {
@@ -236,44 +239,9 @@ impl Joints {
             }
         }
         if let Some(before) = before {
-            self.keep_linkage(before);
+            self.keep_linkage(before, JointState::gives_way_from);
         }
         any
-    }
-
-    /// The set-points of joints 2 and 3, if both have one.
-    fn linkage_set_points(&self) -> Option<[MicroDegrees; 2]> {
-        let [_, two, three, ..] = &self.joints;
-        let both = two.drive.has_set_point() && three.drive.has_set_point();
-        both.then(|| [two.drive.set_point(), three.drive.set_point()])
-    }
-
-    /// Lets joints 2 and 3 wait for each other where their step would break the linkage
-    /// ([D25](protocol_core::decisions#d25)). A joint that gives way to an obstacle does not wait: it would go on pushing
-    /// until its servo switches itself off ([D27](protocol_core::decisions#d27)).
-    fn keep_linkage(&mut self, before: [MicroDegrees; 2]) {
-        let Some(after) = self.linkage_set_points() else { return };
-        let allowed = linkage_step(before, after);
-        let [_, two, three, ..] = &mut self.joints;
-        for ((joint, before), (after, allowed)) in
-            [two, three].into_iter().zip(before).zip(after.into_iter().zip(allowed))
-        {
-            if allowed != after && !joint.gives_way_from(before) {
-                joint.drive.hold_back(allowed);
-            }
-        }
-    }
-
-    /// The first register because of which a write is refused against a limit ([D25](protocol_core::decisions#d25)).
-    pub(crate) fn against_limit(&self, check: &LimitCheck<'_>) -> Option<u8> {
-        let enters_servo = self.state != MotorState::Servo
-            && check.accepted.value_at(MOTOR_STATE.address) == Some(motor_state::SERVO);
-        let target = |state: &JointState| {
-            let measured = if enters_servo { state.known_angle() } else { None };
-            Some(measured.unwrap_or(state.target()))
-        };
-        let set_point = |state: &JointState| state.drive.has_set_point().then_some(state.drive.set_point());
-        check.first_refused(&self.joints.each_ref().map(target), &self.joints.each_ref().map(set_point))
     }
 
     /// Holds every joint at its set-point ([D24](protocol_core::decisions#d24)).

@@ -832,7 +832,7 @@ class Recording:
     """
     @classmethod
     def load(cls, path: _Path) -> Recording:
-        """Reads a file."""
+        """Reads a file: text, CSV or MCAP, which its first bytes tell."""
     @classmethod
     def parse(cls, text: str, arrivals: Iterable[float] | None = None) -> Recording:
         """From the text of a file, as `str(recording)` gives it, and the times of arrival."""
@@ -845,7 +845,9 @@ class Recording:
     ) -> Recording:
         """From times in seconds, in ascending order, and as many rows of seven angles, 0 to 180 degrees."""
     def save(self, path: _Path) -> None:
-        """Writes a file, which `sevenbot play` takes, too."""
+        """Writes a file, which `sevenbot play` takes, too: CSV for a name with `.csv` at its end, MCAP with messages of ROS 2 for
+        `.mcap`, else text.
+        """
     @property
     def times(self) -> NDArray[float64]:
         """The times of the moments in seconds: a numpy array, or a tuple without numpy.

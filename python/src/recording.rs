@@ -1,12 +1,13 @@
 //! `Recording`: a movement as a text file, and as arrays.
 
-use std::fs;
+use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyType};
+use recording_formats::{Format, ReadError};
 use sevenbot::recording::{FileVersion, Moment, Recording as Moments, head};
 
 use crate::bulk;
@@ -54,11 +55,14 @@ fn told(moment: Moment) -> (f64, Angles, bool) {
 
 #[pymethods]
 impl Recording {
-    /// Reads a file.
+    /// Reads a file: text, CSV or MCAP, which its first bytes tell.
     #[classmethod]
     fn load(_: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let text = fs::read_to_string(&path).map_err(|why| file_error(py, &path, &why))?;
-        Self::of_text(py, &text)
+        let file = File::open(&path).map_err(|why| file_error(py, &path, &why))?;
+        match recording_formats::read(file) {
+            Err(ReadError::Io(why)) => Err(file_error(py, &path, &why)),
+            read => raised(py, read).map(|moments| Self { moments, arrivals: None }),
+        }
     }
 
     /// From the text of a file, as `str(recording)` gives it, and the times of arrival.
@@ -98,9 +102,13 @@ impl Recording {
         Self::of_text(py, &(head(FileVersion::Hundredths) + &lines.collect::<String>()))
     }
 
-    /// Writes a file, which `sevenbot play` takes, too.
+    /// Writes a file, which `sevenbot play` takes, too: CSV for a name with `.csv` at its end, MCAP with messages of ROS 2 for
+    /// `.mcap`, else text.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        fs::write(&path, self.__str__()).map_err(|why| file_error(py, &path, &why))
+        let format = Format::of_name(&path).unwrap_or(Format::Text);
+        let mut bytes = Vec::new();
+        let written = recording_formats::write(&self.moments, format, &mut bytes);
+        written.and_then(|()| fs::write(&path, bytes)).map_err(|why| file_error(py, &path, &why))
     }
 
     /// The times of the moments in seconds: a numpy array, or a tuple without numpy.

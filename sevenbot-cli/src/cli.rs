@@ -9,8 +9,8 @@ use crate::command_error::CommandError;
 #[cfg(unix)]
 use crate::commands::sim;
 use crate::commands::{
-    backup, baud, calibrate, effector, get, info, log, model, monitor, move_to, park, play, plot, ports,
-    pose, position, record, recover, registers, servo, set, shell, sniff, state, status, stop, stream,
+    backup, baud, calibrate, convert, effector, get, info, log, model, monitor, move_to, park, play, plot,
+    ports, pose, position, record, recover, registers, servo, set, shell, sniff, state, status, stop, stream,
 };
 #[cfg(target_os = "linux")]
 use crate::commands::{serve, view};
@@ -109,6 +109,7 @@ pub(crate) enum Command {
     Record(record::RecordArgs),
     Play(play::PlayArgs),
     Stream(stream::StreamArgs),
+    Convert(convert::ConvertArgs),
     Plot(plot::PlotArgs),
     Calibrate(calibrate::CalibrateArgs),
     Baud(baud::BaudArgs),
@@ -156,6 +157,7 @@ impl Command {
             Self::Record(args) => record::run(session, &args),
             Self::Play(args) => play::run(session, &args),
             Self::Stream(args) => stream::run(session, &args),
+            Self::Convert(args) => convert::run(session, &args),
             Self::Plot(args) => plot::run(session, &args),
             Self::Calibrate(args) => calibrate::run(session, &args),
             Self::Baud(args) => baud::run(session, &args),
@@ -182,7 +184,7 @@ impl Command {
     const fn opens_arm(&self) -> bool {
         match self {
             Self::Ports(_) | Self::Plot(_) | Self::Sniff(_) | Self::Servo(_) | Self::Registers(_) => false,
-            Self::Model(_) | Self::Completions(_) | Self::Man(_) => false,
+            Self::Convert(_) | Self::Model(_) | Self::Completions(_) | Self::Man(_) => false,
             #[cfg(target_os = "linux")]
             Self::Serve(_) | Self::View(_) => false,
             #[cfg(unix)]

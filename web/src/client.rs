@@ -13,9 +13,8 @@ use std::collections::VecDeque;
 use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId};
 use protocol_core::registers::Map;
 use protocol_core::time::{Duration, Instant};
-use sevenbot::map::{
-    DEVICE_CODE, FINE_TARGET, PRESENT_POSITION, PROTECTION_VERSION, SERVO_TEMPERATURE, STATUS_VERSION,
-};
+use sevenbot::map::{DEVICE_CODE, FINE_TARGET, PRESENT_POSITION, PROTECTION_VERSION, SERVO_TEMPERATURE};
+use sevenbot::sharing;
 use sevenbot::traffic::Traffic;
 use sevenbot::{Snapshot, Span};
 
@@ -31,11 +30,11 @@ const KEPT_FRAMES: usize = 40;
 /// The baud rate of the arm's line where nothing else is known.
 pub const BAUD: u32 = 115_200;
 
-/// What each round reads.
+/// What each round reads, with the registers of a server before those of the arm's status.
 const ROUND: [Span; 3] = [
     Span::between(&DEVICE_CODE, &PRESENT_POSITION),
     Span::between(&FINE_TARGET, &PROTECTION_VERSION),
-    Span::between(&STATUS_VERSION, &SERVO_TEMPERATURE),
+    Span::one(sharing::FIRST).through(&SERVO_TEMPERATURE),
 ];
 
 /// A frame that is shown: its time, true for one to the arm, and its content.

@@ -15,6 +15,7 @@ use sevenbot::movement_run::{MovementRun, RunStep};
 use sevenbot::playback;
 use sevenbot::point_path::PointPath;
 use sevenbot::recording::{FileVersion, Moment, Recording, RecordingError, RecordingLines};
+use sevenbot::sharing::{self, Sharing};
 use sevenbot::stream::{StreamOptions, WatchdogAction};
 use sevenbot::{FineAngle, Health, Joint, Snapshot};
 
@@ -107,6 +108,8 @@ pub enum PlayFailure {
     NotTaken,
     /// These joints have settled away from the last pose: joint, position and target in degrees.
     NotReached(Vec<(Joint, u8, u8)>),
+    /// Another program has stopped the arm.
+    StoppedByAnother,
 }
 
 /// Frames that are written again until registers that were read afterwards hold their values.
@@ -148,6 +151,14 @@ impl Confirmed {
 fn write_all(frames: &[(u8, Vec<u8>)], now: Instant, client: &mut Client) {
     for (address, values) in frames {
         client.write(now, *address, values);
+    }
+}
+
+/// A stop of another program, before a person wanted this movement, does not concern it.
+fn start_anew(now: Instant, client: &mut Client) {
+    if Sharing::of(client.registers()).is_some() {
+        let (address, values) = sharing::START_ANEW;
+        client.write(now, address, &values);
     }
 }
 
@@ -255,7 +266,10 @@ impl Player {
 
     fn advance(&mut self, now: Instant, client: &mut Client) -> Result<PlayProgress, PlayFailure> {
         match &mut self.stage {
-            Stage::Start => self.stage = Stage::Opening(Confirmed::write(self.opening_frames(), now, client)),
+            Stage::Start => {
+                start_anew(now, client);
+                self.stage = Stage::Opening(Confirmed::write(self.opening_frames(), now, client));
+            }
             Stage::Opening(opening) => {
                 if opening.poll(now, client)? {
                     self.stage = Stage::Way(self.way(now));
@@ -287,6 +301,9 @@ impl Player {
     fn watch(&mut self, now: Instant, client: &Client) -> Result<(), PlayFailure> {
         if client.rounds() != self.watched_round {
             self.watched_round = client.rounds();
+            if Sharing::of(client.registers()).is_some_and(|sharing| sharing.is_stopped) {
+                return Err(PlayFailure::StoppedByAnother);
+            }
             self.watch.registers(since_start(now), client.registers()).map_err(PlayFailure::Arm)?;
         }
         // The rounds of reads answer the questions.

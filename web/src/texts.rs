@@ -245,8 +245,9 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ),
     (
         "no-server",
-        "There is no arm at this address. Connect one, and start `sevenbot view` again.",
-        "此地址没有机械臂。请连接机械臂，然后重新运行 `sevenbot view`。",
+        "There is no arm at this address, or the address is an old one. Start `sevenbot view` beside the arm, and open the \
+         address that it prints.",
+        "此地址没有机械臂，或地址已失效。请在机械臂旁运行 `sevenbot view`，并打开它显示的地址。",
     ),
     ("closed", "The connection ended:", "连接已断开："),
     ("bad-file", "This file is no recording:", "此文件不是动作录制："),
@@ -258,6 +259,8 @@ const TEXTS: &[(&str, &str, &str)] = &[
         "This page did not run for a while, and the arm has stopped.",
         "本页面暂停运行了一段时间，机械臂已停止。",
     ),
+    ("stopped-by-another", "Another program has stopped the arm.", "另一个程序停止了机械臂。"),
+    ("another-drives", "another program moves the arm", "另一个程序正在控制机械臂"),
     ("not-taken", "The arm does not take its commands.", "机械臂不接受命令。"),
     (
         "not-reached",

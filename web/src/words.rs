@@ -110,6 +110,7 @@ pub fn play_failure(language: Language, failure: &PlayFailure) -> String {
         PlayFailure::Arm(fault) => move_fault(language, fault),
         PlayFailure::Paused(_) => language.text("paused").to_owned(),
         PlayFailure::NotTaken => language.text("not-taken").to_owned(),
+        PlayFailure::StoppedByAnother => language.text("stopped-by-another").to_owned(),
         PlayFailure::NotReached(away) => {
             let numbers = away.iter().map(|(joint, ..)| joint.number().to_string());
             format!("{} {}", language.text("not-reached"), numbers.collect::<Vec<_>>().join(", "))

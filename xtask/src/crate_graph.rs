@@ -29,6 +29,7 @@ const GROUPS: [Group; 3] = [
             "host-link",
             "host-sim",
             "sevenbot",
+            "recording-formats",
             "sevenbot-cli",
             "sevenbot-serve",
             "sevenbot-python",

@@ -6,13 +6,16 @@ use std::process::{Command, Stdio};
 
 use crate::run::{TaskResult, root, target_directory};
 
-/// The packages from PyPI, at versions that were tried. gymnasium and numpy are optional for users, but have tests.
-const PACKAGES: [&str; 7] = [
+/// The packages from PyPI, at versions that were tried. gymnasium and numpy are optional for users, but have tests;
+/// mcap and rosbags read what the package writes.
+const PACKAGES: [&str; 9] = [
     "maturin==1.16.0",
     "gymnasium==1.4.0",
+    "mcap==1.6.0",
     "mypy==2.4.1",
     "basedpyright==1.40.2",
     "pytest==9.2.0",
+    "rosbags==0.11.9",
     "numpy==2.4.6; python_version >= '3.11'",
     "numpy==2.2.6; python_version < '3.11'",
 ];

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use crate::python::{copy_of, pip, run, wheel, works};
-use crate::run::{TaskResult, build_host_sim, build_image, root, target_directory};
+use crate::run::{TESTED, TaskResult, build_host_sim, build_image, cargo, root, target_directory};
 
 /// The packages from PyPI, at versions that were tried.
 const PACKAGES: [&str; 15] = [
@@ -45,6 +45,7 @@ pub(crate) fn check() -> TaskResult {
     run(pip(&python).args(["--force-reinstall", "--no-deps"]).args([&wheel, &package]))?;
     check_types(&python)?;
     build_host_sim()?;
+    cargo(&format!("build --quiet {TESTED} --bin sevenbot"))?;
     build_image()?;
     test(&python)
 }
@@ -90,6 +91,7 @@ fn test(python: &Path) -> TaskResult {
     command.arg(root().join("ros/pytest.ini")).arg(root().join("ros/tests"));
     command
         .env("HOST_SIM", target_directory().join("debug/host-sim"))
+        .env("SEVENBOT", target_directory().join("debug/sevenbot"))
         .env("XTASK", env::current_exe()?)
         .env("ROS_LOG_DIR", folder().join("log"))
         .env("PYTHONDONTWRITEBYTECODE", "1")

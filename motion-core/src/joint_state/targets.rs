@@ -24,6 +24,13 @@ impl JointState {
         }
     }
 
+    /// Moves the set-point at once to where the joint is, if that is on the way to the target.
+    pub(crate) fn catch_up(&mut self) {
+        if let Some(angle) = self.measured {
+            self.drive.catch_up(angle);
+        }
+    }
+
     /// Moves to a target that the register shows already.
     pub(crate) fn move_to(&mut self, degrees: u8, time: u8) {
         self.target = MicroDegrees::from_degrees(degrees);

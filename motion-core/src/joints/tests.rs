@@ -1,7 +1,7 @@
 use super::*;
 use crate::CYCLE;
 use crate::servo_bus::{HeldGoal, Reading};
-use protocol_core::registers::map::PRESENT_POSITION;
+use protocol_core::registers::map::{LIMITS, PRESENT_POSITION, limit};
 
 const J1: Joint = Joint::ALL[0];
 
@@ -19,11 +19,16 @@ fn answer(position_counts: u16) -> Answer {
 fn measured(state: MotorState) -> (Joints, RegisterFile) {
     let mut registers = RegisterFile::new([0; 6], None);
     let mut joints = Joints::new(state);
-    joints.measured(at_ms(0), J1, &answer(511), true, &mut registers);
-    joints.measured(at_ms(10), J1, &answer(511), true, &mut registers);
-    let torque = Some(HeldGoal { is_on: false, goal_counts: 511 });
-    joints.measured(at_ms(10), J1, &Answer { torque, ..answer(511) }, true, &mut registers);
+    measure(&mut joints, J1, 511, &mut registers);
     (joints, registers)
+}
+
+/// Measures a joint until it engages, and shows it its goal.
+fn measure(joints: &mut Joints, joint: Joint, counts: u16, registers: &mut RegisterFile) {
+    joints.measured(at_ms(0), joint, &answer(counts), true, registers);
+    joints.measured(at_ms(10), joint, &answer(counts), true, registers);
+    let torque = Some(HeldGoal { is_on: false, goal_counts: counts });
+    joints.measured(at_ms(10), joint, &Answer { torque, ..answer(counts) }, true, registers);
 }
 
 #[test]
@@ -72,26 +77,48 @@ fn d12_a_joint_is_not_given_torque_where_it_was_measured_long_ago() {
     assert_eq!(joints.take_torque(true), [None; JOINTS]);
 }
 
-/// A servo pushes with all it has and turns its joint on, while each answer takes five control cycles.
+/// The positions and the goals of a joint whose servo pushes with all it has and turns it on `from` these counts, while each
+/// answer takes five control cycles.
+fn turned_on(joints: &mut Joints, registers: &mut RegisterFile, joint: Joint, from: u16) -> Vec<(u16, u16)> {
+    registers.set(SPEED.of(joint), 90);
+    let mut step = |(millis, position)| {
+        for cycle in (millis - 50..millis).step_by(10).map(at_ms) {
+            joints.advance(cycle, cycle + CYCLE, registers);
+        }
+        let reading = Reading { speed: 300, load: 1_000, ..answer(position).reading };
+        let late = Answer { reading, alarms: 0, answer_micros: 49_000, ..answer(position) };
+        joints.measured(at_ms(millis), joint, &late, true, registers);
+        let goal = joints.goals(at_ms(millis), registers).find(|(other, _)| *other == joint);
+        (position, goal.unwrap().1)
+    };
+    (60..=710).step_by(50).zip((from..).step_by(25)).map(&mut step).collect()
+}
+
 #[test]
 fn d27_a_set_point_that_gave_way_never_turns_back_a_joint_that_turned_past_it() {
     let (mut joints, mut registers) = measured(MotorState::Servo);
     joints.take_torque(true);
-    registers.set(SPEED.of(J1), 90);
     joints.joint_mut(J1).unwrap().move_to(180, 0);
-    let mut goals = vec![511];
-    for (millis, position) in (60..=510).step_by(50).zip((511..).step_by(25)) {
-        for cycle in (millis - 50..millis).step_by(10).map(at_ms) {
-            joints.advance(cycle, cycle + CYCLE, &mut registers);
-        }
-        let reading = Reading { speed: 300, load: 1_000, ..answer(position).reading };
-        let late = Answer { reading, alarms: 0, answer_micros: 49_000, ..answer(position) };
-        joints.measured(at_ms(millis), J1, &late, true, &mut registers);
-        let [(_, goal)] = joints.goals(at_ms(millis), &registers).collect::<Vec<_>>()[..] else { panic!() };
-        goals.push(goal);
-        assert!(goal >= position, "at {position}: {goals:?}");
-    }
-    assert!(!goals.is_sorted(), "it never gave way: {goals:?}");
+    let moments = turned_on(&mut joints, &mut registers, J1, 511);
+    assert!(moments.iter().all(|(position, goal)| goal >= position), "{moments:?}");
+    assert!(!moments.is_sorted_by_key(|(_, goal)| goal), "it never gave way: {moments:?}");
+}
+
+#[test]
+fn d25_a_set_point_does_not_follow_a_joint_out_of_the_linkage() {
+    let [_, two, three, ..] = Joint::ALL;
+    let (mut joints, mut registers) = measured(MotorState::Servo);
+    registers.set(LIMITS.address, limit::LINKAGE);
+    let counts = |joint, degrees| counts_from_angle(joint, MicroDegrees::from_degrees(degrees), 0);
+    measure(&mut joints, two, counts(two, 40), &mut registers);
+    measure(&mut joints, three, counts(three, 90), &mut registers);
+    joints.take_torque(true);
+    joints.joint_mut(three).unwrap().move_to(0, 0);
+    let moments = turned_on(&mut joints, &mut registers, three, counts(three, 90));
+    let end = counts(three, 84 - 40);
+    assert!(moments.iter().any(|(position, _)| *position > end + 10), "{moments:?}");
+    assert!(moments.iter().all(|(_, goal)| *goal <= end), "{moments:?}, and {end} is the last one inside");
+    assert!(!moments.is_sorted_by_key(|(_, goal)| goal), "it never gave way: {moments:?}");
 }
 
 /// Some servos show their torque switch as on while heat keeps them from holding.

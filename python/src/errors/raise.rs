@@ -2,6 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
+use recording_formats::ReadError;
 use sevenbot::cartesian::{StraightLineError, StraightLineFault, TipRefusal};
 use sevenbot::checked_write::WriteError;
 use sevenbot::health::{remedies, sentences};
@@ -148,6 +149,19 @@ impl Raise for StreamError {
 impl Raise for RecordingError {
     fn raise(&self, py: Python<'_>) -> PyErr {
         error::<BadRecording>(py, &self.to_string(), &[])
+    }
+}
+
+impl Raise for ReadError {
+    fn raise(&self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::Text(error) => error.raise(py),
+            other => {
+                let hint = "`sevenbot convert` writes what can be read to a new file".to_owned();
+                let hints = if matches!(other, Self::Damaged { .. }) { vec![hint] } else { Vec::new() };
+                error::<BadRecording>(py, &other.to_string(), &hints)
+            }
+        }
     }
 }
 

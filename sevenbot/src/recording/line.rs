@@ -105,6 +105,14 @@ pub(super) fn parse(line: &str, version: FileVersion) -> Result<Moment, LineErro
     Ok(Moment { time: seconds(time)?, pose: angles, vacuum: suck(vacuum)? })
 }
 
+/// The moment, if its time can be written.
+pub(super) fn checked(moment: Moment) -> Result<Moment, LineError> {
+    match moment.time {
+        time if time > LONGEST => Err(LineError::Time(time.as_secs_f64().to_string())),
+        _ => Ok(moment),
+    }
+}
+
 fn parse_angle(text: &str, joint: Joint, version: FileVersion) -> Result<FineAngle, LineError> {
     match version {
         FileVersion::Degrees => {

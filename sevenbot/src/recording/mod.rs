@@ -87,10 +87,26 @@ impl Recording {
     pub fn parse(text: &str) -> Result<Self, RecordingError> {
         let mut lines = (1..).zip(text.lines()).filter(|(_, line)| has_content(line));
         let version = header(lines.next().map(|(_, line)| line))?;
+        Self::in_order(lines.map(|(number, line)| (number, line::parse(line, version))))
+    }
+
+    /// From moments in ascending order of time.
+    ///
+    /// # Errors
+    /// There is none, or the first one that is refused: it is not later than the one before, or later than a day. The number is
+    /// that of the moment, from 1.
+    pub fn of_moments(moments: impl IntoIterator<Item = Moment>) -> Result<Self, RecordingError> {
+        Self::in_order((1..).zip(moments).map(|(number, moment)| (number, line::checked(moment))))
+    }
+
+    /// From moments with their numbers.
+    fn in_order(
+        numbered: impl Iterator<Item = (usize, Result<Moment, LineError>)>,
+    ) -> Result<Self, RecordingError> {
         let mut moments: Vec<(usize, Moment)> = Vec::new();
-        for (number, line) in lines {
+        for (number, moment) in numbered {
             let at_line = |cause| RecordingError::Line { number, cause };
-            let moment = line::parse(line, version).map_err(at_line)?;
+            let moment = moment.map_err(at_line)?;
             if moments.last().is_some_and(|(_, before)| moment.time <= before.time) {
                 return Err(at_line(LineError::NotLater));
             }

@@ -59,6 +59,14 @@ impl Viewed {
         self.folder.path().join(name)
     }
 
+    /// The program `sevenbot`, where the arm is `./arm`.
+    #[must_use]
+    pub fn tool(&self) -> Command {
+        let mut command = tool();
+        command.current_dir(&self.folder);
+        command
+    }
+
     /// The address without path and token.
     #[must_use]
     pub fn origin(&self) -> &str {

@@ -2,6 +2,7 @@
 
 use kinematics::forward;
 use sevenbot::map::{EXTENDED_VERSION, SERVO_TEMPERATURE};
+use sevenbot::sharing::Sharing;
 use sevenbot::{Span, register_text};
 use wasm_bindgen::JsValue;
 use web_sys::{Element, HtmlInputElement};
@@ -48,6 +49,9 @@ pub(super) fn build(dom: &Dom) -> Result<(), JsValue> {
 /// Shows the arm as it is now.
 pub(super) fn show(app: &mut App, state: &ArmState) {
     show_line(app, state);
+    if app.client.rounds() == 0 {
+        return show_nothing_known(&app.dom, app.language);
+    }
     let (dom, language) = (&app.dom, app.language);
     show_joints(dom, language, state);
     if app.client.rounds() >= app.slid_round {
@@ -61,7 +65,7 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     let reach = app.unreachable.map(|(_, why)| why).or(at);
     let reach = reach.map_or(String::new(), |why| format!(" · {}", language.text(why)));
     dom.set_text("tip", &format!("{}: x {x:.0}, y {y:.0}, z {z:.0} mm{reach}", language.text("tip")));
-    dom.set_text("health", &health(language, state));
+    dom.set_text("health", &health(app, state));
     show_recording(app);
     if let Line::Simulated(source) = &app.line {
         app.dom.set_text("time", &format!("{:.1} s", seconds(source.now())));
@@ -74,11 +78,25 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     }
 }
 
-/// Supply and temperature, as far as they are known.
-fn health(language: Language, state: &ArmState) -> String {
+/// No arm has answered yet: no value is shown.
+fn show_nothing_known(dom: &Dom, language: Language) {
+    let unknown = language.text("not-measured");
+    for number in 1..=7 {
+        dom.set_text(&format!("angle-{number}"), unknown);
+    }
+    dom.press("motors", "");
+    dom.set_text("tip", &format!("{}: {unknown}", language.text("tip")));
+    dom.set_text("health", "");
+}
+
+/// Supply and temperature, as far as they are known, and who else moves the arm.
+fn health(app: &App, state: &ArmState) -> String {
+    let language = app.language;
+    let is_driven = Sharing::of(app.client.registers()).is_some_and(|sharing| sharing.another_drives);
+    let another = is_driven.then(|| language.text("another-drives").to_owned());
     let volts = state.volts.map(|volts| format!("{} {volts:.1} V", language.text("supply")));
     let celsius = state.celsius.map(|celsius| format!("{} {celsius} °C", language.text("temperature")));
-    volts.into_iter().chain(celsius).collect::<Vec<_>>().join(" · ")
+    another.into_iter().chain(volts).chain(celsius).collect::<Vec<_>>().join(" · ")
 }
 
 fn show_line(app: &mut App, state: &ArmState) {

@@ -1,31 +1,37 @@
 //! `record`: writes the positions of a guided or moving arm to a file.
 //!
 //! ```text
-//!   arm ── reports ──▶ Recorder (time of measurement) ──▶ one line each ──▶ file
-//!                       TeachPendant (keys: pump, nudges, end) ──┘
+//!   arm ── reports ──▶ Recorder (time of measurement) ──▶ one line each ──▶ Outputs: text, MCAP
+//!    │                  TeachPendant (keys: pump, nudges, end) ──┘              ▲
+//!    └── reads ───────▶ TelemetryReader (targets, velocities, loads, health) ───┘ MCAP only
 //! ```
 //!
-//! After any end the file has whole lines, and an arm that is still connected holds its position.
+//! After any end the files have whole moments, and an arm that is still connected holds its position.
 
+mod outputs;
 mod teach_pendant;
+mod telemetry;
 
+use std::fmt;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, value_parser};
+use clap::{ArgGroup, Args, value_parser};
+use recording_formats::{Format, Telemetry};
 use serde::Serialize;
 use sevenbot::health::ProblemKind;
 use sevenbot::map::{MOTOR_STATE, VACUUM_PUMP, motor_state, report_content};
 use sevenbot::moves::{ConnectionLost, RecordedPose, Recorder};
-use sevenbot::recording::{FileVersion, Moment, RecordingLines};
+use sevenbot::recording::{FileVersion, Moment};
 use sevenbot::{Arm, Problem, Span};
 
+use self::outputs::{Outputs, is_stdout};
 use self::teach_pendant::TeachPendant;
+use self::telemetry::TelemetryReader;
 use crate::command_error::CommandError;
 use crate::confirm::confirm;
 use crate::interrupt::{Interrupt, hold, report_hold};
-use crate::line_file::LineFile;
 use crate::printer::{Printable, note};
 use crate::session::Session;
 
@@ -35,6 +41,7 @@ use crate::session::Session;
 /// arm holds its pose, also with --driven. On a terminal v switches the vacuum pump, and the space bar ends
 /// the recording as Ctrl-C does.
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("outputs").args(["file", "mcap"]).required(true).multiple(true)))]
 #[command(after_help = "\
 Examples:
   sevenbot record wave.txt  hold the arm, answer y, guide it; Ctrl-C ends
@@ -43,17 +50,29 @@ Examples:
   sevenbot pose 150 60 90 90 90 90 80 --speed 10
   sevenbot record move.txt --driven --seconds 5
                             records a move
+  sevenbot record --mcap move.mcap --driven
+                            for Rerun and ROS 2, with velocities and loads
+  sevenbot record --mcap - --driven | program
+                            each moment at once, for a program that reads MCAP
 
-The file is text, one line per moment: seconds, seven angles in degrees, vacuum.
+FILE is text, one line per moment: seconds, seven angles in degrees, vacuum.
 Angles have two decimals if the arm measures them. `sevenbot play` plays it, and
-also a file written by hand.
+also a file written by hand. `sevenbot convert` makes it CSV or MCAP.
+
+An MCAP file has messages of ROS 2, in radians: /joint_states, /tf and
+/robot_description, with --driven the targets as /robot_joint_command,
+/diagnostics once a second, and /vacuum. Velocities and loads are read up to
+20 ms after the positions. If the program is killed, the last second is missing.
 
 Exit status 1 if a servo does not answer, because the joint's position is
 unknown then, or if the controller restarts. The file has what was recorded
 before.")]
 pub(crate) struct RecordArgs {
-    /// The file for the recording.
-    file: PathBuf,
+    /// The text file for the recording.
+    file: Option<PathBuf>,
+    /// Write an MCAP file, beside FILE or without it; - is standard output.
+    #[arg(long, value_name = "MCAP")]
+    mcap: Option<PathBuf>,
     /// End after N seconds.
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=86_400))]
     seconds: Option<u32>,
@@ -63,7 +82,7 @@ pub(crate) struct RecordArgs {
     /// Leave the motors on, to record a move of the arm or one made with keys.
     #[arg(long)]
     driven: bool,
-    /// Do not ask whether the arm is held and FILE may be replaced.
+    /// Do not ask whether the arm is held and the files may be replaced.
     #[arg(long)]
     yes: bool,
 }
@@ -74,25 +93,43 @@ const POLL_PERIOD: Duration = Duration::from_millis(20);
 /// The result of `record`.
 #[derive(Debug, Serialize)]
 struct Recorded {
-    file: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mcap: Option<String>,
     moments: u64,
     seconds: f64,
 }
 
+impl Recorded {
+    fn of(args: &RecordArgs, outputs: &Outputs) -> Self {
+        let name = |path: &Option<PathBuf>| match path {
+            Some(path) if is_stdout(path) => Some("standard output".to_owned()),
+            path => path.as_ref().map(|path| path.display().to_string()),
+        };
+        let (moments, seconds) = (outputs.count(), outputs.duration().as_secs_f64());
+        Self { file: name(&args.file), mcap: name(&args.mcap), moments, seconds }
+    }
+}
+
+impl fmt::Display for Recorded {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let files: Vec<&str> = self.file.iter().chain(&self.mcap).map(String::as_str).collect();
+        write!(out, "{}: {} moments in {:.1} s", files.join(", "), self.moments, self.seconds)
+    }
+}
+
 impl Printable for Recorded {
     fn write_text(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "{}: {} moments in {:.1} s", self.file, self.moments, self.seconds)
+        writeln!(out, "{self}")
     }
 }
 
 pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), CommandError> {
-    if args.file.as_os_str() == "-" {
-        let reason = "- is no name of a file: to record to standard output, use /dev/stdout";
-        return Err(CommandError::Usage(reason.to_owned()));
-    }
+    check_names(args)?;
     let mut arm = session.connect_to_move()?;
-    if args.file.is_file() {
-        confirm(&format!("{} exists. Replace it?", args.file.display()), args.yes)?;
+    for path in args.file.iter().chain(&args.mcap).filter(|path| path.is_file()) {
+        confirm(&format!("{} exists. Replace it?", path.display()), args.yes)?;
     }
     if args.driven {
         arm.driven_joints()?;
@@ -104,28 +141,48 @@ pub(crate) fn run(session: &mut Session, args: &RecordArgs) -> Result<(), Comman
         report_content::POSITIONS => FileVersion::Degrees,
         _ => FileVersion::Hundredths,
     };
-    let mut recording = RecordingFile::create(&args.file, version)?;
+    let mut outputs = Outputs::create(args.file.as_deref(), args.mcap.as_deref(), version)?;
     Interrupt::catch();
     let before = arm.joints()?;
+    let baud = session.options.baud;
     let done = set_motors(&mut arm, args).and_then(|()| {
         arm.with_reports(args.hz, content, |arm| {
             // A restart would drive the joints of an arm that is to be guided.
             if arm.joints()?.has_restarted_since(&before) {
                 return Err(CommandError::Problems(vec![Problem::of_arm(ProblemKind::Restarted)]));
             }
-            record_reports(arm, args, content, &mut recording)
+            record_reports(arm, args, (content, baud), &mut outputs)
         })
     });
     // Without a connection the arm cannot be made to hold.
     let is_gone = done.as_ref().is_err_and(CommandError::is_connection_lost);
     let held = if is_gone && !Interrupt::is_requested() { Ok(()) } else { hold_at_end(&mut arm, args) };
-    let (moments, seconds) = (recording.lines.count(), recording.lines.duration().as_secs_f64());
-    let recorded = Recorded { file: args.file.display().to_string(), moments, seconds };
+    let done = done.and(outputs.finish());
     if done.is_err() {
-        note(format_args!("{} is complete up to {seconds:.1} s, {moments} moments", recorded.file));
+        outputs.note_what_is_there();
     }
     done.and(held)?;
+    let recorded = Recorded::of(args, &outputs);
+    if args.mcap.as_deref().is_some_and(is_stdout) {
+        note(recorded);
+        return Ok(());
+    }
     session.printer.print(&recorded)
+}
+
+/// Each format has its argument.
+fn check_names(args: &RecordArgs) -> Result<(), CommandError> {
+    let Some(file) = &args.file else { return Ok(()) };
+    let name = file.display();
+    let reason = match Format::of_name(file) {
+        _ if is_stdout(file) => {
+            "- is no name of a file: to record to standard output, use /dev/stdout".to_owned()
+        }
+        Some(Format::Mcap) => format!("FILE is text: for MCAP use --mcap {name}"),
+        Some(Format::Csv) => format!("FILE is text: `sevenbot convert` makes {name} of it"),
+        _ => return Ok(()),
+    };
+    Err(CommandError::Usage(reason))
 }
 
 /// Switches the motors off if the user guides the arm.
@@ -152,38 +209,29 @@ fn hold_at_end(arm: &mut Arm, args: &RecordArgs) -> Result<(), CommandError> {
 fn record_reports(
     arm: &mut Arm,
     args: &RecordArgs,
-    content: u8,
-    recording: &mut RecordingFile,
+    (content, baud): (u8, u32),
+    outputs: &mut Outputs,
 ) -> Result<(), CommandError> {
     let vacuum = arm.read_span(Span::of(&VACUUM_PUMP))?.byte(&VACUUM_PUMP) != 0;
     let mut pendant = TeachPendant::new(arm.targets()?, vacuum, args.driven);
     let mut recorder = Recorder::new(arm, args.hz, content);
+    let mut telemetry = outputs.has_telemetry().then(|| {
+        let (reports, is_fine) =
+            (arm.report_period(args.hz, content), content == report_content::FINE_POSITIONS);
+        TelemetryReader::new(arm, baud, reports, args.driven, is_fine)
+    });
     let limit = args.seconds.map(|seconds| Duration::from_secs(seconds.into()));
     while !Interrupt::is_requested() && !pendant.poll_keys(arm)? {
         let Some(RecordedPose { time, pose, .. }) = recorder.next(arm, POLL_PERIOD)? else { continue };
         if limit.is_some_and(|limit| time > limit) {
             break;
         }
-        recording.add(&Moment { time, pose, vacuum: pendant.vacuum() })?;
-        pendant.show(recording.lines.count(), time);
+        let told = telemetry.as_mut().map_or(Ok(Telemetry::default()), |reader| reader.read(arm))?;
+        outputs.add(&Moment { time, pose, vacuum: pendant.vacuum() }, &told)?;
+        if let Some(health) = telemetry.as_mut().map_or(Ok(None), |reader| reader.health(arm))? {
+            outputs.diagnose(time, &health, arm.port())?;
+        }
+        pendant.show(outputs.count(), time);
     }
     Ok(())
-}
-
-/// The file, and the lines of the recording so far.
-struct RecordingFile {
-    file: LineFile,
-    lines: RecordingLines,
-}
-
-impl RecordingFile {
-    fn create(path: &Path, version: FileVersion) -> Result<Self, CommandError> {
-        let (mut file, lines) = (LineFile::create(path)?, RecordingLines::new(version));
-        file.add(&lines.head())?;
-        Ok(Self { file, lines })
-    }
-
-    fn add(&mut self, moment: &Moment) -> Result<(), CommandError> {
-        self.lines.add(moment).map_or(Ok(()), |line| self.file.add(&line))
-    }
 }

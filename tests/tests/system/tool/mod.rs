@@ -3,6 +3,7 @@
 mod basics;
 mod calibrate;
 mod fine;
+mod formats;
 mod lost_recordings;
 mod map21;
 mod monitor;

@@ -43,6 +43,8 @@ struct Known {
     is_read_off: bool,
     /// How often its torque was read off without a reading that it is on.
     offs: u8,
+    /// The same without the first answers after a silence, which the controller may not take.
+    taken_offs: u8,
     /// Its torque was read off [`LOST_BY`] times since it was last given torque.
     was_lost: bool,
     /// When its torque was read after that, and how often that happened since its last goal.
@@ -55,7 +57,7 @@ struct Known {
 }
 
 /// What is known of all servos.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct ServoReplies {
     codes: TorqueCodes,
     /// Decodes the bytes that the controller receives.
@@ -80,7 +82,7 @@ impl ServoReplies {
             servo.is_doubtful |= servo.is_driven;
             servo.is_read_on = false;
         } else {
-            servo.is_driven = is_driven && !servo.is_read_off;
+            servo.is_driven = is_driven && servo.taken_offs < LOST_BY;
         }
         servo.unanswered = servo.unanswered.saturating_add(1);
         servo.asked_at = now;
@@ -152,7 +154,7 @@ impl ServoReplies {
     pub(super) fn forget_doubt(&mut self, joint: Joint) {
         let servo = &mut self.servos[joint];
         (servo.is_doubtful, servo.is_read_on, servo.is_read_off) = (false, false, false);
-        (servo.offs, servo.was_lost) = (0, false);
+        (servo.offs, servo.taken_offs, servo.was_lost) = (0, 0, false);
         servo.is_driven = false;
     }
 
@@ -204,7 +206,8 @@ impl Known {
     fn answered(&mut self, now: Instant, params: &[u8], on: u8) -> bool {
         self.replies = self.replies.saturating_add(1);
         self.unanswered = 0;
-        if let Some(since) = self.silent_since.take() {
+        let ended_silence = self.silent_since.take();
+        if let Some(since) = ended_silence {
             self.silence = (since, now);
         }
         if let Some(&[high, low, ..]) = measurements(params) {
@@ -218,6 +221,8 @@ impl Known {
             self.is_read_on = code == on;
             self.is_read_off = code != on;
             self.offs = if code == on { 0 } else { self.offs.saturating_add(1) };
+            let is_taken = ended_silence.is_none();
+            self.taken_offs = if code == on { 0 } else { self.taken_offs.saturating_add(is_taken.into()) };
             self.was_lost |= self.offs >= LOST_BY;
             self.held_goal = goal(params).filter(|_| code == on);
         }
@@ -305,6 +310,23 @@ mod tests {
     }
 
     #[test]
+    fn a_servo_that_answers_once_after_each_silence_may_still_be_driven_without_torque() {
+        let mut replies = ServoReplies::new(TorqueCodes::default());
+        is_on(&mut replies, 0);
+        for start in (10..500).step_by(100) {
+            [0, 10, 20].into_iter().for_each(|millis| fails(&mut replies, start + millis));
+            has(&mut replies, start + 30, Torque::Damping);
+        }
+        let has_outage_after = |answers: u64| {
+            let mut replies = replies.clone();
+            (0..answers).for_each(|n| has(&mut replies, 600 + n, Torque::Damping));
+            [700, 710, 1_720].into_iter().for_each(|millis| fails(&mut replies, millis));
+            replies.was_outage()
+        };
+        assert_eq!([0, 1, 2].map(has_outage_after), [true, true, false]);
+    }
+
+    #[test]
     fn a_driven_servo_is_doubtful_after_a_silence_until_its_torque_is_read() {
         let mut replies = ServoReplies::new(TorqueCodes::default());
         is_on(&mut replies, 0);
@@ -314,10 +336,10 @@ mod tests {
         assert!(replies.is_doubtful(JOINT) && replies.unanswered(JOINT) == 2);
         is_on(&mut replies, 30);
         assert!(!replies.is_doubtful(JOINT));
-        has(&mut replies, 40, Torque::Damping);
-        fails(&mut replies, 50);
+        [40, 50].into_iter().for_each(|millis| has(&mut replies, millis, Torque::Damping));
         fails(&mut replies, 60);
-        assert!(!replies.is_doubtful(JOINT), "it was read off, so it is not driven");
+        fails(&mut replies, 70);
+        assert!(!replies.is_doubtful(JOINT), "it was read off twice, so it is not driven");
     }
 
     #[test]

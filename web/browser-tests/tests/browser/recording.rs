@@ -65,10 +65,8 @@ fn a_recording_of_the_tool_is_played_and_another_file_is_refused() {
     assert!(page.text("#recording").contains("recorded: "), "the last one is kept");
 }
 
-#[test]
-fn a_stop_ends_a_movement_that_is_played() {
-    let viewed = Viewed::without_arm();
-    let mut page = viewed.open();
+/// Plays a movement that turns joint 1 for a minute, and waits until it turns.
+fn play_slowly(viewed: &Viewed, page: &mut Page) {
     let file = viewed.path("slow.7bot");
     let text = "7bot-recording 2\n0.000 90 90 65 90 90 90 80 0\n60.000 180 90 65 90 90 90 80 0\n";
     std::fs::write(&file, text).expect("a file");
@@ -76,10 +74,33 @@ fn a_stop_ends_a_movement_that_is_played() {
     page.wait_for_text("#recording", "recorded: ");
     page.click("[data-action=play]");
     page.wait_for_state("joint 1 turns", |state| state["measured"][0].as_f64() > Some(92.0));
-    page.key(" ");
-    page.wait_for_text("#state", "Stopped: the arm holds.");
+}
+
+/// The movement is over, and the arm stands.
+fn check_it_stands(page: &mut Page) {
     let held = page.measured()[0];
     page.pass(2.0);
     assert!((page.measured()[0] - held).abs() < 1.0, "{held}");
     assert!(!page.text("#recording").contains("playing"));
+}
+
+#[test]
+fn a_stop_ends_a_movement_that_is_played() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    play_slowly(&viewed, &mut page);
+    page.key(" ");
+    page.wait_for_text("#state", "Stopped: the arm holds.");
+    check_it_stands(&mut page);
+}
+
+#[test]
+fn a_stop_of_another_program_ends_a_movement_that_is_played() {
+    let viewed = Viewed::with_arm();
+    let mut page = viewed.open();
+    play_slowly(&viewed, &mut page);
+    let stop = viewed.tool().args(["stop", "--port", "./arm"]).output().expect("it runs");
+    assert!(stop.status.success(), "{stop:?}");
+    page.wait_for_text("#notice", "Another program has stopped the arm.");
+    check_it_stands(&mut page);
 }

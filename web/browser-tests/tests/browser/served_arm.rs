@@ -86,5 +86,11 @@ fn a_page_without_a_token_moves_no_arm() {
     let mut page = Page::open(&format!("{}/", viewed.origin()));
     assert_eq!(page.evaluate("document.querySelector('#source').value"), "simulator");
     page.choose("#source", "server");
-    page.wait_for_text("#notice", "There is no arm at this address.");
+    page.wait_for_text("#notice", "There is no arm at this address, or the address is an old one.");
+    let shown = ["#angle-1", "#tip", "#health"].map(|place| page.text(place));
+    assert_eq!(shown, ["unknown", "Tip: unknown", ""], "no value is invented");
+    assert_eq!(
+        page.evaluate("document.querySelectorAll('[data-action=motors][aria-pressed=true]').length"),
+        0
+    );
 }

@@ -58,7 +58,11 @@ impl CommandChecker {
         let new = ReachableRange::at(joint, goal, speed, context.now);
         // A joint without torque that engages anew where it is did not move there.
         let is_engaging = !self.is_on[joint] || self.replies.was_read_off(joint);
-        self.ranges[joint] = reached.filter(|_| paused.is_none() && !is_engaging).or(Some(new));
+        let goes_on = reached.filter(|_| paused.is_none() && !is_engaging);
+        if goes_on.is_none() {
+            self.linkage.reset();
+        }
+        self.ranges[joint] = goes_on.or(Some(new));
         self.check_doubt(joint, goal, context)?;
         match before {
             _ if reached.is_some() => check_arrival(joint, goal, context),
@@ -70,10 +74,7 @@ impl CommandChecker {
                 joint.number(),
                 before.last_goal
             ))),
-            _ => {
-                self.linkage.reset();
-                self.check_position(joint, goal, "is driven", context)
-            }
+            _ => self.check_position(joint, goal, "is driven", context),
         }
     }
 

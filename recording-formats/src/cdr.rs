@@ -1,0 +1,79 @@
+//! Messages as bytes, in the encoding of ROS 2: CDR, with four bytes before it that name the byte order.
+//!
+//! ```text
+//!   00 01 00 00   CDR, little-endian, no options
+//!   ...           the fields, each aligned to its size, counted from here
+//! ```
+
+use byteorder::{BigEndian, LittleEndian};
+use serde::{Deserialize, Serialize};
+
+const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
+const BIG_ENDIAN: [u8; 4] = [0, 0, 0, 0];
+
+/// The bytes of a message.
+pub(crate) fn encode(message: &impl Serialize) -> Result<Vec<u8>, cdr_encoding::Error> {
+    let mut bytes = LITTLE_ENDIAN.to_vec();
+    bytes.extend(cdr_encoding::to_vec::<_, LittleEndian>(message)?);
+    Ok(bytes)
+}
+
+/// A message from its bytes; `None` if they are not one.
+pub(crate) fn decode<'a, M: Deserialize<'a>>(bytes: &'a [u8]) -> Option<M> {
+    let (head, body) = bytes.split_first_chunk()?;
+    match *head {
+        LITTLE_ENDIAN => Some(cdr_encoding::from_bytes::<M, LittleEndian>(body).ok()?.0),
+        BIG_ENDIAN => Some(cdr_encoding::from_bytes::<M, BigEndian>(body).ok()?.0),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages::{Header, JointState, Time};
+
+    /// Two joints at 1.5 s: each field in its line.
+    const BYTES: &[&[u8]] = &[
+        &[0, 1, 0, 0],
+        &[1, 0, 0, 0, 0, 0x65, 0xCD, 0x1D],
+        // A text has its length with the 0 at its end. The next number is aligned.
+        &[1, 0, 0, 0, 0, 0, 0, 0],
+        &[2, 0, 0, 0, 2, 0, 0, 0, b'a', 0, 0, 0, 3, 0, 0, 0, b'b', b'c', 0, 0],
+        &[2, 0, 0, 0],
+        &[0, 0, 0, 0, 0, 0, 0xF0, 0x3F, 0, 0, 0, 0, 0, 0, 0, 0xC0],
+        &[0, 0, 0, 0],
+        &[0, 0, 0, 0],
+    ];
+
+    fn state() -> JointState {
+        JointState {
+            header: Header { stamp: Time { sec: 1, nanosec: 500_000_000 }, frame_id: String::new() },
+            name: vec!["a".to_owned(), "bc".to_owned()],
+            position: vec![1.0, -2.0],
+            velocity: Vec::new(),
+            effort: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_joint_state_has_the_bytes_of_ros() {
+        assert_eq!(encode(&state()).expect("bytes"), BYTES.concat());
+        assert_eq!(decode(&BYTES.concat()), Some(state()));
+    }
+
+    #[test]
+    fn cut_and_changed_messages_are_none_or_another_message() {
+        let bytes = BYTES.concat();
+        for end in 0..bytes.len() {
+            assert_eq!(decode::<JointState>(&bytes[..end]), None, "{end} bytes");
+        }
+        for place in 0..bytes.len() {
+            for value in [0, 1, 0x7F, 0xFF] {
+                let mut changed = bytes.clone();
+                changed[place] = value;
+                let _ = decode::<JointState>(&changed);
+            }
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Recordings of movements in the formats of other programs.
+//!
+//! ```text
+//!   text  ┐                                        ┌─▶ text   `sevenbot play`
+//!   CSV   ┼─▶ read ──▶ Recording ──▶ write ────────┼─▶ CSV    spreadsheets, plot programs
+//!   MCAP  ┘                                        └─▶ MCAP   Rerun, ROS 2
+//!                      an arm ──▶ McapWriter ────────▶        the same, while it moves
+//! ```
+//!
+//! An MCAP file has the topics of the node in `ros/sevenbot_ros`, with angles in radians. It is not compressed.
+
+#![forbid(unsafe_code)]
+
+mod cdr;
+mod convert;
+mod csv;
+mod diagnosis;
+mod format;
+mod joints;
+mod mcap_reader;
+mod messages;
+mod read;
+mod telemetry;
+mod topics;
+mod write;
+mod writer;
+
+pub use convert::convert;
+pub use format::Format;
+pub use mcap_reader::McapReadError;
+pub use read::{ReadError, read};
+pub use telemetry::{JointMotion, Telemetry};
+pub use write::write;
+pub use writer::{McapLayout, McapWriter};

@@ -1,0 +1,199 @@
+//! Reads a recording from an MCAP file: one of this program, or a bag of `ros/sevenbot_ros`.
+//!
+//! A file without an end is read as far as it goes.
+
+use std::collections::BTreeMap;
+use std::io::{self, Read};
+use std::time::Duration;
+
+use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
+use mcap::{McapError, Message};
+use sevenbot::recording::{Moment, Recording, RecordingError};
+use sevenbot::{FineAngle, Joint};
+
+use crate::cdr;
+use crate::joints::{names, to_degrees};
+use crate::messages::{JointState, RosMessage, Switch};
+use crate::read::ReadError;
+
+/// Longer records are none of an arm. Without a bound, a damaged length fills the memory.
+const LONGEST_RECORD: usize = 64 * 1_024 * 1_024;
+/// The last words of topics with the states of joints, the preferred one first.
+const STATES: [&str; 2] = ["joint_states", "robot_joint_states"];
+/// The last word of the topic with the state of the pump.
+const VACUUM: &str = "vacuum";
+/// The times of a recording are milliseconds.
+const RESOLUTION: Duration = Duration::from_millis(1);
+
+/// Why an MCAP file has no recording.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum McapReadError {
+    /// No topic has the states of the joints.
+    #[error(
+        "no message of a topic `joint_states` or `robot_joint_states` has the positions of joint_1 to joint_7"
+    )]
+    NoJoints,
+    /// Several arms were recorded.
+    #[error("this has the joints of several arms: {}", .0.join(", "))]
+    SeveralArms(Vec<String>),
+    /// The chunks are compressed.
+    #[error("its chunks are compressed with {0}: only uncompressed files are read")]
+    Compressed(String),
+    /// A joint is beyond its range.
+    #[error("at {seconds:.3} s joint {} is at {degrees:.2} degrees, and the range is 0 to 180", joint.number())]
+    OutOfRange {
+        /// The joint.
+        joint: Joint,
+        /// Its angle, as the registers have it.
+        degrees: f64,
+        /// The time in the file, since its first moment.
+        seconds: f64,
+    },
+    /// A message is older than the one before.
+    #[error("after {seconds:.3} s the time goes back: are these two recordings?")]
+    TimeGoesBack {
+        /// The time of the message before, since the first moment.
+        seconds: f64,
+    },
+    /// The moments are refused.
+    #[error(transparent)]
+    Refused(#[from] RecordingError),
+    /// The file is damaged before its first moment.
+    #[error("{0}, before its first moment")]
+    Unreadable(String),
+}
+
+/// Reads the recording, and passes each message on.
+pub(crate) fn read(
+    source: impl Read,
+    mut pass_on: impl FnMut(&Message) -> io::Result<()>,
+) -> Result<Recording, ReadError> {
+    let options = LinearReaderOptions::default()
+        .with_prevalidate_chunk_crcs(true)
+        .with_validate_data_section_crc(true)
+        .with_record_length_limit(LONGEST_RECORD);
+    let mut tracks = Tracks::default();
+    for message in MessageReader::new_with_options(source, options) {
+        match message {
+            Ok(message) => {
+                tracks.add(&message)?;
+                pass_on(&message)?;
+            }
+            Err(McapError::Io(error)) => return Err(error.into()),
+            Err(McapError::UnsupportedCompression(name)) => {
+                return Err(McapReadError::Compressed(name).into());
+            }
+            Err(damage) => return Err(tracks.damaged(told(&damage))),
+        }
+    }
+    Ok(tracks.recording()?)
+}
+
+fn told(damage: &McapError) -> String {
+    match damage {
+        McapError::UnexpectedEof | McapError::UnexpectedEoc => "the file ends in the middle".to_owned(),
+        McapError::BadDataCrc { .. } => {
+            "the checksum of the file is wrong, so a moment may be wrong or missing".to_owned()
+        }
+        other => format!("the file is damaged ({other})"),
+    }
+}
+
+/// The moments of each topic, while the file is read.
+#[derive(Default)]
+struct Tracks {
+    by_topic: BTreeMap<String, Track>,
+    vacuum: bool,
+}
+
+#[derive(Default)]
+struct Track {
+    /// The time of the first moment, since 1970.
+    start: Duration,
+    moments: Vec<Moment>,
+}
+
+impl Tracks {
+    fn add(&mut self, message: &Message) -> Result<(), McapReadError> {
+        let is = |name: &str| message.channel.schema.as_ref().is_some_and(|schema| schema.name == name);
+        let word = last_word(&message.channel.topic);
+        if word == VACUUM && is(Switch::NAME) {
+            self.vacuum = cdr::decode::<Switch>(&message.data).map_or(self.vacuum, |switch| switch.data);
+        }
+        if !(STATES.contains(&word) && is(JointState::NAME)) {
+            return Ok(());
+        }
+        let Some(state) = cdr::decode::<JointState>(&message.data) else { return Ok(()) };
+        let Some(positions) = positions(&state) else { return Ok(()) };
+        // Some programs leave the stamp at 0.
+        let stamp = state.header.stamp.since_epoch().filter(|stamp| !stamp.is_zero());
+        let time = stamp.unwrap_or(Duration::from_nanos(message.log_time));
+        let track = self.by_topic.entry(message.channel.topic.clone()).or_default();
+        track.add(time, positions, self.vacuum)
+    }
+
+    /// That of the preferred topic.
+    fn recording(self) -> Result<Recording, McapReadError> {
+        let preferred = |word: &str| -> Vec<String> {
+            self.by_topic.keys().filter(|topic| last_word(topic) == word).cloned().collect()
+        };
+        let topics = STATES.into_iter().map(preferred).find(|topics| !topics.is_empty());
+        let topics = topics.ok_or(McapReadError::NoJoints)?;
+        let [topic] = topics.as_slice() else { return Err(McapReadError::SeveralArms(topics)) };
+        let moments = self.by_topic.get(topic).map(|track| track.moments.clone()).unwrap_or_default();
+        Ok(Recording::of_moments(moments)?)
+    }
+
+    fn damaged(self, cause: String) -> ReadError {
+        match self.recording() {
+            Ok(readable) => ReadError::Damaged { readable, cause },
+            Err(McapReadError::NoJoints) => McapReadError::Unreadable(cause).into(),
+            Err(other) => other.into(),
+        }
+    }
+}
+
+impl Track {
+    fn add(&mut self, at: Duration, radians: [f64; 7], vacuum: bool) -> Result<(), McapReadError> {
+        let last = self.moments.last().map(|last| last.time);
+        if last.is_none() {
+            self.start = at;
+        }
+        let (time, seconds) = (at.checked_sub(self.start), last.unwrap_or_default().as_secs_f64());
+        let time = time.ok_or(McapReadError::TimeGoesBack { seconds })?;
+        match last {
+            Some(last) if time < last => return Err(McapReadError::TimeGoesBack { seconds }),
+            Some(last) if time < last + RESOLUTION => return Ok(()),
+            _ => {}
+        }
+        let pose = pose(radians, time.as_secs_f64())?;
+        self.moments.push(Moment { time, pose, vacuum });
+        Ok(())
+    }
+}
+
+/// The topic without its namespace.
+fn last_word(topic: &str) -> &str {
+    topic.rsplit('/').next().unwrap_or(topic)
+}
+
+/// The positions of joints 1 to 7 in radians; `None` if the message lacks one.
+fn positions(state: &JointState) -> Option<[f64; 7]> {
+    let mut positions = [0.0; 7];
+    for (position, name) in positions.iter_mut().zip(names()) {
+        let place = state.name.iter().position(|other| *other == name)?;
+        *position = *state.position.get(place)?;
+    }
+    Some(positions)
+}
+
+fn pose(radians: [f64; 7], seconds: f64) -> Result<[FineAngle; 7], McapReadError> {
+    let mut pose = [FineAngle::from(sevenbot::Angle::from_register(0)); 7];
+    for ((angle, radians), joint) in pose.iter_mut().zip(radians).zip(Joint::ALL) {
+        let degrees = to_degrees(joint, radians);
+        *angle =
+            FineAngle::from_degrees(degrees).ok_or(McapReadError::OutOfRange { joint, degrees, seconds })?;
+    }
+    Ok(pose)
+}

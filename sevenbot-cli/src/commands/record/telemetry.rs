@@ -1,0 +1,81 @@
+//! What is read of an arm during a recording besides its poses, as often as the line allows.
+
+use std::time::{Duration, Instant};
+
+use recording_formats::{JointMotion, Telemetry};
+use sevenbot::fine::FineState;
+use sevenbot::map::{FINE_TARGET, LOAD};
+use sevenbot::{Angle, Arm, Error, FineAngle, Health, Snapshot, Span};
+
+/// Targets, positions, velocities and loads.
+const REGISTERS: Span = Span::between(&FINE_TARGET, &LOAD);
+/// Bits of a question and its answer on the line: 7 bytes each around the values, ten bits a byte.
+const BITS: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
+/// The answers take at most this part of the line: the rest is for reports.
+const SHARE_OF_LINE: u32 = 2;
+/// Between two questions for the health, which has more registers.
+const HEALTH_PERIOD: Duration = Duration::from_secs(1);
+/// A health takes as long as so many answers.
+const ANSWERS_PER_HEALTH: u32 = 4;
+
+/// Reads targets, velocities and loads, and the health once a second.
+pub(crate) struct TelemetryReader {
+    /// Do the motors follow the targets?
+    is_driven: bool,
+    /// Does the arm have hundredths, velocities and loads?
+    is_fine: bool,
+    /// The shortest time between two questions; 0 where the line is fast enough for one at each report.
+    period: Duration,
+    next: Instant,
+    health_period: Duration,
+    next_health: Instant,
+}
+
+impl TelemetryReader {
+    /// For an arm whose line has this baud rate, and that reports in this period.
+    pub(crate) fn new(arm: &Arm, baud: u32, reports: Duration, is_driven: bool, is_fine: bool) -> Self {
+        let answer = Duration::from_secs(1) * BITS / baud.max(1);
+        let period = answer * SHARE_OF_LINE;
+        Self {
+            is_driven,
+            is_fine,
+            period: if period <= reports { Duration::ZERO } else { period },
+            next: arm.now(),
+            health_period: HEALTH_PERIOD.max(period * ANSWERS_PER_HEALTH),
+            next_health: arm.now(),
+        }
+    }
+
+    /// What the arm tells now. Nothing on a slow line, until it is time again.
+    pub(crate) fn read(&mut self, arm: &mut Arm) -> Result<Telemetry, Error> {
+        let now = arm.now();
+        if now < self.next {
+            return Ok(Telemetry::default());
+        }
+        self.next = now + self.period;
+        let (targets, motion) = match self.is_fine {
+            true => fine(&arm.read_span(REGISTERS)?),
+            false => (arm.targets()?.map(FineAngle::from), None),
+        };
+        Ok(Telemetry { targets: self.is_driven.then_some(targets), motion })
+    }
+
+    /// The health, once a second.
+    pub(crate) fn health(&mut self, arm: &mut Arm) -> Result<Option<Health>, Error> {
+        let now = arm.now();
+        if now < self.next_health {
+            return Ok(None);
+        }
+        self.next_health = now + self.health_period;
+        arm.health().map(Some)
+    }
+}
+
+fn fine(registers: &Snapshot) -> ([FineAngle; 7], Option<JointMotion>) {
+    let nearest = |word: u16| FineAngle::from_hundredths(word.min(FineAngle::MAX_HUNDREDTHS));
+    let targets =
+        registers.words(&FINE_TARGET).map(|word| nearest(word).unwrap_or(Angle::from_register(0).into()));
+    let state = FineState::new(registers);
+    let tenths = |values: [i16; 7]| values.map(|value| f64::from(value) / 10.0);
+    (targets, Some(JointMotion { velocities: tenths(state.velocities), loads: tenths(state.loads) }))
+}
