@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 use sevenbot::network::mdns::Announcement;
-use sevenbot::network::{LocalServer, Registered};
+use sevenbot::network::{self, LocalServer, Registered};
 use sevenbot::open_port::OpenPort;
 use sevenbot::simulated::simulated_port;
 use sevenbot::{OpenError, ports};
@@ -250,9 +250,7 @@ fn token(args: &ServeArgs) -> Result<Option<String>, CommandError> {
 
 /// Parses the name of an arm.
 fn name(text: &str) -> Result<String, &'static str> {
-    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-';
-    let is_name = (1..=63).contains(&text.len()) && text.bytes().all(is_plain);
-    if is_name { Ok(text.to_owned()) } else { Err("use 1 to 63 letters, digits and hyphens") }
+    if network::is_name(text) { Ok(text.to_owned()) } else { Err(network::NAME_RULE) }
 }
 
 /// A port from the command line is kept. Otherwise the arm is searched again each time it was unplugged.
