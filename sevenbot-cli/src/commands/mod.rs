@@ -19,7 +19,6 @@ pub(crate) mod position;
 pub(crate) mod record;
 pub(crate) mod recover;
 pub(crate) mod registers;
-#[cfg(target_os = "linux")]
 pub(crate) mod serve;
 pub(crate) mod servo;
 pub(crate) mod set;
@@ -31,5 +30,4 @@ pub(crate) mod state;
 pub(crate) mod status;
 pub(crate) mod stop;
 pub(crate) mod stream;
-#[cfg(target_os = "linux")]
 pub(crate) mod view;

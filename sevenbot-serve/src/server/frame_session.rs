@@ -76,6 +76,7 @@ impl FrameSession {
 
     /// Another client uses the same wire from now on. The bytes that the hub has not got yet are those of the client before, or may
     /// be its own. In the first case its writes are carried out, but the next client does not wait for replies that nobody wants.
+    #[cfg(target_os = "linux")] // Pseudo-terminals are for Linux.
     pub(super) fn succeed(self, are_of_the_one_before: bool) -> Self {
         let mut next = Self::open(self.seat.shared());
         (next.input, next.since) = (self.input, self.since);
