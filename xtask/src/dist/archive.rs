@@ -60,7 +60,7 @@ pub(super) fn tar_gz(files: &[PackedFile], epoch: u64) -> TaskResult<Vec<u8>> {
 
 /// Compressed, without a name and a time.
 pub(super) fn gzip(bytes: &[u8]) -> TaskResult<Vec<u8>> {
-    let mut encoder = GzBuilder::new().write(Vec::new(), Compression::best());
+    let mut encoder = GzBuilder::new().write(Vec::new(), Compression::default());
     encoder.write_all(bytes)?;
     Ok(encoder.finish()?)
 }
@@ -71,7 +71,6 @@ pub(super) fn zip(files: &[PackedFile]) -> TaskResult<Vec<u8>> {
     for file in sorted(files) {
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Deflated)
-            .compression_level(Some(9))
             .last_modified_time(DateTime::default())
             .unix_permissions(file.mode());
         archive.start_file(&file.path, options)?;

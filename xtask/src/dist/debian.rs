@@ -50,8 +50,10 @@ pub(super) fn write(release: &Release, platform: Platform, files: &[PackedFile])
     for (name, text) in [("control", control), ("md5sums", md5sums(&folder)?)] {
         put(&folder, &PackedFile::text(format!("DEBIAN/{name}"), text))?;
     }
+    // Only what is passed on has to be small: the programs of the tests have their debug information.
+    let compressor = if release.commit.is_some() { "-Zxz" } else { "-Zgzip" };
     let mut dpkg = Command::new("dpkg-deb");
-    dpkg.args(["--root-owner-group", "--build", "-Zxz"]).arg(&folder).arg(release.path(&name(release, debian)));
+    dpkg.args(["--root-owner-group", "--build", compressor]).arg(&folder).arg(release.path(&name(release, debian)));
     run(dpkg.env("SOURCE_DATE_EPOCH", release.epoch.to_string()).stdout(std::process::Stdio::null()))
 }
 
@@ -99,9 +101,11 @@ fn control(release: &Release, debian: &str, files: &[PackedFile]) -> String {
     let kib: usize = files.iter().map(|file| file.bytes.len().div_ceil(1024)).sum();
     let programs = files.iter().filter(|file| file.is_program);
     let glibc = programs.filter_map(|program| newest_glibc(&program.bytes)).max().unwrap_or((2, 17));
+    let unwinds_by_libgcc = |file: &PackedFile| file.is_program && contains(&file.bytes, b"libgcc_s.so.1");
+    let libgcc = if files.iter().any(unwinds_by_libgcc) { ", libgcc-s1" } else { "" };
     format!(
         "Package: sevenbot\nVersion: {}\nArchitecture: {debian}\nMaintainer: {}\nInstalled-Size: {kib}\n\
-         Depends: libc6 (>= {}.{})\nSection: electronics\nPriority: optional\n\
+         Depends: libc6 (>= {}.{}){libgcc}\nSection: electronics\nPriority: optional\n\
          Description: programs for the robot arm 7Bot V2\n \
          `sevenbot` controls the arm over its serial port: poses, recordings, a monitor\n \
          in the terminal, a page in the browser, and one arm for many programs.\n \
@@ -118,6 +122,10 @@ fn maintainer() -> String {
         (Ok(name), Ok(address)) => format!("{name} <{address}>"),
         _ => MAINTAINER.to_owned(),
     }
+}
+
+fn contains(bytes: &[u8], part: &[u8]) -> bool {
+    bytes.windows(part.len()).any(|window| window == part)
 }
 
 /// The newest version of the C library of which a program uses a symbol: `GLIBC_2.17`.

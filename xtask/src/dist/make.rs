@@ -10,7 +10,6 @@ use super::platform::{PLATFORMS, Platform, host_platform};
 use super::release::Release;
 use super::tree::{self, CommonFiles};
 use super::{check, debian, firmware, licences, page, sbom, sums, tools, wheels};
-use crate::python;
 use crate::run::{TaskResult, target_directory};
 
 /// Makes everything.
@@ -44,8 +43,8 @@ pub(super) fn make(folder: PathBuf) -> TaskResult {
     check::check(&release.folder, true)
 }
 
-/// Packs the programs that the tests of this computer built: the archive, the package and the wheel, in a folder of their own.
-/// Returns the folder.
+/// Packs the programs that the tests of this computer built, in a folder of their own: the archive and the package. A step of
+/// the Python package installs the wheel. Returns the folder.
 pub(super) fn make_native() -> TaskResult<PathBuf> {
     let folder = target_directory().join("dist-native");
     let release = Release { commit: None, ..Release::of_this_commit(folder)? };
@@ -53,8 +52,6 @@ pub(super) fn make_native() -> TaskResult<PathBuf> {
     let built = target_directory().join("debug");
     let common = CommonFiles::new(&built.join("sevenbot"))?;
     pack(&release, host_platform()?, &built, &common)?;
-    let wheel = python::wheel()?;
-    fs::copy(&wheel, release.path(&wheel.file_name().unwrap_or_default().to_string_lossy()))?;
     finish(&release)?;
     check::check(&release.folder, false)?;
     Ok(release.folder)
