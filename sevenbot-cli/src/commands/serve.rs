@@ -3,7 +3,6 @@
 use std::fs;
 use std::io::{self, Write};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -15,7 +14,7 @@ use sevenbot::simulated::simulated_port;
 use sevenbot::{OpenError, ports};
 use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::server::{
-    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, TlsFiles,
+    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, Stop, TlsFiles,
 };
 
 use crate::command_error::CommandError;
@@ -147,10 +146,10 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
     run_server(server, &stop, local.as_ref())
 }
 
-/// Serves until `stop` is readable. Other programs of this user find the server by `local`.
+/// Serves until it is stopped. Other programs of this user find the server by `local`.
 pub(super) fn run_server(
     server: Server,
-    stop: &UnixStream,
+    stop: &Stop,
     local: Option<&LocalServer>,
 ) -> Result<(), CommandError> {
     let mut registered = None;
@@ -276,11 +275,11 @@ pub(super) fn check_not_busy(arm: &ArmLocation, baud: u32) -> Result<(), Command
     }
 }
 
-/// Becomes readable at Ctrl-C, and at signals that ask a program to end.
-pub(super) fn stop_signal() -> Result<UnixStream, CommandError> {
-    let (stop, mut trigger) = UnixStream::pair()?;
-    let handler = move || drop(trigger.write_all(&[0]));
-    ctrlc::set_handler(handler)
+/// Ends the server at Ctrl-C, and at signals that ask a program to end.
+pub(super) fn stop_signal() -> Result<Stop, CommandError> {
+    let stop = Stop::default();
+    let trigger = stop.clone();
+    ctrlc::set_handler(move || trigger.stop())
         .map_err(|error| CommandError::Arm(format!("cannot catch Ctrl-C: {error}")))?;
     Ok(stop)
 }
