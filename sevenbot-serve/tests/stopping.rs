@@ -7,7 +7,7 @@
 mod rig;
 
 use protocol_core::registers::map::{
-    CHIP_ID, FINE_POSITION, FINE_TARGET, MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION,
+    CHIP_ID, FINE_POSITION, FINE_TARGET, HOST_WATCHDOG, MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION,
 };
 use protocol_core::time::Duration;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -182,6 +182,45 @@ fn a_command_to_the_server_stops_the_arm_and_ends_streams() {
     assert_eq!(world.arm.registers().get(TARGET_POSITION.address), held);
 }
 
+/// The weight draws the joints off their targets. Holds at the positions would let the arm sink by as much each time.
+#[test]
+fn d24_an_arm_that_is_held_again_and_again_does_not_sink() {
+    let mut world = World::new(3);
+    world.send(0, &write(TARGET_POSITION.address, &[60, 40, 65]));
+    world.run(3_000);
+    let before = (targets(&world), positions(&world));
+    let droop =
+        before.0.chunks(2).zip(before.1).map(|(target, position)| {
+            (i32::from(u16::from_le_bytes([target[0], target[1]])) - position).abs()
+        });
+    assert!(droop.max() > Some(20), "the weight acts: {before:?}");
+    for turn in 0..40 {
+        world.send(1, &write(COMMAND, &[1]));
+        // A watchdog of 10 ms, and then silence.
+        world.send(2, &write(HOST_WATCHDOG.address, &[1]));
+        world.run(25);
+        assert_eq!(targets(&world), before.0, "hold {turn}");
+    }
+    let moved = before.1.iter().zip(positions(&world)).map(|(before, after)| (before - after).abs()).max();
+    assert!(moved <= Some(10), "moved by {moved:?} hundredths");
+}
+
+/// Each command begins another hold before the one before has ended.
+#[test]
+fn commands_without_a_pause_stop_the_arm() {
+    let mut world = World::new(4);
+    world.send(0, &write(TARGET_POSITION.address, &[150]));
+    world.run(300);
+    for _ in 0..100 {
+        (1..4).for_each(|program| world.send(program, &write(COMMAND, &[1])));
+        world.run(2);
+    }
+    let held = world.arm.registers().get(TARGET_POSITION.address);
+    assert!((91..149).contains(&held), "on its way: {held}");
+    world.run(500);
+    assert_eq!(world.arm.registers().get(TARGET_POSITION.address), held);
+}
+
 /// With a set-point period a fine target is the next point of a stream, up to two seconds later.
 #[test]
 fn a_command_stops_a_stream_with_a_long_period() {
@@ -322,6 +361,31 @@ fn with_read_only_access_nothing_but_reads_is_sent() {
     let answers: Vec<_> = world.pages[0].answers.iter().map(|(_, answer)| answer.as_str()).collect();
     assert!(answers.iter().all(|answer| answer.contains("read-only")) && answers.len() == 2, "{answers:?}");
     assert_eq!(sharing(&mut world, 0)[4], 2);
+}
+
+#[test]
+fn without_an_arm_a_program_can_read_that_there_is_none() {
+    let mut world = World::new(1);
+    world.unplug();
+    world.send(0, &[read(PRESENT_POSITION.address, 7), read(SHARING.0, SHARING.1), read(231, 8)].concat());
+    world.run(10);
+    assert_eq!(world.take(0), [(SHARING.0, vec![1, 1, 0, 0, 8, 0, 0, 0])], "nothing else is answered");
+    world.plug();
+    world.run(1_000);
+    assert_eq!(sharing(&mut world, 0)[4], 0);
+}
+
+/// It asks all the time, and takes no reply.
+#[test]
+fn replies_without_an_arm_do_not_pile_up() {
+    let mut world = World::new(1);
+    world.unplug();
+    world.programs[0].reads = false;
+    for _ in 0..2_000 {
+        world.send(0, &read(SHARING.0, SHARING.1));
+        world.run(1);
+    }
+    assert!(world.programs[0].unread_bytes() < 6_000, "{}", world.programs[0].unread_bytes());
 }
 
 #[test]

@@ -107,6 +107,14 @@ pub fn send_signal(process: &Child, signal: Signal) {
     kill_process(Pid::from_child(process), signal).expect("the process is running");
 }
 
+/// Memory of a program in KiB.
+#[must_use]
+pub fn kilobytes(process: &Child) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", process.id())).expect("a status");
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("its memory");
+    line.trim().trim_end_matches("kB").trim().parse().expect("a number")
+}
+
 /// Waits for the end of a process.
 #[track_caller]
 pub fn wait_for_exit(process: &mut Child) -> ExitStatus {

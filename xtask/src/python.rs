@@ -59,7 +59,7 @@ fn first_interpreter() -> TaskResult<(String, &'static str)> {
 }
 
 /// The versions on PATH, each once, with a program of each.
-fn interpreters() -> Vec<(String, &'static str)> {
+pub(crate) fn interpreters() -> Vec<(String, &'static str)> {
     let mut found: Vec<(String, &str)> = Vec::new();
     for program in INTERPRETERS {
         let output = Command::new(program).args(["-c", VERSION]).stderr(Stdio::null()).output();

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot::network::mdns::{self, Announced};
+use sevenbot::network::{self, Address, KnownName, mdns};
 use sevenbot::ports::{PortInfo, ProbeResult, probe, reachable};
 
 use crate::command_error::CommandError;
@@ -21,17 +21,31 @@ devices receive 14 bytes. Lists the servers of this user, too; an arm that
 
 Examples:
   sevenbot ports
-  sevenbot ports /dev/ttyUSB0 ./7bot     only these, also unlisted ones")]
+  sevenbot ports /dev/ttyUSB0 ./7bot     only these, also unlisted ones
+  sevenbot ports --network
+  sevenbot ports --remember lab-3=tls://10.0.0.5:7777")]
 pub(crate) struct PortsArgs {
     /// Ask only these ports.
     #[arg(value_name = "PORT")]
     ports: Vec<String>,
-    /// Ask the local network for the names of arms, too. It takes a second and a half.
+    /// Ask the local network for the names of arms, too, and list those that are known. It takes a second and a half.
     #[arg(long)]
     network: bool,
+    /// Remember the address of an arm on the network, for --port sevenbot://NAME: for networks that block multicast.
+    #[arg(long, value_name = "NAME=ADDRESS", value_parser = known_name)]
+    remember: Option<KnownName>,
+    /// Forget the address of a name.
+    #[arg(long, value_name = "NAME", conflicts_with = "remember")]
+    forget: Option<String>,
 }
 
 pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), CommandError> {
+    if let Some(known) = &args.remember {
+        return Ok(network::remember(known)?);
+    }
+    if let Some(name) = &args.forget {
+        return Ok(network::forget(name)?);
+    }
     let named = args.ports.iter().chain(&session.port);
     let named = named.map(|name| PortInfo { name: name.clone(), description: String::new() });
     let mut asked = if args.ports.is_empty() { reachable() } else { Vec::new() };
@@ -40,22 +54,37 @@ pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), Command
             asked.push(port);
         }
     }
-    let announced = if args.network { mdns::announced() } else { Vec::new() };
-    let ports = probe(asked, session.options.baud).into_iter().map(PortLine::from);
-    let ports = ports.chain(announced.into_iter().map(announced_line)).collect();
+    let of_network = if args.network { names_of_network() } else { Vec::new() };
+    let ports =
+        probe(asked, session.options.baud).into_iter().map(PortLine::from).chain(of_network).collect();
     session.printer.print(&Ports { ports })
 }
 
-/// A server of the local network in the list of ports. It is not asked: it may want a token.
-fn announced_line(arm: Announced) -> PortLine {
-    let Announced { name, address, is_encrypted } = arm;
-    let scheme = if is_encrypted { "tls" } else { "tcp" };
-    let port = format!("sevenbot://{name}");
+/// Parses `NAME=ADDRESS`.
+fn known_name(text: &str) -> Result<KnownName, String> {
+    let (name, address) =
+        text.split_once('=').ok_or("write NAME=ADDRESS, such as lab-3=tls://10.0.0.5:7777")?;
+    let address = Address::parse(address).filter(Address::is_of_network);
+    let address = address.ok_or("the address: use tcp://HOST:PORT or tls://HOST:PORT")?;
+    let name = Some(name).filter(|name| network::is_name(name)).ok_or(network::NAME_RULE)?.to_owned();
+    Ok(KnownName { name, address })
+}
+
+/// The servers of the local network in the list of ports, and those that were there. They are not asked: they may want a token.
+fn names_of_network() -> Vec<PortLine> {
+    let announced: Vec<KnownName> = mdns::announced().into_iter().map(KnownName::from).collect();
+    let mut known = network::known_names();
+    known.retain(|known| announced.iter().all(|other| other.name != known.name));
+    let announced = announced.into_iter().map(|arm| network_line(&arm, "announced on the network"));
+    announced.chain(known.iter().map(|arm| network_line(arm, "known, and not announced now"))).collect()
+}
+
+fn network_line(arm: &KnownName, state: &str) -> PortLine {
     PortLine {
-        port,
-        description: format!("{scheme}://{address}"),
+        port: format!("sevenbot://{}", arm.name),
+        description: arm.address.to_string(),
         arm: None,
-        no_arm: Some("announced on the network".to_owned()),
+        no_arm: Some(state.to_owned()),
     }
 }
 

@@ -3,19 +3,18 @@
 use std::fs;
 use std::io::{self, Write};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
 use sevenbot::network::mdns::Announcement;
-use sevenbot::network::{LocalServer, Registered, is_token};
+use sevenbot::network::{self, LocalServer, Registered, is_token};
 use sevenbot::open_port::OpenPort;
 use sevenbot::simulated::simulated_port;
 use sevenbot::{OpenError, ports};
 use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::server::{
-    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, TlsFiles,
+    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, Stop, TlsFiles,
 };
 
 use crate::command_error::CommandError;
@@ -147,10 +146,10 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
     run_server(server, &stop, local.as_ref())
 }
 
-/// Serves until `stop` is readable. Other programs of this user find the server by `local`.
+/// Serves until it is stopped. Other programs of this user find the server by `local`.
 pub(super) fn run_server(
     server: Server,
-    stop: &UnixStream,
+    stop: &Stop,
     local: Option<&LocalServer>,
 ) -> Result<(), CommandError> {
     let mut registered = None;
@@ -250,9 +249,7 @@ fn token(args: &ServeArgs) -> Result<Option<String>, CommandError> {
 
 /// Parses the name of an arm.
 fn name(text: &str) -> Result<String, &'static str> {
-    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-';
-    let is_name = (1..=63).contains(&text.len()) && text.bytes().all(is_plain);
-    if is_name { Ok(text.to_owned()) } else { Err("use 1 to 63 letters, digits and hyphens") }
+    if network::is_name(text) { Ok(text.to_owned()) } else { Err(network::NAME_RULE) }
 }
 
 /// A port from the command line is kept. Otherwise the arm is searched again each time it was unplugged.
@@ -278,11 +275,11 @@ pub(super) fn check_not_busy(arm: &ArmLocation, baud: u32) -> Result<(), Command
     }
 }
 
-/// Becomes readable at Ctrl-C, and at signals that ask a program to end.
-pub(super) fn stop_signal() -> Result<UnixStream, CommandError> {
-    let (stop, mut trigger) = UnixStream::pair()?;
-    let handler = move || drop(trigger.write_all(&[0]));
-    ctrlc::set_handler(handler)
+/// Ends the server at Ctrl-C, and at signals that ask a program to end.
+pub(super) fn stop_signal() -> Result<Stop, CommandError> {
+    let stop = Stop::default();
+    let trigger = stop.clone();
+    ctrlc::set_handler(move || trigger.stop())
         .map_err(|error| CommandError::Arm(format!("cannot catch Ctrl-C: {error}")))?;
     Ok(stop)
 }

@@ -2,7 +2,7 @@
 
 use protocol_core::time::Instant;
 
-use super::client::{LONGEST_WAIT, Waiting};
+use super::client::{LONGEST_WAIT, MOST_WAITING, Waiting};
 use super::client_id::ClientId;
 use super::drive::MayNotMove;
 use super::intent::Intent;
@@ -17,7 +17,7 @@ pub enum Admission {
     Queued,
     /// The client has too many requests: it is dropped.
     NoRoom,
-    /// There is no arm: it is dropped.
+    /// There is no arm: it is dropped, unless it reads the server's own registers.
     NoArm,
     /// It waits for its turn, and then writes nothing but the client's own registers.
     ReadOnly,
@@ -43,8 +43,7 @@ impl Hub {
             return Admission::NoRoom;
         };
         if self.arm != ArmState::Present {
-            client.refuse(&request);
-            self.news.insert(id);
+            self.answer_without_arm(now, id, &request);
             return Admission::NoArm;
         }
         let (intent, command) = client.meaning(now, &request, &self.known);
@@ -67,6 +66,17 @@ impl Hub {
         }
         self.queue(now, id, Waiting { request, intent, since });
         Admission::Queued
+    }
+
+    /// Without an arm, a client can still read that there is none.
+    fn answer_without_arm(&mut self, now: Instant, id: ClientId, request: &WholeRequest) {
+        let reply = self.own_reply(now, id, request);
+        let Some(client) = self.clients.get_mut(&id) else { return };
+        match reply {
+            Some(reply) if client.events.len() < MOST_WAITING => client.events.push_back(reply),
+            _ => client.refuse(request),
+        }
+        self.news.insert(id);
     }
 
     /// A request comes too late. The targets of a late stop would move the arm, so the hub holds it where it is.

@@ -7,7 +7,8 @@ use super::Hub;
 use super::client::{Client, Event};
 use super::client_id::ClientId;
 use super::line::Owner;
-use super::sharing_block::{DrivenBy, SharingState};
+use super::request::WholeRequest;
+use super::sharing_block::{self, DrivenBy, SharingState};
 
 impl Hub {
     pub(super) fn deliver(&mut self, now: Instant, owner: Owner, event: Event) {
@@ -48,6 +49,17 @@ impl Hub {
         }
     }
 
+    /// The reply to a read of the server's registers and no others: it needs no arm.
+    pub(super) fn own_reply(&self, now: Instant, id: ClientId, request: &WholeRequest) -> Option<Event> {
+        let &WholeRequest::Read { address, count } = request else { return None };
+        let client = self.clients.get(&id).filter(|client| client.can_receive)?;
+        sharing_block::is_own(address, count).then(|| {
+            let mut values = vec![0; count.into()];
+            self.sharing_state(now, id, client).overlay(address, &mut values);
+            Event::Reply { address, values }
+        })
+    }
+
     /// What the registers of the server tell a client.
     fn sharing_state(&self, now: Instant, id: ClientId, client: &Client) -> SharingState {
         let clients = self.clients.values().filter(|client| client.left.is_none()).count();
@@ -62,6 +74,7 @@ impl Hub {
             is_stopped: client.driving.is_stopped(now),
             is_read_only: self.options.is_read_only,
             has_one_driver: self.options.has_one_driver,
+            is_without_arm: !self.has_arm(),
             dropped: client.dropped,
         }
     }

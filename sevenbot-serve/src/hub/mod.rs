@@ -37,7 +37,7 @@ mod watchdog;
 use std::collections::{BTreeMap, BTreeSet};
 
 use protocol_core::registers::Map;
-use protocol_core::registers::map::FEEDBACK_FREQUENCY;
+use protocol_core::registers::map::{FEEDBACK_FREQUENCY, SET_POINT_PERIOD};
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};
 use protocol_core::time::{Duration, Instant};
 
@@ -156,8 +156,13 @@ impl Hub {
         self.clients.get(&id).is_some_and(Client::has_room)
     }
 
+    /// Holds the arm; after the hold in progress, if there is one.
     fn start_hold(&mut self) {
-        self.hold = Some(ArmHold::new(self.known.is_ours()));
+        if let Some(hold) = &mut self.hold {
+            return hold.want_again();
+        }
+        let is_streaming = self.known.word(SET_POINT_PERIOD.address) != 0;
+        self.hold = Some(ArmHold::new(self.known.is_ours(), is_streaming));
     }
 
     /// The clients that have something new since the last call: events, or room for requests.

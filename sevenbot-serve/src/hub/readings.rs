@@ -1,5 +1,6 @@
 //! The positions that a client has read of late. Targets that equal them hold the arm: that is how every program stops it
-//! ([D24](protocol_core::decisions#d24) and `sevenbot::hold`), for the wire has no request to stop.
+//! ([D24](protocol_core::decisions#d24) and `sevenbot::hold`), for the wire has no request to stop. A joint that was read to be near its
+//! target may keep it.
 
 use std::collections::VecDeque;
 
@@ -11,6 +12,8 @@ use protocol_core::time::{Duration, Instant};
 const KEPT: usize = 8;
 /// Older readings tell nothing about where the arm is.
 const FRESH: Duration = Duration::from_millis(1_000);
+/// The weight draws a joint so far off its target at most, in hundredths of a degree.
+const DROOP: u16 = 150;
 /// The value of a fine position that was not measured.
 const UNMEASURED: [u8; 2] = [0xFF; 2];
 
@@ -58,12 +61,23 @@ impl Reading {
         for joint in Joint::ALL {
             let Some(target) = bytes(targets, joint, address, values) else { continue };
             let position = bytes(positions, joint, self.address, &self.values)?;
-            if target != position || target == UNMEASURED {
+            let is_kept = || bytes(targets, joint, self.address, &self.values) == Some(target);
+            if target == UNMEASURED || (target != position && !(is_near(target, position) && is_kept())) {
                 return None;
             }
             count += 1;
         }
         Some(count)
+    }
+}
+
+/// Are these values in hundredths of a degree, and near each other?
+fn is_near(target: &[u8], position: &[u8]) -> bool {
+    match (target, position) {
+        (&[low, high], &[low_too, high_too]) => {
+            u16::from_le_bytes([low, high]).abs_diff(u16::from_le_bytes([low_too, high_too])) <= DROOP
+        }
+        _ => false,
     }
 }
 
@@ -98,5 +112,21 @@ mod tests {
         (0..8).for_each(|_| readings.note(at_ms(20), 60, &[1]));
         assert_eq!(readings.held_joints(at_ms(20), 46, &POSE), None, "forgotten");
         assert_eq!(readings.held_joints(at_ms(20), 52, &[1]), Some(1));
+    }
+
+    #[test]
+    fn a_joint_that_was_near_its_target_may_keep_it() {
+        let reading = |position: u16| {
+            let mut readings = Readings::default();
+            let values = [9_000_u16, 0, 0, 0, 0, 0, 0, position].map(u16::to_le_bytes).concat();
+            readings.note(at_ms(0), 128, &values);
+            readings
+        };
+        let held =
+            |readings: &Readings, target: u16| readings.held_joints(at_ms(0), 128, &target.to_le_bytes());
+        assert_eq!(held(&reading(8_900), 9_000), Some(1));
+        assert_eq!(held(&reading(8_900), 8_900), Some(1));
+        assert_eq!(held(&reading(8_900), 8_950), None, "neither of them");
+        assert_eq!(held(&reading(8_800), 9_000), None, "it is on its way");
     }
 }

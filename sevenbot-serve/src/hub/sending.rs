@@ -44,11 +44,13 @@ impl Hub {
     /// Writes the targets that hold the arm.
     pub(super) fn continue_hold(&mut self, now: Instant, reply: Option<(u8, &[u8])>) {
         let Some(mut hold) = self.hold.take() else { return };
-        let Some((address, values)) = reply else {
-            self.hold = hold.note_no_reply().then_some(hold);
-            return;
+        let frames = match reply {
+            Some((address, values)) => hold.frames(address, values),
+            None => {
+                hold.note_no_reply();
+                Vec::new()
+            }
         };
-        let frames = hold.frames(address, values);
         let period = self.known.word(SET_POINT_PERIOD.address);
         if !frames.is_empty() && period != 0 {
             self.write_arm(now, SET_POINT_PERIOD.address, &[0, 0]);
@@ -59,7 +61,11 @@ impl Hub {
         if !frames.is_empty() && period != 0 {
             self.write_arm(now, SET_POINT_PERIOD.address, &period.to_le_bytes());
         }
-        self.hold = (!hold.is_over(&frames)).then_some(hold);
+        match hold.is_over() {
+            false => self.hold = Some(hold),
+            true if hold.is_wanted_again() => self.start_hold(),
+            true => {}
+        }
     }
 
     /// Sends the next request or sample. Returns false if there is none.

@@ -5,11 +5,16 @@
 //! ```
 
 /// The first register.
-pub(crate) const FIRST: u8 = 232;
+const FIRST: u8 = 232;
 /// The register that a client writes commands to.
 const COMMAND: u8 = 239;
 /// The version of this layout.
 const VERSION: u8 = 1;
+
+/// Are all these registers the server's?
+pub(crate) const fn is_own(address: u8, count: u8) -> bool {
+    FIRST <= address && address <= COMMAND && 0 < count && count <= COMMAND - address + 1
+}
 
 /// Who wrote targets last, within the last second.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,14 +67,16 @@ pub struct SharingState {
     pub is_read_only: bool,
     /// Only one client drives at a time.
     pub has_one_driver: bool,
+    /// No arm answers.
+    pub is_without_arm: bool,
     /// Writes of this client that were not carried out, wrapping.
     pub dropped: u16,
 }
 
 impl SharingState {
     fn bytes(self) -> [u8; 8] {
-        let flags =
-            u8::from(self.is_stopped) | u8::from(self.is_read_only) << 1 | u8::from(self.has_one_driver) << 2;
+        let bits = [self.is_stopped, self.is_read_only, self.has_one_driver, self.is_without_arm];
+        let flags = (0..).zip(bits).fold(0, |flags, (bit, is_set)| flags | u8::from(is_set) << bit);
         let [low, high] = self.dropped.to_le_bytes();
         [VERSION, self.clients, self.driven_by as u8, self.stops, flags, low, high, 0]
     }
@@ -88,6 +95,20 @@ impl SharingState {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_own_registers_are_those_of_the_block() {
+        for (address, count, wanted) in [
+            (232, 8, true),
+            (239, 1, true),
+            (231, 2, false),
+            (239, 2, false),
+            (236, 0, false),
+            (240, 1, false),
+        ] {
+            assert_eq!(is_own(address, count), wanted, "{address}+{count}");
+        }
+    }
 
     #[test]
     fn the_block_replaces_its_own_registers_only() {

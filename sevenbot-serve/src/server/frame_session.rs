@@ -74,14 +74,19 @@ impl FrameSession {
         self.seat.news_until(if is_through { self.client.deadline() } else { Instant::FAR_FUTURE }).await;
     }
 
-    /// Another client uses the same wire from now on. The bytes that the hub has not got yet are those of the client before, or may
-    /// be its own. In the first case its writes are carried out, but the next client does not wait for replies that nobody wants.
-    pub(super) fn succeed(self, are_of_the_one_before: bool) -> Self {
+    /// Another client uses the same wire from now on. The bytes that the hub has not got yet stay.
+    #[cfg(target_os = "linux")] // Pseudo-terminals are for Linux.
+    pub(super) fn succeed(self) -> Self {
         let mut next = Self::open(self.seat.shared());
         (next.input, next.since) = (self.input, self.since);
-        next.client.set_drops_reads(are_of_the_one_before);
         self.seat.leave(End::Clean);
         next
+    }
+
+    /// States whether the bytes that the hub has not got yet are those of a client that is gone: then its writes are carried out, but
+    /// nobody waits for replies.
+    pub(super) const fn set_drops_reads(&mut self, are_of_the_one_before: bool) {
+        self.client.set_drops_reads(are_of_the_one_before);
     }
 
     /// The connection has ended.

@@ -40,12 +40,21 @@ impl PtyPort {
         let opened = self.clients.as_ref().map(Readiness::of).transpose()?;
         let mut session = FrameSession::open(&shared);
         let mut last_empty = shared.now();
+        // Bytes of programs that are gone came to this session.
+        let mut is_used = false;
         loop {
             session.exchange();
             let count = self.receive(&mut session, &mut last_empty, &shared)?;
-            if self.was_closed()? {
-                // What was read before, when no close was seen, the one before sent.
-                session = session.succeed(count == 0);
+            let was_closed = self.was_closed()?;
+            let is_unused = !self.pty.has_client();
+            if was_closed || (is_used && !is_unused) {
+                session = session.succeed();
+            }
+            is_used = is_unused && (is_used || count > 0);
+            if was_closed || count > 0 {
+                // What was read before, when no close was seen, the one before sent. While no program has the terminal open, all is
+                // of those before.
+                session.set_drops_reads(is_unused || (was_closed && count == 0));
             }
             session.exchange();
             self.send(&mut session)?;
@@ -61,14 +70,14 @@ impl PtyPort {
         }
     }
 
-    /// Reads bytes, unless earlier ones wait.
+    /// Reads bytes, unless earlier ones wait. Without a program nobody waits for room: the kernel must not keep bytes for the next one.
     fn receive(
         &self,
         session: &mut FrameSession,
         last_empty: &mut Instant,
         shared: &Shared,
     ) -> io::Result<usize> {
-        if !session.has_room() {
+        if !session.has_room() && self.pty.has_client() {
             return Ok(0);
         }
         let mut bytes = [0; PIECE];

@@ -273,6 +273,11 @@ impl Program {
         self.to_send.len()
     }
 
+    /// Bytes that the program has not taken.
+    pub fn unread_bytes(&self) -> usize {
+        self.client.output().len()
+    }
+
     fn take(&mut self, now: Instant) {
         let bytes = self.client.output().to_vec();
         self.client.consume(bytes.len());

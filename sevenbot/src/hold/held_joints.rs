@@ -12,6 +12,10 @@ use crate::joints::{JointSnapshot, frames_for};
 use crate::status_block::StatusBlock;
 use host_link::{Snapshot, Span};
 
+/// The weight draws a joint that has reached its target so far off it at most, in hundredths of a degree. What draws it further is
+/// an obstacle, and the joint is held where it is.
+const DROOP: u16 = 150;
+
 /// A target that was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct SentTarget {
@@ -97,7 +101,8 @@ impl HeldJoints {
     /// The position at which the joint has to hold; `None` if it is unknown.
     fn hold_target(&self, joint: Joint, is_past_start_up: bool) -> Option<u16> {
         if self.fine.is_some() {
-            return self.measured(joint);
+            let measured = self.measured(joint)?;
+            return Some(if self.rests_at_target(joint, measured) { self.target(joint) } else { measured });
         }
         let joints = &self.joints;
         let present = joints.present(joint);
@@ -106,6 +111,13 @@ impl HeldJoints {
         // start-up the arm does not drive a joint before it is measured, and the next read shows that.
         let can_wait = self.may_be_unmeasured(joint, is_past_start_up) && !joints.is_moving(joint);
         (!is_unknown && !can_wait).then_some(present.into())
+    }
+
+    /// Has the joint reached its target? It keeps it ([D24](protocol_core::decisions#d24)): with its position as the new target, its
+    /// weight would draw it down by as much again.
+    fn rests_at_target(&self, joint: Joint, measured: u16) -> bool {
+        let is_silent = self.joints.status.is_none() || self.joints.is_missing(joint);
+        !is_silent && !self.joints.is_moving(joint) && self.target(joint).abs_diff(measured) <= DROOP
     }
 
     /// The frames that write these targets.
@@ -213,6 +225,18 @@ mod tests {
         let joints = joint_snapshot([170, 90, 170, 90, 90, 90, 80], [120, 90, 0, 90, 90, 90, 80], 0b101, 0);
         let held = joints.targets_to_write(&NOTHING_SENT, true);
         assert_eq!((held[0], held[2]), (Some(120), None));
+    }
+
+    #[test]
+    fn d24_a_joint_that_has_reached_its_target_keeps_it() {
+        // Joint 1 moves, joint 2 stands lower by its weight, joint 3 by an obstacle, and joint 4 is silent.
+        let targets = [9_000, 9_000, 9_000, 9_000, 9_000, 9_000, 9_000_u16];
+        let positions = [8_950, 8_900, 8_700, 8_900, 9_000, 9_000, 9_000_u16];
+        let values = targets.into_iter().chain(positions).flat_map(u16::to_le_bytes).collect();
+        let fine = Some(Snapshot { address: FINE_TARGET.address, values });
+        let now = HeldJoints { fine, joints: tests::joint_snapshot(POSE, POSE, 0b1000, 0b1) };
+        let held = now.targets_to_write(&NOTHING_SENT, false);
+        assert_eq!(held[..5], [Some(8_950), Some(9_000), Some(8_700), Some(8_900), Some(9_000)]);
     }
 
     #[test]

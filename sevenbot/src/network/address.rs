@@ -1,7 +1,7 @@
 //! The address of an arm behind a server, as it stands in the place of a port's name.
 
-use std::env;
 use std::path::PathBuf;
+use std::{env, fmt};
 
 /// The environment variable with the token of servers that want one.
 pub const TOKEN_VARIABLE: &str = "SEVENBOT_TOKEN";
@@ -61,6 +61,12 @@ impl Address {
         !matches!(self, Self::Unix(_))
     }
 
+    /// Is it an address that other computers have, too?
+    #[must_use]
+    pub const fn is_of_network(&self) -> bool {
+        matches!(self, Self::Tcp(_) | Self::Tls(_))
+    }
+
     /// The token that servers over TCP, also with TLS, may want: of the environment variable [`TOKEN_VARIABLE`].
     pub(super) fn token() -> Option<String> {
         env::var(TOKEN_VARIABLE).ok().filter(|token| !token.is_empty())
@@ -72,6 +78,17 @@ impl Address {
 #[must_use]
 pub fn is_token(token: &str) -> bool {
     (8..=128).contains(&token.len()) && token.bytes().all(|byte| byte.is_ascii_graphic())
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tcp(address) => write!(out, "tcp://{address}"),
+            Self::Tls(address) => write!(out, "tls://{address}"),
+            Self::Unix(path) => write!(out, "unix:{}", path.display()),
+            Self::Name(name) => write!(out, "sevenbot://{name}"),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,9 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::{env, process};
+use std::process;
+
+use super::directories::runtime_directory;
 
 /// What the file of a server ends with, and its socket.
 const FILE: &str = "server";
@@ -35,7 +37,7 @@ impl LocalServer {
     /// The server of this process. `None` if there is no directory for its files.
     #[must_use]
     pub fn of_this_process(name: Option<String>) -> Option<Self> {
-        let socket = directory()?.join(format!("serve-{}.{SOCKET}", process::id()));
+        let socket = runtime_directory()?.join(format!("serve-{}.{SOCKET}", process::id()));
         Some(Self { socket, port: PathBuf::new(), name })
     }
 
@@ -85,7 +87,7 @@ impl LocalServer {
 /// The servers of this user that run.
 #[must_use]
 pub fn servers() -> Vec<LocalServer> {
-    let entries = directory().and_then(|directory| fs::read_dir(directory).ok());
+    let entries = runtime_directory().and_then(|directory| fs::read_dir(directory).ok());
     let files = entries.into_iter().flatten().flatten().map(|entry| entry.path());
     let files = files.filter(|path| path.extension().is_some_and(|extension| extension == FILE));
     let mut found: Vec<_> =
@@ -99,49 +101,4 @@ pub fn servers() -> Vec<LocalServer> {
 pub fn serving(port: &str) -> Option<LocalServer> {
     let port = fs::canonicalize(port).ok()?;
     servers().into_iter().find(|server| server.port == port)
-}
-
-/// Where the files are. `None` if others can write there.
-fn directory() -> Option<PathBuf> {
-    let absolute = |name| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    let base = absolute("XDG_RUNTIME_DIR").or_else(|| absolute("XDG_STATE_HOME"));
-    let directory = base.or_else(|| Some(absolute("HOME")?.join(".local/state")))?.join("7bot");
-    is_private(&directory).then_some(directory)
-}
-
-/// Is it a directory that only this user can write to? It is created if it does not exist.
-#[cfg(unix)]
-fn is_private(directory: &Path) -> bool {
-    use std::os::unix::fs::{DirBuilderExt, MetadataExt};
-    let _ = fs::DirBuilder::new().recursive(true).mode(0o700).create(directory);
-    // The owner of what this process shows of itself, where the system has that, is this user.
-    let user = fs::metadata("/proc/self").map(|shown| shown.uid()).ok();
-    fs::symlink_metadata(directory).is_ok_and(|found| {
-        let is_ours = user.is_none_or(|user| user == found.uid());
-        found.is_dir() && is_ours && found.mode() & 0o022 == 0
-    })
-}
-
-#[cfg(not(unix))]
-const fn is_private(_: &Path) -> bool {
-    false
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[cfg(unix)]
-    #[test]
-    fn a_directory_that_others_can_write_to_is_not_used() {
-        use std::os::unix::fs::PermissionsExt;
-        let directory = env::temp_dir().join(format!("sevenbot-private-{}", process::id()));
-        assert!(is_private(&directory));
-        fs::set_permissions(&directory, fs::Permissions::from_mode(0o777)).expect("permissions");
-        assert!(!is_private(&directory));
-        let link = directory.join("link");
-        std::os::unix::fs::symlink(env::temp_dir(), &link).expect("a link");
-        assert!(!is_private(&link));
-        fs::remove_dir_all(directory).expect("its end");
-    }
 }

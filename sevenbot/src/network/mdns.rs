@@ -5,6 +5,9 @@ use std::time::{Duration, Instant};
 
 use mdns_sd::{IfKind, ServiceDaemon, ServiceEvent, ServiceInfo};
 
+use super::address::Address;
+use super::known_names::KnownName;
+
 /// The type of service.
 const SERVICE: &str = "_sevenbot._tcp.local.";
 /// The property of a server with TLS.
@@ -21,6 +24,14 @@ pub struct Announced {
     pub address: SocketAddr,
     /// The connection has to be encrypted.
     pub is_encrypted: bool,
+}
+
+impl From<Announced> for KnownName {
+    fn from(arm: Announced) -> Self {
+        let Announced { name, address, is_encrypted } = arm;
+        let address = address.to_string();
+        Self { name, address: if is_encrypted { Address::Tls(address) } else { Address::Tcp(address) } }
+    }
 }
 
 /// Why a name is not announced.

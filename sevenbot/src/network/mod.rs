@@ -5,11 +5,14 @@
 //!   tcp://HOST:PORT ──▶ address ──▶ socket_line ──▶ Arm
 //!   tls://HOST:PORT ──▶    ▲            └── tls
 //!   unix:PATH       ──▶    │
-//!   sevenbot://NAME ──▶ local_server: the servers of this user; mdns: those of the local network
+//!   sevenbot://NAME ──▶ local_server: the servers of this user; mdns: those of the local network; known_names: where
+//!                       they were last
 //!   sim, sim:SEED   ──▶ RealTimeLine ──▶ Arm
 //! ```
 
 mod address;
+mod directories;
+mod known_names;
 mod local_server;
 #[cfg(feature = "mdns")]
 pub mod mdns;
@@ -23,6 +26,7 @@ use crate::open_port::OpenPort;
 use crate::real_time_line::{RealTimeLine, simulated_port};
 
 pub use self::address::{Address, CERTIFICATE_VARIABLE, TOKEN_VARIABLE, is_token};
+pub use self::known_names::{KnownName, NAME_RULE, forget, is_name, known_names, remember};
 pub use self::local_server::{LocalServer, Registered, servers, serving};
 pub use self::socket_line::SocketLine;
 

@@ -8,6 +8,7 @@ use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
 use super::address::Address;
+use super::known_names::{KnownName, known_names, remember};
 use super::local_server::servers;
 use crate::error::{OpenError, PortError};
 use crate::host_line::HostLine;
@@ -76,17 +77,35 @@ impl SocketLine {
     }
 }
 
-/// Connects to a server of the local network.
-#[cfg(feature = "mdns")]
+/// Connects to a server of the local network: where its name is announced now, or else where it was last.
 fn connect_named(name: &str, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
-    let found = super::mdns::find(name).ok_or(OpenError::NotFound)?;
-    // The certificate is for the name: the address may be another one tomorrow.
-    connect_tcp(&found.address.to_string(), found.is_encrypted.then_some(name), token)
+    if let Some(known) = announced(name) {
+        let stream = connect_known(&known, token)?;
+        // It is for networks that block multicast. Without the file, names are found as before.
+        let _ = remember(&known);
+        return Ok(stream);
+    }
+    let known = known_names().into_iter().find(|known| known.name == name).ok_or(OpenError::NotFound)?;
+    connect_known(&known, token)
+}
+
+/// The certificate is for the name: the address may be another one tomorrow.
+fn connect_known(known: &KnownName, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
+    match &known.address {
+        Address::Tls(address) => connect_tcp(address, Some(&known.name), token),
+        Address::Tcp(address) => connect_tcp(address, None, token),
+        Address::Unix(_) | Address::Name(_) => Err(OpenError::NotFound),
+    }
+}
+
+#[cfg(feature = "mdns")]
+fn announced(name: &str) -> Option<KnownName> {
+    super::mdns::find(name).map(KnownName::from)
 }
 
 #[cfg(not(feature = "mdns"))]
-fn connect_named(_: &str, _: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
-    Err(OpenError::NotFound)
+const fn announced(_: &str) -> Option<KnownName> {
+    None
 }
 
 /// `host`: the connection is encrypted, and the certificate is for this host.

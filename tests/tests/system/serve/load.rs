@@ -19,7 +19,7 @@ use system_tests::{ArmClient, read_request, write_request};
 use super::served::{LOCAL_PAGE, Served, WebClient, names};
 
 /// A reply that has not come after this time is lost.
-const LOST: Duration = Duration::from_secs(10);
+const LOST: Duration = Duration::from_secs(30);
 /// Rate of the reports of present angles, in map 2.1.
 const ANGLE_FEEDBACK_FREQUENCY: u8 = 82;
 
@@ -117,20 +117,26 @@ fn frame_program(mut wire: impl Wire, own: u8, map: Map, hertz: u8, end: Instant
     for value in (1..=100).cycle().take_while(|_| Instant::now() < end) {
         wire.send(&[map.write(own, value), read_request(own, 1)].concat());
         tally.requests += 2;
-        loop {
-            match wire.frame() {
-                None => tally.lost += 1,
-                Some(frame) if hertz > 0 && frame.starts_with(&map.report()) => {
-                    tally.reports += 1;
-                    continue;
-                }
-                Some(frame) if frame == reply(own, &[value]) => tally.replies += 1,
-                Some(_) => tally.crossed += 1,
-            }
-            break;
+        match next_reply(&mut wire, map, hertz, &mut tally.reports) {
+            None => tally.lost += 1,
+            Some(frame) if frame == reply(own, &[value]) => tally.replies += 1,
+            Some(_) => tally.crossed += 1,
         }
     }
     tally
+}
+
+/// The next frame that is no report; `None` if none comes, however many reports do.
+fn next_reply(wire: &mut impl Wire, map: Map, hertz: u8, reports: &mut usize) -> Option<Vec<u8>> {
+    let end = Instant::now() + LOST;
+    while Instant::now() < end {
+        let frame = wire.frame()?;
+        if hertz == 0 || !frame.starts_with(&map.report()) {
+            return Some(frame);
+        }
+        *reports += 1;
+    }
+    None
 }
 
 /// The same over the WebSocket. A page also gets an answer to each write.
@@ -161,7 +167,7 @@ fn ten_clients_of_three_kinds_lose_nothing_and_cross_nothing() {
         let mut programs = Vec::new();
         let forms = [(Map::V22, 0), (Map::V21, 0), (Map::V22, 50), (Map::V21, 30)];
         for ((name, own), (map, hertz)) in names(4).zip(SPEED..).zip(forms) {
-            let wire = served.open(name);
+            let wire = served.open(&name);
             let run = move || ("pseudo-terminal", frame_program(wire, own, map, hertz, end));
             programs.push(scope.spawn(run));
         }

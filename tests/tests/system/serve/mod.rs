@@ -5,6 +5,7 @@ mod bad_web;
 mod chaos;
 mod load;
 mod network;
+mod rates;
 mod served;
 mod sharing;
 mod stops;

@@ -1,5 +1,6 @@
 //! Servers of the network: TLS, and names.
 
+use std::path::Path;
 use std::process::Output;
 
 use system_tests::multicast;
@@ -39,40 +40,67 @@ fn the_tool_connects_with_tls_and_the_certificate_of_the_server() {
     assert!(!other.status.success(), "{other:?}");
 }
 
-/// Another user of this computer finds it by multicast, as other computers do. Where multicast is blocked, a name is an error that
-/// names it, and the address works.
+/// Runs the tool as another user of this computer would: without the files of the server.
+fn run_elsewhere(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = tool();
+    command
+        .env("XDG_RUNTIME_DIR", folder)
+        .env("XDG_STATE_HOME", folder)
+        .env("SEVENBOT_TOKEN", "correct-horse");
+    command.env_remove("SEVENBOT_PORT").args(arguments).output().expect("the tool runs")
+}
+
+fn all_of(output: &Output) -> String {
+    [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes)).concat()
+}
+
+/// A server with a name that it announces.
+fn announced(name: &str) -> Served {
+    Served::start(1, &["--token", "correct-horse", "--listen", "0.0.0.0", "--unencrypted", "--name", name])
+}
+
+/// Another user of this computer finds it by multicast, as other computers do, and its address is known from then on.
 #[test]
 fn a_name_is_found_on_the_network() {
     let name = format!("test-{}", std::process::id());
-    let options = ["--token", "correct-horse", "--listen", "0.0.0.0", "--unencrypted", "--name", &name];
-    let served = Served::start(1, &options);
+    let served = announced(&name);
     let elsewhere = tempfile::tempdir().expect("a folder");
-    let run = |arguments: &[&str]| {
-        let mut command = tool();
-        command.env("XDG_RUNTIME_DIR", elsewhere.path()).env("SEVENBOT_TOKEN", "correct-horse");
-        command.env_remove("SEVENBOT_PORT").args(arguments).output().expect("the tool runs")
-    };
-    let has_multicast = multicast::works();
-    let port = format!("sevenbot://{name}");
+    let run = |arguments: &[&str]| run_elsewhere(elsewhere.path(), arguments);
     let unknown = run(&["--port", "sevenbot://nobody-has-this-name", "get", "device-code"]);
-    assert!(!unknown.status.success(), "{unknown:?}");
-    assert!(String::from_utf8_lossy(&unknown.stderr).contains("nobody-has-this-name"), "{unknown:?}");
-    if !has_multicast {
-        eprintln!(
-            "this system has no multicast: what is tested is that the name is not found, and that the address works"
-        );
-        let not_found = run(&["--port", &port, "get", "device-code"]);
-        assert!(!not_found.status.success() && String::from_utf8_lossy(&not_found.stderr).contains(&name));
-        let address = format!("tcp://127.0.0.1:{}", served.connect().peer_addr().expect("an address").port());
-        let read = run(&["--port", &address, "get", "device-code"]);
-        assert!(read.status.success(), "{read:?}");
+    assert!(!unknown.status.success() && all_of(&unknown).contains("nobody-has-this-name"), "{unknown:?}");
+    if !multicast::works() {
+        eprintln!("this system has no multicast: no name is announced");
         return;
     }
-    wait_until("the name is listed", || {
-        let listed = run(&["ports", "--network"]);
-        String::from_utf8_lossy(&listed.stdout).contains(&port)
-    });
+    let port = format!("sevenbot://{name}");
+    wait_until("the name is listed", || all_of(&run(&["ports", "--network"])).contains(&port));
     let read = run(&["--port", &port, "get", "device-code"]);
     assert!(read.status.success(), "{read:?}");
     drop(served);
+    wait_until("the name is not announced any more", || {
+        let listed = all_of(&run(&["ports", "--network"]));
+        listed.contains("known, and not announced now") && listed.contains(&port)
+    });
+    assert!(run(&["ports", "--forget", &name]).status.success());
+    assert!(!all_of(&run(&["ports", "--network"])).contains(&port));
+}
+
+/// Nobody announces this name, as on a network that blocks multicast.
+#[test]
+fn a_name_that_the_user_entered_needs_no_multicast() {
+    let served = Served::start(1, &["--token", "correct-horse"]);
+    let elsewhere = tempfile::tempdir().expect("a folder");
+    let run = |arguments: &[&str]| run_elsewhere(elsewhere.path(), arguments);
+    let address = format!("tcp://127.0.0.1:{}", served.connect().peer_addr().expect("an address").port());
+    for wrong in ["lab-3", "lab-3=/dev/ttyUSB0", "a b=tcp://127.0.0.1:1"] {
+        let refused = run(&["ports", "--remember", wrong]);
+        assert_eq!(refused.status.code(), Some(2), "{wrong}: {refused:?}");
+    }
+    assert!(run(&["ports", "--remember", &format!("entered-by-hand={address}")]).status.success());
+    let read = run(&["--port", "sevenbot://entered-by-hand", "get", "device-code"]);
+    assert!(read.status.success(), "{read:?}");
+    let listed = all_of(&run(&["ports", "--network"]));
+    assert!(listed.contains("sevenbot://entered-by-hand") && listed.contains(&address), "{listed}");
+    let read = run(&["--port", &address, "get", "device-code"]);
+    assert!(read.status.success(), "{read:?}");
 }

@@ -56,7 +56,7 @@ impl Served {
             .args(["--port", "./arm", "serve", "--tcp", "0", "--ws", "0"])
             .args(options);
         for name in names(ptys) {
-            command.args(["--pty", name]);
+            command.args(["--pty", &name]);
         }
         let (server, ports) = process::start(&mut command, ptys + 3).expect("the server is ready");
         let served = Self { server, simulator, ports, relay, folder };
@@ -118,8 +118,9 @@ impl Served {
     }
 }
 
-pub(crate) fn names(count: usize) -> impl Iterator<Item = &'static str> {
-    ["a", "b", "c", "d", "e", "f", "g", "h"].into_iter().take(count)
+/// The links of so many pseudo-terminals, 52 at most.
+pub(crate) fn names(count: usize) -> impl Iterator<Item = String> {
+    ('a'..='z').chain('A'..='Z').take(count).map(String::from)
 }
 
 /// A relay between the simulator and the link that the server opens.

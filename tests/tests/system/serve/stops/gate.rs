@@ -2,6 +2,8 @@
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
+use system_tests::wait::TIMEOUT;
+
 /// The state of the turns.
 #[derive(Default)]
 struct Turns {
@@ -45,10 +47,11 @@ impl Gate {
         turns.count += 1;
         turns.begun = 0;
         self.changed.notify_all();
-        while turns.begun < programs && !turns.is_over {
-            turns = self.changed.wait(turns).unwrap_or_else(PoisonError::into_inner);
-        }
+        let waits = |turns: &mut Turns| turns.begun < programs && !turns.is_over;
+        turns =
+            self.changed.wait_timeout_while(turns, TIMEOUT, waits).unwrap_or_else(PoisonError::into_inner).0;
         assert!(!turns.is_over, "a program failed");
+        assert!(turns.begun >= programs, "timeout: {} of {programs} programs have begun", turns.begun);
     }
 
     /// Waits for the next turn. Returns false at the end.

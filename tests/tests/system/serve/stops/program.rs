@@ -3,6 +3,7 @@
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
+use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
@@ -29,11 +30,21 @@ pub(crate) struct Program(pub(super) Box<dyn Wire>);
 impl Program {
     /// One on a pseudo-terminal, one at the Unix socket, one over TCP.
     pub(crate) fn of_each_kind(served: &Served) -> Vec<Self> {
-        let path = served.folder.path().join("a");
+        let terminal = Self::on_terminal(&served.folder.path().join("a"));
+        vec![terminal, Self::over_unix(served), Self::over_tcp(served)]
+    }
+
+    /// One on a pseudo-terminal.
+    pub(crate) fn on_terminal(path: &Path) -> Self {
         let terminal = serialport::new(path.to_str().expect("text"), 115_200).timeout(TIMEOUT).open();
+        Self(Box::new(terminal.expect("a port")))
+    }
+
+    /// One at the Unix socket.
+    pub(crate) fn over_unix(served: &Served) -> Self {
         let local = UnixStream::connect(served.local_socket()).expect("a connection");
         local.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
-        vec![Self(Box::new(terminal.expect("a port"))), Self(Box::new(local)), Self::over_tcp(served)]
+        Self(Box::new(local))
     }
 
     /// One over TCP.

@@ -1,0 +1,127 @@
+//! The addresses of arms whose names were found on the network, or that the user entered: they work where multicast is blocked.
+//!
+//! The file `names` of the state directory has a line for each, such as `lab-3 tls://10.0.0.5:7777`.
+
+use std::fs;
+use std::io::{self, ErrorKind, Write};
+use std::path::Path;
+
+use super::address::Address;
+use super::directories::state_directory;
+
+const FILE: &str = "names";
+/// More names are forgotten, the oldest first.
+const MOST_NAMES: usize = 256;
+
+/// A name, and where the arm was last.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KnownName {
+    /// The name, as in `sevenbot://NAME`.
+    pub name: String,
+    /// The address: TCP, or TLS with a certificate for the name.
+    pub address: Address,
+}
+
+impl KnownName {
+    fn parse(line: &str) -> Option<Self> {
+        let (name, address) = line.trim().split_once(' ')?;
+        let address = Address::parse(address.trim()).filter(Address::is_of_network)?;
+        is_name(name).then(|| Self { name: name.to_owned(), address })
+    }
+}
+
+/// What to do about a name that no arm may have.
+pub const NAME_RULE: &str = "use 1 to 63 letters, digits and hyphens";
+
+/// May an arm have this name? See [`NAME_RULE`].
+#[must_use]
+pub fn is_name(text: &str) -> bool {
+    (1..=63).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-')
+}
+
+/// The names that are known, the newest last.
+#[must_use]
+pub fn known_names() -> Vec<KnownName> {
+    state_directory().map(|directory| read(&directory.join(FILE))).unwrap_or_default()
+}
+
+/// Remembers where an arm is, in the place of what was known before.
+///
+/// # Errors
+/// This user has no state directory that only they can write to, or the file cannot be written.
+pub fn remember(known: &KnownName) -> io::Result<()> {
+    change(|names| {
+        names.retain(|other| other.name != known.name);
+        names.push(known.clone());
+    })
+}
+
+/// Forgets a name.
+///
+/// # Errors
+/// As [`remember`].
+pub fn forget(name: &str) -> io::Result<()> {
+    change(|names| names.retain(|other| other.name != name))
+}
+
+fn read(file: &Path) -> Vec<KnownName> {
+    fs::read_to_string(file).unwrap_or_default().lines().filter_map(KnownName::parse).collect()
+}
+
+fn change(change: impl FnOnce(&mut Vec<KnownName>)) -> io::Result<()> {
+    let directory = state_directory().ok_or_else(|| {
+        io::Error::new(ErrorKind::NotFound, "there is no state directory that only this user can write to")
+    })?;
+    let mut names = read(&directory.join(FILE));
+    let before = names.clone();
+    change(&mut names);
+    if names == before { Ok(()) } else { write(&directory, &names) }
+}
+
+/// Replaces the file: another program reads the old one or the new one.
+fn write(directory: &Path, names: &[KnownName]) -> io::Result<()> {
+    let kept = names.get(names.len().saturating_sub(MOST_NAMES)..).unwrap_or_default();
+    let text: String = kept.iter().map(|known| format!("{} {}\n", known.name, known.address)).collect();
+    let new = directory.join(format!("{FILE}.{}.new", std::process::id()));
+    // Nobody else can write here, so what is there is of a program that was killed.
+    let _ = fs::remove_file(&new);
+    fs::File::create_new(&new)?.write_all(text.as_bytes())?;
+    fs::rename(&new, directory.join(FILE))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_a_name_and_an_address_of_the_network() {
+        let known = KnownName::parse("lab-3 tls://10.0.0.5:7777").expect("a name");
+        assert_eq!(
+            (known.name.as_str(), known.address.to_string().as_str()),
+            ("lab-3", "tls://10.0.0.5:7777")
+        );
+        for line in [
+            "",
+            "lab-3",
+            "lab-3 /dev/ttyUSB0",
+            "lab-3 sevenbot://lab-4",
+            "lab-3 unix:/run/a.sock",
+            "a.b tcp://h:1",
+        ] {
+            assert_eq!(KnownName::parse(line), None, "{line}");
+        }
+    }
+
+    #[test]
+    fn what_was_written_is_read_and_the_oldest_go() {
+        let directory = std::env::temp_dir().join(format!("sevenbot-names-{}", std::process::id()));
+        fs::create_dir_all(&directory).expect("a directory");
+        let name = |number: usize| {
+            KnownName::parse(&format!("arm-{number} tcp://10.0.0.5:{number}")).expect("a name")
+        };
+        let names: Vec<_> = (1..=MOST_NAMES + 2).map(name).collect();
+        write(&directory, &names).expect("written");
+        assert_eq!(read(&directory.join(FILE)), names[2..]);
+        fs::remove_dir_all(directory).expect("its end");
+    }
+}
