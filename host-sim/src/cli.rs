@@ -98,6 +98,10 @@ pub struct Options {
     )]
     pub servo_socket: Option<PathBuf>,
 
+    /// With --servo-socket: write the true angles of the joints to this file, each 10 ms with the seconds since 1970
+    #[arg(long, value_name = "FILE", requires = "servo_socket")]
+    pub angles: Option<PathBuf>,
+
     /// Drive real servos behind the USB adapter at PORT, /dev/ttyUSB0 for example: see REAL SERVOS below
     #[arg(long, value_name = "PORT", conflicts_with_all = ["arms", "faults", "servo_socket"])]
     pub servos: Option<PathBuf>,

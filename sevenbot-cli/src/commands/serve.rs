@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 use sevenbot::network::mdns::Announcement;
-use sevenbot::network::{self, LocalServer, Registered};
+use sevenbot::network::{self, LocalServer, Registered, is_token};
 use sevenbot::open_port::OpenPort;
 use sevenbot::simulated::simulated_port;
 use sevenbot::{OpenError, ports};
@@ -284,11 +284,6 @@ pub(super) fn stop_signal() -> Result<Stop, CommandError> {
     Ok(stop)
 }
 
-/// Long enough not to be guessed, and fit for a line.
-fn is_token(token: &str) -> bool {
-    (8..=128).contains(&token.len()) && token.bytes().all(|byte| byte.is_ascii_graphic())
-}
-
 fn report(notice: &Notice) {
     match notice {
         Notice::ArmFound(port) => note(format_args!("{}: the arm answers", port.display())),
@@ -308,18 +303,5 @@ fn report(notice: &Notice) {
                     "it does not speak frames, as a web page does that tries this port",
             }
         )),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_token_is_long_and_has_no_spaces() {
-        assert!(is_token("0123456789abcdef"));
-        for bad in ["", "short", "with a space in it", "line\nfeed in it", &"x".repeat(129)] {
-            assert!(!is_token(bad), "{bad:?}");
-        }
     }
 }
