@@ -103,9 +103,9 @@ const STAGES: &[Stage] = &[
             cargo("test --release -p motion-core --test all linkage -- --ignored")
         }),
         long("the arm's model in MuJoCo", mujoco::check),
-        long("many arms in two processes, with Ray", python::ray),
         long("each library builds from its archive", dist::build_from_archives),
         long("a whole release, with each part installed and used", dist::whole),
+        long("many arms in two processes, with Ray", python::ray),
         long("the plugin for LeRobot, with the base classes of LeRobot", lerobot::check),
         long("LeRobot's own commands, on the simulator and on the image in an emulator", lerobot::commands),
         long("more fuzzing", || {

@@ -48,6 +48,12 @@ impl Address {
         }
     }
 
+    /// Is it an address that other computers have, too?
+    #[must_use]
+    pub const fn is_of_network(&self) -> bool {
+        matches!(self, Self::Tcp(_) | Self::Tls(_))
+    }
+
     /// Does a server at this address get a token?
     ///
     /// ```
@@ -61,23 +67,10 @@ impl Address {
         !matches!(self, Self::Unix(_))
     }
 
-    /// Is it an address that other computers have, too?
-    #[must_use]
-    pub const fn is_of_network(&self) -> bool {
-        matches!(self, Self::Tcp(_) | Self::Tls(_))
-    }
-
     /// The token that servers over TCP, also with TLS, may want: of the environment variable [`TOKEN_VARIABLE`].
     pub(super) fn token() -> Option<String> {
         env::var(TOKEN_VARIABLE).ok().filter(|token| !token.is_empty())
     }
-}
-
-/// Can it be the token of a server? It is long enough not to be guessed, and fit for a line: 8 to 128 letters, digits and
-/// punctuation marks, without spaces.
-#[must_use]
-pub fn is_token(token: &str) -> bool {
-    (8..=128).contains(&token.len()) && token.bytes().all(|byte| byte.is_ascii_graphic())
 }
 
 impl fmt::Display for Address {
@@ -89,6 +82,13 @@ impl fmt::Display for Address {
             Self::Name(name) => write!(out, "sevenbot://{name}"),
         }
     }
+}
+
+/// Can it be the token of a server? It is long enough not to be guessed, and fit for a line: 8 to 128 letters, digits and
+/// punctuation marks, without spaces.
+#[must_use]
+pub fn is_token(token: &str) -> bool {
+    (8..=128).contains(&token.len()) && token.bytes().all(|byte| byte.is_ascii_graphic())
 }
 
 #[cfg(test)]
