@@ -7,10 +7,16 @@
 //!   shoulder ●──────● end of the lever
 //! ```
 //!
-//! Joint 2 turns the rear arm and joint 3 the lever, both about the shoulder. The elbow and the rod are passive.
+//! Joint 2 turns the rear arm and joint 3 the lever, both about the shoulder. The elbow and the rod are passive. Masses and
+//! servos are those of the simulator, [`arm_sim::parameters`].
 
 use std::io;
 
+use arm_sim::Joint;
+use arm_sim::parameters::{
+    FOREARM_CENTRE_MM, FOREARM_G, FULL_DUTY_ERROR, NO_LOAD_SPEED, REAR_ARM_CENTRE_MM, REAR_ARM_G,
+    ServoParameters, TOOL_CENTRE_MM, TOOL_G,
+};
 use kinematics::geometry::{
     DISC_RADIUS, ELBOW_OFFSET, FOREARM, LEVER, LINKAGE_MAX, LINKAGE_MIN, REAR_ARM, SHOULDER_FORWARD,
     SHOULDER_HEIGHT, TOOL,
@@ -29,6 +35,10 @@ const ORIGIN: Axes = [0.0; 3];
 /// The end of the lever, relative to the shoulder. The rod ends at the same distance behind the elbow.
 const LEVER_END: Axes = [m(-LEVER), 0.0, 0.0];
 const RADIUS: f64 = m(4.0);
+/// A body that the simulator gives no mass, in kilograms.
+const LIGHT: f64 = 0.001;
+/// The inertia of a body about its centre, in kilogram square metres: the simulator has point masses.
+const POINT: f64 = 1e-6;
 
 /// The arm in the format of MuJoCo.
 ///
@@ -50,7 +60,12 @@ pub fn mjcf() -> io::Result<String> {
         "joint_2 turns the rear arm and joint_3 the lever. The constraint `parallelogram` closes the loop of lever, rod \
          and forearm; elbow = joint_2 + joint_3, and the range of the elbow is the limit of the linkage.",
     )?;
+    out.comment(
+        "Masses, friction and servos are those of the project's simulator, which assumes most of them. An actuator is a \
+         servo's control: kv is its derivative term, so give it the set-point and kv / kp times the set-point's velocity.",
+    )?;
     out.empty("compiler", &[text("angle", "radian"), text("autolimits", "true")])?;
+    out.empty("option", &[text("integrator", "implicitfast")])?;
     defaults(&mut out)?;
     out.begin("worldbody", &[])?;
     base(&mut out)?;
@@ -67,15 +82,73 @@ fn text(name: &'static str, value: &str) -> (&'static str, String) {
 /// Parts of the arm do not collide with each other, but with everything else.
 fn defaults(out: &mut XmlDocument) -> io::Result<()> {
     out.begin("default", &[])?;
-    out.empty("joint", &[text("damping", "0.1"), text("armature", "0.01")])?;
+    // Of the passive joints.
+    out.empty("joint", &[text("damping", "0.001"), text("armature", "0.0001")])?;
     out.empty("geom", &[text("contype", "1"), text("conaffinity", "0"), text("type", "cylinder")])?;
-    out.empty("position", &[text("kp", "50")])?;
+    for class in [LARGE, SMALL] {
+        out.begin("default", &[text("class", class.name)])?;
+        let parameters = ServoParameters::of(class.joint);
+        out.empty("joint", &joint_of(parameters))?;
+        out.empty("position", &control_of(parameters))?;
+        out.end()?;
+    }
     out.end()
+}
+
+/// A make of servo.
+struct ServoClass {
+    name: &'static str,
+    /// A joint that has it.
+    joint: Joint,
+}
+
+const LARGE: ServoClass = ServoClass { name: "large", joint: Joint::ALL[0] };
+const SMALL: ServoClass = ServoClass { name: "small", joint: Joint::ALL[6] };
+
+/// The class of the servo of one of joints 1 to 6, by its name in the model; `None` for a passive joint.
+fn class_of(name: &str) -> Option<(&'static str, String)> {
+    let (joint, _) = Joint::ALL.into_iter().zip(JOINT_NAMES).find(|(_, other)| *other == name)?;
+    let is_large = ServoParameters::of(joint) == ServoParameters::of(LARGE.joint);
+    Some(text("class", if is_large { LARGE.name } else { SMALL.name }))
+}
+
+/// From micronewton metres, and from gram square millimetres times 1000, to newton metres and kilogram square metres.
+fn millionths(value: i64) -> f64 {
+    value as f64 / 1e6
+}
+
+/// Newton metres for each radian of error.
+fn stiffness(servo: &ServoParameters) -> f64 {
+    millionths(servo.stall_torque) / thousandths(FULL_DUTY_ERROR).to_radians()
+}
+
+fn thousandths(value: i64) -> f64 {
+    value as f64 / 1e3
+}
+
+/// A driven joint: its own voltage drags the motor.
+fn joint_of(servo: &ServoParameters) -> [(&'static str, String); 3] {
+    let drag = millionths(servo.stall_torque) / thousandths(NO_LOAD_SPEED).to_radians();
+    [
+        ("damping", number(drag)),
+        ("armature", number(millionths(servo.rotor_inertia) / 1e3)),
+        ("frictionloss", number(millionths(servo.sliding_friction))),
+    ]
+}
+
+fn control_of(servo: &ServoParameters) -> [(&'static str, String); 3] {
+    let torque = millionths(servo.stall_torque);
+    [
+        ("kp", number(stiffness(servo))),
+        ("kv", number(stiffness(servo) * thousandths(servo.derivative_ms))),
+        ("forcerange", format!("{} {}", number(-torque), number(torque))),
+    ]
 }
 
 fn base(out: &mut XmlDocument) -> io::Result<()> {
     body(out, "base_link", ORIGIN, BASE_SOLIDS)?;
     body(out, "turret", ORIGIN, TURRET_SOLIDS)?;
+    mass(out, LIGHT, ORIGIN)?;
     hinge(out, "joint_1", UP, QUARTER)?;
     let shoulder = [m(SHOULDER_FORWARD), 0.0, m(SHOULDER_HEIGHT)];
     rear_arm(out, shoulder)?;
@@ -86,16 +159,21 @@ fn base(out: &mut XmlDocument) -> io::Result<()> {
 
 fn rear_arm(out: &mut XmlDocument, shoulder: Axes) -> io::Result<()> {
     body(out, "rear_arm", shoulder, REAR_ARM_SOLIDS)?;
+    mass(out, thousandths(REAR_ARM_G), [0.0, 0.0, thousandths(REAR_ARM_CENTRE_MM)])?;
     hinge(out, "joint_2", RIGHT, QUARTER)?;
     let behind = Solid { from: ORIGIN, to: LEVER_END, radius: RADIUS };
     let solids = [FOREARM_SOLIDS, &[behind]].concat();
     body(out, "forearm", [0.0, 0.0, m(REAR_ARM)], &solids)?;
+    mass(out, thousandths(FOREARM_G), [thousandths(FOREARM_CENTRE_MM), 0.0, m(ELBOW_OFFSET)])?;
     hinge(out, "elbow", LEFT, [LINKAGE_MIN, LINKAGE_MAX].map(|degrees| (degrees - 90.0).to_radians()))?;
     body(out, "wrist", [m(FOREARM), 0.0, m(ELBOW_OFFSET)], WRIST_SOLIDS)?;
+    mass(out, LIGHT, ORIGIN)?;
     hinge(out, "joint_4", BACK, QUARTER)?;
     body(out, "hand", ORIGIN, HAND_SOLIDS)?;
+    mass(out, thousandths(TOOL_G), [thousandths(TOOL_CENTRE_MM), 0.0, 0.0])?;
     hinge(out, "joint_5", LEFT, QUARTER)?;
     body(out, "disc", [m(TOOL), 0.0, 0.0], DISC_SOLIDS)?;
+    mass(out, LIGHT, ORIGIN)?;
     hinge(out, "joint_6", BACK, QUARTER)?;
     out.empty("site", &[text("name", TIP), ("pos", triple(ORIGIN)), text("size", "0.002")])?;
     let edge = [0.0, m(DISC_RADIUS), 0.0];
@@ -108,9 +186,11 @@ fn rear_arm(out: &mut XmlDocument, shoulder: Axes) -> io::Result<()> {
 
 fn lever(out: &mut XmlDocument, shoulder: Axes) -> io::Result<()> {
     body(out, "lever", shoulder, &[Solid { from: ORIGIN, to: LEVER_END, radius: RADIUS }])?;
+    mass(out, LIGHT, ORIGIN)?;
     hinge(out, "joint_3", LEFT, [JOINT_3_LOW, JOINT_3_HIGH])?;
     let rod = Solid { from: ORIGIN, to: [0.0, 0.0, m(REAR_ARM)], radius: RADIUS };
     body(out, "rod", LEVER_END, &[rod])?;
+    mass(out, LIGHT, ORIGIN)?;
     out.empty("joint", &[text("name", "rod_joint"), text("type", "hinge"), ("axis", triple(LEFT))])?;
     out.end()?;
     out.end()
@@ -126,9 +206,18 @@ fn body(out: &mut XmlDocument, name: &str, position: Axes, solids: &[Solid]) -> 
     Ok(())
 }
 
+/// The mass of the body in kilograms, and its centre.
+fn mass(out: &mut XmlDocument, kilograms: f64, centre: Axes) -> io::Result<()> {
+    let inertia = ("diaginertia", triple([POINT; 3]));
+    out.empty("inertial", &[("mass", number(kilograms)), ("pos", triple(centre)), inertia])
+}
+
+/// A joint, with its servo if it is one of joints 1 to 6.
 fn hinge(out: &mut XmlDocument, name: &str, axis: Axes, range: [f64; 2]) -> io::Result<()> {
     let range = range.map(number).join(" ");
-    out.empty("joint", &[text("name", name), text("type", "hinge"), ("axis", triple(axis)), ("range", range)])
+    let mut words = vec![text("name", name), text("type", "hinge"), ("axis", triple(axis)), ("range", range)];
+    words.extend(class_of(name));
+    out.empty("joint", &words)
 }
 
 fn equality(out: &mut XmlDocument) -> io::Result<()> {
@@ -144,7 +233,9 @@ fn equality(out: &mut XmlDocument) -> io::Result<()> {
 fn actuators(out: &mut XmlDocument) -> io::Result<()> {
     out.begin("actuator", &[])?;
     for name in JOINT_NAMES {
-        out.empty("position", &[text("name", name), text("joint", name), text("inheritrange", "1")])?;
+        let mut words = vec![text("name", name), text("joint", name), text("inheritrange", "1")];
+        words.extend(class_of(name));
+        out.empty("position", &words)?;
     }
     out.end()
 }

@@ -40,7 +40,7 @@ pub mod faulty_flash;
 pub mod flash;
 pub mod host_line;
 pub mod pace;
-mod parameters;
+pub mod parameters;
 pub mod plant;
 pub mod replay;
 pub mod servo;

@@ -41,26 +41,26 @@ use protocol_core::time::Duration;
 
 /// The parameters of a make of servo. Torques are in micronewton metres, drags in micronewton metre seconds per radian,
 /// inertias in gram square millimetres.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ServoParameters {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ServoParameters {
     /// The torque at full duty and standstill.
-    pub(crate) stall_torque: i64,
+    pub stall_torque: i64,
     /// The torque below which the gear does not start to turn.
-    pub(crate) static_friction: i64,
+    pub static_friction: i64,
     /// The torque that the gear loses while it turns.
-    pub(crate) sliding_friction: i64,
+    pub sliding_friction: i64,
     /// The drag of the gear, without torque.
-    pub(crate) free_drag: i64,
+    pub free_drag: i64,
     /// The drag with the windings shorted.
-    pub(crate) damped_drag: i64,
+    pub damped_drag: i64,
     /// The inertia of rotor and gear, as the joint has to turn it.
-    pub(crate) rotor_inertia: i64,
+    pub rotor_inertia: i64,
     /// The duty grows by the change of the error in this many milliseconds.
-    pub(crate) derivative_ms: i64,
+    pub derivative_ms: i64,
     /// Counts in half a turn.
-    pub(crate) half_turn: i64,
+    pub half_turn: i64,
     /// Counts in a thousand radians.
-    pub(crate) counts_per_kiloradian: i64,
+    pub counts_per_kiloradian: i64,
 }
 
 /// Joints 1 to 4.
@@ -90,54 +90,71 @@ const SMALL: ServoParameters = ServoParameters {
 };
 
 impl ServoParameters {
-    pub(crate) const fn of(joint: Joint) -> &'static Self {
+    /// Those of a joint's servo.
+    #[must_use]
+    pub const fn of(joint: Joint) -> &'static Self {
         if joint.number() < 5 { &LARGE } else { &SMALL }
+    }
+
+    /// With a share of the stall torque, and of all friction and drag of the gear, in percent.
+    #[must_use]
+    pub const fn scaled(self, torque_percent: u16, friction_percent: u16) -> Self {
+        let torque = self.stall_torque * torque_percent as i64 / 100;
+        let friction = friction_percent as i64;
+        Self {
+            stall_torque: torque,
+            static_friction: self.static_friction * friction / 100,
+            sliding_friction: self.sliding_friction * friction / 100,
+            free_drag: self.free_drag * friction / 100,
+            damped_drag: self.damped_drag * friction / 100,
+            ..self
+        }
     }
 }
 
 /// Full speed without load, in thousandths of a degree per second.
-pub(crate) const NO_LOAD_SPEED: i64 = 372_000;
+pub const NO_LOAD_SPEED: i64 = 372_000;
 /// The distance between set-point and position at which the motor gets full duty, in thousandths of a degree.
-pub(crate) const FULL_DUTY_ERROR: i64 = 4_300;
+pub const FULL_DUTY_ERROR: i64 = 4_300;
 /// The time constant of the filter of that change.
-pub(crate) const DERIVATIVE_FILTER_MS: i64 = 4;
+pub const DERIVATIVE_FILTER_MS: i64 = 4;
 /// A joint that turns more slowly than this has static friction.
-pub(crate) const CREEP_COUNTS_PER_SECOND: i64 = 5;
+pub const CREEP_COUNTS_PER_SECOND: i64 = 5;
 /// The share of the torque from outside that the gear loses to friction, in percent.
-pub(crate) const LOAD_FRICTION_PERCENT: i64 = 5;
+pub const LOAD_FRICTION_PERCENT: i64 = 5;
 
 /// A torque above this share of the stall torque is an overload, in 0.1 %.
-pub(crate) const OVERLOAD: u16 = 800;
+pub const OVERLOAD: u16 = 800;
 /// After an overload of this many milliseconds a servo latches it.
-pub(crate) const OVERLOAD_MS: u32 = 1_000;
+pub const OVERLOAD_MS: u32 = 1_000;
 /// A servo restarts below this supply voltage, in 0.1 V.
-pub(crate) const BROWN_OUT_DECIVOLTS: u8 = 45;
+pub const BROWN_OUT_DECIVOLTS: u8 = 45;
 /// The temperature around the arm, in thousandths of a degree Celsius.
-pub(crate) const AMBIENT_MILLIDEGREES: u64 = 25_000;
+pub const AMBIENT_MILLIDEGREES: u64 = 25_000;
 /// The final rise in temperature at the stall torque, in thousandths of a degree. It grows with the square of the torque.
-pub(crate) const STALL_RISE_MILLIDEGREES: u64 = 200_000;
+pub const STALL_RISE_MILLIDEGREES: u64 = 200_000;
 /// The time constant of the temperature.
-pub(crate) const THERMAL_TIME: Duration = Duration::from_millis(300_000);
+pub const THERMAL_TIME: Duration = Duration::from_millis(300_000);
 
 /// From the axis of the base to the shoulder, in millimetres (the maker's length d).
-pub(crate) const SHOULDER_FORWARD_MM: i64 = 29;
+pub const SHOULDER_FORWARD_MM: i64 = 29;
 /// Shoulder to elbow, in millimetres (the maker's length a).
-pub(crate) const REAR_ARM_MM: i64 = 120;
+pub const REAR_ARM_MM: i64 = 120;
 /// Elbow pin to the axis of the forearm, at a right angle, in millimetres (the maker's length h).
-pub(crate) const ELBOW_OFFSET_MM: i64 = 25;
+pub const ELBOW_OFFSET_MM: i64 = 25;
 /// Elbow to joint 5, in hundredths of a millimetre (the maker's length c).
-pub(crate) const FOREARM_CENTI_MM: i64 = 19_850;
+pub const FOREARM_CENTI_MM: i64 = 19_850;
 /// The rear arm, in grams.
-pub(crate) const REAR_ARM_G: i64 = 120;
+pub const REAR_ARM_G: i64 = 120;
 /// Its centre of mass, from the shoulder, in millimetres.
-pub(crate) const REAR_ARM_CENTRE_MM: i64 = 60;
+pub const REAR_ARM_CENTRE_MM: i64 = 60;
 /// The forearm with the servos of joints 4 and 5, in grams.
-pub(crate) const FOREARM_G: i64 = 200;
+pub const FOREARM_G: i64 = 200;
 /// Its centre of mass, from the elbow, in millimetres.
-pub(crate) const FOREARM_CENTRE_MM: i64 = 110;
+pub const FOREARM_CENTRE_MM: i64 = 110;
 /// The tool: the servos of joints 6 and 7, and the claw or the cup, in grams.
-pub(crate) const TOOL_G: i64 = 100;
+pub const TOOL_G: i64 = 100;
 /// Its centre of mass, from the axis of joint 5, in millimetres.
-pub(crate) const TOOL_CENTRE_MM: i64 = 50;
+pub const TOOL_CENTRE_MM: i64 = 50;
 /// The grip, from the axis of joint 5, in millimetres.
-pub(crate) const GRIP_MM: i64 = 90;
+pub const GRIP_MM: i64 = 90;

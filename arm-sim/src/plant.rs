@@ -13,6 +13,7 @@
 mod disturbance;
 mod inertia;
 mod obstacles;
+mod outside;
 mod pose;
 mod sine;
 mod supply;
@@ -32,6 +33,7 @@ use crate::fault_count::FaultCount;
 use crate::servo::units::STEP;
 use crate::servo::{Servo, ServoConfig, ServoFault};
 pub use obstacles::{HIGHEST_STIFFNESS, STRONGEST_PUSH, Thing, Wall};
+pub use outside::OutsideState;
 use pose::{AngleScale, JointSines};
 use supply::Supply;
 pub use supply::{SupplyFault, UnknownSupplyFault};
@@ -193,17 +195,29 @@ impl Plant {
         self.now = self.now + STEP;
         self.supply.step(self.now);
         let supply = self.supply_decivolts();
-        let mut has_turned = false;
-        for servo in &mut self.servos {
-            has_turned |= servo.step(self.now, supply);
+        let mut turned = [false; JOINTS];
+        for (servo, turned) in self.servos.iter_mut().zip(&mut turned) {
+            *turned = servo.step(self.now, supply);
         }
-        if has_turned {
-            self.follow_claw();
-            self.update_weight();
+        if turned.contains(&true) {
+            self.follow(turned);
         } else {
             let supply = self.supply_decivolts();
             let ends = self.servos.iter().map(|servo| servo.rest_until(self.now, supply));
             self.rest_until = ends.min().unwrap_or(self.now).min(self.supply.steady_until(self.now));
+        }
+    }
+
+    /// The arm after a step in which these joints turned.
+    fn follow(&mut self, [_, shoulder, elbow, roll, pitch, _, claw]: [bool; JOINTS]) {
+        if claw {
+            self.follow_claw();
+        }
+        // The others carry no weight, and change no inertia.
+        if shoulder || elbow || roll || pitch {
+            self.update_weight();
+        } else {
+            self.rest_until = self.now;
         }
     }
 

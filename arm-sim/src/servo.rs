@@ -15,6 +15,7 @@ mod fault_state;
 mod gear;
 mod motor;
 mod obstacles;
+mod outside;
 mod protection;
 mod registers;
 mod steps;
@@ -28,6 +29,7 @@ use protocol_core::registers::Joint;
 use protocol_core::time::{Duration, Instant};
 
 use crate::fault_count::FaultCount;
+use crate::parameters::ServoParameters;
 pub use config::ServoConfig;
 pub use fault::{ServoFault, UnknownFault};
 use fault_state::FaultState;
@@ -149,6 +151,11 @@ impl Servo {
     /// Changes the configuration.
     pub const fn set_config(&mut self, config: ServoConfig) {
         self.config = config;
+    }
+
+    /// Gives it another gear and another strength.
+    pub(crate) fn set_parameters(&mut self, parameters: &ServoParameters) {
+        self.motor.set_parameters(parameters);
     }
 
     /// Executes a frame that ends at `now`, and returns the answer if there is one.

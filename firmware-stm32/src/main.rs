@@ -32,6 +32,12 @@ use stm32f4::stm32f405 as pac;
 use crate::log::Log;
 use crate::main_loop::MainLoop;
 
+/// `cargo xtask dist` adds the commit.
+const VERSION: &str = match option_env!("SEVENBOT_RELEASE") {
+    Some(release) => release,
+    None => env!("CARGO_PKG_VERSION"),
+};
+
 #[entry]
 fn main() -> ! {
     let (Some(chip), Some(mut core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
@@ -64,6 +70,7 @@ fn main() -> ! {
     };
     let controller = Controller::new(clock.now(), config, settings.found(), settings.storage());
     // Before the host link is open: a log line masks the interrupts for longer than a byte may wait.
+    defmt::info!("version {=str}", VERSION);
     defmt::info!("ready: clock {}, crystal {} kHz", source, crystal_khz);
     defmt::info!("faults {=u8:#b}, {=u32} baud", faults, controller.baud());
     let host = host_link::open(chip.USART1, rates, controller.baud(), &mut core.NVIC);

@@ -18,9 +18,15 @@ const DEFAULT_CHIP_ID: &str = "53494d000001";
 /// The ids of servos: one value of an option.
 pub type Ids = Vec<u8>;
 
+/// `cargo xtask dist` adds the commit.
+const VERSION: &str = match option_env!("SEVENBOT_RELEASE") {
+    Some(release) => release,
+    None => env!("CARGO_PKG_VERSION"),
+};
+
 /// A simulated 7Bot V2 arm on a port that any serial client can open.
 #[derive(Clone, Debug, Parser)]
-#[command(version, about, after_help = lesson())]
+#[command(version = VERSION, about, after_help = lesson())]
 #[command(group = ArgGroup::new("adapter").args(["servos", "servos_only"]))]
 pub struct Options {
     /// Keep a symbolic link to the port at PATH while running
@@ -91,6 +97,10 @@ pub struct Options {
         conflicts_with_all = ["arms", "link", "eeprom", "unpaced", "chip_id", "trace"]
     )]
     pub servo_socket: Option<PathBuf>,
+
+    /// With --servo-socket: write the true angles of the joints to this file, each 10 ms with the seconds since 1970
+    #[arg(long, value_name = "FILE", requires = "servo_socket")]
+    pub angles: Option<PathBuf>,
 
     /// Drive real servos behind the USB adapter at PORT, /dev/ttyUSB0 for example: see REAL SERVOS below
     #[arg(long, value_name = "PORT", conflicts_with_all = ["arms", "faults", "servo_socket"])]

@@ -24,6 +24,7 @@
 
 #![deny(unsafe_code)]
 
+pub mod angle_log;
 pub mod bus_line;
 pub mod bus_statistics;
 pub mod cli;

@@ -15,6 +15,7 @@ use arm_sim::servo_bus::ServoBus;
 use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use arm_sim::stock_controller::StockController;
 use clap::Parser;
+use host_sim::angle_log::AngleLog;
 use host_sim::bus_line::BusLine;
 use host_sim::cli::{Options, in_one_line};
 use host_sim::clock::RealClock;
@@ -132,7 +133,8 @@ fn run_servo_socket(
     signals: &mut Signals,
 ) -> Result<(), Failure> {
     let plant = plant_alone(options, clock)?;
-    let socket = ServoSocket::listen(path)?;
+    let angles = options.angles.as_deref().map(AngleLog::create).transpose().map_err(Failure::Running)?;
+    let socket = ServoSocket::listen(path, angles)?;
     print_ready(&[path.to_owned()]);
     socket.serve(plant, clock, signals).map_err(Failure::Running)
 }

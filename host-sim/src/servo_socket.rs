@@ -13,6 +13,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use tracing::{debug, info};
 
+use crate::angle_log::AngleLog;
 use crate::clock::{RealClock, sleep_until};
 use crate::private_socket::{PrivateSocket, SocketError, is_temporary};
 use crate::signals::{SignalAction, Signals};
@@ -20,22 +21,26 @@ use arm_sim::plant::Plant;
 
 /// The servos' socket.
 #[derive(Debug)]
-pub struct ServoSocket(PrivateSocket);
+pub struct ServoSocket {
+    socket: PrivateSocket,
+    angles: Option<AngleLog>,
+}
 
 impl ServoSocket {
-    /// Listens at `path`, for this user only.
+    /// Listens at `path`, for this user only. The true angles are written to `angles`.
     ///
     /// # Errors
     /// See [`SocketError`].
-    pub fn listen(path: &Path) -> Result<Self, SocketError> {
-        PrivateSocket::listen("servo-socket", path).map(Self)
+    pub fn listen(path: &Path, angles: Option<AngleLog>) -> Result<Self, SocketError> {
+        let socket = PrivateSocket::listen("servo-socket", path)?;
+        Ok(Self { socket, angles })
     }
 
     /// Serves one controller after another until a signal ends it.
     ///
     /// # Errors
-    /// The operating system fails: poll(2), or accepting a connection.
-    pub fn serve(self, mut plant: Plant, clock: &mut RealClock, signals: &mut Signals) -> io::Result<()> {
+    /// The operating system fails: poll(2), accepting a connection, or writing the angles.
+    pub fn serve(mut self, mut plant: Plant, clock: &mut RealClock, signals: &mut Signals) -> io::Result<()> {
         let mut controller: Option<UnixStream> = None;
         plant.ignore_collisions();
         loop {
@@ -52,7 +57,7 @@ impl ServoSocket {
                 }
             }
             if controller.is_none() {
-                controller = self.0.accept()?;
+                controller = self.socket.accept()?;
                 controller.iter().for_each(|_| info!("controller connected"));
             }
             if let Some(stream) = &mut controller
@@ -62,8 +67,12 @@ impl ServoSocket {
                 controller = None;
                 continue;
             }
-            let deadline = plant.deadline().unwrap_or(Instant::FAR_FUTURE);
-            let source = controller.as_ref().map_or_else(|| self.0.as_fd(), AsFd::as_fd);
+            let mut deadline = plant.deadline().unwrap_or(Instant::FAR_FUTURE);
+            if let Some(angles) = &mut self.angles {
+                angles.write(now, &plant)?;
+                deadline = deadline.min(angles.due());
+            }
+            let source = controller.as_ref().map_or_else(|| self.socket.as_fd(), AsFd::as_fd);
             sleep(&sleep_until(clock.now(), deadline), source, signals)?;
         }
     }

@@ -28,8 +28,22 @@ def rate(step: Callable[[int], None], arms: int) -> tuple[float, float]:
     return done / (time.perf_counter() - start), done / (time.process_time() - used)
 
 
+def without_frames(count: int, threads: int) -> tuple[float, float]:
+    """The same motion with a point each second, and without reads: what is left is the time of the arms alone."""
+    arms = sevenbot.SimulatedArms(count, threads=threads)
+    actions, inside, wanted = np.tile(REST, (count, 1)), np.full((count, 21), np.nan), np.empty((count, 21))
+
+    def step(number: int) -> None:
+        if number % 50 == 0:
+            actions[:, 0] = 90 + 20 * np.sin(number / 25)
+            arms.send(actions, 1.0)
+        arms.exchange(inside, 0.02, wanted)
+
+    return rate(step, count)
+
+
 def ours(count: int, threads: int) -> tuple[float, float]:
-    """All arms follow a sine with joint 1."""
+    """All arms follow a sine with joint 1: a point and a read in each step."""
     arms = sevenbot.SimulatedArms(count, threads=threads)
     actions, seen = np.tile(REST, (count, 1)), arms.observe()
 
@@ -57,15 +71,17 @@ def mujoco_alone(model_file: str) -> tuple[float, float]:
 
 
 def main() -> None:
-    print("| arms | threads | arm-steps a second | a second of the processor |\n| --: | --: | --: | --: |")
+    print("Arm-steps of 20 ms a second of the clock, and of the processor:\n")
+    print("| arms | threads | frames | of the processor | without frames | of the processor |")
+    print("| --: | --: | --: | --: | --: | --: |")
     for count in (1, 100, 1_000, 10_000):
         for threads in (1, 2):
             if threads <= count:
-                wall, processor = ours(count, threads)
-                print(f"| {count:,} | {threads} | {wall:,.0f} | {processor:,.0f} |", flush=True)
+                rates = [*ours(count, threads), *without_frames(count, threads)]
+                print(f"| {count:,} | {threads} | " + " | ".join(f"{rate:,.0f}" for rate in rates) + " |", flush=True)
     for model in sys.argv[1:]:
         wall, processor = mujoco_alone(model)
-        print(f"| MuJoCo, 1 | 1 | {wall:,.0f} | {processor:,.0f} |")
+        print(f"| MuJoCo, 1 | 1 | | | {wall:,.0f} | {processor:,.0f} |")
 
 
 if __name__ == "__main__":

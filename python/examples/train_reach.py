@@ -23,6 +23,10 @@ Array = NDArray[np.float32]
 PAIRS = 128
 STEPS = 75
 HIDDEN = 24
+SIGMA = 0.05
+"""The size of a random step of a weight."""
+RATE = 0.03
+"""Of learning."""
 # What the policy sees of an observation: joints 1 to 5, their velocities, and the way to the goal.
 INPUTS = [0, 1, 2, 3, 4, 7, 8, 9, 10, 11, 24, 25, 26]
 SHAPES = [(len(INPUTS) + 1, HIDDEN), (HIDDEN + 1, sevenbot.gym.JOINTS)]
@@ -53,10 +57,51 @@ def run(
     return total, near
 
 
-def sampled_goals(count: int, seed: int) -> Array:
-    """Goals that the tip can reach."""
-    random = np.random.default_rng(seed)
-    return np.array([sevenbot.gym.sample_goal(random) for _ in range(count)], dtype=np.float32)
+def environments(count: int, *, disturbed: bool = False, threads: int | None = None) -> sevenbot.gym.ReachVectorEnv:
+    """Arms that learn to reach."""
+    envs = gymnasium.make_vec(
+        "sevenbot/Reach-v0",
+        num_envs=count,
+        vectorization_mode="vector_entry_point",
+        disturbed=disturbed,
+        threads=threads,
+    )
+    assert isinstance(envs, sevenbot.gym.ReachVectorEnv)
+    return envs
+
+
+class Evolution:
+    """The policy, and the steps that are tried in this generation."""
+
+    def __init__(self, seed: int) -> None:
+        """A policy that does little."""
+        self.random = np.random.default_rng(seed)
+        self.policy: Array = (self.random.standard_normal(SIZE) * 0.1).astype(np.float32)
+        self.noise: Array = np.zeros((PAIRS, SIZE), dtype=np.float32)
+        self.first, self.second = np.zeros(SIZE), np.zeros(SIZE)
+        self.generation = 0
+
+    def policies(self) -> Array:
+        """The policies of the next generation: 128 changed by a step, then 128 changed by its opposite."""
+        self.generation += 1
+        self.noise = self.random.standard_normal((PAIRS, SIZE)).astype(np.float32)
+        return np.concatenate([self.policy + SIGMA * self.noise, self.policy - SIGMA * self.noise])
+
+    def goals(self) -> Array:
+        """A goal for each policy: the two of a pair have the same. The tip can reach all of them."""
+        random = np.random.default_rng(self.generation)
+        goals = np.array([sevenbot.gym.sample_goal(random) for _ in range(PAIRS)], dtype=np.float32)
+        return np.tile(goals, (2, 1))
+
+    def learn(self, total: Array) -> None:
+        """Moves the policy towards those with the larger sums of rewards, by Adam."""
+        gain = total[:PAIRS] - total[PAIRS:]
+        gradient = (gain / (np.abs(gain).mean() + 1e-9)) @ self.noise / PAIRS
+        self.first = 0.9 * self.first + 0.1 * gradient
+        self.second = 0.99 * self.second + 0.01 * np.square(gradient)
+        first = self.first / (1 - 0.9**self.generation)
+        second = self.second / (1 - 0.99**self.generation)
+        self.policy = (self.policy + RATE * first / (np.sqrt(second) + 1e-8)).astype(np.float32)
 
 
 def main() -> None:
@@ -66,38 +111,21 @@ def main() -> None:
     parser.add_argument("--disturbed", action="store_true", help="with loads, delays and faults")
     parser.add_argument("--save", default="reach_policy.npy")
     options = parser.parse_args()
-    random = np.random.default_rng(options.seed)
-    envs = gymnasium.make_vec(
-        "sevenbot/Reach-v0",
-        num_envs=2 * PAIRS,
-        vectorization_mode="vector_entry_point",
-        disturbed=options.disturbed,
-    )
-    assert isinstance(envs, sevenbot.gym.ReachVectorEnv)
-    policy = (random.standard_normal(SIZE) * 0.1).astype(np.float32)
-    first, second, sigma, rate = np.zeros(SIZE), np.zeros(SIZE), 0.05, 0.03
+    envs = environments(2 * PAIRS, disturbed=options.disturbed)
+    evolution = Evolution(options.seed)
     start = time.perf_counter()
     try:
         for generation in range(1, options.generations + 1):
-            noise = random.standard_normal((PAIRS, SIZE)).astype(np.float32)
-            policies = np.concatenate([policy + sigma * noise, policy - sigma * noise])
-            goals = np.tile(sampled_goals(PAIRS, generation), (2, 1))
-            total, near = run(envs, policies, generation, goals)
-            gain = total[:PAIRS] - total[PAIRS:]
-            gradient = (gain / (np.abs(gain).mean() + 1e-9)) @ noise / PAIRS
-            # Adam.
-            first = 0.9 * first + 0.1 * gradient
-            second = 0.99 * second + 0.01 * np.square(gradient)
-            corrected = first / (1 - 0.9**generation), second / (1 - 0.99**generation)
-            policy = (policy + rate * corrected[0] / (np.sqrt(corrected[1]) + 1e-8)).astype(np.float32)
+            total, near = run(envs, evolution.policies(), generation, evolution.goals())
+            evolution.learn(total)
             if generation % 10 == 0:
                 passed = time.perf_counter() - start
                 words = f"mean reward {total.mean():7.2f}, near {near:.0%}"
                 print(f"{generation:4} {passed:6.1f} s  {words}", flush=True)
     except KeyboardInterrupt:
         print("ended early")
-    np.save(options.save, policy)
-    total, near = run(envs, np.tile(policy, (2 * PAIRS, 1)), 10_000, None)
+    np.save(options.save, evolution.policy)
+    total, near = run(envs, np.tile(evolution.policy, (2 * PAIRS, 1)), 10_000, None)
     seconds = STEPS * sevenbot.gym.DT
     print(f"{2 * PAIRS} new goals: {near:.0%} within 10 mm after {seconds:.1f} s; saved {options.save}")
     envs.close()

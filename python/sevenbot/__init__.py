@@ -40,6 +40,7 @@ from sevenbot._sevenbot import (
     SimulationSnapshot,
     Status,
     Stream,
+    StreamCounts,
     Tip,
     TooFar,
     UnknownRegister,
@@ -47,6 +48,7 @@ from sevenbot._sevenbot import (
     forward,
     inverse,
     limits,
+    model,
     ports,
 )
 
@@ -81,6 +83,7 @@ __all__ = [
     "SimulationSnapshot",
     "Status",
     "Stream",
+    "StreamCounts",
     "Tip",
     "TooFar",
     "UnknownRegister",
@@ -88,5 +91,6 @@ __all__ = [
     "forward",
     "inverse",
     "limits",
+    "model",
     "ports",
 ]

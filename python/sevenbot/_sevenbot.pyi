@@ -40,6 +40,7 @@ __all__ = [
     "SimulationSnapshot",
     "Status",
     "Stream",
+    "StreamCounts",
     "Tip",
     "TooFar",
     "UnknownRegister",
@@ -47,6 +48,7 @@ __all__ = [
     "forward",
     "inverse",
     "limits",
+    "model",
     "ports",
 ]
 
@@ -137,8 +139,15 @@ def limits() -> tuple[NDArray[float64], NDArray[float64]]:
 
     The linkage keeps joints 2 and 3 together: joint 2 + joint 3 - 65 is 19 to 161.
     """
-def ports(baud: int = 115200) -> list[tuple[str, str, int, str]]:
-    """The serial ports of this machine with an arm: name, description, device id (register 11) and firmware version.
+def model(format: Literal["urdf", "mjcf"]) -> str:
+    """The model of the arm for other programs, as text: `"urdf"`, or `"mjcf"` for MuJoCo, where the parallelogram is a closed loop.
+
+    It is that of `sevenbot model`. Lengths are metres and angles radians; a joint's angle is that of the registers less 90, 90, 65,
+    90, 90, 90 degrees. The claw, joint 7, is left out.
+    """
+def ports(baud: int = 115200) -> list[tuple[str, str, int, str, str]]:
+    """The arms of this machine: port, description, device id (register 11), firmware version and `chip_id`. Their ports are serial
+    ports, or servers of this user (`sevenbot serve`).
 
     Asks all ports at the same time, at `baud` bits per second, for about half a second.
     """
@@ -147,8 +156,10 @@ def ports(baud: int = 115200) -> list[tuple[str, str, int, str]]:
 class Arm:
     """A 7Bot V2 arm.
 
-    `Arm("/dev/ttyUSB0")` opens a port, `Arm()` the only port with an arm that answers, `Arm(id=5)` that of the arm with this
-    number (register 11), `Arm(chip="...")` that with this `chip_id`, and `Arm.simulated()` an arm in virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the end, as `stop()`, and closes the port.
+    `Arm("/dev/ttyUSB0")` opens a port, `Arm("tcp://HOST:PORT", token="...")` connects to a server, `Arm()` opens the only port with
+    an arm that answers, `Arm(id=5)` that of the arm with this number (register 11), `Arm(chip="...")` that with this `chip_id`,
+    and `Arm.simulated()` is an arm in virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the
+    end, as `stop()`, and closes the port.
 
     Angles are degrees, 0 to 180, joint 1 first; positions millimetres; times seconds.
     """
@@ -158,6 +169,7 @@ class Arm:
         *,
         id: int | None = None,
         chip: str | None = None,
+        token: str | None = None,
         baud: int = 115200,
         timeout: float = 0.5,
         attempts: int = 3,
@@ -490,7 +502,8 @@ class SimulatedArms:
 
     `seen` is an array of a row for each arm. The slices `POSITIONS`, `VELOCITIES`, `LOADS`, `TIP`, `BLOCKED` and `AGE` name its
     columns: `seen[:, arms.TIP]`. Each arm is a controller that parses frames and answers a read, with servos, virtual time,
-    faults and a load of its own. Its line takes no time. The results do not depend on the number of threads.
+    faults and a load of its own. Its line takes no time. The results do not depend on the number of threads. `exchange` lets
+    another simulation move the joints.
 
     The first arm has the seed `seed`, and each other one the next number; or give `seeds`. By default there is a thread for each
     processor. Needs numpy.
@@ -502,6 +515,9 @@ class SimulatedArms:
     TIP: ClassVar[slice]
     BLOCKED: ClassVar[slice]
     AGE: ClassVar[slice]
+    SET_POINTS: ClassVar[slice]
+    SET_VELOCITIES: ClassVar[slice]
+    DRIVES: ClassVar[slice]
     def __new__(
         cls,
         n: int,
@@ -524,6 +540,29 @@ class SimulatedArms:
     def step(self, actions: NDArray[float32], dt: float = 0.02, out: None = None) -> NDArray[float32]: ...
     @overload
     def step(self, actions: ArrayLike | None, dt: float = 0.02, out: None = None) -> NDArray[float64]: ...
+    def send(self, actions: ArrayLike, period: float = 0.02) -> None:
+        """Sends each arm its action as the next point of a stream of this period, as `step` does. No time passes."""
+    @overload
+    def exchange(
+        self, measured: ArrayLike, dt: float = 0.002, out: None = None
+    ) -> NDArray[float64]:
+        """Lets another simulation move the joints, such as MuJoCo: tells each arm what that one measured, lets `dt` pass, and returns
+        what the servos want then.
+
+        `measured` is an array (n, 21) with the columns `POSITIONS`, `VELOCITIES` and `LOADS`, in the units of an observation. A
+        joint whose position is NaN is moved by this simulation. Returns `out`, or a new array (n, 21): `SET_POINTS` in degrees,
+        `SET_VELOCITIES` in degrees per second, and `DRIVES`: 1 for a motor that drives its joint, 2 for one that damps it, or else
+        0. `dt` is 0.001 to 1 second in whole milliseconds. `send` gives actions, `read` the observations.
+        """
+    @overload
+    def exchange(self, measured: ArrayLike, dt: float, out: NDArray[float64]) -> NDArray[float64]: ...
+    @overload
+    def exchange(self, measured: ArrayLike, dt: float = 0.002, *, out: NDArray[float64]) -> NDArray[float64]: ...
+    @overload
+    def read(self, out: _Numbers) -> _Numbers:
+        """Asks each arm for its state: `out`, or a new array (n, 32). No time passes."""
+    @overload
+    def read(self, out: None = None) -> NDArray[float64]: ...
     @overload
     def observe(self, out: _Numbers) -> _Numbers:
         """What the last reads told: `out`, or a new array (n, 32). No time passes."""
@@ -546,12 +585,18 @@ class SimulatedArms:
     def clear(self, mask: ArrayLike | None = None, location: str | None = None) -> None:
         """Takes the faults of the arms of the mask, or of all, back: all, or those at one location, `"3"`, `"supply"`, `"line"`."""
     def set_load(self, grams: ArrayLike, mask: ArrayLike | None = None) -> None:
-        """Hangs a weight on the tip of the arms of the mask, or of all: grams, 0 to 65535, one number or one for each of the n arms."""
+        """Hangs a weight on the tip of the arms of the mask, or of all: grams, 0 to 1000, one number or one for each of the n arms."""
     def set(
         self, name: str, values: SupportsIndex | Iterable[SupportsIndex], mask: ArrayLike | None = None
     ) -> None:
         """Writes registers of the arms of the mask, or of all, in one frame each: `arms.set("push-limit", 50)`. Names and numbers
         are those of docs/registers.md. An arm refuses a write that its rules forbid.
+        """
+    def scale_servos(
+        self, torque: ArrayLike, friction: ArrayLike, mask: ArrayLike | None = None
+    ) -> None:
+        """Makes the servos of the arms of the mask, or of all, stronger or weaker, and their gears stiffer: factors of the stall torque
+        and of all friction and drag, 0.1 to 10 in steps of 0.01, one number or one for each of the n arms. `reset` takes it back.
         """
     def snapshot(self, arm: int) -> SimulationSnapshot:
         """A copy of an arm as it is now, by its number from 0: for `reset`, and for `Simulation.restore`."""
@@ -606,25 +651,7 @@ class Tip:
     @overload
     @staticmethod
     def of(angles: Iterable[float], /) -> Tip:
-        """staticmethod(function) -> method
-
-        Convert a function to be a static method.
-
-        A static method does not receive an implicit first argument.
-        To declare a static method, use this idiom:
-
-             class C:
-                 @staticmethod
-                 def f(arg1, arg2, argN):
-                     ...
-
-        It can be called either on the class (e.g. C.f()) or on an instance
-        (e.g. C().f()). Both the class and the instance are ignored, and
-        neither is passed implicitly as the first argument to the method.
-
-        Static methods in Python are similar to those found in Java or C++.
-        For a more advanced concept, see the classmethod builtin.
-        """
+        """Where an arm with these seven angles is, in degrees: forward kinematics, without an arm."""
     @overload
     @staticmethod
     def of(
@@ -799,8 +826,8 @@ class Status:
 class Stream:
     """A stream of set-points, a context manager: `with arm.stream(0.02) as stream: stream.send(...)`.
 
-    `send` waits until the next point is due. If the program sends nothing for longer than the watchdog's time, the arm
-    holds. At the end it waits until the joints stand at their last points, and raises `ArmProblem` or `NotReached` if one
+    `send` waits until the next point is due, `latest` does not wait. If the program sends nothing for longer than the watchdog's
+    time, the arm holds. At the end it waits until the joints stand at their last points, and raises `ArmProblem` or `NotReached` if one
     does not get there. The registers of the stream have their old values again.
     """
     def __enter__(self) -> Self: ...
@@ -818,9 +845,43 @@ class Stream:
         second; else `TooFar` is raised, unless the stream has an `approach`. Then the call takes that time. The first point below
         the table or in the base gives a `GuardWarning`. After `Simulation.restore` the next point is a first one again.
         """
+    def latest(self, angles: _Goals) -> StreamCounts:
+        """Offers an action, and does not wait: seven angles, as for `send`; `None` keeps that of the action before.
+
+        A thread outside the interpreter sends the newest action each `period`, and without a new one the last one again. Once
+        the program has offered nothing for the time of `watchdog`, it sends nothing, so that the watchdog of the arm acts after
+        the same time again. Returns how the actions became points so far: see `StreamCounts`.
+
+        A failure of the thread is raised by the next call, which then offers nothing. It goes on after an `ArmProblem` of a joint.
+        After all other failures, and after `Arm.stop` (`Interrupted`), it begins again with the next action. That is a first one,
+        as of `send`, and so is the next one after the watchdog has acted. A simulated arm sends while its time passes: in
+        `Arm.sleep`, or when the arm is asked. `record`, `sample` and moves hold the sender up.
+        """
+    @property
+    def counts(self) -> StreamCounts:
+        """How the actions of `latest` became points so far."""
     @property
     def period(self) -> float:
         """The time between two points in seconds."""
+
+@final
+class StreamCounts:
+    """How the actions of `Stream.latest` became points so far."""
+    @property
+    def sent(self) -> int:
+        """Points that were sent, repeated ones included."""
+    @property
+    def skipped(self) -> int:
+        """Actions that a newer one replaced before a point was due."""
+    @property
+    def repeated(self) -> int:
+        """Points without a new action: the last one again."""
+    @property
+    def missed(self) -> int:
+        """Points that were due and not sent, because the sender was late."""
+    @property
+    def watchdog(self) -> int:
+        """How often the program was silent until the watchdog of the arm acted."""
 
 @final
 class Recording:
@@ -924,7 +985,7 @@ class Simulation:
         """Takes the hand away from a joint: without torque, a loaded joint falls."""
     @property
     def load_grams(self) -> int:
-        """The weight at the tip in grams, 0 to 65535."""
+        """The weight in the gripper in grams, 0 to 1000."""
     @load_grams.setter
     def load_grams(self, value: int, /) -> None: ...
     def drop_load(self) -> None:

@@ -193,6 +193,10 @@ class Stream:
         """As `sevenbot.Stream.send`: waits until the point is due, and returns its number."""
         return self._arm._call(self.sync.send, angles)
 
+    def latest(self, angles: Iterable[_Goal]) -> sevenbot.StreamCounts:
+        """As `sevenbot.Stream.latest`, which does not wait: no coroutine."""
+        return self.sync.latest(angles)
+
     async def send_all(
         self, points: AsyncIterable[Iterable[_Goal]] | Iterable[Iterable[_Goal]]
     ) -> int:

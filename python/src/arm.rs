@@ -16,7 +16,7 @@ use crate::motion::{self, PlayOptions, RecordOptions, TipWish};
 use crate::numbers::{Angles, Values, duration, seed};
 use crate::observation::Observation;
 use crate::opening::{self, Opened};
-use crate::ports::Wanted;
+use crate::ports::{self, Wanted};
 use crate::recording::Recording;
 use crate::registers::{self, Registers, Shown};
 use crate::simulation::Simulation;
@@ -29,8 +29,10 @@ mod calls;
 
 /// A 7Bot V2 arm.
 ///
-/// `Arm("/dev/ttyUSB0")` opens a port, `Arm()` the only port with an arm that answers, `Arm(id=5)` that of the arm with this
-/// number (register 11), `Arm(chip="...")` that with this `chip_id`, and `Arm.simulated()` an arm in virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the end, as `stop()`, and closes the port.
+/// `Arm("/dev/ttyUSB0")` opens a port, `Arm("tcp://HOST:PORT", token="...")` connects to a server, `Arm()` opens the only port with
+/// an arm that answers, `Arm(id=5)` that of the arm with this number (register 11), `Arm(chip="...")` that with this `chip_id`,
+/// and `Arm.simulated()` is an arm in virtual time. All have the same methods. `with Arm() as arm:` stops what moves at the
+/// end, as `stop()`, and closes the port.
 ///
 /// Angles are degrees, 0 to 180, joint 1 first; positions millimetres; times seconds.
 #[pyclass(frozen, subclass, module = "sevenbot")]
@@ -46,12 +48,13 @@ pub(crate) struct Arm {
 #[pymethods]
 impl Arm {
     #[new]
-    #[pyo3(signature = (port = None, *, id = None, chip = None, baud = 115_200, timeout = 0.5, attempts = 3, map = None))]
+    #[pyo3(signature = (port = None, *, id = None, chip = None, token = None, baud = 115_200, timeout = 0.5, attempts = 3, map = None))]
     fn new(
         py: Python<'_>,
         port: Option<PortName>,
         id: Option<i64>,
         chip: Option<&str>,
+        token: Option<String>,
         baud: i64,
         timeout: f64,
         attempts: i64,
@@ -60,7 +63,8 @@ impl Arm {
         let options = OpenArguments { baud, timeout, attempts, map }.options(py)?;
         let wanted = Wanted::of(py, id, chip)?;
         let port = wanted.port(py, port, options.baud)?;
-        opening::port(py, &port, options).map(|(worker, opened)| Self::of(worker, opened, None))
+        let token = ports::token(py, &port, token)?;
+        opening::port(py, &port, token, options).map(|(worker, opened)| Self::of(worker, opened, None))
     }
 
     /// An arm in virtual time. The same calls give the same values on every machine.
@@ -236,8 +240,7 @@ impl Arm {
     /// Waits this many seconds, 0 to 86400, on the clock of the arm: virtual time for a simulated one.
     fn sleep(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let time = duration(py, seconds)?;
-        let slept = self.worker.call(py, move |arm, watch| motion::sleep(arm, time, watch))?;
-        raised(py, slept)
+        raised(py, self.worker.sleep(py, time)?)
     }
 
     #[doc = include_str!("arm/help/stop.txt")]

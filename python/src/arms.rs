@@ -5,11 +5,12 @@ use std::sync::Mutex;
 use std::thread::available_parallelism;
 use std::time::Duration;
 
+use arm_sim::plant::HEAVIEST_LOAD_G;
 use numpy::{Element, PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
 use sevenbot::register_values::bytes;
-use sevenbot::simulated_arms::{self as library, Number, WIDTH};
+use sevenbot::simulated_arms::{self as library, MEASURED, Number, StepError, WANTED, WIDTH};
 use sevenbot::{Joint, names};
 
 use crate::arguments::whole;
@@ -20,6 +21,8 @@ use crate::numbers::{Values, duration};
 use crate::simulation::{self, SimulationSnapshot, fault_location, fault_time};
 use crate::worker::lock;
 
+/// Weights in the gripper.
+const GRAMS: std::ops::RangeInclusive<f64> = 0.0..=HEAVIEST_LOAD_G as f64;
 /// The most arms; each takes some 20 kilobytes.
 const MOST_ARMS: i64 = 1_000_000;
 
@@ -28,7 +31,8 @@ const MOST_ARMS: i64 = 1_000_000;
 ///
 /// `seen` is an array of a row for each arm. The slices `POSITIONS`, `VELOCITIES`, `LOADS`, `TIP`, `BLOCKED` and `AGE` name its
 /// columns: `seen[:, arms.TIP]`. Each arm is a controller that parses frames and answers a read, with servos, virtual time,
-/// faults and a load of its own. Its line takes no time. The results do not depend on the number of threads.
+/// faults and a load of its own. Its line takes no time. The results do not depend on the number of threads. `exchange` lets
+/// another simulation move the joints.
 ///
 /// The first arm has the seed `seed`, and each other one the next number; or give `seeds`. By default there is a thread for each
 /// processor. Needs numpy.
@@ -54,29 +58,27 @@ impl SimulatedArms {
     ) -> PyResult<Bound<'py, PyAny>> {
         let actions: Option<PyReadonlyArray2<'py, N>> =
             actions.map(|actions| given(actions, [self.count, 7], "actions")).transpose()?;
-        let out = arrays::out::<N>(py, out, [self.count, WIDTH])?;
-        let mut filled = writing(&out)?;
         let numbers = actions.as_ref().map(|array| array.as_slice()).transpose();
-        let (numbers, seen) =
-            (numbers.map_err(arrays::gaps(py))?, filled.as_slice_mut().map_err(arrays::gaps(py))?);
-        let stepped = self.with(py, |arms| arms.step(numbers, time, seen));
-        drop(filled);
-        stepped.map_err(|error| InvalidValue::raise(py, &error.to_string()))?;
+        let numbers = numbers.map_err(arrays::gaps(py))?;
+        let seen = self.fill::<N>(py, out, WIDTH, |arms, seen| arms.step(numbers, time, seen))?;
         py.check_signals()?;
-        Ok(out.into_any())
+        Ok(seen)
     }
 
-    fn observe_as<'py, N: Number + Element>(
+    /// Fills `out`, or a new array of so many columns.
+    fn fill<'py, N: Number + Element>(
         &self,
         py: Python<'py>,
         out: Option<&Bound<'py, PyAny>>,
+        columns: usize,
+        work: impl FnOnce(&mut library::SimulatedArms, &mut [N]) -> Result<(), StepError> + Send,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let out = arrays::out::<N>(py, out, [self.count, WIDTH])?;
+        let out = arrays::out::<N>(py, out, [self.count, columns])?;
         let mut filled = writing(&out)?;
-        let seen = filled.as_slice_mut().map_err(arrays::gaps(py))?;
-        let observed = self.with(py, |arms| arms.observe(seen));
+        let numbers = filled.as_slice_mut().map_err(arrays::gaps(py))?;
+        let done = self.with(py, |arms| work(arms, numbers));
         drop(filled);
-        observed.map_err(|error| InvalidValue::raise(py, &error.to_string()))?;
+        done.map_err(|error| InvalidValue::raise(py, &error.to_string()))?;
         Ok(out.into_any())
     }
 
@@ -105,6 +107,15 @@ impl SimulatedArms {
     /// Seconds since the last reply: 0 if the last read was answered.
     #[classattr]
     const AGE: Columns = Columns(library::AGE);
+    /// Of `exchange`: the angles that the servos' control aims at, in degrees.
+    #[classattr]
+    const SET_POINTS: Columns = Columns(library::SET_POINTS);
+    /// Of `exchange`: the velocities of the set-points in degrees per second.
+    #[classattr]
+    const SET_VELOCITIES: Columns = Columns(library::SET_VELOCITIES);
+    /// Of `exchange`: 1 for a motor that drives its joint, 2 for one that damps it, or else 0.
+    #[classattr]
+    const DRIVES: Columns = Columns(library::DRIVES);
 
     #[new]
     #[pyo3(signature = (n, seed = None, *, seeds = None, threads = None), text_signature = "(n, seed=1, *, seeds=None, threads=None)")]
@@ -146,13 +157,54 @@ impl SimulatedArms {
         }
     }
 
+    /// Sends each arm its action as the next point of a stream of this period, as `step` does. No time passes.
+    #[pyo3(signature = (actions, period = 0.02))]
+    fn send(&self, py: Python<'_>, actions: &Bound<'_, PyAny>, period: f64) -> PyResult<()> {
+        let time = duration(py, period)?;
+        let actions: PyReadonlyArray2<'_, f64> = given(actions, [self.count, 7], "actions")?;
+        let numbers = actions.as_slice().map_err(arrays::gaps(py))?;
+        let sent = self.with(py, |arms| arms.send(numbers, time));
+        sent.map_err(|error| InvalidValue::raise(py, &error.to_string()))
+    }
+
+    /// Lets another simulation move the joints, such as MuJoCo: tells each arm what that one measured, lets `dt` pass, and returns
+    /// what the servos want then.
+    ///
+    /// `measured` is an array (n, 21) with the columns `POSITIONS`, `VELOCITIES` and `LOADS`, in the units of an observation. A
+    /// joint whose position is NaN is moved by this simulation. Returns `out`, or a new array (n, 21): `SET_POINTS` in degrees,
+    /// `SET_VELOCITIES` in degrees per second, and `DRIVES`: 1 for a motor that drives its joint, 2 for one that damps it, or else
+    /// 0. `dt` is 0.001 to 1 second in whole milliseconds. `send` gives actions, `read` the observations.
+    #[pyo3(signature = (measured, dt = 0.002, out = None))]
+    fn exchange<'py>(
+        &self,
+        py: Python<'py>,
+        measured: &Bound<'py, PyAny>,
+        dt: f64,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let time = duration(py, dt)?;
+        let measured: PyReadonlyArray2<'py, f64> = given(measured, [self.count, MEASURED], "measured")?;
+        let numbers = measured.as_slice().map_err(arrays::gaps(py))?;
+        self.fill::<f64>(py, out, WANTED, |arms, wanted| arms.exchange(numbers, time, wanted))
+    }
+
+    /// Asks each arm for its state: `out`, or a new array (n, 32). No time passes.
+    #[pyo3(signature = (out = None))]
+    fn read<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        if out.is_some_and(is_single) {
+            self.fill::<f32>(py, out, WIDTH, |arms, seen| arms.read(seen))
+        } else {
+            self.fill::<f64>(py, out, WIDTH, |arms, seen| arms.read(seen))
+        }
+    }
+
     /// What the last reads told: `out`, or a new array (n, 32). No time passes.
     #[pyo3(signature = (out = None))]
     fn observe<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         if out.is_some_and(is_single) {
-            self.observe_as::<f32>(py, out)
+            self.fill::<f32>(py, out, WIDTH, |arms, seen| arms.observe(seen))
         } else {
-            self.observe_as::<f64>(py, out)
+            self.fill::<f64>(py, out, WIDTH, |arms, seen| arms.observe(seen))
         }
     }
 
@@ -209,7 +261,7 @@ impl SimulatedArms {
         Ok(())
     }
 
-    /// Hangs a weight on the tip of the arms of the mask, or of all: grams, 0 to 65535, one number or one for each of the n arms.
+    /// Hangs a weight on the tip of the arms of the mask, or of all: grams, 0 to 1000, one number or one for each of the n arms.
     #[pyo3(signature = (grams, mask = None))]
     fn set_load(
         &self,
@@ -218,11 +270,38 @@ impl SimulatedArms {
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let mask = self.mask(mask)?;
-        let grams = each_number(grams, self.count, "grams")?.into_iter().map(|grams| self::grams(py, grams));
+        let grams = each_number(grams, self.count, "grams")?.into_iter();
+        let grams = grams.map(|grams| arrays::steps(py, "grams", grams, GRAMS, 1.0));
         let grams: Vec<u16> = grams.collect::<PyResult<_>>()?;
         self.with(py, |arms| {
             arms.each(mask.as_deref(), |index, arm| {
                 arm.plant_mut().set_load(grams.get(index).copied().unwrap_or_default());
+            });
+        });
+        Ok(())
+    }
+
+    /// Makes the servos of the arms of the mask, or of all, stronger or weaker, and their gears stiffer: factors of the stall torque
+    /// and of all friction and drag, 0.1 to 10 in steps of 0.01, one number or one for each of the n arms. `reset` takes it back.
+    #[pyo3(signature = (torque, friction, mask = None))]
+    fn scale_servos(
+        &self,
+        py: Python<'_>,
+        torque: &Bound<'_, PyAny>,
+        friction: &Bound<'_, PyAny>,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let mask = self.mask(mask)?;
+        let percents = |factors, name| -> PyResult<Vec<u16>> {
+            let factors = each_number(factors, self.count, name)?;
+            let percent = |factor: f64| arrays::steps(py, name, factor, 0.1..=10.0, 100.0);
+            factors.into_iter().map(percent).collect()
+        };
+        let (torque, friction) = (percents(torque, "torque")?, percents(friction, "friction")?);
+        self.with(py, |arms| {
+            let percent = |percents: &[u16], index| percents.get(index).copied().unwrap_or(100);
+            arms.each(mask.as_deref(), |index, arm| {
+                arm.plant_mut().scale_servos(percent(&torque, index), percent(&friction, index));
             });
         });
         Ok(())
@@ -303,12 +382,4 @@ impl<'py> IntoPyObject<'py> for Columns {
     fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
         Ok(PySlice::new(py, isize::try_from(self.0.start)?, isize::try_from(self.0.end)?, 1))
     }
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 65535")]
-fn grams(py: Python<'_>, grams: f64) -> PyResult<u16> {
-    let found = Some(grams.round()).filter(|grams| (0.0..=f64::from(u16::MAX)).contains(grams));
-    found
-        .map(|grams| grams as u16)
-        .ok_or_else(|| InvalidValue::raise(py, &format!("grams: {grams} is out of range: use 0 to 65535")))
 }

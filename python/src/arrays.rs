@@ -128,3 +128,19 @@ pub(crate) fn seeds(
     let first = first.map_or(Ok(1), seed)?;
     Ok((0..count).zip(0_u64..).map(|(_, number)| first.wrapping_add(number)).collect())
 }
+
+/// A number of a range, in so many steps for each unit.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the range")]
+pub(crate) fn steps(
+    py: Python<'_>,
+    name: &str,
+    number: f64,
+    range: std::ops::RangeInclusive<f64>,
+    steps: f64,
+) -> PyResult<u16> {
+    if range.contains(&number) {
+        return Ok((number * steps).round() as u16);
+    }
+    let (low, high) = range.into_inner();
+    Err(InvalidValue::raise(py, &format!("{name}: {number} is out of range: use {low} to {high}")))
+}

@@ -1,4 +1,4 @@
-//! Kinematics and limits, without an arm.
+//! Kinematics, limits and models, without an arm.
 
 use kinematics::geometry::{CLAW_MAX, JOINT_MAX};
 use pyo3::prelude::*;
@@ -8,7 +8,7 @@ use sevenbot::cartesian::{TipTarget, Vector};
 
 use crate::arguments::{Direction, Goals};
 use crate::bulk;
-use crate::errors::raised;
+use crate::errors::{InvalidValue, raised};
 use crate::tip::Tip;
 
 /// Where an arm with these seven angles is, in degrees: forward kinematics. The same as `Tip.of`.
@@ -42,4 +42,18 @@ pub(crate) fn inverse(
 pub(crate) fn limits(py: Python<'_>) -> PyResult<(Bound<'_, PyAny>, Bound<'_, PyAny>)> {
     let high = Joint::ALL.map(|joint| if joint.number() == 7 { CLAW_MAX } else { JOINT_MAX });
     Ok((bulk::numbers(py, &[0.0; 7])?, bulk::numbers(py, &high)?))
+}
+
+/// The model of the arm for other programs, as text: `"urdf"`, or `"mjcf"` for MuJoCo, where the parallelogram is a closed loop.
+///
+/// It is that of `sevenbot model`. Lengths are metres and angles radians; a joint's angle is that of the registers less 90, 90, 65,
+/// 90, 90, 90 degrees. The claw, joint 7, is left out.
+#[pyfunction]
+pub(crate) fn model(py: Python<'_>, format: &str) -> PyResult<String> {
+    let text = match format {
+        "urdf" => arm_model::urdf(),
+        "mjcf" => arm_model::mjcf(),
+        _ => return Err(InvalidValue::raise(py, &format!("format {format}: use \"urdf\" or \"mjcf\""))),
+    };
+    Ok(text?)
 }

@@ -20,6 +20,8 @@ mod bulk;
 mod errors;
 mod geometry;
 mod health;
+mod latest;
+mod lead;
 mod motion;
 mod numbers;
 mod observation;
@@ -32,6 +34,7 @@ mod registers;
 mod simulation;
 mod status;
 mod stream;
+mod stream_counts;
 mod tip;
 mod watch;
 mod worker;
@@ -53,10 +56,12 @@ fn _sevenbot(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulation::SimulationSnapshot>()?;
     module.add_class::<status::Status>()?;
     module.add_class::<stream::Stream>()?;
+    module.add_class::<stream_counts::StreamCounts>()?;
     module.add_class::<tip::Tip>()?;
     module.add_function(wrap_pyfunction!(geometry::forward, module)?)?;
     module.add_function(wrap_pyfunction!(geometry::inverse, module)?)?;
     module.add_function(wrap_pyfunction!(geometry::limits, module)?)?;
+    module.add_function(wrap_pyfunction!(geometry::model, module)?)?;
     module.add_function(wrap_pyfunction!(ports::ports, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

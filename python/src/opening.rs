@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 use sevenbot::host_line::HostLine;
-use sevenbot::network::open_line;
+use sevenbot::network::open_line_with_token;
 use sevenbot::simulated::{SharedSimulation, Simulation, SimulationConfig};
 use sevenbot::{ArmOptions, OpenError, PortError};
 
@@ -37,11 +37,17 @@ impl Opened {
     }
 }
 
-/// Opens a port. A signal of Python ends it.
-pub(crate) fn port(py: Python<'_>, port: &str, options: ArmOptions) -> PyResult<(Worker, Opened)> {
+/// Opens a port. A signal of Python ends it. A server may want a token.
+pub(crate) fn port(
+    py: Python<'_>,
+    port: &str,
+    token: Option<String>,
+    options: ArmOptions,
+) -> PyResult<(Worker, Opened)> {
     let name = port.to_owned();
     let open = move |is_cancelled| {
-        let line = CancellableLine { line: open_line(&name, options.baud)?, is_cancelled };
+        let line = open_line_with_token(&name, options.baud, token.as_deref())?;
+        let line = CancellableLine { line, is_cancelled };
         sevenbot::Arm::over(Box::new(line), &name, options)
     };
     Worker::start(py, Box::new(open), Opened::of)?.map_err(|why| not_opened(py, port, &why))

@@ -2,23 +2,43 @@
 
 use pyo3::prelude::*;
 use sevenbot::Identity;
-use sevenbot::ports::{ProbeResult, available, probe};
+use sevenbot::network::{Address, is_token};
+use sevenbot::ports::{ProbeResult, probe, reachable};
 
 use crate::arguments::{PortName, whole};
-use crate::errors::{InvalidType, PortError, error};
+use crate::errors::{InvalidType, InvalidValue, PortError, error};
 
-/// The serial ports of this machine with an arm: name, description, device id (register 11) and firmware version.
+/// The arms of this machine: port, description, device id (register 11), firmware version and `chip_id`. Their ports are serial
+/// ports, or servers of this user (`sevenbot serve`).
 ///
 /// Asks all ports at the same time, at `baud` bits per second, for about half a second.
 #[pyfunction]
 #[pyo3(signature = (baud = 115_200))]
-pub(crate) fn ports(py: Python<'_>, baud: u32) -> Vec<(String, String, u8, String)> {
-    let found = py.detach(|| probe(available(), baud));
+pub(crate) fn ports(py: Python<'_>, baud: u32) -> Vec<(String, String, u8, String, String)> {
+    let found = py.detach(|| probe(reachable(), baud));
     let arms = found.into_iter().filter_map(|found| {
         let (identity, id) = found.answer.ok()?;
-        Some((found.port.name, found.port.description, id, identity.version()))
+        Some((found.port.name, found.port.description, id, identity.version(), identity.chip_name()))
     });
     arms.collect()
+}
+
+/// The token for a server, which has to be at an address that takes one.
+pub(crate) fn token(py: Python<'_>, port: &str, token: Option<String>) -> PyResult<Option<String>> {
+    let Some(token) = token else { return Ok(None) };
+    if !is_token(&token) {
+        return Err(InvalidValue::raise(
+            py,
+            "token: use 8 to 128 letters, digits and punctuation marks, without spaces",
+        ));
+    }
+    if Address::parse(port).is_some_and(|address| address.takes_token()) {
+        return Ok(Some(token));
+    }
+    Err(InvalidType::raise(
+        py,
+        "a token goes with a port as \"tcp://HOST:PORT\", \"tls://HOST:PORT\" or \"sevenbot://NAME\"",
+    ))
 }
 
 /// The arm that is wanted: its number (register 11), its chip, or any.
@@ -51,7 +71,7 @@ impl Wanted {
     }
 
     fn only_one(&self, py: Python<'_>, baud: u32) -> PyResult<String> {
-        let found = py.detach(|| probe(available(), baud));
+        let found = py.detach(|| probe(reachable(), baud));
         let is_wanted =
             |found: &ProbeResult| found.answer.as_ref().is_ok_and(|(identity, id)| self.is(identity, *id));
         let names: Vec<_> = found.into_iter().filter(is_wanted).map(|found| found.port.name).collect();

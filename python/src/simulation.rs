@@ -4,6 +4,7 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use arm_sim::faults::{ArmFault, FaultLocation};
+use arm_sim::plant::HEAVIEST_LOAD_G;
 use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use pyo3::prelude::*;
 use sevenbot::Joint;
@@ -188,7 +189,7 @@ impl Simulation {
         self.with(py, |simulation| simulation.plant_mut().let_go(joint))
     }
 
-    /// The weight at the tip in grams, 0 to 65535.
+    /// The weight in the gripper in grams, 0 to 1000.
     #[getter]
     fn load_grams(&self, py: Python<'_>) -> PyResult<u16> {
         self.with(py, |simulation| simulation.plant().load_grams())
@@ -196,7 +197,7 @@ impl Simulation {
 
     #[setter]
     fn set_load_grams(&self, py: Python<'_>, grams: i64) -> PyResult<()> {
-        let grams = whole(py, "load_grams", grams, 0, i64::from(u16::MAX))?;
+        let grams = whole(py, "load_grams", grams, 0, i64::from(HEAVIEST_LOAD_G))?;
         self.with(py, |simulation| simulation.plant_mut().set_load(grams))
     }
 

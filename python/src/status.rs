@@ -231,11 +231,11 @@ impl Status {
 impl Status {
     fn numbers_of(&self, is_so: fn(&sevenbot::health::JointHealth) -> Option<bool>) -> Vec<u16> {
         let joints = self.health.joints.iter().filter(|joint| is_so(joint) == Some(true));
-        joints.map(|joint| joint.joint.number().into()).collect()
+        joints.map(|joint| u16::from(joint.joint.number())).collect()
     }
 }
 
 /// The numbers of joints. A vector of bytes would be `bytes` in Python.
 fn numbers(bits: u8) -> Vec<u16> {
-    Joint::ALL.iter().filter(|joint| bits & joint.bit() != 0).map(|joint| joint.number().into()).collect()
+    Joint::ALL.iter().filter(|joint| bits & joint.bit() != 0).map(|joint| u16::from(joint.number())).collect()
 }

@@ -14,8 +14,10 @@ use sevenbot::simulated::SharedSimulation;
 use sevenbot::stream::{StreamError, StreamOptions, StreamPace};
 
 use crate::arguments::Goals;
-use crate::errors::{raised, warn_of};
-use crate::watch::{PacedStream, Watch};
+use crate::errors::{Closed, raised, warn_of};
+use crate::latest::LatestSlot;
+use crate::stream_counts::StreamCounts;
+use crate::watch::{PacedStream, StreamOrder, Watch};
 use crate::worker::{Worker, lock};
 
 /// The longest time between two frames while a point is not due yet: a watchdog of 10 ms needs more than this.
@@ -23,8 +25,8 @@ const SLICE: Duration = Duration::from_millis(20);
 
 /// A stream of set-points, a context manager: `with arm.stream(0.02) as stream: stream.send(...)`.
 ///
-/// `send` waits until the next point is due. If the program sends nothing for longer than the watchdog's time, the arm
-/// holds. At the end it waits until the joints stand at their last points, and raises `ArmProblem` or `NotReached` if one
+/// `send` waits until the next point is due, `latest` does not wait. If the program sends nothing for longer than the watchdog's
+/// time, the arm holds. At the end it waits until the joints stand at their last points, and raises `ArmProblem` or `NotReached` if one
 /// does not get there. The registers of the stream have their old values again.
 #[pyclass(frozen, module = "sevenbot")]
 pub(crate) struct Stream {
@@ -35,6 +37,7 @@ pub(crate) struct Stream {
     guard: Mutex<Option<Guard>>,
     /// `None` for a real arm.
     simulation: Option<SharedSimulation>,
+    slot: Arc<LatestSlot>,
 }
 
 impl Stream {
@@ -45,14 +48,18 @@ impl Stream {
         guard: Option<Guard>,
         simulation: Option<SharedSimulation>,
     ) -> Self {
-        Self { worker, options, rule, guard: Mutex::new(guard), simulation }
+        Self { worker, options, rule, guard: Mutex::new(guard), simulation, slot: Arc::default() }
     }
 }
 
 impl Stream {
-    /// How often the simulated arm was restored; 0 for a real one.
-    fn restores(&self) -> u64 {
-        self.simulation.as_ref().map_or(0, SharedSimulation::restores)
+    fn order(&self) -> StreamOrder {
+        StreamOrder {
+            options: self.options,
+            rule: self.rule,
+            slot: Arc::clone(&self.slot),
+            simulation: self.simulation.clone(),
+        }
     }
 
     /// Warns once if the guard would not allow the points of the stream.
@@ -68,14 +75,16 @@ impl Stream {
 impl PacedStream<'_> {
     /// Waits until the joints stand at their last points.
     fn arrive(&mut self, watch: &mut Watch<'_>) -> Result<(), MoveError> {
-        if self.pace.counts().points == 0 {
+        self.finish_leading(watch)?;
+        if self.pace.counts().points == 0 && self.points.counts().sent == 0 {
             return Ok(());
         }
         self.stream.wait_until_arrived(|stream, end| stream.wait_until(end, watch))
     }
 
     /// After a restore the arm is elsewhere, and does not know of the stream.
-    fn notice_restores(&mut self, restores: u64) -> Result<(), StreamError> {
+    pub(crate) fn notice_restores(&mut self) -> Result<(), StreamError> {
+        let restores = self.simulation.as_ref().map_or(0, SharedSimulation::restores);
         if self.restores != restores {
             self.stream.begin_again()?;
             (self.restores, self.first) = (restores, FirstPoints::default());
@@ -86,13 +95,8 @@ impl PacedStream<'_> {
     }
 
     /// Goes to the first point of joints. The next point is due afterwards.
-    fn approach(
-        &mut self,
-        first: &FineTargets,
-        rule: ApproachRule,
-        watch: &mut Watch<'_>,
-    ) -> Result<(), MoveError> {
-        let way = Approach::plan(&self.stream.arm().standing()?, first, rule)?;
+    pub(crate) fn approach(&mut self, first: &FineTargets, watch: &mut Watch<'_>) -> Result<(), MoveError> {
+        let way = Approach::plan(&self.stream.arm().standing()?, first, self.rule)?;
         self.stream.approach(&way, watch)?;
         let now = self.stream.arm().elapsed();
         if self.pace.counts().points == 0 {
@@ -107,7 +111,7 @@ impl PacedStream<'_> {
 #[pymethods]
 impl Stream {
     fn __enter__<'py>(slf: PyRef<'py, Self>) -> PyResult<PyRef<'py, Self>> {
-        slf.worker.open_stream(slf.py(), slf.options, slf.restores())?;
+        slf.worker.open_stream(slf.py(), slf.order())?;
         Ok(slf)
     }
 
@@ -133,11 +137,12 @@ impl Stream {
     /// second; else `TooFar` is raised, unless the stream has an `approach`. Then the call takes that time. The first point below
     /// the table or in the base gives a `GuardWarning`. After `Simulation.restore` the next point is a first one again.
     fn send(&self, py: Python<'_>, angles: Goals) -> PyResult<u32> {
-        let (point, rule, restores) = (angles.targets(py)?, self.rule, self.restores());
+        let point = angles.targets(py)?;
         let sent = self.worker.stream_call(py, move |open, watch| {
-            open.notice_restores(restores)?;
+            open.points.stop();
+            open.notice_restores()?;
             if let Some(first) = { open.first }.take(&point) {
-                open.approach(&first, rule, watch)?;
+                open.approach(&first, watch)?;
                 open.first.take(&point);
             }
             loop {
@@ -163,6 +168,31 @@ impl Stream {
         let (number, pose) = raised(py, sent)?;
         self.warn_of_pose(py, pose)?;
         Ok(number)
+    }
+
+    /// Offers an action, and does not wait: seven angles, as for `send`; `None` keeps that of the action before.
+    ///
+    /// A thread outside the interpreter sends the newest action each `period`, and without a new one the last one again. Once
+    /// the program has offered nothing for the time of `watchdog`, it sends nothing, so that the watchdog of the arm acts after
+    /// the same time again. Returns how the actions became points so far: see `StreamCounts`.
+    ///
+    /// A failure of the thread is raised by the next call, which then offers nothing. It goes on after an `ArmProblem` of a joint.
+    /// After all other failures, and after `Arm.stop` (`Interrupted`), it begins again with the next action. That is a first one,
+    /// as of `send`, and so is the next one after the watchdog has acted. A simulated arm sends while its time passes: in
+    /// `Arm.sleep`, or when the arm is asked. `record`, `sample` and moves hold the sender up.
+    fn latest(&self, py: Python<'_>, angles: Goals) -> PyResult<StreamCounts> {
+        let action = angles.targets(py)?;
+        let told = self.slot.offer(&action).ok_or_else(|| Closed::raise_closed(py))?;
+        let told = raised(py, told)?;
+        self.worker.wake(py)?;
+        self.warn_of_pose(py, told.pose)?;
+        Ok(told.counts.into())
+    }
+
+    /// How the actions of `latest` became points so far.
+    #[getter]
+    fn counts(&self) -> StreamCounts {
+        self.slot.counts().into()
     }
 
     /// The time between two points in seconds.

@@ -4,34 +4,86 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::Duration;
 
 use sevenbot::Arm;
-use sevenbot::approach::FirstPoints;
-use sevenbot::moves::{Observer, Stage};
-use sevenbot::stream::{SetPointStream, StreamError, StreamOptions, StreamPace};
+use sevenbot::approach::{ApproachRule, FirstPoints};
+use sevenbot::moves::{MoveError, Observer, Stage};
+use sevenbot::simulated::SharedSimulation;
+use sevenbot::stream::{LatestPoints, SetPointStream, StreamError, StreamOptions, StreamPace};
+
+use crate::latest::LatestSlot;
 
 /// The longest time that a read of another thread waits for an arm that moves.
 const BETWEEN_READS: Duration = Duration::from_millis(20);
+
+/// A stream that Python opens.
+pub(crate) struct StreamOrder {
+    pub(crate) options: StreamOptions,
+    pub(crate) rule: ApproachRule,
+    pub(crate) slot: Arc<LatestSlot>,
+    /// `None` for a real arm.
+    pub(crate) simulation: Option<SharedSimulation>,
+}
 
 /// A stream, when its next point is due, and which joints had one.
 pub(crate) struct PacedStream<'a> {
     pub(crate) stream: SetPointStream<'a>,
     pub(crate) pace: StreamPace,
     pub(crate) first: FirstPoints,
+    pub(crate) rule: ApproachRule,
     /// The last point of each joint in degrees, and the target at the start where it had none.
     pub(crate) pose: [f64; 7],
-    /// How often a simulated arm was restored when the stream began.
+    /// The points of a program that does not wait, and what it offers.
+    pub(crate) points: LatestPoints,
+    pub(crate) slot: Arc<LatestSlot>,
+    /// The watchdog of the arm has acted since the last point.
+    pub(crate) is_held: bool,
+    /// How often the arm was stopped by now, and at the last look.
+    pub(crate) stops: Arc<AtomicU64>,
+    pub(crate) stops_before: u64,
+    pub(crate) simulation: Option<SharedSimulation>,
+    /// How often the simulated arm was restored by the last look.
     pub(crate) restores: u64,
 }
 
 impl<'a> PacedStream<'a> {
-    pub(crate) fn open(arm: &'a mut Arm, options: StreamOptions, restores: u64) -> Result<Self, StreamError> {
+    pub(crate) fn open(
+        arm: &'a mut Arm,
+        order: StreamOrder,
+        stops: &Arc<AtomicU64>,
+    ) -> Result<Self, StreamError> {
+        let StreamOrder { options, rule, slot, simulation } = order;
         let mut stream = SetPointStream::open(arm, options)?;
         let pose = stream.arm().standing()?.targets;
-        let pace = StreamPace::new(stream.arm().elapsed(), options.period());
-        Ok(Self { stream, pace, first: FirstPoints::default(), pose, restores })
+        slot.open(pose);
+        Ok(Self {
+            pace: StreamPace::new(stream.arm().elapsed(), options.period()),
+            stream,
+            first: FirstPoints::default(),
+            rule,
+            pose,
+            points: LatestPoints::new(options),
+            slot,
+            is_held: false,
+            stops: Arc::clone(stops),
+            stops_before: stops.load(Ordering::Relaxed),
+            restores: simulation.as_ref().map_or(0, SharedSimulation::restores),
+            simulation,
+        })
+    }
+
+    /// The time of the arm's line.
+    pub(crate) fn elapsed(&mut self) -> Duration {
+        self.stream.arm().elapsed()
+    }
+
+    /// Puts the registers back.
+    pub(crate) fn close(self) -> Result<(), StreamError> {
+        let closed = self.stream.close();
+        self.slot.close();
+        closed
     }
 }
 
@@ -44,9 +96,13 @@ pub(crate) enum Message {
     Call(ArmCall),
     /// A short read, which changes nothing.
     Read(ArmCall),
-    OpenStream(StreamOptions, u64, StreamResult),
+    /// Wait this long, in the time of the arm's line.
+    Sleep(Duration, Arc<CallState>, SyncSender<Result<(), MoveError>>),
+    OpenStream(StreamOrder, StreamResult),
     StreamCall(StreamCall),
     CloseStream(StreamResult),
+    /// Look what is due. An arm in virtual time looks while its time passes.
+    Wake,
 }
 
 /// What the two threads of a call share.
@@ -104,11 +160,25 @@ impl Inbox {
         deferred.or_else(|| self.messages.recv().ok())
     }
 
+    /// As [`Self::next`], but [`Message::Wake`] after this time.
+    pub(crate) fn next_within(&self, time: Option<Duration>) -> Option<Message> {
+        let Some(time) = time else { return self.next() };
+        if let Some(deferred) = self.deferred.borrow_mut().pop_front() {
+            return Some(deferred);
+        }
+        match self.messages.recv_timeout(time) {
+            Ok(message) => Some(message),
+            Err(RecvTimeoutError::Timeout) => Some(Message::Wake),
+            Err(RecvTimeoutError::Disconnected) => None,
+        }
+    }
+
     /// Runs the reads that other threads wait for. Keeps everything else for later, in its order.
     fn serve_reads(&self, arm: &mut Arm) {
         while let Ok(message) = self.messages.try_recv() {
             match message {
                 Message::Read(call) => call(arm, self),
+                Message::Wake => {}
                 other => self.deferred.borrow_mut().push_back(other),
             }
         }
@@ -121,7 +191,12 @@ pub(crate) struct Watch<'a> {
     pub(crate) inbox: &'a Inbox,
 }
 
-impl Watch<'_> {
+impl<'a> Watch<'a> {
+    /// Of something that no call waits for. [`CallState::new`] of now.
+    pub(crate) fn of_no_call(stops: &Arc<AtomicU64>, inbox: &'a Inbox) -> Self {
+        Self { state: Arc::new(CallState::new(stops)), inbox }
+    }
+
     /// Did another thread stop the arm during this call?
     pub(crate) fn is_stopped(&self) -> bool {
         self.state.is_stopped()

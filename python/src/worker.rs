@@ -16,13 +16,15 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use sevenbot::map::DEVICE_CODE;
-use sevenbot::stream::{StreamError, StreamOptions};
+use sevenbot::moves::MoveError;
+use sevenbot::stream::StreamError;
 use sevenbot::{Arm, OpenError, Span};
 
 use crate::errors::{Closed, Raise};
+use crate::motion;
 use crate::place::{Place, no_thread};
 use crate::progress::ProgressLine;
-use crate::watch::{CallState, Inbox, Message, PacedStream, Watch};
+use crate::watch::{CallState, Inbox, Message, PacedStream, StreamOrder, Watch};
 
 /// Time between two checks of Python's signals.
 pub(crate) const SIGNAL_PERIOD: Duration = Duration::from_millis(50);
@@ -54,6 +56,8 @@ impl Worker {
         seen: fn(&mut Arm) -> T,
     ) -> PyResult<Result<(Self, T), OpenError>> {
         let ((messages, received), (reply, answer)) = (channel(), sync_channel(1));
+        let stops = Arc::<AtomicU64>::default();
+        let counted = Arc::clone(&stops);
         let is_cancelled = Arc::new(AtomicBool::new(false));
         let (place, flag) = (Place::take(py)?, Arc::clone(&is_cancelled));
         let thread = thread::Builder::new().name("sevenbot".to_owned()).spawn(move || {
@@ -61,20 +65,20 @@ impl Worker {
             match open(flag) {
                 Ok(mut arm) => {
                     let _ = reply.send(Ok(seen(&mut arm)));
-                    serve(arm, &Inbox::new(received));
+                    serve(arm, &Inbox::new(received), &counted);
                 }
                 Err(error) => drop(reply.send(Err(error))),
             }
         });
         let thread = thread.map_err(|why| no_thread(py, &why.to_string()))?;
         let (opened, _) = wait(py, answer, &CallState::default(), Wait::AtMostUntilSignal(&is_cancelled))?;
-        Ok(opened.map(|told| (Self::of(Port { messages, thread }), told)))
+        Ok(opened.map(|told| (Self::of(Port { messages, thread }, stops), told)))
     }
 
-    fn of(port: Port) -> Self {
+    fn of(port: Port, stops: Arc<AtomicU64>) -> Self {
         Self {
             open: Mutex::new(Some(port)),
-            stops: Arc::default(),
+            stops,
             process: std::process::id(),
             shows_progress: AtomicBool::new(true),
         }
@@ -134,9 +138,23 @@ impl Worker {
         self.stops.fetch_add(1, Ordering::Relaxed);
     }
 
-    pub(crate) fn open_stream(&self, py: Python<'_>, options: StreamOptions, restores: u64) -> PyResult<()> {
+    /// Waits this long in the time of the arm's line. An open stream goes on.
+    pub(crate) fn sleep(&self, py: Python<'_>, time: Duration) -> PyResult<Result<(), MoveError>> {
         let (reply, answer) = sync_channel(1);
-        self.send(py, Message::OpenStream(options, restores, reply))?;
+        let state = Arc::new(CallState::new(&self.stops));
+        self.send(py, Message::Sleep(time, Arc::clone(&state), reply))?;
+        let (slept, signal) = self.wait(py, answer, &state)?;
+        signal.map_or(Ok(slept), Err)
+    }
+
+    /// Lets the thread of the port see what is due. Does not wait.
+    pub(crate) fn wake(&self, py: Python<'_>) -> PyResult<()> {
+        self.send(py, Message::Wake)
+    }
+
+    pub(crate) fn open_stream(&self, py: Python<'_>, order: StreamOrder) -> PyResult<()> {
+        let (reply, answer) = sync_channel(1);
+        self.send(py, Message::OpenStream(order, reply))?;
         finish(py, self.wait(py, answer, &CallState::default())?)
     }
 
@@ -270,34 +288,42 @@ fn wait<T: Send>(
     }
 }
 
-fn serve(mut arm: Arm, inbox: &Inbox) {
+fn serve(mut arm: Arm, inbox: &Inbox, stops: &Arc<AtomicU64>) {
     while let Some(message) = inbox.next() {
         match message {
             Message::Call(call) | Message::Read(call) => call(&mut arm, inbox),
-            Message::OpenStream(options, restores, opened) => {
-                match PacedStream::open(&mut arm, options, restores) {
-                    Ok(stream) => {
-                        let _ = opened.send(Ok(()));
-                        serve_stream(stream, inbox);
-                    }
-                    Err(error) => drop(opened.send(Err(error))),
-                }
+            Message::Sleep(time, state, slept) => {
+                let _ = slept.send(motion::sleep(&mut arm, time, &mut Watch { state, inbox }));
             }
+            Message::OpenStream(order, opened) => match PacedStream::open(&mut arm, order, stops) {
+                Ok(stream) => {
+                    let _ = opened.send(Ok(()));
+                    serve_stream(stream, inbox);
+                }
+                Err(error) => drop(opened.send(Err(error))),
+            },
             // No stream is open. The caller sees the end of the channel.
-            Message::StreamCall(_) | Message::CloseStream(_) => {}
+            Message::StreamCall(_) | Message::CloseStream(_) | Message::Wake => {}
         }
     }
 }
 
-/// Serves calls while a stream is open. Without a caller the stream sends nothing, so that the arm's watchdog acts.
+/// Serves calls while a stream is open. Without a caller, and without actions of a program that does not wait, the stream sends
+/// nothing, so that the arm's watchdog acts.
 fn serve_stream(mut stream: PacedStream<'_>, inbox: &Inbox) {
-    while let Some(message) = inbox.next() {
+    while let Some(message) = inbox.next_within(stream.wakes_in()) {
+        if stream.simulation.is_none() || !matches!(message, Message::Wake) {
+            stream.lead(inbox);
+        }
         match message {
             Message::Call(call) | Message::Read(call) => call(stream.stream.arm(), inbox),
+            Message::Sleep(time, state, slept) => {
+                let _ = slept.send(stream.sleep(time, &mut Watch { state, inbox }));
+            }
             Message::StreamCall(call) => call(&mut stream, inbox),
-            Message::OpenStream(..) => {}
+            Message::OpenStream(..) | Message::Wake => {}
             Message::CloseStream(closed) => {
-                let _ = closed.send(stream.stream.close());
+                let _ = closed.send(stream.close());
                 return;
             }
         }

@@ -123,6 +123,26 @@ def test_a_wall_blocks_and_a_load_is_felt() -> None:
     assert abs(seen[1, 16]) > abs(seen[0, 16])
 
 
+def test_servos_differ_from_arm_to_arm() -> None:
+    arms = Arms(3)
+    arms.set_load(300)
+    arms.scale_servos([0.5, 1, 2], 1)
+    for _ in range(100):
+        seen = arms.step(numpy.tile(REST, (3, 1)))
+    loads = numpy.abs(seen[:, 16])
+    assert loads[0] > 1.3 * loads[1] > 1.3 * 1.3 * loads[2] > 10
+    # The weight turns a weaker joint further off its target.
+    assert seen[0, 2] - 65 > 1.5 * (seen[1, 2] - 65) > 0
+    arms.reset()
+    arms.set_load(300)
+    for _ in range(100):
+        seen = arms.step(numpy.tile(REST, (3, 1)))
+    assert (seen[0, :31] == seen[1, :31]).all()
+    for torque, friction, word in [(0.05, 1, "torque"), (1, 20, "friction"), (numpy.nan, 1, "torque")]:
+        with pytest.raises(ValueError, match=f"{word}: .* 0.1 to 10"):
+            arms.scale_servos(torque, friction)
+
+
 WRONG: dict[str, tuple[type[Exception], str, Callable[[], object]]] = {
     "no number": (ValueError, "arm 1, joint 2: NaN", lambda: Arms(2).step([REST, [90, numpy.nan, *REST[2:]]])),
     "out of range": (ValueError, "arm 0, joint 1: 181", lambda: Arms(1).step([[181, *REST[1:]]])),
@@ -135,7 +155,11 @@ WRONG: dict[str, tuple[type[Exception], str, Callable[[], object]]] = {
     "mask": (TypeError, "2 truth values", lambda: Arms(2).reset([True])),
     "mask of numbers": (TypeError, "truth values", lambda: Arms(2).reset([0, 1])),
     "fault": (ValueError, "nonsense", lambda: Arms(1).fault(None, "nonsense")),
-    "load": (ValueError, "grams", lambda: Arms(1).set_load(-1)),
+    "load": (ValueError, "grams: 1001", lambda: Arms(1).set_load(1001)),
+    "measured": (ValueError, "arm 0, joint 2", lambda: Arms(1).exchange([[*REST, 0, numpy.nan, *[0] * 12]])),
+    "measured shape": (ValueError, r"\(1, 21\)", lambda: Arms(1).exchange([REST])),
+    "exchange time": (ValueError, "0.001 to 1 s", lambda: Arms(1).exchange([[0] * 21], 0.0005)),
+    "period": (ValueError, "0.005 to 1 s", lambda: Arms(1).send([REST], 0.002)),
     "loads": (TypeError, "grams", lambda: Arms(2).set_load([1, 2, 3])),
     "register": (KeyError, "no register", lambda: Arms(1).set("nonsense", 1)),
     "no arms": (ValueError, "n: 0", lambda: Arms(0)),

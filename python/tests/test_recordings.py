@@ -5,16 +5,16 @@ from __future__ import annotations
 import csv
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
+from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
-from mcap.records import Message
+from rosbags.highlevel import AnyReader
 
 import sevenbot
-
-rosbags = pytest.importorskip("rosbags.highlevel")
 
 REST = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0]
 COUNT = 250
@@ -61,13 +61,13 @@ def test_mcap_reads_the_file_by_its_index(file: Path) -> None:
             "/joint_states": COUNT, "/tf": COUNT, "/tf_static": 1, "/robot_description": 1, "/vacuum": 2,
         }  # fmt: skip
         assert len(summary.chunk_indexes) == 5
-        part = list(reader.iter_messages("/joint_states", start_time=1_000_000_000, end_time=2_000_000_000))
+        part = list(reader.iter_messages("/joint_states", starting_at=1_000_000_000, ending_before=2_000_000_000))
         assert len(part) == 50
 
 
 def test_rosbags_reads_every_message(file: Path, recording: sevenbot.Recording) -> None:
-    with rosbags.AnyReader([file]) as bag:
-        messages = [
+    with AnyReader([file]) as bag:
+        messages: list[tuple[str, Any]] = [
             (connection.topic, bag.deserialize(raw, connection.msgtype)) for connection, _, raw in bag.messages()
         ]
     states = [message for topic, message in messages if topic == "/joint_states"]
@@ -93,14 +93,17 @@ def test_a_cut_file_is_read_as_far_as_it_goes(file: Path, kept: float) -> None:
         sevenbot.Recording.load(cut)
     assert "sevenbot convert" in refused.value.hints[0]
     # What another reader finds in it.
-    messages = 0
+    topics, moments = {}, 0
     with cut.open("rb") as stream:
         try:
             for record in StreamReader(stream).records:
-                messages += isinstance(record, Message)
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                if isinstance(record, Message):
+                    moments += topics[record.channel_id] == "/joint_states"
         except (McapError, EOFError):
             pass
-    assert f"; {(messages - 3) // 2} moments" in str(refused.value) or messages >= 3
+    assert f"; {moments} moments" in str(refused.value)
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:

@@ -18,7 +18,8 @@ Place = ast.ClassDef | ast.FunctionDef
 
 def docstring(found: object, indent: str) -> str | None:
     """The lines of a docstring in the stubs."""
-    text = inspect.getdoc(found)
+    # A static method has the words of Python itself, which differ between its versions.
+    text = inspect.getdoc(found.__func__ if isinstance(found, staticmethod) else found)
     if text is None:
         return None
     assert '"""' not in text

@@ -5,9 +5,11 @@ use std::io::{Read, Write};
 use mcap::write::NoSeek;
 use sevenbot::recording::Recording;
 
-use crate::read::{ReadError, read_and_pass_on};
+use crate::format::Format;
+use crate::read::read_and_pass_on;
+use crate::read_error::ReadError;
+use crate::write::write;
 use crate::writer::{io_error, options};
-use crate::{Format, write};
 
 /// Reads a recording, and writes it in a format. From MCAP to MCAP all messages are copied, also those of other topics, and a
 /// file that is cut off gets an end and an index.

@@ -20,6 +20,7 @@ mod joints;
 mod mcap_reader;
 mod messages;
 mod read;
+mod read_error;
 mod telemetry;
 mod topics;
 mod write;
@@ -27,8 +28,8 @@ mod writer;
 
 pub use convert::convert;
 pub use format::Format;
-pub use mcap_reader::McapReadError;
-pub use read::{ReadError, read};
+pub use read::read;
+pub use read_error::{McapReadError, ReadError};
 pub use telemetry::{JointMotion, Telemetry};
 pub use write::write;
 pub use writer::{McapLayout, McapWriter};

@@ -9,13 +9,13 @@ use std::time::Duration;
 use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
 use mcap::{McapError, Message};
-use sevenbot::recording::{Moment, Recording, RecordingError};
+use sevenbot::recording::{Moment, Recording};
 use sevenbot::{FineAngle, Joint};
 
 use crate::cdr;
 use crate::joints::{names, to_degrees};
 use crate::messages::{JointState, RosMessage, Switch};
-use crate::read::ReadError;
+use crate::read_error::{McapReadError, ReadError};
 
 /// Longer records are none of an arm. Without a bound, a damaged length fills the memory.
 const LONGEST_RECORD: usize = 64 * 1_024 * 1_024;
@@ -25,44 +25,6 @@ const STATES: [&str; 2] = ["joint_states", "robot_joint_states"];
 const VACUUM: &str = "vacuum";
 /// The times of a recording are milliseconds.
 const RESOLUTION: Duration = Duration::from_millis(1);
-
-/// Why an MCAP file has no recording.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum McapReadError {
-    /// No topic has the states of the joints.
-    #[error(
-        "no message of a topic `joint_states` or `robot_joint_states` has the positions of joint_1 to joint_7"
-    )]
-    NoJoints,
-    /// Several arms were recorded.
-    #[error("this has the joints of several arms: {}", .0.join(", "))]
-    SeveralArms(Vec<String>),
-    /// The chunks are compressed.
-    #[error("its chunks are compressed with {0}: only uncompressed files are read")]
-    Compressed(String),
-    /// A joint is beyond its range.
-    #[error("at {seconds:.3} s joint {} is at {degrees:.2} degrees, and the range is 0 to 180", joint.number())]
-    OutOfRange {
-        /// The joint.
-        joint: Joint,
-        /// Its angle, as the registers have it.
-        degrees: f64,
-        /// The time in the file, since its first moment.
-        seconds: f64,
-    },
-    /// A message is older than the one before.
-    #[error("after {seconds:.3} s the time goes back: are these two recordings?")]
-    TimeGoesBack {
-        /// The time of the message before, since the first moment.
-        seconds: f64,
-    },
-    /// The moments are refused.
-    #[error(transparent)]
-    Refused(#[from] RecordingError),
-    /// The file is damaged before its first moment.
-    #[error("{0}, before its first moment")]
-    Unreadable(String),
-}
 
 /// Reads the recording, and passes each message on.
 pub(crate) fn read(

@@ -7,41 +7,11 @@ use std::io::{self, Read};
 use mcap::Message;
 use sevenbot::recording::{Recording, RecordingError};
 
-use crate::csv;
-use crate::mcap_reader::{self, McapReadError};
+use crate::read_error::{LONGEST_TEXT, ReadError};
+use crate::{csv, mcap_reader};
 
 /// The start of a text is checked before the rest is read.
 const START: u64 = 64 * 1_024;
-/// More than a day of 50 moments a second, in bytes of the text format.
-const LONGEST_TEXT: u64 = 512 * 1_024 * 1_024;
-
-/// Why there is no recording, or no whole one.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadError {
-    /// The source cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// The text is too long for a recording.
-    #[error("this is longer than {LONGEST_TEXT} bytes: is it the right file?")]
-    TooLong,
-    /// The first bytes are those of a text, but the rest is not.
-    #[error("this is not text in UTF-8")]
-    NotText,
-    /// The text is refused.
-    #[error(transparent)]
-    Text(#[from] RecordingError),
-    /// The MCAP file has no recording of an arm.
-    #[error(transparent)]
-    Mcap(#[from] McapReadError),
-    /// The MCAP file is cut off or damaged.
-    #[error("{cause}; {} moments, {:.1} s, can be read", .readable.moments().count(), .readable.duration().as_secs_f64())]
-    Damaged {
-        /// What can be read: of a file that is cut off, all that is there.
-        readable: Recording,
-        /// What is wrong, and where.
-        cause: String,
-    },
-}
 
 /// Reads a recording: text, CSV or MCAP.
 ///

@@ -4,9 +4,10 @@ use std::io::{self, Write};
 
 use sevenbot::recording::{FileVersion, Recording, head};
 
+use crate::csv;
+use crate::format::Format;
 use crate::telemetry::Telemetry;
 use crate::writer::{McapLayout, McapWriter};
-use crate::{Format, csv};
 
 /// Writes a recording. In MCAP its time begins in 1970, because the text format has no date.
 ///

@@ -52,9 +52,7 @@ def test_rerun_has_the_model_and_its_motion(start: Start, tmp_path: Path) -> Non
     mcap, rrd = tmp_path / "run.mcap", tmp_path / "run.rrd"
     record(start, mcap)
     rerun = Path(sys.executable).parent / "rerun"
-    # By standard input and output, as `sevenbot record --mcap -` gives it.
-    with mcap.open("rb") as source, rrd.open("wb") as target:
-        subprocess.run([rerun, "mcap", "convert"], stdin=source, stdout=target, check=True, timeout=120)
+    subprocess.run([rerun, "mcap", "convert", mcap, "-o", rrd], check=True, timeout=120)
     shown = subprocess.run([rerun, "rrd", "print", rrd], check=True, timeout=120, capture_output=True, text=True).stdout
     for columns in (
         "/tf - data columns: [Transform3D:child_frame Transform3D:parent_frame Transform3D:quaternion",

@@ -10,10 +10,9 @@ use crate::command_error::CommandError;
 use crate::commands::sim;
 use crate::commands::{
     backup, baud, calibrate, convert, effector, get, info, log, model, monitor, move_to, park, play, plot,
-    ports, pose, position, record, recover, registers, servo, set, shell, sniff, state, status, stop, stream,
+    ports, pose, position, record, recover, registers, serve, servo, set, shell, sniff, state, status, stop,
+    stream, view,
 };
-#[cfg(target_os = "linux")]
-use crate::commands::{serve, view};
 use crate::session::Session;
 
 const EXAMPLES: &str = "\
@@ -44,9 +43,15 @@ With --json, notes, warnings and errors are JSON, too: one object in a line on
 standard error. {\"error\": TEXT, \"advice\": [TEXT, ...], \"status\": NUMBER},
 {\"warning\": TEXT}, {\"note\": TEXT}. Wrong arguments are told as text.";
 
+/// `cargo xtask dist` adds the commit.
+const VERSION: &str = match option_env!("SEVENBOT_RELEASE") {
+    Some(release) => release,
+    None => env!("CARGO_PKG_VERSION"),
+};
+
 /// Controls a 7Bot V2 robot arm over its serial port. The arm may be real, simulated, or the firmware in an emulator.
 #[derive(Debug, Parser)]
-#[command(name = "sevenbot", version, after_help = EXAMPLES)]
+#[command(name = "sevenbot", version = VERSION, after_help = EXAMPLES)]
 pub(crate) struct Cli {
     #[command(flatten)]
     pub(crate) global: Global,
@@ -116,9 +121,7 @@ pub(crate) enum Command {
     Backup(backup::BackupArgs),
     Restore(backup::RestoreArgs),
     Sniff(sniff::SniffArgs),
-    #[cfg(target_os = "linux")]
     Serve(serve::ServeArgs),
-    #[cfg(target_os = "linux")]
     View(view::ViewArgs),
     Servo(servo::ServoArgs),
     #[cfg(unix)]
@@ -164,9 +167,7 @@ impl Command {
             Self::Backup(args) => backup::backup(session, &args),
             Self::Restore(args) => backup::restore(session, &args),
             Self::Sniff(args) => sniff::run(session, &args),
-            #[cfg(target_os = "linux")]
             Self::Serve(args) => serve::run(session, &args),
-            #[cfg(target_os = "linux")]
             Self::View(args) => view::run(session, &args),
             Self::Servo(args) => servo::run(session, &args),
             #[cfg(unix)]
@@ -185,7 +186,6 @@ impl Command {
         match self {
             Self::Ports(_) | Self::Plot(_) | Self::Sniff(_) | Self::Servo(_) | Self::Registers(_) => false,
             Self::Convert(_) | Self::Model(_) | Self::Completions(_) | Self::Man(_) => false,
-            #[cfg(target_os = "linux")]
             Self::Serve(_) | Self::View(_) => false,
             #[cfg(unix)]
             Self::Sim(_) => false,

@@ -55,9 +55,7 @@
 pub mod frame_client;
 pub mod hub;
 pub mod maker;
-#[cfg(target_os = "linux")]
 pub mod server;
-#[cfg(target_os = "linux")]
 mod token;
 
 pub use frame_client::FrameClient;

@@ -4,8 +4,6 @@
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used)] // A panic is a failed test.
 
 use std::fs;
-use std::io::Write;
-use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver};
 use std::sync::{LazyLock, OnceLock};
@@ -17,7 +15,7 @@ use arm_sim::plant::Plant;
 use arm_sim::simulated_arm::{ArmConfig, SimulatedArm};
 use motion_core::servo_bus::TorqueCodes;
 use protocol_core::time::Instant;
-use sevenbot_serve::server::{ArmLocation, Notice, Server, ServerConfig};
+use sevenbot_serve::server::{ArmLocation, Notice, Server, ServerConfig, Stop};
 use tty_ports::pty::Pty;
 use tty_ports::symlink::Symlink;
 
@@ -88,7 +86,8 @@ fn an_arm_that_comes_back_under_another_name_is_found_among_others() {
     let (arm, other_arm) = (Some([1; 6]), Some([2; 6]));
     let plugged = Plugged::plug(&port("ttyUSB0"), arm);
     let _silent = Plugged::plug(&port("ttyUSB1"), None);
-    let (stop, mut trigger) = UnixStream::pair().expect("a pair");
+    let stop = Stop::default();
+    let trigger = stop.clone();
     let (sender, notices) = mpsc::channel();
     let server = thread::spawn(move || {
         let location = ArmLocation::Search { first: port("ttyUSB0"), list: ports };
@@ -106,7 +105,7 @@ fn an_arm_that_comes_back_under_another_name_is_found_among_others() {
     assert!(matches!(next(&notices), Notice::ArmLost { .. }));
     let _plugged = Plugged::plug(&port("ttyUSB0"), arm);
     assert_eq!(next(&notices), Notice::ArmFound(port("ttyUSB0")));
-    trigger.write_all(&[0]).expect("a byte");
+    trigger.stop();
     server.join().expect("no panic").expect("no error");
     fs::remove_dir_all(folder).expect("its end");
 }

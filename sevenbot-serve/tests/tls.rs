@@ -5,13 +5,12 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
-use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use sevenbot_serve::server::{AccessPolicy, Notice, RefusalReason, Server, ServerConfig, TlsFiles};
+use sevenbot_serve::server::{AccessPolicy, Notice, RefusalReason, Server, ServerConfig, Stop, TlsFiles};
 use tokio_rustls::rustls::pki_types::CertificateDer;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::{ClientConfig, ClientConnection, RootCertStore, StreamOwned};
@@ -50,7 +49,8 @@ fn only_encrypted_clients_with_the_token_are_served() {
     };
     let server = Server::open(config).expect("a server");
     let address = server.tcp_address().expect("an address");
-    let (stop, mut trigger) = UnixStream::pair().expect("a pair");
+    let stop = Stop::default();
+    let trigger = stop.clone();
     let (sender, notices) = mpsc::channel();
     let running = thread::spawn(move || server.run(&stop, &mut |notice| drop(sender.send(notice))));
 
@@ -70,7 +70,7 @@ fn only_encrypted_clients_with_the_token_are_served() {
         ended.is_err_and(|error| matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut));
     assert!(!is_timeout, "the server ends the connection");
     assert!(is_open(&mut good), "it has not noticed the others");
-    trigger.write_all(&[0]).expect("a byte");
+    trigger.stop();
     running.join().expect("no panic").expect("no error");
 }
 

@@ -53,6 +53,18 @@ impl OpenPort {
     }
 }
 
+impl OpenPort {
+    /// For how many bytes a read may ask. On Windows it may wait until all are there: that it returns with the first ones is a
+    /// rule for one combination of time-outs, which Wine and some drivers lack.
+    fn readable_length(&self, longest: usize) -> serialport::Result<usize> {
+        if !cfg!(windows) {
+            return Ok(longest);
+        }
+        let waiting = usize::try_from(self.port.bytes_to_read()?).unwrap_or(longest);
+        Ok(waiting.clamp(1, longest))
+    }
+}
+
 impl HostLine for OpenPort {
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.port.set_timeout(WRITE_TIMEOUT).map_err(lost)?;
@@ -69,7 +81,8 @@ impl HostLine for OpenPort {
         self.port.set_timeout(timeout.max(SHORTEST_WAIT)).map_err(lost)?;
         let mut chunk = [0; 4096];
         loop {
-            match self.port.read(&mut chunk) {
+            let length = self.readable_length(chunk.len()).map_err(lost)?;
+            match self.port.read(chunk.get_mut(..length).unwrap_or_default()) {
                 Ok(0) => return Err(PortError::Lost(ErrorKind::UnexpectedEof)),
                 Ok(length) => return Ok(chunk.into_iter().take(length).collect()),
                 Err(error) if error.kind() == ErrorKind::TimedOut => return Ok(Vec::new()),

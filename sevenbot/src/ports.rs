@@ -1,5 +1,6 @@
 //! The serial ports of this machine, and which of them lead to an arm.
 
+use std::fs;
 use std::thread;
 use std::time::Duration;
 
@@ -10,6 +11,7 @@ use crate::arm::Arm;
 use crate::arm_options::ArmOptions;
 use crate::error::OpenError;
 use crate::identity::Identity;
+use crate::network::{LocalServer, servers};
 use host_link::Span;
 
 /// Eight registers take 2 ms at 115,200 baud and 25 ms at 9,600 baud. USB adapters add up to 16 ms in each direction.
@@ -58,6 +60,29 @@ pub fn available() -> Vec<PortInfo> {
         ports.retain(|port| !port.name.starts_with("/dev/tty."));
     }
     ports
+}
+
+/// The servers of this user, and the serial ports that none of them holds: each arm once. [`probe`] asks them.
+#[must_use]
+pub fn reachable() -> Vec<PortInfo> {
+    let served = servers();
+    let is_held = |port: &PortInfo| {
+        fs::canonicalize(&port.name).is_ok_and(|path| served.iter().any(|server| server.port == path))
+    };
+    let free = available().into_iter().filter(|port| !is_held(port));
+    served.iter().map(served_port).chain(free).collect()
+}
+
+/// A server in the list of ports.
+fn served_port(server: &LocalServer) -> PortInfo {
+    let port = server.port.display();
+    match &server.name {
+        Some(name) => PortInfo {
+            name: format!("sevenbot://{name}"),
+            description: format!("{}, for {port}", server.address()),
+        },
+        None => PortInfo { name: server.address(), description: format!("for {port}") },
+    }
 }
 
 fn port(info: serialport::SerialPortInfo) -> PortInfo {

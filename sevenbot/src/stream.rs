@@ -3,7 +3,8 @@
 //! ```text
 //!   SetPointStream::open ──▶ period and watchdog of this stream ──▶ send, send, ... ──▶ values from before
 //!                                                                      ▲                 (also on drop)
-//!   StreamPace: when the next point is due ────────────────────────────┘
+//!   StreamPace: when the next point is due ────────────────────────────┤
+//!   LatestPoints: what a program that does not wait sends then ────────┘
 //! ```
 //!
 //! If the program dies, the watchdog makes the arm hold. A clean end, an error and a panic put the registers back.
@@ -25,8 +26,10 @@ use crate::health::{MoveCheck, MoveCheckError, MoveState};
 use crate::units::Speed;
 use host_link::Span;
 
+mod latest;
 mod pace;
 
+pub use latest::{LatestCounts, LatestPoints, LatestStep};
 pub use pace::{PaceCounts, StreamPace};
 
 /// The registers that a stream sets: period, time of the watchdog, action of the watchdog.
@@ -95,9 +98,11 @@ impl StreamOptions {
         [low, high, steps, u8::from(action == WatchdogAction::Damping)]
     }
 
-    /// The host sends something at least this often, or the watchdog acts.
-    fn keep_alive_period(self) -> Duration {
-        Duration::from_millis(u64::from(self.watchdog.0) * 10) / 3
+    /// The time of the watchdog; `None` if there is none.
+    #[must_use]
+    pub fn watchdog_time(self) -> Option<Duration> {
+        let (steps, _) = self.watchdog;
+        (steps > 0).then(|| WATCHDOG_STEP * u32::from(steps))
     }
 }
 
@@ -230,12 +235,13 @@ impl<'a> SetPointStream<'a> {
         self.check.joints()
     }
 
-    /// Sends an empty write if the watchdog would act soon. Call it while no point is due.
+    /// Sends an empty write if the watchdog would act soon: after a third of its time. Call it while no point is due.
     ///
     /// # Errors
     /// The port failed.
     pub fn keep_alive(&mut self) -> Result<(), Error> {
-        if self.arm.elapsed() >= self.last_sent + self.options.keep_alive_period() {
+        let is_due = |time| self.arm.elapsed() >= self.last_sent + time / 3;
+        if self.options.watchdog_time().is_some_and(is_due) {
             self.arm.write(FINE_TARGET.address, &[])?;
             self.last_sent = self.arm.elapsed();
         }
@@ -246,6 +252,12 @@ impl<'a> SetPointStream<'a> {
     #[must_use]
     pub const fn period(&self) -> Duration {
         self.options.period()
+    }
+
+    /// Period and watchdog.
+    #[must_use]
+    pub const fn options(&self) -> StreamOptions {
+        self.options
     }
 
     /// The arm, for other requests and its reports during the stream.

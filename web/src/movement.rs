@@ -5,6 +5,8 @@
 //!            └────────── each confirmed by a read, and written again until it is ──┘
 //! ```
 
+mod confirmed;
+
 use std::time::Duration;
 
 use protocol_core::time::Instant;
@@ -19,6 +21,8 @@ use sevenbot::sharing::{self, Sharing};
 use sevenbot::stream::{StreamOptions, WatchdogAction};
 use sevenbot::{FineAngle, Health, Joint, Snapshot};
 
+use confirmed::{Confirmed, write_all};
+
 use crate::arm_state::has_extended_block;
 use crate::client::{BAUD, Client};
 use crate::stop::since_start;
@@ -29,8 +33,6 @@ const PERIOD_MS: u16 = 50;
 const PERIOD: Duration = Duration::from_millis(50);
 /// The arm holds if the page is silent for this long while it plays: 500 ms, in units of 10 ms (D24).
 const WATCHDOG: u8 = 50;
-/// Registers are written this many times before their loss is an error.
-const ATTEMPTS: u32 = 5;
 /// After a movement the joints have this time to settle.
 const SETTLE_TIME: Duration = Duration::from_secs(2);
 const ALL_JOINTS: u8 = 0x7F;
@@ -112,48 +114,6 @@ pub enum PlayFailure {
     StoppedByAnother,
 }
 
-/// Frames that are written again until registers that were read afterwards hold their values.
-#[derive(Debug)]
-struct Confirmed {
-    frames: Vec<(u8, Vec<u8>)>,
-    written: Instant,
-    attempts: u32,
-}
-
-impl Confirmed {
-    fn write(frames: Vec<(u8, Vec<u8>)>, now: Instant, client: &mut Client) -> Self {
-        let times = frames.iter().map(|(address, values)| client.write(now, *address, values));
-        let written = times.last().unwrap_or(now);
-        Self { frames, written, attempts: 1 }
-    }
-
-    /// Has the arm taken them? `Ok(false)`: not known yet.
-    fn poll(&mut self, now: Instant, client: &mut Client) -> Result<bool, PlayFailure> {
-        if !client.was_read_since(self.written) {
-            return Ok(false);
-        }
-        let registers = client.registers();
-        let is_taken = |(address, values): &(u8, Vec<u8>)| {
-            (*address..=u8::MAX).zip(values).all(|(address, value)| registers.at(address) == *value)
-        };
-        if self.frames.iter().all(is_taken) {
-            return Ok(true);
-        }
-        if self.attempts >= ATTEMPTS {
-            return Err(PlayFailure::NotTaken);
-        }
-        let attempts = self.attempts + 1;
-        *self = Self { attempts, ..Self::write(std::mem::take(&mut self.frames), now, client) };
-        Ok(false)
-    }
-}
-
-fn write_all(frames: &[(u8, Vec<u8>)], now: Instant, client: &mut Client) {
-    for (address, values) in frames {
-        client.write(now, *address, values);
-    }
-}
-
 /// A stop of another program, before a person wanted this movement, does not concern it.
 fn start_anew(now: Instant, client: &mut Client) {
     if Sharing::of(client.registers()).is_some() {
@@ -185,6 +145,8 @@ pub struct Player {
     watch: MoveWatch,
     /// The last registers that were watched are those of this round.
     watched_round: u64,
+    /// A fault that may be the trace of a stop of another program, whose writes come one after the other.
+    suspected: Option<MoveFault>,
     stage: Stage,
 }
 
@@ -215,6 +177,7 @@ impl Player {
             before: registers.clone(),
             watch: if is_fine { watch.with_period(PERIOD_MS) } else { watch },
             watched_round: 0,
+            suspected: None,
             stage: Stage::Start,
         })
     }
@@ -277,7 +240,9 @@ impl Player {
             }
             Stage::Way(_) | Stage::Path(_) => {
                 self.watch(now, client)?;
-                self.drive(now, client)?;
+                if self.suspected.is_none() {
+                    self.drive(now, client)?;
+                }
             }
             Stage::Closing(closing) => {
                 if closing.poll(now, client)? {
@@ -301,10 +266,17 @@ impl Player {
     fn watch(&mut self, now: Instant, client: &Client) -> Result<(), PlayFailure> {
         if client.rounds() != self.watched_round {
             self.watched_round = client.rounds();
-            if Sharing::of(client.registers()).is_some_and(|sharing| sharing.is_stopped) {
+            let sharing = Sharing::of(client.registers());
+            if sharing.is_some_and(|sharing| sharing.is_stopped) {
                 return Err(PlayFailure::StoppedByAnother);
             }
-            self.watch.registers(since_start(now), client.registers()).map_err(PlayFailure::Arm)?;
+            if let Some(fault) = self.suspected.take() {
+                return Err(PlayFailure::Arm(fault));
+            }
+            match self.watch.registers(since_start(now), client.registers()) {
+                Err(fault) if sharing.is_some() => self.suspected = Some(fault),
+                seen => seen.map_err(PlayFailure::Arm)?,
+            }
         }
         // The rounds of reads answer the questions.
         self.watch.question(since_start(now)).map(drop).map_err(PlayFailure::Arm)

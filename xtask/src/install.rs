@@ -19,7 +19,7 @@ struct Tool {
 /// All programs know this.
 const VERSION: &[&str] = &["--version"];
 
-const TOOLS: [Tool; 8] = [
+const TOOLS: [Tool; 11] = [
     Tool { program: QEMU, arguments: VERSION, package: QEMU, purpose: "runs the image for the arm" },
     Tool { program: "c++", arguments: VERSION, package: "g++", purpose: "builds the fuzzer" },
     Tool {
@@ -48,13 +48,53 @@ const TOOLS: [Tool; 8] = [
         package: "iproute2",
         purpose: "opens the network of the tests with ROS",
     },
+    Tool { program: "dpkg-deb", arguments: VERSION, package: "dpkg", purpose: "makes the Debian package" },
+    Tool {
+        program: "mmdebstrap",
+        arguments: VERSION,
+        package: "mmdebstrap",
+        purpose: "makes the bare system on which a release is tried",
+    },
+    Tool {
+        program: "x86_64-w64-mingw32-gcc",
+        arguments: VERSION,
+        package: "gcc-mingw-w64-x86-64",
+        purpose: "links the programs for Windows",
+    },
 ];
 
-/// Installs the missing tools.
+/// What tries a whole release.
+const RELEASE_TOOLS: [Tool; 4] = [
+    Tool { program: "wine", arguments: VERSION, package: "wine", purpose: "runs the program for Windows" },
+    Tool {
+        program: "qemu-aarch64-static",
+        arguments: VERSION,
+        package: "qemu-user-static",
+        purpose: "runs the programs for aarch64",
+    },
+    Tool { program: "lintian", arguments: VERSION, package: "lintian", purpose: "checks the Debian package" },
+    Tool {
+        program: "dfu-suffix",
+        arguments: VERSION,
+        package: "dfu-util",
+        purpose: "checks the image for USB",
+    },
+];
+
+/// Installs the missing tools that each run of the tests needs.
 pub(crate) fn all() -> TaskResult {
     run("rustup", "component add clippy rustfmt", &[])?;
     run("rustup", &format!("target add {CHIP} {BROWSER}"), &[])?;
-    let missing: Vec<_> = TOOLS.iter().filter(|tool| !tool.works()).collect();
+    install_missing(&TOOLS)
+}
+
+/// Installs the missing tools that try a whole release.
+pub(crate) fn for_release() -> TaskResult {
+    install_missing(&RELEASE_TOOLS)
+}
+
+fn install_missing(tools: &[Tool]) -> TaskResult {
+    let missing: Vec<_> = tools.iter().filter(|tool| !tool.works()).collect();
     if missing.is_empty() {
         return Ok(());
     }

@@ -10,6 +10,7 @@ mod coverage;
 mod crate_graph;
 mod decisions;
 mod deny;
+mod dist;
 mod footprint;
 mod fuzz;
 mod generated;
@@ -70,6 +71,8 @@ enum Task {
     Fuzz(fuzz::FuzzArgs),
     /// Check licences, versions and sources of all dependencies, and the advisories if they can be downloaded
     Deny,
+    /// Make everything that a release consists of: archives, packages, wheels, the image, the page, and their sums
+    Dist(dist::DistArgs),
     /// Fail if files of a crate depend on each other in a cycle
     Modules,
     /// Install MuJoCo from PyPI, and compare its forward kinematics of the arm's model with ours (needs Python)
@@ -151,6 +154,7 @@ fn run_task(task: &Task) -> TaskResult {
         Task::Test(options) => test::run_steps(options),
         Task::Docs { check: true } => DOCUMENTS.iter().try_for_each(|document| (document.check)()),
         Task::Docs { check: false } => DOCUMENTS.iter().try_for_each(|document| (document.write)()),
+        Task::Dist(options) => dist::run(options),
         Task::Modules => modules::check(),
         Task::Torture(options) => torture::run(options),
         Task::Replays => replays::long(),

@@ -6,12 +6,13 @@ use std::process::{Command, Stdio};
 
 use crate::run::{TaskResult, root, target_directory};
 
-/// The packages from PyPI, at versions that were tried. gymnasium and numpy are optional for users, but have tests;
+/// The packages from PyPI, at versions that were tried. gymnasium, mujoco and numpy are optional for users, but have tests;
 /// mcap and rosbags read what the package writes.
-const PACKAGES: [&str; 9] = [
+const PACKAGES: [&str; 10] = [
     "maturin==1.16.0",
     "gymnasium==1.4.0",
     "mcap==1.6.0",
+    "mujoco==3.3.7; python_version < '3.14'",
     "mypy==2.4.1",
     "basedpyright==1.40.2",
     "pytest==9.2.0",
@@ -19,6 +20,8 @@ const PACKAGES: [&str; 9] = [
     "numpy==2.4.6; python_version >= '3.11'",
     "numpy==2.2.6; python_version < '3.11'",
 ];
+/// For the example with several processes.
+const RAY: &str = "ray==2.51.1";
 /// Interpreters that are tested if they are on PATH. The wheel is the same for all of them.
 const INTERPRETERS: [&str; 6] =
     ["python3", "python3.10", "python3.11", "python3.12", "python3.13", "python3.14"];
@@ -35,15 +38,28 @@ pub(crate) fn check() -> TaskResult {
     Ok(())
 }
 
+/// The example with Ray: two workers do what one process does. With the first interpreter on PATH.
+pub(crate) fn ray() -> TaskResult {
+    let (version, program) = first_interpreter()?;
+    let python = environment(&version, program)?;
+    let wheel = build_wheel(&python)?;
+    run(pip(&python).arg(RAY))?;
+    run(pip(&python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
+    run(&mut pytest(&python, "python/tests/test_ray.py"))
+}
+
 /// Builds the wheel with the first interpreter on PATH.
 pub(crate) fn wheel() -> TaskResult<PathBuf> {
-    let interpreters = interpreters();
-    let (version, program) = interpreters.first().ok_or("no Python of at least 3.10 on PATH")?;
-    build_wheel(&environment(version, program)?)
+    let (version, program) = first_interpreter()?;
+    build_wheel(&environment(&version, program)?)
+}
+
+fn first_interpreter() -> TaskResult<(String, &'static str)> {
+    interpreters().into_iter().next().ok_or_else(|| "no Python of at least 3.10 on PATH".into())
 }
 
 /// The versions on PATH, each once, with a program of each.
-fn interpreters() -> Vec<(String, &'static str)> {
+pub(crate) fn interpreters() -> Vec<(String, &'static str)> {
     let mut found: Vec<(String, &str)> = Vec::new();
     for program in INTERPRETERS {
         let output = Command::new(program).args(["-c", VERSION]).stderr(Stdio::null()).output();
@@ -112,7 +128,16 @@ fn test(python: &Path, wheel: &Path) -> TaskResult {
     run(module(&["mypy", "--strict", "--config-file"]).arg(&config).args(["-p", "sevenbot"]))?;
     run(module(&["mypy", "--strict", "--config-file"]).arg(&config).arg(&tests))?;
     run(&mut module(&["mypy.stubtest", "sevenbot"]))?;
-    run(module(&["pytest", "--quiet", "-p", "no:cacheprovider", "--config-file"]).arg(&config).arg(&tests))
+    run(&mut pytest(python, "python/tests"))
+}
+
+/// pytest, with the programs of the step that built all of them.
+fn pytest(python: &Path, tests: &str) -> Command {
+    let mut command = Command::new(python);
+    command.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider", "--config-file"]);
+    command.arg(root().join("python/pyproject.toml")).arg(root().join(tests)).current_dir(folder());
+    command.env("SEVENBOT_PROGRAMS", target_directory().join("debug"));
+    command
 }
 
 /// A copy of a package: setuptools would leave files beside the sources.

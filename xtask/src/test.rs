@@ -7,7 +7,7 @@ use clap::Args;
 use crate::run::{CHECKED, CHIP, TESTED, TaskResult, build_for_browser, cargo, run};
 use crate::steps::{self, Stage, TestScope, long, quick, whole};
 use crate::{
-    count, crate_graph, decisions, deny, footprint, fuzz, install, lerobot, modules, mujoco, no_panic,
+    count, crate_graph, decisions, deny, dist, footprint, fuzz, install, lerobot, modules, mujoco, no_panic,
     python, registers_md, replays, ros, ros_model, start_up, system_tests, torture, trials, web,
 };
 
@@ -51,6 +51,7 @@ const STAGES: &[Stage] = &[
         quick("lints, chip", || {
             cargo(&format!("clippy -p footprint -p firmware-stm32 --target {CHIP} -- -D warnings"))
         }),
+        quick("lints, Windows and macOS", dist::lint_other_systems),
         quick("docs/registers.md is up to date", registers_md::check),
         quick("the model in the ROS packages is up to date", ros_model::check),
         quick("every decision of docs/protocol.md has tests", decisions::check),
@@ -77,6 +78,8 @@ const STAGES: &[Stage] = &[
                 system_tests::run_on(&system_tests::ADAPTER)
             }),
             whole("the Python package", python::check),
+            whole("the ROS packages", ros::check),
+            whole("this computer's part of a release, installed on a bare system", dist::native),
         ],
         &[
             whole("the page in a browser", || {
@@ -100,7 +103,9 @@ const STAGES: &[Stage] = &[
             cargo("test --release -p motion-core --test all linkage -- --ignored")
         }),
         long("the arm's model in MuJoCo", mujoco::check),
-        long("the ROS packages", ros::check),
+        long("each library builds from its archive", dist::build_from_archives),
+        long("a whole release, with each part installed and used", dist::whole),
+        long("many arms in two processes, with Ray", python::ray),
         long("the plugin for LeRobot, with the base classes of LeRobot", lerobot::check),
         long("LeRobot's own commands, on the simulator and on the image in an emulator", lerobot::commands),
         long("more fuzzing", || {

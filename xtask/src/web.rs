@@ -34,15 +34,19 @@ pub(crate) fn build() -> TaskResult {
         fs::remove_dir_all(&dist)?;
     }
     copy_folder(&root().join("web/page"), &dist)?;
-    let module = target_directory().join(BROWSER).join(PROFILE).join("sevenbot_web.wasm");
-    Bindgen::new()
-        .input_path(module)
-        .remove_name_section(true)
-        .remove_producers_section(true)
-        .web(true)
-        .and_then(|bindgen| bindgen.typescript(false).generate(&dist))
-        .map_err(|why| format!("wasm-bindgen: {why:#}"))?;
+    bindgen(Bindgen::new().input_path(module(&target_directory())).web(true)?, &dist)?;
     budget::check("web", &[Figure::new("page: all files with gzip, bytes", print_sizes(&dist)?)], false)
+}
+
+/// The page's module in a target directory of cargo.
+pub(crate) fn module(target_directory: &Path) -> PathBuf {
+    target_directory.join(BROWSER).join(PROFILE).join("sevenbot_web.wasm")
+}
+
+/// Writes the module of the page for browsers, and the script that loads it.
+pub(crate) fn bindgen(bindgen: &mut Bindgen, folder: &Path) -> TaskResult {
+    let bindgen = bindgen.remove_name_section(true).remove_producers_section(true).typescript(false);
+    Ok(bindgen.generate(folder).map_err(|why| format!("wasm-bindgen: {why:#}"))?)
 }
 
 /// Builds the page, then runs `sevenbot view`, which contains it.
@@ -84,7 +88,7 @@ fn print_sizes(dist: &Path) -> TaskResult<u64> {
 }
 
 /// All files below a folder, in the order of their names.
-fn files(folder: &Path) -> TaskResult<Vec<PathBuf>> {
+pub(crate) fn files(folder: &Path) -> TaskResult<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();

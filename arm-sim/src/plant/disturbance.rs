@@ -7,6 +7,7 @@ use super::Plant;
 use super::supply::SupplyFault;
 use super::weight::HEAVIEST_LOAD_G;
 use crate::fault_count::FaultCount;
+use crate::parameters::ServoParameters;
 use crate::servo::{Servo, ServoFault};
 
 impl Plant {
@@ -40,6 +41,14 @@ impl Plant {
     pub fn set_load(&mut self, grams: u16) {
         self.load_g = grams.min(HEAVIEST_LOAD_G);
         self.update_weight();
+    }
+
+    /// Scales the stall torque of all servos, and the friction and drag of their gears, in percent of those in
+    /// [`parameters`](crate::parameters): for arms that differ from each other.
+    pub fn scale_servos(&mut self, torque_percent: u16, friction_percent: u16) {
+        for (servo, joint) in self.servos_mut().iter_mut().zip(Joint::ALL) {
+            servo.set_parameters(&ServoParameters::of(joint).scaled(torque_percent, friction_percent));
+        }
     }
 
     /// The weight in the gripper, in grams.

@@ -32,7 +32,12 @@ impl AngleScale {
 
     /// The servo position in millionths of a count, at an angle in thousandths of a degree.
     pub(crate) fn position(self, angle: i64) -> i64 {
-        ((angle - self.first) * i64::from(SPAN) * COUNT).checked_div(self.span).unwrap_or(0)
+        self.distance(angle - self.first)
+    }
+
+    /// The distance of a servo in millionths of a count, for one of the joint in thousandths of a degree.
+    pub(crate) fn distance(self, angle: i64) -> i64 {
+        (angle * i64::from(SPAN) * COUNT).checked_div(self.span).unwrap_or(0)
     }
 
     /// A torque in millinewton metres for each degree, in micronewton metres for each count.

@@ -33,7 +33,7 @@ impl Torques {
 
 /// The constants of a gear.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Gear(pub(super) &'static ServoParameters);
+pub(super) struct Gear(pub(super) ServoParameters);
 
 impl Gear {
     /// Does static friction hold a joint at rest?
@@ -74,7 +74,7 @@ mod tests {
     const INERTIA: i64 = 8_700_000;
 
     fn gear() -> Gear {
-        Gear(ServoParameters::of(Joint::ALL[2]))
+        Gear(*ServoParameters::of(Joint::ALL[2]))
     }
 
     /// The speed of joint 3 in degrees per second, after this many milliseconds at this torque from rest.
@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn friction_holds_a_light_load() {
-        let ServoParameters { free_drag, damped_drag, .. } = *gear().0;
+        let ServoParameters { free_drag, damped_drag, .. } = gear().0;
         assert_eq!(degrees_per_second(105_000, free_drag, 1_000), 0);
         assert_eq!(degrees_per_second(-105_000, damped_drag, 1_000), 0);
         assert!(degrees_per_second(110_000, free_drag, 1_000) > 0);
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn a_level_forearm_reaches_102_degrees_per_second_free_and_4_damped() {
-        let ServoParameters { free_drag, damped_drag, .. } = *gear().0;
+        let ServoParameters { free_drag, damped_drag, .. } = gear().0;
         assert_eq!(degrees_per_second(LEVEL, free_drag, 2_000), 102);
         assert_eq!(degrees_per_second(-LEVEL, free_drag, 2_000), -102);
         assert_eq!(degrees_per_second(LEVEL, damped_drag, 2_000), 4);

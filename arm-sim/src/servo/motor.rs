@@ -60,6 +60,8 @@ pub(crate) struct Motor {
     duty: i64,
     /// The torque in the last step, in 0.1 % of the stall torque.
     torque: i16,
+    /// Another simulation moves it: see [`Self::measure`].
+    is_outside: bool,
 }
 
 /// What acts on a motor in a step, besides its surroundings.
@@ -94,10 +96,10 @@ impl Motor {
         let parameters = ServoParameters::of(joint);
         let no_load_distance = NO_LOAD_SPEED * parameters.half_turn * COUNT_PER_SECOND / 180_000;
         Self {
-            gear: Gear(parameters),
+            gear: Gear(*parameters),
             no_load_distance,
             full_error: FULL_DUTY_ERROR * parameters.half_turn * COUNT / 180_000,
-            back_emf: parameters.stall_torque * parameters.counts_per_kiloradian / no_load_distance.max(1),
+            back_emf: back_emf(parameters, no_load_distance),
             surroundings: Surroundings::default(),
             position,
             mode: MotorMode::Held,
@@ -109,7 +111,14 @@ impl Motor {
             error_change: 0,
             duty: 0,
             torque: 0,
+            is_outside: false,
         }
+    }
+
+    /// Gives it another gear and another strength. Its control and its speed stay.
+    pub(crate) fn set_parameters(&mut self, parameters: &ServoParameters) {
+        self.gear = Gear(*parameters);
+        self.back_emf = back_emf(parameters, self.no_load_distance);
     }
 
     /// Starts a move from the set-point.
@@ -135,6 +144,10 @@ impl Motor {
     /// Simulates a [`STEP`](super::units::STEP).
     pub(crate) fn step(&mut self, mode: MotorMode) {
         self.mode = mode;
+        if self.is_outside {
+            self.step_outside();
+            return;
+        }
         if mode.is_controlled() {
             self.control();
         } else {
@@ -152,9 +165,42 @@ impl Motor {
         }
     }
 
+    /// A step in which another simulation moves the joint: from its last measurement on at the same speed.
+    fn step_outside(&mut self) {
+        self.position = (self.position + self.moved).clamp(0, END);
+        if self.mode.is_controlled() {
+            self.advance_set_point();
+        } else {
+            (self.set_point, self.target) = (self.position, self.position);
+        }
+        self.torque = self.torque_in_step();
+    }
+
+    /// Another simulation moves the joint from now on, and measured this: the position, the distance in a step, and the duty in
+    /// millionths.
+    pub(crate) fn measure(&mut self, position: i64, moved: i64, duty: i64) {
+        self.is_outside = true;
+        self.position = position.clamp(0, END);
+        (self.moved, self.duty) = (moved, duty.clamp(-FULL_DUTY, FULL_DUTY));
+    }
+
+    /// This simulation moves the joint again.
+    pub(crate) const fn move_inside(&mut self) {
+        self.is_outside = false;
+    }
+
+    /// The position that the control aims at.
+    pub(crate) const fn set_point(&self) -> i64 {
+        self.set_point
+    }
+
+    fn advance_set_point(&mut self) {
+        self.set_point += (self.target - self.set_point).clamp(-self.rate, self.rate);
+    }
+
     /// Moves the set-point on, and sets the duty.
     fn control(&mut self) {
-        self.set_point += (self.target - self.set_point).clamp(-self.rate, self.rate);
+        self.advance_set_point();
         let error = self.set_point - self.position;
         let change = error - self.error;
         self.error_change = (self.error_change * (DERIVATIVE_FILTER_MS - 1) + change) / DERIVATIVE_FILTER_MS;
@@ -243,6 +289,7 @@ impl Motor {
     /// Does a step in this mode change nothing?
     pub(crate) fn is_at_rest(&self, mode: MotorMode) -> bool {
         mode == self.mode
+            && !self.is_outside
             && self.moved == 0
             && self.set_point == self.target
             && (self.error_change, self.error) == (0, self.set_point - self.position)
@@ -265,6 +312,11 @@ impl Motor {
     pub(crate) const fn is_moving(&self) -> bool {
         self.moved != 0 || self.set_point != self.target
     }
+}
+
+/// The drag of a driven motor by its own voltage, in micronewton metre seconds per radian.
+fn back_emf(parameters: &ServoParameters, no_load_distance: i64) -> i64 {
+    parameters.stall_torque * parameters.counts_per_kiloradian / no_load_distance.max(1)
 }
 
 #[cfg(test)]

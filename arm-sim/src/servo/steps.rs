@@ -96,6 +96,9 @@ impl Servo {
     }
 
     fn count_obstacles(&mut self, steps: u32) {
+        if !self.motor.surroundings.has_contact() {
+            return;
+        }
         let Self { motor, wall_count, thing_count, push_count, .. } = self;
         let (around, position) = (&motor.surroundings, motor.position());
         let touches = [

@@ -73,6 +73,11 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
+    /// Is there an obstacle, or a hand?
+    pub(crate) const fn has_contact(&self) -> bool {
+        self.wall.is_some() || self.thing.is_some() || self.push != 0
+    }
+
     fn obstacles(&self) -> impl Iterator<Item = &Surface> {
         [&self.wall, &self.thing].into_iter().flatten()
     }

@@ -89,34 +89,66 @@ def lerobot(tmp_path: Path) -> LeRobot:
     return LeRobot(tmp_path)
 
 
-@pytest.fixture
-def hand(tmp_path: Path) -> Path:
+def led(path: Path, speed: float) -> Path:
     """A movement in which each joint has its own rhythm: a path that does not repeat itself.
 
     The hand waits first, as a person does, until the follower has come.
     """
     middle = np.array([90.0, 90.0, 70.0, 90.0, 90.0, 90.0, 42.0])
-    way = np.array([40.0, 12.0, 12.0, 30.0, 25.0, 45.0, 35.0])
-    rhythm = np.array([1.0, 2.0, 3.0, 1.5, 2.5, 0.5, 2.0])
+    way = np.array([40.0, 18.0, 18.0, 30.0, 25.0, 45.0, 35.0])
+    rhythm = speed * np.array([1.0, 2.0, 3.0, 1.5, 2.5, 0.5, 2.0])
     times = np.arange(0, 16, 0.05)
     moved = np.maximum(times - 4, 0)[:, None]
     angles = middle + way * np.sin(moved * rhythm * 2 * math.pi / 12)
-    path = tmp_path / "hand.txt"
     sevenbot.Recording.from_points(times, angles).save(path)
     return path
 
 
 @pytest.fixture
-def emulated_arm(tmp_path: Path) -> Iterator[str]:
-    """The port of the image for the arm in an emulator: `cargo xtask emulate`."""
-    link = tmp_path / "arm"
-    emulator = subprocess.Popen([os.environ["XTASK"], "emulate", "--no-build", "--link", link])
+def hand(tmp_path: Path) -> Path:
+    """A hand that moves joints at up to 37 degrees a second."""
+    return led(tmp_path / "hand.txt", 1.0)
+
+
+@pytest.fixture
+def slow_hand(tmp_path: Path) -> Path:
+    """A hand that moves joints at up to 12 degrees a second.
+
+    The emulator has the time of the computer. On a busy one it stands still for 0.1 to 0.3 s, and then each joint catches up at a speed of
+    its own, off the path by up to the way that it missed. So the path is as exact as the hand is slow.
+    """
+    return led(tmp_path / "hand.txt", 1 / 3)
+
+
+@dataclass(frozen=True)
+class EmulatedArm:
+    """The image for the arm in an emulator: its port, and a file of the true angles of its simulated servos."""
+
+    port: Path
+    angles: Path
+
+    def true_path(self, log: Log, rows: slice) -> tuple[NDArray[np.float64], Rows]:
+        """The times of the log's clock and the true angles, from the first to the last of these rows of a log."""
+        table = np.loadtxt(self.angles, delimiter=",")
+        # The file has the time since 1970.
+        times = table[:, 0] - (time.time() - time.monotonic())
+        begin, *_, end = log.times[rows]
+        inside = (times >= begin) & (times <= end)
+        return times[inside], table[inside, 1:]
+
+
+@pytest.fixture
+def emulated_arm(tmp_path: Path) -> Iterator[EmulatedArm]:
+    """`cargo xtask emulate`."""
+    arm = EmulatedArm(tmp_path / "arm", tmp_path / "angles.csv")
+    options = ["--no-build", "--link", arm.port, "--angles", arm.angles]
+    emulator = subprocess.Popen([os.environ["XTASK"], "emulate", *options])
     try:
         deadline = time.monotonic() + START_UP
-        while not answers(link):
+        while not answers(arm.port):
             assert time.monotonic() < deadline and emulator.poll() is None, "the emulated arm does not start"
             time.sleep(0.2)
-        yield str(link)
+        yield arm
     finally:
         emulator.send_signal(signal.SIGTERM)
         emulator.wait(timeout=TIMEOUT)

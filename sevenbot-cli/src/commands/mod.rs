@@ -20,7 +20,6 @@ pub(crate) mod position;
 pub(crate) mod record;
 pub(crate) mod recover;
 pub(crate) mod registers;
-#[cfg(target_os = "linux")]
 pub(crate) mod serve;
 pub(crate) mod servo;
 pub(crate) mod set;
@@ -32,5 +31,4 @@ pub(crate) mod state;
 pub(crate) mod status;
 pub(crate) mod stop;
 pub(crate) mod stream;
-#[cfg(target_os = "linux")]
 pub(crate) mod view;

@@ -4,8 +4,8 @@ use std::io::{self, Write};
 
 use clap::Args;
 use serde::Serialize;
-use sevenbot::network::{self, Address, KnownName, LocalServer, mdns};
-use sevenbot::ports::{PortInfo, ProbeResult, available, probe};
+use sevenbot::network::{self, Address, KnownName, mdns};
+use sevenbot::ports::{PortInfo, ProbeResult, probe, reachable};
 
 use crate::command_error::CommandError;
 use crate::printer::Printable;
@@ -48,11 +48,7 @@ pub(crate) fn run(session: &mut Session, args: &PortsArgs) -> Result<(), Command
     }
     let named = args.ports.iter().chain(&session.port);
     let named = named.map(|name| PortInfo { name: name.clone(), description: String::new() });
-    let served = if args.ports.is_empty() { network::servers() } else { Vec::new() };
-    let mut asked: Vec<PortInfo> = served.iter().map(served_port).collect();
-    if args.ports.is_empty() {
-        asked.extend(available().into_iter().filter(|port| network::serving(&port.name).is_none()));
-    }
+    let mut asked = if args.ports.is_empty() { reachable() } else { Vec::new() };
     for port in named {
         if asked.iter().all(|known| known.name != port.name) {
             asked.push(port);
@@ -89,18 +85,6 @@ fn network_line(arm: &KnownName, state: &str) -> PortLine {
         description: arm.address.to_string(),
         arm: None,
         no_arm: Some(state.to_owned()),
-    }
-}
-
-/// A server in the list of ports.
-fn served_port(server: &LocalServer) -> PortInfo {
-    let port = server.port.display();
-    match &server.name {
-        Some(name) => PortInfo {
-            name: format!("sevenbot://{name}"),
-            description: format!("{}, for {port}", server.address()),
-        },
-        None => PortInfo { name: server.address(), description: format!("for {port}") },
     }
 }
 

@@ -3,19 +3,18 @@
 use std::fs;
 use std::io::{self, Write};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
 use sevenbot::network::mdns::Announcement;
-use sevenbot::network::{self, LocalServer, Registered};
+use sevenbot::network::{self, LocalServer, Registered, is_token};
 use sevenbot::open_port::OpenPort;
 use sevenbot::simulated::simulated_port;
 use sevenbot::{OpenError, ports};
 use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::server::{
-    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, TlsFiles,
+    AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, Stop, TlsFiles,
 };
 
 use crate::command_error::CommandError;
@@ -147,10 +146,10 @@ pub(crate) fn run(session: &mut Session, args: &ServeArgs) -> Result<(), Command
     run_server(server, &stop, local.as_ref())
 }
 
-/// Serves until `stop` is readable. Other programs of this user find the server by `local`.
+/// Serves until it is stopped. Other programs of this user find the server by `local`.
 pub(super) fn run_server(
     server: Server,
-    stop: &UnixStream,
+    stop: &Stop,
     local: Option<&LocalServer>,
 ) -> Result<(), CommandError> {
     let mut registered = None;
@@ -276,18 +275,13 @@ pub(super) fn check_not_busy(arm: &ArmLocation, baud: u32) -> Result<(), Command
     }
 }
 
-/// Becomes readable at Ctrl-C, and at signals that ask a program to end.
-pub(super) fn stop_signal() -> Result<UnixStream, CommandError> {
-    let (stop, mut trigger) = UnixStream::pair()?;
-    let handler = move || drop(trigger.write_all(&[0]));
-    ctrlc::set_handler(handler)
+/// Ends the server at Ctrl-C, and at signals that ask a program to end.
+pub(super) fn stop_signal() -> Result<Stop, CommandError> {
+    let stop = Stop::default();
+    let trigger = stop.clone();
+    ctrlc::set_handler(move || trigger.stop())
         .map_err(|error| CommandError::Arm(format!("cannot catch Ctrl-C: {error}")))?;
     Ok(stop)
-}
-
-/// Long enough not to be guessed, and fit for a line.
-fn is_token(token: &str) -> bool {
-    (8..=128).contains(&token.len()) && token.bytes().all(|byte| byte.is_ascii_graphic())
 }
 
 fn report(notice: &Notice) {
@@ -309,18 +303,5 @@ fn report(notice: &Notice) {
                     "it does not speak frames, as a web page does that tries this port",
             }
         )),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_token_is_long_and_has_no_spaces() {
-        assert!(is_token("0123456789abcdef"));
-        for bad in ["", "short", "with a space in it", "line\nfeed in it", &"x".repeat(129)] {
-            assert!(!is_token(bad), "{bad:?}");
-        }
     }
 }

@@ -1,11 +1,9 @@
 //! `view`: the arm in a browser.
 
-use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
 
 use clap::Args;
 use rust_embed::RustEmbed;
-use rustix::rand::{GetRandomFlags, getrandom};
 use sevenbot::simulated::simulated_port;
 use sevenbot_serve::hub::HubOptions;
 use sevenbot_serve::server::{ArmLocation, PageConfig, Server, ServerConfig, StartError};
@@ -129,10 +127,8 @@ fn open(mut config: ServerConfig, any_port: bool) -> Result<Server, StartError> 
 /// 128 random bits.
 fn token() -> Result<String, CommandError> {
     let mut bytes = [0_u8; 16];
-    let count = getrandom(&mut bytes, GetRandomFlags::empty()).map_err(io::Error::from)?;
-    if count != bytes.len() {
-        return Err(CommandError::Arm("the operating system has no random numbers".to_owned()));
-    }
+    let failed = |reason| CommandError::Arm(format!("the operating system has no random numbers: {reason}"));
+    getrandom::fill(&mut bytes).map_err(failed)?;
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 

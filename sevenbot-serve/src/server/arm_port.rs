@@ -6,11 +6,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use protocol_core::time::{Duration, Instant};
-use tty_ports::serial::Serial;
 
 use super::arm_location::{ArmLocation, PortSearch};
+use super::arm_serial::ArmSerial;
 use super::notice::Notice;
-use super::readiness::Readiness;
 use super::shared::Shared;
 use crate::hub::Hub;
 
@@ -37,7 +36,7 @@ enum ArmPortState {
     /// Tried again at this time.
     Closed(Instant),
     /// Opened at this time.
-    Open(Serial, Readiness, Instant),
+    Open(ArmSerial, Instant),
 }
 
 impl ArmPort {
@@ -68,11 +67,11 @@ impl ArmPort {
 
     /// Ends when the port has bytes, or takes some.
     async fn is_ready(&self, has_output: bool) {
-        let ArmPortState::Open(_, readiness, _) = &self.state else { return std::future::pending().await };
+        let ArmPortState::Open(port, _) = &self.state else { return std::future::pending().await };
         // An error shows itself when the port is used.
         let _ = tokio::select! {
-            ready = readiness.readable() => ready,
-            ready = readiness.writable(), if has_output => ready,
+            ready = port.readable() => ready,
+            ready = port.writable(), if has_output => ready,
         };
     }
 
@@ -81,7 +80,7 @@ impl ArmPort {
         match &self.state {
             ArmPortState::Closed(due) if *due <= now => self.open(hub, now, notify),
             ArmPortState::Closed(_) => {}
-            ArmPortState::Open(port, _, opened) => {
+            ArmPortState::Open(port, opened) => {
                 let had_arm = hub.has_arm();
                 match read_all(port, hub, now) {
                     Err(error) => self.close(hub, now, notify, &error.to_string()),
@@ -137,10 +136,9 @@ impl ArmPort {
         if let Some(path) = self.search.as_mut().and_then(|search| search.next(&self.path)) {
             self.path = path;
         }
-        let opened = Serial::open(&self.path, self.baud).map_err(io::Error::other);
-        match opened.and_then(|port| Ok((Readiness::of(&port)?, port))) {
-            Ok((readiness, port)) => {
-                self.state = ArmPortState::Open(port, readiness, now);
+        match ArmSerial::open(&self.path, self.baud) {
+            Ok(port) => {
+                self.state = ArmPortState::Open(port, now);
                 hub.open_arm(now);
             }
             Err(error) => self.close(hub, now, notify, &error.to_string()),
@@ -168,7 +166,7 @@ impl ArmPort {
 }
 
 /// Passes all bytes that have arrived. The read without bytes at the end states that the line is silent.
-fn read_all(port: &Serial, hub: &mut Hub, now: Instant) -> io::Result<()> {
+fn read_all(port: &ArmSerial, hub: &mut Hub, now: Instant) -> io::Result<()> {
     let mut bytes = [0; 4_096];
     loop {
         let count = port.read(&mut bytes)?;

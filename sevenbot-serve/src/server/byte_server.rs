@@ -10,11 +10,15 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 
 use super::admission::Admission;
+use super::breakage::Breakage;
 use super::byte_connection::{self, ByteStream, NoFrames};
-use super::listener::{LocalSocket, accept_tcp};
+use super::listener::accept_tcp;
+#[cfg(unix)]
+use super::local_socket::LocalSocket;
 use super::notice::{Notice, Notices, RefusalReason};
-use super::readiness::Breakage;
 use super::shared::Shared;
+#[cfg(not(unix))]
+use super::unsupported::LocalSocket;
 use crate::token::is_equal;
 
 /// How long a client may take for the handshake of TLS, and to send the token.

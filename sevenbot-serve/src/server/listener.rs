@@ -1,18 +1,11 @@
-//! TCP ports and Unix sockets that clients connect to.
+//! TCP ports that clients connect to.
 
-use std::fs;
 use std::io;
 use std::net::SocketAddr;
-use std::os::fd::AsFd;
-use std::os::unix::fs::{FileTypeExt, MetadataExt};
-use std::os::unix::net::UnixStream as StdUnixStream;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use rustix::fs::Mode;
-use rustix::net::sockopt;
-use rustix::process::umask;
-use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+use socket2::{SockRef, TcpKeepalive};
+use tokio::net::{TcpListener, TcpStream};
 
 use super::start_error::StartError;
 
@@ -25,10 +18,11 @@ const RECEIVE_BUFFER: usize = 4_096;
 const KEEPALIVE_IDLE: Duration = Duration::from_secs(10);
 const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(5);
 const KEEPALIVE_PROBES: u32 = 3;
-/// A peer that takes no byte for this long, in milliseconds, is gone.
-const USER_TIMEOUT: u32 = 60_000;
+/// A peer that takes no byte for this long is gone. Other systems than Linux decide that by themselves.
+#[cfg(target_os = "linux")]
+const USER_TIMEOUT: Duration = Duration::from_secs(60);
 /// After an error, such as too many open files, the next connection is waited for.
-const AFTER_ERROR: Duration = Duration::from_millis(100);
+pub(super) const AFTER_ERROR: Duration = Duration::from_millis(100);
 
 /// Opens a TCP port.
 pub(super) fn open_tcp(address: SocketAddr) -> Result<TcpListener, StartError> {
@@ -38,7 +32,7 @@ pub(super) fn open_tcp(address: SocketAddr) -> Result<TcpListener, StartError> {
     };
     let listener = std::net::TcpListener::bind(address).map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
-    let _ = sockopt::set_socket_recv_buffer_size(&listener, RECEIVE_BUFFER);
+    let _ = SockRef::from(&listener).set_recv_buffer_size(RECEIVE_BUFFER);
     TcpListener::from_std(listener).map_err(failed)
 }
 
@@ -55,69 +49,13 @@ pub(super) async fn accept_tcp(listener: &TcpListener) -> (TcpStream, SocketAddr
 
 fn set_options(stream: &TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
-    let stream = stream.as_fd();
-    sockopt::set_socket_send_buffer_size(stream, SEND_BUFFER)?;
-    sockopt::set_socket_keepalive(stream, true)?;
-    sockopt::set_tcp_keepidle(stream, KEEPALIVE_IDLE)?;
-    sockopt::set_tcp_keepintvl(stream, KEEPALIVE_INTERVAL)?;
-    sockopt::set_tcp_keepcnt(stream, KEEPALIVE_PROBES)?;
-    Ok(sockopt::set_tcp_user_timeout(stream, USER_TIMEOUT)?)
-}
-
-/// A Unix socket that only this user can open. Dropping it removes its file, unless another program has replaced it.
-#[derive(Debug)]
-pub(super) struct LocalSocket {
-    listener: UnixListener,
-    path: PathBuf,
-    inode: u64,
-}
-
-impl LocalSocket {
-    /// Listens at a path. Replaces a socket that a program left which was killed.
-    pub(super) fn open(path: &Path) -> Result<Self, StartError> {
-        let failed = |cause| StartError::Socket { path: path.to_owned(), cause };
-        match fs::symlink_metadata(path) {
-            Ok(found) if !found.file_type().is_socket() => {
-                return Err(failed(io::Error::other("that is no socket, so it is not replaced")));
-            }
-            Ok(_) if StdUnixStream::connect(path).is_ok() => {
-                return Err(failed(io::Error::other("another server listens there")));
-            }
-            Ok(_) => fs::remove_file(path).map_err(failed)?,
-            Err(_) => {}
-        }
-        // With this mask, other users cannot open the file at any time.
-        let mask = umask(Mode::RWXG | Mode::RWXO | Mode::XUSR);
-        let listener = UnixListener::bind(path);
-        umask(mask);
-        let listener = listener.map_err(failed)?;
-        let inode = fs::symlink_metadata(path).map_err(failed)?.ino();
-        Ok(Self { listener, path: path.to_owned(), inode })
-    }
-
-    pub(super) fn path(&self) -> &Path {
-        &self.path
-    }
-
-    pub(super) async fn accept(&self) -> UnixStream {
-        loop {
-            match self.listener.accept().await {
-                Ok((stream, _)) => {
-                    let _ = sockopt::set_socket_send_buffer_size(&stream, SEND_BUFFER);
-                    return stream;
-                }
-                Err(_) => tokio::time::sleep(AFTER_ERROR).await,
-            }
-        }
-    }
-}
-
-impl Drop for LocalSocket {
-    fn drop(&mut self) {
-        if fs::symlink_metadata(&self.path).is_ok_and(|found| found.ino() == self.inode) {
-            let _ = fs::remove_file(&self.path);
-        }
-    }
+    let stream = SockRef::from(stream);
+    stream.set_send_buffer_size(SEND_BUFFER)?;
+    let keepalive = TcpKeepalive::new().with_time(KEEPALIVE_IDLE).with_interval(KEEPALIVE_INTERVAL);
+    stream.set_tcp_keepalive(&keepalive.with_retries(KEEPALIVE_PROBES))?;
+    #[cfg(target_os = "linux")]
+    stream.set_tcp_user_timeout(Some(USER_TIMEOUT))?;
+    Ok(())
 }
 
 #[cfg(test)]
@@ -131,12 +69,14 @@ mod tests {
             let listener = open_tcp(SocketAddr::from(([127, 0, 0, 1], 0))).unwrap();
             let _client = std::net::TcpStream::connect(listener.local_addr().unwrap()).unwrap();
             let (stream, _) = accept_tcp(&listener).await;
-            assert!(sockopt::socket_keepalive(&stream).unwrap());
-            let silence = sockopt::tcp_keepidle(&stream).unwrap()
-                + sockopt::tcp_keepintvl(&stream).unwrap() * sockopt::tcp_keepcnt(&stream).unwrap();
-            assert_eq!(silence, Duration::from_secs(25), "the time in docs/serve.md");
-            assert_eq!(sockopt::tcp_user_timeout(&stream).unwrap(), 60_000);
             assert!(stream.nodelay().unwrap());
+            let stream = SockRef::from(&stream);
+            assert!(stream.keepalive().unwrap());
+            let silence = stream.tcp_keepalive_time().unwrap()
+                + stream.tcp_keepalive_interval().unwrap() * stream.tcp_keepalive_retries().unwrap();
+            assert_eq!(silence, Duration::from_secs(25), "the time in docs/serve.md");
+            #[cfg(target_os = "linux")]
+            assert_eq!(stream.tcp_user_timeout().unwrap(), Some(Duration::from_secs(60)));
         });
     }
 }

@@ -1,4 +1,4 @@
-//! The server: the hub between the arm's serial port and the connections of its clients. Linux only.
+//! The server: the hub between the arm's serial port and the connections of its clients.
 //!
 //! ```text
 //!   ArmPort ◀──▶ Shared: Hub ◀─┬─▶ FrameSession ◀──▶ PtyPort, or byte_connection: TCP, TLS, Unix socket
@@ -13,24 +13,32 @@ mod access;
 mod admission;
 mod arm_location;
 mod arm_port;
+mod arm_serial;
+mod breakage;
 mod byte_connection;
 mod byte_server;
 mod frame_session;
 mod listener;
+#[cfg(unix)]
+mod local_socket;
 mod notice;
+#[cfg(target_os = "linux")]
 mod pty;
+#[cfg(target_os = "linux")]
 mod readiness;
 mod seat;
 mod shared;
 mod site;
 mod start_error;
+mod stop;
 mod tls;
+#[cfg(not(target_os = "linux"))]
+mod unsupported;
 mod web_server;
 mod web_socket;
 
 use std::io;
 use std::net::SocketAddr;
-use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -43,12 +51,18 @@ use tokio_rustls::TlsAcceptor;
 use self::admission::Admission;
 use self::arm_port::ArmPort;
 use self::byte_server::ByteServer;
-use self::listener::{LocalSocket, open_tcp};
+use self::listener::open_tcp;
+#[cfg(unix)]
+use self::local_socket::LocalSocket;
 use self::notice::Notices;
+#[cfg(target_os = "linux")]
 use self::pty::PtyPort;
-use self::readiness::Readiness;
 use self::shared::Shared;
 use self::site::{PageSite, Site};
+#[cfg(not(unix))]
+use self::unsupported::LocalSocket;
+#[cfg(not(target_os = "linux"))]
+use self::unsupported::PtyPort;
 use self::web_server::WebServer;
 use crate::hub::{Hub, HubOptions};
 
@@ -57,6 +71,7 @@ pub use self::arm_location::ArmLocation;
 pub use self::notice::{Notice, RefusalReason};
 pub use self::site::{PageConfig, PageFiles};
 pub use self::start_error::StartError;
+pub use self::stop::Stop;
 pub use self::tls::TlsFiles;
 
 /// Notices about refused clients that may wait. More are dropped.
@@ -75,9 +90,9 @@ pub struct ServerConfig {
     pub arm: Option<ArmLocation>,
     /// Its rate, in bits per second.
     pub baud: u32,
-    /// Links to pseudo-terminals.
+    /// Links to pseudo-terminals; Linux only.
     pub ptys: Vec<PathBuf>,
-    /// A Unix socket for programs of this user.
+    /// A Unix socket for programs of this user; not on Windows.
     pub socket: Option<PathBuf>,
     /// Address for clients that speak frames over TCP.
     pub tcp: Option<SocketAddr>,
@@ -178,14 +193,13 @@ impl Server {
         address(self.page.as_ref())
     }
 
-    /// Serves until `stop` is readable.
+    /// Serves until it is stopped.
     ///
     /// # Errors
-    /// The operating system fails: a pseudo-terminal, or `stop`.
-    pub fn run(self, stop: &impl AsFd, notify: &mut dyn FnMut(Notice)) -> io::Result<()> {
+    /// The operating system fails: a pseudo-terminal.
+    pub fn run(self, stop: &Stop, notify: &mut dyn FnMut(Notice)) -> io::Result<()> {
         let Self { runtime, ptys, socket, tcp, web_socket, page, tls, config } = self;
         runtime.block_on(async {
-            let stop = Readiness::of(stop)?;
             let shared = Shared::new(Hub::new(config.baud, config.options), config.baud);
             tokio::spawn(Arc::clone(&shared).beat());
             let (arm_notices, mut arm_news) = mpsc::unbounded_channel();
@@ -210,7 +224,7 @@ impl Server {
             let mut next_refusal = tokio::time::Instant::now();
             loop {
                 tokio::select! {
-                    ended = stop.readable() => return ended,
+                    () = stop.stopped() => return Ok(()),
                     Some(error) = failed.recv() => return Err(error),
                     Some(notice) = arm_news.recv() => notify(notice),
                     Some(notice) = refused.recv() => {

@@ -3,7 +3,6 @@
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 
-use tokio::io::Interest;
 use tokio::io::unix::{AsyncFd, AsyncFdReadyGuard};
 
 /// Tells when a file descriptor can be read or written.
@@ -33,25 +32,4 @@ impl Readiness {
 
 fn clear(mut ready: AsyncFdReadyGuard<'_, OwnedFd>) {
     ready.clear_ready();
-}
-
-/// Tells when a connection breaks, also while nothing of it is read.
-#[derive(Debug)]
-pub(super) struct Breakage(AsyncFd<OwnedFd>);
-
-impl Breakage {
-    /// Of another handle of a socket.
-    pub(super) fn of(socket: &impl AsFd) -> io::Result<Self> {
-        let handle = socket.as_fd().try_clone_to_owned()?;
-        #[expect(deprecated, reason = "an OwnedFd stays open, and stays the same")]
-        AsyncFd::with_interest(handle, Interest::ERROR).map(Self)
-    }
-
-    /// Does `work` until it ends, or the connection breaks: then there is no outcome.
-    pub(super) async fn or_end<T>(&self, work: impl Future<Output = T>) -> Option<T> {
-        tokio::select! {
-            outcome = work => Some(outcome),
-            _ = self.0.ready(Interest::ERROR) => None,
-        }
-    }
 }

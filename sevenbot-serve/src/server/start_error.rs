@@ -4,19 +4,30 @@ use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
+#[cfg(target_os = "linux")]
 use tty_ports::symlink::SymlinkError;
 
 /// Why the server does not start. Each message says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
     /// A link cannot be created.
+    #[cfg(target_os = "linux")]
     #[error("--pty {0}")]
     Symlink(#[from] SymlinkError),
     /// The system has no pseudo-terminal.
+    #[cfg(target_os = "linux")]
     #[error("no pseudo-terminal: {0}: see that /dev/pts is mounted and has not run out, nor 'ulimit -n'")]
     Pty(io::Error),
+    /// Pseudo-terminals are for Linux.
+    #[cfg(not(target_os = "linux"))]
+    #[error(
+        "--pty needs Linux: use --tcp PORT here, and socket://127.0.0.1:PORT in programs that use pyserial"
+    )]
+    NoPty,
     /// Another program listens there.
-    #[error("{0}: another program listens there: choose another port, or end it; 'ss -ltnp' shows which one")]
+    #[error(
+        "{0}: another program listens there: choose another port, or end it; on Linux, 'ss -ltnp' shows which one"
+    )]
     InUse(SocketAddr),
     /// The local socket cannot be used.
     #[error("{}: {cause}: choose another path for the socket", path.display())]

@@ -8,7 +8,6 @@
 
 use std::convert::Infallible;
 use std::net::SocketAddr;
-use std::os::fd::{AsFd, OwnedFd};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -20,16 +19,16 @@ use hyper::upgrade::OnUpgrade;
 use hyper::{Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use rustix::net::sockopt::set_socket_send_buffer_size;
+use socket2::{SockRef, Socket};
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsAcceptor;
 use tower_http::compression::Compression;
 
 use super::admission::{Admission, Place};
+use super::breakage::Breakage;
 use super::byte_connection::ByteStream;
 use super::listener::{SEND_BUFFER, accept_tcp};
 use super::notice::{Notice, Notices, RefusalReason};
-use super::readiness::Breakage;
 use super::shared::{Shared, lock};
 use super::site::{Answer, Protocol, Site, refusal};
 use super::web_socket::{serve_frames, serve_maker};
@@ -73,14 +72,14 @@ impl WebServer {
     /// Answers one request, and then serves the WebSocket if it asked for one.
     async fn serve_client(&self, stream: TcpStream, peer: SocketAddr) {
         // A smaller buffer is only slower.
-        let _ = set_socket_send_buffer_size(&stream, FILE_BUFFER);
-        let Ok(socket) = stream.as_fd().try_clone_to_owned() else { return };
+        let _ = SockRef::from(&stream).set_send_buffer_size(FILE_BUFFER);
+        let Ok(socket) = SockRef::from(&stream).try_clone() else { return };
         let answered = self.admission.log_in(TIMEOUT, self.answer_request(stream, peer)).await;
         let Some(Upgrade { connection, protocol, place }) = answered else { return };
         let Ok(connection) = connection.await else { return };
-        let _ = set_socket_send_buffer_size(&socket, SEND_BUFFER);
+        let _ = socket.set_send_buffer_size(SEND_BUFFER);
         let Ok(breakage) = Breakage::of(&socket) else { return };
-        drop::<OwnedFd>(socket);
+        drop::<Socket>(socket);
         let stream = TokioIo::new(connection);
         let serve = async {
             match protocol {

@@ -54,6 +54,19 @@ impl Address {
         matches!(self, Self::Tcp(_) | Self::Tls(_))
     }
 
+    /// Does a server at this address get a token?
+    ///
+    /// ```
+    /// use sevenbot::network::Address;
+    ///
+    /// let takes_token = |name| Address::parse(name).is_some_and(|address| address.takes_token());
+    /// assert!(takes_token("tcp://10.0.0.5:7777") && !takes_token("unix:/run/arm.sock"));
+    /// ```
+    #[must_use]
+    pub const fn takes_token(&self) -> bool {
+        !matches!(self, Self::Unix(_))
+    }
+
     /// The token that servers over TCP, also with TLS, may want: of the environment variable [`TOKEN_VARIABLE`].
     pub(super) fn token() -> Option<String> {
         env::var(TOKEN_VARIABLE).ok().filter(|token| !token.is_empty())
@@ -71,9 +84,24 @@ impl fmt::Display for Address {
     }
 }
 
+/// Can it be the token of a server? It is long enough not to be guessed, and fit for a line: 8 to 128 letters, digits and
+/// punctuation marks, without spaces.
+#[must_use]
+pub fn is_token(token: &str) -> bool {
+    (8..=128).contains(&token.len()) && token.bytes().all(|byte| byte.is_ascii_graphic())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_token_is_long_and_has_no_spaces() {
+        assert!(is_token("0123456789abcdef"));
+        for bad in ["", "short", "with a space in it", "line\nfeed in it", &"x".repeat(129)] {
+            assert!(!is_token(bad), "{bad:?}");
+        }
+    }
 
     #[test]
     fn names_of_serial_ports_are_no_addresses() {

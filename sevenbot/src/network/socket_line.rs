@@ -55,19 +55,22 @@ impl fmt::Debug for SocketLine {
 }
 
 impl SocketLine {
-    /// Connects to a server. Over TCP the token is that of the environment variable [`TOKEN_VARIABLE`](super::TOKEN_VARIABLE), and
-    /// with TLS the certificate is one of those in the file of [`CERTIFICATE_VARIABLE`](super::CERTIFICATE_VARIABLE).
+    /// Connects to a server. Over TCP it gets this token, or without one that of the environment variable
+    /// [`TOKEN_VARIABLE`](super::TOKEN_VARIABLE). With TLS the certificate is one of those in the file of
+    /// [`CERTIFICATE_VARIABLE`](super::CERTIFICATE_VARIABLE).
     ///
     /// # Errors
     /// There is no such server, or it cannot be reached.
-    pub fn connect(address: &Address) -> Result<Self, OpenError> {
+    pub fn connect(address: &Address, token: Option<&str>) -> Result<Self, OpenError> {
+        let token = token.map(str::to_owned).or_else(Address::token);
+        let token = token.as_deref();
         match address {
-            Address::Tcp(address) => connect_tcp(address, None),
-            Address::Tls(address) => connect_tcp(address, Some(host(address))),
+            Address::Tcp(address) => connect_tcp(address, None, token),
+            Address::Tls(address) => connect_tcp(address, Some(host(address)), token),
             Address::Unix(path) => connect_unix(path),
             Address::Name(name) => {
                 let named = servers().into_iter().find(|server| server.name.as_ref() == Some(name));
-                named.map_or_else(|| connect_named(name), |server| connect_unix(&server.socket))
+                named.map_or_else(|| connect_named(name, token), |server| connect_unix(&server.socket))
             }
         }
         .map(Self)
@@ -75,22 +78,22 @@ impl SocketLine {
 }
 
 /// Connects to a server of the local network: where its name is announced now, or else where it was last.
-fn connect_named(name: &str) -> Result<Box<dyn Stream>, OpenError> {
+fn connect_named(name: &str, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
     if let Some(known) = announced(name) {
-        let stream = connect_known(&known)?;
+        let stream = connect_known(&known, token)?;
         // It is for networks that block multicast. Without the file, names are found as before.
         let _ = remember(&known);
         return Ok(stream);
     }
     let known = known_names().into_iter().find(|known| known.name == name).ok_or(OpenError::NotFound)?;
-    connect_known(&known)
+    connect_known(&known, token)
 }
 
 /// The certificate is for the name: the address may be another one tomorrow.
-fn connect_known(known: &KnownName) -> Result<Box<dyn Stream>, OpenError> {
+fn connect_known(known: &KnownName, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
     match &known.address {
-        Address::Tls(address) => connect_tcp(address, Some(&known.name)),
-        Address::Tcp(address) => connect_tcp(address, None),
+        Address::Tls(address) => connect_tcp(address, Some(&known.name), token),
+        Address::Tcp(address) => connect_tcp(address, None, token),
         Address::Unix(_) | Address::Name(_) => Err(OpenError::NotFound),
     }
 }
@@ -106,11 +109,12 @@ const fn announced(_: &str) -> Option<KnownName> {
 }
 
 /// `host`: the connection is encrypted, and the certificate is for this host.
-fn connect_tcp(address: &str, host: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
+fn connect_tcp(address: &str, host: Option<&str>, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
     let addresses = std::net::ToSocketAddrs::to_socket_addrs(address).map_err(|error| failed(&error))?;
     let mut last = OpenError::NotFound;
     for address in addresses {
-        match TcpStream::connect_timeout(&address, CONNECT_TIMEOUT).and_then(|stream| log_in(stream, host)) {
+        let stream = TcpStream::connect_timeout(&address, CONNECT_TIMEOUT);
+        match stream.and_then(|stream| log_in(stream, host, token)) {
             Ok(stream) => return Ok(stream),
             Err(error) => last = failed(&error),
         }
@@ -124,7 +128,7 @@ fn host(address: &str) -> &str {
     host.trim_start_matches('[').trim_end_matches(']')
 }
 
-fn log_in(stream: TcpStream, host: Option<&str>) -> io::Result<Box<dyn Stream>> {
+fn log_in(stream: TcpStream, host: Option<&str>, token: Option<&str>) -> io::Result<Box<dyn Stream>> {
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
     stream.set_read_timeout(Some(CONNECT_TIMEOUT))?;
@@ -132,7 +136,7 @@ fn log_in(stream: TcpStream, host: Option<&str>) -> io::Result<Box<dyn Stream>> 
         None => Box::new(stream),
         Some(host) => encrypt(stream, host)?,
     };
-    if let Some(token) = Address::token() {
+    if let Some(token) = token {
         stream.write_all(format!("{token}\n").as_bytes())?;
     }
     Ok(stream)
@@ -215,12 +219,13 @@ mod tests {
     fn bytes_pass_and_the_end_of_the_server_is_an_error() {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = listener.local_addr().expect("an address").to_string();
-        let mut line = SocketLine::connect(&Address::Tcp(address)).expect("a connection");
+        let mut line = SocketLine::connect(&Address::Tcp(address), Some("a token")).expect("a connection");
         let (mut server, _) = listener.accept().expect("a client");
         assert_eq!(line.receive(Duration::ZERO), Ok(Vec::new()));
         line.send(b"request").expect("sent");
-        let mut request = [0; 7];
+        let mut request = [0; 15];
         server.read_exact(&mut request).expect("received");
+        assert_eq!(&request, b"a token\nrequest");
         server.write_all(b"reply").expect("sent");
         assert_eq!(line.receive(Duration::from_secs(10)), Ok(b"reply".to_vec()));
         drop(server);
@@ -237,7 +242,10 @@ mod tests {
     #[test]
     fn no_server_is_an_error() {
         let name = Address::Name("no server has this name".to_owned());
-        assert!(matches!(SocketLine::connect(&name), Err(OpenError::NotFound)));
-        assert!(matches!(SocketLine::connect(&Address::Unix("/none".into())), Err(OpenError::NotFound)));
+        assert!(matches!(SocketLine::connect(&name, None), Err(OpenError::NotFound)));
+        assert!(matches!(
+            SocketLine::connect(&Address::Unix("/none".into()), None),
+            Err(OpenError::NotFound)
+        ));
     }
 }

@@ -35,12 +35,14 @@ use crate::fine_angle::FineAngle;
 
 mod observation;
 mod one_arm;
+mod outside;
 #[cfg(test)]
 mod tests;
 mod threads;
 
 pub use observation::{AGE, BLOCKED, LOADS, Number, POSITIONS, TIP, VELOCITIES, WIDTH};
 use one_arm::SteppedArm;
+pub use outside::{DRIVES, MEASURED, SET_POINTS, SET_VELOCITIES, WANTED};
 use threads::share;
 
 /// Joints of an arm.
@@ -63,6 +65,19 @@ pub enum StepError {
         /// The target.
         degrees: f64,
     },
+    /// A measurement of another simulation is not a number, or far too large.
+    #[error("arm {arm}, joint {joint}: a measurement of {value} is out of range")]
+    Measured {
+        /// The number of the arm, from 0.
+        arm: usize,
+        /// The number of the joint, from 1.
+        joint: usize,
+        /// The measurement.
+        value: f64,
+    },
+    /// The time of an exchange.
+    #[error("an exchange for {} s: use 0.001 to 1 s in whole milliseconds", .0.as_secs_f64())]
+    ExchangeTime(Duration),
     /// The time of a step.
     #[error("a step of {} s: use 0.005 to 1 s in whole milliseconds", .0.as_secs_f64())]
     Time(Duration),
@@ -132,6 +147,76 @@ impl SimulatedArms {
             }
         });
         Ok(())
+    }
+
+    /// Sends each arm its seven targets in degrees as the next point of a stream of this period. No time passes.
+    ///
+    /// # Errors
+    /// As of [`Self::step`].
+    pub fn send<T: Number>(&mut self, targets: &[T], period: Duration) -> Result<(), StepError> {
+        let milliseconds = milliseconds(period).ok_or(StepError::Time(period))?;
+        self.check(targets)?;
+        for (arm, targets) in self.arms.iter_mut().zip(targets.as_chunks::<JOINTS>().0) {
+            fine(targets).into_iter().for_each(|targets| arm.send(targets, milliseconds));
+        }
+        Ok(())
+    }
+
+    /// Lets another simulation move the joints: tells each arm what that one measured ([`MEASURED`] numbers), lets `time` pass,
+    /// and writes what the servos want then ([`WANTED`] numbers).
+    ///
+    /// ```
+    /// use sevenbot::simulated_arms::{DRIVES, MEASURED, SET_POINTS, SimulatedArms, WANTED};
+    /// use std::num::NonZeroUsize;
+    /// use std::time::Duration;
+    ///
+    /// let mut arms = SimulatedArms::new(&[1], NonZeroUsize::MIN);
+    /// let (mut measured, mut wanted) = ([0.0; MEASURED], [0.0; WANTED]);
+    /// measured[..7].copy_from_slice(&[90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0]);
+    /// arms.send(&[100.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0], Duration::from_millis(20))?;
+    /// for _ in 0..100 {
+    ///     arms.exchange(&measured, Duration::from_millis(2), &mut wanted)?;
+    ///     // A simulation whose joints are always where they should be.
+    ///     measured[..14].copy_from_slice(&wanted[..14]);
+    /// }
+    /// assert!((wanted[SET_POINTS][0] - 100.0_f64).abs() < 0.3, "{wanted:?}");
+    /// assert_eq!(wanted[DRIVES], [1.0; 7]);
+    /// # Ok::<(), sevenbot::simulated_arms::StepError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// The first measurement that is not a number, the time or the lengths: then nothing is done.
+    pub fn exchange<T: Number, N: Number>(
+        &mut self,
+        measured: &[T],
+        time: Duration,
+        wanted: &mut [N],
+    ) -> Result<(), StepError> {
+        let milliseconds = whole_milliseconds(time).ok_or(StepError::ExchangeTime(time))?;
+        self.check_length(measured.len(), MEASURED)?;
+        self.check_length(wanted.len(), WANTED)?;
+        outside::check(measured)?;
+        let time = time::Duration::from_millis(milliseconds.into());
+        let (measured, wanted) = (measured.chunks(GROUP * MEASURED), wanted.chunks_mut(GROUP * WANTED));
+        let threads = self.threads.get().min(self.arms.len().div_ceil(GROUP));
+        let groups = self.arms.chunks_mut(GROUP).zip(measured).zip(wanted);
+        share(threads, groups, |((arms, measured), wanted)| {
+            let rows = measured.chunks(MEASURED).zip(wanted.chunks_mut(WANTED));
+            for (arm, (measured, wanted)) in arms.iter_mut().zip(rows) {
+                outside::exchange(&mut arm.simulation, measured, time, wanted);
+            }
+        });
+        Ok(())
+    }
+
+    /// Reads each arm's state, and writes it into [`WIDTH`] numbers. No time passes.
+    ///
+    /// # Errors
+    /// The length.
+    pub fn read<N: Number>(&mut self, observations: &mut [N]) -> Result<(), StepError> {
+        self.check_length(observations.len(), WIDTH)?;
+        self.arms.iter_mut().for_each(SteppedArm::observe);
+        self.observe(observations)
     }
 
     fn check_length(&self, given: usize, each: usize) -> Result<(), StepError> {
@@ -204,6 +289,11 @@ fn fine<T: Number>(degrees: &[T; JOINTS]) -> Option<[FineAngle; JOINTS]> {
 
 /// The time of a step, which is a set-point period ([D23](protocol_core::decisions#d23)).
 fn milliseconds(time: Duration) -> Option<u16> {
-    let milliseconds = u16::try_from(time.as_millis()).ok().filter(|time| (5..=1_000).contains(time))?;
+    whole_milliseconds(time).filter(|time| *time >= 5)
+}
+
+/// A time of 1 to 1000 ms.
+fn whole_milliseconds(time: Duration) -> Option<u16> {
+    let milliseconds = u16::try_from(time.as_millis()).ok().filter(|time| (1..=1_000).contains(time))?;
     (Duration::from_millis(milliseconds.into()) == time).then_some(milliseconds)
 }

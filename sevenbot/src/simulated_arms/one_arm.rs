@@ -45,12 +45,17 @@ impl SteppedArm {
     /// Sends the targets as the next point of a stream, if there are any, lets `milliseconds` pass, and asks for the state.
     pub(crate) fn step(&mut self, targets: Option<[FineAngle; 7]>, milliseconds: u16) {
         if let Some(targets) = targets {
-            self.write_period(milliseconds);
-            let [a, b, c, d, e, f, g] = targets.map(|target| target.hundredths().to_le_bytes());
-            self.write(FINE_TARGET.address, [a, b, c, d, e, f, g].as_flattened());
+            self.send(targets, milliseconds);
         }
         self.simulation.advance(Duration::from_millis(milliseconds.into()));
         self.observe();
+    }
+
+    /// Sends the targets as the next point of a stream of this period in milliseconds.
+    pub(crate) fn send(&mut self, targets: [FineAngle; 7], period: u16) {
+        self.write_period(period);
+        let [a, b, c, d, e, f, g] = targets.map(|target| target.hundredths().to_le_bytes());
+        self.write(FINE_TARGET.address, [a, b, c, d, e, f, g].as_flattened());
     }
 
     fn write_period(&mut self, milliseconds: u16) {

@@ -137,3 +137,51 @@ fn a_lost_reply_leaves_the_last_observation_and_tells_its_age() {
     assert_eq!(seen[AGE], [0.06]);
     assert_eq!(seen[..31], before[..31]);
 }
+
+#[test]
+fn arms_whose_joints_are_moved_outside_do_not_depend_on_the_threads() {
+    let run = |threads| {
+        let mut arms = arms(40, threads);
+        let (mut measured, mut wanted) = (vec![0.0; 40 * MEASURED], vec![0.0; 40 * WANTED]);
+        for row in measured.chunks_mut(MEASURED) {
+            row[..JOINTS].copy_from_slice(&REST);
+            row[6] = f64::NAN;
+        }
+        for step in 0..20 {
+            let all: Vec<f64> = (0..40).flat_map(|arm| targets(arm, step)).collect();
+            arms.send(&all, STEP).expect("targets");
+            for _ in 0..10 {
+                arms.exchange(&measured, Duration::from_millis(2), &mut wanted).expect("an exchange");
+                for (measured, wanted) in measured.chunks_mut(MEASURED).zip(wanted.chunks(WANTED)) {
+                    measured[..6].copy_from_slice(&wanted[..6]);
+                    measured[7..14].copy_from_slice(&wanted[SET_VELOCITIES]);
+                }
+            }
+        }
+        let mut seen = vec![0.0_f64; 40 * WIDTH];
+        arms.read(&mut seen).expect("the length");
+        let last = targets(7, 18);
+        let row = &seen[7 * WIDTH..];
+        assert!((row[0] - last[0]).abs() < 1.0, "outside: {} is not {}", row[0], last[0]);
+        assert!((row[6] - last[6]).abs() < 3.0, "joint 7 is inside: {} is not {}", row[6], last[6]);
+        (wanted, seen)
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn a_wrong_measurement_lets_no_time_pass() {
+    let mut arms = arms(2, 1);
+    let before = arms.arm(0).expect("an arm").now();
+    let (mut measured, mut wanted) = ([90.0; 2 * MEASURED], [0.0_f64; 2 * WANTED]);
+    measured[MEASURED + 9] = f64::NAN;
+    let error = arms.exchange(&measured, Duration::from_millis(2), &mut wanted).expect_err("no number");
+    assert_eq!(error.to_string(), "arm 1, joint 3: a measurement of NaN is out of range");
+    measured[MEASURED + 2] = f64::NAN;
+    let time = Duration::from_micros(1_500);
+    assert_eq!(arms.exchange(&measured, time, &mut wanted), Err(StepError::ExchangeTime(time)));
+    let length = StepError::Length { given: 1, wanted: 2 * MEASURED };
+    assert_eq!(arms.exchange(&measured[..1], STEP, &mut wanted), Err(length));
+    assert_eq!(arms.arm(0).expect("an arm").now(), before);
+    assert_eq!(arms.exchange(&measured, STEP, &mut wanted), Ok(()));
+}

@@ -12,7 +12,7 @@
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixListener;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use clap::Args;
@@ -63,6 +63,9 @@ pub struct EmulateArgs {
     /// Write the bytes to the servos into this file
     #[arg(long, value_name = "PATH")]
     servo_line: Option<PathBuf>,
+    /// Write the true angles of the joints into this file: see `host-sim --help`
+    #[arg(long, value_name = "PATH")]
+    angles: Option<PathBuf>,
     /// Use the image and the simulator of the last build
     #[arg(long)]
     pub no_build: bool,
@@ -73,7 +76,7 @@ pub fn run(options: &EmulateArgs) -> TaskResult {
     need_qemu()?;
     let mut signals = Signals::catch()?;
     let folder = tempfile::tempdir()?;
-    let servos = start_servos(&folder, &options.fault)?;
+    let servos = start_servos(&folder, &options.fault, options.angles.as_deref())?;
     let host = UnixListener::bind(folder.path().join("host"))?;
     let commands = UnixListener::bind(folder.path().join("monitor"))?;
     let image = if options.self_test { &SELF_TEST } else { &IMAGE };
@@ -124,12 +127,15 @@ pub fn need_qemu() -> TaskResult {
     Err(format!("{QEMU} is missing: {HOW_TO_GET_QEMU}, or let `cargo xtask test` install it"))?
 }
 
-/// Starts the seven servos on a socket.
-pub fn start_servos(folder: &TempDir, faults: &[String]) -> TaskResult<ChildProcess> {
+/// Starts the seven servos on a socket. They write their true angles to `angles`.
+pub fn start_servos(folder: &TempDir, faults: &[String], angles: Option<&Path>) -> TaskResult<ChildProcess> {
     let mut command = Command::new(target_directory().join("debug").join("host-sim"));
     command.arg("--quiet").arg("--servo-socket").arg(folder.path().join("servos"));
     faults.iter().for_each(|fault| {
         command.arg("--fault").arg(fault);
+    });
+    angles.iter().for_each(|path| {
+        command.arg("--angles").arg(path);
     });
     let mut child = ChildProcess(command.stdout(Stdio::piped()).spawn()?);
     let mut line = String::new();

@@ -12,10 +12,12 @@ use std::error::Error;
 
 mod elf;
 mod jump_table;
+mod loaded;
 mod stack;
 mod thumb_decode;
 
 pub use elf::{Program, Section, SourceLine, Symbol};
+pub use loaded::{LoadedRange, loaded_ranges};
 pub use stack::{CallGraph, Depth};
 pub use thumb_decode::Effect;
 

@@ -35,7 +35,7 @@ impl Machine {
     /// Starts the image with seven servos, and waits until its arm is in its pose.
     pub(crate) fn with_servos() -> TaskResult<Self> {
         let folder = tempfile::tempdir()?;
-        let servos = emulator::start_servos(&folder, &[])?;
+        let servos = emulator::start_servos(&folder, &[], None)?;
         let bus = emulator::servo_socket(&folder);
         let mut machine = Self::start(folder, Some(servos), &bus, "shift=0,sleep=on")?;
         // Twice: before their first read, no servos are reported as missing.

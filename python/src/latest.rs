@@ -1,0 +1,98 @@
+//! What a program that does not wait and the thread of the port tell each other.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use sevenbot::FineAngle;
+use sevenbot::fine::FineTargets;
+use sevenbot::moves::MoveError;
+use sevenbot::stream::LatestCounts;
+
+/// The newest action of a program, and what became of those before.
+#[derive(Debug, Default)]
+pub(crate) struct LatestSlot(Mutex<Slot>);
+
+#[derive(Debug, Default)]
+struct Slot {
+    is_open: bool,
+    /// The thread of the port has not taken it yet.
+    action: Option<FineTargets>,
+    /// Actions that were replaced here.
+    skipped: u32,
+    /// Those of the sender.
+    counts: LatestCounts,
+    failed: Option<MoveError>,
+    /// The last angle of each joint in degrees.
+    pose: [f64; 7],
+}
+
+impl Slot {
+    fn counts(&self) -> LatestCounts {
+        LatestCounts { skipped: self.counts.skipped + self.skipped, ..self.counts }
+    }
+}
+
+/// What a program is told that offered an action.
+pub(crate) struct Told {
+    pub(crate) counts: LatestCounts,
+    /// Where the actions so far lead, in degrees.
+    pub(crate) pose: [f64; 7],
+}
+
+impl LatestSlot {
+    fn slot(&self) -> MutexGuard<'_, Slot> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A stream begins at this pose.
+    pub(crate) fn open(&self, pose: [f64; 7]) {
+        *self.slot() = Slot { is_open: true, pose, ..Slot::default() };
+    }
+
+    /// The stream has ended. Its counts stay.
+    pub(crate) fn close(&self) {
+        self.slot().is_open = false;
+    }
+
+    /// Offers an action, which replaces one that still waits. `None`: no stream is open. After a failure it is not taken.
+    pub(crate) fn offer(&self, action: &FineTargets) -> Option<Result<Told, MoveError>> {
+        let mut slot = self.slot();
+        if !slot.is_open {
+            return None;
+        }
+        if let Some(failed) = slot.failed.take() {
+            return Some(Err(failed));
+        }
+        let mut newest = *action;
+        if let Some(older) = slot.action {
+            slot.skipped += 1;
+            newest.iter_mut().zip(older).for_each(|(newer, older)| *newer = newer.or(older));
+        }
+        slot.action = Some(newest);
+        for (degrees, angle) in slot.pose.iter_mut().zip(action) {
+            *degrees = angle.map_or(*degrees, FineAngle::degrees);
+        }
+        Some(Ok(Told { counts: slot.counts(), pose: slot.pose }))
+    }
+
+    /// Takes the action that waits.
+    pub(crate) fn take(&self) -> Option<FineTargets> {
+        self.slot().action.take()
+    }
+
+    /// The action that waits.
+    pub(crate) fn waiting(&self) -> Option<FineTargets> {
+        self.slot().action
+    }
+
+    /// Tells the program what became of its actions.
+    pub(crate) fn tell(&self, counts: LatestCounts, failed: Option<MoveError>) {
+        let mut slot = self.slot();
+        slot.counts = counts;
+        slot.failed = failed.or(slot.failed.take());
+    }
+
+    /// How the actions became points so far.
+    pub(crate) fn counts(&self) -> LatestCounts {
+        self.slot().counts()
+    }
+}

@@ -1,0 +1,75 @@
+//! Why a file is no recording.
+
+use std::io;
+
+use sevenbot::Joint;
+use sevenbot::recording::{Recording, RecordingError};
+
+/// More than a day of 50 moments a second, in bytes of the text format.
+pub(crate) const LONGEST_TEXT: u64 = 512 * 1_024 * 1_024;
+
+/// Why there is no recording, or no whole one.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The source cannot be read.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// The text is too long for a recording.
+    #[error("this is longer than {LONGEST_TEXT} bytes: is it the right file?")]
+    TooLong,
+    /// The first bytes are those of a text, but the rest is not.
+    #[error("this is not text in UTF-8")]
+    NotText,
+    /// The text is refused.
+    #[error(transparent)]
+    Text(#[from] RecordingError),
+    /// The MCAP file has no recording of an arm.
+    #[error(transparent)]
+    Mcap(#[from] McapReadError),
+    /// The MCAP file is cut off or damaged.
+    #[error("{cause}; {} moments, {:.1} s, can be read", .readable.moments().count(), .readable.duration().as_secs_f64())]
+    Damaged {
+        /// What can be read: of a file that is cut off, all that is there.
+        readable: Recording,
+        /// What is wrong, and where.
+        cause: String,
+    },
+}
+
+/// Why an MCAP file has no recording.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum McapReadError {
+    /// No topic has the states of the joints.
+    #[error(
+        "no message of a topic `joint_states` or `robot_joint_states` has the positions of joint_1 to joint_7"
+    )]
+    NoJoints,
+    /// Several arms were recorded.
+    #[error("this has the joints of several arms: {}", .0.join(", "))]
+    SeveralArms(Vec<String>),
+    /// The chunks are compressed.
+    #[error("its chunks are compressed with {0}: only uncompressed files are read")]
+    Compressed(String),
+    /// A joint is beyond its range.
+    #[error("at {seconds:.3} s joint {} is at {degrees:.2} degrees, and the range is 0 to 180", joint.number())]
+    OutOfRange {
+        /// The joint.
+        joint: Joint,
+        /// Its angle, as the registers have it.
+        degrees: f64,
+        /// The time in the file, since its first moment.
+        seconds: f64,
+    },
+    /// A message is older than the one before.
+    #[error("after {seconds:.3} s the time goes back: are these two recordings?")]
+    TimeGoesBack {
+        /// The time of the message before, since the first moment.
+        seconds: f64,
+    },
+    /// The moments are refused.
+    #[error(transparent)]
+    Refused(#[from] RecordingError),
+    /// The file is damaged before its first moment.
+    #[error("{0}, before its first moment")]
+    Unreadable(String),
+}

@@ -1,0 +1,51 @@
+//! Frames that the arm has to take before a movement goes on.
+
+use protocol_core::time::Instant;
+
+use super::PlayFailure;
+use crate::client::Client;
+
+/// Registers are written this many times before their loss is an error.
+const ATTEMPTS: u32 = 5;
+
+/// Frames that are written again until registers that were read afterwards hold their values.
+#[derive(Debug)]
+pub(super) struct Confirmed {
+    frames: Vec<(u8, Vec<u8>)>,
+    written: Instant,
+    attempts: u32,
+}
+
+impl Confirmed {
+    pub(super) fn write(frames: Vec<(u8, Vec<u8>)>, now: Instant, client: &mut Client) -> Self {
+        let times = frames.iter().map(|(address, values)| client.write(now, *address, values));
+        let written = times.last().unwrap_or(now);
+        Self { frames, written, attempts: 1 }
+    }
+
+    /// Has the arm taken them? `Ok(false)`: not known yet.
+    pub(super) fn poll(&mut self, now: Instant, client: &mut Client) -> Result<bool, PlayFailure> {
+        if !client.was_read_since(self.written) {
+            return Ok(false);
+        }
+        let registers = client.registers();
+        let is_taken = |(address, values): &(u8, Vec<u8>)| {
+            (*address..=u8::MAX).zip(values).all(|(address, value)| registers.at(address) == *value)
+        };
+        if self.frames.iter().all(is_taken) {
+            return Ok(true);
+        }
+        if self.attempts >= ATTEMPTS {
+            return Err(PlayFailure::NotTaken);
+        }
+        let attempts = self.attempts + 1;
+        *self = Self { attempts, ..Self::write(std::mem::take(&mut self.frames), now, client) };
+        Ok(false)
+    }
+}
+
+pub(super) fn write_all(frames: &[(u8, Vec<u8>)], now: Instant, client: &mut Client) {
+    for (address, values) in frames {
+        client.write(now, *address, values);
+    }
+}

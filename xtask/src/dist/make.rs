@@ -1,0 +1,90 @@
+//! Makes all files of a release.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::archive::{PackedFile, tar_gz, zip};
+use super::contents::{NOTE, archive_name, licences_name};
+use super::platform::{PLATFORMS, Platform, host_platform};
+use super::release::Release;
+use super::tree::{self, CommonFiles};
+use super::{check, debian, firmware, licences, page, sbom, sums, tools, wheels};
+use crate::run::{TaskResult, target_directory};
+
+/// Makes everything.
+pub(super) fn make(folder: PathBuf) -> TaskResult {
+    let release = Release::of_this_commit(folder)?;
+    empty(&release.folder)?;
+    println!("{}", release.text());
+    timed("tools", || tools::python().map(drop))?;
+    timed("page", || {
+        page::build(&release)?;
+        page::write(&release)
+    })?;
+    let native = host_platform()?;
+    let mut built = Vec::new();
+    for platform in PLATFORMS {
+        timed(platform.name, || {
+            built.push((platform, platform.build(&release)?));
+            Ok(())
+        })?;
+    }
+    let programs =
+        built.iter().find(|(platform, _)| *platform == native).ok_or("no programs for this computer")?;
+    let common = CommonFiles::new(&programs.1.join("sevenbot"))?;
+    for (platform, folder) in &built {
+        pack(&release, *platform, folder, &common)?;
+    }
+    timed("Python packages", || wheels::write(&release))?;
+    timed("firmware", || firmware::write(&release))?;
+    timed("lists of parts", || sbom::write(&release))?;
+    fs::write(release.path(&licences_name(&release)), licences::text()?)?;
+    finish(&release)?;
+    check::check(&release.folder, true)
+}
+
+/// Packs the programs that the tests of this computer built, in a folder of their own: the archive and the package. A step of
+/// the Python package installs the wheel. Returns the folder.
+pub(super) fn make_native() -> TaskResult<PathBuf> {
+    let folder = target_directory().join("dist-native");
+    let release = Release { commit: None, ..Release::of_this_commit(folder)? };
+    empty(&release.folder)?;
+    let built = target_directory().join("debug");
+    let common = CommonFiles::new(&built.join("sevenbot"))?;
+    pack(&release, host_platform()?, &built, &common)?;
+    finish(&release)?;
+    check::check(&release.folder, false)?;
+    Ok(release.folder)
+}
+
+/// The archive and the package of a system.
+fn pack(release: &Release, platform: Platform, built: &Path, common: &CommonFiles) -> TaskResult {
+    let files = tree::files(platform, built, common)?;
+    let folder = release.name("sevenbot", &format!("-{}", platform.name));
+    let below: Vec<PackedFile> = files.iter().map(|file| file.below(&folder)).collect();
+    let bytes = if platform.debian.is_some() { tar_gz(&below, release.epoch)? } else { zip(&below)? };
+    fs::write(release.path(&archive_name(release, platform)), bytes)?;
+    debian::write(release, platform, &files)
+}
+
+/// What the folder says of itself, and the sums.
+fn finish(release: &Release) -> TaskResult {
+    fs::write(release.path(NOTE), release.note())?;
+    sums::write(&release.folder)
+}
+
+fn empty(folder: &Path) -> TaskResult {
+    if folder.exists() {
+        fs::remove_dir_all(folder)?;
+    }
+    Ok(fs::create_dir_all(folder)?)
+}
+
+/// Does a part, and prints how long it took.
+fn timed(what: &str, part: impl FnOnce() -> TaskResult) -> TaskResult {
+    let start = Instant::now();
+    part().map_err(|why| format!("{what}: {why}"))?;
+    println!("{what}: {} s", start.elapsed().as_secs());
+    Ok(())
+}

@@ -1,0 +1,22 @@
+//! Checks what claims to run on Windows and macOS, also where it cannot be linked or run.
+
+use super::platform::{WINDOWS, add_target};
+use super::tools;
+use crate::python::run;
+use crate::run::{TaskResult, root};
+
+const SYSTEMS: [&str; 3] = [WINDOWS.triple, "aarch64-apple-darwin", "x86_64-apple-darwin"];
+/// All other crates that run there are dependencies of these.
+const PACKAGES: [&str; 3] = ["sevenbot-cli", "sevenbot-python", "sevenbot-serve"];
+
+/// Lints the packages. The C code among their dependencies is compiled by zig.
+pub(crate) fn lint_other_systems() -> TaskResult {
+    for system in SYSTEMS {
+        add_target(system)?;
+        let mut clippy = tools::cargo_with_zig("clippy")?;
+        clippy.args(["--quiet", "--target", system]);
+        clippy.args(PACKAGES.iter().flat_map(|package| ["--package", package]));
+        run(clippy.args(["--", "-D", "warnings"]).current_dir(root()))?;
+    }
+    Ok(())
+}

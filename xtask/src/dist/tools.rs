@@ -1,0 +1,63 @@
+//! The tools that make a release, each at the version that was tried. All come from PyPI, crates.io, rustup or Debian.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::{env, fs};
+
+use crate::python::{pip, run, works};
+use crate::run::{TaskResult, target_directory};
+
+/// From PyPI: the compiler for other systems, what calls it, and what makes wheels.
+const PYTHON_PACKAGES: [&str; 5] =
+    ["cargo-zigbuild==0.24.1", "maturin==1.16.0", "setuptools==82.0.1", "wheel==0.48.0", "ziglang==0.15.2"];
+/// From crates.io: lists what a program consists of.
+const CYCLONEDX: (&str, &str) = ("cargo-cyclonedx", "0.5.9");
+
+/// Where the tools are. They are kept for the next release.
+fn folder() -> PathBuf {
+    target_directory().join("dist-tools")
+}
+
+/// The Python of an environment with the packages.
+pub(super) fn python() -> TaskResult<PathBuf> {
+    let (python, installed) = (folder().join("venv/bin/python"), folder().join("packages.txt"));
+    let packages = PYTHON_PACKAGES.join("\n");
+    if fs::read_to_string(&installed).is_ok_and(|text| text == packages) && works(&python) {
+        return Ok(python);
+    }
+    run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(folder().join("venv")))?;
+    run(pip(&python).args(PYTHON_PACKAGES))?;
+    fs::write(installed, packages)?;
+    Ok(python)
+}
+
+/// `PATH`, with the programs of the environment first: there zig is found.
+pub(super) fn search_path() -> TaskResult<OsString> {
+    let mut folders = vec![python()?.with_file_name("")];
+    folders.extend(env::split_paths(&env::var_os("PATH").unwrap_or_default()));
+    Ok(env::join_paths(folders)?)
+}
+
+/// A command of cargo for which zig compiles C code, and links: `zigbuild`, `clippy`.
+pub(super) fn cargo_with_zig(subcommand: &str) -> TaskResult<Command> {
+    let mut command = Command::new(python()?.with_file_name("cargo-zigbuild"));
+    command.arg(subcommand).env("PATH", search_path()?);
+    Ok(command)
+}
+
+/// `cargo-cyclonedx`, built without optimisation: that is sooner done.
+pub(super) fn cyclonedx() -> TaskResult<PathBuf> {
+    let (name, version) = CYCLONEDX;
+    let program = folder().join("bin").join(name);
+    let is_installed = || {
+        let output = Command::new(&program).args(["cyclonedx", "--version"]).stderr(Stdio::null()).output();
+        output.is_ok_and(|output| String::from_utf8_lossy(&output.stdout).trim().ends_with(version))
+    };
+    if !is_installed() {
+        let mut cargo = Command::new("cargo");
+        cargo.args(["install", "--quiet", "--locked", "--debug", name, "--version", version, "--root"]);
+        run(cargo.arg(folder()).env("CARGO_TARGET_DIR", folder().join("target")))?;
+    }
+    Ok(program)
+}

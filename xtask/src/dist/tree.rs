@@ -1,0 +1,111 @@
+//! The files of an installation, below `/usr`, `/usr/local` or `~/.local`.
+//!
+//! ```text
+//!   bin/                             sevenbot, host-sim
+//!   lib/udev/rules.d/                names and rights of the ports
+//!   share/man/man1/                  the manual pages
+//!   share/bash-completion, zsh, fish the completions
+//!   share/doc/sevenbot/              README, changes, licences
+//! ```
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use clap::CommandFactory;
+use clap_mangen::Man;
+use host_sim::cli::Options;
+
+use super::archive::PackedFile;
+use super::licences;
+use super::platform::{Platform, build_directory, read_program};
+use crate::python::run;
+use crate::run::{TaskResult, root};
+
+/// Gives the arm and its adapter names that stay, and the group `dialout` the right to open them.
+pub(super) const UDEV_RULE: &str = "lib/udev/rules.d/70-sevenbot.rules";
+/// Where the licences and the changes are.
+pub(super) const DOC: &str = "share/doc/sevenbot";
+/// The page of the programs that are installed without a package.
+const README: &str = include_str!("../../../packaging/README.txt");
+
+/// Completions: the name of a shell, and its file.
+const COMPLETIONS: [(&str, &str); 3] = [
+    ("bash", "share/bash-completion/completions/sevenbot"),
+    ("fish", "share/fish/vendor_completions.d/sevenbot.fish"),
+    ("zsh", "share/zsh/vendor-completions/_sevenbot"),
+];
+
+/// What is the same on all systems.
+pub(super) struct CommonFiles {
+    /// The licences and the changes.
+    pub(super) documents: Vec<PackedFile>,
+    /// What Linux programs have beside them.
+    pub(super) linux: Vec<PackedFile>,
+}
+
+impl CommonFiles {
+    /// `program`: a `sevenbot` that runs on this computer.
+    pub(super) fn new(program: &Path) -> TaskResult<Self> {
+        let mut linux = man_pages(program)?;
+        for (shell, path) in COMPLETIONS {
+            linux.push(PackedFile::text(path, output(program, &["completions", shell])?));
+        }
+        linux.push(PackedFile::text(UDEV_RULE, fs::read(root().join("packaging/70-sevenbot.rules"))?));
+        Ok(Self { documents: documents()?, linux })
+    }
+}
+
+/// The archive's files for a system: on Windows, everything in one folder.
+pub(super) fn files(platform: Platform, built: &Path, common: &CommonFiles) -> TaskResult<Vec<PackedFile>> {
+    let folder = if platform.debian.is_some() { "bin/" } else { "" };
+    let mut files = Vec::new();
+    for name in platform.programs() {
+        files.push(PackedFile::program(format!("{folder}{name}"), read_program(built, name)?));
+    }
+    if platform.debian.is_some() {
+        files.extend(common.linux.iter().cloned());
+        files.extend(common.documents.iter().map(|file| file.below(DOC)));
+    } else {
+        files.extend(common.documents.iter().cloned());
+    }
+    Ok(files)
+}
+
+fn documents() -> TaskResult<Vec<PackedFile>> {
+    let mut files = vec![
+        PackedFile::text("README.txt", README),
+        PackedFile::text("THIRD-PARTY-LICENCES.txt", licences::text()?),
+    ];
+    for name in ["CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"] {
+        files.push(PackedFile::text(name, fs::read(root().join(name))?));
+    }
+    Ok(files)
+}
+
+/// The pages of `sevenbot`, which prints its own, and of `host-sim`.
+fn man_pages(program: &Path) -> TaskResult<Vec<PackedFile>> {
+    let folder = build_directory().join("man");
+    if folder.exists() {
+        fs::remove_dir_all(&folder)?;
+    }
+    run(Command::new(program).args(["man", "--dir"]).arg(&folder))?;
+    let mut page = Vec::new();
+    Man::new(Options::command().name("host-sim")).render(&mut page)?;
+    let mut pages = vec![PackedFile::text("share/man/man1/host-sim.1", page)];
+    for entry in fs::read_dir(&folder)? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        pages.push(PackedFile::text(format!("share/man/man1/{name}"), fs::read(&path)?));
+    }
+    Ok(pages)
+}
+
+fn output(program: &Path, arguments: &[&str]) -> TaskResult<Vec<u8>> {
+    let output = Command::new(program).args(arguments).output()?;
+    if output.status.success() {
+        Ok(output.stdout)
+    } else {
+        Err(format!("{program:?} {arguments:?} failed").into())
+    }
+}

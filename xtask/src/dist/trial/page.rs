@@ -1,0 +1,64 @@
+//! The page in a browser: as one file from the disk, and as a folder under a path of a web server.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use tempfile::TempDir;
+
+use crate::dist::page::{file_name, folder_name};
+use crate::dist::release::Release;
+use crate::python::run;
+use crate::run::{ChildProcess, TaskResult, wait_for};
+
+/// Serves a folder at a free port, and prints the port.
+const SERVER: &str = "
+import functools, http.server, sys
+handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=sys.argv[1])
+server = http.server.ThreadingHTTPServer(('127.0.0.1', 0), handler)
+open(sys.argv[2], 'w').write(f'{server.server_port}\\n')
+server.serve_forever()
+";
+/// The page has drawn its seven joints when this is in it seven times.
+const SLIDER: &str = "type=\"range\"";
+const JOINTS: usize = 7;
+
+/// Opens both forms of the page.
+pub(super) fn both(release: &Release) -> TaskResult {
+    shows_joints(&format!("file://{}", fs::canonicalize(release.path(&file_name(release)))?.display()))?;
+    let folder = TempDir::new()?;
+    let below = folder.path().join("any/path");
+    let mut unzip = Command::new("python3");
+    unzip.args(["-m", "zipfile", "-e"]).arg(release.path(&folder_name(release)));
+    run(unzip.arg(&below))?;
+    let (_server, port) = serve(folder.path())?;
+    shows_joints(&format!("http://127.0.0.1:{port}/any/path/sevenbot-page/"))
+}
+
+fn serve(folder: &Path) -> TaskResult<(ChildProcess, u16)> {
+    let note = folder.join("port.txt");
+    let mut python = Command::new("python3");
+    python.args(["-c", SERVER]).arg(folder).arg(&note).stderr(Stdio::null());
+    let server = ChildProcess(python.spawn()?);
+    let port = wait_for("the port of the web server", || {
+        Ok(fs::read_to_string(&note).ok().and_then(|text| text.strip_suffix('\n')?.parse().ok()))
+    })?;
+    Ok((server, port))
+}
+
+/// The page at this address starts, without any other file of this computer.
+fn shows_joints(address: &str) -> TaskResult {
+    let profile = TempDir::new()?;
+    let mut browser = Command::new("chromium");
+    browser.args(["--headless", "--no-sandbox", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]);
+    browser.arg(format!("--user-data-dir={}", profile.path().display()));
+    // Time of the page, not of this computer.
+    browser.args(["--virtual-time-budget=20000", "--dump-dom", address]).stderr(Stdio::null());
+    let page = String::from_utf8(browser.output()?.stdout)?;
+    let joints = page.matches(SLIDER).count();
+    if joints < JOINTS {
+        return Err(format!("{address}: the page shows {joints} joints:\n{page}").into());
+    }
+    println!("{address}: the page shows its joints");
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! `sevenbot.exe` in Wine: with the arm inside the program, and with the simulator's port as COM7.
+//!
+//! Wine 8 has no `bcryptprimitives.dll`, from which each Rust program takes random numbers: one of few lines stands in.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use tempfile::TempDir;
+
+use crate::dist::contents::archive_name;
+use crate::dist::platform::{LINUX_X86_64, WINDOWS};
+use crate::dist::release::Release;
+use crate::python::run;
+use crate::run::{ChildProcess, TaskResult, wait_for};
+
+/// Random numbers from the function that Wine has.
+const STAND_IN: &str = "
+typedef unsigned char BOOLEAN;
+__declspec(dllimport) BOOLEAN __stdcall SystemFunction036(void *, unsigned long);
+__declspec(dllexport) int __stdcall ProcessPrng(unsigned char *to, unsigned long long count)
+{ return SystemFunction036(to, (unsigned long)count); }
+";
+const COMPILER: &str = "x86_64-w64-mingw32-gcc";
+
+/// Wine, with files of its own, and the program.
+struct Wine {
+    folder: TempDir,
+}
+
+/// Tries the program.
+pub(super) fn programs(release: &Release) -> TaskResult {
+    let wine = Wine::with(&release.path(&archive_name(release, WINDOWS)))?;
+    let version = wine.output(&["--version"])?;
+    if version.trim() != format!("sevenbot {}", release.text()) {
+        return Err(format!("sevenbot.exe says {version:?}").into());
+    }
+    wine.first_minute("sim")?;
+    let (_simulator, port) = simulator(release, wine.folder.path())?;
+    wine.connect(&port)?;
+    wine.first_minute("COM7")?;
+    wine.sevenbot(&["--port", "COM7", "play", "moments.txt", "--approach", "3"])?;
+    let picture = wine.output(&["--port", "COM7", "--json", "state"])?;
+    if picture.is_empty() { Err("no state over COM7".into()) } else { Ok(()) }
+}
+
+impl Wine {
+    /// Unpacks the archive, and makes an empty Windows.
+    fn with(archive: &Path) -> TaskResult<Self> {
+        let wine = Self { folder: TempDir::new()? };
+        let folder = wine.folder.path();
+        let mut unzip = Command::new("python3");
+        run(unzip.args(["-m", "zipfile", "-e"]).arg(archive).arg(folder))?;
+        let unpacked = fs::read_dir(folder)?.next().ok_or("the archive is empty")??.path();
+        fs::rename(unpacked, folder.join("programs"))?;
+        let source = folder.join("random.c");
+        fs::write(&source, STAND_IN)?;
+        let mut compiler = Command::new(COMPILER);
+        compiler.arg("-shared").arg("-o").arg(folder.join("programs/bcryptprimitives.dll"));
+        run(compiler.arg(source).arg("-ladvapi32"))?;
+        run(wine.command("wineboot").arg("--init").stdout(Stdio::null()).stderr(Stdio::null()))?;
+        Ok(wine)
+    }
+
+    fn command(&self, program: &str) -> Command {
+        let mut command = Command::new(program);
+        command
+            .env("WINEPREFIX", self.folder.path().join("wine"))
+            .env("WINEDEBUG", "-all")
+            .env("WINEDLLOVERRIDES", "mscoree,mshtml=")
+            .current_dir(self.folder.path());
+        command
+    }
+
+    fn sevenbot_command(&self, arguments: &[&str]) -> Command {
+        let mut command = self.command("wine");
+        command.arg("programs/sevenbot.exe").args(arguments);
+        command
+    }
+
+    fn sevenbot(&self, arguments: &[&str]) -> TaskResult {
+        run(&mut self.sevenbot_command(arguments))
+    }
+
+    fn output(&self, arguments: &[&str]) -> TaskResult<String> {
+        let output = self.sevenbot_command(arguments).stderr(Stdio::inherit()).output()?;
+        if output.status.success() {
+            Ok(String::from_utf8(output.stdout)?)
+        } else {
+            Err(format!("{arguments:?} failed").into())
+        }
+    }
+
+    fn first_minute(&self, port: &str) -> TaskResult {
+        println!("sevenbot.exe --port {port}");
+        let file = self.folder.path().join("moments.txt");
+        let _ = fs::remove_file(&file);
+        self.sevenbot(&["--port", port, "info"])?;
+        self.sevenbot(&["--port", port, "pose", "120", "90", "65", "90", "90", "90", "80", "--wait"])?;
+        self.sevenbot(&["--port", port, "record", "moments.txt", "--driven", "--yes", "--seconds", "1"])?;
+        let lines = fs::read_to_string(file)?.lines().count();
+        if lines > 10 { Ok(()) } else { Err(format!("{lines} lines were recorded").into()) }
+    }
+
+    /// Makes a terminal of Linux the port COM7.
+    fn connect(&self, terminal: &Path) -> TaskResult {
+        let key = ["reg", "add", r"HKLM\Software\Wine\Ports", "/v", "COM7", "/d"];
+        run(self.command("wine").args(key).arg(terminal).arg("/f").stdout(Stdio::null()))?;
+        run(self.command("wineserver").arg("--kill"))?;
+        let link = self.folder.path().join("wine/dosdevices/com7");
+        let _ = fs::remove_file(&link);
+        Ok(symlink(terminal, link)?)
+    }
+}
+
+/// The simulator of the release on this computer, and its port.
+fn simulator(release: &Release, folder: &Path) -> TaskResult<(ChildProcess, PathBuf)> {
+    let mut tar = Command::new("tar");
+    tar.args(["--extract", "--directory"]).arg(folder).arg("--file");
+    run(tar.arg(release.path(&archive_name(release, LINUX_X86_64))))?;
+    let name = format!("sevenbot-{}-{}/bin/host-sim", release.version, LINUX_X86_64.name);
+    let link = folder.join("7bot");
+    let mut command = Command::new(folder.join(name));
+    command.args(["--quiet", "--eeprom", "none", "--control", "none", "--link"]).arg(&link);
+    let child = ChildProcess(command.stdout(Stdio::null()).spawn()?);
+    wait_for("the port of the simulator", || Ok(link.exists().then_some(())))?;
+    Ok((child, fs::canonicalize(link)?))
+}
