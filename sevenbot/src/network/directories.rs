@@ -1,7 +1,6 @@
 //! The directories of this user for files that other users must not write to.
 
 use std::env;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Where servers leave their files: `7bot` in `XDG_RUNTIME_DIR`, or else in the state directory. `None` if others can write there.
@@ -31,6 +30,7 @@ fn private(base: PathBuf) -> Option<PathBuf> {
 /// Is it a directory that only this user can write to? It is created if it does not exist.
 #[cfg(unix)]
 fn is_private(directory: &Path) -> bool {
+    use std::fs;
     use std::os::unix::fs::{DirBuilderExt, MetadataExt};
     let _ = fs::DirBuilder::new().recursive(true).mode(0o700).create(directory);
     // The owner of what this process shows of itself, where the system has that, is this user.
@@ -46,12 +46,11 @@ const fn is_private(_: &Path) -> bool {
     false
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
-    use std::process;
+    use std::{fs, process};
 
-    #[cfg(unix)]
     #[test]
     fn a_directory_that_others_can_write_to_is_not_used() {
         use std::os::unix::fs::PermissionsExt;
