@@ -1,7 +1,6 @@
 //! The directories of this user for files that other users must not write to.
 
 use std::env;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Where servers leave their files: `7bot` in `XDG_RUNTIME_DIR`, or else in the state directory. `None` if others can write there.
@@ -31,6 +30,7 @@ fn private(base: PathBuf) -> Option<PathBuf> {
 /// Is it a directory that only this user can write to? It is created if it does not exist.
 #[cfg(unix)]
 fn is_private(directory: &Path) -> bool {
+    use std::fs;
     use std::os::unix::fs::{DirBuilderExt, MetadataExt};
     let _ = fs::DirBuilder::new().recursive(true).mode(0o700).create(directory);
     // The owner of what this process shows of itself, where the system has that, is this user.
@@ -54,6 +54,7 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn a_directory_that_others_can_write_to_is_not_used() {
+        use std::fs;
         use std::os::unix::fs::PermissionsExt;
         let directory = env::temp_dir().join(format!("sevenbot-private-{}", process::id()));
         assert!(is_private(&directory));
