@@ -85,6 +85,7 @@ impl FrameSession {
 
     /// States whether the bytes that the hub has not got yet are those of a client that is gone: then its writes are carried out, but
     /// nobody waits for replies.
+    #[cfg(target_os = "linux")] // For pseudo-terminals.
     pub(super) const fn set_drops_reads(&mut self, are_of_the_one_before: bool) {
         self.client.set_drops_reads(are_of_the_one_before);
     }
