@@ -97,7 +97,7 @@ pub(super) fn packages_are_flawless(release: &Release) -> TaskResult {
 pub(super) fn wheels(release: &Release) -> TaskResult {
     let name = wheels::wheel(release, host_platform()?);
     let wheel = release.path(&name);
-    let root = BareRoot::with(&[wheel.clone()])?;
+    let root = BareRoot::with(std::slice::from_ref(&wheel))?;
     root.run(&format!("python3 -m venv v\nv/bin/pip install --quiet --no-index /release/{name}\nv/bin/python -c \"{FIRST_PROGRAM}\""))?;
     interpreters().iter().try_for_each(|(_, program)| try_wheel(program, &wheel))
 }
