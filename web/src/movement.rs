@@ -21,7 +21,7 @@ use sevenbot::sharing::{self, Sharing};
 use sevenbot::stream::{StreamOptions, WatchdogAction};
 use sevenbot::{FineAngle, Health, Joint, Snapshot};
 
-use confirmed::{Confirmed, write_all};
+use confirmed::{Confirmed, NotTaken, write_all};
 
 use crate::arm_state::has_extended_block;
 use crate::client::{BAUD, Client};
@@ -112,6 +112,12 @@ pub enum PlayFailure {
     NotReached(Vec<(Joint, u8, u8)>),
     /// Another program has stopped the arm.
     StoppedByAnother,
+}
+
+impl From<NotTaken> for PlayFailure {
+    fn from(_: NotTaken) -> Self {
+        Self::NotTaken
+    }
 }
 
 /// A stop of another program, before a person wanted this movement, does not concern it.

@@ -29,6 +29,7 @@ use std::num::NonZeroUsize;
 use std::time::Duration;
 
 use arm_sim::{Simulation, SimulationConfig};
+use protocol_core::registers::JOINTS;
 use protocol_core::time;
 
 use crate::fine_angle::FineAngle;
@@ -36,6 +37,7 @@ use crate::fine_angle::FineAngle;
 mod observation;
 mod one_arm;
 mod outside;
+mod step_error;
 #[cfg(test)]
 mod tests;
 mod threads;
@@ -43,53 +45,13 @@ mod threads;
 pub use observation::{AGE, BLOCKED, LOADS, Number, POSITIONS, TIP, VELOCITIES, WIDTH};
 use one_arm::SteppedArm;
 pub use outside::{DRIVES, MEASURED, SET_POINTS, SET_VELOCITIES, WANTED};
+pub use step_error::StepError;
 use threads::share;
 
-/// Joints of an arm.
-const JOINTS: usize = 7;
 /// Arms that a thread takes at a time: the work of some 100 microseconds, so that taking them costs nothing.
 const GROUP: usize = 16;
 /// After power-up the servos start, and the joints are measured.
 const START: time::Duration = time::Duration::from_millis(1_000);
-
-/// Why the arms did not step. No time has passed for any of them.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum StepError {
-    /// A target is out of range or not a number.
-    #[error("arm {arm}, joint {joint}: {degrees} is out of range: use 0 to 180 degrees")]
-    Target {
-        /// The number of the arm, from 0.
-        arm: usize,
-        /// The number of the joint, from 1.
-        joint: usize,
-        /// The target.
-        degrees: f64,
-    },
-    /// A measurement of another simulation is not a number, or far too large.
-    #[error("arm {arm}, joint {joint}: a measurement of {value} is out of range")]
-    Measured {
-        /// The number of the arm, from 0.
-        arm: usize,
-        /// The number of the joint, from 1.
-        joint: usize,
-        /// The measurement.
-        value: f64,
-    },
-    /// The time of an exchange.
-    #[error("an exchange for {} s: use 0.001 to 1 s in whole milliseconds", .0.as_secs_f64())]
-    ExchangeTime(Duration),
-    /// The time of a step.
-    #[error("a step of {} s: use 0.005 to 1 s in whole milliseconds", .0.as_secs_f64())]
-    Time(Duration),
-    /// A slice of another length than that of all arms.
-    #[error("{given} numbers: {wanted} are needed")]
-    Length {
-        /// The length of the slice.
-        given: usize,
-        /// What the arms need.
-        wanted: usize,
-    },
-}
 
 /// Arms that step together.
 #[derive(Clone, Debug)]

@@ -5,10 +5,11 @@ use std::ops::Range;
 use arm_sim::plant::OutsideState;
 use arm_sim::{Joint, Simulation};
 use motion_core::servo_bus::Torque;
+use protocol_core::registers::JOINTS;
 use protocol_core::time::Duration;
 
 use super::observation::Number;
-use super::{JOINTS, StepError};
+use super::step_error::StepError;
 
 /// The numbers of a measurement: seven positions in degrees, seven velocities in degrees per second, seven loads in percent of
 /// the stall torque, as in an observation. A joint whose position is NaN is moved by the simulation here.

@@ -2,11 +2,14 @@
 
 use protocol_core::time::Instant;
 
-use super::PlayFailure;
 use crate::client::Client;
 
 /// Registers are written this many times before their loss is an error.
 const ATTEMPTS: u32 = 5;
+
+/// The arm did not take the frames, however often they were written.
+#[derive(Debug)]
+pub(super) struct NotTaken;
 
 /// Frames that are written again until registers that were read afterwards hold their values.
 #[derive(Debug)]
@@ -24,7 +27,7 @@ impl Confirmed {
     }
 
     /// Has the arm taken them? `Ok(false)`: not known yet.
-    pub(super) fn poll(&mut self, now: Instant, client: &mut Client) -> Result<bool, PlayFailure> {
+    pub(super) fn poll(&mut self, now: Instant, client: &mut Client) -> Result<bool, NotTaken> {
         if !client.was_read_since(self.written) {
             return Ok(false);
         }
@@ -36,7 +39,7 @@ impl Confirmed {
             return Ok(true);
         }
         if self.attempts >= ATTEMPTS {
-            return Err(PlayFailure::NotTaken);
+            return Err(NotTaken);
         }
         let attempts = self.attempts + 1;
         *self = Self { attempts, ..Self::write(std::mem::take(&mut self.frames), now, client) };

@@ -9,35 +9,35 @@ use crate::server::readiness::Readiness;
 
 /// An open port.
 #[derive(Debug)]
-pub(in crate::server) struct ArmSerial {
+pub(crate) struct ArmSerial {
     port: Serial,
     readiness: Readiness,
 }
 
 impl ArmSerial {
-    pub(in crate::server) fn open(path: &Path, baud: u32) -> io::Result<Self> {
+    pub(crate) fn open(path: &Path, baud: u32) -> io::Result<Self> {
         let port = Serial::open(path, baud).map_err(io::Error::other)?;
         let readiness = Readiness::of(&port)?;
         Ok(Self { port, readiness })
     }
 
     /// Reads bytes that have arrived. Fewer than asked for: there are no more.
-    pub(in crate::server) fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
+    pub(crate) fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
         self.port.read(bytes)
     }
 
     /// Sends bytes. Returns how many were accepted.
-    pub(in crate::server) fn write(&self, bytes: &[u8]) -> io::Result<usize> {
+    pub(crate) fn write(&self, bytes: &[u8]) -> io::Result<usize> {
         self.port.write(bytes)
     }
 
     /// Ends when there is something to read, or an error.
-    pub(in crate::server) async fn readable(&self) -> io::Result<()> {
+    pub(crate) async fn readable(&self) -> io::Result<()> {
         self.readiness.readable().await
     }
 
     /// Ends when the port takes bytes.
-    pub(in crate::server) async fn writable(&self) -> io::Result<()> {
+    pub(crate) async fn writable(&self) -> io::Result<()> {
         self.readiness.writable().await
     }
 }

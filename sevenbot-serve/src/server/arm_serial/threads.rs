@@ -26,7 +26,7 @@ const PIECE: usize = 256;
 
 /// An open port. Dropping it ends its thread.
 #[derive(Debug)]
-pub(in crate::server) struct ArmSerial(Arc<PortState>);
+pub(crate) struct ArmSerial(Arc<PortState>);
 
 /// What the thread and the server share.
 #[derive(Debug, Default)]
@@ -50,7 +50,7 @@ struct Boxes {
 }
 
 impl ArmSerial {
-    pub(in crate::server) fn open(path: &Path, baud: u32) -> io::Result<Self> {
+    pub(crate) fn open(path: &Path, baud: u32) -> io::Result<Self> {
         let mut port = serialport::new(path.to_string_lossy(), baud).timeout(READ_TIMEOUT).open()?;
         let state = Arc::new(PortState::default());
         let of_thread = Arc::clone(&state);
@@ -65,7 +65,7 @@ impl ArmSerial {
     }
 
     /// Reads bytes that have arrived. Fewer than asked for: there are no more.
-    pub(in crate::server) fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
+    pub(crate) fn read(&self, bytes: &mut [u8]) -> io::Result<usize> {
         let mut boxes = lock(&self.0.boxes);
         if let (true, Some(failure)) = (boxes.inbox.is_empty(), boxes.failure) {
             return Err(failure.into());
@@ -76,7 +76,7 @@ impl ArmSerial {
     }
 
     /// Sends bytes. Returns how many were accepted.
-    pub(in crate::server) fn write(&self, bytes: &[u8]) -> io::Result<usize> {
+    pub(crate) fn write(&self, bytes: &[u8]) -> io::Result<usize> {
         let mut boxes = lock(&self.0.boxes);
         if let Some(failure) = boxes.failure {
             return Err(failure.into());
@@ -87,13 +87,13 @@ impl ArmSerial {
     }
 
     /// Ends when there is something to read, or an error.
-    pub(in crate::server) async fn readable(&self) -> io::Result<()> {
+    pub(crate) async fn readable(&self) -> io::Result<()> {
         self.0.arrived.notified().await;
         Ok(())
     }
 
     /// Ends when the port takes bytes.
-    pub(in crate::server) async fn writable(&self) -> io::Result<()> {
+    pub(crate) async fn writable(&self) -> io::Result<()> {
         self.0.written.notified().await;
         Ok(())
     }
@@ -147,7 +147,7 @@ mod tests {
     async fn receive(port: &ArmSerial, count: usize) -> io::Result<Vec<u8>> {
         let mut received = Vec::new();
         while received.len() < count {
-            tokio::time::timeout(TIMEOUT, port.readable()).await.expect("bytes in time")?;
+            tokio::time::timeout(TIMEOUT, port.readable()).await??;
             let mut bytes = [0; 64];
             let count = port.read(&mut bytes)?;
             received.extend(bytes.iter().take(count));
