@@ -54,7 +54,6 @@ mod tests {
 
     #[test]
     fn a_directory_that_others_can_write_to_is_not_used() {
-        use std::fs;
         use std::os::unix::fs::PermissionsExt;
         let directory = env::temp_dir().join(format!("sevenbot-private-{}", process::id()));
         assert!(is_private(&directory));
