@@ -18,8 +18,9 @@ use crate::session::{Session, running_simulators};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sets the targets to the measured positions, reads them back, and repeats the
-write if necessary. A joint that has reached its target keeps it. Then watches for half a second whether the joints hold.
-Writes nothing if the motors are off (state 0 or 2).
+write if necessary. A joint that has reached its target keeps it. Then watches
+for half a second whether the joints hold. Writes nothing if the motors are off
+(state 0 or 2).
 
 If `sevenbot serve` of the same user holds the port, the stop goes through it,
 before everything else. It ends what other programs stream until they pause for
