@@ -10,7 +10,7 @@
 //! ```
 //!
 //! It reads no clock and opens no port: time and bytes are arguments. The blocking library, the hub of `sevenbot serve` and
-//! the page in a browser are shells round it. It does not know what the registers mean.
+//! the page in a browser are shells round it. It does not know what the registers of the arm mean; [`sharing`] has those of a server.
 //!
 //! ```
 //! use host_link::{HostEvent, HostLink, LinkOptions, Patience, Span};
@@ -40,6 +40,7 @@ mod line_time;
 mod link;
 mod open_reads;
 mod pending_reads;
+pub mod sharing;
 mod snapshot;
 mod span;
 

@@ -66,7 +66,6 @@ pub mod register_values;
 mod reports;
 #[cfg(feature = "serial")]
 pub mod servo_bench;
-pub mod sharing;
 pub mod simulated;
 pub mod simulated_arms;
 pub mod status_block;

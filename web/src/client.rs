@@ -10,11 +10,10 @@
 
 use std::collections::VecDeque;
 
-use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId};
+use host_link::{HostEvent, HostLink, LinkOptions, Patience, RequestId, sharing};
 use protocol_core::registers::Map;
 use protocol_core::time::{Duration, Instant};
 use sevenbot::map::{DEVICE_CODE, FINE_TARGET, PRESENT_POSITION, PROTECTION_VERSION, SERVO_TEMPERATURE};
-use sevenbot::sharing;
 use sevenbot::traffic::Traffic;
 use sevenbot::{Snapshot, Span};
 

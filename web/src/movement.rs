@@ -9,6 +9,7 @@ mod confirmed;
 
 use std::time::Duration;
 
+use host_link::sharing::{Command, SharingState};
 use protocol_core::time::Instant;
 use sevenbot::approach::{Approach, ApproachRule, Standing, StartTooFar};
 use sevenbot::health::{MoveFault, MoveWatch};
@@ -17,7 +18,6 @@ use sevenbot::movement_run::{MovementRun, RunStep};
 use sevenbot::playback;
 use sevenbot::point_path::PointPath;
 use sevenbot::recording::{FileVersion, Moment, Recording, RecordingError, RecordingLines};
-use sevenbot::sharing::{self, Sharing};
 use sevenbot::stream::{StreamOptions, WatchdogAction};
 use sevenbot::{FineAngle, Health, Joint, Snapshot};
 
@@ -122,8 +122,8 @@ impl From<NotTaken> for PlayFailure {
 
 /// A stop of another program, before a person wanted this movement, does not concern it.
 fn start_anew(now: Instant, client: &mut Client) {
-    if Sharing::of(client.registers()).is_some() {
-        let (address, values) = sharing::START_ANEW;
+    if SharingState::of(client.registers()).is_some() {
+        let (address, values) = Command::StartAnew.write();
         client.write(now, address, &values);
     }
 }
@@ -272,7 +272,7 @@ impl Player {
     fn watch(&mut self, now: Instant, client: &Client) -> Result<(), PlayFailure> {
         if client.rounds() != self.watched_round {
             self.watched_round = client.rounds();
-            let sharing = Sharing::of(client.registers());
+            let sharing = SharingState::of(client.registers());
             if sharing.is_some_and(|sharing| sharing.is_stopped) {
                 return Err(PlayFailure::StoppedByAnother);
             }

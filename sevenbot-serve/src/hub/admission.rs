@@ -1,5 +1,6 @@
 //! What becomes of a request: queued, dropped, or a stop, which ends what waits and what the others stream.
 
+use host_link::sharing::Command;
 use protocol_core::time::Instant;
 
 use super::client::{LONGEST_WAIT, MOST_WAITING, Waiting};
@@ -7,7 +8,6 @@ use super::client_id::ClientId;
 use super::drive::MayNotMove;
 use super::intent::Intent;
 use super::request::WholeRequest;
-use super::sharing_block::Command;
 use super::{ArmState, Hub};
 
 /// What becomes of a request.

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use host_link::sharing::Command;
 use protocol_core::registers::Map;
 use protocol_core::time::{Duration, Instant};
 
@@ -13,7 +14,6 @@ use super::readings::Readings;
 use super::request::WholeRequest;
 use super::schedule::Schedule;
 use super::shares::Share;
-use super::sharing_block::Command;
 use super::stream::Stream;
 
 /// Requests of one client that may wait. The maker's arm has the same limit for its WebSocket.

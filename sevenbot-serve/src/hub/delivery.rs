@@ -1,5 +1,6 @@
 //! From the line to the clients: each reply to the client that asked, with the registers that are not the arm's.
 
+use host_link::sharing::{self, DrivenBy, SharingState};
 use protocol_core::registers::map::{FAULTS, fault};
 use protocol_core::time::Instant;
 
@@ -8,7 +9,6 @@ use super::client::{Client, Event};
 use super::client_id::ClientId;
 use super::line::Owner;
 use super::request::WholeRequest;
-use super::sharing_block::{self, DrivenBy, SharingState};
 
 impl Hub {
     pub(super) fn deliver(&mut self, now: Instant, owner: Owner, event: Event) {
@@ -53,7 +53,7 @@ impl Hub {
     pub(super) fn own_reply(&self, now: Instant, id: ClientId, request: &WholeRequest) -> Option<Event> {
         let &WholeRequest::Read { address, count } = request else { return None };
         let client = self.clients.get(&id).filter(|client| client.can_receive)?;
-        sharing_block::is_own(address, count).then(|| {
+        sharing::is_own(address, count).then(|| {
             let mut values = vec![0; count.into()];
             self.sharing_state(now, id, client).overlay(address, &mut values);
             Event::Reply { address, values }

@@ -30,7 +30,6 @@ mod sampler;
 mod schedule;
 mod sending;
 mod shares;
-mod sharing_block;
 mod stream;
 mod watchdog;
 

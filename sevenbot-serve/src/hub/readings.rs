@@ -4,6 +4,7 @@
 
 use std::collections::VecDeque;
 
+use host_link::sharing::DROOP;
 use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, PRESENT_POSITION, TARGET_POSITION};
 use protocol_core::registers::{Joint, Register};
 use protocol_core::time::{Duration, Instant};
@@ -12,8 +13,6 @@ use protocol_core::time::{Duration, Instant};
 const KEPT: usize = 8;
 /// Older readings tell nothing about where the arm is.
 const FRESH: Duration = Duration::from_millis(1_000);
-/// The weight draws a joint so far off its target at most, in hundredths of a degree.
-const DROOP: u16 = 150;
 /// The value of a fine position that was not measured.
 const UNMEASURED: [u8; 2] = [0xFF; 2];
 

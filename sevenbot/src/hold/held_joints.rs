@@ -10,11 +10,8 @@ use crate::fine::{KNOWN_LAYOUT, fine_frames};
 use crate::fine_angle::FineAngle;
 use crate::joints::{JointSnapshot, frames_for};
 use crate::status_block::StatusBlock;
+use host_link::sharing::DROOP;
 use host_link::{Snapshot, Span};
-
-/// The weight draws a joint that has reached its target so far off it at most, in hundredths of a degree. What draws it further is
-/// an obstacle, and the joint is held where it is.
-const DROOP: u16 = 150;
 
 /// A target that was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

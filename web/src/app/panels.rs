@@ -1,8 +1,8 @@
 //! What the page shows beside the picture of the arm.
 
+use host_link::sharing::{DrivenBy, SharingState};
 use kinematics::forward;
 use sevenbot::map::{EXTENDED_VERSION, SERVO_TEMPERATURE};
-use sevenbot::sharing::Sharing;
 use sevenbot::{Span, register_text};
 use wasm_bindgen::JsValue;
 use web_sys::{Element, HtmlInputElement};
@@ -92,7 +92,8 @@ fn show_nothing_known(dom: &Dom, language: Language) {
 /// Supply and temperature, as far as they are known, and who else moves the arm.
 fn health(app: &App, state: &ArmState) -> String {
     let language = app.language;
-    let is_driven = Sharing::of(app.client.registers()).is_some_and(|sharing| sharing.another_drives);
+    let sharing = SharingState::of(app.client.registers());
+    let is_driven = sharing.is_some_and(|sharing| sharing.driven_by == DrivenBy::Another);
     let another = is_driven.then(|| language.text("another-drives").to_owned());
     let volts = state.volts.map(|volts| format!("{} {volts:.1} V", language.text("supply")));
     let celsius = state.celsius.map(|celsius| format!("{} {celsius} °C", language.text("temperature")));
