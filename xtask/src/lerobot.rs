@@ -5,8 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::python::{copy_of, folder, pip, run, wheel, works};
-use crate::run::{TaskResult, build_host_sim, build_image, root};
+use crate::python::{copy_of, folder, wheel};
+use crate::run::{TaskResult, build_host_sim, build_image, root, run_command};
+use crate::venv::{self, pip};
 
 /// LeRobot without what it depends on: some gigabytes, of which its base classes need little.
 const LEROBOT: &str = "lerobot==0.6.1";
@@ -27,14 +28,14 @@ const VERSION: &str = "import sys; assert sys.version_info >= (3, 12)";
 /// Types and behaviour of the plugin, with the base classes of LeRobot.
 pub(crate) fn check() -> TaskResult {
     let python = environment("lerobot-base")?;
-    run(pip(&python).args(["--no-deps", LEROBOT]))?;
-    run(pip(&python).args(BASE_PACKAGES).args(TEST_PACKAGES))?;
+    run_command(pip(&python).args(["--no-deps", LEROBOT]))?;
+    run_command(pip(&python).args(BASE_PACKAGES).args(TEST_PACKAGES))?;
     install_plugin(&python)?;
     let [tests, commands] = ["tests", "command_tests"].map(|name| plugin().join(name));
     mypy(&python, &["-p".as_ref(), "lerobot_robot_sevenbot".as_ref()])?;
     mypy(&python, &[&tests])?;
     mypy(&python, &[&commands])?;
-    run(&mut pytest(&python, &tests))
+    run_command(&mut pytest(&python, &tests))
 }
 
 /// LeRobot's own commands with the plugin. Installs all of LeRobot at the first time.
@@ -43,14 +44,14 @@ pub(crate) fn commands() -> TaskResult {
     if !python.with_file_name("lerobot-record").exists() {
         need_disk()?;
     }
-    run(pip(&python).arg("--no-cache-dir").args([WHOLE]).args(TEST_PACKAGES))?;
+    run_command(pip(&python).arg("--no-cache-dir").args([WHOLE]).args(TEST_PACKAGES))?;
     install_plugin(&python)?;
-    run(&mut pytest(&python, &plugin().join("tests")))?;
+    run_command(&mut pytest(&python, &plugin().join("tests")))?;
     emulator::need_qemu()?;
     build_image()?;
     build_host_sim()?;
     // The tests start the emulator: `cargo xtask emulate`.
-    run(pytest(&python, &plugin().join("command_tests")).env("XTASK", env::current_exe()?))
+    run_command(pytest(&python, &plugin().join("command_tests")).env("XTASK", env::current_exe()?))
 }
 
 fn plugin() -> PathBuf {
@@ -59,12 +60,7 @@ fn plugin() -> PathBuf {
 
 /// An environment of its own, which is kept for the next run.
 fn environment(name: &str) -> TaskResult<PathBuf> {
-    let folder = folder().join(name);
-    let python = folder.join("bin/python");
-    if !works(&python) {
-        run(Command::new(interpreter()?).args(["-m", "venv", "--clear"]).arg(&folder))?;
-    }
-    Ok(python)
+    venv::with_packages(&folder().join(name), interpreter, &[])
 }
 
 /// A Python that LeRobot accepts: on PATH, or one that pyenv has installed.
@@ -108,7 +104,7 @@ fn need_disk() -> TaskResult {
 fn install_plugin(python: &Path) -> TaskResult {
     let copy = folder().join("lerobot-plugin");
     copy_of(&plugin(), &copy)?;
-    run(pip(python).args(["--force-reinstall", "--no-deps"]).arg(wheel()?).arg(&copy))
+    run_command(pip(python).args(["--force-reinstall", "--no-deps"]).arg(wheel()?).arg(&copy))
 }
 
 fn module(python: &Path, name: &str) -> Command {
@@ -120,7 +116,7 @@ fn module(python: &Path, name: &str) -> Command {
 
 fn mypy(python: &Path, what: &[&Path]) -> TaskResult {
     let config = plugin().join("pyproject.toml");
-    run(module(python, "mypy").args(["--strict", "--config-file"]).arg(config).args(what))
+    run_command(module(python, "mypy").args(["--strict", "--config-file"]).arg(config).args(what))
 }
 
 fn pytest(python: &Path, tests: &Path) -> Command {

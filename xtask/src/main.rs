@@ -36,6 +36,7 @@ mod test;
 mod times;
 mod torture;
 mod trials;
+mod venv;
 mod web;
 mod workspace;
 

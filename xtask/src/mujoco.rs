@@ -8,7 +8,8 @@ use std::process::Command;
 use kinematics::limits::check_arm;
 use kinematics::{Vector, forward};
 
-use crate::run::{TaskResult, root};
+use crate::run::{TaskResult, root, run_command};
+use crate::venv;
 
 /// The version that is installed from PyPI.
 const PACKAGE: &str = "mujoco==3.3.7";
@@ -20,23 +21,12 @@ const SCRIPT: &str = include_str!("mujoco.py");
 /// Installs MuJoCo into an environment of its own, and compares many poses. Fails above 0.01 mm.
 pub(crate) fn check() -> TaskResult {
     let folder = root().join("target/mujoco");
-    let python = folder.join("bin/python");
-    if !python.exists() {
-        run(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
-    }
-    run(Command::new(&python).args([
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--disable-pip-version-check",
-        PACKAGE,
-    ]))?;
+    let python = venv::with_packages(&folder, || Ok("python3".into()), &[PACKAGE])?;
     let [script, model, poses] = ["compare.py", "7bot.xml", "poses.txt"].map(|name| folder.join(name));
     fs::write(&script, SCRIPT)?;
     fs::write(&model, arm_model::mjcf()?)?;
     write_poses(&poses)?;
-    run(Command::new(&python).args([&script, &model, &poses]))
+    run_command(Command::new(&python).args([&script, &model, &poses]))
 }
 
 fn write_poses(path: &Path) -> TaskResult {
@@ -64,9 +54,4 @@ fn line(degrees: [f64; 6]) -> String {
 /// From millimetres with x to the right and y forward to metres with x forward and y to the left.
 fn rep_103(point: Vector<f64>) -> [f64; 3] {
     [point.y, -point.x, point.z].map(|number| number / 1000.0)
-}
-
-fn run(command: &mut Command) -> TaskResult {
-    let status = command.status().map_err(|why| format!("cannot start {command:?}: {why}"))?;
-    if status.success() { Ok(()) } else { Err(format!("{command:?} failed").into()) }
 }

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::run::{TaskResult, root, target_directory};
+use crate::run::{TaskResult, root, run_command, target_directory};
+use crate::venv::{self, pip};
 
 /// The packages from PyPI, at versions that were tried. gymnasium, mujoco and numpy are optional for users, but have tests;
 /// mcap and rosbags read what the package writes.
@@ -43,9 +44,9 @@ pub(crate) fn ray() -> TaskResult {
     let (version, program) = first_interpreter()?;
     let python = environment(&version, program)?;
     let wheel = build_wheel(&python)?;
-    run(pip(&python).arg(RAY))?;
-    run(pip(&python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
-    run(&mut pytest(&python, "python/tests/test_ray.py"))
+    run_command(pip(&python).arg(RAY))?;
+    run_command(pip(&python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
+    run_command(&mut pytest(&python, "python/tests/test_ray.py"))
 }
 
 /// Builds the wheel with the first interpreter on PATH.
@@ -77,29 +78,9 @@ pub(crate) fn folder() -> PathBuf {
     target_directory().join("python")
 }
 
-/// A virtual environment with the packages. It is kept for the next run.
+/// The environment of a version.
 fn environment(version: &str, program: &str) -> TaskResult<PathBuf> {
-    let folder = folder().join(version);
-    let python = folder.join("bin/python");
-    if !works(&python) {
-        run(Command::new(program).args(["-m", "venv", "--clear"]).arg(&folder))?;
-    }
-    run(pip(&python).args(PACKAGES))?;
-    Ok(python)
-}
-
-/// Is this the Python of an environment with pip?
-pub(crate) fn works(python: &Path) -> bool {
-    let mut pip = Command::new(python);
-    pip.args(["-m", "pip", "--version"]).stdout(Stdio::null()).stderr(Stdio::null());
-    pip.status().is_ok_and(|status| status.success())
-}
-
-/// `pip install`.
-pub(crate) fn pip(python: &Path) -> Command {
-    let mut command = Command::new(python);
-    command.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
-    command
+    venv::with_packages(&folder().join(version), || Ok(program.into()), &PACKAGES)
 }
 
 /// The profile is that of the other tests, which builds quickly.
@@ -110,7 +91,7 @@ fn build_wheel(python: &Path) -> TaskResult<PathBuf> {
     }
     let mut maturin = Command::new(python);
     maturin.args(["-m", "maturin", "build", "--quiet", "--profile", "dev", "--manifest-path"]);
-    run(maturin.arg(root().join("python/Cargo.toml")).arg("--out").arg(&wheels))?;
+    run_command(maturin.arg(root().join("python/Cargo.toml")).arg("--out").arg(&wheels))?;
     let wheel = fs::read_dir(&wheels)?.next().ok_or("maturin built no wheel")??;
     Ok(wheel.path())
 }
@@ -118,17 +99,17 @@ fn build_wheel(python: &Path) -> TaskResult<PathBuf> {
 /// Types and behaviour of the installed package. The folder of the sources is not the current one, so that it is not
 /// imported.
 fn test(python: &Path, wheel: &Path) -> TaskResult {
-    run(pip(python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
+    run_command(pip(python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
     let module = |words: &[&str]| {
         let mut command = Command::new(python);
         command.arg("-m").args(words).current_dir(folder());
         command
     };
     let [config, tests] = ["python/pyproject.toml", "python/tests"].map(|path| root().join(path));
-    run(module(&["mypy", "--strict", "--config-file"]).arg(&config).args(["-p", "sevenbot"]))?;
-    run(module(&["mypy", "--strict", "--config-file"]).arg(&config).arg(&tests))?;
-    run(&mut module(&["mypy.stubtest", "sevenbot"]))?;
-    run(&mut pytest(python, "python/tests"))
+    run_command(module(&["mypy", "--strict", "--config-file"]).arg(&config).args(["-p", "sevenbot"]))?;
+    run_command(module(&["mypy", "--strict", "--config-file"]).arg(&config).arg(&tests))?;
+    run_command(&mut module(&["mypy.stubtest", "sevenbot"]))?;
+    run_command(&mut pytest(python, "python/tests"))
 }
 
 /// pytest, with the programs of the step that built all of them.
@@ -145,11 +126,5 @@ pub(crate) fn copy_of(package: &Path, copy: &Path) -> TaskResult {
     if copy.exists() {
         fs::remove_dir_all(copy)?;
     }
-    run(Command::new("cp").arg("-r").arg(package).arg(copy))
-}
-
-/// Runs a program, and waits for its end.
-pub(crate) fn run(command: &mut Command) -> TaskResult {
-    let status = command.status().map_err(|why| format!("cannot start {command:?}: {why}"))?;
-    if status.success() { Ok(()) } else { Err(format!("{command:?} failed").into()) }
+    run_command(Command::new("cp").arg("-r").arg(package).arg(copy))
 }

@@ -1,12 +1,14 @@
 //! The ROS packages: installed with ROS 2 from PyPI into an environment of their own, and tested in a network of their own.
 
 use std::env;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::python::{copy_of, pip, run, wheel, works};
-use crate::run::{TESTED, TaskResult, build_host_sim, build_image, cargo, root, target_directory};
+use crate::python::{copy_of, wheel};
+use crate::run::{
+    TESTED, TaskResult, build_host_sim, build_image, cargo, root, run_command, target_directory,
+};
+use crate::venv::{self, pip};
 
 /// The packages from PyPI, at versions that were tried.
 const PACKAGES: [&str; 15] = [
@@ -37,12 +39,12 @@ const NETWORK: &str = "ip link set lo up && exec \"$@\"";
 
 /// Installs and tests the packages.
 pub(crate) fn check() -> TaskResult {
-    let python = environment()?;
+    let python = venv::with_packages(&folder().join("venv"), interpreter, &PACKAGES)?;
     let wheel = wheel()?;
     // Its name is another one, so that it is not imported.
     let package = folder().join("package");
     copy_of(&root().join("ros/sevenbot_ros"), &package)?;
-    run(pip(&python).args(["--force-reinstall", "--no-deps"]).args([&wheel, &package]))?;
+    run_command(pip(&python).args(["--force-reinstall", "--no-deps"]).args([&wheel, &package]))?;
     check_types(&python)?;
     build_host_sim()?;
     cargo(&format!("build --quiet {TESTED} --bin sevenbot"))?;
@@ -54,33 +56,20 @@ fn folder() -> PathBuf {
     target_directory().join("ros")
 }
 
-/// A virtual environment with the packages. It is kept for the next run, unless the list of packages changed.
-fn environment() -> TaskResult<PathBuf> {
-    let (python, installed) = (folder().join("venv/bin/python"), folder().join("packages.txt"));
-    let packages = PACKAGES.join("\n");
-    if fs::read_to_string(&installed).is_ok_and(|text| text == packages) && works(&python) {
-        return Ok(python);
-    }
-    let program = interpreter().ok_or("ROS 2 needs Python 3.10, 3.11, 3.12 or 3.13 on PATH")?;
-    run(Command::new(program).args(["-m", "venv", "--clear"]).arg(folder().join("venv")))?;
-    run(pip(&python).args(PACKAGES))?;
-    fs::write(installed, packages)?;
-    Ok(python)
-}
-
-fn interpreter() -> Option<&'static str> {
-    INTERPRETERS.into_iter().find(|program| {
+fn interpreter() -> TaskResult<PathBuf> {
+    let found = INTERPRETERS.into_iter().find(|program| {
         let mut command = Command::new(program);
         command.args(["-c", VERSION]).stderr(Stdio::null());
         command.status().is_ok_and(|status| status.success())
-    })
+    });
+    found.map(PathBuf::from).ok_or_else(|| "ROS 2 needs Python 3.10, 3.11, 3.12 or 3.13 on PATH".into())
 }
 
 /// The types of the installed package.
 fn check_types(python: &Path) -> TaskResult {
     let mut command = Command::new(python);
     command.args(["-m", "mypy", "--config-file"]).arg(root().join("ros/mypy.ini"));
-    run(command.args(["-p", "sevenbot_ros"]).current_dir(folder()))
+    run_command(command.args(["-p", "sevenbot_ros"]).current_dir(folder()))
 }
 
 /// The tests, in a network with only the loopback interface.
@@ -96,5 +85,5 @@ fn test(python: &Path) -> TaskResult {
         .env("ROS_LOG_DIR", folder().join("log"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .current_dir(folder());
-    run(&mut command)
+    run_command(&mut command)
 }

@@ -30,6 +30,12 @@ pub(crate) fn run(program: &str, words: &str, variables: &[(&str, &str)]) -> Tas
     if status.success() { Ok(()) } else { Err(format!("`{program} {words}` failed").into()) }
 }
 
+/// Runs a program, and waits for its end.
+pub(crate) fn run_command(command: &mut Command) -> TaskResult {
+    let status = command.status().map_err(|why| format!("cannot start {command:?}: {why}"))?;
+    if status.success() { Ok(()) } else { Err(format!("{command:?} failed").into()) }
+}
+
 /// The profile of `footprint` for size, and the one for speed.
 pub(crate) const SMALL: &str = "chip";
 pub(crate) const FAST: &str = "chip-fast";

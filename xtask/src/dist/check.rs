@@ -70,11 +70,7 @@ fn check_programs(release: &Release, files: &[(String, Vec<u8>)]) -> TaskResult 
     }
     let text = release.text();
     for (path, bytes) in files {
-        let is_program =
-            ["sevenbot", "sevenbot.exe", "host-sim"].iter().any(|name| path.ends_with(&format!("/{name}")));
-        let is_program = is_program && bytes.get(1..4) == Some(b"ELF")
-            || bytes.starts_with(b"MZ") && path.ends_with("exe");
-        if is_program && !bytes.windows(text.len()).any(|window| window == text.as_bytes()) {
+        if is_program(path, bytes) && !bytes.windows(text.len()).any(|window| window == text.as_bytes()) {
             return Err(format!("{path} is not of version {text}").into());
         }
         if path.ends_with(".dist-info/METADATA") {
@@ -85,6 +81,12 @@ fn check_programs(release: &Release, files: &[(String, Vec<u8>)]) -> TaskResult 
         }
     }
     Ok(())
+}
+
+/// A file of completions has the name of a program, too.
+fn is_program(path: &str, bytes: &[u8]) -> bool {
+    let is_named = ["/sevenbot", "/sevenbot.exe", "/host-sim"].iter().any(|name| path.ends_with(name));
+    is_named && (bytes.starts_with(b"\x7FELF") || bytes.starts_with(b"MZ"))
 }
 
 fn check_deb(release: &Release, name: &str) -> TaskResult {

@@ -3,7 +3,7 @@
 use crate::run::{TaskResult, cargo};
 
 /// The libraries. A registry gets those first on which others stand.
-const LIBRARIES: [&str; 9] = [
+const LIBRARIES: [&str; 10] = [
     "kinematics",
     "protocol-core",
     "motion-core",
@@ -12,6 +12,7 @@ const LIBRARIES: [&str; 9] = [
     "arm-model",
     "tty-ports",
     "sevenbot",
+    "recording-formats",
     "sevenbot-serve",
 ];
 

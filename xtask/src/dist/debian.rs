@@ -9,8 +9,7 @@ use super::archive::{PackedFile, gzip};
 use super::platform::{Platform, build_directory};
 use super::release::Release;
 use super::tree::DOC;
-use crate::python::run;
-use crate::run::TaskResult;
+use crate::run::{TaskResult, run_command};
 
 /// Who answers for the package, unless the variables of Debian's tools name somebody.
 const MAINTAINER: &str = "7Bot V2 firmware developers <sevenbot@example.org>";
@@ -56,7 +55,7 @@ pub(super) fn write(release: &Release, platform: Platform, files: &[PackedFile])
     dpkg.args(["--root-owner-group", "--build", compressor])
         .arg(&folder)
         .arg(release.path(&name(release, debian)));
-    run(dpkg.env("SOURCE_DATE_EPOCH", release.epoch.to_string()).stdout(std::process::Stdio::null()))
+    run_command(dpkg.env("SOURCE_DATE_EPOCH", release.epoch.to_string()).stdout(std::process::Stdio::null()))
 }
 
 /// The files as Debian's policy wants them: below /usr, manual pages and changes compressed, one file with the copyright.

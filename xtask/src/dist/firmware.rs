@@ -17,8 +17,7 @@ use torture::text_table::TextTable;
 use super::dfu;
 use super::platform::{build_directory, reproducible};
 use super::release::Release;
-use crate::python::run;
-use crate::run::{CHIP, TaskResult, root};
+use crate::run::{CHIP, TaskResult, root, run_command};
 
 /// Bytes of flash that are erased have this value.
 const ERASED: u8 = 0xFF;
@@ -66,7 +65,7 @@ fn build(release: &Release, program: &str, flags: &str) -> TaskResult {
     cargo.args(["rustc", "--quiet", "--locked", "--package", "firmware-stm32", "--bin", program]);
     cargo.args(["--target", CHIP, "--profile", "firmware", "--"]).args(flags.split_whitespace());
     reproducible(&mut cargo, release, CHIP)?;
-    run(cargo.current_dir(root()))
+    run_command(cargo.current_dir(root()))
 }
 
 /// All ranges in one, with erased flash between them.

@@ -32,14 +32,15 @@ pub(super) fn make(folder: PathBuf) -> TaskResult {
     }
     let programs =
         built.iter().find(|(platform, _)| *platform == native).ok_or("no programs for this computer")?;
-    let common = CommonFiles::new(&programs.1.join("sevenbot"))?;
+    let licences = licences::text()?;
+    let common = CommonFiles::new(&programs.1.join("sevenbot"), &licences)?;
     for (platform, folder) in &built {
         pack(&release, *platform, folder, &common)?;
     }
     timed("Python packages", || wheels::write(&release))?;
     timed("firmware", || firmware::write(&release))?;
     timed("lists of parts", || sbom::write(&release))?;
-    fs::write(release.path(&licences_name(&release)), licences::text()?)?;
+    fs::write(release.path(&licences_name(&release)), licences)?;
     finish(&release)?;
     check::check(&release.folder, true)
 }
@@ -51,7 +52,7 @@ pub(super) fn make_native() -> TaskResult<PathBuf> {
     let release = Release { commit: None, ..Release::of_this_commit(folder)? };
     empty(&release.folder)?;
     let built = target_directory().join("debug");
-    let common = CommonFiles::new(&built.join("sevenbot"))?;
+    let common = CommonFiles::new(&built.join("sevenbot"), &licences::text()?)?;
     pack(&release, host_platform()?, &built, &common)?;
     finish(&release)?;
     check::check(&release.folder, false)?;

@@ -2,8 +2,7 @@
 
 use super::platform::{WINDOWS, add_target};
 use super::tools;
-use crate::python::run;
-use crate::run::{TaskResult, root};
+use crate::run::{TaskResult, root, run_command};
 
 const SYSTEMS: [&str; 3] = [WINDOWS.triple, "aarch64-apple-darwin", "x86_64-apple-darwin"];
 /// All other crates that run there are dependencies of these.
@@ -16,7 +15,7 @@ pub(crate) fn lint_other_systems() -> TaskResult {
         let mut clippy = tools::cargo_with_zig("clippy")?;
         clippy.args(["--quiet", "--target", system]);
         clippy.args(PACKAGES.iter().flat_map(|package| ["--package", package]));
-        run(clippy.args(["--", "-D", "warnings"]).current_dir(root()))?;
+        run_command(clippy.args(["--", "-D", "warnings"]).current_dir(root()))?;
     }
     Ok(())
 }

@@ -12,8 +12,7 @@ use wasm_bindgen_cli_support::Bindgen;
 use super::archive::{PackedFile, zip};
 use super::platform::{build_directory, reproducible};
 use super::release::Release;
-use crate::python::run;
-use crate::run::{BROWSER, TaskResult, root};
+use crate::run::{BROWSER, TaskResult, root, run_command};
 use crate::web::{self, files};
 
 /// What the page with several files loads, and what the page in one file has instead.
@@ -39,7 +38,7 @@ pub(super) fn file_name(release: &Release) -> String {
 pub(super) fn build(release: &Release) -> TaskResult {
     let mut web = Command::new(env::current_exe()?);
     reproducible(&mut web, release, BROWSER)?;
-    run(web.arg("web"))
+    run_command(web.arg("web"))
 }
 
 /// Writes both forms of the page that was built.

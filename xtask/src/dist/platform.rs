@@ -7,8 +7,7 @@ use std::process::Command;
 
 use super::release::Release;
 use super::tools;
-use crate::python::run;
-use crate::run::{TaskResult, root, target_directory};
+use crate::run::{TaskResult, root, run_command, target_directory};
 
 /// The profile of all programs and modules of a release.
 pub(super) const PROFILE: &str = "dist";
@@ -69,14 +68,14 @@ impl Platform {
         };
         command.args(["--quiet", "--locked", "--profile", PROFILE, "--package", "sevenbot-cli"]);
         reproducible(&mut command, release, self.triple)?;
-        run(command.current_dir(root()))?;
+        run_command(command.current_dir(root()))?;
         Ok(build_directory().join(self.triple).join(PROFILE))
     }
 }
 
 /// Installs the standard library for a system.
 pub(super) fn add_target(triple: &str) -> TaskResult {
-    run(Command::new("rustup").args(["--quiet", "target", "add", triple]).current_dir(root()))
+    run_command(Command::new("rustup").args(["--quiet", "target", "add", triple]).current_dir(root()))
 }
 
 /// The system of this computer.

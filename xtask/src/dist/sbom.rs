@@ -7,8 +7,7 @@ use std::process::{Command, Stdio};
 use super::platform::build_directory;
 use super::release::Release;
 use super::tools;
-use crate::python::run;
-use crate::run::{TaskResult, root};
+use crate::run::{TaskResult, root, run_command};
 
 /// The packages that have a list: their folder, and the name of the list.
 const LISTED: [(&str, &str, &str); 5] = [
@@ -38,7 +37,7 @@ pub(super) fn write(release: &Release) -> TaskResult {
     copy_sources(&copy)?;
     let mut tool = Command::new(tools::cyclonedx()?);
     tool.args(["cyclonedx", "--format", "json", "--spec-version", "1.5", "--all", "--quiet"]);
-    run(tool.env("SOURCE_DATE_EPOCH", release.epoch.to_string()).current_dir(&copy))?;
+    run_command(tool.env("SOURCE_DATE_EPOCH", release.epoch.to_string()).current_dir(&copy))?;
     for (folder, package, stem) in LISTED {
         let list = fs::read_to_string(copy.join(folder).join(format!("{package}.cdx.json")))?;
         let list = list.replace(&copy.display().to_string(), "/sevenbot");
@@ -59,7 +58,7 @@ fn copy_sources(copy: &Path) -> TaskResult {
         .stdout(Stdio::piped());
     let mut pack = pack.spawn()?;
     let packed = pack.stdout.take().ok_or("tar has no output")?;
-    run(Command::new("tar").args(["--extract", "--directory"]).arg(copy).stdin(packed))?;
+    run_command(Command::new("tar").args(["--extract", "--directory"]).arg(copy).stdin(packed))?;
     if list.wait()?.success() && pack.wait()?.success() {
         Ok(())
     } else {

@@ -1,12 +1,12 @@
 //! The tools that make a release, each at the version that was tried. All come from PyPI, crates.io, rustup or Debian.
 
+use std::env;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
-use std::{env, fs};
 
-use crate::python::{pip, run, works};
-use crate::run::{TaskResult, target_directory};
+use crate::run::{TaskResult, run_command, target_directory};
+use crate::venv;
 
 /// From PyPI: the compiler for other systems, what calls it, and what makes wheels.
 const PYTHON_PACKAGES: [&str; 5] =
@@ -21,15 +21,7 @@ fn folder() -> PathBuf {
 
 /// The Python of an environment with the packages.
 pub(super) fn python() -> TaskResult<PathBuf> {
-    let (python, installed) = (folder().join("venv/bin/python"), folder().join("packages.txt"));
-    let packages = PYTHON_PACKAGES.join("\n");
-    if fs::read_to_string(&installed).is_ok_and(|text| text == packages) && works(&python) {
-        return Ok(python);
-    }
-    run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(folder().join("venv")))?;
-    run(pip(&python).args(PYTHON_PACKAGES))?;
-    fs::write(installed, packages)?;
-    Ok(python)
+    venv::with_packages(&folder().join("venv"), || Ok("python3".into()), &PYTHON_PACKAGES)
 }
 
 /// `PATH`, with the programs of the environment first: there zig is found.
@@ -57,7 +49,7 @@ pub(super) fn cyclonedx() -> TaskResult<PathBuf> {
     if !is_installed() {
         let mut cargo = Command::new("cargo");
         cargo.args(["install", "--quiet", "--locked", "--debug", name, "--version", version, "--root"]);
-        run(cargo.arg(folder()).env("CARGO_TARGET_DIR", folder().join("target")))?;
+        run_command(cargo.arg(folder()).env("CARGO_TARGET_DIR", folder().join("target")))?;
     }
     Ok(program)
 }

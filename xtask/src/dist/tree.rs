@@ -17,10 +17,8 @@ use clap_mangen::Man;
 use host_sim::cli::Options;
 
 use super::archive::PackedFile;
-use super::licences;
 use super::platform::{Platform, build_directory, read_program};
-use crate::python::run;
-use crate::run::{TaskResult, root};
+use crate::run::{TaskResult, root, run_command};
 
 /// Gives the arm and its adapter names that stay, and the group `dialout` the right to open them.
 pub(super) const UDEV_RULE: &str = "lib/udev/rules.d/70-sevenbot.rules";
@@ -45,14 +43,14 @@ pub(super) struct CommonFiles {
 }
 
 impl CommonFiles {
-    /// `program`: a `sevenbot` that runs on this computer.
-    pub(super) fn new(program: &Path) -> TaskResult<Self> {
+    /// `program`: a `sevenbot` that runs on this computer. `licences`: those of all parts.
+    pub(super) fn new(program: &Path, licences: &str) -> TaskResult<Self> {
         let mut linux = man_pages(program)?;
         for (shell, path) in COMPLETIONS {
             linux.push(PackedFile::text(path, output(program, &["completions", shell])?));
         }
         linux.push(PackedFile::text(UDEV_RULE, fs::read(root().join("packaging/70-sevenbot.rules"))?));
-        Ok(Self { documents: documents()?, linux })
+        Ok(Self { documents: documents(licences)?, linux })
     }
 }
 
@@ -72,11 +70,9 @@ pub(super) fn files(platform: Platform, built: &Path, common: &CommonFiles) -> T
     Ok(files)
 }
 
-fn documents() -> TaskResult<Vec<PackedFile>> {
-    let mut files = vec![
-        PackedFile::text("README.txt", README),
-        PackedFile::text("THIRD-PARTY-LICENCES.txt", licences::text()?),
-    ];
+fn documents(licences: &str) -> TaskResult<Vec<PackedFile>> {
+    let mut files =
+        vec![PackedFile::text("README.txt", README), PackedFile::text("THIRD-PARTY-LICENCES.txt", licences)];
     for name in ["CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"] {
         files.push(PackedFile::text(name, fs::read(root().join(name))?));
     }
@@ -89,7 +85,7 @@ fn man_pages(program: &Path) -> TaskResult<Vec<PackedFile>> {
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
     }
-    run(Command::new(program).args(["man", "--dir"]).arg(&folder))?;
+    run_command(Command::new(program).args(["man", "--dir"]).arg(&folder))?;
     let mut page = Vec::new();
     Man::new(Options::command().name("host-sim")).render(&mut page)?;
     let mut pages = vec![PackedFile::text("share/man/man1/host-sim.1", page)];

@@ -6,8 +6,8 @@ use std::process::Command;
 use super::platform::{LINUX_AARCH64, PLATFORMS, PROFILE, Platform, build_directory, reproducible};
 use super::release::Release;
 use super::tools;
-use crate::python::{copy_of, run};
-use crate::run::{TaskResult, root};
+use crate::python::copy_of;
+use crate::run::{TaskResult, root, run_command};
 
 /// The packages without compiled code: their folder, and their name.
 const PURE: [(&str, &str); 2] =
@@ -36,7 +36,7 @@ pub(super) fn write(release: &Release) -> TaskResult {
         write_wheel(release, platform)?;
     }
     let mut maturin = maturin(release, "sdist", LINUX_AARCH64.triple)?;
-    run(&mut maturin)?;
+    run_command(&mut maturin)?;
     PURE.iter().try_for_each(|(folder, name)| write_pure(release, folder, name))
 }
 
@@ -46,7 +46,7 @@ fn write_wheel(release: &Release, platform: Platform) -> TaskResult {
     if platform.debian.is_some() {
         maturin.args(["--zig", "--compatibility", "manylinux2014"]);
     }
-    run(&mut maturin)
+    run_command(&mut maturin)
 }
 
 fn maturin(release: &Release, what: &str, triple: &str) -> TaskResult<Command> {
@@ -66,5 +66,5 @@ fn write_pure(release: &Release, folder: &str, name: &str) -> TaskResult {
     let mut pip = Command::new(tools::python()?);
     pip.args(["-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps"]);
     pip.args(["--no-build-isolation", "--wheel-dir"]).arg(&release.folder).arg(copy);
-    run(pip.env("SOURCE_DATE_EPOCH", release.epoch.to_string()))
+    run_command(pip.env("SOURCE_DATE_EPOCH", release.epoch.to_string()))
 }

@@ -6,8 +6,7 @@ use std::process::Command;
 
 use tempfile::TempDir;
 
-use crate::python::run;
-use crate::run::{TaskResult, target_directory};
+use crate::run::{TaskResult, run_command, target_directory};
 
 /// The release of Debian.
 const SUITE: &str = "bookworm";
@@ -26,11 +25,13 @@ impl BareRoot {
     pub(super) fn with(files: &[PathBuf]) -> TaskResult<Self> {
         let packed = packed()?;
         let folder = TempDir::new_in(directory())?;
-        run(Command::new("tar")
-            .args(["--extract", "--directory"])
-            .arg(folder.path())
-            .arg("--file")
-            .arg(packed))?;
+        run_command(
+            Command::new("tar")
+                .args(["--extract", "--directory"])
+                .arg(folder.path())
+                .arg("--file")
+                .arg(packed),
+        )?;
         let release = folder.path().join("release");
         fs::create_dir(&release)?;
         for file in files {
@@ -43,7 +44,7 @@ impl BareRoot {
     pub(super) fn run(&self, script: &str) -> TaskResult {
         let mut command = Command::new("unshare");
         command.args(["--mount", "--pid", "--fork", "--kill-child", "sh", "-c", ENTER, "sh"]);
-        run(command.arg(self.0.path()).arg(format!("cd /root\n{script}")))
+        run_command(command.arg(self.0.path()).arg(format!("cd /root\n{script}")))
             .map_err(|_| "the installed programs failed, see above".into())
     }
 }
@@ -65,7 +66,7 @@ pub(super) fn make(path: &Path, options: &[&str]) -> TaskResult<PathBuf> {
     if !path.exists() {
         fs::create_dir_all(directory())?;
         let part = path.with_extension("part.tar");
-        run(Command::new("mmdebstrap").arg("--quiet").args(options).arg(SUITE).arg(&part))?;
+        run_command(Command::new("mmdebstrap").arg("--quiet").args(options).arg(SUITE).arg(&part))?;
         fs::rename(part, path)?;
     }
     Ok(path.to_owned())

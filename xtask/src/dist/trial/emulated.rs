@@ -11,8 +11,7 @@ use crate::dist::contents::archive_name;
 use crate::dist::platform::LINUX_AARCH64;
 use crate::dist::release::Release;
 use crate::dist::wheels;
-use crate::python::run;
-use crate::run::{TaskResult, target_directory};
+use crate::run::{TaskResult, run_command, target_directory};
 
 /// Emulates a program of that processor, on the system calls of this one.
 const QEMU: &str = "qemu-aarch64-static";
@@ -35,24 +34,28 @@ pub(super) fn aarch64(release: &Release) -> TaskResult {
         qemu
     };
     let moments = folder.path().join("moments.txt");
-    run(emulated(&program).args(["--port", "sim", "info"]))?;
-    run(emulated(&program)
-        .args(["--port", "sim", "pose", "120", "90", "65", "90", "90", "90", "80", "--wait"]))?;
-    run(emulated(&program)
-        .args(["--port", "sim", "record", "--driven", "--yes", "--seconds", "1"])
-        .arg(moments))?;
+    run_command(emulated(&program).args(["--port", "sim", "info"]))?;
+    run_command(
+        emulated(&program)
+            .args(["--port", "sim", "pose", "120", "90", "65", "90", "90", "90", "80", "--wait"]),
+    )?;
+    run_command(
+        emulated(&program)
+            .args(["--port", "sim", "record", "--driven", "--yes", "--seconds", "1"])
+            .arg(moments),
+    )?;
     let module = folder.path().join("module");
     let mut unzip = Command::new("python3");
     unzip.args(["-m", "zipfile", "-e"]).arg(release.path(&wheels::wheel(release, LINUX_AARCH64)));
-    run(unzip.arg(&module))?;
+    run_command(unzip.arg(&module))?;
     let mut python = emulated(&root.join("usr/bin/python3"));
     python.args(["-c", FIRST_PROGRAM]).env("PYTHONPATH", module).env("PYTHONHOME", root.join("usr"));
-    run(&mut python)
+    run_command(&mut python)
 }
 
 fn unpack(archive: &Path, folder: &Path) -> TaskResult {
     std::fs::create_dir(folder)?;
     let mut tar = Command::new("tar");
     tar.args(["--extract", "--exclude=./dev/*", "--directory"]).arg(folder).arg("--file").arg(archive);
-    run(&mut tar)
+    run_command(&mut tar)
 }

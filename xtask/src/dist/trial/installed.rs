@@ -11,8 +11,8 @@ use crate::dist::contents::archive_name;
 use crate::dist::platform::{PLATFORMS, host_platform};
 use crate::dist::release::Release;
 use crate::dist::{debian, wheels};
-use crate::python::{interpreters, run};
-use crate::run::TaskResult;
+use crate::python::interpreters;
+use crate::run::{TaskResult, run_command};
 
 /// What a user does in the first minute. `$VERSION`: what the programs say of themselves.
 const FIRST_MINUTE: &str = r#"
@@ -86,9 +86,11 @@ pub(super) fn programs(release: &Release) -> TaskResult {
 pub(super) fn packages_are_flawless(release: &Release) -> TaskResult {
     for debian in PLATFORMS.iter().filter_map(|platform| platform.debian) {
         let mut lintian = Command::new("lintian");
-        run(lintian
-            .args(["--allow-root", "--fail-on", "error"])
-            .arg(release.path(&debian::name(release, debian))))?;
+        run_command(
+            lintian
+                .args(["--allow-root", "--fail-on", "error"])
+                .arg(release.path(&debian::name(release, debian))),
+        )?;
     }
     Ok(())
 }
@@ -104,11 +106,11 @@ pub(super) fn wheels(release: &Release) -> TaskResult {
 
 fn try_wheel(program: &str, wheel: &Path) -> TaskResult {
     let folder = TempDir::new()?;
-    run(Command::new(program).args(["-m", "venv"]).arg(folder.path()))?;
+    run_command(Command::new(program).args(["-m", "venv"]).arg(folder.path()))?;
     let python = folder.path().join("bin/python");
     let mut pip = Command::new(&python);
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-index"]);
-    run(pip.arg(wheel))?;
+    run_command(pip.arg(wheel))?;
     fs::create_dir(folder.path().join("empty"))?;
-    run(Command::new(python).args(["-c", FIRST_PROGRAM]).current_dir(folder.path().join("empty")))
+    run_command(Command::new(python).args(["-c", FIRST_PROGRAM]).current_dir(folder.path().join("empty")))
 }

@@ -20,8 +20,7 @@ use super::check::{self, noted};
 use super::firmware;
 use super::make::{make, make_native};
 use crate::install;
-use crate::python::run;
-use crate::run::{TaskResult, target_directory};
+use crate::run::{TaskResult, run_command, target_directory};
 
 /// Makes the part of a release for this computer from the programs that the tests built, and tries it.
 pub(crate) fn native() -> TaskResult {
@@ -47,5 +46,5 @@ pub(super) fn parts(folder: &Path) -> TaskResult {
     emulated::aarch64(&release)?;
     wine::programs(&release)?;
     page::both(&release)?;
-    run(Command::new("dfu-suffix").arg("--check").arg(release.path(&firmware::dfu_name(&release))))
+    run_command(Command::new("dfu-suffix").arg("--check").arg(release.path(&firmware::dfu_name(&release))))
 }

@@ -8,8 +8,7 @@ use tempfile::TempDir;
 
 use crate::dist::page::{file_name, folder_name};
 use crate::dist::release::Release;
-use crate::python::run;
-use crate::run::{ChildProcess, TaskResult, wait_for};
+use crate::run::{ChildProcess, TaskResult, run_command, wait_for};
 
 /// Serves a folder at a free port, and prints the port.
 const SERVER: &str = "
@@ -30,7 +29,7 @@ pub(super) fn both(release: &Release) -> TaskResult {
     let below = folder.path().join("any/path");
     let mut unzip = Command::new("python3");
     unzip.args(["-m", "zipfile", "-e"]).arg(release.path(&folder_name(release)));
-    run(unzip.arg(&below))?;
+    run_command(unzip.arg(&below))?;
     let (_server, port) = serve(folder.path())?;
     shows_joints(&format!("http://127.0.0.1:{port}/any/path/sevenbot-page/"))
 }

@@ -12,8 +12,7 @@ use tempfile::TempDir;
 use crate::dist::contents::archive_name;
 use crate::dist::platform::{LINUX_X86_64, WINDOWS};
 use crate::dist::release::Release;
-use crate::python::run;
-use crate::run::{ChildProcess, TaskResult, wait_for};
+use crate::run::{ChildProcess, TaskResult, run_command, wait_for};
 
 /// Random numbers from the function that Wine has.
 const STAND_IN: &str = "
@@ -51,15 +50,15 @@ impl Wine {
         let wine = Self { folder: TempDir::new()? };
         let folder = wine.folder.path();
         let mut unzip = Command::new("python3");
-        run(unzip.args(["-m", "zipfile", "-e"]).arg(archive).arg(folder))?;
+        run_command(unzip.args(["-m", "zipfile", "-e"]).arg(archive).arg(folder))?;
         let unpacked = fs::read_dir(folder)?.next().ok_or("the archive is empty")??.path();
         fs::rename(unpacked, folder.join("programs"))?;
         let source = folder.join("random.c");
         fs::write(&source, STAND_IN)?;
         let mut compiler = Command::new(COMPILER);
         compiler.arg("-shared").arg("-o").arg(folder.join("programs/bcryptprimitives.dll"));
-        run(compiler.arg(source).arg("-ladvapi32"))?;
-        run(wine.command("wineboot").arg("--init").stdout(Stdio::null()).stderr(Stdio::null()))?;
+        run_command(compiler.arg(source).arg("-ladvapi32"))?;
+        run_command(wine.command("wineboot").arg("--init").stdout(Stdio::null()).stderr(Stdio::null()))?;
         Ok(wine)
     }
 
@@ -80,7 +79,7 @@ impl Wine {
     }
 
     fn sevenbot(&self, arguments: &[&str]) -> TaskResult {
-        run(&mut self.sevenbot_command(arguments))
+        run_command(&mut self.sevenbot_command(arguments))
     }
 
     fn output(&self, arguments: &[&str]) -> TaskResult<String> {
@@ -106,8 +105,8 @@ impl Wine {
     /// Makes a terminal of Linux the port COM7.
     fn connect(&self, terminal: &Path) -> TaskResult {
         let key = ["reg", "add", r"HKLM\Software\Wine\Ports", "/v", "COM7", "/d"];
-        run(self.command("wine").args(key).arg(terminal).arg("/f").stdout(Stdio::null()))?;
-        run(self.command("wineserver").arg("--kill"))?;
+        run_command(self.command("wine").args(key).arg(terminal).arg("/f").stdout(Stdio::null()))?;
+        run_command(self.command("wineserver").arg("--kill"))?;
         let link = self.folder.path().join("wine/dosdevices/com7");
         let _ = fs::remove_file(&link);
         Ok(symlink(terminal, link)?)
@@ -118,7 +117,7 @@ impl Wine {
 fn simulator(release: &Release, folder: &Path) -> TaskResult<(ChildProcess, PathBuf)> {
     let mut tar = Command::new("tar");
     tar.args(["--extract", "--directory"]).arg(folder).arg("--file");
-    run(tar.arg(release.path(&archive_name(release, LINUX_X86_64))))?;
+    run_command(tar.arg(release.path(&archive_name(release, LINUX_X86_64))))?;
     let name = format!("sevenbot-{}-{}/bin/host-sim", release.version, LINUX_X86_64.name);
     let link = folder.join("7bot");
     let mut command = Command::new(folder.join(name));
