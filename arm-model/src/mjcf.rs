@@ -112,7 +112,7 @@ fn class_of(name: &str) -> Option<(&'static str, String)> {
     Some(text("class", if is_large { LARGE.name } else { SMALL.name }))
 }
 
-/// From micronewton metres, and from gram square millimetres times 1000, to newton metres and kilogram square metres.
+/// From micronewton metres to newton metres.
 fn millionths(value: i64) -> f64 {
     value as f64 / 1e6
 }
@@ -131,7 +131,8 @@ fn joint_of(servo: &ServoParameters) -> [(&'static str, String); 3] {
     let drag = millionths(servo.stall_torque) / thousandths(NO_LOAD_SPEED).to_radians();
     [
         ("damping", number(drag)),
-        ("armature", number(millionths(servo.rotor_inertia) / 1e3)),
+        // A gram square millimetre is 1e-9 kg m².
+        ("armature", number(servo.rotor_inertia as f64 / 1e9)),
         ("frictionloss", number(millionths(servo.sliding_friction))),
     ]
 }

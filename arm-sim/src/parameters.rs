@@ -117,33 +117,33 @@ pub const NO_LOAD_SPEED: i64 = 372_000;
 /// The distance between set-point and position at which the motor gets full duty, in thousandths of a degree.
 pub const FULL_DUTY_ERROR: i64 = 4_300;
 /// The time constant of the filter of that change.
-pub const DERIVATIVE_FILTER_MS: i64 = 4;
+pub(crate) const DERIVATIVE_FILTER_MS: i64 = 4;
 /// A joint that turns more slowly than this has static friction.
-pub const CREEP_COUNTS_PER_SECOND: i64 = 5;
+pub(crate) const CREEP_COUNTS_PER_SECOND: i64 = 5;
 /// The share of the torque from outside that the gear loses to friction, in percent.
-pub const LOAD_FRICTION_PERCENT: i64 = 5;
+pub(crate) const LOAD_FRICTION_PERCENT: i64 = 5;
 
 /// A torque above this share of the stall torque is an overload, in 0.1 %.
-pub const OVERLOAD: u16 = 800;
+pub(crate) const OVERLOAD: u16 = 800;
 /// After an overload of this many milliseconds a servo latches it.
-pub const OVERLOAD_MS: u32 = 1_000;
+pub(crate) const OVERLOAD_MS: u32 = 1_000;
 /// A servo restarts below this supply voltage, in 0.1 V.
-pub const BROWN_OUT_DECIVOLTS: u8 = 45;
+pub(crate) const BROWN_OUT_DECIVOLTS: u8 = 45;
 /// The temperature around the arm, in thousandths of a degree Celsius.
-pub const AMBIENT_MILLIDEGREES: u64 = 25_000;
+pub(crate) const AMBIENT_MILLIDEGREES: u64 = 25_000;
 /// The final rise in temperature at the stall torque, in thousandths of a degree. It grows with the square of the torque.
-pub const STALL_RISE_MILLIDEGREES: u64 = 200_000;
+pub(crate) const STALL_RISE_MILLIDEGREES: u64 = 200_000;
 /// The time constant of the temperature.
-pub const THERMAL_TIME: Duration = Duration::from_millis(300_000);
+pub(crate) const THERMAL_TIME: Duration = Duration::from_millis(300_000);
 
 /// From the axis of the base to the shoulder, in millimetres (the maker's length d).
-pub const SHOULDER_FORWARD_MM: i64 = 29;
+pub(crate) const SHOULDER_FORWARD_MM: i64 = 29;
 /// Shoulder to elbow, in millimetres (the maker's length a).
-pub const REAR_ARM_MM: i64 = 120;
+pub(crate) const REAR_ARM_MM: i64 = 120;
 /// Elbow pin to the axis of the forearm, at a right angle, in millimetres (the maker's length h).
-pub const ELBOW_OFFSET_MM: i64 = 25;
+pub(crate) const ELBOW_OFFSET_MM: i64 = 25;
 /// Elbow to joint 5, in hundredths of a millimetre (the maker's length c).
-pub const FOREARM_CENTI_MM: i64 = 19_850;
+pub(crate) const FOREARM_CENTI_MM: i64 = 19_850;
 /// The rear arm, in grams.
 pub const REAR_ARM_G: i64 = 120;
 /// Its centre of mass, from the shoulder, in millimetres.
@@ -157,4 +157,4 @@ pub const TOOL_G: i64 = 100;
 /// Its centre of mass, from the axis of joint 5, in millimetres.
 pub const TOOL_CENTRE_MM: i64 = 50;
 /// The grip, from the axis of joint 5, in millimetres.
-pub const GRIP_MM: i64 = 90;
+pub(crate) const GRIP_MM: i64 = 90;

@@ -10,6 +10,7 @@
 //! This file does not know the other joints.
 
 mod engaging;
+mod measured;
 mod targets;
 
 use protocol_core::registers::map::{
@@ -31,34 +32,7 @@ use crate::position_filter::{FilterOutcome, PositionFilter};
 use crate::push_limiter::{FULL_LOAD, PushLimit, PushSample};
 use crate::servo_bus::{Answer, Reading, Torque};
 use crate::torque_check::{TorqueCheck, TorqueFound};
-
-/// The effect of a reading.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Measured {
-    /// The position filter rejected the reading.
-    Rejected,
-    /// The filter rejected the reading, and the servo counts as silent from now on.
-    FellSilent,
-    /// The filter accepted the reading. The servo was not silent, and its error bits and its temperature are as before.
-    Accepted,
-    /// The filter accepted the reading. The servo was silent, or its error bits or its temperature changed.
-    ServoChanged,
-    /// The filter accepted the reading, and the joint engaged: its servo needs its goal, then a question about it.
-    Engaged,
-    /// The joint needs torque, after its goal was sent this often.
-    TorqueDue { goals: u8 },
-    /// An alarm has freed the joint: its servo needs torque-off, which frees nothing and ends a latched overload
-    /// ([D28](protocol_core::decisions#d28)).
-    Freed,
-    /// The servo of a driven joint has no torque. [`Joints`](crate::joints::Joints) decides what that means
-    /// ([D29](protocol_core::decisions#d29)).
-    TorqueLost,
-    /// All driven servos have no torque after a long silence ([D29](protocol_core::decisions#d29)).
-    SupplyLost,
-    /// The joint has turned past a set-point that an obstacle held back. [`Joints`](crate::joints::Joints) lets the set-point
-    /// catch up.
-    TurnedPast,
-}
+pub(crate) use measured::Measured;
 
 /// What became of a joint that has a set-point.
 enum Protected {

@@ -192,7 +192,7 @@ pub(crate) struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Of something that no call waits for. [`CallState::new`] of now.
+    /// For work that no call waits for. A stop from now on ends it.
     pub(crate) fn of_no_call(stops: &Arc<AtomicU64>, inbox: &'a Inbox) -> Self {
         Self { state: Arc::new(CallState::new(stops)), inbox }
     }

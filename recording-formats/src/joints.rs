@@ -10,13 +10,13 @@ const PASSIVE: [(&str, usize, f64); 3] =
     [("elbow", 1, -1.0), ("finger", 6, 0.5), ("opposite_finger", 6, -0.5)];
 
 /// Joints 1 to 7.
-pub(crate) fn names() -> Vec<String> {
-    JOINT_NAMES.into_iter().chain([CLAW]).map(str::to_owned).collect()
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+    JOINT_NAMES.into_iter().chain([CLAW])
 }
 
 /// Joints 1 to 7, and those that follow them.
-pub(crate) fn all_names() -> Vec<String> {
-    names().into_iter().chain(PASSIVE.map(|(name, ..)| name.to_owned())).collect()
+pub(crate) fn all_names() -> impl Iterator<Item = &'static str> {
+    names().chain(PASSIVE.map(|(name, ..)| name))
 }
 
 /// The angles of the model in radians.

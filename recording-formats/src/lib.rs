@@ -8,6 +8,17 @@
 //! ```
 //!
 //! An MCAP file has the topics of the node in `ros/sevenbot_ros`, with angles in radians. It is not compressed.
+//!
+//! ```
+//! use recording_formats::{Format, read, write};
+//!
+//! let text = "7bot-recording 1\n0 90 90 65 90 90 90 80 0\n1 120 90 65 90 90 90 80 0\n";
+//! let recording = read(text.as_bytes())?;
+//! let mut mcap = Vec::new();
+//! write(&recording, Format::Mcap, &mut mcap)?;
+//! assert!(read(mcap.as_slice())?.moments().eq(recording.moments()));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![forbid(unsafe_code)]
 

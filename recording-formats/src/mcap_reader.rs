@@ -144,7 +144,7 @@ fn last_word(topic: &str) -> &str {
 fn positions(state: &JointState) -> Option<[f64; 7]> {
     let mut positions = [0.0; 7];
     for (position, name) in positions.iter_mut().zip(names()) {
-        let place = state.name.iter().position(|other| *other == name)?;
+        let place = state.name.iter().position(|other| other == name)?;
         *position = *state.position.get(place)?;
     }
     Some(positions)

@@ -213,7 +213,7 @@ fn joint_state(at: Duration, pose: [FineAngle; 7], telemetry: &Telemetry) -> Joi
     }
     JointState {
         header: header(at, ""),
-        name: all_names(),
+        name: all_names().map(str::to_owned).collect(),
         position: with_passive(to_radians(pose)),
         velocity,
         effort,
@@ -222,7 +222,12 @@ fn joint_state(at: Duration, pose: [FineAngle; 7], telemetry: &Telemetry) -> Joi
 
 fn command(at: Duration, targets: [FineAngle; 7]) -> JointState {
     let position = to_radians(targets).to_vec();
-    JointState { header: header(at, ""), name: names(), position, ..JointState::default() }
+    JointState {
+        header: header(at, ""),
+        name: names().map(str::to_owned).collect(),
+        position,
+        ..JointState::default()
+    }
 }
 
 fn transforms(at: Duration, pose: [FineAngle; 7], fixed: bool) -> Transforms {

@@ -12,14 +12,11 @@ use protocol_core::registers::map::{
 use protocol_core::time::Duration;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use rig::{World, read, write};
+use rig::{World, read, sharing, write};
 use sevenbot_serve::hub::HubOptions;
 
 const SEED: u64 = 25;
-/// The registers of the server.
-const SHARING: (u8, u8) = (232, 8);
 const COMMAND: u8 = 239;
-const POSE: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];
 
 fn targets(world: &World) -> Vec<u8> {
     world.arm.registers().read(FINE_TARGET.address, FINE_TARGET.count).to_vec()
@@ -28,15 +25,6 @@ fn targets(world: &World) -> Vec<u8> {
 fn positions(world: &World) -> [i32; 7] {
     let bytes = world.arm.registers().read(FINE_POSITION.address, FINE_POSITION.count);
     std::array::from_fn(|joint| i32::from(u16::from_le_bytes([bytes[2 * joint], bytes[2 * joint + 1]])))
-}
-
-/// The registers of the server, as a program reads them.
-fn sharing(world: &mut World, program: usize) -> Vec<u8> {
-    world.take(program);
-    world.send(program, &read(SHARING.0, SHARING.1));
-    world.run(30);
-    let reply = world.take(program).into_iter().find(|(address, _)| *address == SHARING.0);
-    reply.expect("a reply").1
 }
 
 /// A program stops the arm as `sevenbot stop` does: it reads where the arm is, and writes that. Returns how long the write took
@@ -293,21 +281,6 @@ fn a_target_that_waited_too_long_is_dropped() {
 }
 
 #[test]
-fn nothing_that_was_sent_to_an_unplugged_arm_is_carried_out() {
-    let mut world = World::new(2);
-    world.unplug();
-    for turn in 0..3_000_u32 {
-        let value = u8::try_from(turn % 100).unwrap() + 40;
-        world.send(0, &write(TARGET_POSITION.address, &[value]));
-    }
-    world.run(100);
-    assert!(!world.programs[0].is_waiting(), "nothing is kept");
-    world.plug();
-    world.run(2_000);
-    assert_eq!(world.arm.registers().read(TARGET_POSITION.address, 7), POSE);
-}
-
-#[test]
 fn a_short_read_beside_31_readers_of_long_replies_takes_at_most_100_ms() {
     let mut world = World::new(33);
     let mut times: Vec<u64> = (0..60)
@@ -361,47 +334,4 @@ fn with_read_only_access_nothing_but_reads_is_sent() {
     let answers: Vec<_> = world.pages[0].answers.iter().map(|(_, answer)| answer.as_str()).collect();
     assert!(answers.iter().all(|answer| answer.contains("read-only")) && answers.len() == 2, "{answers:?}");
     assert_eq!(sharing(&mut world, 0)[4], 2);
-}
-
-#[test]
-fn without_an_arm_a_program_can_read_that_there_is_none() {
-    let mut world = World::new(1);
-    world.unplug();
-    world.send(0, &[read(PRESENT_POSITION.address, 7), read(SHARING.0, SHARING.1), read(231, 8)].concat());
-    world.run(10);
-    assert_eq!(world.take(0), [(SHARING.0, vec![1, 1, 0, 0, 8, 0, 0, 0])], "nothing else is answered");
-    world.plug();
-    world.run(1_000);
-    assert_eq!(sharing(&mut world, 0)[4], 0);
-}
-
-/// It asks all the time, and takes no reply.
-#[test]
-fn replies_without_an_arm_do_not_pile_up() {
-    let mut world = World::new(1);
-    world.unplug();
-    world.programs[0].reads = false;
-    for _ in 0..2_000 {
-        world.send(0, &read(SHARING.0, SHARING.1));
-        world.run(1);
-    }
-    assert!(world.programs[0].unread_bytes() < 6_000, "{}", world.programs[0].unread_bytes());
-}
-
-#[test]
-fn without_an_arm_a_page_is_told() {
-    let mut world = World::new(0);
-    world.join_page();
-    world.unplug();
-    for message in
-        [r#"{"cmd":"angle","id":0,"angle":80}"#, r#"{"cmd":"stop"}"#, r#"{"cmd":"IK5","pos":[0,250,100]}"#]
-    {
-        world.send_message(0, message);
-    }
-    world.run(100);
-    let answers = &world.pages[0].answers;
-    assert!(
-        answers.iter().all(|(_, answer)| answer.contains("does not answer")) && answers.len() == 3,
-        "{answers:?}"
-    );
 }

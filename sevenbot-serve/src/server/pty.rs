@@ -40,21 +40,21 @@ impl PtyPort {
         let opened = self.clients.as_ref().map(Readiness::of).transpose()?;
         let mut session = FrameSession::open(&shared);
         let mut last_empty = shared.now();
-        // Bytes of programs that are gone came to this session.
-        let mut is_used = false;
+        // Programs that are gone left bytes to this session.
+        let mut has_leftovers = false;
         loop {
             session.exchange();
             let count = self.receive(&mut session, &mut last_empty, &shared)?;
             let was_closed = self.was_closed()?;
-            let is_unused = !self.pty.has_client();
-            if was_closed || (is_used && !is_unused) {
+            let is_open = self.pty.has_client();
+            if was_closed || (has_leftovers && is_open) {
                 session = session.succeed();
             }
-            is_used = is_unused && (is_used || count > 0);
+            has_leftovers = !is_open && (has_leftovers || count > 0);
             if was_closed || count > 0 {
                 // What was read before, when no close was seen, the one before sent. While no program has the terminal open, all is
                 // of those before.
-                session.set_drops_reads(is_unused || (was_closed && count == 0));
+                session.set_drops_reads(!is_open || (was_closed && count == 0));
             }
             session.exchange();
             self.send(&mut session)?;

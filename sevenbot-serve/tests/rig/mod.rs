@@ -299,3 +299,15 @@ impl Program {
         }
     }
 }
+
+/// The registers of the server.
+pub const SHARING: (u8, u8) = (232, 8);
+
+/// The registers of the server, as a program reads them.
+pub fn sharing(world: &mut World, program: usize) -> Vec<u8> {
+    world.take(program);
+    world.send(program, &read(SHARING.0, SHARING.1));
+    world.run(30);
+    let reply = world.take(program).into_iter().find(|(address, _)| *address == SHARING.0);
+    reply.expect("a reply").1
+}
