@@ -33,7 +33,8 @@ impl DisturbedBus {
             self.truths = PerJoint::default();
         }
         let is_undisturbed = self.is_undisturbed(now);
-        let limited = if is_guarded && is_undisturbed { self.limited_joints(now) } else { PerJoint::default() };
+        let limited =
+            if is_guarded && is_undisturbed { self.limited_joints(now) } else { PerJoint::default() };
         for joint in Joint::ALL {
             self.check_push(now, joint, limits[joint].filter(|_| limited[joint]))?;
         }
