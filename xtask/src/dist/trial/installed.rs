@@ -109,7 +109,8 @@ pub(super) fn wheels(release: &Release) -> TaskResult {
 fn pythons() -> TaskResult<Vec<(String, PathBuf)>> {
     let mut programs: Vec<_> = INTERPRETERS.iter().map(PathBuf::from).collect();
     let pyenv = env::var_os("PYENV_ROOT").map(PathBuf::from);
-    if let Some(folder) = pyenv.or_else(|| Some(env::home_dir()?.join(".pyenv"))).map(|at| at.join("versions"))
+    if let Some(folder) =
+        pyenv.or_else(|| Some(env::home_dir()?.join(".pyenv"))).map(|at| at.join("versions"))
         && folder.exists()
     {
         for entry in fs::read_dir(folder)? {

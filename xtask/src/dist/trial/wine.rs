@@ -111,7 +111,8 @@ impl Wine {
     /// The monitor draws its seven joints, and ends by its key.
     fn monitor(&self, port: &str) -> TaskResult {
         let program = self.folder.path().join("programs/sevenbot.exe").display().to_string();
-        let variables: Vec<_> = self.variables().iter().map(|(name, value)| format!("{name}={value}")).collect();
+        let variables: Vec<_> =
+            self.variables().iter().map(|(name, value)| format!("{name}={value}")).collect();
         let mut words: Vec<&str> = variables.iter().map(String::as_str).collect();
         words.extend(["wine", &program, "--port", port, "monitor"]);
         let mut terminal = Terminal::run(Path::new("env"), &words);
