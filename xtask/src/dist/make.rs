@@ -3,6 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use rustix::fs::Mode;
+use rustix::process::umask;
+
 use super::archive::{PackedFile, tar_gz, zip};
 use super::contents::{NOTE, archive_name, licences_name};
 use super::platform::{PLATFORMS, Platform, host_platform};
@@ -14,6 +17,8 @@ use crate::times::Times;
 
 /// Makes everything.
 pub(super) fn make(folder: PathBuf) -> TaskResult {
+    // Archives that other tools make keep the permissions of files, which depend on this.
+    umask(Mode::from_raw_mode(0o022));
     let release = Release::of_this_commit(folder)?;
     empty(&release.folder)?;
     println!("{}", release.text());

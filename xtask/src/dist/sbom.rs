@@ -32,6 +32,8 @@ pub(super) fn write(release: &Release) -> TaskResult {
     sources::copy(&copy)?;
     let mut tool = Command::new(tools::cyclonedx()?);
     tool.args(["cyclonedx", "--format", "json", "--spec-version", "1.5", "--all", "--quiet"]);
+    // Otherwise the parts for the chip, the browser and Windows are missing.
+    tool.args(["--target", "all", "--no-build-deps"]);
     run_command(tool.env("SOURCE_DATE_EPOCH", release.epoch.to_string()).current_dir(&copy))?;
     for (folder, package, stem) in LISTED {
         let list = fs::read_to_string(copy.join(folder).join(format!("{package}.cdx.json")))?;
