@@ -12,6 +12,7 @@
 //!                           pointers)              clicks and keys; tests)
 //! ```
 
+mod controls;
 mod dom;
 mod events;
 mod exports;
@@ -19,6 +20,8 @@ mod hand;
 mod page;
 mod panels;
 mod picture;
+mod recording;
+mod storage;
 
 use std::cell::RefCell;
 use std::rc::Rc;
