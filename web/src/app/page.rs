@@ -11,7 +11,7 @@ use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{CanvasRenderingContext2d, Element, Event};
 
 use super::dom::Dom;
-use super::recording::KeptRecording;
+use super::kept_recording::KeptRecording;
 use super::storage;
 use crate::client::Client;
 use crate::movement::{Player, Recorder};

@@ -2,41 +2,18 @@
 
 use std::time::Duration;
 
-use sevenbot::recording::{Recording, RecordingError};
+use sevenbot::recording::RecordingError;
 use wasm_bindgen::JsCast;
 use wasm_bindgen_futures::{JsFuture, spawn_local};
 use web_sys::{Blob, Element, HtmlAnchorElement, HtmlInputElement, Url};
 
 use super::dom::number;
+use super::kept_recording::KeptRecording;
 use super::page::{App, with_app};
-use super::storage;
 use crate::movement::{PlayRefusal, Player, Recorder};
 
 /// The longest way to the first pose of a movement, in seconds.
 const LONGEST_APPROACH: f32 = 60.0;
-/// The name of the recording in the browser's storage.
-const KEPT: &str = "recording";
-
-/// The recording that the page has.
-pub(super) struct KeptRecording {
-    text: String,
-    /// The number of its moments, and the time of the last one.
-    pub(super) moments: usize,
-    pub(super) length: Duration,
-}
-
-impl KeptRecording {
-    /// The recording of the page before it was loaded again.
-    pub(super) fn of_storage() -> Option<Self> {
-        storage::load(KEPT).and_then(|text| Self::parse(text).ok())
-    }
-
-    fn parse(text: String) -> Result<Self, RecordingError> {
-        let recording = Recording::parse(&text)?;
-        let length = recording.moments().last().map_or(Duration::ZERO, |last| last.time);
-        Ok(Self { moments: recording.moments().count(), length, text })
-    }
-}
 
 impl App {
     pub(super) fn record(&mut self) {
@@ -55,7 +32,7 @@ impl App {
     }
 
     fn keep(&mut self, recording: KeptRecording) {
-        storage::save(KEPT, &recording.text);
+        recording.store();
         self.recording = Some(recording);
         self.dom.end_notice();
     }
