@@ -17,6 +17,8 @@ use sevenbot_serve::hub::HubOptions;
 
 const SEED: u64 = 25;
 const COMMAND: u8 = 239;
+/// The weight draws a joint so far off its target at most, in hundredths of a degree.
+const DROOP: i32 = 150;
 
 fn targets(world: &World) -> Vec<u8> {
     world.arm.registers().read(FINE_TARGET.address, FINE_TARGET.count).to_vec()
@@ -42,14 +44,22 @@ fn stop(world: &mut World, program: usize) -> (Duration, Vec<u8>) {
     (world.now - start, held)
 }
 
+/// The greatest distance of a joint from its target in these fine targets, in hundredths of a degree.
+fn farthest(targets: &[u8], positions: [i32; 7]) -> i32 {
+    let targets = targets.chunks(2).map(|word| i32::from(u16::from_le_bytes([word[0], word[1]])));
+    targets.zip(positions).map(|(target, position)| (target - position).abs()).max().unwrap()
+}
+
 /// Who else uses the server while the arm is stopped.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Attack {
     Nothing,
     Readers,
     LongWrites,
     Targets,
     Stops,
+    /// Watchdogs of 10 ms of programs that are silent for 20 ms.
+    Watchdogs,
 }
 
 const ATTACKERS: usize = 31;
@@ -62,9 +72,12 @@ impl Attack {
             Self::LongWrites => write(0, &[0; 255]),
             Self::Targets => write(TARGET_POSITION.address, &[u8::try_from(turn % 100).unwrap() + 40]),
             Self::Stops => write(MOTOR_STATE.address, &[1]),
+            Self::Watchdogs if world.now.as_micros() / 10_000 % 3 == 0 => write(HOST_WATCHDOG.address, &[1]),
+            Self::Watchdogs => return,
         };
+        let most_bytes = if self == Self::Watchdogs { 1 } else { 600 };
         for attacker in 2..2 + ATTACKERS {
-            while world.programs[attacker].to_send_bytes() < 600 {
+            while world.programs[attacker].to_send_bytes() < most_bytes {
                 world.send(attacker, &request);
             }
         }
@@ -100,6 +113,8 @@ fn stop_often(attack: Attack) {
             let moved = before.iter().zip(after).map(|(before, after)| (before - after).abs()).max().unwrap();
             assert!(settling < 10 || moved <= 30, "{attack:?}, stop {turn}: moved by {moved} hundredths");
         }
+        let off = farthest(&held, positions(&world));
+        assert!(off <= DROOP, "{attack:?}, stop {turn}: rests {off} hundredths from where it was stopped");
     }
     delays.sort_unstable();
     let (p50, p99) = (delays[delays.len() / 2], delays[delays.len() * 99 / 100]);
@@ -133,6 +148,11 @@ fn a_stop_reaches_the_arm_beside_others_that_stream() {
 #[test]
 fn a_stop_reaches_the_arm_beside_others_that_switch_the_motors_on() {
     stop_often(Attack::Stops);
+}
+
+#[test]
+fn a_stop_holds_the_arm_where_it_was_beside_watchdogs_that_act() {
+    stop_often(Attack::Watchdogs);
 }
 
 #[test]
@@ -191,6 +211,25 @@ fn d24_an_arm_that_is_held_again_and_again_does_not_sink() {
     }
     let moved = before.1.iter().zip(positions(&world)).map(|(before, after)| (before - after).abs()).max();
     assert!(moved <= Some(10), "moved by {moved:?} hundredths");
+}
+
+/// The hold reads where the arm is, and writes that. A program's stop comes at each moment meanwhile.
+#[test]
+fn a_hold_under_way_does_not_overwrite_a_stop_that_comes_meanwhile() {
+    let mut world = World::new(3);
+    world.send(0, &write(SPEED.address, &[100; 7]));
+    for steps in (0..150).step_by(2) {
+        let goal = if steps % 4 == 0 { 40 } else { 140 };
+        world.send(0, &[write(COMMAND, &[2]), write(TARGET_POSITION.address, &[goal])].concat());
+        world.run(200);
+        world.round_trip(2, &read(FINE_TARGET.address, 28));
+        let (_, values) = world.take(2).pop().expect("a reply");
+        world.send(1, &write(COMMAND, &[1]));
+        world.advance(steps);
+        world.send(2, &write(FINE_TARGET.address, &values[14..]));
+        world.run(100);
+        assert_eq!(targets(&world), values[14..], "{steps} steps of 0.1 ms after the hold began");
+    }
 }
 
 /// Each command begins another hold before the one before has ended.

@@ -6,6 +6,7 @@
 //! SERVE_LOAD_SECONDS=900 cargo nextest run -p system-tests --test system serve::load --no-capture
 //! ```
 
+use std::fmt::Debug;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::ops::AddAssign;
@@ -23,8 +24,11 @@ const LOST: Duration = Duration::from_secs(30);
 /// Rate of the reports of present angles, in map 2.1.
 const ANGLE_FEEDBACK_FREQUENCY: u8 = 82;
 
+/// Faults of a program that are described. After one reply of another program each further one is wrong, too.
+const MOST_DESCRIBED: usize = 5;
+
 /// What one program, or all of them, sent and received.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 struct Tally {
     /// Writes and reads.
     requests: usize,
@@ -35,6 +39,24 @@ struct Tally {
     lost: usize,
     /// Replies of another program, and reports that the program did not ask for.
     crossed: usize,
+    /// The first faults, in words.
+    faults: Vec<String>,
+}
+
+impl Tally {
+    /// A reply that is lost, or one that is not that of the request.
+    fn fault(&mut self, asked: &str, sent: Instant, received: Option<&dyn Debug>) {
+        let (lost, crossed) = if received.is_some() { (0, 1) } else { (1, 0) };
+        (self.lost, self.crossed) = (self.lost + lost, self.crossed + crossed);
+        if self.faults.len() < MOST_DESCRIBED {
+            let place = self.replies + self.lost + self.crossed;
+            let after = sent.elapsed();
+            self.faults.push(match received {
+                Some(received) => format!("{received:02x?} for {asked}, turn {place}, after {after:?}"),
+                None => format!("nothing for {asked}, turn {place}, after {after:?}"),
+            });
+        }
+    }
 }
 
 impl AddAssign for Tally {
@@ -44,6 +66,7 @@ impl AddAssign for Tally {
         self.reports += other.reports;
         self.lost += other.lost;
         self.crossed += other.crossed;
+        self.faults.extend(other.faults);
     }
 }
 
@@ -79,7 +102,7 @@ impl Wire for TcpStream {
 }
 
 /// The function code of a program's writes.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 enum Map {
     V22,
     V21,
@@ -116,11 +139,13 @@ fn frame_program(mut wire: impl Wire, own: u8, map: Map, hertz: u8, end: Instant
     wire.send(&map.subscribe(hertz));
     for value in (1..=100).cycle().take_while(|_| Instant::now() < end) {
         wire.send(&[map.write(own, value), read_request(own, 1)].concat());
+        let sent = Instant::now();
         tally.requests += 2;
+        let asked = format!("register {own}, {value:02x} written, in map {map:?}");
         match next_reply(&mut wire, map, hertz, &mut tally.reports) {
-            None => tally.lost += 1,
+            None => tally.fault(&asked, sent, None),
             Some(frame) if frame == reply(own, &[value]) => tally.replies += 1,
-            Some(_) => tally.crossed += 1,
+            Some(frame) => tally.fault(&asked, sent, Some(&frame)),
         }
     }
     tally
@@ -145,14 +170,19 @@ fn web_program(mut client: WebClient, own: u8, is_page: bool, end: Instant) -> T
     for value in (1..=100_u8).cycle().take_while(|_| Instant::now() < end) {
         client.send(&format!(r#"{{"cmd":"write","id":{own},"num":1,"value":[{value}]}}"#));
         client.send(&format!(r#"{{"cmd":"read","id":{own},"num":1}}"#));
+        let sent = Instant::now();
         tally.requests += 2;
-        if is_page && client.receive().is_none_or(|answer| answer["message"] != "Values written") {
-            tally.crossed += 1;
+        if is_page {
+            match client.receive() {
+                Some(answer) if answer["message"] == "Values written" => {}
+                other => tally.fault(&format!("a write of register {own}"), sent, other.as_ref().map(|it| it as _)),
+            }
         }
+        let asked = format!("register {own}, {value} written");
         match client.receive() {
-            None => tally.lost += 1,
+            None => tally.fault(&asked, sent, None),
             Some(answer) if answer["data"] == serde_json::json!([value]) => tally.replies += 1,
-            Some(_) => tally.crossed += 1,
+            Some(answer) => tally.fault(&asked, sent, Some(&answer)),
         }
     }
     tally
@@ -188,10 +218,10 @@ fn ten_clients_of_three_kinds_lose_nothing_and_cross_nothing() {
     let mut total = Tally::default();
     for (kind, tally) in &tallies {
         println!("{kind:>15}: {tally:?}");
-        total += *tally;
+        total += tally.clone();
     }
     println!("{seconds} s, all: {total:?}");
-    assert_eq!((total.lost, total.crossed), (0, 0));
+    assert_eq!((total.lost, total.crossed), (0, 0), "lost and crossed: {:#?}", total.faults);
     assert!(tallies.iter().all(|(_, tally)| tally.replies > 0));
     assert!(tallies.iter().filter(|(_, tally)| tally.reports > 0).count() == 4, "four programs want reports");
 }

@@ -3,6 +3,7 @@
 mod attacks;
 mod bad_web;
 mod chaos;
+mod descriptors;
 mod load;
 mod network;
 mod rates;

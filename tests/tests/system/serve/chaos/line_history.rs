@@ -2,12 +2,15 @@
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use system_tests::relay::Passing;
 
 /// Frames that are remembered: those of more than half a minute.
 const REMEMBERED: usize = 40_000;
+
+/// What is told of the state of the line is about this time.
+const LATELY: Duration = Duration::from_secs(5);
 
 #[derive(Clone, Copy)]
 struct Read {
@@ -39,6 +42,17 @@ impl LineHistory {
         }
         let is_reply = matches!(passing, Passing::Reply(_));
         reads.push_back(Read { at: Instant::now(), is_reply, address, count });
+    }
+
+    /// The reads and replies of the last seconds, and the last one of each.
+    pub(super) fn of_late(&self) -> String {
+        let reads = self.reads.lock().expect("no panic");
+        let of_kind = |is_reply: bool| {
+            let ages = reads.iter().rev().filter(|read| read.is_reply == is_reply).map(|read| read.at.elapsed());
+            let (count, last) = (ages.clone().take_while(|&age| age < LATELY).count(), ages.clone().next());
+            format!("{count} in {LATELY:?}, the last one {last:?} ago")
+        };
+        format!("reads on the line: {}, replies: {}", of_kind(false), of_kind(true))
     }
 
     /// What became of a read of these registers that was sent at this time.

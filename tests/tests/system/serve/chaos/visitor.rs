@@ -81,6 +81,11 @@ impl Chaos {
         self.history.note(passing);
     }
 
+    /// What the arm's line carried of late.
+    pub(crate) fn line_of_late(&self) -> String {
+        self.history.of_late()
+    }
+
     /// A wait begins for the reply with these registers: the first one, and how many.
     pub(super) fn wait(&self, asked: (u8, u8)) -> ReplyWait<'_> {
         ReplyWait {

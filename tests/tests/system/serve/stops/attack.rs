@@ -17,7 +17,7 @@ const HOST_WATCHDOG: u8 = 186;
 const NO_FRAMES: &[u8] = &[0xAA, 0x77, 0x06, 0xAA, 0x77, 0xAA, 0xFF, 0x00, 0x77, 0x03];
 
 /// What the other programs do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Attack {
     /// One program streams targets, as beside all other attacks.
     Stream,
@@ -64,11 +64,6 @@ impl Attack {
             Self::Fragments | Self::Connections => 4,
             _ => 12,
         }
-    }
-
-    /// The server holds the arm by itself, whenever a watchdog acts.
-    pub(crate) fn lets_the_server_hold(self) -> bool {
-        self == Self::Watchdogs
     }
 
     /// Attacks in each turn of the gate, until its end.
