@@ -23,6 +23,7 @@ mod listener;
 #[cfg(unix)]
 mod local_socket;
 mod notice;
+mod pace;
 #[cfg(target_os = "linux")]
 mod pty;
 #[cfg(target_os = "linux")]

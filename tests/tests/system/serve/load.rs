@@ -10,6 +10,7 @@ use std::fmt::Debug;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::ops::AddAssign;
+use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -17,6 +18,7 @@ use system_tests::frames::{reply, with_checksum};
 use system_tests::registers::{FEEDBACK_FREQUENCY, PRESENT_POSITION, SPEED, TIME};
 use system_tests::{ArmClient, read_request, write_request};
 
+use super::line_history::LineHistory;
 use super::served::{LOCAL_PAGE, Served, WebClient, names};
 
 /// A reply that has not come after this time is lost.
@@ -43,18 +45,29 @@ struct Tally {
     faults: Vec<String>,
 }
 
+/// A read, and what was written directly before.
+struct Asked<'a> {
+    kind: &'static str,
+    register: u8,
+    value: u8,
+    sent: Instant,
+    history: &'a LineHistory,
+}
+
 impl Tally {
     /// A reply that is lost, or one that is not that of the request.
-    fn fault(&mut self, asked: &str, sent: Instant, received: Option<&dyn Debug>) {
+    fn fault(&mut self, asked: &Asked<'_>, received: Option<&dyn Debug>) {
         let (lost, crossed) = if received.is_some() { (0, 1) } else { (1, 0) };
         (self.lost, self.crossed) = (self.lost + lost, self.crossed + crossed);
         if self.faults.len() < MOST_DESCRIBED {
-            let place = self.replies + self.lost + self.crossed;
-            let after = sent.elapsed();
-            self.faults.push(match received {
-                Some(received) => format!("{received:02x?} for {asked}, turn {place}, after {after:?}"),
-                None => format!("nothing for {asked}, turn {place}, after {after:?}"),
-            });
+            let Asked { kind, register, value, sent, history } = asked;
+            let received = received.map_or("nothing".to_owned(), |received| format!("{received:02x?}"));
+            self.faults.push(format!(
+                "{kind}, turn {}: {received} for register {register}, {value:02x} written, after {:?}; {}",
+                self.replies + self.lost + self.crossed,
+                sent.elapsed(),
+                history.told(*sent, (*register, 1))
+            ));
         }
     }
 }
@@ -102,7 +115,7 @@ impl Wire for TcpStream {
 }
 
 /// The function code of a program's writes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 enum Map {
     V22,
     V21,
@@ -134,18 +147,24 @@ impl Map {
 }
 
 /// A program that writes its own register and reads it back until `end`. `hertz`: it also wants reports.
-fn frame_program(mut wire: impl Wire, own: u8, map: Map, hertz: u8, end: Instant) -> Tally {
+fn frame_program(
+    mut wire: impl Wire,
+    own: u8,
+    (map, hertz): (Map, u8),
+    end: Instant,
+    history: &LineHistory,
+) -> Tally {
     let mut tally = Tally { requests: 1, ..Tally::default() };
     wire.send(&map.subscribe(hertz));
     for value in (1..=100).cycle().take_while(|_| Instant::now() < end) {
         wire.send(&[map.write(own, value), read_request(own, 1)].concat());
-        let sent = Instant::now();
+        let kind = if matches!(map, Map::V22) { "frames of map 2.2" } else { "frames of map 2.1" };
+        let asked = Asked { kind, register: own, value, sent: Instant::now(), history };
         tally.requests += 2;
-        let asked = format!("register {own}, {value:02x} written, in map {map:?}");
         match next_reply(&mut wire, map, hertz, &mut tally.reports) {
-            None => tally.fault(&asked, sent, None),
+            None => tally.fault(&asked, None),
             Some(frame) if frame == reply(own, &[value]) => tally.replies += 1,
-            Some(frame) => tally.fault(&asked, sent, Some(&frame)),
+            Some(frame) => tally.fault(&asked, Some(&frame)),
         }
     }
     tally
@@ -165,24 +184,30 @@ fn next_reply(wire: &mut impl Wire, map: Map, hertz: u8, reports: &mut usize) ->
 }
 
 /// The same over the WebSocket. A page also gets an answer to each write.
-fn web_program(mut client: WebClient, own: u8, is_page: bool, end: Instant) -> Tally {
+fn web_program(
+    mut client: WebClient,
+    own: u8,
+    is_page: bool,
+    end: Instant,
+    history: &LineHistory,
+) -> Tally {
     let mut tally = Tally::default();
     for value in (1..=100_u8).cycle().take_while(|_| Instant::now() < end) {
         client.send(&format!(r#"{{"cmd":"write","id":{own},"num":1,"value":[{value}]}}"#));
         client.send(&format!(r#"{{"cmd":"read","id":{own},"num":1}}"#));
-        let sent = Instant::now();
+        let kind = if is_page { "page" } else { "maker's program" };
+        let asked = Asked { kind, register: own, value, sent: Instant::now(), history };
         tally.requests += 2;
         if is_page {
             match client.receive() {
                 Some(answer) if answer["message"] == "Values written" => {}
-                other => tally.fault(&format!("a write of register {own}"), sent, other.as_ref().map(|it| it as _)),
+                other => tally.fault(&asked, other.as_ref().map(|it| it as _)),
             }
         }
-        let asked = format!("register {own}, {value} written");
         match client.receive() {
-            None => tally.fault(&asked, sent, None),
+            None => tally.fault(&asked, None),
             Some(answer) if answer["data"] == serde_json::json!([value]) => tally.replies += 1,
-            Some(answer) => tally.fault(&asked, sent, Some(&answer)),
+            Some(answer) => tally.fault(&asked, Some(&answer)),
         }
     }
     tally
@@ -191,14 +216,17 @@ fn web_program(mut client: WebClient, own: u8, is_page: bool, end: Instant) -> T
 #[test]
 fn ten_clients_of_three_kinds_lose_nothing_and_cross_nothing() {
     let seconds = std::env::var("SERVE_LOAD_SECONDS").map_or(5, |text| text.parse().expect("a number"));
-    let served = Served::start(4, &[]);
+    let history = Arc::new(LineHistory::default());
+    let watching = Arc::clone(&history);
+    let served = Served::start_watched(4, &[], Box::new(move |passing| watching.note(passing)));
+    let history = &*history;
     let end = Instant::now() + Duration::from_secs(seconds);
     let tallies: Vec<(&str, Tally)> = thread::scope(|scope| {
         let mut programs = Vec::new();
         let forms = [(Map::V22, 0), (Map::V21, 0), (Map::V22, 50), (Map::V21, 30)];
         for ((name, own), (map, hertz)) in names(4).zip(SPEED..).zip(forms) {
             let wire = served.open(&name);
-            let run = move || ("pseudo-terminal", frame_program(wire, own, map, hertz, end));
+            let run = move || ("pseudo-terminal", frame_program(wire, own, (map, hertz), end, history));
             programs.push(scope.spawn(run));
         }
         for ((map, hertz), own) in
@@ -206,12 +234,12 @@ fn ten_clients_of_three_kinds_lose_nothing_and_cross_nothing() {
         {
             let wire = served.connect();
             wire.set_read_timeout(Some(LOST)).expect("a timeout");
-            programs.push(scope.spawn(move || ("TCP", frame_program(wire, own, map, hertz, end))));
+            programs.push(scope.spawn(move || ("TCP", frame_program(wire, own, (map, hertz), end, history))));
         }
         for (is_page, own) in [false, false, true].into_iter().zip(TIME..) {
             let headers: &[_] = if is_page { &[LOCAL_PAGE] } else { &[] };
             let client = WebClient::connect(&served, headers).expect("accepted");
-            programs.push(scope.spawn(move || ("WebSocket", web_program(client, own, is_page, end))));
+            programs.push(scope.spawn(move || ("WebSocket", web_program(client, own, is_page, end, history))));
         }
         programs.into_iter().map(|program| program.join().expect("no program fails")).collect()
     });

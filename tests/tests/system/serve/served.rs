@@ -32,8 +32,6 @@ pub(crate) struct Served {
     pub(crate) folder: TempDir,
 }
 
-/// How long it is waited for one reply: many programs may use the line, and the machine may be busy.
-const ANSWERED: Duration = Duration::from_secs(5);
 /// The link of the simulator when a relay is between it and the server.
 const SIMULATOR: &str = "sim";
 
@@ -73,7 +71,7 @@ impl Served {
         let served = Self { server, simulator, ports, relay, folder };
         if ptys > 0 {
             // Not over a terminal: a late reply would come to the program that opens it next.
-            wait_for("the arm answers", || served.ask_for_arm());
+            wait_for("the arm answers", || served.ask_for_arm(Duration::from_millis(500)));
         }
         served
     }
@@ -107,11 +105,11 @@ impl Served {
         ready.strip_prefix("unix:").expect("a path").into()
     }
 
-    /// Asks whether the arm answers, as a program that connects to the Unix socket now.
-    pub(crate) fn ask_for_arm(&self) -> Result<(), String> {
+    /// Asks whether the arm answers, as a program that connects to the Unix socket now and waits for so long.
+    pub(crate) fn ask_for_arm(&self, answered: Duration) -> Result<(), String> {
         let failed = |step: &'static str| move |error: io::Error| format!("{step}: {error}");
         let mut stream = UnixStream::connect(self.local_socket()).map_err(failed("connect"))?;
-        stream.set_read_timeout(Some(ANSWERED)).expect("a timeout");
+        stream.set_read_timeout(Some(answered)).expect("a timeout");
         stream.write_all(&read_request(DEVICE_CODE, 1)).map_err(failed("send"))?;
         stream.read_exact(&mut [0; 8]).map_err(failed("receive"))
     }

@@ -13,7 +13,6 @@
 //! ```
 
 mod frame_visits;
-mod line_history;
 mod sent_targets;
 mod visit;
 mod visitor;
@@ -47,6 +46,8 @@ const OUTAGE: Duration = Duration::from_millis(3_500);
 /// A target waits in the server for 200 ms at most. The rest is for programs that the system does not run for a while. In each run of
 /// the tests, on a machine that may be busy, only what waited through an outage is late.
 const LATE: Duration = Duration::from_millis(2_000);
+/// How long it is waited for the reply to one read: fifty programs use the line, and the machine may be busy.
+const ANSWERED: Duration = Duration::from_secs(5);
 /// Kilobytes by which the server may grow.
 const MOST_GROWTH: u64 = 8_192;
 
@@ -163,7 +164,7 @@ fn ways_in(served: &Served) -> Vec<WayIn> {
 /// Waits until the arm answers a program that connects. A failure tells what the line and both programs were doing.
 fn wait_for_arm(chaos: &Chaos, served: &Served) {
     wait_for("the arm answers", || {
-        served.ask_for_arm().map_err(|error| {
+        served.ask_for_arm(ANSWERED).map_err(|error| {
             let load = fs::read_to_string("/proc/loadavg").expect("the load of the machine");
             format!(
                 "{error}; {}; server: {}, {} open files; simulator: {}; load {}",

@@ -22,18 +22,18 @@ struct Read {
 
 /// The reads and replies on the line, and the outages.
 #[derive(Default)]
-pub(super) struct LineHistory {
+pub(crate) struct LineHistory {
     reads: Mutex<VecDeque<Read>>,
     /// Each outage has two: when it began, and when the arm was seen to answer again.
     turns: Mutex<Vec<Instant>>,
 }
 
 impl LineHistory {
-    pub(super) fn turn_over(&self) {
+    pub(crate) fn turn_over(&self) {
         self.turns.lock().expect("no panic").push(Instant::now());
     }
 
-    pub(super) fn note(&self, passing: Passing<'_>) {
+    pub(crate) fn note(&self, passing: Passing<'_>) {
         let (Passing::Request(frame) | Passing::Reply(frame)) = passing;
         let &[_, _, 3, address, count, ..] = frame else { return };
         let mut reads = self.reads.lock().expect("no panic");
@@ -45,7 +45,7 @@ impl LineHistory {
     }
 
     /// The reads and replies of the last seconds, and the last one of each.
-    pub(super) fn of_late(&self) -> String {
+    pub(crate) fn of_late(&self) -> String {
         let reads = self.reads.lock().expect("no panic");
         let of_kind = |is_reply: bool| {
             let ages = reads.iter().rev().filter(|read| read.is_reply == is_reply).map(|read| read.at.elapsed());
@@ -56,7 +56,7 @@ impl LineHistory {
     }
 
     /// What became of a read of these registers that was sent at this time.
-    pub(super) fn told(&self, sent: Instant, (address, count): (u8, u8)) -> String {
+    pub(crate) fn told(&self, sent: Instant, (address, count): (u8, u8)) -> String {
         let since = |at: Instant| match at.checked_duration_since(sent) {
             Some(after) => after.as_secs_f64(),
             None => -(sent - at).as_secs_f64(),

@@ -1,0 +1,55 @@
+//! How fast the bytes of a client are taken. A flood of requests that the hub drops at once would keep the server busy, and with it a
+//! stop of another client. So no client is read much faster than the arm's line could carry.
+
+use protocol_core::time::{Duration, Instant};
+
+/// A client may send so many times as much as the line carries: commands of the WebSocket are longer than frames.
+const TIMES_LINE: u64 = 4;
+/// A client may be so far ahead of that.
+const AHEAD: Duration = Duration::from_millis(20);
+/// Microseconds of ten bits, a byte with start and stop bit, at 1 bit/s.
+const BYTE: u64 = 10_000_000;
+
+/// The bytes of one client, as if they passed a line.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pace {
+    /// Of the arm's line, in bits per second.
+    baud: u32,
+    passed: Instant,
+}
+
+impl Pace {
+    pub(super) const fn new(baud: u32) -> Self {
+        Self { baud, passed: Instant::ZERO }
+    }
+
+    /// So many bytes were read at `now`.
+    pub(super) fn note(&mut self, now: Instant, bytes: usize) {
+        let bits = u64::try_from(bytes).unwrap_or(u64::MAX).saturating_mul(BYTE);
+        let time = bits / u64::from(self.baud).saturating_mul(TIMES_LINE).max(1);
+        self.passed = self.passed.max(now) + Duration::from_micros(time);
+    }
+
+    /// When more may be read.
+    pub(super) fn free_at(&self) -> Instant {
+        Instant::from_micros(self.passed.as_micros().saturating_sub(AHEAD.as_micros()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_client_is_read_four_times_as_fast_as_the_line() {
+        let (mut pace, mut now, mut taken) = (Pace::new(115_200), Instant::from_micros(5_000_000), 0);
+        let end = now + Duration::from_millis(1_000);
+        while now < end {
+            now = now.max(pace.free_at());
+            pace.note(now, 512);
+            taken += 512;
+        }
+        assert!((46_080..48_000).contains(&taken), "{taken}");
+        assert!(pace.free_at() <= now + Duration::from_millis(12), "a pause of one piece");
+    }
+}
