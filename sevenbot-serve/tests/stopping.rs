@@ -24,9 +24,16 @@ fn targets(world: &World) -> Vec<u8> {
     world.arm.registers().read(FINE_TARGET.address, FINE_TARGET.count).to_vec()
 }
 
-fn positions(world: &World) -> [i32; 7] {
-    let bytes = world.arm.registers().read(FINE_POSITION.address, FINE_POSITION.count);
-    std::array::from_fn(|joint| i32::from(u16::from_le_bytes([bytes[2 * joint], bytes[2 * joint + 1]])))
+/// The fine targets and positions as program 1 reads them. The arm brings these registers up to date when they are read.
+fn look(world: &mut World) -> (Vec<u8>, [i32; 7]) {
+    world.round_trip(1, &read(FINE_TARGET.address, 28));
+    let (_, values) = world.take(1).pop().expect("a reply");
+    let position = |joint: usize| u16::from_le_bytes([values[14 + 2 * joint], values[15 + 2 * joint]]);
+    (values[..14].to_vec(), std::array::from_fn(|joint| position(joint).into()))
+}
+
+fn positions(world: &mut World) -> [i32; 7] {
+    look(world).1
 }
 
 /// A program stops the arm as `sevenbot stop` does: it reads where the arm is, and writes that. Returns how long the write took
@@ -51,14 +58,15 @@ fn farthest(targets: &[u8], positions: [i32; 7]) -> i32 {
 }
 
 /// Who else uses the server while the arm is stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 enum Attack {
     Nothing,
     Readers,
     LongWrites,
     Targets,
     Stops,
-    /// Watchdogs of 10 ms of programs that are silent for 20 ms.
+    /// Watchdogs of 20 ms of a program that is silent for 50 ms, while another one reads. Without that one the arm's own watchdog
+    /// would act, too.
     Watchdogs,
 }
 
@@ -72,12 +80,15 @@ impl Attack {
             Self::LongWrites => write(0, &[0; 255]),
             Self::Targets => write(TARGET_POSITION.address, &[u8::try_from(turn % 100).unwrap() + 40]),
             Self::Stops => write(MOTOR_STATE.address, &[1]),
-            Self::Watchdogs if world.now.as_micros() / 10_000 % 3 == 0 => write(HOST_WATCHDOG.address, &[1]),
-            Self::Watchdogs => return,
+            Self::Watchdogs => {
+                if world.now.as_micros() / 10_000 % 5 == 0 {
+                    world.send(2, &write(HOST_WATCHDOG.address, &[2]));
+                }
+                return world.send(3, &read(SPEED.address, 1));
+            }
         };
-        let most_bytes = if self == Self::Watchdogs { 1 } else { 600 };
         for attacker in 2..2 + ATTACKERS {
-            while world.programs[attacker].to_send_bytes() < most_bytes {
+            while world.programs[attacker].to_send_bytes() < 600 {
                 world.send(attacker, &request);
             }
         }
@@ -102,18 +113,18 @@ fn stop_often(attack: Attack) {
         let (delay, held) = stop(&mut world, 1);
         delays.push(delay.as_micros());
         for settling in 0..14 {
-            let before = positions(&world);
+            let before = positions(&mut world);
             for _ in 0..4 {
                 world.send(0, &write(TARGET_POSITION.address, &[goal]));
                 attack.refill(&mut world, turn);
                 world.advance(50);
             }
-            assert_eq!(targets(&world), held, "{attack:?}, stop {turn}: nothing moves it");
-            let after = positions(&world);
+            let (targets, after) = look(&mut world);
+            assert_eq!(targets, held, "{attack:?}, stop {turn}: nothing moves it");
             let moved = before.iter().zip(after).map(|(before, after)| (before - after).abs()).max().unwrap();
             assert!(settling < 10 || moved <= 30, "{attack:?}, stop {turn}: moved by {moved} hundredths");
         }
-        let off = farthest(&held, positions(&world));
+        let off = farthest(&held, positions(&mut world));
         assert!(off <= DROOP, "{attack:?}, stop {turn}: rests {off} hundredths from where it was stopped");
     }
     delays.sort_unstable();
@@ -196,7 +207,7 @@ fn d24_an_arm_that_is_held_again_and_again_does_not_sink() {
     let mut world = World::new(3);
     world.send(0, &write(TARGET_POSITION.address, &[60, 40, 65]));
     world.run(3_000);
-    let before = (targets(&world), positions(&world));
+    let before = look(&mut world);
     let droop =
         before.0.chunks(2).zip(before.1).map(|(target, position)| {
             (i32::from(u16::from_le_bytes([target[0], target[1]])) - position).abs()
@@ -207,9 +218,10 @@ fn d24_an_arm_that_is_held_again_and_again_does_not_sink() {
         // A watchdog of 10 ms, and then silence.
         world.send(2, &write(HOST_WATCHDOG.address, &[1]));
         world.run(25);
-        assert_eq!(targets(&world), before.0, "hold {turn}");
+        assert_eq!(look(&mut world).0, before.0, "hold {turn}");
     }
-    let moved = before.1.iter().zip(positions(&world)).map(|(before, after)| (before - after).abs()).max();
+    let moved =
+        before.1.iter().zip(positions(&mut world)).map(|(before, after)| (before - after).abs()).max();
     assert!(moved <= Some(10), "moved by {moved:?} hundredths");
 }
 
@@ -257,9 +269,9 @@ fn a_command_stops_a_stream_with_a_long_period() {
     world.run(700);
     world.send(1, &write(COMMAND, &[1]));
     world.run(200);
-    let before = positions(&world);
+    let before = positions(&mut world);
     world.run(500);
-    assert!(positions(&world)[0].abs_diff(before[0]) <= 30, "{before:?} {:?}", positions(&world));
+    assert!(positions(&mut world)[0].abs_diff(before[0]) <= 30, "{before:?} {:?}", positions(&mut world));
     assert_eq!(world.arm.registers().read(184, 2), 1_000_u16.to_le_bytes(), "the period stays");
 }
 

@@ -150,7 +150,9 @@ impl ArmHold {
             let wanted = kept.map_or(position, |kept| self.is_streaming.then_some(kept));
             let Some(bytes) = wanted.map(|wanted| self.bytes(wanted)) else { continue };
             match frames.last_mut() {
-                Some((first, values)) if usize::from(*first) + values.len() == usize::from(targets.of(joint)) => {
+                Some((first, values))
+                    if usize::from(*first) + values.len() == usize::from(targets.of(joint)) =>
+                {
                     values.extend(bytes);
                 }
                 _ => frames.push((targets.of(joint), bytes)),

@@ -14,7 +14,8 @@ const RESERVED: usize = 16;
 #[cfg(unix)]
 pub(super) fn connections() -> usize {
     use rustix::process::{Resource, getrlimit};
-    let Some(limit) = getrlimit(Resource::Nofile).current.and_then(|limit| usize::try_from(limit).ok()) else {
+    let Some(limit) = getrlimit(Resource::Nofile).current.and_then(|limit| usize::try_from(limit).ok())
+    else {
         return MOST;
     };
     // Where the system does not list them, those of a server with many ways in.

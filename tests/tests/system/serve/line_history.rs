@@ -48,7 +48,8 @@ impl LineHistory {
     pub(crate) fn of_late(&self) -> String {
         let reads = self.reads.lock().expect("no panic");
         let of_kind = |is_reply: bool| {
-            let ages = reads.iter().rev().filter(|read| read.is_reply == is_reply).map(|read| read.at.elapsed());
+            let ages =
+                reads.iter().rev().filter(|read| read.is_reply == is_reply).map(|read| read.at.elapsed());
             let (count, last) = (ages.clone().take_while(|&age| age < LATELY).count(), ages.clone().next());
             format!("{count} in {LATELY:?}, the last one {last:?} ago")
         };

@@ -184,13 +184,7 @@ fn next_reply(wire: &mut impl Wire, map: Map, hertz: u8, reports: &mut usize) ->
 }
 
 /// The same over the WebSocket. A page also gets an answer to each write.
-fn web_program(
-    mut client: WebClient,
-    own: u8,
-    is_page: bool,
-    end: Instant,
-    history: &LineHistory,
-) -> Tally {
+fn web_program(mut client: WebClient, own: u8, is_page: bool, end: Instant, history: &LineHistory) -> Tally {
     let mut tally = Tally::default();
     for value in (1..=100_u8).cycle().take_while(|_| Instant::now() < end) {
         client.send(&format!(r#"{{"cmd":"write","id":{own},"num":1,"value":[{value}]}}"#));
@@ -239,7 +233,8 @@ fn ten_clients_of_three_kinds_lose_nothing_and_cross_nothing() {
         for (is_page, own) in [false, false, true].into_iter().zip(TIME..) {
             let headers: &[_] = if is_page { &[LOCAL_PAGE] } else { &[] };
             let client = WebClient::connect(&served, headers).expect("accepted");
-            programs.push(scope.spawn(move || ("WebSocket", web_program(client, own, is_page, end, history))));
+            programs
+                .push(scope.spawn(move || ("WebSocket", web_program(client, own, is_page, end, history))));
         }
         programs.into_iter().map(|program| program.join().expect("no program fails")).collect()
     });
