@@ -38,7 +38,7 @@ impl TestArgs {
 /// Seconds of fuzzing for each target, with another seed in each run.
 const LONG_FUZZ_SECONDS: u64 = 300;
 
-/// The steps, in order, until one fails. Steps that mostly wait or use one processor run beside each other. Tests come last, so
+/// The steps, in order, until one fails. Steps that mostly wait run beside steps that compute. Tests come last, so
 /// that their output is at the end.
 const STAGES: &[Stage] = &[
     &[&[
@@ -68,25 +68,27 @@ const STAGES: &[Stage] = &[
         quick("programs and tests", || cargo(&format!("test {TESTED} --no-run"))),
     ]],
     &[
+        // What computes,
         &[
             whole("start-up of the image", start_up::check),
             whole("instructions are within their budgets", || count::check(false)),
+            whole("recorded sessions, natively and in a WebAssembly module", replays::short),
+            whole("worlds with injected faults", torture::short),
+        ],
+        // beside what mostly waits for an arm, a browser or a network.
+        &[
             whole("system tests, the image for the arm in an emulator", || {
                 system_tests::run_on(&system_tests::EMULATOR)
             }),
             whole("system tests, the controller on this computer with servos behind a USB adapter", || {
                 system_tests::run_on(&system_tests::ADAPTER)
             }),
-            whole("the Python package", python::check),
-            whole("the ROS packages", ros::check),
-        ],
-        &[
             whole("the page in a browser", || {
                 let variables = [("RUST_TEST_THREADS", "1"), ("POSES", "1000")];
                 run("cargo", &format!("test {TESTED} --test browser"), &variables)
             }),
-            whole("recorded sessions, natively and in a WebAssembly module", replays::short),
-            whole("worlds with injected faults", torture::short),
+            whole("the Python package", python::check),
+            whole("the ROS packages", ros::check),
             whole("fuzzing", fuzz::fixed),
         ],
     ],

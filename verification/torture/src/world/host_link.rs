@@ -104,6 +104,10 @@ impl ArmToHost {
     }
 
     pub(super) fn room(&mut self, now: Instant) -> usize {
+        if self.level == 0 {
+            self.now = now;
+            return Self::CAPACITY;
+        }
         let since = self.now.max(self.blocked_until.min(now));
         let byte = time_of(1, self.baud).as_micros().max(1);
         let sent = usize::try_from((now - since).as_micros() / byte).unwrap_or(usize::MAX);

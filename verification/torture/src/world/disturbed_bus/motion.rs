@@ -32,11 +32,14 @@ impl DisturbedBus {
         if !is_servo {
             self.truths = PerJoint::default();
         }
+        let is_undisturbed = self.is_undisturbed(now);
+        let limited =
+            if is_guarded && is_undisturbed { self.limited_joints(now) } else { PerJoint::default() };
         for joint in Joint::ALL {
-            self.check_push(now, joint, limits[joint].filter(|_| is_guarded))?;
+            self.check_push(now, joint, limits[joint].filter(|_| limited[joint]))?;
         }
         for joint in Joint::ALL.into_iter().filter(|_| is_servo) {
-            let may_miss = self.may_miss_orders(now, joint);
+            let may_miss = !is_undisturbed || self.availability(joint) == Availability::Uncertain;
             self.truths[joint].observe(now, self.plant.torque(joint), may_miss);
             self.truths[joint].stands(now, self.plant.position_counts(joint));
             self.truths[joint].pushes(now, self.plant.motor_torque(joint), limits[joint]);
@@ -52,21 +55,25 @@ impl DisturbedBus {
                 self.motion_checker.may_overrun(now, joint);
             }
         }
-        let is_guarded = is_guarded && self.is_undisturbed(now);
-        self.motion_checker.check(now, is_servo, is_guarded, &self.plant)
+        self.motion_checker.check(now, is_servo, is_guarded && is_undisturbed, &self.plant)
     }
 
-    /// Checks the push of a joint, with the limit that the controller keeps.
-    fn check_push(&mut self, now: Instant, joint: Joint, limit: Option<i16>) -> Check {
+    /// The joints whose push a controller can limit that is not disturbed.
+    fn limited_joints(&self, now: Instant) -> PerJoint<bool> {
         let responds =
             |joint| matches!(self.availability(joint), Availability::Responding(since) if now >= since);
+        let responding = PerJoint(Joint::ALL.map(responds));
         // Each silent servo costs a timeout: with long ones the others are read a few times a second.
-        let is_read_often = self.timely_limit <= SHORT || Joint::ALL.into_iter().all(responds);
-        let can_limit = is_read_often && responds(joint) && self.is_undisturbed(now);
+        let is_read_often = self.timely_limit <= SHORT || responding == PerJoint::all(true);
+        if is_read_often { responding } else { PerJoint::default() }
+    }
+
+    /// Checks the push of a joint. `limit` is what the controller keeps, if it can.
+    fn check_push(&mut self, now: Instant, joint: Joint, limit: Option<i16>) -> Check {
         let push = Push {
             permille: self.plant.motor_torque(joint),
             speed: self.plant.load(joint).saturating_sub(self.plant.motor_torque(joint)),
-            limit: limit.filter(|_| can_limit),
+            limit,
             is_overloaded: self.plant.is_overloaded(joint),
         };
         self.push_rules[joint].check(now, joint, push)

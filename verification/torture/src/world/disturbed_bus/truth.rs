@@ -61,11 +61,6 @@ impl DisturbedBus {
         self.truths[joint].may_be_let_go(now) || self.may_be_misread(joint, now)
     }
 
-    /// True if the servo may miss a frame, or not answer a question.
-    pub(super) fn may_miss_orders(&self, now: Instant, joint: Joint) -> bool {
-        !self.is_undisturbed(now) || self.availability(joint) == Availability::Uncertain
-    }
-
     /// True if there have been no disturbances for long enough that the controller knows the state of the servos.
     pub(crate) fn is_undisturbed(&self, now: Instant) -> bool {
         self.disturbance == DisturbanceRates::default() && now - self.disturbed_at > REPEAT_TIME
