@@ -17,7 +17,7 @@ const HOST_WATCHDOG: u8 = 186;
 const NO_FRAMES: &[u8] = &[0xAA, 0x77, 0x06, 0xAA, 0x77, 0xAA, 0xFF, 0x00, 0x77, 0x03];
 
 /// What the other programs do.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Attack {
     /// One program streams targets, as beside all other attacks.
     Stream,
@@ -64,6 +64,12 @@ impl Attack {
             Self::Fragments | Self::Connections => 4,
             _ => 12,
         }
+    }
+
+    /// The arm's own watchdog acts whenever the line is silent for 10 ms, and holds the arm where its set-point is while it brakes
+    /// (D24). How far the server's holds are from the stop is tested in virtual time, on a line that is not silent.
+    pub(crate) fn lets_the_arm_hold(self) -> bool {
+        self == Self::Watchdogs
     }
 
     /// Attacks in each turn of the gate, until its end.
