@@ -7,7 +7,7 @@
 mod rig;
 
 use protocol_core::registers::map::{
-    CHIP_ID, FINE_POSITION, FINE_TARGET, HOST_WATCHDOG, MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION,
+    CHIP_ID, FINE_TARGET, HOST_WATCHDOG, MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION,
 };
 use protocol_core::time::Duration;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -81,7 +81,7 @@ impl Attack {
             Self::Targets => write(TARGET_POSITION.address, &[u8::try_from(turn % 100).unwrap() + 40]),
             Self::Stops => write(MOTOR_STATE.address, &[1]),
             Self::Watchdogs => {
-                if world.now.as_micros() / 10_000 % 5 == 0 {
+                if (world.now.as_micros() / 10_000).is_multiple_of(5) {
                     world.send(2, &write(HOST_WATCHDOG.address, &[2]));
                 }
                 return world.send(3, &read(SPEED.address, 1));

@@ -1,14 +1,13 @@
 //! How fast the bytes of a client are taken. A flood of requests that the hub drops at once would keep the server busy, and with it a
 //! stop of another client. So no client is read much faster than the arm's line could carry.
 
+use host_link::time_on_line;
 use protocol_core::time::{Duration, Instant};
 
 /// A client may send so many times as much as the line carries: commands of the WebSocket are longer than frames.
-const TIMES_LINE: u64 = 4;
+const TIMES_LINE: u32 = 4;
 /// A client may be so far ahead of that.
 const AHEAD: Duration = Duration::from_millis(20);
-/// Microseconds of ten bits, a byte with start and stop bit, at 1 bit/s.
-const BYTE: u64 = 10_000_000;
 
 /// The bytes of one client, as if they passed a line.
 #[derive(Clone, Copy, Debug)]
@@ -25,9 +24,7 @@ impl Pace {
 
     /// So many bytes were read at `now`.
     pub(super) fn note(&mut self, now: Instant, bytes: usize) {
-        let bits = u64::try_from(bytes).unwrap_or(u64::MAX).saturating_mul(BYTE);
-        let time = bits / u64::from(self.baud).saturating_mul(TIMES_LINE).max(1);
-        self.passed = self.passed.max(now) + Duration::from_micros(time);
+        self.passed = self.passed.max(now) + time_on_line(self.baud.saturating_mul(TIMES_LINE), bytes);
     }
 
     /// When more may be read.
