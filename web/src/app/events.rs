@@ -63,10 +63,7 @@ impl App {
             }
             "break" => {
                 let (joint, kind) = (self.dom.choice("fault-joint"), self.dom.choice("fault-kind"));
-                match kind.strip_prefix("trip") {
-                    Some(alarm) => self.act_on_simulation(&format!("trip {joint}{alarm}")),
-                    None => self.act("fault", &format!("{joint}={kind}")),
-                }
+                self.act_on_simulation(&break_action(&joint, &kind, self.wall_angle()));
             }
             "thing" => {
                 self.act_on_simulation(&format!("weight {}", self.dom.choice("payload")));
@@ -97,6 +94,12 @@ impl App {
         self.park = None;
         let now = self.now();
         self.client.write(now, address, values);
+    }
+
+    /// Where the wall is, in degrees.
+    fn wall_angle(&self) -> f32 {
+        let field = self.dom.get::<HtmlInputElement>("wall-at").ok();
+        field.as_ref().and_then(number).filter(|degrees| (0.0..=180.0).contains(degrees)).unwrap_or(60.0)
     }
 
     /// Takes the faults of a simulated arm away, and lets joints that were blocked or have let go try again (D27, D28).
@@ -292,5 +295,18 @@ impl App {
         if let Ok(dialog) = self.dom.get::<HtmlDialogElement>("tour") {
             dialog.close();
         }
+    }
+}
+
+/// The action of the simulation that breaks a servo, or puts something in the way of its joint.
+fn break_action(joint: &str, kind: &str, wall: f32) -> String {
+    match kind {
+        "wall" => format!("fault {joint}=wall={wall}"),
+        // 500 millinewton metres for each degree.
+        "soft" => format!("fault {joint}=wall={wall}/500"),
+        _ => match kind.strip_prefix("trip") {
+            Some(alarm) => format!("trip {joint}{alarm}"),
+            None => format!("fault {joint}={kind}"),
+        },
     }
 }

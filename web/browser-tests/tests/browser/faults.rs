@@ -165,3 +165,17 @@ fn a_register_is_written_in_the_table_and_a_wrong_value_is_refused_in_words() {
     page.wait_until_said("#notice", "This value cannot be written:");
     assert_eq!(page.state()["motors"], 2);
 }
+
+#[test]
+fn a_wall_stands_where_a_person_puts_it() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    page.choose("#fault-joint", "1");
+    page.choose("#fault-kind", "wall");
+    page.type_into("#wall-at", "110");
+    page.click("[data-action=break]");
+    page.type_into("#target-1", "150");
+    page.wait_until_said("#state", "oint 1 is blocked");
+    let stopped = page.measured()[0];
+    assert!((stopped - 110.0).abs() < 2.0, "{stopped}");
+}
