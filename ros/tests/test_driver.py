@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import sevenbot
+from sevenbot_ros import actions
 from sevenbot_ros.commands import Refusal, Targets
 from sevenbot_ros.driver import Driver, Measurement, Settings
 from sevenbot_ros.health import Health
@@ -47,6 +49,32 @@ class Heard:
 
     def ended(self) -> None:
         pass
+
+
+@contextmanager
+def running(**settings: float) -> Iterator[tuple[Driver, Heard]]:
+    """A driver whose simulated arm answers."""
+    heard = Heard()
+    driver = Driver(Settings(port="sim", **settings), heard)  # type: ignore[arg-type]
+    driver.start()
+    try:
+        heard.until(lambda: heard.last is not None)
+        yield driver, heard
+    finally:
+        driver.close()
+    assert not driver.has_failed
+
+
+def test_thirty_stops_do_not_lose_the_arm() -> None:
+    with running(real_time_factor=20.0) as (driver, heard):
+        arm = driver.arm()
+        for number in range(30):
+            assert driver.command(Targets({0: 90.0 + number % 4})) is None
+            heard.until(lambda: driver._stream is not None)
+            actions.stop(driver)
+            actions.hold(driver)
+        assert driver.arm() is arm
+        assert len(heard.told) == 1, heard.told
 
 
 def test_a_command_that_comes_while_the_arm_is_lost_does_not_lead_the_next_one() -> None:
