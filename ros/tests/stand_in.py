@@ -12,8 +12,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import rclpy
+from rclpy.signals import SignalHandlerOptions
 from sevenbot_ros.__main__ import spin
 from sevenbot_ros.node import ArmNode
+from sevenbot_ros.signals import EndSignals
 from sevenbot_ros.trajectory_action import Goal, TrajectoryAction
 from test_msgs.action import Fibonacci
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -89,8 +91,9 @@ class StandIn:
 
 
 def main() -> int:
-    rclpy.init()
-    return spin(ArmNode(), TrajectoryAction(Fibonacci, StandIn()))
+    signals = EndSignals()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    return spin(ArmNode(), TrajectoryAction(Fibonacci, StandIn()), signals)
 
 
 if __name__ == "__main__":

@@ -220,10 +220,16 @@ def test_a_wrong_parameter_ends_the_program(start: Start) -> None:
     assert "rate is 1000: it has to be 1 to 200" in node.text()
 
 
-def test_ctrl_c_ends_the_program(start: Start, client: Clients) -> None:
-    node = start.node()
-    client(simulated_time=True).connect()
-    assert node.end(signal.SIGINT) == 0
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_program_without_a_complaint(start: Start, client: Clients, how: signal.Signals) -> None:
+    hearing = client(simulated_time=True)
+    # The signal comes at any point of the cycle of the arm's thread.
+    for _ in range(3):
+        node = start.node(rate=200)
+        hearing.states.clear()
+        hearing.connect()
+        assert node.end(how) == 0, node.text()
+        assert not any(word in node.text() for word in ("Traceback", "Exception", "ERROR")), node.text()
 
 
 def test_memory_does_not_grow(start: Start, client: Clients, report: Report) -> None:
