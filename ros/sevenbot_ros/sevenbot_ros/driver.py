@@ -148,6 +148,8 @@ class Driver:
             if refusal := self._refusal():
                 return refusal
             if self._lead is not None:
+                if not self._lead.gives_way_to(lead):
+                    return Refusal("busy", "a trajectory of other joints is running: wait for its end, or cancel it")
                 self._lead.end("another one replaces it")
             self._lead = lead
             return None
