@@ -4,7 +4,7 @@ use sevenbot::ProblemKind;
 use sevenbot::health::MoveFault;
 use sevenbot::map::motor_state;
 
-use crate::arm_state::ArmState;
+use crate::arm_state::{ArmState, breach, breach_text};
 use crate::movement::PlayFailure;
 use crate::stop::StopProgress;
 use crate::texts::Language;
@@ -46,13 +46,13 @@ pub enum Answers {
     NoLonger,
 }
 
-/// The line, and its mood: the most important thing first.
+/// The line, and its mood: the most important thing first. `doing` is the name of the text of what the page does with the arm.
 #[must_use]
 pub fn state_line(
     language: Language,
     answers: Answers,
     state: &ArmState,
-    stop: StopProgress,
+    (stop, doing): (StopProgress, Option<&'static str>),
 ) -> (String, Mood) {
     let plain = |name| (language.text(name).to_owned(), Mood::Plain);
     let bad = |name| (language.text(name).to_owned(), Mood::Bad);
@@ -83,9 +83,28 @@ pub fn state_line(
         (_, motor_state::DAMPING) => plain("damped"),
         (_, motor_state::FORCELESS) => plain("limp"),
         _ if state.measured.contains(&None) => plain("starting"),
-        _ if state.moving != 0 => plain("moving"),
-        (StopProgress::Holds, _) => (language.text("holds").to_owned(), Mood::Good),
-        _ => (language.text("ready").to_owned(), Mood::Good),
+        _ => moving_or_ready(language, state, stop, doing),
+    }
+}
+
+fn moving_or_ready(
+    language: Language,
+    state: &ArmState,
+    stop: StopProgress,
+    doing: Option<&'static str>,
+) -> (String, Mood) {
+    let moving = (state.moving != 0).then_some("moving");
+    if let Some(name) = doing.or(moving) {
+        return (language.text(name).to_owned(), Mood::Plain);
+    }
+    let name = if stop == StopProgress::Holds { "holds" } else { "ready" };
+    match breach(state.angles()) {
+        Some(breach) => {
+            let [line, part, place] =
+                [name, "a-part-is", breach_text(&breach)].map(|name| language.text(name));
+            (format!("{line} {part} {place}."), Mood::Bad)
+        }
+        None => (language.text(name).to_owned(), Mood::Good),
     }
 }
 
@@ -167,7 +186,7 @@ mod tests {
     }
 
     fn said(state: &ArmState, stop: StopProgress) -> String {
-        state_line(Language::English, Answers::Yes, state, stop).0
+        state_line(Language::English, Answers::Yes, state, (stop, None)).0
     }
 
     #[test]
@@ -227,7 +246,8 @@ mod tests {
     #[test]
     fn a_silent_arm_is_said_first() {
         let missing = with(&[(242, 1)]);
-        let (line, mood) = state_line(Language::English, Answers::NoLonger, &missing, StopProgress::None);
+        let (line, mood) =
+            state_line(Language::English, Answers::NoLonger, &missing, (StopProgress::None, None));
         assert!(line.starts_with("The arm does not answer") && mood == Mood::Bad);
     }
 }

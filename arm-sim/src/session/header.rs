@@ -80,7 +80,10 @@ impl Display for SessionHeader {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HeaderError {
     /// The file is something else.
-    #[error("it does not begin with '7bot-session {VERSION}'")]
+    #[error(
+        "it does not begin with '7bot-session {VERSION}', as what `host-sim --record` writes. `sevenbot sniff FILE` shows \
+         a log of `sevenbot log` or `--log`"
+    )]
     NoSession,
     /// A value is missing or wrong.
     #[error("its first two lines have no good value of {0}")]

@@ -33,7 +33,7 @@ $XDG_CONFIG_HOME/7bot/park-poses, or in ~/.config/7bot/park-poses; on Windows in
 
 Examples:
   sevenbot park
-  sevenbot park _ 95 20 90 60 _ _ --keep
+  sevenbot park _ 92 2 _ 50 _ _ --keep
                             this arm parks here from now on
   sevenbot park --standard  the standard pose, although another one is kept
 

@@ -33,7 +33,8 @@ The steps, as far as they are necessary:
 2. Asks whether that is done. A servo that holds again may turn a joint by a few
    degrees: keep clear of the arm.
 3. Writes motor state 1, so that servos that let go hold again where they are,
-   and sets the targets to the measured positions. It does not do that while no
+   and sets the targets of blocked joints to their positions; of all joints, if
+   the motors were off. It does not do that while no
    servo answers, or while a servo is too hot or has a wrong supply. Firmware
    that does not tell which servo was overloaded needs motor state 2 for a
    moment: the arm falls unless you hold it, and that is asked for separately.
@@ -141,7 +142,23 @@ fn recover(arm: &mut Arm, before: &Health, yes: bool) -> Result<(), CommandError
     }
     arm.write_motion(MOTOR_STATE.address, &[motor_state::SERVO])?;
     // The joints may need some time: step 4 watches them.
+    if before.is_driven() && before.joints.iter().all(|joint| joint.is_blocked.is_some()) {
+        return free_blocked_joints(arm, &now);
+    }
     arm.hold().map(drop).map_err(|error| MoveError::from(error).into())
+}
+
+/// Makes blocked joints hold where they are, which a new target does (D27). A joint that let go engages where it is by itself (D28),
+/// and the others keep their targets: with its position as its target, a loaded joint would sink a little further.
+fn free_blocked_joints(arm: &mut Arm, health: &Health) -> Result<(), CommandError> {
+    let mut targets = [None; 7];
+    for (target, joint) in targets.iter_mut().zip(&health.joints) {
+        *target = joint.position.filter(|_| joint.is_blocked == Some(true));
+    }
+    if targets.iter().any(Option::is_some) {
+        arm.set_fine_targets_checked(&targets)?;
+    }
+    Ok(())
 }
 
 /// Does the problem end only when the motor state or a target is written?

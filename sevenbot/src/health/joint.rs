@@ -1,8 +1,9 @@
 //! The health of one joint.
 
 use protocol_core::registers::map::{
-    BLOCKED_JOINTS, EFFECTOR_TYPE, FINE_POSITION, FINE_TARGET, LET_GO_JOINTS, LOAD, MEASURED_JOINTS,
-    MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, TARGET_POSITION, VELOCITY, motor_state,
+    BLOCKED_JOINTS, EFFECTOR_TYPE, FINE_POSITION, FINE_TARGET, GRIP_LIMIT, LET_GO_JOINTS, LOAD,
+    MEASURED_JOINTS, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS, PRESENT_POSITION, TARGET_POSITION, VELOCITY,
+    motor_state,
 };
 use protocol_core::registers::{Joint, Register};
 
@@ -36,7 +37,7 @@ pub struct JointHealth {
     /// Does an obstacle keep the joint from its target ([D27](protocol_core::decisions#d27))? Not of a gripper that
     /// holds something.
     pub is_blocked: Option<bool>,
-    /// Does the joint, a gripper, hold something?
+    /// Does the joint, a gripper, hold something? It was stopped by it, and still presses it with at least half of the grip limit.
     pub is_gripping: Option<bool>,
     /// Does the servo hold no torque although it should ([D28](protocol_core::decisions#d28))?
     pub has_let_go: Option<bool>,
@@ -54,6 +55,9 @@ impl JointHealth {
         let is_moving = bit(told.status, &MOVING_JOINTS);
         let is_gripper = CLAW == Some(joint) && registers.byte(&EFFECTOR_TYPE) == GRIPPER;
         let is_stopped = bit(told.protection, &BLOCKED_JOINTS);
+        let load_percent = tenths(&LOAD);
+        let least_grip = f64::from(registers.byte(&GRIP_LIMIT)) / 2.0;
+        let presses = load_percent.is_none_or(|percent| percent.abs() >= least_grip);
         let is_near = position
             .is_some_and(|position| (position.degrees() - target.degrees()).abs() <= AT_TARGET_DEGREES);
         Self {
@@ -61,11 +65,11 @@ impl JointHealth {
             target,
             position,
             velocity: tenths(&VELOCITY),
-            load_percent: tenths(&LOAD),
+            load_percent,
             is_moving,
             is_silent: bit(told.status, &MISSING_SERVOS),
             is_blocked: is_stopped.map(|stopped| stopped && !is_gripper),
-            is_gripping: is_stopped.map(|stopped| stopped && is_gripper),
+            is_gripping: is_stopped.map(|stopped| stopped && is_gripper && presses),
             has_let_go: bit(told.protection, &LET_GO_JOINTS),
             is_at_target: is_near
                 && is_moving != Some(true)

@@ -11,8 +11,8 @@ use protocol_core::request::Request;
 use serialport::TTYPort;
 use sevenbot::health::{MoveCheck, MoveCheckError, ProblemKind};
 use sevenbot::map::{
-    BLOCKED_JOINTS, EFFECTOR_TYPE, FRAMES_ACCEPTED, LET_GO_JOINTS, MISSING_SERVOS, MOTOR_STATE,
-    SET_POINT_PERIOD, SUPPLY_LOST,
+    BLOCKED_JOINTS, EFFECTOR_TYPE, FRAMES_ACCEPTED, GRIP_LIMIT, LET_GO_JOINTS, LOAD, MISSING_SERVOS,
+    MOTOR_STATE, SET_POINT_PERIOD, SUPPLY_LOST,
 };
 use sevenbot::moves::{JointMove, MoveError};
 use sevenbot::stream::{SetPointStream, StreamOptions};
@@ -76,9 +76,15 @@ fn d27_a_gripper_that_holds_something_is_not_blocked() {
     assert_eq!(told(check.check(&mut arm)), [(ProblemKind::Blocked, Some(7))], "a suction cup");
     set(&registers, EFFECTOR_TYPE, 1);
     assert!(check.check(&mut arm).unwrap().is_gripping);
-    let health = arm.health().unwrap();
-    assert_eq!(health.problems(), []);
-    assert_eq!(health.joints[6].word(true), "holds something");
+    set(&registers, GRIP_LIMIT, 40);
+    let claw_load = usize::from(LOAD.of(Joint::ALL[6]));
+    for (tenths_of_a_percent, word) in [(-200_i16, "holds something"), (199, "moving")] {
+        registers.lock().unwrap()[claw_load..claw_load + 2]
+            .copy_from_slice(&tenths_of_a_percent.to_le_bytes());
+        let health = arm.health().unwrap();
+        assert_eq!(health.problems(), []);
+        assert_eq!(health.joints[6].word(true), word, "the claw presses with {tenths_of_a_percent}");
+    }
 }
 
 #[test]

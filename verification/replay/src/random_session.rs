@@ -14,9 +14,26 @@ const ACTS: u32 = 40;
 /// The longest time between two of them, in microseconds.
 const LONGEST_PAUSE: u64 = 100_000;
 /// Actions that are always the same.
-const ACTIONS: [&str; 7] = ["clear", "restart", "power-cycle", "disconnect", "weight 100", "seed 9", "halt"];
-/// Faults of a servo, for a time.
-const SERVO_FAULTS: [&str; 4] = ["late=20", "garbled=3", "stuck", "missing"];
+const ACTIONS: [&str; 11] = [
+    "clear",
+    "restart",
+    "power-cycle",
+    "disconnect",
+    "weight 100",
+    "weight 500",
+    "drop",
+    "trip 2",
+    "trip 5 heat",
+    "seed 9",
+    "halt",
+];
+/// Faults of a servo and what a joint meets, for a time.
+const JOINT_FAULTS: [&str; 8] =
+    ["late=20", "garbled=3", "stuck", "missing", "wall=80", "wall=100/500", "push=700", "push=-700"];
+/// Other faults, for a time.
+const SHORT_FAULTS: [&str; 3] = ["7=thing=30", "7=thing=60/100", "supply=off"];
+/// How long they last: an emergency stop of a second switches the motors off (D29).
+const SHORTLY: [u64; 2] = [300_000, 1_200_000];
 /// Faults until they are taken back.
 const ARM_FAULTS: [&str; 5] =
     ["line=loss=5", "line=corruption=5", "line=delay=3", "bus=echo", "supply=dips=100"];
@@ -85,13 +102,14 @@ impl Random {
 
     fn action(&mut self) -> Option<Action> {
         let joint = self.pick(&Joint::ALL)?;
-        Some(match self.byte(4) {
+        Some(match self.byte(5) {
             0 => {
-                let fault = self.pick(&SERVO_FAULTS)?.parse().ok()?;
-                Action::Fault(
-                    arm_sim::faults::ArmFault::Servo(joint, fault),
-                    Some(Duration::from_millis(300)),
-                )
+                let fault = format!("{}={}", joint.number(), self.pick(&JOINT_FAULTS)?);
+                Action::Fault(fault.parse().ok()?, Some(Duration::from_micros(self.pick(&SHORTLY)?)))
+            }
+            4 => {
+                let fault = self.pick(&SHORT_FAULTS)?.parse().ok()?;
+                Action::Fault(fault, Some(Duration::from_micros(self.pick(&SHORTLY)?)))
             }
             1 => Action::Fault(self.pick(&ARM_FAULTS)?.parse().ok()?, None),
             2 => Action::Hand(joint, 4 * u16::from(self.byte(255))),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::page::Page;
 use system_tests::wait::wait_until;
@@ -100,6 +100,29 @@ impl Page {
     /// Presses a key once.
     pub fn key(&mut self, key: &str) {
         self.keys(key, 1);
+    }
+
+    /// Replaces the content of a field, and presses Enter.
+    #[track_caller]
+    pub fn type_into(&mut self, selector: &str, text: &str) {
+        self.evaluate(&format!("document.querySelector(`{selector}`).select()"));
+        self.focus(selector);
+        self.call("Input.insertText", json!({ "text": text }));
+        self.key("Enter");
+    }
+
+    /// Moves a finger from one place to another.
+    pub fn swipe(&mut self, from: [f64; 2], to: [f64; 2]) {
+        let mut touch = |kind: &str, points: Value| {
+            self.call("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points }));
+        };
+        touch("touchStart", json!([{ "x": from[0], "y": from[1] }]));
+        for step in 1..=DRAG_STEPS {
+            let share = f64::from(step) / f64::from(DRAG_STEPS);
+            let at = |axis: usize| from[axis] + share * (to[axis] - from[axis]);
+            touch("touchMove", json!([{ "x": at(0), "y": at(1) }]));
+        }
+        touch("touchEnd", json!([]));
     }
 
     /// Chooses an option of a list.

@@ -72,15 +72,28 @@ impl Page {
             page.call("Page.addScriptToEvaluateOnNewDocument", json!({ "source": script }));
         }
         page.call("Page.navigate", json!({ "url": url }));
+        page.wait_until_it_draws();
+        page
+    }
+
+    /// Loads the page again.
+    #[track_caller]
+    pub fn reload(&mut self) {
+        self.evaluate("delete window.sevenbot");
+        self.call("Page.reload", json!({}));
+        self.wait_until_it_draws();
+    }
+
+    #[track_caller]
+    fn wait_until_it_draws(&mut self) {
         wait_for("the page draws", || {
-            let frames = page.try_evaluate("window.sevenbot.frame_count()");
+            let frames = self.try_evaluate("window.sevenbot.frame_count()");
             frames
                 .ok()
                 .and_then(|count| count.as_u64())
                 .filter(|&count| count > 2)
-                .ok_or_else(|| page.report())
+                .ok_or_else(|| self.report())
         });
-        page
     }
 
     /// Changes the screen, and waits until the page has it.

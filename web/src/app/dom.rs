@@ -94,7 +94,7 @@ impl Dom {
     /// Says something that a person should know now.
     pub(super) fn notice(&self, text: &str) {
         self.set_text("notice", text);
-        self.set_hidden("notice", false);
+        self.set_hidden("notice-bar", false);
     }
 
     /// Says why there is no picture of the arm. The rest of the page works.
@@ -105,7 +105,7 @@ impl Dom {
 
     /// Takes the last notice back.
     pub(super) fn end_notice(&self) {
-        self.set_hidden("notice", true);
+        self.set_hidden("notice-bar", true);
         self.set_text("notice", "");
     }
 

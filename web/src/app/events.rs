@@ -1,30 +1,25 @@
 //! What a person does: clicks, keys, sliders, the pointer on the picture, files.
 
-use std::time::Duration;
-
 use protocol_core::time::Instant;
 use sevenbot::map::{MOTOR_STATE, motor_state};
-use sevenbot::recording::{Recording, RecordingError};
 use sevenbot::{Span, register_values};
 use wasm_bindgen::{JsCast, JsValue};
-use wasm_bindgen_futures::{JsFuture, spawn_local};
-use web_sys::{
-    Blob, Element, Event, HtmlAnchorElement, HtmlDialogElement, HtmlInputElement, KeyboardEvent, Url,
-};
+use web_sys::{Element, Event, HtmlDialogElement, HtmlInputElement, KeyboardEvent};
 
 use super::dom::{Dom, number};
 use super::hand;
-use super::page::{App, Line, on, with_app};
+use super::page::{App, Line, on};
+use super::panels::TIP_FIELDS;
+use super::recording::upload;
+use super::storage;
 use crate::arm_state::target_frame;
-use crate::movement::{PlayProgress, PlayRefusal, Player, Recorder};
+use crate::movement::{PlayProgress, Player};
 use crate::park::{Park, ParkProgress};
 use crate::plots::Quantity;
 use crate::source::serial::SerialSource;
 use crate::source::socket::SocketSource;
 use crate::words;
 
-/// The longest way to the first pose of a movement, in seconds.
-const LONGEST_APPROACH: f32 = 60.0;
 /// The texts of the tour, in their order. The last one is for a real arm.
 const TOUR: [&str; 5] = ["tour-1", "tour-2", "tour-3", "tour-4", "tour-5"];
 
@@ -55,7 +50,10 @@ impl App {
     fn act(&mut self, action: &str, value: &str) {
         match action {
             "stop" => self.stop(),
-            "language" => self.set_language(self.language.other()),
+            "language" => {
+                self.set_language(self.language.other());
+                storage::save("language", self.language.tag());
+            }
             "motors" => self.write(MOTOR_STATE.address, &[value.parse().unwrap_or(motor_state::SERVO)]),
             "park" => self.begin_park(),
             "plot" => self.choose_plot(value),
@@ -65,10 +63,7 @@ impl App {
             }
             "break" => {
                 let (joint, kind) = (self.dom.choice("fault-joint"), self.dom.choice("fault-kind"));
-                match kind.strip_prefix("trip") {
-                    Some(alarm) => self.act_on_simulation(&format!("trip {joint}{alarm}")),
-                    None => self.act("fault", &format!("{joint}={kind}")),
-                }
+                self.act_on_simulation(&break_action(&joint, &kind, self.wall_angle()));
             }
             "thing" => {
                 self.act_on_simulation(&format!("weight {}", self.dom.choice("payload")));
@@ -76,7 +71,7 @@ impl App {
             }
             "drop" => self.act_on_simulation("drop"),
             "fault" => self.act_on_simulation(&format!("fault {value}")),
-            "repair" => self.act_on_simulation("clear"),
+            "repair" => self.repair(),
             "power" => self.act_on_simulation("power-cycle"),
             "record" => self.record(),
             "play" => self.begin_play(),
@@ -90,7 +85,8 @@ impl App {
                 self.show_tour();
             }
             "tour-end" => self.end_tour(),
-            _ => {}
+            "close-notice" => self.dom.end_notice(),
+            _ => self.control(action, value),
         }
     }
 
@@ -98,6 +94,27 @@ impl App {
         self.park = None;
         let now = self.now();
         self.client.write(now, address, values);
+    }
+
+    /// Where the wall is, in degrees.
+    fn wall_angle(&self) -> f32 {
+        let field = self.dom.get::<HtmlInputElement>("wall-at").ok();
+        field.as_ref().and_then(number).filter(|degrees| (0.0..=180.0).contains(degrees)).unwrap_or(60.0)
+    }
+
+    /// Takes the faults of a simulated arm away, and lets joints that were blocked or have let go try again (D27, D28).
+    fn repair(&mut self) {
+        self.act_on_simulation("clear");
+        let state = self.client.state();
+        if state.motor_state != motor_state::SERVO {
+            return;
+        }
+        self.write(MOTOR_STATE.address, &[motor_state::SERVO]);
+        for (joint, target) in
+            (1..).zip(state.targets).filter(|(joint, _)| state.stalled >> (joint - 1) & 1 == 1)
+        {
+            self.send_joint(joint, target);
+        }
     }
 
     fn begin_park(&mut self) {
@@ -163,6 +180,10 @@ impl App {
         else {
             return;
         };
+        // A number is sent when it is complete.
+        if slider.type_() == "number" {
+            return;
+        }
         let joint = slider.get_attribute("data-joint").and_then(|joint| joint.parse().ok());
         if let Some((joint, degrees)) = joint.zip(number(&slider)) {
             // The round that is on its way may be older than this target.
@@ -184,6 +205,9 @@ impl App {
         match element.id().as_str() {
             "source" => self.choose_source(),
             "upload" => upload(&element),
+            "joint-speed" => self.choose_speed(),
+            id if TIP_FIELDS.contains(&id) => self.type_tip(),
+            id if id.starts_with("target-") => self.type_joint(&element),
             _ => self.change_register(&element),
         }
     }
@@ -196,7 +220,9 @@ impl App {
             self.choose_source();
             self.tour_step = TOUR.len() - 1;
         }
-        self.begin_tour();
+        if storage::load("tour").is_none() {
+            self.begin_tour();
+        }
     }
 
     fn choose_source(&mut self) {
@@ -250,63 +276,6 @@ impl App {
         }
     }
 
-    fn record(&mut self) {
-        if self.recorder.is_some() {
-            self.end_recording();
-        } else {
-            self.recorder = Some(Recorder::new(self.now()));
-        }
-    }
-
-    pub(super) fn end_recording(&mut self) {
-        let recorded = self.recorder.take().and_then(Recorder::finish);
-        self.recording = recorded.or(self.recording.take());
-    }
-
-    fn begin_play(&mut self) {
-        self.park = None;
-        let Some(recording) = &self.recording else { return };
-        let seconds = self.dom.get::<HtmlInputElement>("approach").ok().and_then(|field| number(&field));
-        let approach = seconds.filter(|seconds| *seconds > 0.0);
-        let approach = approach.map(|seconds| Duration::from_secs_f32(seconds.min(LONGEST_APPROACH)));
-        match Player::new(recording, self.client.registers(), approach, self.now()) {
-            Ok(player) => {
-                self.player = Some(player);
-                self.dom.end_notice();
-            }
-            Err(PlayRefusal::NoRecording(why)) => self.refuse_file(&why),
-            Err(PlayRefusal::TooFar(far)) => {
-                let joints = far
-                    .joints
-                    .iter()
-                    .map(|(joint, here, first)| format!("{}: {here:.1}° → {first:.1}°", joint.number()));
-                let joints = joints.collect::<Vec<_>>().join(", ");
-                self.dom.notice(&format!("{} {joints}", self.language.text("too-far")));
-            }
-        }
-    }
-
-    fn refuse_file(&self, why: &RecordingError) {
-        self.dom.notice(&format!("{} {why}", self.language.text("bad-file")));
-    }
-
-    fn download(&self) {
-        let Some(recording) = &self.recording else { return };
-        let parts = js_sys::Array::of1(&recording.as_str().into());
-        let address =
-            Blob::new_with_str_sequence(&parts).and_then(|blob| Url::create_object_url_with_blob(&blob));
-        let Ok(address) = address else { return };
-        if let Ok(link) =
-            self.dom.0.create_element("a").and_then(|link| Ok(link.dyn_into::<HtmlAnchorElement>()?))
-        {
-            link.set_href(&address);
-            link.set_download("movement.7bot");
-            link.click();
-        }
-        // The browser has its own reference by now.
-        let _ = Url::revoke_object_url(&address);
-    }
-
     pub(super) fn begin_tour(&mut self) {
         if let Ok(dialog) = self.dom.get::<HtmlDialogElement>("tour") {
             dialog.show();
@@ -322,27 +291,22 @@ impl App {
     }
 
     fn end_tour(&mut self) {
+        storage::save("tour", "seen");
         if let Ok(dialog) = self.dom.get::<HtmlDialogElement>("tour") {
             dialog.close();
         }
     }
 }
 
-/// Reads the file that a person chose.
-fn upload(element: &Element) {
-    let Some(input) = element.dyn_ref::<HtmlInputElement>() else { return };
-    let Some(file) = input.files().and_then(|files| files.get(0)) else { return };
-    // So that the same file can be chosen again after a change.
-    input.set_value("");
-    spawn_local(async move {
-        let text =
-            JsFuture::from(file.text()).await.ok().and_then(|text| text.as_string()).unwrap_or_default();
-        with_app(|app| match Recording::parse(&text) {
-            Ok(_) => {
-                app.recording = Some(text.clone());
-                app.dom.end_notice();
-            }
-            Err(why) => app.refuse_file(&why),
-        });
-    });
+/// The action of the simulation that breaks a servo, or puts something in the way of its joint.
+fn break_action(joint: &str, kind: &str, wall: f32) -> String {
+    match kind {
+        "wall" => format!("fault {joint}=wall={wall}"),
+        // 500 millinewton metres for each degree.
+        "soft" => format!("fault {joint}=wall={wall}/500"),
+        _ => match kind.strip_prefix("trip") {
+            Some(alarm) => format!("trip {joint}{alarm}"),
+            None => format!("fault {joint}={kind}"),
+        },
+    }
 }

@@ -5,7 +5,7 @@ use motion_core::calibration::{MicroDegrees, counts_from_angle};
 use sevenbot::map::{FINE_TARGET, motor_state};
 use sevenbot::{FineAngle, Joint};
 use wasm_bindgen::JsValue;
-use web_sys::{Element, PointerEvent, WheelEvent};
+use web_sys::{Element, PointerEvent, TouchEvent, WheelEvent};
 
 use super::dom::Dom;
 use super::page::{App, Line, on};
@@ -34,6 +34,12 @@ pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
         let event = app.scene.as_mut().and_then(Scene::pointer_left);
         app.scene_event(event);
     })?;
+    // Above the arm a finger moves it, elsewhere the page; two fingers zoom.
+    on(&canvas, "touchstart", |app, touch: &TouchEvent, event| {
+        if app.takes_touch(touch) {
+            event.prevent_default();
+        }
+    })?;
     on(&canvas, "wheel", |app, wheel: &WheelEvent, event| {
         event.prevent_default();
         if let Some(scene) = &mut app.scene {
@@ -52,6 +58,19 @@ fn place(pointer: &PointerEvent) -> [f32; 2] {
 }
 
 impl App {
+    /// Is this touch for the arm?
+    fn takes_touch(&self, event: &TouchEvent) -> bool {
+        let touches = event.touches();
+        let (Some(touch), Ok(canvas), Some(scene)) = (touches.get(0), self.dom.canvas("scene"), &self.scene)
+        else {
+            return false;
+        };
+        let corner = canvas.get_bounding_client_rect();
+        let [x, y] =
+            [f64::from(touch.client_x()) - corner.left(), f64::from(touch.client_y()) - corner.top()];
+        touches.length() > 1 || scene.pick(narrow(x), narrow(y), self.client.state().angles()).is_some()
+    }
+
     fn pointer_down(&mut self, pointer: &PointerEvent) {
         let angles = self.client.state().angles();
         let button = if pointer.button() == 0 { Button::Primary } else { Button::Secondary };
@@ -89,7 +108,7 @@ impl App {
     }
 
     /// Sends the arm to a pose of a dragged tip. Returns the text that says why not, if the way there is not allowed.
-    fn drag_tip(&mut self, angles: [f32; 7]) -> Option<&'static str> {
+    pub(super) fn drag_tip(&mut self, angles: [f32; 7]) -> Option<&'static str> {
         let breach = breach_on_way(self.client.registers(), angles);
         if breach.is_none() {
             self.send_pose(angles);
@@ -108,7 +127,7 @@ impl App {
         self.hand = Some(joint);
     }
 
-    fn send_pose(&mut self, angles: [f32; 7]) {
+    pub(super) fn send_pose(&mut self, angles: [f32; 7]) {
         let values: Vec<u8> = angles
             .iter()
             .filter_map(|&degrees| FineAngle::from_degrees(f64::from(degrees)))

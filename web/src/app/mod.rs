@@ -7,18 +7,25 @@
 //! ```
 //!
 //! ```text
-//!   dom.rs ──▶ page.rs ──▶ panels.rs, hand.rs ──▶ picture.rs, events.rs, exports.rs ──▶ mod.rs
-//!   (elements)  (App)      (what it shows,        (before each picture;                (start)
-//!                           pointers)              clicks and keys; tests)
+//!   dom.rs, storage.rs, kept_recording.rs ──▶ page.rs ──▶ panels.rs, hand.rs, recording.rs ──▶ controls.rs
+//!   (the browser's elements and storage)     (App)      (what it shows, pointers,             (numbers and
+//!                                                        movements)                            buttons)
+//!                ──▶ picture.rs, events.rs, exports.rs ──▶ mod.rs
+//!                    (before each picture; clicks and       (start)
+//!                     keys; tests)
 //! ```
 
+mod controls;
 mod dom;
 mod events;
 mod exports;
 mod hand;
+mod kept_recording;
 mod page;
 mod panels;
 mod picture;
+mod recording;
+mod storage;
 
 use std::cell::RefCell;
 use std::rc::Rc;

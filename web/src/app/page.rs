@@ -11,6 +11,8 @@ use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{CanvasRenderingContext2d, Element, Event};
 
 use super::dom::Dom;
+use super::kept_recording::KeptRecording;
+use super::storage;
 use crate::client::Client;
 use crate::movement::{Player, Recorder};
 use crate::park::Park;
@@ -73,7 +75,7 @@ pub(super) struct App {
     pub(super) recorder: Option<Recorder>,
     pub(super) park: Option<Park>,
     pub(super) player: Option<Player>,
-    pub(super) recording: Option<String>,
+    pub(super) recording: Option<KeptRecording>,
     pub(super) tour_step: usize,
 }
 
@@ -128,6 +130,7 @@ impl App {
 
     fn new(dom: Dom) -> Result<Self, JsValue> {
         let tag = web_sys::window().and_then(|window| window.navigator().language());
+        let tag = storage::load("language").or(tag);
         let language = Language::of_tag(&tag.unwrap_or_default());
         let scene = Scene::new(dom.canvas("scene")?);
         if let Err(reason) = &scene {
@@ -154,7 +157,7 @@ impl App {
             recorder: None,
             park: None,
             player: None,
-            recording: None,
+            recording: KeptRecording::of_storage(),
             tour_step: 0,
         })
     }

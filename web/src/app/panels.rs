@@ -1,8 +1,11 @@
 //! What the page shows beside the picture of the arm.
 
+use std::fmt::Display;
+use std::str::FromStr;
+
 use host_link::sharing::{DrivenBy, SharingState};
 use kinematics::forward;
-use sevenbot::map::{EXTENDED_VERSION, SERVO_TEMPERATURE};
+use sevenbot::map::{EXTENDED_VERSION, SERVO_TEMPERATURE, SPEED, VACUUM_PUMP};
 use sevenbot::{Span, register_text};
 use wasm_bindgen::JsValue;
 use web_sys::{Element, HtmlInputElement};
@@ -16,6 +19,8 @@ use crate::words::{Answers, state_line};
 
 /// The highest angle of a slider, in degrees, per joint; joint 7 ends where its claw is open.
 const HIGHEST: [&str; 7] = ["180", "180", "180", "180", "180", "180", "84"];
+/// The fields with the position of the tip, in mm.
+pub(super) const TIP_FIELDS: [&str; 3] = ["tip-x", "tip-y", "tip-z"];
 /// The registers of the table: all that are read.
 const SHOWN: [std::ops::RangeInclusive<u8>; 3] =
     [0..=60, 128..=EXTENDED_VERSION.address, 240..=SERVO_TEMPERATURE.address];
@@ -30,15 +35,21 @@ pub(super) fn build(dom: &Dom) -> Result<(), JsValue> {
         row.set_id(&format!("row-{number}"));
         let label = dom.add(&row, "label")?;
         let name = format!("joint-{number}");
+        label.set_id(&format!("name-{number}"));
         label.set_attribute("for", &name)?;
         label.set_attribute("data-text", &name)?;
-        let slider = dom.add(&row, "input")?;
-        for (name, value) in [("type", "range"), ("min", "0"), ("max", highest)] {
-            slider.set_attribute(name, value)?;
+        let measured = dom.add(&row, "output")?;
+        measured.set_id(&format!("angle-{number}"));
+        measured.set_attribute("aria-live", "off")?;
+        for (kind, id) in [("range", &name), ("number", &format!("target-{number}"))] {
+            let field = dom.add(&row, "input")?;
+            let joint = number.to_string();
+            for (name, value) in [("type", kind), ("min", "0"), ("max", highest), ("data-joint", &joint)] {
+                field.set_attribute(name, value)?;
+            }
+            field.set_id(id);
+            field.set_attribute("aria-labelledby", &label.id())?;
         }
-        slider.set_id(&format!("joint-{number}"));
-        slider.set_attribute("data-joint", &number.to_string())?;
-        dom.add(&row, "output")?.set_id(&format!("angle-{number}"));
         let option = dom.add(&broken, "option")?;
         option.set_attribute("value", &number.to_string())?;
         option.set_attribute("data-text", &name)?;
@@ -56,9 +67,10 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     show_joints(dom, language, state);
     if app.client.rounds() >= app.slid_round {
         let step = if has_extended_block(app.client.registers()) { "0.5" } else { "1" };
-        show_sliders(dom, state, step);
+        show_targets(dom, state, step);
     }
     dom.press("motors", &state.motor_state.to_string());
+    show_speed_and_pump(app);
     let [x, y, z] = tip(state.angles());
     // Sliders go anywhere: this is the warning.
     let at = breach(state.angles()).or(breach(state.targets)).map(|breach| breach_text(&breach));
@@ -75,6 +87,18 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     }
     if is_open(&app.dom, "registers-panel") {
         show_registers(app);
+    }
+}
+
+fn show_speed_and_pump(app: &App) {
+    let (dom, registers) = (&app.dom, app.client.registers());
+    dom.press("pump", &registers.byte(&VACUUM_PUMP).to_string());
+    let [first, others @ ..] = registers.joints(&SPEED);
+    // Other speeds are none of the choices, and show nothing.
+    let is_one = others.iter().all(|&other| other == first);
+    let speed = if is_one { first.to_string() } else { String::new() };
+    if dom.element("joint-speed").is_some_and(|choice| !dom.has_focus(&choice)) {
+        dom.choose("joint-speed", &speed);
     }
 }
 
@@ -106,7 +130,12 @@ fn show_line(app: &mut App, state: &ArmState) {
         (0, _) => Answers::NotYet,
         _ => Answers::NoLonger,
     };
-    let (line, mood) = state_line(app.language, answers, state, app.client.stop_progress());
+    let doing = match (&app.player, &app.park) {
+        (Some(_), _) => Some("plays"),
+        (None, Some(_)) => Some("parks"),
+        (None, None) => None,
+    };
+    let (line, mood) = state_line(app.language, answers, state, (app.client.stop_progress(), doing));
     app.dom.set_text("state", &line);
     if let Some(element) = app.dom.element("state") {
         set_attribute(&element, "class", mood.class());
@@ -118,12 +147,12 @@ fn show_line(app: &mut App, state: &ArmState) {
 }
 
 fn show_joints(dom: &Dom, language: Language, state: &ArmState) {
-    for ((index, measured), target) in (0..).zip(state.measured).zip(state.targets) {
+    for (index, measured) in (0..).zip(state.measured) {
         let number = index + 1;
         let is_missing = state.missing >> index & 1 == 1;
         let angle = match measured {
             _ if is_missing => language.text("no-answer").to_owned(),
-            Some(angle) => format!("{angle:.1}° → {target:.1}°"),
+            Some(angle) => format!("{angle:.1}°"),
             None => language.text("not-measured").to_owned(),
         };
         dom.set_text(&format!("angle-{number}"), &angle);
@@ -134,14 +163,27 @@ fn show_joints(dom: &Dom, language: Language, state: &ArmState) {
     }
 }
 
-/// The sliders at the targets, in steps of what the arm can take.
-fn show_sliders(dom: &Dom, state: &ArmState, step: &str) {
+/// The sliders and the numbers beside them at the targets, in steps of what the arm can take.
+fn show_targets(dom: &Dom, state: &ArmState, step: &str) {
     for (number, target) in (1..).zip(state.targets) {
-        let Ok(slider) = dom.get::<HtmlInputElement>(&format!("joint-{number}")) else { continue };
-        set_attribute(&slider, "step", step);
-        if slider.value().parse() != Ok(target) {
-            slider.set_value(&target.to_string());
+        for id in [format!("joint-{number}"), format!("target-{number}")] {
+            let Ok(field) = dom.get::<HtmlInputElement>(&id) else { continue };
+            set_attribute(&field, "step", step);
+            show_number(dom, &field, target);
         }
+    }
+    for (axis, position) in TIP_FIELDS.into_iter().zip(tip(state.targets)) {
+        if let Ok(field) = dom.get::<HtmlInputElement>(axis) {
+            show_number(dom, &field, position.round());
+        }
+    }
+}
+
+/// Shows a number, unless a person types another one. A slider is never typed in.
+fn show_number(dom: &Dom, field: &HtmlInputElement, number: impl Display + FromStr + PartialEq) {
+    let is_typed = field.type_() == "number" && dom.has_focus(field);
+    if !is_typed && field.value().parse().ok().as_ref() != Some(&number) {
+        field.set_value(&number.to_string());
     }
 }
 
@@ -151,7 +193,8 @@ fn show_recording(app: &App) {
         (Some(_), ..) => format!("● {}", text("record")),
         (_, Some(player), _) => format!("{} {:.0} %", text("playing"), player.progress() * 100.0),
         (_, _, Some(recording)) => {
-            format!("{}: {}", text("recorded"), recording.lines().count().saturating_sub(2))
+            let (moments, seconds) = (recording.moments, recording.length.as_secs_f64());
+            format!("{}: {moments} {}, {seconds:.1} s", text("recorded"), text("points"))
         }
         _ => text("no-recording").to_owned(),
     };

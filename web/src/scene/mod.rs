@@ -23,7 +23,7 @@ pub mod view;
 pub use arm::{Angles, Part};
 pub use camera::{Camera, Preset};
 pub use canvas::Scene;
-pub use drag::{Refusal, TipWish, Unreachable};
+pub use drag::{Refusal, TipWish, Unreachable, wish};
 pub use pointer::{Button, SceneEvent};
 pub use theme::{Rgb, Theme};
 pub use view::View;

@@ -20,7 +20,7 @@ use sevenbot::fine::FineTargets;
 use sevenbot::map::report_content;
 use sevenbot::moves::MoveError;
 use sevenbot::stream::{PaceCounts, SetPointStream, StreamError, StreamOptions, StreamPace, WatchdogAction};
-use sevenbot::{Arm, StatusBlock};
+use sevenbot::{Arm, FineAngle, StatusBlock};
 
 use self::feed::Feed;
 use self::input::TimedPoint;
@@ -293,10 +293,18 @@ impl Streamer<'_, '_> {
         take_reports_until(&mut self.stream, self.tracking, end, interrupt)
     }
 
-    /// Waits until the joints stand at the last points. Fails if one does not get there.
+    /// Waits until the joints stand at the last points. Fails if one does not get there, or if one without points is elsewhere.
     fn wait_until_arrived(&mut self, interrupt: Interrupt) -> Result<(), CommandError> {
         let Self { stream, tracking, .. } = self;
-        stream.wait_until_arrived(|stream, end| take_reports_until(stream, tracking, end, interrupt))
+        stream.wait_until_arrived(|stream, end| take_reports_until(stream, tracking, end, interrupt))?;
+        let targets = stream.arm().fine_targets()?.map(FineAngle::degrees);
+        match tracking.moved_from_outside(targets) {
+            Some((joint, from, to)) => Err(CommandError::Arm(format!(
+                "joint {joint} was to stay at {from:.1} degrees, and holds at {to:.1}: its servo had no torque or no supply for a \
+                 moment, or another program moved it. `sevenbot status` shows the arm as it is now"
+            ))),
+            None => Ok(()),
+        }
     }
 }
 

@@ -8,6 +8,8 @@ use sevenbot::fine::FineTargets;
 
 /// Points older than this are forgotten. No report is later.
 const KEPT: Duration = Duration::from_secs(2);
+/// A target this far from the last point belongs to somebody else, in degrees.
+const ELSEWHERE: f64 = 3.0;
 
 /// The points that were sent, and the errors so far.
 #[derive(Debug)]
@@ -53,6 +55,12 @@ impl Tracking {
     /// The last point of each joint, in degrees; the target at the start where it had none.
     pub(super) const fn pose(&self) -> [f64; 7] {
         self.pose
+    }
+
+    /// The first joint whose target is no longer the last point, or the target at the start: its number, and both in degrees.
+    pub(super) fn moved_from_outside(&self, targets: [f64; 7]) -> Option<(u8, f64, f64)> {
+        let joints = (1..).zip(self.pose).zip(targets).map(|((joint, from), to)| (joint, from, to));
+        joints.into_iter().find(|(_, from, to)| (from - to).abs() > ELSEWHERE)
     }
 
     /// Adds measured positions.

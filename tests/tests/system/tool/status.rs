@@ -4,7 +4,7 @@ use std::io::Write;
 use std::process::{Output, Stdio};
 
 use super::output::{all_output, failed, succeeded, words};
-use system_tests::process::RunningProgram;
+use system_tests::process::{RunningProgram, Signal, send_signal};
 use system_tests::programs::tool;
 use system_tests::simulator::Simulator;
 use system_tests::wait::wait_until;
@@ -32,11 +32,23 @@ impl Rig {
     }
 
     fn stream(&self, lines: &str) -> Output {
+        self.begin_stream(lines).output()
+    }
+
+    fn begin_stream(&self, lines: &str) -> RunningProgram {
         let mut tool = tool();
         tool.arg("--port").arg(&self.0.ports[0]).arg("stream").stdin(Stdio::piped());
         let mut tool = RunningProgram::spawn(tool.stdout(Stdio::piped()).stderr(Stdio::piped()));
         tool.stdin.take().expect("a pipe").write_all(lines.as_bytes()).expect("the tool reads");
-        tool.output()
+        // The end of the input is the end of the stream.
+        tool.stdin = None;
+        tool
+    }
+
+    /// The true angles.
+    fn angles(&self) -> [f64; 7] {
+        let state = self.0.state();
+        std::array::from_fn(|joint| state["joints"][joint]["angle_degrees"].as_f64().expect("an angle"))
     }
 
     /// Sets a fault, and waits until the status tells of it.
@@ -84,6 +96,38 @@ fn d27_a_pose_and_a_stream_end_at_a_blocked_joint_and_recover_helps() {
     succeeded(rig.run(&["status"]));
 }
 
+/// The stream does not run meanwhile. The controller follows a joint that fell and holds it, so only its target tells that it is
+/// elsewhere.
+#[test]
+fn d29_a_stream_tells_of_a_short_stop_in_which_a_joint_without_points_fell() {
+    let rig = Rig::start();
+    let stream = rig.begin_stream("0,90,,,,,,\n1,95,,,,,,\n3,90,,,,,,\n");
+    wait_until("joint 1 follows the stream", || rig.angles()[0] > 91.0);
+    let before = rig.angles()[2];
+    send_signal(&stream, Signal::STOP);
+    rig.0.says(&["fault", "supply=off", "--for", "300ms"]);
+    wait_until("joint 3 has fallen and is held", || {
+        rig.angles()[2] > before + 10.0 && rig.0.joint(3, "torque") == "on"
+    });
+    send_signal(&stream, Signal::CONT);
+    let text = failed(&stream.output(), 1);
+    assert!(text.contains("joint 3 was to stay at 65.0 degrees, and holds at"), "{text}");
+}
+
+#[test]
+fn d27_recover_leaves_the_joints_that_are_well_where_they_are() {
+    let rig = Rig::start();
+    rig.0.says(&["weight", "300"]);
+    rig.0.says(&["fault", "1=stuck"]);
+    failed(&rig.run(&["pose", "130", "_", "_", "_", "_", "_", "_", "--wait"]), 1);
+    let before = rig.angles();
+    rig.0.says(&["fault", "clear"]);
+    succeeded(rig.run(&["recover", "--yes"]));
+    let after = rig.angles();
+    let moved: Vec<_> = before.iter().zip(after).map(|(before, after)| (before - after).abs()).collect();
+    assert!(moved[1..].iter().all(|degrees| *degrees < 0.7), "{before:?} {after:?}");
+}
+
 #[test]
 fn d29_a_lost_supply_is_told_and_recover_asks_before_the_motors_go_on() {
     let rig = Rig::start();
@@ -112,6 +156,9 @@ fn a_parked_arm_stays_and_its_own_pose_is_kept() {
     let first = succeeded(rig.run(&["park"]));
     assert!(first.starts_with("90.00 90.00 0."), "{first}");
     assert!(succeeded(rig.run(&["status"])).starts_with("motors damping protection"));
+    succeeded(rig.run(&["state", "servo"]));
+    // The example of `park --help`.
+    succeeded(rig.run(&["park", "_", "92", "2", "_", "50", "_", "_", "--keep"]));
     succeeded(rig.run(&["state", "servo"]));
     succeeded(rig.run(&["park", "100", "90", "2", "90", "50", "_", "_", "--keep"]));
     succeeded(rig.run(&["state", "servo"]));

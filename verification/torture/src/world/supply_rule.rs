@@ -48,3 +48,34 @@ impl SupplyRule {
         Ok(is_due)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(millis: u64) -> Instant {
+        Instant::from_micros(millis * 1_000)
+    }
+
+    /// The rule after a stop of this length that began at 10 s, checked when the arm has to be in state 0.
+    fn check(stop_millis: u64, has_told: bool) -> Check<bool> {
+        let mut registers = RegisterFile::new([0; 6], None);
+        registers.set(SUPPLY_LOST, u8::from(has_told));
+        let mut rule = SupplyRule::default();
+        rule.stop_begins(at(10_000));
+        let end = at(10_000 + stop_millis);
+        rule.stop_ends(end);
+        assert!(
+            !rule.check(end + Duration::from_micros(NOTICE_TIME.as_micros() - 1), &registers)?,
+            "it has some time"
+        );
+        rule.check(end + NOTICE_TIME, &registers)
+    }
+
+    #[test]
+    fn an_arm_that_does_not_enter_state_0_after_a_long_stop_breaks_the_rule() {
+        assert!(check(1_500, false).is_err());
+        assert!(check(1_500, true).unwrap(), "checked");
+        assert!(!check(1_499, false).unwrap(), "a short stop: nothing is demanded");
+    }
+}

@@ -60,11 +60,8 @@ fn each_joint_that_is_stuck_has_the_colour_of_a_fault_and_is_named() {
         let (red, others) = (faulty(&picture), working(&picture));
         assert!(red > 40 && others > 500, "joint {joint}: {red} pixels, {others} of joints that work");
         page.click("[data-action=repair]");
-        page.click("[data-action=motors][data-value='2']");
-        page.wait_for_text("#state", "The motors are off.");
-        page.click("[data-action=motors][data-value='1']");
-        page.wait_for_text("#state", "The arm is ready.");
-        // It fell meanwhile, further on a busy machine. In some poses the next joint is hidden.
+        page.wait_until_said("#state", "The arm is ready.");
+        // In some poses the next joint is hidden.
         page.slide_all(STANDARD_POSE);
         let goals: Vec<_> = (1..).zip(STANDARD_POSE.map(f64::from)).collect();
         page.wait_until_joints_rest(&goals);
@@ -167,4 +164,18 @@ fn a_register_is_written_in_the_table_and_a_wrong_value_is_refused_in_words() {
     page.write_register(MOTOR_STATE.address, "7");
     page.wait_until_said("#notice", "This value cannot be written:");
     assert_eq!(page.state()["motors"], 2);
+}
+
+#[test]
+fn a_wall_stands_where_a_person_puts_it() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    page.choose("#fault-joint", "1");
+    page.choose("#fault-kind", "wall");
+    page.type_into("#wall-at", "110");
+    page.click("[data-action=break]");
+    page.type_into("#target-1", "150");
+    page.wait_until_said("#state", "oint 1 is blocked");
+    let stopped = page.measured()[0];
+    assert!((stopped - 110.0).abs() < 2.0, "{stopped}");
 }

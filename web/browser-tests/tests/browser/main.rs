@@ -1,5 +1,6 @@
 //! The page in real browsers: one program, which `cargo xtask test` runs by its name.
 
+mod controls;
 mod endurance;
 mod faults;
 mod figures;

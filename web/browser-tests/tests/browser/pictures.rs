@@ -33,7 +33,7 @@ fn write_the_pictures() {
     page.show_on(DESKTOP);
     page.choose("#fault-joint", "3");
     page.click("[data-action=break]");
-    page.wait_for_text("#state", "joint 3");
+    page.wait_for_text("#state", "oint 3");
     page.evaluate("scrollTo(0, 0)");
     page.pass(1.0);
     keep(&mut page, "web-fault.png");
@@ -52,7 +52,7 @@ fn write_the_animation() {
         page.key(key);
         for _ in 0..6 {
             page.pass(0.15);
-            pictures.push(page.picture_of([30.0, 118.0], [800.0, 430.0]).half());
+            pictures.push(page.picture_of([30.0, 141.0], [800.0, 430.0]).half());
         }
     }
     write_animation(&folder().join("web.png"), &pictures, 6);

@@ -104,3 +104,22 @@ fn a_stop_of_another_program_ends_a_movement_that_is_played() {
     page.wait_for_text("#notice", "Another program has stopped the arm.");
     check_it_stands(&mut page);
 }
+
+#[test]
+fn a_reload_keeps_the_movement_and_the_language_and_shows_no_tour() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    page.click("[data-action=play]");
+    page.wait_for_text("#notice", "There is no movement yet");
+    let file = viewed.path("wave.7bot");
+    std::fs::write(&file, "7bot-recording 2\n0.000 90 90 65 90 90 90 80 0\n3.000 120 90 65 90 90 90 80 0\n")
+        .expect("a file");
+    page.choose_file("#upload", &file);
+    page.wait_for_text("#recording", "recorded: 2 points, 3.0 s");
+    assert_eq!(page.text("#notice"), "", "it is no longer true");
+    page.click("[data-action=tour-end]");
+    page.click("[data-action=language]");
+    page.reload();
+    page.wait_for_text("#recording", "已录制: 2 个点, 3.0 s");
+    assert_eq!(page.evaluate("document.querySelector('dialog').open"), false);
+}
