@@ -7,7 +7,7 @@
 mod rig;
 
 use protocol_core::registers::map::{
-    CHIP_ID, FINE_POSITION, FINE_TARGET, HOST_WATCHDOG, MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION,
+    CHIP_ID, FINE_TARGET, HOST_WATCHDOG, MOTOR_STATE, PRESENT_POSITION, SPEED, TARGET_POSITION,
 };
 use protocol_core::time::Duration;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -17,14 +17,23 @@ use sevenbot_serve::hub::HubOptions;
 
 const SEED: u64 = 25;
 const COMMAND: u8 = 239;
+/// The weight draws a joint so far off its target at most, in hundredths of a degree.
+const DROOP: i32 = 150;
 
 fn targets(world: &World) -> Vec<u8> {
     world.arm.registers().read(FINE_TARGET.address, FINE_TARGET.count).to_vec()
 }
 
-fn positions(world: &World) -> [i32; 7] {
-    let bytes = world.arm.registers().read(FINE_POSITION.address, FINE_POSITION.count);
-    std::array::from_fn(|joint| i32::from(u16::from_le_bytes([bytes[2 * joint], bytes[2 * joint + 1]])))
+/// The fine targets and positions as program 1 reads them. The arm brings these registers up to date when they are read.
+fn look(world: &mut World) -> (Vec<u8>, [i32; 7]) {
+    world.round_trip(1, &read(FINE_TARGET.address, 28));
+    let (_, values) = world.take(1).pop().expect("a reply");
+    let position = |joint: usize| u16::from_le_bytes([values[14 + 2 * joint], values[15 + 2 * joint]]);
+    (values[..14].to_vec(), std::array::from_fn(|joint| position(joint).into()))
+}
+
+fn positions(world: &mut World) -> [i32; 7] {
+    look(world).1
 }
 
 /// A program stops the arm as `sevenbot stop` does: it reads where the arm is, and writes that. Returns how long the write took
@@ -42,6 +51,12 @@ fn stop(world: &mut World, program: usize) -> (Duration, Vec<u8>) {
     (world.now - start, held)
 }
 
+/// The greatest distance of a joint from its target in these fine targets, in hundredths of a degree.
+fn farthest(targets: &[u8], positions: [i32; 7]) -> i32 {
+    let targets = targets.chunks(2).map(|word| i32::from(u16::from_le_bytes([word[0], word[1]])));
+    targets.zip(positions).map(|(target, position)| (target - position).abs()).max().unwrap()
+}
+
 /// Who else uses the server while the arm is stopped.
 #[derive(Clone, Copy, Debug)]
 enum Attack {
@@ -50,6 +65,9 @@ enum Attack {
     LongWrites,
     Targets,
     Stops,
+    /// Watchdogs of 20 ms of a program that is silent for 50 ms, while another one reads. Without that one the arm's own watchdog
+    /// would act, too.
+    Watchdogs,
 }
 
 const ATTACKERS: usize = 31;
@@ -62,6 +80,12 @@ impl Attack {
             Self::LongWrites => write(0, &[0; 255]),
             Self::Targets => write(TARGET_POSITION.address, &[u8::try_from(turn % 100).unwrap() + 40]),
             Self::Stops => write(MOTOR_STATE.address, &[1]),
+            Self::Watchdogs => {
+                if (world.now.as_micros() / 10_000).is_multiple_of(5) {
+                    world.send(2, &write(HOST_WATCHDOG.address, &[2]));
+                }
+                return world.send(3, &read(SPEED.address, 1));
+            }
         };
         for attacker in 2..2 + ATTACKERS {
             while world.programs[attacker].to_send_bytes() < 600 {
@@ -89,17 +113,19 @@ fn stop_often(attack: Attack) {
         let (delay, held) = stop(&mut world, 1);
         delays.push(delay.as_micros());
         for settling in 0..14 {
-            let before = positions(&world);
+            let before = positions(&mut world);
             for _ in 0..4 {
                 world.send(0, &write(TARGET_POSITION.address, &[goal]));
                 attack.refill(&mut world, turn);
                 world.advance(50);
             }
-            assert_eq!(targets(&world), held, "{attack:?}, stop {turn}: nothing moves it");
-            let after = positions(&world);
+            let (targets, after) = look(&mut world);
+            assert_eq!(targets, held, "{attack:?}, stop {turn}: nothing moves it");
             let moved = before.iter().zip(after).map(|(before, after)| (before - after).abs()).max().unwrap();
             assert!(settling < 10 || moved <= 30, "{attack:?}, stop {turn}: moved by {moved} hundredths");
         }
+        let off = farthest(&held, positions(&mut world));
+        assert!(off <= DROOP, "{attack:?}, stop {turn}: rests {off} hundredths from where it was stopped");
     }
     delays.sort_unstable();
     let (p50, p99) = (delays[delays.len() / 2], delays[delays.len() * 99 / 100]);
@@ -133,6 +159,11 @@ fn a_stop_reaches_the_arm_beside_others_that_stream() {
 #[test]
 fn a_stop_reaches_the_arm_beside_others_that_switch_the_motors_on() {
     stop_often(Attack::Stops);
+}
+
+#[test]
+fn a_stop_holds_the_arm_where_it_was_beside_watchdogs_that_act() {
+    stop_often(Attack::Watchdogs);
 }
 
 #[test]
@@ -176,7 +207,7 @@ fn d24_an_arm_that_is_held_again_and_again_does_not_sink() {
     let mut world = World::new(3);
     world.send(0, &write(TARGET_POSITION.address, &[60, 40, 65]));
     world.run(3_000);
-    let before = (targets(&world), positions(&world));
+    let before = look(&mut world);
     let droop =
         before.0.chunks(2).zip(before.1).map(|(target, position)| {
             (i32::from(u16::from_le_bytes([target[0], target[1]])) - position).abs()
@@ -187,10 +218,30 @@ fn d24_an_arm_that_is_held_again_and_again_does_not_sink() {
         // A watchdog of 10 ms, and then silence.
         world.send(2, &write(HOST_WATCHDOG.address, &[1]));
         world.run(25);
-        assert_eq!(targets(&world), before.0, "hold {turn}");
+        assert_eq!(look(&mut world).0, before.0, "hold {turn}");
     }
-    let moved = before.1.iter().zip(positions(&world)).map(|(before, after)| (before - after).abs()).max();
+    let moved =
+        before.1.iter().zip(positions(&mut world)).map(|(before, after)| (before - after).abs()).max();
     assert!(moved <= Some(10), "moved by {moved:?} hundredths");
+}
+
+/// The hold reads where the arm is, and writes that. A program's stop comes at each moment meanwhile.
+#[test]
+fn a_hold_under_way_does_not_overwrite_a_stop_that_comes_meanwhile() {
+    let mut world = World::new(3);
+    world.send(0, &write(SPEED.address, &[100; 7]));
+    for steps in (0..150).step_by(2) {
+        let goal = if steps % 4 == 0 { 40 } else { 140 };
+        world.send(0, &[write(COMMAND, &[2]), write(TARGET_POSITION.address, &[goal])].concat());
+        world.run(200);
+        world.round_trip(2, &read(FINE_TARGET.address, 28));
+        let (_, values) = world.take(2).pop().expect("a reply");
+        world.send(1, &write(COMMAND, &[1]));
+        world.advance(steps);
+        world.send(2, &write(FINE_TARGET.address, &values[14..]));
+        world.run(100);
+        assert_eq!(targets(&world), values[14..], "{steps} steps of 0.1 ms after the hold began");
+    }
 }
 
 /// Each command begins another hold before the one before has ended.
@@ -218,9 +269,9 @@ fn a_command_stops_a_stream_with_a_long_period() {
     world.run(700);
     world.send(1, &write(COMMAND, &[1]));
     world.run(200);
-    let before = positions(&world);
+    let before = positions(&mut world);
     world.run(500);
-    assert!(positions(&world)[0].abs_diff(before[0]) <= 30, "{before:?} {:?}", positions(&world));
+    assert!(positions(&mut world)[0].abs_diff(before[0]) <= 30, "{before:?} {:?}", positions(&mut world));
     assert_eq!(world.arm.registers().read(184, 2), 1_000_u16.to_le_bytes(), "the period stays");
 }
 

@@ -7,17 +7,22 @@
 //! ```
 //!
 //! A joint that has reached its target keeps it ([D24](protocol_core::decisions#d24)). Its load draws it some tenths of a degree
-//! off its target: with its position as the new target it would sink by as much in each hold.
+//! off its target: with its position as the new target it would sink by as much in each hold. A joint that still brakes after a stop
+//! or a hold keeps its target, too ([`HeldTargets`]).
 
-use protocol_core::registers::Joint;
 use protocol_core::registers::map::{
     FINE_POSITION, FINE_TARGET, MISSING_SERVOS, MOVING_JOINTS, PRESENT_POSITION, TARGET_POSITION,
 };
+use protocol_core::registers::{Joint, Register};
+
+use super::held_targets::{HeldTargets, Targets};
 
 /// Reads and writes are repeated this often.
 const MOST_ROUNDS: u8 = 5;
 /// The value of a fine position that was not measured.
 const UNMEASURED: u16 = u16::MAX;
+/// Hundredths of a degree in a register of one byte.
+const DEGREE: u16 = 100;
 
 /// A frame to write: the first register, and the values.
 pub(crate) type Frame = (u8, Vec<u8>);
@@ -33,6 +38,8 @@ pub(crate) struct ArmHold {
     moving: Option<u8>,
     rounds: u8,
     sent: Vec<Frame>,
+    /// Joints that a client held after the last read was sent, one bit each.
+    held_meanwhile: u8,
     /// Its read has no reply yet.
     waits: bool,
     /// The arm holds.
@@ -52,6 +59,7 @@ impl ArmHold {
             moving,
             rounds: 0,
             sent: Vec::new(),
+            held_meanwhile: 0,
             waits: false,
             is_done: false,
             is_wanted_again: false,
@@ -68,19 +76,30 @@ impl ArmHold {
         self.is_wanted_again
     }
 
+    /// A client holds the joints that have a target here: what was read of them before is out of date.
+    pub(crate) fn note_held(&mut self, targets: &Targets) {
+        let held = Joint::ALL.into_iter().zip(targets).filter(|(_, target)| target.is_some());
+        self.held_meanwhile = held.fold(self.held_meanwhile, |bits, (joint, _)| bits | joint.bit());
+    }
+
     /// The registers to read now, and how many.
     pub(crate) fn next_read(&mut self) -> Option<(u8, u8)> {
         if self.waits {
             return None;
         }
         self.waits = true;
+        self.held_meanwhile = 0;
         self.rounds += 1;
         if self.moving.is_none() {
             return Some((MISSING_SERVOS.address, MOVING_JOINTS.address + 1 - MISSING_SERVOS.address));
         }
-        let (targets, positions) =
-            if self.is_fine { (&FINE_TARGET, &FINE_POSITION) } else { (&TARGET_POSITION, &PRESENT_POSITION) };
+        let (targets, positions) = self.rows();
         Some((targets.address, positions.address + positions.count - targets.address))
+    }
+
+    /// The registers of the targets and of the positions.
+    const fn rows(&self) -> (&'static Register, &'static Register) {
+        if self.is_fine { (&FINE_TARGET, &FINE_POSITION) } else { (&TARGET_POSITION, &PRESENT_POSITION) }
     }
 
     /// Is the hold over? Either the arm holds, or it was tried often enough.
@@ -94,7 +113,7 @@ impl ArmHold {
     }
 
     /// The frames to write for this reply.
-    pub(crate) fn frames(&mut self, address: u8, values: &[u8]) -> Vec<Frame> {
+    pub(crate) fn frames(&mut self, address: u8, values: &[u8], held: &HeldTargets) -> Vec<Frame> {
         self.waits = false;
         let Some(moving) = self.moving else {
             // The set-point of a silent joint stands still, and would go on to its target.
@@ -111,53 +130,64 @@ impl ArmHold {
             self.is_done = true;
             return Vec::new();
         }
-        self.sent = if self.is_fine {
-            self.fine_frames(address, values, moving)
-        } else {
-            coarse_frames(address, values)
-        };
+        self.sent = self.frames_that_hold(moving, address, values, held);
         self.is_done = self.sent.is_empty();
         self.sent.clone()
     }
 
-    /// One frame for each row of joints that have a target.
-    fn fine_frames(&self, address: u8, values: &[u8], moving: u8) -> Vec<Frame> {
+    /// One frame for each row of joints that get a target.
+    fn frames_that_hold(&self, moving: u8, address: u8, values: &[u8], held: &HeldTargets) -> Vec<Frame> {
+        let (targets, positions) = self.rows();
         let mut frames: Vec<Frame> = Vec::new();
         for joint in Joint::ALL {
-            let target = FINE_TARGET.of(joint);
-            let value = match moving & joint.bit() {
-                0 if self.is_streaming => word(values, address, target),
-                0 => None,
-                _ => word(values, address, FINE_POSITION.of(joint)),
+            let target = self.value(values, address, targets.of(joint));
+            let position = self.value(values, address, positions.of(joint)).filter(|&at| at != UNMEASURED);
+            let kept = match moving & joint.bit() {
+                0 => target,
+                _ => position.and_then(|position| self.held_target(joint, position, target, held)),
             };
-            let Some(bytes) = value.filter(|&value| value != UNMEASURED).map(u16::to_le_bytes) else {
-                continue;
-            };
+            // The points of a stream that are ahead would move a joint which keeps its target.
+            let wanted = kept.map_or(position, |kept| self.is_streaming.then_some(kept));
+            let Some(bytes) = wanted.map(|wanted| self.bytes(wanted)) else { continue };
             match frames.last_mut() {
-                Some((first, values)) if usize::from(*first) + values.len() == usize::from(target) => {
+                Some((first, values))
+                    if usize::from(*first) + values.len() == usize::from(targets.of(joint)) =>
+                {
                     values.extend(bytes);
                 }
-                _ => frames.push((target, bytes.to_vec())),
+                _ => frames.push((targets.of(joint), bytes)),
             }
         }
         frames
     }
-}
 
-/// A register of two bytes in the values from `address` on.
-fn word(values: &[u8], address: u8, register: u8) -> Option<u16> {
-    let start = usize::from(register.checked_sub(address)?);
-    Some(u16::from_le_bytes(*values.get(start..)?.first_chunk()?))
-}
+    /// The target of a joint that was held before: as it was read, or one that a client wrote meanwhile.
+    fn held_target(&self, joint: Joint, position: u16, read: Option<u16>, held: &HeldTargets) -> Option<u16> {
+        let is_newer = self.held_meanwhile & joint.bit() != 0;
+        held.near(joint, position).filter(|&target| is_newer || Some(target) == read)
+    }
 
-fn coarse_frames(address: u8, values: &[u8]) -> Vec<Frame> {
-    let start = usize::from(PRESENT_POSITION.address.saturating_sub(address));
-    let positions = values.get(start..start + usize::from(PRESENT_POSITION.count));
-    positions.map(|positions| (TARGET_POSITION.address, positions.to_vec())).into_iter().collect()
+    /// A register of a joint in the values from `address` on, in hundredths of a degree.
+    fn value(&self, values: &[u8], address: u8, register: u8) -> Option<u16> {
+        let bytes = values.get(usize::from(register.checked_sub(address)?)..)?;
+        match self.is_fine {
+            true => bytes.first_chunk().map(|&word| u16::from_le_bytes(word)),
+            false => bytes.first().map(|&degrees| DEGREE * u16::from(degrees)),
+        }
+    }
+
+    /// The bytes of such a register.
+    fn bytes(&self, value: u16) -> Vec<u8> {
+        match self.is_fine {
+            true => value.to_le_bytes().to_vec(),
+            false => u8::try_from(value / DEGREE).into_iter().collect(),
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::intent::Intent;
     use super::*;
 
     /// Targets 1..14, and positions of which that of joint 3 was not measured.
@@ -172,7 +202,7 @@ mod tests {
         let mut hold = ArmHold::new(true, is_streaming);
         assert_eq!(hold.next_read(), Some((242, 2)));
         assert_eq!(hold.next_read(), None);
-        assert_eq!(hold.frames(242, &[0, moving]), []);
+        assert_eq!(hold.frames(242, &[0, moving], &HeldTargets::default()), []);
         hold
     }
 
@@ -182,13 +212,13 @@ mod tests {
         assert!(!hold.is_over());
         assert_eq!(hold.next_read(), Some((128, 28)));
         let mut values = values();
-        let frames = hold.frames(128, &values);
+        let frames = hold.frames(128, &values, &HeldTargets::default());
         assert_eq!(frames, [(128, vec![21, 22, 23, 24]), (136, vec![27, 28, 29, 30, 31, 32])]);
         assert!(!hold.is_over());
         assert_eq!(hold.next_read(), Some((128, 28)));
         values[..4].copy_from_slice(&[21, 22, 23, 24]);
         values[8..14].copy_from_slice(&[27, 28, 29, 30, 31, 32]);
-        assert_eq!(hold.frames(128, &values), []);
+        assert_eq!(hold.frames(128, &values, &HeldTargets::default()), []);
         assert!(hold.is_over());
     }
 
@@ -197,7 +227,7 @@ mod tests {
         assert!(hold(0, false).is_over(), "nothing is read or written");
         let mut hold = hold(0, true);
         assert_eq!(hold.next_read(), Some((128, 28)));
-        let frames = hold.frames(128, &values());
+        let frames = hold.frames(128, &values(), &HeldTargets::default());
         assert_eq!(frames, [(128, (1..15).collect())], "the end of a stream that has points left");
     }
 
@@ -209,6 +239,39 @@ mod tests {
         assert!(!hold.is_over());
         assert_eq!(hold.next_read(), Some((46, 15)));
         let values = [9, 9, 9, 9, 9, 9, 9, 0, 1, 2, 3, 4, 5, 6, 7];
-        assert_eq!(hold.frames(46, &values), [(46, vec![1, 2, 3, 4, 5, 6, 7])]);
+        assert_eq!(hold.frames(46, &values, &HeldTargets::default()), [(46, vec![1, 2, 3, 4, 5, 6, 7])]);
+    }
+
+    #[test]
+    fn a_joint_that_brakes_towards_the_target_of_a_stop_keeps_it() {
+        let mut held = HeldTargets::default();
+        let targets = [Some(0x0201), None, None, None, None, None, None];
+        held.note_write(Intent::Stop, &targets);
+        let mut values = values();
+        values[14..16].copy_from_slice(&[1, 3]);
+        let mut braking = hold(0b1, false);
+        braking.next_read();
+        assert_eq!(braking.frames(128, &values, &held), []);
+        assert!(braking.is_over());
+        values[14..16].copy_from_slice(&[1, 9]);
+        let mut far = hold(0b1, false);
+        far.next_read();
+        assert_eq!(far.frames(128, &values, &held), [(128, vec![1, 9])], "it moves back from far away");
+        held.note_write(Intent::Motion, &[None; 7]);
+        values[14..16].copy_from_slice(&[1, 3]);
+        let mut moving = hold(0b1, false);
+        moving.next_read();
+        assert_eq!(moving.frames(128, &values, &held), [(128, vec![1, 3])], "it moves elsewhere");
+    }
+
+    #[test]
+    fn what_a_client_held_after_the_read_was_sent_is_not_overwritten() {
+        let mut held = HeldTargets::default();
+        let mut hold = hold(0b11, false);
+        hold.next_read();
+        let targets = [Some(0x1614), None, None, None, None, None, None];
+        held.note_write(Intent::Stop, &targets);
+        hold.note_held(&targets);
+        assert_eq!(hold.frames(128, &values(), &held), [(130, vec![23, 24])], "the other joint");
     }
 }

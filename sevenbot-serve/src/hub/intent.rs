@@ -60,6 +60,11 @@ impl Intent {
         matches!(self, Self::Hold | Self::Stop | Self::MotorsOff)
     }
 
+    /// Does it hold the joints that have a target in it?
+    pub(crate) const fn holds(self) -> bool {
+        matches!(self, Self::Hold | Self::Stop)
+    }
+
     /// Does it end what others stream?
     pub(crate) const fn ends_streams(self) -> bool {
         matches!(self, Self::Stop | Self::MotorsOff)

@@ -5,9 +5,13 @@
 //! unknown here, and so is a restart of the controller, which locks the EEPROM.
 
 use motion_core::reach;
-use protocol_core::registers::map::{CHIP_ID, DEVICE_CODE, EEPROM_LOCK, FIRMWARE_VERSION, WATCHDOG_ACTION};
+use protocol_core::registers::map::{
+    CHIP_ID, DEVICE_CODE, EEPROM_LOCK, FINE_TARGET, FIRMWARE_VERSION, TARGET_POSITION, WATCHDOG_ACTION,
+};
 use protocol_core::registers::map21::{OPTIONS, option};
-use protocol_core::registers::{Accepted, Map, RegisterFile};
+use protocol_core::registers::{Accepted, Joint, Map, RegisterFile};
+
+use super::held_targets::Targets;
 
 /// The registers of the arm that the hub knows.
 #[derive(Debug)]
@@ -65,6 +69,16 @@ impl KnownRegisters {
         if let Some(accepted) = self.check(map, address, values) {
             self.0.apply(&accepted);
         }
+    }
+
+    /// The targets in a write that the arm accepts, in hundredths of a degree.
+    pub(crate) fn targets_in(&self, map: Map, address: u8, values: &[u8]) -> Targets {
+        let Some(accepted) = self.check(map, address, values) else { return Targets::default() };
+        Joint::ALL.map(|joint| {
+            let degrees = accepted.value_at(TARGET_POSITION.of(joint));
+            let fine = || accepted.word_at(FINE_TARGET.of(joint));
+            degrees.map(|degrees| 100 * u16::from(degrees)).or_else(fine)
+        })
     }
 
     fn check<'a>(&self, map: Map, address: u8, values: &'a [u8]) -> Option<Accepted<'a>> {

@@ -20,6 +20,7 @@ mod client;
 mod client_id;
 mod delivery;
 mod drive;
+mod held_targets;
 mod intent;
 mod known_registers;
 mod line;
@@ -43,6 +44,7 @@ use protocol_core::time::{Duration, Instant};
 use self::arm_hold::ArmHold;
 use self::client::Client;
 use self::drive::Driver;
+use self::held_targets::HeldTargets;
 use self::known_registers::KnownRegisters;
 use self::line::{Line, Owner};
 use self::sampler::Sampler;
@@ -92,6 +94,7 @@ pub struct Hub {
     watchdog: ClientWatchdog,
     /// The hub holds the arm by itself.
     hold: Option<ArmHold>,
+    held: HeldTargets,
     driver: Driver,
     /// Stops of all clients so far, wrapping.
     stops: u8,
@@ -115,6 +118,7 @@ impl Hub {
             sampler: Sampler::new(baud),
             watchdog: ClientWatchdog::default(),
             hold: None,
+            held: HeldTargets::default(),
             driver: Driver::new(options.has_one_driver),
             stops: 0,
             shares: Shares::default(),
@@ -204,6 +208,7 @@ impl Hub {
     fn forget_arm(&mut self) {
         self.line.reset();
         self.hold = None;
+        self.held = HeldTargets::default();
         self.driver.end(None);
         for (&id, client) in &mut self.clients {
             client.drop_waiting();

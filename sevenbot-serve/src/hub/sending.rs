@@ -6,7 +6,9 @@ use protocol_core::time::Instant;
 
 use super::Hub;
 use super::arm_hold::ArmHold;
+use super::client::Waiting;
 use super::client_id::ClientId;
+use super::intent::Intent;
 use super::line::Owner;
 use super::request::{WholeRequest, read_bytes, without_idle_ends};
 use super::shares::Shares;
@@ -18,7 +20,10 @@ impl Hub {
     pub(super) fn act(&mut self, now: Instant, action: WatchdogAction) {
         match action {
             WatchdogAction::Hold => self.start_hold(),
-            WatchdogAction::Damp => self.write_arm(now, MOTOR_STATE.address, &[motor_state::DAMPING]),
+            WatchdogAction::Damp => {
+                self.note_targets(Intent::MotorsOff, Map::V22, MOTOR_STATE.address, &[]);
+                self.write_arm(now, MOTOR_STATE.address, &[motor_state::DAMPING]);
+            }
         }
     }
 
@@ -27,7 +32,7 @@ impl Hub {
         let ids: Vec<ClientId> = self.clients.keys().copied().collect();
         for id in ids {
             while let Some(waiting) = self.clients.get_mut(&id).and_then(|client| client.urgent.pop_front()) {
-                self.send_request(now, id, waiting.request);
+                self.send_request(now, id, waiting);
             }
         }
         if let Some((address, count)) = self.hold.as_mut().and_then(ArmHold::next_read) {
@@ -45,7 +50,7 @@ impl Hub {
     pub(super) fn continue_hold(&mut self, now: Instant, reply: Option<(u8, &[u8])>) {
         let Some(mut hold) = self.hold.take() else { return };
         let frames = match reply {
-            Some((address, values)) => hold.frames(address, values),
+            Some((address, values)) => hold.frames(address, values, &self.held),
             None => {
                 hold.note_no_reply();
                 Vec::new()
@@ -56,6 +61,7 @@ impl Hub {
             self.write_arm(now, SET_POINT_PERIOD.address, &[0, 0]);
         }
         for (address, values) in &frames {
+            self.note_targets(Intent::Hold, Map::V22, *address, values);
             self.write_arm(now, *address, values);
         }
         if !frames.is_empty() && period != 0 {
@@ -85,7 +91,7 @@ impl Hub {
         match next {
             Some((_, Some(id), _)) => {
                 let waiting = self.clients.get_mut(&id).and_then(|client| client.waiting.pop_front());
-                waiting.into_iter().for_each(|waiting| self.send_request(now, id, waiting.request));
+                waiting.into_iter().for_each(|waiting| self.send_request(now, id, waiting));
                 self.news.insert(id);
             }
             Some((_, _, Some(stream))) => self.send_sample(now, stream),
@@ -109,18 +115,20 @@ impl Hub {
         }
     }
 
-    fn send_request(&mut self, now: Instant, id: ClientId, request: WholeRequest) {
+    fn send_request(&mut self, now: Instant, id: ClientId, Waiting { request, intent, .. }: Waiting) {
         let Some(client) = self.clients.get_mut(&id) else { return };
         self.shares.charge(&mut client.share, request.line_bytes());
         self.watchdog.sent_request(now, id);
         match request {
             WholeRequest::Read { address, count } => self.send_read(now, id, address, count),
             WholeRequest::Write { map, address, values } => {
-                self.send_write(now, id, map, address, values);
+                self.send_write(now, id, intent, map, address, values);
             }
             WholeRequest::WritesBetweenReads { map, writes, read: (first, count) } => {
                 self.send_read(now, id, first, count);
-                writes.into_iter().for_each(|(start, bytes)| self.send_write(now, id, map, start, bytes));
+                for (start, bytes) in writes {
+                    self.send_write(now, id, intent, map, start, bytes);
+                }
                 self.send_read(now, id, first, count);
             }
         }
@@ -137,7 +145,15 @@ impl Hub {
         self.line.send_read(now, Owner::Client(id), address, count);
     }
 
-    fn send_write(&mut self, now: Instant, id: ClientId, map: Map, address: u8, mut values: Vec<u8>) {
+    fn send_write(
+        &mut self,
+        now: Instant,
+        id: ClientId,
+        intent: Intent,
+        map: Map,
+        address: u8,
+        mut values: Vec<u8>,
+    ) {
         let Some(client) = self.clients.get_mut(&id) else { return };
         let is_accepted = self.known.accepts(map, address, &values);
         if is_accepted && client.own.write(map, address, &mut values) {
@@ -145,6 +161,7 @@ impl Hub {
             self.set_frequencies(now);
         }
         if !self.options.is_read_only {
+            self.note_targets(intent, map, address, &values);
             self.known.write(map, address, &values);
             if is_accepted && map == Map::V22 {
                 let damps = self.known.watchdog_damps();
@@ -152,6 +169,15 @@ impl Hub {
             }
             let (start, bytes) = without_idle_ends(address, &values);
             self.line.send_write(now, map, start, bytes);
+        }
+    }
+
+    /// A write goes to the arm: which joints does it hold, or move?
+    fn note_targets(&mut self, intent: Intent, map: Map, address: u8, values: &[u8]) {
+        let targets = self.known.targets_in(map, address, values);
+        self.held.note_write(intent, &targets);
+        if let Some(hold) = self.hold.as_mut().filter(|_| intent.holds()) {
+            hold.note_held(&targets);
         }
     }
 

@@ -1,7 +1,8 @@
 //! Places for connections: for those that have not shown their token yet, and others for clients.
 //!
 //! A place before the token is taken over by the next connection if all are taken: the oldest one loses it. So connections that
-//! send nothing keep nobody out who sends the token at once. Wrong tokens make the next ones of the same address wait.
+//! send nothing keep nobody out who sends the token at once. Wrong tokens make the next ones of the same address wait. While there
+//! are more connections than places, no other one is accepted: each takes file descriptors.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;
@@ -12,25 +13,24 @@ use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore};
 
 use super::shared::lock;
 
-/// Clients over the network at the same time. The next one is closed at once.
-const MOST_NETWORK_CLIENTS: usize = 64;
-/// Connections that have not shown their token.
-/// All programs of a server may come back at once.
-const MOST_UNKNOWN: usize = MOST_NETWORK_CLIENTS;
+/// Connections beyond the places: each way in may have one that it is about to refuse.
+const WAYS_IN: usize = 3;
 /// The first wait after a wrong token; each further one doubles it.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
 /// Addresses with wrong tokens that are remembered.
 const MOST_ADDRESSES: usize = 256;
 
-/// A place of a client.
+/// A place of a client, or of any connection.
 pub(super) type Place = OwnedSemaphorePermit;
 
 /// The places.
 #[derive(Debug)]
 pub(super) struct Admission {
+    connections: Arc<Semaphore>,
     clients: Arc<Semaphore>,
     unknown: Mutex<VecDeque<Arc<Notify>>>,
+    most_unknown: usize,
     wrong: Mutex<BTreeMap<IpAddr, WrongTokens>>,
 }
 
@@ -42,9 +42,21 @@ struct WrongTokens {
 }
 
 impl Admission {
-    pub(super) fn new() -> Arc<Self> {
-        let clients = Arc::new(Semaphore::new(MOST_NETWORK_CLIENTS));
-        Arc::new(Self { clients, unknown: Mutex::default(), wrong: Mutex::default() })
+    /// Places for so many clients, and for as many connections that have not shown their token: all programs of a server may come
+    /// back at once.
+    pub(super) fn new(most: usize) -> Arc<Self> {
+        Arc::new(Self {
+            connections: Arc::new(Semaphore::new(2 * most + WAYS_IN)),
+            clients: Arc::new(Semaphore::new(most)),
+            unknown: Mutex::default(),
+            most_unknown: most,
+            wrong: Mutex::default(),
+        })
+    }
+
+    /// Waits until another connection may be accepted.
+    pub(super) async fn connection(&self) -> Option<Place> {
+        Arc::clone(&self.connections).acquire_owned().await.ok()
     }
 
     /// Runs the login of a connection, which has to end within `timeout`. `None` if it does not, or lost its place.
@@ -57,7 +69,7 @@ impl Admission {
         {
             let mut unknown = lock(&self.unknown);
             unknown.push_back(Arc::clone(&ticket));
-            if unknown.len() > MOST_UNKNOWN
+            if unknown.len() > self.most_unknown
                 && let Some(oldest) = unknown.pop_front()
             {
                 oldest.notify_one();
@@ -113,19 +125,20 @@ mod tests {
         tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(work)
     }
 
+    const MOST: usize = 64;
     const LONG: Duration = Duration::from_secs(600);
 
     #[test]
     fn silent_connections_lose_their_places_to_the_next_ones() {
         run(async {
-            let admission = Admission::new();
-            let silent: Vec<_> = (0..MOST_UNKNOWN + 24)
+            let admission = Admission::new(MOST);
+            let silent: Vec<_> = (0..MOST + 24)
                 .map(|_| {
                     let admission = Arc::clone(&admission);
                     tokio::spawn(async move { admission.log_in(LONG, pending::<Option<()>>()).await })
                 })
                 .collect();
-            while lock(&admission.unknown).len() < MOST_UNKNOWN {
+            while lock(&admission.unknown).len() < MOST {
                 tokio::task::yield_now().await;
             }
             // The last ones have to be there, too.
@@ -136,13 +149,13 @@ mod tests {
                 tokio::task::yield_now().await;
                 ended = silent.iter().filter(|task| task.is_finished()).count();
             }
-            assert_eq!(lock(&admission.unknown).len(), MOST_UNKNOWN - 1);
+            assert_eq!(lock(&admission.unknown).len(), MOST - 1);
         });
     }
 
     #[test]
     fn each_wrong_token_makes_the_next_one_of_the_address_wait_longer() {
-        let admission = Admission::new();
+        let admission = Admission::new(MOST);
         let address: IpAddr = "10.0.0.1".parse().unwrap();
         let start = Instant::now();
         (0..6).for_each(|_| admission.note(Some(address), false));

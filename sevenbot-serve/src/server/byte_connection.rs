@@ -7,6 +7,7 @@ use protocol_core::time::Instant;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
 use super::frame_session::FrameSession;
+use super::pace::Pace;
 use super::seat::End;
 use super::shared::Shared;
 
@@ -38,14 +39,17 @@ pub(super) async fn serve(
     let mut client = FrameStream { session: FrameSession::open(shared), has_begun: false };
     // When it was last seen that no byte waits to be read: what is read now was sent later.
     let mut last_empty = shared.now();
+    let mut pace = Pace::new(shared.baud);
     let mut piece = vec![0; PIECE];
     client.put(last_empty, &first)?;
     let end = loop {
         client.session.exchange();
-        let waits_for_input = client.session.has_room();
+        let has_room = client.session.has_room();
+        let waits_for_input = has_room && pace.free_at() <= shared.now();
         if waits_for_input {
             match receive(&mut reader, &mut piece).now_or_never() {
                 Some(Ok(bytes)) => {
+                    pace.note(shared.now(), bytes.len());
                     client.put(last_empty, bytes)?;
                     // So that a flood leaves the thread to others.
                     tokio::task::yield_now().await;
@@ -58,13 +62,17 @@ pub(super) async fn serve(
         let session = &mut client.session;
         tokio::select! {
             received = receive(&mut reader, &mut piece), if waits_for_input => match received {
-                Ok(bytes) => client.put(shared.earliest(), bytes)?,
+                Ok(bytes) => {
+                    pace.note(shared.now(), bytes.len());
+                    client.put(shared.earliest(), bytes)?;
+                }
                 Err(end) => break end,
             },
             written = writer.write(session.output()), if !session.output().is_empty() => match written {
                 Ok(count) => session.consume(count),
                 Err(_) => break End::Broken,
             },
+            () = shared.sleep_until(pace.free_at()), if has_room && !waits_for_input => {}
             () = session.news() => {}
         }
         if waits_for_input {

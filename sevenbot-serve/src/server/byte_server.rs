@@ -40,9 +40,13 @@ impl ByteServer {
     /// Serves all clients of a TCP port.
     pub(super) async fn serve_tcp(self, listener: TcpListener) {
         loop {
+            let connection = self.admission.connection().await;
             let (stream, peer) = accept_tcp(&listener).await;
             let server = self.clone();
-            tokio::spawn(async move { server.serve_client(stream, peer).await });
+            tokio::spawn(async move {
+                server.serve_client(stream, peer).await;
+                drop(connection);
+            });
         }
     }
 
@@ -50,11 +54,12 @@ impl ByteServer {
     pub(super) async fn serve_local(self, socket: LocalSocket) {
         loop {
             let stream = socket.accept().await;
+            // The next one that has no place is closed.
+            let Some(place) = self.admission.place() else { continue };
             let server = self.clone();
             tokio::spawn(async move {
-                if let Some(_place) = server.admission.place() {
-                    let _ = byte_connection::serve(&server.shared, stream, Vec::new()).await;
-                }
+                let _ = byte_connection::serve(&server.shared, stream, Vec::new()).await;
+                drop(place);
             });
         }
     }

@@ -17,11 +17,13 @@ mod arm_serial;
 mod breakage;
 mod byte_connection;
 mod byte_server;
+mod descriptors;
 mod frame_session;
 mod listener;
 #[cfg(unix)]
 mod local_socket;
 mod notice;
+mod pace;
 #[cfg(target_os = "linux")]
 mod pty;
 #[cfg(target_os = "linux")]
@@ -256,10 +258,11 @@ impl Network {
         web_socket: Option<TcpListener>,
         page: Option<TcpListener>,
     ) {
-        let admission = Admission::new();
+        let most = descriptors::connections();
+        let admission = Admission::new(most);
         // Programs of this user keep their places whatever the network does.
         let local = ByteServer {
-            admission: Admission::new(),
+            admission: Admission::new(most),
             token: None,
             tls: None,
             ..self.bytes(config, &admission)

@@ -10,6 +10,7 @@ use tty_ports::pty::Pty;
 use tty_ports::symlink::Symlink;
 
 use super::frame_session::FrameSession;
+use super::pace::Pace;
 use super::readiness::Readiness;
 use super::shared::Shared;
 use super::start_error::StartError;
@@ -40,11 +41,12 @@ impl PtyPort {
         let opened = self.clients.as_ref().map(Readiness::of).transpose()?;
         let mut session = FrameSession::open(&shared);
         let mut last_empty = shared.now();
+        let mut pace = Pace::new(shared.baud);
         // Programs that are gone left bytes to this session.
         let mut has_leftovers = false;
         loop {
             session.exchange();
-            let count = self.receive(&mut session, &mut last_empty, &shared)?;
+            let count = self.receive(&mut session, &mut last_empty, &mut pace, &shared)?;
             let was_closed = self.was_closed()?;
             let is_open = self.pty.has_client();
             if was_closed || (has_leftovers && is_open) {
@@ -62,8 +64,11 @@ impl PtyPort {
                 tokio::task::yield_now().await;
                 continue;
             }
-            let waits_for_input = session.has_room();
-            wait(&master, opened.as_ref(), &session).await?;
+            let waits_for_input = session.has_room() && pace.free_at() <= shared.now();
+            tokio::select! {
+                done = wait(&master, opened.as_ref(), &session, waits_for_input) => done?,
+                () = shared.sleep_until(pace.free_at()), if session.has_room() && !waits_for_input => {}
+            }
             if waits_for_input {
                 last_empty = shared.earliest();
             }
@@ -75,9 +80,11 @@ impl PtyPort {
         &self,
         session: &mut FrameSession,
         last_empty: &mut Instant,
+        pace: &mut Pace,
         shared: &Shared,
     ) -> io::Result<usize> {
-        if !session.has_room() && self.pty.has_client() {
+        let is_free = session.has_room() && pace.free_at() <= shared.now();
+        if !is_free && self.pty.has_client() {
             return Ok(0);
         }
         let mut bytes = [0; PIECE];
@@ -85,6 +92,7 @@ impl PtyPort {
         if count == 0 {
             *last_empty = shared.now();
         }
+        pace.note(shared.now(), count);
         session.put(*last_empty, bytes.get(..count).unwrap_or_default());
         Ok(count)
     }
@@ -110,7 +118,12 @@ impl PtyPort {
 }
 
 /// Waits until there is something to do.
-async fn wait(master: &Readiness, opened: Option<&Readiness>, session: &FrameSession) -> io::Result<()> {
+async fn wait(
+    master: &Readiness,
+    opened: Option<&Readiness>,
+    session: &FrameSession,
+    waits_for_input: bool,
+) -> io::Result<()> {
     let was_opened = async {
         match opened {
             Some(opened) => opened.readable().await,
@@ -118,7 +131,7 @@ async fn wait(master: &Readiness, opened: Option<&Readiness>, session: &FrameSes
         }
     };
     tokio::select! {
-        ready = master.readable(), if session.has_room() => ready?,
+        ready = master.readable(), if waits_for_input => ready?,
         ready = master.writable(), if !session.output().is_empty() => ready?,
         done = was_opened => done?,
         () = session.news() => {}

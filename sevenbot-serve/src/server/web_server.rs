@@ -63,9 +63,13 @@ impl WebServer {
     /// Serves all clients of a port.
     pub(super) async fn serve(self, listener: TcpListener) {
         loop {
+            let connection = self.admission.connection().await;
             let (stream, peer) = accept_tcp(&listener).await;
             let server = self.clone();
-            tokio::spawn(async move { server.serve_client(stream, peer).await });
+            tokio::spawn(async move {
+                server.serve_client(stream, peer).await;
+                drop(connection);
+            });
         }
     }
 

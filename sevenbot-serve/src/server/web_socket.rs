@@ -15,6 +15,7 @@ use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message};
 
 use super::frame_session::FrameSession;
+use super::pace::Pace;
 use super::seat::{End, Seat};
 use super::shared::Shared;
 use crate::maker::MakerClient;
@@ -252,14 +253,17 @@ where
     let mut session = session();
     // When it was last seen that no message waits: what is read now was sent later.
     let mut last_empty = shared.now();
+    let mut pace = Pace::new(shared.baud);
     let end = loop {
         if let Some(message) = session.advance(sender.is_idle()) {
             sender.start(message);
         }
-        let waits_for_input = session.has_room();
+        let has_room = session.has_room();
+        let waits_for_input = has_room && pace.free_at() <= shared.now();
         if waits_for_input {
             match messages.next().now_or_never() {
                 Some(Ok(message)) => {
+                    pace.note(shared.now(), message.len());
                     session.put(last_empty, message);
                     // So that a flood leaves the thread to others.
                     tokio::task::yield_now().await;
@@ -271,10 +275,14 @@ where
         }
         tokio::select! {
             message = messages.next(), if waits_for_input => match message {
-                Ok(message) => session.put(shared.earliest(), message),
+                Ok(message) => {
+                    pace.note(shared.now(), message.len());
+                    session.put(shared.earliest(), message);
+                }
                 Err(end) => break end,
             },
             sent = sender.done() => if let Err(end) = sent { break end },
+            () = shared.sleep_until(pace.free_at()), if has_room && !waits_for_input => {}
             () = session.news() => {}
         }
         if waits_for_input {

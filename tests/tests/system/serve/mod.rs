@@ -3,6 +3,8 @@
 mod attacks;
 mod bad_web;
 mod chaos;
+mod descriptors;
+mod line_history;
 mod load;
 mod network;
 mod rates;

@@ -1,7 +1,8 @@
 //! A simulator, and a server that shares it.
 
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::net::TcpStream;
+use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -11,7 +12,7 @@ use system_tests::process::{self, RunningProgram};
 use system_tests::programs::{host_sim, tool};
 use system_tests::registers::DEVICE_CODE;
 use system_tests::relay::{Relay, Watch};
-use system_tests::wait::wait_until;
+use system_tests::wait::{wait_for, wait_until};
 use system_tests::{ArmClient, read_request};
 use tempfile::TempDir;
 use tungstenite::client::IntoClientRequest;
@@ -37,19 +38,27 @@ const SIMULATOR: &str = "sim";
 impl Served {
     /// Starts a server with the pseudo-terminals `a`, `b`, ..., a TCP port and a WebSocket.
     pub(crate) fn start(ptys: usize, options: &[&str]) -> Self {
-        Self::start_with(ptys, options, None)
+        Self::start_with(tool(), ptys, options, None)
+    }
+
+    /// Starts one that may have so many file descriptors.
+    pub(crate) fn start_with_descriptors(most: usize, ptys: usize) -> Self {
+        let tool = tool();
+        let mut command = Command::new("sh");
+        command.args(["-c", &format!("ulimit -n {most}; exec \"$0\" \"$@\"")]).arg(tool.get_program());
+        command.envs(tool.get_envs().filter_map(|(name, value)| Some((name, value?))));
+        Self::start_with(command, ptys, &[], None)
     }
 
     /// Starts one whose line to the arm `watch` sees.
     pub(crate) fn start_watched(ptys: usize, options: &[&str], watch: Watch) -> Self {
-        Self::start_with(ptys, options, Some(watch))
+        Self::start_with(tool(), ptys, options, Some(watch))
     }
 
-    fn start_with(ptys: usize, options: &[&str], watch: Option<Watch>) -> Self {
+    fn start_with(mut command: Command, ptys: usize, options: &[&str], watch: Option<Watch>) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let simulator = simulator_at(&folder.path().join(if watch.is_some() { SIMULATOR } else { "arm" }));
         let relay = watch.map(|watch| plug(folder.path(), watch));
-        let mut command = tool();
         command
             .current_dir(&folder)
             .env("XDG_RUNTIME_DIR", folder.path())
@@ -61,7 +70,8 @@ impl Served {
         let (server, ports) = process::start(&mut command, ptys + 3).expect("the server is ready");
         let served = Self { server, simulator, ports, relay, folder };
         if ptys > 0 {
-            served.wait_for_arm(&mut served.open("a"));
+            // Not over a terminal: a late reply would come to the program that opens it next.
+            wait_for("the arm answers", || served.ask_for_arm(Duration::from_millis(500)));
         }
         served
     }
@@ -93,6 +103,15 @@ impl Served {
     pub(crate) fn local_socket(&self) -> PathBuf {
         let ready = self.ports.last().and_then(|port| port.to_str()).expect("a socket");
         ready.strip_prefix("unix:").expect("a path").into()
+    }
+
+    /// Asks whether the arm answers, as a program that connects to the Unix socket now and waits for so long.
+    pub(crate) fn ask_for_arm(&self, answered: Duration) -> Result<(), String> {
+        let failed = |step: &'static str| move |error: io::Error| format!("{step}: {error}");
+        let mut stream = UnixStream::connect(self.local_socket()).map_err(failed("connect"))?;
+        stream.set_read_timeout(Some(answered)).expect("a timeout");
+        stream.write_all(&read_request(DEVICE_CODE, 1)).map_err(failed("send"))?;
+        stream.read_exact(&mut [0; 8]).map_err(failed("receive"))
     }
 
     fn web_url(&self) -> &str {

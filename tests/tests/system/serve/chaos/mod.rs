@@ -13,7 +13,6 @@
 //! ```
 
 mod frame_visits;
-mod line_history;
 mod sent_targets;
 mod visit;
 mod visitor;
@@ -21,8 +20,6 @@ mod web_visits;
 mod wire;
 
 use std::fs;
-use std::io::{Read, Write};
-use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::sync::Arc;
@@ -30,10 +27,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use system_tests::process::kilobytes;
-use system_tests::read_request;
-use system_tests::registers::DEVICE_CODE;
 use system_tests::relay::Watch;
-use system_tests::wait::{wait_for, wait_until};
+use system_tests::wait::wait_for;
 
 use self::visitor::{Chaos, Tally, visit};
 use self::wire::{Security, WayIn};
@@ -78,8 +73,7 @@ fn run(length: Duration, seed: u64, late: Duration) {
         Box::new(move |passing| chaos.note(passing))
     };
     let mut served = Served::start_watched(TERMINALS, &options, watch());
-    let socket = served.local_socket();
-    wait_until("the arm answers", || is_answered(&socket));
+    wait_for_arm(&chaos, &served);
     let files = open_files(&served.server);
     let ways_in = ways_in(&served);
     let (total, memory) = thread::scope(|scope| {
@@ -104,7 +98,7 @@ fn run(length: Duration, seed: u64, late: Duration) {
                 served.unplug();
                 thread::sleep(OUTAGE);
                 served.plug(watch());
-                wait_until("the arm answers", || is_answered(&socket));
+                wait_for_arm(&chaos, &served);
                 chaos.turn_over();
                 next_outage = Instant::now() + BETWEEN_OUTAGES;
             }
@@ -167,12 +161,29 @@ fn ways_in(served: &Served) -> Vec<WayIn> {
     all
 }
 
-/// Does the arm answer a program that connects now?
-fn is_answered(socket: &Path) -> bool {
-    let Ok(mut stream) = UnixStream::connect(socket) else { return false };
-    let mut received = [0; 8];
-    stream.set_read_timeout(Some(ANSWERED)).expect("a timeout");
-    stream.write_all(&read_request(DEVICE_CODE, 1)).is_ok() && stream.read_exact(&mut received).is_ok()
+/// Waits until the arm answers a program that connects. A failure tells what the line and both programs were doing.
+fn wait_for_arm(chaos: &Chaos, served: &Served) {
+    wait_for("the arm answers", || {
+        served.ask_for_arm(ANSWERED).map_err(|error| {
+            let load = fs::read_to_string("/proc/loadavg").expect("the load of the machine");
+            format!(
+                "{error}; {}; server: {}, {} open files; simulator: {}; load {}",
+                chaos.line_of_late(),
+                state_of(&served.server),
+                open_files(&served.server),
+                state_of(&served.simulator),
+                load.trim()
+            )
+        })
+    });
+}
+
+/// Whether a process runs or waits, and the processor time that it has used.
+fn state_of(process: &Child) -> String {
+    let stat = fs::read_to_string(format!("/proc/{}/stat", process.id())).expect("its state");
+    let (_, fields) = stat.rsplit_once(')').expect("a name");
+    let fields: Vec<&str> = fields.split_whitespace().collect();
+    format!("{}, {} + {} ticks of processor", fields[0], fields[11], fields[12])
 }
 
 fn open_files(process: &Child) -> usize {

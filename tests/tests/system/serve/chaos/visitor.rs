@@ -10,11 +10,11 @@ use system_tests::registers::SPEED;
 use system_tests::relay::Passing;
 
 use super::frame_visits::FrameVisit;
-use super::line_history::LineHistory;
 use super::sent_targets::SentTargets;
 use super::visit::Visit;
 use super::web_visits::WebVisit;
 use super::wire::{Security, WayIn};
+use crate::serve::line_history::LineHistory;
 
 /// A reply that has not come after this time is lost.
 const LOST: Duration = Duration::from_secs(30);
@@ -79,6 +79,11 @@ impl Chaos {
     pub(crate) fn note(&self, passing: Passing<'_>) {
         self.targets.note(passing);
         self.history.note(passing);
+    }
+
+    /// What the arm's line carried of late.
+    pub(crate) fn line_of_late(&self) -> String {
+        self.history.of_late()
     }
 
     /// A wait begins for the reply with these registers: the first one, and how many.

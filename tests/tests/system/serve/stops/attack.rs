@@ -66,8 +66,9 @@ impl Attack {
         }
     }
 
-    /// The server holds the arm by itself, whenever a watchdog acts.
-    pub(crate) fn lets_the_server_hold(self) -> bool {
+    /// The arm's own watchdog acts whenever the line is silent for 10 ms, and holds the arm where its set-point is while it brakes
+    /// (D24). How far the server's holds are from the stop is tested in virtual time, on a line that is not silent.
+    pub(crate) fn lets_the_arm_hold(self) -> bool {
         self == Self::Watchdogs
     }
 

@@ -76,15 +76,6 @@ struct StopTimes {
 
 #[test]
 fn nothing_moves_the_arm_after_a_stop_whoever_attacks() {
-    stop_beside(|attack| !attack.lets_the_server_hold());
-}
-
-#[test]
-fn nothing_moves_the_arm_after_a_stop_beside_watchdogs_that_act_all_the_time() {
-    stop_beside(Attack::lets_the_server_hold);
-}
-
-fn stop_beside(is_wanted: impl Fn(Attack) -> bool) {
     let campaign = std::env::var("SERVE_STOPS").ok().map(|text| text.parse().expect("a number"));
     let count = campaign.unwrap_or(2);
     println!("{count} stops beside each attack, seed {SEED}");
@@ -103,7 +94,7 @@ fn stop_beside(is_wanted: impl Fn(Attack) -> bool) {
     let mut random = Random::new(SEED);
     let mut stoppers = Program::of_each_kind(&served);
     let chosen = std::env::var("SERVE_ATTACK").ok();
-    for attack in Attack::ALL.into_iter().filter(|&attack| is_wanted(attack)) {
+    for attack in Attack::ALL {
         if chosen.as_ref().is_some_and(|chosen| *chosen != format!("{attack:?}")) {
             continue;
         }
@@ -149,12 +140,11 @@ fn beside(
             thread::sleep(WATCHED);
             let context = format!("{attack:?}, stop {turn}");
             check_rests(line, &write_request(FINE_TARGET, &held), &context);
-            if !attack.lets_the_server_hold() {
+            if !attack.lets_the_arm_hold() {
                 assert_eq!(stopper.read(FINE_TARGET, FINE), held, "{context}: nothing moves it");
             }
             if (turn + 1) % BETWEEN_RESTS == 0 || turn + 1 == count {
-                // A watchdog that acts holds the arm elsewhere: where it is at that time.
-                let place = Some(&held).filter(|_| !attack.lets_the_server_hold());
+                let place = Some(&held).filter(|_| !attack.lets_the_arm_hold());
                 check_is_at_rest(stopper, place, &context);
             }
         }

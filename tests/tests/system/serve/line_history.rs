@@ -2,12 +2,15 @@
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use system_tests::relay::Passing;
 
 /// Frames that are remembered: those of more than half a minute.
 const REMEMBERED: usize = 40_000;
+
+/// What is told of the state of the line is about this time.
+const LATELY: Duration = Duration::from_secs(5);
 
 #[derive(Clone, Copy)]
 struct Read {
@@ -19,18 +22,18 @@ struct Read {
 
 /// The reads and replies on the line, and the outages.
 #[derive(Default)]
-pub(super) struct LineHistory {
+pub(crate) struct LineHistory {
     reads: Mutex<VecDeque<Read>>,
     /// Each outage has two: when it began, and when the arm was seen to answer again.
     turns: Mutex<Vec<Instant>>,
 }
 
 impl LineHistory {
-    pub(super) fn turn_over(&self) {
+    pub(crate) fn turn_over(&self) {
         self.turns.lock().expect("no panic").push(Instant::now());
     }
 
-    pub(super) fn note(&self, passing: Passing<'_>) {
+    pub(crate) fn note(&self, passing: Passing<'_>) {
         let (Passing::Request(frame) | Passing::Reply(frame)) = passing;
         let &[_, _, 3, address, count, ..] = frame else { return };
         let mut reads = self.reads.lock().expect("no panic");
@@ -41,8 +44,20 @@ impl LineHistory {
         reads.push_back(Read { at: Instant::now(), is_reply, address, count });
     }
 
+    /// The reads and replies of the last seconds, and the last one of each.
+    pub(crate) fn of_late(&self) -> String {
+        let reads = self.reads.lock().expect("no panic");
+        let of_kind = |is_reply: bool| {
+            let ages =
+                reads.iter().rev().filter(|read| read.is_reply == is_reply).map(|read| read.at.elapsed());
+            let (count, last) = (ages.clone().take_while(|&age| age < LATELY).count(), ages.clone().next());
+            format!("{count} in {LATELY:?}, the last one {last:?} ago")
+        };
+        format!("reads on the line: {}, replies: {}", of_kind(false), of_kind(true))
+    }
+
     /// What became of a read of these registers that was sent at this time.
-    pub(super) fn told(&self, sent: Instant, (address, count): (u8, u8)) -> String {
+    pub(crate) fn told(&self, sent: Instant, (address, count): (u8, u8)) -> String {
         let since = |at: Instant| match at.checked_duration_since(sent) {
             Some(after) => after.as_secs_f64(),
             None => -(sent - at).as_secs_f64(),

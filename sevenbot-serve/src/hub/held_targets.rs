@@ -1,0 +1,40 @@
+//! The targets that hold joints: the last write of a target to such a joint was a stop or a hold.
+//!
+//! A joint that was stopped brakes past its target and returns to it. The server must not hold it again where it is measured
+//! meanwhile: the arm would rest elsewhere than where a stop was confirmed.
+
+use protocol_core::registers::{JOINTS, Joint};
+
+use super::intent::Intent;
+
+/// A joint may be so far from the target that holds it, in hundredths of a degree. One that is farther away is not braking: the
+/// program that held it read its position long before.
+const LONGEST_BRAKING: u16 = 1_500;
+
+/// One target for each joint, in hundredths of a degree; `None`: it does not hold.
+pub(crate) type Targets = [Option<u16>; JOINTS];
+
+/// The targets that hold joints.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct HeldTargets(Targets);
+
+impl HeldTargets {
+    /// A write with this intent and these targets goes to the arm.
+    pub(crate) fn note_write(&mut self, intent: Intent, targets: &Targets) {
+        match intent {
+            Intent::Setting => {}
+            Intent::Hold | Intent::Stop => {
+                for (held, target) in self.0.iter_mut().zip(targets) {
+                    *held = target.or(*held);
+                }
+            }
+            Intent::Motion | Intent::Switch | Intent::MotorsOff => *self = Self::default(),
+        }
+    }
+
+    /// The target that holds a joint which is measured at this position.
+    pub(crate) fn near(&self, joint: Joint, position: u16) -> Option<u16> {
+        let held = self.0.get(usize::from(joint.index())).copied().flatten();
+        held.filter(|held| held.abs_diff(position) <= LONGEST_BRAKING)
+    }
+}
