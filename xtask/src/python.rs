@@ -1,5 +1,6 @@
 //! The Python package: built as a wheel, installed into a fresh environment, and tested there.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -24,7 +25,7 @@ const PACKAGES: [&str; 10] = [
 /// For the example with several processes.
 const RAY: &str = "ray==2.51.1";
 /// Interpreters that are tested if they are on PATH. The wheel is the same for all of them.
-const INTERPRETERS: [&str; 6] =
+pub(crate) const INTERPRETERS: [&str; 6] =
     ["python3", "python3.10", "python3.11", "python3.12", "python3.13", "python3.14"];
 /// Prints the version, and fails below 3.10.
 const VERSION: &str = "import sys; assert sys.version_info >= (3, 10); print('%d.%d' % sys.version_info[:2])";
@@ -61,9 +62,14 @@ fn first_interpreter() -> TaskResult<(String, &'static str)> {
 
 /// The versions on PATH, each once, with a program of each.
 pub(crate) fn interpreters() -> Vec<(String, &'static str)> {
-    let mut found: Vec<(String, &str)> = Vec::new();
-    for program in INTERPRETERS {
-        let output = Command::new(program).args(["-c", VERSION]).stderr(Stdio::null()).output();
+    with_versions(INTERPRETERS.into_iter())
+}
+
+/// The programs that are a Python of at least 3.10, with their versions. Each version is there once.
+pub(crate) fn with_versions<P: AsRef<OsStr>>(programs: impl Iterator<Item = P>) -> Vec<(String, P)> {
+    let mut found: Vec<(String, P)> = Vec::new();
+    for program in programs {
+        let output = Command::new(&program).args(["-c", VERSION]).stderr(Stdio::null()).output();
         let Some(output) = output.ok().filter(|output| output.status.success()) else { continue };
         let version = String::from_utf8_lossy(&output.stdout).trim().to_owned();
         if found.iter().all(|(other, _)| *other != version) {

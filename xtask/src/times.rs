@@ -3,7 +3,7 @@
 use std::fmt::{self, Display};
 use std::fs;
 use std::process::Child;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
 
@@ -22,6 +22,14 @@ pub(crate) struct Times {
 }
 
 impl Times {
+    /// Does a piece of work of this process. Children count if they have ended and were waited for.
+    pub(crate) fn of<T>(work: impl FnOnce() -> T) -> (Self, T) {
+        let (start, before) = (Instant::now(), own_processor_time());
+        let outcome = work();
+        let processor = own_processor_time().zip(before).map(|(after, before)| after.saturating_sub(before));
+        (Self { elapsed: start.elapsed(), processor }, outcome)
+    }
+
     /// Waits for the end of a child, and returns its processor time. The child has to be waited for again.
     pub(crate) fn processor_of(child: &Child) -> TaskResult<Option<Duration>> {
         let pid = Pid::from_child(child);
@@ -36,6 +44,11 @@ impl Times {
             self.processor.map_or("?".to_owned(), |processor| format!("{:.1}", processor.as_secs_f64()));
         [format!("{:.0}", self.elapsed.as_secs_f64()), processor]
     }
+}
+
+/// The processor time of this process so far.
+fn own_processor_time() -> Option<Duration> {
+    fs::read_to_string("/proc/self/stat").ok().and_then(|stat| processor(&stat))
 }
 
 /// The processor time of a process and of its children that it waited for: proc_pid_stat(5), fields 14 to 17.

@@ -55,12 +55,12 @@ pub(super) fn tar_gz(files: &[PackedFile], epoch: u64) -> TaskResult<Vec<u8>> {
         header.set_mtime(epoch);
         archive.append_data(&mut header, &file.path, file.bytes.as_slice())?;
     }
-    gzip(&archive.into_inner()?)
+    gzip(&archive.into_inner()?, Compression::default())
 }
 
 /// Compressed, without a name and a time.
-pub(super) fn gzip(bytes: &[u8]) -> TaskResult<Vec<u8>> {
-    let mut encoder = GzBuilder::new().write(Vec::new(), Compression::default());
+pub(super) fn gzip(bytes: &[u8], level: Compression) -> TaskResult<Vec<u8>> {
+    let mut encoder = GzBuilder::new().write(Vec::new(), level);
     encoder.write_all(bytes)?;
     Ok(encoder.finish()?)
 }

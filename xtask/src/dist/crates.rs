@@ -1,6 +1,10 @@
 //! The library crates as archives, as a registry would have them.
 
-use crate::run::{TaskResult, cargo};
+use std::fs;
+use std::process::Command;
+
+use super::sources;
+use crate::run::{TaskResult, run_command, target_directory};
 
 /// The libraries. A registry gets those first on which others stand.
 const LIBRARIES: [&str; 10] = [
@@ -16,8 +20,22 @@ const LIBRARIES: [&str; 10] = [
     "sevenbot-serve",
 ];
 
-/// Packs each library, and builds it from its archive alone.
+/// Stands in the workspace's manifest. cargo tells such packages no versions of each other.
+const NOT_PUBLISHED: &str = "\npublish = false\n";
+const PUBLISHED: &str = "\npublish = true\n";
+
+/// Packs each library, and builds it from its archive alone, in a copy where the libraries may be published.
 pub(crate) fn build_from_archives() -> TaskResult {
-    let packages: Vec<_> = LIBRARIES.iter().map(|name| format!("--package {name}")).collect();
-    cargo(&format!("package --quiet --allow-dirty {}", packages.join(" ")))
+    let copy = target_directory().join("dist-crates");
+    sources::copy(&copy)?;
+    let manifest = copy.join("Cargo.toml");
+    let text = fs::read_to_string(&manifest)?;
+    if !text.contains(NOT_PUBLISHED) {
+        return Err("Cargo.toml does not contain `publish = false`".into());
+    }
+    fs::write(&manifest, text.replace(NOT_PUBLISHED, PUBLISHED))?;
+    let mut cargo = Command::new("cargo");
+    cargo.args(["package", "--quiet", "--allow-dirty"]);
+    cargo.args(LIBRARIES.iter().flat_map(|name| ["--package", name])).current_dir(copy);
+    run_command(cargo.env("CARGO_TARGET_DIR", target_directory().join("dist-archives")))
 }

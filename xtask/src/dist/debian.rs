@@ -5,6 +5,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use flate2::Compression;
+
 use super::archive::{PackedFile, gzip};
 use super::platform::{Platform, build_directory};
 use super::release::Release;
@@ -58,12 +60,14 @@ pub(super) fn write(release: &Release, platform: Platform, files: &[PackedFile])
     run_command(dpkg.env("SOURCE_DATE_EPOCH", release.epoch.to_string()).stdout(std::process::Stdio::null()))
 }
 
-/// The files as Debian's policy wants them: below /usr, manual pages and changes compressed, one file with the copyright.
+/// The files as Debian's policy wants them: below /usr, manual pages and changes compressed as far as possible, one file with
+/// the copyright.
 fn in_debian(files: &[PackedFile], release: &Release) -> TaskResult<Vec<PackedFile>> {
     let mut found = Vec::new();
     for file in files {
         let name = file.path.rsplit('/').next().unwrap_or_default();
-        let compressed = |path: String| TaskResult::Ok(PackedFile::text(path, gzip(&file.bytes)?));
+        let compressed =
+            |path: String| TaskResult::Ok(PackedFile::text(path, gzip(&file.bytes, Compression::best())?));
         match name {
             "LICENSE-APACHE" | "README.txt" => {}
             "LICENSE-MIT" => {
@@ -74,7 +78,7 @@ fn in_debian(files: &[PackedFile], release: &Release) -> TaskResult<Vec<PackedFi
                 found.push(compressed(format!("usr/{DOC}/NEWS.gz"))?);
                 found.push(PackedFile::text(
                     format!("usr/{DOC}/changelog.gz"),
-                    gzip(changelog(release)?.as_bytes())?,
+                    gzip(changelog(release)?.as_bytes(), Compression::best())?,
                 ));
             }
             "THIRD-PARTY-LICENCES.txt" => found.push(compressed(format!("usr/{}.gz", file.path))?),

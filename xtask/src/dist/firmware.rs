@@ -39,6 +39,8 @@ pub(super) fn dfu_name(release: &Release) -> String {
 /// Builds the image and the self-test image, and writes the files.
 pub(super) fn write(release: &Release) -> TaskResult {
     let map = build_directory().join("firmware.map");
+    // cargo hashes the arguments of the linker into the names of symbols, so this path is the same in each clone.
+    let map = map.strip_prefix(root()).unwrap_or(&map);
     build(release, "self-test", "")?;
     build(release, "firmware-stm32", &format!("-Clink-arg=-Map={}", map.display()))?;
     let built = build_directory().join(CHIP).join("firmware");
@@ -52,7 +54,7 @@ pub(super) fn write(release: &Release) -> TaskResult {
     put(".bin", &flat(&ranges)?)?;
     put(".hex", hex(&ranges)?.as_bytes())?;
     put(".dfu", &dfu::file(&ranges)?)?;
-    put(".map", portable(&fs::read_to_string(map)?).as_bytes())?;
+    put(".map", portable(&fs::read_to_string(root().join(map))?).as_bytes())?;
     put(".sizes.txt", sizes(&elf)?.as_bytes())?;
     put(".elf", &elf)?;
     let self_test = fs::read(built.join("self-test"))?;

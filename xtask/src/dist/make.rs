@@ -2,7 +2,9 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+
+use rustix::fs::Mode;
+use rustix::process::umask;
 
 use super::archive::{PackedFile, tar_gz, zip};
 use super::contents::{NOTE, archive_name, licences_name};
@@ -11,9 +13,12 @@ use super::release::Release;
 use super::tree::{self, CommonFiles};
 use super::{check, debian, firmware, licences, page, sbom, sums, tools, wheels};
 use crate::run::{TaskResult, target_directory};
+use crate::times::Times;
 
 /// Makes everything.
 pub(super) fn make(folder: PathBuf) -> TaskResult {
+    // Archives that other tools make keep the permissions of files, which depend on this.
+    umask(Mode::from_raw_mode(0o022));
     let release = Release::of_this_commit(folder)?;
     empty(&release.folder)?;
     println!("{}", release.text());
@@ -84,8 +89,7 @@ fn empty(folder: &Path) -> TaskResult {
 
 /// Does a part, and prints how long it took.
 fn timed(what: &str, part: impl FnOnce() -> TaskResult) -> TaskResult {
-    let start = Instant::now();
-    part().map_err(|why| format!("{what}: {why}"))?;
-    println!("{what}: {} s", start.elapsed().as_secs());
-    Ok(())
+    let (times, outcome) = Times::of(part);
+    println!("{what}: {times}");
+    outcome.map_err(|why| format!("{what}: {why}").into())
 }

@@ -21,6 +21,7 @@ mod page;
 mod platform;
 mod release;
 mod sbom;
+mod sources;
 mod sums;
 mod tools;
 mod tree;

@@ -42,7 +42,7 @@ pub(super) fn write(release: &Release) -> TaskResult {
 
 fn write_wheel(release: &Release, platform: Platform) -> TaskResult {
     let mut maturin = maturin(release, "build", platform.triple)?;
-    maturin.args(["--locked", "--profile", PROFILE, "--target", platform.triple]);
+    maturin.args(["--quiet", "--locked", "--profile", PROFILE, "--target", platform.triple]);
     if platform.debian.is_some() {
         maturin.args(["--zig", "--compatibility", "manylinux2014"]);
     }
@@ -52,19 +52,23 @@ fn write_wheel(release: &Release, platform: Platform) -> TaskResult {
 fn maturin(release: &Release, what: &str, triple: &str) -> TaskResult<Command> {
     let python = tools::python()?;
     let mut maturin = Command::new(&python);
-    maturin.args(["-m", "maturin", what, "--quiet", "--manifest-path"]).arg(root().join("python/Cargo.toml"));
+    maturin.args(["-m", "maturin", what, "--manifest-path"]).arg(root().join("python/Cargo.toml"));
     maturin.arg("--out").arg(&release.folder).env("PATH", tools::search_path()?);
     reproducible(&mut maturin, release, triple)?;
     Ok(maturin)
 }
 
-/// setuptools leaves files beside the sources, so it gets a copy.
+/// setuptools leaves files beside the sources, so it gets a copy. The wheel may be for a later Python than the one that makes it.
 fn write_pure(release: &Release, folder: &str, name: &str) -> TaskResult {
     let copy = build_directory().join("python").join(name);
     fs::create_dir_all(build_directory().join("python"))?;
     copy_of(&root().join(folder), &copy)?;
+    // A wheel keeps the permissions of its files, which a checkout has from the user's umask.
+    run_command(Command::new("chmod").args(["-R", "u=rwX,go=rX"]).arg(&copy))?;
     let mut pip = Command::new(tools::python()?);
     pip.args(["-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps"]);
-    pip.args(["--no-build-isolation", "--wheel-dir"]).arg(&release.folder).arg(copy);
+    pip.args(["--no-build-isolation", "--ignore-requires-python", "--wheel-dir"])
+        .arg(&release.folder)
+        .arg(copy);
     run_command(pip.env("SOURCE_DATE_EPOCH", release.epoch.to_string()))
 }

@@ -1,7 +1,8 @@
 //! Programs and wheels, installed on a bare system and on this one.
 
+use std::env;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use tempfile::TempDir;
@@ -11,7 +12,7 @@ use crate::dist::contents::archive_name;
 use crate::dist::platform::{PLATFORMS, host_platform};
 use crate::dist::release::Release;
 use crate::dist::{debian, wheels};
-use crate::python::interpreters;
+use crate::python::{INTERPRETERS, with_versions};
 use crate::run::{TaskResult, run_command};
 
 /// What a user does in the first minute. `$VERSION`: what the programs say of themselves.
@@ -95,16 +96,31 @@ pub(super) fn packages_are_flawless(release: &Release) -> TaskResult {
     Ok(())
 }
 
-/// The wheel of this computer, in the Python of a bare system, and in each Python on PATH.
+/// The wheel of this computer, in the Python of a bare system, and in each Python of this one.
 pub(super) fn wheels(release: &Release) -> TaskResult {
     let name = wheels::wheel(release, host_platform()?);
     let wheel = release.path(&name);
     let root = BareRoot::with(std::slice::from_ref(&wheel))?;
     root.run(&format!("python3 -m venv v\nv/bin/pip install --quiet --no-index /release/{name}\nv/bin/python -c \"{FIRST_PROGRAM}\""))?;
-    interpreters().iter().try_for_each(|(_, program)| try_wheel(program, &wheel))
+    pythons()?.iter().try_for_each(|(_, program)| try_wheel(program, &wheel))
 }
 
-fn try_wheel(program: &str, wheel: &Path) -> TaskResult {
+/// Each version of Python on PATH, and those of pyenv.
+fn pythons() -> TaskResult<Vec<(String, PathBuf)>> {
+    let mut programs: Vec<_> = INTERPRETERS.iter().map(PathBuf::from).collect();
+    let pyenv = env::var_os("PYENV_ROOT").map(PathBuf::from);
+    if let Some(folder) =
+        pyenv.or_else(|| Some(env::home_dir()?.join(".pyenv"))).map(|at| at.join("versions"))
+        && folder.exists()
+    {
+        for entry in fs::read_dir(folder)? {
+            programs.push(entry?.path().join("bin/python3"));
+        }
+    }
+    Ok(with_versions(programs.into_iter()))
+}
+
+fn try_wheel(program: &Path, wheel: &Path) -> TaskResult {
     let folder = TempDir::new()?;
     run_command(Command::new(program).args(["-m", "venv"]).arg(folder.path()))?;
     let python = folder.path().join("bin/python");

@@ -7,6 +7,7 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use system_tests::terminal::Terminal;
 use tempfile::TempDir;
 
 use crate::dist::contents::archive_name;
@@ -21,6 +22,8 @@ __declspec(dllimport) BOOLEAN __stdcall SystemFunction036(void *, unsigned long)
 __declspec(dllexport) int __stdcall ProcessPrng(unsigned char *to, unsigned long long count)
 { return SystemFunction036(to, (unsigned long)count); }
 ";
+/// Joints of the arm.
+const JOINTS: usize = 7;
 const COMPILER: &str = "x86_64-w64-mingw32-gcc";
 
 /// Wine, with files of its own, and the program.
@@ -40,8 +43,7 @@ pub(super) fn programs(release: &Release) -> TaskResult {
     wine.connect(&port)?;
     wine.first_minute("COM7")?;
     wine.sevenbot(&["--port", "COM7", "play", "moments.txt", "--approach", "3"])?;
-    let picture = wine.output(&["--port", "COM7", "--json", "state"])?;
-    if picture.is_empty() { Err("no state over COM7".into()) } else { Ok(()) }
+    wine.monitor("COM7")
 }
 
 impl Wine {
@@ -64,12 +66,16 @@ impl Wine {
 
     fn command(&self, program: &str) -> Command {
         let mut command = Command::new(program);
+        command.envs(self.variables()).current_dir(self.folder.path());
         command
-            .env("WINEPREFIX", self.folder.path().join("wine"))
-            .env("WINEDEBUG", "-all")
-            .env("WINEDLLOVERRIDES", "mscoree,mshtml=")
-            .current_dir(self.folder.path());
-        command
+    }
+
+    fn variables(&self) -> [(&'static str, String); 3] {
+        [
+            ("WINEPREFIX", self.folder.path().join("wine").display().to_string()),
+            ("WINEDEBUG", "-all".to_owned()),
+            ("WINEDLLOVERRIDES", "mscoree,mshtml=".to_owned()),
+        ]
     }
 
     fn sevenbot_command(&self, arguments: &[&str]) -> Command {
@@ -100,6 +106,22 @@ impl Wine {
         self.sevenbot(&["--port", port, "record", "moments.txt", "--driven", "--yes", "--seconds", "1"])?;
         let lines = fs::read_to_string(file)?.lines().count();
         if lines > 10 { Ok(()) } else { Err(format!("{lines} lines were recorded").into()) }
+    }
+
+    /// The monitor draws its seven joints, and ends by its key.
+    fn monitor(&self, port: &str) -> TaskResult {
+        let program = self.folder.path().join("programs/sevenbot.exe").display().to_string();
+        let variables: Vec<_> =
+            self.variables().iter().map(|(name, value)| format!("{name}={value}")).collect();
+        let mut words: Vec<&str> = variables.iter().map(String::as_str).collect();
+        words.extend(["wine", &program, "--port", port, "monitor"]);
+        let mut terminal = Terminal::run(Path::new("env"), &words);
+        let picture = terminal.wait_until("the joints", |screen| {
+            screen.contains("joint  target  position") && screen.matches('●').count() == JOINTS
+        });
+        println!("{picture}");
+        terminal.keys("q");
+        if terminal.wait().success() { Ok(()) } else { Err("the monitor failed".into()) }
     }
 
     /// Makes a terminal of Linux the port COM7.
