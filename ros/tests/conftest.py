@@ -50,7 +50,6 @@ class Program:
     def end(self, how: signal.Signals = signal.SIGKILL) -> int:
         """Ends it, and waits."""
         if self.process.poll() is None:
-            # A process that has its own, such as the emulator, ends those when it is terminated.
             os.killpg(self.process.pid, how)
         return self.process.wait(TIMEOUT)
 
@@ -89,11 +88,17 @@ class Start:
         assert simulator.line().startswith("ready ")
         return simulator
 
-    def emulator(self) -> tuple[Program, str]:
-        """The image for the arm in an emulator, and its port."""
-        program = self.program([os.environ["XTASK"], "emulate", "--no-build"])
-        self._stack.callback(lambda: program.end(signal.SIGTERM))
-        return program, program.line().split()[1]
+    def emulator(self) -> Program:
+        """The image for the arm in an emulator behind the link, ready."""
+        emulator = self.program([os.environ["XTASK"], "emulate", "--no-build", "--link", self.link])
+        # A process that has its own, such as the emulator, ends those when it is terminated.
+        self._stack.callback(lambda: emulator.end(signal.SIGTERM))
+        emulator.line()
+        return emulator
+
+    def arm(self, kind: str) -> Program:
+        """A controller behind the link: "simulator", or the "image" in an emulator, which runs in the time of the computer."""
+        return self.emulator() if kind == "image" else self.simulator()
 
     @property
     def link(self) -> str:

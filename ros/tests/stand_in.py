@@ -12,8 +12,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import rclpy
+from rclpy.signals import SignalHandlerOptions
 from sevenbot_ros.__main__ import spin
 from sevenbot_ros.node import ArmNode
+from sevenbot_ros.signals import EndSignals
 from sevenbot_ros.trajectory_action import Goal, TrajectoryAction
 from test_msgs.action import Fibonacci
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -61,6 +63,14 @@ def way_to_begin() -> JointTrajectory:
     return message
 
 
+def claw() -> JointTrajectory:
+    """The claw from 80 to 60 degrees, as a planner's trajectory of its group."""
+    message = JointTrajectory(joint_names=["joint_7"])
+    message.points = [JointTrajectoryPoint(positions=[math.radians(60.0)])]
+    message.points[0].time_from_start.sec = 1
+    return message
+
+
 def wrong(name: str) -> JointTrajectory:
     """A trajectory that is refused."""
     message = JointTrajectory(joint_names=[name])
@@ -69,7 +79,7 @@ def wrong(name: str) -> JointTrajectory:
     return message
 
 
-TRAJECTORIES = {1: long_path, 2: lambda: wrong("joint_9"), 3: lambda: wrong("joint_1"), 4: way_to_begin}
+TRAJECTORIES = {1: long_path, 2: lambda: wrong("joint_9"), 3: lambda: wrong("joint_1"), 4: way_to_begin, 5: claw}
 
 
 class StandIn:
@@ -77,8 +87,8 @@ class StandIn:
 
     def goal(self, request: Any) -> Goal:
         # Half a radian: who leaves the path fails.
-        tolerance = {name: 0.5 for name in JOINTS}
-        return Goal(TRAJECTORIES[request.order](), tolerance, {}, 0.0)
+        trajectory = TRAJECTORIES[request.order]()
+        return Goal(trajectory, {name: 0.5 for name in trajectory.joint_names}, {}, 0.0)
 
     def feedback(self, names: Sequence[str], desired: Sequence[float], actual: Sequence[float], seconds: float) -> Any:
         return Fibonacci.Feedback(sequence=[round(angle * 1000) for angle in [*desired, *actual]])
@@ -89,8 +99,9 @@ class StandIn:
 
 
 def main() -> int:
-    rclpy.init()
-    return spin(ArmNode(), TrajectoryAction(Fibonacci, StandIn()))
+    signals = EndSignals()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    return spin(ArmNode(), TrajectoryAction(Fibonacci, StandIn()), signals)
 
 
 if __name__ == "__main__":

@@ -131,6 +131,14 @@ def test_a_target_that_moves_on_is_caught_up_with() -> None:
     assert not following.is_approaching
 
 
+def test_targets_that_came_while_the_stream_opened_are_approached() -> None:
+    following = follower()
+    for step in range(1, 6):
+        assert following.take(Targets({0: 90.0 + 4.0 * step})) is None
+    assert following.advance(0.0)[0] == 90.0
+    assert following.advance(0.02)[0] == pytest.approx(90.6)
+
+
 def test_a_jump_is_refused_and_the_last_target_stays() -> None:
     following = follower()
     following.take(Targets({0: 91.0}))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
+import pytest
 import sevenbot
+from sevenbot_ros import actions, opening
 from sevenbot_ros.commands import Refusal, Targets
-from sevenbot_ros.driver import Driver, Measurement, Settings
+from sevenbot_ros.driver import Driver, Halted, Measurement, Settings
 from sevenbot_ros.health import Health
 
 
@@ -47,6 +50,77 @@ class Heard:
 
     def ended(self) -> None:
         pass
+
+
+@contextmanager
+def running(**settings: float) -> Iterator[tuple[Driver, Heard]]:
+    """A driver whose simulated arm answers."""
+    heard = Heard()
+    driver = Driver(Settings(port="sim", **settings), heard)  # type: ignore[arg-type]
+    driver.start()
+    try:
+        heard.until(lambda: heard.last is not None)
+        yield driver, heard
+    finally:
+        driver.close()
+    assert not driver.has_failed
+
+
+def test_thirty_stops_do_not_lose_the_arm() -> None:
+    with running(real_time_factor=20.0) as (driver, heard):
+        arm = driver.arm()
+        for number in range(30):
+            assert driver.command(Targets({0: 90.0 + number % 4})) is None
+            heard.until(lambda: driver._stream is not None)
+            actions.stop(driver)
+            actions.hold(driver)
+        assert driver.arm() is arm
+        assert len(heard.told) == 1, heard.told
+
+
+def test_nothing_moves_after_a_stop_without_a_hold() -> None:
+    with running(real_time_factor=20.0) as (driver, _):
+        with driver.action() as arm:
+            arm.pose(110, None, None, None, None, None, None)
+        actions.stop(driver)
+        standing = opening.standing(driver.arm())
+        for move in (actions.home, actions.park):
+            with pytest.raises(Halted, match="the arm was stopped: call the service `hold` to move again"):
+                move(driver)
+        assert opening.standing(driver.arm()) == standing
+        actions.hold(driver)
+        assert actions.home(driver) == "the arm stands in the standard pose"
+
+
+def test_a_hold_on_the_way_home_does_not_count_as_home() -> None:
+    # Slow, so that the hold comes in the middle of the motion.
+    with running(real_time_factor=0.5) as (driver, heard):
+        with driver.action() as arm:
+            arm.pose(150, None, None, None, None, None, None)
+        raised: list[Exception] = []
+
+        def go() -> None:
+            try:
+                actions.home(driver)
+            except sevenbot.Error as error:
+                raised.append(error)
+
+        mover = threading.Thread(target=go)
+        mover.start()
+        heard.until(lambda: heard.last is not None and heard.last.positions[0] < 145.0)
+        actions.hold(driver)
+        mover.join()
+        assert [type(error) for error in raised] == [sevenbot.Interrupted]
+
+
+def test_a_stop_during_a_hold_is_not_undone() -> None:
+    with running() as (driver, _):
+        stop_count = driver.stop_count
+        actions.stop(driver)
+        with pytest.raises(Halted):
+            driver.release(stop_count)
+        refusal = driver.command(Targets({0: 91.0}))
+        assert refusal is not None and refusal.key == "halted"
 
 
 def test_a_command_that_comes_while_the_arm_is_lost_does_not_lead_the_next_one() -> None:

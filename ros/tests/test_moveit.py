@@ -13,11 +13,14 @@ from xml.etree import ElementTree as Xml
 import pytest
 import yaml
 from sevenbot_ros.joints import LINKAGE, NAMES, PASSIVE
+from sevenbot_ros.parameters import DECLARED
+from sevenbot_ros.trajectory_action import CONTROLLERS
 from test_files import JOINTS, LINKS, ROBOT, ROS, attribute
 
 CONFIG = ROS / "sevenbot_moveit_config/config"
 SRDF = Xml.parse(CONFIG / "7bot_v2.srdf").getroot()
 ARM = list(NAMES[:6])
+DEFAULTS = {name: default for name, default, _ in DECLARED}
 
 
 def read(name: str) -> Any:
@@ -89,6 +92,7 @@ def test_controllers_of_moveit_are_those_of_ros2_control() -> None:
         assert name in control["controller_manager"]["ros__parameters"]
     assert moveit["arm_controller"]["joints"] == ARM
     assert moveit["claw_controller"]["joints"] == ["joint_7"]
+    assert [DEFAULTS[name] for name, _ in CONTROLLERS] == moveit["controller_names"]
     interfaces = {str(each.get("name")) for each in ROBOT.iter("command_interface")}
     assert {each for name in moveit["controller_names"] for each in control[name]["ros__parameters"]["command_interfaces"]} == interfaces
     assert set(read("kinematics.yaml")) == {"arm"}

@@ -12,12 +12,13 @@ from collections.abc import Callable
 import pytest
 import sevenbot
 from client import Client, seconds_of
-from conftest import Start
+from conftest import Program, Start
 from diagnostic_msgs.msg import KeyValue
 from sevenbot_ros.joints import NAMES, PASSIVE
 
 Report = Callable[[str], None]
 Clients = Callable[..., Client]
+KINDS = pytest.mark.parametrize("kind", ["simulator", "image"])
 HOME = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 80.0]
 
 
@@ -32,9 +33,9 @@ def level(client: Client) -> tuple[int, str]:
     return status.level[0], status.message
 
 
-@pytest.mark.parametrize("rate", [50, 100])
-def test_states_come_at_their_rate(start: Start, client: Clients, report: Report, rate: int) -> None:
-    start.simulator()
+@pytest.mark.parametrize(("kind", "rate"), [("simulator", 50), ("simulator", 100), ("image", 50)])
+def test_states_come_at_their_rate(start: Start, client: Clients, report: Report, kind: str, rate: int) -> None:
+    start.arm(kind)
     start.node(start.link, rate=float(rate))
     hearing = client()
     hearing.connect()
@@ -50,7 +51,7 @@ def test_states_come_at_their_rate(start: Start, client: Clients, report: Report
     gaps = [(later - earlier) * 1000 for earlier, later in zip(arrivals, arrivals[1:], strict=False)]
     stamps = [seconds_of(state) for state in hearing.states]
     report(
-        f"states at {rate} Hz: median {statistics.median(gaps):.1f} ms, worst {max(gaps):.1f} ms between two, "
+        f"states of the {kind} at {rate} Hz: median {statistics.median(gaps):.1f} ms, worst {max(gaps):.1f} ms between two, "
         f"{len(gaps)} of them on this machine as busy as it was"
     )
     assert stamps == sorted(stamps)
@@ -112,31 +113,48 @@ def test_a_sine_is_followed_and_a_stop_ends_it(start: Start, client: Clients, re
     leading.until(lambda: leading.degrees()[0] == pytest.approx(standing + 2.0, abs=0.5), "motion after hold")
 
 
-def moving(client: Client) -> None:
+def healthy(client: Client) -> None:
+    """Waits until the next diagnosis tells of no error."""
+    client.diagnostics.clear()
+    client.until(lambda: client.diagnostics and level(client)[0] < 2, "health")
+
+
+def lead(client: Client, node: Program, send: Callable[[], None], is_there: Callable[[], bool]) -> None:
+    """Sends commands until the joints are there. The servos of the emulator answer late on a busy machine: then the arm holds, as it
+    has to, and takes commands after `hold`."""
+    held = 0
+
+    def go() -> bool:
+        nonlocal held
+        send()
+        if (count := node.text().count("the arm holds")) > held:
+            held = count
+            healthy(client)
+            success, text = client.call("hold")
+            assert success, text
+        return is_there()
+
+    client.until(go, "motion")
+
+
+def moving(client: Client, node: Program) -> None:
     """Sends commands that move joint 1, until it has left its place."""
     begin = client.seconds()
     client.until(lambda: client.degrees()[0] == pytest.approx(0.0, abs=1.0))
 
-    def send() -> bool:
+    def send() -> None:
         client.send({"joint_1": min((client.seconds() - begin) * 8.0, 60.0)})
-        return client.degrees()[0] > 10.0
 
-    client.until(send, "motion")
-
-
-def called(client: Client, service: str) -> bool:
-    """Calls a service, and shows what it says."""
-    success, text = client.call(service)
-    print(f"{service}: {text}")
-    return success
+    lead(client, node, send, lambda: client.degrees()[0] > 10.0)
 
 
-def test_a_killed_node_leaves_the_arm_to_its_watchdog(start: Start, client: Clients) -> None:
-    start.simulator()
-    node = start.node(start.link, jump="approach")
+@KINDS
+def test_a_killed_node_leaves_the_arm_to_its_watchdog(start: Start, client: Clients, kind: str) -> None:
+    start.arm(kind)
+    node = start.node(start.link, jump="approach", max_age=30.0)
     leading = client()
     leading.connect()
-    moving(leading)
+    moving(leading, node)
     node.end()
     # A program that asks the arm would end the silence.
     time.sleep(1.0)
@@ -147,26 +165,27 @@ def test_a_killed_node_leaves_the_arm_to_its_watchdog(start: Start, client: Clie
     arm.sleep(0.5)
     assert arm.angles[0] == pytest.approx(standing, abs=0.3)
     assert arm.get("motor-state") == 1
-    assert 5.0 < standing - 90.0 < 55.0
+    assert 5.0 < standing - 90.0 < 65.0
     arm.close()
 
 
-def test_a_simulator_that_is_killed_and_started_again_as_an_unplugged_arm(start: Start, client: Clients) -> None:
-    simulator = start.simulator()
-    node = start.node(start.link, jump="approach")
+@KINDS
+def test_a_controller_that_is_killed_and_started_again_as_an_unplugged_arm(start: Start, client: Clients, kind: str) -> None:
+    controller = start.arm(kind)
+    node = start.node(start.link, jump="approach", max_age=30.0)
     leading = client()
     leading.connect()
-    moving(leading)
-    simulator.end()
+    moving(leading, node)
+    controller.end(signal.SIGTERM if kind == "image" else signal.SIGKILL)
     leading.diagnostics.clear()
     leading.until(lambda: leading.diagnostics and level(leading)[0] == 2 and level(leading)[1].startswith("no arm"))
     leading.send({"joint_1": 10.0})
     leading.until(lambda: "no arm answers" in node.text(), "a warning")
-    start.simulator()
+    start.arm(kind)
     leading.states.clear()
     leading.until(lambda: leading.states, "states after the restart")
     leading.until(lambda: leading.diagnostics and level(leading)[0] < 2, "health after the restart")
-    moving(leading)
+    moving(leading, node)
 
 
 def test_services(start: Start, client: Clients) -> None:
@@ -220,10 +239,16 @@ def test_a_wrong_parameter_ends_the_program(start: Start) -> None:
     assert "rate is 1000: it has to be 1 to 200" in node.text()
 
 
-def test_ctrl_c_ends_the_program(start: Start, client: Clients) -> None:
-    node = start.node()
-    client(simulated_time=True).connect()
-    assert node.end(signal.SIGINT) == 0
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_program_without_a_complaint(start: Start, client: Clients, how: signal.Signals) -> None:
+    hearing = client(simulated_time=True)
+    # The signal comes at any point of the cycle of the arm's thread.
+    for _ in range(3):
+        node = start.node(rate=200)
+        hearing.states.clear()
+        hearing.connect()
+        assert node.end(how) == 0, node.text()
+        assert not any(word in node.text() for word in ("Traceback", "Exception", "ERROR")), node.text()
 
 
 def test_memory_does_not_grow(start: Start, client: Clients, report: Report) -> None:
@@ -249,26 +274,35 @@ def test_memory_does_not_grow(start: Start, client: Clients, report: Report) -> 
     assert after - before < 1024 + 4 * seconds
 
 
-def test_the_emulated_image(start: Start, client: Clients, report: Report) -> None:
-    _, port = start.emulator()
-    node = start.node(port, jump="approach")
+def test_the_emulated_image_follows_a_sine_and_stops(start: Start, client: Clients, report: Report) -> None:
+    """The emulator runs in the time of the computer, so the path of the joints is judged, and its delay is only told."""
+    start.emulator()
+    node = start.node(start.link, jump="approach", max_age=30.0)
     leading = client()
     leading.connect()
-    states = len(leading.states)
-    asked = 0.0
+    begin = leading.seconds()
 
-    def moves() -> bool:
-        nonlocal asked
-        leading.send({"joint_1": 12.0})
-        # On a busy machine its servos answer late: then the arm holds, as it has to, and takes commands after `hold`.
-        if "the arm holds" in node.text() and leading.seconds() - asked > 5.0:
-            asked = leading.seconds()
-            called(leading, "hold")
-        return leading.degrees()[0] > 10.0
+    def wanted(seconds: float) -> float:
+        return 8.0 * (1.0 - math.cos(seconds * 0.4 * math.pi))
 
-    leading.until(moves, "motion", timeout=120.0)
+    def send() -> None:
+        leading.send([wanted(leading.seconds() - begin), *HOME[1:]])
+
+    leading.states.clear()
+    lead(leading, node, send, lambda: leading.seconds() > begin + 5.0)
+    told = [(seconds_of(state) - begin, [math.degrees(angle) for angle in state.position]) for state in leading.states]
+    lags = [
+        (statistics.median(abs(pose[0] - wanted(seconds - lag)) for seconds, pose in told), lag)
+        for lag in (step / 200 for step in range(80))
+    ]
+    report("a sine of 8 degrees and 0.2 Hz on the emulated image: median error {:.2f} degrees behind {:.3f} s".format(*min(lags)))
+    assert all(-1.5 < pose[0] < 17.5 for _, pose in told)
+    assert all(pose[1:] == pytest.approx(HOME[1:], abs=2.0) for _, pose in told)
+    lead(leading, node, lambda: leading.send([12.0, *HOME[1:]]), lambda: abs(leading.degrees()[0] - 12.0) < 1.5)
     for service in ("stop", "hold"):
-        leading.until(lambda: called(leading, service), service)
-    leading.diagnostics.clear()
-    leading.until(lambda: leading.diagnostics and level(leading)[0] < 2, "health")
-    report(f"the emulated image: {len(leading.states) - states} states during a motion of joint 1 by 12 degrees, a stop and a hold")
+        healthy(leading)
+        success, text = leading.call(service)
+        # On a machine that starves the emulator its servos are silent. This failure is told, and no other one is allowed.
+        assert success or text.startswith(("joint", "no servo")), text
+        report(f"{service} on the emulated image: {text.splitlines()[0]}")
+    healthy(leading)

@@ -79,6 +79,29 @@ def test_an_action_of_500_points(start: Start, client: Clients, report: Report) 
     server.destroy()
 
 
+def test_the_claw_has_an_action_of_its_own(start: Start, client: Clients) -> None:
+    node = start.node(module="stand_in", real_time_factor=2)
+    leading = client(simulated_time=True)
+    leading.connect()
+    arm, claw = (
+        ActionClient(leading.node, Fibonacci, f"{name}/follow_joint_trajectory")
+        for name in ("arm_controller", "claw_controller")
+    )
+    leading.until(lambda: arm.server_is_ready() and claw.server_is_ready(), "the actions")
+    assert result(leading, goal(leading, claw, 4, [])) == (6, -2)
+    assert "this controller has no joint joint_1" in node.text()
+    # A trajectory of the arm ends at its end, not by one of the claw.
+    way = goal(leading, arm, 4, [])
+    leading.until(lambda: leading.degrees()[2] < -5.0, "motion of the arm")
+    assert result(leading, goal(leading, claw, 5, [])) == (6, -1)
+    assert "a trajectory of other joints is running" in node.text()
+    assert result(leading, way) == (4, 0), node.text()
+    assert result(leading, goal(leading, claw, 5, [])) == (4, 0), node.text()
+    assert leading.degrees()[6] == pytest.approx(60.0, abs=3.5)
+    arm.destroy()
+    claw.destroy()
+
+
 def test_the_topic_interface_of_ros2_control(start: Start, client: Clients, report: Report) -> None:
     """What the published plugin sends with a threshold of -1: all joints, in each cycle of 50 Hz, with NaN before a controller is
     active, and the last target while it rests."""

@@ -9,7 +9,7 @@ import time
 
 import sevenbot
 
-from sevenbot_ros.driver import Driver
+from sevenbot_ros.driver import Driver, Halted
 
 # The standard pose in degrees, and the speed to it in degrees a second.
 HOME = (90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0)
@@ -17,6 +17,8 @@ HOME_SPEED = 19.0
 # The longest move, in seconds of the arm, and the time between two looks at it.
 LONGEST_MOVE = 30.0
 LOOK = 0.1
+# A target may be rounded to a degree.
+ROUNDING = 1.0
 
 
 def stop(driver: Driver) -> str:
@@ -27,36 +29,53 @@ def stop(driver: Driver) -> str:
 
 def hold(driver: Driver) -> str:
     """Hold where the joints are, with torque, and take commands again."""
+    stop_count = driver.stop_count
     with driver.action() as arm:
         if _is_driven(arm):
             arm.stop()
         else:
             arm.torque_on()
-        driver.halt(None)
+        driver.release(stop_count)
     return "the joints hold, and commands are taken"
 
 
 def home(driver: Driver) -> str:
     """Move to the standard pose. Paced by the thread of the driver, so that a simulated arm takes its time, too."""
+    driver.check_halted()
     with driver.action() as arm:
-        halted = driver.halted
+        driver.check_halted()
         arm.pose(HOME, speed=HOME_SPEED, wait=False)
-        end = driver.now() + LONGEST_MOVE
-        while driver.now() < end:
-            time.sleep(LOOK)
-            if driver.halted != halted:
-                raise sevenbot.Interrupted(driver.halted or "the arm was stopped")
-            status = arm.status()
-            if status is None or all(joint.is_at_target for joint in status.joints):
-                return "the arm stands in the standard pose"
-            if status.problems:
-                raise sevenbot.NotReached("; ".join(f"{problem}" for problem in status.problems))
+        try:
+            _arrive(driver, arm)
+        except Halted:
+            # A stop may have come just before the targets.
+            arm.stop()
+            raise
+    return "the arm stands in the standard pose"
+
+
+def _arrive(driver: Driver, arm: sevenbot.Arm) -> None:
+    end = driver.now() + LONGEST_MOVE
+    while driver.now() < end:
+        time.sleep(LOOK)
+        driver.check_halted()
+        status = arm.status()
+        if status is None:
+            return
+        if any(abs(joint.target - angle) > ROUNDING for joint, angle in zip(status.joints, HOME, strict=True)):
+            raise sevenbot.Interrupted("the arm got other targets on its way")
+        if status.problems:
+            raise sevenbot.NotReached("; ".join(f"{problem}" for problem in status.problems))
+        if all(joint.is_at_target for joint in status.joints):
+            return
     raise sevenbot.NotReached("the arm does not get to the standard pose")
 
 
 def park(driver: Driver) -> str:
     """Move to the park pose, let go, and see that the arm stays. Commands are refused until `hold`."""
+    driver.check_halted()
     with driver.action() as arm:
+        driver.check_halted()
         arm.park()
         driver.halt("the arm is parked")
     return "the arm is parked, its motors are damped"

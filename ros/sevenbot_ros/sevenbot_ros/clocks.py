@@ -20,7 +20,7 @@ class Clock(Protocol):
         """The present time in seconds."""
 
     def wait_until(self, end: float) -> None:
-        """Waits until this time."""
+        """Waits until this time. A stop of the arm may end the wait early."""
 
 
 class RealClock:
@@ -57,7 +57,11 @@ class SimulatedClock:
         left = end - self.now()
         if left > 0.0:
             # Shorter than a microsecond is no time for the arm.
-            self._arm.sleep(max(left, STEP))
+            try:
+                self._arm.sleep(max(left, STEP))
+            except sevenbot.Interrupted:
+                # A service stopped the arm, which ends the wait of this thread, too.
+                return
         ahead = (self.now() - self._virtual) / self._factor - (time.monotonic() - self._real)
         if ahead > LEAP or ahead < -LEAP:
             self._rebase()

@@ -81,6 +81,10 @@ class Events(Protocol):
         """The thread ends."""
 
 
+class Halted(sevenbot.Error):
+    """Commands and motions are refused until `hold`."""
+
+
 class Driver:
     """One arm, opened again and again while the node lives."""
 
@@ -95,8 +99,9 @@ class Driver:
         self._clock: Clock = RealClock()
         self._stream: sevenbot.Stream | None = None
         self._lead: Lead | None = None
-        # Why commands are refused until `hold`.
+        # Why commands are refused until `hold`, and how often the arm was stopped.
         self._halted: str | None = None
+        self._stop_count = 0
         self._actions = 0
         # Did the thread end by an error of this program?
         self.has_failed = False
@@ -143,6 +148,8 @@ class Driver:
             if refusal := self._refusal():
                 return refusal
             if self._lead is not None:
+                if not self._lead.gives_way_to(lead):
+                    return Refusal("busy", "a trajectory of other joints is running: wait for its end, or cancel it")
                 self._lead.end("another one replaces it")
             self._lead = lead
             return None
@@ -151,7 +158,7 @@ class Driver:
         if self._arm is None:
             return Refusal("no arm", "no arm answers")
         if self._halted is not None:
-            return Refusal("halted", f"{self._halted}: call the service `hold` to move again")
+            return Refusal("halted", _until_hold(self._halted))
         if self._actions:
             return Refusal("busy", "a service moves the arm")
         return None
@@ -173,21 +180,35 @@ class Driver:
         """The clock of the arm."""
         return self._clock.now()
 
-    @property
-    def halted(self) -> str | None:
-        """Why commands are refused, until `hold`."""
-        return self._halted
+    def check_halted(self) -> None:
+        """Raises `Halted` if commands are refused until `hold`."""
+        halted = self._halted
+        if halted is not None:
+            raise Halted(_until_hold(halted))
 
-    def halt(self, reason: str | None) -> None:
-        """Refuse all commands for this reason; `None`: take them again."""
+    def halt(self, reason: str) -> None:
+        """Refuse all commands for this reason, until `release`."""
         with self._lock:
             self._halted = reason
+
+    @property
+    def stop_count(self) -> int:
+        """How often the arm was stopped so far."""
+        return self._stop_count
+
+    def release(self, stop_count: int) -> None:
+        """Takes commands again. Raises `Halted` if the arm was stopped since this count."""
+        with self._lock:
+            if self._stop_count == stop_count:
+                self._halted = None
+        self.check_halted()
 
     def stop(self, reason: str) -> list[int]:
         """Makes the arm hold at once, also in the middle of a stream, and refuses commands for this reason."""
         arm = self.arm()
         with self._lock:
             self._halted = reason
+            self._stop_count += 1
             self._stops += 1
         try:
             return arm.stop()
@@ -389,6 +410,10 @@ class Driver:
         before = errors if self._errors_before is None else self._errors_before
         self._events.diagnosed(health.of_registers(motor, protection, status, before))
         self._blocks, self._errors_before = [], errors
+
+
+def _until_hold(reason: str) -> str:
+    return f"{reason}: call the service `hold` to move again"
 
 
 def _next(due: float, period: float, now: float) -> float:

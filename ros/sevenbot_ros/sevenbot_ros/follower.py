@@ -73,7 +73,8 @@ class Follower:
 
     def advance(self, seconds: float) -> list[float | None]:
         """The next point, this long after the last one. `None` for joints that never had a target."""
-        travel, self._travel = self._travel, 0.0
+        # The first point is where the joints stand: targets that came while the stream opened may have gone far.
+        travel, self._travel = self._travel if seconds > 0.0 else 0.0, 0.0
         if self._is_approaching:
             self._approach(self._approach_speed * seconds + travel)
         else:

@@ -44,6 +44,9 @@ class Lead(Protocol):
     def end(self, reason: str) -> None:
         """The stream ends for this reason, unless it ended by itself."""
 
+    def gives_way_to(self, other: Lead) -> bool:
+        """May this one end so that the other leads the arm?"""
+
 
 class CommandLead:
     """Follows commands, and ends after a while without one."""
@@ -90,6 +93,9 @@ class CommandLead:
 
     def end(self, reason: str) -> None:
         pass
+
+    def gives_way_to(self, other: Lead) -> bool:
+        return True
 
 
 class Outcome(Enum):
@@ -173,6 +179,11 @@ class TrajectoryLead:
     def end(self, reason: str) -> None:
         if not self.ended.is_set():
             self._finish(Outcome.STOPPED, reason)
+
+    def gives_way_to(self, other: Lead) -> bool:
+        # The controllers of arm and claw do not replace each other's trajectories.
+        is_apart = isinstance(other, TrajectoryLead) and not {*self.trajectory.joints} & {*other.trajectory.joints}
+        return self.ended.is_set() or not is_apart
 
     def _finish(self, outcome: Outcome, reason: str) -> None:
         self.outcome, self.reason = outcome, reason

@@ -11,7 +11,7 @@ from sevenbot_ros.follower import Jump
 from sevenbot_ros.joints import NAMES, Limits
 
 # Name, default, and meaning.
-_DECLARED: tuple[tuple[str, object, str], ...] = (
+DECLARED: tuple[tuple[str, object, str], ...] = (
     ("port", "", "serial port; 'sim' for a simulated arm in this process; empty for the only port with an arm"),
     ("id", -1, "number of the arm (register 11); -1 for any"),
     ("chip", "", "chip id of the arm; empty for any"),
@@ -27,6 +27,7 @@ _DECLARED: tuple[tuple[str, object, str], ...] = (
     ("publish_joint_states", True, "publish joint_states; false beside a joint_state_broadcaster"),
     ("follow_joint_trajectory", True, "serve the action FollowJointTrajectory if control_msgs is there; false beside ros2_control"),
     ("controller_name", "arm_controller", "the action is CONTROLLER_NAME/follow_joint_trajectory"),
+    ("claw_controller_name", "claw_controller", "the same for an action that takes joint 7 alone"),
     ("frame_prefix", "", "what stands before the frames of this arm, as robot_state_publisher has it"),
     ("mesh_prefix", "", "where the meshes are; empty for this package"),
     ("clock", True, "publish /clock with port 'sim'; false for all simulated arms but one"),
@@ -41,7 +42,7 @@ class WrongParameter(ValueError):
 
 def declare(node: Node) -> None:
     """Declares all of them, read only, so that a change at run time is refused rather than ignored."""
-    for name, default, meaning in _DECLARED:
+    for name, default, meaning in DECLARED:
         descriptor = ParameterDescriptor(description=meaning, read_only=True)
         # A whole number is a number, and a chip id may look like one.
         descriptor.dynamic_typing = not isinstance(default, (bool, int))

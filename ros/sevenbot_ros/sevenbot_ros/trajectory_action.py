@@ -1,4 +1,4 @@
-"""The action FollowJointTrajectory, for users without ros2_control.
+"""The action FollowJointTrajectory for the arm and for its claw, for users without ros2_control.
 
 Its type is that of `control_msgs`, which is not on PyPI. So the server reads goals and writes results through an adapter: the published
 type has one here, and tests have one for a type that can be installed.
@@ -30,6 +30,8 @@ from sevenbot_ros.trajectory import RawPoint, plan
 GOAL_TOLERANCE = 3.0
 GOAL_TIME = 2.0
 FEEDBACK_PERIOD = 0.1
+# The parameters with the names of the controllers, and the joints that each of them takes.
+CONTROLLERS = (("controller_name", NAMES), ("claw_controller_name", NAMES[6:]))
 # The codes of `control_msgs/action/FollowJointTrajectory`.
 SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS, OLD_HEADER, PATH_VIOLATED, GOAL_VIOLATED = 0, -1, -2, -3, -4, -5
 CODES = {Outcome.REACHED: SUCCESSFUL, Outcome.PATH: PATH_VIOLATED, Outcome.GOAL: GOAL_VIOLATED, Outcome.STOPPED: INVALID_GOAL}
@@ -96,26 +98,29 @@ def published_type() -> TrajectoryAction | None:
 
 
 class TrajectoryAction:
-    """An action server that lets the driver follow a trajectory."""
+    """Action servers that let the driver follow a trajectory: one for each controller."""
 
     def __init__(self, action: Any, adapter: GoalAdapter) -> None:
         self._type, self._adapter = action, adapter
 
     def serve(self, node: ArmNode) -> None:
-        """Opens the server."""
+        """Opens the servers."""
         self._node = node
-        self._server = ActionServer(
-            node,
+        self._servers = [self._open(str(node.get_parameter(name).value), joints) for name, joints in CONTROLLERS]
+
+    def _open(self, controller: str, joints: Sequence[str]) -> ActionServer:
+        return ActionServer(
+            self._node,
             self._type,
-            f"{node.get_parameter('controller_name').value}/follow_joint_trajectory",
-            execute_callback=self._execute,
+            f"{controller}/follow_joint_trajectory",
+            execute_callback=lambda handle: self._execute(handle, joints),
             goal_callback=lambda _: GoalResponse.ACCEPT,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
             callback_group=ReentrantCallbackGroup(),
         )
 
-    def _execute(self, handle: ServerGoalHandle) -> Any:
-        lead = self._begin(self._adapter.goal(handle.request))
+    def _execute(self, handle: ServerGoalHandle, joints: Sequence[str]) -> Any:
+        lead = self._begin(self._adapter.goal(handle.request), joints)
         if isinstance(lead, Refusal):
             handle.abort()
             code = INVALID_JOINTS if lead.key == "unknown joint" else OLD_HEADER if lead.key == "old" else INVALID_GOAL
@@ -132,8 +137,11 @@ class TrajectoryAction:
             handle.abort()
         return self._adapter.result(CODES[lead.outcome], lead.reason)
 
-    def _begin(self, goal: Goal) -> TrajectoryLead | Refusal:
+    def _begin(self, goal: Goal, joints: Sequence[str]) -> TrajectoryLead | Refusal:
         message, driver, settings = goal.trajectory, self._node.driver, self._node.driver.settings
+        if others := [name for name in message.joint_names if name not in joints]:
+            text = f"this controller has no joint {', '.join(others)}: its joints are {', '.join(joints)}"
+            return Refusal("unknown joint", text)
         start = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
         now = self._node.seconds()
         if start and now - start > settings.rules.max_age:
