@@ -19,7 +19,7 @@ struct Tool {
 /// All programs know this.
 const VERSION: &[&str] = &["--version"];
 
-const TOOLS: [Tool; 11] = [
+const TOOLS: [Tool; 9] = [
     Tool { program: QEMU, arguments: VERSION, package: QEMU, purpose: "runs the image for the arm" },
     Tool { program: "c++", arguments: VERSION, package: "g++", purpose: "builds the fuzzer" },
     Tool {
@@ -48,13 +48,6 @@ const TOOLS: [Tool; 11] = [
         package: "iproute2",
         purpose: "opens the network of the tests with ROS",
     },
-    Tool { program: "dpkg-deb", arguments: VERSION, package: "dpkg", purpose: "makes the Debian package" },
-    Tool {
-        program: "mmdebstrap",
-        arguments: VERSION,
-        package: "mmdebstrap",
-        purpose: "makes the bare system on which a release is tried",
-    },
     Tool {
         program: "x86_64-w64-mingw32-gcc",
         arguments: VERSION,
@@ -63,8 +56,15 @@ const TOOLS: [Tool; 11] = [
     },
 ];
 
-/// What tries a whole release.
-const RELEASE_TOOLS: [Tool; 4] = [
+/// What makes and tries a release.
+const RELEASE_TOOLS: [Tool; 6] = [
+    Tool { program: "dpkg-deb", arguments: VERSION, package: "dpkg", purpose: "makes the Debian package" },
+    Tool {
+        program: "mmdebstrap",
+        arguments: VERSION,
+        package: "mmdebstrap",
+        purpose: "makes the bare system on which a release is tried",
+    },
     Tool { program: "wine", arguments: VERSION, package: "wine", purpose: "runs the program for Windows" },
     Tool {
         program: "qemu-aarch64-static",

@@ -87,7 +87,6 @@ const STAGES: &[Stage] = &[
                 let variables = [("RUST_TEST_THREADS", "1"), ("POSES", "1000")];
                 run("cargo", &format!("test {TESTED} --test browser"), &variables)
             }),
-            whole("this computer's part of a release, installed on a bare system", dist::native),
             whole("the Python package", python::check),
             whole("the ROS packages", ros::check),
             whole("fuzzing", fuzz::fixed),
@@ -106,6 +105,7 @@ const STAGES: &[Stage] = &[
         }),
         long("the arm's model in MuJoCo", mujoco::check),
         long("each library builds from its archive", dist::build_from_archives),
+        long("this computer's part of a release, installed on a bare system", dist::native),
         long("a whole release, with each part installed and used", dist::whole),
         long("many arms in two processes, with Ray", python::ray),
         long("the plugin for LeRobot, with the base classes of LeRobot", lerobot::check),

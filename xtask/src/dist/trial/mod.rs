@@ -24,6 +24,7 @@ use crate::run::{TaskResult, run_command, target_directory};
 
 /// Makes the part of a release for this computer from the programs that the tests built, and tries it.
 pub(crate) fn native() -> TaskResult {
+    install::for_release()?;
     let folder = make_native()?;
     installed::programs(&noted(&folder)?)
 }
