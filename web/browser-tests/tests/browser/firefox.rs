@@ -30,7 +30,7 @@ fn the_simulated_arm_is_shown_and_moved_and_nothing_is_requested_from_elsewhere(
         let differences = page.picture().differences(&before);
         if differences > 500 { Ok(()) } else { Err(format!("{differences} pixels")) }
     });
-    assert_eq!(page.evaluate("document.querySelector('#notice').hidden"), true, "there is a picture");
+    assert_eq!(page.evaluate("document.querySelector('#notice-bar').hidden"), true, "there is a picture");
     assert_eq!(page.errors().collect::<Vec<_>>(), [""; 0]);
     // Firefox draws its own controls with pictures and a font that are within it.
     let requests: Vec<_> = page.requests().filter(|url| !url.starts_with("data:")).collect();
