@@ -6,6 +6,7 @@ import os
 import pty
 import re
 import select
+import signal
 import subprocess
 import sys
 import time
@@ -50,8 +51,9 @@ class Terminal:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        # Without the terminal the program gets SIGHUP.
+        # Without the terminal the program gets SIGHUP, which it may ignore.
         os.close(self._master)
+        os.kill(self.pid, signal.SIGKILL)
         os.waitpid(self.pid, 0)
 
     def wait_for(self, pattern: str) -> re.Match[str]:
