@@ -34,10 +34,10 @@ The steps, as far as they are necessary:
    degrees: keep clear of the arm.
 3. Writes motor state 1, so that servos that let go hold again where they are,
    and sets the targets of blocked joints to their positions; of all joints, if
-   the motors were off. It does not do that while no
-   servo answers, or while a servo is too hot or has a wrong supply. Firmware
-   that does not tell which servo was overloaded needs motor state 2 for a
-   moment: the arm falls unless you hold it, and that is asked for separately.
+   the motors were off. It does not do that while no servo answers, or while a
+   servo is too hot or has a wrong supply. Firmware that does not tell which
+   servo was overloaded needs motor state 2 for a moment: the arm falls unless
+   you hold it, and that is asked for separately.
 4. Waits, looks again for two seconds, and says what is still wrong.
 
 Examples:

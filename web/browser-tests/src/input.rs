@@ -10,6 +10,14 @@ use system_tests::wait::wait_until;
 /// How many events a drag has between its ends.
 const DRAG_STEPS: u32 = 20;
 
+/// The places of these events.
+fn way(from: [f64; 2], to: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+    (1..=DRAG_STEPS).map(move |step| {
+        let share = f64::from(step) / f64::from(DRAG_STEPS);
+        [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]))
+    })
+}
+
 impl Page {
     /// The centre of an element in CSS pixels, scrolled into view.
     #[track_caller]
@@ -50,11 +58,7 @@ impl Page {
     pub fn drag_and_hold(&mut self, from: [f64; 2], to: [f64; 2]) {
         self.mouse("mouseMoved", from, 0);
         self.press(from);
-        for step in 1..=DRAG_STEPS {
-            let share = f64::from(step) / f64::from(DRAG_STEPS);
-            let at = |axis: usize| from[axis] + share * (to[axis] - from[axis]);
-            self.mouse("mouseMoved", [at(0), at(1)], 1);
-        }
+        way(from, to).for_each(|at| self.mouse("mouseMoved", at, 1));
     }
 
     /// Presses the button of the mouse.
@@ -117,11 +121,7 @@ impl Page {
             self.call("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points }));
         };
         touch("touchStart", json!([{ "x": from[0], "y": from[1] }]));
-        for step in 1..=DRAG_STEPS {
-            let share = f64::from(step) / f64::from(DRAG_STEPS);
-            let at = |axis: usize| from[axis] + share * (to[axis] - from[axis]);
-            touch("touchMove", json!([{ "x": at(0), "y": at(1) }]));
-        }
+        way(from, to).for_each(|[x, y]| touch("touchMove", json!([{ "x": x, "y": y }])));
         touch("touchEnd", json!([]));
     }
 
