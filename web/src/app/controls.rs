@@ -1,7 +1,7 @@
 //! Controls beside the sliders: numbers for the joints and the tip, home, claw, pump, speed, and the sides of the camera.
 
 use glam::Vec3;
-use sevenbot::map::{SPEED, VACUUM_PUMP};
+use sevenbot::map::{SPEED, TARGET_POSITION, VACUUM_PUMP};
 use wasm_bindgen::JsCast;
 use web_sys::{Element, HtmlInputElement};
 
@@ -11,8 +11,6 @@ use super::panels::TIP_FIELDS;
 use crate::arm_state::breach_text;
 use crate::scene::{Preset, Refusal, wish};
 
-/// The pose of `sevenbot home`, in degrees.
-const HOME: [f32; 7] = [90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0];
 /// The number of the claw's joint.
 const CLAW: u8 = 7;
 
@@ -20,7 +18,8 @@ impl App {
     /// Does what a button asks for. Other actions do nothing.
     pub(super) fn control(&mut self, action: &str, value: &str) {
         match action {
-            "home" => self.go(HOME),
+            // As `sevenbot home`.
+            "home" => self.go(TARGET_POSITION.default_bytes().map(f32::from)),
             "grip" => self.send_joint(CLAW, value.parse().unwrap_or_default()),
             "pump" => {
                 let is_on = self.client.registers().byte(&VACUUM_PUMP) != 0;
