@@ -10,8 +10,11 @@ import pytest
 import sevenbot
 from sevenbot_ros import actions, opening
 from sevenbot_ros.commands import Refusal, Targets
-from sevenbot_ros.driver import Driver, Halted, Measurement, Settings
+from sevenbot_ros.driver import Driver
+from sevenbot_ros.events import Measurement
 from sevenbot_ros.health import Health
+from sevenbot_ros.interlock import Halted
+from sevenbot_ros.settings import Settings
 
 
 class Heard:
@@ -52,6 +55,12 @@ class Heard:
         pass
 
 
+def wait(driver: Driver, heard: Heard, seconds: float) -> None:
+    """Waits in the time of the arm."""
+    end = driver.now() + seconds
+    heard.until(lambda: driver.now() > end)
+
+
 @contextmanager
 def running(**settings: float) -> Iterator[tuple[Driver, Heard]]:
     """A driver whose simulated arm answers."""
@@ -70,8 +79,9 @@ def test_thirty_stops_do_not_lose_the_arm() -> None:
     with running(real_time_factor=20.0) as (driver, heard):
         arm = driver.arm()
         for number in range(30):
-            assert driver.command(Targets({0: 90.0 + number % 4})) is None
-            heard.until(lambda: driver._stream is not None)
+            # Again and again, because a stream ends soon without commands.
+            target = Targets({0: 90.0 + number % 4})
+            heard.until(lambda: driver.leads.command(target) is None and driver.streamer.is_open)
             actions.stop(driver)
             actions.hold(driver)
         assert driver.arm() is arm
@@ -117,11 +127,11 @@ def test_a_hold_on_the_way_home_does_not_count_as_home() -> None:
 
 def test_a_stop_during_a_hold_is_not_undone() -> None:
     with running() as (driver, _):
-        stop_count = driver.stop_count
+        stop_count = driver.interlock.stop_count
         actions.stop(driver)
         with pytest.raises(Halted):
-            driver.release(stop_count)
-        refusal = driver.command(Targets({0: 91.0}))
+            driver.interlock.release(stop_count)
+        refusal = driver.leads.command(Targets({0: 91.0}))
         assert refusal is not None and refusal.key == "halted"
 
 
@@ -129,26 +139,24 @@ def test_a_command_that_comes_while_the_arm_is_lost_does_not_lead_the_next_one()
     heard = Heard()
     driver = Driver(Settings(port="sim"), heard)
     answers: list[Refusal | None] = []
-    close_stream = driver._close_stream
+    close_stream = driver.streamer.close
 
     def close() -> None:
-        if driver._stream is not None:
+        if driver.streamer.is_open:
             # Another thread hears a command while the stream of the lost arm is closed.
-            answers.append(driver.command(Targets({0: 94.0})))
+            answers.append(driver.leads.command(Targets({0: 94.0})))
         close_stream()
 
-    driver._close_stream = close  # type: ignore[method-assign]
+    driver.streamer.close = close  # type: ignore[method-assign]
     driver.start()
     heard.until(lambda: heard.last is not None)
-    assert driver.command(Targets({0: 92.0})) is None
-    heard.until(lambda: driver._stream is not None)
+    heard.until(lambda: driver.leads.command(Targets({0: 92.0})) is None and driver.streamer.is_open)
     simulation = driver.arm().simulation
     assert isinstance(simulation, sevenbot.Simulation)
     simulation.unplug()
     heard.until(lambda: sum(" answers at " in text for text in heard.told) == 2)
     heard.until(lambda: driver.measurement is not None)
-    end = driver.now() + 1.0
-    heard.until(lambda: driver.now() > end)
+    wait(driver, heard, 1.0)
     assert [answer.key if answer else None for answer in answers] == ["no arm"]
     assert heard.last is not None and abs(heard.last.positions[0] - 90.0) < 0.5
     driver.close()

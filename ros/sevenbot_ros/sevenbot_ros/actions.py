@@ -9,7 +9,8 @@ import time
 
 import sevenbot
 
-from sevenbot_ros.driver import Driver, Halted
+from sevenbot_ros.driver import Driver
+from sevenbot_ros.interlock import Halted
 
 # The standard pose in degrees, and the speed to it in degrees a second.
 HOME = (90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0)
@@ -23,27 +24,27 @@ ROUNDING = 1.0
 
 def stop(driver: Driver) -> str:
     """Hold at once, and refuse commands until `hold`."""
-    targets = driver.stop("the arm was stopped")
+    targets = driver.interlock.stop("the arm was stopped")
     return f"the joints hold at {' '.join(f'{angle:g}' for angle in targets)} degrees"
 
 
 def hold(driver: Driver) -> str:
     """Hold where the joints are, with torque, and take commands again."""
-    stop_count = driver.stop_count
+    stop_count = driver.interlock.stop_count
     with driver.action() as arm:
         if _is_driven(arm):
             arm.stop()
         else:
             arm.torque_on()
-        driver.release(stop_count)
+        driver.interlock.release(stop_count)
     return "the joints hold, and commands are taken"
 
 
 def home(driver: Driver) -> str:
     """Move to the standard pose. Paced by the thread of the driver, so that a simulated arm takes its time, too."""
-    driver.check_halted()
+    driver.interlock.check_halted()
     with driver.action() as arm:
-        driver.check_halted()
+        driver.interlock.check_halted()
         arm.pose(HOME, speed=HOME_SPEED, wait=False)
         try:
             _arrive(driver, arm)
@@ -58,7 +59,7 @@ def _arrive(driver: Driver, arm: sevenbot.Arm) -> None:
     end = driver.now() + LONGEST_MOVE
     while driver.now() < end:
         time.sleep(LOOK)
-        driver.check_halted()
+        driver.interlock.check_halted()
         status = arm.status()
         if status is None:
             return
@@ -73,11 +74,11 @@ def _arrive(driver: Driver, arm: sevenbot.Arm) -> None:
 
 def park(driver: Driver) -> str:
     """Move to the park pose, let go, and see that the arm stays. Commands are refused until `hold`."""
-    driver.check_halted()
+    driver.interlock.check_halted()
     with driver.action() as arm:
-        driver.check_halted()
+        driver.interlock.check_halted()
         arm.park()
-        driver.halt("the arm is parked")
+        driver.interlock.halt("the arm is parked")
     return "the arm is parked, its motors are damped"
 
 
@@ -86,7 +87,7 @@ def torque(driver: Driver, on: bool) -> str:
     if on:
         return hold(driver)
     with driver.action() as arm:
-        driver.halt("the motors are off")
+        driver.interlock.halt("the motors are off")
         arm.torque_off()
     return "the motors are off"
 

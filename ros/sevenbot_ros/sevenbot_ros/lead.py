@@ -1,4 +1,4 @@
-"""What leads the arm: commands as they come, or a trajectory. The driver asks for each point of the stream.
+"""What leads the arm: commands as they come, or a trajectory. The streamer asks for each point of the stream.
 
 Knows neither ROS nor the arm. Angles are degrees of the arm.
 """
@@ -8,15 +8,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from enum import Enum
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from sevenbot_ros.commands import Refusal, Targets
+from sevenbot_ros.events import Measurement
 from sevenbot_ros.follower import Follower
 from sevenbot_ros.joints import NAMES
+from sevenbot_ros.settings import Settings
 from sevenbot_ros.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from sevenbot_ros.driver import Measurement, Settings
 
 # A joint reaches a point two periods and a cycle of the controller after it was sent, and its measurement is as old as a cycle.
 LAG_PERIODS = 2

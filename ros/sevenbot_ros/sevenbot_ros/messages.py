@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
 
-from sevenbot_ros.driver import Measurement
+from sevenbot_ros.events import Measurement
 from sevenbot_ros.health import Health
 from sevenbot_ros.joints import NAMES, PASSIVE, STALL_TORQUE, speeds_to_radians, to_radians, with_passive
 

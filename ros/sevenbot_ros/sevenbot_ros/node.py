@@ -18,7 +18,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from sevenbot_ros import actions, description, messages, parameters
 from sevenbot_ros.commands import Refusal, Throttle, check
-from sevenbot_ros.driver import Driver, Measurement
+from sevenbot_ros.driver import Driver
+from sevenbot_ros.events import Measurement
 from sevenbot_ros.health import Health
 from sevenbot_ros.opening import SIMULATOR
 
@@ -137,7 +138,7 @@ class ArmNode(Node):
             return
         for refusal in answer.refused:
             self.refused(refusal)
-        if refused := self.driver.command(answer):
+        if refused := self.driver.leads.command(answer):
             self.refused(refused)
 
     def refused(self, refusal: Refusal) -> None:

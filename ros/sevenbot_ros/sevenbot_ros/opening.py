@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import sevenbot
 
 from sevenbot_ros.clocks import Clock, RealClock, SimulatedClock
-
-if TYPE_CHECKING:
-    from sevenbot_ros.driver import Settings
+from sevenbot_ros.settings import Settings
 
 # The port that is no port: an arm in this process.
 SIMULATOR = "sim"

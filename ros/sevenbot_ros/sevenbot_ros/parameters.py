@@ -6,9 +6,9 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
 from sevenbot_ros.commands import Rules
-from sevenbot_ros.driver import Settings
 from sevenbot_ros.follower import Jump
 from sevenbot_ros.joints import NAMES, Limits
+from sevenbot_ros.settings import Settings
 
 # Name, default, and meaning.
 DECLARED: tuple[tuple[str, object, str], ...] = (

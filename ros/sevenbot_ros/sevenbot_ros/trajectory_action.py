@@ -169,7 +169,7 @@ class TrajectoryAction:
         )
         while start > self._node.seconds():
             time.sleep(min(start - self._node.seconds(), 0.05))
-        return driver.lead(lead) or lead
+        return driver.leads.lead(lead) or lead
 
     def _tell(self, handle: ServerGoalHandle, lead: TrajectoryLead) -> None:
         measurement, joints = self._node.driver.measurement, lead.trajectory.joints

@@ -1,0 +1,42 @@
+"""What the thread of the arm tells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from sevenbot_ros.commands import Refusal
+from sevenbot_ros.health import Health
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Degrees of the arm, degrees a second, percent of the stall torque, and the greatest age in seconds."""
+
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...]
+    loads: tuple[float, ...]
+    age: float
+    time: float
+
+
+class Events(Protocol):
+    """Who hears it. All calls come from the thread of the arm."""
+
+    def measured(self, measurement: Measurement) -> None:
+        """The joints were measured."""
+
+    def diagnosed(self, diagnosis: Health) -> None:
+        """The health was read."""
+
+    def passed(self, simulated: float) -> None:
+        """Simulated time passed."""
+
+    def refused(self, refusal: Refusal) -> None:
+        """A command is refused."""
+
+    def changed(self, text: str) -> None:
+        """Something happened that a user wants to read."""
+
+    def ended(self) -> None:
+        """The thread ends."""

@@ -1,0 +1,120 @@
+"""May the arm move? It has to be connected, not stopped, and not used by a service.
+
+Knows neither ROS nor the stream. All threads call it.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import sevenbot
+
+from sevenbot_ros.commands import Refusal
+
+
+class Halted(sevenbot.Error):
+    """Commands and motions are refused until `hold`."""
+
+
+class Interlock:
+    """The connected arm, and the reasons why it must not move."""
+
+    def __init__(self) -> None:
+        # Also for those who act on an answer: nothing changes it while they have this lock.
+        self.lock = threading.Condition()
+        self._arm: sevenbot.Arm | None = None
+        # Why commands are refused until `hold`, and how often the arm was stopped.
+        self._halted: str | None = None
+        self._stop_count = 0
+        # Services that use the arm, and stops that still watch whether it holds.
+        self._actions = self._stops = 0
+
+    def connect(self, arm: sevenbot.Arm | None) -> None:
+        """This arm answers, or none does."""
+        with self.lock:
+            self._arm = arm
+
+    def arm(self) -> sevenbot.Arm:
+        """The arm. Raises `sevenbot.Closed` if none answers."""
+        arm = self._arm
+        if arm is None:
+            raise sevenbot.Closed("no arm answers")
+        return arm
+
+    def refusal(self) -> Refusal | None:
+        """Why a command is refused."""
+        with self.lock:
+            if self._arm is None:
+                return Refusal("no arm", "no arm answers")
+            if self._halted is not None:
+                return Refusal("halted", _until_hold(self._halted))
+            if self._actions:
+                return Refusal("busy", "a service moves the arm")
+            return None
+
+    @property
+    def stop_count(self) -> int:
+        """How often the arm was stopped so far."""
+        return self._stop_count
+
+    @property
+    def is_stopping(self) -> bool:
+        """Does a stop watch whether the arm holds?"""
+        return self._stops > 0
+
+    def halt(self, reason: str) -> None:
+        """Refuses all commands for this reason, until `release`."""
+        with self.lock:
+            self._halted = reason
+
+    def halt_first(self, reason: str) -> bool:
+        """As `halt`, unless there is a reason already. Tells whether this is the reason."""
+        with self.lock:
+            if self._halted is not None:
+                return False
+            self._halted = reason
+            return True
+
+    def release(self, stop_count: int) -> None:
+        """Takes commands again. Raises `Halted` if the arm was stopped since this count."""
+        with self.lock:
+            if self._stop_count == stop_count:
+                self._halted = None
+        self.check_halted()
+
+    def check_halted(self) -> None:
+        """Raises `Halted` if commands are refused until `hold`."""
+        halted = self._halted
+        if halted is not None:
+            raise Halted(_until_hold(halted))
+
+    def stop(self, reason: str) -> list[int]:
+        """Makes the arm hold at once, also in the middle of a stream, and refuses commands for this reason."""
+        arm = self.arm()
+        with self.lock:
+            self._halted = reason
+            self._stop_count += 1
+            self._stops += 1
+        try:
+            return arm.stop()
+        finally:
+            with self.lock:
+                self._stops -= 1
+
+    @contextmanager
+    def action(self) -> Iterator[sevenbot.Arm]:
+        """The arm for a service. Commands are refused meanwhile."""
+        arm = self.arm()
+        with self.lock:
+            self._actions += 1
+        try:
+            yield arm
+        finally:
+            with self.lock:
+                self._actions -= 1
+
+
+def _until_hold(reason: str) -> str:
+    return f"{reason}: call the service `hold` to move again"
