@@ -8,10 +8,12 @@ from contextlib import contextmanager
 
 import pytest
 import sevenbot
+from conftest import Start
 from sevenbot_ros import actions, opening
 from sevenbot_ros.commands import Refusal, Targets
 from sevenbot_ros.driver import Driver
 from sevenbot_ros.events import Measurement
+from sevenbot_ros.follower import Jump
 from sevenbot_ros.health import Health
 from sevenbot_ros.interlock import Halted
 from sevenbot_ros.settings import Settings
@@ -62,10 +64,10 @@ def wait(driver: Driver, heard: Heard, seconds: float) -> None:
 
 
 @contextmanager
-def running(**settings: float) -> Iterator[tuple[Driver, Heard]]:
+def running(port: str = "sim", **settings: object) -> Iterator[tuple[Driver, Heard]]:
     """A driver whose simulated arm answers."""
     heard = Heard()
-    driver = Driver(Settings(port="sim", **settings), heard)  # type: ignore[arg-type]
+    driver = Driver(Settings(port=port, **settings), heard)  # type: ignore[arg-type]
     driver.start()
     try:
         heard.until(lambda: heard.last is not None)
@@ -100,6 +102,60 @@ def test_nothing_moves_after_a_stop_without_a_hold() -> None:
         assert opening.standing(driver.arm()) == standing
         actions.hold(driver)
         assert actions.home(driver) == "the arm stands in the standard pose"
+
+
+@pytest.mark.parametrize("move", [actions.home, actions.park])
+def test_a_stop_between_the_check_and_the_motion_ends_the_motion(start: Start, move: Callable[[Driver], str]) -> None:
+    # In real time: in the time of a simulated arm of this process a motion ends at once.
+    start.simulator()
+    with running(start.link) as (driver, heard):
+        with driver.action() as arm:
+            arm.pose(150, None, None, None, None, None, None)
+        allowed = driver.motion
+        stopping = threading.Thread(target=actions.stop, args=[driver])
+
+        @contextmanager
+        def stopped() -> Iterator[sevenbot.Arm]:
+            with allowed() as arm:
+                stopping.start()
+                heard.until(lambda: driver.interlock.stop_count == 1)
+                # The stop makes the arm hold, and watches it for half a second.
+                wait(driver, heard, 1.0)
+                yield arm
+
+        driver.motion = stopped  # type: ignore[method-assign]
+        with pytest.raises((Halted, sevenbot.Interrupted)):
+            move(driver)
+        stopping.join()
+        standing = driver.arm().angles
+        assert standing[0] > 100.0
+        wait(driver, heard, 1.0)
+        assert driver.arm().angles == pytest.approx(standing, abs=0.5)
+
+
+def test_a_stop_whose_servo_answers_late_names_it_and_makes_the_arm_hold() -> None:
+    # As servos in an emulator on a busy machine: they do what they are told, but the arm does not hear them.
+    with running(jump=Jump.APPROACH) as (driver, heard):
+        simulation = driver.arm().simulation
+        assert isinstance(simulation, sevenbot.Simulation)
+        assert driver.leads.command(Targets({0: 150.0})) is None
+        heard.until(lambda: heard.last is not None and heard.last.positions[0] > 95.0)
+        simulation.fault("3=late=20")
+        with pytest.raises(sevenbot.ArmProblem, match="joint 3 does not answer"):
+            actions.stop(driver)
+        standing = simulation.angles
+        assert standing[0] < 145.0
+        with pytest.raises(sevenbot.ArmProblem, match="joint 3 does not answer"):
+            actions.hold(driver)
+        refusal = driver.leads.command(Targets({0: 150.0}))
+        assert refusal is not None and refusal.key == "halted" and "the arm was stopped" in refusal.text
+        wait(driver, heard, 1.0)
+        assert simulation.angles == pytest.approx(standing, abs=1.0)
+        simulation.clear()
+        wait(driver, heard, 1.0)
+        actions.hold(driver)
+        assert driver.leads.command(Targets({0: 150.0})) is None
+        heard.until(lambda: heard.last is not None and heard.last.positions[0] > standing[0] + 2.0)
 
 
 def test_a_hold_on_the_way_home_does_not_count_as_home() -> None:

@@ -5,12 +5,9 @@ Knows no ROS.
 
 from __future__ import annotations
 
-import time
-
 import sevenbot
 
 from sevenbot_ros.driver import Driver
-from sevenbot_ros.interlock import Halted
 
 # The standard pose in degrees, and the speed to it in degrees a second.
 HOME = (90.0, 90.0, 65.0, 90.0, 90.0, 90.0, 80.0)
@@ -42,24 +39,16 @@ def hold(driver: Driver) -> str:
 
 def home(driver: Driver) -> str:
     """Move to the standard pose. Paced by the thread of the driver, so that a simulated arm takes its time, too."""
-    driver.interlock.check_halted()
-    with driver.action() as arm:
-        driver.interlock.check_halted()
+    with driver.motion() as arm:
         arm.pose(HOME, speed=HOME_SPEED, wait=False)
-        try:
-            _arrive(driver, arm)
-        except Halted:
-            # A stop may have come just before the targets.
-            arm.stop()
-            raise
+        _arrive(driver, arm)
     return "the arm stands in the standard pose"
 
 
 def _arrive(driver: Driver, arm: sevenbot.Arm) -> None:
     end = driver.now() + LONGEST_MOVE
     while driver.now() < end:
-        time.sleep(LOOK)
-        driver.interlock.check_halted()
+        driver.interlock.wait(LOOK)
         status = arm.status()
         if status is None:
             return
@@ -74,9 +63,7 @@ def _arrive(driver: Driver, arm: sevenbot.Arm) -> None:
 
 def park(driver: Driver) -> str:
     """Move to the park pose, let go, and see that the arm stays. Commands are refused until `hold`."""
-    driver.interlock.check_halted()
-    with driver.action() as arm:
-        driver.interlock.check_halted()
+    with driver.motion() as arm:
         arm.park()
         driver.interlock.halt("the arm is parked")
     return "the arm is parked, its motors are damped"

@@ -79,6 +79,12 @@ class Driver:
             self.streamer.wait_until_closed()
             yield arm
 
+    @contextmanager
+    def motion(self) -> Iterator[sevenbot.Arm]:
+        """As `action`, for a service that moves the arm: every stop ends the motion. Raises `Halted` after a stop until `hold`."""
+        with self.action() as arm, self.interlock.motion():
+            yield arm
+
     def _run(self) -> None:
         try:
             self._open_and_serve()

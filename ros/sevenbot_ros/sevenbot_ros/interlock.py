@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import sevenbot
 
@@ -28,8 +28,8 @@ class Interlock:
         # Why commands are refused until `hold`, and how often the arm was stopped.
         self._halted: str | None = None
         self._stop_count = 0
-        # Services that use the arm, and stops that still watch whether it holds.
-        self._actions = self._stops = 0
+        # Services that use the arm, those of them that move it, and stops that still watch whether it holds.
+        self._actions = self._motions = self._stops = 0
 
     def connect(self, arm: sevenbot.Arm | None) -> None:
         """This arm answers, or none does."""
@@ -90,6 +90,12 @@ class Interlock:
         if halted is not None:
             raise Halted(_until_hold(halted))
 
+    def wait(self, seconds: float) -> None:
+        """Waits this long. Raises `Halted` as soon as commands are refused until `hold`."""
+        with self.lock:
+            self.lock.wait_for(lambda: self._halted is not None, seconds)
+        self.check_halted()
+
     def stop(self, reason: str) -> list[int]:
         """Makes the arm hold at once, also in the middle of a stream, and refuses commands for this reason."""
         arm = self.arm()
@@ -97,11 +103,20 @@ class Interlock:
             self._halted = reason
             self._stop_count += 1
             self._stops += 1
+            self.lock.notify_all()
         try:
+            self._end_motions(arm)
             return arm.stop()
         finally:
             with self.lock:
                 self._stops -= 1
+
+    def _end_motions(self, arm: sevenbot.Arm) -> None:
+        """Holds until the motions have ended that were allowed before the stop: each may write its first target after a hold."""
+        while self._motions:
+            # The last hold tells what is wrong.
+            with suppress(sevenbot.Error):
+                arm.stop()
 
     @contextmanager
     def action(self) -> Iterator[sevenbot.Arm]:
@@ -114,6 +129,18 @@ class Interlock:
         finally:
             with self.lock:
                 self._actions -= 1
+
+    @contextmanager
+    def motion(self) -> Iterator[None]:
+        """What a service does in here moves the arm, and every `stop` ends it. Raises `Halted` if commands are refused."""
+        with self.lock:
+            self.check_halted()
+            self._motions += 1
+        try:
+            yield
+        finally:
+            with self.lock:
+                self._motions -= 1
 
 
 def _until_hold(reason: str) -> str:
