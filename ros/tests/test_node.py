@@ -20,6 +20,9 @@ Report = Callable[[str], None]
 Clients = Callable[..., Client]
 KINDS = pytest.mark.parametrize("kind", ["simulator", "image"])
 HOME = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 80.0]
+# A stream that had no command for so long may have ended, and the next one begins with an approach. Seconds.
+LONGEST_GAP = 0.2
+APPROACH = 1.0
 
 
 def values(client: Client) -> list[KeyValue]:
@@ -31,6 +34,26 @@ def level(client: Client) -> tuple[int, str]:
     """The newest diagnosis."""
     status = client.diagnostics[-1].status[0]
     return status.level[0], status.message
+
+
+def stamp_gaps(client: Client) -> list[float]:
+    """The seconds from stamp to stamp of the states."""
+    stamps = [seconds_of(state) for state in client.states]
+    return [later - earlier for earlier, later in zip(stamps, stamps[1:], strict=False)]
+
+
+@pytest.mark.parametrize("rate", [50, 100])
+def test_states_come_at_their_rate_in_simulated_time(start: Start, client: Clients, rate: int) -> None:
+    # Slow motion, so that a busy client misses none.
+    start.node(rate=float(rate), real_time_factor=0.25)
+    hearing = client(simulated_time=True)
+    hearing.connect()
+    hearing.states.clear()
+    hearing.until(lambda: len(hearing.states) >= rate, "states")
+    gaps = stamp_gaps(hearing)
+    assert min(gaps) > 0.0
+    # A busy machine slows the time of the arm, and may lose states on their way: neither changes the median.
+    assert statistics.median(gaps) == pytest.approx(1.0 / rate, rel=0.01)
 
 
 @pytest.mark.parametrize(("kind", "rate"), [("simulator", 50), ("simulator", 100), ("image", 50)])
@@ -49,12 +72,14 @@ def test_states_come_at_their_rate(start: Start, client: Clients, report: Report
 
     hearing.until(heard, "states")
     gaps = [(later - earlier) * 1000 for earlier, later in zip(arrivals, arrivals[1:], strict=False)]
-    stamps = [seconds_of(state) for state in hearing.states]
     report(
         f"states of the {kind} at {rate} Hz: median {statistics.median(gaps):.1f} ms, worst {max(gaps):.1f} ms between two, "
         f"{len(gaps)} of them on this machine as busy as it was"
     )
-    assert stamps == sorted(stamps)
+    between = stamp_gaps(hearing)
+    assert min(between) >= 0.0
+    # A busy machine makes states late, never early.
+    assert statistics.fmean(between) > 0.9 / rate
     assert hearing.degrees() == pytest.approx(HOME, abs=2.0)
 
 
@@ -129,12 +154,40 @@ def lead(client: Client, node: Program, send: Callable[[], None], is_there: Call
         send()
         if (count := node.text().count("the arm holds")) > held:
             held = count
-            healthy(client)
-            success, text = client.call("hold")
-            assert success, text
+            hold(client)
         return is_there()
 
     client.until(go, "motion")
+
+
+def hold(client: Client) -> None:
+    """Calls `hold` until all servos answer it."""
+
+    def holds() -> bool:
+        healthy(client)
+        success, text = client.call("hold")
+        assert success or is_silence(text), text
+        return success
+
+    client.until(holds, "hold")
+
+
+def is_silence(text: str) -> bool:
+    """Does this tell of servos that do not answer, and of nothing else?"""
+    problem = text.splitlines()[0]
+    return "does not answer" in problem or "no servo answers" in problem
+
+
+def bus_errors(client: Client) -> int:
+    """The errors of the servo bus in the newest diagnosis."""
+    return next(int(value.value) for value in values(client) if value.key == "errors of the servo bus")
+
+
+def state_now(client: Client) -> list[float]:
+    """Degrees that were measured after this call."""
+    now = client.seconds()
+    client.until(lambda: seconds_of(client.states[-1]) > now, "a new state")
+    return client.degrees()
 
 
 def moving(client: Client, node: Program) -> None:
@@ -275,34 +328,55 @@ def test_memory_does_not_grow(start: Start, client: Clients, report: Report) -> 
 
 
 def test_the_emulated_image_follows_a_sine_and_stops(start: Start, client: Clients, report: Report) -> None:
-    """The emulator runs in the time of the computer, so the path of the joints is judged, and its delay is only told."""
+    """The emulator runs in the time of the computer. So states count while nothing made the arm hold, and the delay is only told."""
     start.emulator()
     node = start.node(start.link, jump="approach", max_age=30.0)
     leading = client()
     leading.connect()
-    begin = leading.seconds()
+    begin = led_since = last = leading.seconds()
+    told: list[tuple[float, list[float]]] = []
 
     def wanted(seconds: float) -> float:
-        return 8.0 * (1.0 - math.cos(seconds * 0.4 * math.pi))
+        return 8.0 * (1.0 - math.cos((seconds - begin) * 0.4 * math.pi))
 
     def send() -> None:
-        leading.send([wanted(leading.seconds() - begin), *HOME[1:]])
+        nonlocal led_since, last
+        now = leading.seconds()
+        if now - last > LONGEST_GAP:
+            led_since = now
+        last = now
+        leading.send([wanted(now), *HOME[1:]])
+        new, leading.states[:-1] = leading.states[:-1], []
+        told.extend(
+            (seconds_of(state), [math.degrees(angle) for angle in state.position])
+            for state in new
+            if seconds_of(state) > led_since + APPROACH
+        )
 
-    leading.states.clear()
-    lead(leading, node, send, lambda: leading.seconds() > begin + 5.0)
-    told = [(seconds_of(state) - begin, [math.degrees(angle) for angle in state.position]) for state in leading.states]
+    lead(leading, node, send, lambda: len(told) >= 200)
     lags = [
         (statistics.median(abs(pose[0] - wanted(seconds - lag)) for seconds, pose in told), lag)
         for lag in (step / 200 for step in range(80))
     ]
-    report("a sine of 8 degrees and 0.2 Hz on the emulated image: median error {:.2f} degrees behind {:.3f} s".format(*min(lags)))
+    error, lag = min(lags)
+    # Above 2 degrees if the arm does not move, goes half the way, or is 0.7 s late; 0.3 on a computer with 6 busy programs on 2 cores.
+    report(f"a sine of 8 degrees and 0.2 Hz on the emulated image: median error {error:.2f} degrees behind {lag:.3f} s")
+    assert error < 1.5
     assert all(-1.5 < pose[0] < 17.5 for _, pose in told)
     assert all(pose[1:] == pytest.approx(HOME[1:], abs=2.0) for _, pose in told)
-    lead(leading, node, lambda: leading.send([12.0, *HOME[1:]]), lambda: abs(leading.degrees()[0] - 12.0) < 1.5)
-    for service in ("stop", "hold"):
-        healthy(leading)
-        success, text = leading.call(service)
-        # On a machine that starves the emulator its servos are silent. This failure is told, and no other one is allowed.
-        assert success or text.startswith(("joint", "no servo")), text
-        report(f"{service} on the emulated image: {text.splitlines()[0]}")
-    healthy(leading)
+    errors = bus_errors(leading)
+    success, text = leading.call("stop")
+    report(f"stop on the emulated image: {text.splitlines()[0]}")
+    if not success:
+        # The machine starves the emulator: the arm waited in vain for its servos, and counted this.
+        assert is_silence(text), text
+        leading.diagnostics.clear()
+        leading.until(lambda: values(leading) and bus_errors(leading) > errors, "new errors of the servo bus")
+    # With or without an answer of the servos, the arm has new targets, and follows no command before `hold`.
+    standing = state_now(leading)
+    leading.each(0.02, 50, lambda _: leading.send([standing[0] + 20.0, *HOME[1:]]))
+    assert state_now(leading) == pytest.approx(standing, abs=1.0)
+    assert "command refused: the arm was stopped: call the service `hold`" in node.text()
+    hold(leading)
+    target = standing[0] + 3.0
+    lead(leading, node, lambda: leading.send([target, *HOME[1:]]), lambda: abs(leading.degrees()[0] - target) < 1.5)
