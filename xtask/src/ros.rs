@@ -83,7 +83,8 @@ fn test(python: &Path) -> TaskResult {
         .env("SEVENBOT", target_directory().join("debug/sevenbot"))
         .env("XTASK", env::current_exe()?)
         .env("ROS_LOG_DIR", folder().join("log"))
-        .env("PYTHONDONTWRITEBYTECODE", "1")
+        // Programs of the tests share it, and none of it is left beside the sources.
+        .env("PYTHONPYCACHEPREFIX", folder().join("bytecode"))
         .current_dir(folder());
     run_command(&mut command)
 }
