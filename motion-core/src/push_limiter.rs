@@ -33,11 +33,11 @@ impl PushLimit {
     }
 
     /// How long a turning joint may exceed it, and one at a standstill. [D27](protocol_core::decisions#d27) allows 300 ms. A
-    /// joint of the arm stays over it for less than 250 ms while it accelerates freely with 300 g, and turns after a push of
-    /// 80 ms.
+    /// joint of the arm stays over it for up to 270 ms when it turns back at full speed with 300 g: it brakes and accelerates
+    /// with the same push. It turns after a push of 80 ms.
     const fn grace(self) -> [Duration; 2] {
         match self {
-            Self::Arm(_) => [Duration::from_millis(250), Duration::from_millis(80)],
+            Self::Arm(_) => [Duration::from_millis(280), Duration::from_millis(80)],
             Self::Grip(_) => [Duration::from_millis(50), Duration::from_millis(30)],
         }
     }

@@ -55,6 +55,22 @@ fn d24_the_frames_of_others_do_not_keep_the_watchdog_of_a_silent_program_alive()
 }
 
 #[test]
+fn d24_a_short_watchdog_is_the_servers_and_the_arm_gets_a_longer_one() {
+    let mut world = World::new(2);
+    for steps in [0, 1, 19, 20, 255] {
+        world.send(0, &write(HOST_WATCHDOG.address, &[steps, 1]));
+        world.run(10);
+        let of_arm = if steps == 0 { 0 } else { steps.max(20) };
+        assert_eq!(world.arm.registers().get(HOST_WATCHDOG.address), of_arm);
+        world.take(1);
+        world.send(1, &read(HOST_WATCHDOG.address - 1, 4));
+        world.run(10);
+        let reply = world.take(1).into_iter().find(|(address, _)| *address == HOST_WATCHDOG.address - 1);
+        assert_eq!(reply.expect("a reply").1, [0, steps, 1, 0], "programs read what one wrote");
+    }
+}
+
+#[test]
 fn d24_the_watchdog_of_a_program_that_is_gone_acts() {
     for is_reset in [false, true] {
         let mut world = streamer_and_reader();

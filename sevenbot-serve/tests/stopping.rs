@@ -65,8 +65,7 @@ enum Attack {
     LongWrites,
     Targets,
     Stops,
-    /// Watchdogs of 20 ms of a program that is silent for 50 ms, while another one reads. Without that one the arm's own watchdog
-    /// would act, too.
+    /// Watchdogs of 10 ms of a program that is silent for 50 ms.
     Watchdogs,
 }
 
@@ -82,9 +81,9 @@ impl Attack {
             Self::Stops => write(MOTOR_STATE.address, &[1]),
             Self::Watchdogs => {
                 if (world.now.as_micros() / 10_000).is_multiple_of(5) {
-                    world.send(2, &write(HOST_WATCHDOG.address, &[2]));
+                    world.send(2, &write(HOST_WATCHDOG.address, &[1]));
                 }
-                return world.send(3, &read(SPEED.address, 1));
+                return;
             }
         };
         for attacker in 2..2 + ATTACKERS {

@@ -43,6 +43,7 @@ impl Hub {
         if let Some(faults) = place.and_then(|place| values.get_mut(place)).filter(|_| self.known.is_ours()) {
             *faults |= if self.watchdog.has_acted() { fault::HOST_SILENT } else { 0 };
         }
+        self.watchdog.overlay(address, values);
         if let Some(client) = self.clients.get(&id) {
             client.own.overlay(address, values);
             self.sharing_state(now, id, client).overlay(address, values);

@@ -13,7 +13,7 @@ use super::line::Owner;
 use super::request::{WholeRequest, read_bytes, without_idle_ends};
 use super::shares::Shares;
 use super::stream::Stream;
-use super::watchdog::WatchdogAction;
+use super::watchdog::{ClientWatchdog, WatchdogAction};
 
 impl Hub {
     /// The watchdog of a client acts.
@@ -166,6 +166,7 @@ impl Hub {
             if is_accepted && map == Map::V22 {
                 let damps = self.known.watchdog_damps();
                 self.watchdog.wrote(now, id, damps, address, &values);
+                ClientWatchdog::for_arm(address, &mut values);
             }
             let (start, bytes) = without_idle_ends(address, &values);
             self.line.send_write(now, map, start, bytes);

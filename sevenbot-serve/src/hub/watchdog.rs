@@ -8,8 +8,9 @@
 //! ```
 //!
 //! The arm counts the frames of all clients, and the samples. So once the client has been silent for the time of its
-//! watchdog, the hub does what the arm would do. A client that has left is silent, too. The arm's own watchdog stays as the
-//! client set it, and acts if the server fails.
+//! watchdog, the hub does what the arm would do. A client that has left is silent, too. The arm's own watchdog acts if the
+//! server fails. It is set to [`LEAST_OF_ARM`] at least: in a short pause of a busy server it would hold joints that brake
+//! after a stop where their set-points are, and not where the stop was confirmed. A client reads what it wrote.
 
 use protocol_core::registers::map::{HOST_WATCHDOG, WATCHDOG_ACTION};
 use protocol_core::time::{Duration, Instant};
@@ -18,6 +19,9 @@ use super::client_id::ClientId;
 
 /// One step of register 186.
 const STEP: Duration = Duration::from_millis(10);
+
+/// The least time of the arm's own watchdog, in steps of 10 ms: joints that brake stand by then.
+const LEAST_OF_ARM: u8 = 20;
 
 /// What a watchdog does (register 187).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,7 +36,8 @@ pub(crate) enum WatchdogAction {
 #[derive(Clone, Copy, Debug)]
 struct Watched {
     client: ClientId,
-    timeout: Duration,
+    /// Register 186 as the client wrote it.
+    steps: u8,
     action: WatchdogAction,
     /// When the last request of the client was sent.
     heard: Instant,
@@ -62,8 +67,7 @@ impl ClientWatchdog {
 
     /// A client wrote register 186, in steps of 10 ms; 0 switches the watchdog off.
     fn set(&mut self, now: Instant, client: ClientId, steps: u8, action: WatchdogAction) {
-        let timeout = Duration::from_micros(STEP.as_micros() * u64::from(steps));
-        let watched = Watched { client, timeout, action, heard: now, is_silent: false };
+        let watched = Watched { client, steps, action, heard: now, is_silent: false };
         *self = Self { watched: (steps > 0).then_some(watched), has_acted: false };
     }
 
@@ -91,13 +95,37 @@ impl ClientWatchdog {
     /// When the client has been silent for too long.
     pub(crate) fn due(&self) -> Instant {
         let watched = self.watched.filter(|watched| !watched.is_silent);
-        watched.map_or(Instant::FAR_FUTURE, |watched| watched.heard + watched.timeout)
+        watched.map_or(Instant::FAR_FUTURE, |watched| watched.heard + watched.timeout())
+    }
+
+    /// Replaces register 186 in a reply to a client, whose first register is `address`.
+    pub(crate) fn overlay(&self, address: u8, values: &mut [u8]) {
+        if let (Some(watched), Some(value)) = (self.watched, register_186(address, values)) {
+            *value = watched.steps;
+        }
+    }
+
+    /// Replaces register 186 in a write to the arm.
+    pub(crate) fn for_arm(address: u8, values: &mut [u8]) {
+        if let Some(steps) = register_186(address, values).filter(|steps| **steps > 0) {
+            *steps = LEAST_OF_ARM.max(*steps);
+        }
     }
 
     /// Did it act since register 186 was written?
     pub(crate) const fn has_acted(&self) -> bool {
         self.has_acted
     }
+}
+
+impl Watched {
+    fn timeout(&self) -> Duration {
+        Duration::from_micros(STEP.as_micros() * u64::from(self.steps))
+    }
+}
+
+fn register_186(address: u8, values: &mut [u8]) -> Option<&mut u8> {
+    values.get_mut(usize::from(HOST_WATCHDOG.address.checked_sub(address)?))
 }
 
 #[cfg(test)]

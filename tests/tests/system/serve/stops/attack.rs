@@ -66,12 +66,6 @@ impl Attack {
         }
     }
 
-    /// The arm's own watchdog acts whenever the line is silent for 10 ms, and holds the arm where its set-point is while it brakes
-    /// (D24). How far the server's holds are from the stop is tested in virtual time, on a line that is not silent.
-    pub(crate) fn lets_the_arm_hold(self) -> bool {
-        self == Self::Watchdogs
-    }
-
     /// Attacks in each turn of the gate, until its end.
     pub(crate) fn run(self, served: &Served, gate: &Gate) {
         while gate.wait() {

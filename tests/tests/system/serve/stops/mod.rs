@@ -140,28 +140,25 @@ fn beside(
             thread::sleep(WATCHED);
             let context = format!("{attack:?}, stop {turn}");
             check_rests(line, &write_request(FINE_TARGET, &held), &context);
-            if !attack.lets_the_arm_hold() {
-                assert_eq!(stopper.read(FINE_TARGET, FINE), held, "{context}: nothing moves it");
-            }
+            assert_eq!(stopper.read(FINE_TARGET, FINE), held, "{context}: nothing moves it");
             if (turn + 1) % BETWEEN_RESTS == 0 || turn + 1 == count {
-                let place = Some(&held).filter(|_| !attack.lets_the_arm_hold());
-                check_is_at_rest(stopper, place, &context);
+                check_is_at_rest(stopper, &held, &context);
             }
         }
     });
     times
 }
 
-/// The arm comes to rest, and stays there; near `place`, if it is known.
+/// The arm comes to rest near `held`, and stays there.
 #[track_caller]
-fn check_is_at_rest(program: &mut Program, place: Option<&Vec<u8>>, context: &str) {
+fn check_is_at_rest(program: &mut Program, held: &[u8], context: &str) {
     let mut at_rest = program.read(FINE_POSITION, FINE);
     wait_until("the arm rests", || {
         thread::sleep(Duration::from_millis(200));
         let before = std::mem::replace(&mut at_rest, program.read(FINE_POSITION, FINE));
         farthest(&before, &at_rest) <= STILL
     });
-    let off = place.map_or(0, |held| farthest(held, &at_rest));
+    let off = farthest(held, &at_rest);
     assert!(off <= DROOP, "{context}: at rest {off} hundredths from where it was stopped");
     thread::sleep(WATCHED_AT_REST);
     let moved = farthest(&at_rest, &program.read(FINE_POSITION, FINE));
