@@ -359,7 +359,7 @@ def test_the_emulated_image_follows_a_sine_and_stops(start: Start, client: Clien
         for lag in (step / 200 for step in range(80))
     ]
     error, lag = min(lags)
-    # Above 2 degrees if the arm does not move, goes half the way, or is 0.7 s late; 0.3 on a computer with 6 busy programs on 2 cores.
+    # Above 2 degrees if the arm does not move, goes half the way, or is 0.7 s late; 0.3 with a load average of 5.6 on 2 cores.
     report(f"a sine of 8 degrees and 0.2 Hz on the emulated image: median error {error:.2f} degrees behind {lag:.3f} s")
     assert error < 1.5
     assert all(-1.5 < pose[0] < 17.5 for _, pose in told)
