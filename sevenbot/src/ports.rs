@@ -11,7 +11,7 @@ use crate::arm::Arm;
 use crate::arm_options::ArmOptions;
 use crate::error::OpenError;
 use crate::identity::Identity;
-use crate::network::{LocalServer, servers};
+use crate::network::{Address, LocalServer, servers};
 use host_link::Span;
 
 /// Eight registers take 2 ms at 115,200 baud and 25 ms at 9,600 baud. USB adapters add up to 16 ms in each direction.
@@ -116,7 +116,11 @@ pub fn probe(ports: Vec<PortInfo>, baud: u32) -> Vec<ProbeResult> {
 }
 
 fn ask(name: &str, baud: u32) -> Result<(Identity, u8), OpenError> {
-    let mut arm = open_quickly(name, baud)?;
+    let mut arm = match Address::parse(name) {
+        // Replies of a server may have to wait for those to other programs.
+        Some(_) => Arm::open_with(name, ArmOptions { baud, ..ArmOptions::default() })?,
+        None => open_quickly(name, baud)?,
+    };
     let device_id = arm.read_span(Span::of(&DEVICE_ID))?.byte(&DEVICE_ID);
     Ok((arm.identity().clone(), device_id))
 }

@@ -79,9 +79,7 @@ struct Messages<S> {
 impl<S: AsyncRead + AsyncWrite + Unpin> Messages<S> {
     /// The next message; how the connection ended if there is none.
     async fn next(&mut self) -> Result<Message, End> {
-        let message = self.stream.next().await;
-        self.unfinished.store(0, Ordering::Relaxed);
-        match message {
+        match self.stream.next().await {
             Some(Ok(Message::Close(_))) | None | Some(Err(Error::ConnectionClosed)) => Err(End::Clean),
             Some(Ok(message)) => Ok(message),
             // Many programs close the connection without a word.
@@ -90,6 +88,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Messages<S> {
             }
             Some(Err(_)) => Err(End::Broken),
         }
+    }
+
+    /// Bytes that were read since the last call.
+    fn take_count(&self) -> usize {
+        self.unfinished.swap(0, Ordering::Relaxed)
     }
 }
 
@@ -263,7 +266,7 @@ where
         if waits_for_input {
             match messages.next().now_or_never() {
                 Some(Ok(message)) => {
-                    pace.note(shared.now(), message.len());
+                    pace.note(shared.now(), messages.take_count());
                     session.put(last_empty, message);
                     // So that a flood leaves the thread to others.
                     tokio::task::yield_now().await;
@@ -276,7 +279,7 @@ where
         tokio::select! {
             message = messages.next(), if waits_for_input => match message {
                 Ok(message) => {
-                    pace.note(shared.now(), message.len());
+                    pace.note(shared.now(), messages.take_count());
                     session.put(shared.earliest(), message);
                 }
                 Err(end) => break end,
@@ -290,4 +293,7 @@ where
         }
     };
     session.close(end);
+    // A client that sent no whole messages could else begin again at once.
+    pace.note(shared.now(), messages.take_count());
+    shared.sleep_until(pace.free_at()).await;
 }

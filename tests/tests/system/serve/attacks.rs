@@ -99,6 +99,20 @@ fn fragments_without_end_keep_nobody_waiting() {
     assert!(count < 20_000, "the server ended the connection");
 }
 
+/// The server reads 32 KiB of each, and not faster than four lines of 115 200 baud: that takes 711 ms, less 20 at its beginning.
+#[test]
+fn fragments_without_end_do_not_begin_again_at_once() {
+    let served = Served::start(1, &[]);
+    let start = Instant::now();
+    for _ in 0..3 {
+        let mut flood = WebClient::connect(&served, &[LOCAL_PAGE]).expect("accepted");
+        flood.send_bytes(&web_frame(0x01, b"{"));
+        let fragments = web_frame(0x00, b"").repeat(1_000);
+        while flood.stream().write_all(&fragments).is_ok() {}
+    }
+    assert!(start.elapsed() >= Duration::from_millis(3 * 690), "{:?}", start.elapsed());
+}
+
 #[test]
 fn what_was_sent_to_an_unplugged_arm_never_moves_it() {
     let mut served = Served::start(1, &[]);

@@ -25,6 +25,8 @@ __declspec(dllexport) int __stdcall ProcessPrng(unsigned char *to, unsigned long
 /// Joints of the arm.
 const JOINTS: usize = 7;
 const COMPILER: &str = "x86_64-w64-mingw32-gcc";
+/// Seconds after which a program in Wine has failed: its server may wait for ever.
+const LONGEST: &str = "600";
 
 /// Wine, with files of its own, and the program.
 struct Wine {
@@ -65,7 +67,8 @@ impl Wine {
     }
 
     fn command(&self, program: &str) -> Command {
-        let mut command = Command::new(program);
+        let mut command = Command::new("timeout");
+        command.args(["--foreground", LONGEST, program]);
         command.envs(self.variables()).current_dir(self.folder.path());
         command
     }

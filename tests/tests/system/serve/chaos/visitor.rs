@@ -18,6 +18,8 @@ use crate::serve::line_history::LineHistory;
 
 /// A reply that has not come after this time is lost.
 const LOST: Duration = Duration::from_secs(30);
+/// The same, whatever else comes: replies to the program before, which stand before it, and reports.
+const LONGEST: Duration = Duration::from_secs(120);
 /// A reply that an outage took does not come any more after this time.
 const AFTER_OUTAGE: Duration = Duration::from_secs(1);
 /// Programs that have a register of their own, from [`SPEED`] on.
@@ -135,7 +137,7 @@ impl ReplyWait<'_> {
         if elapsed >= AFTER_OUTAGE && self.may_be_cut() {
             return Some(Answer::Cut);
         }
-        (self.quiet_since.elapsed() >= LOST).then(|| self.lost())
+        (self.quiet_since.elapsed() >= LOST || elapsed >= LONGEST).then(|| self.lost())
     }
 
     /// The reply is lost. Says what the line and the outages had to do with it.
