@@ -230,7 +230,6 @@ impl ArmFault {
         }
     }
 
-    /// Removes the fault from a plant.
     pub(crate) fn remove(self, plant: &mut Plant) {
         match self {
             Self::Servo(joint, _) => plant.set_fault(joint, None),

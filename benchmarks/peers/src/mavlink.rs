@@ -81,7 +81,6 @@ pub struct MavlinkServer {
 }
 
 impl Default for MavlinkServer {
-    /// A server that has received nothing.
     fn default() -> Self {
         Self {
             reader: MavlinkReader::new(ReceivedBytes(Inbox::new())),

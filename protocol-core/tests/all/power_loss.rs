@@ -94,7 +94,8 @@ fn the_first_generation_follows_the_last() {
     }
 }
 
-/// Cuts power cycles, then the next start and some saves, and so on: each at every operation in every way.
+/// Cuts the power at every operation of each cycle, in every way. Then likewise during the next start and its saves, until
+/// there were `cuts` cuts in a row.
 fn cut_everything_again<const SECTOR: usize>(
     cycles: impl IntoIterator<Item = usize>,
     saves_after: usize,
