@@ -30,7 +30,7 @@ class Events(Protocol):
         """The health was read."""
 
     def passed(self, simulated: float) -> None:
-        """Simulated time passed."""
+        """Simulated time passed: it is `simulated` seconds now."""
 
     def refused(self, refusal: Refusal) -> None:
         """A command is refused."""

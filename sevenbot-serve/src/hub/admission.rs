@@ -68,7 +68,7 @@ impl Hub {
         Admission::Queued
     }
 
-    /// Without an arm, a client can still read that there is none.
+    /// Answers a request while there is no arm: a read of the server's own registers gets a reply, all others are refused.
     fn answer_without_arm(&mut self, now: Instant, id: ClientId, request: &WholeRequest) {
         let reply = self.own_reply(now, id, request);
         let Some(client) = self.clients.get_mut(&id) else { return };

@@ -13,7 +13,7 @@ use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore};
 
 use super::shared::lock;
 
-/// Connections beyond the places: each way in may have one that it is about to refuse.
+/// Connections beyond the places: each of the TCP listeners may hold one that it is about to refuse.
 const WAYS_IN: usize = 3;
 /// The first wait after a wrong token; each further one doubles it.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
@@ -37,7 +37,7 @@ pub(super) struct Admission {
 #[derive(Clone, Copy, Debug)]
 struct WrongTokens {
     count: u32,
-    /// The next token is looked at then.
+    /// The next token from this address is not checked before this time.
     next: Instant,
 }
 
