@@ -69,7 +69,7 @@ impl Fault {
         control.result(&json!({ "do": "fault", "fault": fault }));
     }
 
-    /// Acts during the command. Then the arm has so many milliseconds to notice it.
+    /// Begins a fault during the command. Then `notice` milliseconds of virtual time pass, in which the arm notices it.
     pub(crate) fn act(self, control: &mut Control, notice: u64) -> LineAction {
         // The arm carries out the frames before first.
         control.advance(BEFORE);

@@ -44,7 +44,7 @@ impl SentTargets {
         }
     }
 
-    /// Sends targets that hold a number of their own.
+    /// Sends targets that encode a new number, and notes when they were sent.
     pub(crate) fn send<T>(&self, send: impl FnOnce([u8; DIGITS as usize]) -> T) -> T {
         let number = self.next.fetch_add(1, Ordering::SeqCst);
         let time = self.slot(number);
