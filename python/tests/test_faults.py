@@ -28,7 +28,7 @@ NEAR = 3.0
 STILL = 1.5
 #: The arm has this time to do what a method began, in seconds.
 AFTERWARDS = 3.0
-#: The arm has received so many frames before: a restart is seen by the counter of frames.
+#: The arm has received this many frames before. A method detects a restart by the counter of frames.
 USED = 100
 
 #: The words for a supply that is lost and comes back: which ones depends on when the method reads the arm.

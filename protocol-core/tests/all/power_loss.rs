@@ -41,7 +41,7 @@ impl Tally {
     }
 }
 
-/// Cuts every operation of power cycles with so many saves each, in every way, once.
+/// Cuts the power once in each cycle, at every operation and in every way. `cycles` has the number of saves of each cycle.
 fn cut_everything_once<const SECTOR: usize>(cycles: impl IntoIterator<Item = usize>) {
     let tally = cut_everything_once_in(World::<SECTOR>::new(), cycles);
     tally.report(&format!("{SECTOR} B sectors, power cut at every step in 25 ways"));
@@ -262,7 +262,7 @@ fn a_record_with_remains_behind_it_is_appended_again() {
 fn what_is_in_doubt_and_finds_no_slot_is_moved() {
     use Operation::{Erase, Program};
     let mut world = World::<512>::new();
-    // As many as find room; the seal of the last one is cut.
+    // There is room for 21 saves. The seal of the last one is cut.
     let saves = 21;
     let seal = world.operations(saves).len() - 1;
     assert_eq!(world.cycle(saves, Some(torn_after(seal))), End::Cut);

@@ -35,7 +35,7 @@ pub struct Rig {
     pub saved: Vec<Image>,
     /// What becomes of the next save.
     pub storage: Storage,
-    /// The frames of goals that name this servo do not reach the servos, this often.
+    /// The id of a servo, and how many of the next frames with a goal for it are lost.
     pub lost_goals: (u8, usize),
     /// A servo without torque does not show its goal.
     pub hides_goals: bool,

@@ -28,7 +28,8 @@ pub(crate) use faults::{FAULTS, Fault};
 const AFTERWARDS: u64 = 3_000;
 /// The servos take this virtual time to start, in milliseconds.
 const START_UP: u64 = 1_500;
-/// The arm has received so many frames before: it was not switched on this moment. A restart is seen by the counter of frames.
+/// The arm has received this many frames before, as one that was switched on long ago. A command detects a restart by the
+/// counter of frames.
 const USED: usize = 100;
 /// First of the fine targets.
 const FINE_TARGET: u8 = 128;

@@ -16,7 +16,7 @@ const BASE: u64 = 100;
 const LOWEST: u64 = 40;
 /// Writes whose times are known at the same time.
 const KEPT: u64 = 1 << 20;
-/// Joints, and positions of theirs that are remembered.
+/// Number of joints, and of the last positions that are remembered.
 const JOINTS: usize = 7;
 const REMEMBERED: usize = 512;
 
