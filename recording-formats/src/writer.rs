@@ -186,7 +186,7 @@ impl<W: Write> McapWriter<W> {
     }
 }
 
-/// How all files are written.
+/// The options of every file: uncompressed, and without an index.
 pub(crate) fn options() -> WriteOptions {
     let library = concat!("sevenbot ", env!("CARGO_PKG_VERSION"));
     WriteOptions::new().compression(None).profile("ros2").library(library).disable_seeking(true)

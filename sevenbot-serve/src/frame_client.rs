@@ -22,7 +22,7 @@ pub struct FrameClient {
     id: ClientId,
     deframer: Deframer<ToArm>,
     output: Vec<u8>,
-    /// The bytes that come are those of a program that is gone: nobody waits for replies.
+    /// The bytes that come are those of a program that is gone, so reads are dropped.
     drops_reads: bool,
 }
 

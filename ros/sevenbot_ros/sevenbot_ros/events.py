@@ -21,7 +21,7 @@ class Measurement:
 
 
 class Events(Protocol):
-    """Who hears it. All calls come from the thread of the arm."""
+    """Receives what happens to the arm. All calls come from the thread of the arm."""
 
     def measured(self, measurement: Measurement) -> None:
         """The joints were measured."""

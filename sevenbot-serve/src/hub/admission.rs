@@ -21,7 +21,7 @@ pub enum Admission {
     NoArm,
     /// It waits for its turn, and then writes nothing but the client's own registers.
     ReadOnly,
-    /// It is dropped: somebody stopped the arm, and the client has not started anew.
+    /// It is dropped: another client stopped the arm, and this one has not started anew.
     Stopped,
     /// It is dropped: another client drives.
     AnotherDrives,

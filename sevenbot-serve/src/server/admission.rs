@@ -1,8 +1,8 @@
 //! Places for connections: for those that have not shown their token yet, and others for clients.
 //!
-//! A place before the token is taken over by the next connection if all are taken: the oldest one loses it. So connections that
-//! send nothing keep nobody out who sends the token at once. Wrong tokens make the next ones of the same address wait. While there
-//! are more connections than places, no other one is accepted: each takes file descriptors.
+//! If all places before the token are taken, the oldest connection there loses its place to the next one. So connections that
+//! send nothing do not keep out a client that sends its token at once. Wrong tokens make the next ones of the same address
+//! wait. While there are more connections than places, no other one is accepted: each takes file descriptors.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;

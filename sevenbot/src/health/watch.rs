@@ -219,7 +219,7 @@ mod tests {
         Duration::from_millis(milliseconds)
     }
 
-    /// All registers of a driven arm with a stream of 20 ms, after so many frames.
+    /// All registers of a driven arm with a stream of 20 ms. It has accepted `frames` frames.
     fn registers(frames: u8) -> Snapshot {
         let mut all = Snapshot { address: 0, values: vec![0; 256] };
         let rows = [&STATUS_VERSION, &PROTECTION_VERSION, &MOTOR_STATE].map(|row| (row.address, 1));
