@@ -90,7 +90,7 @@ const SMALL: ServoParameters = ServoParameters {
 };
 
 impl ServoParameters {
-    /// Those of a joint's servo.
+    /// The parameters of a joint's servo.
     #[must_use]
     pub const fn of(joint: Joint) -> &'static Self {
         if joint.number() < 5 { &LARGE } else { &SMALL }

@@ -10,7 +10,7 @@ use crate::span::Span;
 
 /// How long the reply to a read is waited for, and whether it is repeated meanwhile.
 ///
-/// A read is repeated as soon as its reply is later than replies were of late ([`ROUND_TRIP`] before there were any). The time
+/// A read is repeated as soon as its reply is later than replies were lately ([`ROUND_TRIP`] before there were any). The time
 /// to the next repeat doubles, up to [`ROUND_TRIP`] or what was learned, whichever is longer. A read changes nothing, so a
 /// needless one does no harm. It is given up after `timeout` for each attempt, counted from the time when its reply was due.
 /// So a lost reply costs little, several are no error, and a slow arm gets all of the time.

@@ -97,7 +97,7 @@ pub struct Model {
     history: Vec<u8>,
     /// Lengths of the history at which the line was silent for the gap.
     short: Vec<usize>,
-    /// The same for the long silence.
+    /// Lengths of the history at which the line was silent for the timeout.
     long: Vec<usize>,
     silence: u64,
     told: HashSet<usize>,

@@ -209,7 +209,7 @@ pub fn push_against_wall<A: ObstacleArm>(
 /// A case, whether the arm was protected, and what became of the joint.
 type Outcome = (WallCase, bool, WallResult);
 
-/// The worst results by joint, and likewise by what distinguishes the cases.
+/// The worst results by joint, and by what distinguishes the cases.
 pub(super) fn tables<A: ObstacleArm>(cases: &[WallCase]) -> Result<String, A::Error> {
     let mut outcomes: Vec<Outcome> = Vec::new();
     for (case, is_protected) in cases.iter().flat_map(|case| [(case, false), (case, true)]) {
