@@ -213,8 +213,8 @@ fn noise_in_the_spare_leaves_the_settings() {
     assert_eq!(Journal::open(flash).1, Opened::Found(newest));
 }
 
-/// A word that is cut at its very beginning need not show. On a flash that disturbs bits which were to stay
-/// ones, a record in such a slot would not last: it is not used again.
+/// A word whose programming is cut at its very beginning may leave no trace. On a flash that disturbs bits which were to stay
+/// ones, a record in such a slot would not last: the slot is not used again.
 #[test]
 fn a_slot_that_was_begun_without_a_trace_is_skipped() {
     let mut cases = 0;

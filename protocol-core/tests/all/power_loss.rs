@@ -79,7 +79,7 @@ fn a_cut_at_every_step_of_a_thousand_updates_of_small_flashes() {
     cut_everything_once::<2_048>(cycles().take(240));
 }
 
-/// No flash lives long enough, but one that is damaged, or an image file with any content, may say so.
+/// No flash lives for so many generations. But a damaged flash, or an image file with any content, may hold the last one.
 #[test]
 fn the_first_generation_follows_the_last() {
     const LAST: u32 = u32::MAX / 2;

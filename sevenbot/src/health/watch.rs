@@ -172,7 +172,7 @@ impl MoveWatch {
         if has_state {
             self.is_gripper = registers.byte(&EFFECTOR_TYPE) == GRIPPER;
         }
-        // A lost supply is the reason for motors that are off.
+        // Problems come before the motor state: a lost supply is the reason why the motors are off.
         if registers.holds(REGISTERS) {
             let problems = self.problems(registers, now);
             if !problems.is_empty() {
