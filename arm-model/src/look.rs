@@ -108,7 +108,7 @@ const fn at(x: f64, z: f64) -> Axes {
     [x, 0.0, z]
 }
 
-/// The same plate on the left and on the right.
+/// Adds a plate on the left and its mirror image on the right.
 fn both_sides(mesh: &mut Mesh, circles: &[(Axes, f64)], [near, far]: [f64; 2]) {
     mesh.plate(Shell, MeshAxis::Y, circles, [near, far]);
     mesh.plate(Shell, MeshAxis::Y, circles, [-far, -near]);

@@ -23,7 +23,7 @@ impl Pose {
         Self { x, y, z: x.cross(y), origin }
     }
 
-    /// A point in the axes of the body, in the frame of the arm, in mm.
+    /// Converts a point from the axes of the body to the frame of the arm, in mm.
     #[must_use]
     pub fn point(&self, x: f64, y: f64, z: f64) -> Vector<f64> {
         self.origin + self.x * x + self.y * y + self.z * z

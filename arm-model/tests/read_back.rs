@@ -52,7 +52,7 @@ fn urdf_poses(robot: &Robot, angles: &HashMap<String, f64>) -> HashMap<String, P
     poses
 }
 
-/// The same from the transforms of the links.
+/// The poses computed from the transforms of the links.
 fn transformed_poses(angles: [f64; 6]) -> HashMap<&'static str, Pose> {
     let zero = Vector::new(0.0, 0.0, 0.0);
     let axes = [Vector::new(1.0, 0.0, 0.0), Vector::new(0.0, 1.0, 0.0), Vector::new(0.0, 0.0, 1.0)];

@@ -76,22 +76,22 @@ pub enum UnknownArmFault {
          arm=goal-starts-torque"
     )]
     Location,
-    /// The part after it is no fault of a servo.
+    /// The part after the joint is not a fault of a servo.
     #[error(transparent)]
     Kind(#[from] UnknownFault),
-    /// Likewise, no obstacle.
+    /// The part after the joint is not an obstacle.
     #[error(transparent)]
     Obstacle(#[from] UnknownObstacle),
     /// Something is between the claws, and those are moved by joint 7.
     #[error("only joint 7 moves the claws: use 7=thing=DEGREES")]
     NoClaw,
-    /// Likewise, of the supply.
+    /// The part after `supply=` is not a fault of the supply.
     #[error(transparent)]
     Supply(#[from] UnknownSupplyFault),
-    /// Likewise, of the flash.
+    /// The part after `flash=` is not a fault of the flash.
     #[error(transparent)]
     Flash(#[from] UnknownFlashFault),
-    /// Likewise, of the host line.
+    /// The part after `line=` is not a fault of the host line.
     #[error(transparent)]
     Line(#[from] UnknownLineFault),
 }
@@ -230,7 +230,6 @@ impl ArmFault {
         }
     }
 
-    /// Removes the fault from a plant.
     pub(crate) fn remove(self, plant: &mut Plant) {
         match self {
             Self::Servo(joint, _) => plant.set_fault(joint, None),

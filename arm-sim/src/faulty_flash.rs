@@ -45,9 +45,9 @@ impl Display for FlashFault {
 /// Why an operation failed.
 #[derive(Debug)]
 pub enum FlashError<E> {
-    /// The fault.
+    /// [`FlashFault::Fails`] refuses the operation.
     Fault,
-    /// The flash.
+    /// The flash itself reports this error.
     Flash(E),
 }
 

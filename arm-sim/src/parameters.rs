@@ -90,7 +90,7 @@ const SMALL: ServoParameters = ServoParameters {
 };
 
 impl ServoParameters {
-    /// Those of a joint's servo.
+    /// The parameters of a joint's servo.
     #[must_use]
     pub const fn of(joint: Joint) -> &'static Self {
         if joint.number() < 5 { &LARGE } else { &SMALL }
@@ -116,7 +116,7 @@ impl ServoParameters {
 pub const NO_LOAD_SPEED: i64 = 372_000;
 /// The distance between set-point and position at which the motor gets full duty, in thousandths of a degree.
 pub const FULL_DUTY_ERROR: i64 = 4_300;
-/// The time constant of the filter of that change.
+/// The time constant of the filter of the change of the error, in milliseconds.
 pub(crate) const DERIVATIVE_FILTER_MS: i64 = 4;
 /// A joint that turns more slowly than this has static friction.
 pub(crate) const CREEP_COUNTS_PER_SECOND: i64 = 5;

@@ -79,7 +79,7 @@ impl Plant {
         Self::with_config(now, ServoConfig::default())
     }
 
-    /// Likewise, with servos of this make.
+    /// As [`Self::new`], with servos of this configuration.
     #[must_use]
     pub fn with_config(now: Instant, config: ServoConfig) -> Self {
         let ready_at = now + config.boot_time;

@@ -40,10 +40,10 @@ impl Display for Difference {
 /// Why a session cannot be replayed, or how it ended.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReplayError {
-    /// The first two lines are no start of a session.
+    /// The first two lines do not begin a session.
     #[error(transparent)]
     Header(#[from] HeaderError),
-    /// A line is no entry.
+    /// A line is not an entry.
     #[error("line {line}: {reason}")]
     Line {
         /// Its number; the first is 1.

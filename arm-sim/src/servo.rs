@@ -65,11 +65,11 @@ pub struct Servo {
     is_supported: bool,
     protection: Protection,
     temperature: Temperature,
-    /// Milliseconds at its wall.
+    /// Milliseconds in which the joint touched its wall.
     wall_count: FaultCount,
-    /// Milliseconds at the thing between the claws.
+    /// Milliseconds in which the claws touched the thing between them.
     thing_count: FaultCount,
-    /// Milliseconds of a push.
+    /// Milliseconds in which the joint was pushed.
     push_count: FaultCount,
     /// What the registers hold, apart from the measurements of the motor.
     reported: Option<Reported>,
@@ -208,7 +208,7 @@ impl Servo {
     #[must_use]
     pub fn torque(&self, now: Instant) -> Option<Torque> {
         let switch = self.torque_switch();
-        // An alarm takes the motor its voltage. The brake needs none: assumed.
+        // An alarm switches off the voltage of the motor. Damping needs no voltage, so it stays on (assumed).
         let is_freed = switch == Torque::On && self.protection.is_unloaded();
         (self.has_power(now) && !is_freed).then_some(switch)
     }

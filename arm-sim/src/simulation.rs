@@ -278,7 +278,7 @@ impl<C: ArmController> Simulation<C> {
         self.arm.faults()
     }
 
-    /// Takes the reports of the faults whose time was over since the last call, at most the last 16.
+    /// Takes the reports of the faults that have ended by themselves since the last call; of more than 16, the last 16.
     pub fn take_ended_faults(&mut self) -> Vec<FaultReport> {
         self.arm.take_ended_faults()
     }

@@ -47,7 +47,7 @@ impl FromStr for Latency {
     }
 }
 
-/// The direction of an adapter to the computer.
+/// The direction from the adapter to the computer.
 #[derive(Clone, Debug)]
 pub struct UsbAdapter {
     latency: Latency,

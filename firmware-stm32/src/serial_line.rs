@@ -88,7 +88,7 @@ pub struct SerialLine<U, D, const RECEIVE: usize, const TRANSMIT: usize> {
     /// How many bytes of `received` come before the mark.
     mark_at: Option<usize>,
     to_send: ByteQueue<TRANSMIT>,
-    /// From the first byte pushed until the last one was passed on, with a direction until its stop bit has left.
+    /// See [`Self::is_sending()`].
     is_sending: bool,
     /// What the USART's interrupt is set to.
     event: TransmitEvent,
@@ -228,7 +228,7 @@ impl<U: UsartRegisters, D: BusDirection, const RECEIVE: usize, const TRANSMIT: u
         self.to_send.room()
     }
 
-    /// True from the first byte pushed until the transmitter has the last one; with a direction until its stop bit has left.
+    /// True from the first byte pushed until the transmitter has the last one; with a direction pin, until its stop bit is out.
     pub const fn is_sending(&self) -> bool {
         self.is_sending
     }

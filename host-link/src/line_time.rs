@@ -44,8 +44,8 @@ impl LineTime {
         self.busy_until
     }
 
-    /// How much later than due replies may be: twice as much as of late. So a lost reply costs little on a line where replies come
-    /// in time, and a slow server is not asked more often the slower it gets.
+    /// How much later than due replies may be: twice as much as they were lately. So a lost reply costs little on a line
+    /// where replies come in time, and a slow server is not asked more often the slower it gets.
     pub(crate) const fn allowance(&self) -> Duration {
         self.allowance
     }

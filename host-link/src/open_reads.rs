@@ -10,7 +10,7 @@ use crate::span::Span;
 
 /// How long the reply to a read is waited for, and whether it is repeated meanwhile.
 ///
-/// A read is repeated as soon as its reply is later than replies were of late ([`ROUND_TRIP`] before there were any). The time
+/// A read is repeated as soon as its reply is later than replies were lately ([`ROUND_TRIP`] before there were any). The time
 /// to the next repeat doubles, up to [`ROUND_TRIP`] or what was learned, whichever is longer. A read changes nothing, so a
 /// needless one does no harm. It is given up after `timeout` for each attempt, counted from the time when its reply was due.
 /// So a lost reply costs little, several are no error, and a slow arm gets all of the time.
@@ -61,7 +61,8 @@ impl OpenRead {
         Self { id, wanted, patience, sent: 0, writes_before: 0, due: Instant::FAR_FUTURE, give_up_at: None }
     }
 
-    /// It is sent, after so many writes. Its reply is due at this time, and may be later by the allowance.
+    /// The read is sent; `writes` counts the writes sent before it. Its reply is due at `reply_due`, and may be later by the
+    /// allowance.
     pub(crate) fn note_sent(&mut self, reply_due: Instant, allowance: Duration, writes: u64) {
         self.sent = self.sent.saturating_add(1);
         self.writes_before = writes;
@@ -70,7 +71,7 @@ impl OpenRead {
         self.due = if self.patience.repeats() { repeat_at.min(give_up_at) } else { give_up_at };
     }
 
-    /// May it be sent again after so many writes? Behind a write it would read what the write changed.
+    /// May it be sent again? Not if writes were sent since: it would read what they changed. `writes` counts all writes so far.
     pub(crate) const fn may_repeat(&self, writes: u64) -> bool {
         self.patience.repeats() && self.writes_before == writes
     }
@@ -106,7 +107,7 @@ impl OpenReads {
         self.0.drain(..)
     }
 
-    /// A read whose time has come at `now`, after so many writes. It is taken out.
+    /// Takes out a read whose time has come at `now`. `writes` counts all writes so far.
     pub(crate) fn take_overdue(&mut self, now: Instant, writes: u64) -> Option<Overdue> {
         while let Some(index) = self.0.iter().position(|read| read.due <= now) {
             let read = self.0.get_mut(index)?;

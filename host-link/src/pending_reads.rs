@@ -32,7 +32,7 @@ struct SentRead {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PendingReads(VecDeque<SentRead>);
 
-/// Whose reply came.
+/// The read that a reply answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Matched {
     /// The read that it answers; `None` if that was given up.

@@ -11,7 +11,7 @@ use crate::Snapshot;
 pub const FIRST: u8 = 232;
 /// The register that a program writes commands to.
 const COMMAND: u8 = 239;
-/// The version of this layout.
+/// The value of register 232: the version of the layout of this block.
 const VERSION: u8 = 1;
 /// The weight draws a joint that has reached its target so far off it at most, in hundredths of a degree. A stop may leave such a
 /// joint its target ([D24](protocol_core::decisions#d24)), and what draws it further is an obstacle.

@@ -40,7 +40,7 @@ enum Fate {
     Arrives,
     Lost,
     Damaged,
-    /// Late by so many milliseconds, and so is all behind it.
+    /// Late by this many milliseconds, and so is every answer behind it.
     Late(u64),
 }
 

@@ -14,7 +14,7 @@ use protocol_core::time::{Duration, Instant};
 /// Time between two lines, if the computer is fast enough.
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// The file.
+/// A file with the angles of the joints, a line each 10 ms.
 #[derive(Debug)]
 pub struct AngleLog {
     file: File,

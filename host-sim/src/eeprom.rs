@@ -138,7 +138,7 @@ fn users_own(variable: impl Fn(&str) -> Option<PathBuf>) -> Result<PathBuf, Imag
 fn make_blank(path: &Path) -> io::Result<()> {
     let mut draft = path.as_os_str().to_owned();
     draft.push(format!(".{}.new", std::process::id()));
-    // What an earlier program left, or a link that somebody planted: it is not followed.
+    // Removes what an earlier program left. A link that another user planted is removed too, and not followed.
     let _ = fs::remove_file(&draft);
     let made = write_blank(Path::new(&draft)).and_then(|()| publish(Path::new(&draft), path));
     if made.is_err() {

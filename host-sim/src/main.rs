@@ -95,7 +95,7 @@ fn log_to_stderr(options: &Options) {
 fn run(options: &Options) -> Result<(), Failure> {
     if let Some(path) = &options.replay {
         let lines = session_file::replay(path)?;
-        // Nothing has to read this line.
+        // An error is ignored: standard output may be closed.
         let _ = writeln!(io::stdout(), "{}: {lines} lines replayed, all equal", path.display());
         return Ok(());
     }

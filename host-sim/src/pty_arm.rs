@@ -50,7 +50,7 @@ struct ArmSnapshot<F, B, C> {
 }
 
 impl<F: NorFlash + Clone, B: ServoBus> PtyArm<F, B> {
-    /// The value of a register.
+    /// The value of a register as the controller holds it; 0 where the map has none.
     #[must_use]
     pub fn register(&self, address: u8) -> u8 {
         self.simulation.registers().get(address)

@@ -188,7 +188,7 @@ fn half_turn<F: Float>() -> F {
     F::of(180.0)
 }
 
-/// The same angle with -180 degrees turned into 180: rounding decides which of them it is.
+/// Turns an angle of -180 degrees into 180: rounding decides which of the two it is.
 fn unwrapped<F: Float>(degrees: F) -> F {
     if degrees < F::of(TOLERANCE - 180.0) { degrees + F::of(360.0) } else { degrees }
 }

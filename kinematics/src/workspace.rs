@@ -24,7 +24,7 @@ pub const BASE_MARGIN: f64 = 10.0;
 pub const KEEP_OUT_RADIUS: f64 = BASE_RADIUS + BASE_MARGIN;
 /// The upper end of that cylinder, in mm.
 pub const KEEP_OUT_TOP: f64 = BASE_MARGIN;
-/// Halvings of a segment in the search for its deepest point: 200 mm / 1.5^30 is 1 um.
+/// Steps of the search for the deepest point of a segment. Each leaves two thirds of it: 200 mm / 1.5^30 is 1 um.
 const SEARCH_STEPS: u32 = 30;
 /// The directions from the tip to the points of the disc's edge that are checked, in eighths of a turn. Between two of
 /// them the edge is up to 1.5 mm further out.

@@ -87,7 +87,7 @@ impl ArmControl {
         }
     }
 
-    // Like the other functions that are not inlined here: most polls do not call it, and would save its registers.
+    // Not inlined, as other functions here: most polls do not call it, and would save the registers that it uses.
     #[inline(never)]
     fn begin_cycle(&mut self, now: Instant, end: Instant) {
         self.bus.begin_cycle(end);

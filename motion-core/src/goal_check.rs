@@ -12,7 +12,7 @@
 //! times more directly before torque: a servo that does show its goal goes to an old one only if six frames in a row are
 //! lost, three of them at least 10 ms apart. This file does not know goals.
 
-/// A servo that has shown another goal this often does not show goals.
+/// A servo that has shown another goal this often counts as one that does not show goals.
 const HIDDEN_AFTER: u8 = 3;
 /// How often a goal is sent before torque to a servo that does not show it.
 const REPEATS: u8 = 3;

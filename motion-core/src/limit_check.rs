@@ -18,7 +18,7 @@ pub(crate) type Angles = [Option<MicroDegrees>; JOINTS];
 #[derive(Clone, Copy)]
 pub(crate) struct LimitCheck<'a> {
     pub(crate) accepted: &'a Accepted<'a>,
-    /// The targets that the write reaches by a position.
+    /// The targets that inverse kinematics finds for a position in the write ([M7](protocol_core::decisions#m7)).
     pub(crate) reached: &'a Reached,
     /// The limits that are on before the write: [`LIMITS`].
     pub(crate) limits: u8,

@@ -10,7 +10,7 @@ use crate::push_limiter::{PushLimit, PushLimiter, PushSample};
 
 /// A joint that is held back for this long, and comes no nearer to its target, is blocked.
 const BLOCKED_AFTER: Duration = Duration::from_millis(1_000);
-/// The same in control cycles.
+/// [`BLOCKED_AFTER`] in control cycles of 10 ms.
 const BLOCKED_AFTER_CYCLES: u8 = 100;
 /// A joint that came nearer by more than a count has moved: 0.29 degrees of joints 5 to 7.
 const NEARER_BY: u32 = 300_000;

@@ -18,7 +18,7 @@ pub struct Instant(u64);
 pub struct Duration(u64);
 
 impl Instant {
-    /// The zero of time.
+    /// The start of the clock, from which instants count.
     pub const ZERO: Self = Self(0);
     /// Later than every event: a deadline that never comes.
     pub const FAR_FUTURE: Self = Self(u64::MAX);

@@ -129,7 +129,7 @@ pub(crate) fn seeds(
     Ok((0..count).zip(0_u64..).map(|(_, number)| first.wrapping_add(number)).collect())
 }
 
-/// A number of a range, in so many steps for each unit.
+/// Converts a number within the range to steps; `steps` is how many there are for each unit.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the range")]
 pub(crate) fn steps(
     py: Python<'_>,

@@ -18,7 +18,7 @@ struct Slot {
     action: Option<FineTargets>,
     /// Actions that were replaced here.
     skipped: u32,
-    /// Those of the sender.
+    /// The counts of the sender.
     counts: LatestCounts,
     failed: Option<MoveError>,
     /// The last angle of each joint in degrees.

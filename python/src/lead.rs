@@ -1,4 +1,4 @@
-//! The sender of a program that does not wait: it keeps the period of the stream in the thread of the port.
+//! Sends the points of a program that does not wait for each of them: it keeps the period in the thread of the port.
 //!
 //! ```text
 //!   Python: latest(action) ──▶ LatestSlot ──▶ LatestPoints: which point is due ──▶ SetPointStream
@@ -145,7 +145,8 @@ fn is_far(newer: &FineTargets, point: &FineTargets) -> bool {
     both.map(|(newer, point)| (newer.degrees() - point.degrees()).abs()).any(|way| way > NEAR_DEGREES)
 }
 
-/// Does the sender end after this failure? It goes on after one of a single joint, which takes the stream up when it is free.
+/// Does the sender end after this failure? A failure of single joints does not end it: such a joint takes up the stream when
+/// it is free (D27).
 fn ends_leading(failure: &MoveError) -> bool {
     match failure {
         MoveError::Problems(problems) => problems.iter().any(|problem| problem.joint.is_none()),

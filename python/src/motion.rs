@@ -20,7 +20,7 @@ use crate::watch::Watch;
 
 /// The longest time between two questions whether the call goes on.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
-/// The same for a caller that sleeps, on the clock of the arm.
+/// As [`POLL_PERIOD`], for a caller that sleeps on the clock of the arm.
 const SLEEP_PERIOD: Duration = Duration::from_millis(20);
 /// The tip stays on a line that is shorter than this, in millimetres.
 const SHORTEST_LINE: f64 = 0.5;

@@ -68,7 +68,7 @@ pub(crate) fn simulated(
     Ok((worker, opened, simulation))
 }
 
-/// A line whose waits end early when nobody waits for the arm to open any more.
+/// A line whose waits end early when the opening of the arm was cancelled.
 #[derive(Debug)]
 struct CancellableLine {
     line: Box<dyn HostLine>,

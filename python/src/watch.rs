@@ -145,7 +145,7 @@ impl CallState {
 /// The messages to the thread of the port.
 pub(crate) struct Inbox {
     messages: Receiver<Message>,
-    /// Those that came during a call and are no reads, oldest first.
+    /// The messages that came during a call and are not reads, oldest first.
     deferred: RefCell<VecDeque<Message>>,
 }
 

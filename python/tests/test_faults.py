@@ -28,10 +28,10 @@ NEAR = 3.0
 STILL = 1.5
 #: The arm has this time to do what a method began, in seconds.
 AFTERWARDS = 3.0
-#: The arm has received so many frames before: a restart is seen by the counter of frames.
+#: The arm has received this many frames before. A method detects a restart by the counter of frames.
 USED = 100
 
-#: A supply that goes and comes back is seen as one of these, as fast as the method looks.
+#: The words for a supply that is lost and comes back: which ones depends on when the method reads the arm.
 SUPPLY_WORDS = ["no servo answers", "does not answer", "let go", "lost their supply"]
 
 Angles = tuple[float, ...]
@@ -39,7 +39,10 @@ Angles = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Cell:
-    """What a method did. `done` is None if it was asked for words alone."""
+    """What a method did.
+
+    `done`: whether the arm did what it was asked. None if the method only reads, raised an error, or ended before the fault.
+    """
 
     outcome: str
     done: bool | None

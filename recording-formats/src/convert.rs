@@ -15,7 +15,7 @@ use crate::writer::{io_error, options};
 /// file that is cut off gets an end and an index.
 ///
 /// # Errors
-/// Those of [`crate::read`], and those of the output. At [`ReadError::Damaged`] what can be read has been written.
+/// The errors of [`crate::read`], or the output cannot be written. At [`ReadError::Damaged`] what can be read has been written.
 pub fn convert(source: impl Read, format: Format, mut out: impl Write) -> Result<Recording, ReadError> {
     let mut copy = Vec::new();
     let mut writer = options().create(NoSeek::new(&mut copy)).map_err(io_error)?;

@@ -17,7 +17,7 @@ use crate::joints::{names, to_degrees};
 use crate::messages::{JointState, RosMessage, Switch};
 use crate::read_error::{McapReadError, ReadError};
 
-/// Longer records are none of an arm. Without a bound, a damaged length fills the memory.
+/// No recording of an arm has longer records. Without a bound, a damaged length would fill the memory.
 const LONGEST_RECORD: usize = 64 * 1_024 * 1_024;
 /// The last words of topics with the states of joints, the preferred one first.
 const STATES: [&str; 2] = ["joint_states", "robot_joint_states"];

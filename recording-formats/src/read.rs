@@ -28,7 +28,7 @@ pub fn read(source: impl Read) -> Result<Recording, ReadError> {
     read_and_pass_on(source, |_| Ok(()))
 }
 
-/// The same, and passes on each message of an MCAP file.
+/// As [`read`], and passes on each message of an MCAP file.
 pub(crate) fn read_and_pass_on(
     mut source: impl Read,
     pass_on: impl FnMut(&Message) -> io::Result<()>,

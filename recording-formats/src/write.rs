@@ -12,7 +12,7 @@ use crate::writer::{McapLayout, McapWriter};
 /// Writes a recording. In MCAP its time begins in 1970, because the text format has no date.
 ///
 /// # Errors
-/// Those of the output.
+/// The output cannot be written.
 pub fn write(recording: &Recording, format: Format, mut out: impl Write) -> io::Result<()> {
     match format {
         Format::Text => out.write_all(text(recording).as_bytes()),

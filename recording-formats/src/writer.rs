@@ -84,7 +84,7 @@ impl<W: Write> McapWriter<W> {
     /// Begins a file.
     ///
     /// # Errors
-    /// Those of the output.
+    /// The output cannot be written.
     pub fn new(out: W, layout: McapLayout) -> io::Result<Self> {
         let options = options().use_chunks(layout == McapLayout::Indexed);
         Ok(Self {
@@ -101,7 +101,7 @@ impl<W: Write> McapWriter<W> {
     /// Adds a moment, not earlier than the one before. `at`: its time since 1970, which the file has in the place of its own.
     ///
     /// # Errors
-    /// Those of the output. The file then ends with the moments of [`McapWriter::written`].
+    /// The output cannot be written. The file then ends with the moments of [`McapWriter::written`].
     pub fn add(&mut self, at: Duration, moment: &Moment, telemetry: &Telemetry) -> io::Result<()> {
         if self.vacuum.is_none() {
             self.describe(at)?;
@@ -121,7 +121,7 @@ impl<W: Write> McapWriter<W> {
     /// Adds the health of the arm at this port, `at` a time since 1970.
     ///
     /// # Errors
-    /// Those of the output.
+    /// The output cannot be written.
     pub fn diagnose(&mut self, at: Duration, health: &Health, port: &str) -> io::Result<()> {
         let status = vec![diagnosis::status(health, port)];
         self.publish(topics::DIAGNOSTICS, at, &Diagnostics { header: header(at, ""), status })
@@ -136,7 +136,7 @@ impl<W: Write> McapWriter<W> {
     /// Ends the file. Nothing can be added afterwards.
     ///
     /// # Errors
-    /// Those of the output.
+    /// The output cannot be written.
     pub fn finish(&mut self) -> io::Result<()> {
         self.writer.finish().map_err(io_error)?;
         self.written += std::mem::take(&mut self.open);
@@ -186,7 +186,7 @@ impl<W: Write> McapWriter<W> {
     }
 }
 
-/// How all files are written.
+/// The options of every file: uncompressed, and without an index.
 pub(crate) fn options() -> WriteOptions {
     let library = concat!("sevenbot ", env!("CARGO_PKG_VERSION"));
     WriteOptions::new().compression(None).profile("ros2").library(library).disable_seeking(true)

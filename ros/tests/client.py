@@ -41,7 +41,7 @@ class Client:
         self.diagnostics: list[DiagnosticArray] = []
         self.descriptions: list[str] = []
         latched = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        # The quality of service of the published topic interface: sensor data for states, one reliable command.
+        # The quality of service of ros2_control's topic interface: sensor data for states; reliable, depth 1, for commands.
         self._hear(JointState, "robot_joint_states", self.states.append, qos_profile_sensor_data)
         self._hear(JointState, "joint_states", self.joint_states.append, 10)
         self._hear(PoseStamped, "tip", self.tips.append, 10)

@@ -1,7 +1,7 @@
-"""A node whose action FollowJointTrajectory has a type that is on PyPI: `test_msgs/action/Fibonacci`.
+"""The node with its trajectory action, but of type `test_msgs/action/Fibonacci`: `control_msgs` is not on PyPI, and this is.
 
-The number of a goal names a trajectory of `TRAJECTORIES`. Feedback and results are numbers: thousandths of a radian, and the code. The
-server, its checks and the motion are those of the product.
+The number in a goal chooses a trajectory of `TRAJECTORIES`. Feedback and results are numbers: thousandths of a radian, and the
+code. The server, its checks and the motion are those of the product.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ impl MeasuredPose {
 }
 
 impl PositionDegrees {
-    /// The text of each angle.
+    /// The angles as text: whole degrees, or degrees with two decimals.
     pub(crate) fn texts(self) -> [String; 7] {
         match self {
             Self::Whole(degrees) => degrees.map(|degrees| degrees.to_string()),

@@ -95,7 +95,7 @@ impl Session {
     }
 }
 
-/// Puts right what a program left in the arm that was killed while it streamed, and says so.
+/// Repairs what a program left in the arm when it was killed while it streamed, and tells the user.
 pub(crate) fn put_right(arm: &mut Arm) -> Result<(), CommandError> {
     if arm.end_abandoned_stream()? {
         note(

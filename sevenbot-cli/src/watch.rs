@@ -17,7 +17,7 @@ pub(crate) struct ProgressWatch {
 }
 
 impl ProgressWatch {
-    /// While [`Interrupt`] catches Ctrl-C.
+    /// Needs an [`Interrupt`], because only that catches Ctrl-C.
     pub(crate) const fn new(_: Interrupt) -> Self {
         Self { bar: None }
     }

@@ -11,7 +11,8 @@ use protocol_core::wire::{Deframer, FrameBuffer, Function, MAX_LENGTH, ToArm};
 
 use crate::hub::{ClientId, Event, Hub, Stream, WholeRequest};
 
-/// Bytes for the client beyond which reports are dropped: a second of reports at the highest frequency.
+/// Bytes for the client beyond which reports are dropped: at 50 Hz, 1.4 s of reports of 14 bytes, or 0.4 s of the longest ones,
+/// 49 bytes.
 const MOST_REPORT_BYTES: usize = 1_024;
 /// Bytes for the client beyond which its reads wait.
 const MOST_BYTES: usize = 4_096;
@@ -22,7 +23,7 @@ pub struct FrameClient {
     id: ClientId,
     deframer: Deframer<ToArm>,
     output: Vec<u8>,
-    /// The bytes that come are those of a program that is gone: nobody waits for replies.
+    /// The bytes that come are those of a program that is gone, so reads are dropped.
     drops_reads: bool,
 }
 

@@ -39,7 +39,7 @@ fn streamer_and_reader() -> World {
     world
 }
 
-/// The joint moves and the streamer is silent. The arm holds in time, and nobody waits for it.
+/// The joint moves and the streamer is silent. The arm holds in time, and the hold delays no other program.
 #[test]
 fn d24_the_frames_of_others_do_not_keep_the_watchdog_of_a_silent_program_alive() {
     let mut world = streamer_and_reader();

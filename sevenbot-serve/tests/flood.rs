@@ -102,7 +102,7 @@ fn frames_that_the_hub_has_no_room_for_stay_with_their_sender() {
     assert!((20..=21).contains(&taken), "{taken} frames are taken");
 }
 
-/// Otherwise nobody would pass on the bytes that wait for the room, and the program would wait for ever.
+/// Without the news the server would not pass on the bytes that wait for room, and the program would wait for ever.
 #[test]
 fn a_stop_that_makes_room_for_a_program_is_news_for_it() {
     let mut world = World::new(2);

@@ -57,7 +57,7 @@ fn farthest(targets: &[u8], positions: [i32; 7]) -> i32 {
     targets.zip(positions).map(|(target, position)| (target - position).abs()).max().unwrap()
 }
 
-/// Who else uses the server while the arm is stopped.
+/// The other clients of the server while the arm is stopped.
 #[derive(Clone, Copy, Debug)]
 enum Attack {
     Nothing,

@@ -205,7 +205,7 @@ impl Arm {
     }
 
     /// Our firmware shows the offsets in the encoding of the map that was written last, maybe by another program (M5). A
-    /// write without registers makes it this one.
+    /// write of 0 registers makes that the map of this view.
     fn claim_offset_encoding(&mut self) {
         self.link.write(&WriteFrame { map: self.view.map, address: 0, values: Vec::new() });
     }

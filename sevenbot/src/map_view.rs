@@ -72,7 +72,7 @@ impl MapView {
         self.firmware != Firmware::Ours && self.map == Map::V21 && is_inverse(address)
     }
 
-    /// The registers to read for these ones: a range that holds them all.
+    /// The range of the arm's addresses that holds these registers of map 2.2.
     pub(crate) fn read_span(self, span: Span) -> Span {
         let addresses = || span.addresses().map(|address| self.address(address));
         match (self.map, addresses().min(), addresses().max()) {

@@ -115,7 +115,7 @@ pub fn kilobytes(process: &Child) -> u64 {
     line.trim().trim_end_matches("kB").trim().parse().expect("a number")
 }
 
-/// Waits for the end of a process.
+/// Waits for the end of a process. Panics if it is still running at the time limit.
 #[track_caller]
 pub fn wait_for_exit(process: &mut Child) -> ExitStatus {
     wait_for("the process ends", || {

@@ -22,7 +22,7 @@ use crate::programs::{host_sim, xtask};
 pub enum ArmKind {
     /// The simulator.
     Simulator,
-    /// The image for the arm in an emulator, with simulated servos.
+    /// The firmware image in an emulator, with simulated servos.
     Emulator,
     /// The simulator without servos. A second process simulates a USB adapter with servos.
     Adapter,

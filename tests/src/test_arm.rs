@@ -256,7 +256,8 @@ impl TestArm {
         RunningProgram::spawn(tool.stdout(Stdio::piped()).stderr(Stdio::piped()))
     }
 
-    /// Likewise, and waits until the tool prints `text` on standard error: with `--verbose`, a frame for example.
+    /// As [`Self::spawn_sevenbot`], and waits until the tool prints `text` on standard error: with `--verbose`, a frame for
+    /// example.
     pub fn spawn_sevenbot_until(&mut self, arguments: &[&str], text: &str) -> RunningProgram {
         let mut tool = self.spawn_sevenbot(arguments);
         let mut stderr = tool.stderr.take().expect("a pipe");

@@ -227,7 +227,7 @@ impl Player {
     }
 
     /// Later targets are approached by speed again. The arm stops at its last point.
-    fn end(&self, now: Instant, client: &mut Client) {
+    pub fn end(&self, now: Instant, client: &mut Client) {
         if !matches!(self.stage, Stage::Start | Stage::Settling(_)) {
             write_all(&self.closing_frames(), now, client);
         }

@@ -58,7 +58,7 @@ impl Park {
         Some(Self { way, speeds, sent: None, let_go: None })
     }
 
-    /// The speeds of the joints before it.
+    /// The speed registers of the joints before parking, to be written back afterwards.
     #[must_use]
     pub const fn speeds(&self) -> [u8; 7] {
         self.speeds

@@ -14,7 +14,7 @@ use crate::run::{TaskResult, root};
 /// The letter and the number of a decision.
 type Decision = (char, u8);
 
-/// All decisions. The number M11 is not used.
+/// The decisions about the arm. D30 is about the programs of the host, and `docs/protocol.md` has no M11.
 fn all_decisions() -> impl Iterator<Item = Decision> {
     let of_map22 = (1..=29).map(|number| ('D', number));
     of_map22.chain((1..=10).chain([12]).map(|number| ('M', number)))

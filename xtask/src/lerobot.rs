@@ -83,7 +83,7 @@ fn is_new_enough(program: &Path) -> bool {
     python.status().is_ok_and(|status| status.success())
 }
 
-/// Fails before gigabytes are fetched for nothing.
+/// Fails if there is too little free disk, before anything is downloaded.
 fn need_disk() -> TaskResult {
     let output = Command::new("df").args(["-Pk"]).arg(folder()).output()?;
     let text = String::from_utf8_lossy(&output.stdout);

@@ -72,7 +72,7 @@ fn check_types(python: &Path) -> TaskResult {
     run_command(command.args(["-p", "sevenbot_ros"]).current_dir(folder()))
 }
 
-/// The tests, in a network with only the loopback interface.
+/// Runs the tests in a network that has only the loopback interface.
 fn test(python: &Path) -> TaskResult {
     let mut command = Command::new("unshare");
     command.args(["--net", "--map-root-user", "sh", "-c", NETWORK, "sh"]).arg(python);

@@ -61,7 +61,7 @@ pub(crate) fn link() -> TaskResult<&'static [ChipProgram]> {
     Ok(LINKED)
 }
 
-/// Builds the image for the arm.
+/// Builds the firmware image.
 pub(crate) fn build_image() -> TaskResult {
     run("rustup", &format!("--quiet target add {CHIP}"), &[])?;
     cargo("fw --quiet")

@@ -15,7 +15,7 @@ pub(crate) struct SystemTests {
     skipped: &'static [&'static str],
 }
 
-/// The image for the arm in the emulator.
+/// The system tests of the firmware image in the emulator.
 pub(crate) const EMULATOR: SystemTests = SystemTests {
     arm: "emulator",
     // Most tests of the tool test its own code, which does not depend on the arm. The emulator's flash does not change, so the

@@ -35,7 +35,7 @@ pub struct Wall {
 pub struct Thing {
     /// The angle of joint 7 at which the claws touch it.
     pub millidegrees: i32,
-    /// As of a [`Wall`].
+    /// As [`Wall::stiffness`].
     pub stiffness: Option<u16>,
 }
 

@@ -141,7 +141,7 @@ impl Supply {
         }
     }
 
-    /// How often the fault took effect: frames to the servos, or dips.
+    /// How often the fault took effect: for `Dips` the number of dips, otherwise that of the frames counted above.
     pub(super) const fn count(&self) -> FaultCount {
         self.count
     }

@@ -27,13 +27,13 @@ pub const HEAVIEST_LOAD_G: u16 = 1_000;
 /// The weight of a gram in micronewton. Grams times millimetres times this are nanonewton metres.
 const GRAVITY: i64 = 9_807;
 
-/// The moment on joint 2, in gram millimetres.
+/// Sum of mass times distance, in gram millimetres: about joint 2, along the rear arm.
 const SHOULDER: i64 = REAR_ARM_G * REAR_ARM_CENTRE_MM + (FOREARM_G + TOOL_G) * REAR_ARM_MM;
-/// The moment on joint 3 along the forearm.
+/// About joint 3, along the forearm.
 const FOREARM: i64 = FOREARM_G * FOREARM_CENTRE_MM + TOOL_G * FOREARM_CENTI_MM / 100;
-/// The moment on joint 3 at a right angle to the forearm.
+/// About joint 3, at a right angle to the forearm.
 const ELBOW: i64 = (FOREARM_G + TOOL_G) * ELBOW_OFFSET_MM;
-/// The moment on joints 3, 4 and 5 along the tool.
+/// About joints 3, 4 and 5, along the tool.
 const TOOL: i64 = TOOL_G * TOOL_CENTRE_MM;
 /// The torque of gravity on each joint, in micronewton metres, towards greater angles, with this weight in the gripper in
 /// grams.
@@ -59,7 +59,7 @@ pub(crate) fn torques(pose: JointSines, load_g: i64) -> [i64; JOINTS] {
     ]
 }
 
-/// Micronewton metres, of gram millimetres in millionths.
+/// Converts a moment from millionths of a gram millimetre to micronewton metres.
 const fn torque(moment: i64) -> i64 {
     moment / 1_000 * GRAVITY / ONE
 }

@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     const LEVEL: i64 = 459_448;
-    /// Of the forearm with its tool, in gram square millimetres.
+    /// The inertia of the forearm with its tool, in gram square millimetres.
     const INERTIA: i64 = 8_700_000;
 
     fn gear() -> Gear {

@@ -1,4 +1,4 @@
-//! The units in which motors are simulated: fixed steps of time, and parts of a count that are whole numbers.
+//! The units in which motors are simulated: steps of 1 ms, and whole millionths of a count.
 
 use protocol_core::time::Duration;
 

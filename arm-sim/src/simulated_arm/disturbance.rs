@@ -95,7 +95,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
         listed.into_iter().map(|listed| self.report(listed)).collect()
     }
 
-    /// Takes the reports of the faults whose time was over since the last call, at most the last 16.
+    /// Takes the reports of the faults that have ended by themselves since the last call; of more than 16, the last 16.
     pub fn take_ended_faults(&mut self) -> Vec<FaultReport> {
         self.ended_faults.take()
     }
@@ -109,7 +109,7 @@ impl<F: NorFlash, C: ArmController> SimulatedArm<F, Plant, C> {
 }
 
 impl<F: NorFlash, B: ServoBus, C: ArmController> SimulatedArm<F, B, C> {
-    /// Ends the faults whose time is over.
+    /// Ends the faults whose time is over, and a thing between the claws that was dropped.
     pub(super) fn end_due_faults(&mut self) {
         if self.faults.has_thing() && self.bus.plant_mut().is_some_and(|plant| !plant.has_thing()) {
             // The claws opened and dropped it.

@@ -5,7 +5,6 @@ use core::sync::atomic::{Ordering, compiler_fence};
 
 use crate::opaque;
 
-/// The address of a peripheral's register.
 type RegisterAddress = *mut u32;
 
 /// TIM2 (RM0090, section 18.4): control register.

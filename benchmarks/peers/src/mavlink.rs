@@ -81,7 +81,6 @@ pub struct MavlinkServer {
 }
 
 impl Default for MavlinkServer {
-    /// A server that has received nothing.
     fn default() -> Self {
         Self {
             reader: MavlinkReader::new(ReceivedBytes(Inbox::new())),
@@ -105,7 +104,7 @@ const fn empty() -> TUNNEL_DATA {
 }
 
 impl MavlinkServer {
-    /// Executes a request and returns the reply to a read. `None` if the message is not a valid request.
+    /// Executes a request, and passes the reply to a read to `reply`. `None` if the message is not a valid request.
     fn answer(
         &mut self,
         from: MavHeader,

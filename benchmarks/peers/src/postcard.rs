@@ -92,7 +92,7 @@ impl PostcardServer {
 }
 
 impl RegisterServer {
-    /// Executes a request and returns the reply to a read. `None` if the frame is not a valid request.
+    /// Executes a request, and passes the reply to a read to `reply`. `None` if the frame is not a valid request.
     fn answer(&mut self, frame: &[u8], reply: &mut impl FnMut(&[u8])) -> Option<()> {
         let report = cobs::decode(frame, &mut self.plain).ok()?;
         let plain = self.plain.get(..report.frame_size())?;

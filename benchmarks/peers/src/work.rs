@@ -23,7 +23,7 @@ pub fn initial_values() -> [u8; 256] {
 /// The number of registers of a Modbus server.
 pub const REGISTERS: usize = 128;
 
-/// The same values as the registers of a Modbus server, two bytes in each.
+/// The values of [`initial_values`] as the registers of a Modbus server, two bytes in each.
 #[must_use]
 pub fn initial_words() -> [u16; REGISTERS] {
     let values = initial_values();

@@ -84,7 +84,7 @@ fn registers(registers: &RegisterFile) -> Value {
     })
 }
 
-/// Reports of faults.
+/// The reports of faults as JSON, with the time that is left at `now`.
 #[must_use]
 pub fn reports(reports: &[FaultReport], now: Instant) -> Vec<Value> {
     reports.iter().map(|report| self::report(report, now)).collect()

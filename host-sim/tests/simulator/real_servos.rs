@@ -4,7 +4,6 @@
 //!   client ──▶ host-sim --servos ──▶ link ──▶ host-sim --servos-only --trace ──▶ log
 //! ```
 
-#[allow(dead_code)] // Each test file uses a part of it.
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -35,7 +35,7 @@ fn d12_a_goal_stays_where_the_joint_is_until_it_has_torque() {
     }
 }
 
-/// The same bytes may bring an answer and the write: then the answer counts first.
+/// An answer and the write may come in one call. The answer is then processed first.
 #[test]
 fn d13_an_answer_that_has_come_is_where_the_servo_state_is_entered() {
     let mut rig = Rig::started();

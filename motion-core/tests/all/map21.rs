@@ -17,7 +17,7 @@ fn write_21(rig: &mut Rig, address: u8, values: &[u8]) {
     rig.send(&frame(4, address, u8::try_from(values.len()).unwrap(), values));
 }
 
-/// A controller whose settings are the defaults but for register 20.
+/// A controller whose settings are the defaults, except register 20.
 fn with_options(options: u8) -> Rig {
     let mut image = Image([0; Image::LENGTH]);
     image.0[12] = options;

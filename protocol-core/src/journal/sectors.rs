@@ -25,7 +25,7 @@ pub(super) struct SlotAddress {
 pub(super) struct Survey {
     pub(super) sector: u32,
     pub(super) mark: Word,
-    /// Number of revocations behind the mark: so many marks of the other sector are no longer valid.
+    /// Number of revocations behind the mark. Each makes one mark of the other sector invalid.
     pub(super) revoked: u32,
     /// The first slot of the blank rest of the sector.
     pub(super) end: u32,

@@ -140,7 +140,7 @@ impl RegisterFile {
     /// Checks a write of the host in map 2.2 without applying it.
     ///
     /// # Errors
-    /// The first register that can be written now and cannot take its value.
+    /// The first register that is writable now and whose value is out of range, or that is half of a two-byte register.
     pub fn check<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, Refused> {
         let (start, values) = self.unlocked(address, values);
         let accepted = Accepted { map: Map::V22, start, values };
@@ -157,7 +157,7 @@ impl RegisterFile {
     /// Checks a write of the host in map 2.1 without applying it.
     ///
     /// # Errors
-    /// The first register that can be written now and cannot take its value.
+    /// The first register that is writable now and whose value is out of range.
     pub fn check_map21<'a>(&self, address: u8, values: &'a [u8]) -> Result<Accepted<'a>, Refused> {
         let (start, values) = self.unlocked(address, values);
         for ((rule, &value), address) in rules_21_from(start).iter().zip(values).zip(start..) {

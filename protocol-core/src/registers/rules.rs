@@ -90,7 +90,7 @@ impl Rule {
         value & self.mask <= self.max
     }
 
-    /// The same for a rule of map 2.1, which has biased ranges in place of signs and magnitudes.
+    /// As [`Self::allows`], for a rule of map 2.1, which has biased ranges in place of signs and magnitudes.
     pub(super) const fn allows_21(self, value: u8) -> bool {
         let bias = if self.mask == !SIGN { self.max / 2 } else { 0 };
         value.wrapping_add(bias) & self.mask <= self.max

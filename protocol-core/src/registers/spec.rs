@@ -24,7 +24,7 @@ pub enum Access {
     ReadOnly,
     /// Can be read and written.
     ReadWrite,
-    /// Reserved by the maker: reads 0; a write has no effect.
+    /// Reserved by the maker: a write in this map has no effect. Reads 0, unless the other map writes the register.
     Reserved,
 }
 

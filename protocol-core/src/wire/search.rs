@@ -1,12 +1,14 @@
 //! The search for frames in the bytes of a stream, and how far it has come (D3, D4).
 //!
 //! ```text
-//!    0        head      scan_pos             gap_end          timeout_end      bytes.len()
-//!    ├──────────┼──────────┼───────────────────┼──────────────────┼────────────────┤
+//!    0        head      scan_pos             gap_end          bytes.len()
+//!    ├──────────┼──────────┼───────────────────┼────────────────┤
 //!      finished   the frame   searched once the
 //!                 at the head  line was silent
 //!                 is incomplete  up to gap_end
 //! ```
+//!
+//! A timeout that the search has not passed yet is at the end of the bytes: until then the deframer appends none.
 //!
 //! This file handles positions only. The deframer owns the bytes and appends to them while the search goes on.
 

@@ -6,7 +6,7 @@ use flash_model::{Cut, EraseTear, Flash, Operation, ProgramTear, Random};
 use protocol_core::journal::{Journal, Opened, SaveError};
 use protocol_core::registers::Image;
 
-/// A flash on which so many images were saved, as far as they found room, and the last of them.
+/// A flash on which `saves` images were saved, or as many as there is room for, and the last of them.
 fn saved<const SECTOR: usize>(saves: u64) -> (Flash<SECTOR>, Image) {
     let (mut journal, _) = Journal::open(Flash::<SECTOR>::new(2));
     let count = saves.min(journal.room() as u64);
@@ -16,7 +16,7 @@ fn saved<const SECTOR: usize>(saves: u64) -> (Flash<SECTOR>, Image) {
     (journal.release(), image(count))
 }
 
-/// Every single bit of a flash that is as full as can be, but for so many saves.
+/// Flips each bit of a flash with `saves` images, and checks that two starts find the last one. Returns how many bits.
 fn flip_every_bit<const SECTOR: usize>(saves: u64) -> usize {
     let (flash, newest) = saved::<SECTOR>(saves);
     let bits = 2 * SECTOR * 8;
@@ -213,8 +213,8 @@ fn noise_in_the_spare_leaves_the_settings() {
     assert_eq!(Journal::open(flash).1, Opened::Found(newest));
 }
 
-/// A word that is cut at its very beginning need not show. On a flash that disturbs bits which were to stay
-/// ones, a record in such a slot would not last: it is not used again.
+/// A word whose programming is cut at its very beginning may leave no trace. On a flash that disturbs bits which were to stay
+/// ones, a record in such a slot would not last: the slot is not used again.
 #[test]
 fn a_slot_that_was_begun_without_a_trace_is_skipped() {
     let mut cases = 0;

@@ -41,7 +41,7 @@ impl Tally {
     }
 }
 
-/// Cuts every operation of power cycles with so many saves each, in every way, once.
+/// Cuts the power once in each cycle, at every operation and in every way. `cycles` has the number of saves of each cycle.
 fn cut_everything_once<const SECTOR: usize>(cycles: impl IntoIterator<Item = usize>) {
     let tally = cut_everything_once_in(World::<SECTOR>::new(), cycles);
     tally.report(&format!("{SECTOR} B sectors, power cut at every step in 25 ways"));
@@ -79,7 +79,7 @@ fn a_cut_at_every_step_of_a_thousand_updates_of_small_flashes() {
     cut_everything_once::<2_048>(cycles().take(240));
 }
 
-/// No flash lives long enough, but one that is damaged, or an image file with any content, may say so.
+/// No flash lives for so many generations. But a damaged flash, or an image file with any content, may hold the last one.
 #[test]
 fn the_first_generation_follows_the_last() {
     const LAST: u32 = u32::MAX / 2;
@@ -94,7 +94,8 @@ fn the_first_generation_follows_the_last() {
     }
 }
 
-/// Cuts power cycles, then the next start and some saves, and so on: each at every operation in every way.
+/// Cuts the power at every operation of each cycle, in every way. Then likewise during the next start and its saves, until
+/// there were `cuts` cuts in a row.
 fn cut_everything_again<const SECTOR: usize>(
     cycles: impl IntoIterator<Item = usize>,
     saves_after: usize,
@@ -261,7 +262,7 @@ fn a_record_with_remains_behind_it_is_appended_again() {
 fn what_is_in_doubt_and_finds_no_slot_is_moved() {
     use Operation::{Erase, Program};
     let mut world = World::<512>::new();
-    // As many as find room; the seal of the last one is cut.
+    // There is room for 21 saves. The seal of the last one is cut.
     let saves = 21;
     let seal = world.operations(saves).len() - 1;
     assert_eq!(world.cycle(saves, Some(torn_after(seal))), End::Cut);

@@ -42,7 +42,7 @@ fn shown(address: u8, value: u8) -> u8 {
 fn expected(before: &[u8; 256], address: u8, values: &[u8]) -> Result<[u8; 256], u8> {
     let lock = before[usize::from(LOCK)];
     let mut after = *before;
-    // The last write was in map 2.1.
+    // After a write in map 2.1, an offset of 0 reads 128 (M5).
     for at in OFFSETS.filter(|&at| before[usize::from(at)] == 0) {
         after[usize::from(at)] = 128;
     }

@@ -32,7 +32,7 @@ class SevenbotLeader(Device, Teleoperator):
 
     @cached_property
     def feedback_features(self) -> dict[str, type]:
-        """None: the arm pushes nobody's hand."""
+        """No features: the arm gives no force to the hand."""
         return {}
 
     def configure(self) -> None:

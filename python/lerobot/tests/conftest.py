@@ -22,7 +22,7 @@ def calibration_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The wall clock of the plugin, in one number: sleeping moves it, and a test does."""
+    """The clock of the plugin in seconds, as a list of one number. A sleep advances it, and so may a test."""
     clock = [1000.0]
 
     def sleep(seconds: float) -> None:

@@ -88,7 +88,7 @@ pub(crate) fn file_error(py: Python<'_>, path: &std::path::Path, why: &io::Error
     raise().unwrap_or_else(|error| error)
 }
 
-/// Closed, while an attribute is read: `hasattr` says that a closed arm does not have it.
+/// Turns `Closed` into an error that is an `AttributeError` too, so that `hasattr` is false for attributes of a closed arm.
 pub(crate) fn without_attribute(py: Python<'_>, error: PyErr) -> PyErr {
     static CLASS: Class = Class::new();
     if !error.is_instance_of::<Closed>(py) {

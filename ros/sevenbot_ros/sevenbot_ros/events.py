@@ -21,7 +21,7 @@ class Measurement:
 
 
 class Events(Protocol):
-    """Who hears it. All calls come from the thread of the arm."""
+    """Receives what happens to the arm. All calls come from the thread of the arm."""
 
     def measured(self, measurement: Measurement) -> None:
         """The joints were measured."""
@@ -30,7 +30,7 @@ class Events(Protocol):
         """The health was read."""
 
     def passed(self, simulated: float) -> None:
-        """Simulated time passed."""
+        """Simulated time passed: it is `simulated` seconds now."""
 
     def refused(self, refusal: Refusal) -> None:
         """A command is refused."""

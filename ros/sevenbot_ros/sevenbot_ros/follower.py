@@ -39,7 +39,7 @@ class Follower:
         self._is_driven = [False] * JOINTS
         # The first target may be some degrees away, too, and is approached.
         self._is_approaching = True
-        # How far the targets went since the last point, but for jumps.
+        # Degrees that the targets moved since the last point. Jumps do not count: they are approached.
         self._travel = 0.0
 
     @property

@@ -22,7 +22,7 @@ class Interlock:
     """The connected arm, and the reasons why it must not move."""
 
     def __init__(self) -> None:
-        # Also for those who act on an answer: nothing changes it while they have this lock.
+        # Public: a caller that acts on an answer holds this lock until it has acted, so that the answer stays true.
         self.lock = threading.Condition()
         self._arm: sevenbot.Arm | None = None
         # Why commands are refused until `hold`, and how often the arm was stopped.

@@ -55,7 +55,7 @@ class Limits:
 
     @classmethod
     def of_arm(cls) -> Limits:
-        """Those of the arm itself."""
+        """The limits of the arm itself. The claw ends at `CLAW_MAX`."""
         low, high = (tuple(float(angle) for angle in side) for side in sevenbot.limits())
         return cls(low, (*high[:6], min(high[6], CLAW_MAX)))
 

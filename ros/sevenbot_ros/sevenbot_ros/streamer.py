@@ -19,7 +19,7 @@ from sevenbot_ros.settings import Settings
 
 # The stream is asked this much before a point is due, and waits the rest itself. Seconds.
 MARGIN = 0.002
-# The longest time until a stream ends that nothing leads any more, in seconds.
+# A stream that nothing leads any more ends within this time, in seconds.
 LONGEST_END = 5.0
 
 

@@ -57,7 +57,7 @@ class GoalAdapter(Protocol):
         """The feedback, positions in radians."""
 
     def result(self, code: int, text: str) -> Any:
-        """The result."""
+        """The result with one of the codes of FollowJointTrajectory, and a text for the user."""
 
 
 class PublishedAdapter:

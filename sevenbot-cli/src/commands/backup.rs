@@ -81,7 +81,7 @@ fn write_whole(path: &Path, text: &str, may_replace: bool) -> Result<(), Command
     }
     if may_replace {
         let beside = path.with_extension("toml.new");
-        // What an earlier program left, or a link that somebody planted: it is not followed.
+        // Removes what an earlier program left. A link that another user planted is removed too, and not followed.
         let _ = fs::remove_file(&beside);
         return File::create_new(&beside)
             .and_then(|mut file| file.write_all(text.as_bytes()))

@@ -34,7 +34,7 @@ pub(crate) struct SniffArgs {
     file: Option<PathBuf>,
 }
 
-/// The first words of a log are in so many bytes.
+/// The first words of a log are within this many bytes.
 const LONGEST_HEAD: u64 = 64;
 /// An empty line for this time ends an unfinished frame (D4).
 const GAP: Duration = Duration::from_millis(100);

@@ -21,7 +21,7 @@ pub enum Admission {
     NoArm,
     /// It waits for its turn, and then writes nothing but the client's own registers.
     ReadOnly,
-    /// It is dropped: somebody stopped the arm, and the client has not started anew.
+    /// It is dropped: another client stopped the arm, and this one has not started anew.
     Stopped,
     /// It is dropped: another client drives.
     AnotherDrives,
@@ -68,7 +68,7 @@ impl Hub {
         Admission::Queued
     }
 
-    /// Without an arm, a client can still read that there is none.
+    /// Answers a request while there is no arm: a read of the server's own registers gets a reply, all others are refused.
     fn answer_without_arm(&mut self, now: Instant, id: ClientId, request: &WholeRequest) {
         let reply = self.own_reply(now, id, request);
         let Some(client) = self.clients.get_mut(&id) else { return };

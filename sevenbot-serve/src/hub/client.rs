@@ -24,7 +24,7 @@ pub const LONGEST_WAIT: Duration = Duration::from_millis(200);
 const MOST_REPORTS: usize = 4;
 /// Bytes on the line, replies included, that may wait for a client: 90 ms at 115 200 baud. One request is always allowed.
 const MOST_WAITING_BYTES: usize = 1_024;
-/// A client may send this many stops in each period. More wait like other requests, so that a flood of them holds up nobody.
+/// A client may send this many stops in each period. More wait like other requests, so that a flood delays no other client.
 const MOST_URGENT: u8 = 4;
 const URGENT_PERIOD: Duration = Duration::from_millis(100);
 

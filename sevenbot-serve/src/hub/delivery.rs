@@ -37,7 +37,7 @@ impl Hub {
         }
     }
 
-    /// Replaces the registers that are not the arm's in a reply.
+    /// Overwrites in a reply the registers whose values the server keeps, not the arm.
     fn overlay(&self, now: Instant, id: ClientId, address: u8, values: &mut [u8]) {
         let place = FAULTS.address.checked_sub(address).map(usize::from);
         if let Some(faults) = place.and_then(|place| values.get_mut(place)).filter(|_| self.known.is_ours()) {

@@ -91,7 +91,7 @@ impl Driver {
         Ok(())
     }
 
-    /// The client hands over, is gone, or somebody stopped the arm.
+    /// Ends the driving of the client `of`, which hands over or is gone. `None`: the arm was stopped, and no client drives.
     pub(crate) fn end(&mut self, of: Option<ClientId>) {
         self.last = self.last.filter(|&(id, _)| of.is_some_and(|of| of != id));
     }

@@ -7,7 +7,7 @@ use protocol_core::registers::{JOINTS, Map, Register};
 use super::readings::Readings;
 use protocol_core::time::Instant;
 
-/// A hold of fewer joints is no stop of the arm: a program may hold one joint while others move.
+/// A hold of fewer joints is not a stop of the arm: a program may hold one joint while others move.
 const STOP_JOINTS: usize = 3;
 
 /// What a write does to the arm's motion.
@@ -21,7 +21,7 @@ pub(crate) enum Intent {
     Motion,
     /// It holds joints where its client has read that they are.
     Hold,
-    /// The same for the arm.
+    /// It holds so many joints there that it is a stop of the arm.
     Stop,
     /// It switches the motors off.
     MotorsOff,

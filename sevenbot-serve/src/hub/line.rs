@@ -54,7 +54,7 @@ impl Owner {
     }
 }
 
-/// The line.
+/// The line, with the owner of each pending read.
 #[derive(Debug)]
 pub(crate) struct Line {
     link: HostLink,

@@ -1,7 +1,7 @@
 //! The registers that each client has for itself: the frequencies of its reports, and what they hold.
 //!
-//! A write to them is taken out of the frame, and a read of them is overlaid with the client's values. The other
-//! registers of the frame pass unchanged.
+//! A write gives them to the server, and the arm gets 0 in their place. A read of them is overlaid with the client's
+//! values. The other registers of the frame pass unchanged.
 
 use protocol_core::registers::map::{FEEDBACK_FREQUENCY, OFFSET, REPORT_CONTENT};
 use protocol_core::registers::map21::{ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY};

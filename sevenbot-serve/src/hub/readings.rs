@@ -1,4 +1,4 @@
-//! The positions that a client has read of late. Targets that equal them hold the arm: that is how every program stops it
+//! The positions that a client has read lately. Targets that equal them hold the arm: that is how every program stops it
 //! ([D24](protocol_core::decisions#d24) and `sevenbot::hold`), for the wire has no request to stop. A joint that was read to be near its
 //! target may keep it.
 

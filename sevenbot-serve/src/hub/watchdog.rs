@@ -53,7 +53,7 @@ pub(crate) struct ClientWatchdog {
 }
 
 impl ClientWatchdog {
-    /// The arm accepted a write of a client, of function 06. `damps`: what register 187 says after it.
+    /// The arm accepted a write of a client by function 06. `damps`: register 187 chooses damping after this write.
     pub(crate) fn wrote(&mut self, now: Instant, client: ClientId, damps: bool, address: u8, values: &[u8]) {
         let value = |register: u8| values.get(usize::from(register.checked_sub(address)?)).copied();
         let action = if damps { WatchdogAction::Damp } else { WatchdogAction::Hold };

@@ -18,7 +18,7 @@ pub(super) enum Block {
     Ik5,
     /// The position of the tip and the direction of the tool.
     Ik6,
-    /// The same, and the direction of the disc of joint 6.
+    /// The position of the tip, the direction of the tool, and the direction of the disc of joint 6.
     Ik7,
 }
 

@@ -1,8 +1,8 @@
 //! Places for connections: for those that have not shown their token yet, and others for clients.
 //!
-//! A place before the token is taken over by the next connection if all are taken: the oldest one loses it. So connections that
-//! send nothing keep nobody out who sends the token at once. Wrong tokens make the next ones of the same address wait. While there
-//! are more connections than places, no other one is accepted: each takes file descriptors.
+//! If all places before the token are taken, the oldest connection there loses its place to the next one. So connections that
+//! send nothing do not keep out a client that sends its token at once. Wrong tokens make the next ones of the same address
+//! wait. While there are more connections than places, no other one is accepted: each takes file descriptors.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;
@@ -13,7 +13,7 @@ use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore};
 
 use super::shared::lock;
 
-/// Connections beyond the places: each way in may have one that it is about to refuse.
+/// Connections beyond the places: each of the TCP listeners may hold one that it is about to refuse.
 const WAYS_IN: usize = 3;
 /// The first wait after a wrong token; each further one doubles it.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
@@ -37,7 +37,7 @@ pub(super) struct Admission {
 #[derive(Clone, Copy, Debug)]
 struct WrongTokens {
     count: u32,
-    /// The next token is looked at then.
+    /// The next token from this address is not checked before this time.
     next: Instant,
 }
 

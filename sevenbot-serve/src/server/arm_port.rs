@@ -17,7 +17,7 @@ use crate::hub::Hub;
 const RETRY_PERIOD: Duration = Duration::from_millis(500);
 /// Time after which an open port without an arm is opened anew: the device behind the path may be another one.
 const IDENTIFY_TIMEOUT: Duration = Duration::from_millis(3_000);
-/// The same while several ports are tried.
+/// As [`IDENTIFY_TIMEOUT`], while several ports are tried.
 const SEARCH_TIMEOUT: Duration = Duration::from_millis(1_000);
 
 /// The serial port of the arm.

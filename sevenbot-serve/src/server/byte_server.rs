@@ -54,7 +54,7 @@ impl ByteServer {
     pub(super) async fn serve_local(self, socket: LocalSocket) {
         loop {
             let stream = socket.accept().await;
-            // The next one that has no place is closed.
+            // Without a free place the connection is closed.
             let Some(place) = self.admission.place() else { continue };
             let server = self.clone();
             tokio::spawn(async move {

@@ -83,8 +83,8 @@ impl FrameSession {
         next
     }
 
-    /// States whether the bytes that the hub has not got yet are those of a client that is gone: then its writes are carried out, but
-    /// nobody waits for replies.
+    /// States whether the bytes that the hub has not got yet are those of a client that is gone. Then its writes are carried
+    /// out, and its reads are dropped.
     #[cfg(target_os = "linux")] // For pseudo-terminals.
     pub(super) const fn set_drops_reads(&mut self, are_of_the_one_before: bool) {
         self.client.set_drops_reads(are_of_the_one_before);

@@ -183,13 +183,13 @@ impl Server {
         address(self.tcp.as_ref())
     }
 
-    /// The address for WebSocket clients, likewise.
+    /// The address for WebSocket clients, with the port that the system chose for port 0.
     #[must_use]
     pub fn web_socket_address(&self) -> Option<SocketAddr> {
         address(self.web_socket.as_ref())
     }
 
-    /// The address of the page, likewise.
+    /// The address of the page, with the port that the system chose for port 0.
     #[must_use]
     pub fn page_address(&self) -> Option<SocketAddr> {
         address(self.page.as_ref())

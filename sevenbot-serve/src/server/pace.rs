@@ -4,9 +4,9 @@
 use host_link::time_on_line;
 use protocol_core::time::{Duration, Instant};
 
-/// A client may send so many times as much as the line carries: commands of the WebSocket are longer than frames.
+/// A client may send this many times as much as the line carries: commands of the WebSocket are longer than frames.
 const TIMES_LINE: u32 = 4;
-/// A client may be so far ahead of that.
+/// A client may be ahead of that rate by this time.
 const AHEAD: Duration = Duration::from_millis(20);
 
 /// The bytes of one client, as if they passed a line.

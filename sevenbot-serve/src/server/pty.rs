@@ -75,7 +75,8 @@ impl PtyPort {
         }
     }
 
-    /// Reads bytes, unless earlier ones wait. Without a program nobody waits for room: the kernel must not keep bytes for the next one.
+    /// Reads bytes, unless earlier ones wait. After the program has closed the terminal it reads without waiting, so that the
+    /// kernel keeps no bytes for the next program.
     fn receive(
         &self,
         session: &mut FrameSession,

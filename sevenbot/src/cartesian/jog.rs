@@ -13,9 +13,9 @@ use crate::units::Angle;
 /// The axes of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JogAxes {
-    /// Those of the base: x to the right, y forward, z up.
+    /// The axes of the base: x to the right, y forward, z up.
     Base,
-    /// Those of the tool: x in the direction of the disc, z along the tool away from the wrist.
+    /// The axes of the tool: x in the direction of the disc, z along the tool away from the wrist.
     Tool,
 }
 

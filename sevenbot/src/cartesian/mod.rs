@@ -47,7 +47,7 @@ pub type Vector = kinematics::Vector<f64>;
 /// The tool straight down.
 pub const DOWN: Vector = Vector::new(0.0, 0.0, -1.0);
 
-/// The step in which the angles of the joints are known.
+/// The resolution in which the angles of the joints are known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AngleStep {
     /// The registers of map 2.1 and 2.2: one degree.

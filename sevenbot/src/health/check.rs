@@ -142,7 +142,7 @@ impl MoveCheck {
         Ok(())
     }
 
-    /// Reads the registers, and judges them. `None` from firmware without a status block.
+    /// Reads the registers, and checks them. `None` from firmware without a status block.
     fn read(&mut self, arm: &mut Arm) -> Result<Option<Snapshot>, MoveCheckError> {
         let mut registers = arm.read_span(STATE_REGISTERS)?;
         if arm.identity().has_status_block() {

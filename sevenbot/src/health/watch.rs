@@ -172,7 +172,7 @@ impl MoveWatch {
         if has_state {
             self.is_gripper = registers.byte(&EFFECTOR_TYPE) == GRIPPER;
         }
-        // A lost supply is the reason for motors that are off.
+        // Problems come before the motor state: a lost supply is the reason why the motors are off.
         if registers.holds(REGISTERS) {
             let problems = self.problems(registers, now);
             if !problems.is_empty() {
@@ -219,7 +219,7 @@ mod tests {
         Duration::from_millis(milliseconds)
     }
 
-    /// All registers of a driven arm with a stream of 20 ms, after so many frames.
+    /// All registers of a driven arm with a stream of 20 ms. It has accepted `frames` frames.
     fn registers(frames: u8) -> Snapshot {
         let mut all = Snapshot { address: 0, values: vec![0; 256] };
         let rows = [&STATUS_VERSION, &PROTECTION_VERSION, &MOTOR_STATE].map(|row| (row.address, 1));

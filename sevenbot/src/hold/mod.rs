@@ -119,7 +119,7 @@ pub struct Hold {
     /// Were the speeds written?
     is_restoring: bool,
     stage: Stage,
-    /// Only what was asked for at this time or later shows the effect of the frames.
+    /// A read shows the effect of the frames only if it was sent at this time or later.
     written: Duration,
     /// When the frames that are not confirmed were written last.
     repeated: Duration,

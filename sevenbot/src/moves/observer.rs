@@ -1,4 +1,4 @@
-//! Who watches a call that takes a while.
+//! Observers of a call that takes a while.
 
 use std::time::Duration;
 
@@ -26,7 +26,7 @@ impl Stage {
     }
 }
 
-/// Who watches a call that takes a while. `()` watches nothing.
+/// Observes a call that takes a while, and may end it. `()` does neither.
 ///
 /// ```
 /// use sevenbot::moves::{Observer, Stage};

@@ -52,7 +52,7 @@ impl LocalServer {
         if let Some(name) = &self.name {
             text.push_str(&format!("name {name}\n"));
         }
-        // No link that somebody planted is followed.
+        // Removes a link that another user planted, so that it is not followed.
         let _ = fs::remove_file(&path);
         let mut file = fs::File::create_new(&path)?;
         io::Write::write_all(&mut file, text.as_bytes())?;

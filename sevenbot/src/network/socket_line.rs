@@ -89,7 +89,7 @@ fn connect_named(name: &str, token: Option<&str>) -> Result<Box<dyn Stream>, Ope
     connect_known(&known, token)
 }
 
-/// The certificate is for the name: the address may be another one tomorrow.
+/// Connects to a known server. Its certificate has to match its name, because its address may change.
 fn connect_known(known: &KnownName, token: Option<&str>) -> Result<Box<dyn Stream>, OpenError> {
     match &known.address {
         Address::Tls(address) => connect_tcp(address, Some(&known.name), token),

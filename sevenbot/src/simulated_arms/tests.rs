@@ -1,4 +1,4 @@
-//! The same steps give the same numbers, whatever steps them.
+//! The same steps give the same numbers on any number of threads, and as frames on a single arm.
 
 use arm_sim::request::Request;
 use protocol_core::registers::map::{FINE_POSITION, FINE_TARGET, SET_POINT_PERIOD};

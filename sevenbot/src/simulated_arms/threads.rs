@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
-/// Does `work` on each of the groups, on so many threads, this one included. Each thread takes the next group, so the threads
+/// Does `work` on each of the groups, on `threads` threads, this one included. Each thread takes the next group, so the threads
 /// end together also if some groups take longer.
 pub(crate) fn share<T, I>(threads: usize, groups: I, work: impl Fn(T) + Sync)
 where

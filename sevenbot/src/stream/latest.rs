@@ -72,7 +72,7 @@ struct Leading {
     pace: StreamPace,
     /// The newest angle of each joint.
     newest: FineTargets,
-    /// No point had it.
+    /// No point with these angles was sent yet.
     is_new: bool,
     offered: Duration,
     /// The program has been silent, and the watchdog was asked for.

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-/// A point may be early or late by a quarter of the period without a ripple of the velocity (D23).
+/// A point may be early or late by a quarter of the period: the velocity then ripples by less than 5 % (D23).
 const TOLERANCE_DIVISOR: u32 = 4;
 
 /// The due times of a stream: one each period after the start, without drift.

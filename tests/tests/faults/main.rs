@@ -25,7 +25,7 @@ use system_tests::terminal::Terminal;
 
 /// Cells at the same time. They wait for most of their time.
 const THREADS: usize = 24;
-/// It holds the table in short.
+/// The document that has a short form of the table.
 const DOCUMENT: &str = include_str!("../../../docs/reliability.md");
 
 #[test]

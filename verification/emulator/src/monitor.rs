@@ -48,7 +48,7 @@ impl Monitor {
         }
     }
 
-    /// Executes a command of the monitor for people.
+    /// Executes a command of QEMU's human monitor.
     pub fn human(&mut self, line: &str) -> TaskResult {
         self.execute("human-monitor-command", &format!(r#""command-line":"{line}""#))
     }

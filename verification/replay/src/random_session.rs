@@ -13,7 +13,7 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 const ACTS: u32 = 40;
 /// The longest time between two of them, in microseconds.
 const LONGEST_PAUSE: u64 = 100_000;
-/// Actions that are always the same.
+/// Actions without a random part.
 const ACTIONS: [&str; 11] = [
     "clear",
     "restart",

@@ -16,7 +16,7 @@ pub type ResultRow = [String; 3];
 #[derive(Debug)]
 pub struct ResultTable<'a>(pub &'a CampaignPlan, pub &'a CampaignResult);
 
-/// Virtual days.
+/// Converts microseconds of virtual time to days.
 #[must_use]
 #[allow(clippy::cast_precision_loss)] // Shown with two decimals.
 pub fn days(micros: u64) -> f64 {

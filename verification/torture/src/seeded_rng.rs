@@ -9,7 +9,7 @@ use protocol_core::time::Duration;
 pub struct SeededRng(Random);
 
 impl SeededRng {
-    /// A generator with this seed.
+    /// Begins the sequence of this seed. The same seed gives the same numbers.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(Random::new(seed))

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use crate::connection::{Connection, line_after};
 
-/// Software rendering at full speed, also of a window that nobody sees, and nothing that asks or goes to other computers.
+/// Software rendering at full speed, also of a hidden window; no questions to a user, and no connections to other computers.
 const OPTIONS: &[&str] = &[
     "--headless=new",
     "--remote-debugging-port=0",

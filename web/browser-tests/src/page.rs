@@ -47,7 +47,7 @@ pub struct Screen {
 
 /// A desktop computer with light colours.
 pub const DESKTOP: Screen = Screen { width: 1_280, height: 720, is_dark: false, is_phone: false };
-/// The same with dark colours.
+/// A desktop computer with dark colours.
 pub const DARK: Screen = Screen { is_dark: true, ..DESKTOP };
 /// A phone.
 pub const PHONE: Screen = Screen { width: 390, height: 844, is_dark: false, is_phone: true };
@@ -59,7 +59,7 @@ impl Page {
         Self::open_after(url, "")
     }
 
-    /// The same, after a script that runs before those of the page.
+    /// As [`Self::open`]. `script` runs before the scripts of the page.
     #[must_use]
     pub fn open_after(url: &str, script: &str) -> Self {
         let mut page = Self { browser: Chromium::start(), heard: 0 };
@@ -139,7 +139,7 @@ impl Page {
         self.try_evaluate(expression).unwrap_or_else(|exception| panic!("{expression}: {exception}"))
     }
 
-    /// The same, for a number.
+    /// As [`Self::evaluate`], for a number.
     #[track_caller]
     pub fn number(&mut self, expression: &str) -> f64 {
         let value = self.evaluate(expression);

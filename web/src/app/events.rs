@@ -1,7 +1,7 @@
 //! What a person does: clicks, keys, sliders, the pointer on the picture, files.
 
 use protocol_core::time::Instant;
-use sevenbot::map::{MOTOR_STATE, motor_state};
+use sevenbot::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION, motor_state};
 use sevenbot::{Span, register_values};
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{Element, Event, HtmlDialogElement, HtmlInputElement, KeyboardEvent};
@@ -93,6 +93,11 @@ impl App {
     pub(super) fn write(&mut self, address: u8, values: &[u8]) {
         self.park = None;
         let now = self.now();
+        // A target would be one point of the stream of a movement, and the next point would lead back.
+        let moves = [MOTOR_STATE, TARGET_POSITION, FINE_TARGET].iter().any(|row| row.holds(address));
+        if let Some(player) = self.player.take_if(|_| moves) {
+            player.end(now, &mut self.client);
+        }
         self.client.write(now, address, values);
     }
 

@@ -257,7 +257,7 @@ impl App {
     }
 }
 
-/// Not negative, and far below the limit.
+/// Converts a number that is not negative and far below the limit.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 pub(super) const fn whole(number: f64) -> u64 {
     number as u64

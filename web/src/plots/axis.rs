@@ -12,7 +12,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// An axis from zero or below to zero or above that holds all values, and at least `least` to both sides. Its ends are
+    /// An axis with zero in its middle that holds all values, and at least `least` to both sides. Its ends are
     /// multiples of a round step, with at most `most_steps` of them.
     #[must_use]
     pub fn around_zero(values: impl Iterator<Item = f32>, least: f32, most_steps: f32) -> Self {

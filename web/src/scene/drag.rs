@@ -93,7 +93,7 @@ pub fn limits(joint: u8, angles: Angles) -> [f32; 2] {
     }
 }
 
-/// The same angles but for one joint, 1 to 7.
+/// These angles, with another angle in degrees for one joint, 1 to 7.
 #[must_use]
 pub fn with_joint(mut angles: Angles, joint: u8, degrees: f32) -> Angles {
     if let Some(angle) = usize::from(joint).checked_sub(1).and_then(|place| angles.get_mut(place)) {

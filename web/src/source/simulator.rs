@@ -132,7 +132,7 @@ mod tests {
         assert!((base(&arm) - rested).abs() < 0.5, "from {rested} to {}", base(&arm));
     }
 
-    /// Plays a movement of joint 1 until it ends; `during` may break something after so many pictures.
+    /// Plays a movement of joint 1 until it ends. `during` gets the number of each picture, and may break something.
     fn play(
         client: &mut Client,
         arm: &mut SimulatedSource,

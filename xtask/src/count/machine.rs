@@ -103,7 +103,7 @@ impl Machine {
         }
     }
 
-    /// Logs the instructions during `act`.
+    /// Logs the instructions and register accesses during `act`.
     pub(crate) fn watch(&mut self, act: impl FnOnce(&mut Self) -> TaskResult) -> TaskResult<Vec<TraceEvent>> {
         let before = fs::metadata(&self.log).map_or(0, |log| log.len());
         for event in ["read", "write"] {
@@ -125,7 +125,7 @@ impl Machine {
     }
 }
 
-/// The frame of a request.
+/// Encodes a request as a frame.
 pub(crate) fn frame(request: Request<'_>) -> Vec<u8> {
     let mut buffer = FrameBuffer::new();
     request.encode(&mut buffer);

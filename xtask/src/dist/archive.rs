@@ -27,7 +27,7 @@ impl PackedFile {
         Self { path: path.into(), bytes, is_program: true }
     }
 
-    /// The same file below a folder.
+    /// A copy of the file below a folder.
     pub(super) fn below(&self, folder: &str) -> Self {
         Self { path: format!("{folder}/{}", self.path), ..self.clone() }
     }

@@ -83,7 +83,7 @@ fn check_programs(release: &Release, files: &[(String, Vec<u8>)]) -> TaskResult 
     Ok(())
 }
 
-/// A file of completions has the name of a program, too.
+/// Is this a program? Completions for a shell have the same file name, so the first bytes decide.
 fn is_program(path: &str, bytes: &[u8]) -> bool {
     let is_named = ["/sevenbot", "/sevenbot.exe", "/host-sim"].iter().any(|name| path.ends_with(name));
     is_named && (bytes.starts_with(b"\x7FELF") || bytes.starts_with(b"MZ"))

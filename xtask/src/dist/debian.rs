@@ -13,7 +13,7 @@ use super::release::Release;
 use super::tree::DOC;
 use crate::run::{TaskResult, run_command};
 
-/// Who answers for the package, unless the variables of Debian's tools name somebody.
+/// The maintainer of the package, unless the variables of Debian's tools name another one.
 const MAINTAINER: &str = "7Bot V2 firmware developers <sevenbot@example.org>";
 /// The text of the MIT licence is in the package; that of Apache is in each Debian system.
 const COPYRIGHT: &str = "\

@@ -37,7 +37,7 @@ impl Release {
         }
     }
 
-    /// What the folder says of itself, one `key: value` in a line.
+    /// The text of `RELEASE.txt`: version, commit and time, each a line `key: value`.
     pub(super) fn note(&self) -> String {
         let commit = self.commit.as_ref().map(|commit| format!("commit: {commit}\n")).unwrap_or_default();
         format!("version: {}\n{commit}time: {}\n", self.version, self.epoch)

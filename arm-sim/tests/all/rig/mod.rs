@@ -36,7 +36,7 @@ impl Rig {
         rig
     }
 
-    /// Likewise, with torque. The goal of each joint is its position.
+    /// As [`Self::ready`], with torque. The goal of each joint is its position.
     pub fn driven() -> Self {
         let mut rig = Self::ready();
         rig.all_goals(Joint::ALL.map(|joint| rig.counts(joint)));

@@ -37,7 +37,7 @@ pub(crate) fn refused(arguments: &[&str]) -> String {
     complaint(&mut command(tempfile::tempdir().unwrap().path(), arguments))
 }
 
-/// Likewise, for a command.
+/// As [`refused`], for a command.
 pub(crate) fn complaint(command: &mut Command) -> String {
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let status = wait(&mut child);
@@ -69,12 +69,12 @@ impl Sim {
         Self::spawn(child, state)
     }
 
-    /// Likewise, with this state directory.
+    /// As [`Self::start`], with this state directory.
     pub(crate) fn start_in(state: &Path, arguments: &[&str]) -> Self {
         Self::spawn(command(state, arguments), tempfile::tempdir().unwrap())
     }
 
-    /// Likewise, with its standard error in a file, so that much output needs no reader.
+    /// As [`Self::start`], with its standard error in a file, so that much output needs no reader.
     pub(crate) fn start_with_log(arguments: &[&str], log: &Path) -> Self {
         let state = tempfile::tempdir().unwrap();
         let command = command(state.path(), arguments);

@@ -90,7 +90,7 @@ fn d27_a_joint_gives_way_also_out_of_the_linkage() {
     rig.run_ms(500);
     rig.write(29, &[1]);
     rig.run_ms(500);
-    // From outside, the set-point goes inwards: to the obstacle it has to come back outwards.
+    // The arm is outside the linkage, so its set-point goes inwards. To give way to the obstacle it has to come back outwards.
     rig.plant.set_wall(joint(2), stiff_wall(22));
     rig.write(47, &[90]);
     rig.run_ms(1_000);

@@ -8,7 +8,7 @@ use protocol_core::time::{Duration, Instant};
 
 const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
 pub const STANDARD_POSE: [u8; 7] = [90, 90, 65, 90, 90, 90, 80];
-/// The same in servo positions.
+/// [`STANDARD_POSE`] in servo counts.
 pub const STANDARD_COUNTS: [u16; 7] = [511, 445, 684, 511, 512, 512, 1008];
 
 /// A frame for the servos, taken apart.
@@ -35,7 +35,7 @@ pub struct Rig {
     pub saved: Vec<Image>,
     /// What becomes of the next save.
     pub storage: Storage,
-    /// The frames of goals that name this servo do not reach the servos, this often.
+    /// The id of a servo, and how many of the next frames with a goal for it are lost.
     pub lost_goals: (u8, usize),
     /// A servo without torque does not show its goal.
     pub hides_goals: bool,
@@ -89,7 +89,7 @@ impl Rig {
         rig
     }
 
-    /// Likewise, without torque and on a stand: each joint is exactly in the standard pose. With torque, the level
+    /// As [`Self::started`], without torque and on a stand: each joint is exactly in the standard pose. With torque, the level
     /// forearm droops by 0.7 degrees.
     pub fn on_a_stand() -> Self {
         let mut rig = Self::new();

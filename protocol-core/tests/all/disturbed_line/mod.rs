@@ -94,7 +94,7 @@ pub struct Tally {
     pub worst_delay_us: u64,
 }
 
-/// Sends at least so many good frames.
+/// Sends at least `frames` good frames, in bursts, with a disturbance before each burst.
 pub fn run(disturbance: Disturbance, seed: u64, frames: usize) -> Tally {
     let mut random = Random::new(seed);
     let mut line = Line::new();

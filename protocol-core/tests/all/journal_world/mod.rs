@@ -223,7 +223,7 @@ pub fn cuts(after: usize, operation: Operation, seed: u64) -> impl Iterator<Item
     programs.chain(erases.map(move |erase| Cut { erase, ..base }))
 }
 
-/// Every way to cut a power cycle after so many of its operations, and what is there afterwards.
+/// Cuts a power cycle with `saves` saves at each operation from number `from` on, in every way. Returns the world after each cut.
 pub fn every_cut<const SECTOR: usize>(
     world: &World<SECTOR>,
     saves: usize,

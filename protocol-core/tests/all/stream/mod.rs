@@ -17,7 +17,7 @@ const CRC: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
 #[derive(Clone, Debug)]
 pub enum Event {
     Bytes(Vec<u8>),
-    /// No byte for so many microseconds. The deframer is called at the end.
+    /// No byte for this many microseconds. The deframer is called at the end.
     Silence(u64),
 }
 
@@ -97,7 +97,7 @@ pub struct Model {
     history: Vec<u8>,
     /// Lengths of the history at which the line was silent for the gap.
     short: Vec<usize>,
-    /// The same for the long silence.
+    /// Lengths of the history at which the line was silent for the timeout.
     long: Vec<usize>,
     silence: u64,
     told: HashSet<usize>,

@@ -10,7 +10,7 @@ use super::view::{Dialog, MonitorView, SpeedChange, UiCommand};
 /// Degrees of a nudge, without and with Shift.
 const NUDGE: i16 = 1;
 const BIG_NUDGE: i16 = 10;
-/// Millimetres of a step of the tip, without and with Shift. A degree moves the tip by up to 6 mm.
+/// Millimetres of a step of the tip, without and with Shift. A degree of joint 1 moves the tip by up to 6.5 mm.
 const JOG: i16 = 5;
 const BIG_JOG: i16 = 20;
 /// The help: keys and their effect.

@@ -13,9 +13,9 @@ const REGISTERS: Span = Span::between(&FINE_TARGET, &LOAD);
 const BITS: u32 = 10 * (7 + 7 + REGISTERS.count() as u32);
 /// The answers take at most this part of the line: the rest is for reports.
 const SHARE_OF_LINE: u32 = 2;
-/// Between two questions for the health, which has more registers.
+/// The time between two reads of the health, which has more registers.
 const HEALTH_PERIOD: Duration = Duration::from_secs(1);
-/// A health takes as long as so many answers.
+/// A read of the health takes as long on the line as this many other answers.
 const ANSWERS_PER_HEALTH: u32 = 4;
 
 /// Reads targets, velocities and loads, and the health once a second.

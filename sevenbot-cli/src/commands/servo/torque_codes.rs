@@ -139,7 +139,7 @@ pub(super) fn run(session: &mut Session, args: &TorqueCodesArgs) -> Result<(), C
         false,
     )?;
     let lighter = ask_lighter_code(&mut bus, id);
-    // Also after a failure. The first failure is then reported.
+    // Switch torque off also after a failure. Of two failures the first is reported.
     let ended = switch(&mut bus, id, TorqueOffCode::Zero);
     match lighter? {
         Err(error) => Err(exchange_error(session, bus, error)),

@@ -8,7 +8,7 @@ use sevenbot::fine::FineTargets;
 
 /// Points older than this are forgotten. No report is later.
 const KEPT: Duration = Duration::from_secs(2);
-/// A target this far from the last point belongs to somebody else, in degrees.
+/// A target this far from the last point was written by another program, in degrees.
 const ELSEWHERE: f64 = 3.0;
 
 /// The points that were sent, and the errors so far.

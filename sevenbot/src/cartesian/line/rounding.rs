@@ -59,7 +59,7 @@ impl Rounding {
         PlannedPose::of(targets, path, share)
     }
 
-    /// The targets at the end of the line: of whole degrees those with the smallest miss.
+    /// The targets at the end of the line. In whole degrees, these are the ones with the smallest miss.
     pub(super) fn last_pose(&self, angles: Angles, path: &TipPath) -> PlannedPose {
         match self.resolution {
             TargetResolution::Degrees => PlannedPose::of(self.best_degrees(angles, path, 1.0), path, 1.0),

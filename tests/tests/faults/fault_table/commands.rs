@@ -3,7 +3,7 @@
 use system_tests::registers::{EFFECTOR_TYPE, MOTOR_STATE, SPEED, TARGET_POSITION, VACUUM_PUMP};
 use system_tests::relay::Moment;
 
-/// A row.
+/// A row of the table.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Command {
     /// The arguments. `FOLDER` is a folder with the files of [`FILES`].
@@ -28,7 +28,7 @@ pub(crate) struct Command {
 /// What a command is asked to do.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Asked {
-    /// To tell something: success means that it did.
+    /// To print something. There is no motion to check.
     Words,
     /// To bring joints to these angles in degrees.
     Reach(&'static [(usize, f64)]),
@@ -82,12 +82,12 @@ const fn moving(arguments: &'static str, moment: Moment, asked: Asked) -> Comman
 }
 
 impl Command {
-    /// With joints 1 and 2 away from the standard pose.
+    /// The command runs with joints 1 and 2 away from the standard pose.
     const fn begins_away(self) -> Self {
         Self { before: &[(TARGET_POSITION, &[110, 105]), SLOW], pauses: (2_000, 1_500), ..self }
     }
 
-    /// With the tool straight down at 0 185 50.
+    /// The command runs with the tool straight down, and the tip at (0, 185, 50) mm.
     const fn begins_tool_down(self) -> Self {
         Self {
             before: &[(TARGET_POSITION, &[90, 91, 110, 90, 135]), SLOW],
@@ -97,7 +97,7 @@ impl Command {
         }
     }
 
-    /// While the arm moves slowly.
+    /// The command runs while the arm moves slowly.
     const fn during_a_move(self) -> Self {
         Self { before: &[SLOWEST, (TARGET_POSITION, &[130, 130])], pauses: (300, 700), ..self }
     }

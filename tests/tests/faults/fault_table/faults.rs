@@ -7,7 +7,7 @@ use system_tests::relay::LineAction;
 /// The frames before the fault are on the line for a few milliseconds.
 const BEFORE: u64 = 20;
 
-/// A column.
+/// A column of the table.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fault {
     pub(crate) name: &'static str,
@@ -23,7 +23,7 @@ pub(crate) enum Effect {
     Before(&'static str),
     /// A wall in the way of joint 2.
     Wall,
-    /// A fault of the simulator that begins during the command, and lasts so many milliseconds.
+    /// A fault of the simulator that begins during the command, and how many milliseconds it lasts; `None`: it stays.
     During(&'static str, Option<u64>),
     /// A request to the simulator during the command.
     Request(&'static str),
@@ -69,7 +69,7 @@ impl Fault {
         control.result(&json!({ "do": "fault", "fault": fault }));
     }
 
-    /// Acts during the command. Then the arm has so many milliseconds to notice it.
+    /// Begins a fault during the command. Then `notice` milliseconds of virtual time pass, in which the arm notices it.
     pub(crate) fn act(self, control: &mut Control, notice: u64) -> LineAction {
         // The arm carries out the frames before first.
         control.advance(BEFORE);

@@ -28,7 +28,8 @@ pub(crate) use faults::{FAULTS, Fault};
 const AFTERWARDS: u64 = 3_000;
 /// The servos take this virtual time to start, in milliseconds.
 const START_UP: u64 = 1_500;
-/// The arm has received so many frames before: it was not switched on this moment. A restart is seen by the counter of frames.
+/// The arm has received this many frames before, as one that was switched on long ago. A command detects a restart by the
+/// counter of frames.
 const USED: usize = 100;
 /// First of the fine targets.
 const FINE_TARGET: u8 = 128;
@@ -36,7 +37,7 @@ const FINE_TARGET: u8 = 128;
 const NEAR: f64 = 3.0;
 /// A joint that moves by less than this in [`AFTERWARDS`] stands still, in degrees.
 const STILL: f64 = 1.5;
-/// A supply that goes and comes back is seen as one of these, as fast as the command looks.
+/// The words for a supply that is lost and comes back: which ones depends on when the command reads the arm.
 const SUPPLY_WORDS: [&str; 4] = [
     "no servo answers",
     "does not answer: its position is unknown",
@@ -193,8 +194,8 @@ fn first_words(text: &str, port: &str, folder: &Path) -> String {
     words.trim_end().to_owned()
 }
 
-/// The line without what depends on the moment at which the command noticed a fault: one that comes or goes is seen in
-/// several stages, and a lost line by the read or the write that was next.
+/// Cuts off what depends on the moment at which the command noticed a lost connection: the end of the line names the read or
+/// the write that came next.
 fn without_timing(line: &str) -> String {
     for end in ["the connection is gone", "no answer to a read"] {
         if let Some(begin) = line.find(end) {

@@ -1,4 +1,4 @@
-//! What was on the arm's line of late, and when it was unplugged: tells why a reply is missing.
+//! The last frames on the arm's line, and when it was unplugged. They tell why a reply is missing.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;

@@ -183,7 +183,7 @@ fn next_reply(wire: &mut impl Wire, map: Map, hertz: u8, reports: &mut usize) ->
     None
 }
 
-/// The same over the WebSocket. A page also gets an answer to each write.
+/// A program over the WebSocket. A page also gets an answer to each write.
 fn web_program(mut client: WebClient, own: u8, is_page: bool, end: Instant, history: &LineHistory) -> Tally {
     let mut tally = Tally::default();
     for value in (1..=100_u8).cycle().take_while(|_| Instant::now() < end) {

@@ -41,7 +41,7 @@ impl Served {
         Self::start_with(tool(), ptys, options, None)
     }
 
-    /// Starts one that may have so many file descriptors.
+    /// Starts a server that may have at most this many file descriptors.
     pub(crate) fn start_with_descriptors(most: usize, ptys: usize) -> Self {
         let tool = tool();
         let mut command = Command::new("sh");
@@ -137,7 +137,7 @@ impl Served {
     }
 }
 
-/// The links of so many pseudo-terminals, 52 at most.
+/// The names of `count` links to pseudo-terminals, 52 at most.
 pub(crate) fn names(count: usize) -> impl Iterator<Item = String> {
     ('a'..='z').chain('A'..='Z').take(count).map(String::from)
 }

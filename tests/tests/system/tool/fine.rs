@@ -32,7 +32,7 @@ fn d21_a_pose_takes_decimals() {
         assert_eq!([1, 2, 3].map(|joint| arm.counter(FINE_TARGET + 2 * (joint - 1))), [9_525, 9_000, 6_550]);
         let first: f64 = text.split_whitespace().next().expect("degrees").parse().expect("degrees");
         assert!((first - 95.25).abs() < 1.0 && text.contains('.'), "{text}");
-        // A step goes on from the hundredths.
+        // A relative step begins at the target in hundredths.
         arm.write(STREAM_REGISTERS, &[20, 0]);
         succeeded(arm.sevenbot(&["pose", "-0.3", "_", "_", "_", "_", "_", "_", "--wait"]));
         assert_eq!((arm.counter(FINE_TARGET), arm.counter(STREAM_REGISTERS)), (9_495, 20));

@@ -232,12 +232,12 @@ fn word_at(address: u8) -> Option<u8> {
     matches!(address, 128..=141 | 184..=185).then_some(address & !1)
 }
 
-/// The column "range" of the writable registers of two bytes.
+/// Is the value in the range of a writable register of two bytes, according to `docs/protocol.md`?
 fn is_word(low: u8, word: u16) -> bool {
     if low == 184 { word == 0 || (5..=1_000).contains(&word) } else { word <= 18_000 }
 }
 
-/// The column "range" of the writable registers.
+/// Is the value in the range of a writable register, according to `docs/protocol.md`?
 fn is_in_range(map: Map, address: u8, value: u8) -> bool {
     let max = match (map, address) {
         (_, 12) => 7,

@@ -136,8 +136,8 @@ impl WallCase {
     }
 }
 
-/// The greatest average of the pushes, from some time after the joint came to the wall. A joint that bounces off comes to it
-/// again.
+/// The greatest average push. The first [`LASTING_AFTER`] of each contact do not count, and a joint that bounces off begins a
+/// new contact.
 fn lasting(pushes: &[(Instant, u16)]) -> u16 {
     let contacts = pushes.chunk_by(|(before, _), (at, _)| *at - *before < BOUNCE_TIME);
     contacts.map(lasting_of_contact).max().unwrap_or(0)
@@ -209,7 +209,7 @@ pub fn push_against_wall<A: ObstacleArm>(
 /// A case, whether the arm was protected, and what became of the joint.
 type Outcome = (WallCase, bool, WallResult);
 
-/// The worst results by joint, and likewise by what distinguishes the cases.
+/// The worst results by joint, and by what distinguishes the cases.
 pub(super) fn tables<A: ObstacleArm>(cases: &[WallCase]) -> Result<String, A::Error> {
     let mut outcomes: Vec<Outcome> = Vec::new();
     for (case, is_protected) in cases.iter().flat_map(|case| [(case, false), (case, true)]) {

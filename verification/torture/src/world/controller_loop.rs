@@ -195,7 +195,7 @@ impl TortureWorld {
             arm.status_checker.reports.disturb();
         }
         if !arm.to_arm.waiting().is_empty() {
-            // The controller has been offered these bytes: they wait for room, and the wait says nothing about them.
+            // The controller did not take these bytes, for lack of room. The time of its wait does not depend on them.
         } else if until > self.now {
             arm.expired_waits = 0;
             arm.check_pending(self.now, room)?;

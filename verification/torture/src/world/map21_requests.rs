@@ -3,7 +3,7 @@
 use super::host_request::HostRequest;
 use crate::seeded_rng::SeededRng;
 
-/// A write that a program of map 2.2 could send, too: mostly, so that both maps change the same registers.
+/// A write of map 2.1 to the registers of a write of map 2.2. Most writes are such, so that both maps change the same registers.
 pub(super) fn of_map22(request: (u8, Vec<u8>)) -> HostRequest {
     let (address, values) = request;
     HostRequest::WriteMap21 { address, values }

@@ -111,7 +111,7 @@ impl TortureWorld {
         }
     }
 
-    /// When the next of them ends.
+    /// When the next obstacle, push or emergency stop ends.
     pub(super) fn next_ending(&self) -> Instant {
         self.endings.iter().map(|(at, _)| *at).min().unwrap_or(Instant::FAR_FUTURE)
     }

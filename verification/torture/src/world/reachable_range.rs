@@ -39,7 +39,7 @@ impl ReachableRange {
         self.lower -= NANOCOUNTS;
     }
 
-    /// The range of a joint whose set-point stood still until now, but for `ahead` after the last goal.
+    /// The range of a joint whose set-point stood still until now, except for the time `ahead` after the last goal.
     pub(super) fn resumed(self, now: Instant, ahead: Duration) -> Self {
         let moved = (now - self.at).min(ahead);
         Self { at: Instant::from_micros(now.as_micros().saturating_sub(moved.as_micros())), ..self }

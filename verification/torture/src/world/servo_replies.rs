@@ -43,7 +43,7 @@ struct Known {
     is_read_off: bool,
     /// How often its torque was read off without a reading that it is on.
     offs: u8,
-    /// The same without the first answers after a silence, which the controller may not take.
+    /// As `offs`, without the first answers after a silence, which the controller may not accept.
     taken_offs: u8,
     /// Its torque was read off [`LOST_BY`] times since it was last given torque.
     was_lost: bool,

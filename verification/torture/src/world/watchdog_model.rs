@@ -14,7 +14,7 @@ const ACTS_WITHIN: Duration = Duration::from_millis(30);
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WatchdogModel {
     timeout: Duration,
-    /// The end of the longest silence; `None` while the watchdog is off.
+    /// The watchdog acts at this time unless a request comes before; `None` while it is off.
     due: Option<Instant>,
     /// True if a silence was long enough since register 186 was written.
     may_have_acted: bool,

@@ -38,7 +38,7 @@ fn each_servo_that_does_not_answer_loses_its_colour_and_is_named() {
         assert!(broken + 40 < whole, "joint {joint}: {broken} of {whole} pixels");
         page.click("[data-action=repair]");
         page.wait_for_text("#state", "The arm is ready.");
-        // It gave way meanwhile, so that the picture is another one. Its angle is measured again.
+        // The joint gave way meanwhile, so the picture differs. Wait until its angle is measured again.
         page.wait_for_text(&format!("#angle-{joint}"), "°");
         assert_eq!(page.errors(), [""; 0]);
     }

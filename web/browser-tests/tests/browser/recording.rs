@@ -95,6 +95,20 @@ fn a_stop_ends_a_movement_that_is_played() {
 }
 
 #[test]
+fn a_slider_ends_a_movement_that_is_played_and_its_joint_goes_where_it_is_set() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    play_slowly(&viewed, &mut page);
+    page.click("[data-action=pump]");
+    assert!(page.text("#recording").contains("playing"), "what moves no joint leaves it");
+    page.focus("#joint-2");
+    page.keys("ArrowRight", 10);
+    page.wait_until_joint_rests(2, 100.0);
+    check_it_stands(&mut page);
+    assert_eq!(page.state()["registers"][184], 0, "the stream is closed");
+}
+
+#[test]
 fn a_stop_of_another_program_ends_a_movement_that_is_played() {
     let viewed = Viewed::with_arm();
     let mut page = viewed.open();

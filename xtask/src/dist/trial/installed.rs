@@ -96,7 +96,7 @@ pub(super) fn packages_are_flawless(release: &Release) -> TaskResult {
     Ok(())
 }
 
-/// The wheel of this computer, in the Python of a bare system, and in each Python of this one.
+/// Tries the wheel for this computer: in the Python of a bare system, and in each Python of this computer.
 pub(super) fn wheels(release: &Release) -> TaskResult {
     let name = wheels::wheel(release, host_platform()?);
     let wheel = release.path(&name);

@@ -17,7 +17,7 @@ const VELOCITY: f64 = 3.0;
 /// Runs of each scenario, each with its own seed and phase of the control cycles.
 const RUNS: u64 = 20;
 const PERIODS: [f64; 5] = [0.005, 0.01, 0.02, 0.05, 0.1];
-/// After so many points a method has settled.
+/// A method has settled after this many points.
 const SETTLING_POINTS: usize = 40;
 
 /// How the frames of a stream come.

@@ -16,7 +16,7 @@ const BASE: u64 = 100;
 const LOWEST: u64 = 40;
 /// Writes whose times are known at the same time.
 const KEPT: u64 = 1 << 20;
-/// Joints, and positions of theirs that are remembered.
+/// Number of joints, and of the last positions that are remembered.
 const JOINTS: usize = 7;
 const REMEMBERED: usize = 512;
 
@@ -44,7 +44,7 @@ impl SentTargets {
         }
     }
 
-    /// Sends targets that hold a number of their own.
+    /// Sends targets that encode a new number, and notes when they were sent.
     pub(crate) fn send<T>(&self, send: impl FnOnce([u8; DIGITS as usize]) -> T) -> T {
         let number = self.next.fetch_add(1, Ordering::SeqCst);
         let time = self.slot(number);

@@ -18,7 +18,7 @@ use crate::serve::line_history::LineHistory;
 
 /// A reply that has not come after this time is lost.
 const LOST: Duration = Duration::from_secs(30);
-/// The same, whatever else comes: replies to the program before, which stand before it, and reports.
+/// A reply is lost after this time even if other frames come: reports, and replies to an earlier program.
 const LONGEST: Duration = Duration::from_secs(120);
 /// A reply that an outage took does not come any more after this time.
 const AFTER_OUTAGE: Duration = Duration::from_secs(1);
@@ -83,7 +83,7 @@ impl Chaos {
         self.history.note(passing);
     }
 
-    /// What the arm's line carried of late.
+    /// The last frames on the arm's line.
     pub(crate) fn line_of_late(&self) -> String {
         self.history.of_late()
     }

@@ -1,4 +1,4 @@
-//! The ways to the server, and a wire of each.
+//! The ways to connect to the server, and a connection of each kind.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;

@@ -56,7 +56,7 @@ impl Program {
         self.0.write_all(bytes).expect("the server takes bytes");
     }
 
-    /// The values of registers.
+    /// Reads registers, checks the frame of the reply, and returns their values.
     #[track_caller]
     pub(crate) fn read(&mut self, address: u8, count: u8) -> Vec<u8> {
         self.send(&read_request(address, count));

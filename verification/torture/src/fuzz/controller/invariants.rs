@@ -65,7 +65,7 @@ impl InvariantChecker {
         }
     }
 
-    /// A frame to the host is complete, and its values are those of the registers.
+    /// Checks that a frame to the host is complete, and that its values are those of the registers.
     pub fn frame_to_host(&self, bytes: &[u8], registers: &RegisterFile) {
         let ParseOutcome::Complete(reply, length) = parse::<ToHost>(bytes) else {
             panic!("{bytes:?} is not a frame")

@@ -82,7 +82,7 @@ impl StatusChecker {
         let position = context.bus.position(joint);
         let (last, since) = self.last_moves[joint];
         let checked_at = std::mem::replace(&mut self.position_checked_at[joint], context.now);
-        // While it was not checked, the joint may have moved away and back.
+        // The joint may have moved away and back since the last check.
         let may_have_moved = last != position
             || context.now - checked_at > UNCHECKED_TIME
             || context.bus.truth(joint).has_turned_since(checked_at);
