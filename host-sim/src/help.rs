@@ -17,8 +17,8 @@ THE FIRST MINUTE
                                    answer
   host-sim --arms 3 --link ./7bot  three arms, behind ./7bot-1, ./7bot-2 and
                                    ./7bot-3
-  In the source tree: cargo sim -- --link ./7bot, and cargo sevenbot --port
-  ./7bot pose ...
+  In the source tree: cargo sim -- --link ./7bot, and cargo sevenbot --
+  --port ./7bot pose ...
 
   Any serial client can open the port, at any baud rate; with --strict-baud only
   at that of the arm. The first line on standard output is 'ready <tty path>',

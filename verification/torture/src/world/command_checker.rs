@@ -27,6 +27,7 @@ use super::servo_replies::ServoReplies;
 use crate::linkage_goals::LinkageGoals;
 use crate::per_joint::PerJoint;
 use crate::violation::Violation;
+use crate::world_counts::WorldCounts;
 
 /// A joint that had no goal for this long is let go, unless it is silent: an alarm freed it. It is not driven any more.
 const LET_GO_TIME: Duration = Duration::from_millis(10_000);
@@ -70,8 +71,8 @@ pub(super) struct CommandChecker {
     is_written_for_later: PerJoint<bool>,
     /// How often each joint was given torque since register 29 was written.
     attempts: PerJoint<EngagementAttempts>,
-    pub(super) count: u64,
-    pub(super) engagements: u64,
+    count: u64,
+    engagements: u64,
 }
 
 /// The state of the arm when a command is sent.
@@ -116,6 +117,11 @@ impl CommandChecker {
             count: 0,
             engagements: 0,
         }
+    }
+
+    /// What was checked.
+    pub(super) fn counts(&self) -> WorldCounts {
+        WorldCounts { commands: self.count, engagements: self.engagements, ..WorldCounts::default() }
     }
 
     /// Takes bytes that the controller receives.

@@ -194,6 +194,7 @@ impl DisturbedBus {
         let status = starts.filter_map(|start| self.partial_reply.get(start..)).find_map(whole_status);
         if let Some((joint, status)) = status {
             self.last_status[joint] = status;
+            self.truths[joint].answers(now, status);
             if status.speed > BELIEVED_SPEED {
                 self.outran_at[joint] = now;
             }

@@ -3,6 +3,7 @@
 //! The controller follows both late. So each of them tells for some time what the controller may do (D27, D28).
 
 use motion_core::servo_bus::Torque;
+use motion_core::servo_bus::frame::error;
 use protocol_core::time::{Duration, Instant};
 
 use super::status_reply::StatusFields;
@@ -20,6 +21,9 @@ const PUSH_ERROR: i16 = 150;
 /// Celsius.
 pub(super) const COOL: u8 = 75;
 
+/// An alarm has been gone for this long when its joint engages again: 500 ms (D28), less what an answer may be late.
+const ALARM_OVER: Duration = Duration::from_millis(400);
+
 /// The truth about one joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct JointTruth {
@@ -30,6 +34,8 @@ pub(super) struct JointTruth {
     off_at: Instant,
     /// The last alarm, or the last time that the servo was still hot after one. A joint that nothing moves counts as held as long as its servo has an alarm (D28).
     alarm_at: Option<Instant>,
+    /// The last answer with an alarm that ends by itself: heat, or a wrong voltage.
+    passing_alarm_at: Option<Instant>,
     /// It has no torque since a disturbance: the controller cannot tell a lost order from lost torque.
     lacks_order: bool,
     /// The last push over the limit.
@@ -45,6 +51,18 @@ impl JointTruth {
         if status.alarms != 0 || is_hot {
             self.alarm_at = Some(now);
         }
+    }
+
+    /// Takes an answer of the servo.
+    pub(super) fn answers(&mut self, now: Instant, status: StatusFields) {
+        if status.alarms & !error::OVERLOAD != 0 {
+            self.passing_alarm_at = Some(now);
+        }
+    }
+
+    /// True if no alarm that ends by itself keeps the joint from engaging again (D28).
+    pub(super) fn is_calm(&self, now: Instant) -> bool {
+        self.passing_alarm_at.is_none_or(|at| now - at >= ALARM_OVER)
     }
 
     /// Takes the torque of the servo. `may_miss_orders` tells that frames may be lost, or questions not answered.
@@ -105,8 +123,6 @@ impl JointTruth {
 
 #[cfg(test)]
 mod tests {
-    use motion_core::servo_bus::frame::error;
-
     use super::*;
 
     const ON: Option<Torque> = Some(Torque::On);
@@ -154,6 +170,17 @@ mod tests {
         truth.reports(at(1_100), StatusFields { celsius: 75, ..StatusFields::default() });
         assert!(truth.may_be_let_go(at(8_499)) && !truth.may_be_let_go(at(8_500)));
         assert!(truth.may_wait_for_torque(at(10_999)) && !truth.may_wait_for_torque(at(11_000)));
+    }
+
+    #[test]
+    fn a_joint_is_calm_some_time_after_the_last_answer_with_an_alarm_that_ends_by_itself() {
+        let mut truth = JointTruth::default();
+        let answer = |alarms| StatusFields { alarms, ..StatusFields::default() };
+        truth.answers(at(0), answer(error::OVERLOAD));
+        assert!(truth.is_calm(at(0)), "it is latched");
+        truth.answers(at(100), answer(error::OVERLOAD | error::OVERHEAT));
+        truth.answers(at(200), answer(error::OVERLOAD));
+        assert!(!truth.is_calm(at(499)) && truth.is_calm(at(500)));
     }
 
     #[test]

@@ -122,10 +122,14 @@ impl TortureWorld {
         while self.now < end {
             self.step().map_err(|violation| Box::new(self.failed(violation)))?;
         }
-        self.counts.micros = self.now.as_micros();
-        self.counts.disturbed_servo_frames = self.bus.disturbed_frames;
-        self.counts.undetected_errors = self.bus.undetected_errors;
-        Ok(self.counts)
+        let mut counts = self.counts;
+        counts.micros = self.now.as_micros();
+        counts.disturbed_servo_frames = self.bus.disturbed_frames;
+        counts.undetected_errors = self.bus.undetected_errors;
+        if let PowerState::On(arm) = &self.power {
+            counts += arm.command_checker.counts();
+        }
+        Ok(counts)
     }
 
     fn failed(&self, violation: Violation) -> FailedWorld {

@@ -92,8 +92,7 @@ impl TortureWorld {
     pub(super) fn power_down(&mut self, arm: &PoweredArm, servos_too: bool) {
         self.supply_rule.forget();
         self.counts.power_cuts += 1;
-        self.counts.commands += arm.command_checker.count;
-        self.counts.engagements += arm.command_checker.engagements;
+        self.counts += arm.command_checker.counts();
         if !servos_too {
             self.bus.restarted_at = self.now;
         }

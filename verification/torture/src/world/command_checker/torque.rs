@@ -4,10 +4,14 @@
 use motion_core::servo_bus::Torque;
 use protocol_core::registers::Joint;
 use protocol_core::registers::map::{MOTOR_STATE, TARGET_POSITION, motor_state};
+use protocol_core::time::Duration;
 
 use super::position::degree;
 use super::{CommandChecker, CommandContext, invalid_frame};
 use crate::violation::{Check, Violation, ensure};
+
+/// After this time with torque, the controller has read that a servo has it.
+const HELD_FOR: Duration = Duration::from_millis(1_000);
 
 impl CommandChecker {
     /// Torque switches are set to the motor state in register 29 (D13).
@@ -72,6 +76,7 @@ impl CommandChecker {
             self.check_position(joint, range.last_goal, "is given torque", context)?;
         }
         self.check_servo_goal(joint, range.last_goal, context)?;
+        self.check_alarm_is_over(joint, context)?;
         self.kept_goals[joint] = None;
         self.is_first[joint] = false;
         self.replies.forget_doubt(joint);
@@ -93,6 +98,17 @@ impl CommandChecker {
         let held = bus.servo_goal(joint);
         ensure(!context.is_known(joint) || !bus.is_free(joint) || held.abs_diff(goal) <= 1, || {
             format!("joint {} is given torque with the goal {held} instead of {goal}", joint.number())
+        })
+    }
+
+    /// A joint that let go engages when its alarm has been gone for a while (D28). If it let go soon after it had got torque, the
+    /// controller may take its order for lost.
+    fn check_alarm_is_over(&self, joint: Joint, context: &CommandContext<'_>) -> Check {
+        let truth = context.bus.truth(joint);
+        let times = truth.lost_at().zip(self.engaged_at[joint]);
+        let is_let_go = times.is_some_and(|(lost, engaged)| lost > engaged + HELD_FOR);
+        ensure(!is_let_go || !context.is_known(joint) || truth.is_calm(context.now), || {
+            format!("joint {} is given torque before its alarm is over", joint.number())
         })
     }
 
@@ -125,6 +141,7 @@ impl CommandChecker {
 
 #[cfg(test)]
 mod tests {
+    use arm_sim::servo::Trip;
     use protocol_core::registers::map::MOVING_JOINTS;
 
     use super::*;
@@ -190,6 +207,24 @@ mod tests {
         arm.bus.restart_servo(arm.now, JOINT);
         arm.run(300).unwrap();
         assert_eq!(arm.torque(JOINT, Torque::Damping), Ok(()));
+    }
+
+    #[test]
+    fn a_joint_that_heat_freed_gets_no_torque_before_the_alarm_is_over() {
+        for (is_hot, is_right) in [(false, true), (true, false)] {
+            let mut arm = ScriptedArm::with_engaged(JOINT);
+            arm.run(1_500).unwrap();
+            if is_hot {
+                arm.bus.trip(arm.now, JOINT, Trip::Heat);
+            } else {
+                arm.bus.restart_servo(arm.now, JOINT);
+            }
+            arm.run(300).unwrap();
+            arm.torque(JOINT, Torque::Damping).unwrap();
+            let check = arm.engage(JOINT);
+            assert_eq!(check.is_ok(), is_right, "{check:?}");
+            assert_eq!(says(&check, "before its alarm is over"), is_hot, "{check:?}");
+        }
     }
 
     #[test]
