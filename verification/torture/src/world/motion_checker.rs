@@ -37,8 +37,8 @@ const CHECK_PERIOD: Duration = Duration::from_millis(5);
 const SHRINK_PER_SECOND: u64 = 80_000;
 /// A servo may still approach a goal of this age: its set-point and its motor lag behind by 30 ms.
 const GOAL_AGE: Duration = Duration::from_millis(100);
-/// When the set-point of a joint that pushes comes back at once (D27), the derivative term of its servo turns the joint
-/// away from its goal for a moment: by this much, in millidegrees.
+/// When the set-point of a joint that pushes comes back fast, the derivative term of its servo turns the joint away from its
+/// goal for a moment: by this much, in millidegrees.
 const RECOIL: i32 = 2_000;
 /// A joint that something has turned past its goals is back this long after it is gone.
 const OVERRUN_TIME: Duration = Duration::from_millis(1_000);
@@ -70,7 +70,7 @@ impl MotionChecker {
         bounds.awaits_goal &= exemption == Exemption::PowerLoss;
     }
 
-    /// The set-point of a joint that pushes may come back at once (D27).
+    /// The set-point of a joint that pushes may come back at once (D27), or fast from far behind a wall.
     pub(super) fn may_recoil(&mut self, joint: Joint, plant: &Plant) {
         let [largest, _] = &mut self.joints[joint].yields;
         *largest = (*largest).max(yield_of(joint, plant).saturating_add(RECOIL));

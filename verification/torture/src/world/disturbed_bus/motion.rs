@@ -44,7 +44,7 @@ impl DisturbedBus {
             self.truths[joint].stands(now, self.plant.position_counts(joint));
             self.truths[joint].pushes(now, self.plant.motor_torque(joint), limits[joint]);
             self.truths[joint].reports(now, self.last_status[joint]);
-            if self.truths[joint].may_give_way(now) {
+            if self.truths[joint].may_give_way(now) || self.has_wall[joint] {
                 self.motion_checker.may_recoil(joint, &self.plant);
             }
         }
