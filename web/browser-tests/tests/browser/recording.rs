@@ -103,7 +103,7 @@ fn a_slider_ends_a_movement_that_is_played_and_its_joint_goes_where_it_is_set() 
     assert!(page.text("#recording").contains("playing"), "what moves no joint leaves it");
     page.focus("#joint-2");
     page.keys("ArrowRight", 10);
-    page.wait_until_joint_rests(2, 100.0);
+    page.wait_until_joint_rests(2, 95.0);
     check_it_stands(&mut page);
     assert_eq!(page.state()["registers"][184], 0, "the stream is closed");
 }
