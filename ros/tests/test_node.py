@@ -203,12 +203,17 @@ def moving(client: Client, node: Program) -> None:
 
 @KINDS
 def test_a_killed_node_leaves_the_arm_to_its_watchdog(start: Start, client: Clients, kind: str) -> None:
-    start.arm(kind)
-    node = start.node(start.link, jump="approach", max_age=30.0)
-    leading = client()
-    leading.connect()
-    moving(leading, node)
-    node.end()
+    for _ in range(6):
+        controller = start.arm(kind)
+        node = start.node(start.link, jump="approach", max_age=30.0)
+        leading = client()
+        leading.connect()
+        moving(leading, node)
+        node.end()
+        if "the arm holds" not in node.text():
+            break
+        # Servos miss answers on a busy machine, and the node made the arm hold before it was killed.
+        controller.end(signal.SIGTERM)
     # A program that asks the arm would end the silence.
     time.sleep(1.0)
     arm = sevenbot.Arm(start.link)
