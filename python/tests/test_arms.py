@@ -130,7 +130,8 @@ def test_servos_differ_from_arm_to_arm() -> None:
     for _ in range(100):
         seen = arms.step(numpy.tile(REST, (3, 1)))
     loads = numpy.abs(seen[:, 16])
-    assert loads[0] > 1.3 * loads[1] > 1.3 * 1.3 * loads[2] > 10
+    # The weakest one pushes as hard as its limit lets it.
+    assert loads[0] > 1.2 * loads[1] > 1.2 * 1.2 * loads[2] > 10
     # The weight turns a weaker joint further off its target.
     assert seen[0, 2] - 65 > 1.5 * (seen[1, 2] - 65) > 0
     arms.reset()
