@@ -188,6 +188,13 @@ impl Player {
         })
     }
 
+    /// Ends a movement that is played now. The registers before that one are restored at the end of this one.
+    #[must_use]
+    pub fn instead_of(self, earlier: &Self, now: Instant, client: &mut Client) -> Self {
+        earlier.end(now, client);
+        Self { before: earlier.before.clone(), ..self }
+    }
+
     /// How much was played, from 0 to 1.
     #[must_use]
     pub fn progress(&self) -> f64 {

@@ -45,20 +45,19 @@ pub struct Park {
 }
 
 impl Park {
-    /// Begins at the present pose of the arm. `None` if a joint is not measured.
+    /// Begins at the present pose of the arm. `speeds`: the speed registers before it. `None` if a joint is not measured.
     #[must_use]
-    pub fn new(state: &ArmState, client: &Client) -> Option<Self> {
+    pub fn new(state: &ArmState, speeds: [u8; 7]) -> Option<Self> {
         let mut now = [FineAngle::from_hundredths(0)?; 7];
         for (angle, measured) in now.iter_mut().zip(state.measured) {
             *angle = FineAngle::from_degrees(f64::from(measured?))?;
         }
         let mut way = park_way(None, now);
         way.reverse();
-        let speeds = client.registers().joints(&SPEED);
         Some(Self { way, speeds, sent: None, let_go: None })
     }
 
-    /// The speed registers of the joints before parking, to be written back afterwards.
+    /// The speed registers before parking, to be written back afterwards.
     #[must_use]
     pub const fn speeds(&self) -> [u8; 7] {
         self.speeds

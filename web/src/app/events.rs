@@ -1,7 +1,7 @@
 //! What a person does: clicks, keys, sliders, the pointer on the picture, files.
 
 use protocol_core::time::Instant;
-use sevenbot::map::{FINE_TARGET, MOTOR_STATE, TARGET_POSITION, motor_state};
+use sevenbot::map::{FINE_TARGET, MOTOR_STATE, SPEED, TARGET_POSITION, motor_state};
 use sevenbot::{Span, register_values};
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{Element, Event, HtmlDialogElement, HtmlInputElement, KeyboardEvent};
@@ -95,10 +95,17 @@ impl App {
         let now = self.now();
         // A target would be one point of the stream of a movement, and the next point would lead back.
         let moves = [MOTOR_STATE, TARGET_POSITION, FINE_TARGET].iter().any(|row| row.holds(address));
-        if let Some(player) = self.player.take_if(|_| moves) {
-            player.end(now, &mut self.client);
+        if moves {
+            self.end_movement();
         }
         self.client.write(now, address, values);
+    }
+
+    /// Ends a movement that is played. Returns the speed registers before it, which the arm has again soon.
+    fn end_movement(&mut self) -> Option<[u8; 7]> {
+        let (player, now) = (self.player.take()?, self.now());
+        player.end(now, &mut self.client);
+        Some(player.speeds())
     }
 
     /// Where the wall is, in degrees.
@@ -123,8 +130,8 @@ impl App {
     }
 
     fn begin_park(&mut self) {
-        self.player = None;
-        self.park = Park::new(&self.client.state(), &self.client);
+        let speeds = self.end_movement().unwrap_or_else(|| self.client.registers().joints(&SPEED));
+        self.park = Park::new(&self.client.state(), speeds);
         let text = if self.park.is_some() { "parking" } else { "park-failed" };
         self.dom.notice(self.language.text(text));
     }

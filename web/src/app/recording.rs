@@ -43,9 +43,13 @@ impl App {
         let seconds = self.dom.get::<HtmlInputElement>("approach").ok().and_then(|field| number(&field));
         let approach = seconds.filter(|seconds| *seconds > 0.0);
         let approach = approach.map(|seconds| Duration::from_secs_f32(seconds.min(LONGEST_APPROACH)));
-        match Player::new(&recording.text, self.client.registers(), approach, self.now()) {
+        let now = self.now();
+        match Player::new(&recording.text, self.client.registers(), approach, now) {
             Ok(player) => {
-                self.player = Some(player);
+                self.player = Some(match self.player.take() {
+                    Some(earlier) => player.instead_of(&earlier, now, &mut self.client),
+                    None => player,
+                });
                 self.dom.end_notice();
             }
             Err(PlayRefusal::NoRecording(why)) => self.refuse_file(&why),

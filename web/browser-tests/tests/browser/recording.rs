@@ -108,6 +108,26 @@ fn a_slider_ends_a_movement_that_is_played_and_its_joint_goes_where_it_is_set() 
     assert_eq!(page.state()["registers"][184], 0, "the stream is closed");
 }
 
+/// The speeds of the joints, and the period of a stream.
+fn settings(page: &mut Page) -> Vec<u64> {
+    let state = page.state();
+    let registers = (32..39).chain([184]);
+    registers.map(|address| state["registers"][address].as_u64().expect("a value")).collect()
+}
+
+#[test]
+fn park_or_another_movement_ends_one_that_is_played_and_restores_its_speeds() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    let before = settings(&mut page);
+    play_slowly(&viewed, &mut page);
+    assert_ne!(settings(&mut page), before, "points tell the speed");
+    page.click("[data-action=play]");
+    page.click("[data-action=park]");
+    page.wait_for_text("#notice", "Parked: the motors are off");
+    assert_eq!(settings(&mut page), before);
+}
+
 #[test]
 fn a_stop_of_another_program_ends_a_movement_that_is_played() {
     let viewed = Viewed::with_arm();
