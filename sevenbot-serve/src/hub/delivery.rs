@@ -8,6 +8,7 @@ use super::Hub;
 use super::client::{Client, Event};
 use super::client_id::ClientId;
 use super::line::Owner;
+use super::own_registers::byte_at;
 use super::request::WholeRequest;
 
 impl Hub {
@@ -39,8 +40,7 @@ impl Hub {
 
     /// Overwrites in a reply the registers whose values the server keeps, not the arm.
     fn overlay(&self, now: Instant, id: ClientId, address: u8, values: &mut [u8]) {
-        let place = FAULTS.address.checked_sub(address).map(usize::from);
-        if let Some(faults) = place.and_then(|place| values.get_mut(place)).filter(|_| self.known.is_ours()) {
+        if let Some(faults) = byte_at(address, values, &FAULTS).filter(|_| self.known.is_ours()) {
             *faults |= if self.watchdog.has_acted() { fault::HOST_SILENT } else { 0 };
         }
         self.watchdog.overlay(address, values);

@@ -95,7 +95,7 @@ impl OwnRegisters {
 }
 
 /// The byte of a register in the values from `address` on.
-fn byte_at<'a>(address: u8, values: &'a mut [u8], register: &Register) -> Option<&'a mut u8> {
+pub(super) fn byte_at<'a>(address: u8, values: &'a mut [u8], register: &Register) -> Option<&'a mut u8> {
     values.get_mut(usize::from(register.address.checked_sub(address)?))
 }
 

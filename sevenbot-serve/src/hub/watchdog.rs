@@ -16,6 +16,7 @@ use protocol_core::registers::map::{HOST_WATCHDOG, WATCHDOG_ACTION};
 use protocol_core::time::{Duration, Instant};
 
 use super::client_id::ClientId;
+use super::own_registers::byte_at;
 
 /// One step of register 186.
 const STEP: Duration = Duration::from_millis(10);
@@ -100,14 +101,14 @@ impl ClientWatchdog {
 
     /// Replaces register 186 in a reply to a client, whose first register is `address`.
     pub(crate) fn overlay(&self, address: u8, values: &mut [u8]) {
-        if let (Some(watched), Some(value)) = (self.watched, register_186(address, values)) {
-            *value = watched.steps;
+        if let (Some(watched), Some(steps)) = (self.watched, byte_at(address, values, &HOST_WATCHDOG)) {
+            *steps = watched.steps;
         }
     }
 
     /// Replaces register 186 in a write to the arm.
     pub(crate) fn for_arm(address: u8, values: &mut [u8]) {
-        if let Some(steps) = register_186(address, values).filter(|steps| **steps > 0) {
+        if let Some(steps) = byte_at(address, values, &HOST_WATCHDOG).filter(|steps| **steps > 0) {
             *steps = LEAST_OF_ARM.max(*steps);
         }
     }
@@ -122,10 +123,6 @@ impl Watched {
     fn timeout(&self) -> Duration {
         Duration::from_micros(STEP.as_micros() * u64::from(self.steps))
     }
-}
-
-fn register_186(address: u8, values: &mut [u8]) -> Option<&mut u8> {
-    values.get_mut(usize::from(HOST_WATCHDOG.address.checked_sub(address)?))
 }
 
 #[cfg(test)]
