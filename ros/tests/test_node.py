@@ -12,28 +12,13 @@ from collections.abc import Callable
 import pytest
 import sevenbot
 from client import Client, seconds_of
-from conftest import Program, Start
-from diagnostic_msgs.msg import KeyValue
+from conftest import Start
+from leading import HOME, healthy, hold, level, moving, values
 from sevenbot_ros.joints import NAMES, PASSIVE
 
 Report = Callable[[str], None]
 Clients = Callable[..., Client]
 KINDS = pytest.mark.parametrize("kind", ["simulator", "image"])
-HOME = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 80.0]
-# A stream that had no command for so long may have ended, and the next one begins with an approach. Seconds.
-LONGEST_GAP = 0.2
-APPROACH = 1.0
-
-
-def values(client: Client) -> list[KeyValue]:
-    """Those of the newest diagnosis."""
-    return client.diagnostics[-1].status[0].values if client.diagnostics else []
-
-
-def level(client: Client) -> tuple[int, str]:
-    """The newest diagnosis."""
-    status = client.diagnostics[-1].status[0]
-    return status.level[0], status.message
 
 
 def stamp_gaps(client: Client) -> list[float]:
@@ -136,69 +121,6 @@ def test_a_sine_is_followed_and_a_stop_ends_it(start: Start, client: Clients, re
     assert leading.call("hold")[0]
     leading.each(0.02, 50, lambda _: leading.send([standing + 2.0, *HOME[1:]]))
     leading.until(lambda: leading.degrees()[0] == pytest.approx(standing + 2.0, abs=0.5), "motion after hold")
-
-
-def healthy(client: Client) -> None:
-    """Waits until the next diagnosis tells of no error."""
-    client.diagnostics.clear()
-    client.until(lambda: client.diagnostics and level(client)[0] < 2, "health")
-
-
-def lead(client: Client, node: Program, send: Callable[[], None], is_there: Callable[[], bool]) -> None:
-    """Sends commands until the joints are there. The servos of the emulator answer late on a busy machine: then the arm holds, as it
-    has to, and takes commands after `hold`."""
-    held = 0
-
-    def go() -> bool:
-        nonlocal held
-        send()
-        if (count := node.text().count("the arm holds")) > held:
-            held = count
-            hold(client)
-        return is_there()
-
-    client.until(go, "motion")
-
-
-def hold(client: Client) -> None:
-    """Calls `hold` until all servos answer it."""
-
-    def holds() -> bool:
-        healthy(client)
-        success, text = client.call("hold")
-        assert success or is_silence(text), text
-        return success
-
-    client.until(holds, "hold")
-
-
-def is_silence(text: str) -> bool:
-    """Does this tell of servos that do not answer, and of nothing else?"""
-    problem = text.splitlines()[0]
-    return "does not answer" in problem or "no servo answers" in problem
-
-
-def bus_errors(client: Client) -> int:
-    """The errors of the servo bus in the newest diagnosis."""
-    return next(int(value.value) for value in values(client) if value.key == "errors of the servo bus")
-
-
-def state_now(client: Client) -> list[float]:
-    """Degrees that were measured after this call."""
-    now = client.seconds()
-    client.until(lambda: seconds_of(client.states[-1]) > now, "a new state")
-    return client.degrees()
-
-
-def moving(client: Client, node: Program) -> None:
-    """Sends commands that move joint 1, until it has left its place."""
-    begin = client.seconds()
-    client.until(lambda: client.degrees()[0] == pytest.approx(0.0, abs=1.0))
-
-    def send() -> None:
-        client.send({"joint_1": min((client.seconds() - begin) * 8.0, 60.0)})
-
-    lead(client, node, send, lambda: client.degrees()[0] > 10.0)
 
 
 @KINDS
@@ -330,58 +252,3 @@ def test_memory_does_not_grow(start: Start, client: Clients, report: Report) -> 
     after = node.memory()
     report(f"memory of the node: {before} kB, {after} kB after {seconds:.0f} s more")
     assert after - before < 1024 + 4 * seconds
-
-
-def test_the_emulated_image_follows_a_sine_and_stops(start: Start, client: Clients, report: Report) -> None:
-    """The emulator runs in the time of the computer. So states count while nothing made the arm hold, and the delay is only told."""
-    start.emulator()
-    node = start.node(start.link, jump="approach", max_age=30.0)
-    leading = client()
-    leading.connect()
-    begin = led_since = last = leading.seconds()
-    told: list[tuple[float, list[float]]] = []
-
-    def wanted(seconds: float) -> float:
-        return 8.0 * (1.0 - math.cos((seconds - begin) * 0.4 * math.pi))
-
-    def send() -> None:
-        nonlocal led_since, last
-        now = leading.seconds()
-        if now - last > LONGEST_GAP:
-            led_since = now
-        last = now
-        leading.send([wanted(now), *HOME[1:]])
-        new, leading.states[:-1] = leading.states[:-1], []
-        told.extend(
-            (seconds_of(state), [math.degrees(angle) for angle in state.position])
-            for state in new
-            if seconds_of(state) > led_since + APPROACH
-        )
-
-    lead(leading, node, send, lambda: len(told) >= 200)
-    lags = [
-        (statistics.median(abs(pose[0] - wanted(seconds - lag)) for seconds, pose in told), lag)
-        for lag in (step / 200 for step in range(80))
-    ]
-    error, lag = min(lags)
-    # Above 2 degrees if the arm does not move, goes half the way, or is 0.7 s late; 0.3 with a load average of 5.6 on 2 cores.
-    report(f"a sine of 8 degrees and 0.2 Hz on the emulated image: median error {error:.2f} degrees behind {lag:.3f} s")
-    assert error < 1.5
-    assert all(-1.5 < pose[0] < 17.5 for _, pose in told)
-    assert all(pose[1:] == pytest.approx(HOME[1:], abs=2.0) for _, pose in told)
-    errors = bus_errors(leading)
-    success, text = leading.call("stop")
-    report(f"stop on the emulated image: {text.splitlines()[0]}")
-    if not success:
-        # The machine starves the emulator: the arm waited in vain for its servos, and counted this.
-        assert is_silence(text), text
-        leading.diagnostics.clear()
-        leading.until(lambda: values(leading) and bus_errors(leading) > errors, "new errors of the servo bus")
-    # With or without an answer of the servos, the arm has new targets, and follows no command before `hold`.
-    standing = state_now(leading)
-    leading.each(0.02, 50, lambda _: leading.send([standing[0] + 20.0, *HOME[1:]]))
-    assert state_now(leading) == pytest.approx(standing, abs=1.0)
-    assert "command refused: the arm was stopped: call the service `hold`" in node.text()
-    hold(leading)
-    target = standing[0] + 3.0
-    lead(leading, node, lambda: leading.send([target, *HOME[1:]]), lambda: abs(leading.degrees()[0] - target) < 1.5)
