@@ -121,15 +121,10 @@ pub(crate) fn pace(py: Python<'_>, speed: Option<f64>, duration: Option<f64>) ->
     refuse_both(py, speed, duration)?;
     let wrong = |text: &str| InvalidValue::raise(py, text);
     let speed = speed.map(|speed| {
-        let found =
-            (1..=100).filter_map(Speed::from_steps).rfind(|step| step.degrees_per_second() <= speed + 0.05);
-        found.filter(|_| speed <= 190.05).ok_or_else(|| wrong("use a speed of 1.9 to 190 degrees per second"))
+        Speed::at_most(speed).ok_or_else(|| wrong("use a speed of 1.9 to 190 degrees per second"))
     });
-    let time = duration.map(|duration| {
-        let found = (1..=100)
-            .filter_map(MoveTime::from_steps)
-            .find(|step| step.duration().as_secs_f64() >= duration - 0.001);
-        found.filter(|_| duration > 0.0).ok_or_else(|| wrong("use a duration of 0.1 to 10 seconds"))
+    let time = duration.map(|seconds| {
+        MoveTime::at_least(seconds).ok_or_else(|| wrong("use a duration of 0.1 to 10 seconds"))
     });
     Ok(Pace { speed: speed.transpose()?, time: time.transpose()? })
 }

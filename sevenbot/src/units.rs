@@ -68,6 +68,16 @@ impl Speed {
         if steps <= 100 { Some(Self(steps)) } else { None }
     }
 
+    /// The largest speed of at most this many degrees/s, 1.9 to 190. `None` outside of that.
+    #[must_use]
+    pub fn at_most(degrees_per_second: f64) -> Option<Self> {
+        // A speed that was computed is that of its step, whatever its last digits are.
+        const ROUNDING: f64 = 0.05;
+        let mut speeds = (1..=100).map(Self);
+        let found = speeds.rfind(|speed| speed.degrees_per_second() <= degrees_per_second + ROUNDING);
+        found.filter(|_| degrees_per_second <= 190.0 + ROUNDING)
+    }
+
     /// The register's value.
     #[must_use]
     pub const fn steps(self) -> u8 {
@@ -106,6 +116,13 @@ impl MoveTime {
         if steps <= 100 { Some(Self(steps)) } else { None }
     }
 
+    /// The shortest duration of at least this many seconds, up to 10. `None` outside of that.
+    #[must_use]
+    pub fn at_least(seconds: f64) -> Option<Self> {
+        let found = (1..=100).map(Self).find(|time| time.duration().as_secs_f64() >= seconds - 0.001);
+        found.filter(|_| seconds > 0.0)
+    }
+
     /// The register's value.
     #[must_use]
     pub const fn steps(self) -> u8 {
@@ -139,6 +156,19 @@ mod tests {
         assert_eq!(move_duration(19, slow, long), Duration::from_secs(1));
         assert_eq!(move_duration(19, Speed::MAXIMUM, long), Duration::from_secs(5));
         assert_eq!(move_duration(186, Speed::MAXIMUM, MoveTime::NONE), Duration::from_millis(500));
+    }
+
+    #[test]
+    fn numbers_become_the_nearest_slower_step() {
+        let speed = |number: f64| Speed::at_most(number).map(Speed::steps);
+        assert_eq!(
+            [0.0, 1.9, 3.7, 60.0, 190.0, 191.0].map(speed),
+            [None, Some(1), Some(1), Some(31), Some(100), None]
+        );
+        assert_eq!(speed(f64::NAN), None);
+        let time = |number: f64| MoveTime::at_least(number).map(MoveTime::steps);
+        assert_eq!([0.0, 0.05, 1.01, 10.0, 10.1].map(time), [None, Some(1), Some(11), Some(100), None]);
+        assert_eq!(time(f64::NAN), None);
     }
 
     #[test]

@@ -1,0 +1,145 @@
+//! What a program wants of the arm.
+
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+use sevenbot::cartesian::Vector;
+use sevenbot::fine::FineTargets;
+use sevenbot::moves::Pace;
+use sevenbot::{FineAngle, Joint, MoveTime, Speed};
+
+use crate::fault::{ProgramFault, Quantity};
+
+/// Speeds of the tip on a straight line, in mm/s. As those of the Python package.
+pub const LINE_SPEEDS: RangeInclusive<f64> = 1.0..=500.0;
+/// The longest time of a wait, in seconds: a day. As that of the Python package.
+const LONGEST_WAIT: f64 = 86_400.0;
+/// The angle of joint 7 where the claw is open, and where it is closed, in degrees.
+pub(crate) const CLAW: [f64; 2] = [84.0, 0.0];
+
+/// Something that the arm shall do. The program goes on when the arm has done it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Joints go to targets.
+    Joints {
+        /// The targets.
+        targets: FineTargets,
+        /// How fast.
+        pace: Pace,
+    },
+    /// The tip goes to a point, with the joints at their speed.
+    Tip {
+        /// In millimetres.
+        tip: Vector,
+        /// The direction of the tool.
+        tool: Vector,
+        /// How fast.
+        pace: Pace,
+    },
+    /// The tip goes to a point on a straight line.
+    Line {
+        /// In millimetres.
+        tip: Vector,
+        /// The direction of the tool.
+        tool: Vector,
+        /// In millimetres per second.
+        speed: f64,
+    },
+    /// The gripper opens or closes. It may hold something then.
+    Grip {
+        /// The target of joint 7.
+        claw: FineAngle,
+    },
+    /// The pump sucks or not.
+    Vacuum(bool),
+    /// Nothing, for this time.
+    Wait(Duration),
+}
+
+/// Something that a program wants to know of the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sensor {
+    /// The measured angle of a joint, in degrees.
+    Angle(Joint),
+    /// The position of the tip along an axis, in millimetres.
+    Tip(Axis),
+    /// The load of a joint, in percent of the stall torque.
+    Load(Joint),
+    /// Does an obstacle keep a joint from its target?
+    Blocked(Joint),
+    /// Does the gripper hold something?
+    Gripping,
+}
+
+/// An axis of positions: x to the right, y forward, z up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// To the right.
+    X,
+    /// Forward.
+    Y,
+    /// Up.
+    Z,
+}
+
+/// The direction of the tool.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tool {
+    Down,
+    Forward,
+    Left,
+    Right,
+    Up,
+}
+
+impl Tool {
+    /// The direction: x, y, z.
+    pub(crate) const fn direction(self) -> [i8; 3] {
+        match self {
+            Self::Down => [0, 0, -1],
+            Self::Forward => [0, 1, 0],
+            Self::Left => [-1, 0, 0],
+            Self::Right => [1, 0, 0],
+            Self::Up => [0, 0, 1],
+        }
+    }
+
+    pub(crate) fn vector(self) -> Vector {
+        let [x, y, z] = self.direction().map(f64::from);
+        Vector::new(x, y, z)
+    }
+}
+
+const fn out_of_range(quantity: Quantity, value: f64, lowest: f64, highest: f64) -> ProgramFault {
+    ProgramFault::OutOfRange { quantity, value, lowest, highest }
+}
+
+/// A target of a joint.
+pub(crate) fn angle(degrees: f64) -> Result<FineAngle, ProgramFault> {
+    FineAngle::from_degrees(degrees).ok_or(out_of_range(Quantity::Angle, degrees, 0.0, 180.0))
+}
+
+/// At this speed in degrees per second.
+pub(crate) fn joint_pace(speed: f64) -> Result<Pace, ProgramFault> {
+    let steps = Speed::at_most(speed).ok_or(out_of_range(Quantity::JointSpeed, speed, 1.9, 190.0))?;
+    Ok(Pace { speed: Some(steps), time: None })
+}
+
+/// In this time in seconds.
+pub(crate) fn timed_pace(seconds: f64) -> Result<Pace, ProgramFault> {
+    let time = MoveTime::at_least(seconds).ok_or(out_of_range(Quantity::Time, seconds, 0.1, 10.0))?;
+    Ok(Pace { speed: None, time: Some(time) })
+}
+
+/// A speed of the tip in millimetres per second.
+pub(crate) fn line_speed(speed: f64) -> Result<f64, ProgramFault> {
+    let (lowest, highest) = (*LINE_SPEEDS.start(), *LINE_SPEEDS.end());
+    let is_allowed = LINE_SPEEDS.contains(&speed);
+    is_allowed.then_some(speed).ok_or(out_of_range(Quantity::TipSpeed, speed, lowest, highest))
+}
+
+/// A time to wait.
+pub(crate) fn wait(seconds: f64) -> Result<Duration, ProgramFault> {
+    let time = Duration::try_from_secs_f64(seconds).ok().filter(|_| seconds <= LONGEST_WAIT);
+    time.ok_or(out_of_range(Quantity::Time, seconds, 0.0, LONGEST_WAIT))
+}

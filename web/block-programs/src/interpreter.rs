@@ -1,0 +1,243 @@
+//! Runs a program: tells what it wants, one thing at a time.
+
+use crate::code::{Act, Code, Instruction, Step};
+use crate::command::{CLAW, Command, Sensor, angle, joint_pace, line_speed, timed_pace, wait};
+use crate::compile::compile;
+use crate::fault::{BlockId, ProgramError, ProgramFault};
+use crate::program::{Program, Variable};
+use crate::value::Value;
+
+use sevenbot::cartesian::Vector;
+
+/// So many calls may be open at a time.
+pub const MOST_CALLS: usize = 200;
+
+/// What a program wants.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// This block begins. The program goes on at the next call.
+    Begin(BlockId),
+    /// The arm has to do this before the program goes on.
+    Command(Command),
+    /// The program goes on after [`Interpreter::answer`].
+    Sensor(Sensor),
+    /// The program is over.
+    Over,
+}
+
+/// A program that runs.
+///
+/// ```
+/// use block_programs::{Event, Interpreter, Program};
+///
+/// let workspace = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "a", "next": {"block":
+///     {"type": "arm_vacuum", "id": "b", "fields": {"STATE": "ON"}}}}]}}"#;
+/// let mut run = Interpreter::new(&Program::parse(workspace)?);
+/// assert_eq!(run.advance()?, Event::Begin("b".into()));
+/// assert_eq!(run.advance()?, Event::Command(block_programs::Command::Vacuum(true)));
+/// assert_eq!(run.advance()?, Event::Over);
+/// # Ok::<(), block_programs::ProgramError>(())
+/// ```
+#[derive(Debug)]
+pub struct Interpreter {
+    code: Code,
+    next: usize,
+    stack: Vec<Value>,
+    globals: Vec<Value>,
+    calls: Vec<OpenCall>,
+}
+
+/// A function that was called and has not ended.
+#[derive(Debug)]
+struct OpenCall {
+    /// Where the caller goes on.
+    back: usize,
+    /// Where its parameters begin on the stack.
+    base: usize,
+}
+
+impl Interpreter {
+    /// At the beginning of a program. All variables are 0.
+    #[must_use]
+    pub fn new(program: &Program) -> Self {
+        let code = compile(program);
+        let globals = vec![Value::Number(0.0); code.globals];
+        Self { code, next: 0, stack: Vec::new(), globals, calls: Vec::new() }
+    }
+
+    /// Goes on until the program wants something. Takes at most one round of a loop, or one call.
+    ///
+    /// # Errors
+    /// The program cannot go on, and the block where that shows.
+    pub fn advance(&mut self) -> Result<Event, ProgramError> {
+        while let Some((step, block)) = self.code.instructions.get(self.next).cloned() {
+            self.next += 1;
+            if let Some(event) = self.step(step, &block).map_err(|fault| fault.at(&block))? {
+                return Ok(event);
+            }
+        }
+        Ok(Event::Over)
+    }
+
+    /// Gives the value of the sensor that the program waits for.
+    pub fn answer(&mut self, value: Value) {
+        self.stack.push(value);
+    }
+
+    /// The block that comes next.
+    #[must_use]
+    pub fn next_block(&self) -> Option<&BlockId> {
+        self.code.instructions.get(self.next).map(|(_, block): &Instruction| block)
+    }
+
+    fn step(&mut self, step: Step, block: &BlockId) -> Result<Option<Event>, ProgramFault> {
+        match step {
+            Step::Begin => return Ok(Some(Event::Begin(block.clone()))),
+            Step::Sense(sensor) => return Ok(Some(Event::Sensor(sensor))),
+            Step::Act(act) => return Ok(Some(Event::Command(self.command(act)?))),
+            Step::End => {
+                self.next = self.code.instructions.len();
+                return Ok(Some(Event::Over));
+            }
+            Step::Push(value) => self.stack.push(value),
+            Step::Load(variable) => {
+                let value = self.variable(variable).map_or(Value::Number(0.0), |value| *value);
+                self.stack.push(value);
+            }
+            Step::Store(variable) => {
+                let value = self.pop();
+                if let Some(place) = self.variable(variable) {
+                    *place = value;
+                }
+            }
+            Step::Calculate(operation) => {
+                let (other, one) = (self.pop(), self.pop());
+                self.stack.push(one.calculate(operation, other)?);
+            }
+            Step::Compare(comparison) => {
+                let (other, one) = (self.pop(), self.pop());
+                self.stack.push(one.compare(comparison, other));
+            }
+            Step::Not => {
+                let value = Value::Truth(!self.pop().truth());
+                self.stack.push(value);
+            }
+            Step::Pop => drop(self.pop()),
+            _ => self.flow(step)?,
+        }
+        Ok(None)
+    }
+
+    /// Steps that decide which step is next.
+    fn flow(&mut self, step: Step) -> Result<(), ProgramFault> {
+        match step {
+            Step::Jump(to) => self.next = to,
+            Step::JumpIfFalse(to) => self.next = if self.pop().truth() { self.next } else { to },
+            Step::JumpKeepingIf { truth, to } => {
+                if self.stack.last().is_some_and(|value| value.truth() == truth) {
+                    self.next = to;
+                } else {
+                    self.pop();
+                }
+            }
+            Step::Count => {
+                let rounds = self.pop().number().trunc().max(0.0);
+                self.stack.push(Value::Number(rounds));
+            }
+            Step::NextRound(to) => {
+                let rounds = self.pop().number();
+                if rounds > 0.0 {
+                    self.stack.push(Value::Number(rounds - 1.0));
+                } else {
+                    self.next = to;
+                }
+            }
+            Step::Call { function, arguments } => self.call(function, arguments)?,
+            Step::Return => {
+                let value = self.pop();
+                if let Some(call) = self.calls.pop() {
+                    self.stack.truncate(call.base);
+                    self.next = call.back;
+                }
+                self.stack.push(value);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn call(&mut self, function: usize, arguments: usize) -> Result<(), ProgramFault> {
+        if self.calls.len() >= MOST_CALLS {
+            return Err(ProgramFault::TooManyCalls);
+        }
+        let base = self.stack.len().saturating_sub(arguments);
+        self.calls.push(OpenCall { back: self.next, base });
+        self.next = self.code.functions.get(function).copied().unwrap_or(usize::MAX);
+        Ok(())
+    }
+
+    fn variable(&mut self, variable: Variable) -> Option<&mut Value> {
+        match variable {
+            Variable::Global(number) => self.globals.get_mut(number),
+            Variable::Parameter(number) => {
+                let base = self.calls.last().map_or(0, |call| call.base);
+                self.stack.get_mut(base + number)
+            }
+        }
+    }
+
+    /// The compiler pops only what it has pushed.
+    fn pop(&mut self) -> Value {
+        self.stack.pop().unwrap_or(Value::Number(0.0))
+    }
+
+    /// The numbers on top of the stack, in their order.
+    fn numbers<const N: usize>(&mut self) -> [f64; N] {
+        let mut numbers = [0.0; N];
+        for number in numbers.iter_mut().rev() {
+            *number = self.pop().number();
+        }
+        numbers
+    }
+
+    fn command(&mut self, act: Act) -> Result<Command, ProgramFault> {
+        Ok(match act {
+            Act::MoveJoint(joint) => {
+                let [degrees, speed] = self.numbers();
+                let mut targets = [None; 7];
+                if let Some(target) = targets.get_mut(usize::from(joint.index())) {
+                    *target = Some(angle(degrees)?);
+                }
+                Command::Joints { targets, pace: joint_pace(speed)? }
+            }
+            Act::Pose => {
+                let [one, two, three, four, five, six, seven, seconds] = self.numbers();
+                let mut targets = [None; 7];
+                for (target, degrees) in targets.iter_mut().zip([one, two, three, four, five, six, seven]) {
+                    *target = Some(angle(degrees)?);
+                }
+                Command::Joints { targets, pace: timed_pace(seconds)? }
+            }
+            Act::MoveTip(tool) => {
+                let [x, y, z, speed] = self.numbers();
+                Command::Tip { tip: Vector::new(x, y, z), tool: tool.vector(), pace: joint_pace(speed)? }
+            }
+            Act::Line(tool) => {
+                let [x, y, z, speed] = self.numbers();
+                Command::Line { tip: Vector::new(x, y, z), tool: tool.vector(), speed: line_speed(speed)? }
+            }
+            Act::Grip(is_open) => {
+                let [open, closed] = CLAW;
+                Command::Grip { claw: angle(if is_open { open } else { closed })? }
+            }
+            Act::Vacuum(is_on) => Command::Vacuum(is_on),
+            Act::Wait => {
+                let [seconds] = self.numbers();
+                Command::Wait(wait(seconds)?)
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

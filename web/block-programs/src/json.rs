@@ -1,0 +1,157 @@
+//! Blockly's JSON of a workspace: blocks, their fields and their connections. Knows no kind of block.
+//!
+//! The block below another one is nested in it. So a long stack would be nested deeply, and a parser that calls itself would need
+//! much memory. Here connections stay text until they are followed.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use serde_json::Value;
+use serde_json::value::RawValue;
+
+use crate::fault::{BlockId, ProgramError, ProgramFault};
+
+/// A longer text is no program of a person, in bytes. A stack takes time with the square of its length.
+const LARGEST: usize = 200_000;
+
+#[derive(Deserialize)]
+pub(crate) struct Workspace<'a> {
+    #[serde(borrow, default)]
+    blocks: TopBlocks<'a>,
+    #[serde(default)]
+    pub(crate) variables: Vec<VariableModel>,
+}
+
+#[derive(Default, Deserialize)]
+struct TopBlocks<'a> {
+    #[serde(borrow, default)]
+    blocks: Vec<&'a RawValue>,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct VariableModel {
+    pub(crate) id: String,
+    pub(crate) name: String,
+}
+
+/// One block.
+#[derive(Deserialize)]
+pub(crate) struct Block<'a> {
+    #[serde(rename = "type")]
+    pub(crate) kind: String,
+    #[serde(default = "no_id")]
+    pub(crate) id: BlockText,
+    #[serde(default)]
+    fields: BTreeMap<String, Value>,
+    #[serde(borrow, default)]
+    inputs: BTreeMap<String, Connection<'a>>,
+    #[serde(borrow, default)]
+    next: Option<Connection<'a>>,
+    /// What a block tells of its own shape.
+    #[serde(default, rename = "extraState")]
+    pub(crate) extra: Value,
+    #[serde(default, rename = "disabledReasons")]
+    disabled_reasons: Vec<Value>,
+    enabled: Option<bool>,
+}
+
+/// The identifier of a block in JSON.
+#[derive(Deserialize)]
+#[serde(from = "String")]
+pub(crate) struct BlockText(pub(crate) BlockId);
+
+impl From<String> for BlockText {
+    fn from(text: String) -> Self {
+        Self(text.into())
+    }
+}
+
+fn no_id() -> BlockText {
+    BlockText("".into())
+}
+
+#[derive(Deserialize)]
+struct Connection<'a> {
+    #[serde(borrow)]
+    block: Option<&'a RawValue>,
+    #[serde(borrow)]
+    shadow: Option<&'a RawValue>,
+}
+
+impl<'a> Connection<'a> {
+    /// The block there. A shadow shows through where there is no other.
+    fn block(&self) -> Result<Option<Block<'a>>, ProgramError> {
+        self.block.or(self.shadow).map(block).transpose()
+    }
+}
+
+fn block(text: &RawValue) -> Result<Block<'_>, ProgramError> {
+    serde_json::from_str(text.get()).map_err(no_workspace)
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
+fn no_workspace(error: serde_json::Error) -> ProgramError {
+    ProgramFault::NotAWorkspace(error.to_string()).of_workspace()
+}
+
+impl<'a> Workspace<'a> {
+    pub(crate) fn of(text: &'a str) -> Result<Self, ProgramError> {
+        if text.len() > LARGEST {
+            return Err(ProgramFault::TooLarge.of_workspace());
+        }
+        serde_json::from_str(text).map_err(no_workspace)
+    }
+
+    /// The blocks that are below no other.
+    pub(crate) fn top_blocks(&self) -> Result<Vec<Block<'a>>, ProgramError> {
+        self.blocks.blocks.iter().map(|&text| block(text)).collect()
+    }
+}
+
+impl<'a> Block<'a> {
+    pub(crate) fn fault(&self, fault: ProgramFault) -> ProgramError {
+        fault.at(&self.id.0)
+    }
+
+    pub(crate) fn is_enabled(&self) -> bool {
+        self.disabled_reasons.is_empty() && self.enabled != Some(false)
+    }
+
+    /// The block in an input, if there is one.
+    pub(crate) fn input(&self, name: &str) -> Result<Option<Block<'a>>, ProgramError> {
+        let block = self.inputs.get(name).map(Connection::block).transpose()?.flatten();
+        Ok(block.filter(Block::is_enabled))
+    }
+
+    /// The block below, if there is one.
+    pub(crate) fn next(&self) -> Result<Option<Block<'a>>, ProgramError> {
+        Ok(self.next.as_ref().map(Connection::block).transpose()?.flatten())
+    }
+
+    /// A field with a text.
+    pub(crate) fn text(&self, field: &str) -> Result<&str, ProgramError> {
+        self.fields.get(field).and_then(Value::as_str).ok_or_else(|| self.bad_field(field))
+    }
+
+    /// A field with a number.
+    pub(crate) fn number(&self, field: &str) -> Result<f64, ProgramError> {
+        self.fields.get(field).and_then(Value::as_f64).ok_or_else(|| self.bad_field(field))
+    }
+
+    /// The identifier of the variable in a field.
+    pub(crate) fn variable(&self, field: &str) -> Result<&str, ProgramError> {
+        let id = self.fields.get(field).and_then(|value| value.get("id")).and_then(Value::as_str);
+        id.ok_or_else(|| self.bad_field(field))
+    }
+
+    /// What a field chooses, of these choices with their names.
+    pub(crate) fn choice<T: Copy>(&self, field: &str, choices: &[(&str, T)]) -> Result<T, ProgramError> {
+        let name = self.text(field)?;
+        let found = choices.iter().find(|(known, _)| *known == name);
+        found.map(|(_, choice)| *choice).ok_or_else(|| self.bad_field(field))
+    }
+
+    pub(crate) fn bad_field(&self, field: &str) -> ProgramError {
+        self.fault(ProgramFault::BadField(field.to_owned()))
+    }
+}

@@ -1,0 +1,311 @@
+//! Parses blocks: which kinds there are, and which inputs and fields they have.
+
+use std::collections::HashMap;
+
+use sevenbot::Joint;
+
+use crate::command::{Axis, Sensor, Tool};
+use crate::fault::{ProgramError, ProgramFault};
+use crate::json::{Block, Workspace};
+use crate::program::{
+    Arithmetic, Comparison, Expression, ExpressionKind, Function, Program, Statement, StatementKind, Variable,
+};
+
+/// The block with which a program starts.
+const START: &str = "arm_start";
+/// A function without a value, and one with a value.
+const FUNCTIONS: [&str; 2] = ["procedures_defnoreturn", GIVES_VALUE];
+const GIVES_VALUE: &str = "procedures_defreturn";
+/// Deeper nested blocks are an error. Each level needs some hundred bytes of the stack.
+const DEEPEST: usize = 60;
+
+const AXES: [(&str, Axis); 3] = [("X", Axis::X), ("Y", Axis::Y), ("Z", Axis::Z)];
+const TOOLS: [(&str, Tool); 5] = [
+    ("DOWN", Tool::Down),
+    ("FORWARD", Tool::Forward),
+    ("LEFT", Tool::Left),
+    ("RIGHT", Tool::Right),
+    ("UP", Tool::Up),
+];
+const ARITHMETIC: [(&str, Arithmetic); 5] = [
+    ("ADD", Arithmetic::Add),
+    ("MINUS", Arithmetic::Subtract),
+    ("MULTIPLY", Arithmetic::Multiply),
+    ("DIVIDE", Arithmetic::Divide),
+    ("POWER", Arithmetic::Power),
+];
+const COMPARISONS: [(&str, Comparison); 6] = [
+    ("EQ", Comparison::Equal),
+    ("NEQ", Comparison::NotEqual),
+    ("LT", Comparison::Less),
+    ("LTE", Comparison::LessOrEqual),
+    ("GT", Comparison::Greater),
+    ("GTE", Comparison::GreaterOrEqual),
+];
+
+/// Parses a workspace. Blocks that are neither below the start nor a function are left out.
+pub(crate) fn program(text: &str) -> Result<Program, ProgramError> {
+    let workspace = Workspace::of(text)?;
+    let blocks: Vec<_> = workspace.top_blocks()?.into_iter().filter(Block::is_enabled).collect();
+    let mut starts = blocks.iter().filter(|block| block.kind == START);
+    let start = starts.next().ok_or_else(|| ProgramFault::NoStart.of_workspace())?;
+    if let Some(second) = starts.next() {
+        return Err(second.fault(ProgramFault::SeveralStarts));
+    }
+    let is_function = |block: &&Block<'_>| FUNCTIONS.contains(&block.kind.as_str());
+    let functions: Vec<_> = blocks.iter().filter(is_function).collect();
+    let mut names = HashMap::new();
+    for (number, block) in functions.iter().enumerate() {
+        let known = KnownFunction { number, parameters: parameters(block)?.len() };
+        names.insert(block.text("NAME")?.to_owned(), known);
+    }
+    let ids = workspace.variables.iter().enumerate();
+    let globals = ids.map(|(number, variable)| (variable.id.clone(), Variable::Global(number))).collect();
+    let scope = Scope { variables: globals, functions: &names, function: None, loops: 0, depth: 0 };
+    Ok(Program {
+        body: scope.statements(start.next()?)?,
+        functions: functions.into_iter().map(|block| scope.function(block)).collect::<Result<_, _>>()?,
+        variables: workspace.variables.iter().map(|variable| variable.name.clone()).collect(),
+    })
+}
+
+/// A function that blocks may call.
+struct KnownFunction {
+    number: usize,
+    /// How many it has.
+    parameters: usize,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum FunctionKind {
+    WithValue,
+    WithoutValue,
+}
+
+impl FunctionKind {
+    fn of(block: &Block<'_>) -> Self {
+        if block.kind == GIVES_VALUE { Self::WithValue } else { Self::WithoutValue }
+    }
+}
+
+/// Where a block is: which names it sees.
+#[derive(Clone)]
+struct Scope<'a> {
+    /// By their identifiers.
+    variables: HashMap<String, Variable>,
+    /// By their names.
+    functions: &'a HashMap<String, KnownFunction>,
+    /// The function that the block is in.
+    function: Option<FunctionKind>,
+    loops: usize,
+    depth: usize,
+}
+
+impl Scope<'_> {
+    /// The scope within a block.
+    fn within(&self, block: &Block<'_>) -> Result<Self, ProgramError> {
+        if self.depth >= DEEPEST {
+            return Err(block.fault(ProgramFault::TooDeep));
+        }
+        Ok(Self { depth: self.depth + 1, ..self.clone() })
+    }
+
+    fn function(&self, block: &Block<'_>) -> Result<Function, ProgramError> {
+        let kind = FunctionKind::of(block);
+        let mut scope = Self { function: Some(kind), ..self.within(block)? };
+        let mut names = Vec::new();
+        for (name, id) in parameters(block)? {
+            scope.variables.insert(id, Variable::Parameter(names.len()));
+            names.push(name);
+        }
+        let result = (kind == FunctionKind::WithValue).then(|| scope.input(block, "RETURN")).transpose()?;
+        Ok(Function {
+            block: block.id.0.clone(),
+            name: block.text("NAME")?.to_owned(),
+            parameters: names,
+            body: scope.statements(block.input("STACK")?)?,
+            result,
+        })
+    }
+
+    /// A block, and those below it.
+    fn statements(&self, first: Option<Block<'_>>) -> Result<Vec<Statement>, ProgramError> {
+        let (mut statements, mut next) = (Vec::new(), first);
+        while let Some(block) = next {
+            if block.is_enabled() {
+                statements.push(Statement { block: block.id.0.clone(), kind: self.statement(&block)? });
+            }
+            next = block.next()?;
+        }
+        Ok(statements)
+    }
+
+    fn statement(&self, block: &Block<'_>) -> Result<StatementKind, ProgramError> {
+        let input = |name| self.input(block, name);
+        Ok(match block.kind.as_str() {
+            "arm_move_joint" => StatementKind::MoveJoint {
+                joint: joint(block)?,
+                angle: input("ANGLE")?,
+                speed: input("SPEED")?,
+            },
+            "arm_pose" => StatementKind::Pose { angles: pose(block)?, seconds: block.number("SECONDS")? },
+            "arm_move_tip" => StatementKind::MoveTip {
+                to: self.point(block)?,
+                tool: block.choice("TOOL", &TOOLS)?,
+                speed: input("SPEED")?,
+            },
+            "arm_line" => StatementKind::Line {
+                to: self.point(block)?,
+                tool: block.choice("TOOL", &TOOLS)?,
+                speed: input("SPEED")?,
+            },
+            "arm_grip" => StatementKind::Grip(block.choice("STATE", &[("OPEN", true), ("CLOSE", false)])?),
+            "arm_vacuum" => StatementKind::Vacuum(block.choice("STATE", &[("ON", true), ("OFF", false)])?),
+            "arm_wait" => StatementKind::Wait(input("SECONDS")?),
+            "variables_set" => StatementKind::Set(self.variable(block)?, input("VALUE")?),
+            "math_change" => StatementKind::Change(self.variable(block)?, input("DELTA")?),
+            "procedures_callnoreturn" => {
+                let (function, arguments) = self.call(block)?;
+                StatementKind::Call { function, arguments }
+            }
+            _ => self.flow(block)?,
+        })
+    }
+
+    /// What decides which block is next.
+    fn flow(&self, block: &Block<'_>) -> Result<StatementKind, ProgramError> {
+        Ok(match block.kind.as_str() {
+            "controls_repeat_ext" => {
+                StatementKind::Repeat { times: self.input(block, "TIMES")?, body: self.repeated(block)? }
+            }
+            "controls_whileUntil" => {
+                let is_until = block.choice("MODE", &[("WHILE", false), ("UNTIL", true)])?;
+                let condition = self.input(block, "BOOL")?;
+                let condition = if is_until { negated(condition) } else { condition };
+                StatementKind::While { condition, body: self.repeated(block)? }
+            }
+            "controls_flow_statements" if self.loops == 0 => return Err(block.fault(ProgramFault::NotInLoop)),
+            "controls_flow_statements" => {
+                match block.choice("FLOW", &[("BREAK", true), ("CONTINUE", false)])? {
+                    true => StatementKind::Break,
+                    false => StatementKind::Continue,
+                }
+            }
+            "controls_if" => self.branches(block)?,
+            "procedures_ifreturn" => {
+                let kind = self.function.ok_or_else(|| block.fault(ProgramFault::NotInFunction))?;
+                let value =
+                    (kind == FunctionKind::WithValue).then(|| self.input(block, "VALUE")).transpose()?;
+                StatementKind::Return(self.input(block, "CONDITION")?, value)
+            }
+            kind => return Err(block.fault(ProgramFault::UnknownBlock(kind.to_owned()))),
+        })
+    }
+
+    fn repeated(&self, block: &Block<'_>) -> Result<Vec<Statement>, ProgramError> {
+        let scope = Self { loops: self.loops + 1, ..self.within(block)? };
+        scope.statements(block.input("DO")?)
+    }
+
+    fn branches(&self, block: &Block<'_>) -> Result<StatementKind, ProgramError> {
+        let scope = self.within(block)?;
+        let more = block.extra.get("elseIfCount").and_then(serde_json::Value::as_u64).unwrap_or(0);
+        let branch = |number: u64| {
+            let condition = self.input(block, &format!("IF{number}"))?;
+            Ok((condition, scope.statements(block.input(&format!("DO{number}"))?)?))
+        };
+        Ok(StatementKind::If {
+            branches: (0..=more).map(branch).collect::<Result<_, _>>()?,
+            otherwise: scope.statements(block.input("ELSE")?)?,
+        })
+    }
+
+    fn expression(&self, block: &Block<'_>) -> Result<Expression, ProgramError> {
+        let pair = |one, other| {
+            Ok::<_, ProgramError>(Box::new([self.input(block, one)?, self.input(block, other)?]))
+        };
+        let kind = match block.kind.as_str() {
+            "math_number" => ExpressionKind::Number(block.number("NUM")?),
+            "logic_boolean" => {
+                ExpressionKind::Truth(block.choice("BOOL", &[("TRUE", true), ("FALSE", false)])?)
+            }
+            "variables_get" => ExpressionKind::Variable(self.variable(block)?),
+            "math_arithmetic" => ExpressionKind::Calculate(block.choice("OP", &ARITHMETIC)?, pair("A", "B")?),
+            "math_modulo" => ExpressionKind::Calculate(Arithmetic::Remainder, pair("DIVIDEND", "DIVISOR")?),
+            "logic_compare" => ExpressionKind::Compare(block.choice("OP", &COMPARISONS)?, pair("A", "B")?),
+            "logic_operation" => match block.choice("OP", &[("AND", true), ("OR", false)])? {
+                true => ExpressionKind::And(pair("A", "B")?),
+                false => ExpressionKind::Or(pair("A", "B")?),
+            },
+            "logic_negate" => ExpressionKind::Not(Box::new(self.input(block, "BOOL")?)),
+            "procedures_callreturn" => {
+                let (function, arguments) = self.call(block)?;
+                ExpressionKind::Call { function, arguments }
+            }
+            _ => ExpressionKind::Sense(sensor(block)?),
+        };
+        Ok(Expression { block: block.id.0.clone(), kind })
+    }
+
+    fn call(&self, block: &Block<'_>) -> Result<(usize, Vec<Expression>), ProgramError> {
+        let name = block.extra.get("name").and_then(serde_json::Value::as_str).unwrap_or_default();
+        let unknown = || block.fault(ProgramFault::UnknownFunction(name.to_owned()));
+        let function = self.functions.get(name).ok_or_else(unknown)?;
+        let argument = |number| self.input(block, &format!("ARG{number}"));
+        Ok((function.number, (0..function.parameters).map(argument).collect::<Result<_, _>>()?))
+    }
+
+    fn point(&self, block: &Block<'_>) -> Result<[Expression; 3], ProgramError> {
+        Ok([self.input(block, "X")?, self.input(block, "Y")?, self.input(block, "Z")?])
+    }
+
+    /// The expression in an input, which may not be empty.
+    fn input(&self, block: &Block<'_>, name: &str) -> Result<Expression, ProgramError> {
+        let inner =
+            block.input(name)?.ok_or_else(|| block.fault(ProgramFault::EmptyInput(name.to_owned())))?;
+        self.within(&inner)?.expression(&inner)
+    }
+
+    fn variable(&self, block: &Block<'_>) -> Result<Variable, ProgramError> {
+        self.variables.get(block.variable("VAR")?).copied().ok_or_else(|| block.bad_field("VAR"))
+    }
+}
+
+/// The names of a function's parameters, and the identifiers of their variables.
+fn parameters(block: &Block<'_>) -> Result<Vec<(String, String)>, ProgramError> {
+    let list = block.extra.get("params").and_then(serde_json::Value::as_array);
+    let text = |parameter: &serde_json::Value, key| parameter.get(key)?.as_str().map(str::to_owned);
+    let pair = |parameter| text(parameter, "name").zip(text(parameter, "id"));
+    list.into_iter()
+        .flatten()
+        .map(|parameter| pair(parameter).ok_or_else(|| block.bad_field("params")))
+        .collect()
+}
+
+fn negated(condition: Expression) -> Expression {
+    Expression { block: condition.block.clone(), kind: ExpressionKind::Not(Box::new(condition)) }
+}
+
+fn sensor(block: &Block<'_>) -> Result<Sensor, ProgramError> {
+    Ok(match block.kind.as_str() {
+        "arm_angle" => Sensor::Angle(joint(block)?),
+        "arm_tip" => Sensor::Tip(block.choice("AXIS", &AXES)?),
+        "arm_load" => Sensor::Load(joint(block)?),
+        "arm_blocked" => Sensor::Blocked(joint(block)?),
+        "arm_gripping" => Sensor::Gripping,
+        kind => return Err(block.fault(ProgramFault::UnknownBlock(kind.to_owned()))),
+    })
+}
+
+fn joint(block: &Block<'_>) -> Result<Joint, ProgramError> {
+    let number = block.text("JOINT")?.parse().ok();
+    number.and_then(Joint::new).ok_or_else(|| block.bad_field("JOINT"))
+}
+
+fn pose(block: &Block<'_>) -> Result<[f64; 7], ProgramError> {
+    let mut angles = [0.0; 7];
+    for (number, angle) in (1..).zip(&mut angles) {
+        *angle = block.number(&format!("J{number}"))?;
+    }
+    Ok(angles)
+}

@@ -1,0 +1,143 @@
+//! A program as a tree: what the parser makes of Blockly's blocks.
+
+use sevenbot::Joint;
+
+use crate::command::{Axis, Sensor, Tool};
+use crate::fault::{BlockId, ProgramError};
+use crate::parse;
+
+/// A program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Program {
+    /// The names of the variables.
+    pub(crate) variables: Vec<String>,
+    pub(crate) functions: Vec<Function>,
+    pub(crate) body: Vec<Statement>,
+}
+
+impl Program {
+    /// From the text of Blockly's `serialization.workspaces.save`.
+    ///
+    /// # Errors
+    /// It is no program, and the block where that shows.
+    pub fn parse(workspace: &str) -> Result<Self, ProgramError> {
+        parse::program(workspace)
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Function {
+    pub(crate) block: BlockId,
+    pub(crate) name: String,
+    /// The names of its parameters.
+    pub(crate) parameters: Vec<String>,
+    pub(crate) body: Vec<Statement>,
+    pub(crate) result: Option<Expression>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Statement {
+    pub(crate) block: BlockId,
+    pub(crate) kind: StatementKind,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum StatementKind {
+    MoveJoint {
+        joint: Joint,
+        angle: Expression,
+        speed: Expression,
+    },
+    /// Angles in degrees, and the seconds of the way.
+    Pose {
+        angles: [f64; 7],
+        seconds: f64,
+    },
+    MoveTip {
+        to: [Expression; 3],
+        tool: Tool,
+        speed: Expression,
+    },
+    Line {
+        to: [Expression; 3],
+        tool: Tool,
+        speed: Expression,
+    },
+    /// True opens the gripper.
+    Grip(bool),
+    Vacuum(bool),
+    Wait(Expression),
+    Repeat {
+        times: Expression,
+        body: Vec<Statement>,
+    },
+    While {
+        condition: Expression,
+        body: Vec<Statement>,
+    },
+    Break,
+    Continue,
+    If {
+        branches: Vec<(Expression, Vec<Statement>)>,
+        otherwise: Vec<Statement>,
+    },
+    Set(Variable, Expression),
+    Change(Variable, Expression),
+    Call {
+        function: usize,
+        arguments: Vec<Expression>,
+    },
+    /// Ends the function with this value, or with none.
+    Return(Expression, Option<Expression>),
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Expression {
+    pub(crate) block: BlockId,
+    pub(crate) kind: ExpressionKind,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum ExpressionKind {
+    Number(f64),
+    Truth(bool),
+    Variable(Variable),
+    Calculate(Arithmetic, Box<[Expression; 2]>),
+    Compare(Comparison, Box<[Expression; 2]>),
+    And(Box<[Expression; 2]>),
+    Or(Box<[Expression; 2]>),
+    Not(Box<Expression>),
+    Sense(Sensor),
+    Call { function: usize, arguments: Vec<Expression> },
+}
+
+/// A variable of the program, or a parameter of the function, by its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Variable {
+    Global(usize),
+    Parameter(usize),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Arithmetic {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+    Remainder,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Comparison {
+    Equal,
+    NotEqual,
+    Less,
+    LessOrEqual,
+    Greater,
+    GreaterOrEqual,
+}
+
+impl Axis {
+    pub(crate) const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
+}
