@@ -17,10 +17,12 @@
 mod app;
 pub mod arm_state;
 pub mod client;
+mod confirmed;
 pub mod movement;
 pub mod park;
 pub mod plots;
 mod problems_in_chinese;
+pub mod program;
 pub mod scene;
 pub mod source;
 pub mod stop;

@@ -5,8 +5,6 @@
 //!            └────────── each confirmed by a read, and written again until it is ──┘
 //! ```
 
-mod confirmed;
-
 use std::time::Duration;
 
 use host_link::sharing::{Command, SharingState};
@@ -21,10 +19,9 @@ use sevenbot::recording::{FileVersion, Moment, Recording, RecordingError, Record
 use sevenbot::stream::{StreamOptions, WatchdogAction};
 use sevenbot::{FineAngle, Health, Joint, Snapshot};
 
-use confirmed::{Confirmed, NotTaken, write_all};
-
 use crate::arm_state::has_extended_block;
 use crate::client::{BAUD, Client};
+use crate::confirmed::{Confirmed, NotTaken, write_all};
 use crate::stop::since_start;
 
 /// Time between two points of a played movement, in milliseconds. A browser calls the page each 17 ms, and the arm smooths 40 % of
@@ -120,8 +117,8 @@ impl From<NotTaken> for PlayFailure {
     }
 }
 
-/// A stop of another program, before a person wanted this movement, does not concern it.
-fn start_anew(now: Instant, client: &mut Client) {
+/// A stop of another program, before a person wanted this movement or program, does not concern it.
+pub(crate) fn start_anew(now: Instant, client: &mut Client) {
     if SharingState::of(client.registers()).is_some() {
         let (address, values) = Command::StartAnew.write();
         client.write(now, address, &values);
@@ -145,6 +142,8 @@ pub struct Player {
     recording: Recording,
     /// The way to the first moment.
     approach: Approach,
+    /// A stop of another program before it does not concern it.
+    starts_anew: bool,
     is_fine: bool,
     /// The registers before it: speeds and times.
     before: Snapshot,
@@ -170,15 +169,30 @@ impl Player {
         now: Instant,
     ) -> Result<Self, PlayRefusal> {
         let recording = Recording::parse(text).map_err(PlayRefusal::NoRecording)?;
+        let rule = approach.map_or(ApproachRule::Near, ApproachRule::Within);
+        let player = Self::along(recording, registers, rule, now)?;
+        Ok(Self { starts_anew: true, ..player })
+    }
+
+    /// Plays a part of a program: as [`Self::new`], but a stop of another program ends it also before its first point.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn along(
+        recording: Recording,
+        registers: &Snapshot,
+        rule: ApproachRule,
+        now: Instant,
+    ) -> Result<Self, PlayRefusal> {
         recording.check_speeds(1.0).map_err(PlayRefusal::NoRecording)?;
         let first = recording.moments().next().map_or([None; 7], |first| first.pose.map(Some));
-        let rule = approach.map_or(ApproachRule::Near, ApproachRule::Within);
         let approach = Approach::plan(&Standing::of(registers), &first, rule).map_err(PlayRefusal::TooFar)?;
         let is_fine = has_extended_block(registers);
         let watch = MoveWatch::new(since_start(now), ALL_JOINTS, BAUD);
         Ok(Self {
             recording,
             approach,
+            starts_anew: false,
             is_fine,
             before: registers.clone(),
             watch: if is_fine { watch.with_period(PERIOD_MS) } else { watch },
@@ -243,7 +257,9 @@ impl Player {
     fn advance(&mut self, now: Instant, client: &mut Client) -> Result<PlayProgress, PlayFailure> {
         match &mut self.stage {
             Stage::Start => {
-                start_anew(now, client);
+                if self.starts_anew {
+                    start_anew(now, client);
+                }
                 self.stage = Stage::Opening(Confirmed::write(self.opening_frames(), now, client));
             }
             Stage::Opening(opening) => {

@@ -1,11 +1,13 @@
 //! What the page says of the arm, in one line.
 
-use sevenbot::ProblemKind;
+use block_programs::ProgramFault;
 use sevenbot::health::MoveFault;
 use sevenbot::map::motor_state;
+use sevenbot::{Joint, ProblemKind};
 
 use crate::arm_state::{ArmState, breach, breach_text};
 use crate::movement::PlayFailure;
+use crate::program::ProgramFailure;
 use crate::stop::StopProgress;
 use crate::texts::Language;
 
@@ -125,17 +127,67 @@ fn stop_confirmation(state: &ArmState, stop: StopProgress) -> Option<&'static st
 /// Why a movement ended early.
 #[must_use]
 pub fn play_failure(language: Language, failure: &PlayFailure) -> String {
-    let reason = match failure {
+    format!("{} {}", language.text("play-failed"), play_reason(language, failure))
+}
+
+fn play_reason(language: Language, failure: &PlayFailure) -> String {
+    match failure {
         PlayFailure::Arm(fault) => move_fault(language, fault),
         PlayFailure::Paused(_) => language.text("paused").to_owned(),
         PlayFailure::NotTaken => language.text("not-taken").to_owned(),
         PlayFailure::StoppedByAnother => language.text("stopped-by-another").to_owned(),
         PlayFailure::NotReached(away) => {
-            let numbers = away.iter().map(|(joint, ..)| joint.number().to_string());
-            format!("{} {}", language.text("not-reached"), numbers.collect::<Vec<_>>().join(", "))
+            format!("{} {}", language.text("not-reached"), numbers(away.iter().map(|(joint, ..)| *joint)))
+        }
+    }
+}
+
+/// Why a program of blocks ended early.
+#[must_use]
+pub fn program_failure(language: Language, failure: &ProgramFailure) -> String {
+    let reason = match failure {
+        ProgramFailure::Program(error) => program_fault(language, &error.fault),
+        ProgramFailure::Arm(failure) => play_reason(language, failure),
+        ProgramFailure::Refused { details, .. } if language == Language::English => format!("{details}."),
+        ProgramFailure::Refused { text, .. } => {
+            format!("{} {}", language.text("way-refused"), language.text(text))
+        }
+        ProgramFailure::NotTold => language.text("not-told").to_owned(),
+        ProgramFailure::OtherTargets(joints) => {
+            format!("{} {}", language.text("other-targets"), numbers(joints.iter().copied()))
         }
     };
-    format!("{} {reason}", language.text("play-failed"))
+    format!("{} {reason}", language.text("program-failed"))
+}
+
+/// What is wrong with a program.
+#[must_use]
+pub fn program_fault(language: Language, fault: &ProgramFault) -> String {
+    if language == Language::English {
+        return format!("{fault}.");
+    }
+    let text = |name| language.text(name);
+    match fault {
+        ProgramFault::NotAWorkspace(_) | ProgramFault::TooLarge | ProgramFault::TooDeep => {
+            text("no-program").to_owned()
+        }
+        ProgramFault::NoStart | ProgramFault::SeveralStarts => text("one-start").to_owned(),
+        ProgramFault::UnknownBlock(kind) => format!("{} {kind}", text("unknown-block")),
+        ProgramFault::EmptyInput(input) => format!("{} {input}", text("empty-input")),
+        ProgramFault::BadField(field) => format!("{} {field}", text("bad-field")),
+        ProgramFault::UnknownFunction(name) => format!("{} {name}", text("unknown-function")),
+        ProgramFault::NotInLoop | ProgramFault::NotInFunction => text("not-inside").to_owned(),
+        ProgramFault::NoNumber => text("no-result").to_owned(),
+        ProgramFault::TooManyCalls => text("too-many-calls").to_owned(),
+        ProgramFault::OutOfRange { quantity, value, lowest, highest } => {
+            format!("{} {value}: {lowest} – {highest} {}", text("number-range"), quantity.unit())
+        }
+    }
+}
+
+/// The numbers of joints.
+fn numbers(joints: impl Iterator<Item = Joint>) -> String {
+    joints.map(|joint| joint.number().to_string()).collect::<Vec<_>>().join(", ")
 }
 
 /// Why a recording ended early.

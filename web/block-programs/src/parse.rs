@@ -113,16 +113,19 @@ impl Scope<'_> {
     fn function(&self, block: &Block<'_>) -> Result<Function, ProgramError> {
         let kind = FunctionKind::of(block);
         let mut scope = Self { function: Some(kind), ..self.within(block)? };
-        let mut names = Vec::new();
-        for (name, id) in parameters(block)? {
-            scope.variables.insert(id, Variable::Parameter(names.len()));
-            names.push(name);
+        let mut hidden = Vec::new();
+        for id in parameters(block)? {
+            let Some(Variable::Global(number)) = self.variables.get(id) else {
+                return Err(block.bad_field("params"));
+            };
+            scope.variables.insert(id.to_owned(), Variable::Parameter(hidden.len()));
+            hidden.push(*number);
         }
         let result = (kind == FunctionKind::WithValue).then(|| scope.input(block, "RETURN")).transpose()?;
         Ok(Function {
             block: block.id.0.clone(),
             name: block.text("NAME")?.to_owned(),
-            parameters: names,
+            parameters: hidden,
             body: scope.statements(block.input("STACK")?)?,
             result,
         })
@@ -271,15 +274,11 @@ impl Scope<'_> {
     }
 }
 
-/// The names of a function's parameters, and the identifiers of their variables.
-fn parameters(block: &Block<'_>) -> Result<Vec<(String, String)>, ProgramError> {
-    let list = block.extra.get("params").and_then(serde_json::Value::as_array);
-    let text = |parameter: &serde_json::Value, key| parameter.get(key)?.as_str().map(str::to_owned);
-    let pair = |parameter| text(parameter, "name").zip(text(parameter, "id"));
-    list.into_iter()
-        .flatten()
-        .map(|parameter| pair(parameter).ok_or_else(|| block.bad_field("params")))
-        .collect()
+/// The identifiers of a function's parameters.
+fn parameters<'a>(block: &'a Block<'_>) -> Result<Vec<&'a str>, ProgramError> {
+    let list = block.extra.get("params").and_then(serde_json::Value::as_array).into_iter().flatten();
+    let id = |parameter: &'a serde_json::Value| parameter.get("id").and_then(serde_json::Value::as_str);
+    list.map(|parameter| id(parameter).ok_or_else(|| block.bad_field("params"))).collect()
 }
 
 fn negated(condition: Expression) -> Expression {

@@ -29,8 +29,8 @@ impl Program {
 pub(crate) struct Function {
     pub(crate) block: BlockId,
     pub(crate) name: String,
-    /// The names of its parameters.
-    pub(crate) parameters: Vec<String>,
+    /// Its parameters hide these variables.
+    pub(crate) parameters: Vec<usize>,
     pub(crate) body: Vec<Statement>,
     pub(crate) result: Option<Expression>,
 }

@@ -1,5 +1,6 @@
 //! Writes a program as Python, for the package `sevenbot`.
 
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -38,24 +39,21 @@ pub fn python(program: &Program) -> String {
     let mut names = Names::new();
     let globals: Vec<_> = program.variables.iter().map(|name| names.give(name)).collect();
     let functions: Vec<_> = program.functions.iter().map(|function| names.give(&function.name)).collect();
-    let mut text = "import sys\n\nimport sevenbot\n".to_owned();
-    if !globals.is_empty() {
-        text.push('\n');
-    }
-    globals.iter().for_each(|name| line(&mut text, 0, &format!("{name} = 0")));
+    let used = RefCell::default();
+    let writer = Writer { globals: &globals, functions: &functions, parameters: &[], used: &used };
+    let mut defined = String::new();
     for (function, name) in program.functions.iter().zip(&functions) {
-        let mut inner = Names::new();
-        globals.iter().chain(&functions).for_each(|name| drop(inner.give(name)));
-        let parameters: Vec<_> = function.parameters.iter().map(|name| inner.give(name)).collect();
-        let writer = Writer { globals: &globals, functions: &functions, parameters: &parameters };
-        writer.function(&mut text, function, name);
+        Writer { parameters: &function.parameters, ..writer }.function(&mut defined, function, name);
     }
-    text.push_str("\n\n");
-    let text_of_body = Writer { globals: &globals, functions: &functions, parameters: &[] };
-    line(&mut text, 0, "with sevenbot.Arm(*sys.argv[1:2]) as arm:");
-    text_of_body.body(&mut text, 1, &program.body);
-    // One empty line is enough where nothing was defined.
-    if program.functions.is_empty() { text.replacen("\n\n\nwith", "\n\nwith", 1) } else { text }
+    let mut body = String::new();
+    line(&mut body, 0, "with sevenbot.Arm(*sys.argv[1:2]) as arm:");
+    writer.body(&mut body, 1, &program.body);
+    let used = used.take();
+    let variables: String =
+        used.iter().filter_map(|&number| globals.get(number)).map(|name| format!("{name} = 0\n")).collect();
+    let variables = if variables.is_empty() { variables } else { format!("\n{variables}") };
+    let gap = if defined.is_empty() { "\n" } else { "\n\n" };
+    format!("import sys\n\nimport sevenbot\n{variables}{defined}{gap}{body}")
 }
 
 fn line(text: &mut String, depth: usize, content: &str) {
@@ -64,21 +62,25 @@ fn line(text: &mut String, depth: usize, content: &str) {
 }
 
 /// The names that a part of the program sees.
+#[derive(Clone, Copy)]
 struct Writer<'a> {
     globals: &'a [String],
     functions: &'a [String],
-    parameters: &'a [String],
+    /// The variables that they hide.
+    parameters: &'a [usize],
+    /// The variables that the program needs.
+    used: &'a RefCell<BTreeSet<usize>>,
 }
 
 impl Writer<'_> {
     fn function(&self, text: &mut String, function: &Function, name: &str) {
         text.push_str("\n\n");
-        line(text, 0, &format!("def {name}({}):", self.parameters.join(", ")));
+        line(text, 0, &format!("def {name}({}):", self.names(self.parameters).join(", ")));
         let mut set = BTreeSet::new();
         globals_set_in(&function.body, &mut set);
         if !set.is_empty() {
-            let names: Vec<_> = set.iter().filter_map(|&number| self.globals.get(number)).cloned().collect();
-            line(text, 1, &format!("global {}", names.join(", ")));
+            let set: Vec<_> = set.into_iter().collect();
+            line(text, 1, &format!("global {}", self.names(&set).join(", ")));
         }
         match &function.result {
             Some(result) => {
@@ -175,12 +177,19 @@ impl Writer<'_> {
         format!("{name}({})", arguments.join(", "))
     }
 
+    fn names(&self, variables: &[usize]) -> Vec<&str> {
+        variables.iter().filter_map(|&number| self.globals.get(number)).map(String::as_str).collect()
+    }
+
     fn name(&self, variable: Variable) -> &str {
-        let name = match variable {
-            Variable::Global(number) => self.globals.get(number),
-            Variable::Parameter(number) => self.parameters.get(number),
+        let number = match variable {
+            Variable::Global(number) => {
+                self.used.borrow_mut().insert(number);
+                Some(number)
+            }
+            Variable::Parameter(number) => self.parameters.get(number).copied(),
         };
-        name.map_or("", String::as_str)
+        number.and_then(|number| self.globals.get(number)).map_or("", String::as_str)
     }
 
     /// An expression that stands for itself.

@@ -122,7 +122,7 @@ fn a_function_calls_itself_up_to_a_limit() {
     let error = waits(&endless).expect_err("no end");
     assert_eq!((error.fault, error.block.as_deref()), (ProgramFault::TooManyCalls, Some("call")));
     let python = python(&program(&blocks(5.0)).expect("a program"));
-    let function = "def f(n):\n    if n <= 1:\n        return 1\n    return n * f(n - 1)\n";
+    let function = "\n\n\ndef f(y):\n    if y <= 1:\n        return 1\n    return y * f(y - 1)\n\n\nwith";
     assert!(python.contains(function) && python.contains("    arm.sleep(f(5))\n"), "{python}");
 }
 

@@ -9,25 +9,25 @@ const ATTEMPTS: u32 = 5;
 
 /// The arm did not take the frames, however often they were written.
 #[derive(Debug)]
-pub(super) struct NotTaken;
+pub(crate) struct NotTaken;
 
 /// Frames that are written again until registers that were read afterwards hold their values.
 #[derive(Debug)]
-pub(super) struct Confirmed {
+pub(crate) struct Confirmed {
     frames: Vec<(u8, Vec<u8>)>,
     written: Instant,
     attempts: u32,
 }
 
 impl Confirmed {
-    pub(super) fn write(frames: Vec<(u8, Vec<u8>)>, now: Instant, client: &mut Client) -> Self {
+    pub(crate) fn write(frames: Vec<(u8, Vec<u8>)>, now: Instant, client: &mut Client) -> Self {
         let times = frames.iter().map(|(address, values)| client.write(now, *address, values));
         let written = times.last().unwrap_or(now);
         Self { frames, written, attempts: 1 }
     }
 
     /// Has the arm taken them? `Ok(false)`: not known yet.
-    pub(super) fn poll(&mut self, now: Instant, client: &mut Client) -> Result<bool, NotTaken> {
+    pub(crate) fn poll(&mut self, now: Instant, client: &mut Client) -> Result<bool, NotTaken> {
         if !client.was_read_since(self.written) {
             return Ok(false);
         }
@@ -47,7 +47,7 @@ impl Confirmed {
     }
 }
 
-pub(super) fn write_all(frames: &[(u8, Vec<u8>)], now: Instant, client: &mut Client) {
+pub(crate) fn write_all(frames: &[(u8, Vec<u8>)], now: Instant, client: &mut Client) {
     for (address, values) in frames {
         client.write(now, *address, values);
     }

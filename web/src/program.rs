@@ -1,0 +1,277 @@
+//! Runs a program of blocks on the arm: the shell of the page round [`Interpreter`].
+//!
+//! ```text
+//!   Interpreter ── Begin ──▶ the lit block; in single steps the program waits here
+//!        │  ▲ ──── Sensor ─▶ registers of the last round ──┐
+//!        │  └──────────────────────────────────────────────┘
+//!        └── Command ──▶ Confirmed: registers that the arm has to take
+//!                    ──▶ JointMove: targets, until the joints are there as measured
+//!                    ──▶ Player: a straight line
+//! ```
+//!
+//! The program goes on only if the arm has done what the block says. A blocked or silent joint, a stop, or another program that
+//! moves the arm end it.
+
+mod command;
+mod joint_move;
+mod sensor;
+
+use std::time::Duration;
+
+use block_programs::{BlockId, Event, Interpreter, Program, ProgramError};
+use host_link::sharing::SharingState;
+use protocol_core::time::Instant;
+use sevenbot::health::{MoveFault, MoveWatch};
+use sevenbot::map::{SPEED, TIME};
+use sevenbot::{Joint, Snapshot};
+
+use command::Action;
+
+use crate::client::{BAUD, Client};
+use crate::confirmed::{Confirmed, NotTaken, write_all};
+use crate::movement::{PlayFailure, start_anew};
+use crate::stop::since_start;
+
+/// So many blocks begin in one call at most. An endless loop goes on in the next call.
+const BLOCKS_PER_POLL: u32 = 200;
+/// After a longer pause of the page the program is over: a person may rely on an arm that has stopped.
+const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+/// The reads of the present round may be older than a write, those of the next one are not.
+const ROUNDS_TO_KNOW: u64 = 2;
+
+/// How a program goes on or has ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ProgramProgress {
+    /// It goes on.
+    Running,
+    /// It waits before the lit block, for the next step.
+    Waiting,
+    /// It has come to its end.
+    Over,
+    /// It has ended before, for this reason.
+    Failed(ProgramFailure),
+}
+
+/// Why a program ends early.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ProgramFailure {
+    /// The program is wrong.
+    Program(ProgramError),
+    /// The arm does not carry it out.
+    Arm(PlayFailure),
+    /// The tip cannot go there.
+    Refused {
+        /// The name of the text that says why.
+        text: &'static str,
+        /// Why, and what is possible instead, in English.
+        details: String,
+    },
+    /// The firmware of the arm does not tell this.
+    NotTold,
+    /// Joints have other targets than those of the program.
+    OtherTargets(Vec<Joint>),
+}
+
+impl From<MoveFault> for ProgramFailure {
+    fn from(fault: MoveFault) -> Self {
+        Self::Arm(PlayFailure::Arm(fault))
+    }
+}
+
+impl From<NotTaken> for ProgramFailure {
+    fn from(_: NotTaken) -> Self {
+        Self::Arm(PlayFailure::NotTaken)
+    }
+}
+
+impl From<ProgramError> for ProgramFailure {
+    fn from(error: ProgramError) -> Self {
+        Self::Program(error)
+    }
+}
+
+/// Does the program stop before each block?
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// No.
+    Running,
+    /// Yes.
+    SingleSteps,
+}
+
+/// A program that runs on an arm.
+#[derive(Debug)]
+pub struct ProgramRun {
+    interpreter: Interpreter,
+    pace: Pace,
+    /// It waits before a block, for the next step.
+    is_waiting: bool,
+    /// The block that runs.
+    block: Option<BlockId>,
+    action: Action,
+    /// The registers before it: speeds and times.
+    before: Snapshot,
+    watch: MoveWatch,
+    /// The last registers that were watched are those of this round.
+    watched_round: u64,
+    last_poll: Option<Instant>,
+}
+
+impl ProgramRun {
+    /// Begins a program on an arm with these registers.
+    #[must_use]
+    pub fn new(program: &Program, pace: Pace, registers: &Snapshot, now: Instant) -> Self {
+        Self {
+            interpreter: Interpreter::new(program),
+            pace,
+            is_waiting: false,
+            block: None,
+            action: Action::Start,
+            before: registers.clone(),
+            watch: MoveWatch::new(since_start(now), 0, BAUD),
+            watched_round: 0,
+            last_poll: None,
+        }
+    }
+
+    /// The block that runs, or is the next one.
+    #[must_use]
+    pub const fn block(&self) -> Option<&BlockId> {
+        self.block.as_ref()
+    }
+
+    /// The speeds of the joints before it.
+    #[must_use]
+    pub fn speeds(&self) -> [u8; 7] {
+        self.before.joints(&SPEED)
+    }
+
+    /// Does the next block if the program waits, and goes on at this pace.
+    pub const fn go_on(&mut self, pace: Pace) {
+        self.pace = pace;
+        self.is_waiting = false;
+    }
+
+    /// Writes what is due, and runs the blocks that are.
+    pub fn poll(&mut self, now: Instant, client: &mut Client) -> ProgramProgress {
+        match self.advance(now, client) {
+            Ok(progress) => progress,
+            Err(failure) => {
+                self.fail(&failure, now, client);
+                ProgramProgress::Failed(failure)
+            }
+        }
+    }
+
+    /// Makes the arm hold, and ends the program.
+    pub fn stop(self, now: Instant, client: &mut Client) {
+        self.hold(now, client);
+    }
+
+    /// Ends the program, because something else moves the arm now. A move of joints that has begun is not stopped.
+    pub fn end(self, now: Instant, client: &mut Client) {
+        if let Action::Line(player) = &self.action {
+            player.end(now, client);
+        }
+        write_all(&self.closing_frames(), now, client);
+    }
+
+    fn fail(&self, failure: &ProgramFailure, now: Instant, client: &mut Client) {
+        // The arm holds then, and does not take a stop of this program.
+        let is_stopped = *failure == ProgramFailure::Arm(PlayFailure::StoppedByAnother);
+        if self.action.may_move() && !is_stopped {
+            self.hold(now, client);
+        } else {
+            write_all(&self.closing_frames(), now, client);
+        }
+    }
+
+    fn hold(&self, now: Instant, client: &mut Client) {
+        client.stop(now, Some(self.speeds()));
+        if let Action::Line(player) = &self.action {
+            player.end_stream(now, client);
+        }
+        client.write(now, TIME.address, &self.before.joints(&TIME));
+    }
+
+    fn closing_frames(&self) -> Vec<(u8, Vec<u8>)> {
+        [SPEED, TIME].map(|row| (row.address, self.before.joints(&row).to_vec())).into()
+    }
+
+    fn advance(&mut self, now: Instant, client: &mut Client) -> Result<ProgramProgress, ProgramFailure> {
+        self.check_pause(now)?;
+        match self.action {
+            Action::Start => {
+                start_anew(now, client);
+                self.action = Action::Beginning(client.rounds() + ROUNDS_TO_KNOW);
+                return Ok(ProgramProgress::Running);
+            }
+            Action::Beginning(round) if client.rounds() < round => return Ok(ProgramProgress::Running),
+            _ => self.watch(now, client)?,
+        }
+        self.run_blocks(now, client)
+    }
+
+    fn check_pause(&mut self, now: Instant) -> Result<(), ProgramFailure> {
+        let last = self.last_poll.replace(now).unwrap_or(now);
+        let pause = since_start(now).saturating_sub(since_start(last));
+        if pause > LONGEST_PAUSE { Err(ProgramFailure::Arm(PlayFailure::Paused(pause))) } else { Ok(()) }
+    }
+
+    /// Fails if the arm carries out nothing, or another program has stopped it.
+    fn watch(&mut self, now: Instant, client: &Client) -> Result<(), ProgramFailure> {
+        if client.rounds() != self.watched_round {
+            self.watched_round = client.rounds();
+            if SharingState::of(client.registers()).is_some_and(|sharing| sharing.is_stopped) {
+                return Err(ProgramFailure::Arm(PlayFailure::StoppedByAnother));
+            }
+            self.watch.registers(since_start(now), client.registers())?;
+        }
+        // The rounds of reads answer the questions.
+        Ok(self.watch.question(since_start(now)).map(drop)?)
+    }
+
+    fn run_blocks(&mut self, now: Instant, client: &mut Client) -> Result<ProgramProgress, ProgramFailure> {
+        for _ in 0..BLOCKS_PER_POLL {
+            if self.is_waiting {
+                return Ok(ProgramProgress::Waiting);
+            }
+            if !self.action.is_done(now, client)? {
+                return Ok(ProgramProgress::Running);
+            }
+            if matches!(self.action, Action::Closing(_)) {
+                return Ok(ProgramProgress::Over);
+            }
+            self.action = Action::Ready;
+            self.run_block(now, client)?;
+        }
+        Ok(ProgramProgress::Running)
+    }
+
+    /// Goes on until a block begins, or the arm has something to do.
+    fn run_block(&mut self, now: Instant, client: &mut Client) -> Result<(), ProgramFailure> {
+        loop {
+            match self.interpreter.advance()? {
+                Event::Begin(block) => {
+                    self.block = Some(block);
+                    self.is_waiting = self.pace == Pace::SingleSteps;
+                    return Ok(());
+                }
+                Event::Sensor(wanted) => {
+                    self.interpreter.answer(sensor::read(wanted, now, client.registers())?);
+                }
+                Event::Command(command) => {
+                    self.action = command::begin(&command, now, client)?;
+                    return Ok(());
+                }
+                Event::Over => {
+                    self.action = Action::Closing(Confirmed::write(self.closing_frames(), now, client));
+                    return Ok(());
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

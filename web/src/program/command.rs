@@ -1,0 +1,197 @@
+//! What the arm does for one block, until it is done.
+
+use std::time::Duration;
+
+use block_programs::Command;
+use protocol_core::time::Instant;
+use sevenbot::approach::ApproachRule;
+use sevenbot::cartesian::{
+    Guard, JointPath, StraightLine, StraightLineRequest, TargetResolution, TipRefusal, TipTarget, Vector,
+};
+use sevenbot::fine::{FineTargets, fine_frames};
+use sevenbot::joints::frames_for;
+use sevenbot::map::{EFFECTOR_TYPE, SPEED, TARGET_POSITION, TIME, VACUUM_PUMP, effector};
+use sevenbot::moves::Pace;
+use sevenbot::{Angle, FineAngle, Health, MoveTime, Snapshot, Speed};
+
+use super::ProgramFailure;
+use super::joint_move::JointMove;
+use crate::arm_state::{breach_text, has_extended_block};
+use crate::client::Client;
+use crate::confirmed::Confirmed;
+use crate::movement::{PlayProgress, PlayRefusal, Player};
+use crate::stop::since_start;
+
+/// What a program does with the arm.
+#[derive(Debug)]
+pub(super) enum Action {
+    /// The program was not polled yet.
+    Start,
+    /// It begins when this round was read.
+    Beginning(u64),
+    /// The next block may begin.
+    Ready,
+    /// The arm has to take registers. Then comes the next action.
+    Writing(Confirmed, Next),
+    Moving(JointMove),
+    Line(Box<Player>),
+    /// Until this time.
+    Waiting(Duration),
+    /// The last writes of the program.
+    Closing(Confirmed),
+}
+
+/// What comes after registers that the arm has taken.
+#[derive(Debug)]
+pub(super) enum Next {
+    /// The block is done.
+    Nothing,
+    /// Targets, after the speeds for them.
+    Targets(FineTargets),
+    /// The joints are on their way.
+    Arrival(FineTargets),
+}
+
+impl Action {
+    /// May joints be on their way?
+    pub(super) const fn may_move(&self) -> bool {
+        matches!(self, Self::Writing(_, Next::Arrival(_)) | Self::Moving(_) | Self::Line(_))
+    }
+
+    /// Is it done? One action may be followed by another one of the same block.
+    pub(super) fn is_done(&mut self, now: Instant, client: &mut Client) -> Result<bool, ProgramFailure> {
+        match self {
+            Self::Start | Self::Beginning(_) | Self::Ready => Ok(true),
+            Self::Waiting(end) => Ok(since_start(now) >= *end),
+            Self::Closing(written) => Ok(written.poll(now, client)?),
+            Self::Moving(joints) => joints.poll(now, client),
+            Self::Line(player) => match player.poll(now, client) {
+                PlayProgress::Playing => Ok(false),
+                PlayProgress::Played => Ok(true),
+                PlayProgress::Failed(failure) => Err(ProgramFailure::Arm(failure)),
+            },
+            Self::Writing(written, next) => {
+                if !written.poll(now, client)? {
+                    return Ok(false);
+                }
+                let following = match next {
+                    Next::Nothing => return Ok(true),
+                    Next::Targets(targets) => write_targets(*targets, now, client),
+                    Next::Arrival(targets) => Self::Moving(JointMove::new(*targets, now, client.registers())),
+                };
+                *self = following;
+                Ok(false)
+            }
+        }
+    }
+}
+
+/// Begins what a block wants.
+pub(super) fn begin(command: &Command, now: Instant, client: &mut Client) -> Result<Action, ProgramFailure> {
+    match command {
+        Command::Wait(time) => Ok(Action::Waiting(since_start(now) + *time)),
+        Command::Vacuum(is_on) => {
+            let frames = vec![(VACUUM_PUMP.address, vec![u8::from(*is_on)])];
+            Ok(Action::Writing(Confirmed::write(frames, now, client), Next::Nothing))
+        }
+        Command::Joints { targets, pace } => Ok(set_pace(*targets, *pace, now, client)),
+        Command::Grip { claw } => {
+            let frames = vec![(EFFECTOR_TYPE.address, vec![effector::GRIPPER])];
+            let targets = [None, None, None, None, None, None, Some(*claw)];
+            Ok(Action::Writing(Confirmed::write(frames, now, client), Next::Targets(targets)))
+        }
+        Command::Tip { tip, tool, pace } => {
+            let targets = tip_targets(*tip, *tool, *pace, client.registers())?;
+            Ok(set_pace(targets, *pace, now, client))
+        }
+        Command::Line { tip, tool, speed } => {
+            let registers = client.registers();
+            let line = line(*tip, *tool, *speed, registers)?;
+            let player = Player::along(line.recording, registers, ApproachRule::Slowly, now);
+            Ok(Action::Line(Box::new(player.map_err(refused_line)?)))
+        }
+    }
+}
+
+/// Speeds and durations for the joints with a target. The targets follow when the arm has them.
+fn set_pace(targets: FineTargets, pace: Pace, now: Instant, client: &mut Client) -> Action {
+    let steps = |steps: u8| targets.map(|target| target.map(|_| steps));
+    let speed = pace.speed.or(pace.time.map(|_| Speed::MAXIMUM));
+    let speeds = speed.map(|speed| frames_for(&SPEED, &steps(speed.steps())));
+    let times = pace.time.map(|time| frames_for(&TIME, &steps(time.steps())));
+    let frames = speeds.into_iter().chain(times).flatten().collect();
+    Action::Writing(Confirmed::write(frames, now, client), Next::Targets(targets))
+}
+
+fn write_targets(targets: FineTargets, now: Instant, client: &mut Client) -> Action {
+    let frames = if has_extended_block(client.registers()) {
+        fine_frames(&targets)
+    } else {
+        frames_for(&TARGET_POSITION, &targets.map(|target| target.map(|angle| angle.nearest().degrees())))
+    };
+    Action::Writing(Confirmed::write(frames, now, client), Next::Arrival(targets))
+}
+
+/// The targets for a point of the tip, if the guard of the workspace allows the way there.
+fn tip_targets(
+    tip: Vector,
+    tool: Vector,
+    pace: Pace,
+    registers: &Snapshot,
+) -> Result<FineTargets, ProgramFailure> {
+    let guard = Guard::default();
+    let target = TipTarget::guarded(tip, tool, Some(&guard)).map_err(|refusal| refused_tip(&refusal))?;
+    let fine = target.in_hundredths(tip, tool).filter(|_| has_extended_block(registers));
+    let whole = target.degrees.map(|degrees| Angle::from_register(degrees).into());
+    let [one, two, three, four, five] = fine.map_or(whole, |fine| fine.angles);
+    let to = [one, two, three, four, five].map(FineAngle::degrees);
+    let from = measured(registers)?;
+    let speeds = [pace.speed.unwrap_or(Speed::MAXIMUM); 5];
+    let path = JointPath::at_pace(from, to, speeds, [pace.time.unwrap_or(MoveTime::NONE); 5]);
+    guard.check_path(&path).map_err(|on_way| ProgramFailure::Refused {
+        text: breach_text(&on_way.breach),
+        details: on_way.to_string(),
+    })?;
+    Ok([Some(one), Some(two), Some(three), Some(four), Some(five), None, None])
+}
+
+/// Where joints 1 to 5 are.
+fn measured(registers: &Snapshot) -> Result<[f64; 5], ProgramFailure> {
+    let mut angles = [0.0; 5];
+    for (angle, joint) in angles.iter_mut().zip(&Health::new(registers).joints) {
+        *angle = joint.position.ok_or(ProgramFailure::NotTold)?.degrees();
+    }
+    Ok(angles)
+}
+
+/// A straight line from the present targets.
+fn line(tip: Vector, tool: Vector, speed: f64, registers: &Snapshot) -> Result<StraightLine, ProgramFailure> {
+    let is_fine = has_extended_block(registers);
+    let request = StraightLineRequest {
+        start: Health::new(registers).joints.map(|joint| joint.target),
+        resolution: if is_fine { TargetResolution::Hundredths } else { TargetResolution::Degrees },
+        vacuum: registers.byte(&VACUUM_PUMP) != 0,
+        tip,
+        tool,
+        speed,
+        guard: Some(Guard::default()),
+    };
+    StraightLine::plan(&request)
+        .map_err(|error| ProgramFailure::Refused { text: "no-line", details: error.to_string() })
+}
+
+fn refused_tip(refusal: &TipRefusal) -> ProgramFailure {
+    let text = match refusal {
+        TipRefusal::Unreachable(_) => "unreachable",
+        TipRefusal::Guarded(guarded) => breach_text(&guarded.breach),
+    };
+    ProgramFailure::Refused { text, details: refusal.to_string() }
+}
+
+fn refused_line(refusal: PlayRefusal) -> ProgramFailure {
+    let details = match refusal {
+        PlayRefusal::NoRecording(why) => why.to_string(),
+        PlayRefusal::TooFar(far) => far.to_string(),
+    };
+    ProgramFailure::Refused { text: "no-line", details }
+}
