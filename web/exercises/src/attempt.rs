@@ -1,0 +1,176 @@
+//! A learner's attempt at an exercise: which goals are reached.
+
+use crate::exercise::Exercise;
+use crate::goal::Goal;
+use crate::path::{PathProgress, distance};
+
+/// A joint is at an angle if it has been there for this long, in seconds.
+const AT_REST: f64 = 0.5;
+
+/// What the arm measures at one time.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Observation {
+    /// The time in seconds, from any start.
+    pub seconds: f64,
+    /// The tip: x, y, z in mm; `None` if a joint is not measured.
+    pub tip: Option<[f64; 3]>,
+    /// The joints in degrees, joint 1 first; `None` where it is not measured.
+    pub joints: [Option<f64>; 7],
+    /// The joints that are blocked, as register 195 shows them.
+    pub blocked: u8,
+}
+
+#[derive(Clone, Debug)]
+enum Progress {
+    Reached,
+    Open,
+    Along(PathProgress),
+    /// The joint has been at its angle since this time, in seconds.
+    There(f64),
+}
+
+/// An attempt.
+///
+/// ```
+/// use exercises::{Attempt, Exercise, Observation};
+///
+/// let text = r#"{"title": "Touch", "text": "Touch it.", "goals": [{"text": "the point", "tip": [0, 200, 50]}]}"#;
+/// let mut attempt = Attempt::new(&Exercise::parse(text)?);
+/// attempt.observe(&Observation { tip: Some([0.0, 203.0, 50.0]), ..Observation::default() });
+/// assert!(attempt.is_solved());
+/// # Ok::<(), exercises::ExerciseError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Attempt {
+    goals: Vec<(Goal, Progress)>,
+    in_order: bool,
+    seconds: Option<(f64, f64)>,
+}
+
+impl Attempt {
+    /// An attempt at an exercise, with no goal reached.
+    #[must_use]
+    pub fn new(exercise: &Exercise) -> Self {
+        let progress = |goal: &Goal| match goal {
+            Goal::Path { path, within, .. } => Progress::Along(PathProgress::new(path, *within)),
+            _ => Progress::Open,
+        };
+        let goals = exercise.goals.iter().map(|goal| (goal.clone(), progress(goal))).collect();
+        Self { goals, in_order: exercise.in_order, seconds: None }
+    }
+
+    /// Takes what the arm measures. Returns whether a goal was reached now.
+    pub fn observe(&mut self, seen: &Observation) -> bool {
+        if self.is_solved() {
+            return false;
+        }
+        self.seconds = Some((self.seconds.map_or(seen.seconds, |(start, _)| start), seen.seconds));
+        let mut is_any_reached = false;
+        for (goal, progress) in &mut self.goals {
+            if matches!(progress, Progress::Reached) {
+                continue;
+            }
+            if is_reached(goal, progress, seen) {
+                *progress = Progress::Reached;
+                is_any_reached = true;
+            } else if self.in_order {
+                break;
+            }
+        }
+        is_any_reached
+    }
+
+    /// Which goals are reached, in their order.
+    pub fn reached(&self) -> impl Iterator<Item = bool> {
+        self.goals.iter().map(|(_, progress)| matches!(progress, Progress::Reached))
+    }
+
+    /// Are all goals reached?
+    #[must_use]
+    pub fn is_solved(&self) -> bool {
+        self.reached().all(|is_reached| is_reached)
+    }
+
+    /// From the first observation to the last one that was needed, in seconds.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.seconds.map_or(0.0, |(start, end)| end - start)
+    }
+}
+
+fn is_reached(goal: &Goal, progress: &mut Progress, seen: &Observation) -> bool {
+    match goal {
+        Goal::Tip { tip, within, .. } => seen.tip.is_some_and(|at| distance(at, *tip) <= *within),
+        Goal::Path { .. } => match progress {
+            Progress::Along(path) => path.observe(seen.tip),
+            _ => false,
+        },
+        Goal::Joint { joint, degrees, within, .. } => {
+            let at = seen.joints.get(usize::from(joint.saturating_sub(1))).copied().flatten();
+            if !at.is_some_and(|at| (at - degrees).abs() <= *within) {
+                *progress = Progress::Open;
+            } else if !matches!(progress, Progress::There(_)) {
+                *progress = Progress::There(seen.seconds);
+            }
+            matches!(progress, Progress::There(since) if seen.seconds - *since >= AT_REST)
+        }
+        Goal::Blocked { blocked, .. } => {
+            1_u8.checked_shl(u32::from(blocked.saturating_sub(1))).is_some_and(|bit| seen.blocked & bit != 0)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn attempt(goals: &str, rest: &str) -> Attempt {
+        let text = format!(r#"{{"title": "t", "text": "t", "goals": [{goals}]{rest}}}"#);
+        Attempt::new(&Exercise::parse(&text).unwrap_or_else(|error| panic!("{error}")))
+    }
+
+    fn seen(seconds: f64, joint_1: f64) -> Observation {
+        let joints = [Some(joint_1), None, None, None, None, None, None];
+        Observation { seconds, joints, ..Observation::default() }
+    }
+
+    #[test]
+    fn a_joint_that_passes_an_angle_is_not_there() {
+        let mut attempt = attempt(r#"{"text": "t", "joint": 1, "degrees": 120}"#, "");
+        for (seconds, degrees) in [(0.0, 90.0), (0.1, 120.0), (0.2, 150.0), (0.7, 121.0), (1.1, 119.0)] {
+            assert!(!attempt.observe(&seen(seconds, degrees)));
+        }
+        assert!(attempt.observe(&seen(1.2, 119.0)) && attempt.is_solved());
+        assert!((attempt.duration() - 1.2).abs() < 1e-9);
+        assert!(!attempt.observe(&seen(9.0, 0.0)) && attempt.is_solved(), "it stays solved");
+        assert!((attempt.duration() - 1.2).abs() < 1e-9);
+    }
+
+    #[test]
+    fn goals_in_order_wait_for_those_before_them() {
+        let goals = r#"{"text": "a", "tip": [0, 200, 50]}, {"text": "b", "blocked": 2}"#;
+        let at_b = Observation { blocked: 0b10, ..Observation::default() };
+        let at_a = Observation { tip: Some([0.0, 200.0, 50.0]), ..Observation::default() };
+        let mut ordered = attempt(goals, r#", "in_order": true"#);
+        assert!(!ordered.observe(&at_b) && ordered.observe(&at_a) && ordered.observe(&at_b));
+        assert!(ordered.is_solved());
+        let mut any = attempt(goals, "");
+        assert!(any.observe(&at_b) && !any.is_solved());
+        assert_eq!(any.reached().collect::<Vec<_>>(), [false, true]);
+    }
+
+    #[test]
+    fn what_is_wrong_in_a_file_is_told_with_its_line() {
+        let refused = |text: &str| Exercise::parse(text).expect_err("no exercise").to_string();
+        assert!(refused("{\n\"title\": 1}").starts_with("line 2: "));
+        assert!(refused("no").contains("line 1"));
+        let goal = |goal: &str| refused(&format!(r#"{{"title": "t", "text": "t", "goals": [{goal}]}}"#));
+        assert_eq!(goal(""), "an exercise needs at least one goal");
+        assert!(
+            goal(r#"{"text": "t", "joint": 8, "degrees": 10}"#).contains("goal 1: use a joint from 1 to 7")
+        );
+        assert!(goal(r#"{"text": "t", "tip": [0, 1, 2], "within": 0}"#).contains("above 0"));
+        assert!(goal(r#"{"text": "t", "path": [[0, 1, 2]]}"#).contains("2 to 100 points"));
+        assert!(goal(r#"{"text": "t", "tpi": [0, 1, 2]}"#).contains("line 1"));
+    }
+}

@@ -1,0 +1,105 @@
+//! How far a tip has followed a path.
+
+/// The most points of a path.
+pub(crate) const MOST_POINTS: usize = 100;
+/// Checkpoints on the path are this far apart, and so are the places of the tip between two observations, in mm.
+const STEP: f64 = 2.0;
+/// The most places between two observations. A tip that leaps further was not observed on its way.
+const MOST_STEPS: u32 = 50;
+
+type Point = [f64; 3];
+
+/// A tip on its way along a path. It has to pass all checkpoints in their order; if it leaves the path, it begins anew.
+#[derive(Clone, Debug)]
+pub(crate) struct PathProgress {
+    checkpoints: Vec<Point>,
+    within: f64,
+    /// The checkpoints that were passed.
+    passed: usize,
+    last: Option<Point>,
+}
+
+impl PathProgress {
+    pub(crate) fn new(path: &[Point], within: f64) -> Self {
+        let mut checkpoints: Vec<Point> = path.first().copied().into_iter().collect();
+        for (from, to) in path.iter().zip(path.iter().skip(1)) {
+            checkpoints.extend(between(*from, *to));
+        }
+        Self { checkpoints, within, passed: 0, last: None }
+    }
+
+    /// Takes the place of the tip; `None` if it is not measured. Returns whether the path is complete.
+    pub(crate) fn observe(&mut self, tip: Option<Point>) -> bool {
+        let Some(tip) = tip else {
+            self.passed = 0;
+            self.last = None;
+            return false;
+        };
+        let from = self.last.replace(tip).unwrap_or(tip);
+        if distance(from, tip) > STEP * f64::from(MOST_STEPS) {
+            self.passed = 0;
+        }
+        between(from, tip).into_iter().any(|place| self.passes(place))
+    }
+
+    fn passes(&mut self, place: Point) -> bool {
+        let is_near = |point: &Point| distance(*point, place) <= self.within;
+        let ahead = self.checkpoints.iter().skip(self.passed).take_while(|point| is_near(point)).count();
+        self.passed += ahead;
+        // Between two lines at a corner the tip is near to the last checkpoint that it passed.
+        let is_on_path = self.checkpoints.iter().take(self.passed).next_back().is_some_and(is_near);
+        if !is_on_path {
+            self.passed = 0;
+        }
+        self.passed == self.checkpoints.len()
+    }
+}
+
+/// Places on the way from one point to another, without the first and with the last.
+fn between(from: Point, to: Point) -> Vec<Point> {
+    let steps =
+        (1..MOST_STEPS * 100).find(|steps| distance(from, to) <= STEP * f64::from(*steps)).unwrap_or(1);
+    let place = |step| {
+        let part = f64::from(step) / f64::from(steps);
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let [from, to] = [from, to].map(|point: Point| point.get(axis).copied().unwrap_or(0.0));
+            from + (to - from) * part
+        });
+        [x, y, z]
+    };
+    (1..=steps).map(place).collect()
+}
+
+/// The distance of two points, in mm.
+pub(crate) fn distance(one: Point, other: Point) -> f64 {
+    one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CORNER: [Point; 3] = [[0.0, 200.0, 50.0], [100.0, 200.0, 50.0], [100.0, 260.0, 50.0]];
+
+    fn follow(places: &[Point]) -> bool {
+        let mut progress = PathProgress::new(&CORNER, 5.0);
+        places.iter().any(|place| progress.observe(Some(*place)))
+    }
+
+    #[test]
+    fn a_tip_that_goes_along_the_lines_completes_them() {
+        assert!(follow(&CORNER));
+        assert!(follow(&[&[[0.0, 150.0, 50.0]][..], &CORNER].concat()), "from elsewhere");
+        assert!(follow(&[[1.0, 203.0, 52.0], [99.0, 202.0, 50.0], [101.0, 259.0, 47.0]]), "nearly");
+    }
+
+    #[test]
+    fn a_shortcut_a_lifted_pen_and_the_way_back_do_not() {
+        assert!(!follow(&[CORNER[0], CORNER[2]]));
+        assert!(!follow(&[CORNER[0], [50.0, 200.0, 50.0], [50.0, 200.0, 80.0], CORNER[1], CORNER[2]]));
+        assert!(!follow(&[CORNER[2], CORNER[1], CORNER[0]]));
+        let mut progress = PathProgress::new(&CORNER, 5.0);
+        let places = [Some(CORNER[0]), Some(CORNER[1]), None, Some(CORNER[2])];
+        assert!(!places.into_iter().any(|place| progress.observe(place)), "the arm was not measured between");
+    }
+}

@@ -1,0 +1,113 @@
+//! The solution of an exercise: steps in its file, as programs of blocks.
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// One step of a solution.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub(crate) enum Step {
+    /// Joint, degrees, degrees per second.
+    Joint(u8, f64, f64),
+    /// The tip to x, y, z in mm, at degrees per second, the tool down.
+    Tip(f64, f64, f64, f64),
+    /// The tip along a straight line to x, y, z in mm, at mm per second, the tool down.
+    Line(f64, f64, f64, f64),
+    /// Seconds.
+    Wait(f64),
+    /// The obstacles of the simulated arm are taken away, and its joints try again.
+    Repair,
+}
+
+/// A part of a solution.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SolutionPart {
+    /// A program: the JSON of a workspace.
+    Program(String),
+    /// The obstacles of the simulated arm are taken away.
+    Repair,
+}
+
+/// The steps as programs, with what happens between them.
+pub(crate) fn parts(steps: &[Step]) -> Vec<SolutionPart> {
+    let groups = steps.chunk_by(|one, other| !matches!(one, Step::Repair) && !matches!(other, Step::Repair));
+    groups
+        .map(|group| match group {
+            [Step::Repair] => SolutionPart::Repair,
+            steps => SolutionPart::Program(workspace(steps)),
+        })
+        .collect()
+}
+
+/// The workspace of a program with these steps. Each block is nested in the one before it.
+fn workspace(steps: &[Step]) -> String {
+    let stack = steps.iter().enumerate().rev().fold(None, |next, (number, step)| {
+        let mut block = block(step)?;
+        add(&mut block, "id", json!(format!("step-{number}")));
+        if let Some(next) = next {
+            add(&mut block, "next", json!({ "block": next }));
+        }
+        Some(block)
+    });
+    let mut start = json!({"type": "arm_start", "id": "start", "deletable": false, "x": 20, "y": 20});
+    if let Some(first) = stack {
+        add(&mut start, "next", json!({ "block": first }));
+    }
+    json!({"blocks": {"languageVersion": 0, "blocks": [start]}}).to_string()
+}
+
+fn block(step: &Step) -> Option<Value> {
+    let with = |kind: &str, fields: Value, inputs: &[(&str, f64)]| {
+        let inputs: serde_json::Map<_, _> =
+            inputs.iter().map(|(name, value)| ((*name).to_owned(), number(*value))).collect();
+        Some(json!({"type": kind, "fields": fields, "inputs": inputs}))
+    };
+    let down = || json!({"TOOL": "DOWN"});
+    match *step {
+        Step::Joint(joint, degrees, speed) => {
+            let fields = json!({"JOINT": joint.to_string()});
+            with("arm_move_joint", fields, &[("ANGLE", degrees), ("SPEED", speed)])
+        }
+        Step::Tip(x, y, z, speed) => {
+            with("arm_move_tip", down(), &[("X", x), ("Y", y), ("Z", z), ("SPEED", speed)])
+        }
+        Step::Line(x, y, z, speed) => {
+            with("arm_line", down(), &[("X", x), ("Y", y), ("Z", z), ("SPEED", speed)])
+        }
+        Step::Wait(seconds) => with("arm_wait", json!({}), &[("SECONDS", seconds)]),
+        Step::Repair => None,
+    }
+}
+
+/// A number in the socket of a block. It can be replaced by another block.
+fn number(value: f64) -> Value {
+    json!({"shadow": {"type": "math_number", "fields": {"NUM": value}}})
+}
+
+fn add(block: &mut Value, name: &str, value: Value) {
+    if let Value::Object(members) = block {
+        members.insert(name.to_owned(), value);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_become_programs_between_repairs() {
+        let steps =
+            [Step::Joint(1, 120.0, 60.0), Step::Wait(1.0), Step::Repair, Step::Tip(0.0, 200.0, 60.0, 30.0)];
+        let parts = parts(&steps);
+        let [SolutionPart::Program(first), SolutionPart::Repair, SolutionPart::Program(last)] =
+            parts.as_slice()
+        else {
+            panic!("{parts:?}")
+        };
+        let first: Value = serde_json::from_str(first).expect("JSON");
+        let joint = &first["blocks"]["blocks"][0]["next"]["block"];
+        assert_eq!((&joint["type"], &joint["fields"]["JOINT"]), (&json!("arm_move_joint"), &json!("1")));
+        assert_eq!(joint["next"]["block"]["inputs"]["SECONDS"]["shadow"]["fields"]["NUM"], json!(1.0));
+        assert!(last.contains("arm_move_tip") && !last.contains("arm_wait"));
+    }
+}
