@@ -18,6 +18,7 @@ mod app;
 pub mod arm_state;
 pub mod client;
 mod confirmed;
+pub mod exercise;
 pub mod movement;
 pub mod park;
 pub mod plots;
@@ -26,5 +27,7 @@ pub mod program;
 pub mod scene;
 pub mod source;
 pub mod stop;
+#[cfg(test)]
+mod tab;
 pub mod texts;
 pub mod words;

@@ -2,75 +2,10 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 
 use super::*;
-use crate::source::Source;
-use crate::source::simulator::SimulatedSource;
 use crate::stop::StopProgress;
+use crate::tab::Tab;
 use crate::texts::Language;
 use crate::words::program_failure;
-
-/// A picture of the page is shown each 1/60 s.
-const PICTURE_MICROS: f64 = 16_667.0;
-
-/// A page and its simulated arm.
-struct Tab {
-    client: Client,
-    arm: SimulatedSource,
-}
-
-impl Tab {
-    /// An arm that was switched on a second ago.
-    fn new() -> Self {
-        let mut tab = Self { client: Client::default(), arm: SimulatedSource::default() };
-        tab.pass(100);
-        assert!(tab.client.is_connected());
-        tab
-    }
-
-    /// As the page does for each picture.
-    fn pass(&mut self, pictures: u32) {
-        for _ in 0..pictures {
-            self.arm.send(&self.client.poll(self.arm.now()));
-            self.arm.advance(PICTURE_MICROS, || true);
-            let bytes = self.arm.receive();
-            self.client.receive(self.arm.now(), &bytes);
-        }
-    }
-
-    fn act(&mut self, action: &str) {
-        self.arm.act(action.parse().expect("an action"));
-    }
-
-    fn begin(&self, workspace: &str, pace: Pace) -> ProgramRun {
-        let program = Program::parse(workspace).unwrap_or_else(|error| panic!("{error:?}"));
-        ProgramRun::new(&program, pace, self.client.registers(), self.arm.now())
-    }
-
-    /// Runs a program to its end. `during` gets the number of each picture, and may break something.
-    fn run(
-        &mut self,
-        workspace: &str,
-        mut during: impl FnMut(u32, &mut Self),
-    ) -> (ProgramProgress, ProgramRun) {
-        let mut run = self.begin(workspace, Pace::Running);
-        for picture in 0..20_000 {
-            during(picture, self);
-            match run.poll(self.arm.now(), &mut self.client) {
-                ProgramProgress::Running => self.pass(1),
-                end => return (end, run),
-            }
-        }
-        panic!("it does not end, at {:?}: {:?}", run.block(), run.action);
-    }
-
-    /// The true angles of all joints, in degrees.
-    fn angles(&self) -> [f64; 7] {
-        Joint::ALL.map(|joint| f64::from(self.arm.simulation().plant().angle(joint)) / 1e3)
-    }
-
-    fn registers(&self) -> Vec<u8> {
-        [SPEED, TIME].iter().flat_map(|row| self.client.registers().joints(row)).collect()
-    }
-}
 
 /// A workspace whose start is followed by this stack of blocks.
 fn workspace(first: &str) -> String {

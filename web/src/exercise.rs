@@ -1,0 +1,78 @@
+//! What the arm measures, for an exercise.
+
+use exercises::Observation;
+use kinematics::forward;
+use protocol_core::time::Instant;
+use sevenbot::Snapshot;
+use sevenbot::map::BLOCKED_JOINTS;
+
+use crate::arm_state::ArmState;
+use crate::stop::since_start;
+
+/// What these registers of the arm say at `now`.
+#[must_use]
+pub fn observation(now: Instant, registers: &Snapshot) -> Observation {
+    let joints = ArmState::new(registers).measured.map(|angle| angle.map(f64::from));
+    let tip = match joints {
+        [Some(t1), Some(t2), Some(t3), Some(t4), Some(t5), Some(t6), _] => {
+            let tip = forward([t1, t2, t3, t4, t5, t6]).hand.tip;
+            Some([tip.x, tip.y, tip.z])
+        }
+        _ => None,
+    };
+    let blocked = registers.byte(&BLOCKED_JOINTS);
+    Observation { seconds: since_start(now).as_secs_f64(), tip, joints, blocked }
+}
+
+#[cfg(test)]
+mod tests {
+    use exercises::{Attempt, SolutionPart, shipped};
+
+    use super::*;
+    use crate::program::ProgramProgress;
+    use crate::tab::Tab;
+
+    /// Runs the solution of an exercise, and says what each part of it came to.
+    fn solve(tab: &mut Tab, attempt: &mut Attempt, parts: &[SolutionPart]) -> Vec<ProgramProgress> {
+        let mut ends = Vec::new();
+        for part in parts {
+            match part {
+                SolutionPart::Repair => tab.act("clear"),
+                SolutionPart::Program(program) => {
+                    let watch = |_, tab: &mut Tab| {
+                        attempt.observe(&observation(tab.now(), tab.client.registers()));
+                    };
+                    ends.push(tab.run(program, watch).0);
+                    // The hold after a failed program is confirmed.
+                    tab.pass(60);
+                }
+            }
+        }
+        ends
+    }
+
+    #[test]
+    fn the_solution_of_each_shipped_exercise_reaches_all_of_its_goals() {
+        for exercise in shipped() {
+            let title = exercise.title.of("en");
+            let (mut tab, mut attempt) = (Tab::new(), Attempt::new(&exercise));
+            exercise.setup.iter().for_each(|action| tab.act(action));
+            let ends = solve(&mut tab, &mut attempt, &exercise.solution());
+            assert_eq!(ends.last(), Some(&ProgramProgress::Over), "{title}: {ends:?}");
+            let reached: Vec<_> = attempt.reached().collect();
+            assert!(attempt.is_solved(), "{title}: {reached:?}");
+        }
+    }
+
+    #[test]
+    fn an_arm_that_stays_reaches_nothing() {
+        for exercise in shipped() {
+            let (mut tab, mut attempt) = (Tab::new(), Attempt::new(&exercise));
+            for _ in 0..200 {
+                tab.pass(1);
+                attempt.observe(&observation(tab.now(), tab.client.registers()));
+            }
+            assert!(attempt.reached().all(|is_reached| !is_reached), "{}", exercise.title.of("en"));
+        }
+    }
+}
