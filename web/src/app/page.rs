@@ -12,6 +12,7 @@ use web_sys::{CanvasRenderingContext2d, Element, Event};
 
 use super::dom::Dom;
 use super::kept_recording::KeptRecording;
+use super::programs::Programs;
 use super::storage;
 use crate::client::Client;
 use crate::movement::{Player, Recorder};
@@ -76,6 +77,7 @@ pub(super) struct App {
     pub(super) park: Option<Park>,
     pub(super) player: Option<Player>,
     pub(super) recording: Option<KeptRecording>,
+    pub(super) programs: Programs,
     pub(super) tour_step: usize,
 }
 
@@ -95,14 +97,32 @@ pub(super) fn with_app<T>(act: impl FnOnce(&mut App) -> T) -> Option<T> {
 pub(super) fn on<E: JsCast>(
     target: &Element,
     kind: &str,
+    act: impl FnMut(&mut App, &E, &Event) + 'static,
+) -> Result<(), JsValue> {
+    add_listener(target, kind, act, false)
+}
+
+/// As [`on`], before the elements within this one get the event.
+pub(super) fn on_first<E: JsCast>(
+    target: &Element,
+    kind: &str,
+    act: impl FnMut(&mut App, &E, &Event) + 'static,
+) -> Result<(), JsValue> {
+    add_listener(target, kind, act, true)
+}
+
+fn add_listener<E: JsCast>(
+    target: &Element,
+    kind: &str,
     mut act: impl FnMut(&mut App, &E, &Event) + 'static,
+    is_first: bool,
 ) -> Result<(), JsValue> {
     let handler = Closure::<dyn FnMut(Event)>::new(move |event: Event| {
         if let Some(specific) = event.dyn_ref::<E>() {
             with_app(|app| act(app, specific, &event));
         }
     });
-    target.add_event_listener_with_callback(kind, handler.as_ref().unchecked_ref())?;
+    target.add_event_listener_with_callback_and_bool(kind, handler.as_ref().unchecked_ref(), is_first)?;
     handler.forget();
     Ok(())
 }
@@ -158,6 +178,7 @@ impl App {
             park: None,
             player: None,
             recording: KeptRecording::of_storage(),
+            programs: Programs::default(),
             tour_step: 0,
         })
     }
@@ -215,6 +236,7 @@ impl App {
     fn play(&mut self, now: Instant) {
         self.park_on(now);
         self.play_on(now);
+        self.run_on(now);
     }
 
     /// The registers are new.
@@ -238,6 +260,7 @@ impl App {
         self.language = language;
         self.dom.translate(language);
         self.show_tour();
+        self.translate_editor();
     }
 
     /// Changes to another arm: everything that belonged to the last one ends.
@@ -246,6 +269,7 @@ impl App {
         (self.shown_round, self.slid_round) = (0, 0);
         (self.hand, self.unreachable) = (None, None);
         (self.recorder, self.player, self.park) = (None, None, None);
+        self.programs.run = None;
         self.history = History::new(PLOT_SECONDS);
         let is_simulated = matches!(self.line, Line::Simulated(_));
         self.dom.set_hidden("simulator", !is_simulated);
