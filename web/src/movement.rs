@@ -209,6 +209,12 @@ impl Player {
         Self { before: earlier.before.clone(), ..self }
     }
 
+    /// Restores the speeds and times of these registers at the end, if there are any.
+    #[must_use]
+    pub fn restoring(self, before: Option<&Snapshot>) -> Self {
+        Self { before: before.unwrap_or(&self.before).clone(), ..self }
+    }
+
     /// How much was played, from 0 to 1.
     #[must_use]
     pub fn progress(&self) -> f64 {

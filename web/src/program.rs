@@ -72,6 +72,17 @@ pub enum ProgramFailure {
     OtherTargets(Vec<Joint>),
 }
 
+impl ProgramFailure {
+    /// The block that is wrong; `None` if it is the one that runs.
+    #[must_use]
+    pub fn block(&self) -> Option<&BlockId> {
+        match self {
+            Self::Program(error) => error.block.as_ref(),
+            _ => None,
+        }
+    }
+}
+
 impl From<MoveFault> for ProgramFailure {
     fn from(fault: MoveFault) -> Self {
         Self::Arm(PlayFailure::Arm(fault))
@@ -140,10 +151,16 @@ impl ProgramRun {
         self.block.as_ref()
     }
 
-    /// The speeds of the joints before it.
+    /// Does it wait for the next step?
     #[must_use]
-    pub fn speeds(&self) -> [u8; 7] {
-        self.before.joints(&SPEED)
+    pub const fn is_waiting(&self) -> bool {
+        self.is_waiting
+    }
+
+    /// The registers before it. It restores the speeds and times.
+    #[must_use]
+    pub const fn before(&self) -> &Snapshot {
+        &self.before
     }
 
     /// Does the next block if the program waits, and goes on at this pace.
@@ -187,7 +204,7 @@ impl ProgramRun {
     }
 
     fn hold(&self, now: Instant, client: &mut Client) {
-        client.stop(now, Some(self.speeds()));
+        client.stop(now, Some(self.before.joints(&SPEED)));
         if let Action::Line(player) = &self.action {
             player.end_stream(now, client);
         }

@@ -34,6 +34,7 @@ const GROUPS: [Group; 3] = [
             "sevenbot-serve",
             "sevenbot-python",
             "sevenbot-web",
+            "block-programs",
         ],
     ),
     (

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod blockly;
 mod budget;
 mod count;
 mod coverage;

@@ -162,10 +162,11 @@ fn response(status: StatusCode, content_type: &'static str, body: Bytes) -> Resp
     response
 }
 
-/// The page loads nothing from elsewhere, runs no script from a string, and no other page can frame it.
+/// The page loads nothing from elsewhere, runs no script from a string, and no other page can frame it. The editor of programs
+/// has pictures as `data:` addresses.
 fn content_security_policy(host: &str) -> String {
     format!(
-        "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self' ws://{host}; base-uri 'none'; \
+        "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; img-src 'self' data:; connect-src 'self' ws://{host}; base-uri 'none'; \
          form-action 'none'; frame-ancestors 'none'"
     )
 }

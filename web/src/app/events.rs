@@ -7,10 +7,11 @@ use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{Element, Event, HtmlDialogElement, HtmlInputElement, KeyboardEvent};
 
 use super::dom::{Dom, number};
+use super::files;
 use super::hand;
-use super::page::{App, Line, on};
+use super::page::{App, Line, on, on_first};
 use super::panels::TIP_FIELDS;
-use super::recording::upload;
+use super::programs;
 use super::storage;
 use crate::arm_state::target_frame;
 use crate::movement::{PlayProgress, Player};
@@ -29,13 +30,14 @@ pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
     on(&root, "click", |app, _: &Event, event| app.clicked(event))?;
     on(&root, "input", |app, _: &Event, event| app.slid(event))?;
     on(&root, "change", |app, _: &Event, event| app.changed(event))?;
-    on(&root, "keydown", |app, key: &KeyboardEvent, event| app.key(key, event))?;
+    on_first(&root, "keydown", |app, key: &KeyboardEvent, event| app.key(key, event))?;
     // Some browsers click a button when the space bar is released.
     on(&root, "keyup", |_, key: &KeyboardEvent, event| {
         if key.key() == " " {
             event.prevent_default();
         }
     })?;
+    programs::listen(dom)?;
     hand::listen(dom)
 }
 
@@ -86,6 +88,7 @@ impl App {
             }
             "tour-end" => self.end_tour(),
             "close-notice" => self.dom.end_notice(),
+            _ if self.act_on_program(action) || self.act_on_exercise(action) => {}
             _ => self.control(action, value),
         }
     }
@@ -101,9 +104,10 @@ impl App {
         self.client.write(now, address, values);
     }
 
-    /// Ends a movement that is played. Returns the speed registers before it, which the arm has again soon.
-    fn end_movement(&mut self) -> Option<[u8; 7]> {
-        let (player, now) = (self.player.take()?, self.now());
+    /// Ends a movement that is played, or a program. Returns the speed registers before it, which the arm has again soon.
+    pub(super) fn end_movement(&mut self) -> Option<[u8; 7]> {
+        let program = self.end_program().map(|before| before.joints(&SPEED));
+        let (Some(player), now) = (self.player.take(), self.now()) else { return program };
         player.end(now, &mut self.client);
         Some(player.speeds())
     }
@@ -164,6 +168,9 @@ impl App {
 
     fn stop(&mut self) {
         let now = self.now();
+        if self.stop_program(now) {
+            return;
+        }
         let (park, player) = (self.park.take(), self.player.take());
         let speeds = park.map(|park| park.speeds()).or(player.as_ref().map(Player::speeds));
         self.client.stop(now, speeds);
@@ -216,7 +223,10 @@ impl App {
         };
         match element.id().as_str() {
             "source" => self.choose_source(),
-            "upload" => upload(&element),
+            "upload" => files::read(&element, Self::open_recording),
+            "open-program" => files::read(&element, Self::open_program),
+            "open-exercise" => files::read(&element, Self::open_exercise),
+            "exercise-choice" => self.choose_exercise(),
             "joint-speed" => self.choose_speed(),
             id if TIP_FIELDS.contains(&id) => self.type_tip(),
             id if id.starts_with("target-") => self.type_joint(&element),
@@ -277,6 +287,7 @@ impl App {
         if key.key() == " " {
             // Also on buttons, where the space bar would press them: a stop works from everywhere.
             event.prevent_default();
+            event.stop_propagation();
             return self.stop();
         }
         if kind == "CANVAS" && self.scene.as_mut().is_some_and(|scene| scene.key(&key.key(), key.shift_key()))

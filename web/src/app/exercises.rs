@@ -125,7 +125,7 @@ impl App {
             SolutionPart::Program(text) => Some(text),
             SolutionPart::Repair => None,
         }) {
-            Some(program) => self.show_program_text(program),
+            Some(program) => self.show_in_editor(program),
             None => self.dom.notice(self.language.text("no-solution")),
         }
     }
@@ -139,7 +139,11 @@ impl App {
         let goals: String = lines(exercise, Some(attempt), tag).map(|line| format!("{line}\n")).collect();
         let date = String::from(Date::new_0().to_locale_string(tag, &JsValue::UNDEFINED));
         let state = self.exercise_state();
-        files::save(&self.dom, "result.txt", &format!("{}\n{date}\n\n{goals}\n{state}\n", exercise.title.of(tag)));
+        files::save(
+            &self.dom,
+            "result.txt",
+            &format!("{}\n{date}\n\n{goals}\n{state}\n", exercise.title.of(tag)),
+        );
     }
 
     fn exercise_state(&self) -> String {

@@ -17,13 +17,17 @@
 
 mod controls;
 mod dom;
+mod editor;
 mod events;
+mod exercises;
 mod exports;
+mod files;
 mod hand;
 mod kept_recording;
 mod page;
 mod panels;
 mod picture;
+mod programs;
 mod recording;
 mod storage;
 
@@ -49,6 +53,7 @@ pub fn start() -> Result<(), JsValue> {
     with_app(|app| {
         app.set_language(app.language);
         app.show_first_arm();
+        app.open_link();
     });
     request_frames()
 }

@@ -11,7 +11,9 @@ use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{CanvasRenderingContext2d, Element, Event};
 
 use super::dom::Dom;
+use super::exercises::Exercises;
 use super::kept_recording::KeptRecording;
+use super::programs::Programs;
 use super::storage;
 use crate::client::Client;
 use crate::movement::{Player, Recorder};
@@ -76,6 +78,8 @@ pub(super) struct App {
     pub(super) park: Option<Park>,
     pub(super) player: Option<Player>,
     pub(super) recording: Option<KeptRecording>,
+    pub(super) programs: Programs,
+    pub(super) exercises: Exercises,
     pub(super) tour_step: usize,
 }
 
@@ -95,14 +99,32 @@ pub(super) fn with_app<T>(act: impl FnOnce(&mut App) -> T) -> Option<T> {
 pub(super) fn on<E: JsCast>(
     target: &Element,
     kind: &str,
+    act: impl FnMut(&mut App, &E, &Event) + 'static,
+) -> Result<(), JsValue> {
+    add_listener(target, kind, act, false)
+}
+
+/// As [`on`], before the elements within this one get the event.
+pub(super) fn on_first<E: JsCast>(
+    target: &Element,
+    kind: &str,
+    act: impl FnMut(&mut App, &E, &Event) + 'static,
+) -> Result<(), JsValue> {
+    add_listener(target, kind, act, true)
+}
+
+fn add_listener<E: JsCast>(
+    target: &Element,
+    kind: &str,
     mut act: impl FnMut(&mut App, &E, &Event) + 'static,
+    is_first: bool,
 ) -> Result<(), JsValue> {
     let handler = Closure::<dyn FnMut(Event)>::new(move |event: Event| {
         if let Some(specific) = event.dyn_ref::<E>() {
             with_app(|app| act(app, specific, &event));
         }
     });
-    target.add_event_listener_with_callback(kind, handler.as_ref().unchecked_ref())?;
+    target.add_event_listener_with_callback_and_bool(kind, handler.as_ref().unchecked_ref(), is_first)?;
     handler.forget();
     Ok(())
 }
@@ -158,6 +180,8 @@ impl App {
             park: None,
             player: None,
             recording: KeptRecording::of_storage(),
+            programs: Programs::default(),
+            exercises: Exercises::default(),
             tour_step: 0,
         })
     }
@@ -215,6 +239,7 @@ impl App {
     fn play(&mut self, now: Instant) {
         self.park_on(now);
         self.play_on(now);
+        self.run_on(now);
     }
 
     /// The registers are new.
@@ -222,6 +247,7 @@ impl App {
     fn new_state(&mut self, now: Instant) {
         let state = self.client.state();
         let vacuum = self.client.registers().byte(&VACUUM_PUMP) != 0;
+        self.observe_exercise(now);
         let registers = self.client.registers();
         if let Some(recorder) = &mut self.recorder
             && let Err(fault) = recorder.add(now, registers, vacuum)
@@ -238,6 +264,8 @@ impl App {
         self.language = language;
         self.dom.translate(language);
         self.show_tour();
+        self.translate_editor();
+        self.show_exercise();
     }
 
     /// Changes to another arm: everything that belonged to the last one ends.
@@ -246,6 +274,8 @@ impl App {
         (self.shown_round, self.slid_round) = (0, 0);
         (self.hand, self.unreachable) = (None, None);
         (self.recorder, self.player, self.park) = (None, None, None);
+        self.programs.run = None;
+        self.exercises.end();
         self.history = History::new(PLOT_SECONDS);
         let is_simulated = matches!(self.line, Line::Simulated(_));
         self.dom.set_hidden("simulator", !is_simulated);

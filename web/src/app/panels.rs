@@ -79,6 +79,7 @@ pub(super) fn show(app: &mut App, state: &ArmState) {
     dom.set_text("tip", &format!("{}: x {x:.0}, y {y:.0}, z {z:.0} mm{reach}", language.text("tip")));
     dom.set_text("health", &health(app, state));
     show_recording(app);
+    app.show_program();
     if let Line::Simulated(source) = &app.line {
         app.dom.set_text("time", &format!("{:.1} s", seconds(source.now())));
     }
@@ -130,10 +131,11 @@ fn show_line(app: &mut App, state: &ArmState) {
         (0, _) => Answers::NotYet,
         _ => Answers::NoLonger,
     };
-    let doing = match (&app.player, &app.park) {
-        (Some(_), _) => Some("plays"),
-        (None, Some(_)) => Some("parks"),
-        (None, None) => None,
+    let doing = match (&app.player, &app.park, &app.programs.run) {
+        (Some(_), ..) => Some("plays"),
+        (_, Some(_), _) => Some("parks"),
+        (.., Some(_)) => Some("program-runs"),
+        _ => None,
     };
     let (line, mood) = state_line(app.language, answers, state, (app.client.stop_progress(), doing));
     app.dom.set_text("state", &line);

@@ -3,13 +3,12 @@
 use std::time::Duration;
 
 use sevenbot::recording::RecordingError;
-use wasm_bindgen::JsCast;
-use wasm_bindgen_futures::{JsFuture, spawn_local};
-use web_sys::{Blob, Element, HtmlAnchorElement, HtmlInputElement, Url};
+use web_sys::HtmlInputElement;
 
 use super::dom::number;
+use super::files;
 use super::kept_recording::KeptRecording;
-use super::page::{App, with_app};
+use super::page::App;
 use crate::movement::{PlayRefusal, Player, Recorder};
 
 /// The longest way to the first pose of a movement, in seconds.
@@ -46,9 +45,10 @@ impl App {
         let now = self.now();
         match Player::new(&recording.text, self.client.registers(), approach, now) {
             Ok(player) => {
+                let before = self.end_program();
                 self.player = Some(match self.player.take() {
                     Some(earlier) => player.instead_of(&earlier, now, &mut self.client),
-                    None => player,
+                    None => player.restoring(before.as_ref()),
                 });
                 self.dom.end_notice();
             }
@@ -72,36 +72,16 @@ impl App {
         self.dom.notice(&format!("{} {why}", self.language.text("bad-file")));
     }
 
+    /// A file with a movement was opened.
+    pub(super) fn open_recording(&mut self, text: String) {
+        match KeptRecording::parse(text) {
+            Ok(recording) => self.keep(recording),
+            Err(why) => self.refuse_file(&why),
+        }
+    }
+
     pub(super) fn download(&self) {
         let Some(recording) = &self.recording else { return self.say_that_nothing_is_recorded() };
-        let parts = js_sys::Array::of1(&recording.text.as_str().into());
-        let address =
-            Blob::new_with_str_sequence(&parts).and_then(|blob| Url::create_object_url_with_blob(&blob));
-        let Ok(address) = address else { return };
-        if let Ok(link) =
-            self.dom.0.create_element("a").and_then(|link| Ok(link.dyn_into::<HtmlAnchorElement>()?))
-        {
-            link.set_href(&address);
-            link.set_download("movement.7bot");
-            link.click();
-        }
-        // The browser has its own reference by now.
-        let _ = Url::revoke_object_url(&address);
+        files::save(&self.dom, "movement.7bot", &recording.text);
     }
-}
-
-/// Reads the file that a person chose.
-pub(super) fn upload(element: &Element) {
-    let Some(input) = element.dyn_ref::<HtmlInputElement>() else { return };
-    let Some(file) = input.files().and_then(|files| files.get(0)) else { return };
-    // So that the same file can be chosen again after a change.
-    input.set_value("");
-    spawn_local(async move {
-        let text =
-            JsFuture::from(file.text()).await.ok().and_then(|text| text.as_string()).unwrap_or_default();
-        with_app(|app| match KeptRecording::parse(text) {
-            Ok(recording) => app.keep(recording),
-            Err(why) => app.refuse_file(&why),
-        });
-    });
 }

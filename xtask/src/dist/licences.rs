@@ -8,6 +8,7 @@ use std::process::{Command, Stdio};
 
 use serde::Deserialize;
 
+use crate::blockly;
 use crate::run::{TaskResult, root};
 
 /// The packages whose programs, module, page and image are released.
@@ -69,8 +70,8 @@ pub(super) fn text() -> TaskResult<String> {
         .collect();
     crates.sort_by(|one, other| (&one.name, &one.version).cmp(&(&other.name, &other.version)));
     let mut text =
-        "The programs, the Python module, the page and the image contain these packages of crates.io.\n\
-                    The texts of their licences follow the list.\n\n"
+        "The programs, the Python module, the page and the image contain these packages of crates.io, and the page contains\n\
+         Blockly. The texts of their licences follow the list.\n\n"
             .to_owned();
     let mut licences: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for package in crates {
@@ -80,6 +81,8 @@ pub(super) fn text() -> TaskResult<String> {
             licences.entry(licence).or_default().push(name.clone());
         }
     }
+    writeln!(text, "{}", blockly::NAME)?;
+    licences.entry(blockly::licence()?).or_default().push(blockly::NAME.to_owned());
     let mut licences: Vec<_> = licences.into_iter().collect();
     licences.sort_by(|(_, one), (_, other)| one.cmp(other));
     for (licence, names) in licences {

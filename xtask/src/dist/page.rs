@@ -19,10 +19,12 @@ use crate::web::{self, files};
 const STYLE: &str = r#"<link rel="stylesheet" href="style.css">"#;
 const SCRIPT: &str = r#"<script type="module" src="start.js"></script>"#;
 const ICON: &str = r#"href="icon.svg""#;
-const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval';";
+const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; img-src 'self' data:;";
 /// A page from a disk may not load files beside it, so this one needs none, and loads nothing.
 const OWN_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; \
                           style-src 'unsafe-inline'; img-src data:;";
+/// The editor of block programs: the page loads it, or finds it as this element.
+const EDITOR: [&str; 2] = ["<script type=\"text/plain\" id=\"programs\">", "</script>"];
 
 /// The page as a folder, packed.
 pub(super) fn folder_name(release: &Release) -> String {
@@ -59,13 +61,23 @@ fn in_one_file() -> TaskResult<String> {
     let mut page = read("index.html")?;
     let icon = format!(r#"href="data:image/svg+xml;base64,{}""#, BASE64_STANDARD.encode(read("icon.svg")?));
     let style = format!("<style>\n{}</style>", read("style.css")?);
-    for (loaded, own) in [(POLICY, OWN_POLICY), (ICON, &icon), (STYLE, &style), (SCRIPT, &script()?)] {
+    let script = format!("{}\n{}", editor()?, script()?);
+    for (loaded, own) in [(POLICY, OWN_POLICY), (ICON, &icon), (STYLE, &style), (SCRIPT, &script)] {
         if page.matches(loaded).count() != 1 {
             return Err(format!("web/page/index.html does not contain `{loaded}` once").into());
         }
         page = page.replace(loaded, own);
     }
     Ok(page)
+}
+
+/// The editor of block programs as text, which the page makes a script when it needs it.
+fn editor() -> TaskResult<String> {
+    let [begin, end] = EDITOR;
+    let code = fs::read_to_string(root().join("web/dist").join(web::EDITOR))?;
+    // Within texts of the script these mean the same, and do not end the element.
+    let code = code.replace("</script", "<\\/script").replace("<!--", "<\\!--");
+    Ok(format!("{begin}{code}{end}"))
 }
 
 /// The program of the page, with its module as text.

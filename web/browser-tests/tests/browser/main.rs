@@ -9,5 +9,6 @@ mod moving;
 mod page;
 mod pictures;
 mod pixels;
+mod programs;
 mod recording;
 mod served_arm;

@@ -1,9 +1,14 @@
 //! The page in a browser: as one file from the disk, and as a folder under a path of a web server.
 
 use std::fs;
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use base64::Engine;
+use base64::prelude::BASE64_URL_SAFE_NO_PAD;
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
 use tempfile::TempDir;
 
 use crate::dist::page::{file_name, folder_name};
@@ -18,6 +23,10 @@ server = http.server.ThreadingHTTPServer(('127.0.0.1', 0), handler)
 open(sys.argv[2], 'w').write(f'{server.server_port}\\n')
 server.serve_forever()
 ";
+/// A program of one block, and what it is in Python.
+const PROGRAM: &str = r#"{"blocks": {"blocks": [{"type": "arm_start", "id": "a", "next": {"block":
+    {"type": "arm_vacuum", "id": "b", "fields": {"STATE": "ON"}}}}]}}"#;
+const PYTHON: &str = "arm.set(\"vacuum-pump\", 1)";
 /// The page has drawn its seven joints when this is in it seven times.
 const SLIDER: &str = "type=\"range\"";
 const JOINTS: usize = 7;
@@ -45,19 +54,31 @@ fn serve(folder: &Path) -> TaskResult<(ChildProcess, u16)> {
     Ok((server, port))
 }
 
-/// The page at this address starts, without any other file of this computer.
+/// The address of the page with a program in it, as the page makes it.
+fn with_program(address: &str) -> TaskResult<String> {
+    let mut encoder = DeflateEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(PROGRAM.as_bytes())?;
+    Ok(format!("{address}#program={}", BASE64_URL_SAFE_NO_PAD.encode(encoder.finish()?)))
+}
+
+/// The page at this address starts, without any other file of this computer, and shows a program of blocks.
 fn shows_joints(address: &str) -> TaskResult {
     let profile = TempDir::new()?;
     let mut browser = Command::new("chromium");
     browser.args(["--headless", "--no-sandbox", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]);
     browser.arg(format!("--user-data-dir={}", profile.path().display()));
     // Time of the page, not of this computer.
-    browser.args(["--virtual-time-budget=20000", "--dump-dom", address]).stderr(Stdio::null());
+    browser
+        .args(["--virtual-time-budget=20000", "--dump-dom", &with_program(address)?])
+        .stderr(Stdio::null());
     let page = String::from_utf8(browser.output()?.stdout)?;
     let joints = page.matches(SLIDER).count();
     if joints < JOINTS {
         return Err(format!("{address}: the page shows {joints} joints:\n{page}").into());
     }
-    println!("{address}: the page shows its joints");
+    if !page.contains(PYTHON) || !page.contains("blocklyBlockCanvas") {
+        return Err(format!("{address}: the page does not show the program of its address:\n{page}").into());
+    }
+    println!("{address}: the page shows its joints and a program");
     Ok(())
 }

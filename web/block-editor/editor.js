@@ -1,0 +1,132 @@
+// The editor of block programs: Blockly with the blocks of the arm. Knows nothing of the arm: the page reads the text of the
+// program and lights its blocks. `cargo xtask web` puts Blockly, its texts and the table of blocks in front of this file.
+
+var blockEditor = (() => {
+  "use strict";
+  const MOST_BYTES = 200_000;
+  const EMPTY = { blocks: { blocks: [{ type: "arm_start", deletable: false, x: 20, y: 20 }] } };
+  let workspace = null;
+  let shown = null;
+
+  Blockly.dialog.setPrompt(ask);
+  // The page shows what happens in its own places.
+  Blockly.dialog.setAlert((_, done) => done?.());
+
+  // Blockly makes its styles as text, which the content security policy does not allow as an element.
+  function adoptStyles() {
+    for (const text of document.querySelectorAll("template[id^=blockly]")) {
+      if (text.dataset.adopted) continue;
+      text.dataset.adopted = "yes";
+      const sheet = new CSSStyleSheet();
+      sheet.replaceSync(text.textContent);
+      document.adoptedStyleSheets.push(sheet);
+    }
+  }
+
+  // Asks for a name. A dialog of the browser would stop the page, and with it the arm's program.
+  function ask(message, suggested, done) {
+    const dialog = document.getElementById("ask");
+    const field = dialog.querySelector("input");
+    dialog.querySelector("label span").textContent = message;
+    field.value = suggested;
+    dialog.returnValue = "";
+    dialog.addEventListener("close", () => done(dialog.returnValue == "yes" ? field.value : null), { once: true });
+    dialog.onclick = (event) => event.target.dataset.answer && dialog.close(event.target.dataset.answer);
+    field.onkeydown = (event) => event.key == "Enter" && dialog.close("yes");
+    dialog.showModal();
+    field.select();
+  }
+
+  // Shows the editor in an element, in a language, with the program that it had. `changed` is called after each edit.
+  function open(element, language, changed) {
+    const program = workspace ? text() : null;
+    workspace?.dispose();
+    Blockly.setLocale(blocklyTexts[language]);
+    for (const [name, texts] of Object.entries(blockTable.texts)) Blockly.Msg[name] = texts[language];
+    const isNarrow = element.clientWidth < 560;
+    workspace = Blockly.inject(element, {
+      toolbox: blockTable.toolbox, media: "media/", sounds: false, trashcan: false, comments: false, horizontalLayout: isNarrow,
+      renderer: "zelos", zoom: { startScale: isNarrow ? 0.6 : 0.7, wheel: false, pinch: true },
+      move: { scrollbars: true, drag: true, wheel: true },
+    });
+    adoptStyles();
+    workspace.addChangeListener(Blockly.Events.disableOrphans);
+    workspace.addChangeListener((event) => {
+      if (!event.isUiEvent && !workspace.isDragging()) changed();
+    });
+    shown ??= new ResizeObserver(() => workspace && Blockly.svgResize(workspace));
+    shown.observe(element);
+    load(program ?? JSON.stringify(EMPTY), false);
+  }
+
+  function text() {
+    return JSON.stringify(Blockly.serialization.workspaces.save(workspace));
+  }
+
+  // Returns why the text is no program, or an empty text. Undo brings the program back that was there.
+  function load(program, canUndo) {
+    const before = Blockly.serialization.workspaces.save(workspace);
+    try {
+      Blockly.serialization.workspaces.load(JSON.parse(program), workspace, { recordUndo: canUndo });
+      return "";
+    } catch (error) {
+      Blockly.serialization.workspaces.load(before, workspace);
+      return String(error.message ?? error);
+    }
+  }
+
+  // Lights one block, or none.
+  function light(id) {
+    workspace.highlightBlock(id || null);
+  }
+
+  // Shows what is wrong at a block; without a text at no block.
+  function warn(id, message) {
+    for (const block of workspace.getAllBlocks(false)) block.setWarningText(null);
+    const block = id && workspace.getBlockById(id);
+    if (!block || !message) return;
+    block.setWarningText(message);
+    workspace.centerOnBlock(id);
+  }
+
+  // Adds a pose below the last block of the program.
+  function addPose(angles) {
+    let last = workspace.getBlocksByType("arm_start", false)[0];
+    while (last?.getNextBlock()) last = last.getNextBlock();
+    const fields = Object.fromEntries(angles.map((angle, index) => [`J${index + 1}`, angle]));
+    Blockly.Events.setGroup(true);
+    const pose = Blockly.serialization.blocks.append({ type: "arm_pose", fields }, workspace, { recordUndo: true });
+    last?.nextConnection?.connect(pose.previousConnection);
+    Blockly.Events.setGroup(false);
+  }
+
+  async function piped(bytes, stream) {
+    const reader = new Blob([bytes]).stream().pipeThrough(stream).getReader();
+    const parts = [];
+    let size = 0;
+    for (let part; !(part = await reader.read()).done && size <= MOST_BYTES; size += part.value.length) parts.push(part.value);
+    return new Uint8Array(await new Blob(parts).arrayBuffer());
+  }
+
+  // A program as letters for an address.
+  async function pack(program) {
+    const bytes = await piped(program, new CompressionStream("deflate-raw"));
+    return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
+  }
+
+  // The program of an address; empty if it is none.
+  async function unpack(letters) {
+    try {
+      const bytes = Uint8Array.from(atob(letters.replaceAll("-", "+").replaceAll("_", "/")), (letter) => letter.charCodeAt(0));
+      return new TextDecoder().decode(await piped(bytes, new DecompressionStream("deflate-raw")));
+    } catch {
+      return "";
+    }
+  }
+
+  function copy(text) {
+    navigator.clipboard?.writeText(text).catch(() => {});
+  }
+
+  return { copy, open, text, load, light, warn, addPose, pack, unpack };
+})();
