@@ -14,7 +14,7 @@ use sevenbot::servo_bench::ServoError;
 use sevenbot::stream::StreamError;
 use sevenbot::{Error, OpenError};
 
-use crate::advice::{self, owned};
+use crate::advice::{self, START_SIMULATOR, owned};
 use crate::style::BAD;
 
 /// The exit status after Ctrl-C: 128 plus the number of SIGINT, as in shells.
@@ -236,8 +236,7 @@ impl CommandError {
             Self::NoArm { tried } => {
                 let tried = tried.iter().map(|(port, reason)| format!("{port}: {reason}"));
                 let inside = "--port sim is a simulated arm inside this command";
-                let simulator = "`cargo sim -- --link ./7bot` starts one that stays, for --port ./7bot";
-                tried.chain([say_which, inside, simulator].map(str::to_owned)).collect()
+                tried.chain([say_which, inside, START_SIMULATOR].map(str::to_owned)).collect()
             }
             Self::SeveralArms { .. } => vec![say_which.to_owned()],
             Self::NoRate { .. } => {

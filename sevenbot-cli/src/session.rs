@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
-use sevenbot::network;
-use sevenbot::ports::{self, ProbeResult};
+use sevenbot::network::{self, Address};
+use sevenbot::ports::{self, PortInfo, ProbeResult};
 use sevenbot::wire_log::LoggedLine;
 use sevenbot::{Arm, ArmOptions, Firmware, OpenError};
 
@@ -82,17 +82,35 @@ impl Session {
         Arm::over(Box::new(line), &port, self.options).map_err(failed)
     }
 
-    /// The port from the command line, or the only one that leads to an arm. Without any, that of the only simulator that
-    /// runs: a pseudo-terminal is not in the list of serial ports.
+    /// The port from the command line, or the only one that leads to an arm, also through a server of this user. Without any,
+    /// that of the only simulator that runs: a pseudo-terminal is not in the list of serial ports.
     pub(crate) fn port_name(&self) -> Result<String, CommandError> {
+        self.port_among(ports::reachable)
+    }
+
+    /// As [`Self::port_name`], for a command that a server cannot serve: only a port of this computer.
+    pub(crate) fn own_port_name(&self) -> Result<String, CommandError> {
+        self.port.as_deref().map_or(Ok(()), check_is_no_server)?;
+        self.port_among(ports::available)
+    }
+
+    fn port_among(&self, list: impl FnOnce() -> Vec<PortInfo>) -> Result<String, CommandError> {
         if let Some(port) = &self.port {
             return Ok(port.clone());
         }
-        match the_only(ports::probe(ports::available(), self.options.baud)) {
+        match the_only(ports::probe(list(), self.options.baud)) {
             Err(no_arm @ CommandError::NoArm { .. }) => simulator(running_simulators(), no_arm),
             found => found,
         }
     }
+}
+
+/// Fails if the port is the address of a server.
+pub(crate) fn check_is_no_server(port: &str) -> Result<(), CommandError> {
+    Address::parse(port).map_or(Ok(()), |_| {
+        let reason = "is a server, and this command needs a port of this computer, such as /dev/ttyUSB0: `sevenbot ports` lists them";
+        Err(CommandError::Usage(format!("{port} {reason}")))
+    })
 }
 
 /// Repairs what a program left in the arm when it was killed while it streamed, and tells the user.

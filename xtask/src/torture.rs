@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!   torture   worlds with injected faults                  half of the time
+//!             free motion, with and without protection     a thousand motions
 //!             the parser on a disturbed line               a million frames for each disturbance
 //!   journal   the long forms of its tests                  all of them
 //!   fuzz      six targets                                  the other half of the time
@@ -40,7 +41,9 @@ pub(crate) fn long() -> TaskResult {
 }
 
 fn days(days: u32) -> TaskResult {
-    cargo(&format!("run --quiet --release --package torture -- --days {days} --seed 1 --frames 0"))
+    cargo(&format!(
+        "run --quiet --release --package torture -- --days {days} --seed 1 --frames 0 --motions 200"
+    ))
 }
 
 /// Runs all trials.

@@ -7,6 +7,7 @@ mod emergency_stop;
 mod engaging;
 mod extended_block;
 mod failing_servos;
+mod free_moves;
 mod guard_time;
 mod holding;
 mod host_link;

@@ -17,6 +17,7 @@ use sevenbot_serve::server::{
     AccessPolicy, ArmLocation, Notice, RefusalReason, Server, ServerConfig, Stop, TlsFiles,
 };
 
+use crate::advice::START_SIMULATOR;
 use crate::command_error::CommandError;
 use crate::printer::{Printable, note, warn};
 use crate::session::Session;
@@ -254,11 +255,10 @@ fn name(text: &str) -> Result<String, &'static str> {
 
 /// A port from the command line is kept. Otherwise the arm is searched again each time it was unplugged.
 pub(super) fn location(session: &Session) -> Result<ArmLocation, CommandError> {
-    let first = session.port_name()?;
+    let first = session.own_port_name()?;
     if simulated_port(&first).is_some() {
-        let reason = "the arm of --port sim lives in one command only: start one that stays with `cargo sim -- --link ./7bot`, \
-                      and use --port ./7bot";
-        return Err(CommandError::Usage(reason.to_owned()));
+        let reason = format!("the arm of --port sim lives in one command only: {START_SIMULATOR}");
+        return Err(CommandError::Usage(reason));
     }
     let first = PathBuf::from(first);
     let list = || ports::available().into_iter().map(|port| port.name.into()).collect();

@@ -14,7 +14,7 @@ use sevenbot::wire_log::{self, Sender};
 
 use crate::command_error::CommandError;
 use crate::printer::{Printable, Printer};
-use crate::session::Session;
+use crate::session::{Session, check_is_no_server};
 use crate::style::WARNING;
 
 /// Show the traffic of a line as text, frame by frame.
@@ -104,6 +104,7 @@ fn port(session: &mut Session) -> Result<(), CommandError> {
     let name = session.port.clone().ok_or_else(|| {
         CommandError::Usage("no input: use --port PORT, or give a file; - is standard input".to_owned())
     })?;
+    check_is_no_server(&name)?;
     let opened = OpenPort::open(&name, session.options.baud);
     let mut port = opened.map_err(|error| CommandError::Open { port: name, error })?;
     let mut parser = TrafficParser::default();

@@ -1,6 +1,7 @@
 //! Runs worlds on all processors until the time is used up or a rule is violated.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
@@ -8,6 +9,7 @@ use std::time::{Duration as RealTime, Instant as RealInstant};
 
 use protocol_core::time::Duration;
 
+use crate::free_motion::{self, FreeMotionTrial};
 use crate::parser_trial::{self, ParserTrial};
 use crate::scenario::{Scenario, of_seed};
 use crate::world::{FailedWorld, TortureWorld};
@@ -38,6 +40,8 @@ pub struct CampaignPlan {
     pub scenario: Option<&'static Scenario>,
     /// Good frames for each kind of disturbance in the trials of the parser.
     pub frames: usize,
+    /// Free motions to compare with those without protection.
+    pub motions: u64,
 }
 
 /// The result of a campaign.
@@ -49,6 +53,8 @@ pub struct CampaignResult {
     pub failure: Option<Box<FailedWorld>>,
     /// The trials of the parser.
     pub parser_trials: Vec<ParserTrial>,
+    /// The trial of free motion.
+    pub free_motion: FreeMotionTrial,
     /// The real time of the worlds.
     pub elapsed: RealTime,
 }
@@ -66,7 +72,9 @@ impl CampaignResult {
     /// True if no rule was violated.
     #[must_use]
     pub fn passed(&self) -> bool {
-        self.failure.is_none() && self.parser_trials.iter().all(ParserTrial::passed)
+        self.failure.is_none()
+            && self.free_motion.different.is_empty()
+            && self.parser_trials.iter().all(ParserTrial::passed)
     }
 }
 
@@ -102,8 +110,14 @@ pub fn run(plan: &CampaignPlan, mut progress: impl FnMut(&CampaignResult, RealTi
         collect(&mut result, &receiver, &remaining, |result| progress(result, start.elapsed()));
     });
     result.elapsed = start.elapsed();
-    if result.failure.is_none() && plan.frames > 0 {
-        result.parser_trials = parser_trials(plan);
+    if result.failure.is_none() {
+        let motions = plan.seed..plan.seed.saturating_add(plan.motions);
+        on_all_processors(motions, free_motion::run)
+            .into_iter()
+            .for_each(|trial| result.free_motion.add(trial));
+        let kinds = 0..if plan.frames > 0 { parser_trial::DISTURBANCES } else { 0 };
+        let trials = on_all_processors(kinds, |kind| parser_trial::run(kind, plan.seed, plan.frames));
+        result.parser_trials = trials.into_iter().flatten().collect();
     }
     result
 }
@@ -174,13 +188,16 @@ fn collect(
     }
 }
 
-/// Runs the trials of the parser on all processors.
-fn parser_trials(plan: &CampaignPlan) -> Vec<ParserTrial> {
-    let next = Mutex::new(0..parser_trial::DISTURBANCES);
+/// Runs trials on all processors. The results have the order of the trials.
+fn on_all_processors<N: Copy + Ord + Send, T: Send>(trials: Range<N>, run: impl Fn(N) -> T + Sync) -> Vec<T>
+where
+    Range<N>: Iterator<Item = N>,
+{
+    let next = Mutex::new(trials);
     let work = || {
         let mut done = Vec::new();
-        while let Some(kind) = next.lock().ok().and_then(|mut next| next.next()) {
-            done.extend(parser_trial::run(kind, plan.seed, plan.frames).map(|trial| (kind, trial)));
+        while let Some(trial) = next.lock().ok().and_then(|mut next| next.next()) {
+            done.push((trial, run(trial)));
         }
         done
     };
@@ -188,6 +205,6 @@ fn parser_trials(plan: &CampaignPlan) -> Vec<ParserTrial> {
         let workers: Vec<_> = (0..workers()).map(|_| scope.spawn(work)).collect();
         workers.into_iter().flat_map(|worker| worker.join().unwrap_or_default()).collect()
     });
-    done.sort_by_key(|(kind, _)| *kind);
-    done.into_iter().map(|(_, trial)| trial).collect()
+    done.sort_by_key(|(trial, _)| *trial);
+    done.into_iter().map(|(_, result)| result).collect()
 }

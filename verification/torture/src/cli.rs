@@ -49,6 +49,10 @@ pub struct CampaignArgs {
     #[arg(long, default_value_t = 1_000_000)]
     pub frames: usize,
 
+    /// Free motions to compare with those without protection; 0 for none
+    #[arg(long, default_value_t = 1_000)]
+    pub motions: u64,
+
     /// Print the rows of the table with tabs between the columns
     #[arg(long)]
     pub rows: bool,
@@ -83,7 +87,13 @@ impl CampaignArgs {
             Some(minutes) => TimeBudget::Real(RealTime::from_secs_f64(minutes * 60.0)),
             None => TimeBudget::Virtual(virtual_days(self.days.unwrap_or(DAYS))),
         };
-        CampaignPlan { seed: self.seed, budget, scenario: self.scenario, frames: self.frames }
+        CampaignPlan {
+            seed: self.seed,
+            budget,
+            scenario: self.scenario,
+            frames: self.frames,
+            motions: self.motions,
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!   cli ─▶ CampaignPlan ─▶ campaign ─▶ TortureWorld (one seed, one scenario, an hour) ─▶ WorldCounts or FailedWorld ─┐
+//!                                 ├──▶ free_motion: motions with and without protection ─▶ FreeMotionTrial ───────────┤
 //!                                 └──▶ parser_trial: good frames on a disturbed line ─▶ ParserTrial ─────────────────┤
 //!   cli ─▶ load: a client that saturates a port                                               result_table ◀─────────┘
 //!   cli ─▶ sag: how far the arm sags during a failure
@@ -15,6 +16,7 @@ pub mod campaign;
 pub mod cli;
 pub mod seeded_rng;
 // Fuzz targets report a violated rule by a panic. Only the fuzzer and tests call them.
+pub mod free_motion;
 #[allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 pub mod fuzz;
 mod linkage_goals;

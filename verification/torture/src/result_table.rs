@@ -3,6 +3,7 @@
 use std::fmt::{self, Display};
 
 use crate::campaign::{CampaignPlan, CampaignResult};
+use crate::free_motion::FreeMotionTrial;
 use crate::parser_trial::ParserTrial;
 use crate::scenario::SCENARIOS;
 use crate::text_table::Column::{Left, Right};
@@ -30,6 +31,7 @@ impl ResultTable<'_> {
         let Self(_, outcome) = self;
         let mut rows = self.worlds();
         rows.extend(self.total());
+        rows.extend(motion_row(&outcome.free_motion));
         rows.extend(outcome.parser_trials.iter().map(parser_row));
         if let Some(failure) = &outcome.failure {
             let trial = format!("{}: seed {}", failure.scenario.name, failure.seed);
@@ -99,6 +101,17 @@ fn amount(worlds: u64, counts: &WorldCounts) -> String {
 
 fn row(trial: &str, number: &str) -> ResultRow {
     [trial.to_owned(), number.to_owned(), "none".to_owned()]
+}
+
+fn motion_row(trial: &FreeMotionTrial) -> Option<ResultRow> {
+    let FreeMotionTrial { motions, bytes, different } = trial;
+    let failures = if different.is_empty() {
+        "none".to_owned()
+    } else {
+        format!("differ or are blocked: seeds {different:?}")
+    };
+    let number = format!("{motions} motions, {bytes} bytes to the servos");
+    (*motions > 0).then(|| ["free motion, with and without protection".to_owned(), number, failures])
 }
 
 fn parser_row(trial: &ParserTrial) -> ResultRow {

@@ -33,6 +33,8 @@ pub(super) struct JointMove {
     end: Duration,
     watch: MoveWatch,
     round: u64,
+    /// The arm had other targets in the last round. A stop of another program writes them, and tells of itself one round later.
+    has_other_targets: bool,
     /// Since when no set-point moves.
     resting: Option<Duration>,
 }
@@ -44,7 +46,15 @@ impl JointMove {
         let joints = with_target.fold(0, |bits, (joint, _)| bits | joint.bit());
         let now = since_start(now);
         let end = now + longest(&targets, registers) * 2 + MARGIN;
-        Self { targets, joints, end, watch: MoveWatch::new(now, joints, BAUD), round: 0, resting: None }
+        Self {
+            targets,
+            joints,
+            end,
+            watch: MoveWatch::new(now, joints, BAUD),
+            round: 0,
+            has_other_targets: false,
+            resting: None,
+        }
     }
 
     /// Are the joints there?
@@ -56,7 +66,13 @@ impl JointMove {
         let (now, registers) = (since_start(now), client.registers());
         self.watch.registers(now, registers)?;
         let (health, state) = (Health::new(registers), client.state());
-        self.check_targets(&health)?;
+        let other = self.other_targets(&health);
+        if std::mem::replace(&mut self.has_other_targets, !other.is_empty()) && !other.is_empty() {
+            return Err(ProgramFailure::OtherTargets(other));
+        }
+        if self.has_other_targets {
+            return Ok(false);
+        }
         let away = health.away_from_targets(self.joints);
         if state.moving & self.joints != 0 {
             self.resting = None;
@@ -75,8 +91,8 @@ impl JointMove {
         }
     }
 
-    /// Fails if the arm has other targets than these: something else moves it.
-    fn check_targets(&self, health: &Health) -> Result<(), ProgramFailure> {
+    /// The joints that have other targets than these: something else moves them.
+    fn other_targets(&self, health: &Health) -> Vec<Joint> {
         let joints = health.joints.iter().zip(&self.targets);
         let other = joints.filter(|(joint, target)| {
             let is_claw = usize::from(joint.joint.index()) == CLAW;
@@ -86,8 +102,7 @@ impl JointMove {
             };
             !is_claw && target.as_ref().is_some_and(|target| !is_same(target))
         });
-        let other: Vec<_> = other.map(|(joint, _)| joint.joint).collect();
-        if other.is_empty() { Ok(()) } else { Err(ProgramFailure::OtherTargets(other)) }
+        other.map(|(joint, _)| joint.joint).collect()
     }
 
     fn is_still(&self, state: &ArmState) -> bool {

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
+use crate::advice::START_SIMULATOR;
 use crate::command_error::CommandError;
 
 /// A simulator answers sooner than this.
@@ -135,7 +136,7 @@ fn directory() -> Option<PathBuf> {
 
 fn none(message: &str) -> CommandError {
     let advice = [
-        "`host-sim --link ./7bot` starts one; in the source tree, `cargo sim -- --link ./7bot`",
+        START_SIMULATOR,
         "it prints the path of its control socket: use that path with --control",
         "an arm that is no simulation has no control socket",
     ];

@@ -238,6 +238,20 @@ fn stop_all_finds_the_server() {
 }
 
 #[test]
+fn commands_without_a_port_find_the_server() {
+    let served = Served::start(1, &[]);
+    for arguments in [&["pose", "100", "90", "65", "90", "90", "90", "80", "--wait"][..], &["stop"]] {
+        let mut command = tool();
+        command.current_dir(served.folder.path()).env("XDG_RUNTIME_DIR", served.folder.path());
+        let done = command.env_remove("SEVENBOT_PORT").args(arguments).output().expect("the tool runs");
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.success() && said.contains("using unix:"), "{arguments:?}: {done:?}");
+    }
+    let target = target(&mut served.open("a"));
+    assert!(target.abs_diff(100) <= 1, "{target}");
+}
+
+#[test]
 fn silent_connections_keep_nobody_out_who_knows_the_token() {
     let served = Served::start(1, &["--token", "correct-horse"]);
     let silent: Vec<TcpStream> = (0..100).map(|_| served.connect()).collect();

@@ -252,3 +252,12 @@ fn help_contains_examples_and_exit_statuses() {
         assert!(help(&[command, "--help"]).contains("Examples:"), "{command}");
     }
 }
+
+#[test]
+fn commands_that_need_a_port_of_this_computer_refuse_a_server() {
+    for command in [&["serve"][..], &["view", "--no-open"], &["sniff"]] {
+        let refused = run_without_arm(&[&["--port", "sevenbot://lab-3"], command].concat());
+        let said = failed(&refused, 2);
+        assert!(said.contains("sevenbot://lab-3 is a server"), "{said}");
+    }
+}

@@ -28,6 +28,9 @@ const ALARM_OVER: Duration = Duration::from_millis(400);
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct JointTruth {
     is_on: bool,
+    has_power: bool,
+    /// The last loss of power in the motor state servo. A servo that restarts is let go, also if it never had torque (D28).
+    unpowered_at: Option<Instant>,
     /// The last loss of torque in the motor state servo.
     lost_at: Option<Instant>,
     /// The last time without torque after a loss.
@@ -65,12 +68,15 @@ impl JointTruth {
         self.passing_alarm_at.is_none_or(|at| now - at >= ALARM_OVER)
     }
 
-    /// Takes the torque of the servo. `may_miss_orders` tells that frames may be lost, or questions not answered.
+    /// Takes the torque of the servo; `None` without power. `may_miss_orders` tells that frames may be lost, or questions not answered.
     pub(super) fn observe(&mut self, now: Instant, torque: Option<Torque>, may_miss_orders: bool) {
         let is_on = torque == Some(Torque::On);
         self.lacks_order = !is_on && (self.lacks_order || may_miss_orders);
         if self.is_on && !is_on {
             self.lost_at = Some(now);
+        }
+        if std::mem::replace(&mut self.has_power, torque.is_some()) && torque.is_none() {
+            self.unpowered_at = Some(now);
         }
         if !is_on {
             self.off_at = now;
@@ -104,14 +110,14 @@ impl JointTruth {
 
     /// True if the controller need not have given torque again by now (D28): the joint was let go a moment ago.
     pub(super) fn may_wait_for_torque(&self, now: Instant) -> bool {
-        self.lost_at.max(self.alarm_at).is_some_and(|at| now - at < ENGAGE_TIME)
+        self.lost_at.max(self.alarm_at).max(self.unpowered_at).is_some_and(|at| now - at < ENGAGE_TIME)
     }
 
-    /// True if the controller may take the joint for let go (D28): it has an alarm, or it lost its torque, or an alarm kept it
-    /// from getting any, or the order may be lost.
+    /// True if the controller may take the joint for let go (D28): it has an alarm, or it lost its torque or power, or an alarm
+    /// kept it from getting torque, or the order may be lost.
     pub(super) fn may_be_let_go(&self, now: Instant) -> bool {
         let has_alarm = self.alarm_at.is_some_and(|at| now - at < NOTICE_TIME);
-        let had_cause = self.lost_at.is_some() || self.alarm_at.is_some();
+        let had_cause = self.lost_at.max(self.alarm_at).max(self.unpowered_at).is_some();
         has_alarm || self.lacks_order || had_cause && now - self.off_at < NOTICE_TIME
     }
 
@@ -143,6 +149,18 @@ mod tests {
         assert!(truth.may_wait_for_torque(at(10_199)) && !truth.may_wait_for_torque(at(10_200)));
         truth.observe(at(20_000), OFF, false);
         assert!(truth.may_be_let_go(at(27_499)) && !truth.may_be_let_go(at(27_500)));
+    }
+
+    #[test]
+    fn a_joint_that_restarts_before_it_had_torque_may_be_let_go() {
+        let mut truth = JointTruth::default();
+        truth.observe(at(0), None, false);
+        truth.observe(at(100), OFF, false);
+        assert!(!truth.may_be_let_go(at(100)), "it had no power yet");
+        truth.observe(at(200), None, false);
+        truth.observe(at(500), OFF, false);
+        assert!(truth.may_be_let_go(at(500)) && truth.may_wait_for_torque(at(10_199)));
+        assert!(!truth.may_wait_for_torque(at(10_200)) && truth.lost_at().is_none());
     }
 
     #[test]

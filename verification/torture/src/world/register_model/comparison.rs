@@ -87,7 +87,9 @@ impl RegisterModel {
             ensure(found == present || is_held || is_own, || {
                 let wanted = self.get(at);
                 let number = joint.number();
-                format!("target {number} is {found}: the host wrote {wanted}, and the joint was at {present}")
+                format!(
+                    "target {number} is {found}: the host wrote {wanted}, and the joint was at {present} ({own:?})"
+                )
             })?;
             self.take_target(joint, found);
         }
