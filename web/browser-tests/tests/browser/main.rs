@@ -2,6 +2,7 @@
 
 mod controls;
 mod endurance;
+mod exercises;
 mod faults;
 mod figures;
 mod firefox;
