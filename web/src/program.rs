@@ -126,6 +126,8 @@ pub struct ProgramRun {
     /// The last registers that were watched are those of this round.
     watched_round: u64,
     last_poll: Option<Instant>,
+    /// The stops of all programs before it, as a server counts them; the inner `None` without a server.
+    stops: Option<Option<u8>>,
 }
 
 impl ProgramRun {
@@ -142,6 +144,7 @@ impl ProgramRun {
             watch: MoveWatch::new(since_start(now), 0, BAUD),
             watched_round: 0,
             last_poll: None,
+            stops: None,
         }
     }
 
@@ -239,7 +242,11 @@ impl ProgramRun {
     fn watch(&mut self, now: Instant, client: &Client) -> Result<(), ProgramFailure> {
         if client.rounds() != self.watched_round {
             self.watched_round = client.rounds();
-            if SharingState::of(client.registers()).is_some_and(|sharing| sharing.is_stopped) {
+            let sharing = SharingState::of(client.registers());
+            // A server drops the targets of a program that streamed. One that waits for its joints sees the count of stops.
+            let stops = sharing.map(|sharing| sharing.stops);
+            let is_stopped = sharing.is_some_and(|sharing| sharing.is_stopped);
+            if is_stopped || *self.stops.get_or_insert(stops) != stops {
                 return Err(ProgramFailure::Arm(PlayFailure::StoppedByAnother));
             }
             self.watch.registers(since_start(now), client.registers())?;
