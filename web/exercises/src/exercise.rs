@@ -1,6 +1,7 @@
 //! An exercise and its text file.
 
 use serde::Deserialize;
+use serde_json::Value;
 
 use crate::goal::Goal;
 use crate::solution::{SolutionPart, Step, parts};
@@ -10,7 +11,7 @@ const LARGEST: usize = 200_000;
 
 /// A text in the languages of the page. A file may have one text for all languages.
 #[derive(Clone, Debug, Deserialize, PartialEq, Eq)]
-#[serde(untagged)]
+#[serde(try_from = "Value")]
 pub enum Text {
     /// For all languages.
     One(String),
@@ -19,9 +20,21 @@ pub enum Text {
         /// English.
         en: String,
         /// Simplified Chinese.
-        #[serde(rename = "zh-CN")]
         zh: String,
     },
+}
+
+impl TryFrom<Value> for Text {
+    type Error = &'static str;
+
+    fn try_from(value: Value) -> Result<Self, Self::Error> {
+        let member = |name| value.get(name).and_then(Value::as_str).map(str::to_owned);
+        match (value.as_str(), member("en"), member("zh-CN")) {
+            (Some(text), ..) => Ok(Self::One(text.to_owned())),
+            (_, Some(en), Some(zh)) => Ok(Self::Each { en, zh }),
+            _ => Err("a text is \"...\" or {\"en\": \"...\", \"zh-CN\": \"...\"}"),
+        }
+    }
 }
 
 impl Text {

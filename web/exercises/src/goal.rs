@@ -12,21 +12,22 @@ const PATH_WITHIN: f64 = 8.0;
 /// By default a joint is at an angle within this, in degrees.
 const JOINT_WITHIN: f64 = 2.0;
 
-const fn tip_within() -> f64 {
-    TIP_WITHIN
-}
-
-const fn path_within() -> f64 {
-    PATH_WITHIN
-}
-
-const fn joint_within() -> f64 {
-    JOINT_WITHIN
+/// A goal in a file: one of the four kinds.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GoalInFile {
+    text: Text,
+    tip: Option<[f64; 3]>,
+    path: Option<Vec<[f64; 3]>>,
+    joint: Option<u8>,
+    degrees: Option<f64>,
+    blocked: Option<u8>,
+    within: Option<f64>,
 }
 
 /// One goal of an exercise.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(untagged, deny_unknown_fields)]
+#[serde(try_from = "GoalInFile")]
 pub enum Goal {
     /// The tip touches a point.
     Tip {
@@ -35,7 +36,6 @@ pub enum Goal {
         /// The point: x, y, z in mm.
         tip: [f64; 3],
         /// How near, in mm.
-        #[serde(default = "tip_within")]
         within: f64,
     },
     /// The tip goes along straight lines from point to point, without leaving them.
@@ -45,7 +45,6 @@ pub enum Goal {
         /// The points: x, y, z in mm.
         path: Vec<[f64; 3]>,
         /// How near to the lines, in mm.
-        #[serde(default = "path_within")]
         within: f64,
     },
     /// A joint comes to rest at an angle.
@@ -57,7 +56,6 @@ pub enum Goal {
         /// The angle.
         degrees: f64,
         /// How near, in degrees.
-        #[serde(default = "joint_within")]
         within: f64,
     },
     /// A joint is blocked by an obstacle.
@@ -67,6 +65,27 @@ pub enum Goal {
         /// The joint, from 1 to 7.
         blocked: u8,
     },
+}
+
+impl TryFrom<GoalInFile> for Goal {
+    type Error = &'static str;
+
+    fn try_from(found: GoalInFile) -> Result<Self, Self::Error> {
+        let GoalInFile { text, tip, path, joint, degrees, blocked, within } = found;
+        match (tip, path, joint.zip(degrees), blocked) {
+            (Some(tip), None, None, None) => {
+                Ok(Self::Tip { text, tip, within: within.unwrap_or(TIP_WITHIN) })
+            }
+            (None, Some(path), None, None) => {
+                Ok(Self::Path { text, path, within: within.unwrap_or(PATH_WITHIN) })
+            }
+            (None, None, Some((joint, degrees)), None) => {
+                Ok(Self::Joint { text, joint, degrees, within: within.unwrap_or(JOINT_WITHIN) })
+            }
+            (None, None, None, Some(blocked)) => Ok(Self::Blocked { text, blocked }),
+            _ => Err("a goal has \"tip\", \"path\", \"joint\" with \"degrees\", or \"blocked\""),
+        }
+    }
 }
 
 impl Goal {

@@ -42,6 +42,7 @@ fn a_blocked_joint_is_found_and_freed() {
     page.wait_for_text("#exercise-goals", "✓ Joint 1 is blocked");
     page.wait_for_text("#state", "Joint 1 is blocked");
     page.click("[data-action=repair]");
+    turn(&mut page, 1, "150");
     page.wait_for_text("#exercise-state", "Solved! It took");
 }
 
@@ -58,12 +59,18 @@ fn hints_a_solution_and_an_exercise_of_a_file_are_shown() {
     page.wait_for_text("#python", "120");
 
     let file = viewed.path("own.json");
-    std::fs::write(&file, r#"{"title": "Own", "text": "Turn <it>.", "goals": [{"text": "g", "joint": 9, "degrees": 1}]}"#)
-        .expect("a file");
+    std::fs::write(
+        &file,
+        r#"{"title": "Own", "text": "Turn <it>.", "goals": [{"text": "g", "joint": 9, "degrees": 1}]}"#,
+    )
+    .expect("a file");
     page.choose_file("#open-exercise", &file);
     page.wait_for_text("#notice", "This file is no exercise. goal 1: use a joint from 1 to 7");
-    std::fs::write(&file, r#"{"title": "Own", "text": "Turn <it>.", "goals": [{"text": "g", "joint": 1, "degrees": 91}]}"#)
-        .expect("a file");
+    std::fs::write(
+        &file,
+        r#"{"title": "Own", "text": "Turn <it>.", "goals": [{"text": "g", "joint": 1, "degrees": 91}]}"#,
+    )
+    .expect("a file");
     page.choose_file("#open-exercise", &file);
     page.wait_for_text("#exercise-text", "Turn <it>.");
     page.click("[data-action=begin-exercise]");
