@@ -13,22 +13,24 @@
 //! moves the arm end it.
 
 mod command;
+mod failure;
 mod joint_move;
 mod sensor;
 
 use std::time::Duration;
 
-use block_programs::{BlockId, Event, Interpreter, Program, ProgramError};
+use block_programs::{BlockId, Event, Interpreter, Program};
 use host_link::sharing::SharingState;
 use protocol_core::time::Instant;
-use sevenbot::health::{MoveFault, MoveWatch};
+use sevenbot::Snapshot;
+use sevenbot::health::MoveWatch;
 use sevenbot::map::{SPEED, TIME};
-use sevenbot::{Joint, Snapshot};
 
 use command::Action;
+pub use failure::ProgramFailure;
 
 use crate::client::{BAUD, Client};
-use crate::confirmed::{Confirmed, NotTaken, write_all};
+use crate::confirmed::{Confirmed, write_all};
 use crate::movement::{PlayFailure, start_anew};
 use crate::stop::since_start;
 
@@ -50,55 +52,6 @@ pub enum ProgramProgress {
     Over,
     /// It has ended before, for this reason.
     Failed(ProgramFailure),
-}
-
-/// Why a program ends early.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ProgramFailure {
-    /// The program is wrong.
-    Program(ProgramError),
-    /// The arm does not carry it out.
-    Arm(PlayFailure),
-    /// The tip cannot go there.
-    Refused {
-        /// The name of the text that says why.
-        text: &'static str,
-        /// Why, and what is possible instead, in English.
-        details: String,
-    },
-    /// The firmware of the arm does not tell this.
-    NotTold,
-    /// Joints have other targets than those of the program.
-    OtherTargets(Vec<Joint>),
-}
-
-impl ProgramFailure {
-    /// The block that is wrong; `None` if it is the one that runs.
-    #[must_use]
-    pub fn block(&self) -> Option<&BlockId> {
-        match self {
-            Self::Program(error) => error.block.as_ref(),
-            _ => None,
-        }
-    }
-}
-
-impl From<MoveFault> for ProgramFailure {
-    fn from(fault: MoveFault) -> Self {
-        Self::Arm(PlayFailure::Arm(fault))
-    }
-}
-
-impl From<NotTaken> for ProgramFailure {
-    fn from(_: NotTaken) -> Self {
-        Self::Arm(PlayFailure::NotTaken)
-    }
-}
-
-impl From<ProgramError> for ProgramFailure {
-    fn from(error: ProgramError) -> Self {
-        Self::Program(error)
-    }
 }
 
 /// Does the program stop before each block?

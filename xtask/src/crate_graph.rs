@@ -35,6 +35,7 @@ const GROUPS: [Group; 3] = [
             "sevenbot-python",
             "sevenbot-web",
             "block-programs",
+            "exercises",
         ],
     ),
     (

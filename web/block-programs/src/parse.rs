@@ -43,8 +43,18 @@ const COMPARISONS: [(&str, Comparison); 6] = [
     ("GTE", Comparison::GreaterOrEqual),
 ];
 
+impl Program {
+    /// From the text of Blockly's `serialization.workspaces.save`.
+    ///
+    /// # Errors
+    /// It is no program, and the block where that shows.
+    pub fn parse(workspace: &str) -> Result<Self, ProgramError> {
+        program(workspace)
+    }
+}
+
 /// Parses a workspace. Blocks that are neither below the start nor a function are left out.
-pub(crate) fn program(text: &str) -> Result<Program, ProgramError> {
+fn program(text: &str) -> Result<Program, ProgramError> {
     let workspace = Workspace::of(text)?;
     let blocks: Vec<_> = workspace.top_blocks()?.into_iter().filter(Block::is_enabled).collect();
     let mut starts = blocks.iter().filter(|block| block.kind == START);

@@ -3,8 +3,7 @@
 use sevenbot::Joint;
 
 use crate::command::{Axis, Sensor, Tool};
-use crate::fault::{BlockId, ProgramError};
-use crate::parse;
+use crate::fault::BlockId;
 
 /// A program.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,16 +12,6 @@ pub struct Program {
     pub(crate) variables: Vec<String>,
     pub(crate) functions: Vec<Function>,
     pub(crate) body: Vec<Statement>,
-}
-
-impl Program {
-    /// From the text of Blockly's `serialization.workspaces.save`.
-    ///
-    /// # Errors
-    /// It is no program, and the block where that shows.
-    pub fn parse(workspace: &str) -> Result<Self, ProgramError> {
-        parse::program(workspace)
-    }
 }
 
 #[derive(Clone, Debug, PartialEq)]

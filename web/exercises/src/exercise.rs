@@ -1,58 +1,13 @@
 //! An exercise and its text file.
 
 use serde::Deserialize;
-use serde_json::Value;
 
 use crate::goal::Goal;
 use crate::solution::{SolutionPart, Step, parts};
+use crate::text::Text;
 
 /// A longer file is no exercise, in bytes.
 const LARGEST: usize = 200_000;
-
-/// A text in the languages of the page. A file may have one text for all languages.
-#[derive(Clone, Debug, Deserialize, PartialEq, Eq)]
-#[serde(try_from = "Value")]
-pub enum Text {
-    /// For all languages.
-    One(String),
-    /// English, and Simplified Chinese.
-    Each {
-        /// English.
-        en: String,
-        /// Simplified Chinese.
-        zh: String,
-    },
-}
-
-impl TryFrom<Value> for Text {
-    type Error = &'static str;
-
-    fn try_from(value: Value) -> Result<Self, Self::Error> {
-        let member = |name| value.get(name).and_then(Value::as_str).map(str::to_owned);
-        match (value.as_str(), member("en"), member("zh-CN")) {
-            (Some(text), ..) => Ok(Self::One(text.to_owned())),
-            (_, Some(en), Some(zh)) => Ok(Self::Each { en, zh }),
-            _ => Err("a text is \"...\" or {\"en\": \"...\", \"zh-CN\": \"...\"}"),
-        }
-    }
-}
-
-impl Text {
-    /// The text in the language of a tag, `en` or `zh-CN`.
-    #[must_use]
-    pub fn of(&self, tag: &str) -> &str {
-        match self {
-            Self::One(text) => text,
-            Self::Each { en, zh } => {
-                if tag == "zh-CN" {
-                    zh
-                } else {
-                    en
-                }
-            }
-        }
-    }
-}
 
 /// An exercise.
 ///

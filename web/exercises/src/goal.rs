@@ -2,8 +2,8 @@
 
 use serde::Deserialize;
 
-use crate::exercise::Text;
 use crate::path::MOST_POINTS;
+use crate::text::Text;
 
 /// By default a tip is at a point within this distance, in mm.
 const TIP_WITHIN: f64 = 10.0;

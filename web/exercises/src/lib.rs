@@ -14,9 +14,11 @@ mod goal;
 mod path;
 mod shipped;
 mod solution;
+mod text;
 
 pub use attempt::{Attempt, Observation};
-pub use exercise::{Exercise, ExerciseError, Text};
+pub use exercise::{Exercise, ExerciseError};
 pub use goal::Goal;
 pub use shipped::shipped;
 pub use solution::SolutionPart;
+pub use text::Text;

@@ -1,6 +1,6 @@
 //! Exercises: chosen, begun, watched while the arm moves, and their results saved.
 
-use exercises::{Attempt, Exercise, SolutionPart, shipped};
+use exercises::{Attempt, Exercise, SolutionPart};
 use js_sys::Date;
 use protocol_core::time::Instant;
 use wasm_bindgen::JsValue;
@@ -10,33 +10,6 @@ use super::dom::{Dom, set_attribute, set_text};
 use super::files;
 use super::page::{App, Line};
 use crate::exercise::observation;
-
-/// What the page has of exercises.
-pub(super) struct Exercises {
-    is_open: bool,
-    /// Those that ship, and those that were opened from files.
-    all: Vec<Exercise>,
-    chosen: usize,
-    attempt: Option<Attempt>,
-    shown_hints: usize,
-}
-
-impl Default for Exercises {
-    fn default() -> Self {
-        Self { is_open: false, all: shipped(), chosen: 0, attempt: None, shown_hints: 0 }
-    }
-}
-
-impl Exercises {
-    fn exercise(&self) -> Option<&Exercise> {
-        self.all.get(self.chosen)
-    }
-
-    /// Another arm: what was reached with the last one does not count.
-    pub(super) fn end(&mut self) {
-        self.attempt = None;
-    }
-}
 
 impl App {
     /// Does what a button asks for. Returns whether it is one of exercises.

@@ -11,9 +11,9 @@ use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{CanvasRenderingContext2d, Element, Event};
 
 use super::dom::Dom;
-use super::exercises::Exercises;
+use super::exercise_list::Exercises;
 use super::kept_recording::KeptRecording;
-use super::programs::Programs;
+use super::program_state::Programs;
 use super::storage;
 use crate::client::Client;
 use crate::movement::{Player, Recorder};

@@ -23,21 +23,6 @@ const KEPT: &str = "program";
 /// How the part of an address begins that holds a program.
 const FRAGMENT: &str = "#program=";
 
-/// What the page has of programs.
-#[derive(Default)]
-pub(super) struct Programs {
-    pub(super) run: Option<ProgramRun>,
-    is_open: bool,
-    /// The program in the editor.
-    text: String,
-    /// The program that is to be shown when the editor is there.
-    wanted: Option<String>,
-    /// The block that is lit.
-    lit: String,
-    /// The name of the text that says how the last run ended.
-    ended: Option<&'static str>,
-}
-
 /// Shows the program of the address, if it has one, now and when the address changes.
 pub(super) fn listen(dom: &Dom) -> Result<(), JsValue> {
     let window = web_sys::window().ok_or("no window")?;

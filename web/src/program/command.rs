@@ -14,7 +14,7 @@ use sevenbot::map::{EFFECTOR_TYPE, SPEED, TARGET_POSITION, TIME, VACUUM_PUMP, ef
 use sevenbot::moves::Pace;
 use sevenbot::{Angle, FineAngle, Health, MoveTime, Snapshot, Speed};
 
-use super::ProgramFailure;
+use super::failure::ProgramFailure;
 use super::joint_move::JointMove;
 use crate::arm_state::{breach_text, has_extended_block};
 use crate::client::Client;

@@ -9,7 +9,7 @@ use sevenbot::map::{SPEED, TIME};
 use sevenbot::units::move_duration;
 use sevenbot::{Angle, Joint, MoveTime, Snapshot, Speed};
 
-use super::ProgramFailure;
+use super::failure::ProgramFailure;
 use crate::arm_state::ArmState;
 use crate::client::{BAUD, Client};
 use crate::movement::PlayFailure;

@@ -5,7 +5,7 @@ use protocol_core::time::Instant;
 use sevenbot::health::{JointHealth, MoveWatch};
 use sevenbot::{FineAngle, Health, Joint, Snapshot};
 
-use super::ProgramFailure;
+use super::failure::ProgramFailure;
 use crate::client::BAUD;
 use crate::stop::since_start;
 

@@ -1,5 +1,6 @@
 use proptest::collection::vec;
 use proptest::prelude::*;
+use sevenbot::Joint;
 
 use super::*;
 use crate::stop::StopProgress;
