@@ -112,8 +112,9 @@ impl Package {
 fn download(path: &PathBuf) -> TaskResult<Vec<u8>> {
     println!("fetching {URL}");
     let mut curl = Command::new("curl");
-    let output =
-        curl.args(["--fail", "--silent", "--show-error", "--location", "--max-time", "300", URL]).output();
+    let output = curl
+        .args(["--fail", "--silent", "--show-error", "--location", "--retry", "3", "--max-time", "300", URL])
+        .output();
     let output = output.map_err(|why| format!("cannot start curl, which fetches {URL}: {why}"))?;
     if !output.status.success() {
         let why = String::from_utf8_lossy(&output.stderr);

@@ -19,8 +19,14 @@ struct Tool {
 /// All programs know this.
 const VERSION: &[&str] = &["--version"];
 
-const TOOLS: [Tool; 9] = [
+const TOOLS: [Tool; 10] = [
     Tool { program: QEMU, arguments: VERSION, package: QEMU, purpose: "runs the image for the arm" },
+    Tool {
+        program: "curl",
+        arguments: VERSION,
+        package: "curl ca-certificates",
+        purpose: "fetches the editor of the page's programs",
+    },
     Tool { program: "c++", arguments: VERSION, package: "g++", purpose: "builds the fuzzer" },
     Tool {
         program: "chromium",
