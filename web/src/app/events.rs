@@ -297,6 +297,12 @@ impl App {
         if key.key() == "Escape" {
             self.end_tour();
         }
+        // The same number again is no change. A joint that was blocked is told to try again with it.
+        if key.key() == "Enter"
+            && let Some(field) = target.filter(|target| target.id().starts_with("target-"))
+        {
+            self.type_joint(&field);
+        }
     }
 
     pub(super) fn begin_tour(&mut self) {
