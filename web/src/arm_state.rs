@@ -1,5 +1,6 @@
 //! What the registers say of an arm, in units.
 
+use kinematics::forward;
 use sevenbot::cartesian::{Breach, Guard, JointPath, Obstacle};
 use sevenbot::map::{
     EXTENDED_VERSION, FAULTS, FINE_POSITION, FINE_TARGET, LOAD, MISSING_SERVOS, MOTOR_STATE, MOVING_JOINTS,
@@ -101,6 +102,22 @@ impl ArmState {
         stalled.fold(0, |bits, (((index, _), _), _)| bits | 1 << index)
     }
 
+    /// The angles of joints whose servos answer. A silent servo leaves its last angle in the registers.
+    #[must_use]
+    pub fn answered(&self) -> [Option<f32>; 7] {
+        let mut angles = self.measured;
+        for (angle, index) in angles.iter_mut().zip(0..) {
+            *angle = angle.filter(|_| self.missing >> index & 1 == 0);
+        }
+        angles
+    }
+
+    /// The tip: x, y, z in mm; `None` if the servo of one of joints 1 to 6 does not answer.
+    #[must_use]
+    pub fn tip(&self) -> Option<[f64; 3]> {
+        self.answered().iter().take(6).all(Option::is_some).then(|| tip(self.angles()))
+    }
+
     /// The measured angles, and the targets of joints that were not measured.
     #[must_use]
     pub fn angles(&self) -> [f32; 7] {
@@ -110,6 +127,14 @@ impl ArmState {
         }
         angles
     }
+}
+
+/// The tip at these angles: x, y, z in mm.
+#[must_use]
+pub fn tip(angles: [f32; 7]) -> [f64; 3] {
+    let [t1, t2, t3, t4, t5, t6, _] = angles.map(f64::from);
+    let tip = forward([t1, t2, t3, t4, t5, t6]).hand.tip;
+    [tip.x, tip.y, tip.z]
 }
 
 /// Where the guard of the workspace does not allow the way of the joints to these angles, at the speeds of the registers.

@@ -1,7 +1,6 @@
 //! What the arm measures, for an exercise.
 
 use exercises::Observation;
-use kinematics::forward;
 use protocol_core::time::Instant;
 use sevenbot::Snapshot;
 use sevenbot::map::BLOCKED_JOINTS;
@@ -12,16 +11,13 @@ use crate::stop::since_start;
 /// What these registers of the arm say at `now`.
 #[must_use]
 pub fn observation(now: Instant, registers: &Snapshot) -> Observation {
-    let joints = ArmState::new(registers).measured.map(|angle| angle.map(f64::from));
-    let tip = match joints {
-        [Some(t1), Some(t2), Some(t3), Some(t4), Some(t5), Some(t6), _] => {
-            let tip = forward([t1, t2, t3, t4, t5, t6]).hand.tip;
-            Some([tip.x, tip.y, tip.z])
-        }
-        _ => None,
-    };
-    let blocked = registers.byte(&BLOCKED_JOINTS);
-    Observation { seconds: since_start(now).as_secs_f64(), tip, joints, blocked }
+    let state = ArmState::new(registers);
+    Observation {
+        seconds: since_start(now).as_secs_f64(),
+        tip: state.tip(),
+        joints: state.answered().map(|angle| angle.map(f64::from)),
+        blocked: registers.byte(&BLOCKED_JOINTS),
+    }
 }
 
 #[cfg(test)]
@@ -62,6 +58,17 @@ mod tests {
             let reached: Vec<_> = attempt.reached().collect();
             assert!(attempt.is_solved(), "{title}: {reached:?}");
         }
+    }
+
+    #[test]
+    fn a_silent_joint_is_nowhere() {
+        let mut tab = Tab::new();
+        let seen = |tab: &Tab| observation(tab.now(), tab.client.registers());
+        assert!(seen(&tab).tip.is_some() && seen(&tab).joints[2].is_some());
+        tab.act("fault 3=missing");
+        tab.pass(60);
+        let seen = seen(&tab);
+        assert!(seen.tip.is_none() && seen.joints[2].is_none() && seen.joints[0].is_some(), "{seen:?}");
     }
 
     #[test]

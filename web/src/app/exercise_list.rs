@@ -23,6 +23,11 @@ impl Exercises {
         self.all.get(self.chosen)
     }
 
+    /// Chooses an exercise, which is not begun.
+    pub(super) fn choose(&mut self, index: usize) {
+        (self.chosen, self.attempt, self.shown_hints) = (index, None, 0);
+    }
+
     /// Another arm: what was reached with the last one does not count.
     pub(super) fn end(&mut self) {
         self.attempt = None;

@@ -1,5 +1,6 @@
 //! Exercises: chosen, begun, watched while the arm moves, and their results saved.
 
+use arm_sim::Action;
 use exercises::{Attempt, Exercise, SolutionPart};
 use js_sys::Date;
 use protocol_core::time::Instant;
@@ -40,8 +41,7 @@ impl App {
 
     /// A person chose another exercise.
     pub(super) fn choose_exercise(&mut self) {
-        self.exercises.chosen = self.dom.choice("exercise-choice").parse().unwrap_or(0);
-        (self.exercises.attempt, self.exercises.shown_hints) = (None, 0);
+        self.exercises.choose(self.dom.choice("exercise-choice").parse().unwrap_or(0));
         self.show_exercise();
     }
 
@@ -50,8 +50,7 @@ impl App {
         match Exercise::parse(&text) {
             Ok(exercise) => {
                 self.exercises.all.push(exercise);
-                self.exercises.chosen = self.exercises.all.len() - 1;
-                (self.exercises.attempt, self.exercises.shown_hints) = (None, 0);
+                self.exercises.choose(self.exercises.all.len() - 1);
                 self.dom.end_notice();
                 self.show_exercise();
             }
@@ -63,21 +62,16 @@ impl App {
     fn begin_exercise(&mut self) {
         let Some(exercise) = self.exercises.exercise() else { return };
         let attempt = Attempt::new(exercise);
-        let actions: Vec<_> = exercise.setup.iter().map(|action| action.parse()).collect();
-        let Line::Simulated(source) = &mut self.line else {
-            if actions.is_empty() {
-                self.exercises.attempt = Some(attempt);
-                return self.show_exercise();
+        let actions: Result<Vec<Action>, _> = exercise.setup.iter().map(|action| action.parse()).collect();
+        match (actions, &mut self.line) {
+            (Err(error), _) => {
+                return self.dom.notice(&format!("{} {error}", self.language.text("no-exercise")));
             }
-            return self.dom.notice(self.language.text("exercise-needs-simulation"));
-        };
-        for action in actions {
-            match action {
-                Ok(action) => source.act(action),
-                Err(error) => {
-                    return self.dom.notice(&format!("{} {error}", self.language.text("no-exercise")));
-                }
+            (Ok(actions), Line::Simulated(source)) => {
+                actions.into_iter().for_each(|action| source.act(action))
             }
+            (Ok(actions), _) if actions.is_empty() => {}
+            _ => return self.dom.notice(self.language.text("exercise-needs-simulation")),
         }
         self.exercises.attempt = Some(attempt);
         self.show_exercise();

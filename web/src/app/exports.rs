@@ -4,7 +4,7 @@ use glam::Vec3;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::page::with_app;
-use super::panels::tip;
+use crate::arm_state::tip;
 
 /// What the page shows: angles and targets in degrees, the tip in mm.
 #[wasm_bindgen]

@@ -4,7 +4,6 @@ use std::fmt::Display;
 use std::str::FromStr;
 
 use host_link::sharing::{DrivenBy, SharingState};
-use kinematics::forward;
 use sevenbot::map::{EXTENDED_VERSION, SERVO_TEMPERATURE, SPEED, VACUUM_PUMP};
 use sevenbot::{Span, register_text};
 use wasm_bindgen::JsValue;
@@ -12,7 +11,7 @@ use web_sys::{Element, HtmlInputElement};
 
 use super::dom::{Dom, set_attribute, set_text};
 use super::page::{App, Line};
-use crate::arm_state::{ArmState, breach, breach_text, has_extended_block};
+use crate::arm_state::{ArmState, breach, breach_text, has_extended_block, tip};
 use crate::source::LineState;
 use crate::texts::Language;
 use crate::words::{Answers, state_line};
@@ -277,12 +276,6 @@ fn is_writable(address: u8) -> bool {
 }
 
 /// The tip of the arm in mm.
-pub(super) fn tip(angles: [f32; 7]) -> [f64; 3] {
-    let [one, two, three, four, five, six, _] = angles.map(f64::from);
-    let tip = forward([one, two, three, four, five, six]).hand.tip;
-    [tip.x, tip.y, tip.z]
-}
-
 fn is_open(dom: &Dom, id: &str) -> bool {
     dom.element(id).is_some_and(|panel| panel.has_attribute("open"))
 }

@@ -90,15 +90,13 @@ impl App {
 
     /// Opens the view of programs with this program. Undo brings the last one back.
     pub(super) fn show_in_editor(&mut self, text: String) {
-        let is_loaded = Editor.is_loaded();
-        if !is_loaded {
-            self.programs.wanted = Some(text.clone());
-        }
         if !self.programs.is_open {
             self.toggle_programs();
         }
-        if is_loaded {
+        if Editor.is_loaded() {
             self.open_program(text);
+        } else {
+            self.programs.wanted = Some(text);
         }
     }
 
