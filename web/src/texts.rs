@@ -352,7 +352,11 @@ const TEXTS: &[(&str, &str, &str)] = &[
     ("program-waits", "The program waits before the lit block.", "程序停在高亮的积木之前。"),
     ("program-over", "The program has ended.", "程序已完成。"),
     ("program-ended", "The program was ended.", "程序已中止。"),
-    ("no-editor", "The editor of programs cannot be loaded.", "无法加载程序编辑器。"),
+    (
+        "no-editor",
+        "The editor of programs cannot be loaded. Close Programs, and open it again.",
+        "无法加载程序编辑器。请关闭“程序”后重新打开。",
+    ),
     ("bad-link", "This address holds no program: it may be cut off.", "此链接不含程序，可能不完整。"),
     ("ok", "OK", "确定"),
     ("cancel", "Cancel", "取消"),

@@ -13,17 +13,22 @@ const FILE: &str = "programs.js";
 /// A page in one file has the script as the text of this element.
 const TEXT_OF_SCRIPT: &str = "programs";
 
+/// The element that loads it.
+const SCRIPT: &str = "editor-script";
+
 /// The editor. Its calls do nothing before it is loaded.
 #[derive(Clone, Copy)]
 pub(super) struct Editor;
 
 impl Editor {
-    /// Loads the script if it is not there yet, and calls `loaded` then.
-    pub(super) fn load(self, dom: &Dom, loaded: fn(&mut App)) -> Result<(), JsValue> {
-        if object().is_some() {
+    /// Loads the script if it is neither there nor on its way, and calls `loaded` then, or `failed`. After a failure the next
+    /// call tries again.
+    pub(super) fn load(self, dom: &Dom, loaded: fn(&mut App), failed: fn(&mut App)) -> Result<(), JsValue> {
+        if object().is_some() || dom.element(SCRIPT).is_some() {
             return Ok(());
         }
         let script = dom.0.create_element("script")?;
+        script.set_id(SCRIPT);
         let head = dom.0.document_element().ok_or("no document")?;
         let call = Closure::once_into_js(move || {
             with_app(loaded);
@@ -37,6 +42,12 @@ impl Editor {
         } else {
             script.set_attribute("src", FILE)?;
             script.add_event_listener_with_callback("load", call.unchecked_ref())?;
+            let lost = script.clone();
+            let failed = Closure::once_into_js(move || {
+                lost.remove();
+                with_app(failed);
+            });
+            script.add_event_listener_with_callback("error", failed.unchecked_ref())?;
             head.append_child(&script)?;
         }
         Ok(())

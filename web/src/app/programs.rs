@@ -69,9 +69,13 @@ impl App {
         for button in self.dom.all("[data-action=programs]") {
             set_attribute(&button, "aria-pressed", if is_open { "true" } else { "false" });
         }
-        if is_open && Editor.load(&self.dom, Self::show_editor).is_err() {
-            self.dom.notice(self.language.text("no-editor"));
+        if is_open && Editor.load(&self.dom, Self::show_editor, Self::say_that_there_is_no_editor).is_err() {
+            self.say_that_there_is_no_editor();
         }
+    }
+
+    fn say_that_there_is_no_editor(&mut self) {
+        self.dom.notice(self.language.text("no-editor"));
     }
 
     /// The editor is there: shows it with the program of before, or with that of the address.

@@ -6,6 +6,7 @@ use browser_tests::page::PHONE;
 use browser_tests::{Page, Viewed};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use serde_json::json;
 use system_tests::wait::wait_for;
 
 /// The state of the last block that is lit.
@@ -55,6 +56,21 @@ fn examples() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../block-programs/examples");
     let files = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
     files.filter(|path| path.extension().is_some_and(|extension| extension == "json")).collect()
+}
+
+#[test]
+fn an_editor_that_cannot_be_loaded_is_told_and_loaded_once_at_the_next_attempt() {
+    let viewed = Viewed::without_arm();
+    let mut page = viewed.open();
+    page.call("Network.enable", json!({}));
+    page.call("Network.setBlockedURLs", json!({"urls": ["*programs.js"]}));
+    page.click("[data-action=programs]");
+    page.wait_for_text("#notice", "The editor of programs cannot be loaded.");
+    page.call("Network.setBlockedURLs", json!({"urls": []}));
+    // Closed, opened, and closed and opened again while the script is on its way.
+    page.evaluate("[1, 2, 3].forEach(() => document.querySelector('[data-action=programs]').click())");
+    open_programs(&mut page);
+    assert_eq!(page.number("document.querySelectorAll('#blocks .injectionDiv').length"), 1.0);
 }
 
 /// A test of `block-programs` checks that the examples have every kind of block.
