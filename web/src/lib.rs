@@ -24,6 +24,7 @@ pub mod park;
 pub mod plots;
 mod problems_in_chinese;
 pub mod program;
+pub mod recorder;
 pub mod scene;
 pub mod source;
 pub mod stop;

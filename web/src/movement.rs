@@ -1,4 +1,4 @@
-//! Records the joints and plays recordings: the shells of the page round [`MovementRun`], [`MoveWatch`] and [`RecordingLines`].
+//! Plays recordings: the shell of the page round [`MovementRun`] and [`MoveWatch`].
 //!
 //! ```text
 //!   Player: open the stream ──▶ way to the first pose ──▶ the movement ──▶ close the stream ──▶ PlayProgress
@@ -15,9 +15,9 @@ use sevenbot::map::{SET_POINT_PERIOD, SPEED, TIME};
 use sevenbot::movement_run::{MovementRun, RunStep};
 use sevenbot::playback;
 use sevenbot::point_path::PointPath;
-use sevenbot::recording::{FileVersion, Moment, Recording, RecordingError, RecordingLines};
+use sevenbot::recording::{Recording, RecordingError};
 use sevenbot::stream::{StreamOptions, WatchdogAction};
-use sevenbot::{FineAngle, Health, Joint, Snapshot};
+use sevenbot::{Health, Joint, Snapshot};
 
 use crate::arm_state::has_extended_block;
 use crate::client::{BAUD, Client};
@@ -33,48 +33,6 @@ const WATCHDOG: u8 = 50;
 /// After a movement the joints have this time to settle.
 const SETTLE_TIME: Duration = Duration::from_secs(2);
 const ALL_JOINTS: u8 = 0x7F;
-
-/// A movement that grows while it is recorded.
-#[derive(Debug)]
-pub struct Recorder {
-    start: Instant,
-    lines: RecordingLines,
-    text: String,
-    watch: MoveWatch,
-}
-
-impl Recorder {
-    /// A recording that begins now.
-    #[must_use]
-    pub fn new(now: Instant) -> Self {
-        let lines = RecordingLines::new(FileVersion::Hundredths);
-        let watch = MoveWatch::new(since_start(now), 0, BAUD).of_positions();
-        Self { start: now, text: lines.head(), lines, watch }
-    }
-
-    /// Adds the joints of these registers, if all of them are measured and time has passed.
-    ///
-    /// # Errors
-    /// A servo is silent, or the controller restarted: the positions are not those of the arm, and the recording has ended.
-    pub fn add(&mut self, now: Instant, registers: &Snapshot, vacuum: bool) -> Result<(), MoveFault> {
-        self.watch.registers(since_start(now), registers)?;
-        let measured = Standing::of(registers).measured.map(|angle| FineAngle::from_degrees(angle?));
-        let mut pose = [FineAngle::from(sevenbot::Angle::from_register(0)); 7];
-        for (angle, measured) in pose.iter_mut().zip(measured) {
-            let Some(measured) = measured else { return Ok(()) };
-            *angle = measured;
-        }
-        let time = since_start(now).saturating_sub(since_start(self.start));
-        self.text.extend(self.lines.add(&Moment { time, pose, vacuum }));
-        Ok(())
-    }
-
-    /// The recording as a file; `None` if nothing was measured.
-    #[must_use]
-    pub fn finish(self) -> Option<String> {
-        (self.lines.count() > 0).then_some(self.text)
-    }
-}
 
 /// Why a movement is not played.
 #[derive(Clone, Debug, PartialEq)]

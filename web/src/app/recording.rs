@@ -9,7 +9,8 @@ use super::dom::number;
 use super::files;
 use super::kept_recording::KeptRecording;
 use super::page::App;
-use crate::movement::{PlayRefusal, Player, Recorder};
+use crate::movement::{PlayRefusal, Player};
+use crate::recorder::Recorder;
 
 /// The longest way to the first pose of a movement, in seconds.
 const LONGEST_APPROACH: f32 = 60.0;

@@ -1,4 +1,7 @@
+use sevenbot::FineAngle;
+
 use super::*;
+use crate::recorder::Recorder;
 
 const WAVE: &str = "7bot-recording 2\n0 90 90 65 90 90 90 80 0\n2 120.5 90 65 90 90 90 80 1\n";
 

@@ -1,0 +1,52 @@
+//! Records the joints: the shell of the page round [`MoveWatch`] and [`RecordingLines`].
+
+use protocol_core::time::Instant;
+use sevenbot::approach::Standing;
+use sevenbot::health::{MoveFault, MoveWatch};
+use sevenbot::recording::{FileVersion, Moment, RecordingLines};
+use sevenbot::{FineAngle, Snapshot};
+
+use crate::client::BAUD;
+use crate::stop::since_start;
+
+/// A movement that grows while it is recorded.
+#[derive(Debug)]
+pub struct Recorder {
+    start: Instant,
+    lines: RecordingLines,
+    text: String,
+    watch: MoveWatch,
+}
+
+impl Recorder {
+    /// A recording that begins now.
+    #[must_use]
+    pub fn new(now: Instant) -> Self {
+        let lines = RecordingLines::new(FileVersion::Hundredths);
+        let watch = MoveWatch::new(since_start(now), 0, BAUD).of_positions();
+        Self { start: now, text: lines.head(), lines, watch }
+    }
+
+    /// Adds the joints of these registers, if all of them are measured and time has passed.
+    ///
+    /// # Errors
+    /// A servo is silent, or the controller restarted: the positions are not those of the arm, and the recording has ended.
+    pub fn add(&mut self, now: Instant, registers: &Snapshot, vacuum: bool) -> Result<(), MoveFault> {
+        self.watch.registers(since_start(now), registers)?;
+        let measured = Standing::of(registers).measured.map(|angle| FineAngle::from_degrees(angle?));
+        let mut pose = [FineAngle::from(sevenbot::Angle::from_register(0)); 7];
+        for (angle, measured) in pose.iter_mut().zip(measured) {
+            let Some(measured) = measured else { return Ok(()) };
+            *angle = measured;
+        }
+        let time = since_start(now).saturating_sub(since_start(self.start));
+        self.text.extend(self.lines.add(&Moment { time, pose, vacuum }));
+        Ok(())
+    }
+
+    /// The recording as a file; `None` if nothing was measured.
+    #[must_use]
+    pub fn finish(self) -> Option<String> {
+        (self.lines.count() > 0).then_some(self.text)
+    }
+}
