@@ -110,12 +110,15 @@ class Client:
         return answer.success, answer.message
 
     def each(self, period: float, count: int, act: Callable[[int], None]) -> None:
-        """Acts so often, once in a period of this client's clock, and hears meanwhile."""
-        begin = self.seconds()
+        """Acts so often, a period of this client's clock or more after the last time, and hears meanwhile. What a busy machine made
+        late is not caught up: a command that leaps ahead would be a jump."""
+        due = self.seconds()
         for index in range(count):
-            while (left := begin + index * period - self.seconds()) > 0.0:
+            self.spin(0.0)
+            while (left := due - self.seconds()) > 0.0:
                 self.spin(min(left, 0.005))
             act(index)
+            due = max(due + period, self.seconds())
 
 
 def seconds_of(message: Any) -> float:
