@@ -35,6 +35,7 @@
 
 mod connection;
 mod desk;
+mod for_pupil;
 mod lease;
 pub mod message;
 pub mod name;

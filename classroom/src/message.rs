@@ -31,6 +31,15 @@ pub enum FromPupil {
     StopArm,
 }
 
+impl FromPupil {
+    /// The message in JSON.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        // Structures of text and numbers always become JSON.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
 /// What the arm of a tab does.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Report {
@@ -94,7 +103,7 @@ pub enum StopOutcome {
 }
 
 /// What a pupil's tab gets.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ToPupil {
     /// The tab is in the class.
@@ -126,7 +135,7 @@ pub enum ToPupil {
 }
 
 /// Why a tab is not in the class.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Refusal {
     /// There is no letter or digit in the name.
@@ -140,7 +149,7 @@ pub enum Refusal {
 }
 
 /// The real arm, while a pupil has it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LentArm {
     /// Who has it.
     pub holder: String,
@@ -151,7 +160,7 @@ pub struct LentArm {
 }
 
 /// Why a pupil has the real arm no longer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LeaseEnd {
     /// The time is over.

@@ -71,7 +71,7 @@ impl Lesson {
     }
 
     fn told(&mut self, id: ConnectionId) -> Option<ToPupil> {
-        self.class.next_message(self.now, id).map(|text| serde_json::from_str(&text).unwrap())
+        self.class.next_message(self.now, id).map(|text| ToPupil::parse(&text).unwrap())
     }
 
     fn hear_all(&mut self, id: ConnectionId) -> Vec<ToPupil> {

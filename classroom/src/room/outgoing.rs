@@ -16,7 +16,7 @@ impl Classroom {
                 self.pupils.get(number).is_some_and(|pupil| pupil.has_message(now, self.message.0))
             }
             Connection::Teacher(desk) => desk.has_message(now, self.change),
-            Connection::Refused(_) => true,
+            Connection::Refused(why) => why.is_some(),
         };
         self.connections.iter().filter(move |(_, connection)| has_message(connection)).map(|(&id, _)| id)
     }
