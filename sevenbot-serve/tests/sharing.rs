@@ -5,8 +5,8 @@
 mod rig;
 
 use protocol_core::registers::map::{
-    CHIP_ID, DEVICE_CODE, DEVICE_ID, EEPROM_LOCK, FEEDBACK_FREQUENCY, FRAMES_REFUSED, OFFSET,
-    PRESENT_POSITION, SPEED, TARGET_POSITION,
+    CHIP_ID, DEVICE_CODE, DEVICE_ID, EEPROM_LOCK, FEEDBACK_FREQUENCY, FRAMES_ACCEPTED, FRAMES_REFUSED,
+    OFFSET, PRESENT_POSITION, SPEED, TARGET_POSITION,
 };
 use protocol_core::registers::map21::{
     ANGLE_FEEDBACK_FREQUENCY, LOAD_FEEDBACK_FREQUENCY, OPTIONS, TIP_POSITION,
@@ -48,6 +48,26 @@ fn a_program_reads_what_it_wrote_directly_before() {
         let values: Vec<_> = world.take(program.into()).into_iter().map(|(_, values)| values[0]).collect();
         assert_eq!(values, (1..=40).collect::<Vec<_>>());
     }
+}
+
+#[test]
+fn one_reply_answers_equal_reads_that_wait() {
+    let mut world = World::new(20);
+    let accepted = |world: &World| world.arm.registers().get(FRAMES_ACCEPTED.address);
+    world.run(100);
+    let before = accepted(&world);
+    for program in 0..20 {
+        world.send(program, &write(SPEED.address, &[u8::try_from(program).unwrap() + 1]));
+        world.send(program, &read(POSITIONS.0, POSITIONS.1));
+        world.send(program, &read(SPEED.address, 1));
+    }
+    world.run(1_000);
+    for program in 0..20 {
+        let shapes: Vec<_> = world.take(program).iter().map(|(at, values)| (*at, values.len())).collect();
+        assert_eq!(shapes, [(POSITIONS.0, 7), (SPEED.address, 1)]);
+    }
+    let frames = accepted(&world).wrapping_sub(before);
+    assert!((22..=40).contains(&frames), "{frames} frames for 20 writes and 40 reads");
 }
 
 #[test]

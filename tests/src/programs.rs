@@ -1,4 +1,4 @@
-//! The paths of the programs under test. A missing program is built.
+//! The paths of the programs under test. A program that is missing, or older than its source files, is built.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -41,10 +41,19 @@ fn program(package: &str, name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("the path of the test");
     let folder = test.ancestors().nth(2).expect("cargo's folders");
     let path = folder.join(name).with_extension(std::env::consts::EXE_EXTENSION);
-    if !path.exists() {
+    if !is_current(&path) {
         build(package, folder);
     }
     path
+}
+
+/// Does the program exist, and is it newer than the files that cargo lists beside it?
+fn is_current(program: &Path) -> bool {
+    let time = |path: &Path| path.metadata().and_then(|metadata| metadata.modified()).ok();
+    let Some(built) = time(program) else { return false };
+    let list = std::fs::read_to_string(program.with_extension("d")).unwrap_or_default();
+    let sources = list.split_once(": ").map_or("", |(_, sources)| sources);
+    sources.split_whitespace().all(|source| time(Path::new(source)).is_none_or(|changed| changed <= built))
 }
 
 fn build(package: &str, folder: &Path) {

@@ -17,6 +17,7 @@ use std::thread::{self, JoinHandle};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags, open};
+use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
@@ -246,16 +247,20 @@ impl Line {
     }
 }
 
-/// Writes a frame. An arm that takes no bytes for a second is a fault that a test wants.
+/// Writes a frame. An arm that takes no bytes for a second, or is gone, is a fault that a test wants.
 fn pass_on(arm: &OwnedFd, frame: &[u8]) {
     let mut rest = frame;
-    while let Some(more) =
-        rest.get(rustix::io::write(arm, rest).unwrap_or(0)..).filter(|more| !more.is_empty())
-    {
-        rest = more;
-        let timeout = Timespec { tv_sec: 1, tv_nsec: 0 };
-        if poll(&mut [PollFd::new(arm, PollFlags::OUT)], Some(&timeout)).is_ok_and(|ready| ready == 0) {
-            return;
+    while !rest.is_empty() {
+        match rustix::io::write(arm, rest) {
+            Ok(count) => rest = rest.get(count..).unwrap_or_default(),
+            Err(Errno::AGAIN | Errno::INTR) => {
+                let timeout = Timespec { tv_sec: 1, tv_nsec: 0 };
+                if poll(&mut [PollFd::new(arm, PollFlags::OUT)], Some(&timeout)).is_ok_and(|ready| ready == 0)
+                {
+                    return;
+                }
+            }
+            Err(_) => return,
         }
     }
 }

@@ -134,6 +134,12 @@ impl Client {
         *count <= MOST_URGENT
     }
 
+    /// Is its next request a read of these registers, which can be sent?
+    pub(crate) fn waits_to_read(&self, address: u8, count: u8) -> bool {
+        let next = self.waiting.front().map(|waiting| &waiting.request);
+        self.can_receive && self.unanswered == 0 && next == Some(&WholeRequest::Read { address, count })
+    }
+
     /// Bytes that the next request takes on the line.
     pub(crate) fn next_bytes(&self) -> usize {
         self.waiting.front().map_or(0, |waiting| waiting.request.line_bytes())

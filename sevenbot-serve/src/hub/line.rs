@@ -59,8 +59,8 @@ impl Owner {
 pub(crate) struct Line {
     link: HostLink,
     output: Vec<u8>,
-    /// The owners of the reads without an end.
-    owners: BTreeMap<RequestId, Owner>,
+    /// The owners of the reads without an end. Clients may share a read.
+    owners: BTreeMap<RequestId, Vec<Owner>>,
     events: VecDeque<(Owner, Event)>,
 }
 
@@ -103,7 +103,8 @@ impl Line {
                 HostEvent::NoReply(id, range) => (id, no_reply(range.address(), range.count())),
                 _ => continue,
             };
-            self.events.extend(self.owners.remove(&id).map(|owner| (owner, event)));
+            let owners = self.owners.remove(&id).unwrap_or_default();
+            self.events.extend(owners.into_iter().map(|owner| (owner, event.clone())));
         }
     }
 
@@ -144,12 +145,29 @@ impl Line {
     }
 
     pub(crate) fn send_read(&mut self, now: Instant, owner: Owner, address: u8, count: u8) {
+        self.send_shared_read(now, vec![owner], owner.patience(), address, count);
+    }
+
+    /// Sends a read whose reply is for all these clients.
+    pub(crate) fn send_clients_read(&mut self, now: Instant, clients: Vec<ClientId>, address: u8, count: u8) {
+        let owners = clients.into_iter().map(Owner::Client).collect();
+        self.send_shared_read(now, owners, CLIENT_PATIENCE, address, count);
+    }
+
+    fn send_shared_read(
+        &mut self,
+        now: Instant,
+        owners: Vec<Owner>,
+        patience: Patience,
+        address: u8,
+        count: u8,
+    ) {
         match Span::new(address, count) {
             Some(range) => {
-                self.owners.insert(self.link.read(range, owner.patience()), owner);
+                self.owners.insert(self.link.read(range, patience), owners);
             }
             // The arm would not answer (D2).
-            None => self.events.push_back((owner, no_reply(address, count))),
+            None => self.events.extend(owners.into_iter().map(|owner| (owner, no_reply(address, count)))),
         }
         self.advance(now);
     }

@@ -120,21 +120,43 @@ impl Hub {
         self.shares.charge(&mut client.share, request.line_bytes());
         self.watchdog.sent_request(now, id);
         match request {
-            WholeRequest::Read { address, count } => self.send_read(now, id, address, count),
+            WholeRequest::Read { address, count } => {
+                let others = self.take_equal_reads(now, id, address, count);
+                self.send_read(now, id, others, address, count);
+            }
             WholeRequest::Write { map, address, values } => {
                 self.send_write(now, id, intent, map, address, values);
             }
             WholeRequest::WritesBetweenReads { map, writes, read: (first, count) } => {
-                self.send_read(now, id, first, count);
+                self.send_read(now, id, Vec::new(), first, count);
                 for (start, bytes) in writes {
                     self.send_write(now, id, intent, map, start, bytes);
                 }
-                self.send_read(now, id, first, count);
+                self.send_read(now, id, Vec::new(), first, count);
             }
         }
     }
 
-    fn send_read(&mut self, now: Instant, id: ClientId, address: u8, count: u8) {
+    /// Takes the reads of the same registers that are next of other clients: one reply answers all. Many programs read where the
+    /// arm is. A read of the offsets is a client's own, because of their form.
+    fn take_equal_reads(&mut self, now: Instant, id: ClientId, address: u8, count: u8) -> Vec<ClientId> {
+        let form = self.known.form_before_writes();
+        let mut others = Vec::new();
+        for (&other, client) in self.clients.iter_mut().filter(|(other, _)| **other != id) {
+            let is_next = client.waits_to_read(address, count);
+            if is_next && client.own.form_of_read(address, count, form).is_none() {
+                client.waiting.pop_front();
+                client.unanswered += 1;
+                self.watchdog.sent_request(now, other);
+                others.push(other);
+            }
+        }
+        self.news.extend(&others);
+        others
+    }
+
+    /// Sends a read of a client, whose reply is for `others`, too.
+    fn send_read(&mut self, now: Instant, id: ClientId, others: Vec<ClientId>, address: u8, count: u8) {
         let Some(client) = self.clients.get_mut(&id) else { return };
         client.unanswered += 1;
         // A write of 0 registers chooses the form of the offsets (M5).
@@ -142,7 +164,8 @@ impl Hub {
         if let Some(map) = form.filter(|_| !self.options.is_read_only) {
             self.line.send_write(now, map, 0, &[]);
         }
-        self.line.send_read(now, Owner::Client(id), address, count);
+        let clients = std::iter::once(id).chain(others).collect();
+        self.line.send_clients_read(now, clients, address, count);
     }
 
     fn send_write(

@@ -26,19 +26,27 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> ByteStream for S {}
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NoFrames;
 
-/// Serves a client until it ends. `first`: bytes that it has sent already.
+/// What a client has sent before its session began.
+#[derive(Debug)]
+pub(super) struct First {
+    pub(super) bytes: Vec<u8>,
+    /// These bytes, and what waits behind them, were sent at this time or later.
+    pub(super) since: Instant,
+}
+
+/// Serves a client until it ends.
 ///
 /// # Errors
 /// The client speaks something else than frames.
 pub(super) async fn serve(
     shared: &Arc<Shared>,
     stream: impl ByteStream,
-    first: Vec<u8>,
+    First { bytes: first, since }: First,
 ) -> Result<(), NoFrames> {
     let (mut reader, mut writer) = tokio::io::split(stream);
     let mut client = FrameStream { session: FrameSession::open(shared), has_begun: false };
     // When it was last seen that no byte waits to be read: what is read now was sent later.
-    let mut last_empty = shared.now();
+    let mut last_empty = since;
     let mut pace = Pace::new(shared.baud);
     let mut piece = vec![0; PIECE];
     client.put(last_empty, &first)?;

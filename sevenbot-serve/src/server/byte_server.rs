@@ -11,7 +11,7 @@ use tokio_rustls::TlsAcceptor;
 
 use super::admission::Admission;
 use super::breakage::Breakage;
-use super::byte_connection::{self, ByteStream, NoFrames};
+use super::byte_connection::{self, ByteStream, First, NoFrames};
 use super::listener::accept_tcp;
 #[cfg(unix)]
 use super::local_socket::LocalSocket;
@@ -58,7 +58,8 @@ impl ByteServer {
             let Some(place) = self.admission.place() else { continue };
             let server = self.clone();
             tokio::spawn(async move {
-                let _ = byte_connection::serve(&server.shared, stream, Vec::new()).await;
+                let first = First { bytes: Vec::new(), since: server.shared.earliest() };
+                let _ = byte_connection::serve(&server.shared, stream, first).await;
                 drop(place);
             });
         }
@@ -70,7 +71,7 @@ impl ByteServer {
         let login = async {
             let mut stream = self.secure(stream).await.ok()?;
             let first = match &self.token {
-                None => Vec::new(),
+                None => First { bytes: Vec::new(), since: self.shared.earliest() },
                 Some(token) => self.read_token(&mut stream, peer, token).await?,
             };
             Some((stream, first))
@@ -96,17 +97,18 @@ impl ByteServer {
         stream: &mut Box<dyn ByteStream>,
         peer: SocketAddr,
         token: &str,
-    ) -> Option<Vec<u8>> {
+    ) -> Option<First> {
         let mut line = Vec::new();
-        let (given, rest) = loop {
+        let (given, rest, since) = loop {
             let mut bytes = [0; LONGEST_LINE];
             let count = stream.read(&mut bytes).await.ok().filter(|&count| count > 0)?;
+            let since = self.shared.earliest();
             line.extend_from_slice(bytes.get(..count)?);
             if let Some(end) = line.iter().position(|&byte| byte == b'\n') {
-                break (line.get(..end)?, line.get(end + 1..)?);
+                break (line.get(..end)?, line.get(end + 1..)?, since);
             }
             if line.len() >= LONGEST_LINE {
-                break (line.as_slice(), &[][..]);
+                break (line.as_slice(), &[][..], since);
             }
         };
         self.admission.wait(Some(peer.ip())).await;
@@ -115,6 +117,6 @@ impl ByteServer {
         if !is_right {
             self.notices.send(Notice::Refused { peer: Some(peer), reason: RefusalReason::WrongToken });
         }
-        is_right.then(|| rest.to_vec())
+        is_right.then(|| First { bytes: rest.to_vec(), since })
     }
 }

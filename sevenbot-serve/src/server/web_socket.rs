@@ -263,7 +263,7 @@ where
     let (mut sender, mut messages) = open(stream, longest).await;
     let mut session = session();
     // When it was last seen that no message waits: what is read now was sent later.
-    let mut last_empty = shared.now();
+    let mut last_empty = shared.earliest();
     let mut pace = Pace::new(shared.baud);
     let end = loop {
         if let Some(message) = session.advance(sender.is_idle()) {

@@ -276,6 +276,30 @@ fn each_wrong_token_makes_the_next_one_wait_longer() {
 }
 
 #[test]
+fn a_target_that_waited_for_the_check_of_its_token_is_not_carried_out() {
+    let served = Served::start(1, &["--token", "correct-horse"]);
+    let mut arm = served.open("a");
+    for _ in 0..5 {
+        let mut stream = served.connect();
+        stream.write_all(b"battery-staple\n").expect("bytes");
+        let _ = stream.read(&mut [0]);
+    }
+    // The next token of this address is checked after 1.6 s.
+    let mut stream = served.connect();
+    let read = read_request(DEVICE_CODE, 1);
+    let sent = [b"correct-horse\n".as_slice(), &write_request(TARGET_POSITION, &[10]), &read].concat();
+    stream.write_all(&sent).expect("bytes");
+    stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
+    stream.read_exact(&mut [0; 7]).expect("the reply to the read behind the target");
+    assert_eq!(target(&mut arm), 90);
+    // The program is connected, and what it sends now is carried out.
+    system_tests::wait::wait_until("a new target is carried out", || {
+        stream.write_all(&write_request(TARGET_POSITION, &[100])).expect("bytes");
+        target(&mut arm) == 100
+    });
+}
+
+#[test]
 fn the_local_socket_is_for_this_user_and_needs_no_token() {
     let served = Served::start(1, &["--token", "correct-horse", "--name", "lab-3"]);
     let socket = served.local_socket();

@@ -21,6 +21,7 @@ mod fault_injection;
 mod host_link;
 mod host_request;
 mod joint_truth;
+mod let_go_rule;
 mod limit_verdict;
 mod map21_model;
 mod map21_requests;

@@ -9,6 +9,7 @@ use protocol_core::time::Duration;
 
 use super::command_checker::CommandChecker;
 use super::host_link::{ArmToHost, HostToArm};
+use super::let_go_rule::LetGoRule;
 use super::register_model::RegisterModel;
 use super::settings_storage::{PowerOutcome, StoredSettings};
 use super::state::{PowerState, PoweredArm, TortureWorld};
@@ -78,6 +79,7 @@ impl TortureWorld {
             watchdog: WatchdogModel::OFF,
             command_checker: CommandChecker::new(now, codes, timeout),
             status_checker: StatusChecker::new(now),
+            let_go_rule: LetGoRule::NONE,
             to_arm: HostToArm::new(baud),
             to_host: ArmToHost::new(baud, now),
             pending: VecDeque::new(),

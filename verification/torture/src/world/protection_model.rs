@@ -9,6 +9,8 @@ pub(super) const PROTECTION: u8 = 192;
 pub(super) const PUSH_LIMIT: u8 = 193;
 /// The limit of a gripper in percent.
 pub(super) const GRIP_LIMIT: u8 = 194;
+/// Joints that are let go, bit n-1 = joint n (D28).
+pub(super) const LET_GO: u8 = 196;
 /// 1: the arm entered state 0 by itself (D29).
 pub(super) const SUPPLY_LOST: u8 = 198;
 

@@ -11,6 +11,7 @@ use super::disturbed_bus::DisturbedBus;
 use super::event_log::EventLog;
 use super::host_link::{ArmToHost, HostToArm};
 use super::host_request::HostRequest;
+use super::let_go_rule::LetGoRule;
 use super::outside_ending::Ending;
 use super::parameters::WorldParameters;
 use super::register_model::{RegisterModel, RequestEffect};
@@ -72,6 +73,7 @@ pub(super) struct PoweredArm {
     pub(super) watchdog: WatchdogModel,
     pub(super) command_checker: CommandChecker,
     pub(super) status_checker: StatusChecker,
+    pub(super) let_go_rule: LetGoRule,
     pub(super) to_arm: HostToArm,
     pub(super) to_host: ArmToHost,
     pub(super) pending: VecDeque<PendingRequest>,

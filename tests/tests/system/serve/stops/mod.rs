@@ -3,10 +3,10 @@
 //!
 //! Two stops beside each attack are part of each run of the tests; they depend on no time. A campaign also asserts how long a
 //! stop takes, on a machine that does nothing else. `SERVE_STOPS` is the number of stops beside each attack, and `SERVE_ATTACK` selects
-//! one, such as `Readers`. A thousand beside each take about an hour:
+//! one, such as `Readers`. A hundred beside each take about seven minutes:
 //!
 //! ```sh
-//! SERVE_STOPS=1000 cargo test --release -p system-tests --test system serve::stops -- --nocapture
+//! SERVE_STOPS=100 cargo test --release -p system-tests --test system serve::stops -- --nocapture
 //! ```
 
 mod attack;
@@ -139,8 +139,10 @@ fn beside(
             times.push(stop);
             thread::sleep(WATCHED);
             let context = format!("{attack:?}, stop {turn}");
-            check_rests(line, &write_request(FINE_TARGET, &held), &context);
-            assert_eq!(stopper.read(FINE_TARGET, FINE), held, "{context}: nothing moves it");
+            let request = write_request(FINE_TARGET, &held);
+            check_rests(line, &request, &context);
+            let target = stopper.read(FINE_TARGET, FINE);
+            assert_eq!(target, held, "{context}: nothing moves it\n{}", writes_since(line, &request));
             if (turn + 1) % BETWEEN_RESTS == 0 || turn + 1 == count {
                 check_is_at_rest(stopper, &held, &context);
             }
@@ -198,6 +200,15 @@ fn check_rests(line: &Line, stop: &[u8], context: &str) {
     let is_coarse = |target: &&Target| (TARGET_POSITION..FINE_TARGET).contains(&target.frame[3]);
     let after = line.targets[place..].iter().filter(is_coarse);
     assert_eq!(after.count(), 0, "{context}: a target came after it");
+}
+
+/// The writes of targets since the stop, for a message.
+fn writes_since(line: &Line, stop: &[u8]) -> String {
+    let line = line.lock().expect("no panic");
+    let place = line.targets.iter().position(|target| target.frame == stop).expect("the stop");
+    let start = line.targets[place].at;
+    let text = |target: &Target| format!("{:?}: {:?}", target.at - start, target.frame);
+    line.targets[place..].iter().map(text).collect::<Vec<_>>().join("\n")
 }
 
 /// Does the frame write targets, of this map or of the maker's?

@@ -1,0 +1,71 @@
+//! The target of a joint that is let go follows its measured position, unless the host writes one (D28).
+
+use protocol_core::registers::map::{PRESENT_POSITION, TARGET_POSITION};
+use protocol_core::registers::{Joint, RegisterFile};
+
+use super::protection_model::{LET_GO, PROTECTION};
+use crate::per_joint::PerJoint;
+use crate::violation::{Check, ensure};
+
+/// A joint that is let go, and whose target was its measured position when this was read first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Freed {
+    /// Its measured position in degrees.
+    present: u8,
+    /// How often the host had written its target.
+    writes: u64,
+}
+
+/// The joints that are let go.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LetGoRule(PerJoint<Option<Freed>>);
+
+impl LetGoRule {
+    /// No joint is let go.
+    pub(super) const NONE: Self = Self(PerJoint::all(None));
+
+    /// Checks the registers, which the host reads now. `writes`: how often the host wrote each target.
+    pub(super) fn check(&mut self, registers: &RegisterFile, writes: &PerJoint<u64>) -> Check {
+        for joint in Joint::ALL {
+            let [target, present] =
+                [TARGET_POSITION, PRESENT_POSITION].map(|row| registers.get(row.of(joint)));
+            let freed = Freed { present, writes: writes[joint] };
+            let is_let_go = registers.get(PROTECTION) == 1 && registers.get(LET_GO) & joint.bit() != 0;
+            let before = self.0[joint].filter(|before| is_let_go && before.writes == freed.writes);
+            ensure(before.is_none_or(|before| before.present == present || target == present), || {
+                let number = joint.number();
+                format!("joint {number} is let go and turned to {present}, and its target stayed at {target}")
+            })?;
+            self.0[joint] = is_let_go.then_some(freed).filter(|_| before.is_some() || target == present);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const JOINT: Joint = Joint::ALL[1];
+
+    /// Joint 2 is let go at 90 degrees, and is measured at 80 degrees later, when the host has written its target so often.
+    fn check(target: u8, writes: u64) -> Check {
+        let mut registers = RegisterFile::new([0; 6], None);
+        registers.set(PROTECTION, 1);
+        registers.set(LET_GO, JOINT.bit());
+        let mut rule = LetGoRule::NONE;
+        for (present, target, writes) in [(90, 90, 5), (80, target, writes)] {
+            registers.set(PRESENT_POSITION.of(JOINT), present);
+            registers.set(TARGET_POSITION.of(JOINT), target);
+            rule.check(&registers, &PerJoint::all(writes))?;
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_target_that_stays_breaks_the_rule_unless_the_host_wrote_it() {
+        assert!(check(80, 5).is_ok());
+        assert!(check(90, 5).is_err());
+        assert!(check(90, 6).is_ok());
+    }
+}
