@@ -89,6 +89,8 @@ pub use self::tls::TlsFiles;
 
 /// Notices about refused clients that may wait. More are dropped.
 const MOST_NOTICES: usize = 4;
+/// Connections with which a browser loads the page. A class opens it all at once.
+const FILES_OF_EACH_TAB: usize = 4;
 /// Teacher's screens, and sessions with the arm of a class.
 const OTHER_TABS: usize = 8;
 /// Time between two notices about refused clients, so that a flood of them fills no log.
@@ -325,7 +327,8 @@ impl Network {
         let class = Class::new(Arc::clone(&self.shared), Classroom::new(info));
         tokio::spawn(Arc::clone(&class).run());
         let site = Site::Class(ClassSite { files, code, secret, class: Arc::clone(&class), is_encrypted });
-        let admission = Admission::new(MOST_PUPILS + OTHER_TABS);
+        let admission =
+            Admission::with_unknown(MOST_PUPILS + OTHER_TABS, FILES_OF_EACH_TAB * descriptors::connections());
         let server = self.web(site, self.tls.clone(), &admission);
         tokio::spawn(WebServer { class: Some((class, new_key)), ..server }.serve(listener));
     }

@@ -47,7 +47,13 @@ impl ClassRun {
     /// Opens a pupil's page in the browser of another page, and types a name and the code.
     #[must_use]
     pub fn join(&self, beside: &Page, name: &str) -> Page {
-        let mut page = beside.open_beside(&self.pupils);
+        self.join_after(beside, name, "")
+    }
+
+    /// As [`Self::join`]. `script` runs before the scripts of the page.
+    #[must_use]
+    pub fn join_after(&self, beside: &Page, name: &str, script: &str) -> Page {
+        let mut page = beside.open_beside(&self.pupils, script);
         page.key("Escape");
         page.wait_until_ready();
         page.evaluate("document.querySelector('#class-code').value = 'robots7'");

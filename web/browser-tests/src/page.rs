@@ -68,10 +68,10 @@ impl Page {
         Self::open_in(Arc::new(Chromium::start()), url, script)
     }
 
-    /// Opens an address in another window of the same browser.
+    /// Opens an address in another window of the same browser. `script` runs before the scripts of the page.
     #[must_use]
-    pub fn open_beside(&self, url: &str) -> Self {
-        Self::open_in(Arc::clone(&self.browser), url, "")
+    pub fn open_beside(&self, url: &str, script: &str) -> Self {
+        Self::open_in(Arc::clone(&self.browser), url, script)
     }
 
     fn open_in(browser: Arc<Chromium>, url: &str, script: &str) -> Self {

@@ -1,5 +1,6 @@
 //! `sevenbot class`: who gets in, a stop for all, and the real arm for one pupil at a time.
 
+use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
@@ -114,6 +115,25 @@ fn the_pages_are_for_all_and_messages_for_those_who_know_the_code() {
     assert_eq!(status(code, &[("host", "evil.example")]), Some(403));
     assert_eq!(status(code, &[("origin", &format!("http://{address}"))]), None);
     assert_eq!(status("/frames?token=", &[]), Some(403), "nobody has the arm");
+}
+
+/// Thirty browsers with four connections each. The answers fill all buffers, so no connection ends before it is read.
+#[test]
+fn a_whole_class_can_load_the_page_at_once() {
+    let class = Class::start(false, "robots7");
+    let request = format!("GET /sevenbot_web_bg.wasm HTTP/1.1\r\nHost: {}\r\n\r\n", class.address);
+    let mut streams: Vec<_> = (0..120).map(|_| class.stream()).collect();
+    for stream in &mut streams {
+        stream.write_all(request.as_bytes()).expect("a request");
+    }
+    let lengths: Vec<_> = streams
+        .iter_mut()
+        .map(|stream| {
+            let mut answer = Vec::new();
+            stream.read_to_end(&mut answer).map_or(0, |_| answer.len())
+        })
+        .collect();
+    assert!(lengths[0] > 500_000 && lengths.iter().all(|length| *length == lengths[0]), "{lengths:?}");
 }
 
 #[test]

@@ -17,6 +17,15 @@ use crate::programs::{SLOW, open_file, open_programs};
 
 /// The tabs of a class.
 const TABS: usize = 30;
+/// No WebGL, and five pictures a second: thirty laptops draw their arms each for itself, but this computer would draw all of them in
+/// software.
+const FEW_PICTURES: &str = "
+    const request = window.requestAnimationFrame;
+    window.requestAnimationFrame = act => setTimeout(() => request(act), 200);
+    const context = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+      return kind === 'webgl2' ? null : context.call(this, kind, ...more);
+    };";
 
 /// The text of a part of a pupil's tile.
 fn tile(teacher: &mut Page, name: &str, part: &str) -> String {
@@ -170,7 +179,7 @@ fn thirty_tabs_stop_together() {
     let begin = Instant::now();
     let mut pupils: Vec<Page> = (1..=TABS)
         .map(|number| {
-            let mut page = class.join(&teacher, &format!("Pupil {number}"));
+            let mut page = class.join_after(&teacher, &format!("Pupil {number}"), FEW_PICTURES);
             page.show_on(small);
             page
         })
