@@ -43,6 +43,10 @@ const STILL: u16 = 30;
 /// The weight draws a joint so far off its target at most, in hundredths of a degree.
 const DROOP: u16 = 150;
 
+/// A joint that the server finds farther from the target of a stop is not braking, in hundredths of a degree: on a busy machine the
+/// program that stopped it had read its position long before. The server may hold such a joint where it is.
+const LONGEST_BRAKING: u16 = 1_500;
+
 /// How long a stop may take to the arm, and the bytes that may go to the arm meanwhile: as many as the line carries in this time.
 const LATEST: Duration = Duration::from_millis(20);
 const MOST_BEFORE: u64 = 230;
@@ -142,9 +146,15 @@ fn beside(
             let request = write_request(FINE_TARGET, &held);
             check_rests(line, &request, &context);
             let target = stopper.read(FINE_TARGET, FINE);
-            assert_eq!(target, held, "{context}: nothing moves it\n{}", writes_since(line, &request));
+            let moved = words(&target).zip(words(&held)).map(|(is, was)| is.abs_diff(was));
+            let is_held = moved.clone().all(|distance| distance == 0 || distance > LONGEST_BRAKING);
+            assert!(
+                is_held,
+                "{context}: nothing moves it: {held:?}, {target:?}\n{}",
+                writes_since(line, &request)
+            );
             if (turn + 1) % BETWEEN_RESTS == 0 || turn + 1 == count {
-                check_is_at_rest(stopper, &held, &context);
+                check_is_at_rest(stopper, &target, &context);
             }
         }
     });
@@ -220,11 +230,11 @@ fn writes_targets(frame: &[u8]) -> bool {
 }
 
 fn farthest(one: &[u8], other: &[u8]) -> u16 {
-    let words = |bytes: &[u8]| -> Vec<u16> {
-        bytes.chunks(2).map(|word| u16::from_le_bytes([word[0], word[1]])).collect()
-    };
-    let pairs = words(one).into_iter().zip(words(other));
-    pairs.map(|(one, other)| one.abs_diff(other)).max().expect("joints")
+    words(one).zip(words(other)).map(|(one, other)| one.abs_diff(other)).max().expect("joints")
+}
+
+fn words(bytes: &[u8]) -> impl Iterator<Item = u16> + Clone {
+    bytes.chunks_exact(2).map(|word| u16::from_le_bytes([word[0], word[1]]))
 }
 
 fn print(attack: Attack, times: &[StopTimes]) {
