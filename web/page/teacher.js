@@ -226,7 +226,7 @@ function showTile(tile, pupil) {
 }
 
 // From a corner, so that each direction shows: x to the right, y to the back, z up. Millimetres to pixels of the canvas.
-const place = ([x, y, z]) => [120 + 0.26 * (x - 0.45 * (y - 120)), 150 - 0.26 * (z + 60 + 0.35 * (y - 120))];
+const place = ([x, y, z]) => [120 + 0.3 * (x - 0.45 * (y - 120)), 150 - 0.3 * (z + 60 + 0.35 * (y - 120))];
 
 function draw(canvas, points, isBad) {
   const colours = getComputedStyle(document.documentElement);
