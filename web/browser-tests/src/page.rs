@@ -1,6 +1,6 @@
 //! A page in the browser: its values, its pictures, its faults and what it requested.
 
-use std::sync::Arc;
+use std::rc::Rc;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -30,7 +30,7 @@ const KEEP_TEXTS: &str = "
 #[derive(Debug)]
 pub struct Page {
     connection: Connection,
-    browser: Arc<Chromium>,
+    browser: Rc<Chromium>,
     /// The number of kept texts up to the last one that the test waited for.
     heard: usize,
 }
@@ -65,16 +65,16 @@ impl Page {
     /// As [`Self::open`]. `script` runs before the scripts of the page.
     #[must_use]
     pub fn open_after(url: &str, script: &str) -> Self {
-        Self::open_in(Arc::new(Chromium::start()), url, script)
+        Self::open_in(Rc::new(Chromium::start()), url, script)
     }
 
     /// Opens an address in another window of the same browser. `script` runs before the scripts of the page.
     #[must_use]
     pub fn open_beside(&self, url: &str, script: &str) -> Self {
-        Self::open_in(Arc::clone(&self.browser), url, script)
+        Self::open_in(Rc::clone(&self.browser), url, script)
     }
 
-    fn open_in(browser: Arc<Chromium>, url: &str, script: &str) -> Self {
+    fn open_in(browser: Rc<Chromium>, url: &str, script: &str) -> Self {
         let mut page = Self { connection: browser.open_page(), browser, heard: 0 };
         for domain in ["Page", "Log", "Network", "Runtime"] {
             page.call(&format!("{domain}.enable"), json!({}));
